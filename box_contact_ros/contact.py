@@ -1,0 +1,59 @@
+"""What a solver says of a pair of boxes, and the kernels that write it down."""
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from .jit import kernel
+from .pose import AXES_A, LANES, ORIGIN_A, SEPARATION
+
+
+class Contact(NamedTuple):
+    """What `ContactSolver` says of one pair of boxes. Frame: that of the poses."""
+
+    colliding: bool
+    """True from exact touch on: separation ≤ 8 ulp of the largest coordinate or size."""
+    separation: float
+    """Signed [m]: negative is the overlap depth, positive the largest gap on a SAT axis."""
+    normal: np.ndarray
+    """(3,) unit vector from A to B; NaN without contact."""
+    point: np.ndarray
+    """(3,) centroid of A∩B [m]; NaN without contact."""
+
+
+class Contacts(NamedTuple):
+    """What `ContactSolver.batch` says of n pairs: the fields of `Contact` as arrays."""
+
+    colliding: np.ndarray
+    """(n,) bool."""
+    separation: np.ndarray
+    """(n,) [m]."""
+    normal: np.ndarray
+    """(n, 3)."""
+    point: np.ndarray
+    """(n, 3) [m]."""
+
+
+@kernel
+def write_contact(work, i, row, n, p, colliding, separation, normal, point):
+    """Write pair `i` of a block to row `row` of the results; n, p are in A's frame."""
+    colliding[row] = True
+    separation[row] = work[SEPARATION + i]
+    for k in range(3):
+        a0 = work[AXES_A + 3 * k * LANES + i]
+        a1 = work[AXES_A + (3 * k + 1) * LANES + i]
+        a2 = work[AXES_A + (3 * k + 2) * LANES + i]
+        normal[row, k] = a0 * n[0] + a1 * n[1] + a2 * n[2]
+        point[row, k] = work[ORIGIN_A + k * LANES + i] + (a0 * p[0] + a1 * p[1] + a2 * p[2])
+
+
+@kernel
+def write_apart(work, i, row, colliding, separation, normal, point):
+    """Write the result of a pair that does not touch."""
+    colliding[row] = False
+    separation[row] = work[SEPARATION + i]
+    for k in range(3):
+        normal[row, k] = math.nan
+        point[row, k] = math.nan

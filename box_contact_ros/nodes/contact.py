@@ -1,0 +1,176 @@
+"""Program `contact_node`: two box poses in, contact point and normal out.
+
+Topics (relative names): `box_a/pose`, `box_b/pose` (PoseStamped) in; `contact/point`
+(PointStamped) and `contact/normal` (Vector3Stamped) while the boxes touch, then `contacts`
+(PointCloud2) on every evaluation; `/diagnostics` at 1 Hz. Parameters: PARAMETERS.
+"""
+from __future__ import annotations
+
+import gc
+from collections import Counter
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from geometry_msgs.msg import PointStamped, PoseStamped, Vector3Stamped
+from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rclpy.context import Context
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from sensor_msgs.msg import PointCloud2
+
+from ..checks import pose_fault
+from ..pairing import PAIRINGS
+from ..solver import MODELS, ContactSolver
+from .messages import StampedPose, make_cloud, make_header, make_normal, make_point, read_pose
+from .runtime import CONTACT_QOS, POSE_QOS, run_node
+
+CONTAINER = [12.192, 2.438, 2.591]  # ISO 40 ft [m]
+PARAMETERS = {
+    'size_a': (CONTAINER, 'full extents of box A [m], three numbers > 0'),
+    'size_b': (CONTAINER, 'full extents of box B [m], three numbers > 0'),
+    'model': ('paper', f'how the contact point is found: {", ".join(MODELS)}'),
+    'weights': ('', 'weights file to use in place of the shipped one; empty: the shipped one'),
+    'pairing': ('stamp', "'stamp': answer once, when poses of equal stamp are in; "
+                         "'latest': answer every pose with the other box's last one"),
+}
+"""Name: default, description."""
+PAIR = 0                  # id of the only pair
+UNMATCHED_SECONDS = 1.0   # poses without a partner for this long are worth a warning
+LOG_SECONDS = 1.0         # the same complaint is logged at most this often
+
+
+class ContactNode(Node):
+    """Answers pairs of poses; every pose that is refused is counted and said, never answered."""
+
+    def __init__(self, context: Context, **options: Any) -> None:
+        super().__init__('contact_node', context=context, **options)
+        for name, (default, description) in PARAMETERS.items():
+            # Dynamic typing accepts [2, 2, 2] where [2.0, 2.0, 2.0] is meant.
+            self.declare_parameter(name, default, ParameterDescriptor(
+                description=description, dynamic_typing=True))
+        self._settings: dict[str, Any] = {}
+        self._apply({name: self.get_parameter(name).value for name in PARAMETERS})
+        self.add_on_set_parameters_callback(self._set_parameters)
+        self.counts: Counter[str] = Counter()
+        self._answered_at = self._now()
+        self._waiting_since: float | None = None
+        self._compute: list[float] = []
+        self._point = self.create_publisher(PointStamped, 'contact/point', CONTACT_QOS)
+        self._normal = self.create_publisher(Vector3Stamped, 'contact/normal', CONTACT_QOS)
+        self._contacts = self.create_publisher(PointCloud2, 'contacts', CONTACT_QOS)
+        self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
+        self.create_timer(1.0, self._report)
+        # Whatever start-up made stays for good: keep it out of later collections.
+        gc.collect()
+        gc.freeze()
+        for box, topic in enumerate(('box_a/pose', 'box_b/pose')):
+            self.create_subscription(PoseStamped, topic, self._pose_callback(box), POSE_QOS)
+        self.get_logger().info(
+            f'ready: model {self._settings["model"]!r}, pairing {self._settings["pairing"]!r}')
+
+    def _now(self) -> float:
+        return self.get_clock().now().nanoseconds * 1e-9
+
+    def _set_parameters(self, parameters: list[Parameter]) -> SetParametersResult:
+        changes = {p.name: p.value for p in parameters if p.name in PARAMETERS}
+        try:
+            self._apply({**self._settings, **changes})
+        except ValueError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    def _apply(self, settings: dict[str, Any]) -> None:
+        """Check settings and take them over as a whole, or raise ValueError and keep the old."""
+        if settings == self._settings:
+            return
+        for name in ('model', 'weights', 'pairing'):
+            if not isinstance(settings[name], str):
+                raise ValueError(f'{name} must be a string, not {settings[name]!r}')
+        if settings['pairing'] not in PAIRINGS:
+            raise ValueError(
+                f'pairing {settings["pairing"]!r} is not one of: {", ".join(PAIRINGS)}')
+        solver = ContactSolver(settings['size_a'], settings['size_b'], model=settings['model'],
+                               weights=settings['weights'] or None)
+        solver(np.eye(7)[6], np.eye(7)[6])  # compiles, or loads, the kernels before they are needed
+        if settings['pairing'] != self._settings.get('pairing'):
+            self._pairing = PAIRINGS[settings['pairing']]()
+        self._solver, self._settings = solver, settings
+
+    def _pose_callback(self, box: int) -> Any:
+        def callback(message: PoseStamped) -> None:
+            try:
+                self._take(box, read_pose(message))
+            except Exception as error:  # a callback must not end the node, whatever happens
+                self._refuse('internal error', f'{type(error).__name__}: {error}')
+        return callback
+
+    def _take(self, box: int, pose: StampedPose) -> None:
+        self.counts['poses'] += 1
+        fault = pose_fault(pose.numbers)
+        if fault:
+            self._refuse('bad pose', f'box_{"ab"[box]}/pose: {fault}')
+            return
+        if self._waiting_since is None:
+            self._waiting_since = self._now()
+        pair = self._pairing.add(box, pose.stamp, pose)
+        if pair is None:
+            return
+        a, b = pair
+        if a.frame_id != b.frame_id:
+            self._refuse('frame_id differs',
+                         f'box_a/pose is in frame {a.frame_id!r}, box_b/pose in {b.frame_id!r}')
+            return
+        self._answer(a, b)
+
+    def _answer(self, a: StampedPose, b: StampedPose) -> None:
+        started = self.get_clock().now().nanoseconds
+        contact = self._solver(a.numbers, b.numbers)
+        self._compute.append((self.get_clock().now().nanoseconds - started) * 1e-3)
+        header = make_header(max(a.stamp, b.stamp), a.frame_id)
+        if contact.colliding:
+            self._point.publish(make_point(header, contact))
+            self._normal.publish(make_normal(header, contact))
+            self.counts['contacts'] += 1
+        self._contacts.publish(make_cloud(header, [(PAIR, contact)]))
+        self.counts['evaluations'] += 1
+        self._waiting_since = None
+
+    def _refuse(self, reason: str, text: str) -> None:
+        self.counts[f'refused: {reason}'] += 1
+        self.get_logger().warning(f'{text}; refused', throttle_duration_sec=LOG_SECONDS)
+
+    def _report(self) -> None:
+        """Once a second: say what happened since the last time."""
+        waiting = self._waiting_since is not None and (
+            self._now() - self._waiting_since > UNMATCHED_SECONDS)
+        if waiting:
+            self.get_logger().warning(
+                f'poses arrive, but none could be answered for {UNMATCHED_SECONDS:g} s (pairing '
+                f'{self._settings["pairing"]!r}: do the stamps of both boxes agree?)',
+                throttle_duration_sec=LOG_SECONDS)
+        compute, self._compute = self._compute, []
+        values = dict(self.counts)
+        values['dropped: no partner'] = self._pairing.dropped
+        values['rate [1/s]'] = len(compute)
+        if compute:
+            values |= {f'compute {name} [us]': f'{value:.1f}' for name, value in zip(
+                ('p50', 'p99', 'max'), np.percentile(compute, (50, 99, 100)))}
+        refused = sum(count for name, count in self.counts.items() if name.startswith('refused'))
+        level, message = DiagnosticStatus.OK, 'answering' if compute else 'no poses'
+        if waiting:
+            level, message = DiagnosticStatus.WARN, 'poses without a partner'
+        elif refused:
+            level, message = DiagnosticStatus.WARN, 'poses refused'
+        status = DiagnosticStatus(
+            level=level, name=f'{self.get_fully_qualified_name()}: contacts', message=message,
+            hardware_id='none',
+            values=[KeyValue(key=key, value=str(value)) for key, value in values.items()])
+        header = make_header(self.get_clock().now().nanoseconds, '')
+        self._diagnostics.publish(DiagnosticArray(header=header, status=[status]))
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the node until SIGINT or SIGTERM."""
+    return run_node(lambda context: ContactNode(context), args)

@@ -1,0 +1,73 @@
+"""What every node here needs from rclpy: an executor that keeps up, and a clean end."""
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
+
+try:
+    from rclpy.experimental.events_executor import EventsExecutor
+except ImportError:  # rclpy before 7.1.4
+    EventsExecutor = None
+
+REFUSALS = (ValueError, rclpy.exceptions.ParameterException, rclpy_implementation.RCLError)
+"""What a node raises on parameters or arguments that it cannot start with."""
+POSE_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
+"""Pose inputs: best effort matches every publisher; the depth bridges 100 ms at 1 kHz."""
+CONTACT_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
+"""Contact outputs."""
+SPIN_SECONDS = 1.0
+"""EventsExecutor hangs when it spins without a timeout, so it is spun in slices."""
+
+
+def make_executor(context: Context) -> Any:
+    """The executor that loses nothing at 1 kHz where rclpy has it, else the default one.
+
+    A wait-set executor may deliver pose i + 1 of one box before pose i of the other.
+    """
+    if EventsExecutor is None:
+        return SingleThreadedExecutor(context=context)
+    return EventsExecutor(context=context)
+
+
+def spin(node: Node) -> None:
+    """Serve a node until its context is shut down (SIGINT, SIGTERM, or `context.shutdown()`)."""
+    executor = make_executor(node.context)
+    executor.add_node(node)
+    try:
+        while node.context.ok():
+            executor.spin_once(timeout_sec=SPIN_SECONDS)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        executor.shutdown()
+
+
+def run_node(make_node: Callable[[Context], Node], args: Sequence[str] | None) -> int:
+    """Start a node and serve it: 0 after a clean end, 1 (with one line) if it refuses to start."""
+    context = Context()
+    node = None
+    try:
+        # Handlers have to be asked for where the context is not the default one.
+        rclpy.init(args=args, context=context,
+                   signal_handler_options=SignalHandlerOptions.ALL)
+        node = make_node(context)
+        spin(node)
+    except REFUSALS as error:
+        print(f'error: {error}', file=sys.stderr)
+        return 1
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        if node is not None:
+            node.destroy_node()
+        context.try_shutdown()
+    return 0

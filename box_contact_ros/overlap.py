@@ -1,0 +1,224 @@
+"""The exact contact point: the centroid of the overlap region A∩B, by clipping.
+
+The frame is that of the box with the best face axis (the reference box): its contact face is the
+plane w = 0, the box lies below it, and (u, v) run along the face. Of the other (incident) box, the
+column over (u, v) reaches from w_bottom to w_top; the part inside the reference box is
+clamp(w_top) − clamp(w_bottom), clamped to [−thickness, 0]. So the volume of A∩B and its first
+moments are sums, over the incident box's six faces, of integrals of the clamped height over the
+face's projection, cut off at the reference rectangle:
+
+1. Corners of the incident box in (u, v, w); a face wholly above w = 0 contributes nothing.
+2. Each other face is clipped by the rectangle's four sides and by w ≤ 0 (Sutherland–Hodgman).
+3. A part that comes out below the reference box counts with the constant height −thickness.
+4. Signed integrals of w, u w, v w and w²/2 over the polygon, triangle by triangle.
+
+No face of the reference box is ever clipped, and every integrand is continuous and vanishes on the
+plane w = 0. That is why coplanar faces need no case: they contribute nothing, in exact arithmetic
+and in rounded. (Clipping both boxes' faces and adding them up counts a shared face twice or not at
+all, at the mercy of the last bit.)
+
+Accuracy: heights carry an error of a few roundings of the size, so the centroid's error is about
+1e-16·size/depth of the size. A∩B contains a ball of radius depth/(2√3) (shrink both boxes by more
+and an axis separates them), so the volume stays well above that error down to DEPTH_FLOOR.
+"""
+from __future__ import annotations
+
+import numpy as np
+
+from .jit import kernel
+from .pose import FACE, HALF_A, HALF_B, LANES, OFFSET_A, OFFSET_B, ROTATION, SEPARATION, SIZE
+
+DEPTH_FLOOR = 1e-9
+"""Depth, as a fraction of the size, to which B is pressed in before the centroid is taken. At exact
+touch A∩B has no volume; at 1e-9 of the size its heights still have seven good digits."""
+
+_POLYGON = 3 * 12        # room for a quadrilateral clipped by six planes, as u, v, w
+CLIP_SIZE = 24 + 2 * _POLYGON
+"""Length of the scratch array of `centroid`: eight corners and two polygons."""
+
+_FACES = np.array([[0, 4, 6, 2], [1, 3, 7, 5],     # x = −, +; corner c has signs (c&1, c&2, c&4)
+                   [0, 1, 5, 4], [2, 6, 7, 3],     # y = −, +
+                   [0, 2, 3, 1], [4, 5, 7, 6]])    # z = −, +; all counter-clockwise from outside
+_CORNERS = np.array([[1.0 if corner >> k & 1 else -1.0 for k in range(3)] for corner in range(8)])
+
+
+@kernel
+def _clip(clip, source, count, target, axis, sign, bound):
+    """Keep the part of a polygon with sign·p[axis] ≤ bound; returns its number of vertices."""
+    kept = 0
+    before = source + 3 * (count - 1)
+    excess_before = sign * clip[before + axis] - bound
+    for vertex in range(count):
+        here = source + 3 * vertex
+        excess = sign * clip[here + axis] - bound
+        if (excess > 0.0) != (excess_before > 0.0):
+            f = excess_before / (excess_before - excess)
+            for k in range(3):
+                clip[target + 3 * kept + k] = (
+                    clip[before + k] + f * (clip[here + k] - clip[before + k]))
+            clip[target + 3 * kept + axis] = sign * bound
+            kept += 1
+        if not excess > 0.0:
+            for k in range(3):
+                clip[target + 3 * kept + k] = clip[here + k]
+            kept += 1
+        before = here
+        excess_before = excess
+    return kept
+
+
+@kernel
+def _moments(clip, polygon, count):
+    """Signed ∫ (w, u w, v w, w²/2) over the projection of a polygon on (u, v), by triangles."""
+    m0, mu, mv, mw = 0.0, 0.0, 0.0, 0.0
+    u0, v0, w0 = clip[polygon], clip[polygon + 1], clip[polygon + 2]
+    for vertex in range(1, count - 1):
+        p = polygon + 3 * vertex
+        u1, v1, w1 = clip[p], clip[p + 1], clip[p + 2]
+        u2, v2, w2 = clip[p + 3], clip[p + 4], clip[p + 5]
+        double = (u1 - u0) * (v2 - v0) - (u2 - u0) * (v1 - v0)
+        w = w0 + w1 + w2
+        m0 += double * w * (1.0 / 6.0)
+        mu += double * ((u0 + u1 + u2) * w + (u0 * w0 + u1 * w1 + u2 * w2)) * (1.0 / 24.0)
+        mv += double * ((v0 + v1 + v2) * w + (v0 * w0 + v1 * w1 + v2 * w2)) * (1.0 / 24.0)
+        mw += double * (w * w + (w0 * w0 + w1 * w1 + w2 * w2)) * (1.0 / 48.0)
+    return m0, mu, mv, mw
+
+
+@kernel
+def centroid(work, i, n0, n1, n2, clip):
+    """Centroid of A∩B of pair `i`, in A's frame, with B first pressed in to DEPTH_FLOOR.
+
+    (n0, n1, n2) is the normal in A's frame. `clip` is scratch of CLIP_SIZE numbers.
+    """
+    floor = DEPTH_FLOOR * work[SIZE + i]
+    press = max(0.0, floor + work[SEPARATION + i])
+    face = int(work[FACE + i])
+    of_a = face < 3
+    k = face if of_a else face - 3
+    a = (k + 1) % 3
+    b = (k + 2) % 3
+
+    # The incident box in the reference box's frame, (u, v, w) = (a, b, k): centre c, axes e.
+    ku, kv, kw = a * LANES, b * LANES, k * LANES
+    if of_a:
+        cu = work[OFFSET_A + ku + i] - press * _component(a, n0, n1, n2)
+        cv = work[OFFSET_A + kv + i] - press * _component(b, n0, n1, n2)
+        cw = work[OFFSET_A + kw + i] - press * _component(k, n0, n1, n2)
+        hu, hv, hw = work[HALF_A + ku + i], work[HALF_A + kv + i], work[HALF_A + kw + i]
+        g0, g1, g2 = work[HALF_B + i], work[HALF_B + LANES + i], work[HALF_B + 2 * LANES + i]
+        row, column = 3 * LANES, LANES
+    else:
+        # The normal's components along B's axes: Rᵀ n.
+        cu = press * _along_b(work, i, a, n0, n1, n2) - work[OFFSET_B + ku + i]
+        cv = press * _along_b(work, i, b, n0, n1, n2) - work[OFFSET_B + kv + i]
+        cw = press * _along_b(work, i, k, n0, n1, n2) - work[OFFSET_B + kw + i]
+        hu, hv, hw = work[HALF_B + ku + i], work[HALF_B + kv + i], work[HALF_B + kw + i]
+        g0, g1, g2 = work[HALF_A + i], work[HALF_A + LANES + i], work[HALF_A + 2 * LANES + i]
+        row, column = LANES, 3 * LANES
+    side = 1.0 if cw >= 0.0 else -1.0
+    eu0 = g0 * work[ROTATION + a * row + i]
+    eu1 = g1 * work[ROTATION + a * row + column + i]
+    eu2 = g2 * work[ROTATION + a * row + 2 * column + i]
+    ev0 = g0 * work[ROTATION + b * row + i]
+    ev1 = g1 * work[ROTATION + b * row + column + i]
+    ev2 = g2 * work[ROTATION + b * row + 2 * column + i]
+    ew0 = side * g0 * work[ROTATION + k * row + i]
+    ew1 = side * g1 * work[ROTATION + k * row + column + i]
+    ew2 = side * g2 * work[ROTATION + k * row + 2 * column + i]
+
+    # Moments are taken about the middle of the rectangle that bounds both boxes' projections, so
+    # that a small box on a large one keeps its own digits.
+    reach = abs(eu0) + abs(eu1) + abs(eu2)
+    u_low, u_high = max(-hu, cu - reach), min(hu, cu + reach)
+    middle_u = 0.5 * (u_low + u_high)
+    reach = abs(ev0) + abs(ev1) + abs(ev2)
+    v_low, v_high = max(-hv, cv - reach), min(hv, cv + reach)
+    middle_v = 0.5 * (v_low + v_high)
+
+    # 1. Corners, w measured from the contact face.
+    top = side * cw - hw
+    lowest = 0.0
+    for corner in range(8):
+        s0, s1, s2 = _CORNERS[corner, 0], _CORNERS[corner, 1], _CORNERS[corner, 2]
+        w = top + (s0 * ew0 + s1 * ew1 + s2 * ew2)
+        clip[3 * corner] = (cu - middle_u) + (s0 * eu0 + s1 * eu1 + s2 * eu2)
+        clip[3 * corner + 1] = (cv - middle_v) + (s0 * ev0 + s1 * ev1 + s2 * ev2)
+        clip[3 * corner + 2] = w
+        lowest = min(lowest, w)
+    through = lowest < -2.0 * hw
+
+    volume, mu, mv, mw = 0.0, 0.0, 0.0, 0.0
+    one = 24
+    two = 24 + _POLYGON
+    for side_face in range(6):
+        above = True
+        for vertex in range(4):
+            corner = 3 * _FACES[side_face, vertex]
+            clip[one + 3 * vertex] = clip[corner]
+            clip[one + 3 * vertex + 1] = clip[corner + 1]
+            clip[one + 3 * vertex + 2] = clip[corner + 2]
+            above = above and clip[corner + 2] >= 0.0
+        if above:
+            continue
+        # 2. Clip by w ≤ 0 and by the sides of the reference rectangle.
+        count = _clip(clip, one, 4, two, 2, 1.0, 0.0)
+        count = _clip(clip, two, count, one, 0, 1.0, hu - middle_u)
+        count = _clip(clip, one, count, two, 0, -1.0, hu + middle_u)
+        count = _clip(clip, two, count, one, 1, 1.0, hv - middle_v)
+        count = _clip(clip, one, count, two, 1, -1.0, hv + middle_v)
+        if through:
+            # 3. The part below the reference box, lifted to its far face.
+            below = _clip(clip, two, count, one, 2, 1.0, -2.0 * hw)
+            for vertex in range(below):
+                clip[one + 3 * vertex + 2] = -2.0 * hw
+            d0, du, dv, dw = _moments(clip, one, below)
+            volume += d0
+            mu += du
+            mv += dv
+            mw += dw
+            count = _clip(clip, two, count, one, 2, -1.0, 2.0 * hw)
+            d0, du, dv, dw = _moments(clip, one, count)
+        else:
+            d0, du, dv, dw = _moments(clip, two, count)
+        # 4. Sum.
+        volume += d0
+        mu += du
+        mv += dv
+        mw += dw
+
+    # The sign of the volume is that of the frame's handedness (`side`), and cancels in the ratio.
+    if volume != 0.0:
+        pu = middle_u + min(max(mu / volume, u_low - middle_u), u_high - middle_u)
+        pv = middle_v + min(max(mv / volume, v_low - middle_v), v_high - middle_v)
+        pw = min(max(mw / volume, max(lowest, -2.0 * hw)), 0.0)
+    else:  # boxes thinner than the rounding of their sizes
+        pu, pv, pw = middle_u, middle_v, 0.5 * max(lowest, -2.0 * hw)
+    pw = side * (pw + hw)
+
+    # From (u, v, w) to x, y, z of the reference box, and on to A.
+    x = pu if a == 0 else (pv if b == 0 else pw)
+    y = pu if a == 1 else (pv if b == 1 else pw)
+    z = pu if a == 2 else (pv if b == 2 else pw)
+    if of_a:
+        return x, y, z
+    return (work[OFFSET_A + i] - press * n0
+            + (work[ROTATION + i] * x + work[ROTATION + LANES + i] * y
+               + work[ROTATION + 2 * LANES + i] * z),
+            work[OFFSET_A + LANES + i] - press * n1
+            + (work[ROTATION + 3 * LANES + i] * x + work[ROTATION + 4 * LANES + i] * y
+               + work[ROTATION + 5 * LANES + i] * z),
+            work[OFFSET_A + 2 * LANES + i] - press * n2
+            + (work[ROTATION + 6 * LANES + i] * x + work[ROTATION + 7 * LANES + i] * y
+               + work[ROTATION + 8 * LANES + i] * z))
+
+
+@kernel
+def _component(k, x, y, z):
+    return x if k == 0 else (y if k == 1 else z)
+
+
+@kernel
+def _along_b(work, i, k, n0, n1, n2):
+    return (work[ROTATION + k * LANES + i] * n0 + work[ROTATION + (3 + k) * LANES + i] * n1
+            + work[ROTATION + (6 + k) * LANES + i] * n2)

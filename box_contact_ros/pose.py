@@ -1,0 +1,229 @@
+"""Poses, and what a pair of boxes becomes before any axis is tested.
+
+Conventions (the one place in the code; docs/conventions.md repeats them for users)
+    Units are SI, frames right-handed. A pose is 7 numbers `x y z qx qy qz qw` in a frame common to
+    both boxes. A size is three FULL extents in metres; kernels use half extents.
+    `normal` is a unit vector from A to B. `separation` is signed: negative = overlap depth along
+    `normal`, positive = the largest gap on a separating axis. `point` is the centroid of A∩B.
+
+Rotations are formed from each quaternion and multiplied out as R[i, j] = a_i · b_j, the products
+of the boxes' axes, and the offset as B − A before anything else: everything that can cancel does
+so in float64, once. The products are also bit for bit the same when the boxes are swapped
+(R becomes its transpose, offsets change sign), which the verdict relies on (see `sat`).
+
+Kernels work on blocks of up to `LANES` pairs, stored as a structure of arrays in one flat scratch
+array: value `NAME` of pair `i` of the block is `work[NAME + i]`. The stages of a block are
+`load_block` (here), `sat.query_block`, and a builder of the point (`overlap`, `network`).
+"""
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from .jit import kernel
+
+LANES = 64
+"""Pairs per block: a multiple of every vector width, and a working set that stays in L1/L2."""
+
+_row = 0
+
+
+def _rows(count: int) -> int:
+    global _row
+    first = _row * LANES
+    _row += count
+    return first
+
+
+# What load_block writes. Axes are counted x, y, z; R is row-major: R[i, j] = a_i · b_j.
+HALF_A = _rows(3)      # half extents of A [m]
+HALF_B = _rows(3)      # half extents of B [m]
+ORIGIN_A = _rows(3)    # position of A, common frame [m]
+AXES_A = _rows(9)      # rotation of A, common frame, row-major (columns are A's axes)
+OFFSET_A = _rows(3)    # B − A in A's frame [m]
+OFFSET_B = _rows(3)    # B − A in B's frame [m]
+ROTATION = _rows(9)    # R, orientation of B in A's frame
+SIZE = _rows(1)        # largest full extent of the pair [m]
+TOUCH = _rows(1)       # separation up to which the boxes touch [m]: see CONTACT_ULPS
+A_FIRST = _rows(1)     # 1.0 where A comes first in the order used for edge axes (see sat)
+# What sat.query_block writes.
+SEPARATION = _rows(1)  # signed separation [m]
+AXIS = _rows(1)        # winning axis: 0–2 faces of A, 3–5 faces of B, 6 + 3 i + j for a_i × b_j
+FACE = _rows(1)        # best face axis, 0–5, whatever wins
+
+WORK_SIZE = _row * LANES
+
+CONTACT_ULPS = 8.0
+"""Boxes touch up to a separation of 8 ulp of the pair's largest coordinate or size: the rounding
+of an exactly touching pose (4 ulp at worst over dyadic touching poses moved rigidly) with a factor
+of two to spare; a real gap of 1e-14 m between two 40 ft containers is still a gap."""
+
+# Lengths are raised up to the fifth power (second moments of volumes), so sizes and coordinates
+# stay far from the overflow and underflow of float64. Nothing that is simulated is outside.
+LENGTH_MIN = 1e-50
+"""Least extent [m] accepted."""
+LENGTH_MAX = 1e50
+"""Largest extent or coordinate [m] accepted."""
+QUATERNION_MIN = 1e-100
+"""Least quaternion norm accepted: below, it counts as zero (its square would underflow)."""
+QUATERNION_MAX = 1e100
+"""Largest quaternion norm accepted (its square would overflow)."""
+
+# Status of a row, in the order in which load_block checks.
+OK, BAD_POSE_A, BAD_POSE_B, BAD_SIZE_A, BAD_SIZE_B = range(5)
+
+_HALF_ULP_AND_MORE = 0.75 * 2.0**-52
+
+
+@kernel
+def ulp(x):
+    """Distance from a positive normal number to the next larger one (without a branch).
+
+    0.75·2⁻⁵²·x lies between 0.75 and 1.5 ulp, so the sum is rounded to the next number.
+    """
+    return (x + x * _HALF_ULP_AND_MORE) - x
+
+
+@kernel
+def rotation_entries(x, y, z, w):
+    """Rotation matrix of a quaternion of any length, row-major, 9 numbers.
+
+    Dividing by the squared norm normalises exactly and needs no square root; q and −q give the
+    same bits.
+    """
+    s = 2.0 / ((x * x + y * y) + (z * z + w * w))
+    return (1.0 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y),
+            s * (x * y + w * z), 1.0 - s * (x * x + z * z), s * (y * z - w * x),
+            s * (x * z - w * y), s * (y * z + w * x), 1.0 - s * (x * x + y * y))
+
+
+@kernel
+def _valid_pose(pose, i):
+    # Written so that NaN fails every comparison.
+    norm = math.sqrt(pose[i, 3]**2 + pose[i, 4]**2 + pose[i, 5]**2 + pose[i, 6]**2)
+    return (abs(pose[i, 0]) <= LENGTH_MAX and abs(pose[i, 1]) <= LENGTH_MAX
+            and abs(pose[i, 2]) <= LENGTH_MAX
+            and norm >= QUATERNION_MIN and norm <= QUATERNION_MAX)
+
+
+@kernel
+def _valid_half(half, i):
+    return (2.0 * half[i, 0] >= LENGTH_MIN and 2.0 * half[i, 0] <= LENGTH_MAX
+            and 2.0 * half[i, 1] >= LENGTH_MIN and 2.0 * half[i, 1] <= LENGTH_MAX
+            and 2.0 * half[i, 2] >= LENGTH_MIN and 2.0 * half[i, 2] <= LENGTH_MAX)
+
+
+@kernel
+def load_block(poses_a, poses_b, halves_a, halves_b, start, count, work, status):
+    """Check `count` pairs from row `start` on and write them into `work`.
+
+    poses_a, poses_b are (n, 7); halves_a, halves_b are (n, 3), or (1, 3) for one size for all.
+    A row that fails a check gets its status (BAD_…) and the values of two unit cubes far apart,
+    so that the later stages need no test; returns the number of such rows.
+    """
+    bad = 0
+    shared_a = halves_a.shape[0] == 1
+    shared_b = halves_b.shape[0] == 1
+    for i in range(count):
+        row = start + i
+        row_a = 0 if shared_a else row
+        row_b = 0 if shared_b else row
+        code = OK
+        if not _valid_pose(poses_a, row):
+            code = BAD_POSE_A
+        elif not _valid_pose(poses_b, row):
+            code = BAD_POSE_B
+        elif not _valid_half(halves_a, row_a):
+            code = BAD_SIZE_A
+        elif not _valid_half(halves_b, row_b):
+            code = BAD_SIZE_B
+        status[row] = code
+        if code != OK:
+            bad += 1
+            _load_apart(work, i)
+            continue
+        for k in range(3):
+            work[HALF_A + k * LANES + i] = halves_a[row_a, k]
+            work[HALF_B + k * LANES + i] = halves_b[row_b, k]
+            work[ORIGIN_A + k * LANES + i] = poses_a[row, k]
+        a = rotation_entries(poses_a[row, 3], poses_a[row, 4], poses_a[row, 5], poses_a[row, 6])
+        b = rotation_entries(poses_b[row, 3], poses_b[row, 4], poses_b[row, 5], poses_b[row, 6])
+        tx = poses_b[row, 0] - poses_a[row, 0]
+        ty = poses_b[row, 1] - poses_a[row, 1]
+        tz = poses_b[row, 2] - poses_a[row, 2]
+        for k in range(9):
+            work[AXES_A + k * LANES + i] = a[k]
+        for k in range(3):
+            work[OFFSET_A + k * LANES + i] = (a[k] * tx + a[3 + k] * ty) + a[6 + k] * tz
+            work[OFFSET_B + k * LANES + i] = (b[k] * tx + b[3 + k] * ty) + b[6 + k] * tz
+            for j in range(3):
+                work[ROTATION + (3 * k + j) * LANES + i] = (
+                    (a[k] * b[j] + a[3 + k] * b[3 + j]) + a[6 + k] * b[6 + j])
+        half = max(max(halves_a[row_a, 0], halves_a[row_a, 1], halves_a[row_a, 2]),
+                   max(halves_b[row_b, 0], halves_b[row_b, 1], halves_b[row_b, 2]))
+        reach_a = max(abs(poses_a[row, 0]), abs(poses_a[row, 1]), abs(poses_a[row, 2]))
+        reach_b = max(abs(poses_b[row, 0]), abs(poses_b[row, 1]), abs(poses_b[row, 2]))
+        work[SIZE + i] = 2.0 * half
+        work[TOUCH + i] = CONTACT_ULPS * ulp(max(max(reach_a, reach_b), 2.0 * half))
+        # The sign of B − A changes on a swap, so its first component that is not zero says which
+        # box comes first; for concentric boxes any order will do.
+        a_first = tx > 0.0 or (tx == 0.0 and (ty > 0.0 or (ty == 0.0 and tz >= 0.0)))
+        work[A_FIRST + i] = 1.0 if a_first else 0.0
+    return bad
+
+
+@kernel
+def _load_apart(work, i):
+    for k in range(3):
+        work[HALF_A + k * LANES + i] = 0.5
+        work[HALF_B + k * LANES + i] = 0.5
+        work[ORIGIN_A + k * LANES + i] = 0.0
+        work[OFFSET_A + k * LANES + i] = 4.0
+        work[OFFSET_B + k * LANES + i] = 4.0
+        for j in range(3):
+            unit = 1.0 if k == j else 0.0
+            work[AXES_A + (3 * k + j) * LANES + i] = unit
+            work[ROTATION + (3 * k + j) * LANES + i] = unit
+    work[SIZE + i] = 1.0
+    work[TOUCH + i] = 0.0
+    work[A_FIRST + i] = 1.0
+
+
+def rotation_matrix(quaternion: np.ndarray) -> np.ndarray:
+    """Rotation matrices (..., 3, 3) of quaternions (..., 4) xyzw of any length but zero."""
+    q = np.moveaxis(np.asarray(quaternion, dtype=np.float64), -1, 0)
+    entries = rotation_entries.py_func(*q)
+    return np.stack(entries, axis=-1).reshape(*q.shape[1:], 3, 3)
+
+
+def quaternion_multiply(p: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """Hamilton product p ⊗ q of quaternions (..., 4) xyzw: first q, then p."""
+    px, py, pz, pw = np.moveaxis(np.asarray(p, dtype=np.float64), -1, 0)
+    qx, qy, qz, qw = np.moveaxis(np.asarray(q, dtype=np.float64), -1, 0)
+    return np.stack([pw * qx + px * qw + py * qz - pz * qy,
+                     pw * qy - px * qz + py * qw + pz * qx,
+                     pw * qz + px * qy - py * qx + pz * qw,
+                     pw * qw - px * qx - py * qy - pz * qz], axis=-1)
+
+
+def quaternion_from_matrix(matrix: np.ndarray) -> np.ndarray:
+    """Unit quaternions (..., 4) xyzw of rotation matrices (..., 3, 3), largest component positive.
+
+    Of the four classical formulas the best conditioned is taken (Shepperd 1978).
+    """
+    m = np.asarray(matrix, dtype=np.float64)
+    diagonal = np.stack([m[..., 0, 0], m[..., 1, 1], m[..., 2, 2]], axis=-1)
+    trace = diagonal.sum(axis=-1, keepdims=True)
+    # 4 q qᵀ, whose row of the largest diagonal entry is that component times 4 q.
+    outer = np.empty((*m.shape[:-2], 4, 4))
+    for i in range(3):
+        for j in range(3):
+            outer[..., i, j] = m[..., i, j] + m[..., j, i]
+        outer[..., i, i] = 1.0 + 2.0 * diagonal[..., i] - trace[..., 0]
+        j, k = (i + 1) % 3, (i + 2) % 3
+        outer[..., i, 3] = outer[..., 3, i] = m[..., k, j] - m[..., j, k]
+    outer[..., 3, 3] = 1.0 + trace[..., 0]
+    best = np.argmax(np.diagonal(outer, axis1=-2, axis2=-1), axis=-1)
+    row = np.take_along_axis(outer, best[..., None, None], axis=-2)[..., 0, :]
+    return row / np.linalg.norm(row, axis=-1, keepdims=True)

@@ -1,0 +1,187 @@
+"""Which axis separates two boxes, or is the shallowest: the 15-axis separating-axis test.
+
+Two boxes are disjoint exactly if one of 15 axes separates their projections (Gottschalk, Lin and
+Manocha 1996): the three face normals of each box and the nine cross products of their edges. The
+gap on a unit axis n is |t·n| − r_A(n) − r_B(n) with t = B − A and r the half widths. The largest
+of the 15 gaps is the `separation`; for boxes that overlap, its negative is the least translation
+that separates them.
+
+1. Face axes. Gaps need the entries of R alone. The best face axis is remembered: it carries the
+   frame in which the contact point is built, whatever axis wins.
+2. Edge axes, normalised. Each gap is evaluated as the exact gap along the axis AS ROUNDED: the
+   half widths are those of that very vector, not the textbook's |R| entries. For edges almost
+   parallel the axis is noise of relative size 1e-16 / length, but noise can then only make the
+   overlap deeper than the true one, never invent a gap. (With the textbook's entries, a container
+   yawed by 1e-7 rad on its stack had a depth wrong by 1e-9 of its length.)
+3. Ties. An axis replaces an earlier one only if it is better by more than TIE of the size, in the
+   order faces of A, faces of B, edges: aligned boxes, for which up to four axes agree to the last
+   bits, get the face normal.
+
+The separation is the largest gap itself, tie or not, and it has the same bits when the boxes are
+swapped: face gaps because their formulas are symmetric, edge gaps because they are evaluated in
+the frame of the box that comes first in an order of the data, not of the call.
+"""
+from __future__ import annotations
+
+import math
+
+from .jit import kernel
+from .pose import (
+    A_FIRST,
+    AXIS,
+    FACE,
+    HALF_A,
+    HALF_B,
+    LANES,
+    OFFSET_A,
+    OFFSET_B,
+    ROTATION,
+    SEPARATION,
+    SIZE,
+)
+
+PARALLEL = 1e-8
+"""Edge axes shorter than this (sine of the angle between the edges) are skipped. Boxes that share
+an edge direction are separated by a face axis if at all, and what is lost below is at most 1e-8 of
+the size; the common alternatives are worse: a constant added to |R| reports contacts across real
+gaps, no guard at all misses 17–23 % of stacked containers at a tilt of 1e-16 rad."""
+
+TIE = 2.0**-46
+"""Gaps closer than this fraction of the size (1.4e-14, some 64 roundings) count as equal: the
+rounding error of a gap is below 12 units of 2⁻⁵³ of the size, and twice that must not decide."""
+
+
+@kernel
+def _edge_gap(t1, t2, h1, h2, u1, u2, v1, v2, hv, w1, w2, hw):
+    """Gap on the axis e × u in the frame of a box with the edge direction e.
+
+    1 and 2 count the two components across e: offset t, half extents h of that box, edge u of the
+    other box, and the other box's two further edges v and w with half extents hv and hw. In this
+    frame the axis is (0, −u2, u1).
+    """
+    length2 = u1 * u1 + u2 * u2
+    width = ((h1 * abs(u2) + h2 * abs(u1))
+             + (hv * abs(v2 * u1 - v1 * u2) + hw * abs(w2 * u1 - w1 * u2)))
+    gap = (abs(t2 * u1 - t1 * u2) - width) / math.sqrt(length2)
+    return gap if length2 >= PARALLEL * PARALLEL else -math.inf
+
+
+@kernel
+def _better(best, axis, gap, candidate, tie):
+    """The better of two axes, the earlier one where they tie."""
+    wins = gap > best + tie
+    return (gap if wins else best), (candidate if wins else axis)
+
+
+@kernel
+def query_block(count, work):
+    """SAT of the first `count` pairs of the block; writes SEPARATION, AXIS and FACE."""
+    for i in range(count):
+        r00 = work[ROTATION + i]
+        r01 = work[ROTATION + LANES + i]
+        r02 = work[ROTATION + 2 * LANES + i]
+        r10 = work[ROTATION + 3 * LANES + i]
+        r11 = work[ROTATION + 4 * LANES + i]
+        r12 = work[ROTATION + 5 * LANES + i]
+        r20 = work[ROTATION + 6 * LANES + i]
+        r21 = work[ROTATION + 7 * LANES + i]
+        r22 = work[ROTATION + 8 * LANES + i]
+        ha0 = work[HALF_A + i]
+        ha1 = work[HALF_A + LANES + i]
+        ha2 = work[HALF_A + 2 * LANES + i]
+        hb0 = work[HALF_B + i]
+        hb1 = work[HALF_B + LANES + i]
+        hb2 = work[HALF_B + 2 * LANES + i]
+        ta0 = work[OFFSET_A + i]
+        ta1 = work[OFFSET_A + LANES + i]
+        ta2 = work[OFFSET_A + 2 * LANES + i]
+        tb0 = work[OFFSET_B + i]
+        tb1 = work[OFFSET_B + LANES + i]
+        tb2 = work[OFFSET_B + 2 * LANES + i]
+        tie = TIE * work[SIZE + i]
+
+        # 1. Face axes.
+        g0 = abs(ta0) - (ha0 + ((hb0 * abs(r00) + hb1 * abs(r01)) + hb2 * abs(r02)))
+        g1 = abs(ta1) - (ha1 + ((hb0 * abs(r10) + hb1 * abs(r11)) + hb2 * abs(r12)))
+        g2 = abs(ta2) - (ha2 + ((hb0 * abs(r20) + hb1 * abs(r21)) + hb2 * abs(r22)))
+        g3 = abs(tb0) - (hb0 + ((ha0 * abs(r00) + ha1 * abs(r10)) + ha2 * abs(r20)))
+        g4 = abs(tb1) - (hb1 + ((ha0 * abs(r01) + ha1 * abs(r11)) + ha2 * abs(r21)))
+        g5 = abs(tb2) - (hb2 + ((ha0 * abs(r02) + ha1 * abs(r12)) + ha2 * abs(r22)))
+        best, axis = _better(g0, 0.0, g1, 1.0, tie)
+        best, axis = _better(best, axis, g2, 2.0, tie)
+        best, axis = _better(best, axis, g3, 3.0, tie)
+        best, axis = _better(best, axis, g4, 4.0, tie)
+        best, face = _better(best, axis, g5, 5.0, tie)
+        work[FACE + i] = face
+        top = max(max(max(g0, g1), max(g2, g3)), max(g4, g5))
+
+        # 2. Edge axes, in the frame of the box that comes first: t offset, h its half extents,
+        #    o the other box's, r the other box's orientation.
+        first = work[A_FIRST + i] > 0.5
+        t0, h0, o0 = (ta0 if first else tb0), (ha0 if first else hb0), (hb0 if first else ha0)
+        t1, h1, o1 = (ta1 if first else tb1), (ha1 if first else hb1), (hb1 if first else ha1)
+        t2, h2, o2 = (ta2 if first else tb2), (ha2 if first else hb2), (hb2 if first else ha2)
+        r01, r10 = (r01 if first else r10), (r10 if first else r01)
+        r02, r20 = (r02 if first else r20), (r20 if first else r02)
+        r12, r21 = (r12 if first else r21), (r21 if first else r12)
+        g0 = _edge_gap(t1, t2, h1, h2, r10, r20, r11, r21, o1, r12, r22, o2)
+        g1 = _edge_gap(t1, t2, h1, h2, r11, r21, r12, r22, o2, r10, r20, o0)
+        g2 = _edge_gap(t1, t2, h1, h2, r12, r22, r10, r20, o0, r11, r21, o1)
+        g3 = _edge_gap(t2, t0, h2, h0, r20, r00, r21, r01, o1, r22, r02, o2)
+        g4 = _edge_gap(t2, t0, h2, h0, r21, r01, r22, r02, o2, r20, r00, o0)
+        g5 = _edge_gap(t2, t0, h2, h0, r22, r02, r20, r00, o0, r21, r01, o1)
+        g6 = _edge_gap(t0, t1, h0, h1, r00, r10, r01, r11, o1, r02, r12, o2)
+        g7 = _edge_gap(t0, t1, h0, h1, r01, r11, r02, r12, o2, r00, r10, o0)
+        g8 = _edge_gap(t0, t1, h0, h1, r02, r12, r00, r10, o0, r01, r11, o1)
+        best, axis = _better(best, face, g0, 6.0, tie)
+        best, axis = _better(best, axis, g1, 7.0 if first else 9.0, tie)
+        best, axis = _better(best, axis, g2, 8.0 if first else 12.0, tie)
+        best, axis = _better(best, axis, g3, 9.0 if first else 7.0, tie)
+        best, axis = _better(best, axis, g4, 10.0, tie)
+        best, axis = _better(best, axis, g5, 11.0 if first else 13.0, tie)
+        best, axis = _better(best, axis, g6, 12.0 if first else 8.0, tie)
+        best, axis = _better(best, axis, g7, 13.0 if first else 11.0, tie)
+        best, axis = _better(best, axis, g8, 14.0, tie)
+        work[AXIS + i] = axis
+        top = max(top, max(max(max(g0, g1), max(g2, g3)), max(max(g4, g5), max(g6, max(g7, g8)))))
+        work[SEPARATION + i] = top
+
+
+@kernel
+def axis_normal(work, i):
+    """Unit vector, from A to B, in A's frame, along the winning axis of pair `i`."""
+    axis = int(work[AXIS + i])
+    if axis < 3:
+        s = 1.0 if work[OFFSET_A + axis * LANES + i] >= 0.0 else -1.0
+        return (s if axis == 0 else 0.0), (s if axis == 1 else 0.0), (s if axis == 2 else 0.0)
+    if axis < 6:
+        j = axis - 3
+        s = 1.0 if work[OFFSET_B + j * LANES + i] >= 0.0 else -1.0
+        return (s * work[ROTATION + j * LANES + i], s * work[ROTATION + (3 + j) * LANES + i],
+                s * work[ROTATION + (6 + j) * LANES + i])
+    # An edge axis is taken in the very frame in which the query evaluated it: (0, −u2, u1) across
+    # the first box's edge e, in cyclic order.
+    first = work[A_FIRST + i] > 0.5
+    j = (axis - 6) % 3
+    e = (axis - 6) // 3
+    if not first:
+        e, j = j, e
+    p = (e + 1) % 3
+    q = (e + 2) % 3
+    if first:
+        u1 = work[ROTATION + (3 * p + j) * LANES + i]
+        u2 = work[ROTATION + (3 * q + j) * LANES + i]
+        along = work[OFFSET_A + q * LANES + i] * u1 - work[OFFSET_A + p * LANES + i] * u2
+    else:
+        u1 = work[ROTATION + (3 * j + p) * LANES + i]
+        u2 = work[ROTATION + (3 * j + q) * LANES + i]
+        along = work[OFFSET_B + q * LANES + i] * u1 - work[OFFSET_B + p * LANES + i] * u2
+    s = (1.0 if along >= 0.0 else -1.0) / math.sqrt(u1 * u1 + u2 * u2)
+    np_, nq = -s * u2, s * u1
+    if first:
+        return ((np_ if p == 0 else (nq if q == 0 else 0.0)),
+                (np_ if p == 1 else (nq if q == 1 else 0.0)),
+                (np_ if p == 2 else (nq if q == 2 else 0.0)))
+    return (np_ * work[ROTATION + p * LANES + i] + nq * work[ROTATION + q * LANES + i],
+            np_ * work[ROTATION + (3 + p) * LANES + i] + nq * work[ROTATION + (3 + q) * LANES + i],
+            np_ * work[ROTATION + (6 + p) * LANES + i] + nq * work[ROTATION + (6 + q) * LANES + i])

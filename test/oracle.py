@@ -1,0 +1,159 @@
+"""Slow, obvious truth for two boxes, in 60-digit arithmetic. Shares no code with the package.
+
+Inputs are the very doubles a solver gets; everything after them is mpmath: quaternions are
+normalised to 60 digits, the 15 axes are tested as the textbook writes them, and the overlap's
+volume and centroid come from its faces: each face of either box, clipped by the other box's six
+half-spaces, is one side of a pyramid whose apex lies inside.
+"""
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import mpmath as mp
+import numpy as np
+
+mp.mp.dps = 60
+ZERO, ONE = mp.mpf(0), mp.mpf(1)
+SAME = mp.mpf(10)**-40
+"""Lengths below this are zero: 20 digits above the rounding of 60-digit arithmetic, and 20 below
+anything that doubles can express between boxes of everyday sizes."""
+
+
+def dot(a, b):
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def cross(a, b):
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+def add(a, b, factor=1):
+    return (a[0] + factor * b[0], a[1] + factor * b[1], a[2] + factor * b[2])
+
+
+def scaled(a, factor):
+    return (a[0] * factor, a[1] * factor, a[2] * factor)
+
+
+@dataclass(frozen=True)
+class Box:
+    """Centre, unit axes (as rows) and half extents, all in 60 digits."""
+
+    centre: tuple
+    axes: tuple
+    half: tuple
+
+    def face(self, k, sign):
+        """Corners of the face `sign` times axis k, in cyclic order."""
+        i, j = (k + 1) % 3, (k + 2) % 3
+        middle = add(self.centre, self.axes[k], sign * self.half[k])
+        return [add(add(middle, self.axes[i], s * self.half[i]), self.axes[j], t * self.half[j])
+                for s, t in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+
+    def width(self, axis):
+        """Half width of the projection on a unit axis."""
+        return sum(h * abs(dot(e, axis)) for h, e in zip(self.half, self.axes))
+
+
+def make_box(pose, size):
+    x, y, z, qx, qy, qz, qw = (mp.mpf(float(v)) for v in pose)
+    n2 = qx * qx + qy * qy + qz * qz + qw * qw
+    s = 2 / n2
+    axes = ((1 - s * (qy * qy + qz * qz), s * (qx * qy + qw * qz), s * (qx * qz - qw * qy)),
+            (s * (qx * qy - qw * qz), 1 - s * (qx * qx + qz * qz), s * (qy * qz + qw * qx)),
+            (s * (qx * qz + qw * qy), s * (qy * qz - qw * qx), 1 - s * (qx * qx + qy * qy)))
+    return Box((x, y, z), axes, tuple(mp.mpf(float(v)) / 2 for v in size))
+
+
+def axis_gaps(a, b):
+    """(number, unit axis from A to B, gap) of every axis that exists: 0–2, 3–5, 6 + 3 i + j."""
+    t = add(b.centre, a.centre, -1)
+    found = []
+    candidates = list(a.axes) + list(b.axes) + [cross(u, v) for u in a.axes for v in b.axes]
+    for number, axis in enumerate(candidates):
+        length = mp.sqrt(dot(axis, axis))
+        if length < SAME:
+            continue
+        axis = scaled(axis, 1 / length)
+        along = dot(t, axis)
+        if along < 0:
+            axis, along = scaled(axis, -1), -along
+        found.append((number, axis, along - a.width(axis) - b.width(axis)))
+    return found
+
+
+def separation(a, b):
+    """Largest gap over the axes."""
+    return max(gap for _, _, gap in axis_gaps(a, b))
+
+
+def _clip(polygon, axis, bound, drop_on_plane):
+    """The part of a polygon with dot(axis, p) ≤ bound; a polygon IN the plane goes or stays."""
+    excess = [dot(axis, p) - bound for p in polygon]
+    if all(abs(e) < SAME for e in excess):
+        return [] if drop_on_plane else polygon
+    kept = []
+    for i, (p, e) in enumerate(zip(polygon, excess)):
+        q, f = polygon[i - 1], excess[i - 1]
+        if (e > 0) != (f > 0):
+            kept.append(add(q, add(p, q, -1), f / (f - e)))
+        if e <= 0:
+            kept.append(p)
+    return kept
+
+
+def overlap_faces(a, b):
+    """The faces of A∩B as polygons. Where faces of A and B lie in one plane, A's counts."""
+    faces = []
+    for box, other in ((a, b), (b, a)):
+        for k in range(3):
+            for sign in (1, -1):
+                polygon = box.face(k, sign)
+                outward = scaled(box.axes[k], sign)
+                for m in range(3):
+                    for s in (1, -1):
+                        axis = scaled(other.axes[m], s)
+                        bound = dot(axis, other.centre) + other.half[m]
+                        # In one plane: looking the same way, it is one face of the overlap and
+                        # must count once; looking opposite ways, the overlap has no volume there.
+                        same_way = dot(axis, outward) > 0
+                        if polygon:
+                            polygon = _clip(polygon, axis, bound, same_way and box is b)
+                if len(polygon) >= 3:
+                    faces.append(polygon)
+    return faces
+
+
+def overlap(a, b):
+    """Volume and centroid of A∩B (centroid None where there is no volume)."""
+    faces = overlap_faces(a, b)
+    corners = [p for face in faces for p in face]
+    if not corners:
+        return ZERO, None
+    apex = scaled((sum(p[0] for p in corners), sum(p[1] for p in corners),
+                   sum(p[2] for p in corners)), ONE / len(corners))
+    volume, moment = ZERO, (ZERO, ZERO, ZERO)
+    for face in faces:
+        p = add(face[0], apex, -1)
+        for i in range(1, len(face) - 1):
+            q, r = add(face[i], apex, -1), add(face[i + 1], apex, -1)
+            v = abs(dot(p, cross(q, r))) / 6
+            volume += v
+            moment = add(moment, add(add(p, q), r), v / 4)
+    if volume <= 0:
+        return ZERO, None
+    return volume, add(apex, moment, 1 / volume)
+
+
+def pressed(a, b, axis, depth, floor):
+    """B moved against `axis` (from A to B) until the depth is `floor`, where it is less."""
+    return b if depth >= floor else Box(add(b.centre, axis, depth - floor), b.axes, b.half)
+
+
+def contact_point(a, b, axis, depth, size):
+    """The package's definition of the point: centroid of A∩B, pressed in to 1e-9 of the size."""
+    return overlap(a, pressed(a, b, axis, depth, mp.mpf(10)**-9 * mp.mpf(float(size))))[1]
+
+
+def as_array(vector):
+    return np.array([float(v) for v in vector])
