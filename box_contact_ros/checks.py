@@ -66,10 +66,10 @@ def as_floats(value: ArrayLike, name: str, shapes: str, *accepted: tuple[int | N
     raise ValueError(f'{name} must be {shapes}, not an array of shape {np.shape(value)}')
 
 
-def as_half_extents(size: ArrayLike, name: str) -> np.ndarray:
-    """Three full extents (3,) in metres as half extents (1, 3), checked."""
+def as_size(size: ArrayLike, name: str) -> np.ndarray:
+    """Three full extents (3,) [m], checked, as (1, 3)."""
     array = as_floats(size, name, 'three full extents', (3,))
     fault = size_fault(array)
     if fault:
         raise ValueError(f'{name} {fault}')
-    return 0.5 * array.reshape(1, 3)
+    return array.reshape(1, 3)

@@ -11,14 +11,14 @@ from .sat import axis_normal, query_block
 
 
 @kernel
-def solve_exact(poses_a, poses_b, halves_a, halves_b, work, clip, status,
+def solve_exact(poses_a, poses_b, sizes_a, sizes_b, work, clip, status,
                 colliding, separation, normal, point):
     """Model `exact` for all rows; returns the number of rows refused."""
     bad = 0
     rows = poses_a.shape[0]
     for start in range(0, rows, LANES):
         count = min(LANES, rows - start)
-        bad += load_block(poses_a, poses_b, halves_a, halves_b, start, count, work, status)
+        bad += load_block(poses_a, poses_b, sizes_a, sizes_b, start, count, work, status)
         query_block(count, work)
         for i in range(count):
             if work[SEPARATION + i] <= work[TOUCH + i]:
@@ -37,7 +37,7 @@ class Exact:
         self._work = np.zeros(WORK_SIZE)
         self._clip = np.zeros(CLIP_SIZE)
 
-    def solve(self, a: np.ndarray, b: np.ndarray, half_a: np.ndarray, half_b: np.ndarray,
+    def solve(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
               status: np.ndarray, found: Contacts) -> int:
-        """Fill `found` for poses (n, 7); returns how many rows `status` refuses."""
-        return int(solve_exact(a, b, half_a, half_b, self._work, self._clip, status, *found))
+        """Fill `found` for poses (n, 7), sizes (n or 1, 3); returns how many rows are refused."""
+        return int(solve_exact(a, b, size_a, size_b, self._work, self._clip, status, *found))

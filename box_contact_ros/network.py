@@ -90,10 +90,13 @@ def load_weights(path: Path | str) -> Weights:
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
     except FileNotFoundError as error:
         raise WeightsError(f'weights file {path} does not exist') from error
-    except (SafetensorError, OSError, ValueError) as error:
+    except (SafetensorError, OSError, ValueError, TypeError, AttributeError) as error:
+        # The last two are what number types that NumPy lacks (bfloat16, float8) end in.
         raise WeightsError(f'weights file {path} cannot be read: {error}') from error
     try:
         card = json.loads(metadata['card'])
+        if not isinstance(card, dict):
+            raise TypeError('the card is no JSON object')
         missing = [field for field in CARD_FIELDS if field not in card]
     except (KeyError, TypeError, ValueError) as error:
         raise WeightsError(f'weights file {path} has no readable model card') from error
@@ -111,7 +114,7 @@ def load_weights(path: Path | str) -> Weights:
     networks = {}
     for name in sorted({key.split('.')[0] for key in tensors}):
         networks[name] = _pack(name, tensors, path)
-        if list(networks[name].widths) != list(card['architecture']):
+        if list(networks[name].widths) != card['architecture']:
             raise WeightsError(
                 f'weights file {path}: {name} is {networks[name].widths}, the model card says '
                 f'{card["architecture"]}')
@@ -132,7 +135,8 @@ def _pack(name: str, tensors: dict[str, np.ndarray], path: Path) -> Network:
         widths = (widths or [weight.shape[1]]) + [weight.shape[0]]
         parts += [weight.ravel(), bias]
     used = sum(len(part) for part in parts)
-    if used != sum(array.size for key, array in tensors.items() if key.split('.')[0] == name):
+    mine = [array for key, array in tensors.items() if key.split('.')[0] == name]
+    if not parts or used != sum(array.size for array in mine):
         raise WeightsError(f'weights file {path}: {name} has tensors that belong to no layer')
     return Network(name, tuple(widths), np.concatenate(parts))
 

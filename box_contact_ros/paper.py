@@ -122,14 +122,14 @@ def _learned_contact(work, i, cubes, continuous, packed, widths, activation, fol
 
 
 @kernel
-def solve_paper(poses_a, poses_b, halves_a, halves_b, work, cubes, continuous, packed, widths,
+def solve_paper(poses_a, poses_b, sizes_a, sizes_b, work, cubes, continuous, packed, widths,
                 activation, fold, pair, status, colliding, separation, normal, point):
     """Models `paper` and `paper-continuous` for all rows; returns the number of rows refused."""
     bad = 0
     rows = poses_a.shape[0]
     for start in range(0, rows, LANES):
         count = min(LANES, rows - start)
-        bad += load_block(poses_a, poses_b, halves_a, halves_b, start, count, work, status)
+        bad += load_block(poses_a, poses_b, sizes_a, sizes_b, start, count, work, status)
         query_block(count, work)
         for i in range(count):
             if work[SEPARATION + i] <= work[TOUCH + i]:
@@ -155,7 +155,7 @@ def _is_cube(size: np.ndarray) -> bool:
 class Paper:
     """The source's networks behind the solver's interface.
 
-    half_a, half_b: (1, 3) half extents [m]; weights: a file, or None for the shipped one.
+    size_a, size_b: (1, 3) full extents [m]; weights: a file, or None for the shipped one.
     Raises ValueError for sizes that no weights are for.
     """
 
@@ -163,14 +163,14 @@ class Paper:
     model = 'paper'
     experts: tuple[str, ...] = ('contact',)
 
-    def __init__(self, half_a: np.ndarray, half_b: np.ndarray, weights: str | None) -> None:
-        size = 2.0 * half_a[0]
-        self._check_equal(half_a, half_b)
+    def __init__(self, size_a: np.ndarray, size_b: np.ndarray, weights: str | None) -> None:
+        size = size_a[0]
+        self._check_equal(size_a, size_b)
         self.weights = self._load(size, weights)
         networks = [self._network(name) for name in self.experts]
         self._size = np.array(self.weights.card['sizes'][0], dtype=np.float64)
         self._cubes = _is_cube(self._size)
-        self._check_sizes(half_a, half_b)
+        self._check_sizes(size_a, size_b)
         self._packed = np.stack([network.packed for network in networks])
         self._widths = np.array(networks[0].widths, dtype=np.int64)
         self._activation = np.zeros((2, max(networks[0].widths)), dtype=np.float32)
@@ -197,31 +197,31 @@ class Paper:
                 f'and {OUTPUTS} outputs, which model {self.model!r} needs')
         return network
 
-    def _check_equal(self, half_a: np.ndarray, half_b: np.ndarray) -> None:
-        differs = np.any(np.abs(half_a - half_b) > SAME_SIZE * half_a, axis=1)
+    def _check_equal(self, size_a: np.ndarray, size_b: np.ndarray) -> None:
+        differs = np.any(np.abs(size_a - size_b) > SAME_SIZE * size_a, axis=1)
         if differs.any():
             row = int(np.argmax(differs))
             raise ValueError(
                 f'model {self.model!r} is for two boxes of one size, not '
-                f'{_text(2.0 * half_a[row % len(half_a)])} and '
-                f"{_text(2.0 * half_b[row % len(half_b)])}; any sizes work with model 'exact'")
+                f'{_text(size_a[row % len(size_a)])} and '
+                f"{_text(size_b[row % len(size_b)])}; any sizes work with model 'exact'")
 
-    def _check_sizes(self, half_a: np.ndarray, half_b: np.ndarray) -> None:
-        self._check_equal(half_a, half_b)
-        for half in half_a:
-            fits = (_is_cube(half) if self._cubes
-                    else np.allclose(2.0 * half, self._size, rtol=SAME_SIZE, atol=0.0))
+    def _check_sizes(self, size_a: np.ndarray, size_b: np.ndarray) -> None:
+        self._check_equal(size_a, size_b)
+        for size in size_a:
+            fits = (_is_cube(size) if self._cubes
+                    else np.allclose(size, self._size, rtol=SAME_SIZE, atol=0.0))
             if not fits:
                 known = 'cubes' if self._cubes else _text(self._size)
                 raise ValueError(
                     f'the weights {self.weights.path.name} of model {self.model!r} are for {known},'
-                    f" not for size {_text(2.0 * half)}; any size works with model 'exact'")
+                    f" not for size {_text(size)}; any size works with model 'exact'")
 
-    def solve(self, a: np.ndarray, b: np.ndarray, half_a: np.ndarray, half_b: np.ndarray,
+    def solve(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
               status: np.ndarray, found: Contacts) -> int:
         """Fill `found` for poses (n, 7); returns how many rows `status` refuses."""
-        self._check_sizes(half_a, half_b)
-        return int(solve_paper(a, b, half_a, half_b, self._work, self._cubes, self.continuous,
+        self._check_sizes(size_a, size_b)
+        return int(solve_paper(a, b, size_a, size_b, self._work, self._cubes, self.continuous,
                                self._packed, self._widths, self._activation, self._fold,
                                self._pair, status, *found))
 
@@ -233,10 +233,10 @@ class PaperContinuous(Paper):
     model = 'paper-continuous'
     experts = ('vertex_face', 'edge_edge')  # in the order of symmetry.VERTEX_FACE, EDGE_EDGE
 
-    def _check_sizes(self, half_a: np.ndarray, half_b: np.ndarray) -> None:
+    def _check_sizes(self, size_a: np.ndarray, size_b: np.ndarray) -> None:
         if not self._cubes:
             raise WeightsError(f'model {self.model!r} needs weights for cubes')
-        super()._check_sizes(half_a, half_b)
+        super()._check_sizes(size_a, size_b)
 
 
 def _text(size: np.ndarray) -> str:

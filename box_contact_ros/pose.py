@@ -108,23 +108,23 @@ def _valid_pose(pose, i):
 
 
 @kernel
-def _valid_half(half, i):
-    return (2.0 * half[i, 0] >= LENGTH_MIN and 2.0 * half[i, 0] <= LENGTH_MAX
-            and 2.0 * half[i, 1] >= LENGTH_MIN and 2.0 * half[i, 1] <= LENGTH_MAX
-            and 2.0 * half[i, 2] >= LENGTH_MIN and 2.0 * half[i, 2] <= LENGTH_MAX)
+def _valid_size(size, i):
+    return (size[i, 0] >= LENGTH_MIN and size[i, 0] <= LENGTH_MAX
+            and size[i, 1] >= LENGTH_MIN and size[i, 1] <= LENGTH_MAX
+            and size[i, 2] >= LENGTH_MIN and size[i, 2] <= LENGTH_MAX)
 
 
 @kernel
-def load_block(poses_a, poses_b, halves_a, halves_b, start, count, work, status):
+def load_block(poses_a, poses_b, sizes_a, sizes_b, start, count, work, status):
     """Check `count` pairs from row `start` on and write them into `work`.
 
-    poses_a, poses_b are (n, 7); halves_a, halves_b are (n, 3), or (1, 3) for one size for all.
+    poses_a, poses_b are (n, 7); sizes_a, sizes_b, full extents, are (n, 3), or (1, 3) for all.
     A row that fails a check gets its status (BAD_…) and the values of two unit cubes far apart,
     so that the later stages need no test; returns the number of such rows.
     """
     bad = 0
-    shared_a = halves_a.shape[0] == 1
-    shared_b = halves_b.shape[0] == 1
+    shared_a = sizes_a.shape[0] == 1
+    shared_b = sizes_b.shape[0] == 1
     for i in range(count):
         row = start + i
         row_a = 0 if shared_a else row
@@ -134,9 +134,9 @@ def load_block(poses_a, poses_b, halves_a, halves_b, start, count, work, status)
             code = BAD_POSE_A
         elif not _valid_pose(poses_b, row):
             code = BAD_POSE_B
-        elif not _valid_half(halves_a, row_a):
+        elif not _valid_size(sizes_a, row_a):
             code = BAD_SIZE_A
-        elif not _valid_half(halves_b, row_b):
+        elif not _valid_size(sizes_b, row_b):
             code = BAD_SIZE_B
         status[row] = code
         if code != OK:
@@ -144,8 +144,8 @@ def load_block(poses_a, poses_b, halves_a, halves_b, start, count, work, status)
             _load_apart(work, i)
             continue
         for k in range(3):
-            work[HALF_A + k * LANES + i] = halves_a[row_a, k]
-            work[HALF_B + k * LANES + i] = halves_b[row_b, k]
+            work[HALF_A + k * LANES + i] = 0.5 * sizes_a[row_a, k]
+            work[HALF_B + k * LANES + i] = 0.5 * sizes_b[row_b, k]
             work[ORIGIN_A + k * LANES + i] = poses_a[row, k]
         a = rotation_entries(poses_a[row, 3], poses_a[row, 4], poses_a[row, 5], poses_a[row, 6])
         b = rotation_entries(poses_b[row, 3], poses_b[row, 4], poses_b[row, 5], poses_b[row, 6])
@@ -160,12 +160,12 @@ def load_block(poses_a, poses_b, halves_a, halves_b, start, count, work, status)
             for j in range(3):
                 work[ROTATION + (3 * k + j) * LANES + i] = (
                     (a[k] * b[j] + a[3 + k] * b[3 + j]) + a[6 + k] * b[6 + j])
-        half = max(max(halves_a[row_a, 0], halves_a[row_a, 1], halves_a[row_a, 2]),
-                   max(halves_b[row_b, 0], halves_b[row_b, 1], halves_b[row_b, 2]))
+        size = max(max(sizes_a[row_a, 0], sizes_a[row_a, 1], sizes_a[row_a, 2]),
+                   max(sizes_b[row_b, 0], sizes_b[row_b, 1], sizes_b[row_b, 2]))
         reach_a = max(abs(poses_a[row, 0]), abs(poses_a[row, 1]), abs(poses_a[row, 2]))
         reach_b = max(abs(poses_b[row, 0]), abs(poses_b[row, 1]), abs(poses_b[row, 2]))
-        work[SIZE + i] = 2.0 * half
-        work[TOUCH + i] = CONTACT_ULPS * ulp(max(max(reach_a, reach_b), 2.0 * half))
+        work[SIZE + i] = size
+        work[TOUCH + i] = CONTACT_ULPS * ulp(max(max(reach_a, reach_b), size))
         # The sign of B − A changes on a swap, so its first component that is not zero says which
         # box comes first; for concentric boxes any order will do.
         a_first = tx > 0.0 or (tx == 0.0 and (ty > 0.0 or (ty == 0.0 and tz >= 0.0)))

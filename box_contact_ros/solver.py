@@ -6,7 +6,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .checks import as_floats, as_half_extents, pose_fault, size_fault
+from .checks import as_floats, as_size, pose_fault, size_fault
 from .contact import Contact, Contacts
 from .exact import Exact
 from .paper import Paper, PaperContinuous
@@ -23,25 +23,25 @@ MODELS = {
 class Model(Protocol):
     """What a model behind `ContactSolver` is."""
 
-    def solve(self, a: np.ndarray, b: np.ndarray, half_a: np.ndarray, half_b: np.ndarray,
+    def solve(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
               status: np.ndarray, found: Contacts) -> int:
-        """Fill `found` for poses (n, 7) and half extents (n or 1, 3).
+        """Fill `found` for poses (n, 7) and full extents (n or 1, 3).
 
         Returns the number of rows that are refused, with their reasons (`pose.BAD_…`) in `status`.
         """
 
 
-def make_model(name: str, half_a: np.ndarray, half_b: np.ndarray, weights: str | None) -> Model:
-    """The model of that name for boxes of half extents (1, 3); `weights` names a file or is None.
+def make_model(name: str, size_a: np.ndarray, size_b: np.ndarray, weights: str | None) -> Model:
+    """The model of that name for boxes of full extents (1, 3); `weights` names a file or is None.
 
     Raises ValueError for a name, sizes or weights that do not fit.
     """
     if name == 'exact':
         return Exact()
     if name == 'paper':
-        return Paper(half_a, half_b, weights)
+        return Paper(size_a, size_b, weights)
     if name == 'paper-continuous':
-        return PaperContinuous(half_a, half_b, weights)
+        return PaperContinuous(size_a, size_b, weights)
     raise ValueError(f'model {name!r} is not one of: {", ".join(MODELS)}')
 
 
@@ -63,16 +63,16 @@ class ContactSolver:
 
     def __init__(self, size_a: ArrayLike, size_b: ArrayLike, *, model: str = 'exact',
                  weights: str | None = None) -> None:
-        self._half_a = as_half_extents(size_a, 'size_a')
-        self._half_b = as_half_extents(size_b, 'size_b')
+        self._size_a = as_size(size_a, 'size_a')
+        self._size_b = as_size(size_b, 'size_b')
         self.model = model
-        self._solver = make_model(model, self._half_a, self._half_b, weights)
+        self._solver = make_model(model, self._size_a, self._size_b, weights)
 
     def __call__(self, pose_a: ArrayLike, pose_b: ArrayLike) -> Contact:
         """Contact of one pair; poses are (7,)."""
         a = as_floats(pose_a, 'pose_a', 'a pose (7,)', (7,)).reshape(1, 7)
         b = as_floats(pose_b, 'pose_b', 'a pose (7,)', (7,)).reshape(1, 7)
-        found = self._solve(a, b, self._half_a, self._half_b, ('pose_a', 'pose_b'))
+        found = self._solve(a, b, self._size_a, self._size_b, ('pose_a', 'pose_b'))
         return Contact(bool(found.colliding[0]), float(found.separation[0]), found.normal[0],
                        found.point[0])
 
@@ -87,28 +87,28 @@ class ContactSolver:
         b = as_floats(poses_b, 'poses_b', 'poses (n, 7)', (None, 7))
         if len(a) != len(b):
             raise ValueError(f'poses_a and poses_b must be equally many, not {len(a)} and {len(b)}')
-        halves = []
-        for size, name, default in ((size_a, 'size_a', self._half_a),
-                                    (size_b, 'size_b', self._half_b)):
+        sizes = []
+        for size, name, default in ((size_a, 'size_a', self._size_a),
+                                    (size_b, 'size_b', self._size_b)):
             if size is None:
-                halves.append(default)
+                sizes.append(default)
                 continue
             array = as_floats(size, name, f'full extents (3,) or ({len(a)}, 3)', (3,), (len(a), 3))
-            halves.append(as_half_extents(array, name) if array.ndim == 1 else 0.5 * array)
-        return self._solve(a, b, halves[0], halves[1], ('poses_a', 'poses_b'))
+            sizes.append(as_size(array, name) if array.ndim == 1 else array)
+        return self._solve(a, b, sizes[0], sizes[1], ('poses_a', 'poses_b'))
 
-    def _solve(self, a: np.ndarray, b: np.ndarray, half_a: np.ndarray, half_b: np.ndarray,
+    def _solve(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
                names: tuple[str, str]) -> Contacts:
         rows = len(a)
         found = Contacts(np.empty(rows, dtype=np.bool_), np.empty(rows), np.empty((rows, 3)),
                          np.empty((rows, 3)))
         status = np.empty(rows, dtype=np.int8)
-        if self._solver.solve(a, b, half_a, half_b, status, found):
-            _refuse(a, b, half_a, half_b, status, names)
+        if self._solver.solve(a, b, size_a, size_b, status, found):
+            _refuse(a, b, size_a, size_b, status, names)
         return found
 
 
-def _refuse(a: np.ndarray, b: np.ndarray, half_a: np.ndarray, half_b: np.ndarray,
+def _refuse(a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
             status: np.ndarray, names: tuple[str, str]) -> None:
     """Raise for the first row that the kernel refused."""
     row = int(np.flatnonzero(status)[0])
@@ -117,7 +117,7 @@ def _refuse(a: np.ndarray, b: np.ndarray, half_a: np.ndarray, half_b: np.ndarray
         poses, name = (a, names[0]) if code == BAD_POSE_A else (b, names[1])
         fault = pose_fault(poses[row])
     else:
-        halves, name = (half_a, 'size_a') if code == BAD_SIZE_A else (half_b, 'size_b')
-        fault = size_fault(2.0 * halves[0 if len(halves) == 1 else row])
+        sizes, name = (size_a, 'size_a') if code == BAD_SIZE_A else (size_b, 'size_b')
+        fault = size_fault(sizes[0 if len(sizes) == 1 else row])
     where = f'{name}[{row}]' if name.startswith('poses') or len(status) > 1 else name
     raise ValueError(f'{where} {fault}')

@@ -1,8 +1,8 @@
-"""Program `contact_node`: two box poses in, contact point and normal out.
+"""The contact node: two box poses in, contact point and normal out.
 
-Topics (relative names): `box_a/pose`, `box_b/pose` (PoseStamped) in; `contact/point`
-(PointStamped) and `contact/normal` (Vector3Stamped) while the boxes touch, then `contacts`
-(PointCloud2) on every evaluation; `/diagnostics` at 1 Hz. Parameters: PARAMETERS.
+Subscribes box_a/pose and box_b/pose (geometry_msgs/PoseStamped). Publishes contact/point
+(PointStamped) and contact/normal (Vector3Stamped, from A to B) while the boxes touch, then
+contacts (sensor_msgs/PointCloud2, one row per contact) on every evaluation, and /diagnostics.
 """
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import PointStamped, PoseStamped, Vector3Stamped
-from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rcl_interfaces.msg import SetParametersResult
 from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -24,18 +24,19 @@ from ..checks import pose_fault
 from ..pairing import PAIRINGS
 from ..solver import MODELS, ContactSolver
 from .messages import StampedPose, make_cloud, make_header, make_normal, make_point, read_pose
+from .parameters import Setting, answer_help, checked, declare, numbers, one_of, text
 from .runtime import CONTACT_QOS, POSE_QOS, run_node
 
-CONTAINER = [12.192, 2.438, 2.591]  # ISO 40 ft [m]
+CONTAINER = (12.192, 2.438, 2.591)  # ISO 40 ft [m]
 PARAMETERS = {
-    'size_a': (CONTAINER, 'full extents of box A [m], three numbers > 0'),
-    'size_b': (CONTAINER, 'full extents of box B [m], three numbers > 0'),
-    'model': ('paper', f'how the contact point is found: {", ".join(MODELS)}'),
-    'weights': ('', 'weights file to use in place of the shipped one; empty: the shipped one'),
-    'pairing': ('stamp', "'stamp': answer once, when poses of equal stamp are in; "
-                         "'latest': answer every pose with the other box's last one"),
+    'size_a': Setting(CONTAINER, 'full extents of box A, three numbers > 0 [m]', numbers(3)),
+    'size_b': Setting(CONTAINER, 'full extents of box B, three numbers > 0 [m]', numbers(3)),
+    'model': Setting('paper', f'how the contact point is found: {", ".join(MODELS)}',
+                     one_of(MODELS)),
+    'weights': Setting('', 'weights file to use in place of the shipped one', text),
+    'pairing': Setting('stamp', 'stamp: answer once, when poses of equal stamp are in; latest: '
+                                "answer every pose with the other box's last", one_of(PAIRINGS)),
 }
-"""Name: default, description."""
 PAIR = 0                  # id of the only pair
 UNMATCHED_SECONDS = 1.0   # poses without a partner for this long are worth a warning
 LOG_SECONDS = 1.0         # the same complaint is logged at most this often
@@ -46,12 +47,8 @@ class ContactNode(Node):
 
     def __init__(self, context: Context, **options: Any) -> None:
         super().__init__('contact_node', context=context, **options)
-        for name, (default, description) in PARAMETERS.items():
-            # Dynamic typing accepts [2, 2, 2] where [2.0, 2.0, 2.0] is meant.
-            self.declare_parameter(name, default, ParameterDescriptor(
-                description=description, dynamic_typing=True))
         self._settings: dict[str, Any] = {}
-        self._apply({name: self.get_parameter(name).value for name in PARAMETERS})
+        self._apply(declare(self, PARAMETERS))
         self.add_on_set_parameters_callback(self._set_parameters)
         self.counts: Counter[str] = Counter()
         self._answered_at = self._now()
@@ -76,21 +73,15 @@ class ContactNode(Node):
     def _set_parameters(self, parameters: list[Parameter]) -> SetParametersResult:
         changes = {p.name: p.value for p in parameters if p.name in PARAMETERS}
         try:
-            self._apply({**self._settings, **changes})
+            self._apply(checked(PARAMETERS, {**self._settings, **changes}))
         except ValueError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
 
     def _apply(self, settings: dict[str, Any]) -> None:
-        """Check settings and take them over as a whole, or raise ValueError and keep the old."""
+        """Take settings over as a whole, or raise ValueError and keep the old."""
         if settings == self._settings:
             return
-        for name in ('model', 'weights', 'pairing'):
-            if not isinstance(settings[name], str):
-                raise ValueError(f'{name} must be a string, not {settings[name]!r}')
-        if settings['pairing'] not in PAIRINGS:
-            raise ValueError(
-                f'pairing {settings["pairing"]!r} is not one of: {", ".join(PAIRINGS)}')
         solver = ContactSolver(settings['size_a'], settings['size_b'], model=settings['model'],
                                weights=settings['weights'] or None)
         solver(np.eye(7)[6], np.eye(7)[6])  # compiles, or loads, the kernels before they are needed
@@ -173,4 +164,5 @@ class ContactNode(Node):
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node until SIGINT or SIGTERM."""
-    return run_node(lambda context: ContactNode(context), args)
+    answer_help('contact_node', __doc__, PARAMETERS, args)
+    return run_node(ContactNode, args)

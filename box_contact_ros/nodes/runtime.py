@@ -41,13 +41,14 @@ def make_executor(context: Context) -> Any:
 def spin(node: Node) -> None:
     """Serve a node until its context is shut down (SIGINT, SIGTERM, or `context.shutdown()`)."""
     executor = make_executor(node.context)
-    executor.add_node(node)
     try:
+        executor.add_node(node)
         while node.context.ok():
             executor.spin_once(timeout_sec=SPIN_SECONDS)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     finally:
+        # EventsExecutor aborts the process if it is destroyed while it still has a node.
         executor.shutdown()
 
 

@@ -1,0 +1,21 @@
+"""`python -m box_contact_ros PROGRAM [ARGUMENT ...]`: start one of the package's programs."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+
+from box_contact_ros.programs import run, usage
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the program named by the first argument; without one, list the programs."""
+    args = sys.argv[1:] if args is None else args
+    if not args or args[0] in ('-h', '--help'):
+        print(usage())
+        return 0
+    return run(args[0], args[1:])
+
+
+if __name__ == '__main__':
+    sys.exit(main())

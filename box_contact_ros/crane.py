@@ -1,0 +1,363 @@
+"""A crane that sets a container onto a stack: the simulator side, MuJoCo only, no ROS.
+
+A trolley stands still high above the stack. Four ropes run from it to the four top corners of the
+load. Ropes pull and never push: each is a spatial tendon with an upper length limit, and the hoist
+works by moving that limit. Nothing else holds or damps the load, so it sways, and because the ropes
+converge towards the trolley it pitches and rolls as it sways. The stack is static. MuJoCo's own
+contact is switched off: without a wrench from outside, the load sinks a few centimetres into the
+stack, which is what a contact query has to see.
+
+The programme of the hoist, as shares of the scenario's duration (`HOIST_SHARES`): hang, lower,
+stay (meanwhile the start tilt is trimmed out rope by rope, as a spreader's trim does), lift, hang.
+The programme is tied to the duration, so a short run meets the same contacts as a long one; what
+varies with the duration is the height the load comes from.
+
+Conventions: SI units; world frame with z up and the ground at z = 0; a pose is the seven numbers
+`x y z qx qy qz qw` of the body's centre; angles given to `CraneScenario` are degrees.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+__all__ = ['CONTAINER_40FT', 'Crane', 'CraneScenario']
+
+CONTAINER_40FT = (12.192, 2.438, 2.591)
+"""Length, width and height of a 40-ft container, in metres."""
+
+GRAVITY = 9.81
+"""Gravitational acceleration, m/s^2."""
+
+PHYSICS_STEP = 5e-4
+"""Longest physics step, s. A tick of publication is cut into equal steps no longer than this."""
+
+ROPE_STIFFNESS, ROPE_DAMPING, ROPE_IMPEDANCE = 1600.0, 3.0, 0.75
+"""A rope's stretch as MuJoCo's limit spring, per unit of mass: 1/s^2, 1/s, 1.
+
+Heave on the ropes rings at some 40 rad/s, far above sway, and dies out within a second; the load
+stretches them by about 2 mm. The damping is small for a reason: the solver damps the whole rate of
+a rope, the hoist's own speed included, so a hoist faster than `MAX_HOIST_SPEED` would leave the
+rope taut and slack by turns, in jerks of several times the weight.
+"""
+
+MAX_HOIST_SPEED = (1.0 - ROPE_IMPEDANCE) * GRAVITY / ROPE_DAMPING
+"""Fastest lowering at which gravity's share in the limit outweighs its damping, m/s."""
+
+HOIST_SHARES = {'hang': 0.05, 'lower': 0.30, 'stay': 0.45, 'lift': 0.15}
+"""Phases of the hoist as shares of the duration, in order; the rest of the time the load hangs."""
+
+TRIM_SHARES = (0.40, 0.70)
+"""Shares of the duration between which the start tilt is trimmed out: it begins after the first
+touch, so that the load touches with a corner or an edge and ends on a face."""
+
+_CORNERS = np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]], dtype=float)
+_ROPES = range(len(_CORNERS))
+
+
+@dataclass(frozen=True, kw_only=True)
+class CraneScenario:
+    """What hangs where, and how it is lowered. Lengths in m, angles in degrees, world frame.
+
+    size, stack_size -- full extents (length x, width y, height z) of the load and of the stack
+    mass             -- of the load, kg, spread evenly over its box
+    drop_position    -- x, y of the stack's centre; the stack stands on the ground, not turned
+    offset           -- x, y of the trolley from the stack's centre: the lateral error of the drop
+    rope_length      -- height of the trolley over the load's top once the load is down
+    rope_spread      -- spacing of the ropes at the trolley by their spacing at the load: 1 makes
+                        them parallel (the load sways level), 0 lets them meet in one point
+    rope_angle       -- the load is released at rest with its ropes this far from the plumb line
+    rope_heading     -- direction it is pulled aside to, counter-clockwise from x
+    pitch, roll      -- tilt at the start, about y and about x, held by unequal ropes
+    yaw              -- turn about the plumb line at the start
+    lowering_speed   -- top speed of the hoist, m/s; lifting uses it as well
+    overlap          -- depth to which the load, at rest and level, is lowered into the stack
+    duration         -- of the whole programme, s
+    """
+
+    size: tuple[float, float, float] = CONTAINER_40FT
+    stack_size: tuple[float, float, float] = CONTAINER_40FT
+    mass: float = 20_000.0
+    drop_position: tuple[float, float] = (0.0, 0.0)
+    offset: tuple[float, float] = (0.25, -0.15)
+    rope_length: float = 15.0
+    rope_spread: float = 0.8
+    rope_angle: float = 1.5
+    rope_heading: float = 35.0
+    pitch: float = 0.25
+    roll: float = -0.4
+    yaw: float = 0.6
+    lowering_speed: float = 0.3
+    overlap: float = 0.025
+    duration: float = 18.0
+
+    def __post_init__(self) -> None:
+        """Raise ValueError naming field and value if the scenario makes no sense."""
+        for field, length in (('size', 3), ('stack_size', 3), ('drop_position', 2), ('offset', 2)):
+            values = tuple(float(value) for value in getattr(self, field))
+            if len(values) != length or not all(map(math.isfinite, values)):
+                raise ValueError(f'{field} must be {length} finite numbers, got {values}')
+            if length == 3 and min(values) <= 0.0:
+                raise ValueError(f'{field} must be positive, got {values}')
+            object.__setattr__(self, field, values)
+        for field, low, high in (
+            ('mass', 1.0, 1e6),
+            ('rope_length', 1.0, 200.0),
+            ('rope_spread', 0.0, 1.0),
+            ('rope_angle', 0.0, 20.0),
+            ('rope_heading', -360.0, 360.0),
+            ('pitch', -10.0, 10.0),
+            ('roll', -10.0, 10.0),
+            ('yaw', -20.0, 20.0),
+            ('lowering_speed', 0.0, MAX_HOIST_SPEED),
+            ('overlap', -1e3, 1.0),
+            ('duration', 0.1, 86_400.0),
+        ):
+            value = float(getattr(self, field))
+            if not low <= value <= high:
+                raise ValueError(f'{field} must lie in [{low}, {high}], got {value}')
+            object.__setattr__(self, field, value)
+        if self.lowering_distance > 0.8 * self.rope_length:
+            # The trolley would be in the load's way before the ropes are paid out.
+            raise ValueError(
+                f'duration of {self.duration} s at lowering_speed {self.lowering_speed} m/s starts '
+                f'{self.lowering_distance:.2f} m up, too close to a trolley {self.rope_length} m up'
+            )
+
+    @classmethod
+    def drawn(cls, seed: int, **fixed) -> CraneScenario:
+        """Draw offset, angles and heading at random from `seed`; 0 gives the defaults.
+
+        Keywords in `fixed` are fields that are not drawn.
+        """
+        if seed == 0:
+            return cls(**fixed)
+        random = np.random.default_rng(seed)
+        drawn = {
+            'offset': tuple(random.uniform(-0.5, 0.5, 2)),
+            'rope_angle': random.uniform(1.0, 2.0),
+            'rope_heading': random.uniform(-180.0, 180.0),
+            'pitch': random.uniform(-0.3, 0.3),
+            'roll': random.uniform(-0.5, 0.5),
+            'yaw': random.uniform(-1.0, 1.0),
+        }
+        return cls(**(drawn | fixed))
+
+    @property
+    def lowering_distance(self) -> float:
+        """How far the hoist lowers the load, m; half the top speed is its mean speed."""
+        return 0.5 * self.lowering_speed * HOIST_SHARES['lower'] * self.duration
+
+    @property
+    def lifting_distance(self) -> float:
+        """How far the hoist lifts the load at the end, m."""
+        return 0.5 * self.lowering_speed * HOIST_SHARES['lift'] * self.duration
+
+    def hoist_height(self, time: float) -> float:
+        """Height of the load, level and at rest, over its lowest place, in m at `time` in s."""
+        hang, lower, stay, lift = (share * self.duration for share in HOIST_SHARES.values())
+        down = _ramp((time - hang) / lower)
+        up = _ramp((time - hang - lower - stay) / lift)
+        return self.lowering_distance * (1.0 - down) + self.lifting_distance * up
+
+    def trim(self, time: float) -> float:
+        """Share of the start tilt that the ropes still hold at `time` in s, 1 down to 0."""
+        start, end = (share * self.duration for share in TRIM_SHARES)
+        return 1.0 - _ramp((time - start) / (end - start))
+
+
+class Crane:
+    """The running simulation: load, stack and ropes, advanced by ticks of 1 / rate_hz seconds."""
+
+    def __init__(self, scenario: CraneScenario | None = None, rate_hz: float = 200.0) -> None:
+        """Build the model and put the load at its start; `rate_hz` is ticks per second."""
+        if not (math.isfinite(rate_hz) and rate_hz > 0.0):
+            raise ValueError(f'rate_hz must be positive, got {rate_hz}')
+        self.scenario = scenario = scenario or CraneScenario()
+        self._substeps = math.ceil(1.0 / (rate_hz * PHYSICS_STEP))
+        self._rate_hz = float(rate_hz)
+        self._ticks = 0
+        self._model = mujoco.MjModel.from_xml_string(_mjcf(scenario))
+        self._model.opt.timestep = 1.0 / (rate_hz * self._substeps)
+        self._data = mujoco.MjData(self._model)
+        self._load = self._model.body('load').id
+        self._stack_pose = _pose(
+            self._model.body('stack').pos.copy(), self._model.body('stack').quat.copy()
+        )
+        self._trims = self._start()
+
+    @property
+    def time(self) -> float:
+        """Simulated time since the start, s: whole ticks, so it does not drift."""
+        return self._ticks / self._rate_hz
+
+    @property
+    def load_pose(self) -> np.ndarray:
+        """Pose of the load's centre in the world frame, float64 (7,): x y z qx qy qz qw."""
+        return _pose(self._data.qpos[:3], self._data.qpos[3:])
+
+    @property
+    def stack_pose(self) -> np.ndarray:
+        """Pose of the stack's centre in the world frame, float64 (7,): x y z qx qy qz qw."""
+        return self._stack_pose.copy()
+
+    @property
+    def load_velocity(self) -> np.ndarray:
+        """Velocity of the load's centre and its angular velocity, world frame: (6,) m/s, rad/s."""
+        angular = np.empty(3)
+        # MuJoCo keeps a free joint's angular velocity in the body's own frame.
+        mujoco.mju_rotVecQuat(angular, self._data.qvel[3:], self._data.qpos[3:])
+        return np.concatenate([self._data.qvel[:3], angular])
+
+    @property
+    def rope_tensions(self) -> np.ndarray:
+        """Pull of the four ropes during the last physics step, N, 0 where slack: (4,).
+
+        Order: the corners (+x +y), (+x -y), (-x +y), (-x -y) of the load.
+        """
+        tensions = np.zeros(len(_CORNERS))
+        rows = self._data.efc_type == mujoco.mjtConstraint.mjCNSTR_LIMIT_TENDON
+        tensions[self._data.efc_id[rows]] = self._data.efc_force[rows]
+        return tensions
+
+    def step(self, force=None, torque=None) -> None:
+        """Advance one tick with a wrench held over it.
+
+        force  -- N, world frame, acting at the load's centre of mass: (3,), None for none
+        torque -- N m, world frame, about the load's centre of mass: (3,), None for none
+        """
+        self._data.xfrc_applied[self._load, :3] = 0.0 if force is None else force
+        self._data.xfrc_applied[self._load, 3:] = 0.0 if torque is None else torque
+        for substep in range(1, self._substeps + 1):
+            time = (self._ticks + substep / self._substeps) / self._rate_hz
+            self._set_ropes(self.scenario.hoist_height(time), self.scenario.trim(time))
+            mujoco.mj_step(self._model, self._data)
+        self._ticks += 1
+
+    def _start(self) -> np.ndarray:
+        """Put the load at its start and return each rope's extra length (4,) that holds its tilt.
+
+        Ropes whose spacing is `rope_spread` at the trolley turn the load by (1 - rope_spread) of
+        the angle they sway by. That rule is exact for spreads 0 and 1 and of first order between;
+        the height is then set so that the tightest rope is just taut.
+        """
+        scenario, trolley = self.scenario, np.array(self._model.body('trolley').pos)
+        drop = scenario.rope_length - scenario.lowering_distance
+        half_height = np.array([0.0, 0.0, 0.5 * scenario.size[2]])
+        angle, heading, pitch, roll, yaw = np.radians(
+            [scenario.rope_angle, scenario.rope_heading, scenario.pitch, scenario.roll,
+             scenario.yaw]
+        )
+        tilt = _turn('z', yaw) @ _turn('y', pitch) @ _turn('x', roll)
+
+        level = trolley - [0.0, 0.0, drop] - half_height
+        self._put(level, tilt)
+        lengths = self._data.ten_length.copy()
+        self._put(level, _turn('z', yaw))
+        trims = lengths - self._data.ten_length
+
+        # In the frame where x is the heading, the sway is a turn about -y.
+        sway = _turn('z', heading) @ _turn('y', -(1.0 - scenario.rope_spread) * angle)
+        sway = sway @ _turn('z', -heading)
+        aside = drop * np.array(
+            [math.sin(angle) * math.cos(heading), math.sin(angle) * math.sin(heading),
+             -math.cos(angle)]
+        )
+        centre = trolley + aside - sway @ half_height
+        self._trims = trims
+        self._set_ropes(scenario.lowering_distance, 1.0)
+        for _ in range(4):  # Newton on a nearly linear function: the rope's slope in z is near 1
+            self._put(centre, sway @ tilt)
+            centre[2] += np.max(self._data.ten_length - self._model.tendon_range[:, 1])
+        self._put(centre, sway @ tilt)
+        return trims
+
+    def _put(self, centre: np.ndarray, rotation: np.ndarray) -> None:
+        """Place the load at rest, its centre in the world frame, and update all derived values."""
+        self._data.qpos[:3] = centre
+        mujoco.mju_mat2Quat(self._data.qpos[3:], np.ascontiguousarray(rotation).ravel())
+        self._data.qvel[:] = 0.0
+        mujoco.mj_forward(self._model, self._data)
+
+    def _set_ropes(self, height: float, trim: float) -> None:
+        """Set the ropes' length limits for a level load `height` over its lowest place, m."""
+        scenario = self.scenario
+        drop = scenario.rope_length - height
+        inward = 0.5 * (1.0 - scenario.rope_spread) * math.hypot(*scenario.size[:2])
+        self._model.tendon_range[:, 1] = math.hypot(inward, drop) + trim * self._trims
+
+
+def _ramp(share: float) -> float:
+    """Rise from 0 to 1 over share 0 to 1, starting and ending with no speed and no jerk of it."""
+    share = min(max(share, 0.0), 1.0)
+    return share - math.sin(2.0 * math.pi * share) / (2.0 * math.pi)
+
+
+def _turn(axis: str, angle: float) -> np.ndarray:
+    """Rotation matrix (3, 3) about a coordinate axis by `angle` in rad."""
+    first, second = {'x': (1, 2), 'y': (2, 0), 'z': (0, 1)}[axis]
+    rotation = np.eye(3)
+    rotation[first, first] = rotation[second, second] = math.cos(angle)
+    rotation[second, first], rotation[first, second] = math.sin(angle), -math.sin(angle)
+    return rotation
+
+
+def _pose(position: np.ndarray, quaternion_wxyz: np.ndarray) -> np.ndarray:
+    """Turn MuJoCo's position and w x y z quaternion into x y z qx qy qz qw: the only place."""
+    return np.concatenate([position, quaternion_wxyz[1:], quaternion_wxyz[:1]])
+
+
+def _text(*numbers: float) -> str:
+    """Numbers for an MJCF attribute, in full precision."""
+    return ' '.join(repr(float(number)) for number in numbers)
+
+
+def _mjcf(scenario: CraneScenario) -> str:
+    """Return the scenario as a MuJoCo model: static trolley and stack, free load, four ropes."""
+    half, stack_half = np.array(scenario.size) / 2.0, np.array(scenario.stack_size) / 2.0
+    stack_centre = np.array([*scenario.drop_position, stack_half[2]])
+    lowest_top = 2.0 * stack_half[2] - scenario.overlap + 2.0 * half[2]
+    trolley = np.array([*(stack_centre[:2] + scenario.offset), lowest_top + scenario.rope_length])
+    holds = scenario.rope_spread * _CORNERS * half[:2]
+    corners = _CORNERS * half[:2]
+    newline = '\n'
+    trolley_sites = newline.join(
+        f'      <site name="hold_{i}" pos="{_text(*holds[i], 0.0)}"/>' for i in _ROPES
+    )
+    load_sites = newline.join(
+        f'      <site name="corner_{i}" pos="{_text(*corners[i], half[2])}"/>' for i in _ROPES
+    )
+    # The range's upper end is set by the hoist before every physics step.
+    tendons = newline.join(
+        f'    <spatial name="rope_{i}" limited="true" range="0 {_text(scenario.rope_length)}" '
+        f'solreflimit="{_text(-ROPE_STIFFNESS, -ROPE_DAMPING)}" '
+        f'solimplimit="{_text(ROPE_IMPEDANCE, ROPE_IMPEDANCE, 1.0)}">'
+        f'<site site="hold_{i}"/><site site="corner_{i}"/></spatial>' for i in _ROPES
+    )
+    return f"""
+<mujoco model="crane">
+  <option gravity="0 0 {_text(-GRAVITY)}" integrator="implicitfast"/>
+  <default>
+    <geom type="box" contype="0" conaffinity="0"/>
+  </default>
+  <worldbody>
+    <body name="trolley" pos="{_text(*trolley)}">
+{trolley_sites}
+    </body>
+    <body name="stack" pos="{_text(*stack_centre)}">
+      <geom size="{_text(*stack_half)}"/>
+    </body>
+    <body name="load" pos="{_text(*trolley[:2], lowest_top)}">
+      <freejoint/>
+      <geom size="{_text(*half)}" mass="{_text(scenario.mass)}"/>
+{load_sites}
+    </body>
+  </worldbody>
+  <tendon>
+{tendons}
+  </tendon>
+</mujoco>
+"""

@@ -1,0 +1,153 @@
+"""The demonstration: a contact node and a crane, two processes that talk over DDS.
+
+`python -m box_contact_ros.demo` starts both, shows the crane's live contacts and its summary, and
+ends both again, within a minute. They run in a ROS domain of their own on this host, so that
+nothing else hears them; the environment variable `BOX_CONTACT_DEMO_DOMAIN` chooses another one.
+The exit status is the crane's: 0 only if contacts came through and nothing was lost.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+
+from .crane import CONTAINER_40FT
+
+DOMAIN_VARIABLE = 'BOX_CONTACT_DEMO_DOMAIN'
+DOMAINS = range(1, 102)  # 0 is everybody's; beyond 101, ports run into those Linux hands out
+
+TIME_LIMIT = 58.0  # s for everything: a demo ends within a minute, whatever happens
+OVERHEAD = 8.0  # s of it for starting, for the last answers and for the summary
+END_PATIENCE = 2.0  # s between asking a process group to end and killing it
+
+NEXT = """
+Next:
+  python -m box_contact_ros                  lists all programs
+  python -m box_contact_ros contact_node --ros-args -p size_a:=[12.192,2.438,2.591] \\
+      -p size_b:=[12.192,2.438,2.591]        starts the node for your own box_a/pose, box_b/pose
+  README.md                                  topics, parameters, figures"""
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the demonstration and return the crane's exit status."""
+    options = _options(args)
+    env = os.environ | {
+        'ROS_DOMAIN_ID': str(options.domain),
+        'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
+    }
+    sizes = [f'{name}:=[{",".join(map(str, CONTAINER_40FT))}]' for name in ('size_a', 'size_b')]
+    model = [f'model:={options.model}'] if options.model else []
+    crane = [
+        f'duration:={options.duration}', f'rate:={options.rate}', 'report:=true',
+        f'wait:={TIME_LIMIT - OVERHEAD - options.duration}',
+    ]
+    print(f'A crane lowers one container onto another, {options.duration:g} s in real time; it '
+          f'publishes both poses at {options.rate:g} Hz.\nA contact node answers. Both are ROS 2 '
+          f'processes of their own, in domain {options.domain} on this host.', flush=True)
+    # SIGTERM and SIGHUP must end the children as well, so let them unwind like Ctrl-C does.
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, _exit_on_signal)
+    deadline = time.monotonic() + TIME_LIMIT
+    processes: list[subprocess.Popen] = []
+    with tempfile.TemporaryFile() as node_output:
+        try:
+            processes.append(_start('contact_node', sizes + model, env, node_output))
+            processes.append(_start('crane', sizes + crane, env, None))
+            status = _watch(*processes, deadline)
+        except KeyboardInterrupt:
+            return 128 + signal.SIGINT
+        finally:
+            _end(processes)
+        if status:
+            node_output.seek(0)
+            text = node_output.read().decode(errors='replace').rstrip()
+            print(f'demo: failed with status {status}; what contact_node printed:\n'
+                  f'{text or "(nothing)"}', file=sys.stderr)
+            return status
+    print(NEXT)
+    return 0
+
+
+def _options(args: Sequence[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog='python -m box_contact_ros.demo',
+        description='A contact node and a crane simulator, live in this terminal for less than a '
+                    'minute.',
+        epilog=f'{DOMAIN_VARIABLE}=N in the environment chooses the ROS domain, '
+               f'0 to {DOMAINS[-1]}; without it one is drawn at random.',
+    )
+    parser.add_argument('--model', help="the node's model of the contact point (default: the "
+                                        "node's own)")
+    parser.add_argument('--rate', type=float, default=200.0, metavar='HZ',
+                        help='pairs of poses a second (default: %(default)g)')
+    parser.add_argument('--duration', type=float, default=18.0, metavar='S',
+                        help='length of the motion, 1 to 40 s (default: %(default)g)')
+    options = parser.parse_args(args)
+    if not 1.0 <= options.duration <= 40.0:
+        parser.error(f'--duration must lie in 1 to 40 s, got {options.duration:g}')
+    if not 1.0 <= options.rate <= 2000.0:
+        parser.error(f'--rate must lie in 1 to 2000 Hz, got {options.rate:g}')
+    domain = os.environ.get(DOMAIN_VARIABLE, str(random.choice(DOMAINS)))
+    if not domain.isdecimal() or int(domain) > DOMAINS[-1]:
+        parser.error(f'{DOMAIN_VARIABLE} must be a number from 0 to {DOMAINS[-1]}, got {domain!r}')
+    options.domain = int(domain)
+    return options
+
+
+def _start(program: str, parameters: list[str], env: dict[str, str], output) -> subprocess.Popen:
+    """Start a program of this package in a process group of its own; `output` None passes it on."""
+    command = [sys.executable, '-m', 'box_contact_ros', program, '--ros-args']
+    for parameter in parameters:
+        command += ['-p', parameter]
+    return subprocess.Popen(command, env=env, stdin=subprocess.DEVNULL, stdout=output,
+                            stderr=subprocess.STDOUT if output else None, start_new_session=True)
+
+
+def _watch(node: subprocess.Popen, crane: subprocess.Popen, deadline: float) -> int:
+    """Wait for the crane's exit status; an early end of the node or the time limit is a 1."""
+    while (status := crane.poll()) is None:
+        if node.poll() is not None:
+            print(f'demo: contact_node ended early, status {node.returncode}', file=sys.stderr)
+            return 1
+        if time.monotonic() > deadline:
+            print(f'demo: not done within {TIME_LIMIT:g} s', file=sys.stderr)
+            return 1
+        time.sleep(0.05)
+    return status if status >= 0 else 128 - status
+
+
+def _end(processes: list[subprocess.Popen]) -> None:
+    """End whole process groups: ask first, then kill what is left of them."""
+    for process in processes:
+        _signal_group(process, signal.SIGTERM)
+    deadline = time.monotonic() + END_PATIENCE
+    for process in processes:
+        try:
+            process.wait(max(0.0, deadline - time.monotonic()))
+        except subprocess.TimeoutExpired:
+            pass
+        # Also where the first process is gone: children of its own may be left in the group.
+        _signal_group(process, signal.SIGKILL)
+        process.wait()
+
+
+def _signal_group(process: subprocess.Popen, number: signal.Signals) -> None:
+    try:
+        os.killpg(process.pid, number)
+    except ProcessLookupError:
+        pass  # nobody is left in it
+
+
+def _exit_on_signal(number: int, _frame) -> None:
+    sys.exit(128 + number)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

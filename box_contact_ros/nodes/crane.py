@@ -1,0 +1,223 @@
+"""The crane client: publishes both poses in real time and measures the contacts that come back.
+
+`box_a` is the load on the ropes, `box_b` the stack. The motion is open loop: contacts are recorded,
+not fed back. One thread simulates and publishes on an absolute schedule; the executor receives in
+the main thread. The exit status is 0 only if contacts came through and nothing was lost.
+"""
+
+from __future__ import annotations
+
+import gc
+import sys
+import threading
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import rclpy
+from geometry_msgs.msg import PointStamped, PoseStamped, Vector3Stamped
+from rclpy.context import Context
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
+from sensor_msgs.msg import PointCloud2
+
+from ..crane import Crane, CraneScenario
+from ..solver import ContactSolver
+from .crane_log import CraneLog, LiveReport, cloud_rows
+from .messages import NANOSECONDS
+from .parameters import Setting, answer_help, declare, flag, number, numbers, text
+from .runtime import REFUSALS, make_executor
+
+OFFER_PERIOD = 0.1  # s between the pairs that only ask whether anyone answers
+DRAIN = 1.0  # s of patience for the last answers
+
+STANDARD = CraneScenario()
+PARAMETERS = {
+    'rate': Setting(200.0, 'pairs of poses published per second [Hz]', number(1, 2000)),
+    'duration': Setting(18.0, 'length of the motion [s]', number(0.1, 86_400)),
+    'wait': Setting(10.0, 'patience for a contact node to answer [s]', number(0, 600)),
+    'frame_id': Setting('world', 'frame of the published poses', text),
+    'report': Setting(False, 'print live lines while in contact', flag),
+    'seed': Setting(0, '0: the standard scenario; n > 0: offset and angles drawn at random',
+                    number(0, 2**31)),
+    'size_a': Setting(STANDARD.size, 'full extents of the load [m]', numbers(3)),
+    'size_b': Setting(STANDARD.stack_size, 'full extents of the stack [m]', numbers(3)),
+    'offset': Setting(STANDARD.offset, 'x, y of the trolley from the centre of the stack [m]',
+                      numbers(2)),
+    'rope_angle': Setting(STANDARD.rope_angle, 'ropes from the plumb line at the start [deg]',
+                          number(0, 20)),
+    'pitch': Setting(STANDARD.pitch, 'tilt of the load about y at the start [deg]',
+                     number(-10, 10)),
+    'roll': Setting(STANDARD.roll, 'tilt of the load about x at the start [deg]', number(-10, 10)),
+    'yaw': Setting(STANDARD.yaw, 'turn of the load about the plumb line at the start [deg]',
+                   number(-20, 20)),
+    'lowering_speed': Setting(STANDARD.lowering_speed, 'top speed of the hoist [m/s]',
+                              number(0, 0.8)),
+    'overlap': Setting(STANDARD.overlap, 'depth to which the load is lowered into the stack [m]',
+                       number(-1000, 1)),
+}
+SCENARIO = {name: {'size_a': 'size', 'size_b': 'stack_size'}.get(name, name)
+            for name in PARAMETERS if name not in ('rate', 'wait', 'frame_id', 'report', 'seed')}
+"""Parameter: the field of CraneScenario that it sets."""
+
+
+class CraneNode(Node):
+    """Publishes the crane's poses and gathers the answers in a `CraneLog`."""
+
+    def __init__(self, context: Context, **options: Any) -> None:
+        """Read the parameters, compile the reference; `options` go to Node."""
+        super().__init__('crane', context=context, **options)
+        values = declare(self, PARAMETERS, fixed=True)
+        self.rate, self.wait = values['rate'], values['wait']
+        self.report, self.frame_id = values['report'], values['frame_id']
+        # With a seed, what the user left at its default is drawn.
+        given = {field: values[name] for name, field in SCENARIO.items()
+                 if not values['seed'] or values[name] != PARAMETERS[name].default}
+        self.scenario = CraneScenario.drawn(int(values['seed']), **given)
+        self.log = CraneLog()
+        self.stop = threading.Event()
+        self.solver = ContactSolver(self.scenario.size, self.scenario.stack_size, model='exact')
+        self.solver.batch(*[[[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]]] * 2)  # compile before the start
+
+        # Deep queues: what the DDS layer delivers while Python is busy must not push out the rest.
+        reliable = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
+        self._publishers_ab = [
+            self.create_publisher(PoseStamped, f'{box}/pose', reliable) for box in
+            ('box_a', 'box_b')
+        ]
+        self._answers = [
+            self.create_subscription(kind, topic, callback, reliable) for kind, topic, callback in (
+                (PointStamped, 'contact/point', self._on_point),
+                (Vector3Stamped, 'contact/normal', self._on_normal),
+                (PointCloud2, 'contacts', self._on_cloud),
+            )
+        ]
+
+    def unmatched(self) -> list[str]:
+        """Topics that have no counterpart yet."""
+        return [p.topic_name for p in self._publishers_ab if not p.get_subscription_count()] + [
+            s.topic_name for s in self._answers if not s.get_publisher_count()]
+
+    def await_answers(self) -> None:
+        """Offer the start poses until one pair is answered; raise TimeoutError after `wait` s.
+
+        Matched endpoints alone do not say that the other side has matched too, or spins already.
+        """
+        crane, deadline = Crane(self.scenario, self.rate), time.monotonic() + self.wait
+        while not self.log.offer_answered and not self.stop.is_set():
+            if time.monotonic() > deadline:
+                unmatched = ', '.join(self.unmatched())
+                what = f'nobody at the other end of {unmatched}' if unmatched else 'no answer'
+                raise TimeoutError(f'{what} within {self.wait:g} s; is a contact_node running?')
+            if not self.unmatched():
+                self._publish(crane, offer=True)
+            self.stop.wait(OFFER_PERIOD)
+
+    def lower(self) -> None:
+        """Run the whole motion in real time, then wait a moment for the last answers."""
+        crane = Crane(self.scenario, self.rate)
+        gc.collect()
+        gc.freeze()  # a full collection with Numba loaded would hold up the poses for 10 ms
+        start = time.perf_counter()
+        for tick in range(round(self.scenario.duration * self.rate)):
+            # The schedule is absolute: lateness of one tick is not handed on to the next.
+            if self.stop.wait(max(0.0, start + tick / self.rate - time.perf_counter())):
+                return
+            self._publish(crane)
+            crane.step()
+        deadline = time.monotonic() + DRAIN
+        while not self.log.complete() and time.monotonic() < deadline:
+            if self.stop.wait(0.02):
+                return
+
+    def _publish(self, crane: Crane, *, offer: bool = False) -> None:
+        """Publish both poses under one stamp, the node's clock now; note them beforehand."""
+        stamp = self.get_clock().now()
+        poses = crane.load_pose, crane.stack_pose
+        if offer:
+            self.log.offered(stamp.nanoseconds)
+        else:
+            self.log.sent(stamp.nanoseconds, *poses)
+        for publisher, values in zip(self._publishers_ab, poses, strict=True):
+            message = PoseStamped()
+            message.header.frame_id = self.frame_id
+            message.header.stamp = stamp.to_msg()
+            x, y, z, qx, qy, qz, qw = map(float, values)
+            position, orientation = message.pose.position, message.pose.orientation
+            position.x, position.y, position.z = x, y, z
+            orientation.x, orientation.y, orientation.z, orientation.w = qx, qy, qz, qw
+            publisher.publish(message)
+
+    def _on_point(self, message: PointStamped) -> None:
+        point = (message.point.x, message.point.y, message.point.z)
+        self.log.point(_stamp(message), point, self.get_clock().now().nanoseconds)
+
+    def _on_normal(self, message: Vector3Stamped) -> None:
+        normal = (message.vector.x, message.vector.y, message.vector.z)
+        self.log.normal(_stamp(message), normal, self.get_clock().now().nanoseconds)
+
+    def _on_cloud(self, message: PointCloud2) -> None:
+        self.log.cloud(_stamp(message), cloud_rows(message)['depth'])
+
+
+def _stamp(message: Any) -> int:
+    return message.header.stamp.sec * NANOSECONDS + message.header.stamp.nanosec
+
+
+def _spin(node: CraneNode, executor: Any, work: Callable[[], None]) -> None:
+    """Receive while `work` runs in a thread of its own; raise what it raises."""
+    live = LiveReport(node.log)
+    with ThreadPoolExecutor(max_workers=1) as pool:
+        future = pool.submit(work)
+        try:
+            while not future.done():
+                executor.spin_once(timeout_sec=0.05)
+                if not node.context.ok():  # SIGTERM; the executor may return without a word
+                    raise ExternalShutdownException
+                if node.report:
+                    live.update()
+        except BaseException:
+            node.stop.set()
+            raise
+    future.result()
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the crane once and return 0 only if contacts came through and nothing was lost."""
+    answer_help('crane', __doc__, PARAMETERS, args)
+    context, started, node, executor, signalled = Context(), False, None, None, 0
+    try:
+        # Handlers have to be asked for where the context is not the default one.
+        rclpy.init(args=args, context=context, signal_handler_options=SignalHandlerOptions.ALL)
+        started = True
+        node = CraneNode(context)
+        executor = make_executor(context)
+        executor.add_node(node)
+        _spin(node, executor, node.await_answers)
+        _spin(node, executor, node.lower)
+    except KeyboardInterrupt:
+        signalled = 130  # 128 + SIGINT, as shells report it
+    except Exception as error:
+        if started and not context.ok():
+            signalled = 143  # 128 + SIGTERM, which shuts the context down under whatever runs
+        elif isinstance(error, (*REFUSALS, TimeoutError)):
+            print(f'error: {error}', file=sys.stderr)
+            return 1
+        else:
+            raise
+    finally:
+        if executor is not None:
+            executor.shutdown()
+        if node is not None:
+            node.destroy_node()
+        context.try_shutdown()
+    if node is None or not node.log.exchanges:
+        return signalled
+    edge = min(max(node.scenario.size), max(node.scenario.stack_size))
+    summary = node.log.summary(node.solver, edge)
+    print(f'crane: {"interrupted" if signalled else "done"} after {summary.sent / node.rate:g} s '
+          f'of motion at {node.rate:g} Hz\n{summary}', flush=True)
+    return signalled or (0 if summary.passed else 1)

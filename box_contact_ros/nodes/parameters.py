@@ -1,0 +1,110 @@
+"""Node parameters as one table per node: declared, checked, and listed by `--help` from it.
+
+Parameters are declared with dynamic typing, because a plain declaration refuses `rate:=200` where
+200.0 is meant; the check of each setting says what is accepted instead.
+"""
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from rcl_interfaces.msg import ParameterDescriptor
+from rclpy.node import Node
+from rclpy.utilities import remove_ros_args
+
+Check = Callable[[str, Any], Any]
+"""From a parameter's name and value to the value as the node uses it; ValueError if it is wrong."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One parameter: its default, what it means (with its unit), and what is accepted."""
+
+    default: Any
+    description: str
+    check: Check
+
+
+def number(low: float, high: float) -> Check:
+    """A number within [low, high]; integers are as good as floats."""
+    def check(name: str, value: Any) -> float:
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            raise ValueError(f'{name} must be a number, not {value!r}')
+        if not low <= value <= high:
+            raise ValueError(f'{name} must lie within {low:g} and {high:g}, not {value:g}')
+        return float(value)
+    return check
+
+
+def numbers(count: int) -> Check:
+    """So many finite numbers."""
+    def check(name: str, value: Any) -> tuple[float, ...]:
+        try:
+            found = tuple(float(entry) for entry in value)
+        except (TypeError, ValueError):
+            found = ()
+        if len(found) != count or not all(map(math.isfinite, found)) or isinstance(value, str):
+            raise ValueError(f'{name} must be {count} finite numbers, not {value!r}')
+        return found
+    return check
+
+
+def text(name: str, value: Any) -> str:
+    """Any string."""
+    if not isinstance(value, str):
+        raise ValueError(f'{name} must be a string, not {value!r}')
+    return value
+
+
+def one_of(choices: Iterable[str]) -> Check:
+    """One of some strings."""
+    def check(name: str, value: Any) -> str:
+        if text(name, value) not in choices:
+            raise ValueError(f'{name} {value!r} is not one of: {", ".join(choices)}')
+        return value
+    return check
+
+
+def flag(name: str, value: Any) -> bool:
+    """true or false."""
+    if not isinstance(value, bool):
+        raise ValueError(f'{name} must be true or false, not {value!r}')
+    return value
+
+
+def declare(node: Node, settings: Mapping[str, Setting], *, fixed: bool = False,
+            ) -> dict[str, Any]:
+    """Declare and check a node's parameters; `fixed` ones cannot be changed while it runs."""
+    values = {}
+    for name, setting in settings.items():
+        default = list(setting.default) if isinstance(setting.default, tuple) else setting.default
+        values[name] = node.declare_parameter(name, default, ParameterDescriptor(
+            description=setting.description, dynamic_typing=True, read_only=fixed)).value
+    return checked(settings, values)
+
+
+def checked(settings: Mapping[str, Setting], values: Mapping[str, Any]) -> dict[str, Any]:
+    """All values as the node uses them; ValueError for the first that is wrong."""
+    return {name: setting.check(name, values[name]) for name, setting in settings.items()}
+
+
+def answer_help(program: str, doc: str | None, settings: Mapping[str, Setting],
+                args: Sequence[str] | None) -> None:
+    """Serve `--help`, and refuse whatever stands outside `--ros-args` (exit status 2)."""
+    width = max(map(len, settings))
+    lines = [f'  {name:<{width}}  {setting.description} (default: {_show(setting.default)})'
+             for name, setting in settings.items()]
+    parser = argparse.ArgumentParser(
+        prog=program, description=doc, formatter_class=argparse.RawDescriptionHelpFormatter,
+        usage=f'{program} [-h] [--ros-args -p NAME:=VALUE ... -r FROM:=TO ...]',
+        epilog='parameters (--ros-args -p NAME:=VALUE):\n' + '\n'.join(lines))
+    parser.parse_args(remove_ros_args(['', *(args or ())])[1:])
+
+
+def _show(default: Any) -> str:
+    if isinstance(default, tuple):
+        return '[' + ','.join(map(str, default)) + ']'
+    return str(default).lower() if isinstance(default, bool) else str(default) or 'none'

@@ -1,0 +1,160 @@
+"""The programs of this package, and the one way in which all of them are started.
+
+A program can be started in three ways, which behave alike because all three end in `run`:
+
+- `ros2 run box_contact_ros PROGRAM`   an entry point in lib/box_contact_ros (built with colcon)
+- `box_contact_PROGRAM`                an entry point in bin/ (installed with pip)
+- `python -m box_contact_ros PROGRAM`
+
+`PROGRAMS` is the only list of them. setup.py loads this file by its path, at a time when nothing
+but the standard library can be relied on, so import nothing else at the top of it.
+
+A program is a function `main(args=None) -> int` that returns the exit status. `args` is what
+stands after the program's name, in the manner of `sys.argv[1:]` (without the name), unchanged:
+`rclpy.init(args=args)` finds `--ros-args ...` in it, and `rclpy.utilities.remove_ros_args(args)`
+gives what is left for argparse.
+"""
+
+from __future__ import annotations
+
+import difflib
+import functools
+import importlib
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from types import SimpleNamespace
+
+
+@dataclass(frozen=True)
+class Program:
+    """Where a program is found, what it does, and which extras of setup.py it needs."""
+
+    target: str  # 'module:function'
+    description: str
+    extras: tuple[str, ...]
+
+
+PROGRAMS = {
+    'contact_node': Program(
+        'box_contact_ros.nodes.contact:main',
+        'the ROS 2 node: two box poses in, contact point and normal out',
+        ('ros',),
+    ),
+    'crane': Program(
+        'box_contact_ros.nodes.crane:main',
+        'a MuJoCo crane that lowers one container onto another and publishes both poses',
+        ('ros', 'sim'),
+    ),
+    'train': Program(
+        'box_contact_ros.training.train:main',
+        'make the data sets, fit the networks, write weights/',
+        ('train',),
+    ),
+    'paper': Program(
+        'box_contact_ros.report.paper:main',
+        "redo the source paper's tables, its figures beside ours",
+        ('report',),
+    ),
+}
+
+# What each extra brings, by top-level module. A module that is missing and not listed here is a
+# fault of the package, not of the user's installation, and keeps its traceback.
+MODULES_OF_EXTRA = {
+    'ros': (
+        'rclpy',
+        'builtin_interfaces',
+        'diagnostic_msgs',
+        'geometry_msgs',
+        'rcl_interfaces',
+        'sensor_msgs',
+        'std_msgs',
+    ),
+    'sim': ('mujoco', 'rich'),
+    'soup': ('fcl',),
+    'train': ('torch', 'tqdm'),
+    'report': ('matplotlib', 'tqdm'),
+}
+
+
+def run(name: str, args: Sequence[str]) -> int:
+    """Start program `name` with the arguments after its name; return its exit status.
+
+    A module that is missing because an extra was not installed is answered with one line on stderr
+    and status 1; a name that is no program with one line and status 2, as argparse does.
+    """
+    if name not in PROGRAMS:
+        print(_unknown(name), file=sys.stderr)
+        return 2
+    module, _, function = PROGRAMS[name].target.partition(':')
+    # argparse takes the program's name from here: the same one in usage lines, however started.
+    sys.argv = [name, *args]
+    try:
+        status = getattr(importlib.import_module(module), function)(list(args))
+    except ModuleNotFoundError as error:
+        message = _missing_module(name, error.name or '')
+        if message is None:
+            raise
+        print(message, file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        return 130  # what a shell reports for a program ended by Ctrl-C
+    return int(status or 0)
+
+
+def usage() -> str:
+    """Return the help text: how to start a program, and all of them with their descriptions."""
+    width = max(map(len, PROGRAMS))
+    lines = [f'  {name:<{width}}  {program.description}' for name, program in PROGRAMS.items()]
+    return '\n'.join(
+        [
+            'usage: python -m box_contact_ros PROGRAM [ARGUMENT ...]',
+            '',
+            'programs:',
+            *lines,
+            '',
+            'The same programs start as `box_contact_PROGRAM` where this package was installed',
+            'with pip, and as `ros2 run box_contact_ros PROGRAM` where it was built with colcon.',
+        ]
+    )
+
+
+def entry_points(prefix: str = '') -> list[str]:
+    """Return the console scripts as setup.py wants them, each name with `prefix` before it."""
+    return [f'{prefix}{name} = box_contact_ros.programs:start.{name}' for name in PROGRAMS]
+
+
+def _from_command_line(name: str) -> int:
+    return run(name, sys.argv[1:])
+
+
+# What the console scripts call. A generated script can pass no arguments, so there is a callable
+# per program; the name does not come from sys.argv[0], which a link or a copy would change.
+start = SimpleNamespace(
+    **{name: functools.partial(_from_command_line, name) for name in PROGRAMS}
+)
+
+
+def _unknown(name: str) -> str:
+    close = difflib.get_close_matches(name, PROGRAMS, n=3)
+    hint = f'did you mean {" or ".join(close)}?' if close else f'one of {", ".join(PROGRAMS)}'
+    return f'box_contact_ros: there is no program {name!r}: {hint}'
+
+
+def _missing_module(name: str, module: str) -> str | None:
+    top_level = module.partition('.')[0]
+    bring_it = [extra for extra, modules in MODULES_OF_EXTRA.items() if top_level in modules]
+    if not bring_it:
+        return None
+    # All extras of the program at once: naming only the missing one would make the user fail twice.
+    extras = list(PROGRAMS[name].extras)
+    if not set(extras) & set(bring_it):
+        extras.append(bring_it[0])
+    listed = ','.join(extras)
+    text = (
+        f'box_contact_ros: {name} needs the Python module {module!r}, which is not installed: '
+        f"pip install 'box_contact_ros[{listed}]' (in a checkout: pip install -e '.[{listed}]')"
+    )
+    if 'ros' in bring_it:
+        text += ', or apt install ros-jazzy-ros-base and source /opt/ros/jazzy/setup.bash'
+    return text

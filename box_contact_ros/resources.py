@@ -1,0 +1,62 @@
+"""Where the package's data files are: weights/, msg_schemas/, launch/, config/.
+
+These folders stand at the top level of the repository, beside the Python package and not inside
+it, so `importlib.resources` does not see them. Every kind of install puts them somewhere else:
+
+    checkout, pip install -e, colcon --symlink-install   beside the package
+    pip install, apt                                     PREFIX/share/box_contact_ros
+    colcon build                                         WORKSPACE/install/.../share/...
+
+This is the one place that knows; everything else asks `resource_path`.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+_PACKAGE = Path(__file__).resolve().parent
+_SHARE = Path('share', 'box_contact_ros')
+
+
+def resource_path(*parts: str) -> Path:
+    """Return the path of a data file or folder: `resource_path('weights', 'x.safetensors')`.
+
+    The first place that has it wins: the checkout, the prefix this package was installed into,
+    the ament prefixes (`AMENT_PREFIX_PATH`), Python's own prefix. `FileNotFoundError` names all of
+    them when none has it.
+    """
+    if not parts or Path(parts[0]).is_absolute():
+        raise ValueError(f'resource_path: a path below the data folders is needed, got {parts!r}')
+    looked_at = []
+    for root in _roots():
+        path = root.joinpath(*parts)
+        if path.exists():
+            return path
+        if path not in looked_at:
+            looked_at.append(path)
+    raise FileNotFoundError(
+        f'box_contact_ros has no {os.path.join(*parts)}; looked at:'
+        + ''.join(f'\n  {path}' for path in looked_at)
+    )
+
+
+def _roots() -> Iterator[Path]:
+    # package.xml tells a checkout from site-packages, where `weights` or `config` may well be
+    # another project's package.
+    checkout = _PACKAGE.parent
+    if (checkout / 'package.xml').is_file():
+        yield checkout
+    # The prefix this very package was installed into, four levels up from
+    # PREFIX/lib/python3.x/site-packages/box_contact_ros (one for `pip install --target`). It comes
+    # before the ament prefixes: an overlay of another version must not lend us its weights. It also
+    # serves a colcon or --user install whose environment has not been sourced.
+    for parent in list(_PACKAGE.parents)[:4]:
+        if (parent / _SHARE).is_dir():
+            yield parent / _SHARE
+    for prefix in os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep):
+        if prefix:
+            yield Path(prefix) / _SHARE
+    yield Path(sys.prefix) / _SHARE

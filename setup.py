@@ -1,0 +1,92 @@
+"""Build and installation, for colcon (ROS 2 workspaces) and for pip alike."""
+
+import os
+import runpy
+import sys
+from pathlib import Path
+
+from setuptools import Distribution, find_packages, setup
+
+NAME = 'box_contact_ros'
+
+# Not imported from the package: its __init__.py needs what is only about to be installed.
+programs = runpy.run_path(str(Path(__file__).with_name(NAME) / 'programs.py'))
+
+# colcon (like bloom's Debian packages) runs `setup.py install|develop` and wants programs in
+# lib/box_contact_ros, each under its bare name for `ros2 run`: setup.cfg says where. pip and other
+# PEP 517 front ends have no such folder; there they land in bin/, among the programs of all other
+# packages, hence the prefix. Told apart by the caller: PEP 517 comes through this module of
+# setuptools, and pip sets this variable for everything it builds, its old `setup.py develop` too.
+BY_PIP = 'setuptools.build_meta' in sys.modules or 'PIP_BUILD_TRACKER' in os.environ
+
+
+class PipDistribution(Distribution):
+    """Leaves out the places that setup.cfg sets for the programs of an ament_python package.
+
+    Without it `pip install -e` (up to pip 25.2) would follow them too, into VENV/lib/, where no
+    shell finds the programs.
+    """
+
+    def parse_config_files(self, *args, **kwargs):
+        super().parse_config_files(*args, **kwargs)
+        self.get_option_dict('develop').pop('script_dir', None)
+        self.get_option_dict('install').pop('install_scripts', None)
+
+
+def data_files() -> list[tuple[str, list[str]]]:
+    """Return what goes to share/: the ament index marker, package.xml, the data folders."""
+    share = f'share/{NAME}'
+    files = {
+        'share/ament_index/resource_index/packages': [f'resource/{NAME}'],
+        share: ['package.xml'],
+    }
+    for folder in ('weights', 'msg_schemas', 'launch', 'config'):
+        for path in sorted(Path(folder).rglob('*')):
+            # is_file() also drops links that colcon --symlink-install left to deleted files.
+            if path.is_file() and '__pycache__' not in path.parts:
+                files.setdefault(f'{share}/{path.parent.as_posix()}', []).append(path.as_posix())
+    return list(files.items())
+
+
+setup(
+    name=NAME,
+    version='0.1.0',
+    description='ROS 2 node that answers, for every pair of box poses, with one contact point and '
+    'one normal: exact separating-axis test, then a small neural network',
+    maintainer='The box_contact_ros maintainers',
+    maintainer_email='maintainers@box-contact-ros.org',
+    license='Apache-2.0',
+    packages=find_packages(exclude=['test', 'test.*']),
+    package_data={NAME: ['py.typed']},
+    data_files=data_files(),
+    entry_points={'console_scripts': programs['entry_points']('box_contact_' if BY_PIP else '')},
+    distclass=PipDistribution if BY_PIP else Distribution,
+    zip_safe=False,
+    python_requires='>=3.10',
+    install_requires=['numba', 'numpy', 'pyyaml', 'safetensors'],
+    # Kept apart, so that a user with an apt-installed ROS never gets the ROS wheels, and nobody
+    # gets torch by only wanting contacts.
+    extras_require={
+        'ros': [
+            'ros-jazzy-common-interfaces',
+            'ros-jazzy-rclpy',
+            'ros-jazzy-rmw-fastrtps-cpp',
+        ],
+        'sim': ['mujoco', 'rich'],
+        'soup': ['python-fcl'],
+        'train': ['torch==2.13.0', 'tqdm'],
+        'report': ['matplotlib', 'tqdm'],
+        # colcon test looks for pytest in here, and runs nothing without it.
+        'test': [
+            'catkin-pkg',
+            'gmpy2',
+            'hypothesis',
+            'jsonschema',
+            'mpmath',
+            'pytest',
+            'pytest-timeout',
+            'pytest-xdist',
+            'ruff',
+        ],
+    },
+)

@@ -1,0 +1,141 @@
+"""A client for tests: publishes pose pairs, keeps every message that comes back, by stamp."""
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from threading import Event, Thread
+from typing import Any
+
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PointStamped, PoseStamped, Vector3Stamped
+from rclpy.context import Context
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from sensor_msgs.msg import PointCloud2
+
+from box_contact_ros.nodes.messages import NANOSECONDS, make_header
+from box_contact_ros.nodes.runtime import make_executor
+
+MATCH_SECONDS = 15.0
+"""Discovery takes a fraction of a second, up to ten on a busy machine."""
+
+
+def stamp_of(message: Any) -> int:
+    return message.header.stamp.sec * NANOSECONDS + message.header.stamp.nanosec
+
+
+class Client:
+    """Talks to a contact node under `namespace` (like '' or '/yard')."""
+
+    def __init__(self, namespace: str = '') -> None:
+        self.context = Context()
+        rclpy.init(context=self.context)
+        self.node = Node('client', context=self.context, namespace=namespace or '/')
+        self.executor = make_executor(self.context)
+        self.executor.add_node(self.node)
+        self.points: dict[int, PointStamped] = {}
+        self.normals: dict[int, Vector3Stamped] = {}
+        self.clouds: dict[int, PointCloud2] = {}
+        self.order: list[tuple[str, int]] = []
+        self.diagnostics: list[DiagnosticArray] = []
+        deep = QoSProfile(depth=10_000)
+        self.publishers = [
+            self.node.create_publisher(PoseStamped, f'box_{box}/pose', deep) for box in 'ab']
+        for kind, topic, kept in ((PointStamped, 'contact/point', self.points),
+                                  (Vector3Stamped, 'contact/normal', self.normals),
+                                  (PointCloud2, 'contacts', self.clouds)):
+            self.node.create_subscription(kind, topic, self._keep(topic, kept), deep)
+        self.node.create_subscription(DiagnosticArray, '/diagnostics',
+                                      self.diagnostics.append, 10)
+        self._stamp = 0
+
+    def _keep(self, topic: str, kept: dict[int, Any]) -> Callable[[Any], None]:
+        def callback(message: Any) -> None:
+            kept[stamp_of(message)] = message
+            self.order.append((topic, stamp_of(message)))
+        return callback
+
+    def next_stamp(self) -> int:
+        """A stamp [ns] later than any before."""
+        self._stamp = max(self._stamp + 1, time.time_ns())
+        return self._stamp
+
+    def send(self, pose_a: Any, pose_b: Any, *, frames: tuple[str, str] = ('map', 'map'),
+             stamps: tuple[int, int] | None = None) -> int:
+        """Publish a pair (or, for None, one box only); returns the stamp [ns]."""
+        stamp = self.next_stamp()
+        for publisher, pose, frame, own in zip(self.publishers, (pose_a, pose_b), frames,
+                                               stamps or (stamp, stamp)):
+            if pose is None:
+                continue
+            message = PoseStamped(header=make_header(own, frame))
+            p, q = message.pose.position, message.pose.orientation
+            p.x, p.y, p.z, q.x, q.y, q.z, q.w = (float(value) for value in pose)
+            publisher.publish(message)
+        return max(stamps) if stamps else stamp
+
+    def spin(self, done: Callable[[], bool], timeout: float) -> bool:
+        """Serve until `done()` or the time is over; returns done()."""
+        deadline = time.monotonic() + timeout
+        while not done() and time.monotonic() < deadline:
+            self.executor.spin_once(timeout_sec=0.01)
+        return done()
+
+    def offer_until_answered(self, pose_a: Any, pose_b: Any,
+                             timeout: float = MATCH_SECONDS) -> float:
+        """Send a pair every 50 ms until one is answered: both sides have matched. Seconds taken."""
+        started = time.monotonic()
+        offered: list[int] = []
+        while not any(stamp in self.clouds for stamp in offered):
+            assert time.monotonic() - started < timeout, 'no answer'
+            offered.append(self.send(pose_a, pose_b))
+            self.spin(lambda: offered[-1] in self.clouds, 0.05)
+        # Late answers to offers must not be mistaken for answers to what comes.
+        self.spin(lambda: False, 0.2)
+        return time.monotonic() - started
+
+    def ask(self, pose_a: Any, pose_b: Any, **options: Any) -> int:
+        """Send a pair and wait for its cloud; returns the stamp."""
+        stamp = self.send(pose_a, pose_b, **options)
+        assert self.spin(lambda: stamp in self.clouds, 5.0), 'no answer'
+        return stamp
+
+    def diagnostic(self, key: str, timeout: float = 5.0) -> str:
+        """Value of a key in a diagnostic that was sent after this call."""
+        seen = len(self.diagnostics)
+        assert self.spin(lambda: len(self.diagnostics) > seen + 1, timeout), 'no diagnostics'
+        values = {entry.key: entry.value for entry in self.diagnostics[-1].status[0].values}
+        return values.get(key, '')
+
+    def close(self) -> None:
+        self.executor.shutdown()
+        self.node.destroy_node()
+        self.context.try_shutdown()
+
+
+@contextmanager
+def serving(make_node: Callable[[Context], Node]) -> Iterator[Node]:
+    """A node of the package in this process, served by a thread, with a context of its own."""
+    context = Context()
+    rclpy.init(context=context)
+    node = make_node(context)
+    executor = make_executor(context)
+    executor.add_node(node)
+    stop = Event()
+
+    def serve() -> None:
+        while not stop.is_set():
+            executor.spin_once(timeout_sec=0.05)
+
+    thread = Thread(target=serve)
+    thread.start()
+    try:
+        yield node
+    finally:
+        stop.set()
+        thread.join(10)
+        executor.shutdown()
+        node.destroy_node()
+        context.try_shutdown()

@@ -1,0 +1,235 @@
+"""The crane's book-keeping, without ROS: every planted fault shows up in the summary."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from box_contact_ros.nodes.crane_log import CraneLog, LiveReport, cloud_rows, live_line
+
+MS = 1_000_000  # ns
+START = 1_700_000_000_000_000_000  # ns: stamps as large as real ones
+EDGE = 12.192
+STACK = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+
+
+class FloorSolver:
+    """A reference that can be worked out by hand: contact where the load's z is not positive.
+
+    The point is the load's position, the normal is straight down, the depth is -z.
+    """
+
+    def batch(self, poses_a: np.ndarray, poses_b: np.ndarray) -> SimpleNamespace:
+        """Answer poses (n, 7)."""
+        assert poses_a.shape == poses_b.shape == (len(poses_a), 7)
+        colliding = poses_a[:, 2] <= 0.0
+        nothing = np.where(colliding, 0.0, np.nan)[:, None]
+        return SimpleNamespace(
+            colliding=colliding, separation=poses_a[:, 2], point=poses_a[:, :3] + nothing,
+            normal=np.array([0.0, 0.0, -1.0]) + nothing,
+        )
+
+
+def pose(tick: int) -> np.ndarray:
+    """The load at `tick`: above the floor for 50 ticks, then 1 mm deeper with every tick."""
+    return np.array([0.01 * tick, 2.0, 1e-3 * (50 - tick), 0.0, 0.0, 0.0, 1.0])
+
+
+def play(log: CraneLog, ticks: int = 150, *, lost: tuple = (), late: tuple = (), delay: int = MS,
+         shift=(0.0, 0.0, 0.0), normal=(0.0, 0.0, -1.0)) -> None:
+    """Send `ticks` pairs and answer them rightly, but for what is planted.
+
+    lost  -- (tick, message) that do not arrive; a message is 'cloud', 'point' or 'normal'
+    late  -- ticks whose normal arrives after 20 ms instead of `delay` ns
+    shift -- added to every point, m
+    """
+    for tick in range(ticks):
+        stamp, load = START + 5 * MS * tick, pose(tick)
+        log.sent(stamp, load, STACK)
+        touching = load[2] <= 0.0
+        if touching and (tick, 'point') not in lost:
+            log.point(stamp, load[:3] + shift, stamp + delay // 2)
+        if touching and (tick, 'normal') not in lost:
+            log.normal(stamp, normal, stamp + (20 * MS if tick in late else delay))
+        if (tick, 'cloud') not in lost:
+            log.cloud(stamp, [-load[2]] if touching else [])
+
+
+def test_a_faultless_run_passes():
+    """150 pairs, 100 of them in contact, all answered after 1 ms, the later of the two counts."""
+    log = CraneLog()
+    play(log)
+    assert log.complete()
+    summary = log.summary(FloorSolver(), EDGE)
+    assert summary.passed
+    assert (summary.sent, summary.evaluated, summary.contacts, summary.lost) == (150, 150, 100, 0)
+    assert summary.wrong_verdicts == 0
+    assert summary.latency_p50 == pytest.approx(1e-3, abs=1e-12)
+    assert summary.latency_p99 == pytest.approx(1e-3, abs=1e-12)
+    assert summary.point_error_p99 == 0.0
+    assert summary.normal_error_p99 == 0.0
+
+
+@pytest.mark.parametrize('lost, evaluations, contacts', [
+    ([(10, 'cloud')], 1, 0),
+    ([(100, 'point')], 0, 1),
+    ([(100, 'normal')], 0, 1),
+    ([(100, 'point'), (100, 'normal')], 0, 1),
+    ([(10, 'cloud'), (60, 'cloud'), (100, 'normal')], 2, 1),
+])
+def test_planted_loss_is_counted(lost, evaluations, contacts):
+    """A pair without its cloud is a lost evaluation, a row without its messages a lost contact."""
+    log = CraneLog()
+    play(log, lost=tuple(lost))
+    assert not log.complete()
+    summary = log.summary(FloorSolver(), EDGE)
+    assert (summary.lost_evaluations, summary.lost_contacts) == (evaluations, contacts)
+    assert summary.lost == evaluations + contacts
+    assert not summary.passed
+    assert f'{summary.lost} ({evaluations} evaluations, {contacts} contacts)' in str(summary)
+
+
+def test_planted_late_answers_move_p99_and_not_p50():
+    """3 of 100 normals come 20 ms after the stamp: p99 is 20 ms, p50 stays 1 ms."""
+    log = CraneLog()
+    play(log, late=(80, 90, 100))
+    summary = log.summary(FloorSolver(), EDGE)
+    assert summary.latency_p50 == pytest.approx(1e-3, abs=1e-12)
+    assert summary.latency_p99 == pytest.approx(20e-3, abs=1e-12)
+    assert summary.passed, 'late is not lost'
+
+
+def test_planted_point_shift_shows_in_metres_and_in_percent():
+    """A shift of (3, 0, 4) cm is an error of 5 cm, 0.41 % of an edge of 12.192 m."""
+    log = CraneLog()
+    play(log, shift=np.array([0.03, 0.0, 0.04]))
+    summary = log.summary(FloorSolver(), EDGE)
+    assert summary.point_error_median == pytest.approx(0.05, abs=1e-12)
+    assert summary.point_error_p99 == pytest.approx(0.05, abs=1e-12)
+    assert 'median 50 mm = 0.41 %' in str(summary)
+
+
+@pytest.mark.parametrize('degrees', [1e-6, 2.0, 180.0])
+def test_planted_normal_turn_shows_in_degrees(degrees):
+    """Normals turned about y by an angle err by that angle, a tiny one and a flip included."""
+    turn = math.radians(degrees)
+    log = CraneLog()
+    play(log, normal=(math.sin(turn), 0.0, -math.cos(turn)))
+    summary = log.summary(FloorSolver(), EDGE)
+    assert summary.normal_error_median == pytest.approx(degrees, rel=1e-6)
+
+
+@pytest.mark.parametrize('tick, depths', [(10, [0.01]), (100, [])])
+def test_a_wrong_verdict_is_counted(tick, depths):
+    """Contact claimed in the air, or none inside the floor: one wrong verdict each."""
+    log = CraneLog()
+    play(log, lost=((tick, 'cloud'), (tick, 'point'), (tick, 'normal')))
+    log.cloud(START + 5 * MS * tick, depths)
+    summary = log.summary(FloorSolver(), EDGE)
+    assert summary.wrong_verdicts == 1
+    assert not summary.passed
+
+
+def test_a_point_in_the_air_is_a_wrong_verdict_without_an_error():
+    """A point and a normal where there is no contact count as wrong and spoil no percentile."""
+    log = CraneLog()
+    play(log)
+    log.point(START + 5 * MS * 10, (1.0, 2.0, 3.0), START + 51 * MS)
+    log.normal(START + 5 * MS * 10, (1.0, 0.0, 0.0), START + 51 * MS)
+    summary = log.summary(FloorSolver(), EDGE)
+    assert summary.wrong_verdicts == 1
+    assert summary.point_error_p99 == 0.0
+    assert not summary.passed
+
+
+def test_a_row_of_nan_is_no_answer():
+    """A cloud that says "could not be evaluated" fails the run, and is no verdict nor a loss."""
+    log = CraneLog()
+    play(log, lost=((100, 'cloud'), (100, 'point'), (100, 'normal')))
+    log.cloud(START + 5 * MS * 100, [math.nan])
+    summary = log.summary(FloorSolver(), EDGE)
+    assert (summary.not_evaluated, summary.evaluated, summary.lost) == (1, 149, 0)
+    assert summary.wrong_verdicts == 0
+    assert log.complete()
+    assert not summary.passed
+
+
+def test_answers_to_no_pose_are_counted_but_not_those_to_offers():
+    """An unknown stamp is a stranger; a pair offered before the run asks for an answer only."""
+    log = CraneLog()
+    log.offered(START - MS)
+    assert not log.offer_answered
+    log.cloud(START - MS, [])
+    assert log.offer_answered
+    play(log)
+    assert log.summary(FloorSolver(), EDGE).passed
+    log.point(START + 1, (0.0, 0.0, 0.0), START + MS)
+    summary = log.summary(FloorSolver(), EDGE)
+    assert (summary.strangers, summary.sent) == (1, 150)
+    assert not summary.passed
+
+
+@pytest.mark.parametrize('ticks', [0, 20])
+def test_without_contacts_a_run_fails(ticks):
+    """Nothing sent, or nothing touched: the summary still prints, and it is no success."""
+    log = CraneLog()
+    play(log, ticks=ticks)
+    summary = log.summary(FloorSolver(), EDGE)
+    assert (summary.sent, summary.contacts, summary.lost) == (ticks, 0, 0)
+    assert math.isnan(summary.latency_p50)
+    assert not summary.passed
+    assert 'nan' not in str(summary)
+
+
+@pytest.mark.parametrize('order', ['<', '>'])
+def test_a_cloud_is_read_by_its_field_names(order):
+    """Fields may come in any order, with padding, in either byte order; float64 stays exact."""
+    layout = np.dtype({
+        'names': ['pair', 'depth', 'x'], 'formats': [order + 'u4', order + 'f8', order + 'f8'],
+        'offsets': [0, 8, 24], 'itemsize': 40,
+    })
+    rows = np.zeros(2, dtype=layout)
+    rows['pair'], rows['depth'], rows['x'] = [7, 9], [0.01, math.nan], [4_000_000.123456789, 1.0]
+    cloud = SimpleNamespace(
+        is_bigendian=order == '>', point_step=40, width=2, height=1, data=rows.tobytes(),
+        fields=[SimpleNamespace(name='pair', offset=0, datatype=6),
+                SimpleNamespace(name='depth', offset=8, datatype=8),
+                SimpleNamespace(name='x', offset=24, datatype=8)],
+    )
+    read = cloud_rows(cloud)
+    assert read['pair'].tolist() == [7, 9]
+    assert read['depth'][0] == 0.01 and math.isnan(read['depth'][1])
+    assert read['x'][0] == 4_000_000.123456789
+
+
+def test_an_empty_cloud_has_no_rows():
+    """Width 0 says: evaluated, no contact."""
+    cloud = SimpleNamespace(
+        is_bigendian=False, point_step=60, width=0, height=1, data=b'',
+        fields=[SimpleNamespace(name='depth', offset=48, datatype=8)],
+    )
+    assert cloud_rows(cloud)['depth'].size == 0
+
+
+def test_a_live_line_has_millimetres_and_no_minus_zero():
+    """A separation of -1.5 cm prints as -15 mm; a normal of -1e-9 prints as 0."""
+    line = live_line(12.345, -0.015, (1.0, 2.0, 3.0), (-1e-9, 0.0, -1.0))
+    assert line.split() == [
+        '12.35', '-15.000', '1.0000', '2.0000', '3.0000', '0.00000', '0.00000', '-1.00000']
+
+
+def test_the_live_report_prints_the_newest_contact_once(capsys):
+    """A header, one line for the newest contact in full, and nothing while nothing is new."""
+    log = CraneLog()
+    report = LiveReport(log)
+    report.update()
+    play(log, lost=((149, 'normal'),))
+    report.update()
+    report.update()
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) == 3
+    # Tick 148 is 98 mm deep, 148 * 5 ms after the start.
+    assert lines[2].split()[:2] == ['0.74', '-98.000']

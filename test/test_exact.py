@@ -1,0 +1,101 @@
+"""Model `exact` against the 60-digit oracle: 10,000 random and near-parallel pairs."""
+from __future__ import annotations
+
+import mpmath as mp
+import numpy as np
+import oracle
+import poses
+import pytest
+
+from box_contact_ros import ContactSolver
+
+CHUNK = 500
+SOLVER = ContactSolver((1, 1, 1), (1, 1, 1), model='exact')
+FAMILIES = {'random': poses.random_pairs, 'near-parallel': poses.near_parallel_pairs}
+
+
+@pytest.mark.parametrize('chunk', range(10))
+@pytest.mark.parametrize('family', FAMILIES)
+def test_agrees_with_the_oracle(family, chunk):
+    """Verdict beyond 1e-12·size; depth and axis to 1e-12·size; centroid to
+    max(1e-9, 1e-14·size/depth)·size."""
+    rng = np.random.default_rng([2026, chunk])
+    a, b, size_a, size_b = FAMILIES[family](rng, CHUNK)
+    found = SOLVER.batch(a, b, size_a=size_a, size_b=size_b)
+    assert 0.2 < found.colliding.mean() < 0.9  # both verdicts are really tested
+    for i in range(CHUNK):
+        size = max(size_a[i].max(), size_b[i].max())
+        box_a, box_b = oracle.make_box(a[i], size_a[i]), oracle.make_box(b[i], size_b[i])
+        gaps = oracle.axis_gaps(box_a, box_b)
+        separation = max(gap for _, _, gap in gaps)
+        where = f'{family}[{chunk}][{i}]: {a[i].tolist()}, {b[i].tolist()}'
+        assert abs(float(separation - float(found.separation[i]))) <= 1e-12 * size, where
+        if abs(separation) > 1e-12 * size:
+            assert found.colliding[i] == (separation < 0), where
+        if not found.colliding[i]:
+            assert np.isnan(found.normal[i]).all() and np.isnan(found.point[i]).all(), where
+            continue
+        # The normal is one of the axes whose gap is within 1e-12·size of the largest.
+        best = [oracle.as_array(axis) for _, axis, gap in gaps if gap >= separation - 1e-12 * size]
+        assert min(np.abs(axis - found.normal[i]).max() for axis in best) < 1e-9, where
+        assert abs(np.linalg.norm(found.normal[i]) - 1) < 1e-14, where
+        axis = tuple(mp.mpf(float(v)) for v in found.normal[i])
+        point = oracle.as_array(oracle.contact_point(box_a, box_b, axis, -separation, size))
+        depth = max(-float(separation), 1e-9 * size)
+        bound = max(1e-9, 1e-14 * size / depth) * size
+        assert np.abs(point - found.point[i]).max() <= bound, where
+
+
+@pytest.mark.parametrize('gap', [-0.1, -0.01, -1e-3, -1e-6, -1e-9])
+@pytest.mark.parametrize('shift', [(0.0, 0.0), (6.096, 0.0), (0.0, 1.219), (6.096, 1.219)])
+def test_flush_containers(gap, shift):
+    """A container on another, sides exactly in one plane (or half overhanging): the middle of the
+    patch, at half the depth. Counting a shared side twice would move it."""
+    length, width, height = poses.CONTAINER
+    solver = ContactSolver(poses.CONTAINER, poses.CONTAINER)
+    contact = solver(poses.IDENTITY, (*shift, height + gap, 0, 0, 0, 1))
+    assert contact.colliding
+    assert contact.separation == pytest.approx(gap, abs=1e-14)
+    assert contact.normal.tolist() == [0, 0, 1]
+    assert contact.point == pytest.approx(
+        (shift[0] / 2, shift[1] / 2, (height + gap) / 2), abs=1e-6 * 1e-9 / -gap + 1e-12)
+
+
+def test_vertex_on_face_at_touch_is_the_vertex():
+    """One vertex exactly on a face: the paper's impact point, to the pressing depth 1e-9·size."""
+    a = np.array([0.0, 0, 0, 0, 0, 0, 1])
+    turn = poses.small_rotations(np.array([[1.0, -0.7, 0.2]]), np.array([0.6]))
+    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
+    turned = poses.rotate(np.tile(turn, (8, 1)), corners)
+    lowest = turned[np.argmin(turned[:, 2])]
+    b = np.concatenate([np.array([0.3, -0.2, 1.0]) - lowest, turn[0]])
+    contact = ContactSolver(poses.CUBE, poses.CUBE)(a, b)
+    assert contact.colliding
+    assert contact.point == pytest.approx((0.3, -0.2, 1.0), abs=2e-8)
+
+
+def test_edges_crossing_at_touch_is_the_crossing():
+    """Two edges exactly crossing: roof ridge along x on roof ridge along y, touching at one point.
+    """
+    up = poses.small_rotations(np.array([[1.0, 0, 0], [0, 1.0, 0]]), np.full(2, np.pi / 4))
+    a = np.concatenate([(0, 0, 0), up[0]])
+    b = np.concatenate([(0.25, -0.5, 2 * np.sqrt(2)), up[1]])
+    contact = ContactSolver(poses.CUBE, poses.CUBE)(a, b)
+    assert contact.colliding
+    assert contact.normal == pytest.approx((0, 0, 1), abs=1e-12)
+    # A's ridge is y = 0, B's is x = 0.25.
+    assert contact.point == pytest.approx((0.25, 0, np.sqrt(2)), abs=1e-8)
+
+
+def test_small_box_inside_a_large_one():
+    """Full containment: depth is the way out through the nearest face, the point B's centre."""
+    contact = ContactSolver((10, 10, 10), (1, 1, 1))(poses.IDENTITY, (4, 0.5, 0.25, 0, 0, 0, 1))
+    assert contact.separation == pytest.approx(-1.5, abs=1e-14)
+    assert contact.normal.tolist() == [1, 0, 0]
+    assert contact.point == pytest.approx((4, 0.5, 0.25), abs=1e-14)
+
+
+def test_thin_box_through_a_slab():
+    """A bar that sticks out of a slab on both sides: clamped to the slab's thickness."""
+    contact = ContactSolver((4, 4, 0.5), (0.2, 0.2, 3))(poses.IDENTITY, (1, 0.5, 0.6, 0, 0, 0, 1))
+    assert contact.point == pytest.approx((1, 0.5, 0), abs=1e-14)

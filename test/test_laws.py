@@ -1,0 +1,203 @@
+"""Laws that a right answer obeys, over random and near-parallel pairs."""
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import poses
+import pytest
+
+from box_contact_ros import ContactSolver
+
+N = 2000
+SOLVER = ContactSolver((1, 1, 1), (1, 1, 1), model='exact')
+SAME_NORMAL = 1e-6
+"""Two faces tilted by θ tie when θ² is lost in rounding, so either may give the normal."""
+FAMILIES = {'random': poses.random_pairs, 'near-parallel': poses.near_parallel_pairs}
+
+
+@pytest.fixture(params=FAMILIES)
+def pairs(request):
+    return FAMILIES[request.param](np.random.default_rng(77), N)
+
+
+def solve(a, b, size_a, size_b):
+    return SOLVER.batch(a, b, size_a=size_a, size_b=size_b)
+
+
+def largest(size_a, size_b):
+    return np.maximum(size_a.max(axis=1), size_b.max(axis=1))
+
+
+def point_bound(found, size):
+    """Accuracy of the centroid [m]: max(1e-9, 1e-14·size/depth)·size."""
+    depth = np.maximum(-found.separation, 1e-9 * size)
+    return np.maximum(1e-9, 1e-14 * size / depth) * size
+
+
+def clear_normal(a, b, size_a, size_b, found, size):
+    """Rows whose normal no tie can flip: the boxes moved a little keep it to SAME_NORMAL."""
+    rows = found.colliding.copy()
+    for k in range(3):
+        for sign in (-1e-9, 1e-9):
+            nudged = b.copy()
+            nudged[:, k] += sign * size
+            other = solve(a, nudged, size_a, size_b)
+            rows &= np.abs(other.normal - found.normal).max(axis=1) < SAME_NORMAL
+    return rows
+
+
+def test_swap(pairs):
+    """B against A: same verdict and separation to the bit, opposite normal, same point."""
+    a, b, size_a, size_b = pairs
+    one, two = solve(a, b, size_a, size_b), solve(b, a, size_b, size_a)
+    size = largest(size_a, size_b)
+    assert np.array_equal(one.colliding, two.colliding)
+    assert np.array_equal(one.separation, two.separation)
+    rows = clear_normal(a, b, size_a, size_b, one, size)
+    assert rows.sum() > N / 5
+    assert np.abs(one.normal + two.normal)[rows].max() < SAME_NORMAL
+    deep = rows & (one.separation < -1e-8 * size)
+    error = np.abs(one.point - two.point).max(axis=1)
+    assert np.all(error[deep] <= 2 * point_bound(one, size)[deep])
+
+
+def test_rigid_motion(pairs):
+    """Moved together, verdict and separation stay, normal and point move along."""
+    a, b, size_a, size_b = pairs
+    rng = np.random.default_rng(3)
+    turn, shift = poses.unit_quaternions(rng, N), rng.uniform(-30, 30, (N, 3))
+    one = solve(a, b, size_a, size_b)
+    two = solve(poses.moved(a, shift, turn), poses.moved(b, shift, turn), size_a, size_b)
+    size = largest(size_a, size_b)
+    rounding = 64 * np.finfo(float).eps * np.maximum(size, 60)
+    assert np.all(np.abs(one.separation - two.separation) <= rounding)
+    clear = np.abs(one.separation) > rounding
+    assert np.array_equal(one.colliding[clear], two.colliding[clear])
+    rows = clear_normal(a, b, size_a, size_b, one, size) & (one.separation < -1e-6 * size)
+    assert rows.sum() > N / 5
+    assert np.abs(poses.rotate(turn, one.normal) - two.normal)[rows].max() < SAME_NORMAL
+    moved = poses.rotate(turn, one.point) + shift
+    bound = (rounding / -one.separation + 1e-9) * size
+    assert np.all(np.abs(moved - two.point).max(axis=1)[rows] <= bound[rows])
+
+
+@pytest.mark.parametrize('power', [-20, 20])
+def test_scale_by_powers_of_two_is_exact(pairs, power):
+    """Everything scaled by 2^k: separation and point scale to the bit, the normal stays."""
+    a, b, size_a, size_b = pairs
+    factor = 2.0**power
+    scaling = np.array([factor] * 3 + [1.0] * 4)
+    one = solve(a, b, size_a, size_b)
+    two = solve(a * scaling, b * scaling, size_a * factor, size_b * factor)
+    assert np.array_equal(one.colliding, two.colliding)
+    assert np.array_equal(one.separation * factor, two.separation)
+    assert np.array_equal(one.normal, two.normal, equal_nan=True)
+    assert np.array_equal(one.point * factor, two.point, equal_nan=True)
+
+
+def test_box_symmetries(pairs):
+    """A box's 24 relabellings, and −q for q, change nothing but roundings."""
+    a, b, size_a, size_b = pairs
+    one = solve(a, b, size_a, size_b)
+    size = largest(size_a, size_b)
+    rows = clear_normal(a, b, size_a, size_b, one, size) & (one.separation < -1e-8 * size)
+    minus = np.array([1, 1, 1, -1, -1, -1, -1])
+    for name, left, right in zip(one._fields, one, solve(a * minus, b, size_a, size_b)):
+        assert np.array_equal(left, right, equal_nan=True), name
+    half = np.sqrt(0.5)
+    turns = {'x': (half, 0, 0, half), 'y': (0, half, 0, half), 'z': (0, 0, half, half)}
+    swapped = {'x': (0, 2, 1), 'y': (2, 1, 0), 'z': (1, 0, 2)}
+    for first, second in itertools.product('xyz', repeat=2):
+        turned, extents = b.copy(), size_b
+        for axis in (first, second):
+            turned[:, 3:] = poses.multiply(turned[:, 3:], np.tile(turns[axis], (N, 1)))
+            extents = extents[:, swapped[axis]]
+        two = solve(a, turned, size_a, extents)
+        rounding = 64 * np.finfo(float).eps * np.maximum(size, 30)
+        assert np.all(np.abs(one.separation - two.separation) <= rounding)
+        assert np.abs(one.normal - two.normal)[rows].max() < SAME_NORMAL
+        bound = (rounding / -one.separation + 1e-9) * size
+        assert np.all(np.abs(one.point - two.point).max(axis=1)[rows] <= bound[rows])
+
+
+def test_separated_after_moving_by_the_depth(pairs):
+    """B moved along the normal by the depth plus a margin is free; minus a margin it is not."""
+    a, b, size_a, size_b = pairs
+    one = solve(a, b, size_a, size_b)
+    coordinates = np.maximum(np.abs(a[:, :3]).max(axis=1), np.abs(b[:, :3]).max(axis=1))
+    reach = np.maximum(coordinates, largest(size_a, size_b))
+    margin = np.maximum(1e-9 * -one.separation, 24 * np.spacing(reach))
+    rows = one.colliding & (-one.separation > 2 * margin)
+    assert rows.sum() > N / 5
+    for sign in (1, -1):
+        moved = b.copy()
+        step = (-one.separation + sign * margin)[:, None] * one.normal
+        moved[rows, :3] += step[rows]
+        assert np.all(solve(a, moved, size_a, size_b).colliding[rows] == (sign < 0))
+
+
+def test_no_direction_separates_in_less(pairs):
+    """Along any direction the projections overlap by at least the depth (support functions)."""
+    a, b, size_a, size_b = pairs
+    one = solve(a, b, size_a, size_b)
+    rng = np.random.default_rng(11)
+    least = np.full(N, np.inf)
+    for _ in range(300):
+        direction = rng.normal(size=(N, 3))
+        direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+        width = np.zeros(N)
+        for pose, size in ((a, size_a), (b, size_b)):
+            inverse = pose[:, 3:] * (-1, -1, -1, 1)
+            width += (np.abs(poses.rotate(inverse, direction)) * size).sum(axis=1) / 2
+        least = np.minimum(least, width - np.abs(((b - a)[:, :3] * direction).sum(axis=1)))
+    rows = one.colliding
+    assert np.all((-one.separation <= least + 1e-12 * largest(size_a, size_b))[rows])
+
+
+def test_point_lies_in_both_boxes(pairs):
+    """The point is inside both boxes, up to the pressing depth and rounding."""
+    a, b, size_a, size_b = pairs
+    found = solve(a, b, size_a, size_b)
+    slack = 1.1e-9 * largest(size_a, size_b)
+    for pose, size in ((a, size_a), (b, size_b)):
+        inverse = pose[:, 3:] * (-1, -1, -1, 1)
+        local = np.abs(poses.rotate(inverse, found.point - pose[:, :3]))
+        assert np.all((local - size / 2).max(axis=1)[found.colliding] <= slack[found.colliding])
+
+
+def test_reflection(pairs):
+    """The scene mirrored at x = 0: same verdict and separation, point and normal mirrored."""
+    a, b, size_a, size_b = pairs
+    mirror = np.array([-1, 1, 1, 1, -1, -1, 1.0])  # M R M, M = diag(−1, 1, 1): qy, qz change sign
+    one, two = solve(a, b, size_a, size_b), solve(a * mirror, b * mirror, size_a, size_b)
+    size = largest(size_a, size_b)
+    assert np.all(np.abs(one.separation - two.separation) <= 1e-14 * size)
+    rows = clear_normal(a, b, size_a, size_b, one, size)
+    assert np.abs(one.normal * mirror[:3] - two.normal)[rows].max() < SAME_NORMAL
+    error = np.abs(one.point * mirror[:3] - two.point).max(axis=1)
+    assert np.all(error[rows] <= 2 * point_bound(one, size)[rows] + 1e-12)
+
+
+def test_depth_is_continuous(pairs):
+    """Moving B by a vector changes the separation by at most its length."""
+    a, b, size_a, size_b = pairs
+    rng = np.random.default_rng(4)
+    one = solve(a, b, size_a, size_b)
+    for length in (1e-6, 1e-3, 0.1):
+        step = rng.normal(size=(N, 3))
+        step *= length / np.linalg.norm(step, axis=1, keepdims=True)
+        moved = b.copy()
+        moved[:, :3] += step
+        change = np.abs(solve(a, moved, size_a, size_b).separation - one.separation)
+        assert np.all(change <= length + 1e-13 * largest(size_a, size_b))
+
+
+def test_batch_equals_single_calls(pairs):
+    """Row i of a batch is the single call of row i, to the bit."""
+    a, b, size_a, size_b = pairs
+    many = solve(a, b, size_a, size_b)
+    for i in range(0, N, 7):
+        one = ContactSolver(size_a[i], size_b[i])(a[i], b[i])
+        for name, single, row in zip(one._fields, one, (field[i] for field in many)):
+            assert np.array_equal(single, row, equal_nan=True), name

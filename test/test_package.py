@@ -1,0 +1,299 @@
+"""The package as a thing to install: data files, programs, metadata, what an import costs."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import pytest
+
+from box_contact_ros import __main__ as command_line
+from box_contact_ros import programs, resources
+from box_contact_ros.resources import resource_path
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+def _touch(path: Path) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.touch()
+    return path
+
+
+# --- data files -----------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def places(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, Path]:
+    """Point every place that is searched below tmp_path; return the data folder of each."""
+    prefix = tmp_path / 'prefix'
+    package = prefix / 'lib' / 'python3.12' / 'site-packages' / 'box_contact_ros'
+    package.mkdir(parents=True)
+    monkeypatch.setattr(resources, '_PACKAGE', package)
+    monkeypatch.setattr(sys, 'prefix', str(tmp_path / 'python'))
+    monkeypatch.setenv('AMENT_PREFIX_PATH', f'{tmp_path / "overlay"}:{tmp_path / "underlay"}')
+    share = Path('share', 'box_contact_ros')
+    return {
+        'checkout': package.parent,
+        'own prefix': prefix / share,
+        'ament overlay': tmp_path / 'overlay' / share,
+        'ament underlay': tmp_path / 'underlay' / share,
+        'sys.prefix': tmp_path / 'python' / share,
+    }
+
+
+@pytest.mark.parametrize('place', ['own prefix', 'ament overlay', 'ament underlay', 'sys.prefix'])
+def test_resource_is_found_in_every_kind_of_install(places: dict[str, Path], place: str) -> None:
+    """A file that only one kind of install has is found there, and so is its folder."""
+    weights = _touch(places[place] / 'weights' / 'x.safetensors')
+    assert resource_path('weights', 'x.safetensors') == weights
+    assert resource_path('weights') == weights.parent
+
+
+def test_checkout_wins_over_installed_data(places: dict[str, Path]) -> None:
+    """Beside a package.xml the package is a checkout: edited weights count, not installed ones."""
+    for place in places.values():
+        _touch(place / 'weights' / 'x.safetensors')
+    _touch(places['checkout'] / 'package.xml')
+    assert resource_path('weights') == places['checkout'] / 'weights'
+
+
+def test_neighbour_in_site_packages_is_not_taken_for_a_checkout(places: dict[str, Path]) -> None:
+    """Without a package.xml, `weights` beside the package is somebody else's Python package."""
+    _touch(places['checkout'] / 'weights' / 'x.safetensors')
+    with pytest.raises(FileNotFoundError):
+        resource_path('weights', 'x.safetensors')
+
+
+def test_own_prefix_wins_over_an_overlay(places: dict[str, Path]) -> None:
+    """The weights belong to the code that reads them, not to another version in the workspace."""
+    for place in ('own prefix', 'ament overlay', 'sys.prefix'):
+        _touch(places[place] / 'weights' / 'x.safetensors')
+    assert resource_path('weights') == places['own prefix'] / 'weights'
+
+
+def test_missing_resource_names_the_places_looked_at(places: dict[str, Path]) -> None:
+    """The error shows where the file could be put; an unset AMENT_PREFIX_PATH adds no place."""
+    with pytest.raises(FileNotFoundError) as raised:
+        resource_path('weights', 'no.safetensors')
+    for place in ('ament overlay', 'ament underlay', 'sys.prefix'):
+        assert str(places[place] / 'weights' / 'no.safetensors') in str(raised.value)
+
+
+def test_unset_ament_prefix_path(places: dict[str, Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    """The ROS wheels leave it unset: the current folder must not become a place."""
+    monkeypatch.delenv('AMENT_PREFIX_PATH')
+    with pytest.raises(FileNotFoundError) as raised:
+        resource_path('weights')
+    assert str(raised.value).count('\n') == 1
+
+
+@pytest.mark.parametrize('parts', [(), ('/etc/passwd',)])
+def test_resource_path_outside_the_data_folders(parts: tuple[str, ...]) -> None:
+    """An absolute part would make every place the same."""
+    with pytest.raises(ValueError, match='below the data folders'):
+        resource_path(*parts)
+
+
+def test_resources_of_this_checkout() -> None:
+    """In the tests the real resolver finds the repository."""
+    assert resource_path('package.xml') == ROOT / 'package.xml'
+
+
+# --- programs -------------------------------------------------------------------------------------
+
+
+def _run(*command: str, **env: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, *command],
+        cwd=ROOT,
+        env={**os.environ, **env},
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+
+
+@pytest.mark.parametrize('name', programs.PROGRAMS)
+def test_program_table_is_complete(name: str) -> None:
+    """Every program has a module that gets installed, a description and known extras."""
+    program = programs.PROGRAMS[name]
+    module, _, function = program.target.partition(':')
+    assert function == 'main'
+    path = ROOT.joinpath(*module.split('.')).with_suffix('.py')
+    assert path.is_file()
+    assert path.with_name('__init__.py').is_file()  # find_packages leaves out a folder without it
+    assert program.description and '\n' not in program.description
+    assert set(program.extras) <= set(programs.MODULES_OF_EXTRA)
+    assert callable(getattr(programs.start, name))
+
+
+@pytest.mark.parametrize('arguments', [(), ('--help',), ('-h',)])
+def test_help_lists_the_programs(arguments: tuple[str, ...]) -> None:
+    """Asking for help is not an error, and neither is typing nothing."""
+    done = _run('-m', 'box_contact_ros', *arguments)
+    assert (done.returncode, done.stderr) == (0, '')
+    for name, program in programs.PROGRAMS.items():
+        assert name in done.stdout and program.description in done.stdout
+
+
+def test_unknown_program() -> None:
+    """A typing error is answered with what was meant, status 2 as from argparse."""
+    done = _run('-m', 'box_contact_ros', 'contactnode')
+    assert (done.returncode, done.stdout) == (2, '')
+    assert done.stderr == (
+        "box_contact_ros: there is no program 'contactnode': did you mean contact_node?\n"
+    )
+    assert 'one of contact_node, crane' in _run('-m', 'box_contact_ros', 'zzz').stderr
+
+
+@pytest.fixture
+def probe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Add a program `probe` that prints its arguments as JSON and returns their number."""
+    (tmp_path / 'probe_program.py').write_text(
+        'import json\n'
+        'def main(args=None):\n'
+        '    print(json.dumps(args))\n'
+        '    return len(args)\n'
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setitem(
+        programs.PROGRAMS, 'probe', programs.Program('probe_program:main', 'a test', ())
+    )
+    monkeypatch.setattr(sys, 'argv', list(sys.argv))  # programs.run sets it
+
+
+@pytest.mark.parametrize('arguments', [[], ['--ros-args', '-p', 'model:=exact', '--', '--help']])
+def test_arguments_reach_main_unchanged(
+    probe: None,
+    arguments: list[str],
+    capfd: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """`python -m` and the console scripts pass the same list, and pass on the same status."""
+    assert command_line.main(['probe', *arguments]) == len(arguments)
+    assert json.loads(capfd.readouterr().out) == arguments
+    monkeypatch.setattr(sys, 'argv', ['/usr/bin/box_contact_probe', *arguments])
+    assert programs._from_command_line('probe') == len(arguments)
+    assert json.loads(capfd.readouterr().out) == arguments
+
+
+@pytest.mark.parametrize(
+    ('name', 'module', 'extras'),
+    [
+        ('contact_node', 'rclpy', 'ros'),
+        ('contact_node', 'rclpy.node', 'ros'),
+        ('contact_node', 'torch', 'ros,train'),
+        ('crane', 'mujoco', 'ros,sim'),
+        ('train', 'torch', 'train'),
+        ('train', 'tqdm', 'train'),
+        ('paper', 'matplotlib.pyplot', 'report'),
+        ('paper', 'fcl', 'report,soup'),
+    ],
+)
+def test_missing_extra_is_one_line_that_names_it(
+    name: str,
+    module: str,
+    extras: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """A module missing at import, or only when main runs, gives pip's command, and no traceback."""
+
+    def main(args: list[str]) -> int:
+        raise ModuleNotFoundError(f'No module named {module!r}', name=module)
+
+    monkeypatch.setattr(sys, 'argv', list(sys.argv))
+    fake = type(sys)('fake')
+    fake.main = main
+    monkeypatch.setattr(programs.importlib, 'import_module', lambda _: fake)
+    assert programs.run(name, []) == 1
+    message = capsys.readouterr().err
+    assert message.count('\n') == 1
+    assert f"pip install 'box_contact_ros[{extras}]'" in message
+    assert ('apt install ros-jazzy-ros-base' in message) == module.startswith('rclpy')
+
+
+def test_missing_module_of_our_own_keeps_its_traceback(
+    probe: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No extra would help: hiding where it happened would only hide the fault."""
+    monkeypatch.setitem(
+        programs.PROGRAMS, 'probe', programs.Program('box_contact_ros.no_such:main', 'a test', ())
+    )
+    with pytest.raises(ModuleNotFoundError, match='no_such'):
+        programs.run('probe', [])
+
+
+def test_program_fixture_ends_the_whole_group(program) -> None:
+    """The fixture starts a real process, catches its output and leaves nothing behind."""
+    running = program('--help')
+    assert running.wait() == 0
+    assert 'contact_node' in running.output
+    running.end()
+    with pytest.raises(ProcessLookupError):
+        os.killpg(running.process.pid, 0)
+
+
+# --- metadata -------------------------------------------------------------------------------------
+
+
+def test_versions_agree() -> None:
+    """catkin's release tools rewrite both, so both are written out; here they are compared."""
+    manifest = ElementTree.parse(ROOT / 'package.xml').getroot()
+    done = _run('setup.py', '--name', '--version')
+    assert done.stdout.split() == [manifest.findtext('name'), manifest.findtext('version')]
+
+
+def test_manifest_is_valid() -> None:
+    """What catkin_pkg rejects, colcon silently builds as plain Python, out of reach of ros2 run."""
+    catkin_package = pytest.importorskip('catkin_pkg.package')
+    warned: list[str] = []
+    manifest = catkin_package.parse_package(str(ROOT / 'package.xml'), warnings=warned)
+    manifest.validate()
+    assert warned == []
+    assert manifest.get_build_type() == 'ament_python'
+
+
+@pytest.mark.parametrize(
+    ('env', 'prefix'), [({}, ''), ({'PIP_BUILD_TRACKER': '/tmp'}, 'box_contact_')]
+)
+def test_program_names_under_colcon_and_pip(env: dict[str, str], prefix: str) -> None:
+    """colcon gets the bare names in lib/box_contact_ros, pip the prefixed ones in bin/."""
+    done = _run(
+        '-c',
+        'import json\n'
+        'import setuptools\n'  # before distutils: Python 3.12 has only the one it lends
+        'from distutils.core import run_setup\n'
+        'dist = run_setup("setup.py", stop_after="config")\n'
+        'print(json.dumps([dist.entry_points["console_scripts"],'
+        ' dist.get_option_dict("develop").get("script_dir"),'
+        ' dist.get_option_dict("install").get("install_scripts")]))',
+        **env,
+    )
+    assert done.returncode == 0, done.stderr
+    scripts, develop, install = json.loads(done.stdout)
+    assert scripts == programs.entry_points(prefix)
+    assert [script.partition(' = ')[0] for script in scripts] == [
+        prefix + name for name in programs.PROGRAMS
+    ]
+    folder = '$base/lib/box_contact_ros'
+    assert [entry and entry[1] for entry in (develop, install)] == (
+        [None, None] if prefix else [folder, folder]
+    )
+
+
+def test_import_stays_small() -> None:
+    """The core is for everybody: no ROS, no PyTorch, no FCL, no MuJoCo comes with it."""
+    done = _run(
+        '-c',
+        'import sys, box_contact_ros\n'
+        'print(*{name.partition(".")[0] for name in sys.modules})',
+    )
+    assert done.returncode == 0, done.stderr
+    assert 'box_contact_ros' in done.stdout.split()
+    assert not {'rclpy', 'torch', 'fcl', 'mujoco', 'matplotlib'} & set(done.stdout.split())
