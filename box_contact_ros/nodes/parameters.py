@@ -7,13 +7,12 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
-from rclpy.utilities import remove_ros_args
 
 Check = Callable[[str, Any], Any]
 """From a parameter's name and value to the value as the node uses it; ValueError if it is wrong."""
@@ -101,7 +100,17 @@ def answer_help(program: str, doc: str | None, settings: Mapping[str, Setting],
         prog=program, description=doc, formatter_class=argparse.RawDescriptionHelpFormatter,
         usage=f'{program} [-h] [--ros-args -p NAME:=VALUE ... -r FROM:=TO ...]',
         epilog='parameters (--ros-args -p NAME:=VALUE):\n' + '\n'.join(lines))
-    parser.parse_args(remove_ros_args(['', *(args or ())])[1:])
+    parser.parse_args(list(_outside_ros_args(args or ())))
+
+
+def _outside_ros_args(args: Sequence[str]) -> Iterator[str]:
+    """What is not between `--ros-args` and `--`; rclpy's own function fails on a bad value."""
+    inside = False
+    for arg in args:
+        if arg == '--ros-args' or (inside and arg == '--'):
+            inside = arg == '--ros-args'
+        elif not inside:
+            yield arg
 
 
 def _show(default: Any) -> str:
