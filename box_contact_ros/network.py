@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 from safetensors import SafetensorError, safe_open
-from safetensors.numpy import save_file
+from safetensors.numpy import save
 
 from .jit import kernel
 
@@ -78,7 +78,8 @@ def save_weights(path: Path, networks: dict[str, list[tuple[np.ndarray, np.ndarr
     if missing:
         raise ValueError(f'the model card lacks {", ".join(missing)}')
     path.parent.mkdir(parents=True, exist_ok=True)
-    save_file(tensors, path, metadata={'card': json.dumps(card, ensure_ascii=False)})
+    # Not safetensors' save_file, which leaves the file readable to its owner only.
+    path.write_bytes(save(tensors, metadata={'card': json.dumps(card, ensure_ascii=False)}))
 
 
 def load_weights(path: Path | str) -> Weights:

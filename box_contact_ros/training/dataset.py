@@ -1,0 +1,403 @@
+"""The data of the paper's section 3: pairs of boxes that just touch, and where they do.
+
+1. Placements. The first box stays at the origin. Its trihedron is its faces +x, +y, +z; the second
+   box's is its faces −x, −y, −z, with the corner (−, −, −) and 7 vertices.
+   - vertex-face: a point drawn uniformly by area on the first trihedron; roll, pitch and yaw drawn
+     uniformly in [−π/2, π/2]; one of the 7 vertices is placed on the point. The normal is the
+     face's.
+   - edge-edge: points drawn uniformly by length on the 9 edges of either trihedron; the angles as
+     above; the second point is placed on the first. The normal is the cross product of the edges,
+     from the first box to the second.
+   Placements in which the boxes interpenetrate are thrown away. In what is left the plane through
+   the point that keeps the boxes apart is unique, so the label belongs to the pose and does not
+   depend on how the pose was found.
+2. Patterns. Inputs: the offset t of the second box [m] and its roll, pitch, yaw [rad], in the first
+   box's frame (R = Rz(yaw) Ry(pitch) Rx(roll)). Outputs: azimuth and elevation [rad] of the impact
+   point's direction from the first box's centre, then of the normal.
+   - `paper`: folded into the domain in which the network is asked later (`symmetry.fold_octant`:
+     t ≥ 0, angles in [−π/2, π/2]), or left as drawn.
+   - `continuous`: for cubes. SAT of the pose says which features meet, hence which subset, and
+     `symmetry.fold_features` brings them to the reference features. How a pose was drawn is not
+     asked: the same pose always falls in the same subset.
+
+Everything is drawn from one seed, every set from a stream of its own, so that any set can be made
+without the others.
+"""
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..jit import kernel
+from ..pose import (
+    AXIS,
+    LANES,
+    OFFSET_A,
+    ROTATION,
+    SEPARATION,
+    WORK_SIZE,
+    load_block,
+    quaternion_multiply,
+    rotation_matrix,
+)
+from ..sat import axis_normal, query_block
+from ..symmetry import (
+    EDGE_EDGE,
+    FOLD_SIZE,
+    OFFSET,
+    VERTEX_FACE,
+    euler_angles,
+    fold_features,
+    fold_octant,
+    folded,
+)
+
+CUBE = (2.0, 2.0, 2.0)
+"""The paper's boxes: cubes with edges of length 2."""
+CONTAINER = (12.192, 2.438, 2.591)
+"""A 40 ft container [m]."""
+
+SETS = ('training', 'cross-validation', 'external')
+PAPER_COUNTS = (8000, 5000, 75000)
+"""Patterns per set, with discontinuities."""
+CONTINUOUS_COUNTS = (10000, 6000, 50000)
+"""Patterns per set and subset, without discontinuities."""
+SUBSETS = {'vertex_face': VERTEX_FACE, 'edge_edge': EDGE_EDGE}
+
+INPUTS = ('t_x', 't_y', 't_z', 'roll', 'pitch', 'yaw')
+OUTPUTS = ('point azimuth', 'point elevation', 'normal azimuth', 'normal elevation')
+
+INTERPENETRATION = 1e-12
+"""Depth, as a fraction of the largest extent, from which on boxes interpenetrate. A placement made
+to touch has a depth of some 1e-16 of it by rounding; of the random placements that overlap, one in
+1e11 would be let through."""
+
+POLE = 1e-12
+"""Sine of the angle to the z axis below which a direction is the pole and its azimuth is 0: far
+above the rounding of a unit vector, far below anything that is drawn."""
+
+CHUNK = 1 << 15
+"""Candidates drawn at a time."""
+
+
+@dataclass(frozen=True)
+class Placements:
+    """n pairs of boxes of the same size that just touch, in the first box's frame."""
+
+    size: tuple[float, float, float]
+    """Full extents of either box [m]."""
+    pose: np.ndarray
+    """(n, 7) pose of the second box, x y z qx qy qz qw."""
+    point: np.ndarray
+    """(n, 3) impact point [m]."""
+    normal: np.ndarray
+    """(n, 3) unit normal, out of the first box."""
+
+    def __len__(self) -> int:
+        return len(self.pose)
+
+    def __getitem__(self, rows: np.ndarray | slice) -> Placements:
+        return Placements(self.size, self.pose[rows], self.point[rows], self.normal[rows])
+
+
+@dataclass(frozen=True)
+class Patterns:
+    """n patterns for a network: see the module's docstring, 2."""
+
+    inputs: np.ndarray
+    """(n, 6) t [m]; roll, pitch, yaw [rad]."""
+    outputs: np.ndarray
+    """(n, 4) azimuth and elevation [rad] of the impact point, then of the normal."""
+
+    def __len__(self) -> int:
+        return len(self.inputs)
+
+
+def _joined(parts: Sequence[Placements]) -> Placements:
+    return Placements(parts[0].size, *(np.concatenate([getattr(part, name) for part in parts])
+                                       for name in ('pose', 'point', 'normal')))
+
+
+# --- 1. placements --------------------------------------------------------------------------------
+
+
+def quaternion_from_euler(angles: np.ndarray) -> np.ndarray:
+    """Quaternions (n, 4) xyzw of Rz(yaw) Ry(pitch) Rx(roll); angles (n, 3) roll, pitch, yaw."""
+    about = []
+    for k in range(3):
+        q = np.zeros((len(angles), 4))
+        q[:, k] = np.sin(0.5 * angles[:, k])
+        q[:, 3] = np.cos(0.5 * angles[:, k])
+        about.append(q)
+    return quaternion_multiply(about[2], quaternion_multiply(about[1], about[0]))
+
+
+def vertex_face_candidates(rng: np.random.Generator, count: int, half: np.ndarray) -> Placements:
+    """A vertex of the second trihedron on a random point of the first; most interpenetrate."""
+    area = np.prod(half) / half
+    face = rng.choice(3, count, p=area / area.sum())
+    point = rng.uniform(-half, half, (count, 3))
+    rows = np.arange(count)
+    point[rows, face] = half[face]
+    # The bits of 0 … 6 are the seven vertices; 7 would be (+, +, +), which is on none of its faces.
+    bits = rng.integers(0, 7, count)[:, None] >> np.arange(3) & 1
+    vertex = np.where(bits == 1, half, -half)
+    normal = np.zeros((count, 3))
+    normal[rows, face] = 1.0
+    return _placed(rng, half, point, vertex, normal)
+
+
+def edge_edge_candidates(rng: np.random.Generator, count: int, half: np.ndarray) -> Placements:
+    """A random point of the second trihedron's edges on one of the first's."""
+    point, along_a = _edge_points(rng, count, half)
+    on_b, along_b = _edge_points(rng, count, half)
+    placed = _placed(rng, half, point, -on_b, np.zeros((count, 3)))
+    turn = rotation_matrix(placed.pose[:, 3:])
+    direction_b = turn[np.arange(count), :, along_b]
+    normal = np.cross(np.eye(3)[along_a], direction_b)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    normal *= np.where(np.sum(normal * placed.pose[:, :3], axis=1) < 0.0, -1.0, 1.0)[:, None]
+    return Placements(placed.size, placed.pose, placed.point, normal)
+
+
+def _edge_points(rng: np.random.Generator, count: int, half: np.ndarray,
+                 ) -> tuple[np.ndarray, np.ndarray]:
+    """Points (count, 3) on the 9 edges of the faces +x, +y, +z, and their edges' axes (count,)."""
+    axis = rng.choice(3, count, p=half / half.sum())
+    # Three of the four edges along an axis belong to the trihedron: not the one at (−, −).
+    at = rng.integers(1, 4, count)
+    rows = np.arange(count)
+    point = np.empty((count, 3))
+    point[rows, axis] = rng.uniform(-1.0, 1.0, count)
+    point[rows, (axis + 1) % 3] = np.where(at & 1, 1.0, -1.0)
+    point[rows, (axis + 2) % 3] = np.where(at & 2, 1.0, -1.0)
+    return point * half, axis
+
+
+def _placed(rng: np.random.Generator, half: np.ndarray, point: np.ndarray, on_b: np.ndarray,
+            normal: np.ndarray) -> Placements:
+    """Turn the second box at random and put its point `on_b` on `point`."""
+    angles = rng.uniform(-0.5 * np.pi, 0.5 * np.pi, (len(point), 3))
+    quaternion = quaternion_from_euler(angles)
+    offset = point - np.einsum('nij,nj->ni', rotation_matrix(quaternion), on_b)
+    size = tuple(float(extent) for extent in 2.0 * half)
+    return Placements(size, np.concatenate([offset, quaternion], axis=1), point, normal)
+
+
+GENERATORS = (vertex_face_candidates, edge_edge_candidates)
+
+
+def touching(rng: np.random.Generator, count: int, size: Sequence[float],
+             candidates: Callable[[np.random.Generator, int, np.ndarray], Placements],
+             ) -> Placements:
+    """`count` placements of one of the two kinds that do not interpenetrate."""
+    half = 0.5 * np.asarray(size, dtype=np.float64)
+    kept: list[Placements] = []
+    while sum(map(len, kept)) < count:
+        drawn = candidates(rng, CHUNK, half)
+        separation = query(drawn).separation
+        kept.append(drawn[separation >= -INTERPENETRATION * max(size)])
+    return _joined(kept)[:count]
+
+
+def mixed(rng: np.random.Generator, count: int, size: Sequence[float], edge_share: float,
+          ) -> Placements:
+    """`count` placements of both kinds in random order, `edge_share` of them edge-edge."""
+    edges = round(edge_share * count)
+    parts = [touching(rng, wanted, size, candidates)
+             for wanted, candidates in zip((count - edges, edges), GENERATORS) if wanted]
+    return _joined(parts)[rng.permutation(count)]
+
+
+# --- 2. patterns ----------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Query:
+    """What SAT says of n placements; frame: the first box's."""
+
+    separation: np.ndarray
+    """(n,) [m]."""
+    axis: np.ndarray
+    """(n,) winning axis, see `pose.AXIS`."""
+    normal: np.ndarray
+    """(n, 3) unit vector along it, from the first box to the second."""
+    offset: np.ndarray
+    """(n, 3) of the second box [m]."""
+    turn: np.ndarray
+    """(n, 9) orientation of the second box, row-major."""
+
+
+@kernel
+def _query(poses_a, poses_b, size, work, status, separation, axis, normal, offset, turn):
+    bad = 0
+    rows = poses_a.shape[0]
+    for start in range(0, rows, LANES):
+        count = min(LANES, rows - start)
+        bad += load_block(poses_a, poses_b, size, size, start, count, work, status)
+        query_block(count, work)
+        for i in range(count):
+            row = start + i
+            separation[row] = work[SEPARATION + i]
+            axis[row] = int(work[AXIS + i])
+            n = axis_normal(work, i)
+            for k in range(3):
+                normal[row, k] = n[k]
+                offset[row, k] = work[OFFSET_A + k * LANES + i]
+            for k in range(9):
+                turn[row, k] = work[ROTATION + k * LANES + i]
+    return bad
+
+
+def query(placements: Placements) -> Query:
+    """SAT of every placement."""
+    n = len(placements)
+    found = Query(np.empty(n), np.empty(n, dtype=np.int64), np.empty((n, 3)), np.empty((n, 3)),
+                  np.empty((n, 9)))
+    poses_a = np.zeros((n, 7))
+    poses_a[:, 6] = 1.0
+    size = np.array([placements.size])
+    bad = _query(poses_a, np.ascontiguousarray(placements.pose), size, np.zeros(WORK_SIZE),
+                 np.empty(n, dtype=np.int8), found.separation, found.axis, found.normal,
+                 found.offset, found.turn)
+    if bad:
+        raise ValueError(f'{bad} placements are no valid poses')
+    return found
+
+
+NO_FOLD, OCTANT, FEATURES = 0, 1, 2
+"""Ways to bring a pose into a network's domain: as it is, by `fold_octant`, by `fold_features`."""
+
+
+@kernel
+def _fold(how, offset, turn, axis, sat_normal, point, normal, fold, inputs, out_point, out_normal,
+          subset):
+    for row in range(offset.shape[0]):
+        if how == FEATURES:
+            subset[row] = fold_features(offset[row], turn[row], axis[row], sat_normal[row], fold)
+        else:
+            fold_octant(offset[row], turn[row], fold)
+        angles = euler_angles(fold)
+        p = folded(fold, point[row, 0], point[row, 1], point[row, 2])
+        n = folded(fold, normal[row, 0], normal[row, 1], normal[row, 2])
+        for k in range(3):
+            inputs[row, k] = fold[OFFSET + k]
+            inputs[row, 3 + k] = angles[k]
+            out_point[row, k] = p[k]
+            out_normal[row, k] = n[k]
+
+
+@dataclass(frozen=True)
+class Folded:
+    """n placements in a network's domain."""
+
+    inputs: np.ndarray
+    """(n, 6) t [m]; roll, pitch, yaw [rad]."""
+    point: np.ndarray
+    """(n, 3) impact point [m]."""
+    normal: np.ndarray
+    """(n, 3)."""
+    subset: np.ndarray
+    """(n,) VERTEX_FACE or EDGE_EDGE after `fold_features`, else −1."""
+
+    def patterns(self, rows: np.ndarray | slice = slice(None)) -> Patterns:
+        """Inputs and outputs of some rows."""
+        return Patterns(self.inputs[rows], np.concatenate(
+            [spherical(self.point[rows]), spherical(self.normal[rows])], axis=1))
+
+
+def fold(placements: Placements, how: int) -> Folded:
+    """Bring placements into a network's domain by NO_FOLD, OCTANT or FEATURES."""
+    n = len(placements)
+    sat = query(placements)
+    result = Folded(np.empty((n, 6)), np.empty((n, 3)), np.empty((n, 3)), np.full(n, -1))
+    if how == NO_FOLD:
+        turn = sat.turn.T
+        roll = np.arctan2(turn[7], turn[8])
+        pitch = np.arcsin(np.clip(-turn[6], -1.0, 1.0))
+        yaw = np.arctan2(turn[3], turn[0])
+        inputs = np.column_stack([sat.offset, roll, pitch, yaw])
+        return Folded(inputs, placements.point, placements.normal, result.subset)
+    if how == FEATURES:
+        if len(set(placements.size)) != 1:
+            raise ValueError(f'features are folded for cubes, not for {placements.size}')
+        # A vertex of the first box on a face of the second: the two would have to change places.
+        # The second box's trihedron is the one whose vertices are placed, so it never happens.
+        if np.any((sat.axis >= 3) & (sat.axis < 6)):
+            raise ValueError('a face of the second box won')
+    _fold(how, sat.offset, sat.turn, sat.axis, sat.normal, placements.point, placements.normal,
+          np.empty(FOLD_SIZE), result.inputs, result.point, result.normal, result.subset)
+    return result
+
+
+def spherical(direction: np.ndarray) -> np.ndarray:
+    """Azimuth in [−π, π] and elevation in [−π/2, π/2] [rad] (n, 2) of directions (n, 3).
+
+    The polar axis is z; the azimuth of the poles is 0.
+    """
+    x, y, z = direction.T
+    across = np.hypot(x, y)
+    pole = across <= POLE * np.abs(z)
+    return np.column_stack([np.where(pole, 0.0, np.arctan2(y, x)), np.arctan2(z, across)])
+
+
+# --- the sets -------------------------------------------------------------------------------------
+
+
+def _streams(seed: int, counts: Sequence[int], sets: Sequence[str], progress: bool,
+             ) -> Iterator[tuple[str, int, np.random.Generator]]:
+    """Name, number of patterns and random stream of the sets asked for."""
+    wanted = [name for name in SETS if name in sets]
+    if progress:
+        from tqdm import tqdm
+        wanted = tqdm(wanted, desc='data sets', unit='set')
+    for name in wanted:
+        number = SETS.index(name)
+        yield name, counts[number], np.random.default_rng([seed, number])
+
+
+def paper(seed: int, *, size: Sequence[float] = CUBE, counts: Sequence[int] = PAPER_COUNTS,
+          folded_in: bool = True, edge_share: float = 0.5, sets: Sequence[str] = SETS,
+          progress: bool = False) -> dict[str, Patterns]:
+    """The sets with discontinuities, for two boxes of full extents `size` [m].
+
+    `folded_in`: in the domain of `symmetry.fold_octant`, as at inference; otherwise as drawn.
+    `edge_share` of the patterns are edge-edge.
+    """
+    how = OCTANT if folded_in else NO_FOLD
+    return {name: fold(mixed(rng, count, size, edge_share), how).patterns()
+            for name, count, rng in _streams(seed, counts, sets, progress)}
+
+
+def continuous(seed: int, *, counts: Sequence[int] = CONTINUOUS_COUNTS, edge_share: float = 0.5,
+               sets: Sequence[str] = SETS, progress: bool = False,
+               ) -> dict[str, dict[str, Patterns]]:
+    """The sets of each subset without discontinuities, for two cubes of edge 2."""
+    result: dict[str, dict[str, Patterns]] = {subset: {} for subset in SUBSETS}
+    for name, count, rng in _streams(seed, counts, sets, progress):
+        found: dict[str, list[Patterns]] = {subset: [] for subset in SUBSETS}
+        # Which subset a placement falls in is known only after SAT, so they are drawn until the
+        # smaller subset is full; what the larger has too much is dropped.
+        while min(sum(map(len, parts)) for parts in found.values()) < count:
+            some = fold(mixed(rng, 2 * count, CUBE, edge_share), FEATURES)
+            for subset, number in SUBSETS.items():
+                found[subset].append(some.patterns(some.subset == number))
+        for subset, parts in found.items():
+            result[subset][name] = Patterns(np.concatenate([p.inputs for p in parts])[:count],
+                                            np.concatenate([p.outputs for p in parts])[:count])
+    return result
+
+
+def of_card(card: Mapping[str, Any], sets: Sequence[str] = SETS,
+            ) -> dict[str, dict[str, Patterns]]:
+    """The sets a model card speaks of, made again: per network, per set."""
+    data = card['data']
+    counts = [data['counts'][name] for name in SETS]
+    options = {'counts': counts, 'edge_share': data['edge_share'], 'sets': sets}
+    if card['model'] == 'paper-continuous':
+        return continuous(card['seed'], **options)
+    return {'contact': paper(card['seed'], size=card['sizes'][0],
+                             folded_in=data['folded_in'], **options)}
