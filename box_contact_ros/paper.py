@@ -100,11 +100,11 @@ def _learned_contact(work, i, cubes, continuous, packed, widths, activation, fol
     activation[0, 5] = yaw
     out = activation[forward(packed[expert], widths, activation)]
     # 5. Signed permutations map an octant of directions to an octant, so the ray may be cut off
-    #    after it has been folded back.
-    d = direction_from_angles(out[0], out[1])
+    #    after it has been folded back. Only the network runs in float32.
+    d = direction_from_angles(np.float64(out[0]), np.float64(out[1]))
     d = unfold(fold, d[0], d[1], d[2])
     p = leave_box(d[0], d[1], d[2], h0, h1, h2)
-    m = direction_from_angles(out[2], out[3])
+    m = direction_from_angles(np.float64(out[2]), np.float64(out[3]))
     m = unfold(fold, m[0], m[1], m[2])
     half = 0.5 * depth
     if not swapped:
