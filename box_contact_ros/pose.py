@@ -17,8 +17,6 @@ array: value `NAME` of pair `i` of the block is `work[NAME + i]`. The stages of 
 """
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from .jit import kernel
@@ -40,6 +38,10 @@ def _rows(count: int) -> int:
 HALF_A = _rows(3)      # half extents of A [m]
 HALF_B = _rows(3)      # half extents of B [m]
 ORIGIN_A = _rows(3)    # position of A, common frame [m]
+ORIGIN_B = _rows(3)    # position of B, common frame [m]
+TURN_A = _rows(4)      # quaternions xyzw
+TURN_B = _rows(4)
+VALID = _rows(1)       # 1.0 for a pair that can be evaluated
 AXES_A = _rows(9)      # rotation of A, common frame, row-major (columns are A's axes)
 OFFSET_A = _rows(3)    # B − A in A's frame [m]
 OFFSET_B = _rows(3)    # B − A in B's frame [m]
@@ -99,19 +101,36 @@ def rotation_entries(x, y, z, w):
 
 
 @kernel
-def _valid_pose(pose, i):
-    # Written so that NaN fails every comparison.
-    norm = math.sqrt(pose[i, 3]**2 + pose[i, 4]**2 + pose[i, 5]**2 + pose[i, 6]**2)
-    return (abs(pose[i, 0]) <= LENGTH_MAX and abs(pose[i, 1]) <= LENGTH_MAX
-            and abs(pose[i, 2]) <= LENGTH_MAX
-            and norm >= QUATERNION_MIN and norm <= QUATERNION_MAX)
+def _pose_valid(x, y, z, norm2):
+    # Written so that NaN fails every comparison. An overflown square is infinite, and fails too.
+    return (abs(x) <= LENGTH_MAX and abs(y) <= LENGTH_MAX and abs(z) <= LENGTH_MAX
+            and norm2 >= QUATERNION_MIN * QUATERNION_MIN
+            and norm2 <= QUATERNION_MAX * QUATERNION_MAX)
 
 
 @kernel
-def _valid_size(size, i):
-    return (size[i, 0] >= LENGTH_MIN and size[i, 0] <= LENGTH_MAX
-            and size[i, 1] >= LENGTH_MIN and size[i, 1] <= LENGTH_MAX
-            and size[i, 2] >= LENGTH_MIN and size[i, 2] <= LENGTH_MAX)
+def _size_valid(x, y, z):
+    return min(min(x, y), z) >= LENGTH_MIN and max(max(x, y), z) <= LENGTH_MAX
+
+
+@kernel
+def _copy_block(poses_a, poses_b, sizes_a, sizes_b, start, count, work):
+    shared_a = sizes_a.shape[0] == 1
+    shared_b = sizes_b.shape[0] == 1
+    for i in range(count):
+        row = start + i
+        for k in range(3):
+            work[ORIGIN_A + k * LANES + i] = poses_a[row, k]
+            work[ORIGIN_B + k * LANES + i] = poses_b[row, k]
+        for k in range(4):
+            work[TURN_A + k * LANES + i] = poses_a[row, 3 + k]
+            work[TURN_B + k * LANES + i] = poses_b[row, 3 + k]
+    for i in range(count):
+        row_a = 0 if shared_a else start + i
+        row_b = 0 if shared_b else start + i
+        for k in range(3):
+            work[HALF_A + k * LANES + i] = 0.5 * sizes_a[row_a, k]
+            work[HALF_B + k * LANES + i] = 0.5 * sizes_b[row_b, k]
 
 
 @kernel
@@ -119,58 +138,89 @@ def load_block(poses_a, poses_b, sizes_a, sizes_b, start, count, work, status):
     """Check `count` pairs from row `start` on and write them into `work`.
 
     poses_a, poses_b are (n, 7); sizes_a, sizes_b, full extents, are (n, 3), or (1, 3) for all.
-    A row that fails a check gets its status (BAD_…) and the values of two unit cubes far apart,
-    so that the later stages need no test; returns the number of such rows.
+    A row that fails a check gets its `status` (BAD_…; rows of `status` must be OK before) and the
+    values of two unit cubes far apart, so that the later stages need no test; returns the number
+    of such rows.
     """
-    bad = 0
-    shared_a = sizes_a.shape[0] == 1
-    shared_b = sizes_b.shape[0] == 1
+    _copy_block(poses_a, poses_b, sizes_a, sizes_b, start, count, work)
+    good = 0
     for i in range(count):
-        row = start + i
-        row_a = 0 if shared_a else row
-        row_b = 0 if shared_b else row
-        code = OK
-        if not _valid_pose(poses_a, row):
-            code = BAD_POSE_A
-        elif not _valid_pose(poses_b, row):
-            code = BAD_POSE_B
-        elif not _valid_size(sizes_a, row_a):
-            code = BAD_SIZE_A
-        elif not _valid_size(sizes_b, row_b):
-            code = BAD_SIZE_B
-        status[row] = code
-        if code != OK:
-            bad += 1
-            _load_apart(work, i)
-            continue
-        for k in range(3):
-            work[HALF_A + k * LANES + i] = 0.5 * sizes_a[row_a, k]
-            work[HALF_B + k * LANES + i] = 0.5 * sizes_b[row_b, k]
-            work[ORIGIN_A + k * LANES + i] = poses_a[row, k]
-        a = rotation_entries(poses_a[row, 3], poses_a[row, 4], poses_a[row, 5], poses_a[row, 6])
-        b = rotation_entries(poses_b[row, 3], poses_b[row, 4], poses_b[row, 5], poses_b[row, 6])
-        tx = poses_b[row, 0] - poses_a[row, 0]
-        ty = poses_b[row, 1] - poses_a[row, 1]
-        tz = poses_b[row, 2] - poses_a[row, 2]
-        for k in range(9):
-            work[AXES_A + k * LANES + i] = a[k]
-        for k in range(3):
-            work[OFFSET_A + k * LANES + i] = (a[k] * tx + a[3 + k] * ty) + a[6 + k] * tz
-            work[OFFSET_B + k * LANES + i] = (b[k] * tx + b[3 + k] * ty) + b[6 + k] * tz
-            for j in range(3):
-                work[ROTATION + (3 * k + j) * LANES + i] = (
-                    (a[k] * b[j] + a[3 + k] * b[3 + j]) + a[6 + k] * b[6 + j])
-        size = max(max(sizes_a[row_a, 0], sizes_a[row_a, 1], sizes_a[row_a, 2]),
-                   max(sizes_b[row_b, 0], sizes_b[row_b, 1], sizes_b[row_b, 2]))
-        reach_a = max(abs(poses_a[row, 0]), abs(poses_a[row, 1]), abs(poses_a[row, 2]))
-        reach_b = max(abs(poses_b[row, 0]), abs(poses_b[row, 1]), abs(poses_b[row, 2]))
+        x, y, z, w = (work[TURN_A + i], work[TURN_A + LANES + i], work[TURN_A + 2 * LANES + i],
+                      work[TURN_A + 3 * LANES + i])
+        norm2_a = (x * x + y * y) + (z * z + w * w)
+        a00, a01, a02, a10, a11, a12, a20, a21, a22 = rotation_entries(x, y, z, w)
+        x, y, z, w = (work[TURN_B + i], work[TURN_B + LANES + i], work[TURN_B + 2 * LANES + i],
+                      work[TURN_B + 3 * LANES + i])
+        norm2_b = (x * x + y * y) + (z * z + w * w)
+        b00, b01, b02, b10, b11, b12, b20, b21, b22 = rotation_entries(x, y, z, w)
+        ax, ay, az = (work[ORIGIN_A + i], work[ORIGIN_A + LANES + i],
+                      work[ORIGIN_A + 2 * LANES + i])
+        bx, by, bz = (work[ORIGIN_B + i], work[ORIGIN_B + LANES + i],
+                      work[ORIGIN_B + 2 * LANES + i])
+        ha0, ha1, ha2 = work[HALF_A + i], work[HALF_A + LANES + i], work[HALF_A + 2 * LANES + i]
+        hb0, hb1, hb2 = work[HALF_B + i], work[HALF_B + LANES + i], work[HALF_B + 2 * LANES + i]
+        valid = (_pose_valid(ax, ay, az, norm2_a) and _pose_valid(bx, by, bz, norm2_b)
+                 and _size_valid(2.0 * ha0, 2.0 * ha1, 2.0 * ha2)
+                 and _size_valid(2.0 * hb0, 2.0 * hb1, 2.0 * hb2))
+        work[VALID + i] = 1.0 if valid else 0.0
+        good += 1 if valid else 0
+        tx, ty, tz = bx - ax, by - ay, bz - az
+        work[AXES_A + i] = a00
+        work[AXES_A + LANES + i] = a01
+        work[AXES_A + 2 * LANES + i] = a02
+        work[AXES_A + 3 * LANES + i] = a10
+        work[AXES_A + 4 * LANES + i] = a11
+        work[AXES_A + 5 * LANES + i] = a12
+        work[AXES_A + 6 * LANES + i] = a20
+        work[AXES_A + 7 * LANES + i] = a21
+        work[AXES_A + 8 * LANES + i] = a22
+        work[OFFSET_A + i] = (a00 * tx + a10 * ty) + a20 * tz
+        work[OFFSET_A + LANES + i] = (a01 * tx + a11 * ty) + a21 * tz
+        work[OFFSET_A + 2 * LANES + i] = (a02 * tx + a12 * ty) + a22 * tz
+        work[OFFSET_B + i] = (b00 * tx + b10 * ty) + b20 * tz
+        work[OFFSET_B + LANES + i] = (b01 * tx + b11 * ty) + b21 * tz
+        work[OFFSET_B + 2 * LANES + i] = (b02 * tx + b12 * ty) + b22 * tz
+        work[ROTATION + i] = (a00 * b00 + a10 * b10) + a20 * b20
+        work[ROTATION + LANES + i] = (a00 * b01 + a10 * b11) + a20 * b21
+        work[ROTATION + 2 * LANES + i] = (a00 * b02 + a10 * b12) + a20 * b22
+        work[ROTATION + 3 * LANES + i] = (a01 * b00 + a11 * b10) + a21 * b20
+        work[ROTATION + 4 * LANES + i] = (a01 * b01 + a11 * b11) + a21 * b21
+        work[ROTATION + 5 * LANES + i] = (a01 * b02 + a11 * b12) + a21 * b22
+        work[ROTATION + 6 * LANES + i] = (a02 * b00 + a12 * b10) + a22 * b20
+        work[ROTATION + 7 * LANES + i] = (a02 * b01 + a12 * b11) + a22 * b21
+        work[ROTATION + 8 * LANES + i] = (a02 * b02 + a12 * b12) + a22 * b22
+        size = 2.0 * max(max(max(ha0, ha1), ha2), max(max(hb0, hb1), hb2))
+        reach = max(max(max(abs(ax), abs(ay)), abs(az)), max(max(abs(bx), abs(by)), abs(bz)))
         work[SIZE + i] = size
-        work[TOUCH + i] = CONTACT_ULPS * ulp(max(max(reach_a, reach_b), size))
+        work[TOUCH + i] = CONTACT_ULPS * ulp(max(reach, size))
         # The sign of B − A changes on a swap, so its first component that is not zero says which
         # box comes first; for concentric boxes any order will do.
-        a_first = tx > 0.0 or (tx == 0.0 and (ty > 0.0 or (ty == 0.0 and tz >= 0.0)))
-        work[A_FIRST + i] = 1.0 if a_first else 0.0
-    return bad
+        later = ty > 0.0 or (ty == 0.0 and tz >= 0.0)
+        work[A_FIRST + i] = 1.0 if (tx > 0.0 or (tx == 0.0 and later)) else 0.0
+    if good < count:
+        for i in range(count):
+            if work[VALID + i] == 0.0:
+                status[start + i] = _fault(work, i)
+                _load_apart(work, i)
+    return count - good
+
+
+@kernel
+def _fault(work, i):
+    for box in range(2):
+        origin = ORIGIN_A if box == 0 else ORIGIN_B
+        turn = TURN_A if box == 0 else TURN_B
+        norm2 = 0.0
+        for k in range(4):
+            norm2 += work[turn + k * LANES + i]**2
+        if not _pose_valid(work[origin + i], work[origin + LANES + i],
+                           work[origin + 2 * LANES + i], norm2):
+            return BAD_POSE_A + box
+    half = HALF_A
+    if not _size_valid(2.0 * work[half + i], 2.0 * work[half + LANES + i],
+                       2.0 * work[half + 2 * LANES + i]):
+        return BAD_SIZE_A
+    return BAD_SIZE_B
 
 
 @kernel

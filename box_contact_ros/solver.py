@@ -16,6 +16,7 @@ MODELS = {
     'exact': 'SAT and the exact centroid of the overlap; any sizes; the reference',
     'paper': "the paper's network 6-20-18-4; two equal cubes, or the crane's containers",
     'paper-continuous': "the paper's networks 6-20-17-4 on subsets without jumps; two equal cubes",
+    'fcl': "FCL's box-box, its deepest contact; any sizes; needs python-fcl; a baseline",
 }
 """Models by name, with a line about each."""
 
@@ -42,6 +43,9 @@ def make_model(name: str, size_a: np.ndarray, size_b: np.ndarray, weights: str |
         return Paper(size_a, size_b, weights)
     if name == 'paper-continuous':
         return PaperContinuous(size_a, size_b, weights)
+    if name == 'fcl':
+        from .fcl_box import FclBox  # here, because python-fcl is an extra and the core goes without
+        return FclBox()
     raise ValueError(f'model {name!r} is not one of: {", ".join(MODELS)}')
 
 
@@ -102,7 +106,7 @@ class ContactSolver:
         rows = len(a)
         found = Contacts(np.empty(rows, dtype=np.bool_), np.empty(rows), np.empty((rows, 3)),
                          np.empty((rows, 3)))
-        status = np.empty(rows, dtype=np.int8)
+        status = np.zeros(rows, dtype=np.int8)
         if self._solver.solve(a, b, size_a, size_b, status, found):
             _refuse(a, b, size_a, size_b, status, names)
         return found

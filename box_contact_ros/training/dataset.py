@@ -261,7 +261,7 @@ def query(placements: Placements) -> Query:
     poses_a[:, 6] = 1.0
     size = np.array([placements.size])
     bad = _query(poses_a, np.ascontiguousarray(placements.pose), size, np.zeros(WORK_SIZE),
-                 np.empty(n, dtype=np.int8), found.separation, found.axis, found.normal,
+                 np.zeros(n, dtype=np.int8), found.separation, found.axis, found.normal,
                  found.offset, found.turn)
     if bad:
         raise ValueError(f'{bad} placements are no valid poses')
