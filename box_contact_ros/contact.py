@@ -6,8 +6,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .block import (
+    AXES_A,
+    LANES,
+    NORMAL,
+    ORIGIN_A,
+    SEPARATION,
+)
 from .jit import kernel
-from .pose import AXES_A, LANES, ORIGIN_A, SEPARATION
 
 
 class Contact(NamedTuple):
@@ -47,6 +53,12 @@ def write_contact(work, i, row, n, p, colliding, separation, normal, point):
         a2 = work[AXES_A + (3 * k + 2) * LANES + i]
         normal[row, k] = a0 * n[0] + a1 * n[1] + a2 * n[2]
         point[row, k] = work[ORIGIN_A + k * LANES + i] + (a0 * p[0] + a1 * p[1] + a2 * p[2])
+
+
+@kernel
+def sat_normal(work, i):
+    """SAT's normal of pair `i`, in A's frame."""
+    return work[NORMAL + i], work[NORMAL + LANES + i], work[NORMAL + 2 * LANES + i]
 
 
 @kernel

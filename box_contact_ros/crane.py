@@ -12,6 +12,10 @@ stay (meanwhile the start tilt is trimmed out rope by rope, as a spreader's trim
 The programme is tied to the duration, so a short run meets the same contacts as a long one; what
 varies with the duration is the height the load comes from.
 
+With `land` the hoist has another programme (`LANDING_SHARES`): hang, lower until the ropes are
+slack, and stay so; the ropes keep their start trim. It needs the wrench of a contact, without which
+the load hangs in the stack in the end.
+
 Conventions: SI units; world frame with z up and the ground at z = 0; a pose is the seven numbers
 `x y z qx qy qz qw` of the body's centre; angles given to `CraneScenario` are degrees.
 """
@@ -19,6 +23,7 @@ Conventions: SI units; world frame with z up and the ground at z = 0; a pose is 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import mujoco
@@ -54,6 +59,14 @@ TRIM_SHARES = (0.40, 0.70)
 """Shares of the duration between which the start tilt is trimmed out: it begins after the first
 touch, so that the load touches with a corner or an edge and ends on a face."""
 
+LANDING_SHARES = {'hang': 0.05, 'lower': 0.45}
+"""Phases of the hoist of a landing as shares of the duration, in order; then it stays down."""
+
+LANDING_OVERLAP = 0.8
+"""Overlap for a landing, m: how far the ropes are paid out beyond a load at rest on the stack. A
+load tilted by 3 degrees hangs 0.4 m unevenly in its ropes, and the trolley may stand a metre aside:
+half of this already leaves all four ropes slack in the default geometry."""
+
 _CORNERS = np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]], dtype=float)
 _ROPES = range(len(_CORNERS))
 
@@ -76,6 +89,7 @@ class CraneScenario:
     lowering_speed   -- top speed of the hoist, m/s; lifting uses it as well
     overlap          -- depth to which the load, at rest and level, is lowered into the stack
     duration         -- of the whole programme, s
+    land             -- lower until the ropes are slack (give an `overlap` for it), never lift
     """
 
     size: tuple[float, float, float] = CONTAINER_40FT
@@ -93,6 +107,7 @@ class CraneScenario:
     lowering_speed: float = 0.3
     overlap: float = 0.025
     duration: float = 18.0
+    land: bool = False
 
     def __post_init__(self) -> None:
         """Raise ValueError naming field and value if the scenario makes no sense."""
@@ -149,7 +164,8 @@ class CraneScenario:
     @property
     def lowering_distance(self) -> float:
         """How far the hoist lowers the load, m; half the top speed is its mean speed."""
-        return 0.5 * self.lowering_speed * HOIST_SHARES['lower'] * self.duration
+        shares = LANDING_SHARES if self.land else HOIST_SHARES
+        return 0.5 * self.lowering_speed * shares['lower'] * self.duration
 
     @property
     def lifting_distance(self) -> float:
@@ -158,6 +174,9 @@ class CraneScenario:
 
     def hoist_height(self, time: float) -> float:
         """Height of the load, level and at rest, over its lowest place, in m at `time` in s."""
+        if self.land:
+            hang, lower = (share * self.duration for share in LANDING_SHARES.values())
+            return self.lowering_distance * (1.0 - _ramp((time - hang) / lower))
         hang, lower, stay, lift = (share * self.duration for share in HOIST_SHARES.values())
         down = _ramp((time - hang) / lower)
         up = _ramp((time - hang - lower - stay) / lift)
@@ -165,6 +184,8 @@ class CraneScenario:
 
     def trim(self, time: float) -> float:
         """Share of the start tilt that the ropes still hold at `time` in s, 1 down to 0."""
+        if self.land:
+            return 1.0  # trimmed out by the landing itself, once the ropes are slack
         start, end = (share * self.duration for share in TRIM_SHARES)
         return 1.0 - _ramp((time - start) / (end - start))
 
@@ -229,9 +250,21 @@ class Crane:
         force  -- N, world frame, acting at the load's centre of mass: (3,), None for none
         torque -- N m, world frame, about the load's centre of mass: (3,), None for none
         """
-        self._data.xfrc_applied[self._load, :3] = 0.0 if force is None else force
-        self._data.xfrc_applied[self._load, 3:] = 0.0 if torque is None else torque
+        wrench = np.zeros(6)
+        wrench[:3] = 0.0 if force is None else force
+        wrench[3:] = 0.0 if torque is None else torque
+        self.step_under(lambda _: wrench)
+
+    def step_under(self, wrench: Callable[[float], np.ndarray]) -> None:
+        """Advance one tick under a wrench that may change within it, from one physics step to the
+        next.
+
+        wrench -- from a simulated time in s, the start of a physics step, to the force in N and the
+                  torque in N m (6,) over that step, world frame, at the load's centre of mass
+        """
         for substep in range(1, self._substeps + 1):
+            start = (self._ticks + (substep - 1) / self._substeps) / self._rate_hz
+            self._data.xfrc_applied[self._load] = wrench(start)
             time = (self._ticks + substep / self._substeps) / self._rate_hz
             self._set_ropes(self.scenario.hoist_height(time), self.scenario.trim(time))
             mujoco.mj_step(self._model, self._data)

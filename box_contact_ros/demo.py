@@ -1,9 +1,11 @@
 """The demonstration: a contact node and a crane, two processes that talk over DDS.
 
 `python -m box_contact_ros.demo` starts both, shows the crane's live contacts and its summary, and
-ends both again, within a minute. They run in a ROS domain of their own on this host, so that
-nothing else hears them; the environment variable `BOX_CONTACT_DEMO_DOMAIN` chooses another one.
-The exit status is the crane's: 0 only if contacts came through and nothing was lost.
+ends both again, within a minute. The contacts push the load, one point per tick, and the crane says
+whether it came to rest on the stack; with `--open-loop` they are only recorded. Both run in a ROS
+domain of their own on this host, so that nothing else hears them; the environment variable
+`BOX_CONTACT_DEMO_DOMAIN` chooses another one. The exit status is the crane's: 0 only if contacts
+came through, nothing was lost, and, closed loop, the load came to rest.
 """
 
 from __future__ import annotations
@@ -18,13 +20,16 @@ import tempfile
 import time
 from collections.abc import Sequence
 
-from .crane import CONTAINER_40FT
+from .crane import CONTAINER_40FT, CraneScenario
+from .landing import LANDING_DURATION
 
 DOMAIN_VARIABLE = 'BOX_CONTACT_DEMO_DOMAIN'
 DOMAINS = range(1, 102)  # 0 is everybody's; beyond 101, ports run into those Linux hands out
 
 TIME_LIMIT = 58.0  # s for everything: a demo ends within a minute, whatever happens
 OVERHEAD = 8.0  # s of it for starting, for the last answers and for the summary
+LANDING_LEAST = 22.0  # s: a shorter landing ends before it can be judged
+LANDING_MODEL = 'exact'  # the closed loop's default: it needs a point without jumps
 END_PATIENCE = 2.0  # s between asking a process group to end and killing it
 
 NEXT = """
@@ -47,10 +52,14 @@ def main(args: Sequence[str] | None = None) -> int:
     crane = [
         f'duration:={options.duration}', f'rate:={options.rate}', 'report:=true',
         f'wait:={TIME_LIMIT - OVERHEAD - options.duration}',
+        f'closed_loop:={str(options.closed_loop).lower()}',
     ]
-    print(f'A crane lowers one container onto another, {options.duration:g} s in real time; it '
-          f'publishes both poses at {options.rate:g} Hz.\nA contact node answers. Both are ROS 2 '
-          f'processes of their own, in domain {options.domain} on this host.', flush=True)
+    what = ('sets one container down on another' if options.closed_loop
+            else 'lowers one container onto another and lifts it')
+    how = 'its contacts hold the load up' if options.closed_loop else 'nothing is done with it'
+    print(f'A crane {what}, {options.duration:g} s in real time; it publishes both poses at '
+          f'{options.rate:g} Hz.\nA contact node answers; {how}. Both are ROS 2 processes of their '
+          f'own, in domain {options.domain} on this host.', flush=True)
     # SIGTERM and SIGHUP must end the children as well, so let them unwind like Ctrl-C does.
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, _exit_on_signal)
@@ -83,15 +92,28 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
         epilog=f'{DOMAIN_VARIABLE}=N in the environment chooses the ROS domain, '
                f'0 to {DOMAINS[-1]}; without it one is drawn at random.',
     )
-    parser.add_argument('--model', help="the node's model of the contact point (default: the "
-                                        "node's own)")
+    parser.add_argument('--closed-loop', action='store_true', default=True,
+                        help='apply the contacts to the load as a force, and judge whether it '
+                             'comes to rest')
+    parser.add_argument('--open-loop', dest='closed_loop', action='store_false',
+                        help='only record the contacts')
+    parser.add_argument('--model', help="the node's model of the contact point (default: closed "
+                                        f"loop {LANDING_MODEL}, open loop the node's own)")
     parser.add_argument('--rate', type=float, default=200.0, metavar='HZ',
                         help='pairs of poses a second (default: %(default)g)')
-    parser.add_argument('--duration', type=float, default=18.0, metavar='S',
-                        help='length of the motion, 1 to 40 s (default: %(default)g)')
+    open_loop = CraneScenario().duration
+    parser.add_argument('--duration', type=float, metavar='S',
+                        help=f'length of the motion, closed loop {LANDING_LEAST:g} to 40 s '
+                             f'(default: {LANDING_DURATION:g}), open loop 1 to 40 s (default: '
+                             f'{open_loop:g})')
     options = parser.parse_args(args)
-    if not 1.0 <= options.duration <= 40.0:
-        parser.error(f'--duration must lie in 1 to 40 s, got {options.duration:g}')
+    if options.duration is None:
+        options.duration = LANDING_DURATION if options.closed_loop else open_loop
+    if options.model is None and options.closed_loop:
+        options.model = LANDING_MODEL
+    least = LANDING_LEAST if options.closed_loop else 1.0
+    if not least <= options.duration <= 40.0:
+        parser.error(f'--duration must lie in {least:g} to 40 s, got {options.duration:g}')
     if not 1.0 <= options.rate <= 2000.0:
         parser.error(f'--rate must lie in 1 to 2000 Hz, got {options.rate:g}')
     domain = os.environ.get(DOMAIN_VARIABLE, str(random.choice(DOMAINS)))

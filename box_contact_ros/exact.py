@@ -3,11 +3,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from .contact import Contacts, write_apart, write_contact
+from .block import (
+    LANES,
+    SEPARATION,
+    TOUCH,
+    WORK_SIZE,
+)
+from .contact import Contacts, sat_normal, write_apart, write_contact
 from .jit import kernel
-from .overlap import CLIP_SIZE, centroid
-from .pose import LANES, SEPARATION, TOUCH, WORK_SIZE, load_block
-from .sat import axis_normal, query_block
+from .overlap import CLIP_SIZE, centroid, press
+from .pose import (
+    load_block,
+)
+from .sat import query_block
 
 
 @kernel
@@ -22,9 +30,9 @@ def solve_exact(poses_a, poses_b, sizes_a, sizes_b, work, clip, status,
         query_block(count, work)
         for i in range(count):
             if work[SEPARATION + i] <= work[TOUCH + i]:
-                n = axis_normal(work, i)
-                p = centroid(work, i, n[0], n[1], n[2], clip)
-                write_contact(work, i, start + i, n, p, colliding, separation, normal, point)
+                press(work, i)
+                write_contact(work, i, start + i, sat_normal(work, i), centroid(work, i, clip),
+                              colliding, separation, normal, point)
             else:
                 write_apart(work, i, start + i, colliding, separation, normal, point)
     return bad

@@ -1,17 +1,24 @@
 """Compilation of the numeric kernels: one decorator, so that every kernel is built alike.
 
-Kernels are Numba functions compiled at first use and cached on disk. Where no cache folder can be
-written (a read-only installation) they are compiled without one, and a single warning says so.
+Kernels are Numba functions compiled at first use and cached on disk. Numba takes a cached kernel
+for good as long as its own file is unchanged, even if a kernel that it calls has changed; here an
+edit anywhere in the package compiles all of them anew, so an upgrade in place cannot mix versions.
+Where no cache folder can be written (a read-only installation) kernels are compiled without one,
+and a single warning says so.
 """
 from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numba
 
 _warned = False
+_STAMP = tuple(sorted((path.name, path.stat().st_mtime_ns, path.stat().st_size)
+                      for path in Path(__file__).parent.glob('*.py')))
+"""What the cached kernels are made from: the package's own modules."""
 
 
 def kernel(function: Callable[..., Any]) -> Any:
@@ -20,9 +27,25 @@ def kernel(function: Callable[..., Any]) -> Any:
     Divisions follow IEEE 754 (no ZeroDivisionError), which lets loops be vectorised; fast-math
     stays off, so that a row gives the same bits alone and within a batch.
     """
+    return _compiled(function)
+
+
+def inlined(function: Callable[..., Any]) -> Any:
+    """Like `kernel`, for the small parts of a block kernel: without a call its loop vectorises."""
+    return _compiled(function, forceinline=True)
+
+
+def fused_kernel(function: Callable[..., Any]) -> Any:
+    """Like `kernel`, with a·b + c rounded once: twice as fast, for the float32 networks only."""
+    return _compiled(function, fastmath={'contract'})
+
+
+def _compiled(function: Callable[..., Any], **options: Any) -> Any:
     global _warned
     try:
-        return numba.njit(cache=True, error_model='numpy')(function)
+        compiled = numba.njit(cache=True, error_model='numpy', **options)(function)
+        compiled._cache._cache_file._source_stamp = _STAMP
+        return compiled
     except RuntimeError as error:  # numba: 'cannot cache function ...: no locator available'
         if 'cannot cache' not in str(error):
             raise
@@ -31,5 +54,5 @@ def kernel(function: Callable[..., Any]) -> Any:
             warnings.warn(
                 'no folder for compiled kernels can be written, so they are compiled anew in '
                 'every process; set NUMBA_CACHE_DIR to a writable folder', RuntimeWarning,
-                stacklevel=3)
-        return numba.njit(error_model='numpy')(function)
+                stacklevel=4)
+        return numba.njit(error_model='numpy', **options)(function)

@@ -14,13 +14,16 @@ import json
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save
 
-from .jit import kernel
+from .block import (
+    LANES,
+)
+from .jit import fused_kernel, inlined, kernel
 
 CARD_FIELDS = ('name', 'model', 'architecture', 'inputs', 'outputs', 'sizes', 'data', 'seed',
                'commit', 'metrics', 'sha256')
@@ -140,6 +143,136 @@ def _pack(name: str, tensors: dict[str, np.ndarray], path: Path) -> Network:
     if not parts or used != sum(array.size for array in mine):
         raise WeightsError(f'weights file {path}: {name} has tensors that belong to no layer')
     return Network(name, tuple(widths), np.concatenate(parts))
+
+
+TANH_LIMIT = 3.6467
+"""Where the rational tanh below reaches 1; beyond, it is 1."""
+
+
+@inlined
+def rational_tanh(x):
+    """tanh as the fifth convergent of its continued fraction (Lambert 1770): error below 1.4e-3.
+
+    Networks are trained with this very function, so its error is none of the network's.
+    """
+    x = min(max(x, np.float32(-TANH_LIMIT)), np.float32(TANH_LIMIT))
+    s = x * x
+    above = x * (np.float32(945.0) + s * (np.float32(105.0) + s))
+    return above / (np.float32(945.0) + s * (np.float32(420.0) + s * np.float32(15.0)))
+
+
+class BlockWeights(NamedTuple):
+    """A network laid out for `forward_block` and `forward_one`, in the order in which they read.
+
+    Every layer is widened with zeros to a multiple of 4.
+    """
+
+    tiles: np.ndarray
+    """float32: per layer the biases, then for each group of 4 outputs and each group of 4 inputs
+    the 16 weights, outputs first."""
+    columns: np.ndarray
+    """float32: per layer the biases, then for each input the weights to all outputs."""
+    widths: np.ndarray
+    """(layers + 1,) int64, widened."""
+
+
+def block_weights(network: Network) -> BlockWeights:
+    """Lay a network out for the block kernels."""
+    widths = np.array([-(-width // 4) * 4 for width in network.widths], dtype=np.int64)
+    tiles, columns = [], []
+    place = 0
+    for inputs, outputs, wide_in, wide_out in zip(network.widths, network.widths[1:], widths,
+                                                  widths[1:]):
+        weight = np.zeros((wide_out, wide_in), dtype=np.float32)
+        bias = np.zeros(wide_out, dtype=np.float32)
+        weight[:outputs, :inputs] = network.packed[place:place + inputs * outputs].reshape(
+            outputs, inputs)
+        place += inputs * outputs
+        bias[:outputs] = network.packed[place:place + outputs]
+        place += outputs
+        grouped = weight.reshape(wide_out // 4, 4, wide_in // 4, 4).transpose(0, 2, 1, 3)
+        tiles += [bias, grouped.ravel()]
+        columns += [bias, weight.T.ravel()]
+    return BlockWeights(np.concatenate(tiles), np.concatenate(columns), widths)
+
+
+@fused_kernel
+def forward_block(tiles, widths, values, spare):
+    """Run the network on LANES inputs at once; `values` holds the inputs before, outputs after.
+
+    tiles, widths: see `BlockWeights`; values, spare: (max(widths), LANES) float32, rows of inputs
+    beyond the network's own zero. Four outputs at a time take in four inputs at a time, so that a
+    value loaded is used four times.
+    """
+    place = 0
+    layers = len(widths) - 1
+    for layer in range(layers):
+        outputs = widths[layer + 1]
+        place = _layer_block(tiles, place, widths[layer], outputs, values, spare)
+        if layer < layers - 1:
+            _tanh_block(spare, values, outputs)
+        else:
+            values[:outputs] = spare[:outputs]
+
+
+@fused_kernel
+def _tanh_block(x, y, count):
+    for row in range(count):
+        for i in range(LANES):
+            y[row, i] = rational_tanh(x[row, i])
+
+
+@fused_kernel
+def _layer_block(packed, place, inputs, outputs, x, y):
+    tile = place + outputs
+    for row in range(0, outputs, 4):
+        b0, b1, b2, b3 = (packed[place + row], packed[place + row + 1], packed[place + row + 2],
+                          packed[place + row + 3])
+        for i in range(LANES):
+            y[row, i], y[row + 1, i], y[row + 2, i], y[row + 3, i] = b0, b1, b2, b3
+        for column in range(0, inputs, 4):
+            p0, p1, p2, p3 = packed[tile], packed[tile + 1], packed[tile + 2], packed[tile + 3]
+            q0, q1, q2, q3 = packed[tile + 4], packed[tile + 5], packed[tile + 6], packed[tile + 7]
+            r0, r1, r2, r3 = (packed[tile + 8], packed[tile + 9], packed[tile + 10],
+                              packed[tile + 11])
+            s0, s1, s2, s3 = (packed[tile + 12], packed[tile + 13], packed[tile + 14],
+                              packed[tile + 15])
+            for i in range(LANES):
+                x0, x1, x2, x3 = x[column, i], x[column + 1, i], x[column + 2, i], x[column + 3, i]
+                y[row, i] = (((y[row, i] + p0 * x0) + p1 * x1) + p2 * x2) + p3 * x3
+                y[row + 1, i] = (((y[row + 1, i] + q0 * x0) + q1 * x1) + q2 * x2) + q3 * x3
+                y[row + 2, i] = (((y[row + 2, i] + r0 * x0) + r1 * x1) + r2 * x2) + r3 * x3
+                y[row + 3, i] = (((y[row + 3, i] + s0 * x0) + s1 * x1) + s2 * x2) + s3 * x3
+            tile += 16
+    return tile
+
+
+@fused_kernel
+def forward_one(columns, widths, values, spare):
+    """`forward_block` for the first lane alone, its sums in the same order."""
+    x = spare[0]
+    y = spare[1]
+    for k in range(widths[0]):
+        x[k] = values[k, 0]
+    place = 0
+    layers = len(widths) - 1
+    for layer in range(layers):
+        outputs = widths[layer + 1]
+        for row in range(outputs):
+            y[row] = columns[place + row]
+        place += outputs
+        for column in range(widths[layer]):
+            value = x[column]
+            weights = columns[place:place + outputs]
+            for row in range(outputs):
+                y[row] += weights[row] * value
+            place += outputs
+        if layer < layers - 1:
+            for row in range(outputs):
+                x[row] = rational_tanh(y[row])
+        else:
+            for row in range(outputs):
+                values[row, 0] = y[row]
 
 
 @kernel

@@ -25,8 +25,19 @@ from __future__ import annotations
 
 import numpy as np
 
+from .block import (
+    FACE,
+    HALF_A,
+    HALF_B,
+    LANES,
+    NORMAL,
+    OFFSET_A,
+    OFFSET_B,
+    ROTATION,
+    SEPARATION,
+    SIZE,
+)
 from .jit import kernel
-from .pose import FACE, HALF_A, HALF_B, LANES, OFFSET_A, OFFSET_B, ROTATION, SEPARATION, SIZE
 
 DEPTH_FLOOR = 1e-9
 """Depth, as a fraction of the size, to which B is pressed in before the centroid is taken. At exact
@@ -86,13 +97,27 @@ def _moments(clip, polygon, count):
 
 
 @kernel
-def centroid(work, i, n0, n1, n2, clip):
-    """Centroid of A∩B of pair `i`, in A's frame, with B first pressed in to DEPTH_FLOOR.
+def press(work, i):
+    """Move B of pair `i` against the normal until it is DEPTH_FLOOR deep, if it is not yet.
 
-    (n0, n1, n2) is the normal in A's frame. `clip` is scratch of CLIP_SIZE numbers.
+    The separation stays what it was.
     """
-    floor = DEPTH_FLOOR * work[SIZE + i]
-    press = max(0.0, floor + work[SEPARATION + i])
+    move = DEPTH_FLOOR * work[SIZE + i] + work[SEPARATION + i]
+    if move > 0.0:
+        n0, n1, n2 = work[NORMAL + i], work[NORMAL + LANES + i], work[NORMAL + 2 * LANES + i]
+        for k in range(3):
+            work[OFFSET_A + k * LANES + i] -= move * (n0 if k == 0 else (n1 if k == 1 else n2))
+            work[OFFSET_B + k * LANES + i] -= move * (
+                work[ROTATION + k * LANES + i] * n0 + work[ROTATION + (3 + k) * LANES + i] * n1
+                + work[ROTATION + (6 + k) * LANES + i] * n2)
+
+
+@kernel
+def centroid(work, i, clip):
+    """Centroid of A∩B of pair `i`, which has been pressed in, in A's frame.
+
+    `clip` is scratch of CLIP_SIZE numbers.
+    """
     face = int(work[FACE + i])
     of_a = face < 3
     k = face if of_a else face - 3
@@ -102,17 +127,12 @@ def centroid(work, i, n0, n1, n2, clip):
     # The incident box in the reference box's frame, (u, v, w) = (a, b, k): centre c, axes e.
     ku, kv, kw = a * LANES, b * LANES, k * LANES
     if of_a:
-        cu = work[OFFSET_A + ku + i] - press * _component(a, n0, n1, n2)
-        cv = work[OFFSET_A + kv + i] - press * _component(b, n0, n1, n2)
-        cw = work[OFFSET_A + kw + i] - press * _component(k, n0, n1, n2)
+        cu, cv, cw = work[OFFSET_A + ku + i], work[OFFSET_A + kv + i], work[OFFSET_A + kw + i]
         hu, hv, hw = work[HALF_A + ku + i], work[HALF_A + kv + i], work[HALF_A + kw + i]
         g0, g1, g2 = work[HALF_B + i], work[HALF_B + LANES + i], work[HALF_B + 2 * LANES + i]
         row, column = 3 * LANES, LANES
     else:
-        # The normal's components along B's axes: Rᵀ n.
-        cu = press * _along_b(work, i, a, n0, n1, n2) - work[OFFSET_B + ku + i]
-        cv = press * _along_b(work, i, b, n0, n1, n2) - work[OFFSET_B + kv + i]
-        cw = press * _along_b(work, i, k, n0, n1, n2) - work[OFFSET_B + kw + i]
+        cu, cv, cw = -work[OFFSET_B + ku + i], -work[OFFSET_B + kv + i], -work[OFFSET_B + kw + i]
         hu, hv, hw = work[HALF_B + ku + i], work[HALF_B + kv + i], work[HALF_B + kw + i]
         g0, g1, g2 = work[HALF_A + i], work[HALF_A + LANES + i], work[HALF_A + 2 * LANES + i]
         row, column = LANES, 3 * LANES
@@ -202,23 +222,12 @@ def centroid(work, i, n0, n1, n2, clip):
     z = pu if a == 2 else (pv if b == 2 else pw)
     if of_a:
         return x, y, z
-    return (work[OFFSET_A + i] - press * n0
+    return (work[OFFSET_A + i]
             + (work[ROTATION + i] * x + work[ROTATION + LANES + i] * y
                + work[ROTATION + 2 * LANES + i] * z),
-            work[OFFSET_A + LANES + i] - press * n1
+            work[OFFSET_A + LANES + i]
             + (work[ROTATION + 3 * LANES + i] * x + work[ROTATION + 4 * LANES + i] * y
                + work[ROTATION + 5 * LANES + i] * z),
-            work[OFFSET_A + 2 * LANES + i] - press * n2
+            work[OFFSET_A + 2 * LANES + i]
             + (work[ROTATION + 6 * LANES + i] * x + work[ROTATION + 7 * LANES + i] * y
                + work[ROTATION + 8 * LANES + i] * z))
-
-
-@kernel
-def _component(k, x, y, z):
-    return x if k == 0 else (y if k == 1 else z)
-
-
-@kernel
-def _along_b(work, i, k, n0, n1, n2):
-    return (work[ROTATION + k * LANES + i] * n0 + work[ROTATION + (3 + k) * LANES + i] * n1
-            + work[ROTATION + (6 + k) * LANES + i] * n2)

@@ -20,10 +20,7 @@ import math
 
 import numpy as np
 
-from .contact import Contacts, write_apart, write_contact
-from .jit import kernel
-from .network import Network, Weights, WeightsError, forward, load_weights
-from .pose import (
+from .block import (
     AXIS,
     HALF_A,
     LANES,
@@ -33,10 +30,15 @@ from .pose import (
     SEPARATION,
     TOUCH,
     WORK_SIZE,
+)
+from .contact import Contacts, sat_normal, write_apart, write_contact
+from .jit import kernel
+from .network import Network, Weights, WeightsError, forward, load_weights
+from .pose import (
     load_block,
 )
 from .resources import resource_path
-from .sat import axis_normal, query_block
+from .sat import query_block
 from .symmetry import FOLD_SIZE, OFFSET, euler_angles, fold_features, fold_octant, unfold
 
 INPUTS, OUTPUTS = 6, 4
@@ -64,7 +66,7 @@ def _learned_contact(work, i, cubes, continuous, packed, widths, activation, fol
 
     packed: (networks, parameters); pair: scratch of 15 numbers.
     """
-    n = axis_normal(work, i)
+    n = sat_normal(work, i)
     depth = -work[SEPARATION + i]
     axis = int(work[AXIS + i])
     swapped = 3 <= axis < 6

@@ -10,51 +10,29 @@ Rotations are formed from each quaternion and multiplied out as R[i, j] = a_i ·
 of the boxes' axes, and the offset as B − A before anything else: everything that can cancel does
 so in float64, once. The products are also bit for bit the same when the boxes are swapped
 (R becomes its transpose, offsets change sign), which the verdict relies on (see `sat`).
-
-Kernels work on blocks of up to `LANES` pairs, stored as a structure of arrays in one flat scratch
-array: value `NAME` of pair `i` of the block is `work[NAME + i]`. The stages of a block are
-`load_block` (here), `sat.query_block`, and a builder of the point (`overlap`, `network`).
 """
 from __future__ import annotations
 
 import numpy as np
 
-from .jit import kernel
-
-LANES = 64
-"""Pairs per block: a multiple of every vector width, and a working set that stays in L1/L2."""
-
-_row = 0
-
-
-def _rows(count: int) -> int:
-    global _row
-    first = _row * LANES
-    _row += count
-    return first
-
-
-# What load_block writes. Axes are counted x, y, z; R is row-major: R[i, j] = a_i · b_j.
-HALF_A = _rows(3)      # half extents of A [m]
-HALF_B = _rows(3)      # half extents of B [m]
-ORIGIN_A = _rows(3)    # position of A, common frame [m]
-ORIGIN_B = _rows(3)    # position of B, common frame [m]
-TURN_A = _rows(4)      # quaternions xyzw
-TURN_B = _rows(4)
-VALID = _rows(1)       # 1.0 for a pair that can be evaluated
-AXES_A = _rows(9)      # rotation of A, common frame, row-major (columns are A's axes)
-OFFSET_A = _rows(3)    # B − A in A's frame [m]
-OFFSET_B = _rows(3)    # B − A in B's frame [m]
-ROTATION = _rows(9)    # R, orientation of B in A's frame
-SIZE = _rows(1)        # largest full extent of the pair [m]
-TOUCH = _rows(1)       # separation up to which the boxes touch [m]: see CONTACT_ULPS
-A_FIRST = _rows(1)     # 1.0 where A comes first in the order used for edge axes (see sat)
-# What sat.query_block writes.
-SEPARATION = _rows(1)  # signed separation [m]
-AXIS = _rows(1)        # winning axis: 0–2 faces of A, 3–5 faces of B, 6 + 3 i + j for a_i × b_j
-FACE = _rows(1)        # best face axis, 0–5, whatever wins
-
-WORK_SIZE = _row * LANES
+from .block import (
+    A_FIRST,
+    AXES_A,
+    HALF_A,
+    HALF_B,
+    LANES,
+    OFFSET_A,
+    OFFSET_B,
+    ORIGIN_A,
+    ORIGIN_B,
+    ROTATION,
+    SIZE,
+    TOUCH,
+    TURN_A,
+    TURN_B,
+    VALID,
+)
+from .jit import inlined, kernel
 
 CONTACT_ULPS = 8.0
 """Boxes touch up to a separation of 8 ulp of the pair's largest coordinate or size: the rounding
@@ -78,7 +56,7 @@ OK, BAD_POSE_A, BAD_POSE_B, BAD_SIZE_A, BAD_SIZE_B = range(5)
 _HALF_ULP_AND_MORE = 0.75 * 2.0**-52
 
 
-@kernel
+@inlined
 def ulp(x):
     """Distance from a positive normal number to the next larger one (without a branch).
 
@@ -87,7 +65,7 @@ def ulp(x):
     return (x + x * _HALF_ULP_AND_MORE) - x
 
 
-@kernel
+@inlined
 def rotation_entries(x, y, z, w):
     """Rotation matrix of a quaternion of any length, row-major, 9 numbers.
 
@@ -100,7 +78,7 @@ def rotation_entries(x, y, z, w):
             s * (x * z - w * y), s * (y * z + w * x), 1.0 - s * (x * x + y * y))
 
 
-@kernel
+@inlined
 def _pose_valid(x, y, z, norm2):
     # Written so that NaN fails every comparison. An overflown square is infinite, and fails too.
     return (abs(x) <= LENGTH_MAX and abs(y) <= LENGTH_MAX and abs(z) <= LENGTH_MAX
@@ -108,7 +86,7 @@ def _pose_valid(x, y, z, norm2):
             and norm2 <= QUATERNION_MAX * QUATERNION_MAX)
 
 
-@kernel
+@inlined
 def _size_valid(x, y, z):
     return min(min(x, y), z) >= LENGTH_MIN and max(max(x, y), z) <= LENGTH_MAX
 
@@ -125,12 +103,25 @@ def _copy_block(poses_a, poses_b, sizes_a, sizes_b, start, count, work):
         for k in range(4):
             work[TURN_A + k * LANES + i] = poses_a[row, 3 + k]
             work[TURN_B + k * LANES + i] = poses_b[row, 3 + k]
-    for i in range(count):
-        row_a = 0 if shared_a else start + i
-        row_b = 0 if shared_b else start + i
+        row_a = 0 if shared_a else row
+        row_b = 0 if shared_b else row
         for k in range(3):
             work[HALF_A + k * LANES + i] = 0.5 * sizes_a[row_a, k]
             work[HALF_B + k * LANES + i] = 0.5 * sizes_b[row_b, k]
+
+
+@kernel
+def _copy_apart(work, i):
+    """Two unit cubes far apart, as if they had been given."""
+    for k in range(3):
+        work[ORIGIN_A + k * LANES + i] = 0.0
+        work[ORIGIN_B + k * LANES + i] = 4.0
+        work[TURN_A + k * LANES + i] = 0.0
+        work[TURN_B + k * LANES + i] = 0.0
+        work[HALF_A + k * LANES + i] = 0.5
+        work[HALF_B + k * LANES + i] = 0.5
+    work[TURN_A + 3 * LANES + i] = 1.0
+    work[TURN_B + 3 * LANES + i] = 1.0
 
 
 @kernel
@@ -139,12 +130,30 @@ def load_block(poses_a, poses_b, sizes_a, sizes_b, start, count, work, status):
 
     poses_a, poses_b are (n, 7); sizes_a, sizes_b, full extents, are (n, 3), or (1, 3) for all.
     A row that fails a check gets its `status` (BAD_…; rows of `status` must be OK before) and the
-    values of two unit cubes far apart, so that the later stages need no test; returns the number
-    of such rows.
+    values of two cubes far apart, so that the later stages need no test; returns the number of
+    such rows.
     """
     _copy_block(poses_a, poses_b, sizes_a, sizes_b, start, count, work)
+    if count == 1:
+        bad = 1 - _prepare(1, work)
+    else:
+        for i in range(count, LANES):
+            _copy_apart(work, i)
+        bad = LANES - _prepare(LANES, work)
+    if bad:
+        for i in range(count):
+            if work[VALID + i] == 0.0:
+                status[start + i] = _fault(work, i)
+                _copy_apart(work, i)
+        _prepare(LANES, work)
+    return bad
+
+
+@inlined
+def _prepare(lanes, work):
+    """From poses and sizes to what the axes are tested on; returns the number of good pairs."""
     good = 0
-    for i in range(count):
+    for i in range(lanes):
         x, y, z, w = (work[TURN_A + i], work[TURN_A + LANES + i], work[TURN_A + 2 * LANES + i],
                       work[TURN_A + 3 * LANES + i])
         norm2_a = (x * x + y * y) + (z * z + w * w)
@@ -197,12 +206,7 @@ def load_block(poses_a, poses_b, sizes_a, sizes_b, start, count, work, status):
         # box comes first; for concentric boxes any order will do.
         later = ty > 0.0 or (ty == 0.0 and tz >= 0.0)
         work[A_FIRST + i] = 1.0 if (tx > 0.0 or (tx == 0.0 and later)) else 0.0
-    if good < count:
-        for i in range(count):
-            if work[VALID + i] == 0.0:
-                status[start + i] = _fault(work, i)
-                _load_apart(work, i)
-    return count - good
+    return good
 
 
 @kernel
@@ -221,23 +225,6 @@ def _fault(work, i):
                        2.0 * work[half + 2 * LANES + i]):
         return BAD_SIZE_A
     return BAD_SIZE_B
-
-
-@kernel
-def _load_apart(work, i):
-    for k in range(3):
-        work[HALF_A + k * LANES + i] = 0.5
-        work[HALF_B + k * LANES + i] = 0.5
-        work[ORIGIN_A + k * LANES + i] = 0.0
-        work[OFFSET_A + k * LANES + i] = 4.0
-        work[OFFSET_B + k * LANES + i] = 4.0
-        for j in range(3):
-            unit = 1.0 if k == j else 0.0
-            work[AXES_A + (3 * k + j) * LANES + i] = unit
-            work[ROTATION + (3 * k + j) * LANES + i] = unit
-    work[SIZE + i] = 1.0
-    work[TOUCH + i] = 0.0
-    work[A_FIRST + i] = 1.0
 
 
 def rotation_matrix(quaternion: np.ndarray) -> np.ndarray:

@@ -25,20 +25,21 @@ from __future__ import annotations
 
 import math
 
-from .jit import kernel
-from .pose import (
+from .block import (
     A_FIRST,
     AXIS,
     FACE,
     HALF_A,
     HALF_B,
     LANES,
+    NORMAL,
     OFFSET_A,
     OFFSET_B,
     ROTATION,
     SEPARATION,
     SIZE,
 )
+from .jit import inlined, kernel
 
 PARALLEL = 1e-8
 """Edge axes shorter than this (sine of the angle between the edges) are skipped. Boxes that share
@@ -51,7 +52,7 @@ TIE = 2.0**-46
 rounding error of a gap is below 12 units of 2⁻⁵³ of the size, and twice that must not decide."""
 
 
-@kernel
+@inlined
 def _edge_gap(t1, t2, h1, h2, u1, u2, v1, v2, hv, w1, w2, hw):
     """Gap on the axis e × u in the frame of a box with the edge direction e.
 
@@ -66,7 +67,7 @@ def _edge_gap(t1, t2, h1, h2, u1, u2, v1, v2, hv, w1, w2, hw):
     return gap if length2 >= PARALLEL * PARALLEL else -math.inf
 
 
-@kernel
+@inlined
 def _better(best, axis, gap, candidate, tie):
     """The better of two axes, the earlier one where they tie."""
     wins = gap > best + tie
@@ -75,8 +76,18 @@ def _better(best, axis, gap, candidate, tie):
 
 @kernel
 def query_block(count, work):
-    """SAT of the first `count` pairs of the block; writes SEPARATION, AXIS and FACE."""
-    for i in range(count):
+    """SAT of a block of `count` pairs: writes SEPARATION, AXIS, FACE and NORMAL."""
+    if count == 1:
+        _query(1, work)
+        _normals(1, work)
+    else:
+        _query(LANES, work)
+        _normals(LANES, work)
+
+
+@inlined
+def _query(lanes, work):
+    for i in range(lanes):
         r00 = work[ROTATION + i]
         r01 = work[ROTATION + LANES + i]
         r02 = work[ROTATION + 2 * LANES + i]
@@ -147,41 +158,49 @@ def query_block(count, work):
         work[SEPARATION + i] = top
 
 
-@kernel
-def axis_normal(work, i):
-    """Unit vector, from A to B, in A's frame, along the winning axis of pair `i`."""
-    axis = int(work[AXIS + i])
-    if axis < 3:
-        s = 1.0 if work[OFFSET_A + axis * LANES + i] >= 0.0 else -1.0
-        return (s if axis == 0 else 0.0), (s if axis == 1 else 0.0), (s if axis == 2 else 0.0)
-    if axis < 6:
-        j = axis - 3
-        s = 1.0 if work[OFFSET_B + j * LANES + i] >= 0.0 else -1.0
-        return (s * work[ROTATION + j * LANES + i], s * work[ROTATION + (3 + j) * LANES + i],
-                s * work[ROTATION + (6 + j) * LANES + i])
-    # An edge axis is taken in the very frame in which the query evaluated it: (0, −u2, u1) across
-    # the first box's edge e, in cyclic order.
-    first = work[A_FIRST + i] > 0.5
-    j = (axis - 6) % 3
-    e = (axis - 6) // 3
-    if not first:
-        e, j = j, e
-    p = (e + 1) % 3
-    q = (e + 2) % 3
-    if first:
-        u1 = work[ROTATION + (3 * p + j) * LANES + i]
-        u2 = work[ROTATION + (3 * q + j) * LANES + i]
-        along = work[OFFSET_A + q * LANES + i] * u1 - work[OFFSET_A + p * LANES + i] * u2
-    else:
-        u1 = work[ROTATION + (3 * j + p) * LANES + i]
-        u2 = work[ROTATION + (3 * j + q) * LANES + i]
-        along = work[OFFSET_B + q * LANES + i] * u1 - work[OFFSET_B + p * LANES + i] * u2
-    s = (1.0 if along >= 0.0 else -1.0) / math.sqrt(u1 * u1 + u2 * u2)
-    np_, nq = -s * u2, s * u1
-    if first:
-        return ((np_ if p == 0 else (nq if q == 0 else 0.0)),
-                (np_ if p == 1 else (nq if q == 1 else 0.0)),
-                (np_ if p == 2 else (nq if q == 2 else 0.0)))
-    return (np_ * work[ROTATION + p * LANES + i] + nq * work[ROTATION + q * LANES + i],
-            np_ * work[ROTATION + (3 + p) * LANES + i] + nq * work[ROTATION + (3 + q) * LANES + i],
-            np_ * work[ROTATION + (6 + p) * LANES + i] + nq * work[ROTATION + (6 + q) * LANES + i])
+@inlined
+def _entry(work, i, row, column):
+    return work[ROTATION + (3 * row + column) * LANES + i]
+
+
+@inlined
+def _normals(lanes, work):
+    """The winning axes as unit vectors from A to B, in A's frame."""
+    for i in range(lanes):
+        axis = int(work[AXIS + i])
+        # A face of A or of B: a unit vector, or a column of R.
+        k = axis % 3
+        of_a = axis < 3
+        s = 1.0 if (work[(OFFSET_A if of_a else OFFSET_B) + k * LANES + i]) >= 0.0 else -1.0
+        x = (1.0 if k == 0 else 0.0) if of_a else _entry(work, i, 0, k)
+        y = (1.0 if k == 1 else 0.0) if of_a else _entry(work, i, 1, k)
+        z = (1.0 if k == 2 else 0.0) if of_a else _entry(work, i, 2, k)
+        x, y, z = s * x, s * y, s * z
+        # A pair of edges, in the very frame in which the query evaluated it: (0, −u2, u1) across
+        # the first box's edge e, in cyclic order.
+        first = work[A_FIRST + i] > 0.5
+        number = max(axis - 6, 0)
+        of_first = number // 3 if first else number % 3
+        other = number % 3 if first else number // 3
+        p = 0 if of_first == 2 else of_first + 1
+        q = 0 if p == 2 else p + 1
+        u1 = _entry(work, i, p if first else other, other if first else p)
+        u2 = _entry(work, i, q if first else other, other if first else q)
+        offset = OFFSET_A if first else OFFSET_B
+        along = work[offset + q * LANES + i] * u1 - work[offset + p * LANES + i] * u2
+        length2 = u1 * u1 + u2 * u2
+        s = (1.0 if along >= 0.0 else -1.0) / math.sqrt(length2 if length2 > 0.0 else 1.0)
+        at_p, at_q = -s * u2, s * u1
+        e0 = at_p if p == 0 else (at_q if q == 0 else 0.0)
+        e1 = at_p if p == 1 else (at_q if q == 1 else 0.0)
+        e2 = at_p if p == 2 else (at_q if q == 2 else 0.0)
+        f0 = e0 if first else (
+            at_p * _entry(work, i, 0, p) + at_q * _entry(work, i, 0, q))
+        f1 = e1 if first else (
+            at_p * _entry(work, i, 1, p) + at_q * _entry(work, i, 1, q))
+        f2 = e2 if first else (
+            at_p * _entry(work, i, 2, p) + at_q * _entry(work, i, 2, q))
+        edges = axis >= 6
+        work[NORMAL + i] = f0 if edges else x
+        work[NORMAL + LANES + i] = f1 if edges else y
+        work[NORMAL + 2 * LANES + i] = f2 if edges else z

@@ -7,12 +7,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .checks import as_floats, as_size, pose_fault, size_fault
+from .committee import Committee
 from .contact import Contact, Contacts
 from .exact import Exact
 from .paper import Paper, PaperContinuous
 from .pose import BAD_POSE_A, BAD_POSE_B, BAD_SIZE_A
 
 MODELS = {
+    'committee': 'SAT, and a network for the point; any sizes; constant cost; the default',
     'exact': 'SAT and the exact centroid of the overlap; any sizes; the reference',
     'paper': "the paper's network 6-20-18-4; two equal cubes, or the crane's containers",
     'paper-continuous': "the paper's networks 6-20-17-4 on subsets without jumps; two equal cubes",
@@ -37,6 +39,8 @@ def make_model(name: str, size_a: np.ndarray, size_b: np.ndarray, weights: str |
 
     Raises ValueError for a name, sizes or weights that do not fit.
     """
+    if name == 'committee':
+        return Committee(weights)
     if name == 'exact':
         return Exact()
     if name == 'paper':
@@ -44,7 +48,8 @@ def make_model(name: str, size_a: np.ndarray, size_b: np.ndarray, weights: str |
     if name == 'paper-continuous':
         return PaperContinuous(size_a, size_b, weights)
     if name == 'fcl':
-        from .fcl_box import FclBox  # here, because python-fcl is an extra and the core goes without
+        from .fcl_box import FclBox  # only here: python-fcl is an extra
+
         return FclBox()
     raise ValueError(f'model {name!r} is not one of: {", ".join(MODELS)}')
 

@@ -51,7 +51,7 @@ class ContactNode(Node):
         self._apply(declare(self, PARAMETERS))
         self.add_on_set_parameters_callback(self._set_parameters)
         self.counts: Counter[str] = Counter()
-        self._answered_at = self._now()
+        self._reported: Counter[str] = Counter()  # the counts of the last report
         self._waiting_since: float | None = None
         self._compute: list[float] = []
         self._point = self.create_publisher(PointStamped, 'contact/point', CONTACT_QOS)
@@ -74,7 +74,7 @@ class ContactNode(Node):
         changes = {p.name: p.value for p in parameters if p.name in PARAMETERS}
         try:
             self._apply(checked(PARAMETERS, {**self._settings, **changes}))
-        except ValueError as error:
+        except (ValueError, ImportError) as error:  # a model's library may be missing
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
 
@@ -109,6 +109,7 @@ class ContactNode(Node):
         if pair is None:
             return
         a, b = pair
+        self._waiting_since = None
         if a.frame_id != b.frame_id:
             self._refuse('frame_id differs',
                          f'box_a/pose is in frame {a.frame_id!r}, box_b/pose in {b.frame_id!r}')
@@ -126,7 +127,6 @@ class ContactNode(Node):
             self.counts['contacts'] += 1
         self._contacts.publish(make_cloud(header, [(PAIR, contact)]))
         self.counts['evaluations'] += 1
-        self._waiting_since = None
 
     def _refuse(self, reason: str, text: str) -> None:
         self.counts[f'refused: {reason}'] += 1
@@ -134,7 +134,8 @@ class ContactNode(Node):
 
     def _report(self) -> None:
         """Once a second: say what happened since the last time."""
-        waiting = self._waiting_since is not None and (
+        arrived = self.counts['poses'] - self._reported['poses']
+        waiting = arrived > 0 and self._waiting_since is not None and (
             self._now() - self._waiting_since > UNMATCHED_SECONDS)
         if waiting:
             self.get_logger().warning(
@@ -148,12 +149,14 @@ class ContactNode(Node):
         if compute:
             values |= {f'compute {name} [us]': f'{value:.1f}' for name, value in zip(
                 ('p50', 'p99', 'max'), np.percentile(compute, (50, 99, 100)))}
-        refused = sum(count for name, count in self.counts.items() if name.startswith('refused'))
+        refused = sum(count - self._reported[name] for name, count in self.counts.items()
+                      if name.startswith('refused'))
+        self._reported = Counter(self.counts)
         level, message = DiagnosticStatus.OK, 'answering' if compute else 'no poses'
-        if waiting:
-            level, message = DiagnosticStatus.WARN, 'poses without a partner'
-        elif refused:
+        if refused:
             level, message = DiagnosticStatus.WARN, 'poses refused'
+        elif waiting:
+            level, message = DiagnosticStatus.WARN, 'poses without a partner'
         status = DiagnosticStatus(
             level=level, name=f'{self.get_fully_qualified_name()}: contacts', message=message,
             hardware_id='none',

@@ -1,8 +1,9 @@
 """The crane client: publishes both poses in real time and measures the contacts that come back.
 
-`box_a` is the load on the ropes, `box_b` the stack. The motion is open loop: contacts are recorded,
-not fed back. One thread simulates and publishes on an absolute schedule; the executor receives in
-the main thread. The exit status is 0 only if contacts came through and nothing was lost.
+`box_a` is the load on the ropes, `box_b` the stack. Open loop, contacts are recorded, not fed back;
+closed loop, they push the load, which is set down and comes to rest. One thread simulates and
+publishes on an absolute schedule; the executor receives in the main thread. The exit status is 0
+only if contacts came through, nothing was lost, and, closed loop, the load came to rest.
 """
 
 from __future__ import annotations
@@ -24,44 +25,18 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import PointCloud2
 
-from ..crane import Crane, CraneScenario
+from ..crane import Crane
+from ..landing import LandingResult
 from ..solver import ContactSolver
+from .crane_feedback import CraneFeedback
 from .crane_log import CraneLog, LiveReport, cloud_rows
+from .crane_parameters import PARAMETERS, scenario_from
 from .messages import NANOSECONDS
-from .parameters import Setting, answer_help, declare, flag, number, numbers, text
+from .parameters import answer_help, declare
 from .runtime import REFUSALS, make_executor
 
 OFFER_PERIOD = 0.1  # s between the pairs that only ask whether anyone answers
 DRAIN = 1.0  # s of patience for the last answers
-
-STANDARD = CraneScenario()
-PARAMETERS = {
-    'rate': Setting(200.0, 'pairs of poses published per second [Hz]', number(1, 2000)),
-    'duration': Setting(18.0, 'length of the motion [s]', number(0.1, 86_400)),
-    'wait': Setting(10.0, 'patience for a contact node to answer [s]', number(0, 600)),
-    'frame_id': Setting('world', 'frame of the published poses', text),
-    'report': Setting(False, 'print live lines while in contact', flag),
-    'seed': Setting(0, '0: the standard scenario; n > 0: offset and angles drawn at random',
-                    number(0, 2**31)),
-    'size_a': Setting(STANDARD.size, 'full extents of the load [m]', numbers(3)),
-    'size_b': Setting(STANDARD.stack_size, 'full extents of the stack [m]', numbers(3)),
-    'offset': Setting(STANDARD.offset, 'x, y of the trolley from the centre of the stack [m]',
-                      numbers(2)),
-    'rope_angle': Setting(STANDARD.rope_angle, 'ropes from the plumb line at the start [deg]',
-                          number(0, 20)),
-    'pitch': Setting(STANDARD.pitch, 'tilt of the load about y at the start [deg]',
-                     number(-10, 10)),
-    'roll': Setting(STANDARD.roll, 'tilt of the load about x at the start [deg]', number(-10, 10)),
-    'yaw': Setting(STANDARD.yaw, 'turn of the load about the plumb line at the start [deg]',
-                   number(-20, 20)),
-    'lowering_speed': Setting(STANDARD.lowering_speed, 'top speed of the hoist [m/s]',
-                              number(0, 0.8)),
-    'overlap': Setting(STANDARD.overlap, 'depth to which the load is lowered into the stack [m]',
-                       number(-1000, 1)),
-}
-SCENARIO = {name: {'size_a': 'size', 'size_b': 'stack_size'}.get(name, name)
-            for name in PARAMETERS if name not in ('rate', 'wait', 'frame_id', 'report', 'seed')}
-"""Parameter: the field of CraneScenario that it sets."""
 
 
 class CraneNode(Node):
@@ -73,12 +48,13 @@ class CraneNode(Node):
         values = declare(self, PARAMETERS, fixed=True)
         self.rate, self.wait = values['rate'], values['wait']
         self.report, self.frame_id = values['report'], values['frame_id']
-        # With a seed, what the user left at its default is drawn.
-        given = {field: values[name] for name, field in SCENARIO.items()
-                 if not values['seed'] or values[name] != PARAMETERS[name].default}
-        self.scenario = CraneScenario.drawn(int(values['seed']), **given)
+        self.scenario = scenario_from(values)
         self.log = CraneLog()
         self.stop = threading.Event()
+        self.in_real_time = not (values['closed_loop'] and values['lockstep'])
+        self.feedback = CraneFeedback(
+            self.scenario, self.rate, latency=values['latency'], lockstep=values['lockstep'],
+            stop=self.stop) if values['closed_loop'] else None
         self.solver = ContactSolver(self.scenario.size, self.scenario.stack_size, model='exact')
         self.solver.batch(*[[[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]]] * 2)  # compile before the start
 
@@ -117,30 +93,40 @@ class CraneNode(Node):
             self.stop.wait(OFFER_PERIOD)
 
     def lower(self) -> None:
-        """Run the whole motion in real time, then wait a moment for the last answers."""
+        """Run the whole motion, then wait a moment for the last answers."""
         crane = Crane(self.scenario, self.rate)
         gc.collect()
         gc.freeze()  # a full collection with Numba loaded would hold up the poses for 10 ms
         start = time.perf_counter()
         for tick in range(round(self.scenario.duration * self.rate)):
             # The schedule is absolute: lateness of one tick is not handed on to the next.
-            if self.stop.wait(max(0.0, start + tick / self.rate - time.perf_counter())):
+            early = start + tick / self.rate - time.perf_counter() if self.in_real_time else 0.0
+            if self.stop.wait(max(0.0, early)):
                 return
-            self._publish(crane)
-            crane.step()
+            stamp = self._publish(crane)
+            if self.feedback is None:
+                crane.step()
+            else:
+                self.feedback.step(stamp, crane)
         deadline = time.monotonic() + DRAIN
         while not self.log.complete() and time.monotonic() < deadline:
             if self.stop.wait(0.02):
                 return
 
-    def _publish(self, crane: Crane, *, offer: bool = False) -> None:
-        """Publish both poses under one stamp, the node's clock now; note them beforehand."""
+    def landing(self) -> LandingResult | None:
+        """How the landing went, None in an open loop."""
+        return self.feedback.record.judge() if self.feedback else None
+
+    def _publish(self, crane: Crane, *, offer: bool = False) -> int:
+        """Publish both poses under one stamp [ns], the node's clock now; note them beforehand."""
         stamp = self.get_clock().now()
         poses = crane.load_pose, crane.stack_pose
         if offer:
             self.log.offered(stamp.nanoseconds)
         else:
             self.log.sent(stamp.nanoseconds, *poses)
+            if self.feedback:
+                self.feedback.ask(stamp.nanoseconds, crane)
         for publisher, values in zip(self._publishers_ab, poses, strict=True):
             message = PoseStamped()
             message.header.frame_id = self.frame_id
@@ -150,6 +136,7 @@ class CraneNode(Node):
             position.x, position.y, position.z = x, y, z
             orientation.x, orientation.y, orientation.z, orientation.w = qx, qy, qz, qw
             publisher.publish(message)
+        return stamp.nanoseconds
 
     def _on_point(self, message: PointStamped) -> None:
         point = (message.point.x, message.point.y, message.point.z)
@@ -160,7 +147,10 @@ class CraneNode(Node):
         self.log.normal(_stamp(message), normal, self.get_clock().now().nanoseconds)
 
     def _on_cloud(self, message: PointCloud2) -> None:
-        self.log.cloud(_stamp(message), cloud_rows(message)['depth'])
+        received, rows = self.get_clock().now().nanoseconds, cloud_rows(message)
+        if self.feedback:  # before the log: here somebody waits
+            self.feedback.answer(_stamp(message), rows, received)
+        self.log.cloud(_stamp(message), rows['depth'])
 
 
 def _stamp(message: Any) -> int:
@@ -186,7 +176,7 @@ def _spin(node: CraneNode, executor: Any, work: Callable[[], None]) -> None:
 
 
 def main(args: Sequence[str] | None = None) -> int:
-    """Run the crane once and return 0 only if contacts came through and nothing was lost."""
+    """Run the crane once; 0 only if contacts came through, none was lost, and the load rests."""
     answer_help('crane', __doc__, PARAMETERS, args)
     context, started, node, executor, signalled = Context(), False, None, None, 0
     try:
@@ -217,7 +207,10 @@ def main(args: Sequence[str] | None = None) -> int:
     if node is None or not node.log.exchanges:
         return signalled
     edge = min(max(node.scenario.size), max(node.scenario.stack_size))
-    summary = node.log.summary(node.solver, edge)
+    summary, landing = node.log.summary(node.solver, edge), node.landing()
     print(f'crane: {"interrupted" if signalled else "done"} after {summary.sent / node.rate:g} s '
           f'of motion at {node.rate:g} Hz\n{summary}', flush=True)
-    return signalled or (0 if summary.passed else 1)
+    if landing:
+        print(landing, flush=True)
+    passed = summary.passed and (landing is None or landing.at_rest)
+    return signalled or (0 if passed else 1)

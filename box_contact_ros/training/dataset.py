@@ -31,19 +31,22 @@ from typing import Any
 
 import numpy as np
 
-from ..jit import kernel
-from ..pose import (
+from ..block import (
     AXIS,
     LANES,
     OFFSET_A,
     ROTATION,
     SEPARATION,
     WORK_SIZE,
+)
+from ..contact import sat_normal
+from ..jit import kernel
+from ..pose import (
     load_block,
     quaternion_multiply,
     rotation_matrix,
 )
-from ..sat import axis_normal, query_block
+from ..sat import query_block
 from ..symmetry import (
     EDGE_EDGE,
     FOLD_SIZE,
@@ -243,7 +246,7 @@ def _query(poses_a, poses_b, size, work, status, separation, axis, normal, offse
             row = start + i
             separation[row] = work[SEPARATION + i]
             axis[row] = int(work[AXIS + i])
-            n = axis_normal(work, i)
+            n = sat_normal(work, i)
             for k in range(3):
                 normal[row, k] = n[k]
                 offset[row, k] = work[OFFSET_A + k * LANES + i]

@@ -169,7 +169,7 @@ def main(args: Sequence[str] | None = None) -> int:
     parser.add_argument('--out', type=Path, help='folder to write to (default: weights/)')
     parser.add_argument('--fold', action=argparse.BooleanOptionalAction, help='for paper and '
                         'containers: data folded into the domain in which the solver asks, or as '
-                        'drawn (default: as drawn for paper, folded for containers)')
+                        'drawn (default: folded)')
     parser.add_argument('--quick', action='store_true',
                         help='small sets and few epochs, to try it out; needs --out')
     parser.add_argument('--threads', type=int, default=1, help='of PyTorch (default 1; '

@@ -1,0 +1,71 @@
+"""How a block of pairs lies in memory.
+
+Kernels work on blocks of LANES pairs, stored as a structure of arrays in one flat float64 array:
+value `NAME` of pair `i` of the block is `work[NAME + i]`, and `NAME` of several components has one
+row each, `work[NAME + k * LANES + i]`. One array with constant strides is what lets the compiler
+see that rows do not overlap, and turn loops over `i` to vector instructions.
+
+The stages of a block, and the rows they write, in order: `pose.load_block`, `sat.query_block`,
+then a builder of the point: `overlap.centroid`, pair by pair; `outline`, `committee`; or `paper`.
+Each stage exists twice, compiled for LANES pairs and for one: with a variable number of pairs,
+loops took five times as long. A block that is not full is filled up with boxes far apart.
+"""
+from __future__ import annotations
+
+LANES = 64
+"""Pairs per block: a multiple of every vector width, and a working set that stays in L1/L2."""
+
+_row = 0
+
+
+def _rows(count: int) -> int:
+    global _row
+    first = _row * LANES
+    _row += count
+    return first
+
+
+# pose.load_block. Axes are counted x, y, z; R is row-major: R[i, j] = a_i · b_j.
+HALF_A = _rows(3)      # half extents of A [m]
+HALF_B = _rows(3)      # half extents of B [m]
+ORIGIN_A = _rows(3)    # position of A, common frame [m]
+ORIGIN_B = _rows(3)    # position of B, common frame [m]
+TURN_A = _rows(4)      # quaternions xyzw
+TURN_B = _rows(4)
+VALID = _rows(1)       # 1.0 for a pair that can be evaluated
+AXES_A = _rows(9)      # rotation of A, common frame, row-major (columns are A's axes)
+OFFSET_A = _rows(3)    # B − A in A's frame [m]
+OFFSET_B = _rows(3)    # B − A in B's frame [m]
+ROTATION = _rows(9)    # R, orientation of B in A's frame
+SIZE = _rows(1)        # largest full extent of the pair [m]
+TOUCH = _rows(1)       # separation up to which the boxes touch [m]: see pose.CONTACT_ULPS
+A_FIRST = _rows(1)     # 1.0 where A comes first in the order used for edge axes (see sat)
+
+# sat.query_block.
+SEPARATION = _rows(1)  # signed separation [m]
+AXIS = _rows(1)        # winning axis: 0–2 faces of A, 3–5 faces of B, 6 + 3 i + j for a_i × b_j
+FACE = _rows(1)        # best face axis, 0–5, whatever wins
+NORMAL = _rows(3)      # winning axis, unit, from A to B, in A's frame
+
+# outline.outline_block. "Half extents" below are those of the bounding box chosen.
+INVERSE = _rows(9)     # 1 / R
+LOW_A = _rows(3)       # bounding box of A∩B in A's frame [m]
+HIGH_A = _rows(3)
+LOW_B = _rows(3)       # and in B's, from B's centre
+HIGH_B = _rows(3)
+SUM = _rows(3)         # pieces of edges: length times twice the middle, in A's frame [m²]
+LENGTH = _rows(1)      # pieces of edges: length [m]
+IN_B = _rows(1)        # 1.0 where the frame chosen is B's
+MIDDLE = _rows(3)      # middle of the bounding box, in its frame [m]
+HALF = _rows(3)        # its half extents [m]
+INSIDE = _rows(3)      # a point inside A∩B, from the middle, in half extents
+
+# committee.describe_block and place_block.
+NORMALS = _rows(9)     # the other box's axis f in the frame chosen: 3 f + component
+OFFSETS = _rows(3)     # middle of the bounding box along axis f, from the other box's centre [m]
+OTHER = _rows(3)       # the other box's half extents [m]
+RANKS = _rows(3)       # place of axis q in the network's order
+IN_RANGE = _rows(1)    # 1.0 where the network may be asked
+POINT = _rows(3)       # contact point in A's frame [m]
+
+WORK_SIZE = _row * LANES

@@ -1,0 +1,373 @@
+"""Model `committee`: SAT decides and gives normal and depth exactly; a network gives the point.
+
+Stages of a block of pairs, each a loop without branches over structures of arrays:
+
+1. `load_block`, `query_block`: verdict, separation, axis (`pose`, `sat`).
+2. `press`: pairs shallower than DEPTH_FLOOR are pressed in, as the point's definition says.
+3. `outline_block`: the exact bounding box of A∩B, in the frame of the box where it is smaller, and
+   a point inside (`outline`).
+4. `describe_block`: what the network sees. Scaled to its bounding box, A∩B is the cube [−1, 1]³ cut
+   by the six faces of the other box. A face is described by its unit normal in these coordinates
+   (unit in the sum of the absolute components), times how far it cuts into the cube; a face that
+   cuts nothing off is zero and comes in smoothly. Sizes, units and the depth have gone: one network
+   serves every pair of boxes. The cube's 48 symmetries are used up by the inside point: mirrored to
+   positive components, sorted by size.
+5. `network.forward_block`: the offset of the centroid from the inside point, in float32.
+6. `place_block`: the offset is cut to where a centroid can be (that of a convex body lies in the
+   middle half of its bounding box: Bonnesen and Fenchel 1934, §34) and shortened where it would
+   leave the other box. It starts inside A∩B, so it ends in both boxes, whatever the network says.
+
+Outside the range that the network was trained for (ASPECT_MAX, RATIO_MAX, DEPTH_MAX) the answer is
+the exact one, and counted.
+"""
+from __future__ import annotations
+
+import numpy as np
+
+from .block import (
+    HALF,
+    HALF_A,
+    HALF_B,
+    IN_B,
+    IN_RANGE,
+    INSIDE,
+    LANES,
+    MIDDLE,
+    NORMALS,
+    OFFSET_A,
+    OFFSET_B,
+    OFFSETS,
+    OTHER,
+    POINT,
+    RANKS,
+    ROTATION,
+    SEPARATION,
+    TOUCH,
+    WORK_SIZE,
+)
+from .contact import Contacts, sat_normal, write_apart, write_contact
+from .jit import inlined, kernel
+from .network import WeightsError, block_weights, forward_block, forward_one, load_weights
+from .outline import (
+    outline_block,
+)
+from .overlap import CLIP_SIZE, centroid, press
+from .pose import (
+    load_block,
+)
+from .resources import resource_path
+from .sat import query_block
+
+ASPECT_MAX = 20.0
+"""Longest by shortest edge of either box up to which the network is asked."""
+RATIO_MAX = 20.0
+"""Longest edge of one box by that of the other."""
+DEPTH_MAX = 0.1
+"""Depth by the shortest edge of the two boxes."""
+RANGE_SLACK = 1.0 + 1e-9
+"""The limits of the range belong to it, rounding included."""
+
+CENTROID_REACH = 0.5
+"""Farthest a centroid can be from the middle of its bounding box, in half extents."""
+
+INPUTS, OUTPUTS = 21, 3
+
+@inlined
+def _pick(k0, k1, x0, x1, x2):
+    """x0, x1 or x2: the one whose rank is asked for."""
+    return x0 if k0 else (x1 if k1 else x2)
+
+
+@inlined
+def _half_width(work, f, i):
+    return ((abs(work[NORMALS + 3 * f + i]) * work[HALF + i]
+             + abs(work[NORMALS + 3 * f + LANES + i]) * work[HALF + LANES + i])
+            + abs(work[NORMALS + 3 * f + 2 * LANES + i]) * work[HALF + 2 * LANES + i])
+
+
+@inlined
+def _frame_axis(lanes, work, f):
+    """The other box's axis f (a row offset) in the frame chosen."""
+    for i in range(lanes):
+        in_b = work[IN_B + i] > 0.5
+        x = work[ROTATION + 3 * f + i] if in_b else work[ROTATION + f + i]
+        y = work[ROTATION + 3 * f + LANES + i] if in_b else work[ROTATION + 3 * LANES + f + i]
+        z = work[ROTATION + 3 * f + 2 * LANES + i] if in_b else work[ROTATION + 6 * LANES + f + i]
+        work[NORMALS + 3 * f + i] = x
+        work[NORMALS + 3 * f + LANES + i] = y
+        work[NORMALS + 3 * f + 2 * LANES + i] = z
+        # Along its own axis the other box's centre is at n·c: in A's frame B's centre is at t, and
+        # n·t is t's component in B's frame; in B's frame A's centre is at −t, likewise.
+        centre = -work[OFFSET_A + f + i] if in_b else work[OFFSET_B + f + i]
+        work[OFFSETS + f + i] = ((x * work[MIDDLE + i] + y * work[MIDDLE + LANES + i])
+                                  + z * work[MIDDLE + 2 * LANES + i]) - centre
+        work[OTHER + f + i] = work[HALF_A + f + i] if in_b else work[HALF_B + f + i]
+
+
+@inlined
+def _face_cuts(lanes, work, f, features, row, key):
+    """The two faces across axis f as inputs: the one that cuts more first."""
+    for i in range(lanes):
+        width = _half_width(work, f, i)
+        offset = work[OFFSETS + f + i]
+        half = work[OTHER + f + i]
+        # 1: the face goes through the cube's middle; 0: it just misses the cube; 2: nothing left.
+        upper = min(2.0, max(0.0, 1.0 - (half - offset) / width))
+        lower = min(2.0, max(0.0, 1.0 - (half + offset) / width))
+        flip = upper < lower
+        more = (lower if flip else upper) / width
+        less = (upper if flip else lower) / width
+        sign = -1.0 if flip else 1.0
+        k0 = work[RANKS + i]
+        k1 = work[RANKS + LANES + i]
+        nx = _mirrored(work, f, 0, i) * sign
+        ny = _mirrored(work, f, LANES, i) * sign
+        nz = _mirrored(work, f, 2 * LANES, i) * sign
+        p0 = _pick(k0 == 0.0, k1 == 0.0, nx, ny, nz)
+        p1 = _pick(k0 == 1.0, k1 == 1.0, nx, ny, nz)
+        p2 = _pick(k0 == 2.0, k1 == 2.0, nx, ny, nz)
+        features[row * LANES + i] = p0 * more
+        features[(row + 1) * LANES + i] = p1 * more
+        features[(row + 2) * LANES + i] = p2 * more
+        features[(row + 3) * LANES + i] = p0 * less
+        features[(row + 4) * LANES + i] = p1 * less
+        features[(row + 5) * LANES + i] = p2 * less
+        features[key * LANES + i] = (more + less) * width
+
+
+@inlined
+def _mirrored(work, f, q, i):
+    component = work[NORMALS + 3 * f + q + i] * work[HALF + q + i]
+    return component if work[INSIDE + q + i] >= 0.0 else -component
+
+
+@inlined
+def _swap_rows(lanes, features, one, two, key_one, key_two):
+    """Order two axes' inputs: the one that cuts more (the sum in its key row) first."""
+    for i in range(lanes):
+        swap = features[key_one * LANES + i] < features[key_two * LANES + i]
+        for k in range(6):
+            p, q = features[(one + k) * LANES + i], features[(two + k) * LANES + i]
+            features[(one + k) * LANES + i] = q if swap else p
+            features[(two + k) * LANES + i] = p if swap else q
+        p, q = features[key_one * LANES + i], features[key_two * LANES + i]
+        features[key_one * LANES + i] = q if swap else p
+        features[key_two * LANES + i] = p if swap else q
+
+
+@kernel
+def describe_block(count, work, features):
+    """The network's inputs of a block of `count` pairs: INPUTS rows of LANES float32."""
+    if count == 1:
+        _describe(1, work, features)
+    else:
+        _describe(LANES, work, features)
+
+
+@inlined
+def _describe(lanes, work, features):
+    _frame_axis(lanes, work, 0)
+    _frame_axis(lanes, work, LANES)
+    _frame_axis(lanes, work, 2 * LANES)
+    for i in range(lanes):
+        x = abs(work[INSIDE + i])
+        y = abs(work[INSIDE + LANES + i])
+        z = abs(work[INSIDE + 2 * LANES + i])
+        work[RANKS + i] = (1.0 if y > x else 0.0) + (1.0 if z > x else 0.0)
+        work[RANKS + LANES + i] = (1.0 if x >= y else 0.0) + (1.0 if z > y else 0.0)
+        work[RANKS + 2 * LANES + i] = (1.0 if x >= z else 0.0) + (1.0 if y >= z else 0.0)
+    _face_cuts(lanes, work, 0, features, 0, 18)
+    _face_cuts(lanes, work, LANES, features, 6, 19)
+    _face_cuts(lanes, work, 2 * LANES, features, 12, 20)
+    _swap_rows(lanes, features, 0, 6, 18, 19)
+    _swap_rows(lanes, features, 6, 12, 19, 20)
+    _swap_rows(lanes, features, 0, 6, 18, 19)
+    for i in range(lanes):
+        x = abs(work[INSIDE + i])
+        y = abs(work[INSIDE + LANES + i])
+        z = abs(work[INSIDE + 2 * LANES + i])
+        k0 = work[RANKS + i]
+        k1 = work[RANKS + LANES + i]
+        features[18 * LANES + i] = _pick(k0 == 0.0, k1 == 0.0, x, y, z)
+        features[19 * LANES + i] = _pick(k0 == 1.0, k1 == 1.0, x, y, z)
+        features[20 * LANES + i] = _pick(k0 == 2.0, k1 == 2.0, x, y, z)
+
+
+@inlined
+def _goal(work, offsets, q, i):
+    """Offset of the answer from the inside point along axis q, in half extents."""
+    rank = work[RANKS + q + i]
+    offset = _pick(rank == 0.0, rank == 1.0, np.float64(offsets[i]), np.float64(offsets[LANES + i]),
+                   np.float64(offsets[2 * LANES + i]))
+    inside = work[INSIDE + q + i]
+    offset = offset if inside >= 0.0 else -offset
+    return min(CENTROID_REACH, max(-CENTROID_REACH, inside + offset)) - inside
+
+
+@inlined
+def _share(work, f, i, dx, dy, dz):
+    """Share of the step (dx, dy, dz) [m] that stays between the other box's faces f."""
+    nx = work[NORMALS + 3 * f + i]
+    ny = work[NORMALS + 3 * f + LANES + i]
+    nz = work[NORMALS + 3 * f + 2 * LANES + i]
+    start = work[OFFSETS + f + i] + (
+        (nx * (work[INSIDE + i] * work[HALF + i])
+         + ny * (work[INSIDE + LANES + i] * work[HALF + LANES + i]))
+        + nz * (work[INSIDE + 2 * LANES + i] * work[HALF + 2 * LANES + i]))
+    step = (nx * dx + ny * dy) + nz * dz
+    room = (work[OTHER + f + i] - start) if step >= 0.0 else (work[OTHER + f + i] + start)
+    step = abs(step)
+    return max(0.0, room) / step if step > max(0.0, room) else 1.0
+
+
+@kernel
+def place_block(count, work, offsets):
+    """Points in A's frame [m], 3 rows of LANES, from the network's offsets, 3 rows of LANES."""
+    if count == 1:
+        _place(1, work, offsets)
+    else:
+        _place(LANES, work, offsets)
+
+
+@inlined
+def _place(lanes, work, offsets):
+    for i in range(lanes):
+        dx = _goal(work, offsets, 0, i) * work[HALF + i]
+        dy = _goal(work, offsets, LANES, i) * work[HALF + LANES + i]
+        dz = _goal(work, offsets, 2 * LANES, i) * work[HALF + 2 * LANES + i]
+        share = min(min(_share(work, 0, i, dx, dy, dz),
+                        _share(work, LANES, i, dx, dy, dz)),
+                    _share(work, 2 * LANES, i, dx, dy, dz))
+        x = work[MIDDLE + i] + (work[INSIDE + i] * work[HALF + i] + share * dx)
+        y = work[MIDDLE + LANES + i] + (
+            work[INSIDE + LANES + i] * work[HALF + LANES + i] + share * dy)
+        z = work[MIDDLE + 2 * LANES + i] + (
+            work[INSIDE + 2 * LANES + i] * work[HALF + 2 * LANES + i] + share * dz)
+        in_b = work[IN_B + i] > 0.5
+        work[POINT + i] = (work[OFFSET_A + i] + ((work[ROTATION + i] * x
+                                            + work[ROTATION + LANES + i] * y)
+                                           + work[ROTATION + 2 * LANES + i] * z)) if in_b else x
+        work[POINT + LANES + i] = (work[OFFSET_A + LANES + i] + (
+            (work[ROTATION + 3 * LANES + i] * x + work[ROTATION + 4 * LANES + i] * y)
+            + work[ROTATION + 5 * LANES + i] * z)) if in_b else y
+        work[POINT + 2 * LANES + i] = (work[OFFSET_A + 2 * LANES + i] + (
+            (work[ROTATION + 6 * LANES + i] * x + work[ROTATION + 7 * LANES + i] * y)
+            + work[ROTATION + 8 * LANES + i] * z)) if in_b else z
+
+
+@kernel
+def range_block(count, work):
+    """IN_RANGE of a block: 1.0 for pairs of the kind that the network was trained for."""
+    if count == 1:
+        _range(1, work)
+    else:
+        _range(LANES, work)
+
+
+@inlined
+def _range(lanes, work):
+    for i in range(lanes):
+        a0, a1, a2 = work[HALF_A + i], work[HALF_A + LANES + i], work[HALF_A + 2 * LANES + i]
+        b0, b1, b2 = work[HALF_B + i], work[HALF_B + LANES + i], work[HALF_B + 2 * LANES + i]
+        long_a, short_a = max(max(a0, a1), a2), min(min(a0, a1), a2)
+        long_b, short_b = max(max(b0, b1), b2), min(min(b0, b1), b2)
+        # What is limited, by its limit: 1 at the border of the range.
+        excess = max(long_a / (ASPECT_MAX * short_a), long_b / (ASPECT_MAX * short_b))
+        excess = max(excess, max(long_a, long_b) / (RATIO_MAX * min(long_a, long_b)))
+        excess = max(excess, -work[SEPARATION + i] / (2.0 * DEPTH_MAX * min(short_a, short_b)))
+        work[IN_RANGE + i] = 1.0 if excess <= RANGE_SLACK else 0.0
+
+
+@kernel
+def committee_block(poses_a, poses_b, sizes_a, sizes_b, start, count, work, tiles, columns, widths,
+                    values, spare, clip, status):
+    """Contacts of a block of `count` pairs; POINT is right for those that touch.
+
+    Returns the numbers of rows refused and of contacts answered exactly.
+    """
+    bad = load_block(poses_a, poses_b, sizes_a, sizes_b, start, count, work, status)
+    query_block(count, work)
+    touching = 0
+    for i in range(count):
+        if work[SEPARATION + i] <= work[TOUCH + i]:
+            touching += 1
+            press(work, i)
+    if touching == 0:
+        return bad, 0
+    outline_block(count, work)
+    describe_block(count, work, values.reshape(-1))
+    values[INPUTS:widths[0]] = 0.0  # inputs that only fill up a group of four
+    if count == 1:
+        forward_one(columns, widths, values, spare)
+    else:
+        forward_block(tiles, widths, values, spare)
+    place_block(count, work, values.reshape(-1))
+    range_block(count, work)
+    exact = 0
+    for i in range(count):
+        if work[SEPARATION + i] <= work[TOUCH + i] and work[IN_RANGE + i] == 0.0:
+            exact += 1
+            p = centroid(work, i, clip)
+            for k in range(3):
+                work[POINT + k * LANES + i] = p[k]
+    return bad, exact
+
+
+@kernel
+def solve_committee(poses_a, poses_b, sizes_a, sizes_b, work, tiles, columns, widths, values, spare,
+                    clip, status, colliding, separation, normal, point):
+    """Model `committee` for all rows; returns the numbers of rows refused and answered exactly."""
+    bad = 0
+    exact = 0
+    rows = poses_a.shape[0]
+    for start in range(0, rows, LANES):
+        count = min(LANES, rows - start)
+        refused, exactly = committee_block(
+            poses_a, poses_b, sizes_a, sizes_b, start, count, work, tiles, columns, widths, values,
+            spare, clip, status)
+        bad += refused
+        exact += exactly
+        for i in range(count):
+            if work[SEPARATION + i] <= work[TOUCH + i]:
+                p = (work[POINT + i], work[POINT + LANES + i], work[POINT + 2 * LANES + i])
+                write_contact(work, i, start + i, sat_normal(work, i), p, colliding, separation,
+                              normal, point)
+            else:
+                write_apart(work, i, start + i, colliding, separation, normal, point)
+    return bad, exact
+
+
+class Committee:
+    """SAT and a network for the point; any sizes."""
+
+    def __init__(self, weights: str | None = None) -> None:
+        try:
+            path = weights or resource_path('weights', 'committee.safetensors')
+        except FileNotFoundError as error:
+            raise WeightsError(
+                "model 'committee' has no weights: train them, name a file with `weights`, or use "
+                "model 'exact', which needs none") from error
+        self.weights = load_weights(path)
+        network = self.weights.networks.get('point')
+        if network is None or (network.widths[0], network.widths[-1]) != (INPUTS, OUTPUTS):
+            raise WeightsError(
+                f"weights file {path} has no network 'point' with {INPUTS} inputs and {OUTPUTS} "
+                f"outputs, which model 'committee' needs")
+        if max(network.widths) > LANES:
+            raise WeightsError(f'weights file {path}: no layer may have more than {LANES} units')
+        self.exact_answers = 0
+        """Contacts outside the trained range so far, which were answered by model `exact`."""
+        self._network = block_weights(network)
+        widest = self._network.widths.max()
+        self._values = np.zeros((widest, LANES), dtype=np.float32)
+        self._spare = np.zeros((widest, LANES), dtype=np.float32)
+        self._work = np.zeros(WORK_SIZE)
+        self._clip = np.zeros(CLIP_SIZE)
+
+    def solve(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
+              status: np.ndarray, found: Contacts) -> int:
+        """Fill `found` for poses (n, 7), sizes (n or 1, 3); returns how many rows are refused."""
+        bad, exact = solve_committee(a, b, size_a, size_b, self._work, *self._network,
+                                     self._values, self._spare, self._clip, status, *found)
+        self.exact_answers += exact
+        return int(bad)

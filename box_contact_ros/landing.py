@@ -1,0 +1,335 @@
+"""A container set down by one contact point per tick, and whether it came to rest. No ROS.
+
+`land` runs one landing of `crane.Crane` under `contact_force.ContactLaw`; the contacts come from
+any function of the two poses. What happened is kept tick by tick in a `LandingRecord`, whoever ran
+it, and `LandingRecord.judge` measures it against the criteria below.
+
+The criteria, from `SETTLING` s after the first touch on, for `WINDOW` s: no corner of the load
+moves faster than `corner_speed_limit`, all ropes are slack, the contact force is within
+`FORCE_LIMIT` of the weight at every tick, the load is tilted by less than `TILT_LIMIT`. Always: the
+depth is less than `DEPTH_LIMIT` of the load's height, and after the first touch no gap opens wider
+than `GAP_LIMIT`. Depth, gap and first touch are those of the exact solver on the recorded poses,
+whatever model gave the contacts.
+
+Conventions: those of `pose`, `contact_force` and `crane`; SI units; angles of cases in degrees.
+"""
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from itertools import product
+
+import numpy as np
+
+from .contact import Contact
+from .contact_force import GRAVITY, ContactLaw, HeldWrench, Touch
+from .crane import LANDING_OVERLAP, Crane, CraneScenario
+from .pose import rotation_matrix
+from .solver import ContactSolver
+
+__all__ = ['LandingCase', 'LandingRecord', 'LandingResult', 'cases', 'land', 'landing_scenario',
+           'scenario_of', 'touch_of']
+
+SETTLING, WINDOW = 10.0, 5.0
+"""The load has to be at rest from `SETTLING` s after the first touch on, for `WINDOW` s."""
+CORNER_SPEED_LIMIT = 0.010
+"""Speed of the load's fastest corner at rest [m/s]."""
+SLOW_CORNER_SPEED_LIMIT, SLOW_RATE = 0.020, 200.0
+"""The same [m/s] at rates [1/s] up to `SLOW_RATE`, where the law is scaled down."""
+FORCE_LIMIT = 0.01
+"""Deviation of the contact force's vertical part from the weight, as a share of the weight."""
+TILT_LIMIT = math.radians(0.5)
+"""Angle between the load's and the world's vertical [rad]."""
+DEPTH_LIMIT = 0.01
+"""Depth as a share of the load's height."""
+GAP_LIMIT = 0.020
+"""Gap after the first touch [m]: how high it may bounce."""
+
+LANDING_DURATION = 25.0
+"""Length of a landing [s]. The first touch comes after 5 to 8 s, and 15 s more are looked at."""
+
+ContactSource = Callable[[np.ndarray, np.ndarray], Contact | None]
+"""From pose_a and pose_b (7,) to their contact; None stands for an answer that was lost."""
+
+
+def touch_of(contact: Contact) -> Touch | None:
+    """The part of a contact that the law needs; None where the boxes are apart."""
+    if not contact.colliding:
+        return None
+    return Touch(contact.point, contact.normal, max(0.0, -contact.separation))
+
+
+def landing_scenario(**fields) -> CraneScenario:
+    """A scenario that sets the load down and leaves it; `fields` are those of CraneScenario."""
+    return CraneScenario(**({'land': True, 'overlap': LANDING_OVERLAP,
+                             'duration': LANDING_DURATION} | fields))
+
+
+@dataclass(frozen=True, kw_only=True)
+class LandingCase:
+    """What is varied from landing to landing. Angles in degrees, lengths in m.
+
+    rope_angle, rope_heading -- the ropes at the start, from the plumb line, and whereto
+    tilt, tilt_heading       -- of the load at the start, and the share of pitch (cos), roll (sin)
+    overhang, overhang_heading -- lateral distance of the two centres at the first touch, whereto
+    yaw                      -- of the load at the start
+    """
+
+    rope_angle: float
+    rope_heading: float
+    tilt: float
+    tilt_heading: float
+    overhang: float
+    overhang_heading: float
+    yaw: float
+
+
+def cases(*, rope_angles=(0.5, 1.25, 2.0, 3.0), tilts=(0.5, 1.5, 3.0), overhangs=(0.0, 0.3, 0.6),
+          seed: int = 1) -> Iterator[LandingCase]:
+    """Every combination of rope angle, tilt and overhang; headings and yaw (to 1°) are drawn."""
+    random = np.random.default_rng(seed)
+    for rope_angle, tilt, overhang in product(rope_angles, tilts, overhangs):
+        rope, tilted, hanging = random.uniform(-180.0, 180.0, 3)
+        yield LandingCase(
+            rope_angle=rope_angle, rope_heading=rope, tilt=tilt, tilt_heading=tilted,
+            overhang=overhang, overhang_heading=hanging, yaw=random.uniform(-1.0, 1.0))
+
+
+AIMING_RATE = 100.0
+"""Ticks a second while the trolley is placed; the load moves 5 mm a tick at most."""
+
+
+def scenario_of(case: LandingCase) -> CraneScenario:
+    """The scenario of a case: the trolley stands where the load sways to its overhang.
+
+    Moving the trolley moves the whole motion before the touch, so the trolley is shifted by what
+    was missed, twice: the first shift may change which corner touches, and so when.
+    """
+    tilt, heading = case.tilt, math.radians(case.tilt_heading)
+    hanging = math.radians(case.overhang_heading)
+    wanted = case.overhang * np.array([math.cos(hanging), math.sin(hanging)])
+    scenario = landing_scenario(
+        offset=tuple(wanted), rope_angle=case.rope_angle, rope_heading=case.rope_heading,
+        pitch=tilt * math.cos(heading), roll=tilt * math.sin(heading), yaw=case.yaw)
+    solver = ContactSolver(scenario.size, scenario.stack_size, model='exact')
+    for _ in range(2):
+        crane = Crane(scenario, AIMING_RATE)
+        while not solver(crane.load_pose, crane.stack_pose).colliding:
+            if crane.time > scenario.duration:
+                raise ValueError(f'the load never touches: {case}')
+            crane.step()
+        missed = wanted - (crane.load_pose - crane.stack_pose)[:2]
+        scenario = dataclasses.replace(scenario, offset=tuple(scenario.offset + missed))
+    return scenario
+
+
+@dataclass(frozen=True, kw_only=True)
+class LandingResult:
+    """Figures of one landing. SI units, angles in rad; NaN where nothing was measured.
+
+    touched            time of the first touch [s], NaN for never
+    overhang           lateral distance of the two centres then [m]
+    settled            time from the first touch until corners stay within the limit [s], NaN: never
+    corner_speed       of the fastest corner in the window [m/s]
+    corner_speed_limit its limit [m/s]
+    rope_tension       of the tautest rope in the window [N]
+    force_error        |mean contact force − weight| / weight over the window, and `force_worst`
+                       the same of the worst tick
+    tilt               largest in the window [rad]
+    depth              largest ever, as a share of the load's height
+    gap                largest after the first touch [m]
+    point_step         largest |Δpoint| between neighbouring ticks in the window [m], and
+                       `exact_point_step` that of the exact point on the same poses
+    point_step_ever, exact_point_step_ever  the same over the whole contact
+    """
+
+    touched: float = math.nan
+    overhang: float = math.nan
+    settled: float = math.nan
+    corner_speed: float = math.nan
+    corner_speed_limit: float = CORNER_SPEED_LIMIT
+    rope_tension: float = math.nan
+    force_error: float = math.nan
+    force_worst: float = math.nan
+    tilt: float = math.nan
+    depth: float = math.nan
+    gap: float = math.nan
+    point_step: float = math.nan
+    exact_point_step: float = math.nan
+    point_step_ever: float = math.nan
+    exact_point_step_ever: float = math.nan
+
+    @property
+    def verdicts(self) -> dict[str, bool]:
+        """Whether each criterion is met, by name; what was not measured is not met."""
+        return {
+            'corner speed': self.corner_speed < self.corner_speed_limit,
+            'ropes slack': self.rope_tension == 0.0,
+            'force': self.force_worst < FORCE_LIMIT,
+            'tilt': self.tilt < TILT_LIMIT,
+            'depth': self.depth < DEPTH_LIMIT,
+            'gap': self.gap < GAP_LIMIT,
+        }
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether all criteria are met."""
+        return all(self.verdicts.values())
+
+    def __str__(self) -> str:
+        """A few lines for people: every figure with its limit."""
+        if math.isnan(self.corner_speed):
+            return ('  landing ................ not judged: it takes a touch and '
+                    f'{SETTLING + WINDOW:g} s after it')
+        figures = {
+            'corner speed': f'{1e3 * self.corner_speed:.3g} mm/s at most '
+                            f'(limit {1e3 * self.corner_speed_limit:g})',
+            'ropes slack': f'{self.rope_tension:.3g} N at most',
+            'force': f'{100 * self.force_worst:.2g} % off the weight at worst, '
+                     f'{100 * self.force_error:.2g} % on average (limit {100 * FORCE_LIMIT:g})',
+            'tilt': f'{math.degrees(self.tilt):.2g} deg (limit {math.degrees(TILT_LIMIT):g})',
+            'depth': f'{100 * self.depth:.2g} % of the height (limit {100 * DEPTH_LIMIT:g})',
+            'gap': f'{1e3 * self.gap:.2g} mm after the first touch (limit {1e3 * GAP_LIMIT:g})',
+        }
+        still = 'never' if math.isnan(self.settled) else f'{self.settled:.2g} s after it'
+        rows = [('landing', f'{"at rest" if self.at_rest else "NOT AT REST"} (first touch at '
+                            f'{self.touched:.2f} s; corners below their limit: {still})')]
+        rows += [(name, figures[name] + ('' if met else '  <-- not met'))
+                 for name, met in self.verdicts.items()]
+        rows.append(('point steps', f'{1e3 * self.point_step:.2g} mm at most between ticks (exact: '
+                                    f'{1e3 * self.exact_point_step:.2g}), while settling '
+                                    f'{1e3 * self.point_step_ever:.2g} mm (exact: '
+                                    f'{1e3 * self.exact_point_step_ever:.2g})'))
+        return '\n'.join(f'  {name + " ":.<24} {value}' for name, value in rows)
+
+
+@dataclass
+class LandingRecord:
+    """A landing tick by tick: the state before each tick, and the wrench at its end."""
+
+    scenario: CraneScenario
+    rate_hz: float
+    poses: list[np.ndarray] = field(default_factory=list)
+    velocities: list[np.ndarray] = field(default_factory=list)
+    tensions: list[np.ndarray] = field(default_factory=list)
+    forces: list[np.ndarray] = field(default_factory=list)
+    points: dict[int, np.ndarray] = field(default_factory=dict)
+    """Contact points (3,) by the tick they were asked for; none where there was no contact."""
+
+    def before(self, crane: Crane) -> None:
+        """Note the state in which a tick begins."""
+        self.poses.append(crane.load_pose)
+        self.velocities.append(crane.load_velocity)
+
+    def answered(self, tick: int, touch: Touch | None) -> None:
+        """Note the answer to a tick's poses."""
+        if touch is not None:
+            self.points[tick] = np.array(touch.point)
+
+    def after(self, crane: Crane, wrench: np.ndarray) -> None:
+        """Note how a tick ended: the ropes' tensions and the wrench (6,) that acts."""
+        self.tensions.append(crane.rope_tensions)
+        self.forces.append(wrench[:3].copy())
+
+    def corner_speeds(self) -> np.ndarray:
+        """Speed [m/s] of the fastest of the load's eight corners, per tick (n,)."""
+        signs = np.array(list(product((-0.5, 0.5), repeat=3)))
+        poses, velocities = np.array(self.poses), np.array(self.velocities)
+        arms = np.einsum('nij,kj->nki', rotation_matrix(poses[:, 3:]),
+                         signs * self.scenario.size)
+        speeds = velocities[:, None, :3] + np.cross(velocities[:, None, 3:], arms)
+        return np.linalg.norm(speeds, axis=2).max(axis=1)
+
+    def tilts(self) -> np.ndarray:
+        """Angle [rad] between the load's vertical and the world's, per tick (n,)."""
+        up = rotation_matrix(np.array(self.poses)[:, 3:])[:, :, 2]
+        return np.arctan2(np.hypot(up[:, 0], up[:, 1]), up[:, 2])
+
+    def vertical_forces(self) -> np.ndarray:
+        """Vertical part [N] of the contact force, per tick (n,)."""
+        return np.array(self.forces)[:, 2]
+
+    def point_path(self) -> np.ndarray:
+        """Contact points (n, 3) [m], NaN where there was no contact or no answer."""
+        path = np.full((len(self.poses), 3), math.nan)
+        for tick, point in self.points.items():
+            path[tick] = point
+        return path
+
+    def judge(self) -> LandingResult:
+        """Measure the landing; what would have to be measured later than its end is NaN."""
+        scenario, ticks = self.scenario, len(self.forces)
+        limit = SLOW_CORNER_SPEED_LIMIT if self.rate_hz <= SLOW_RATE else CORNER_SPEED_LIMIT
+        if not ticks:
+            return LandingResult(corner_speed_limit=limit)
+        poses = np.array(self.poses)[:ticks]
+        stack = np.broadcast_to(Crane(scenario, self.rate_hz).stack_pose, (ticks, 7))
+        exact = ContactSolver(scenario.size, scenario.stack_size, model='exact').batch(poses, stack)
+        if not exact.colliding.any():
+            return LandingResult(corner_speed_limit=limit)
+        first = int(np.argmax(exact.colliding))
+        speeds = self.corner_speeds()[:ticks]
+        fast = np.flatnonzero(speeds[first:] >= limit)
+        still = fast[-1] + 1 if len(fast) else 0
+        steps, exact_steps = _steps(self.point_path()[:ticks]), _steps(exact.point)
+        figures = {
+            'touched': first / self.rate_hz,
+            'overhang': float(np.hypot(*(poses - stack)[first, :2])),
+            'settled': still / self.rate_hz if first + still < ticks else math.nan,
+            'corner_speed_limit': limit,
+            'depth': float(np.max(-exact.separation)) / scenario.size[2],
+            'gap': float(max(0.0, np.max(exact.separation[first:]))),
+            'point_step_ever': _largest(steps[first:]),
+            'exact_point_step_ever': _largest(exact_steps[first:]),
+        }
+        window = slice(first + round(SETTLING * self.rate_hz),
+                       first + round((SETTLING + WINDOW) * self.rate_hz))
+        if window.stop <= ticks:
+            weight = scenario.mass * GRAVITY
+            forces = self.vertical_forces()[window]
+            figures |= {
+                'corner_speed': float(speeds[window].max()),
+                'rope_tension': float(np.array(self.tensions)[window].max()),
+                'force_error': abs(float(forces.mean()) / weight - 1.0),
+                'force_worst': float(np.abs(forces / weight - 1.0).max()),
+                'tilt': float(self.tilts()[:ticks][window].max()),
+                'point_step': _largest(steps[window]),
+                'exact_point_step': _largest(exact_steps[window]),
+            }
+        return LandingResult(**figures)
+
+
+def land(scenario: CraneScenario, source: ContactSource, *, rate_hz: float = 200.0,
+         latency: float = 0.0) -> LandingRecord:
+    """Run one landing with contacts from `source`, which act `latency` s after they were asked for.
+
+    The source may be a ContactSolver; where it gives None, the last wrench is held.
+    """
+    crane = Crane(scenario, rate_hz)
+    stack = crane.stack_pose
+    law = ContactLaw.for_load(scenario.mass, scenario.size, rate_hz)
+    held, record = HeldWrench(), LandingRecord(scenario, rate_hz)
+    for tick in range(round(scenario.duration * rate_hz)):
+        asked, pose, velocity = crane.time, crane.load_pose, crane.load_velocity
+        record.before(crane)
+        contact = source(pose, stack)
+        if contact is not None:
+            touch = touch_of(contact)
+            record.answered(tick, touch)
+            held.answer(law.wrench(touch, pose, velocity), asked=asked, due=asked + latency)
+        crane.step_under(held.at)
+        record.after(crane, held.current)
+    return record
+
+
+def _steps(points: np.ndarray) -> np.ndarray:
+    """|Δpoint| [m] to the row before (n,), NaN where one of the two is missing."""
+    steps = np.full(len(points), math.nan)
+    steps[1:] = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    return steps
+
+
+def _largest(values: np.ndarray) -> float:
+    return float(np.nanmax(values)) if np.isfinite(values).any() else math.nan

@@ -1,0 +1,107 @@
+"""The closed loop of the crane client: contacts that come back become the wrench on the load.
+
+Plain Python, no ROS. One thread asks and simulates (`ask`, `step`), another hands the answers in
+(`answer`). The law, and what is held when nothing comes, are those of `contact_force`.
+
+In real time a tick is simulated at its end, not at its beginning: first its poses are published,
+then the answer is awaited for most of the tick, and the contact acts from the time at which it
+really came. Simulated at its beginning, a tick would give every contact a latency of a tick, which
+at 200 Hz is more than the loop bears. In lockstep the simulation waits for every answer, and the
+contact acts `latency` after it was asked for, exactly.
+"""
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+
+import numpy as np
+
+from ..contact_force import ContactLaw, HeldWrench, Touch
+from ..crane import Crane, CraneScenario
+from ..landing import LandingRecord
+
+ANSWER_SHARE = 0.8
+"""Share of a tick for which its answer is awaited in real time; the rest is for simulating it."""
+LOCKSTEP_PATIENCE = 1.0
+"""Time [s] after which lockstep takes an answer for lost, and goes on with the wrench it has."""
+LOCKSTEP_LOST_MOST = 5
+"""So many lost answers in a row end a run in lockstep: then nobody is there any more."""
+POLL = 0.1  # s between looks at whether the run was called off
+
+
+class CraneFeedback:
+    """Steps a crane under the contacts that come back, and records the landing."""
+
+    def __init__(self, scenario: CraneScenario, rate_hz: float, *, latency: float,
+                 lockstep: bool, stop: threading.Event) -> None:
+        """latency -- [s] after asking, before which no contact acts; stop ends every waiting."""
+        self.record = LandingRecord(scenario, rate_hz)
+        self._law = ContactLaw.for_load(scenario.mass, scenario.size, rate_hz)
+        self._rate_hz, self._latency, self._lockstep = rate_hz, latency, lockstep
+        self._held, self._stop = HeldWrench(), stop
+        self._asked: dict[int, tuple[int, float, np.ndarray, np.ndarray]] = {}
+        self._arrived: deque[tuple[int, Touch | None, int]] = deque()
+        self._news = threading.Condition()
+        self._lost_in_a_row = 0
+
+    def ask(self, stamp: int, crane: Crane) -> None:
+        """Note the state whose poses are about to be published under `stamp` [ns]."""
+        tick = len(self.record.poses)
+        self.record.before(crane)
+        self._asked[stamp] = tick, crane.time, crane.load_pose, crane.load_velocity
+
+    def answer(self, stamp: int, rows: np.ndarray, received: int) -> None:
+        """Take the rows of a `contacts` cloud, received at `received` [ns] of the stamps' clock.
+
+        No row is no contact; a row of NaN could not be evaluated, which is no answer.
+        """
+        touch = None
+        if len(rows):
+            row = rows[0]
+            touch = Touch(np.array([row['x'], row['y'], row['z']]),
+                          np.array([row['normal_x'], row['normal_y'], row['normal_z']]),
+                          float(row['depth']))
+            if not np.isfinite([*touch.point, *touch.normal, touch.depth]).all():
+                return
+        with self._news:
+            self._arrived.append((stamp, touch, received))
+            self._news.notify()
+
+    def step(self, stamp: int, crane: Crane) -> None:
+        """Advance the tick whose poses went out under `stamp`, waiting for its answer first.
+
+        Raises TimeoutError in lockstep when answers stay away altogether.
+        """
+        patience = LOCKSTEP_PATIENCE if self._lockstep else ANSWER_SHARE / self._rate_hz
+        deadline = time.monotonic() + patience
+        while stamp in self._asked and not self._stop.is_set():
+            with self._news:
+                left = deadline - time.monotonic()
+                if not self._arrived and left > 0.0:
+                    self._news.wait(min(left, POLL))
+            if not self._apply() and time.monotonic() >= deadline:
+                break
+        self._lost_in_a_row = self._lost_in_a_row + 1 if stamp in self._asked else 0
+        if self._lockstep and self._lost_in_a_row >= LOCKSTEP_LOST_MOST:
+            raise TimeoutError(f'no answer to {LOCKSTEP_LOST_MOST} pairs in a row, each awaited '
+                               f'for {LOCKSTEP_PATIENCE:g} s')
+        crane.step_under(self._held.at)
+        self.record.after(crane, self._held.current)
+
+    def _apply(self) -> bool:
+        """Turn what has arrived into wrenches; returns whether there was anything."""
+        arrived = False
+        while self._arrived:
+            stamp, touch, received = self._arrived.popleft()
+            state = self._asked.pop(stamp, None)
+            if state is None:  # an offer's answer, or one that came twice
+                continue
+            arrived = True
+            tick, asked, pose, velocity = state
+            # Answers take as long in simulated time as they really took, unless time waits.
+            took = 0.0 if self._lockstep else (received - stamp) * 1e-9
+            self.record.answered(tick, touch)
+            self._held.answer(self._law.wrench(touch, pose, velocity), asked=asked,
+                              due=asked + max(self._latency, took))
+        return arrived

@@ -1,0 +1,59 @@
+"""The crane client's parameters, and the scenario they describe."""
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from ..crane import LANDING_OVERLAP, CraneScenario
+from ..landing import LANDING_DURATION
+from .parameters import Setting, flag, number, numbers, text
+
+STANDARD = CraneScenario()
+PARAMETERS = {
+    'rate': Setting(200.0, 'pairs of poses published per second [Hz]', number(1, 2000)),
+    'duration': Setting(STANDARD.duration, f'length of the motion [s]; left at its default, a '
+                        f'closed loop takes {LANDING_DURATION:g}', number(0.1, 86_400)),
+    'wait': Setting(10.0, 'patience for a contact node to answer [s]', number(0, 600)),
+    'frame_id': Setting('world', 'frame of the published poses', text),
+    'report': Setting(False, 'print live lines while in contact', flag),
+    'closed_loop': Setting(False, 'apply the contacts as a force: the load is set down, the ropes '
+                           'go slack, and the exit status says whether it came to rest', flag),
+    'lockstep': Setting(False, 'closed loop: no real time, every tick waits for its answer', flag),
+    'latency': Setting(0.0, 'closed loop: a contact acts no earlier than this after its poses were '
+                       'published [s]', number(0, 1)),
+    'seed': Setting(0, '0: the standard scenario; n > 0: offset and angles drawn at random',
+                    number(0, 2**31)),
+    'size_a': Setting(STANDARD.size, 'full extents of the load [m]', numbers(3)),
+    'size_b': Setting(STANDARD.stack_size, 'full extents of the stack [m]', numbers(3)),
+    'offset': Setting(STANDARD.offset, 'x, y of the trolley from the centre of the stack [m]',
+                      numbers(2)),
+    'rope_angle': Setting(STANDARD.rope_angle, 'ropes from the plumb line at the start [deg]',
+                          number(0, 20)),
+    'rope_heading': Setting(STANDARD.rope_heading, 'whereto, counter-clockwise from x [deg]',
+                            number(-360, 360)),
+    'pitch': Setting(STANDARD.pitch, 'tilt of the load about y at the start [deg]',
+                     number(-10, 10)),
+    'roll': Setting(STANDARD.roll, 'tilt of the load about x at the start [deg]', number(-10, 10)),
+    'yaw': Setting(STANDARD.yaw, 'turn of the load about the plumb line at the start [deg]',
+                   number(-20, 20)),
+    'lowering_speed': Setting(STANDARD.lowering_speed, 'top speed of the hoist [m/s]',
+                              number(0, 0.8)),
+    'overlap': Setting(STANDARD.overlap, 'depth to which the load is lowered into the stack [m]; '
+                       f'left at its default, a closed loop pays the ropes out by '
+                       f'{LANDING_OVERLAP:g} beyond the load at rest', number(-1000, 1)),
+}
+SCENARIO = {name: {'size_a': 'size', 'size_b': 'stack_size'}.get(name, name) for name in (
+    'duration', 'size_a', 'size_b', 'offset', 'rope_angle', 'rope_heading', 'pitch', 'roll', 'yaw',
+    'lowering_speed', 'overlap')}
+"""Parameter: the field of CraneScenario that it sets."""
+
+
+def scenario_from(values: Mapping[str, Any]) -> CraneScenario:
+    """The scenario of checked parameters: what is left at its default may be drawn by the seed, or
+    be what a landing needs.
+    """
+    given = {field: values[name] for name, field in SCENARIO.items()
+             if values[name] != PARAMETERS[name].default}
+    if values['closed_loop']:
+        given = {'land': True, 'overlap': LANDING_OVERLAP, 'duration': LANDING_DURATION} | given
+    return CraneScenario.drawn(int(values['seed']), **given)

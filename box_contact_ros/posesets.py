@@ -1,0 +1,152 @@
+"""Named sets of posed pairs of boxes: what accuracy, speed and training are measured and made on.
+
+A set is a function (rng, n) -> Pairs with about n pairs (a few draws that miss are left out). All
+poses are of boxes that overlap by a depth that is drawn, not left to chance: a pair that overlaps
+deeply is drawn first, then B is moved out along SAT's normal, which changes the depth by just as
+much and keeps the axis.
+"""
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from .pose import quaternion_multiply, rotation_matrix
+from .solver import ContactSolver
+
+CUBE = (2.0, 2.0, 2.0)
+CONTAINER = (12.192, 2.438, 2.591)
+"""ISO 40 ft [m]."""
+
+
+class Pairs(NamedTuple):
+    """n pairs: poses (n, 7), full extents (n, 3)."""
+
+    pose_a: np.ndarray
+    pose_b: np.ndarray
+    size_a: np.ndarray
+    size_b: np.ndarray
+
+
+Generator = Callable[[np.random.Generator, int], Pairs]
+
+
+def unit_quaternions(rng: np.random.Generator, n: int) -> np.ndarray:
+    """Orientations (n, 4) xyzw, uniform over all."""
+    q = rng.normal(size=(n, 4))
+    return q / np.linalg.norm(q, axis=1, keepdims=True)
+
+
+def turns(axes: np.ndarray, angles: np.ndarray) -> np.ndarray:
+    """Quaternions (n, 4) xyzw of rotations about axes (n, 3) or (3,) by angles (n,) [rad]."""
+    axes = np.broadcast_to(np.asarray(axes, dtype=np.float64), (len(angles), 3))
+    axes = axes / np.linalg.norm(axes, axis=1, keepdims=True)
+    return np.concatenate([axes * np.sin(0.5 * angles)[:, None], np.cos(0.5 * angles)[:, None]],
+                          axis=1)
+
+
+def log_uniform(rng: np.random.Generator, low: float, high: float, n: int) -> np.ndarray:
+    """n numbers whose logarithms are uniform."""
+    return np.exp(rng.uniform(np.log(low), np.log(high), n))
+
+
+def pressed(pairs: Pairs, depth: np.ndarray) -> Pairs:
+    """The pairs that overlap, with B moved along SAT's normal to `depth` (n,) [m]."""
+    a, b, size_a, size_b = pairs
+    found = ContactSolver((1, 1, 1), (1, 1, 1), model='exact').batch(
+        a, b, size_a=size_a, size_b=size_b)
+    rows = found.colliding
+    moved = b[rows].copy()
+    moved[:, :3] += (-found.separation - depth)[rows, None] * found.normal[rows]
+    return Pairs(a[rows], moved, size_a[rows], size_b[rows])
+
+
+def any_pose(rng: np.random.Generator, size_a: np.ndarray, size_b: np.ndarray,
+             depth: np.ndarray) -> Pairs:
+    """Boxes in any orientation: a random place of A meets a random place of B, then `depth`."""
+    n = len(size_a)
+    turn_a, turn_b = unit_quaternions(rng, n), unit_quaternions(rng, n)
+    at_a = np.einsum('nij,nj->ni', rotation_matrix(turn_a), rng.uniform(-0.5, 0.5, (n, 3)) * size_a)
+    at_b = np.einsum('nij,nj->ni', rotation_matrix(turn_b), rng.uniform(-0.5, 0.5, (n, 3)) * size_b)
+    a = np.concatenate([np.zeros((n, 3)), turn_a], axis=1)
+    b = np.concatenate([at_a - at_b, turn_b], axis=1)
+    return pressed(Pairs(a, b, size_a, size_b), depth)
+
+
+def stacked(rng: np.random.Generator, size: tuple[float, float, float], tilt: np.ndarray,
+            yaw: np.ndarray, depth: np.ndarray) -> Pairs:
+    """One box on another of the same size, tilted about a random level axis, turned by yaw, [rad],
+    anywhere on it."""
+    n = len(tilt)
+    sizes = np.tile(np.array(size), (n, 1))
+    heading = rng.uniform(-np.pi, np.pi, n)
+    level = np.stack([np.cos(heading), np.sin(heading), np.zeros(n)], axis=1)
+    turn = quaternion_multiply(turns(level, tilt), turns((0.0, 0.0, 1.0), yaw))
+    place = np.concatenate([0.98 * rng.uniform(-1, 1, (n, 2)) * sizes[:, :2],
+                            0.98 * sizes[:, 2:]], axis=1)
+    a = np.tile([0.0, 0, 0, 0, 0, 0, 1], (n, 1))
+    return pressed(Pairs(a, np.concatenate([place, turn], axis=1), sizes, sizes), depth)
+
+
+def cubes(rng: np.random.Generator, n: int) -> Pairs:
+    """Cubes of edge 2 in any pose, 0.1–10 % of the edge deep."""
+    sizes = np.tile(CUBE, (n, 1))
+    return any_pose(rng, sizes, sizes, 2.0 * log_uniform(rng, 1e-3, 0.1, n))
+
+
+def touching(rng: np.random.Generator, n: int) -> Pairs:
+    """Cubes of edge 2 in any pose that just touch: the paper's setting."""
+    sizes = np.tile(CUBE, (n, 1))
+    return any_pose(rng, sizes, sizes, np.zeros(n))
+
+
+def stacks(rng: np.random.Generator, n: int) -> Pairs:
+    """Cubes of edge 2 stacked almost parallel: tilt 1e-6–1e-3 rad, 1e-3 m deep, any yaw."""
+    return stacked(rng, CUBE, log_uniform(rng, 1e-6, 1e-3, n), rng.uniform(-np.pi, np.pi, n),
+                   np.full(n, 1e-3))
+
+
+def tilted(rng: np.random.Generator, n: int) -> Pairs:
+    """Cubes of edge 2 stacked with a tilt of 1e-3–0.1 rad, 1e-3 m deep, any yaw."""
+    return stacked(rng, CUBE, log_uniform(rng, 1e-3, 0.1, n), rng.uniform(-np.pi, np.pi, n),
+                   np.full(n, 1e-3))
+
+
+def containers(rng: np.random.Generator, n: int) -> Pairs:
+    """40 ft containers with sway: roll, pitch, yaw within ±5°, met anywhere, 0.1–10 % deep."""
+    sizes = np.tile(CONTAINER, (n, 1))
+    roll, pitch, yaw = np.radians(rng.uniform(-5, 5, (3, n)))
+    turn = quaternion_multiply(quaternion_multiply(
+        turns((0.0, 0.0, 1.0), yaw), turns((0.0, 1.0, 0.0), pitch)), turns((1.0, 0.0, 0.0), roll))
+    a = np.tile([0.0, 0, 0, 0, 0, 0, 1], (n, 1))
+    b = np.concatenate([0.95 * rng.uniform(-1, 1, (n, 3)) * sizes, turn], axis=1)
+    return pressed(Pairs(a, b, sizes, sizes), 2.438 * log_uniform(rng, 1e-3, 0.1, n))
+
+
+def random_sizes(rng: np.random.Generator, n: int, aspect: float = 20.0, ratio: float = 20.0,
+                 ) -> tuple[np.ndarray, np.ndarray]:
+    """Sizes (n, 3) of two boxes: each of aspect to 1:`aspect`, longest edges to 1:`ratio`."""
+    sizes = []
+    for _ in range(2):
+        extents = np.exp(rng.uniform(0.0, np.log(aspect), (n, 3)))
+        sizes.append(extents / extents.max(axis=1, keepdims=True))
+    return sizes[0], sizes[1] * log_uniform(rng, 1.0 / ratio, ratio, n)[:, None]
+
+
+def size_pairs(rng: np.random.Generator, n: int) -> Pairs:
+    """Random pairs of sizes, aspect to 1:20, size ratio to 1:20, any pose, 0.1–10 % deep."""
+    size_a, size_b = random_sizes(rng, n)
+    shortest = np.minimum(size_a.min(axis=1), size_b.min(axis=1))
+    return any_pose(rng, size_a, size_b, shortest * log_uniform(rng, 1e-3, 0.1, n))
+
+
+SETS: dict[str, Generator] = {
+    'random cubes': cubes,
+    'touching': touching,
+    'random sizes': size_pairs,
+    'stacks': stacks,
+    'tilted stacks': tilted,
+    'containers': containers,
+}
+"""The sets of the accuracy and speed reports."""

@@ -1,0 +1,111 @@
+"""Training data of model `committee`: contacts of all kinds, as the network sees them."""
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..block import (
+    HALF,
+    IN_B,
+    INSIDE,
+    LANES,
+    MIDDLE,
+    OFFSET_A,
+    RANKS,
+    ROTATION,
+    WORK_SIZE,
+)
+from ..committee import (
+    INPUTS,
+    describe_block,
+)
+from ..jit import kernel
+from ..outline import (
+    outline_block,
+)
+from ..overlap import CLIP_SIZE, centroid, press
+from ..pose import (
+    load_block,
+)
+from ..posesets import CONTAINER, Pairs, any_pose, log_uniform, random_sizes, stacked
+from ..sat import query_block
+
+
+class Contacts(NamedTuple):
+    """n contacts in the network's own coordinates and order of axes."""
+
+    inputs: np.ndarray
+    """(n, INPUTS) float32."""
+    offsets: np.ndarray
+    """(n, 3) float32: exact centroid from the inside point, in half extents."""
+    inside: np.ndarray
+    """(n, 3) float32: the inside point, from the bounding box's middle."""
+    scale: np.ndarray
+    """(n, 3) float32: half extents, by the smaller box's longest edge."""
+
+
+@kernel
+def _describe(poses_a, poses_b, sizes_a, sizes_b, work, values, clip, status,
+              inputs, offsets, insides, halves):
+    rows = poses_a.work[0]
+    for start in range(0, rows, LANES):
+        count = min(LANES, rows - start)
+        load_block(poses_a, poses_b, sizes_a, sizes_b, start, count, work, status)
+        query_block(count, work)
+        for i in range(count):
+            press(work, i)
+        outline_block(count, work)
+        describe_block(count, work, values.reshape(-1))
+        for i in range(count):
+            row = start + i
+            for k in range(INPUTS):
+                inputs[row, k] = values[k, i]
+            x, y, z = centroid(work, i, clip)
+            in_b = work[IN_B + i] > 0.5
+            for q in range(3):
+                truth = x if q == 0 else (y if q == 1 else z)
+                if in_b:
+                    truth = (work[ROTATION + q * LANES + i] * (x - work[OFFSET_A + i])
+                             + work[ROTATION + (3 + q) * LANES + i]
+                             * (y - work[OFFSET_A + LANES + i])
+                             + work[ROTATION + (6 + q) * LANES + i]
+                             * (z - work[OFFSET_A + 2 * LANES + i]))
+                rank = int(work[RANKS + q * LANES + i])
+                half = work[HALF + q * LANES + i]
+                inside = work[INSIDE + q * LANES + i]
+                offset = (truth - work[MIDDLE + q * LANES + i]) / half - inside
+                offsets[row, rank] = offset if inside >= 0.0 else -offset
+                insides[row, rank] = abs(inside)
+                halves[row, rank] = half
+
+
+def describe(pairs: Pairs) -> Contacts:
+    """The contacts of pairs that overlap."""
+    n = len(pairs.pose_a)
+    found = Contacts(np.empty((n, INPUTS), dtype=np.float32),
+                     *(np.empty((n, 3), dtype=np.float32) for _ in range(3)))
+    _describe(*(np.ascontiguousarray(part) for part in pairs), np.zeros(WORK_SIZE),
+              np.zeros((INPUTS, LANES), dtype=np.float32), np.zeros(CLIP_SIZE),
+              np.zeros(n, dtype=np.int8), *found)
+    edge = np.minimum(pairs.size_a.max(axis=1), pairs.size_b.max(axis=1))
+    return found._replace(scale=(found.scale / edge[:, None]).astype(np.float32))
+
+
+def mixture(rng: np.random.Generator, n: int) -> Pairs:
+    """About n pairs of the kinds that scenes have: equal cubes and random sizes in any pose,
+    stacks of any box with a tilt of 1e-6 to 0.3 rad, and containers."""
+    share = n // 20
+    parts = []
+    sizes = np.ones((5 * share, 3))
+    parts.append(any_pose(rng, sizes, sizes, log_uniform(rng, 1e-5, 0.1, len(sizes))))
+    size_a, size_b = random_sizes(rng, 5 * share)
+    shortest = np.minimum(size_a.min(axis=1), size_b.min(axis=1))
+    parts.append(any_pose(rng, size_a, size_b,
+                          shortest * log_uniform(rng, 1e-5, 0.1, len(size_a))))
+    for size, count, yaw in (((1.0, 1.0, 1.0), 4 * share, np.pi), (CONTAINER, 3 * share, 0.2),
+                             (CONTAINER, share, np.pi), ((1.0, 0.5, 0.3), 2 * share, np.pi)):
+        parts.append(stacked(rng, size, log_uniform(rng, 1e-6, 0.3, count),
+                             rng.uniform(-yaw, yaw, count),
+                             min(size) * log_uniform(rng, 1e-5, 0.1, count)))
+    return Pairs(*(np.concatenate(columns) for columns in zip(*parts)))

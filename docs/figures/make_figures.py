@@ -1,0 +1,108 @@
+"""Figures of the docs: `python docs/figures/make_figures.py [--out FOLDER]`."""
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+
+matplotlib.use('Agg')  # before pyplot: no display is needed
+
+from matplotlib import pyplot as plt  # noqa: E402
+
+from box_contact_ros import ContactSolver  # noqa: E402
+
+STACK, LOAD, OVERLAP, POINT, CORNER = '#8c8c8c', '#4477aa', '#ccbb44', '#222222', '#ee6677'
+CONTAINER = (12.192, 2.438, 2.591)
+DEPTH = 0.05  # of the lowest corner below the stack's top, in the graph [m]
+
+
+def clip(polygon: np.ndarray, direction: tuple[float, float], bound: float) -> np.ndarray:
+    """The part of a polygon (n, 2) with direction · p ≤ bound."""
+    kept = []
+    excess = polygon @ np.array(direction) - bound
+    for i, (p, e) in enumerate(zip(polygon, excess)):
+        q, f = polygon[i - 1], excess[i - 1]
+        if (e > 0) != (f > 0):
+            kept.append(q + (p - q) * f / (f - e))
+        if e <= 0:
+            kept.append(p)
+    return np.array(kept)
+
+
+def area_centroid(polygon: np.ndarray) -> np.ndarray:
+    """Centroid of the area of a polygon (n, 2)."""
+    following = np.roll(polygon, -1, axis=0)
+    doubled = polygon[:, 0] * following[:, 1] - following[:, 0] * polygon[:, 1]
+    return ((polygon + following) * doubled[:, None]).sum(axis=0) / (3.0 * doubled.sum())
+
+
+def sketch(axes: plt.Axes, tilt: float, letter: str) -> None:
+    """A load of 4 × 1 on a stack whose top is y = 0, its lowest corner 0.35 below; tilt [rad]."""
+    stack = np.array([(-2.0, -1.0), (2.0, -1.0), (2.0, 0.0), (-2.0, 0.0)])
+    turn = np.array([[math.cos(tilt), -math.sin(tilt)], [math.sin(tilt), math.cos(tilt)]])
+    load = np.array([(-1.9, -0.5), (1.9, -0.5), (1.9, 0.5), (-1.9, 0.5)]) @ turn.T
+    load -= (0.0, load[:, 1].min() + 0.35)
+    overlap = clip(clip(clip(load, (0, 1), 0.0), (1, 0), 2.0), (-1, 0), 2.0)
+    centroid, deepest = area_centroid(overlap), load[np.argmin(load[:, 1])]
+    axes.fill(*stack.T, facecolor='#e6e6e6', edgecolor=STACK)
+    axes.fill(*load.T, facecolor='#4477aa22', edgecolor=LOAD)
+    axes.fill(*overlap.T, facecolor=OVERLAP, edgecolor='none')
+    axes.plot(*deepest, 'o', color=CORNER, markersize=7)
+    axes.plot(*centroid, 'o', color=POINT, markersize=7)
+    axes.annotate('', centroid + (0, 0.75), centroid,
+                  arrowprops={'arrowstyle': '-|>', 'color': POINT, 'linewidth': 1.5})
+    axes.text(centroid[0] + 0.12, centroid[1] + 0.5, 'normal', fontsize=8)
+    axes.text(0.0, -0.85, 'A, the stack', ha='center', fontsize=8)
+    beside = load.mean(axis=0) + turn @ (math.copysign(0.8, tilt), 0.0)
+    axes.text(*beside, 'B, the load', ha='center', va='center', fontsize=8, color=LOAD,
+              rotation=math.degrees(tilt))
+    axes.set(title=f'({letter})', aspect='equal', xlim=(-2.3, 2.3), ylim=(-1.1, 1.6))
+    axes.axis('off')
+
+
+def slide(axes: plt.Axes) -> None:
+    """Where a container on another has its contact point, over the tilt, at one depth."""
+    length, _, height = CONTAINER
+    degrees = np.linspace(-1.5, 1.5, 601)
+    tilts = np.radians(degrees)
+    # Turned about y by t, the lowest corner is h/2 cos t + l/2 |sin t| below the centre.
+    low = 0.5 * (height * np.cos(tilts) + length * np.abs(np.sin(tilts)))
+    b = np.zeros((len(tilts), 7))
+    b[:, 2] = 0.5 * height - DEPTH + low
+    b[:, 4], b[:, 6] = np.sin(0.5 * tilts), np.cos(0.5 * tilts)
+    a = np.tile([0.0, 0, 0, 0, 0, 0, 1], (len(tilts), 1))
+    found = ContactSolver(CONTAINER, CONTAINER, model='exact').batch(a, b)
+    ends = np.sign(tilts) * 0.5 * length * np.cos(tilts) - 0.5 * height * np.sin(tilts)
+    ends[tilts == 0.0] = np.nan
+    axes.plot(degrees, ends, color=CORNER, linewidth=2)
+    axes.plot(degrees, found.point[:, 0], color=POINT, linewidth=2)
+    axes.text(0.05, 5.4, 'deepest corner', color=CORNER, fontsize=8)
+    axes.text(0.3, 2.2, 'centroid', color=POINT, fontsize=8)
+    axes.set(title='(c)', xlabel='tilt of a 40 ft container on another [deg]',
+             ylabel='contact point along its length [m]', xlim=(-1.5, 1.5), ylim=(-6.6, 6.6))
+    axes.grid(color='#dddddd')
+    axes.spines[['top', 'right']].set_visible(False)
+
+
+def main() -> None:
+    """Draw all figures."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('--out', type=Path, default=Path(__file__).parent, help='folder')
+    folder = parser.parse_args().out
+    figure, (left, middle, right) = plt.subplots(
+        1, 3, figsize=(10.5, 2.9), dpi=110, width_ratios=(1, 1, 1.1), layout='constrained')
+    sketch(left, math.radians(7.0), 'a')
+    sketch(middle, math.radians(-7.0), 'b')
+    slide(right)
+    left.plot([], [], 'o', color=POINT, label='centroid of the overlap')
+    left.plot([], [], 'o', color=CORNER, label='deepest corner')
+    left.legend(loc='upper left', fontsize=8, frameon=False, borderaxespad=0)
+    # No version and no date in the file: the same figure is the same bytes.
+    figure.savefig(folder / 'centroid.png', metadata={'Software': None})
+
+
+if __name__ == '__main__':
+    main()

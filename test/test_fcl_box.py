@@ -1,0 +1,119 @@
+"""Model `fcl`: FCL's conventions, and what stays SAT's."""
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+import poses
+import pytest
+
+pytest.importorskip('fcl')
+
+from box_contact_ros import ContactSolver  # noqa: E402
+
+CUBES = ContactSolver(poses.CUBE, poses.CUBE, model='fcl')
+IDENTITY = poses.IDENTITY
+
+
+def pairs_of(size, offset_of, seed=5, count=300):
+    """Near-parallel pairs, B shifted against A: (poses_a, poses_b), turned as a whole at random."""
+    rng = np.random.default_rng(seed)
+    axes, tilts = rng.normal(size=(count, 3)), rng.uniform(1e-3, 0.05, count)
+    b = np.concatenate([offset_of(rng, count), poses.small_rotations(axes, tilts)], axis=1)
+    a = np.tile(IDENTITY, (count, 1))
+    shift, turn = rng.uniform(-50, 50, (count, 3)), poses.unit_quaternions(rng, count)
+    return poses.moved(a, shift, turn), poses.moved(b, shift, turn)
+
+
+@pytest.mark.parametrize('axis', range(3))
+@pytest.mark.parametrize('sign', [1.0, -1.0])
+def test_the_normal_points_from_a_to_b(axis, sign):
+    """B 1.9 m beside A along an axis: the normal is that axis, with its sign, and the depth 0.1."""
+    b = IDENTITY.copy()
+    b[axis] = sign * 1.9
+    for first, second, way in ((IDENTITY, b, 1.0), (b, IDENTITY, -1.0)):
+        contact = CUBES(first, second)
+        assert contact.normal == pytest.approx(way * sign * np.eye(3)[axis])
+        assert contact.separation == pytest.approx(-0.1)
+
+
+def test_the_normal_is_sats_up_to_the_axis_chosen():
+    """Moving B by depth along the normal parts the boxes: so it points away from A and is deep
+    enough, whatever axis FCL prefers among nearly equal ones."""
+    def above(rng, count):
+        return np.column_stack([rng.uniform(-1, 1, (count, 2)), rng.uniform(1.8, 1.95, count)])
+
+    a, b = pairs_of(poses.CUBE, above)
+    found, exact = CUBES.batch(a, b), ContactSolver(poses.CUBE, poses.CUBE).batch(a, b)
+    assert np.array_equal(found.colliding, exact.colliding) and found.colliding.all()
+    assert np.linalg.norm(found.normal, axis=1) == pytest.approx(np.ones(len(a)))
+    apart = b.copy()
+    apart[:, :3] -= (found.separation - 1e-6)[:, None] * found.normal
+    assert not ContactSolver(poses.CUBE, poses.CUBE).batch(a, apart).colliding.any()
+    # FCL prefers a face to an edge axis that is better by less than 5 %.
+    assert (-found.separation <= -exact.separation * 1.06 + 1e-9).all()
+    assert (-found.separation >= -exact.separation - 1e-9).all()
+
+
+def test_the_point_is_the_deepest_corner():
+    """B, 0.1 m deep in A's top, tipped by 0.01 rad about y: of the patch's corners those at +x are
+    deepest, whereas the exact point is well inside."""
+    size = poses.CONTAINER
+    b = np.array([0.0, 0.0, size[2] - 0.1, 0.0, np.sin(0.005), 0.0, np.cos(0.005)])
+    deepest = ContactSolver(size, size, model='fcl')(IDENTITY, b)
+    exact = ContactSolver(size, size)(IDENTITY, b)
+    assert deepest.point[0] == pytest.approx(size[0] / 2, abs=0.05)
+    assert abs(deepest.point[1]) == pytest.approx(size[1] / 2, abs=0.01)
+    assert abs(exact.point[0]) < 2.0
+    assert deepest.separation == pytest.approx(exact.separation, rel=1e-6)
+
+
+def test_the_point_lies_in_both_boxes():
+    """Within the overlap of containers, 0.1 % of their length allowed for."""
+    def above(rng, count):
+        return np.column_stack([rng.uniform(-5, 5, count), rng.uniform(-1, 1, count),
+                                rng.uniform(2.5, 2.58, count)])
+
+    size = np.array(poses.CONTAINER)
+    a, b = pairs_of(size, above)
+    found = ContactSolver(size, size, model='fcl').batch(a, b)
+    assert found.colliding.all()
+    for pose in (a, b):
+        inverse = pose[:, 3:] * [-1, -1, -1, 1]
+        inside = poses.rotate(inverse, found.point - pose[:, :3])
+        assert (np.abs(inside) < size / 2 + 1e-3 * size[0]).all()
+
+
+def test_verdicts_and_refusals_are_sats():
+    """Apart: SAT's gap, NaN point; exact touch counts; bad poses are refused with their words."""
+    apart = CUBES(IDENTITY, [0, 0, 2.5, 0, 0, 0, 1])
+    assert apart.colliding is False and apart.separation == 0.5
+    assert np.isnan(apart.point).all() and np.isnan(apart.normal).all()
+    touch = CUBES(IDENTITY, [0, 0, 2.0, 0, 0, 0, 1])
+    assert touch.colliding and np.isfinite([*touch.point, *touch.normal]).all()
+    with pytest.raises(ValueError, match='pose_b'):
+        CUBES(IDENTITY, [0, 0, np.nan, 0, 0, 0, 1])
+
+
+def test_batch_is_row_by_row_with_sizes_of_their_own():
+    a, b, size_a, size_b = poses.random_pairs(np.random.default_rng(3), 60)
+    many = CUBES.batch(a, b, size_a=size_a, size_b=size_b)
+    assert 10 < many.colliding.sum() < 60
+    for row in range(len(a)):
+        one = ContactSolver(size_a[row], size_b[row], model='fcl')(a[row], b[row])
+        assert one.colliding == many.colliding[row]
+        assert np.array_equal(one.point, many.point[row], equal_nan=True)
+        assert np.array_equal(one.normal, many.normal[row], equal_nan=True)
+        assert one.separation == many.separation[row]
+
+
+def test_without_python_fcl_only_this_model_is_missing():
+    """The core imports without it; the model raises ModuleNotFoundError, which programs explain."""
+    code = ('import sys; sys.modules["fcl"] = None\n'
+            'from box_contact_ros import ContactSolver\n'
+            'ContactSolver((1, 1, 1), (1, 1, 1))\n'
+            'try: ContactSolver((1, 1, 1), (1, 1, 1), model="fcl")\n'
+            'except ModuleNotFoundError as error: print(error.name)')
+    done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == 'fcl'

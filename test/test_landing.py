@@ -1,0 +1,155 @@
+"""Landings without ROS: the exact point brings the load to rest, the deepest point does not."""
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+pytest.importorskip('mujoco')
+
+from box_contact_ros import ContactSolver  # noqa: E402
+from box_contact_ros.crane import GRAVITY, Crane  # noqa: E402
+from box_contact_ros.landing import (  # noqa: E402
+    SETTLING,
+    WINDOW,
+    LandingRecord,
+    LandingResult,
+    cases,
+    land,
+    landing_scenario,
+    scenario_of,
+)
+
+CASES = list(cases())
+HANGING_OVER = 17
+"""Tilt of 3°, 0.6 m of overhang: the patch is about to lift off on one side."""
+
+
+def landed(number: int, model: str = 'exact', **options) -> LandingResult:
+    scenario = scenario_of(CASES[number])
+    solver = ContactSolver(scenario.size, scenario.stack_size, model=model)
+    return land(scenario, solver, **options).judge()
+
+
+def test_the_grid_covers_what_is_asked_for():
+    """36 landings: ropes and tilt 0.5 to 3°, overhang 0 to 0.6 m, yaw to 1° either way."""
+    assert len(CASES) == 36
+    for name, low, high in (('rope_angle', 0.5, 3.0), ('tilt', 0.5, 3.0), ('overhang', 0.0, 0.6)):
+        values = [getattr(case, name) for case in CASES]
+        assert (min(values), max(values)) == (low, high)
+    yaws = [case.yaw for case in CASES]
+    assert -1.0 <= min(yaws) < -0.8 and 0.8 < max(yaws) <= 1.0
+
+
+@pytest.mark.parametrize('number', [5, HANGING_OVER, 31])
+def test_the_exact_point_lands_at_200_hz_with_latency(number):
+    """Among the hardest of the grid: with twice the stiffness, none of these three comes to
+    rest."""
+    result = landed(number, rate_hz=200.0, latency=0.002)
+    assert result.at_rest, f'\n{result}'
+    assert result.overhang == pytest.approx(CASES[number].overhang, abs=0.01)
+    assert result.settled < SETTLING / 2
+
+
+@pytest.mark.parametrize('rate_hz, latency', [(200.0, 0.0), (200.0, 0.004), (1000.0, 0.0),
+                                              (1000.0, 0.002)])
+def test_the_exact_point_lands_at_either_rate(rate_hz, latency):
+    result = landed(HANGING_OVER, rate_hz=rate_hz, latency=latency)
+    assert result.at_rest, f'\n{result}'
+    assert result.point_step == result.exact_point_step < 1e-4
+
+
+@pytest.mark.parametrize('rate_hz', [200.0, 1000.0])
+def test_the_deepest_point_does_not_land(rate_hz):
+    """FCL's deepest contact jumps from corner to corner, metres a tick, and the load rattles."""
+    pytest.importorskip('fcl')
+    result = landed(HANGING_OVER, 'fcl', rate_hz=rate_hz)
+    assert not result.at_rest
+    assert not result.verdicts['corner speed'] and not result.verdicts['force']
+    assert result.corner_speed > 0.04
+    assert result.point_step > 5.0
+
+
+def test_lost_answers_are_bridged_by_the_last_wrench():
+    """Every tenth answer lost at random: at rest with the wrench held. With no force on lost ticks
+    instead, it is not."""
+    scenario = scenario_of(CASES[4])
+    solver = ContactSolver(scenario.size, scenario.stack_size)
+    far = solver(np.array([0, 0, 1e3, 0, 0, 0, 1.0]), np.array([0, 0, 0, 0, 0, 0, 1.0]))
+    results = []
+    for on_loss in (None, far):
+        random = np.random.default_rng(2)
+        results.append(land(scenario, lambda a, b, on_loss=on_loss, random=random: (
+            on_loss if random.random() < 0.1 else solver(a, b))).judge())
+    assert results[0].at_rest, f'\n{results[0]}'
+    assert not results[1].at_rest
+
+
+def test_without_contact_nothing_is_judged():
+    """A load that meets no force hangs in the stack, and none that is watched too briefly rests."""
+    scenario = landing_scenario()
+    hanging = land(scenario, lambda a, b: None, rate_hz=100.0).judge()
+    assert not hanging.at_rest and hanging.depth > 0.1 and math.isnan(hanging.settled)
+    brief = land(dataclasses.replace(scenario, duration=0.2), lambda a, b: None).judge()
+    assert not brief.at_rest and 'not judged' in str(brief)
+    assert not LandingRecord(scenario, 200.0).judge().at_rest
+
+
+def test_every_criterion_counts():
+    """A landing that meets all limits but one is not at rest, and says which."""
+    good = {'corner_speed': 0.001, 'rope_tension': 0.0, 'force_worst': 1e-3, 'tilt': 1e-3,
+            'depth': 5e-3, 'gap': 0.0, 'settled': 1.0, 'touched': 7.0}
+    assert LandingResult(**good).at_rest
+    for field, value, name in (
+            ('corner_speed', 0.011, 'corner speed'), ('rope_tension', 1e-9, 'ropes slack'),
+            ('force_worst', 0.011, 'force'), ('tilt', math.radians(0.51), 'tilt'),
+            ('depth', 0.011, 'depth'), ('gap', 0.021, 'gap')):
+        bad = LandingResult(**good | {field: value})
+        assert [key for key, met in bad.verdicts.items() if not met] == [name]
+        assert str(bad).count('not met') == 1 and 'NOT AT REST' in str(bad)
+    nothing = LandingResult()
+    assert not any(nothing.verdicts.values())
+
+
+def test_corner_speeds_and_tilts_are_rigid_motion():
+    """Spinning at ω about the vertical, the corners move at ω·√(L² + W²)/2; a pitch of θ tilts by
+    θ."""
+    scenario = landing_scenario()
+    record = LandingRecord(scenario, 200.0)
+    record.poses = [np.array([1.0, 2, 3, 0, math.sin(0.1), 0, math.cos(0.1)]),
+                    np.array([1.0, 2, 3, 0, 0, 0, 1])]
+    record.velocities = [np.array([0.3, 0, 0.4, 0, 0, 0]), np.array([0, 0, 0, 0, 0, 0.2])]
+    reach = math.hypot(*scenario.size[:2]) / 2
+    assert record.corner_speeds() == pytest.approx([0.5, 0.2 * reach])
+    assert record.tilts() == pytest.approx([0.2, 0.0])
+
+
+def test_the_hoist_of_a_landing_never_lifts():
+    """Down within half of the duration, monotonously, and then it stays."""
+    scenario = landing_scenario()
+    heights = [scenario.hoist_height(time) for time in np.linspace(0.0, scenario.duration, 500)]
+    assert (np.diff(heights) <= 0.0).all()
+    assert heights[0] == scenario.lowering_distance > scenario.overlap
+    assert scenario.hoist_height(0.5 * scenario.duration) == pytest.approx(0.0, abs=1e-12)
+    assert heights[-1] == pytest.approx(0.0, abs=1e-12)
+    assert SETTLING + WINDOW < 0.7 * scenario.duration
+
+
+def test_a_wrench_may_change_within_a_tick():
+    """Slack ropes, gravity cancelled, f = m a from 2 ms of a 5-ms tick on: v = a · 3 ms after it.
+
+    The wrench is asked for at the start of every physics step of 0.5 ms.
+    """
+    crane = Crane(landing_scenario(rope_angle=0.0, pitch=0.0, roll=0.0, yaw=0.0), 200.0)
+    mass, times = crane.scenario.mass, []
+
+    def wrench(time: float) -> np.ndarray:
+        times.append(time)
+        side = 2.0 * mass if time > 0.0019 else 0.0
+        return np.array([side, 0.0, 1.2 * mass * GRAVITY, 0.0, 0.0, 0.0])
+
+    crane.step_under(wrench)
+    assert times == pytest.approx(np.arange(10) * 5e-4, abs=1e-12)
+    assert crane.load_velocity[0] == pytest.approx(2.0 * 0.003, rel=1e-3)

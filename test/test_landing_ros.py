@@ -1,0 +1,119 @@
+"""Landings over DDS: the crane client closes the loop with a contact node in another process."""
+from __future__ import annotations
+
+import time
+
+import pytest
+
+pytest.importorskip('mujoco')
+
+import rclpy  # noqa: E402
+from rclpy.context import Context  # noqa: E402
+from rclpy.parameter import Parameter  # noqa: E402
+
+from box_contact_ros.landing import LANDING_DURATION  # noqa: E402
+from box_contact_ros.nodes import crane as crane_node  # noqa: E402
+from box_contact_ros.nodes import crane_feedback  # noqa: E402
+from box_contact_ros.nodes.runtime import make_executor  # noqa: E402
+
+EXACT = ('--ros-args', '-p', 'model:=exact')
+HARD = {'rope_angle': 3.0, 'rope_heading': 100.0, 'pitch': 2.0, 'roll': -2.0, 'yaw': 1.0,
+        'offset': [0.2, 0.4]}
+"""A landing at the ends of what is asked for."""
+
+
+def arguments(**values):
+    texts = [f'{name}:={str(value).lower()}' for name, value in values.items()]
+    return ['--ros-args', *(word for text in texts for word in ('-p', text))]
+
+
+@pytest.fixture
+def node(program):
+    running = program('contact_node', *EXACT)
+    running.wait_for_output('ready', 120)
+    return running
+
+
+def test_lands_in_lockstep_faster_than_real_time(program, node):
+    """200 Hz, 2 ms latency: at rest, exit status 0, and time does not wait for the clock."""
+    started = time.monotonic()
+    crane = program('crane', *arguments(closed_loop=True, lockstep=True, latency=0.002, **HARD))
+    assert crane.wait(200) == 0, crane.output
+    took = time.monotonic() - started
+    assert 'at rest' in crane.output and 'NOT AT REST' not in crane.output
+    assert 'messages lost .......... 0 ' in crane.output
+    assert took < LANDING_DURATION, f'{took:.1f} s for {LANDING_DURATION:g} s of motion'
+
+
+def test_a_landing_that_does_not_rest_fails(program, node):
+    """Ended before it can be judged: contacts came through, and still the status is 1."""
+    crane = program('crane', *arguments(closed_loop=True, lockstep=True, duration=4.0,
+                                        overlap=0.025))
+    assert crane.wait(100) == 1, crane.output
+    assert 'not judged' in crane.output
+
+
+@pytest.fixture
+def client():
+    """A crane node in this process, closed loop, with what it needs to be served."""
+    context = Context()
+    rclpy.init(context=context)
+    values = {'closed_loop': True, 'lockstep': True} | HARD
+    crane = crane_node.CraneNode(
+        context, parameter_overrides=[Parameter(name, value=v) for name, v in values.items()])
+    executor = make_executor(context)
+    executor.add_node(crane)
+    yield crane, executor
+    executor.shutdown()
+    crane.destroy_node()
+    context.try_shutdown()
+
+
+def test_lost_ticks_are_bridged(node, client, monkeypatch):
+    """Every eleventh answer is thrown away on arrival: the last wrench is held, and it lands."""
+    crane, executor = client
+    monkeypatch.setattr(crane_feedback, 'LOCKSTEP_PATIENCE', 0.01)
+    answer, count = crane.feedback.answer, 0
+
+    def lossy(stamp, rows, received):
+        nonlocal count
+        count += 1
+        if count % 11:
+            answer(stamp, rows, received)
+
+    monkeypatch.setattr(crane.feedback, 'answer', lossy)
+    crane_node._spin(crane, executor, crane.await_answers)
+    crane_node._spin(crane, executor, crane.lower)
+    result = crane.landing()
+    assert count > 4500
+    assert len(crane.feedback.record.points) < 0.95 * sum(
+        bool(exchange.in_contact) for exchange in crane.log.exchanges.values())
+    assert result.at_rest, f'\n{result}'
+
+
+def test_answers_that_say_nothing_are_held_over(client, monkeypatch):
+    """NaN rows are no answer, an empty cloud is "no contact", a contact pushes up."""
+    crane, _ = client
+    monkeypatch.setattr(crane_feedback, 'LOCKSTEP_PATIENCE', 0.01)
+    feedback, simulated = crane.feedback, crane_node.Crane(crane.scenario, crane.rate)
+    row = {'x': 0.0, 'y': 0.0, 'z': 2.6, 'normal_x': 0.0, 'normal_y': 0.0, 'normal_z': -1.0,
+           'depth': 0.005}
+    pushes = []
+    for stamp, rows in enumerate(([row], [row | {'depth': float('nan')}], []), start=1):
+        feedback.ask(stamp, simulated)
+        feedback.answer(stamp, rows, stamp)
+        feedback.step(stamp, simulated)
+        pushes.append(feedback.record.forces[-1][2])
+    assert pushes[0] > 0.0 and pushes[1] == pushes[0] and pushes[2] == 0.0
+
+
+def test_lockstep_ends_when_nobody_answers(client, monkeypatch):
+    """A lost answer is waited for, within bounds, and so is a node that is gone."""
+    crane, _ = client
+    monkeypatch.setattr(crane_feedback, 'LOCKSTEP_PATIENCE', 0.01)
+    simulated = crane_node.Crane(crane.scenario, crane.rate)
+    with pytest.raises(TimeoutError, match='no answer to 5 pairs'):
+        for stamp in range(1, 7):
+            crane.feedback.ask(stamp, simulated)
+            crane.feedback.step(stamp, simulated)
+    assert stamp == 5

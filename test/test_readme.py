@@ -1,0 +1,230 @@
+"""The README and docs/: every command in them works, every example prints what it says.
+
+Commands are the lines of fenced `bash` blocks, and those after `$ ` in `console` blocks. Each must
+match exactly one line of `COMMANDS`, whose check runs it, or a quick variant of it, or says what
+can be checked where it cannot run (root, apt, an installed ROS). A command that nobody has thought
+of fails.
+"""
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import re
+import runpy
+import shlex
+import subprocess
+import sys
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import yaml
+
+from box_contact_ros.nodes.contact import PARAMETERS
+from box_contact_ros.programs import PROGRAMS
+from box_contact_ros.resources import resource_path
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGES = [ROOT / 'README.md', *sorted((ROOT / 'docs').rglob('*.md'))]
+FENCE = re.compile(r'^```(\w*)\n(.*?)^```$', re.MULTILINE | re.DOTALL)
+
+
+def blocks(*languages: str) -> Iterator[tuple[Path, str, str]]:
+    """Page, language and text of the fenced blocks."""
+    for page in PAGES:
+        for language, text in FENCE.findall(page.read_text('utf-8')):
+            if language in languages:
+                yield page, language, text
+
+
+def commands() -> list[str]:
+    """Every command once, continued lines joined, comments dropped."""
+    found: dict[str, None] = {}
+    for _, language, text in blocks('bash', 'console'):
+        for line in text.replace('\\\n', ' ').splitlines():
+            if language == 'console':
+                if not line.startswith('$ '):
+                    continue
+                line = line[2:]
+            line = ' '.join(line.partition(' #')[0].split())
+            if line and not line.startswith('#'):
+                found[line] = None
+    return list(found)
+
+
+# --- what is done with a command ------------------------------------------------------------------
+
+
+def run(*words: str, timeout: float = 120.0, **env: str) -> str:
+    """Run a program of this Python's environment; its output. Fails unless the status is 0."""
+    done = subprocess.run(words, cwd=ROOT, env=os.environ | env, text=True, timeout=timeout,
+                          stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    assert done.returncode == 0, f'{words}: {done.stdout}'
+    return done.stdout
+
+
+def make(words: list[str], **_) -> None:
+    """The targets exist: a dry run plans them."""
+    env = {name: value for name, value in os.environ.items()
+           if not name.startswith(('MAKE', 'MFLAGS'))}  # `make test` may be what runs this
+    done = subprocess.run(['make', '-n', *words[1:]], cwd=ROOT, env=env, capture_output=True,
+                          text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    if words[1] == 'demo' and len(words) > 2:  # what ARGS hands on
+        arguments = shlex.split(words[2].partition('=')[2])
+        assert all(word in run(sys.executable, '-m', 'box_contact_ros.demo', '--help')
+                   for word in arguments if word.startswith('--'))
+
+
+def program_and_arguments(words: list[str]) -> tuple[str, list[str]]:
+    """Of any of the three ways to start a program."""
+    for lead in (['ros2', 'run', 'box_contact_ros'], ['python', '-m', 'box_contact_ros']):
+        if words[:len(lead)] == lead:
+            return words[len(lead)], words[len(lead) + 1:]
+    return words[0].removeprefix('box_contact_'), words[1:]
+
+
+def start(words: list[str], program, **_) -> None:
+    """A node starts and says 'ready'; a crane, shortened, gets its answers; others know the options
+    (their work takes minutes, and other tests do a little of it)."""
+    name, arguments = program_and_arguments(words)
+    assert name in PROGRAMS
+    if name == 'contact_node':
+        program(name, *arguments).wait_for_output('ready', 120)
+    elif name == 'crane' and '--help' not in arguments:
+        program('contact_node', '--ros-args', '-p', 'model:=exact').wait_for_output('ready', 120)
+        crane = program(name, *arguments, '-p', 'duration:=2.0', '-p', 'rate:=100')
+        assert crane.wait(120) == 0, crane.output
+    else:
+        known = run(sys.executable, '-m', 'box_contact_ros', name, '--help')
+        for word in arguments:
+            if word.startswith('--'):
+                assert word in known
+
+
+def topic(words: list[str], **_) -> None:
+    """The topic is one of the contact node's."""
+    document = yaml.safe_load(resource_path('msg_schemas', 'asyncapi.yaml').read_text('utf-8'))
+    addresses = {channel['address'] for channel in document['channels'].values()}
+    assert words[3].removeprefix('/') in addresses
+
+
+def parameter(words: list[str], **_) -> None:
+    """`ros2 param set NODE NAME VALUE`: the node has it, and takes the value."""
+    node, name, value = words[3:]
+    assert node == '/contact_node'
+    PARAMETERS[name].check(name, yaml.safe_load(value))
+
+
+def pip(words: list[str], monkeypatch, **_) -> None:
+    """Names a checkout's existing extras, files that exist, or requirements of this package."""
+    given: dict = {}
+    monkeypatch.setattr('setuptools.setup', given.update)
+    monkeypatch.chdir(ROOT)
+    runpy.run_path('setup.py')
+    expected = 'file'
+    for word in words[2:]:
+        if word == '-c':
+            expected = 'constraints'
+        elif expected == 'constraints':
+            assert (ROOT / word).is_file()
+            expected = 'file'
+        elif word.startswith('.'):
+            extras = re.fullmatch(r'\.(?:\[([\w,]+)\])?', word).group(1)
+            assert set(extras.split(',') if extras else ()) <= set(given['extras_require'])
+        elif not word.startswith('-'):
+            assert word in given['install_requires']
+
+
+def apt(words: list[str], **_) -> None:
+    """Packages that package.xml depends on."""
+    manifest = ElementTree.parse(ROOT / 'package.xml')
+    assert set(words[3:]) <= {entry.text for entry in manifest.findall('exec_depend')}
+
+
+def colcon(words: list[str], **_) -> None:
+    """Selects the package of package.xml."""
+    name = ElementTree.parse(ROOT / 'package.xml').findtext('name')
+    assert words[2:] == ['--packages-select', name]
+
+
+def sourced(words: list[str], **_) -> None:
+    """ROS's own set-up files: not on this machine."""
+    assert words[1] in ('/opt/ros/jazzy/setup.bash', 'install/setup.bash')
+
+
+COMMANDS = {
+    r'make \w+( .*)?': make,
+    r'(ros2 run|python -m) box_contact_ros \w+( .*)?': start,
+    r'box_contact_\w+( .*)?': start,
+    r'ros2 topic echo \S+': topic,
+    r'ros2 param set \S+ \S+ \S+': parameter,
+    r'pip install .+': pip,
+    r'sudo apt install .+': apt,
+    r'colcon build .+': colcon,
+    r'source \S+': sourced,
+}
+
+
+@pytest.mark.parametrize('command', commands())
+def test_command(command, program, monkeypatch):
+    matching = [check for pattern, check in COMMANDS.items() if re.fullmatch(pattern, command)]
+    assert len(matching) == 1, f'no check, or several, for: {command}'
+    matching[0](shlex.split(command), program=program, monkeypatch=monkeypatch)
+
+
+def test_first_commands_are_demo_and_test():
+    """What a newcomer types first stands first."""
+    assert commands()[:2] == ['make demo', 'make test']
+
+
+# --- the rest of the pages ------------------------------------------------------------------------
+
+EXAMPLES = [pytest.param(text, id=f'{page.name}-{number}')
+            for number, (page, _, text) in enumerate(blocks('python'))]
+
+
+@pytest.mark.parametrize('text', EXAMPLES)
+def test_python_example(text):
+    """It runs, and prints what the comments behind its prints say."""
+    with contextlib.redirect_stdout(io.StringIO()) as printed:
+        exec(compile(text, 'example', 'exec'), {'__name__': 'example'})
+    assert printed.getvalue().splitlines() == re.findall(r'^print\(.*\)  # (.*)$', text,
+                                                         re.MULTILINE)
+
+
+def anchors(page: Path) -> set[str]:
+    """The anchors of a page's headings, as GitHub makes them."""
+    text = FENCE.sub('', page.read_text('utf-8'))
+    return {re.sub(r'[^\w\- ]', '', heading.lower()).replace(' ', '-')
+            for heading in re.findall(r'^#+ (.+)$', text, re.MULTILINE)}
+
+
+@pytest.mark.parametrize('page', PAGES, ids=lambda page: page.name)
+def test_links_lead_somewhere(page):
+    for link in re.findall(r'\]\(([^)\s]+)\)', FENCE.sub('', page.read_text('utf-8'))):
+        if re.match(r'\w+:', link):
+            continue
+        path, _, anchor = link.partition('#')
+        target = (page.parent / path).resolve() if path else page
+        assert target.exists(), link
+        assert not anchor or anchor in anchors(target), link
+
+
+def test_files_named_in_backticks_exist():
+    """`docs/...`, `test/...` and `box_contact_ros/...` are paths of this repository."""
+    for page in PAGES:
+        for name in re.findall(r'`((?:docs|test|box_contact_ros|msg_schemas)/[\w./]+\.\w+)`',
+                               page.read_text('utf-8')):
+            assert (ROOT / name).is_file(), f'{page.name}: {name}'
+
+
+def test_figures_are_made(tmp_path):
+    """The script draws all the figures there are."""
+    folder = ROOT / 'docs' / 'figures'
+    run(sys.executable, str(folder / 'make_figures.py'), '--out', str(tmp_path), MPLBACKEND='Agg',
+        PYTHONPATH=os.pathsep.join([str(ROOT), os.environ.get('PYTHONPATH', '')]))
+    assert {path.name for path in tmp_path.iterdir()} == {
+        path.name for path in folder.glob('*.png')}
