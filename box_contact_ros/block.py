@@ -8,12 +8,18 @@ see that rows do not overlap, and turn loops over `i` to vector instructions.
 The stages of a block, and the rows they write, in order: `pose.load_block`, `sat.query_block`,
 then a builder of the point: `overlap.centroid`, pair by pair; `outline`, `committee`; or `paper`.
 Each stage exists twice, compiled for LANES pairs and for one: with a variable number of pairs,
-loops took five times as long. A block that is not full is filled up with boxes far apart.
+loops took five times as long. A block that is not full is filled up with boxes far apart. A single
+pair is copied to SINGLE lanes, so that what is done four times for a pair is done once for four.
 """
 from __future__ import annotations
 
+import numpy as np
+
 LANES = 64
 """Pairs per block: a multiple of every vector width, and a working set that stays in L1/L2."""
+
+SINGLE = 4
+"""Lanes that hold a single pair: the four edges of a box that are parallel to each other."""
 
 _row = 0
 
@@ -32,7 +38,7 @@ ORIGIN_A = _rows(3)    # position of A, common frame [m]
 ORIGIN_B = _rows(3)    # position of B, common frame [m]
 TURN_A = _rows(4)      # quaternions xyzw
 TURN_B = _rows(4)
-VALID = _rows(1)       # 1.0 for a pair that can be evaluated
+FAULT = _rows(1)       # 0, or why the pair cannot be evaluated (BAD_…)
 AXES_A = _rows(9)      # rotation of A, common frame, row-major (columns are A's axes)
 OFFSET_A = _rows(3)    # B − A in A's frame [m]
 OFFSET_B = _rows(3)    # B − A in B's frame [m]
@@ -68,4 +74,30 @@ RANKS = _rows(3)       # place of axis q in the network's order
 IN_RANGE = _rows(1)    # 1.0 where the network may be asked
 POINT = _rows(3)       # contact point in A's frame [m]
 
-WORK_SIZE = _row * LANES
+# Signs, written once by `new_work`: of lane i, where lanes are pairs and where they are edges.
+MINUS = _rows(1)
+PLUS = _rows(1)
+EVEN_ODD = _rows(1)    # −, +, −, +
+HALVES = _rows(1)      # −, −, +, +
+
+# overlap.centroid, one pair at a time: 8 corners, and two polygons to clip from one to the other,
+# each with room for a quadrilateral clipped by six planes; all as u, v, w.
+CORNERS = _row * LANES
+_POLYGON = 3 * 12
+POLYGONS = (CORNERS + 3 * 8, CORNERS + 3 * 8 + _POLYGON)
+
+WORK_SIZE = CORNERS + 3 * 8 + 2 * _POLYGON
+
+
+def new_work() -> np.ndarray:
+    """Scratch memory for one block."""
+    work = np.zeros(WORK_SIZE)
+    work[MINUS:MINUS + LANES] = -1.0
+    work[PLUS:PLUS + LANES] = 1.0
+    work[EVEN_ODD:EVEN_ODD + SINGLE] = (-1.0, 1.0, -1.0, 1.0)
+    work[HALVES:HALVES + SINGLE] = (-1.0, -1.0, 1.0, 1.0)
+    return work
+
+
+OK, BAD_POSE_A, BAD_POSE_B, BAD_SIZE_A, BAD_SIZE_B = range(5)
+"""Values of FAULT, in the order in which they are looked for."""

@@ -25,6 +25,8 @@ from __future__ import annotations
 import numpy as np
 
 from .block import (
+    BAD_POSE_A,
+    FAULT,
     HALF,
     HALF_A,
     HALF_B,
@@ -43,15 +45,22 @@ from .block import (
     ROTATION,
     SEPARATION,
     TOUCH,
-    WORK_SIZE,
+    new_work,
 )
-from .contact import Contacts, sat_normal, write_apart, write_contact
+from .contact import Contacts, sat_normal, write_apart, write_contact, write_faults, write_one
 from .jit import inlined, kernel
-from .network import WeightsError, block_weights, forward_block, forward_one, load_weights
+from .network import (
+    WeightsError,
+    block_numbers,
+    forward_block,
+    forward_one,
+    load_weights,
+    split_numbers,
+)
 from .outline import (
     outline_block,
 )
-from .overlap import CLIP_SIZE, centroid, press
+from .overlap import centroid, press, repeat_pressed
 from .pose import (
     load_block,
 )
@@ -279,13 +288,13 @@ def _range(lanes, work):
 
 
 @kernel
-def committee_block(poses_a, poses_b, sizes_a, sizes_b, start, count, work, tiles, columns, widths,
-                    values, spare, clip, status):
+def committee_block(poses_a, poses_b, sizes_a, sizes_b, start, count, work, numbers, widths):
     """Contacts of a block of `count` pairs; POINT is right for those that touch.
 
-    Returns the numbers of rows refused and of contacts answered exactly.
+    numbers: see `network.block_numbers`. Returns how many rows were refused, and how many contacts
+    answered exactly.
     """
-    bad = load_block(poses_a, poses_b, sizes_a, sizes_b, start, count, work, status)
+    bad = load_block(poses_a, poses_b, sizes_a, sizes_b, start, count, work)
     query_block(count, work)
     touching = 0
     for i in range(count):
@@ -294,38 +303,42 @@ def committee_block(poses_a, poses_b, sizes_a, sizes_b, start, count, work, tile
             press(work, i)
     if touching == 0:
         return bad, 0
+    if count == 1:
+        repeat_pressed(work)
+    values, spare, tiles, columns = split_numbers(numbers, widths)
     outline_block(count, work)
-    describe_block(count, work, values.reshape(-1))
-    values[INPUTS:widths[0]] = 0.0  # inputs that only fill up a group of four
+    describe_block(count, work, values)
+    values[INPUTS * LANES:widths[0] * LANES] = 0.0  # inputs that only fill up a group of four
     if count == 1:
         forward_one(columns, widths, values, spare)
     else:
-        forward_block(tiles, widths, values, spare)
-    place_block(count, work, values.reshape(-1))
+        forward_block(tiles, widths, values.reshape(-1, LANES), spare.reshape(-1, LANES))
+    place_block(count, work, values)
     range_block(count, work)
     exact = 0
     for i in range(count):
         if work[SEPARATION + i] <= work[TOUCH + i] and work[IN_RANGE + i] == 0.0:
             exact += 1
-            p = centroid(work, i, clip)
+            p = centroid(work, i)
             for k in range(3):
                 work[POINT + k * LANES + i] = p[k]
     return bad, exact
 
 
 @kernel
-def solve_committee(poses_a, poses_b, sizes_a, sizes_b, work, tiles, columns, widths, values, spare,
-                    clip, status, colliding, separation, normal, point):
+def solve_committee(poses_a, poses_b, sizes_a, sizes_b, work, numbers, widths, status, colliding,
+                    separation, normal, point):
     """Model `committee` for all rows; returns the numbers of rows refused and answered exactly."""
     bad = 0
     exact = 0
     rows = poses_a.shape[0]
     for start in range(0, rows, LANES):
         count = min(LANES, rows - start)
-        refused, exactly = committee_block(
-            poses_a, poses_b, sizes_a, sizes_b, start, count, work, tiles, columns, widths, values,
-            spare, clip, status)
-        bad += refused
+        refused, exactly = committee_block(poses_a, poses_b, sizes_a, sizes_b, start, count, work,
+                                           numbers, widths)
+        if refused:
+            bad += refused
+            write_faults(work, start, count, status)
         exact += exactly
         for i in range(count):
             if work[SEPARATION + i] <= work[TOUCH + i]:
@@ -337,8 +350,26 @@ def solve_committee(poses_a, poses_b, sizes_a, sizes_b, work, tiles, columns, wi
     return bad, exact
 
 
+@kernel
+def one_committee(pose_a, pose_b, sizes, work, numbers, widths, out):
+    """One pair: (FAULT, colliding, separation); sizes (2, 3), out (2, 3): normal and point."""
+    if len(pose_a) != 7 or len(pose_b) != 7:
+        return BAD_POSE_A, False, 0.0
+    refused, _ = committee_block(pose_a.reshape(1, -1), pose_b.reshape(1, -1), sizes[:1], sizes[1:],
+                                 0, 1, work, numbers, widths)
+    if refused:
+        return int(work[FAULT]), False, 0.0
+    if work[SEPARATION] > work[TOUCH]:
+        out[:] = np.nan
+        return 0, False, work[SEPARATION]
+    write_one(work, (work[POINT], work[POINT + LANES], work[POINT + 2 * LANES]), out)
+    return 0, True, work[SEPARATION]
+
+
 class Committee:
     """SAT and a network for the point; any sizes."""
+
+    one = staticmethod(one_committee)
 
     def __init__(self, weights: str | None = None) -> None:
         try:
@@ -357,17 +388,12 @@ class Committee:
             raise WeightsError(f'weights file {path}: no layer may have more than {LANES} units')
         self.exact_answers = 0
         """Contacts outside the trained range so far, which were answered by model `exact`."""
-        self._network = block_weights(network)
-        widest = self._network.widths.max()
-        self._values = np.zeros((widest, LANES), dtype=np.float32)
-        self._spare = np.zeros((widest, LANES), dtype=np.float32)
-        self._work = np.zeros(WORK_SIZE)
-        self._clip = np.zeros(CLIP_SIZE)
+        numbers, widths = block_numbers(network)
+        self.scratch = (new_work(), numbers, widths)
 
     def solve(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
               status: np.ndarray, found: Contacts) -> int:
         """Fill `found` for poses (n, 7), sizes (n or 1, 3); returns how many rows are refused."""
-        bad, exact = solve_committee(a, b, size_a, size_b, self._work, *self._network,
-                                     self._values, self._spare, self._clip, status, *found)
+        bad, exact = solve_committee(a, b, size_a, size_b, *self.scratch, status, *found)
         self.exact_answers += exact
         return int(bad)

@@ -8,6 +8,7 @@ import numpy as np
 
 from .block import (
     AXES_A,
+    FAULT,
     LANES,
     NORMAL,
     ORIGIN_A,
@@ -59,6 +60,25 @@ def write_contact(work, i, row, n, p, colliding, separation, normal, point):
 def sat_normal(work, i):
     """SAT's normal of pair `i`, in A's frame."""
     return work[NORMAL + i], work[NORMAL + LANES + i], work[NORMAL + 2 * LANES + i]
+
+
+@kernel
+def write_one(work, p, out):
+    """Write the first pair of a block as normal and point, out (2, 3); p is in A's frame."""
+    for k in range(3):
+        a0 = work[AXES_A + 3 * k * LANES]
+        a1 = work[AXES_A + (3 * k + 1) * LANES]
+        a2 = work[AXES_A + (3 * k + 2) * LANES]
+        out[0, k] = (a0 * work[NORMAL] + a1 * work[NORMAL + LANES]
+                     + a2 * work[NORMAL + 2 * LANES])
+        out[1, k] = work[ORIGIN_A + k * LANES] + (a0 * p[0] + a1 * p[1] + a2 * p[2])
+
+
+@kernel
+def write_faults(work, start, count, status):
+    """Copy the faults of a block to their rows of `status`."""
+    for i in range(count):
+        status[start + i] = np.int8(work[FAULT + i])
 
 
 @kernel

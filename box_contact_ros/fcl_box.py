@@ -17,9 +17,9 @@ import functools
 import fcl
 import numpy as np
 
+from .block import OK
 from .contact import Contacts
 from .exact import Exact
-from .pose import OK
 
 MOST_CONTACTS = 16
 """FCL's box-box makes at most eight contacts (two rectangles cut each other in an octagon)."""

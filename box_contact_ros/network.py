@@ -14,7 +14,7 @@ import json
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from safetensors import SafetensorError, safe_open
@@ -161,46 +161,58 @@ def rational_tanh(x):
     return above / (np.float32(945.0) + s * (np.float32(420.0) + s * np.float32(15.0)))
 
 
-class BlockWeights(NamedTuple):
-    """A network laid out for `forward_block` and `forward_one`, in the order in which they read.
+def unpacked(network: Network) -> list[tuple[np.ndarray, np.ndarray]]:
+    """(weight (outputs, inputs), bias (outputs,)) of every layer."""
+    layers, place = [], 0
+    for inputs, outputs in zip(network.widths, network.widths[1:]):
+        end = place + inputs * outputs
+        layers.append((network.packed[place:end].reshape(outputs, inputs),
+                       network.packed[end:end + outputs]))
+        place = end + outputs
+    return layers
 
-    Every layer is widened with zeros to a multiple of 4.
+
+def block_numbers(network: Network) -> tuple[np.ndarray, np.ndarray]:
+    """A network laid out for `forward_block` and `forward_one`: (numbers, widths).
+
+    widths, (layers + 1,) int64, are the layers' widths, widened with zeros to a multiple of 4.
+    numbers, float32, is all in one array, because every array passed costs a single call 50 ns:
+
+    1. values: room for a block, max(widths) rows of LANES; inputs before, outputs after.
+    2. spare: room for a block.
+    3. tiles: per layer the biases, then for each group of 4 outputs and each group of 4 inputs the
+       16 weights, outputs first: the order in which `forward_block` reads.
+    4. columns: per layer the biases, then for each input the weights to all outputs, for
+       `forward_one`.
     """
-
-    tiles: np.ndarray
-    """float32: per layer the biases, then for each group of 4 outputs and each group of 4 inputs
-    the 16 weights, outputs first."""
-    columns: np.ndarray
-    """float32: per layer the biases, then for each input the weights to all outputs."""
-    widths: np.ndarray
-    """(layers + 1,) int64, widened."""
-
-
-def block_weights(network: Network) -> BlockWeights:
-    """Lay a network out for the block kernels."""
     widths = np.array([-(-width // 4) * 4 for width in network.widths], dtype=np.int64)
     tiles, columns = [], []
-    place = 0
-    for inputs, outputs, wide_in, wide_out in zip(network.widths, network.widths[1:], widths,
-                                                  widths[1:]):
+    for (narrow, narrow_bias), wide_in, wide_out in zip(unpacked(network), widths, widths[1:]):
         weight = np.zeros((wide_out, wide_in), dtype=np.float32)
         bias = np.zeros(wide_out, dtype=np.float32)
-        weight[:outputs, :inputs] = network.packed[place:place + inputs * outputs].reshape(
-            outputs, inputs)
-        place += inputs * outputs
-        bias[:outputs] = network.packed[place:place + outputs]
-        place += outputs
+        weight[:narrow.shape[0], :narrow.shape[1]] = narrow
+        bias[:len(narrow_bias)] = narrow_bias
         grouped = weight.reshape(wide_out // 4, 4, wide_in // 4, 4).transpose(0, 2, 1, 3)
         tiles += [bias, grouped.ravel()]
         columns += [bias, weight.T.ravel()]
-    return BlockWeights(np.concatenate(tiles), np.concatenate(columns), widths)
+    room = np.zeros(2 * widths.max() * LANES, dtype=np.float32)
+    return np.concatenate([room, *tiles, *columns]), widths
+
+
+@kernel
+def split_numbers(numbers, widths):
+    """values, spare, tiles and columns of `block_numbers`."""
+    room = widths.max() * LANES
+    weights = (len(numbers) - 2 * room) // 2
+    return (numbers[:room], numbers[room:2 * room], numbers[2 * room:2 * room + weights],
+            numbers[2 * room + weights:])
 
 
 @fused_kernel
 def forward_block(tiles, widths, values, spare):
     """Run the network on LANES inputs at once; `values` holds the inputs before, outputs after.
 
-    tiles, widths: see `BlockWeights`; values, spare: (max(widths), LANES) float32, rows of inputs
+    tiles, widths: see `block_numbers`; values, spare: (max(widths), LANES) float32, rows of inputs
     beyond the network's own zero. Four outputs at a time take in four inputs at a time, so that a
     value loaded is used four times.
     """
@@ -249,11 +261,11 @@ def _layer_block(packed, place, inputs, outputs, x, y):
 
 @fused_kernel
 def forward_one(columns, widths, values, spare):
-    """`forward_block` for the first lane alone, its sums in the same order."""
-    x = spare[0]
-    y = spare[1]
+    """`forward_block` for the first lane alone, its sums in the same order; flat scratch."""
+    x = spare[:LANES]
+    y = spare[LANES:]
     for k in range(widths[0]):
-        x[k] = values[k, 0]
+        x[k] = values[k * LANES]
     place = 0
     layers = len(widths) - 1
     for layer in range(layers):
@@ -272,7 +284,7 @@ def forward_one(columns, widths, values, spare):
                 x[row] = rational_tanh(y[row])
         else:
             for row in range(outputs):
-                values[row, 0] = y[row]
+                values[row * LANES] = y[row]
 
 
 @kernel

@@ -26,6 +26,7 @@ from __future__ import annotations
 import numpy as np
 
 from .block import (
+    CORNERS,
     FACE,
     HALF_A,
     HALF_B,
@@ -33,8 +34,10 @@ from .block import (
     NORMAL,
     OFFSET_A,
     OFFSET_B,
+    POLYGONS,
     ROTATION,
     SEPARATION,
+    SINGLE,
     SIZE,
 )
 from .jit import kernel
@@ -43,10 +46,6 @@ DEPTH_FLOOR = 1e-9
 """Depth, as a fraction of the size, to which B is pressed in before the centroid is taken. At exact
 touch A∩B has no volume; at 1e-9 of the size its heights still have seven good digits."""
 
-_POLYGON = 3 * 12        # room for a quadrilateral clipped by six planes, as u, v, w
-CLIP_SIZE = 24 + 2 * _POLYGON
-"""Length of the scratch array of `centroid`: eight corners and two polygons."""
-
 _FACES = np.array([[0, 4, 6, 2], [1, 3, 7, 5],     # x = −, +; corner c has signs (c&1, c&2, c&4)
                    [0, 1, 5, 4], [2, 6, 7, 3],     # y = −, +
                    [0, 2, 3, 1], [4, 5, 7, 6]])    # z = −, +; all counter-clockwise from outside
@@ -54,24 +53,24 @@ _CORNERS = np.array([[1.0 if corner >> k & 1 else -1.0 for k in range(3)] for co
 
 
 @kernel
-def _clip(clip, source, count, target, axis, sign, bound):
+def _clip(work, source, count, target, axis, sign, bound):
     """Keep the part of a polygon with sign·p[axis] ≤ bound; returns its number of vertices."""
     kept = 0
     before = source + 3 * (count - 1)
-    excess_before = sign * clip[before + axis] - bound
+    excess_before = sign * work[before + axis] - bound
     for vertex in range(count):
         here = source + 3 * vertex
-        excess = sign * clip[here + axis] - bound
+        excess = sign * work[here + axis] - bound
         if (excess > 0.0) != (excess_before > 0.0):
             f = excess_before / (excess_before - excess)
             for k in range(3):
-                clip[target + 3 * kept + k] = (
-                    clip[before + k] + f * (clip[here + k] - clip[before + k]))
-            clip[target + 3 * kept + axis] = sign * bound
+                work[target + 3 * kept + k] = (
+                    work[before + k] + f * (work[here + k] - work[before + k]))
+            work[target + 3 * kept + axis] = sign * bound
             kept += 1
         if not excess > 0.0:
             for k in range(3):
-                clip[target + 3 * kept + k] = clip[here + k]
+                work[target + 3 * kept + k] = work[here + k]
             kept += 1
         before = here
         excess_before = excess
@@ -79,14 +78,14 @@ def _clip(clip, source, count, target, axis, sign, bound):
 
 
 @kernel
-def _moments(clip, polygon, count):
+def _moments(work, polygon, count):
     """Signed ∫ (w, u w, v w, w²/2) over the projection of a polygon on (u, v), by triangles."""
     m0, mu, mv, mw = 0.0, 0.0, 0.0, 0.0
-    u0, v0, w0 = clip[polygon], clip[polygon + 1], clip[polygon + 2]
+    u0, v0, w0 = work[polygon], work[polygon + 1], work[polygon + 2]
     for vertex in range(1, count - 1):
         p = polygon + 3 * vertex
-        u1, v1, w1 = clip[p], clip[p + 1], clip[p + 2]
-        u2, v2, w2 = clip[p + 3], clip[p + 4], clip[p + 5]
+        u1, v1, w1 = work[p], work[p + 1], work[p + 2]
+        u2, v2, w2 = work[p + 3], work[p + 4], work[p + 5]
         double = (u1 - u0) * (v2 - v0) - (u2 - u0) * (v1 - v0)
         w = w0 + w1 + w2
         m0 += double * w * (1.0 / 6.0)
@@ -113,11 +112,17 @@ def press(work, i):
 
 
 @kernel
-def centroid(work, i, clip):
-    """Centroid of A∩B of pair `i`, which has been pressed in, in A's frame.
+def repeat_pressed(work):
+    """Press the other lanes of a single pair like the first."""
+    for k in range(0, 3 * LANES, LANES):
+        for i in range(1, SINGLE):
+            work[OFFSET_A + k + i] = work[OFFSET_A + k]
+            work[OFFSET_B + k + i] = work[OFFSET_B + k]
 
-    `clip` is scratch of CLIP_SIZE numbers.
-    """
+
+@kernel
+def centroid(work, i):
+    """Centroid of A∩B of pair `i`, which has been pressed in, in A's frame."""
     face = int(work[FACE + i])
     of_a = face < 3
     k = face if of_a else face - 3
@@ -162,45 +167,44 @@ def centroid(work, i, clip):
     for corner in range(8):
         s0, s1, s2 = _CORNERS[corner, 0], _CORNERS[corner, 1], _CORNERS[corner, 2]
         w = top + (s0 * ew0 + s1 * ew1 + s2 * ew2)
-        clip[3 * corner] = (cu - middle_u) + (s0 * eu0 + s1 * eu1 + s2 * eu2)
-        clip[3 * corner + 1] = (cv - middle_v) + (s0 * ev0 + s1 * ev1 + s2 * ev2)
-        clip[3 * corner + 2] = w
+        work[CORNERS + 3 * corner] = (cu - middle_u) + (s0 * eu0 + s1 * eu1 + s2 * eu2)
+        work[CORNERS + 3 * corner + 1] = (cv - middle_v) + (s0 * ev0 + s1 * ev1 + s2 * ev2)
+        work[CORNERS + 3 * corner + 2] = w
         lowest = min(lowest, w)
     through = lowest < -2.0 * hw
 
     volume, mu, mv, mw = 0.0, 0.0, 0.0, 0.0
-    one = 24
-    two = 24 + _POLYGON
+    one, two = POLYGONS
     for side_face in range(6):
         above = True
         for vertex in range(4):
-            corner = 3 * _FACES[side_face, vertex]
-            clip[one + 3 * vertex] = clip[corner]
-            clip[one + 3 * vertex + 1] = clip[corner + 1]
-            clip[one + 3 * vertex + 2] = clip[corner + 2]
-            above = above and clip[corner + 2] >= 0.0
+            corner = CORNERS + 3 * _FACES[side_face, vertex]
+            work[one + 3 * vertex] = work[corner]
+            work[one + 3 * vertex + 1] = work[corner + 1]
+            work[one + 3 * vertex + 2] = work[corner + 2]
+            above = above and work[corner + 2] >= 0.0
         if above:
             continue
         # 2. Clip by w ≤ 0 and by the sides of the reference rectangle.
-        count = _clip(clip, one, 4, two, 2, 1.0, 0.0)
-        count = _clip(clip, two, count, one, 0, 1.0, hu - middle_u)
-        count = _clip(clip, one, count, two, 0, -1.0, hu + middle_u)
-        count = _clip(clip, two, count, one, 1, 1.0, hv - middle_v)
-        count = _clip(clip, one, count, two, 1, -1.0, hv + middle_v)
+        count = _clip(work, one, 4, two, 2, 1.0, 0.0)
+        count = _clip(work, two, count, one, 0, 1.0, hu - middle_u)
+        count = _clip(work, one, count, two, 0, -1.0, hu + middle_u)
+        count = _clip(work, two, count, one, 1, 1.0, hv - middle_v)
+        count = _clip(work, one, count, two, 1, -1.0, hv + middle_v)
         if through:
             # 3. The part below the reference box, lifted to its far face.
-            below = _clip(clip, two, count, one, 2, 1.0, -2.0 * hw)
+            below = _clip(work, two, count, one, 2, 1.0, -2.0 * hw)
             for vertex in range(below):
-                clip[one + 3 * vertex + 2] = -2.0 * hw
-            d0, du, dv, dw = _moments(clip, one, below)
+                work[one + 3 * vertex + 2] = -2.0 * hw
+            d0, du, dv, dw = _moments(work, one, below)
             volume += d0
             mu += du
             mv += dv
             mw += dw
-            count = _clip(clip, two, count, one, 2, -1.0, 2.0 * hw)
-            d0, du, dv, dw = _moments(clip, one, count)
+            count = _clip(work, two, count, one, 2, -1.0, 2.0 * hw)
+            d0, du, dv, dw = _moments(work, one, count)
         else:
-            d0, du, dv, dw = _moments(clip, two, count)
+            d0, du, dv, dw = _moments(work, two, count)
         # 4. Sum.
         volume += d0
         mu += du

@@ -29,9 +29,9 @@ from .block import (
     ROTATION,
     SEPARATION,
     TOUCH,
-    WORK_SIZE,
+    new_work,
 )
-from .contact import Contacts, sat_normal, write_apart, write_contact
+from .contact import Contacts, sat_normal, write_apart, write_contact, write_faults
 from .jit import kernel
 from .network import Network, Weights, WeightsError, forward, load_weights
 from .pose import (
@@ -131,7 +131,10 @@ def solve_paper(poses_a, poses_b, sizes_a, sizes_b, work, cubes, continuous, pac
     rows = poses_a.shape[0]
     for start in range(0, rows, LANES):
         count = min(LANES, rows - start)
-        bad += load_block(poses_a, poses_b, sizes_a, sizes_b, start, count, work, status)
+        refused = load_block(poses_a, poses_b, sizes_a, sizes_b, start, count, work)
+        if refused:
+            bad += refused
+            write_faults(work, start, count, status)
         query_block(count, work)
         for i in range(count):
             if work[SEPARATION + i] <= work[TOUCH + i]:
@@ -176,7 +179,7 @@ class Paper:
         self._packed = np.stack([network.packed for network in networks])
         self._widths = np.array(networks[0].widths, dtype=np.int64)
         self._activation = np.zeros((2, max(networks[0].widths)), dtype=np.float32)
-        self._work = np.zeros(WORK_SIZE)
+        self._work = new_work()
         self._fold = np.zeros(FOLD_SIZE)
         self._pair = np.zeros(15)
 

@@ -18,19 +18,24 @@ import numpy as np
 from .block import (
     A_FIRST,
     AXES_A,
+    BAD_POSE_A,
+    BAD_SIZE_A,
+    BAD_SIZE_B,
+    FAULT,
     HALF_A,
     HALF_B,
     LANES,
     OFFSET_A,
     OFFSET_B,
+    OK,
     ORIGIN_A,
     ORIGIN_B,
     ROTATION,
+    SINGLE,
     SIZE,
     TOUCH,
     TURN_A,
     TURN_B,
-    VALID,
 )
 from .jit import inlined, kernel
 
@@ -49,9 +54,6 @@ QUATERNION_MIN = 1e-100
 """Least quaternion norm accepted: below, it counts as zero (its square would underflow)."""
 QUATERNION_MAX = 1e100
 """Largest quaternion norm accepted (its square would overflow)."""
-
-# Status of a row, in the order in which load_block checks.
-OK, BAD_POSE_A, BAD_POSE_B, BAD_SIZE_A, BAD_SIZE_B = range(5)
 
 _HALF_ULP_AND_MORE = 0.75 * 2.0**-52
 
@@ -125,28 +127,47 @@ def _copy_apart(work, i):
 
 
 @kernel
-def load_block(poses_a, poses_b, sizes_a, sizes_b, start, count, work, status):
+def load_block(poses_a, poses_b, sizes_a, sizes_b, start, count, work):
     """Check `count` pairs from row `start` on and write them into `work`.
 
     poses_a, poses_b are (n, 7); sizes_a, sizes_b, full extents, are (n, 3), or (1, 3) for all.
-    A row that fails a check gets its `status` (BAD_…; rows of `status` must be OK before) and the
-    values of two cubes far apart, so that the later stages need no test; returns the number of
-    such rows.
+    A row that fails a check gets its FAULT and the values of two cubes far apart, so that the
+    later stages need no test; returns the number of such rows.
     """
     _copy_block(poses_a, poses_b, sizes_a, sizes_b, start, count, work)
     if count == 1:
-        bad = 1 - _prepare(1, work)
+        _repeat_first(work)
+        bad = 1 if _prepare(SINGLE, work) < SINGLE else 0
     else:
         for i in range(count, LANES):
             _copy_apart(work, i)
         bad = LANES - _prepare(LANES, work)
     if bad:
-        for i in range(count):
-            if work[VALID + i] == 0.0:
-                status[start + i] = _fault(work, i)
-                _copy_apart(work, i)
-        _prepare(LANES, work)
+        _replace_bad(work, count)
     return bad
+
+
+@kernel
+def _repeat_first(work):
+    for row in range(ORIGIN_A, TURN_B + 4 * LANES, LANES):
+        for i in range(1, SINGLE):
+            work[row + i] = work[row]
+    for row in range(HALF_A, HALF_B + 3 * LANES, LANES):
+        for i in range(1, SINGLE):
+            work[row + i] = work[row]
+
+
+@kernel
+def _replace_bad(work, count):
+    for i in range(count):
+        if work[FAULT + i] != OK:
+            work[FAULT + i] = _fault(work, i)
+            _copy_apart(work, i)
+    faults = work[FAULT:FAULT + count].copy()
+    for i in range(count, LANES):
+        _copy_apart(work, i)
+    _prepare(LANES, work)
+    work[FAULT:FAULT + count] = faults
 
 
 @inlined
@@ -171,7 +192,7 @@ def _prepare(lanes, work):
         valid = (_pose_valid(ax, ay, az, norm2_a) and _pose_valid(bx, by, bz, norm2_b)
                  and _size_valid(2.0 * ha0, 2.0 * ha1, 2.0 * ha2)
                  and _size_valid(2.0 * hb0, 2.0 * hb1, 2.0 * hb2))
-        work[VALID + i] = 1.0 if valid else 0.0
+        work[FAULT + i] = OK if valid else BAD_POSE_A  # which one, is looked up where it is so
         good += 1 if valid else 0
         tx, ty, tz = bx - ax, by - ay, bz - az
         work[AXES_A + i] = a00

@@ -46,7 +46,8 @@ def turns(axes: np.ndarray, angles: np.ndarray) -> np.ndarray:
                           axis=1)
 
 
-def log_uniform(rng: np.random.Generator, low: float, high: float, n: int) -> np.ndarray:
+def log_uniform(rng: np.random.Generator, low: float, high: float, n: int | tuple[int, ...],
+                ) -> np.ndarray:
     """n numbers whose logarithms are uniform."""
     return np.exp(rng.uniform(np.log(low), np.log(high), n))
 
@@ -87,6 +88,29 @@ def stacked(rng: np.random.Generator, size: tuple[float, float, float], tilt: np
                             0.98 * sizes[:, 2:]], axis=1)
     a = np.tile([0.0, 0, 0, 0, 0, 0, 1], (n, 1))
     return pressed(Pairs(a, np.concatenate([place, turn], axis=1), sizes, sizes), depth)
+
+
+def laid(rng: np.random.Generator, size_a: np.ndarray, size_b: np.ndarray, tilt: np.ndarray,
+         depth: np.ndarray) -> Pairs:
+    """B on A, sizes (n, 3), any axis of either box up, turned by any yaw, tilted about a random
+    level axis [rad], anywhere on it."""
+    n = len(tilt)
+    orders = np.array([[0, 1, 2], [1, 2, 0], [2, 0, 1]])
+    size_a = np.take_along_axis(size_a, orders[rng.integers(0, 3, n)], axis=1)
+    size_b = np.take_along_axis(size_b, orders[rng.integers(0, 3, n)], axis=1)
+    heading = rng.uniform(-np.pi, np.pi, n)
+    level = np.stack([np.cos(heading), np.sin(heading), np.zeros(n)], axis=1)
+    yaw = rng.uniform(-np.pi, np.pi, n)
+    turn = quaternion_multiply(turns(level, tilt), turns((0.0, 0.0, 1.0), yaw))
+    # A random place of A's top meets a random place of B's bottom.
+    at_b = 0.49 * rng.uniform(-2, 2, (n, 2)) * size_b[:, :2]
+    across = np.stack([np.cos(yaw) * at_b[:, 0] - np.sin(yaw) * at_b[:, 1],
+                       np.sin(yaw) * at_b[:, 0] + np.cos(yaw) * at_b[:, 1]], axis=1)
+    place = np.concatenate([0.49 * rng.uniform(-2, 2, (n, 2)) * size_a[:, :2] - across,
+                            0.5 * (size_a + size_b)[:, 2:]], axis=1)
+    place[:, 2] -= 0.01 * np.minimum(size_a[:, 2], size_b[:, 2])
+    a = np.tile([0.0, 0, 0, 0, 0, 0, 1], (n, 1))
+    return pressed(Pairs(a, np.concatenate([place, turn], axis=1), size_a, size_b), depth)
 
 
 def cubes(rng: np.random.Generator, n: int) -> Pairs:

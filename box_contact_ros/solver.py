@@ -6,12 +6,12 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .block import BAD_POSE_A, BAD_POSE_B, BAD_SIZE_A
 from .checks import as_floats, as_size, pose_fault, size_fault
 from .committee import Committee
 from .contact import Contact, Contacts
 from .exact import Exact
 from .paper import Paper, PaperContinuous
-from .pose import BAD_POSE_A, BAD_POSE_B, BAD_SIZE_A
 
 MODELS = {
     'committee': 'SAT, and a network for the point; any sizes; constant cost; the default',
@@ -30,7 +30,22 @@ class Model(Protocol):
               status: np.ndarray, found: Contacts) -> int:
         """Fill `found` for poses (n, 7) and full extents (n or 1, 3).
 
-        Returns the number of rows that are refused, with their reasons (`pose.BAD_…`) in `status`.
+        Returns the number of rows that are refused, with their reasons (`block.BAD_…`) in `status`.
+        """
+
+
+class SingleModel(Model, Protocol):
+    """A model that has a kernel of its own for single pairs."""
+
+    scratch: tuple[np.ndarray, ...]
+    """Arrays that are handed to `one` on every call."""
+
+    @staticmethod
+    def one(pose_a: np.ndarray, pose_b: np.ndarray, sizes: np.ndarray, *rest: np.ndarray,
+            ) -> tuple[int, bool, float]:
+        """(fault, colliding, separation) of poses (7,) and full extents (2, 3).
+
+        rest: `scratch`, then the array (2, 3) to write normal and point to.
         """
 
 
@@ -76,9 +91,31 @@ class ContactSolver:
         self._size_b = as_size(size_b, 'size_b')
         self.model = model
         self._solver = make_model(model, self._size_a, self._size_b, weights)
+        self._one = None
+        if hasattr(self._solver, 'one'):
+            self._one = self._solver.one
+            self._rest = (np.concatenate([self._size_a, self._size_b]), *self._solver.scratch)
+            # After one call for float64 arrays no other kind is compiled: what is not one raises
+            # TypeError, and is made one.
+            self._one(np.zeros(7), np.zeros(7), *self._rest, np.empty((2, 3)))
+            self._one.disable_compile()
 
     def __call__(self, pose_a: ArrayLike, pose_b: ArrayLike) -> Contact:
         """Contact of one pair; poses are (7,)."""
+        if self._one is None:
+            return self._converted(pose_a, pose_b)
+        out = np.empty((2, 3))
+        try:
+            fault, colliding, separation = self._one(pose_a, pose_b, *self._rest, out)
+        except TypeError:
+            return self._converted(pose_a, pose_b)
+        if fault:
+            return self._converted(pose_a, pose_b)  # which knows the words
+        normal, point = out
+        return Contact(colliding, separation, normal, point)
+
+    def _converted(self, pose_a: ArrayLike, pose_b: ArrayLike) -> Contact:
+        """A single call for poses of any kind, or the reason why they are refused."""
         a = as_floats(pose_a, 'pose_a', 'a pose (7,)', (7,)).reshape(1, 7)
         b = as_floats(pose_b, 'pose_b', 'a pose (7,)', (7,)).reshape(1, 7)
         found = self._solve(a, b, self._size_a, self._size_b, ('pose_a', 'pose_b'))

@@ -1,6 +1,7 @@
 """Training data of model `committee`: contacts of all kinds, as the network sees them."""
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +15,7 @@ from ..block import (
     OFFSET_A,
     RANKS,
     ROTATION,
-    WORK_SIZE,
+    new_work,
 )
 from ..committee import (
     INPUTS,
@@ -24,12 +25,17 @@ from ..jit import kernel
 from ..outline import (
     outline_block,
 )
-from ..overlap import CLIP_SIZE, centroid, press
+from ..overlap import centroid, press
 from ..pose import (
     load_block,
 )
-from ..posesets import CONTAINER, Pairs, any_pose, log_uniform, random_sizes, stacked
+from ..posesets import CONTAINER, Pairs, any_pose, laid, log_uniform, random_sizes, stacked
 from ..sat import query_block
+
+SizePair = tuple[tuple[float, float, float], tuple[float, float, float]]
+"""Full extents of two boxes [m]."""
+PIECE = 100_000
+"""Pairs that are made at a time."""
 
 
 class Contacts(NamedTuple):
@@ -46,12 +52,12 @@ class Contacts(NamedTuple):
 
 
 @kernel
-def _describe(poses_a, poses_b, sizes_a, sizes_b, work, values, clip, status,
+def _describe(poses_a, poses_b, sizes_a, sizes_b, work, values,
               inputs, offsets, insides, halves):
-    rows = poses_a.work[0]
+    rows = poses_a.shape[0]
     for start in range(0, rows, LANES):
         count = min(LANES, rows - start)
-        load_block(poses_a, poses_b, sizes_a, sizes_b, start, count, work, status)
+        load_block(poses_a, poses_b, sizes_a, sizes_b, start, count, work)
         query_block(count, work)
         for i in range(count):
             press(work, i)
@@ -61,7 +67,7 @@ def _describe(poses_a, poses_b, sizes_a, sizes_b, work, values, clip, status,
             row = start + i
             for k in range(INPUTS):
                 inputs[row, k] = values[k, i]
-            x, y, z = centroid(work, i, clip)
+            x, y, z = centroid(work, i)
             in_b = work[IN_B + i] > 0.5
             for q in range(3):
                 truth = x if q == 0 else (y if q == 1 else z)
@@ -85,11 +91,25 @@ def describe(pairs: Pairs) -> Contacts:
     n = len(pairs.pose_a)
     found = Contacts(np.empty((n, INPUTS), dtype=np.float32),
                      *(np.empty((n, 3), dtype=np.float32) for _ in range(3)))
-    _describe(*(np.ascontiguousarray(part) for part in pairs), np.zeros(WORK_SIZE),
-              np.zeros((INPUTS, LANES), dtype=np.float32), np.zeros(CLIP_SIZE),
-              np.zeros(n, dtype=np.int8), *found)
+    _describe(*(np.ascontiguousarray(part) for part in pairs), new_work(),
+              np.zeros((INPUTS, LANES), dtype=np.float32), *found)
     edge = np.minimum(pairs.size_a.max(axis=1), pairs.size_b.max(axis=1))
     return found._replace(scale=(found.scale / edge[:, None]).astype(np.float32))
+
+
+def contacts(make: Callable[..., Pairs], seed: Sequence[int], n: int, progress: bool = False,
+             *rest: object) -> Contacts:
+    """Contacts of about n pairs of `make(rng, n, *rest)`, made in pieces, each with its own seed."""
+    from tqdm import tqdm
+
+    parts = []
+    with tqdm(total=n, desc='data', unit='pair', unit_scale=True, mininterval=1.0,
+              disable=not progress) as bar:
+        for start in range(0, n, PIECE):
+            count = min(PIECE, n - start)
+            parts.append(describe(make(np.random.default_rng([*seed, start]), count, *rest)))
+            bar.update(count)
+    return Contacts(*(np.concatenate(columns) for columns in zip(*parts)))
 
 
 def mixture(rng: np.random.Generator, n: int) -> Pairs:
@@ -108,4 +128,19 @@ def mixture(rng: np.random.Generator, n: int) -> Pairs:
         parts.append(stacked(rng, size, log_uniform(rng, 1e-6, 0.3, count),
                              rng.uniform(-yaw, yaw, count),
                              min(size) * log_uniform(rng, 1e-5, 0.1, count)))
+    return Pairs(*(np.concatenate(columns) for columns in zip(*parts)))
+
+
+def scene_mixture(rng: np.random.Generator, n: int, sizes: Sequence[SizePair]) -> Pairs:
+    """About n pairs of the sizes listed, each in turn as A: half in any pose, half one on the
+    other, any of their axes up, with a tilt of 1e-6 to 0.3 rad."""
+    share = max(1, n // (4 * len(sizes)))
+    parts = []
+    for pair in sizes:
+        for one, other in (pair, pair[::-1]):
+            size_a, size_b = (np.tile(size, (share, 1)) for size in (one, other))
+            shortest = min(*one, *other)
+            depth = shortest * log_uniform(rng, 1e-5, 0.1, (2, share))
+            parts.append(any_pose(rng, size_a, size_b, depth[0]))
+            parts.append(laid(rng, size_a, size_b, log_uniform(rng, 1e-6, 0.3, share), depth[1]))
     return Pairs(*(np.concatenate(columns) for columns in zip(*parts)))

@@ -37,7 +37,7 @@ from ..block import (
     OFFSET_A,
     ROTATION,
     SEPARATION,
-    WORK_SIZE,
+    new_work,
 )
 from ..contact import sat_normal
 from ..jit import kernel
@@ -235,12 +235,12 @@ class Query:
 
 
 @kernel
-def _query(poses_a, poses_b, size, work, status, separation, axis, normal, offset, turn):
+def _query(poses_a, poses_b, size, work, separation, axis, normal, offset, turn):
     bad = 0
     rows = poses_a.shape[0]
     for start in range(0, rows, LANES):
         count = min(LANES, rows - start)
-        bad += load_block(poses_a, poses_b, size, size, start, count, work, status)
+        bad += load_block(poses_a, poses_b, size, size, start, count, work)
         query_block(count, work)
         for i in range(count):
             row = start + i
@@ -263,8 +263,8 @@ def query(placements: Placements) -> Query:
     poses_a = np.zeros((n, 7))
     poses_a[:, 6] = 1.0
     size = np.array([placements.size])
-    bad = _query(poses_a, np.ascontiguousarray(placements.pose), size, np.zeros(WORK_SIZE),
-                 np.zeros(n, dtype=np.int8), found.separation, found.axis, found.normal,
+    bad = _query(poses_a, np.ascontiguousarray(placements.pose), size, new_work(),
+                 found.separation, found.axis, found.normal,
                  found.offset, found.turn)
     if bad:
         raise ValueError(f'{bad} placements are no valid poses')

@@ -1,11 +1,10 @@
 """Fit networks for model `committee`: many at once, of any hidden widths, by Adam.
 
 All networks of a call are one batch of matrices with a leading dimension `networks`, as in `fit`;
-hidden layers are as wide as the widest network needs, and the units that a network does not have
-are masked to zero. What is learned is the offset of the centroid from the inside point, in half
-extents of the bounding box (`committee`); what is minimised weighs it three ways: as it is, as the
-error of the point in edges of the smaller box, and that to the fourth power, because the worst
-cases are what a simulation trips over.
+hidden layers are as wide as the widest network needs (`batched`). What is learned is the offset of
+the centroid from the inside point, in half extents of the bounding box (`committee`); what is
+minimised weighs it three ways: as it is, as the error of the point in edges of the smaller box, and
+that to the fourth power, because the worst cases are what a simulation trips over.
 """
 from __future__ import annotations
 
@@ -16,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
+from ..committee import CENTROID_REACH
 from ..network import TANH_LIMIT
 from .contacts import Contacts
 
@@ -27,7 +27,7 @@ BETA1, BETA2, TINY = 0.9, 0.999, 1e-8  # Adam's usual constants (Kingma and Ba 2
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """One call of `fit_points`. Sequences have an entry per network."""
+    """One training. Sequences have an entry per network."""
 
     hidden: Sequence[tuple[int, int]]
     """Units of the two hidden layers of each network."""
@@ -39,130 +39,173 @@ class Settings:
     device: str = 'cpu'
 
 
-@dataclass(frozen=True)
-class State:
-    """Networks in training: parameters with the moments of their gradients, and the step."""
+Layers = list[tuple[np.ndarray, np.ndarray]]
+"""(weight (outputs, inputs), bias (outputs,)) of each layer, float32."""
 
-    parameters: list[torch.Tensor]
-    """Three weights (networks, inputs, outputs), then three biases (networks, 1, outputs)."""
-    first: list[torch.Tensor]
-    second: list[torch.Tensor]
-    mean: torch.Tensor
-    deviation: torch.Tensor
 
-    def export(self, network: int, hidden: tuple[int, int]) -> list[tuple[np.ndarray, np.ndarray]]:
-        """(weight (outputs, inputs), bias (outputs,)) per layer, for inputs as `committee` has."""
-        sizes = (len(self.mean), *hidden, self.parameters[5].shape[-1])
-        layers = []
-        for number in range(3):
-            weight = self.parameters[number][network].T.cpu().double().numpy()
-            bias = self.parameters[3 + number][network, 0].cpu().double().numpy()
-            if number == 0:
-                weight = weight / self.deviation.cpu().numpy()
-                bias = bias - weight @ self.mean.cpu().numpy()
-            rows, columns = sizes[number + 1], sizes[number]
-            layers.append((weight[:rows, :columns].astype(np.float32),
-                           bias[:rows].astype(np.float32)))
-        return layers
+def drawn(rng: np.random.Generator, widths: Sequence[int], reach: float = math.sqrt(3.0)) -> Layers:
+    """A network to start from: weights uniform in ± reach / √(inputs of the layer), biases 0."""
+    return [((reach / math.sqrt(n_in) * rng.uniform(-1.0, 1.0, (n_out, n_in))).astype(np.float32),
+             np.zeros(n_out, dtype=np.float32)) for n_in, n_out in zip(widths, widths[1:])]
+
+
+def batched(networks: Sequence[Layers]) -> list[torch.Tensor]:
+    """Networks with equally many layers as one batch of matrices, padded with zeros.
+
+    Returns the weights (networks, inputs, outputs) of all layers, then their biases
+    (networks, 1, outputs). Units that a network does not have need no mask: with all weights zero
+    on both sides their activation and every gradient are zero, and they stay so.
+    """
+    weights, biases = [], []
+    for layer in zip(*networks):
+        n_out, n_in = (max(weight.shape[axis] for weight, _ in layer) for axis in (0, 1))
+        weights.append(torch.zeros((len(networks), n_in, n_out)))
+        biases.append(torch.zeros((len(networks), 1, n_out)))
+        for k, (weight, bias) in enumerate(layer):
+            weights[-1][k, :weight.shape[1], :weight.shape[0]] = torch.tensor(weight.T.copy())
+            biases[-1][k, 0, :len(bias)] = torch.tensor(bias)
+    return weights + biases
+
+
+def unbatched(parameters: Sequence[torch.Tensor], networks: Sequence[Sequence[int]],
+              ) -> list[Layers]:
+    """What `batched` was given, from its result and the widths of each network."""
+    count = len(parameters) // 2
+    host = [p.cpu().numpy() for p in parameters]
+    return [[(host[layer][k, :widths[layer], :widths[layer + 1]].T.copy(),
+              host[count + layer][k, 0, :widths[layer + 1]].copy()) for layer in range(count)]
+            for k, widths in enumerate(networks)]
+
+
+def normalisation(inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Mean and deviation (inputs,) that the training scales inputs (n, inputs) by."""
+    # An input that never varies stays as it is.
+    return inputs.mean(axis=0), inputs.std(axis=0) + np.float32(1e-6)
+
+
+def folded(layers: Layers, mean: np.ndarray, deviation: np.ndarray) -> Layers:
+    """The network that takes raw inputs and says what `layers` say of normalised ones."""
+    weight = layers[0][0].astype(np.float64) / deviation
+    bias = layers[0][1] - weight @ mean.astype(np.float64)
+    return [(weight.astype(np.float32), bias.astype(np.float32)), *layers[1:]]
+
+
+def unfolded(layers: Layers, mean: np.ndarray, deviation: np.ndarray) -> Layers:
+    """The inverse of `folded`."""
+    weight = layers[0][0].astype(np.float64)
+    bias = layers[0][1] + weight @ mean.astype(np.float64)
+    return [((weight * deviation).astype(np.float32), bias.astype(np.float32)), *layers[1:]]
 
 
 def rational_tanh(x: torch.Tensor) -> torch.Tensor:
-    """The networks' activation, as in `network.rational_tanh`."""
-    x = x.clamp(-TANH_LIMIT, TANH_LIMIT)
+    """The networks' activation, as in `network.rational_tanh`; x is overwritten."""
+    x.clamp_(-TANH_LIMIT, TANH_LIMIT)
     s = x * x
-    return x * (945.0 + s * (105.0 + s)) / (945.0 + s * (420.0 + s * 15.0))
+    above = (s + 105.0).mul_(s).add_(945.0)
+    below = s.mul(15.0).add_(420.0).mul_(s).add_(945.0)
+    return x.mul_(above).div_(below)
 
 
 class Fit:
-    """A training that can be asked for its errors, stopped, and taken up again."""
+    """A training that can be run step by step, and asked for its errors in between."""
 
-    def __init__(self, data: Contacts, settings: Settings) -> None:
+    def __init__(self, data: Contacts, settings: Settings, *, start: Sequence[Layers] | None = None,
+                 ) -> None:
+        """`start`, if given, has the layers of every network for normalised inputs, in place of
+        random ones."""
         s = self.settings = settings
         self.device = torch.device(s.device)
-        self.inputs, self.offsets, self.scale = (
-            torch.tensor(part, device=self.device)
-            for part in (data.inputs, data.offsets, data.scale))
-        mean = self.inputs.mean(dim=0)
-        deviation = self.inputs.std(dim=0) + 1e-6  # an input that never varies stays as it is
-        self.inputs = (self.inputs - mean) / deviation
-        generator = torch.Generator().manual_seed(s.seed)
-        self.generator = generator
-        count = len(s.hidden)
-        widest = [max(units[layer] for units in s.hidden) for layer in (0, 1)]
-        sizes = (self.inputs.shape[1], *widest, self.offsets.shape[1])
-        weights = [(2.0 * torch.rand((count, n_in, n_out), generator=generator) - 1.0)
-                   * math.sqrt(3.0 / n_in) for n_in, n_out in zip(sizes, sizes[1:])]
-        biases = [torch.zeros((count, 1, n_out)) for n_out in sizes[1:]]
-        parameters = [p.to(self.device) for p in weights + biases]
-        self.state = State(parameters, [torch.zeros_like(p) for p in parameters],
-                           [torch.zeros_like(p) for p in parameters], mean, deviation)
-        self.masks = [torch.tensor([[float(k < units[layer]) for k in range(widest[layer])]
-                                    for units in s.hidden], device=self.device)[:, None, :]
-                      for layer in (0, 1)]
-        self.masked = any(bool((mask == 0).any()) for mask in self.masks)
-        rate = np.broadcast_to(np.asarray(s.rate, dtype=np.float32), (count,)).copy()
-        self.rate = torch.tensor(rate, device=self.device).reshape(-1, 1, 1)
+        self.mean, self.deviation = normalisation(data.inputs)
+        # Batches are slices from a random place on: the data are shuffled once, and rows need not
+        # be gathered in every step (a third of its time).
+        order = np.random.default_rng([s.seed, 0]).permutation(len(data.inputs))
+        self.inputs = self._normalised(data.inputs[order])
+        self.offsets = torch.tensor(data.offsets[order], device=self.device)
+        self.squared_scale = torch.tensor(data.scale[order], device=self.device).square_()
+        self.batch = min(s.batch, len(order))
+        self._places = np.random.default_rng([s.seed, 1])
+        self.widths = [(data.inputs.shape[1], *hidden, data.offsets.shape[1])
+                       for hidden in s.hidden]
+        if start is None:
+            start = [drawn(np.random.default_rng([s.seed, 2, k]), widths)
+                     for k, widths in enumerate(self.widths)]
+        self.parameters = [p.to(self.device) for p in batched(start)]
+        self._first = [torch.zeros_like(p) for p in self.parameters]
+        self._second = [torch.zeros_like(p) for p in self.parameters]
+        rate = np.broadcast_to(np.asarray(s.rate, dtype=np.float32), (len(start),)).copy()
+        self._rate = torch.tensor(rate, device=self.device).reshape(-1, 1, 1)
         self.step = 0
 
+    def _normalised(self, inputs: np.ndarray) -> torch.Tensor:
+        return torch.tensor((inputs - self.mean) / self.deviation, device=self.device)
+
     def layers(self, inputs: torch.Tensor) -> list[torch.Tensor]:
-        """Activations of every layer, inputs first, each (networks, patterns, units)."""
-        p = self.state.parameters
+        """Activations of every layer, inputs (patterns, units) first, each (networks, patterns,
+        units)."""
+        p = self.parameters
         found = [inputs.expand(p[0].shape[0], -1, -1)]
         for layer in range(3):
             total = torch.baddbmm(p[3 + layer], found[-1], p[layer])
-            if layer < 2:
-                total = rational_tanh(total)
-                if self.masked:
-                    total = total * self.masks[layer]
-            found.append(total)
+            found.append(rational_tanh(total) if layer < 2 else total)
         return found
 
-    def run(self, steps: int) -> torch.Tensor:
-        """Take so many steps (at most to the end); returns the last loss of each network."""
-        s, p = self.settings, self.state.parameters
-        loss = torch.full((len(s.hidden),), math.nan)
-        for _ in range(min(steps, s.steps - self.step)):
-            rows = torch.randint(0, len(self.inputs), (s.batch,), generator=self.generator,
-                                 ).to(self.device)
+    def run(self, steps: int) -> np.ndarray:
+        """Take so many steps (at most to the end); returns the last loss (networks,)."""
+        s, p = self.settings, self.parameters
+        loss = torch.full((len(p[0]),), math.nan)
+        steps = min(steps, s.steps - self.step)
+        places = self._places.integers(0, len(self.inputs) - self.batch + 1, steps)
+        for place in places.tolist():
+            rows = slice(place, place + self.batch)
             layers = self.layers(self.inputs[rows])
             error = layers[-1] - self.offsets[rows]
-            squared_scale = self.scale[rows].square()
+            squared_scale = self.squared_scale[rows]
             squared = (error.square() * squared_scale).sum(dim=-1, keepdim=True)
+            # The gradient of what `loss` is below, written out: half the time of automatic
+            # differentiation.
             outputs = error.shape[-1]
-            delta = error * ((2.0 / outputs)
-                             + squared_scale * (2.0 * POINT_WEIGHT + 4.0 * TAIL_WEIGHT * squared))
-            delta = delta / s.batch
+            delta = squared_scale * (squared.mul(4.0 * TAIL_WEIGHT).add_(2.0 * POINT_WEIGHT))
+            delta.add_(2.0 / outputs).mul_(error).mul_(1.0 / self.batch)
             gradients: list[torch.Tensor] = [torch.empty(0)] * 6
             for layer in (2, 1, 0):
                 gradients[layer] = torch.bmm(layers[layer].transpose(1, 2), delta)
                 gradients[3 + layer] = delta.sum(dim=1, keepdim=True)
                 if layer:
                     # The slope of tanh, which is that of the rational one to 1e-3.
-                    below = layers[layer]
-                    delta = torch.bmm(delta, p[layer].transpose(1, 2)) * (1.0 - below * below)
-                    if self.masked:
-                        delta = delta * self.masks[layer - 1]
-            rate = self.rate * (0.5 * (1.0 + math.cos(math.pi * self.step / s.steps)))
-            self.step += 1
-            scale = math.sqrt(1.0 - BETA2**self.step) / (1.0 - BETA1**self.step)
-            for value, first, second, gradient in zip(p, self.state.first, self.state.second,
-                                                      gradients):
-                first.mul_(BETA1).add_(gradient, alpha=1.0 - BETA1)
-                second.mul_(BETA2).addcmul_(gradient, gradient, value=1.0 - BETA2)
-                value.sub_(rate * scale * first / (second.sqrt() + TINY))
-            loss = error.square().mean(dim=(1, 2)) + POINT_WEIGHT * squared.mean(
-                dim=(1, 2)) + TAIL_WEIGHT * squared.square().mean(dim=(1, 2))
-        return loss.cpu()
+                    slope = layers[layer].square_().neg_().add_(1.0)
+                    delta = torch.bmm(delta, p[layer].transpose(1, 2)).mul_(slope)
+            self._adam(gradients)
+        if steps:
+            loss = (error.square().mean(dim=(1, 2)) + POINT_WEIGHT * squared.mean(dim=(1, 2))
+                    + TAIL_WEIGHT * squared.square().mean(dim=(1, 2)))
+        return loss.cpu().numpy()
+
+    def _adam(self, gradients: list[torch.Tensor]) -> None:
+        rate = self._rate * (0.5 * (1.0 + math.cos(math.pi * self.step / self.settings.steps)))
+        self.step += 1
+        scale = math.sqrt(1.0 - BETA2**self.step) / (1.0 - BETA1**self.step)
+        for value, first, second, gradient in zip(self.parameters, self._first, self._second,
+                                                  gradients):
+            first.mul_(BETA1).add_(gradient, alpha=1.0 - BETA1)
+            second.mul_(BETA2).addcmul_(gradient, gradient, value=1.0 - BETA2)
+            value.sub_(rate * scale * first / (second.sqrt() + TINY))
+
+    def networks(self) -> list[Layers]:
+        """The layers of every network, for normalised inputs."""
+        return unbatched(self.parameters, self.widths)
+
+    def export(self, network: int) -> Layers:
+        """The layers of one network, for inputs as `committee` has them."""
+        return folded(self.networks()[network], self.mean, self.deviation)
 
     def point_errors(self, data: Contacts) -> np.ndarray:
         """(networks, n) point errors in edges of the smaller box, clamped as the solver does."""
-        inputs = (torch.tensor(data.inputs, device=self.device) - self.state.mean
-                  ) / self.state.deviation
-        inside = torch.tensor(data.inside, device=self.device)
-        truth = torch.tensor(data.offsets, device=self.device) + inside
-        scale = torch.tensor(data.scale, device=self.device)
         found = []
-        for rows in torch.arange(len(inputs)).split(65_536):
-            point = (self.layers(inputs[rows])[-1] + inside[rows]).clamp(-0.5, 0.5)
-            found.append(((point - truth[rows]) * scale[rows]).norm(dim=-1).cpu())
+        for start in range(0, len(data.inputs), self.batch):
+            rows = slice(start, start + self.batch)
+            inside, offsets, scale = (torch.tensor(part[rows], device=self.device)
+                                      for part in (data.inside, data.offsets, data.scale))
+            point = self.layers(self._normalised(data.inputs[rows]))[-1].add_(inside)
+            point.clamp_(-CENTROID_REACH, CENTROID_REACH)
+            found.append((point.sub_(offsets + inside).mul_(scale)).norm(dim=-1).cpu())
         return torch.cat(found, dim=1).numpy()

@@ -1,0 +1,162 @@
+"""Train the network of model `committee`, for all boxes or for the boxes of one scene.
+
+The general network learns from `contacts.mixture`: it serves any two boxes. A scene's network
+starts from it and goes on with the scene's own pairs of sizes only; it is then asked for these
+sizes alone, and the exact answer is given for others (`committee`).
+"""
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+
+from ..committee import ASPECT_MAX, DEPTH_MAX, INPUTS, OUTPUTS, RATIO_MAX
+from ..network import load_weights, save_weights, unpacked
+from ..posesets import SETS, Pairs
+from ..resources import resource_path
+from ..solver import ContactSolver
+from .contacts import SizePair, contacts, mixture, scene_mixture
+from .points import Fit, Settings, normalisation, unfolded
+
+HIDDEN = (20, 20)
+"""Hidden units: what fits the time that a batch has for the network (docs/search.md)."""
+PAIRS, STEPS, BATCH, RATE = 3_000_000, 240_000, 4096, 4e-3
+SCENE_PAIRS, SCENE_STEPS, SCENE_RATE = 1_000_000, 40_000, 1e-3
+QUICK_PAIRS, QUICK_STEPS = 20_000, 400
+METRIC_PAIRS, QUICK_METRIC_PAIRS = 100_000, 2_000
+"""Pairs of each set in the model card's metrics."""
+
+NAMES = ([f'axis {axis}, {which} face: n{k} × cut' for axis in range(3)
+          for which in ('deeper', 'other') for k in range(3)]
+         + [f'inside {k}' for k in range(3)])
+
+# Streams of random numbers, one each for the data, and for what is measured on.
+_DATA, _METRICS = 0, 1
+
+
+def point_errors(pairs: Pairs, weights: Path | str | None) -> np.ndarray:
+    """(n,) point error of `committee` against `exact`, in edges of the smaller box's longest."""
+    found = []
+    for model, file in (('exact', None), ('committee', weights)):
+        solver = ContactSolver((1, 1, 1), (1, 1, 1), model=model, weights=file and str(file))
+        found.append(solver.batch(pairs.pose_a, pairs.pose_b, size_a=pairs.size_a,
+                                  size_b=pairs.size_b).point)
+    edge = np.minimum(pairs.size_a.max(axis=1), pairs.size_b.max(axis=1))
+    return np.linalg.norm(found[0] - found[1], axis=1) / edge
+
+
+def figures(errors: np.ndarray) -> dict[str, float]:
+    """Mean, 99th percentile and worst, in per cent."""
+    return {'mean': 100.0 * float(errors.mean()), 'p99': 100.0 * float(np.quantile(errors, 0.99)),
+            'worst': 100.0 * float(errors.max())}
+
+
+def train(path: Path, *, seed: int, commit: str, quick: bool = False,
+          hidden: tuple[int, int] = HIDDEN, device: str = 'cpu', progress: bool = True,
+          ) -> dict[str, Any]:
+    """Train the general network and write it to `path`; returns its model card."""
+    began = time.monotonic()
+    pairs, steps = (QUICK_PAIRS, QUICK_STEPS) if quick else (PAIRS, STEPS)
+    data = contacts(mixture, [seed, _DATA], pairs, progress)
+    fit = Fit(data, Settings(hidden=[hidden], steps=steps, batch=BATCH, rate=RATE, seed=seed,
+                             device=device))
+    _run(fit, path.stem, progress)
+    card = _card(path, hidden, seed, commit, [], fit, {'recipe': mixture.__doc__})
+    card['training']['minutes'] = round((time.monotonic() - began) / 60.0, 2)
+    layers = {'point': fit.export(0)}
+    save_weights(path, layers, card)
+    # What is measured is what was written.
+    for number, (name, make) in enumerate(SETS.items()):
+        sample = make(np.random.default_rng([seed, _METRICS, number]),
+                      QUICK_METRIC_PAIRS if quick else METRIC_PAIRS)
+        card['metrics'][name] = figures(point_errors(sample, path))
+    save_weights(path, layers, card)
+    return card
+
+
+def train_scene(path: Path, sizes: Sequence[SizePair], *, seed: int, commit: str,
+                quick: bool = False, device: str = 'cpu', progress: bool = True) -> dict[str, Any]:
+    """Go on from the general network with pairs of these sizes; returns the model card.
+
+    Its metrics hold, for each pair of sizes, the error with the general network ('before') and
+    with this one ('after'), on pairs that it was not trained on.
+    """
+    began = time.monotonic()
+    general = resource_path('weights', 'committee.safetensors')
+    weights = load_weights(general)
+    start = weights.networks['point']
+    hidden = (start.widths[1], start.widths[2])
+    pairs, steps = (QUICK_PAIRS, QUICK_STEPS) if quick else (SCENE_PAIRS, SCENE_STEPS)
+    data = contacts(scene_mixture, [seed, _DATA], pairs, progress, sizes)
+    fit = Fit(data, Settings(hidden=[hidden], steps=steps, batch=BATCH, rate=SCENE_RATE, seed=seed,
+                             device=device),
+              start=[unfolded(unpacked(start), *normalisation(data.inputs))])
+    _run(fit, path.stem, progress)
+    card = _card(path, hidden, seed, commit, [[list(a), list(b)] for a, b in sizes], fit,
+                 {'recipe': scene_mixture.__doc__, 'started from': weights.card['sha256']})
+    card['training']['minutes'] = round((time.monotonic() - began) / 60.0, 2)
+    layers = {'point': fit.export(0)}
+    save_weights(path, layers, card)
+    for number, pair in enumerate(sizes):
+        sample = scene_mixture(np.random.default_rng([seed, _METRICS, number]),
+                               QUICK_METRIC_PAIRS if quick else METRIC_PAIRS, [pair])
+        card['metrics'][_text(pair)] = {'before': figures(point_errors(sample, general)),
+                                        'after': figures(point_errors(sample, path))}
+    save_weights(path, layers, card)
+    return card
+
+
+def _run(fit: Fit, title: str, progress: bool) -> None:
+    """Train to the end, with a progress bar that shows the loss."""
+    from tqdm import tqdm
+
+    chunk = max(1, fit.settings.steps // 200)
+    with tqdm(total=fit.settings.steps, desc=title, unit='step', mininterval=1.0,
+              disable=not progress) as bar:
+        while fit.step < fit.settings.steps:
+            before = fit.step
+            loss = fit.run(chunk)
+            bar.set_postfix(loss=f'{loss.min():.2e}', refresh=False)
+            bar.update(fit.step - before)
+
+
+def _card(path: Path, hidden: tuple[int, int], seed: int, commit: str, sizes: list[Any],
+          fit: Fit, data: dict[str, Any]) -> dict[str, Any]:
+    s = fit.settings
+    return {
+        'name': path.stem, 'model': 'committee', 'architecture': [INPUTS, *hidden, OUTPUTS],
+        'activation': 'rational tanh', 'seed': seed, 'commit': commit, 'sizes': sizes,
+        'inputs': {'names': NAMES, 'range': {'aspect': ASPECT_MAX, 'size ratio': RATIO_MAX,
+                                             'depth by the shortest edge': DEPTH_MAX}},
+        'outputs': ['centroid from the inside point, in half extents of the bounding box'],
+        'data': {**data, 'pairs': len(fit.inputs)}, 'metrics': {},
+        'training': {'algorithm': 'Adam', 'steps': s.steps, 'batch': s.batch, 'rate': s.rate,
+                     'device': s.device, 'threads': torch.get_num_threads()}}
+
+
+def _text(pair: SizePair) -> str:
+    return ' on '.join(' × '.join(f'{extent:g}' for extent in size) for size in pair)
+
+
+def _shown(f: dict[str, float]) -> str:
+    return f'{f["mean"]:.3f} / {f["p99"]:.2f} / {f["worst"]:.1f}'
+
+
+def table(card: dict[str, Any]) -> str:
+    """The card's metrics, for the terminal."""
+    head = "point error against exact, % of the smaller box's longest edge: mean / p99 / worst"
+    lines = [f'  {head}']
+    width = max(map(len, card['metrics']))
+    for name, entry in card['metrics'].items():
+        if 'before' not in entry:
+            lines.append(f'  {name:<{width}}  {_shown(entry)}')
+            continue
+        before, after = entry['before'], entry['after']
+        saved = ' / '.join(f'{100.0 * (after[key] / before[key] - 1.0):+.0f} %'
+                           for key in ('mean', 'p99', 'worst'))
+        lines.append(f'  {name:<{width}}  general {_shown(before)}, this {_shown(after)}: {saved}')
+    return '\n'.join(lines)
