@@ -18,15 +18,15 @@ Stages of a block of pairs, each a loop without branches over structures of arra
    leave the other box. It starts inside A∩B, so it ends in both boxes, whatever the network says.
 
 Outside the range that the network was trained for (ASPECT_MAX, RATIO_MAX, DEPTH_MAX) the answer is
-the exact one, and counted.
+the exact one, and counted. So it is for boxes that the card of the weights does not list, if it
+lists any: those of a scene (`train --scene`).
 """
 from __future__ import annotations
 
 import numpy as np
 
 from .block import (
-    BAD_POSE_A,
-    FAULT,
+    EXACT_ANSWERS,
     HALF,
     HALF_A,
     HALF_B,
@@ -47,23 +47,34 @@ from .block import (
     TOUCH,
     new_work,
 )
-from .contact import Contacts, sat_normal, write_apart, write_contact, write_faults, write_one
+from .contact import (
+    APART,
+    REFUSED,
+    TOUCHING,
+    Contacts,
+    sat_normal,
+    write_apart,
+    write_contact,
+    write_faults,
+    write_nothing,
+    write_one,
+)
+from .exact import solve_exact
 from .jit import inlined, kernel
 from .network import (
+    Weights,
     WeightsError,
     block_numbers,
     forward_block,
     forward_one,
     load_weights,
-    split_numbers,
+    network_values,
 )
 from .outline import (
     outline_block,
 )
 from .overlap import centroid, press, repeat_pressed
-from .pose import (
-    load_block,
-)
+from .pose import load_block, load_one, load_sizes
 from .resources import resource_path
 from .sat import query_block
 
@@ -80,6 +91,8 @@ CENTROID_REACH = 0.5
 """Farthest a centroid can be from the middle of its bounding box, in half extents."""
 
 INPUTS, OUTPUTS = 21, 3
+WIDE_INPUTS = 24
+"""Inputs as the kernels have them, in groups of four; the last three are zero."""
 
 @inlined
 def _pick(k0, k1, x0, x1, x2):
@@ -288,61 +301,41 @@ def _range(lanes, work):
 
 
 @kernel
-def committee_block(poses_a, poses_b, sizes_a, sizes_b, start, count, work, numbers, widths):
-    """Contacts of a block of `count` pairs; POINT is right for those that touch.
-
-    numbers: see `network.block_numbers`. Returns how many rows were refused, and how many contacts
-    answered exactly.
-    """
-    bad = load_block(poses_a, poses_b, sizes_a, sizes_b, start, count, work)
-    query_block(count, work)
-    touching = 0
-    for i in range(count):
-        if work[SEPARATION + i] <= work[TOUCH + i]:
-            touching += 1
-            press(work, i)
-    if touching == 0:
-        return bad, 0
-    if count == 1:
-        repeat_pressed(work)
-    values, spare, tiles, columns = split_numbers(numbers, widths)
-    outline_block(count, work)
-    describe_block(count, work, values)
-    values[INPUTS * LANES:widths[0] * LANES] = 0.0  # inputs that only fill up a group of four
-    if count == 1:
-        forward_one(columns, widths, values, spare)
-    else:
-        forward_block(tiles, widths, values.reshape(-1, LANES), spare.reshape(-1, LANES))
-    place_block(count, work, values)
-    range_block(count, work)
-    exact = 0
-    for i in range(count):
-        if work[SEPARATION + i] <= work[TOUCH + i] and work[IN_RANGE + i] == 0.0:
-            exact += 1
-            p = centroid(work, i)
-            for k in range(3):
-                work[POINT + k * LANES + i] = p[k]
-    return bad, exact
-
-
-@kernel
-def solve_committee(poses_a, poses_b, sizes_a, sizes_b, work, numbers, widths, status, colliding,
+def solve_committee(poses_a, poses_b, sizes_a, sizes_b, work, numbers, status, colliding,
                     separation, normal, point):
-    """Model `committee` for all rows; returns the numbers of rows refused and answered exactly."""
+    """Model `committee` for all rows; returns the numbers of rows refused and answered exactly.
+
+    numbers: see `network.block_numbers`.
+    """
     bad = 0
     exact = 0
     rows = poses_a.shape[0]
+    values = network_values(numbers)
     for start in range(0, rows, LANES):
         count = min(LANES, rows - start)
-        refused, exactly = committee_block(poses_a, poses_b, sizes_a, sizes_b, start, count, work,
-                                           numbers, widths)
+        refused = load_block(poses_a, poses_b, sizes_a, sizes_b, start, count, work)
         if refused:
             bad += refused
             write_faults(work, start, count, status)
-        exact += exactly
+        query_block(count, work)
+        touching = 0
+        for i in range(count):
+            if work[SEPARATION + i] <= work[TOUCH + i]:
+                touching += 1
+                press(work, i)
+        if touching > 0:
+            outline_block(LANES, work)
+            describe_block(LANES, work, values)
+            values[INPUTS * LANES:WIDE_INPUTS * LANES] = 0.0
+            forward_block(numbers)
+            place_block(LANES, work, values)
+            range_block(LANES, work)
         for i in range(count):
             if work[SEPARATION + i] <= work[TOUCH + i]:
                 p = (work[POINT + i], work[POINT + LANES + i], work[POINT + 2 * LANES + i])
+                if work[IN_RANGE + i] == 0.0:
+                    exact += 1
+                    p = centroid(work, i)
                 write_contact(work, i, start + i, sat_normal(work, i), p, colliding, separation,
                               normal, point)
             else:
@@ -351,27 +344,58 @@ def solve_committee(poses_a, poses_b, sizes_a, sizes_b, work, numbers, widths, s
 
 
 @kernel
-def one_committee(pose_a, pose_b, sizes, work, numbers, widths, out):
-    """One pair: (FAULT, colliding, separation); sizes (2, 3), out (2, 3): normal and point."""
-    if len(pose_a) != 7 or len(pose_b) != 7:
-        return BAD_POSE_A, False, 0.0
-    refused, _ = committee_block(pose_a.reshape(1, -1), pose_b.reshape(1, -1), sizes[:1], sizes[1:],
-                                 0, 1, work, numbers, widths)
-    if refused:
-        return int(work[FAULT]), False, 0.0
+def one_committee(work, numbers, pose_a, pose_b, normal, point):
+    """A single pair, poses (7,): writes normal (3,) and point (3,).
+
+    Returns APART, TOUCHING or REFUSED, and the separation.
+    """
+    if load_one(pose_a, pose_b, work):
+        return REFUSED, 0.0
+    query_block(1, work)
     if work[SEPARATION] > work[TOUCH]:
-        out[:] = np.nan
-        return 0, False, work[SEPARATION]
-    write_one(work, (work[POINT], work[POINT + LANES], work[POINT + 2 * LANES]), out)
-    return 0, True, work[SEPARATION]
+        write_nothing(normal, point)
+        return APART, work[SEPARATION]
+    press(work, 0)
+    repeat_pressed(work)
+    range_block(1, work)
+    if work[IN_RANGE] == 0.0:
+        work[EXACT_ANSWERS] += 1.0
+        write_one(work, centroid(work, 0), normal, point)
+        return TOUCHING, work[SEPARATION]
+    values = network_values(numbers)
+    outline_block(1, work)
+    describe_block(1, work, values)
+    for k in range(INPUTS, WIDE_INPUTS):
+        values[k * LANES] = 0.0
+    forward_one(numbers)
+    place_block(1, work, values)
+    write_one(work, (work[POINT], work[POINT + LANES], work[POINT + 2 * LANES]), normal, point)
+    return TOUCHING, work[SEPARATION]
+
+
+SAME_EXTENT = 1e-6
+"""Relative difference up to which an extent is one that the network was trained for: sizes may
+have been through float32 or a text file, and the point moves by as little."""
+
+
+def _listed_sizes(weights: Weights) -> np.ndarray | None:
+    """The pairs of sizes (pairs, 2, 3) that a card lists, extents sorted, or None: any."""
+    listed = weights.card['sizes']
+    try:
+        sizes = np.array(listed, dtype=np.float64)
+    except (TypeError, ValueError):
+        sizes = np.empty(0)
+    if listed and (sizes.ndim != 3 or sizes.shape[1:] != (2, 3) or not np.all(sizes > 0.0)):
+        raise WeightsError(f'weights file {weights.path}: the sizes in its card are no pairs of '
+                           f'three extents')
+    return np.sort(sizes, axis=-1) if listed else None
 
 
 class Committee:
-    """SAT and a network for the point; any sizes."""
+    """SAT and a network for the point, for any sizes or those that the weights' card lists; sizes
+    (2, 3) are those of single calls."""
 
-    one = staticmethod(one_committee)
-
-    def __init__(self, weights: str | None = None) -> None:
+    def __init__(self, sizes: np.ndarray, weights: str | None = None) -> None:
         try:
             path = weights or resource_path('weights', 'committee.safetensors')
         except FileNotFoundError as error:
@@ -386,14 +410,78 @@ class Committee:
                 f"outputs, which model 'committee' needs")
         if max(network.widths) > LANES:
             raise WeightsError(f'weights file {path}: no layer may have more than {LANES} units')
-        self.exact_answers = 0
-        """Contacts outside the trained range so far, which were answered by model `exact`."""
-        numbers, widths = block_numbers(network)
-        self.scratch = (new_work(), numbers, widths)
+        self._exact_answers = 0
+        self._numbers = block_numbers(network)
+        self._work = new_work()
+        # A memory of its own, so that a single call finds its sizes in it.
+        self.one_scratch = (new_work(), block_numbers(network))
+        load_sizes(sizes, self.one_scratch[0])
+        self._listed = _listed_sizes(self.weights)
+        self._looked_up = (b'', np.zeros(1, dtype=np.bool_))
+        # Single calls have no test of the sizes: a solver for boxes that are not listed has no
+        # `one`, and all its calls end in `solve`.
+        if self._in_card(sizes[:1], sizes[1:]).all():
+            self.one = one_committee
+
+    @property
+    def exact_answers(self) -> int:
+        """Contacts outside the trained range or sizes so far, which were answered exactly."""
+        return self._exact_answers + int(self.one_scratch[0][EXACT_ANSWERS])
 
     def solve(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
               status: np.ndarray, found: Contacts) -> int:
         """Fill `found` for poses (n, 7), sizes (n or 1, 3); returns how many rows are refused."""
-        bad, exact = solve_committee(a, b, size_a, size_b, *self.scratch, status, *found)
-        self.exact_answers += exact
+        if self._listed is not None:
+            asked = self._in_card(size_a, size_b)
+            if not asked.all():
+                return self._solve_partly(a, b, size_a, size_b, status, found, asked)
+        bad, exact = solve_committee(a, b, size_a, size_b, self._work, self._numbers, status,
+                                     *found)
+        self._exact_answers += exact
         return int(bad)
+
+    def _solve_partly(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
+                      status: np.ndarray, found: Contacts, asked: np.ndarray) -> int:
+        """`solve` with the network for the rows `asked` (n or 1,), exactly for the others."""
+        refused = 0
+        asked = np.broadcast_to(asked, len(a))
+        for by_network in (True, False):
+            rows = np.flatnonzero(asked == by_network)
+            if not len(rows):
+                continue
+            sizes = [size if len(size) == 1 else size[rows] for size in (size_a, size_b)]
+            part = Contacts(*(whole[rows] for whole in found))
+            reasons = np.zeros(len(rows), dtype=np.int8)
+            if by_network:
+                bad, exact = solve_committee(a[rows], b[rows], *sizes, self._work, self._numbers,
+                                             reasons, *part)
+            else:
+                bad = solve_exact(a[rows], b[rows], *sizes, self._work, reasons, *part)
+                exact = np.count_nonzero(part.colliding & (reasons == 0))
+            self._exact_answers += int(exact)
+            refused += int(bad)
+            status[rows] = reasons
+            for whole, piece in zip(found, part):
+                whole[rows] = piece
+        return refused
+
+    def _in_card(self, size_a: np.ndarray, size_b: np.ndarray) -> np.ndarray:
+        """(n or 1,) whether the card lists these sizes (n or 1, 3), or any.
+
+        The order of the boxes does not matter, nor which of a box's axes is called x, y, z.
+        """
+        if self._listed is None:
+            return np.ones(1, dtype=np.bool_)
+        shared = len(size_a) == len(size_b) == 1  # mostly the solver's own: looked up once
+        key = size_a.tobytes() + size_b.tobytes() if shared else b''
+        if shared and key == self._looked_up[0]:
+            return self._looked_up[1]
+        one, other = np.sort(size_a, axis=-1), np.sort(size_b, axis=-1)
+        listed = np.zeros(max(len(one), len(other)), dtype=np.bool_)
+        for p, q in self._listed:
+            for first, second in ((one, other), (other, one)):
+                listed |= ((abs(first - p) <= SAME_EXTENT * p).all(axis=1)
+                           & (abs(second - q) <= SAME_EXTENT * q).all(axis=1))
+        if shared:
+            self._looked_up = (key, listed)
+        return listed

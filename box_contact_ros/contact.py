@@ -16,6 +16,9 @@ from .block import (
 )
 from .jit import kernel
 
+REFUSED, APART, TOUCHING = -1, 0, 1
+"""What a single-pair kernel answers."""
+
 
 class Contact(NamedTuple):
     """What `ContactSolver` says of one pair of boxes. Frame: that of the poses."""
@@ -63,15 +66,23 @@ def sat_normal(work, i):
 
 
 @kernel
-def write_one(work, p, out):
-    """Write the first pair of a block as normal and point, out (2, 3); p is in A's frame."""
+def write_one(work, p, normal, point):
+    """Write normal and point, each (3,), of the first pair of a block; p is in A's frame."""
     for k in range(3):
         a0 = work[AXES_A + 3 * k * LANES]
         a1 = work[AXES_A + (3 * k + 1) * LANES]
         a2 = work[AXES_A + (3 * k + 2) * LANES]
-        out[0, k] = (a0 * work[NORMAL] + a1 * work[NORMAL + LANES]
+        normal[k] = (a0 * work[NORMAL] + a1 * work[NORMAL + LANES]
                      + a2 * work[NORMAL + 2 * LANES])
-        out[1, k] = work[ORIGIN_A + k * LANES] + (a0 * p[0] + a1 * p[1] + a2 * p[2])
+        point[k] = work[ORIGIN_A + k * LANES] + (a0 * p[0] + a1 * p[1] + a2 * p[2])
+
+
+@kernel
+def write_nothing(normal, point):
+    """Write the normal and the point of a single pair that does not touch."""
+    for k in range(3):
+        normal[k] = math.nan
+        point[k] = math.nan
 
 
 @kernel

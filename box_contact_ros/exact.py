@@ -4,19 +4,26 @@ from __future__ import annotations
 import numpy as np
 
 from .block import (
-    BAD_POSE_A,
-    FAULT,
     LANES,
     SEPARATION,
     TOUCH,
     new_work,
 )
-from .contact import Contacts, sat_normal, write_apart, write_contact, write_faults, write_one
+from .contact import (
+    APART,
+    REFUSED,
+    TOUCHING,
+    Contacts,
+    sat_normal,
+    write_apart,
+    write_contact,
+    write_faults,
+    write_nothing,
+    write_one,
+)
 from .jit import kernel
 from .overlap import centroid, press
-from .pose import (
-    load_block,
-)
+from .pose import load_block, load_one, load_sizes
 from .sat import query_block
 
 
@@ -44,32 +51,33 @@ def solve_exact(poses_a, poses_b, sizes_a, sizes_b, work, status, colliding, sep
 
 
 @kernel
-def one_exact(pose_a, pose_b, sizes, work, out):
-    """One pair: (FAULT, colliding, separation); sizes (2, 3), out (2, 3): normal and point."""
-    if len(pose_a) != 7 or len(pose_b) != 7:
-        return BAD_POSE_A, False, 0.0
-    refused = load_block(pose_a.reshape(1, -1), pose_b.reshape(1, -1), sizes[:1], sizes[1:], 0, 1,
-                         work)
-    if refused:
-        return int(work[FAULT]), False, 0.0
+def one_exact(work, pose_a, pose_b, normal, point):
+    """A single pair, poses (7,): writes normal (3,) and point (3,).
+
+    Returns APART, TOUCHING or REFUSED, and the separation.
+    """
+    if load_one(pose_a, pose_b, work):
+        return REFUSED, 0.0
     query_block(1, work)
     if work[SEPARATION] > work[TOUCH]:
-        out[:] = np.nan
-        return 0, False, work[SEPARATION]
+        write_nothing(normal, point)
+        return APART, work[SEPARATION]
     press(work, 0)
-    write_one(work, centroid(work, 0), out)
-    return 0, True, work[SEPARATION]
+    write_one(work, centroid(work, 0), normal, point)
+    return TOUCHING, work[SEPARATION]
 
 
 class Exact:
-    """SAT + exact centroid, for any sizes."""
+    """SAT + exact centroid, for any sizes; sizes (2, 3) are those of single calls."""
 
     one = staticmethod(one_exact)
 
-    def __init__(self) -> None:
-        self.scratch = (new_work(),)
+    def __init__(self, sizes: np.ndarray) -> None:
+        self._work = new_work()
+        self.one_scratch = (new_work(),)
+        load_sizes(sizes, *self.one_scratch)
 
     def solve(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
               status: np.ndarray, found: Contacts) -> int:
         """Fill `found` for poses (n, 7), sizes (n or 1, 3); returns how many rows are refused."""
-        return int(solve_exact(a, b, size_a, size_b, *self.scratch, status, *found))
+        return int(solve_exact(a, b, size_a, size_b, self._work, status, *found))

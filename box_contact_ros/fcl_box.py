@@ -29,7 +29,7 @@ class FclBox:
     """FCL's box-box collide, deepest contact; any sizes."""
 
     def __init__(self) -> None:
-        self._exact = Exact()
+        self._exact = Exact(np.ones((2, 3)))
         self._request = fcl.CollisionRequest(num_max_contacts=MOST_CONTACTS, enable_contact=True)
 
     def solve(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,

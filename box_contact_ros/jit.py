@@ -40,6 +40,11 @@ def fused_kernel(function: Callable[..., Any]) -> Any:
     return _compiled(function, fastmath={'contract'})
 
 
+def fused_inlined(function: Callable[..., Any]) -> Any:
+    """`fused_kernel` and `inlined` in one."""
+    return _compiled(function, fastmath={'contract'}, forceinline=True)
+
+
 def _compiled(function: Callable[..., Any], **options: Any) -> Any:
     global _warned
     try:

@@ -23,7 +23,7 @@ from safetensors.numpy import save
 from .block import (
     LANES,
 )
-from .jit import fused_kernel, inlined, kernel
+from .jit import fused_inlined, fused_kernel, inlined, kernel
 
 CARD_FIELDS = ('name', 'model', 'architecture', 'inputs', 'outputs', 'sizes', 'data', 'seed',
                'commit', 'metrics', 'sha256')
@@ -172,20 +172,28 @@ def unpacked(network: Network) -> list[tuple[np.ndarray, np.ndarray]]:
     return layers
 
 
-def block_numbers(network: Network) -> tuple[np.ndarray, np.ndarray]:
-    """A network laid out for `forward_block` and `forward_one`: (numbers, widths).
+LAYERS_MAX = 7
+_HEADER = LAYERS_MAX + 1
 
-    widths, (layers + 1,) int64, are the layers' widths, widened with zeros to a multiple of 4.
-    numbers, float32, is all in one array, because every array passed costs a single call 50 ns:
 
-    1. values: room for a block, max(widths) rows of LANES; inputs before, outputs after.
-    2. spare: room for a block.
-    3. tiles: per layer the biases, then for each group of 4 outputs and each group of 4 inputs the
+def block_numbers(network: Network) -> np.ndarray:
+    """A network laid out for `forward_block` and `forward_one`, float32.
+
+    Widths are widened with zeros to multiples of 4. All is in one array, because every array that
+    is passed costs a single call 50 ns:
+
+    1. Header: the number of layers, then their widths, inputs first.
+    2. Values: room for a block, max(widths) rows of LANES; inputs before, outputs after.
+    3. Spare: room for a block.
+    4. Tiles: per layer the biases, then for each group of 4 outputs and each group of 4 inputs the
        16 weights, outputs first: the order in which `forward_block` reads.
-    4. columns: per layer the biases, then for each input the weights to all outputs, for
+    5. Columns: per layer the biases, then for each input the weights to all outputs, for
        `forward_one`.
     """
-    widths = np.array([-(-width // 4) * 4 for width in network.widths], dtype=np.int64)
+    widths = [-(-width // 4) * 4 for width in network.widths]
+    header = np.zeros(_HEADER, dtype=np.float32)
+    header[0] = len(widths) - 1
+    header[1:1 + len(widths)] = widths
     tiles, columns = [], []
     for (narrow, narrow_bias), wide_in, wide_out in zip(unpacked(network), widths, widths[1:]):
         weight = np.zeros((wide_out, wide_in), dtype=np.float32)
@@ -195,32 +203,40 @@ def block_numbers(network: Network) -> tuple[np.ndarray, np.ndarray]:
         grouped = weight.reshape(wide_out // 4, 4, wide_in // 4, 4).transpose(0, 2, 1, 3)
         tiles += [bias, grouped.ravel()]
         columns += [bias, weight.T.ravel()]
-    room = np.zeros(2 * widths.max() * LANES, dtype=np.float32)
-    return np.concatenate([room, *tiles, *columns]), widths
+    room = np.zeros(2 * max(widths) * LANES, dtype=np.float32)
+    return np.concatenate([header, room, *tiles, *columns])
 
 
 @kernel
-def split_numbers(numbers, widths):
-    """values, spare, tiles and columns of `block_numbers`."""
-    room = widths.max() * LANES
-    weights = (len(numbers) - 2 * room) // 2
-    return (numbers[:room], numbers[room:2 * room], numbers[2 * room:2 * room + weights],
-            numbers[2 * room + weights:])
+def _widest(numbers):
+    widest = 0
+    for layer in range(int(numbers[0]) + 1):
+        widest = max(widest, int(numbers[1 + layer]))
+    return widest
+
+
+@kernel
+def network_values(numbers):
+    """The room for inputs and outputs, flat: input k of lane i at k · LANES + i."""
+    return numbers[_HEADER:_HEADER + _widest(numbers) * LANES]
 
 
 @fused_kernel
-def forward_block(tiles, widths, values, spare):
-    """Run the network on LANES inputs at once; `values` holds the inputs before, outputs after.
+def forward_block(numbers):
+    """Run the network on LANES inputs at once.
 
-    tiles, widths: see `block_numbers`; values, spare: (max(widths), LANES) float32, rows of inputs
-    beyond the network's own zero. Four outputs at a time take in four inputs at a time, so that a
-    value loaded is used four times.
+    Four outputs at a time take in four inputs at a time, so that a value loaded is used four times.
     """
+    room = _widest(numbers) * LANES
+    place = _HEADER + 2 * room
+    tiles = numbers[place:]
+    values = numbers[_HEADER:_HEADER + room].reshape(-1, LANES)
+    spare = numbers[_HEADER + room:place].reshape(-1, LANES)
     place = 0
-    layers = len(widths) - 1
+    layers = int(numbers[0])
     for layer in range(layers):
-        outputs = widths[layer + 1]
-        place = _layer_block(tiles, place, widths[layer], outputs, values, spare)
+        outputs = int(numbers[2 + layer])
+        place = _layer_block(tiles, place, int(numbers[1 + layer]), outputs, values, spare)
         if layer < layers - 1:
             _tanh_block(spare, values, outputs)
         else:
@@ -260,31 +276,45 @@ def _layer_block(packed, place, inputs, outputs, x, y):
 
 
 @fused_kernel
-def forward_one(columns, widths, values, spare):
-    """`forward_block` for the first lane alone, its sums in the same order; flat scratch."""
-    x = spare[:LANES]
-    y = spare[LANES:]
-    for k in range(widths[0]):
+def forward_one(numbers):
+    """`forward_block` for the first lane alone, its sums in the same order."""
+    room = _widest(numbers) * LANES
+    values = numbers[_HEADER:]
+    x = numbers[_HEADER + room:]
+    y = numbers[_HEADER + room + LANES:]
+    first = _HEADER + 2 * room
+    columns = numbers[first + (len(numbers) - first) // 2:]
+    layers = int(numbers[0])
+    for k in range(int(numbers[1])):
         x[k] = values[k * LANES]
     place = 0
-    layers = len(widths) - 1
     for layer in range(layers):
-        outputs = widths[layer + 1]
-        for row in range(outputs):
-            y[row] = columns[place + row]
+        outputs = int(numbers[2 + layer])
+        _copy_row(columns[place:], y, outputs)
         place += outputs
-        for column in range(widths[layer]):
-            value = x[column]
-            weights = columns[place:place + outputs]
-            for row in range(outputs):
-                y[row] += weights[row] * value
-            place += outputs
+        for column in range(0, int(numbers[1 + layer]), 4):
+            _four_columns(columns[place:], columns[place + outputs:],
+                          columns[place + 2 * outputs:], columns[place + 3 * outputs:],
+                          x[column], x[column + 1], x[column + 2], x[column + 3], y, outputs)
+            place += 4 * outputs
         if layer < layers - 1:
             for row in range(outputs):
                 x[row] = rational_tanh(y[row])
         else:
             for row in range(outputs):
                 values[row * LANES] = y[row]
+
+
+@inlined
+def _copy_row(source, target, count):
+    for row in range(count):
+        target[row] = source[row]
+
+
+@fused_inlined
+def _four_columns(a, b, c, d, x0, x1, x2, x3, y, count):
+    for row in range(count):
+        y[row] = (((y[row] + a[row] * x0) + b[row] * x1) + c[row] * x2) + d[row] * x3
 
 
 @kernel

@@ -170,11 +170,17 @@ def outline_block(count, work):
         _join(work)
         _finish(1, work)
     else:
+        # Summed up as a single pair's are, so that a row has the same bits alone and in a batch: the
+        # sign of a rounding error chooses the network's mirror image, so it must be the same one.
         _begin(LANES, work)
         _edges(LANES, work, MINUS, MINUS)
-        _edges(LANES, work, MINUS, PLUS)
+        _put_aside(work)
         _edges(LANES, work, PLUS, MINUS)
+        _put_aside(work)
+        _edges(LANES, work, MINUS, PLUS)
+        _put_aside(work)
         _edges(LANES, work, PLUS, PLUS)
+        _add_aside(work)
         _finish(LANES, work)
 
 
@@ -191,8 +197,31 @@ def _begin(lanes, work):
             work[HIGH_A + k * LANES + i] = -_NOWHERE
             work[HIGH_B + k * LANES + i] = -_NOWHERE
             work[SUM + k * LANES + i] = 0.0
+            work[MIDDLE + k * LANES + i] = 0.0
     for i in range(lanes):
         work[LENGTH + i] = 0.0
+        work[IN_B + i] = 0.0
+
+
+@inlined
+def _put_aside(work):
+    """Sums so far, of a fourth of the edges each: four rows that `_finish` is first to need."""
+    for i in range(LANES):
+        work[IN_B + i] += work[LENGTH + i]
+        work[LENGTH + i] = 0.0
+    for k in range(0, 3 * LANES, LANES):
+        for i in range(LANES):
+            work[MIDDLE + k + i] += work[SUM + k + i]
+            work[SUM + k + i] = 0.0
+
+
+@inlined
+def _add_aside(work):
+    for i in range(LANES):
+        work[LENGTH + i] = work[IN_B + i] + work[LENGTH + i]
+    for k in range(0, 3 * LANES, LANES):
+        for i in range(LANES):
+            work[SUM + k + i] = work[MIDDLE + k + i] + work[SUM + k + i]
 
 
 @inlined

@@ -135,26 +135,42 @@ def load_block(poses_a, poses_b, sizes_a, sizes_b, start, count, work):
     later stages need no test; returns the number of such rows.
     """
     _copy_block(poses_a, poses_b, sizes_a, sizes_b, start, count, work)
-    if count == 1:
-        _repeat_first(work)
-        bad = 1 if _prepare(SINGLE, work) < SINGLE else 0
-    else:
-        for i in range(count, LANES):
-            _copy_apart(work, i)
-        bad = LANES - _prepare(LANES, work)
+    for i in range(count, LANES):
+        _copy_apart(work, i)
+    bad = LANES - _prepare(LANES, work)
     if bad:
         _replace_bad(work, count)
     return bad
 
 
 @kernel
-def _repeat_first(work):
-    for row in range(ORIGIN_A, TURN_B + 4 * LANES, LANES):
-        for i in range(1, SINGLE):
-            work[row + i] = work[row]
-    for row in range(HALF_A, HALF_B + 3 * LANES, LANES):
-        for i in range(1, SINGLE):
-            work[row + i] = work[row]
+def load_sizes(sizes, work):
+    """Write the full extents (2, 3) of a single pair; they stay for all its poses."""
+    for k in range(3):
+        for i in range(SINGLE):
+            work[HALF_A + k * LANES + i] = 0.5 * sizes[0, k]
+            work[HALF_B + k * LANES + i] = 0.5 * sizes[1, k]
+
+
+@kernel
+def load_one(pose_a, pose_b, work):
+    """`load_block` for a single pair, whose sizes `load_sizes` has written: poses (7,).
+
+    Returns 0, or BAD_…, and then `work` holds nothing that can be evaluated.
+    """
+    if len(pose_a) != 7 or len(pose_b) != 7:
+        return BAD_POSE_A
+    for k in range(3):
+        a, b = pose_a[k], pose_b[k]
+        for i in range(SINGLE):
+            work[ORIGIN_A + k * LANES + i] = a
+            work[ORIGIN_B + k * LANES + i] = b
+    for k in range(4):
+        a, b = pose_a[3 + k], pose_b[3 + k]
+        for i in range(SINGLE):
+            work[TURN_A + k * LANES + i] = a
+            work[TURN_B + k * LANES + i] = b
+    return OK if _prepare(SINGLE, work) == SINGLE else BAD_POSE_A
 
 
 @kernel

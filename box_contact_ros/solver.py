@@ -1,6 +1,7 @@
 """ContactSolver: SAT first, then the contact point by the chosen model. Conventions: `pose`."""
 from __future__ import annotations
 
+from functools import partial
 from typing import Protocol
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.typing import ArrayLike
 from .block import BAD_POSE_A, BAD_POSE_B, BAD_SIZE_A
 from .checks import as_floats, as_size, pose_fault, size_fault
 from .committee import Committee
-from .contact import Contact, Contacts
+from .contact import TOUCHING, Contact, Contacts
 from .exact import Exact
 from .paper import Paper, PaperContinuous
 
@@ -21,6 +22,10 @@ MODELS = {
     'fcl': "FCL's box-box, its deepest contact; any sizes; needs python-fcl; a baseline",
 }
 """Models by name, with a line about each."""
+
+
+# Looked up once: a single call takes little more than a microsecond.
+_empty, _new_tuple = np.empty, tuple.__new__
 
 
 class Model(Protocol):
@@ -37,15 +42,14 @@ class Model(Protocol):
 class SingleModel(Model, Protocol):
     """A model that has a kernel of its own for single pairs."""
 
-    scratch: tuple[np.ndarray, ...]
-    """Arrays that are handed to `one` on every call."""
+    one_scratch: tuple[np.ndarray, ...]
+    """Arrays that are handed to `one` on every call; they know the sizes."""
 
     @staticmethod
-    def one(pose_a: np.ndarray, pose_b: np.ndarray, sizes: np.ndarray, *rest: np.ndarray,
-            ) -> tuple[int, bool, float]:
-        """(fault, colliding, separation) of poses (7,) and full extents (2, 3).
+    def one(*scratch_poses_normal_point: np.ndarray) -> tuple[int, float]:
+        """(contact.APART, TOUCHING or REFUSED, separation) of a single pair.
 
-        rest: `scratch`, then the array (2, 3) to write normal and point to.
+        Arguments: `one_scratch`, then two poses (7,), and normal (3,) and point (3,) to write.
         """
 
 
@@ -55,9 +59,9 @@ def make_model(name: str, size_a: np.ndarray, size_b: np.ndarray, weights: str |
     Raises ValueError for a name, sizes or weights that do not fit.
     """
     if name == 'committee':
-        return Committee(weights)
+        return Committee(np.concatenate([size_a, size_b]), weights)
     if name == 'exact':
-        return Exact()
+        return Exact(np.concatenate([size_a, size_b]))
     if name == 'paper':
         return Paper(size_a, size_b, weights)
     if name == 'paper-continuous':
@@ -93,26 +97,25 @@ class ContactSolver:
         self._solver = make_model(model, self._size_a, self._size_b, weights)
         self._one = None
         if hasattr(self._solver, 'one'):
-            self._one = self._solver.one
-            self._rest = (np.concatenate([self._size_a, self._size_b]), *self._solver.scratch)
+            one = self._solver.one
+            self._one = partial(one, *self._solver.one_scratch)
             # After one call for float64 arrays no other kind is compiled: what is not one raises
             # TypeError, and is made one.
-            self._one(np.zeros(7), np.zeros(7), *self._rest, np.empty((2, 3)))
-            self._one.disable_compile()
+            self._one(np.zeros(7), np.zeros(7), np.empty(3), np.empty(3))
+            one.disable_compile()
 
     def __call__(self, pose_a: ArrayLike, pose_b: ArrayLike) -> Contact:
         """Contact of one pair; poses are (7,)."""
         if self._one is None:
             return self._converted(pose_a, pose_b)
-        out = np.empty((2, 3))
+        normal, point = _empty(3), _empty(3)
         try:
-            fault, colliding, separation = self._one(pose_a, pose_b, *self._rest, out)
+            verdict, separation = self._one(pose_a, pose_b, normal, point)
         except TypeError:
             return self._converted(pose_a, pose_b)
-        if fault:
+        if verdict < 0:
             return self._converted(pose_a, pose_b)  # which knows the words
-        normal, point = out
-        return Contact(colliding, separation, normal, point)
+        return _new_tuple(Contact, (verdict == TOUCHING, separation, normal, point))
 
     def _converted(self, pose_a: ArrayLike, pose_b: ArrayLike) -> Contact:
         """A single call for poses of any kind, or the reason why they are refused."""

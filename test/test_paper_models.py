@@ -23,8 +23,8 @@ from box_contact_ros.symmetry import (
 EDGE = 2.0
 MODELS = {'paper': (poses.CUBE, 0.6, 12.0), 'paper-continuous': (poses.CUBE, 0.008, 0.15),
           'container': (poses.CONTAINER, 1.4, 12.0)}
-"""Model: size, and bounds of the mean point error [m] and of the mean normal error [deg]; the shipped
-weights reach 0.48 m and 8.9°, 0.006 m and 0.11°, 1.17 m and 9.2°."""
+"""Model: size, and bounds of the mean point error [m] and of the mean normal error [deg]. The
+shipped weights reach 0.48 m and 8.9°, 0.006 m and 0.11°, 1.17 m and 9.2°."""
 
 
 def make(name):
