@@ -12,7 +12,8 @@ Stages of a block of pairs, each a loop without branches over structures of arra
    cuts nothing off is zero and comes in smoothly. Sizes, units and the depth have gone: one network
    serves every pair of boxes. The cube's 48 symmetries are used up by the inside point: mirrored to
    positive components, sorted by size.
-5. `network.forward_block`: the offset of the centroid from the inside point, in float32.
+5. `network.forward_block`: the offset of the centroid from the inside point, in float32; scaled
+   down where A∩B is almost symmetric about its middle (SYMMETRIC).
 6. `place_block`: the offset is cut to where a centroid can be (that of a convex body lies in the
    middle half of its bounding box: Bonnesen and Fenchel 1934, §34) and shortened where it would
    leave the other box. It starts inside A∩B, so it ends in both boxes, whatever the network says.
@@ -26,7 +27,9 @@ from __future__ import annotations
 import numpy as np
 
 from .block import (
+    CUTS,
     EXACT_ANSWERS,
+    FEATURES,
     HALF,
     HALF_A,
     HALF_B,
@@ -35,6 +38,7 @@ from .block import (
     INSIDE,
     LANES,
     MIDDLE,
+    MIRRORED,
     NORMALS,
     OFFSET_A,
     OFFSET_B,
@@ -42,6 +46,7 @@ from .block import (
     OTHER,
     POINT,
     RANKS,
+    REACH,
     ROTATION,
     SEPARATION,
     TOUCH,
@@ -87,12 +92,21 @@ DEPTH_MAX = 0.1
 RANGE_SLACK = 1.0 + 1e-9
 """The limits of the range belong to it, rounding included."""
 
+SYMMETRIC = 0.05
+"""Asymmetry of A∩B in its bounding box below which the network's answer is scaled down, to nothing
+where there is none: an overlap that is its own mirror image through its middle, as that of any two
+containers squarely stacked, has its centroid there. Without it, a container at rest had its point
+jump by the network's error whenever a rounding chose another of the cube's mirror images."""
+
 CENTROID_REACH = 0.5
 """Farthest a centroid can be from the middle of its bounding box, in half extents."""
 
 INPUTS, OUTPUTS = 21, 3
+DESCRIPTION = 'cuts of the unit cube, scaled by reach'
+"""What the inputs and outputs mean; weights made for another meaning are refused."""
 WIDE_INPUTS = 24
 """Inputs as the kernels have them, in groups of four; the last three are zero."""
+
 
 @inlined
 def _pick(k0, k1, x0, x1, x2):
@@ -127,92 +141,102 @@ def _frame_axis(lanes, work, f):
 
 
 @inlined
-def _face_cuts(lanes, work, f, features, row, key):
-    """The two faces across axis f as inputs: the one that cuts more first."""
+def _face_cuts(lanes, work, f, row):
+    """The two faces across axis f as inputs, from `row` on: the one that cuts more first."""
     for i in range(lanes):
         width = _half_width(work, f, i)
         offset = work[OFFSETS + f + i]
         half = work[OTHER + f + i]
         # 1: the face goes through the cube's middle; 0: it just misses the cube; 2: nothing left.
-        upper = min(2.0, max(0.0, 1.0 - (half - offset) / width))
-        lower = min(2.0, max(0.0, 1.0 - (half + offset) / width))
+        inverse = 1.0 / width
+        upper = min(2.0, max(0.0, 1.0 - (half - offset) * inverse))
+        lower = min(2.0, max(0.0, 1.0 - (half + offset) * inverse))
         flip = upper < lower
-        more = (lower if flip else upper) / width
-        less = (upper if flip else lower) / width
-        sign = -1.0 if flip else 1.0
+        more = (-lower if flip else upper) * inverse
+        less = (-upper if flip else lower) * inverse
+        work[CUTS + f + i] = upper + lower
+        work[REACH + i] = max(work[REACH + i], abs(upper - lower))
         k0 = work[RANKS + i]
         k1 = work[RANKS + LANES + i]
-        nx = _mirrored(work, f, 0, i) * sign
-        ny = _mirrored(work, f, LANES, i) * sign
-        nz = _mirrored(work, f, 2 * LANES, i) * sign
+        nx = work[NORMALS + 3 * f + i] * work[MIRRORED + i]
+        ny = work[NORMALS + 3 * f + LANES + i] * work[MIRRORED + LANES + i]
+        nz = work[NORMALS + 3 * f + 2 * LANES + i] * work[MIRRORED + 2 * LANES + i]
         p0 = _pick(k0 == 0.0, k1 == 0.0, nx, ny, nz)
         p1 = _pick(k0 == 1.0, k1 == 1.0, nx, ny, nz)
         p2 = _pick(k0 == 2.0, k1 == 2.0, nx, ny, nz)
-        features[row * LANES + i] = p0 * more
-        features[(row + 1) * LANES + i] = p1 * more
-        features[(row + 2) * LANES + i] = p2 * more
-        features[(row + 3) * LANES + i] = p0 * less
-        features[(row + 4) * LANES + i] = p1 * less
-        features[(row + 5) * LANES + i] = p2 * less
-        features[key * LANES + i] = (more + less) * width
+        work[row + i] = p0 * more
+        work[row + LANES + i] = p1 * more
+        work[row + 2 * LANES + i] = p2 * more
+        work[row + 3 * LANES + i] = p0 * less
+        work[row + 4 * LANES + i] = p1 * less
+        work[row + 5 * LANES + i] = p2 * less
 
 
 @inlined
-def _mirrored(work, f, q, i):
-    component = work[NORMALS + 3 * f + q + i] * work[HALF + q + i]
-    return component if work[INSIDE + q + i] >= 0.0 else -component
+def _exchange(work, one, two, swap):
+    p, q = work[one], work[two]
+    work[one] = q if swap else p
+    work[two] = p if swap else q
 
 
 @inlined
-def _swap_rows(lanes, features, one, two, key_one, key_two):
-    """Order two axes' inputs: the one that cuts more (the sum in its key row) first."""
+def _in_order(lanes, work, f, g, row_f, row_g):
+    """Order two axes' inputs: the one whose faces cut more first."""
     for i in range(lanes):
-        swap = features[key_one * LANES + i] < features[key_two * LANES + i]
-        for k in range(6):
-            p, q = features[(one + k) * LANES + i], features[(two + k) * LANES + i]
-            features[(one + k) * LANES + i] = q if swap else p
-            features[(two + k) * LANES + i] = p if swap else q
-        p, q = features[key_one * LANES + i], features[key_two * LANES + i]
-        features[key_one * LANES + i] = q if swap else p
-        features[key_two * LANES + i] = p if swap else q
+        cut_f, cut_g = work[CUTS + f + i], work[CUTS + g + i]
+        swap = cut_f < cut_g
+        work[CUTS + f + i] = cut_g if swap else cut_f
+        work[CUTS + g + i] = cut_f if swap else cut_g
+        _exchange(work, row_f + i, row_g + i, swap)
+        _exchange(work, row_f + LANES + i, row_g + LANES + i, swap)
+        _exchange(work, row_f + 2 * LANES + i, row_g + 2 * LANES + i, swap)
+        _exchange(work, row_f + 3 * LANES + i, row_g + 3 * LANES + i, swap)
+        _exchange(work, row_f + 4 * LANES + i, row_g + 4 * LANES + i, swap)
+        _exchange(work, row_f + 5 * LANES + i, row_g + 5 * LANES + i, swap)
 
 
 @kernel
-def describe_block(count, work, features):
+def describe_block(count, work, inputs):
     """The network's inputs of a block of `count` pairs: INPUTS rows of LANES float32."""
     if count == 1:
-        _describe(1, work, features)
+        _describe(1, work)
+        for k in range(0, INPUTS * LANES, LANES):
+            inputs[k] = work[FEATURES + k]
     else:
-        _describe(LANES, work, features)
+        _describe(LANES, work)
+        for k in range(INPUTS * LANES):
+            inputs[k] = work[FEATURES + k]
 
 
 @inlined
-def _describe(lanes, work, features):
+def _describe(lanes, work):
+    for i in range(lanes):
+        x, y, z = work[INSIDE + i], work[INSIDE + LANES + i], work[INSIDE + 2 * LANES + i]
+        hx, hy, hz = work[HALF + i], work[HALF + LANES + i], work[HALF + 2 * LANES + i]
+        work[MIRRORED + i] = hx if x >= 0.0 else -hx
+        work[MIRRORED + LANES + i] = hy if y >= 0.0 else -hy
+        work[MIRRORED + 2 * LANES + i] = hz if z >= 0.0 else -hz
+        x, y, z = abs(x), abs(y), abs(z)
+        work[REACH + i] = max(max(x, y), z)
+        k0 = (1.0 if y > x else 0.0) + (1.0 if z > x else 0.0)
+        k1 = (1.0 if x >= y else 0.0) + (1.0 if z > y else 0.0)
+        work[RANKS + i] = k0
+        work[RANKS + LANES + i] = k1
+        work[RANKS + 2 * LANES + i] = 3.0 - (k0 + k1)
+        work[FEATURES + 18 * LANES + i] = _pick(k0 == 0.0, k1 == 0.0, x, y, z)
+        work[FEATURES + 19 * LANES + i] = _pick(k0 == 1.0, k1 == 1.0, x, y, z)
+        work[FEATURES + 20 * LANES + i] = _pick(k0 == 2.0, k1 == 2.0, x, y, z)
     _frame_axis(lanes, work, 0)
     _frame_axis(lanes, work, LANES)
     _frame_axis(lanes, work, 2 * LANES)
+    _face_cuts(lanes, work, 0, FEATURES)
+    _face_cuts(lanes, work, LANES, FEATURES + 6 * LANES)
+    _face_cuts(lanes, work, 2 * LANES, FEATURES + 12 * LANES)
     for i in range(lanes):
-        x = abs(work[INSIDE + i])
-        y = abs(work[INSIDE + LANES + i])
-        z = abs(work[INSIDE + 2 * LANES + i])
-        work[RANKS + i] = (1.0 if y > x else 0.0) + (1.0 if z > x else 0.0)
-        work[RANKS + LANES + i] = (1.0 if x >= y else 0.0) + (1.0 if z > y else 0.0)
-        work[RANKS + 2 * LANES + i] = (1.0 if x >= z else 0.0) + (1.0 if y >= z else 0.0)
-    _face_cuts(lanes, work, 0, features, 0, 18)
-    _face_cuts(lanes, work, LANES, features, 6, 19)
-    _face_cuts(lanes, work, 2 * LANES, features, 12, 20)
-    _swap_rows(lanes, features, 0, 6, 18, 19)
-    _swap_rows(lanes, features, 6, 12, 19, 20)
-    _swap_rows(lanes, features, 0, 6, 18, 19)
-    for i in range(lanes):
-        x = abs(work[INSIDE + i])
-        y = abs(work[INSIDE + LANES + i])
-        z = abs(work[INSIDE + 2 * LANES + i])
-        k0 = work[RANKS + i]
-        k1 = work[RANKS + LANES + i]
-        features[18 * LANES + i] = _pick(k0 == 0.0, k1 == 0.0, x, y, z)
-        features[19 * LANES + i] = _pick(k0 == 1.0, k1 == 1.0, x, y, z)
-        features[20 * LANES + i] = _pick(k0 == 2.0, k1 == 2.0, x, y, z)
+        work[REACH + i] = min(1.0, work[REACH + i] * (1.0 / SYMMETRIC))
+    _in_order(lanes, work, 0, LANES, FEATURES, FEATURES + 6 * LANES)
+    _in_order(lanes, work, LANES, 2 * LANES, FEATURES + 6 * LANES, FEATURES + 12 * LANES)
+    _in_order(lanes, work, 0, LANES, FEATURES, FEATURES + 6 * LANES)
 
 
 @inlined
@@ -222,7 +246,7 @@ def _goal(work, offsets, q, i):
     offset = _pick(rank == 0.0, rank == 1.0, np.float64(offsets[i]), np.float64(offsets[LANES + i]),
                    np.float64(offsets[2 * LANES + i]))
     inside = work[INSIDE + q + i]
-    offset = offset if inside >= 0.0 else -offset
+    offset = work[REACH + i] * (offset if inside >= 0.0 else -offset)
     return min(CENTROID_REACH, max(-CENTROID_REACH, inside + offset)) - inside
 
 
@@ -410,6 +434,8 @@ class Committee:
                 f"outputs, which model 'committee' needs")
         if max(network.widths) > LANES:
             raise WeightsError(f'weights file {path}: no layer may have more than {LANES} units')
+        if self.weights.card['inputs'].get('description') != DESCRIPTION:
+            raise WeightsError(f'weights file {path} is for other inputs than this version has')
         self._exact_answers = 0
         self._numbers = block_numbers(network)
         self._work = new_work()

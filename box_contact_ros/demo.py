@@ -29,7 +29,7 @@ DOMAINS = range(1, 102)  # 0 is everybody's; beyond 101, ports run into those Li
 TIME_LIMIT = 58.0  # s for everything: a demo ends within a minute, whatever happens
 OVERHEAD = 8.0  # s of it for starting, for the last answers and for the summary
 LANDING_LEAST = 22.0  # s: a shorter landing ends before it can be judged
-LANDING_MODEL = 'exact'  # the closed loop's default: it needs a point without jumps
+LANDING_MODEL = 'committee'  # the closed loop's default: it needs a point without jumps
 END_PATIENCE = 2.0  # s between asking a process group to end and killing it
 
 NEXT = """

@@ -149,7 +149,7 @@ TANH_LIMIT = 3.6467
 """Where the rational tanh below reaches 1; beyond, it is 1."""
 
 
-@inlined
+@fused_inlined
 def rational_tanh(x):
     """tanh as the fifth convergent of its continued fraction (Lambert 1770): error below 1.4e-3.
 

@@ -6,8 +6,10 @@ lengths, is a point of A∩B near its centroid. All of it is a fixed sequence of
 comparisons, the same for every pair: constant cost, and one instruction serves eight pairs.
 
 An edge is cut by three slabs (Kay and Kajiya 1986). Its direction in the other box's frame is a row
-or a column of R, so nine reciprocals serve all 24 edges. Each piece is noted in both frames: in its
-own box's frame two of its coordinates are constant.
+or a column of R, so nine reciprocals serve all 24 edges. Four edges along one axis share everything
+but the signs of their middles; a block takes them one after the other, a single pair side by side.
+Each piece is noted in both frames: in its own box's frame two of its coordinates are constant. A
+piece that is not there is NaN, which no comparison lets through.
 
 Of the two bounding boxes the smaller one is chosen. It follows the overlap's own direction: a
 corner pressed into a face, an edge lying across a face, two crossing edges all fill the better of
@@ -16,7 +18,11 @@ sliver (with the same network and data, errors were two to seven times larger).
 """
 from __future__ import annotations
 
+import math
+
 from .block import (
+    CENTRE_A,
+    CENTRE_B,
     EVEN_ODD,
     HALF,
     HALF_A,
@@ -28,23 +34,22 @@ from .block import (
     INSIDE,
     INVERSE,
     LANES,
-    LENGTH,
     LOW_A,
     LOW_B,
     MIDDLE,
-    MINUS,
     OFFSET_A,
     OFFSET_B,
-    PLUS,
+    PIECES_A,
+    PIECES_B,
     ROTATION,
     SINGLE,
     SIZE,
-    SUM,
 )
 from .jit import inlined, kernel
 
-_PARALLEL = 1e-300
-"""Least magnitude that is inverted: an edge exactly along a slab must not give 0 · ∞."""
+_PARALLEL = 1e-90
+"""Least magnitude that is inverted: an edge exactly along a slab must not give 0 · ∞, and three of
+them multiplied must not underflow."""
 _FLUSH = 2.0**-46
 """Slabs are wider by this fraction of the size (1.4e-14). Where faces of both boxes lie in one
 plane, rounding may put either box's edges outside the other: of an aligned stack nothing, or one
@@ -60,182 +65,250 @@ that cross have equal ones, and rounding must not choose between the frames."""
 
 
 @inlined
-def _cut(start, end, middle, inverse, half):
-    """Cut the piece [start, end] of a line to |middle + t·direction| ≤ half."""
-    low = (-half - middle) * inverse
-    high = (half - middle) * inverse
-    return max(start, min(low, high)), min(end, max(low, high))
+def _piece(x, y, z, ix, iy, iz, wx, wy, wz, length):
+    """What three slabs leave of a line: from s to t along it, or NaN.
+
+    (x, y, z) is its middle in the other box's frame, i the reciprocals of its direction, w the
+    slabs' half widths along it, `length` half its length.
+    """
+    kx, ky, kz = x * ix, y * iy, z * iz
+    s = max(max(-length, -kx - wx), max(-ky - wy, -kz - wz))
+    t = min(min(length, wx - kx), min(wy - ky, wz - kz))
+    there = t >= s
+    return (s if there else math.nan), (t if there else math.nan)
 
 
 @inlined
-def _note(work, row_low, row_high, i, p, q, there):
-    low, high = min(p, q), max(p, q)
-    work[row_low + i] = min(work[row_low + i], low) if there else work[row_low + i]
-    work[row_high + i] = max(work[row_high + i], high) if there else work[row_high + i]
+def _lower(low, p, q):
+    low = p if p < low else low
+    return q if q < low else low
 
 
 @inlined
-def _edges_of_b(lanes, work, j, a, b, signs_a, signs_b):
-    """B's edge along its axis j, at the signs given of its axes a and b; row offsets, not axes."""
-    for i in range(lanes):
-        own_a = work[signs_a + i] * work[HALF_B + a + i]
-        own_b = work[signs_b + i] * work[HALF_B + b + i]
-        length = work[HALF_B + j + i]
-        x = work[OFFSET_A + i] + (own_a * work[ROTATION + a + i] + own_b * work[ROTATION + b + i])
-        y = work[OFFSET_A + LANES + i] + (own_a * work[ROTATION + 3 * LANES + a + i]
-                                          + own_b * work[ROTATION + 3 * LANES + b + i])
-        z = work[OFFSET_A + 2 * LANES + i] + (own_a * work[ROTATION + 6 * LANES + a + i]
-                                              + own_b * work[ROTATION + 6 * LANES + b + i])
+def _higher(high, p, q):
+    high = p if p > high else high
+    return q if q > high else high
+
+
+@inlined
+def _grow(work, low_row, high_row, i, p0, q0, p1, q1, p2, q2, p3, q3):
+    """Widen a bounding box's side by eight coordinates, those that are not NaN."""
+    low = _lower(_lower(work[low_row + i], p0, q0), p1, q1)
+    work[low_row + i] = _lower(_lower(low, p2, q2), p3, q3)
+    high = _higher(_higher(work[high_row + i], p0, q0), p1, q1)
+    work[high_row + i] = _higher(_higher(high, p2, q2), p3, q3)
+
+
+@inlined
+def _add(work, pieces, number, i, s, t, x, y, z, ex, ey, ez):
+    """Add a piece to the sums of its sign."""
+    there = t >= s
+    weight = t - s if there else 0.0
+    both = s + t if there else 0.0
+    work[pieces + number * LANES + i] += weight
+    place = pieces + (4 + 3 * number) * LANES + i
+    work[place] += weight * (2.0 * x + both * ex)
+    work[place + LANES] += weight * (2.0 * y + both * ey)
+    work[place + 2 * LANES] += weight * (2.0 * z + both * ez)
+
+
+@inlined
+def _four_edges(work, half_x, half_y, centre, along, across, low_x, high_x, low_y, high_y, pieces,
+                j, a, b):
+    """The four edges of a box X along its axis j, cut by the other box Y.
+
+    j, a, b are X's axes as row offsets; rows of X's own frame end in _x, those of Y's in _y.
+    Component k of X's axis j in Y's frame is R at k · across + j · along.
+    """
+    for i in range(LANES):
+        ga, gb, length = work[half_x + a + i], work[half_x + b + i], work[half_x + j + i]
+        ex = work[ROTATION + j * along + i]
+        ey = work[ROTATION + across + j * along + i]
+        ez = work[ROTATION + 2 * across + j * along + i]
+        ix = work[INVERSE + j * along + i]
+        iy = work[INVERSE + across + j * along + i]
+        iz = work[INVERSE + 2 * across + j * along + i]
         slack = _FLUSH * work[SIZE + i]
-        half_x = work[HALF_A + i] + slack
-        half_y = work[HALF_A + LANES + i] + slack
-        half_z = work[HALF_A + 2 * LANES + i] + slack
-        s, t = _cut(-length, length, x, work[INVERSE + j + i], half_x)
-        s, t = _cut(s, t, y, work[INVERSE + 3 * LANES + j + i], half_y)
-        s, t = _cut(s, t, z, work[INVERSE + 6 * LANES + j + i], half_z)
-        there = t >= s
-        ex = work[ROTATION + j + i]
-        ey = work[ROTATION + 3 * LANES + j + i]
-        ez = work[ROTATION + 6 * LANES + j + i]
-        _note(work, LOW_A, HIGH_A, i, x + s * ex, x + t * ex, there)
-        _note(work, LOW_A + LANES, HIGH_A + LANES, i, y + s * ey, y + t * ey, there)
-        _note(work, LOW_A + 2 * LANES, HIGH_A + 2 * LANES, i, z + s * ez, z + t * ez, there)
-        _note(work, LOW_B + j, HIGH_B + j, i, s, t, there)
-        _note(work, LOW_B + a, HIGH_B + a, i, own_a, own_a, there)
-        _note(work, LOW_B + b, HIGH_B + b, i, own_b, own_b, there)
-        weight = t - s if there else 0.0
-        both = s + t
-        work[SUM + i] += weight * (2.0 * x + both * ex)
-        work[SUM + LANES + i] += weight * (2.0 * y + both * ey)
-        work[SUM + 2 * LANES + i] += weight * (2.0 * z + both * ez)
-        work[LENGTH + i] += weight
+        wx = (work[half_y + i] + slack) * abs(ix)
+        wy = (work[half_y + LANES + i] + slack) * abs(iy)
+        wz = (work[half_y + 2 * LANES + i] + slack) * abs(iz)
+        ax = ga * work[ROTATION + a * along + i]
+        ay = ga * work[ROTATION + across + a * along + i]
+        az = ga * work[ROTATION + 2 * across + a * along + i]
+        bx = gb * work[ROTATION + b * along + i]
+        by = gb * work[ROTATION + across + b * along + i]
+        bz = gb * work[ROTATION + 2 * across + b * along + i]
+        cx, cy, cz = work[centre + i], work[centre + LANES + i], work[centre + 2 * LANES + i]
+        # Signs (−, −), (+, −), (−, +), (+, +) of a and b.
+        x0, y0, z0 = cx - (ax + bx), cy - (ay + by), cz - (az + bz)
+        x1, y1, z1 = cx + (ax - bx), cy + (ay - by), cz + (az - bz)
+        x2, y2, z2 = cx - (ax - bx), cy - (ay - by), cz - (az - bz)
+        x3, y3, z3 = cx + (ax + bx), cy + (ay + by), cz + (az + bz)
+        s0, t0 = _piece(x0, y0, z0, ix, iy, iz, wx, wy, wz, length)
+        s1, t1 = _piece(x1, y1, z1, ix, iy, iz, wx, wy, wz, length)
+        s2, t2 = _piece(x2, y2, z2, ix, iy, iz, wx, wy, wz, length)
+        s3, t3 = _piece(x3, y3, z3, ix, iy, iz, wx, wy, wz, length)
+        _grow(work, low_y, high_y, i, x0 + s0 * ex, x0 + t0 * ex, x1 + s1 * ex, x1 + t1 * ex,
+              x2 + s2 * ex, x2 + t2 * ex, x3 + s3 * ex, x3 + t3 * ex)
+        _grow(work, low_y + LANES, high_y + LANES, i, y0 + s0 * ey, y0 + t0 * ey, y1 + s1 * ey,
+              y1 + t1 * ey, y2 + s2 * ey, y2 + t2 * ey, y3 + s3 * ey, y3 + t3 * ey)
+        _grow(work, low_y + 2 * LANES, high_y + 2 * LANES, i, z0 + s0 * ez, z0 + t0 * ez,
+              z1 + s1 * ez, z1 + t1 * ez, z2 + s2 * ez, z2 + t2 * ez, z3 + s3 * ez, z3 + t3 * ez)
+        # In X's own frame: along j the pieces' ends, across it the signs that have a piece.
+        low = _lower(_lower(work[low_x + j + i], s0, s1), s2, s3)
+        work[low_x + j + i] = low
+        work[high_x + j + i] = _higher(_higher(work[high_x + j + i], t0, t1), t2, t3)
+        there0, there1, there2, there3 = s0 <= t0, s1 <= t1, s2 <= t2, s3 <= t3
+        minus = -ga if there0 or there2 else math.nan
+        plus = ga if there1 or there3 else math.nan
+        work[low_x + a + i] = _lower(work[low_x + a + i], minus, plus)
+        work[high_x + a + i] = _higher(work[high_x + a + i], minus, plus)
+        minus = -gb if there0 or there1 else math.nan
+        plus = gb if there2 or there3 else math.nan
+        work[low_x + b + i] = _lower(work[low_x + b + i], minus, plus)
+        work[high_x + b + i] = _higher(work[high_x + b + i], minus, plus)
+        _add(work, pieces, 0, i, s0, t0, x0, y0, z0, ex, ey, ez)
+        _add(work, pieces, 1, i, s1, t1, x1, y1, z1, ex, ey, ez)
+        _add(work, pieces, 2, i, s2, t2, x2, y2, z2, ex, ey, ez)
+        _add(work, pieces, 3, i, s3, t3, x3, y3, z3, ex, ey, ez)
 
 
 @inlined
-def _edges_of_a(lanes, work, j, a, b, signs_a, signs_b):
-    """A's edge, likewise; in B's frame its direction is row j of R."""
-    for i in range(lanes):
-        own_a = work[signs_a + i] * work[HALF_A + a + i]
-        own_b = work[signs_b + i] * work[HALF_A + b + i]
-        length = work[HALF_A + j + i]
-        x = (own_a * work[ROTATION + 3 * a + i] + own_b * work[ROTATION + 3 * b + i]
-             ) - work[OFFSET_B + i]
-        y = (own_a * work[ROTATION + 3 * a + LANES + i] + own_b * work[ROTATION + 3 * b + LANES + i]
-             ) - work[OFFSET_B + LANES + i]
-        z = (own_a * work[ROTATION + 3 * a + 2 * LANES + i]
-             + own_b * work[ROTATION + 3 * b + 2 * LANES + i]) - work[OFFSET_B + 2 * LANES + i]
+def _side_by_side(work, half_x, half_y, centre, along, across, low_x, high_x, low_y, high_y,
+                  pieces, j, a, b):
+    """`_four_edges` of a single pair: the four signs are four lanes."""
+    for i in range(SINGLE):
+        length = work[half_x + j + i]
+        ga, gb = work[EVEN_ODD + i] * work[half_x + a + i], work[HALVES + i] * work[half_x + b + i]
+        ex = work[ROTATION + j * along + i]
+        ey = work[ROTATION + across + j * along + i]
+        ez = work[ROTATION + 2 * across + j * along + i]
+        ix = work[INVERSE + j * along + i]
+        iy = work[INVERSE + across + j * along + i]
+        iz = work[INVERSE + 2 * across + j * along + i]
         slack = _FLUSH * work[SIZE + i]
-        half_x = work[HALF_B + i] + slack
-        half_y = work[HALF_B + LANES + i] + slack
-        half_z = work[HALF_B + 2 * LANES + i] + slack
-        s, t = _cut(-length, length, x, work[INVERSE + 3 * j + i], half_x)
-        s, t = _cut(s, t, y, work[INVERSE + 3 * j + LANES + i], half_y)
-        s, t = _cut(s, t, z, work[INVERSE + 3 * j + 2 * LANES + i], half_z)
-        there = t >= s
-        ex = work[ROTATION + 3 * j + i]
-        ey = work[ROTATION + 3 * j + LANES + i]
-        ez = work[ROTATION + 3 * j + 2 * LANES + i]
-        _note(work, LOW_B, HIGH_B, i, x + s * ex, x + t * ex, there)
-        _note(work, LOW_B + LANES, HIGH_B + LANES, i, y + s * ey, y + t * ey, there)
-        _note(work, LOW_B + 2 * LANES, HIGH_B + 2 * LANES, i, z + s * ez, z + t * ez, there)
-        _note(work, LOW_A + j, HIGH_A + j, i, s, t, there)
-        _note(work, LOW_A + a, HIGH_A + a, i, own_a, own_a, there)
-        _note(work, LOW_A + b, HIGH_A + b, i, own_b, own_b, there)
-        weight = t - s if there else 0.0
-        work[SUM + j + i] += weight * (s + t)
-        work[SUM + a + i] += weight * (2.0 * own_a)
-        work[SUM + b + i] += weight * (2.0 * own_b)
-        work[LENGTH + i] += weight
-
-
-@inlined
-def _edges(lanes, work, signs_a, signs_b):
-    """One edge of each box along each of its axes."""
-    x, y, z = 0, LANES, 2 * LANES
-    _edges_of_a(lanes, work, x, y, z, signs_a, signs_b)
-    _edges_of_a(lanes, work, y, z, x, signs_a, signs_b)
-    _edges_of_a(lanes, work, z, x, y, signs_a, signs_b)
-    _edges_of_b(lanes, work, x, y, z, signs_a, signs_b)
-    _edges_of_b(lanes, work, y, z, x, signs_a, signs_b)
-    _edges_of_b(lanes, work, z, x, y, signs_a, signs_b)
+        x = work[centre + i] + (ga * work[ROTATION + a * along + i]
+                                + gb * work[ROTATION + b * along + i])
+        y = work[centre + LANES + i] + (ga * work[ROTATION + across + a * along + i]
+                                        + gb * work[ROTATION + across + b * along + i])
+        z = work[centre + 2 * LANES + i] + (ga * work[ROTATION + 2 * across + a * along + i]
+                                            + gb * work[ROTATION + 2 * across + b * along + i])
+        s, t = _piece(x, y, z, ix, iy, iz, (work[half_y + i] + slack) * abs(ix),
+                      (work[half_y + LANES + i] + slack) * abs(iy),
+                      (work[half_y + 2 * LANES + i] + slack) * abs(iz), length)
+        work[low_y + i] = _lower(work[low_y + i], x + s * ex, x + t * ex)
+        work[high_y + i] = _higher(work[high_y + i], x + s * ex, x + t * ex)
+        work[low_y + LANES + i] = _lower(work[low_y + LANES + i], y + s * ey, y + t * ey)
+        work[high_y + LANES + i] = _higher(work[high_y + LANES + i], y + s * ey, y + t * ey)
+        work[low_y + 2 * LANES + i] = _lower(work[low_y + 2 * LANES + i], z + s * ez, z + t * ez)
+        work[high_y + 2 * LANES + i] = _higher(work[high_y + 2 * LANES + i], z + s * ez, z + t * ez)
+        ga = ga if s <= t else math.nan
+        gb = gb if s <= t else math.nan
+        work[low_x + j + i] = _lower(work[low_x + j + i], s, s)
+        work[high_x + j + i] = _higher(work[high_x + j + i], t, t)
+        work[low_x + a + i] = _lower(work[low_x + a + i], ga, ga)
+        work[high_x + a + i] = _higher(work[high_x + a + i], ga, ga)
+        work[low_x + b + i] = _lower(work[low_x + b + i], gb, gb)
+        work[high_x + b + i] = _higher(work[high_x + b + i], gb, gb)
+        _add(work, pieces, 0, i, s, t, x, y, z, ex, ey, ez)
 
 
 @kernel
 def outline_block(count, work):
     """Outlines of a block of `count` pairs; of those that do not overlap, without meaning."""
+    x, y, z = 0, LANES, 2 * LANES
     if count == 1:
-        # The four edges along an axis side by side, as if they were edges of four pairs.
         _begin(SINGLE, work)
-        _edges(SINGLE, work, EVEN_ODD, HALVES)
+        _side_by_side(work, HALF_A, HALF_B, CENTRE_A, 3, LANES, LOW_A, HIGH_A, LOW_B, HIGH_B,
+                      PIECES_A, x, y, z)
+        _side_by_side(work, HALF_A, HALF_B, CENTRE_A, 3, LANES, LOW_A, HIGH_A, LOW_B, HIGH_B,
+                      PIECES_A, y, z, x)
+        _side_by_side(work, HALF_A, HALF_B, CENTRE_A, 3, LANES, LOW_A, HIGH_A, LOW_B, HIGH_B,
+                      PIECES_A, z, x, y)
+        _side_by_side(work, HALF_B, HALF_A, CENTRE_B, 1, 3 * LANES, LOW_B, HIGH_B, LOW_A, HIGH_A,
+                      PIECES_B, x, y, z)
+        _side_by_side(work, HALF_B, HALF_A, CENTRE_B, 1, 3 * LANES, LOW_B, HIGH_B, LOW_A, HIGH_A,
+                      PIECES_B, y, z, x)
+        _side_by_side(work, HALF_B, HALF_A, CENTRE_B, 1, 3 * LANES, LOW_B, HIGH_B, LOW_A, HIGH_A,
+                      PIECES_B, z, x, y)
         _join(work)
         _finish(1, work)
     else:
-        # Summed up as a single pair's are, so that a row has the same bits alone and in a batch: the
-        # sign of a rounding error chooses the network's mirror image, so it must be the same one.
         _begin(LANES, work)
-        _edges(LANES, work, MINUS, MINUS)
-        _put_aside(work)
-        _edges(LANES, work, PLUS, MINUS)
-        _put_aside(work)
-        _edges(LANES, work, MINUS, PLUS)
-        _put_aside(work)
-        _edges(LANES, work, PLUS, PLUS)
-        _add_aside(work)
+        _four_edges(work, HALF_A, HALF_B, CENTRE_A, 3, LANES, LOW_A, HIGH_A, LOW_B, HIGH_B,
+                    PIECES_A, x, y, z)
+        _four_edges(work, HALF_A, HALF_B, CENTRE_A, 3, LANES, LOW_A, HIGH_A, LOW_B, HIGH_B,
+                    PIECES_A, y, z, x)
+        _four_edges(work, HALF_A, HALF_B, CENTRE_A, 3, LANES, LOW_A, HIGH_A, LOW_B, HIGH_B,
+                    PIECES_A, z, x, y)
+        _four_edges(work, HALF_B, HALF_A, CENTRE_B, 1, 3 * LANES, LOW_B, HIGH_B, LOW_A, HIGH_A,
+                    PIECES_B, x, y, z)
+        _four_edges(work, HALF_B, HALF_A, CENTRE_B, 1, 3 * LANES, LOW_B, HIGH_B, LOW_A, HIGH_A,
+                    PIECES_B, y, z, x)
+        _four_edges(work, HALF_B, HALF_A, CENTRE_B, 1, 3 * LANES, LOW_B, HIGH_B, LOW_A, HIGH_A,
+                    PIECES_B, z, x, y)
         _finish(LANES, work)
 
 
 @inlined
 def _begin(lanes, work):
-    for k in range(9):
+    for k in range(0, 9 * LANES, 3 * LANES):
         for i in range(lanes):
-            r = work[ROTATION + k * LANES + i]
-            work[INVERSE + k * LANES + i] = 1.0 / (r if abs(r) > _PARALLEL else _PARALLEL)
-    for k in range(3):
+            # Three reciprocals for one division, which costs as much as ten multiplications.
+            r0, r1, r2 = (work[ROTATION + k + i], work[ROTATION + k + LANES + i],
+                          work[ROTATION + k + 2 * LANES + i])
+            r0 = r0 if abs(r0) > _PARALLEL else _PARALLEL
+            r1 = r1 if abs(r1) > _PARALLEL else _PARALLEL
+            r2 = r2 if abs(r2) > _PARALLEL else _PARALLEL
+            inverse = 1.0 / (r0 * (r1 * r2))
+            work[INVERSE + k + i] = inverse * (r1 * r2)
+            work[INVERSE + k + LANES + i] = inverse * (r0 * r2)
+            work[INVERSE + k + 2 * LANES + i] = inverse * (r0 * r1)
+    for k in range(0, 3 * LANES, LANES):
         for i in range(lanes):
-            work[LOW_A + k * LANES + i] = _NOWHERE
-            work[LOW_B + k * LANES + i] = _NOWHERE
-            work[HIGH_A + k * LANES + i] = -_NOWHERE
-            work[HIGH_B + k * LANES + i] = -_NOWHERE
-            work[SUM + k * LANES + i] = 0.0
-            work[MIDDLE + k * LANES + i] = 0.0
-    for i in range(lanes):
-        work[LENGTH + i] = 0.0
-        work[IN_B + i] = 0.0
-
-
-@inlined
-def _put_aside(work):
-    """Sums so far, of a fourth of the edges each: four rows that `_finish` is first to need."""
-    for i in range(LANES):
-        work[IN_B + i] += work[LENGTH + i]
-        work[LENGTH + i] = 0.0
-    for k in range(0, 3 * LANES, LANES):
-        for i in range(LANES):
-            work[MIDDLE + k + i] += work[SUM + k + i]
-            work[SUM + k + i] = 0.0
-
-
-@inlined
-def _add_aside(work):
-    for i in range(LANES):
-        work[LENGTH + i] = work[IN_B + i] + work[LENGTH + i]
-    for k in range(0, 3 * LANES, LANES):
-        for i in range(LANES):
-            work[SUM + k + i] = work[MIDDLE + k + i] + work[SUM + k + i]
+            work[CENTRE_A + k + i] = -work[OFFSET_B + k + i]
+            work[CENTRE_B + k + i] = work[OFFSET_A + k + i]
+            work[LOW_A + k + i] = _NOWHERE
+            work[LOW_B + k + i] = _NOWHERE
+            work[HIGH_A + k + i] = -_NOWHERE
+            work[HIGH_B + k + i] = -_NOWHERE
+    for k in range(0, 16 * LANES, LANES):
+        for i in range(lanes):
+            work[PIECES_A + k + i] = 0.0
+            work[PIECES_B + k + i] = 0.0
 
 
 @inlined
 def _join(work):
-    """Put what SINGLE lanes found of one pair together in the first."""
+    """Put what the four lanes of a single pair found into the first."""
     for k in range(0, 3 * LANES, LANES):
         for i in range(1, SINGLE):
             work[LOW_A + k] = min(work[LOW_A + k], work[LOW_A + k + i])
             work[HIGH_A + k] = max(work[HIGH_A + k], work[HIGH_A + k + i])
             work[LOW_B + k] = min(work[LOW_B + k], work[LOW_B + k + i])
             work[HIGH_B + k] = max(work[HIGH_B + k], work[HIGH_B + k + i])
-            work[SUM + k] += work[SUM + k + i]
     for i in range(1, SINGLE):
-        work[LENGTH] += work[LENGTH + i]
+        work[PIECES_A + i * LANES] = work[PIECES_A + i]
+        work[PIECES_B + i * LANES] = work[PIECES_B + i]
+        for k in range(3):
+            place = (4 + 3 * i + k) * LANES
+            work[PIECES_A + place] = work[PIECES_A + (4 + k) * LANES + i]
+            work[PIECES_B + place] = work[PIECES_B + (4 + k) * LANES + i]
+
+
+@inlined
+def _total(work, pieces, i):
+    """Sum over the four signs of a length (pieces to its first row, a row apart)."""
+    return ((work[pieces + i] + work[pieces + LANES + i]) + work[pieces + 2 * LANES + i]
+            ) + work[pieces + 3 * LANES + i]
+
+
+@inlined
+def _total3(work, pieces, k, i):
+    """Likewise of component k of the sums."""
+    place = pieces + (4 + k) * LANES + i
+    return ((work[place] + work[place + 3 * LANES]) + work[place + 6 * LANES]
+            ) + work[place + 9 * LANES]
 
 
 @inlined
@@ -249,20 +322,34 @@ def _finish(lanes, work):
                   * (work[HIGH_B + 2 * LANES + i] - work[LOW_B + 2 * LANES + i]))
         in_b = size_b < (1.0 - _ALIKE) * size_a
         work[IN_B + i] = 1.0 if in_b else 0.0
-        # The point inside, first in A's frame, then in B's: Rᵀ (p − t).
-        scale = 0.5 / work[LENGTH + i]
-        x = work[SUM + i] * scale
-        y = work[SUM + LANES + i] * scale
-        z = work[SUM + 2 * LANES + i] * scale
-        bx = (work[ROTATION + i] * x + work[ROTATION + 3 * LANES + i] * y
-              + work[ROTATION + 6 * LANES + i] * z) - work[OFFSET_B + i]
-        by = (work[ROTATION + LANES + i] * x + work[ROTATION + 4 * LANES + i] * y
-              + work[ROTATION + 7 * LANES + i] * z) - work[OFFSET_B + LANES + i]
-        bz = (work[ROTATION + 2 * LANES + i] * x + work[ROTATION + 5 * LANES + i] * y
-              + work[ROTATION + 8 * LANES + i] * z) - work[OFFSET_B + 2 * LANES + i]
-        _choose(work, 0, i, in_b, x, bx)
-        _choose(work, LANES, i, in_b, y, by)
-        _choose(work, 2 * LANES, i, in_b, z, bz)
+        # The point inside, in A's frame and in B's: means over A's edges and over B's, each in the
+        # frame that they were cut in, are brought to the other frame and added.
+        length_a, length_b = _total(work, PIECES_A, i), _total(work, PIECES_B, i)
+        scale = 0.5 / (length_a + length_b)
+        share = 2.0 * (length_a * scale)
+        ax, ay, az = (_total3(work, PIECES_A, 0, i) * scale, _total3(work, PIECES_A, 1, i) * scale,
+                      _total3(work, PIECES_A, 2, i) * scale)
+        bx, by, bz = (_total3(work, PIECES_B, 0, i) * scale, _total3(work, PIECES_B, 1, i) * scale,
+                      _total3(work, PIECES_B, 2, i) * scale)
+        _choose(work, 0, i, in_b, _turned(work, ROTATION, LANES, i, ax, ay, az)
+                + (share * work[CENTRE_B + i] + bx),
+                _turned(work, ROTATION, 3 * LANES, i, bx, by, bz)
+                + ((1.0 - share) * work[CENTRE_A + i] + ax))
+        _choose(work, LANES, i, in_b, _turned(work, ROTATION + 3 * LANES, LANES, i, ax, ay, az)
+                + (share * work[CENTRE_B + LANES + i] + by),
+                _turned(work, ROTATION + LANES, 3 * LANES, i, bx, by, bz)
+                + ((1.0 - share) * work[CENTRE_A + LANES + i] + ay))
+        _choose(work, 2 * LANES, i, in_b,
+                _turned(work, ROTATION + 6 * LANES, LANES, i, ax, ay, az)
+                + (share * work[CENTRE_B + 2 * LANES + i] + bz),
+                _turned(work, ROTATION + 2 * LANES, 3 * LANES, i, bx, by, bz)
+                + ((1.0 - share) * work[CENTRE_A + 2 * LANES + i] + az))
+
+
+@inlined
+def _turned(work, first, step, i, x, y, z):
+    """A row (step LANES) or a column (step 3 · LANES) of R times a vector."""
+    return (work[first + i] * x + work[first + step + i] * y) + work[first + 2 * step + i] * z
 
 
 @inlined

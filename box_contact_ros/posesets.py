@@ -76,15 +76,15 @@ def any_pose(rng: np.random.Generator, size_a: np.ndarray, size_b: np.ndarray,
 
 
 def stacked(rng: np.random.Generator, size: tuple[float, float, float], tilt: np.ndarray,
-            yaw: np.ndarray, depth: np.ndarray) -> Pairs:
+            yaw: np.ndarray, depth: np.ndarray, *, spread: float = 0.98) -> Pairs:
     """One box on another of the same size, tilted about a random level axis, turned by yaw, [rad],
-    anywhere on it."""
+    off its middle by up to `spread` of the size."""
     n = len(tilt)
     sizes = np.tile(np.array(size), (n, 1))
     heading = rng.uniform(-np.pi, np.pi, n)
     level = np.stack([np.cos(heading), np.sin(heading), np.zeros(n)], axis=1)
     turn = quaternion_multiply(turns(level, tilt), turns((0.0, 0.0, 1.0), yaw))
-    place = np.concatenate([0.98 * rng.uniform(-1, 1, (n, 2)) * sizes[:, :2],
+    place = np.concatenate([spread * rng.uniform(-1, 1, (n, 2)) * sizes[:, :2],
                             0.98 * sizes[:, 2:]], axis=1)
     a = np.tile([0.0, 0, 0, 0, 0, 0, 1], (n, 1))
     return pressed(Pairs(a, np.concatenate([place, turn], axis=1), sizes, sizes), depth)

@@ -46,10 +46,30 @@ PROGRAMS = {
         'a MuJoCo crane that lowers one container onto another and publishes both poses',
         ('ros', 'sim'),
     ),
+    'soup_node': Program(
+        'box_contact_ros.nodes.soup:main',
+        'the same node on a polygon soup, under soup/: what the source paper compares with',
+        ('ros', 'soup'),
+    ),
+    'bench': Program(
+        'box_contact_ros.nodes.bench:main',
+        'drive contact, soup and echo node with streams of poses: latency, losses, errors',
+        ('ros', 'sim', 'soup', 'report'),
+    ),
     'train': Program(
         'box_contact_ros.training.train:main',
         'make the data sets, fit the networks, write weights/',
         ('train',),
+    ),
+    'search': Program(
+        'box_contact_ros.training.search:main',
+        'train thousands of networks at once to find the size and settings that they should have',
+        ('train', 'report'),
+    ),
+    'accuracy': Program(
+        'box_contact_ros.report.accuracy:main',
+        'point error of a model against the exact one, per set of poses and contact class',
+        ('report',),
     ),
     'paper': Program(
         'box_contact_ros.report.paper:main',

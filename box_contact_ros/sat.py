@@ -159,48 +159,59 @@ def _query(lanes, work):
 
 
 @inlined
-def _entry(work, i, row, column):
-    return work[ROTATION + (3 * row + column) * LANES + i]
+def _one_of(k, x0, x1, x2):
+    return x0 if k == 0.0 else (x1 if k == 1.0 else x2)
 
 
 @inlined
 def _normals(lanes, work):
     """The winning axes as unit vectors from A to B, in A's frame."""
     for i in range(lanes):
-        axis = int(work[AXIS + i])
+        r00 = work[ROTATION + i]
+        r01 = work[ROTATION + LANES + i]
+        r02 = work[ROTATION + 2 * LANES + i]
+        r10 = work[ROTATION + 3 * LANES + i]
+        r11 = work[ROTATION + 4 * LANES + i]
+        r12 = work[ROTATION + 5 * LANES + i]
+        r20 = work[ROTATION + 6 * LANES + i]
+        r21 = work[ROTATION + 7 * LANES + i]
+        r22 = work[ROTATION + 8 * LANES + i]
+        ta0, ta1, ta2 = (work[OFFSET_A + i], work[OFFSET_A + LANES + i],
+                         work[OFFSET_A + 2 * LANES + i])
+        tb0, tb1, tb2 = (work[OFFSET_B + i], work[OFFSET_B + LANES + i],
+                         work[OFFSET_B + 2 * LANES + i])
+        axis = work[AXIS + i]
         # A face of A or of B: a unit vector, or a column of R.
-        k = axis % 3
-        of_a = axis < 3
-        s = 1.0 if (work[(OFFSET_A if of_a else OFFSET_B) + k * LANES + i]) >= 0.0 else -1.0
-        x = (1.0 if k == 0 else 0.0) if of_a else _entry(work, i, 0, k)
-        y = (1.0 if k == 1 else 0.0) if of_a else _entry(work, i, 1, k)
-        z = (1.0 if k == 2 else 0.0) if of_a else _entry(work, i, 2, k)
-        x, y, z = s * x, s * y, s * z
-        # A pair of edges, in the very frame in which the query evaluated it: (0, −u2, u1) across
-        # the first box's edge e, in cyclic order.
+        of_a = axis < 3.0
+        k = axis if of_a else axis - 3.0
+        x = (1.0 if k == 0.0 else 0.0) if of_a else _one_of(k, r00, r01, r02)
+        y = (1.0 if k == 1.0 else 0.0) if of_a else _one_of(k, r10, r11, r12)
+        z = (1.0 if k == 2.0 else 0.0) if of_a else _one_of(k, r20, r21, r22)
+        along = _one_of(k, ta0, ta1, ta2) if of_a else _one_of(k, tb0, tb1, tb2)
+        # A pair of edges, in the very frame in which the query evaluated it: the first box's edge e
+        # crossed with u, the other box's, which is a column of R or of its transpose.
         first = work[A_FIRST + i] > 0.5
-        number = max(axis - 6, 0)
-        of_first = number // 3 if first else number % 3
-        other = number % 3 if first else number // 3
-        p = 0 if of_first == 2 else of_first + 1
-        q = 0 if p == 2 else p + 1
-        u1 = _entry(work, i, p if first else other, other if first else p)
-        u2 = _entry(work, i, q if first else other, other if first else q)
-        offset = OFFSET_A if first else OFFSET_B
-        along = work[offset + q * LANES + i] * u1 - work[offset + p * LANES + i] * u2
-        length2 = u1 * u1 + u2 * u2
-        s = (1.0 if along >= 0.0 else -1.0) / math.sqrt(length2 if length2 > 0.0 else 1.0)
-        at_p, at_q = -s * u2, s * u1
-        e0 = at_p if p == 0 else (at_q if q == 0 else 0.0)
-        e1 = at_p if p == 1 else (at_q if q == 1 else 0.0)
-        e2 = at_p if p == 2 else (at_q if q == 2 else 0.0)
-        f0 = e0 if first else (
-            at_p * _entry(work, i, 0, p) + at_q * _entry(work, i, 0, q))
-        f1 = e1 if first else (
-            at_p * _entry(work, i, 1, p) + at_q * _entry(work, i, 1, q))
-        f2 = e2 if first else (
-            at_p * _entry(work, i, 2, p) + at_q * _entry(work, i, 2, q))
-        edges = axis >= 6
-        work[NORMAL + i] = f0 if edges else x
-        work[NORMAL + LANES + i] = f1 if edges else y
-        work[NORMAL + 2 * LANES + i] = f2 if edges else z
+        number = axis - 6.0
+        row = 0.0 if number < 3.0 else (1.0 if number < 6.0 else 2.0)
+        column = number - 3.0 * row
+        e = row if first else column
+        j = column if first else row
+        u0 = _one_of(j, r00, r01 if first else r10, r02 if first else r20)
+        u1 = _one_of(j, r10 if first else r01, r11, r12 if first else r21)
+        u2 = _one_of(j, r20 if first else r02, r21 if first else r12, r22)
+        n0 = _one_of(e, 0.0, u2, -u1)
+        n1 = _one_of(e, -u2, 0.0, u0)
+        n2 = _one_of(e, u1, -u0, 0.0)
+        t0, t1, t2 = (ta0 if first else tb0), (ta1 if first else tb1), (ta2 if first else tb2)
+        length2 = (n0 * n0 + n1 * n1) + n2 * n2
+        edges = axis >= 6.0
+        along = (t0 * n0 + t1 * n1) + t2 * n2 if edges else along
+        s = 1.0 if along >= 0.0 else -1.0
+        f = s / math.sqrt(length2 if length2 > 0.0 else 1.0)
+        n0, n1, n2 = f * n0, f * n1, f * n2
+        m0 = n0 if first else (r00 * n0 + r01 * n1) + r02 * n2
+        m1 = n1 if first else (r10 * n0 + r11 * n1) + r12 * n2
+        m2 = n2 if first else (r20 * n0 + r21 * n1) + r22 * n2
+        work[NORMAL + i] = m0 if edges else s * x
+        work[NORMAL + LANES + i] = m1 if edges else s * y
+        work[NORMAL + 2 * LANES + i] = m2 if edges else s * z

@@ -20,8 +20,12 @@ MODELS = {
     'paper': "the paper's network 6-20-18-4; two equal cubes, or the crane's containers",
     'paper-continuous': "the paper's networks 6-20-17-4 on subsets without jumps; two equal cubes",
     'fcl': "FCL's box-box, its deepest contact; any sizes; needs python-fcl; a baseline",
+    'soup': 'polygon soup on FCL, 8 divisions an edge, or N: soup-N; needs python-fcl; a baseline',
 }
 """Models by name, with a line about each."""
+
+SOUP_DIVISIONS, MOST_SOUP_DIVISIONS = 8, 64
+"""Divisions of an edge in model `soup`, and the most that are accepted (49,152 triangles a box)."""
 
 
 # Looked up once: a single call takes little more than a microsecond.
@@ -53,6 +57,19 @@ class SingleModel(Model, Protocol):
         """
 
 
+def soup_divisions(name: str) -> int | None:
+    """N of a model name `soup` or `soup-N`, None for any other; ValueError for a bad N."""
+    if name == 'soup':
+        return SOUP_DIVISIONS
+    if not name.startswith('soup-'):
+        return None
+    text = name.removeprefix('soup-')
+    if text.isascii() and text.isdecimal() and 1 <= int(text) <= MOST_SOUP_DIVISIONS:
+        return int(text)
+    raise ValueError(f'model {name!r}: the divisions N of soup-N must be a whole number from 1 to '
+                     f'{MOST_SOUP_DIVISIONS}')
+
+
 def make_model(name: str, size_a: np.ndarray, size_b: np.ndarray, weights: str | None) -> Model:
     """The model of that name for boxes of full extents (1, 3); `weights` names a file or is None.
 
@@ -70,6 +87,11 @@ def make_model(name: str, size_a: np.ndarray, size_b: np.ndarray, weights: str |
         from .fcl_box import FclBox  # only here: python-fcl is an extra
 
         return FclBox()
+    divisions = soup_divisions(name)
+    if divisions is not None:
+        from .soup import Soup  # likewise
+
+        return Soup(divisions)
     raise ValueError(f'model {name!r} is not one of: {", ".join(MODELS)}')
 
 
@@ -86,10 +108,10 @@ class ContactSolver:
     `ValueError`, with the field and the value, for anything that is not a size or a pose.
     A solver keeps scratch memory: use one per thread.
 
-    model: one of `MODELS`; weights: a file to use in place of the shipped weights.
+    model: one of `MODELS`, or soup-N; weights: a file to use in place of the shipped weights.
     """
 
-    def __init__(self, size_a: ArrayLike, size_b: ArrayLike, *, model: str = 'exact',
+    def __init__(self, size_a: ArrayLike, size_b: ArrayLike, *, model: str = 'committee',
                  weights: str | None = None) -> None:
         self._size_a = as_size(size_a, 'size_a')
         self._size_b = as_size(size_b, 'size_b')
@@ -116,6 +138,11 @@ class ContactSolver:
         if verdict < 0:
             return self._converted(pose_a, pose_b)  # which knows the words
         return _new_tuple(Contact, (verdict == TOUCHING, separation, normal, point))
+
+    @property
+    def exact_answers(self) -> int:
+        """Contacts so far that the model handed to `exact`: see `committee`."""
+        return int(getattr(self._solver, 'exact_answers', 0))
 
     def _converted(self, pose_a: ArrayLike, pose_b: ArrayLike) -> Contact:
         """A single call for poses of any kind, or the reason why they are refused."""

@@ -49,7 +49,7 @@ def test_answers_with_point_normal_and_cloud(node, client):
     """All three messages carry the poses' stamp and frame, and the solver's numbers."""
     client.offer_until_answered(ORIGIN, APART)
     stamp = client.ask(ORIGIN, TOUCHING, frames=('yard', 'yard'))
-    wanted = ContactSolver(poses.CUBE, poses.CUBE)(ORIGIN, TOUCHING)
+    wanted = ContactSolver(poses.CUBE, poses.CUBE, model='exact')(ORIGIN, TOUCHING)
     point, normal, cloud = client.points[stamp], client.normals[stamp], client.clouds[stamp]
     assert point.header == normal.header == cloud.header
     assert point.header.frame_id == 'yard'

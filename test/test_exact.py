@@ -52,7 +52,7 @@ def test_flush_containers(gap, shift):
     """A container on another, sides exactly in one plane (or half overhanging): the middle of the
     patch, at half the depth. Counting a shared side twice would move it."""
     length, width, height = poses.CONTAINER
-    solver = ContactSolver(poses.CONTAINER, poses.CONTAINER)
+    solver = ContactSolver(poses.CONTAINER, poses.CONTAINER, model='exact')
     contact = solver(poses.IDENTITY, (*shift, height + gap, 0, 0, 0, 1))
     assert contact.colliding
     assert contact.separation == pytest.approx(gap, abs=1e-14)
@@ -69,7 +69,7 @@ def test_vertex_on_face_at_touch_is_the_vertex():
     turned = poses.rotate(np.tile(turn, (8, 1)), corners)
     lowest = turned[np.argmin(turned[:, 2])]
     b = np.concatenate([np.array([0.3, -0.2, 1.0]) - lowest, turn[0]])
-    contact = ContactSolver(poses.CUBE, poses.CUBE)(a, b)
+    contact = ContactSolver(poses.CUBE, poses.CUBE, model='exact')(a, b)
     assert contact.colliding
     assert contact.point == pytest.approx((0.3, -0.2, 1.0), abs=2e-8)
 
@@ -80,7 +80,7 @@ def test_edges_crossing_at_touch_is_the_crossing():
     up = poses.small_rotations(np.array([[1.0, 0, 0], [0, 1.0, 0]]), np.full(2, np.pi / 4))
     a = np.concatenate([(0, 0, 0), up[0]])
     b = np.concatenate([(0.25, -0.5, 2 * np.sqrt(2)), up[1]])
-    contact = ContactSolver(poses.CUBE, poses.CUBE)(a, b)
+    contact = ContactSolver(poses.CUBE, poses.CUBE, model='exact')(a, b)
     assert contact.colliding
     assert contact.normal == pytest.approx((0, 0, 1), abs=1e-12)
     # A's ridge is y = 0, B's is x = 0.25.
@@ -89,7 +89,8 @@ def test_edges_crossing_at_touch_is_the_crossing():
 
 def test_small_box_inside_a_large_one():
     """Full containment: depth is the way out through the nearest face, the point B's centre."""
-    contact = ContactSolver((10, 10, 10), (1, 1, 1))(poses.IDENTITY, (4, 0.5, 0.25, 0, 0, 0, 1))
+    solver = ContactSolver((10, 10, 10), (1, 1, 1), model='exact')
+    contact = solver(poses.IDENTITY, (4, 0.5, 0.25, 0, 0, 0, 1))
     assert contact.separation == pytest.approx(-1.5, abs=1e-14)
     assert contact.normal.tolist() == [1, 0, 0]
     assert contact.point == pytest.approx((4, 0.5, 0.25), abs=1e-14)
@@ -97,5 +98,6 @@ def test_small_box_inside_a_large_one():
 
 def test_thin_box_through_a_slab():
     """A bar that sticks out of a slab on both sides: clamped to the slab's thickness."""
-    contact = ContactSolver((4, 4, 0.5), (0.2, 0.2, 3))(poses.IDENTITY, (1, 0.5, 0.6, 0, 0, 0, 1))
+    solver = ContactSolver((4, 4, 0.5), (0.2, 0.2, 3), model='exact')
+    contact = solver(poses.IDENTITY, (1, 0.5, 0.6, 0, 0, 0, 1))
     assert contact.point == pytest.approx((1, 0.5, 0), abs=1e-14)

@@ -45,7 +45,8 @@ def test_the_normal_is_sats_up_to_the_axis_chosen():
         return np.column_stack([rng.uniform(-1, 1, (count, 2)), rng.uniform(1.8, 1.95, count)])
 
     a, b = pairs_of(poses.CUBE, above)
-    found, exact = CUBES.batch(a, b), ContactSolver(poses.CUBE, poses.CUBE).batch(a, b)
+    found, exact = CUBES.batch(a, b), ContactSolver(
+        poses.CUBE, poses.CUBE, model='exact').batch(a, b)
     assert np.array_equal(found.colliding, exact.colliding) and found.colliding.all()
     assert np.linalg.norm(found.normal, axis=1) == pytest.approx(np.ones(len(a)))
     apart = b.copy()
@@ -62,7 +63,7 @@ def test_the_point_is_the_deepest_corner():
     size = poses.CONTAINER
     b = np.array([0.0, 0.0, size[2] - 0.1, 0.0, np.sin(0.005), 0.0, np.cos(0.005)])
     deepest = ContactSolver(size, size, model='fcl')(IDENTITY, b)
-    exact = ContactSolver(size, size)(IDENTITY, b)
+    exact = ContactSolver(size, size, model='exact')(IDENTITY, b)
     assert deepest.point[0] == pytest.approx(size[0] / 2, abs=0.05)
     assert abs(deepest.point[1]) == pytest.approx(size[1] / 2, abs=0.01)
     assert abs(exact.point[0]) < 2.0

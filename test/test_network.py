@@ -250,11 +250,13 @@ def cells(page: str) -> list[str]:
 
 
 def test_tables_in_the_docs_are_the_shipped_weights(tmp_path: Path) -> None:
-    """docs/paper_tables.md is what the program writes; figures may differ by their rounding."""
+    """Tables 1 and 2 of docs/paper_tables.md, the first ones there, are what the program writes;
+    figures may differ by their rounding. (The others hold times: see test_paper_soup.)"""
     docs = Path(__file__).parents[1] / 'docs' / 'paper_tables.md'
-    assert paper.main(['--out', str(tmp_path / 'new' / 'page.md')]) == 0
+    assert paper.main(['--table', '1', '--table', '2',
+                       '--out', str(tmp_path / 'new' / 'page.md')]) == 0
     old, new = cells(docs.read_text()), cells((tmp_path / 'new' / 'page.md').read_text())
-    assert len(old) == len(new) > 100
+    assert len(old) > len(new) > 100
     for before, after in zip(old, new):
         try:
             assert abs(float(before) - float(after)) < 1.5e-4
@@ -265,7 +267,7 @@ def test_tables_in_the_docs_are_the_shipped_weights(tmp_path: Path) -> None:
 def test_paper_program(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
                        tmp_path: Path) -> None:
     """Quick: the paper's figures, a tenth of the patterns, said so. Without weights: one line."""
-    assert paper.main(['--quick']) == 0
+    assert paper.main(['--quick', '--table', '1', '--table', '2']) == 0
     page = capsys.readouterr().out
     assert '0.5624' in page and '0.4523' in page and '7,500' in page and 'every 10th' in page
     monkeypatch.setattr(paper, 'resource_path', lambda *parts: tmp_path.joinpath(*parts))

@@ -36,7 +36,7 @@ def make(name):
 def touching(size, n=4000, depth=0.0, seed=9):
     """Pairs of equal boxes in any orientation, `depth` [m] deep along SAT's normal."""
     rng = np.random.default_rng(seed)
-    exact = ContactSolver(size, size)
+    exact = ContactSolver(size, size, model='exact')
     a = np.concatenate([rng.uniform(-9, 9, (n, 3)), poses.unit_quaternions(rng, n)], axis=1)
     within = poses.rotate(a[:, 3:], rng.uniform(-0.5, 0.5, (n, 3)) * size)
     turn = poses.unit_quaternions(rng, n)

@@ -16,7 +16,7 @@ from box_contact_ros import Contact, ContactSolver
 from box_contact_ros.checks import pose_fault
 from box_contact_ros.pose import quaternion_from_matrix, quaternion_multiply, rotation_matrix
 
-SOLVER = ContactSolver(poses.CUBE, poses.CUBE)
+SOLVER = ContactSolver(poses.CUBE, poses.CUBE, model='exact')
 ABOVE = [0.5, 0.25, 1.875, 0, 0, 0, 1]
 
 
@@ -188,7 +188,7 @@ def test_works_without_a_writable_cache():
     code = ('import numba.core.caching as caching; '
             'caching.CacheImpl._locator_classes = []; '  # as if no folder could be written
             'from box_contact_ros import ContactSolver; '
-            's = ContactSolver((2, 2, 2), (2, 2, 2)); '
+            "s = ContactSolver((2, 2, 2), (2, 2, 2), model='exact'); "
             'print(s([0, 0, 0, 0, 0, 0, 1], [0, 0, 1.5, 0, 0, 0, 1]).separation)')
     result = subprocess.run([sys.executable, '-W', 'always', '-c', code], capture_output=True,
                             text=True, timeout=240, check=False)

@@ -175,7 +175,7 @@ def test_a_folder_that_cannot_be_written_is_said_at_once(
 
 @pytest.mark.parametrize(('arguments', 'message'), [
     (['--quick'], 'name a folder with --out'),
-    (['papers'], "'papers' is not one of paper, paper-continuous, containers, all"),
+    (['papers'], "'papers' is not one of paper, paper-continuous, containers, committee, all"),
     (['paper', '--starts', '0'], '--starts 0 is too small'),
     (['paper', '--seed', '-1'], '--seed -1 is too small'),
 ])

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import gc
 from collections import Counter
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -22,17 +22,23 @@ from sensor_msgs.msg import PointCloud2
 
 from ..checks import pose_fault
 from ..pairing import PAIRINGS
-from ..solver import MODELS, ContactSolver
+from ..solver import MODELS, ContactSolver, soup_divisions
 from .messages import StampedPose, make_cloud, make_header, make_normal, make_point, read_pose
 from .parameters import Setting, answer_help, checked, declare, numbers, one_of, text
 from .runtime import CONTACT_QOS, POSE_QOS, run_node
+
+
+def model_name(name: str, value: Any) -> str:
+    """One of the models, or soup-N."""
+    return value if soup_divisions(text(name, value)) else one_of(MODELS)(name, value)
+
 
 CONTAINER = (12.192, 2.438, 2.591)  # ISO 40 ft [m]
 PARAMETERS = {
     'size_a': Setting(CONTAINER, 'full extents of box A, three numbers > 0 [m]', numbers(3)),
     'size_b': Setting(CONTAINER, 'full extents of box B, three numbers > 0 [m]', numbers(3)),
-    'model': Setting('paper', f'how the contact point is found: {", ".join(MODELS)}',
-                     one_of(MODELS)),
+    'model': Setting('committee', f'how the contact point is found: {", ".join(MODELS)}',
+                     model_name),
     'weights': Setting('', 'weights file to use in place of the shipped one', text),
     'pairing': Setting('stamp', 'stamp: answer once, when poses of equal stamp are in; latest: '
                                 "answer every pose with the other box's last", one_of(PAIRINGS)),
@@ -43,20 +49,29 @@ LOG_SECONDS = 1.0         # the same complaint is logged at most this often
 
 
 class ContactNode(Node):
-    """Answers pairs of poses; every pose that is refused is counted and said, never answered."""
+    """Answers pairs of poses; every pose that is refused is counted and said, never answered.
+
+    A node on another method derives from this one: it names itself, a prefix of its contact topics,
+    its parameters (with `size_a`, `size_b` and `pairing`), and makes the solver from them.
+    """
+
+    name: ClassVar[str] = 'contact_node'
+    prefix: ClassVar[str] = ''
+    parameters: ClassVar[Mapping[str, Setting]] = PARAMETERS
 
     def __init__(self, context: Context, **options: Any) -> None:
-        super().__init__('contact_node', context=context, **options)
+        super().__init__(self.name, context=context, **options)
         self._settings: dict[str, Any] = {}
-        self._apply(declare(self, PARAMETERS))
+        self._apply(declare(self, self.parameters))
         self.add_on_set_parameters_callback(self._set_parameters)
         self.counts: Counter[str] = Counter()
         self._reported: Counter[str] = Counter()  # the counts of the last report
         self._waiting_since: float | None = None
         self._compute: list[float] = []
-        self._point = self.create_publisher(PointStamped, 'contact/point', CONTACT_QOS)
-        self._normal = self.create_publisher(Vector3Stamped, 'contact/normal', CONTACT_QOS)
-        self._contacts = self.create_publisher(PointCloud2, 'contacts', CONTACT_QOS)
+        self._point, self._normal, self._contacts = (
+            self.create_publisher(kind, f'{self.prefix}{topic}', CONTACT_QOS)
+            for kind, topic in ((PointStamped, 'contact/point'),
+                                (Vector3Stamped, 'contact/normal'), (PointCloud2, 'contacts')))
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self.create_timer(1.0, self._report)
         # Whatever start-up made stays for good: keep it out of later collections.
@@ -65,15 +80,21 @@ class ContactNode(Node):
         for box, topic in enumerate(('box_a/pose', 'box_b/pose')):
             self.create_subscription(PoseStamped, topic, self._pose_callback(box), POSE_QOS)
         self.get_logger().info(
-            f'ready: model {self._settings["model"]!r}, pairing {self._settings["pairing"]!r}')
+            f'ready: model {self._solver.model!r}, pairing {self._settings["pairing"]!r}')
+
+    @staticmethod
+    def make_solver(settings: Mapping[str, Any]) -> ContactSolver:
+        """The solver that checked parameters ask for; ValueError if there is none."""
+        return ContactSolver(settings['size_a'], settings['size_b'], model=settings['model'],
+                             weights=settings['weights'] or None)
 
     def _now(self) -> float:
         return self.get_clock().now().nanoseconds * 1e-9
 
     def _set_parameters(self, parameters: list[Parameter]) -> SetParametersResult:
-        changes = {p.name: p.value for p in parameters if p.name in PARAMETERS}
+        changes = {p.name: p.value for p in parameters if p.name in self.parameters}
         try:
-            self._apply(checked(PARAMETERS, {**self._settings, **changes}))
+            self._apply(checked(self.parameters, {**self._settings, **changes}))
         except (ValueError, ImportError) as error:  # a model's library may be missing
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
@@ -82,9 +103,11 @@ class ContactNode(Node):
         """Take settings over as a whole, or raise ValueError and keep the old."""
         if settings == self._settings:
             return
-        solver = ContactSolver(settings['size_a'], settings['size_b'], model=settings['model'],
-                               weights=settings['weights'] or None)
-        solver(np.eye(7)[6], np.eye(7)[6])  # compiles, or loads, the kernels before they are needed
+        solver = self.make_solver(settings)
+        # Compiles, or loads, the kernels before they are needed. Only a corner overlaps: where
+        # faces coincide, a soup takes seconds.
+        corner = 0.49 * np.add(settings['size_a'], settings['size_b'])
+        solver(np.eye(7)[6], np.array((*corner, 0, 0, 0, 1)))
         if settings['pairing'] != self._settings.get('pairing'):
             self._pairing = PAIRINGS[settings['pairing']]()
         self._solver, self._settings = solver, settings

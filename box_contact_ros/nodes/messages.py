@@ -28,7 +28,7 @@ _FIELDS = [
 class StampedPose:
     """A pose as it came: 7 numbers `x y z qx qy qz qw`, frame and stamp [ns]."""
 
-    numbers: tuple[float, float, float, float, float, float, float]
+    numbers: np.ndarray
     frame_id: str
     stamp: int
 
@@ -37,7 +37,7 @@ def read_pose(message: PoseStamped) -> StampedPose:
     """The numbers of a message, unchecked."""
     p, q = message.pose.position, message.pose.orientation
     stamp = message.header.stamp
-    return StampedPose((p.x, p.y, p.z, q.x, q.y, q.z, q.w), message.header.frame_id,
+    return StampedPose(np.array((p.x, p.y, p.z, q.x, q.y, q.z, q.w)), message.header.frame_id,
                        stamp.sec * NANOSECONDS + stamp.nanosec)
 
 

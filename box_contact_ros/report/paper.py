@@ -1,14 +1,17 @@
-"""Program `paper`: Tables 1 and 2 of the source paper, its figures beside ours, as Markdown.
+"""Program `paper`: the source paper's Tables 1 to 4 and Figures 9 and 10, redone, as Markdown.
 
-The data sets are made again from the seed in each model card, and the shipped weights are run on
-them by the kernel that the solver uses. Nothing is copied from the cards, and PyTorch is not used.
+Tables 1 and 2, Figure 9: the data sets are made again from the seed in each model card, and the
+shipped weights are run on them by the kernel that the solver uses. Nothing is copied from the
+cards, and PyTorch is not used. Tables 3 and 4, Figure 10: see `paper_soup`; they need python-fcl.
 """
 from __future__ import annotations
 
 import argparse
+import functools
 import platform
 import sys
-from collections.abc import Mapping, Sequence
+import textwrap
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +20,7 @@ from ..network import Weights, WeightsError, load_weights
 from ..resources import resource_path
 from ..training import dataset
 from ..training.dataset import SETS, Patterns
-from ..training.errors import PARTS, errors_of, figures, figures_by_part
+from ..training.errors import PARTS, errors_of, figures, figures_by_part, predict
 
 PAPER = {
     1: {'ME': (0.0332, 0.0259, -0.0005), 'MAE': (0.4161, 0.4383, 0.5624),
@@ -27,8 +30,26 @@ PAPER = {
 }
 """The paper's figures [rad], by table: training, cross-validation, external validation."""
 
+TABLES, FIGURES = (1, 2, 3, 4), (9, 10)
 QUICK = 10
 """`--quick` looks at every tenth pattern."""
+SHOWN = 150
+"""Patterns in Figure 9."""
+
+_DIFFERENCES = """\
+## What differs from the paper, Tables 1 and 2
+
+- Table 1: the data are those of section 3, with points and angles drawn at random instead of on
+  grids the paper does not give. Equal halves are vertex-face and edge-edge.
+- Table 2: the paper does not say what its subsets are. Here SAT's winning axis, found from the pose
+  alone, chooses between two, and the cube's symmetries bring the features that meet to fixed
+  places. Some outputs are then constant by construction: the normal's two angles in vertex-face,
+  the normal's elevation and the point's azimuth in edge-edge. That is why its errors are so much
+  smaller than the paper's: it is an easier problem, not a like-for-like comparison.
+- The networks are the paper's (two hidden layers of tanh, linear output, backpropagation with
+  momentum stopped by cross-validation), with a learning rate that falls over the epochs, and the
+  best of several starts by the cross-validation error.
+"""
 
 _DATA_AS_DRAWN = """\
 - `paper` was trained on the data as drawn. `paper, folded` is the same network on the same boxes,
@@ -44,7 +65,17 @@ Errors = dict[str, np.ndarray]
 def evaluate(weights: Weights, step: int = 1) -> dict[str, Errors]:
     """Errors of every network of a file on the sets of its card, every `step`-th pattern."""
     return {network: _errors(weights, network, sets, step)
-            for network, sets in dataset.of_card(weights.card).items()}
+            for network, sets in _sets_of(weights.path).items()}
+
+
+@functools.lru_cache(maxsize=4)  # some tables and figures share them; they take seconds to make
+def _sets_of(weights: Path) -> dict[str, dict[str, Patterns]]:
+    """The sets of a file's card, by network."""
+    return dataset.of_card(load_weights(weights).card)
+
+
+def _shipped(name: str) -> Weights:
+    return load_weights(resource_path('weights', f'{name}.safetensors'))
 
 
 def _errors(weights: Weights, network: str, sets: Mapping[str, Patterns], step: int) -> Errors:
@@ -89,6 +120,10 @@ def by_part(columns: Mapping[str, Errors]) -> str:
     return _rows(head, rows)
 
 
+def _external(weights: Weights, network: str) -> Patterns:
+    return _sets_of(weights.path)[network]['external']
+
+
 def processor() -> str:
     """Name of the machine's processor."""
     try:
@@ -101,54 +136,66 @@ def processor() -> str:
     return platform.processor() or platform.machine()
 
 
-def report(*, step: int = 1) -> str:
-    """The whole page."""
-    jumps = load_weights(resource_path('weights', 'paper.safetensors'))
-    smooth = load_weights(resource_path('weights', 'paper-continuous.safetensors'))
-    boxes = load_weights(resource_path('weights', 'paper-12.192x2.438x2.591.safetensors'))
-    ours = evaluate(jumps, step)['contact']
-    subsets = evaluate(smooth, step)
-    pooled = {name: np.concatenate([errors[name] for errors in subsets.values()])
-              for name in SETS}
-    detail, folding = {'paper': ours}, _FOLDED_DATA
-    if not jumps.card['data']['folded_in']:
-        # The sets as the solver would ask: the same boxes, brought into its domain.
-        card = {**jumps.card, 'data': {**jumps.card['data'], 'folded_in': True}}
-        in_domain = dataset.of_card(card)['contact']
-        detail['paper, folded'] = _errors(jumps, 'contact', in_domain, step)
-        folding = _DATA_AS_DRAWN
-    detail |= {**subsets, 'containers': evaluate(boxes, step)['contact']}
-    quick = '' if step == 1 else f' Quick run: every {step}th pattern only.'
-    return f"""# The paper's Tables 1 and 2, redone
+def filled(page: str) -> str:
+    """The page with its paragraphs and list items filled anew, numbers of any length in them."""
+    lines: list[str] = []
+    for line in page.splitlines():
+        text = line.strip()
+        starts = not text or text[0] in '|#!' or line.startswith('- ')
+        if starts or not lines or not lines[-1] or lines[-1][0] in '|#!':
+            lines.append(text)
+        else:
+            lines[-1] += ' ' + text
+    return '\n'.join(line if line[:1] in '|#!' else textwrap.fill(
+        line, 100, subsequent_indent='  ' * line.startswith('- '), break_long_words=False,
+        break_on_hyphens=False) for line in lines) + '\n'
+
+
+def intro(quick: bool) -> str:
+    """Head of the page."""
+    note = f' Quick run: every {QUICK}th pattern only, and fewer for the soup.' if quick else ''
+    return f"""# The paper's tables and figures, redone
 
 Made by `python -m box_contact_ros paper --out docs/paper_tables.md` on {processor()}, from the
-shipped weights and the seeds in their model cards.{quick} Errors in rad over the four output
-angles, differences wrapped so that −π and π are the same direction; the azimuth of the poles is 0.
+shipped weights and the seeds in their model cards.{note} Each table and figure can be made by
+itself: `--table 3`, `--figure 9`. Numbers under "paper" are the paper's.
+"""
 
-## Table 1: with discontinuities, one network 6-20-18-4
+
+def sections_1_and_2(tables: Collection[int], step: int) -> list[str]:
+    """Tables 1 and 2, those of them that are asked for, and their notes."""
+    sections, detail, folding = [], {}, _FOLDED_DATA
+    if 1 in tables:
+        jumps = _shipped('paper')
+        ours = evaluate(jumps, step)['contact']
+        detail['paper'] = ours
+        if not jumps.card['data']['folded_in']:
+            # The sets as the solver would ask: the same boxes, brought into its domain.
+            card = {**jumps.card, 'data': {**jumps.card['data'], 'folded_in': True}}
+            in_domain = dataset.of_card(card)['contact']
+            detail['paper, folded'] = _errors(jumps, 'contact', in_domain, step)
+            folding = _DATA_AS_DRAWN
+        sections.append(f"""## Table 1: with discontinuities, one network 6-20-18-4
+
+Errors in rad over the four output angles, differences wrapped so that −π and π are the same
+direction; the azimuth of the poles is 0.
 
 {beside_paper(1, {'ours': ours})}
-
-## Table 2: without discontinuities, one network 6-20-17-4 per subset
+""")
+    if 2 in tables:
+        subsets = evaluate(_shipped('paper-continuous'), step)
+        pooled = {name: np.concatenate([errors[name] for errors in subsets.values()])
+                  for name in SETS}
+        detail |= subsets
+        sections.append(f"""## Table 2: without discontinuities, one network 6-20-17-4 per subset
 
 {beside_paper(2, {'ours': pooled})}
 
 Ours is over both subsets taken together; each has as many patterns as the paper's set.
-
-## What differs from the paper
-
-- Table 1: the data are those of section 3, with points and angles drawn at random instead of on
-  grids the paper does not give. Equal halves are vertex-face and edge-edge.
-- Table 2: the paper does not say what its subsets are. Here SAT's winning axis, found from the pose
-  alone, chooses between two, and the cube's symmetries bring the features that meet to fixed
-  places. Some outputs are then constant by construction: the normal's two angles in vertex-face,
-  the normal's elevation and the point's azimuth in edge-edge. That is why its errors are so much
-  smaller than the paper's: it is an easier problem, not a like-for-like comparison.
-- The networks are the paper's (two hidden layers of tanh, linear output, backpropagation with
-  momentum stopped by cross-validation), with a learning rate that falls over the epochs, and the
-  best of several starts by the cross-validation error.
-
-## Ours in detail
+""")
+    if 1 in tables:
+        detail['containers'] = evaluate(_shipped('paper-12.192x2.438x2.591'), step)['contact']
+    sections += [_DIFFERENCES, f"""## Tables 1 and 2 in detail
 
 `all` is over the four outputs, `point` and `normal` over the two angles of each.
 
@@ -157,26 +204,108 @@ Ours is over both subsets taken together; each has as many patterns as the paper
 {folding}
 - `vertex_face`, `edge_edge`: the two subsets of Table 2.
 - `containers`: a network 6-20-18-4 for two boxes of 12.192 × 2.438 × 2.591 m, on folded data.
+"""]
+    return sections
+
+
+def section_figure_9(picture: str) -> str:
+    """Figure 9's caption."""
+    return f"""## Figure 9: desired and modelled first output
+
+![A line with dots that scatter about it; a line with dots on it]({picture})
+
+The azimuth of the impact point, for the first {SHOWN} patterns of the external set, sorted by what
+is desired (line); dots: what the network says. Left, one network on data with discontinuities
+(model `paper`, Table 1); right, model `paper-continuous` on its subset `vertex_face` (on
+`edge_edge` this output is constant by construction).
 """
 
 
+def draw_figure_9(path: Path) -> None:
+    """The first output, desired and modelled, as a PNG."""
+    import matplotlib
+
+    matplotlib.use('Agg')
+    from matplotlib import pyplot as plt
+
+    picture, panels = plt.subplots(1, 2, figsize=(11.0, 4.2), layout='constrained', sharex=True)
+    for axes, (name, network) in zip(panels, (('paper', 'contact'),
+                                              ('paper-continuous', 'vertex_face'))):
+        weights = _shipped(name)
+        patterns = _external(weights, network)
+        wanted = patterns.outputs[:SHOWN, 0]
+        order = np.argsort(wanted, kind='stable')
+        said = predict(weights.networks[network], patterns.inputs[:SHOWN])[:, 0]
+        axes.plot(wanted[order], color='black', label='desired')
+        axes.plot(said[order], '.', color='tab:red', markersize=5, label='modelled')
+        axes.set(title=name if network == 'contact' else f'{name}, {network}',
+                 xlabel='pattern of the external set, sorted', ylabel='azimuth of the point [rad]')
+        axes.grid(color='0.9', linewidth=0.6)
+        axes.legend()
+    picture.savefig(path, dpi=130)
+    plt.close(picture)
+
+
+def report(tables: Collection[int], drawn: Collection[int], *, quick: bool = False,
+           folder: Path | None = None) -> str:
+    """The page with some of the tables and figures; pictures and CSV are written to `folder`, or
+    not at all."""
+    sections = [intro(quick)]
+    if {1, 2} & set(tables):
+        sections += sections_1_and_2(tables, QUICK if quick else 1)
+    if 9 in drawn:
+        if folder:
+            draw_figure_9(folder / 'paper_figure_9.png')
+        sections.append(section_figure_9('paper_figure_9.png'))
+    if {3, 4} & set(tables) or 10 in drawn:
+        from . import paper_soup  # only here: python-fcl is an extra
+
+        jumps = _shipped('paper')
+        result = paper_soup.measure(_external(jumps, 'contact').inputs, quick=quick)
+        if folder:
+            paper_soup.write_csv(result, folder / 'paper_soup.csv', processor())
+        if 3 in tables:
+            sections.append(paper_soup.section_3(result))
+        if 4 in tables:
+            sections.append(paper_soup.section_4(result))
+        if 10 in drawn:
+            if folder:
+                paper_soup.draw_figure_10(result, folder / 'paper_figure_10.png')
+            sections.append(paper_soup.section_figure_10(result, 'paper_figure_10.png'))
+        sections.append(paper_soup.section_errors(result))
+    return filled('\n'.join(sections))
+
+
 def main(args: Sequence[str] | None = None) -> int:
-    """Print the tables, or write them to a file."""
+    """Print the page, or write it to a file, with pictures beside it."""
     parser = argparse.ArgumentParser(
-        description='Tables 1 and 2 of the source paper beside the shipped weights, as Markdown.')
-    parser.add_argument('--out', type=Path, help='file to write (default: print)')
+        description="The source paper's Tables 1 to 4 and Figures 9 and 10 beside ours, as "
+        'Markdown. All of them, unless some are chosen.')
+    parser.add_argument('--table', type=int, action='append', choices=TABLES,
+                        help='only this table; may be given several times')
+    parser.add_argument('--figure', type=int, action='append', choices=FIGURES,
+                        help='only this figure; may be given several times')
+    parser.add_argument('--out', type=Path,
+                        help='file to write; pictures and paper_soup.csv go beside it (default: '
+                        'print; pictures asked for by --figure go to the current folder)')
     parser.add_argument('--quick', action='store_true',
-                        help=f'look at every {QUICK}th pattern only')
+                        help=f'look at every {QUICK}th pattern only, and at fewer for the soup')
     options = parser.parse_args(args)
+    chosen = options.table or options.figure
+    tables = options.table or (() if chosen else TABLES)
+    drawn = options.figure or (() if chosen else FIGURES)
+    folder = Path() if options.figure else None
+    if options.out is not None:
+        folder = options.out.parent
+        folder.mkdir(parents=True, exist_ok=True)
     try:
-        page = report(step=QUICK if options.quick else 1)
+        page = report(tables, drawn, quick=options.quick, folder=folder)
     except (WeightsError, FileNotFoundError) as error:
         print(f'paper: {error}', file=sys.stderr)
         return 1
     if options.out is None:
         print(page, end='')
         return 0
-    options.out.parent.mkdir(parents=True, exist_ok=True)
     options.out.write_text(page, encoding='utf-8')
     print(f'written to {options.out}')
     return 0

@@ -7,24 +7,27 @@ sizes alone, and the exact answer is given for others (`committee`).
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
 
-from ..committee import ASPECT_MAX, DEPTH_MAX, INPUTS, OUTPUTS, RATIO_MAX
+from ..committee import ASPECT_MAX, DEPTH_MAX, DESCRIPTION, INPUTS, OUTPUTS, RATIO_MAX
 from ..network import load_weights, save_weights, unpacked
 from ..posesets import SETS, Pairs
 from ..resources import resource_path
 from ..solver import ContactSolver
-from .contacts import SizePair, contacts, mixture, scene_mixture
+from .contacts import Contacts, SizePair, contacts, mixture, scene_mixture
 from .points import Fit, Settings, normalisation, unfolded
 
 HIDDEN = (20, 20)
 """Hidden units: what fits the time that a batch has for the network (docs/search.md)."""
-PAIRS, STEPS, BATCH, RATE = 3_000_000, 240_000, 4096, 4e-3
+PAIRS, STEPS, BATCH, RATE = 3_000_000, 320_000, 4096, 8e-3
+HARD_ROUNDS, HARD_POOL, HARD_PART, HARD_SHARE = (0.4, 0.55, 0.7, 0.85), 2_000_000, 0.01, 0.2
+"""After each of these parts of the steps, a pool of fresh pairs is searched for the hardest part,
+and from then on all that were found so far make up that share of what is learned from."""
 SCENE_PAIRS, SCENE_STEPS, SCENE_RATE = 1_000_000, 40_000, 1e-3
 QUICK_PAIRS, QUICK_STEPS = 20_000, 400
 METRIC_PAIRS, QUICK_METRIC_PAIRS = 100_000, 2_000
@@ -35,7 +38,7 @@ NAMES = ([f'axis {axis}, {which} face: n{k} × cut' for axis in range(3)
          + [f'inside {k}' for k in range(3)])
 
 # Streams of random numbers, one each for the data, and for what is measured on.
-_DATA, _METRICS = 0, 1
+_DATA, _METRICS, _HARD = 0, 1, 2
 
 
 def point_errors(pairs: Pairs, weights: Path | str | None) -> np.ndarray:
@@ -64,7 +67,8 @@ def train(path: Path, *, seed: int, commit: str, quick: bool = False,
     data = contacts(mixture, [seed, _DATA], pairs, progress)
     fit = Fit(data, Settings(hidden=[hidden], steps=steps, batch=BATCH, rate=RATE, seed=seed,
                              device=device))
-    _run(fit, path.stem, progress)
+    _run(fit, data, path.stem, progress, [seed, _HARD], QUICK_PAIRS if quick else HARD_POOL,
+         mixture)
     card = _card(path, hidden, seed, commit, [], fit, {'recipe': mixture.__doc__})
     card['training']['minutes'] = round((time.monotonic() - began) / 60.0, 2)
     layers = {'point': fit.export(0)}
@@ -95,7 +99,8 @@ def train_scene(path: Path, sizes: Sequence[SizePair], *, seed: int, commit: str
     fit = Fit(data, Settings(hidden=[hidden], steps=steps, batch=BATCH, rate=SCENE_RATE, seed=seed,
                              device=device),
               start=[unfolded(unpacked(start), *normalisation(data.inputs))])
-    _run(fit, path.stem, progress)
+    _run(fit, data, path.stem, progress, [seed, _HARD], QUICK_PAIRS if quick else HARD_POOL // 2,
+         scene_mixture, sizes)
     card = _card(path, hidden, seed, commit, [[list(a), list(b)] for a, b in sizes], fit,
                  {'recipe': scene_mixture.__doc__, 'started from': weights.card['sha256']})
     card['training']['minutes'] = round((time.monotonic() - began) / 60.0, 2)
@@ -104,24 +109,43 @@ def train_scene(path: Path, sizes: Sequence[SizePair], *, seed: int, commit: str
     for number, pair in enumerate(sizes):
         sample = scene_mixture(np.random.default_rng([seed, _METRICS, number]),
                                QUICK_METRIC_PAIRS if quick else METRIC_PAIRS, [pair])
-        card['metrics'][_text(pair)] = {'before': figures(point_errors(sample, general)),
+        card['metrics'][text(pair)] = {'before': figures(point_errors(sample, general)),
                                         'after': figures(point_errors(sample, path))}
     save_weights(path, layers, card)
     return card
 
 
-def _run(fit: Fit, title: str, progress: bool) -> None:
-    """Train to the end, with a progress bar that shows the loss."""
+def _run(fit: Fit, data: Contacts, title: str, progress: bool, seed: Sequence[int], pool: int,
+         make: Callable[..., Pairs], *rest: object) -> None:
+    """Train to the end, with a progress bar, and harder data from time to time."""
     from tqdm import tqdm
 
-    chunk = max(1, fit.settings.steps // 200)
-    with tqdm(total=fit.settings.steps, desc=title, unit='step', mininterval=1.0,
-              disable=not progress) as bar:
-        while fit.step < fit.settings.steps:
+    steps = fit.settings.steps
+    chunk = max(1, steps // 200)
+    hard: list[Contacts] = []
+    with tqdm(total=steps, desc=title, unit='step', mininterval=1.0, disable=not progress) as bar:
+        while fit.step < steps:
+            if len(hard) < len(HARD_ROUNDS) and fit.step >= HARD_ROUNDS[len(hard)] * steps:
+                fresh = contacts(make, [*seed, len(hard)], pool, False, *rest)
+                hard.append(_hardest(fit, fresh, HARD_PART))
+                found = _joined(hard)
+                times = HARD_SHARE / (1.0 - HARD_SHARE) * len(data.inputs) / len(found.inputs)
+                fit.feed(_joined([data, *[found] * max(1, round(times))]))
             before = fit.step
             loss = fit.run(chunk)
             bar.set_postfix(loss=f'{loss.min():.2e}', refresh=False)
             bar.update(fit.step - before)
+
+
+def _hardest(fit: Fit, data: Contacts, part: float) -> Contacts:
+    """The part of the contacts in which the network errs most."""
+    errors = fit.point_errors(data)[0]
+    rows = np.sort(np.argsort(errors, kind='stable')[-max(1, round(part * len(errors))):])
+    return Contacts(*(column[rows] for column in data))
+
+
+def _joined(parts: Sequence[Contacts]) -> Contacts:
+    return Contacts(*(np.concatenate(columns) for columns in zip(*parts)))
 
 
 def _card(path: Path, hidden: tuple[int, int], seed: int, commit: str, sizes: list[Any],
@@ -130,15 +154,24 @@ def _card(path: Path, hidden: tuple[int, int], seed: int, commit: str, sizes: li
     return {
         'name': path.stem, 'model': 'committee', 'architecture': [INPUTS, *hidden, OUTPUTS],
         'activation': 'rational tanh', 'seed': seed, 'commit': commit, 'sizes': sizes,
-        'inputs': {'names': NAMES, 'range': {'aspect': ASPECT_MAX, 'size ratio': RATIO_MAX,
-                                             'depth by the shortest edge': DEPTH_MAX}},
+        'inputs': {'description': DESCRIPTION, 'names': NAMES,
+                   'range': {'aspect': ASPECT_MAX, 'size ratio': RATIO_MAX,
+                             'depth by the shortest edge': DEPTH_MAX}},
         'outputs': ['centroid from the inside point, in half extents of the bounding box'],
         'data': {**data, 'pairs': len(fit.inputs)}, 'metrics': {},
         'training': {'algorithm': 'Adam', 'steps': s.steps, 'batch': s.batch, 'rate': s.rate,
                      'device': s.device, 'threads': torch.get_num_threads()}}
 
 
-def _text(pair: SizePair) -> str:
+def in_range(pair: SizePair) -> bool:
+    """Whether the committee's network may be asked for boxes of these sizes at all."""
+    longest, shortest = [max(size) for size in pair], [min(size) for size in pair]
+    return (all(one <= ASPECT_MAX * other for one, other in zip(longest, shortest))
+            and max(longest) <= RATIO_MAX * min(longest))
+
+
+def text(pair: SizePair) -> str:
+    """A pair of sizes, as it is printed."""
     return ' on '.join(' × '.join(f'{extent:g}' for extent in size) for size in pair)
 
 

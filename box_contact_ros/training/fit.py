@@ -113,8 +113,13 @@ def gradients(weights: list[torch.Tensor], layers: list[torch.Tensor], error: to
 
 
 def fit(training: Patterns, checking: Patterns, settings: Settings, *, progress: str = '',
-        ) -> Fitted:
-    """Train; `progress` is the title of a progress bar, none if empty."""
+        start: Sequence[torch.Tensor] | None = None) -> Fitted:
+    """Train; `progress` is the title of a progress bar, none if empty.
+
+    start: weights (networks, inputs, outputs) of all layers, then biases (networks, 1, outputs),
+    for normalised inputs, in place of random ones. Hidden units whose weights are all zero stay
+    so: narrower networks can be padded with them.
+    """
     s = settings
     generator = torch.Generator().manual_seed(s.seed)
     device = torch.device(s.device)
@@ -133,10 +138,14 @@ def fit(training: Patterns, checking: Patterns, settings: Settings, *, progress:
     check_x, check_y = tensors(checking)
     rate, momentum, initial = map(per_network, (s.rate, s.momentum, s.initial))
     # Drawn on the CPU, whatever the device: the same start everywhere.
-    weights = [initial / math.sqrt(n_in) * (2.0 * torch.rand(
-        (s.networks, n_in, n_out), generator=generator).to(device) - 1.0)
-        for n_in, n_out in zip(s.widths, s.widths[1:])]
-    biases = [torch.zeros((s.networks, 1, n_out), device=device) for n_out in s.widths[1:]]
+    if start is None:
+        weights = [initial / math.sqrt(n_in) * (2.0 * torch.rand(
+            (s.networks, n_in, n_out), generator=generator).to(device) - 1.0)
+            for n_in, n_out in zip(s.widths, s.widths[1:])]
+        biases = [torch.zeros((s.networks, 1, n_out), device=device) for n_out in s.widths[1:]]
+    else:
+        copies = [p.to(device, copy=True) for p in start]
+        weights, biases = copies[:len(copies) // 2], copies[len(copies) // 2:]
     parameters = weights + biases
     steps = [torch.zeros_like(p) for p in parameters]
     best = [p.clone() for p in parameters]

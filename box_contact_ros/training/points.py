@@ -15,7 +15,6 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
-from ..committee import CENTROID_REACH
 from ..network import TANH_LIMIT
 from .contacts import Contacts
 
@@ -37,6 +36,11 @@ class Settings:
     """Learning rate at the start; it falls to zero along half a cosine."""
     seed: int = 0
     device: str = 'cpu'
+
+
+def device_of(name: str) -> str:
+    """PyTorch's device for `cpu`, `cuda` or `auto`: a GPU where there is one."""
+    return ('cuda' if torch.cuda.is_available() else 'cpu') if name == 'auto' else name
 
 
 Layers = list[tuple[np.ndarray, np.ndarray]]
@@ -116,14 +120,9 @@ class Fit:
         s = self.settings = settings
         self.device = torch.device(s.device)
         self.mean, self.deviation = normalisation(data.inputs)
-        # Batches are slices from a random place on: the data are shuffled once, and rows need not
-        # be gathered in every step (a third of its time).
-        order = np.random.default_rng([s.seed, 0]).permutation(len(data.inputs))
-        self.inputs = self._normalised(data.inputs[order])
-        self.offsets = torch.tensor(data.offsets[order], device=self.device)
-        self.squared_scale = torch.tensor(data.scale[order], device=self.device).square_()
-        self.batch = min(s.batch, len(order))
+        self.batch = min(s.batch, len(data.inputs))
         self._places = np.random.default_rng([s.seed, 1])
+        self.feed(data)
         self.widths = [(data.inputs.shape[1], *hidden, data.offsets.shape[1])
                        for hidden in s.hidden]
         if start is None:
@@ -135,6 +134,15 @@ class Fit:
         rate = np.broadcast_to(np.asarray(s.rate, dtype=np.float32), (len(start),)).copy()
         self._rate = torch.tensor(rate, device=self.device).reshape(-1, 1, 1)
         self.step = 0
+
+    def feed(self, data: Contacts) -> None:
+        """Go on with these data; the normalisation of the inputs stays that of the first ones."""
+        # Batches are slices from a random place on: the data are shuffled once, and rows need not
+        # be gathered in every step (a third of its time).
+        order = np.random.default_rng([self.settings.seed, 0]).permutation(len(data.inputs))
+        self.inputs = self._normalised(data.inputs[order])
+        self.offsets = torch.tensor(data.offsets[order], device=self.device)
+        self.squared_scale = torch.tensor(data.scale[order], device=self.device).square_()
 
     def _normalised(self, inputs: np.ndarray) -> torch.Tensor:
         return torch.tensor((inputs - self.mean) / self.deviation, device=self.device)
@@ -199,13 +207,12 @@ class Fit:
         return folded(self.networks()[network], self.mean, self.deviation)
 
     def point_errors(self, data: Contacts) -> np.ndarray:
-        """(networks, n) point errors in edges of the smaller box, clamped as the solver does."""
+        """(networks, n) point errors in edges of the smaller box, before the solver clamps."""
         found = []
         for start in range(0, len(data.inputs), self.batch):
             rows = slice(start, start + self.batch)
-            inside, offsets, scale = (torch.tensor(part[rows], device=self.device)
-                                      for part in (data.inside, data.offsets, data.scale))
-            point = self.layers(self._normalised(data.inputs[rows]))[-1].add_(inside)
-            point.clamp_(-CENTROID_REACH, CENTROID_REACH)
-            found.append((point.sub_(offsets + inside).mul_(scale)).norm(dim=-1).cpu())
+            offsets, scale = (torch.tensor(part[rows], device=self.device)
+                              for part in (data.offsets, data.scale))
+            error = self.layers(self._normalised(data.inputs[rows]))[-1].sub_(offsets)
+            found.append(error.mul_(scale).norm(dim=-1).cpu())
         return torch.cat(found, dim=1).numpy()

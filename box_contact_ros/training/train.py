@@ -1,6 +1,7 @@
-"""Program `train`: make the data sets, fit the paper's networks, write weights/ with model cards.
+"""Program `train`: make the data sets, fit the networks, write weights/ with model cards.
 
-What is trained, and with which settings, stands in `JOBS`; everything else follows from the seed.
+What is trained, and with which settings, stands in `JOBS` for the paper's networks and in
+`committee` for the committee's; everything else follows from the seed.
 """
 from __future__ import annotations
 
@@ -16,11 +17,14 @@ from typing import Any
 
 import torch
 
+from ..block import LANES
 from ..network import load_weights, save_weights
 from ..resources import resource_path
-from . import dataset
+from . import committee, dataset
 from .errors import errors_of, figures_by_part
 from .fit import Settings, fit
+from .points import device_of
+from .scene import SceneError, size_pairs
 
 
 @dataclasses.dataclass(frozen=True)
@@ -72,6 +76,10 @@ JOBS = {
         _CONTAINERS,
         _DRAWN),
 }
+
+COMMITTEE = 'committee'
+NAMES = (*JOBS, COMMITTEE)
+"""What can be asked for."""
 
 # `--quick`: enough to see the error fall, in seconds.
 QUICK_COUNTS = (1000, 500, 2000)
@@ -150,22 +158,28 @@ def table(card: dict[str, Any]) -> str:
     return '\n'.join(lines)
 
 
-def main(args: Sequence[str] | None = None) -> int:
-    """Train what is asked for."""
+def _options(args: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         formatter_class=argparse.RawDescriptionHelpFormatter,
         description='Make the data sets, fit the networks, write the weights files.\n\n'
         'Measured on a machine with two cores (each uses one):\n'
         '  paper             two boxes of edge 2, with discontinuities     2 minutes\n'
         '  paper-continuous  the same without, one network per subset      3 minutes\n'
-        '  containers        two boxes of 12.192 x 2.438 x 2.591 m         1 minute')
+        '  containers        two boxes of 12.192 x 2.438 x 2.591 m         1 minute\n'
+        '  committee         any two boxes, the point alone                4 minutes\n'
+        '  --scene FILE      the boxes of one scene, from the committee    1 minute')
     parser.add_argument('what', nargs='*', metavar='what',
-                        help=f'{", ".join(JOBS)}, or all (default)')
+                        help=f'{", ".join(NAMES)}, or all (default)')
+    parser.add_argument('--scene', type=Path, metavar='FILE', help='train a committee for the '
+                        'sizes of the pairs in this scene file alone, and say how much error that '
+                        'saves; writes committee-FILE.safetensors to the current folder, or --out')
     parser.add_argument('--seed', type=int, default=1, help='of data and weights (default 1)')
     parser.add_argument('--starts', type=int, help='networks trained at once, of which the best '
-                        'is kept (default: 24 to 96, by job)')
-    parser.add_argument('--epochs', type=int,
-                        help='passes through the training set (default: 300 to 1000, by job)')
+                        "is kept, of the paper's (default: 24 to 96, by job)")
+    parser.add_argument('--epochs', type=int, help="passes through the training set, of the "
+                        "paper's (default: 300 to 1000, by job)")
+    parser.add_argument('--hidden', type=int, nargs=2, metavar='UNITS', help='of the committee: '
+                        'units of its two hidden layers (default: {} {})'.format(*committee.HIDDEN))
     parser.add_argument('--out', type=Path, help='folder to write to (default: weights/)')
     parser.add_argument('--fold', action=argparse.BooleanOptionalAction, help='for paper and '
                         'containers: data folded into the domain in which the solver asks, or as '
@@ -174,27 +188,72 @@ def main(args: Sequence[str] | None = None) -> int:
                         help='small sets and few epochs, to try it out; needs --out')
     parser.add_argument('--threads', type=int, default=1, help='of PyTorch (default 1; '
                         'matrices this small gain nothing from more)')
+    parser.add_argument('--device', choices=('cpu', 'cuda', 'auto'), default='cpu',
+                        help='of the committee (default cpu: the same weights everywhere; matrices '
+                        'this small gain little from a GPU)')
     options = parser.parse_args(args)
     wanted = options.what or ['all']
-    unknown = [name for name in wanted if name not in (*JOBS, 'all')]
+    unknown = [name for name in wanted if name not in (*NAMES, 'all')]
     if unknown:
-        parser.error(f'{unknown[0]!r} is not one of {", ".join(JOBS)}, all')
-    if options.quick and options.out is None:
+        parser.error(f'{unknown[0]!r} is not one of {", ".join(NAMES)}, all')
+    if options.scene and options.what:
+        parser.error(f'--scene trains for the scene alone: leave out {options.what[0]!r}')
+    if options.scene and options.hidden:
+        parser.error('--scene goes on from the shipped network: leave out --hidden')
+    if options.quick and options.out is None and not options.scene:
         parser.error('--quick would replace the weights in weights/: name a folder with --out')
     for name in ('seed', 'starts', 'epochs', 'threads'):
         value = getattr(options, name)
         if value is not None and value < (0 if name == 'seed' else 1):
             parser.error(f'--{name} {value} is too small')
-    torch.set_num_threads(options.threads)
-    folder = options.out or resource_path('package.xml').parent / 'weights'
+    for units in options.hidden or ():
+        if not 1 <= units <= LANES:
+            parser.error(f'--hidden {units} is not between 1 and {LANES}')
+    options.what = NAMES if 'all' in wanted else [name for name in NAMES if name in wanted]
+    options.sizes = None
+    if options.scene:
+        try:
+            options.sizes = size_pairs(options.scene)
+        except SceneError as error:
+            parser.error(str(error))
+        outside = [pair for pair in options.sizes if not committee.in_range(pair)]
+        for pair in outside:
+            print(f'left out, as the committee always answers them exactly: {committee.text(pair)}')
+            options.sizes.remove(pair)
+        if not options.sizes:
+            parser.error(f'{options.scene}: no pair of sizes is within the range of the committee')
+    shipped = resource_path('package.xml').parent / 'weights'
+    options.out = options.out or (Path() if options.scene else shipped)
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        tempfile.TemporaryFile(dir=folder).close()
+        options.out.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=options.out).close()
     except OSError as error:  # said now, not after minutes of training
-        parser.error(f'cannot write to {folder} ({error.strerror}): name a folder with --out')
-    for name, job in JOBS.items():
-        if name not in wanted and 'all' not in wanted:
+        parser.error(
+            f'cannot write to {options.out} ({error.strerror}): name a folder with --out')
+    options.device = device_of(options.device)
+    return options
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Train what is asked for."""
+    options = _options(args)
+    torch.set_num_threads(options.threads)
+    common = {'seed': options.seed, 'commit': _commit(), 'quick': options.quick,
+              'device': options.device}
+    if options.scene:
+        path = options.out / f'committee-{options.scene.stem}.safetensors'
+        card = committee.train_scene(path, options.sizes, **common)
+        print(f'{path}, {card["training"]["minutes"]} min\n{committee.table(card)}\n'
+              f'use it: ros2 run box_contact_ros contact_node --ros-args -p model:=committee '
+              f'-p weights:={path.resolve()}')
+        return 0
+    for name in options.what:
+        if name == COMMITTEE:
+            path = options.out / f'{COMMITTEE}.safetensors'
+            card = committee.train(path, hidden=tuple(options.hidden or committee.HIDDEN), **common)
+            print(f'{path}, {card["training"]["minutes"]} min\n{committee.table(card)}')
             continue
+        job = JOBS[name]
         starts, epochs = job.settings.networks, job.settings.epochs
         if options.quick:
             starts, epochs = QUICK_STARTS, QUICK_EPOCHS
@@ -203,8 +262,10 @@ def main(args: Sequence[str] | None = None) -> int:
             job = dataclasses.replace(job, folded_in=options.fold)
         settings = dataclasses.replace(job.settings, networks=options.starts or starts,
                                        epochs=options.epochs or epochs)
-        card = run(dataclasses.replace(job, settings=settings), seed=options.seed, folder=folder)
-        print(f'{folder / job.name}.safetensors, {card["training"]["minutes"]} min\n{table(card)}')
+        card = run(dataclasses.replace(job, settings=settings), seed=options.seed,
+                   folder=options.out)
+        print(f'{options.out / job.name}.safetensors, {card["training"]["minutes"]} min\n'
+              f'{table(card)}')
     return 0
 
 

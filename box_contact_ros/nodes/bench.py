@@ -1,0 +1,262 @@
+"""The bench: drives the nodes with named streams of poses at a set rate, and measures the answers.
+
+Contact node, soup node and a bare echo node run as processes of their own, in a ROS domain of their
+own on this host. Each stream goes to one of them after the other, so that they do not compete for
+cores. Every answer is paired by stamp with what was sent, and held against the exact contact. The
+streams for cubes come first; for the containers the nodes are restarted, with the other sizes.
+Prints two tables and writes bench.csv, bench.md and bench.png.
+
+The exit status is 0 only if every node answered, the counts add up (sent = answered + lost), and
+the contact node lost nothing and gave no wrong verdict and no answer twice.
+"""
+from __future__ import annotations
+
+import argparse
+import contextlib
+import os
+import platform
+import random
+import signal
+import sys
+import threading
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import rclpy
+from rclpy.context import Context
+from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import remove_ros_args
+from tqdm import tqdm
+
+from ..contact import Contacts
+from ..solver import MODELS, MOST_SOUP_DIVISIONS, SOUP_DIVISIONS, ContactSolver
+from ..streams import STREAMS, Stream, by_sizes, make_stream
+from .bench_drive import Bench, BenchNode, Clock, Subject
+from .bench_log import (
+    CONTACT_MESSAGES,
+    ECHO_MESSAGES,
+    NodeLog,
+    StreamResult,
+    draw,
+    error_table,
+    latency_table,
+    write_csv,
+)
+from .contact import PARAMETERS
+from .runtime import REFUSALS
+
+DOMAINS = range(1, 102)  # 0 is everybody's; beyond 101, ports run into those Linux hands out
+NODES = ('contact', 'soup', 'echo')
+QUICK_SECONDS = 0.5  # of every stream, with --quick
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the bench; 0 only if all nodes answered, all adds up, the contact node is faultless."""
+    args = list(args or ())
+    try:
+        options = _options(remove_ros_args(args))
+    except REFUSALS as error:
+        print(f'error: {error}', file=sys.stderr)
+        return 1
+    stop, signalled = threading.Event(), []
+
+    def call_off(number: int, _frame: Any) -> None:
+        signalled.append(number)
+        stop.set()
+
+    # First of all: whenever a signal comes, the nodes are ended and the results are kept.
+    before = {number: signal.signal(number, call_off)
+              for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    # Nodes inherit both; nothing else on this network hears what is measured.
+    os.environ['ROS_DOMAIN_ID'] = str(options.domain)
+    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+    cores = os.sched_getaffinity(0)
+    own = {max(cores)} if len(cores) > 1 else cores
+    node_cores = cores - own or cores
+    context, node, bench = Context(), None, None
+    try:
+        subjects = _subjects(options)
+        groups = by_sizes(_streams(options))
+        truths = {stream.name: _truth(stream) for group in groups for stream in group}
+        about = _about(options, own, node_cores)
+        print('\n'.join(f'{name}: {value}' for name, value in about.items()), flush=True)
+        os.sched_setaffinity(0, own)  # before rclpy starts its threads, which inherit it
+        rclpy.init(args=args, context=context, signal_handler_options=SignalHandlerOptions.NO)
+        clock = Clock()
+        node = BenchNode(context, subjects, clock)
+        bench = Bench(node, subjects, rate=options.rate, clock=clock, stop=stop,
+                      node_cores=node_cores)
+        bench.run(groups, truths)
+    except REFUSALS as error:
+        print(f'error: {error}', file=sys.stderr)
+        return 1
+    finally:
+        if bench is not None:
+            bench.close()
+        if node is not None:
+            node.destroy_node()
+        context.try_shutdown()
+        os.sched_setaffinity(0, cores)
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    passed = _report(options, subjects, bench.notes, about, interrupted=bool(signalled))
+    return 128 + signalled[0] if signalled else 0 if passed else 1
+
+
+def _options(args: Sequence[str]) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog='bench', description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter,
+        epilog='streams:\n' + '\n'.join(
+            f'  {name:<14} {source.description}' for name, source in STREAMS.items())
+        + '\n\nWhat follows --ros-args is for the bench itself, not for the nodes.')
+    parser.add_argument('--rate', type=float, default=200.0, metavar='HZ',
+                        help='pairs of poses sent per second (default: %(default)g)')
+    parser.add_argument('--duration', type=float, default=60.0, metavar='S',
+                        help='time in which poses are sent, split evenly over streams and nodes '
+                             '(default: %(default)g)')
+    parser.add_argument('--streams', nargs='+', choices=STREAMS, default=list(STREAMS),
+                        metavar='NAME', help='which of the streams below (default: all)')
+    parser.add_argument('--nodes', nargs='+', choices=NODES, default=list(NODES), metavar='NODE',
+                        help=f'which of: {", ".join(NODES)} (default: all)')
+    parser.add_argument('--model', default=PARAMETERS['model'].default, metavar='NAME',
+                        help=f'of the contact node: {", ".join(MODELS)} (default: %(default)s)')
+    parser.add_argument('--divisions', type=int, default=SOUP_DIVISIONS, metavar='N',
+                        help='of an edge in the polygon soup (default: %(default)s)')
+    parser.add_argument('--seed', type=int, default=1, metavar='N',
+                        help='of the streams (default: %(default)s)')
+    parser.add_argument('--side-by-side', action='store_true',
+                        help='one input for all nodes at the same time, as they would run beside a '
+                             'simulator; they then compete for cores, and the floor with them '
+                             '(default: each stream goes to one node after the other)')
+    parser.add_argument('--out', type=Path, default=Path('bench-results'), metavar='FOLDER',
+                        help='for bench.csv, bench.md, bench.png (default: %(default)s/)')
+    parser.add_argument('--quick', action='store_true',
+                        help=f'{QUICK_SECONDS:g} s per stream, to see that it works')
+    parser.add_argument('--domain', type=int, default=None, metavar='ID',
+                        help=f'ROS domain, 0 to {DOMAINS[-1]} (default: drawn at random)')
+    options = parser.parse_args(list(args))
+    try:
+        PARAMETERS['model'].check('--model', options.model)
+    except ValueError as error:
+        parser.error(str(error))
+    for name, low, high in (('rate', 1.0, 4000.0), ('duration', 0.1, 3600.0),
+                            ('divisions', 1, MOST_SOUP_DIVISIONS), ('seed', 0, 2**32)):
+        if not low <= getattr(options, name) <= high:
+            parser.error(f'--{name} must lie in {low:g} to {high:g}, got {getattr(options, name)}')
+    options.streams = [name for name in STREAMS if name in options.streams]
+    options.nodes = [name for name in NODES if name in options.nodes]
+    if options.quick:
+        options.duration = min(options.duration, QUICK_SECONDS * len(options.streams))
+    if options.domain is None:
+        options.domain = random.choice(DOMAINS)
+    if not 0 <= options.domain <= DOMAINS[-1]:
+        parser.error(f'--domain must lie in 0 to {DOMAINS[-1]}, got {options.domain}')
+    return options
+
+
+def _subjects(options: argparse.Namespace) -> list[Subject]:
+    def program(name: str, *parameters: str) -> list[str]:
+        words = [word for parameter in parameters for word in ('-p', parameter)]
+        return ['-m', 'box_contact_ros', name, '--ros-args', *words]
+
+    made = {
+        'contact': lambda: Subject(
+            'contact', program('contact_node', f'model:={options.model}'),
+            NodeLog('contact', options.model, CONTACT_MESSAGES)),
+        'soup': lambda: Subject(
+            'soup', program('soup_node', f'divisions:={options.divisions}'),
+            NodeLog('soup', f'soup-{options.divisions}', CONTACT_MESSAGES), prefix='soup/'),
+        'echo': lambda: Subject(
+            'echo', ['-m', 'box_contact_ros.nodes.echo', '--ros-args'],
+            NodeLog('echo', '', ECHO_MESSAGES), has_sizes=False),
+    }
+    subjects = [made[name]() for name in options.nodes]
+    if not options.side_by_side:
+        for subject in subjects:
+            subject.poses = f'for_{subject.name}/'
+    return subjects
+
+
+def _streams(options: argparse.Namespace) -> list[Stream]:
+    shares = len(options.streams) * (1 if options.side_by_side else len(options.nodes))
+    count = max(2, round(options.rate * options.duration / shares))
+    return [make_stream(name, count, options.seed)
+            for name in tqdm(options.streams, desc='make streams', disable=None, leave=False)]
+
+
+def _truth(stream: Stream) -> Contacts:
+    solver = ContactSolver(stream.size_a, stream.size_b, model='exact')
+    return solver.batch(stream.pose_a, stream.pose_b)
+
+
+def _about(options: argparse.Namespace, own: set[int], node_cores: set[int]) -> dict[str, str]:
+    """Where and how it ran; in the output and in every row of the CSV."""
+    def listed(cores: set[int]) -> str:
+        return ' '.join(map(str, sorted(cores)))
+
+    return {
+        'machine': f'{platform.node()}: {_processor()}, {os.cpu_count()} cores',
+        'cores': f'bench on {listed(own)}, nodes on {listed(node_cores)}',
+        'load at start': f'{os.getloadavg()[0]:.2f}',
+        'python': platform.python_version(),
+        'nodes run': 'side by side' if options.side_by_side else 'in turn',
+        'set rate [Hz]': f'{options.rate:g}',
+        'seed': str(options.seed),
+    }
+
+
+def _processor() -> str:
+    with contextlib.suppress(OSError):
+        for line in Path('/proc/cpuinfo').read_text().splitlines():
+            if line.startswith('model name'):
+                return line.partition(':')[2].strip()
+    return platform.machine()
+
+
+def _report(options: argparse.Namespace, subjects: list[Subject], notes: list[str],
+            about: dict[str, str], *, interrupted: bool) -> bool:
+    """Print and write the results; whether the bench passed."""
+    order = list(STREAMS)
+    results = sorted((result for subject in subjects for result in subject.log.results()),
+                     key=lambda r: (order.index(r.stream), options.nodes.index(r.node)))
+    lines = list(notes)
+    for name in [subject.name for subject in subjects]:
+        lines.append(f'{name}: {_sum(name, results)}')
+    adds_up = all(r.adds_up for r in results) and all(s.log.adds_up for s in subjects)
+    lines.append('sent = answered + lost: ' + ('yes' if adds_up else 'NO'))
+    late = [r for r in results if r.lateness_max > 0.0]
+    if late:
+        p99, most = (1e3 * max(getattr(r, f'lateness_{name}') for r in late)
+                     for name in ('p99', 'max'))
+        lines.append(f'the bench itself was late by p99 {p99:.3f} ms, at most {most:.3f} ms')
+    text = ('latency [ms], from the stamp of the poses to the answer\n\n'
+            f'{latency_table(results)}\n\n'
+            'error against the exact contact: point [mm], normal [deg]\n\n'
+            f'{error_table(results)}\n')
+    print(f'\n{text}')
+    print('\n'.join(lines), flush=True)
+    if results:
+        options.out.mkdir(parents=True, exist_ok=True)
+        write_csv(options.out / 'bench.csv', results, about)
+        where = '\n'.join(f'- {name}: {value}' for name, value in about.items())
+        found = '\n'.join(f'- {line}' for line in lines)
+        (options.out / 'bench.md').write_text(f'# Bench\n\n{where}\n\n{text}\n{found}\n', 'utf-8')
+        draw(options.out / 'bench.png', results,
+             f'{options.rate:g} Hz, nodes {about["nodes run"]}, {about["machine"]}')
+        print(f'results: {options.out}/bench.csv, bench.md, bench.png', flush=True)
+    faulty = any(r.faults for r in results if r.node == 'contact')
+    return bool(results) and adds_up and not notes and not faulty and not interrupted
+
+
+def _sum(name: str, results: list[StreamResult]) -> str:
+    mine = [r for r in results if r.node == name]
+    sent, answered = sum(r.sent for r in mine), sum(r.answered for r in mine)
+    faults = [f'{r.stream}: {", ".join(r.faults)}' for r in mine if r.faults]
+    text = f'sent {sent}, answered {answered}, lost {sum(r.lost for r in mine)}'
+    latencies = np.concatenate([r.latencies for r in mine] or [np.zeros(0)])
+    if latencies.size:
+        p50, p99 = np.percentile(1e3 * latencies, (50.0, 99.0))
+        text += f', p50 {p50:.3f} ms, p99 {p99:.3f} ms'
+    return f'{text} ({"; ".join(faults)})' if faults else text

@@ -1,0 +1,66 @@
+"""The bare echo node: answers every pair of poses with its stamp, and computes nothing.
+
+It is the floor of the bench: what transport and executor alone cost. It subscribes box_a/pose and
+box_b/pose as the contact node does, and answers on echo (std_msgs/Header) once poses of equal stamp
+are in. Messages stay the bytes they come as; no faster answer can be given from Python.
+
+`python -m box_contact_ros.nodes.echo`; for the bench, not a program of its own.
+"""
+from __future__ import annotations
+
+import gc
+import struct
+import sys
+from collections.abc import Callable
+from typing import Any
+
+from geometry_msgs.msg import PoseStamped
+from rclpy.context import Context
+from rclpy.node import Node
+from std_msgs.msg import Header
+
+from ..pairing import StampPairing
+from .messages import NANOSECONDS
+from .runtime import CONTACT_QOS, POSE_QOS, run_node
+
+STAMP_AT = 4
+"""CDR: four bytes of encapsulation, the second of them 1 for little endian, then the stamp."""
+EMPTY_FRAME = struct.pack('<I', 1) + b'\0'
+"""CDR of an empty string: its length with the closing zero."""
+
+
+def raw_stamp(data: bytes) -> int:
+    """Stamp [ns] of a serialised message that begins with a header."""
+    sec, nanosec = struct.unpack_from('<iI' if data[1] else '>iI', data, STAMP_AT)
+    return sec * NANOSECONDS + nanosec
+
+
+def raw_header(stamp: int) -> bytes:
+    """A serialised Header of a stamp [ns] and no frame."""
+    return b'\0\1\0\0' + struct.pack('<iI', *divmod(stamp, NANOSECONDS)) + EMPTY_FRAME
+
+
+class EchoNode(Node):
+    """Answers each pair of stamps once."""
+
+    def __init__(self, context: Context, **options: Any) -> None:
+        super().__init__('echo_node', context=context, **options)
+        self._pairing: StampPairing[bool] = StampPairing()
+        self._echo = self.create_publisher(Header, 'echo', CONTACT_QOS)
+        gc.collect()
+        gc.freeze()
+        for box, topic in enumerate(('box_a/pose', 'box_b/pose')):
+            self.create_subscription(PoseStamped, topic, self._pose_callback(box), POSE_QOS,
+                                     raw=True)
+        self.get_logger().info('ready')
+
+    def _pose_callback(self, box: int) -> Callable[[bytes], None]:
+        def callback(data: bytes) -> None:
+            stamp = raw_stamp(data)
+            if self._pairing.add(box, stamp, True):
+                self._echo.publish(raw_header(stamp))
+        return callback
+
+
+if __name__ == '__main__':
+    sys.exit(run_node(EchoNode, sys.argv[1:]))

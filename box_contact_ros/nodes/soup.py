@@ -1,0 +1,55 @@
+"""The soup node: the contact node's work done by a polygon soup, the source paper's rival.
+
+Subscribes box_a/pose and box_b/pose like the contact node, and publishes the same messages under
+soup/contact/point, soup/contact/normal and soup/contacts, so that both run side by side on one
+input; and /diagnostics.
+"""
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from ..solver import MOST_SOUP_DIVISIONS, SOUP_DIVISIONS, ContactSolver
+from .contact import PARAMETERS as CONTACT_PARAMETERS
+from .contact import ContactNode
+from .parameters import Check, Setting, answer_help
+from .runtime import run_node
+
+
+def whole_number(low: int, high: int) -> Check:
+    """A whole number within [low, high]."""
+    def check(name: str, value: Any) -> int:
+        if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+            raise ValueError(f'{name} must be a whole number from {low} to {high}, not {value!r}')
+        return value
+    return check
+
+
+PARAMETERS = {
+    'size_a': CONTACT_PARAMETERS['size_a'],
+    'size_b': CONTACT_PARAMETERS['size_b'],
+    'divisions': Setting(
+        SOUP_DIVISIONS, f'squares along each edge of a face, 1 to {MOST_SOUP_DIVISIONS}; '
+        'N make 12 N² triangles a box', whole_number(1, MOST_SOUP_DIVISIONS)),
+    'pairing': CONTACT_PARAMETERS['pairing'],
+}
+
+
+class SoupNode(ContactNode):
+    """ContactNode on model `soup`."""
+
+    name = 'soup_node'
+    prefix = 'soup/'
+    parameters = PARAMETERS
+
+    @staticmethod
+    def make_solver(settings: Mapping[str, Any]) -> ContactSolver:
+        """A soup of so many divisions."""
+        return ContactSolver(settings['size_a'], settings['size_b'],
+                             model=f'soup-{settings["divisions"]}')
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the node until SIGINT or SIGTERM."""
+    answer_help('soup_node', __doc__, PARAMETERS, args)
+    return run_node(SoupNode, args)

@@ -1,0 +1,608 @@
+"""Tables 3 and 4 and Figure 10 of the source paper: what a polygon soup costs, and its errors.
+
+Times are CPU times of one thread on one pinned core, after a warm-up, with garbage collection off.
+Like the paper's gprof, they leave out what other programs take meanwhile. Three of them:
+
+- the step: `fcl.collide` as python-fcl has it, from two placed soups to a list of all contacts;
+  what the paper times. Making Python objects of the contacts is part of it;
+- FCL alone: the same search, asked for one contact and for costs. FCL stops at the first contact
+  only where no costs are asked for, so it tests all it tests in the step, and hands over next to
+  nothing. It is what compiled code would see;
+- the answer: a call of model `soup`, pose to point and normal, with SAT and the exact point (which
+  stands in where the soup finds nothing).
+"""
+from __future__ import annotations
+
+import csv
+import gc
+import math
+import os
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import fcl
+import numpy as np
+from tqdm import tqdm
+
+from .. import soup
+from ..contact import Contacts
+from ..posesets import CUBE, stacks
+from ..solver import ContactSolver
+from ..training.dataset import quaternion_from_euler
+
+PAPER = {8: (1.10, 11233, 11.52), 10: (1.47, 14323, 15.47), 12: (1.85, 17911, 19.2),
+         14: (1.94, 21789, 23.13), 16: (2.13, 24667, 24.63), 18: (2.31, 26517, 28.0),
+         20: (2.72, 30475, 32.44), 22: (2.90, 35411, 36.77)}
+"""By N: Table 3's mean time [ms]; Table 4's largest number of tests, and its time [ms]."""
+PAPER_NETWORK = 0.5
+"""The paper's time of its network [ms]."""
+ALSO = (1, 2, 4, 32, 64)
+"""Divisions at which only the accuracy is measured, on touching boxes."""
+
+OVERLAP = 1e-3
+"""Depth [m] of touching and near-parallel cubes of edge 2 where the accuracy is measured: at exact
+touch the soup finds nothing in a part of the patterns."""
+SEED = 20
+WARM_UP = 30      # patterns before any that counts
+REPEATS = 5       # timings of the pattern with the most pairs; their median counts
+
+
+@dataclass(frozen=True)
+class Counts:
+    """How many patterns of a regime are looked at."""
+
+    timed: int
+    thin: int
+    """Every so many of them are timed for FCL alone and for the answer."""
+    judged: int
+    """Of how many the accuracy is measured."""
+
+
+FULL = {'touching': Counts(75_000, 25, 1000), 'near-parallel': Counts(1000, 1, 1000),
+        'coplanar': Counts(1000, 10, 100)}
+QUICK = {'touching': Counts(100, 10, 20), 'near-parallel': Counts(20, 1, 20),
+         'coplanar': Counts(10, 2, 10)}
+REGIMES = tuple(FULL)
+
+Poses = tuple[np.ndarray, np.ndarray]
+"""Poses (n, 7) of A and of B, two cubes of edge 2."""
+
+
+@dataclass
+class Cell:
+    """Soup of N divisions on one regime; times in ms."""
+
+    regime: str
+    divisions: int
+    steps: np.ndarray = field(default_factory=lambda: np.empty(0))
+    pairs: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    """Pairs of triangles that meet, per pattern."""
+    alone: list[float] = field(default_factory=list)
+    answers: list[float] = field(default_factory=list)
+    worst: int = 0
+    """The pattern with the most pairs."""
+    worst_step: float = math.nan
+    worst_alone: float = math.nan
+    touching: int = 0
+    """Patterns that touch, by SAT, of those timed."""
+    misses: int = 0
+    """Of these, those in which no two triangles meet."""
+    point: np.ndarray = field(default_factory=lambda: np.empty(0))
+    """Error of the point [m] per pattern judged and answered by the soup."""
+    normal: np.ndarray = field(default_factory=lambda: np.empty(0))
+    """Error of the normal [deg]."""
+    depth: np.ndarray = field(default_factory=lambda: np.empty(0))
+    """Deepest contact minus the true depth [m]."""
+
+
+@dataclass(frozen=True)
+class Rival:
+    """A network, on the touching patterns that the soup's accuracy is measured on."""
+
+    point: float
+    """Mean error of the point [m]."""
+    normal: float
+    """Mean error of the normal [deg]."""
+    milliseconds: float
+    """Mean time of a call."""
+
+
+@dataclass(frozen=True)
+class Result:
+    """All that is measured."""
+
+    cells: Mapping[tuple[str, int], Cell]
+    rivals: Mapping[str, Rival]
+    exact: float
+    """Mean time of a call of model `exact` [ms]."""
+    counts: Mapping[str, Counts]
+
+
+# --- the patterns ---------------------------------------------------------------------------------
+
+
+def touching(inputs: np.ndarray) -> Poses:
+    """The paper's patterns (n, 6), offset [m] and roll, pitch, yaw [rad], as poses."""
+    b = np.concatenate([inputs[:, :3], quaternion_from_euler(inputs[:, 3:])], axis=1)
+    return _origin(len(b)), b
+
+
+def near_parallel(rng: np.random.Generator, n: int) -> Poses:
+    """One cube on the other, tilted by 1e-6–1e-3 rad, 1 mm deep, any yaw, anywhere on it."""
+    pairs = stacks(rng, 2 * n)  # a few are placed beside the cube and left out
+    return pairs.pose_a[:n], pairs.pose_b[:n]
+
+
+def coplanar(rng: np.random.Generator, n: int) -> Poses:
+    """One cube on the other, faces in one plane to the last bit. One in ten stands exactly on top;
+    the others anywhere on it, half of them with their sides parallel, half under any yaw."""
+    exactly = np.zeros((math.ceil(n / 10), 7))
+    exactly[:, 2], exactly[:, 6] = CUBE[2], 1.0
+    parallel = (n - len(exactly)) // 2
+    parts = [exactly]
+    for count, largest in ((parallel, 0.0), (n - len(exactly) - parallel, np.pi)):
+        b = np.zeros((2 * count + 10, 7))  # some are placed beside the cube, and left out
+        b[:, :2] = 0.98 * rng.uniform(-CUBE[0], CUBE[0], (len(b), 2))
+        b[:, 2] = CUBE[2]
+        yaw = largest * rng.uniform(-1.0, 1.0, len(b))
+        b[:, 5], b[:, 6] = np.sin(0.5 * yaw), np.cos(0.5 * yaw)
+        parts.append(b[_cubes('exact').batch(_origin(len(b)), b).colliding][:count])
+    return _origin(n), rng.permutation(np.concatenate(parts))
+
+
+def _origin(n: int) -> np.ndarray:
+    return np.tile([0.0, 0, 0, 0, 0, 0, 1], (n, 1))
+
+
+def _cubes(model: str) -> ContactSolver:
+    return ContactSolver(CUBE, CUBE, model=model)
+
+
+def pressed(poses: Poses, depth: float) -> Poses:
+    """The pairs that touch, B moved along SAT's normal until they are `depth` [m] deep."""
+    a, b = poses
+    found = _cubes('exact').batch(a, b)
+    rows = found.colliding
+    moved = b[rows].copy()
+    moved[:, :3] -= (found.separation + depth)[rows, None] * found.normal[rows]
+    return a[rows], moved
+
+
+# --- time -----------------------------------------------------------------------------------------
+
+
+@contextmanager
+def undisturbed() -> Iterator[None]:
+    """One core, the last one that this process may use; no garbage collection."""
+    pinnable = hasattr(os, 'sched_setaffinity')
+    cores = os.sched_getaffinity(0) if pinnable else set()
+    if pinnable:
+        os.sched_setaffinity(0, {max(cores)})
+    gc.collect()
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.enable()
+        if pinnable:
+            os.sched_setaffinity(0, cores)
+
+
+def search(first: fcl.CollisionObject, second: fcl.CollisionObject) -> None:
+    """FCL's search for all pairs, of which one is handed over: see the module's docstring."""
+    fcl.collide(first, second, fcl.CollisionRequest(num_max_contacts=1, enable_contact=True,
+                                                    enable_cost=True), fcl.CollisionResult())
+
+
+def milliseconds(work: Callable[..., object], *arguments: object) -> float:
+    """CPU time of one call [ms]."""
+    started = time.thread_time_ns()
+    work(*arguments)
+    return 1e-6 * (time.thread_time_ns() - started)
+
+
+def pair_count(contacts: Sequence[fcl.Contact]) -> int:
+    """Pairs of triangles that meet; FCL gives one contact or two for each."""
+    return len({(contact.b1, contact.b2) for contact in contacts})
+
+
+def time_cell(cell: Cell, poses: Poses, thin: int, bar: tqdm) -> None:
+    """Fill in times and numbers of pairs of triangles."""
+    a, b = poses
+    boxes = soup.Soup(cell.divisions)
+    solver = _cubes(f'soup-{cell.divisions}')
+    count = len(a)
+    cell.steps, cell.pairs = np.empty(count), np.empty(count, dtype=np.int64)
+    for row in range(min(WARM_UP, count)):
+        pair = boxes.place(a[row], b[row], CUBE, CUBE)
+        soup.collide(*pair), search(*pair), solver(a[row], b[row])
+    for row in range(count):
+        pair = boxes.place(a[row], b[row], CUBE, CUBE)
+        started = time.thread_time_ns()
+        contacts = soup.collide(*pair)
+        cell.steps[row] = 1e-6 * (time.thread_time_ns() - started)
+        cell.pairs[row] = pair_count(contacts)
+        if row % thin == 0:
+            cell.alone.append(milliseconds(search, *pair))
+            cell.answers.append(milliseconds(solver, a[row], b[row]))
+        if row % 100 == 0:
+            bar.update(min(100, count - row))
+    found = _cubes('exact').batch(a, b).colliding
+    cell.touching, cell.misses = int(found.sum()), int((found & (cell.pairs == 0)).sum())
+    cell.worst = int(np.argmax(cell.pairs))
+    pair = boxes.place(a[cell.worst], b[cell.worst], CUBE, CUBE)
+    cell.worst_step = float(np.median([milliseconds(soup.collide, *pair) for _ in range(REPEATS)]))
+    cell.worst_alone = float(np.median([milliseconds(search, *pair) for _ in range(REPEATS)]))
+
+
+# --- accuracy -------------------------------------------------------------------------------------
+
+
+def degrees_between(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Angles (n,) [deg] between unit vectors (n, 3)."""
+    cross = np.linalg.norm(np.cross(one, other), axis=1)
+    return np.degrees(np.arctan2(cross, np.sum(one * other, axis=1)))
+
+
+def judge_cell(cell: Cell, poses: Poses, exact: Contacts, bar: tqdm) -> None:
+    """Fill in the errors against `exact`; patterns without an answer of the soup are left out."""
+    boxes, areas = soup.Soup(cell.divisions), soup.mesh(CUBE, cell.divisions).areas
+    rows, points, normals, depths = [], [], [], []
+    for row, (a, b) in enumerate(zip(*poses)):
+        contacts = soup.collide(*boxes.place(a, b, CUBE, CUBE))
+        answer = soup.point_and_normal(contacts, areas, areas)
+        if answer is not None:
+            rows.append(row)
+            points.append(a[:3] + answer[0])
+            normals.append(answer[1])
+            depths.append(max(contact.penetration_depth for contact in contacts))
+    bar.update(len(poses[0]))
+    cell.point = np.linalg.norm(np.reshape(points, (-1, 3)) - exact.point[rows], axis=1)
+    cell.normal = degrees_between(np.reshape(normals, (-1, 3)), exact.normal[rows])
+    cell.depth = np.array(depths) + exact.separation[rows]
+
+
+def time_calls(solver: ContactSolver, poses: Poses) -> float:
+    """Mean time of a call [ms]; they are too short for a clock each."""
+    def calls() -> None:
+        for a, b in zip(*poses):
+            solver(a, b)
+
+    calls()
+    return milliseconds(calls) / len(poses[0])
+
+
+def judge_rival(model: str, poses: Poses, exact: Contacts) -> Rival:
+    """A network's errors and its time."""
+    solver = _cubes(model)
+    found = solver.batch(*poses)
+    return Rival(float(np.linalg.norm(found.point - exact.point, axis=1).mean()),
+                 float(degrees_between(found.normal, exact.normal).mean()),
+                 time_calls(solver, poses))
+
+
+def crossing(errors: Mapping[int, float], level: float) -> float:
+    """The N at which the error falls to `level`, straight on log-log paper between those measured;
+    0 if it is below from the first on, infinite if it never is."""
+    divisions = sorted(errors)
+    if errors[divisions[0]] <= level:
+        return 0.0
+    for low, high in zip(divisions, divisions[1:]):
+        if errors[high] <= level:
+            share = math.log(errors[low] / level) / math.log(errors[low] / errors[high])
+            return low * (high / low)**share
+    return math.inf
+
+
+# --- all of it ------------------------------------------------------------------------------------
+
+
+def measure(inputs: np.ndarray, *, quick: bool = False) -> Result:
+    """Time and judge every N on every regime; inputs: the paper's external set (n, 6)."""
+    counts = QUICK if quick else FULL
+    rng = np.random.default_rng(SEED)
+    poses = {'touching': touching(inputs[:counts['touching'].timed]),
+             'near-parallel': near_parallel(rng, counts['near-parallel'].timed),
+             'coplanar': coplanar(rng, counts['coplanar'].timed)}
+    judged = {name: tuple(p[:counts[name].judged] for p in given)
+              for name, given in poses.items()}
+    # At exact touch a few are apart by rounding, and left out.
+    some = tuple(p[:2 * counts['touching'].judged] for p in poses['touching'])
+    judged['touching'] = tuple(p[:counts['touching'].judged] for p in pressed(some, OVERLAP))
+    truth = {name: _cubes('exact').batch(*given) for name, given in judged.items()}
+    cells = {}
+    work = len(PAPER) * sum(c.timed + c.judged for c in counts.values())
+    work += len(ALSO) * counts['touching'].judged
+    with undisturbed(), tqdm(total=work, unit='pattern', disable=None) as bar:
+        for divisions in sorted([*PAPER, *ALSO]):
+            for regime in REGIMES if divisions in PAPER else ['touching']:
+                bar.set_description(f'soup, N = {divisions}, {regime}')
+                cell = cells[regime, divisions] = Cell(regime, divisions)
+                if divisions in PAPER:
+                    time_cell(cell, poses[regime], counts[regime].thin, bar)
+                judge_cell(cell, judged[regime], truth[regime], bar)
+        rivals = {model: judge_rival(model, judged['touching'], truth['touching'])
+                  for model in ('paper', 'paper-continuous')}
+        exact = time_calls(_cubes('exact'), judged['touching'])
+    return Result(cells, rivals, exact, counts)
+
+
+# --- what is written ------------------------------------------------------------------------------
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    return '\n'.join('| ' + ' | '.join(line) + ' |' for line in (
+        head, ['---:'] * len(head), *rows))
+
+
+def _ms(value: float) -> str:
+    return f'{value:.3f}' if value < 0.1 else f'{value:.2f}'
+
+
+def table_3(result: Result) -> str:
+    """Mean times by N and regime, the paper's first."""
+    head = ['N', 'triangles a cube', 'paper: touching']
+    for regime in REGIMES:
+        head += [f'{regime}: step', 'FCL alone', 'answer']
+    rows = []
+    for divisions, (paper, _, _) in PAPER.items():
+        row = [str(divisions), f'{12 * divisions**2:,}', f'{paper:.2f}']
+        for regime in REGIMES:
+            cell = result.cells[regime, divisions]
+            row += [_ms(float(np.mean(times))) for times in (cell.steps, cell.alone, cell.answers)]
+        rows.append(row)
+    return _table(head, rows)
+
+
+def table_4(result: Result) -> str:
+    """The largest number of pairs, and the times of that pattern, by N and regime."""
+    head = ['N', 'paper: tests', 'paper: ms']
+    for regime in REGIMES:
+        head += [f'{regime}: pairs', 'step, ms', 'FCL alone, ms']
+    rows = []
+    for divisions, (_, tests, paper) in PAPER.items():
+        row = [str(divisions), f'{tests:,}', f'{paper:.2f}']
+        for regime in REGIMES:
+            cell = result.cells[regime, divisions]
+            row += [f'{cell.pairs[cell.worst]:,}', _ms(cell.worst_step), _ms(cell.worst_alone)]
+        rows.append(row)
+    return _table(head, rows)
+
+
+def table_of_errors(result: Result) -> str:
+    """Errors by N and regime, then the networks'."""
+    head = ['N', 'misses at exact touch']
+    for regime in REGIMES:
+        head += [f'{regime}: point, mean', 'max', 'normal, mean']
+    head += ['depth, touching', 'depth, near-parallel']
+    rows = []
+    for divisions in sorted({divisions for _, divisions in result.cells}):
+        cell = result.cells['touching', divisions]
+        misses = f'{100 * cell.misses / cell.touching:.0f} %' if cell.touching else ''
+        row = [str(divisions), misses]
+        for regime in REGIMES:
+            other = result.cells.get((regime, divisions))
+            row += ['', '', ''] if other is None else [
+                f'{1e3 * other.point.mean():.1f}', f'{1e3 * other.point.max():.0f}',
+                f'{other.normal.mean():.1f}']
+        for regime in ('touching', 'near-parallel'):
+            other = result.cells.get((regime, divisions))
+            row.append('' if other is None else f'{1e3 * other.depth.mean():.0f}')
+        rows.append(row)
+    for name, rival in result.rivals.items():
+        rows.append([f'`{name}`', '', f'{1e3 * rival.point:.1f}', '', f'{rival.normal:.1f}',
+                     *[''] * (len(head) - 5)])
+    return _table(head, rows)
+
+
+def equal_at(result: Result) -> dict[str, float]:
+    """By network: the N at which the soup's mean point error equals its."""
+    errors = {divisions: float(cell.point.mean())
+              for (regime, divisions), cell in result.cells.items() if regime == 'touching'}
+    return {name: crossing(errors, rival.point) for name, rival in result.rivals.items()}
+
+
+def in_words(divisions: float) -> str:
+    """A `crossing`."""
+    if divisions == 0.0:
+        return f'below N = {min(ALSO)}'
+    return f'N ≈ {divisions:.0f}' if math.isfinite(divisions) else f'beyond N = {max(ALSO)}'
+
+
+def section_3(result: Result) -> str:
+    """Table 3 with its notes."""
+    counts = result.counts
+    thin = ', '.join(f'{math.ceil(count.timed / count.thin):,} {name}'
+                     for name, count in counts.items())
+    first, last = (result.cells['coplanar', n] for n in (min(PAPER), max(PAPER)))
+    share = 100 * (1 - np.mean(last.alone) / np.mean(last.steps[::counts['coplanar'].thin]))
+    network = result.rivals['paper'].milliseconds
+    slower = [np.mean(result.cells['touching', n].steps) / network
+              for n in (min(PAPER), max(PAPER))]
+    return f"""## Table 3: polygon soup, mean time
+
+ms, on two cubes of edge 2. *Touching*: {counts['touching'].timed:,} patterns of the external set
+of Table 1. *Near-parallel*: {counts['near-parallel'].timed:,}; one cube on the other, 1 mm deep,
+tilted by 1e-6 to 1e-3 rad. *Coplanar*: {counts['coplanar'].timed:,}; faces in one plane to the last
+bit, one in ten exactly on top, the others anywhere, half with parallel sides, half under any yaw.
+
+{table_3(result)}
+
+- *Step* is what the paper times: two placed soups in, all contacts out, here as python-fcl's list.
+  *FCL alone* is the same search without the list, as compiled code would see it ({share:.0f} % of
+  the coplanar step at N = {last.divisions} is the making of Python objects). *Answer* is a call of
+  model `soup`, with SAT, point and normal. The last two are timed on {thin} patterns.
+- A call of model `paper`, network, SAT and Python included, takes {1e3 * network:.1f} µs in the
+  same run, on any pattern: the step takes {slower[0]:.0f} times that at N = {min(PAPER)} and
+  {slower[1]:.0f} times at N = {max(PAPER)} on touching cubes, and
+  {np.mean(first.steps) / network:,.0f} to {np.mean(last.steps) / network:,.0f} times on coplanar
+  ones. The paper has 2 to 6 on the first.
+- A call of model `exact` takes {1e3 * result.exact:.1f} µs: it is the soup that is slow, not exact
+  geometry, and against that the paper's network wins nothing.
+"""
+
+
+def section_4(result: Result) -> str:
+    """Table 4 with its notes."""
+    low, high = min(PAPER), max(PAPER)
+
+    def growth(regime: str) -> float:
+        return (result.cells[regime, high].worst_step / result.cells[regime, low].worst_step)
+
+    def most(regime: str) -> str:
+        return ' to '.join(f'{result.cells[regime, n].pairs.max():,}' for n in (low, high))
+
+    few = max(result.cells['touching', n].pairs.max() for n in PAPER)
+
+    return f"""## Table 4: polygon soup, the pattern with the most pairs
+
+Of the same patterns: the most pairs of triangles that meet, and that pattern's times (median of
+{REPEATS}).
+
+{table_4(result)}
+
+- The paper counts "tests" and does not say which. FCL counts its tests of volumes and triangles,
+  but python-fcl does not hand the numbers out: here are pairs that do meet.
+- Only exactly coplanar faces come near the paper's numbers ({most('coplanar')} pairs, against
+  {most('near-parallel')} of near-parallel ones): that is the regime of its worst case. A uniform
+  set of angles may well hold exact zeros, and so coplanar cubes; angles drawn at random, as
+  ours, do not, and touching cubes meet in {few} pairs at most.
+- What does not fit is the growth: from N = {low} to {high} the paper's worst time grows by a factor
+  of {PAPER[high][2] / PAPER[low][2]:.1f}, our coplanar one by {growth('coplanar'):.1f} (pairs fill
+  the patch and go with N²), our near-parallel one by {growth('near-parallel'):.1f} (pairs lie along
+  the patch's outline and go with N).
+"""
+
+
+def section_errors(result: Result) -> str:
+    """The soup's errors, and what differs from the paper."""
+    counts = result.counts
+    return f"""## What the soup answers
+
+Errors against `exact`: point in mm (of cubes of 2,000 mm), normal in degrees, depth in mm.
+{counts['touching'].judged:,} touching patterns pressed to 1 mm of overlap,
+{counts['near-parallel'].judged:,} near-parallel ones (1 mm deep as they are) and
+{counts['coplanar'].judged:,} coplanar ones (depth zero).
+
+{table_of_errors(result)}
+
+- *Misses at exact touch*: patterns of Table 3 that touch by the axis test, but where no two
+  triangles meet, within rounding. Model `soup` then gives the axis test's normal and the exact
+  point, and counts it.
+- *Depth*: the deepest of FCL's contacts less the true depth, mean. It is measured to the corners of
+  triangles, so it shrinks with them and not with the overlap: useless at 1 mm. Model `soup` takes
+  separation and verdict from the axis test.
+- On near-parallel cubes the triangles that meet lie along the outline of the patch, not in it, so
+  the point stays {1e3 * result.cells['near-parallel', max(PAPER)].point.mean():.0f} mm off, however
+  small they are.
+- On touching cubes the normal hardly gets better with N: what counts is how many of the triangles
+  that meet are the face's, and how many the sides'.
+
+## What differs from the paper, Tables 3 and 4
+
+- The machine: the paper had a Pentium IV of 1.5 GHz. Compare ratios, not times.
+- FCL in place of RAPID: trees of oriented boxes there as here (FCL's `OBBRSS`), but other code, and
+  a list of Python objects in place of one in C.
+- CPU times of single calls, in place of gprof's samples.
+- The patterns are drawn at random; the paper's angles were a uniform set.
+- The paper's column "triangles/face" holds 12 N²: it is per cube.
+"""
+
+
+def section_figure_10(result: Result, picture: str) -> str:
+    """Figure 10's caption."""
+    equal = equal_at(result)
+    words = '; '.join(f"`{name}`'s ({1e3 * result.rivals[name].point:.0f} mm) at {in_words(n)}"
+                      for name, n in equal.items())
+    return f"""## Figure 10: soup and network against N
+
+![Two graphs over the divisions N: times of soup and network, and the soup's point error]({picture})
+
+Left, the step's mean and the time of Table 4's pattern, with a call of model `paper`; grey, the
+paper's. Right, the mean point error on touching cubes 1 mm deep: the soup's equals {words}. The
+dashed line marks where. The paper draws one such line; its text gives neither the number nor the
+measure of accuracy.
+"""
+
+
+def draw_figure_10(result: Result, path: Path) -> None:
+    """Times and errors against N, as a PNG."""
+    import matplotlib
+
+    matplotlib.use('Agg')
+    from matplotlib import pyplot as plt
+
+    divisions = list(PAPER)
+    figure, (left, right) = plt.subplots(1, 2, figsize=(11.0, 4.8), layout='constrained')
+    for regime, colour in zip(REGIMES, ('tab:blue', 'tab:green', 'tab:red')):
+        cells = [result.cells[regime, n] for n in divisions]
+        left.plot(divisions, [cell.steps.mean() for cell in cells], '-o', color=colour,
+                  markersize=3.5, label=f'{regime}, mean')
+        left.plot(divisions, [cell.worst_step for cell in cells], ':s', color=colour,
+                  markersize=3.5, label=f'{regime}, most pairs')
+    left.axhline(result.rivals['paper'].milliseconds, color='black', label='call of model paper')
+    for column, style, label in ((0, '-', 'mean'), (2, ':', 'maximum')):
+        left.plot(divisions, [PAPER[n][column] for n in divisions], style, color='0.6',
+                  label=f"the paper's soup, {label}")
+    left.axhline(PAPER_NETWORK, color='0.6', linestyle='--', label="the paper's network")
+    left.set(yscale='log', xlabel='divisions N of an edge', ylabel='time [ms]', xticks=divisions)
+    # Room for the legend beside the curves.
+    left.legend(fontsize=7.5, loc='upper center', bbox_to_anchor=(0.5, -0.14), ncols=3)
+
+    errors = sorted((n, 1e3 * cell.point.mean())
+                    for (regime, n), cell in result.cells.items() if regime == 'touching')
+    right.plot(*zip(*errors), '-o', color='tab:blue', markersize=3.5, label='soup, touching')
+    for (name, n), colour in zip(equal_at(result).items(), ('tab:orange', 'tab:purple')):
+        right.axhline(1e3 * result.rivals[name].point, color=colour, label=f'{name}: {in_words(n)}')
+        if 0.0 < n < math.inf:
+            right.axvline(n, color=colour, linestyle='--')
+            if min(divisions) <= n <= max(divisions):
+                left.axvline(n, color=colour, linestyle='--')
+    ticks = [1, 2, 4, 8, 16, 32, 64]
+    right.set(xscale='log', yscale='log', xlabel='divisions N of an edge',
+              ylabel='mean point error [mm]')
+    right.set_xticks(ticks, [str(tick) for tick in ticks])
+    right.set_xticks([], minor=True)
+    right.legend(fontsize=8)
+    for axes in (left, right):
+        axes.grid(color='0.9', which='both', linewidth=0.6)
+        axes.set_axisbelow(True)
+    figure.savefig(path, dpi=130)
+    plt.close(figure)
+
+
+def write_csv(result: Result, path: Path, machine: str) -> None:
+    """A row per model, N and regime."""
+    fcl_version = getattr(fcl, '__version__', 'unknown')
+
+    def mean(values: Sequence[float] | np.ndarray, factor: float = 1.0) -> str:
+        return f'{factor * np.mean(values):.6g}' if len(values) else ''
+
+    columns = ('model', 'divisions', 'triangles', 'regime', 'patterns', 'touching', 'misses',
+               'step_mean_ms', 'step_p50_ms', 'step_p99_ms', 'step_max_ms', 'alone_patterns',
+               'alone_mean_ms', 'answer_mean_ms', 'most_pairs', 'most_pairs_step_ms',
+               'most_pairs_alone_ms', 'judged', 'point_error_mean_m', 'point_error_max_m',
+               'normal_error_mean_deg', 'depth_error_mean_m', 'machine', 'fcl')
+    rows = []
+    for (regime, divisions), cell in result.cells.items():
+        quantiles = np.quantile(cell.steps, (0.5, 0.99, 1.0)) if len(cell.steps) else ()
+        timed = bool(len(cell.steps))
+        rows.append(dict(zip(columns, [
+            'soup', divisions, 12 * divisions**2, regime, len(cell.steps),
+            cell.touching if timed else '', cell.misses if timed else '', mean(cell.steps),
+            *([f'{q:.6g}' for q in quantiles] or ['', '', '']), len(cell.alone), mean(cell.alone),
+            mean(cell.answers), *([int(cell.pairs.max()), f'{cell.worst_step:.6g}',
+                                   f'{cell.worst_alone:.6g}'] if timed else ['', '', '']),
+            len(cell.point), mean(cell.point), f'{cell.point.max():.6g}', mean(cell.normal),
+            mean(cell.depth), machine, fcl_version])))
+    for name, rival in result.rivals.items():
+        rows.append({'model': name, 'regime': 'touching', 'answer_mean_ms':
+                     f'{rival.milliseconds:.6g}', 'point_error_mean_m': f'{rival.point:.6g}',
+                     'normal_error_mean_deg': f'{rival.normal:.6g}', 'machine': machine})
+    with path.open('w', newline='', encoding='utf-8') as file:
+        writer = csv.DictWriter(file, columns, restval='', lineterminator='\n')
+        writer.writeheader()
+        writer.writerows(rows)

@@ -1,0 +1,177 @@
+"""Model `soup`: polygon soup, the method that the source paper compares itself with (section 5).
+
+Each face is split in N × N rectangles of two triangles, 12 N² triangles a box. (The paper's column
+"triangles/face" holds just these numbers: they are per cube.) FCL, in place of the paper's RAPID,
+finds all pairs of triangles that meet, with a bounding volume tree per box. What the paper leaves
+to "an additional algorithm" is done here as follows:
+
+- Contacts. For two triangles that meet, FCL gives the one or two corners of either that lie deepest
+  behind the other's plane, and a normal: the outward normal of A's triangle, or the reverse of the
+  outward normal of B's, whichever plane is less deeply crossed. The triangles are wound so that
+  their normals leave the box; so FCL's normal points from A to B.
+- Point: the mean of the contacts' positions, each weighted by the smaller of its two triangles'
+  areas [m²], the most in which the two can meet. (The area in which they do meet is not known, and
+  is zero where they cross.) On a cube all triangles are alike, and the mean is a plain one.
+- Normal: the mean of the contacts' normals with the same weights, made unit.
+- Separation and verdict: SAT's, as in every model here. The largest depth of the contacts is no
+  substitute: it is measured to the far corners of triangles, and is off by their size, not by a
+  part of the overlap (`docs/paper_tables.md` has figures).
+
+Triangles are surfaces, so there are contacts in the sense of SAT without a pair of triangles: a box
+inside another, and some exact touches, within rounding. There, and where the normals cancel, the
+answer is SAT's normal and the exact point; `Soup.soup_misses` counts them.
+"""
+from __future__ import annotations
+
+import functools
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import fcl
+import numpy as np
+
+from .block import OK
+from .contact import Contacts
+from .exact import Exact
+
+FIRST_CONTACTS = 1 << 16
+"""Contacts asked for at first: two cubes exactly on top of each other make 27,400 with N = 22."""
+MORE_CONTACTS = 16
+"""Factor by which more are asked for when so many have been found."""
+
+CANCELLED = 1e-9
+"""Length of the mean normal up to which it has cancelled and has no direction: a mean of 1e6 unit
+vectors is rounded by 1e-10 at worst, and opposite faces that cancel leave no more than that."""
+
+
+class Mesh(NamedTuple):
+    """A box as polygon soup."""
+
+    model: fcl.BVHModel
+    """Triangles and tree, in the box's own frame."""
+    areas: np.ndarray
+    """(12 N²,) of the triangles, in FCL's numbering [m²]."""
+
+
+def triangles(size: Sequence[float] | np.ndarray, divisions: int) -> np.ndarray:
+    """Corners (12 N², 3, 3) of a box's triangles in its own frame [m], counter-clockwise as seen
+    from outside; size: three full extents [m]."""
+    half = 0.5 * np.asarray(size, dtype=np.float64)
+    faces = []
+    for axis in range(3):
+        u, v = (axis + 1) % 3, (axis + 2) % 3
+        # The same numbers on all faces, so that faces share their edges to the last bit.
+        along_u = np.linspace(-half[u], half[u], divisions + 1)
+        along_v = np.linspace(-half[v], half[v], divisions + 1)
+        grid = np.empty((divisions + 1, divisions + 1, 3))
+        grid[..., u] = along_u[:, None]
+        grid[..., v] = along_v[None, :]
+        for side in (1.0, -1.0):
+            grid[..., axis] = side * half[axis]
+            a, b, c, d = grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]
+            # u, v and the axis are right-handed: from u to v is counter-clockwise from outside.
+            pairs = ((a, b, c), (a, c, d)) if side > 0.0 else ((a, c, b), (a, d, c))
+            faces += [np.stack(corners, axis=2).reshape(-1, 3, 3) for corners in pairs]
+    return np.concatenate(faces)
+
+
+def mesh(size: Sequence[float] | np.ndarray, divisions: int) -> Mesh:
+    """The soup of a box of three full extents [m]; kept, as a scene has few sizes."""
+    return _mesh(tuple(float(extent) for extent in size), divisions)
+
+
+@functools.lru_cache(maxsize=64)
+def _mesh(size: tuple[float, float, float], divisions: int) -> Mesh:
+    corners = triangles(size, divisions)
+    model = fcl.BVHModel()
+    model.beginModel(len(corners), 3 * len(corners))
+    model.addSubModel(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
+    model.endModel()
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return Mesh(model, 0.5 * np.linalg.norm(across, axis=1))
+
+
+def _move(soup: fcl.CollisionObject, position: np.ndarray, quaternion: np.ndarray) -> None:
+    """To a position (3,) [m], quaternion (4,) xyzw of any length but zero."""
+    x, y, z, w = quaternion / np.linalg.norm(quaternion)
+    soup.setTransform(fcl.Transform(np.array([w, x, y, z]), position))
+
+
+def collide(first: fcl.CollisionObject, second: fcl.CollisionObject) -> list[fcl.Contact]:
+    """All contacts of two soups: `b1`, `b2` number the triangles, `pos` [m] is in the frame in
+    which they were placed, `normal` points from the first to the second."""
+    most = FIRST_CONTACTS
+    while True:
+        result = fcl.CollisionResult()
+        fcl.collide(first, second,
+                    fcl.CollisionRequest(num_max_contacts=most, enable_contact=True), result)
+        if len(result.contacts) < most:
+            return result.contacts
+        most *= MORE_CONTACTS
+
+
+def point_and_normal(contacts: Sequence[fcl.Contact], areas_a: np.ndarray, areas_b: np.ndarray,
+                     ) -> tuple[np.ndarray, np.ndarray] | None:
+    """Area-weighted mean point (3,) [m] and normal (3,) of contacts, in their frame; None where
+    there are none or the normals cancel."""
+    if not contacts:
+        return None
+    weights = np.minimum(areas_a[[contact.b1 for contact in contacts]],
+                         areas_b[[contact.b2 for contact in contacts]])
+    weights /= weights.sum()
+    vectors = np.concatenate([[contact.pos, contact.normal] for contact in contacts], axis=1)
+    point, normal = (vectors.reshape(2, -1, 3) * weights[:, None]).sum(axis=1)
+    length = float(np.linalg.norm(normal))
+    return None if length <= CANCELLED else (point, normal / length)
+
+
+class Soup:
+    """Polygon soup of N divisions per edge, for any sizes.
+
+    soup_misses: pairs in contact so far that the soup could not answer, and `exact` did.
+    """
+
+    def __init__(self, divisions: int) -> None:
+        self.divisions = divisions
+        self.soup_misses = 0
+        self._exact = Exact(np.ones((2, 3)))
+
+        def new_object(size: tuple[float, ...], box: int) -> fcl.CollisionObject:
+            return fcl.CollisionObject(mesh(size, divisions).model)
+
+        # Making one passes over all vertices, so they are kept, and moved: for each solver its own,
+        # for A and for B.
+        self._object = functools.lru_cache(maxsize=64)(new_object)
+
+    @property
+    def exact_answers(self) -> int:
+        """`soup_misses`, under the name that all models have for it."""
+        return self.soup_misses
+
+    def place(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
+              ) -> tuple[fcl.CollisionObject, fcl.CollisionObject]:
+        """Soups of full extents (3,) at poses (7,), about A's centre in the common frame's
+        directions; until the next call.
+
+        B − A is formed in float64 here, so that FCL adds no rounding far from the origin.
+        """
+        first, second = self._object(tuple(size_a), 0), self._object(tuple(size_b), 1)
+        _move(first, np.zeros(3), a[3:])
+        _move(second, b[:3] - a[:3], b[3:])
+        return first, second
+
+    def solve(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
+              status: np.ndarray, found: Contacts) -> int:
+        """Fill `found` for poses (n, 7), sizes (n or 1, 3); returns how many rows are refused."""
+        refused = self._exact.solve(a, b, size_a, size_b, status, found)
+        for row in np.flatnonzero(found.colliding & (status == OK)):
+            sizes = size_a[row % len(size_a)], size_b[row % len(size_b)]
+            contacts = collide(*self.place(a[row], b[row], *sizes))
+            answer = point_and_normal(
+                contacts, *(mesh(size, self.divisions).areas for size in sizes))
+            if answer is None:
+                self.soup_misses += 1
+                continue
+            found.point[row] = a[row, :3] + answer[0]
+            found.normal[row] = answer[1]
+        return refused

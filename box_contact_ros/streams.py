@@ -1,0 +1,139 @@
+"""Streams of pose pairs for the bench: named, seeded, each with the box sizes it is meant for.
+
+All poses of a stream are made before it is played, so that playing one costs nothing but sending.
+"""
+from __future__ import annotations
+
+import zlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from . import posesets
+from .posesets import CONTAINER, CUBE, Generator, Pairs
+
+Size = tuple[float, float, float]
+
+EXTRA_DRAWS = 16
+"""Pairs drawn beyond those that are still needed: a few draws of a set miss and are left out."""
+COPLANAR_OFFSET = 0.8
+"""Largest offset of stacked cubes along x and along y, as a share of the edge. Up to 0.85 the two
+faces overlap whatever the yaw: seen along a side of the turned face, at an angle t to x, the
+centres are 2·0.85·(cos t + sin t) apart, which is less than the (cos t + sin t) + 1 that the two
+half-widths of cubes of edge 2 add up to."""
+GAPS = (1e-3, 1.0)
+"""Least and largest SAT gap of the pairs that are apart [m]."""
+
+
+@dataclass(frozen=True)
+class Stream:
+    """n pairs of poses `x y z qx qy qz qw` in a common frame, in the order they are sent."""
+
+    name: str
+    size_a: Size
+    """Full extents of box A [m]."""
+    size_b: Size
+    """Full extents of box B [m]."""
+    pose_a: np.ndarray
+    """(n, 7)."""
+    pose_b: np.ndarray
+    """(n, 7)."""
+
+    def __len__(self) -> int:
+        return len(self.pose_a)
+
+    @property
+    def sizes(self) -> tuple[Size, Size]:
+        """Full extents of both boxes [m]: what the nodes have to be started with."""
+        return self.size_a, self.size_b
+
+
+def coplanar(rng: np.random.Generator, n: int) -> Pairs:
+    """Cubes of edge 2 stacked with exactly coplanar faces, zero depth, any yaw, anywhere on it."""
+    offset = COPLANAR_OFFSET * rng.uniform(-2.0, 2.0, (n, 2))
+    turn = posesets.turns(np.array([0.0, 0.0, 1.0]), rng.uniform(-np.pi, np.pi, n))
+    a = np.tile([0.0, 0, 0, 0, 0, 0, 1], (n, 1))
+    b = np.concatenate([offset, np.full((n, 1), 2.0), turn], axis=1)
+    sizes = np.tile(CUBE, (n, 1))
+    return Pairs(a, b, sizes, sizes)
+
+
+def separated(rng: np.random.Generator, n: int) -> Pairs:
+    """Cubes of edge 2 in any pose, apart by a SAT gap of 1 mm to 1 m."""
+    sizes = np.tile(CUBE, (n, 1))
+    return posesets.any_pose(rng, sizes, sizes, -posesets.log_uniform(rng, *GAPS, n))
+
+
+def crane_run(rng: np.random.Generator, n: int) -> Pairs:
+    """A crane lowers a container onto another and lifts it: the whole motion, in n poses.
+
+    The motion takes 18 s; it is played faster or slower if n poses take another time to send.
+    """
+    from .crane import Crane, CraneScenario  # only here: MuJoCo is an extra
+
+    scenario = CraneScenario.drawn(int(rng.integers(1, 2**31)))
+    crane = Crane(scenario, n / scenario.duration)
+    a, b = np.empty((n, 7)), np.empty((n, 7))
+    for row in range(n):
+        a[row], b[row] = crane.load_pose, crane.stack_pose
+        crane.step()
+    return Pairs(a, b, np.tile(scenario.size, (n, 1)), np.tile(scenario.stack_size, (n, 1)))
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where a stream comes from: how it is drawn, the size of both boxes [m], what it is."""
+
+    draw: Callable[[np.random.Generator, int], Pairs]
+    size: Size
+    description: str
+
+
+def _of_set(draw: Generator) -> Generator:
+    """A set of `posesets`, filled up to exactly n pairs."""
+    def filled(rng: np.random.Generator, n: int) -> Pairs:
+        parts: list[Pairs] = []
+        while (missing := n - sum(len(part.pose_a) for part in parts)) > 0:
+            parts.append(draw(rng, missing + EXTRA_DRAWS))
+        return Pairs(*(np.concatenate(column)[:n] for column in zip(*parts, strict=True)))
+    return filled
+
+
+STREAMS: dict[str, Source] = {
+    'random': Source(_of_set(posesets.SETS['random cubes']), CUBE,
+                     'cubes in any pose, 0.1 to 10 % deep'),
+    'touching': Source(_of_set(posesets.SETS['touching']), CUBE,
+                       'cubes in any pose that just touch'),
+    'near-parallel': Source(_of_set(posesets.SETS['stacks']), CUBE,
+                            'stacked cubes, tilt 1e-6 to 1e-3 rad, 1 mm deep'),
+    'coplanar': Source(coplanar, CUBE, 'stacked cubes, faces exactly coplanar'),
+    'separated': Source(_of_set(separated), CUBE, 'cubes in any pose, 1 mm to 1 m apart'),
+    'containers': Source(_of_set(posesets.SETS['containers']), CONTAINER,
+                         '40 ft containers with sway, 0.1 to 10 % deep'),
+    'crane': Source(crane_run, CONTAINER, 'a recorded run of the crane'),
+}
+"""The streams by name; neighbours are for boxes of the same sizes."""
+
+
+def make_stream(name: str, count: int, seed: int = 1) -> Stream:
+    """`count` pairs of the stream of that name; the same for the same seed, whatever else is made.
+
+    Raises ValueError for a name that is not one of STREAMS or a count below 1.
+    """
+    if name not in STREAMS:
+        raise ValueError(f'stream {name!r} is not one of: {", ".join(STREAMS)}')
+    if count < 1:
+        raise ValueError(f'a stream needs 1 pair or more, not {count}')
+    source = STREAMS[name]
+    rng = np.random.default_rng([seed, zlib.crc32(name.encode())])
+    pairs = source.draw(rng, count)
+    return Stream(name, source.size, source.size, pairs.pose_a, pairs.pose_b)
+
+
+def by_sizes(streams: Sequence[Stream]) -> list[list[Stream]]:
+    """Streams for boxes of the same sizes together, in the order in which they first come."""
+    groups: dict[tuple[Size, Size], list[Stream]] = {}
+    for stream in streams:
+        groups.setdefault(stream.sizes, []).append(stream)
+    return list(groups.values())

@@ -1,0 +1,558 @@
+"""Model `committee`: what it promises whatever its network says, and how good its network is."""
+from __future__ import annotations
+
+import numpy as np
+import poses
+import pytest
+
+from box_contact_ros import ContactSolver
+from box_contact_ros.block import LANES
+from box_contact_ros.committee import ASPECT_MAX, DEPTH_MAX, INPUTS, OUTPUTS, RATIO_MAX
+from box_contact_ros.network import (
+    TANH_LIMIT,
+    Network,
+    WeightsError,
+    block_numbers,
+    forward_block,
+    forward_one,
+    network_values,
+    rational_tanh,
+    save_weights,
+    unpacked,
+)
+from box_contact_ros.overlap import DEPTH_FLOOR
+from box_contact_ros.posesets import SETS, Pairs, log_uniform, quaternion_multiply, turns
+from box_contact_ros.report.accuracy import LIMITS
+
+N = 10_000
+UNIT = (1.0, 1.0, 1.0)
+EXACT = ContactSolver(UNIT, UNIT, model='exact')
+
+INSIDE = 2.0**-44
+"""How far outside a box the point may be, of the size (5.7e-14); for a contact that is pressed in,
+DEPTH_FLOOR more. Far from the origin, ulps of the coordinates are added (none here)."""
+
+FAMILIES = {
+    'random': poses.random_pairs,
+    'near-parallel': poses.near_parallel_pairs,
+    'aligned': lambda rng, n: aligned(rng, n),
+    **SETS}
+
+
+def aligned(rng, n):
+    """Containers exactly above each other, tilted about a level axis of the box or not at all."""
+    axes = np.eye(3)[rng.integers(0, 3, n)]
+    tilt = rng.choice([0.0, 1e-12, 1e-9, 1e-6, 1e-4, 1e-3], n)
+    height = poses.CONTAINER[2] - rng.choice([0.0, 1e-9, 1e-4, 1e-2], n)
+    b = np.column_stack([np.zeros((n, 2)), height, poses.small_rotations(axes, tilt)])
+    turn, shift = poses.unit_quaternions(rng, n), rng.uniform(-20, 20, (n, 3))
+    size = np.tile(poses.CONTAINER, (n, 1))
+    return (poses.moved(np.tile(poses.IDENTITY, (n, 1)), shift, turn), poses.moved(b, shift, turn),
+            size, size)
+
+
+@pytest.fixture(scope='module')
+def committee():
+    return ContactSolver(UNIT, UNIT, model='committee')
+
+
+@pytest.fixture(params=FAMILIES)
+def pairs(request):
+    return Pairs(*FAMILIES[request.param](np.random.default_rng(771), N))
+
+
+@pytest.fixture(params=SETS)
+def named_set(request):
+    return request.param, SETS[request.param](np.random.default_rng(772), N)
+
+
+def solve(solver, pairs):
+    return solver.batch(pairs.pose_a, pairs.pose_b, size_a=pairs.size_a, size_b=pairs.size_b)
+
+
+def largest(pairs):
+    return np.maximum(pairs.size_a.max(axis=1), pairs.size_b.max(axis=1))
+
+
+def edge(pairs):
+    """The smaller box's longest edge [m]: what errors are given in."""
+    return np.minimum(pairs.size_a.max(axis=1), pairs.size_b.max(axis=1))
+
+
+def percent(one, other, pairs):
+    """Distance between points, in % of `edge`; rows with a contact in both."""
+    distance = 100.0 * np.linalg.norm(one - other, axis=1) / edge(pairs)
+    return distance[np.isfinite(distance)]
+
+
+def in_range(pairs, found):
+    """Rows that the committee must answer itself, worked out the plain way."""
+    aspect = np.maximum(pairs.size_a.max(axis=1) / pairs.size_a.min(axis=1),
+                        pairs.size_b.max(axis=1) / pairs.size_b.min(axis=1))
+    ratio = largest(pairs) / edge(pairs)
+    shortest = np.minimum(pairs.size_a.min(axis=1), pairs.size_b.min(axis=1))
+    return ((aspect <= ASPECT_MAX * (1 + 1e-9)) & (ratio <= RATIO_MAX * (1 + 1e-9))
+            & (-found.separation <= DEPTH_MAX * (1 + 1e-9) * shortest))
+
+
+def outside(pairs, found):
+    """(n,) by how much the point is outside either box [m]; negative inside."""
+    worst = np.full(len(pairs.pose_a), -np.inf)
+    for pose, size in ((pairs.pose_a, pairs.size_a), (pairs.pose_b, pairs.size_b)):
+        local = poses.rotate(pose[:, 3:] * (-1, -1, -1, 1), found.point - pose[:, :3])
+        worst = np.maximum(worst, (np.abs(local) - size / 2).max(axis=1))
+    return worst
+
+
+def is_inside(pairs, found):
+    """Every contact's point lies in both boxes, up to INSIDE and how far B is pressed in."""
+    rows = found.colliding
+    size = largest(pairs)
+    coordinates = np.maximum(np.abs(pairs.pose_a[:, :3]), np.abs(pairs.pose_b[:, :3])).max(axis=1)
+    slack = (INSIDE * np.maximum(size, coordinates)
+             + np.maximum(0.0, DEPTH_FLOOR * size + found.separation))
+    return np.isfinite(found.point[rows]).all() and np.all((outside(pairs, found) <= slack)[rows])
+
+
+# --- what SAT gives -------------------------------------------------------------------------------
+
+
+def test_verdict_separation_and_normal_are_those_of_exact(committee, pairs):
+    """Bit for bit; the network has no say in them."""
+    one, other = solve(committee, pairs), solve(EXACT, pairs)
+    for name in ('colliding', 'separation', 'normal'):
+        assert np.array_equal(getattr(one, name), getattr(other, name), equal_nan=True), name
+    assert np.array_equal(np.isnan(one.point), np.isnan(other.point))
+
+
+# --- the point, whatever the network says ---------------------------------------------------------
+
+
+def garbage(rng, kind):
+    """(weight, bias) of three layers that were not trained."""
+    widths = (INPUTS, 32, 32, OUTPUTS)
+    layers = []
+    for number, (inputs, outputs) in enumerate(zip(widths, widths[1:])):
+        weight, bias = rng.normal(size=(outputs, inputs)), rng.normal(size=outputs)
+        if kind == 'as large as a loader believes':
+            weight, bias = 1e4 * np.sign(weight), 1e4 * np.sign(bias)
+        elif kind == 'tiny':  # float32 denormals
+            weight, bias = 1e-40 * weight, 1e-40 * bias
+        elif kind == 'zero':
+            weight, bias = 0.0 * weight, 0.0 * bias
+        elif kind == 'one direction':
+            weight, bias = 0.0 * weight, np.full(outputs, -1e4 if number % 2 else 1e4)
+        layers.append((weight, bias))
+    return layers
+
+
+def written(path, layers):
+    """The weights file of these layers."""
+    card = {'name': path.stem, 'model': 'committee', 'inputs': {}, 'outputs': [], 'sizes': [],
+            'architecture': [INPUTS, 32, 32, OUTPUTS], 'data': {}, 'seed': 0, 'commit': '',
+            'metrics': {}}
+    save_weights(path, {'point': layers}, card)
+    return str(path)
+
+
+@pytest.mark.parametrize('kind', ['random', 'as large as a loader believes', 'tiny', 'zero',
+                                  'one direction'])
+def test_the_point_is_in_both_boxes_even_with_garbage_for_weights(tmp_path, kind):
+    """Weights that nobody trained: points are wrong, finite, and inside."""
+    file = written(tmp_path / 'garbage.safetensors', garbage(np.random.default_rng(4), kind))
+    solver = ContactSolver(UNIT, UNIT, model='committee', weights=file)
+    for name, make in FAMILIES.items():
+        pairs = Pairs(*make(np.random.default_rng(31), N))
+        assert is_inside(pairs, solve(solver, pairs)), name
+
+
+def test_garbage_for_weights_is_really_asked(tmp_path):
+    """The test above would prove nothing of a network whose answer is not used."""
+    file = written(tmp_path / 'garbage.safetensors',
+                   garbage(np.random.default_rng(4), 'one direction'))
+    pairs = SETS['stacks'](np.random.default_rng(31), N)
+    found = solve(ContactSolver(UNIT, UNIT, model='committee', weights=file), pairs)
+    assert np.median(percent(found.point, solve(EXACT, pairs).point, pairs)) > 10.0
+
+
+def test_the_point_is_in_both_boxes(committee, pairs):
+    """With the shipped weights."""
+    assert is_inside(pairs, solve(committee, pairs))
+
+
+def test_points_of_an_aligned_stack_are_inside(committee):
+    """Two containers exactly above each other, turned anywhere. All their sides lie in pairs of one
+    plane, and rounding put the edges of each outside the other: no outline, a point 6 m off."""
+    rng = np.random.default_rng(8)
+    n = 5000
+    b = np.tile((0, 0, poses.CONTAINER[2] - 1e-3, 0, 0, 0, 1.0), (n, 1))
+    turn, shift = poses.unit_quaternions(rng, n), rng.uniform(-20, 20, (n, 3))
+    size = np.tile(poses.CONTAINER, (n, 1))
+    pairs = Pairs(poses.moved(np.tile(poses.IDENTITY, (n, 1)), shift, turn),
+                  poses.moved(b, shift, turn), size, size)
+    found = solve(committee, pairs)
+    assert is_inside(pairs, found)
+    assert percent(found.point, solve(EXACT, pairs).point, pairs).max() < 3.0
+
+
+@pytest.mark.parametrize('size_a, size_b', [((1e-9,) * 3, (1e-9,) * 3), ((1e9,) * 3, (1e9,) * 3),
+                                            (UNIT, (1e-6,) * 3), ((1e-50,) * 3, (1e-50,) * 3),
+                                            ((1e50,) * 3, (1e50,) * 3)])
+def test_extreme_sizes_are_finite_and_inside(committee, size_a, size_b):
+    """From the smallest to the largest that is accepted: nothing over- or underflows."""
+    n = 64
+    reach = 0.5 * (size_a[2] + size_b[2])
+    b = np.tile((0, 0, 0, 0, 0, 0, 1.0), (n, 1))
+    b[:, 2] = reach - min(size_a[2], size_b[2]) * np.linspace(0.0, 0.2, n)
+    b[:, :2] = 0.1 * size_b[0]
+    pairs = Pairs(np.tile(poses.IDENTITY, (n, 1)), b, np.tile(size_a, (n, 1)),
+                  np.tile(size_b, (n, 1)))
+    found = solve(committee, pairs)
+    assert found.colliding.all() and is_inside(pairs, found)
+
+
+# --- the range ------------------------------------------------------------------------------------
+
+
+def test_outside_the_range_the_point_is_the_exact_one_and_counted(pairs):
+    """To the bit; inside the range the network answers, and nothing is counted."""
+    solver = ContactSolver(UNIT, UNIT, model='committee')
+    assert solver.exact_answers == 0
+    found, exact = solve(solver, pairs), solve(EXACT, pairs)
+    out = found.colliding & ~in_range(pairs, found)
+    assert solver.exact_answers == out.sum()
+    assert np.array_equal(found.point[out], exact.point[out])
+
+
+@pytest.mark.parametrize('name', SETS)
+def test_the_sets_are_inside_the_range(name):
+    """A committee that hands the hard half to `exact` has not been built."""
+    solver = ContactSolver(UNIT, UNIT, model='committee')
+    solve(solver, SETS[name](np.random.default_rng(5), N))
+    assert solver.exact_answers == 0
+
+
+@pytest.mark.parametrize('what, size_a, size_b, depth', [
+    ('aspect', (ASPECT_MAX, 1, 1), (ASPECT_MAX, 1, 1), 0.01),
+    ('ratio', (RATIO_MAX,) * 3, UNIT, 0.01),
+    ('depth', UNIT, UNIT, DEPTH_MAX)])
+def test_the_limits_belong_to_the_range(what, size_a, size_b, depth):
+    """At the limit itself the network answers; a little beyond, `exact`. Single calls count too."""
+    for factor, counted in ((1.0, 0), (1.001, 1)):
+        mine = np.array(size_a, dtype=float)
+        if what != 'depth':
+            mine[0 if what == 'aspect' else slice(None)] *= factor
+        deep = depth * (factor if what == 'depth' else 1.0)
+        b = (0.2, 0.1, 0.5 * (mine[2] + size_b[2]) - deep, 0, 0, 0, 1)
+        for call in ('single', 'batch'):
+            solver = ContactSolver(mine, size_b, model='committee')
+            one = (solver(poses.IDENTITY, b) if call == 'single'
+                   else solver.batch([poses.IDENTITY], [b]))
+            assert np.all(one.colliding) and solver.exact_answers == counted, (what, factor, call)
+
+
+# --- laws -----------------------------------------------------------------------------------------
+
+
+def test_batch_equals_single_calls(committee, pairs):
+    """Row i of a batch is the single call of row i, to the bit."""
+    many = solve(committee, pairs)
+    solver, sizes = None, None
+    for i in range(0, len(pairs.pose_a), 29):
+        if sizes != (tuple(pairs.size_a[i]), tuple(pairs.size_b[i])):
+            sizes = (tuple(pairs.size_a[i]), tuple(pairs.size_b[i]))
+            solver = ContactSolver(*sizes, model='committee')
+        one = solver(pairs.pose_a[i], pairs.pose_b[i])
+        for name, single, row in zip(one._fields, one, (field[i] for field in many)):
+            assert np.array_equal(single, row, equal_nan=True), (name, i)
+
+
+@pytest.mark.parametrize('count', [1, 2, LANES - 1, LANES, LANES + 1, 2 * LANES + 2])
+@pytest.mark.parametrize('first', [0, 5])
+def test_a_row_does_not_know_its_neighbours(committee, count, first):
+    """Blocks that are not full, and rows at other places of a block: the same bits."""
+    pairs = Pairs(*poses.near_parallel_pairs(np.random.default_rng(6), 200))
+    all_rows = solve(committee, pairs)
+    some = solve(committee, Pairs(*(part[first:first + count] for part in pairs)))
+    for name, one, many in zip(some._fields, some, all_rows):
+        assert np.array_equal(one, many[first:first + count], equal_nan=True), name
+
+
+def test_rows_apart_refused_or_out_of_range_do_not_disturb_neighbours(committee):
+    """Within one block, contacts between rows of all other kinds keep their bits; a refused row
+    raises, and the next call is right again."""
+    rng = np.random.default_rng(7)
+    pairs = SETS['random sizes'](rng, LANES)
+    clean = solve(committee, pairs)
+    mixed = Pairs(*(part.copy() for part in pairs))
+    mixed.pose_b[1::4, :3] += 1e3                       # far apart
+    mixed.size_a[2::4] = (1.0, 1e-3, 1.0)               # out of range
+    mixed.pose_b[3::8] = mixed.pose_a[3::8]             # one in the other
+    found = solve(committee, mixed)
+    assert np.array_equal(found.point[::4], clean.point[::4])
+    assert not found.colliding[1::4].any() and np.isnan(found.point[1::4]).all()
+    for bad in ((np.nan, 0, 0, 0, 0, 0, 1), (0, 0, 0, 0, 0, 0, 0)):
+        refused = Pairs(*(part.copy() for part in pairs))
+        refused.pose_b[17] = bad
+        with pytest.raises(ValueError, match=r'poses_b\[17\]'):
+            solve(committee, refused)
+        again = solve(committee, pairs)
+        assert np.array_equal(again.point, clean.point)
+
+
+def test_same_input_same_bits(pairs):
+    """Two solvers, one of them after other work, rows in another order."""
+    one = ContactSolver(UNIT, UNIT, model='committee')
+    two = ContactSolver(UNIT, UNIT, model='committee')
+    solve(two, Pairs(*poses.random_pairs(np.random.default_rng(0), 300)))
+    order = np.random.default_rng(1).permutation(len(pairs.pose_a))
+    shuffled = solve(two, Pairs(*(part[order] for part in pairs)))
+    for name, left, right in zip(shuffled._fields, solve(one, pairs), shuffled):
+        assert np.array_equal(left[order], right, equal_nan=True), name
+
+
+@pytest.mark.parametrize('power', [-30, 1, 30])
+def test_scale_by_powers_of_two_is_exact(committee, pairs, power):
+    """Everything scaled by 2^k: the point scales to the bit."""
+    factor = 2.0**power
+    scaling = np.array([factor] * 3 + [1.0] * 4)
+    scaled = Pairs(pairs.pose_a * scaling, pairs.pose_b * scaling, pairs.size_a * factor,
+                   pairs.size_b * factor)
+    assert np.array_equal(solve(committee, pairs).point * factor, solve(committee, scaled).point,
+                          equal_nan=True)
+
+
+def test_minus_q_is_q(committee, pairs):
+    """To the bit."""
+    minus = np.array([1, 1, 1, -1, -1, -1, -1.0])
+    other = pairs._replace(pose_a=pairs.pose_a * minus, pose_b=pairs.pose_b * minus)
+    for name, left, right in zip(Pairs._fields, solve(committee, pairs), solve(committee, other)):
+        assert np.array_equal(left, right, equal_nan=True), name
+
+
+def close(name, one, other, pairs):
+    """The same point up to roundings in 95 % of the rows, up to twice the stated error in all.
+
+    The network's order of axes, and which mirror image it sees, are chosen by comparisons; where
+    they tie, a rounding decides, and the two answers are both within the stated error.
+    """
+    apart = percent(one, other, pairs)
+    assert len(apart) > N / 4
+    assert np.quantile(apart, 0.95) < 1e-3
+    assert apart.max() <= 2.0 * LIMITS[name].worst
+
+
+def test_swap(committee, named_set):
+    """B against A. `stacks` have so many ties that only the bound is asked of them."""
+    name, pairs = named_set
+    other = Pairs(pairs.pose_b, pairs.pose_a, pairs.size_b, pairs.size_a)
+    one, two = solve(committee, pairs).point, solve(committee, other).point
+    assert percent(one, two, pairs).max() <= 2.0 * LIMITS[name].worst
+    assert percent(one, two, pairs).mean() <= 2.0 * LIMITS[name].mean
+
+
+def test_rigid_motion(committee, named_set):
+    """Moved together, the point moves along."""
+    name, pairs = named_set
+    rng = np.random.default_rng(3)
+    n = len(pairs.pose_a)
+    turn, shift = poses.unit_quaternions(rng, n), rng.uniform(-5, 5, (n, 3))
+    moved = pairs._replace(pose_a=poses.moved(pairs.pose_a, shift, turn),
+                           pose_b=poses.moved(pairs.pose_b, shift, turn))
+    close(name, poses.rotate(turn, solve(committee, pairs).point) + shift,
+          solve(committee, moved).point, pairs)
+
+
+def test_box_symmetries(committee, named_set):
+    """A box's axes relabelled: a quarter turn about each of its axes, extents along."""
+    name, pairs = named_set
+    one = solve(committee, pairs).point
+    half = np.sqrt(0.5)
+    for axis, order in (((half, 0, 0, half), (0, 2, 1)), ((0, half, 0, half), (2, 1, 0)),
+                        ((0, 0, half, half), (1, 0, 2))):
+        for pose, size in (('pose_a', 'size_a'), ('pose_b', 'size_b')):
+            turned = getattr(pairs, pose).copy()
+            turned[:, 3:] = poses.multiply(turned[:, 3:], np.tile(axis, (len(turned), 1)))
+            other = pairs._replace(**{pose: turned, size: getattr(pairs, size)[:, order]})
+            close(name, one, solve(committee, other).point, pairs)
+
+
+# --- continuity -----------------------------------------------------------------------------------
+
+PATHS, FRAMES = 100, 400
+JUMP = 2.0 * LIMITS['containers'].worst
+"""Bound of a step of the point beyond the exact point's [% of the edge]: where the network's order
+of axes, mirror image or frame changes, the answers before and after are both within its error. The
+worst of 2.8 million steps was 9.9 (containers, rolling), of most paths below 6."""
+JUMP_999 = 4.0
+"""999 steps of 1,000 [%]; measured: 2.6 on the worst path."""
+
+
+def swaying(rng, size, *, tilt, heading, yaw, lateral, depth):
+    """Frames of paths of a box over another, the lowest corner `depth` deep: (PATHS, FRAMES)."""
+    n = PATHS * FRAMES
+    shape = (PATHS, FRAMES)
+    tilt, heading, yaw, depth = (np.broadcast_to(x, shape).ravel()
+                                 for x in (tilt, heading, yaw, depth))
+    level = np.column_stack([np.cos(heading), np.sin(heading), np.zeros(n)])
+    turn = quaternion_multiply(turns(level, tilt), turns((0.0, 0.0, 1.0), yaw))
+    low = np.full(n, np.inf)
+    for signs in np.ndindex(2, 2, 2):
+        corner = np.tile((np.array(signs) - 0.5) * size, (n, 1))
+        low = np.minimum(low, poses.rotate(turn, corner)[:, 2])
+    place = np.broadcast_to(lateral, (*shape, 2)).reshape(n, 2) * np.array(size)[:2]
+    b = np.column_stack([place, 0.5 * size[2] - low - depth, turn])
+    sizes = np.tile(size, (n, 1))
+    return Pairs(np.tile(poses.IDENTITY, (n, 1)), b, sizes, sizes)
+
+
+def path(name, rng, size):
+    """Paths of one kind; angles in rad."""
+    def each(low, high, *more):
+        return rng.uniform(low, high, (PATHS, 1, *more))
+
+    time = np.linspace(0.0, 1.0, FRAMES)[None]
+    motion = {'tilt': each(1e-4, 0.01), 'heading': each(-np.pi, np.pi), 'yaw': each(-0.3, 0.3),
+              'lateral': each(-0.2, 0.2, 2), 'depth': 0.004 * size[2]}
+    motion |= {
+        'landing': {'tilt': each(0.005, 0.05) * (1 - time), 'depth': 1e-3 * size[2]},
+        'through zero tilt': {'tilt': each(5e-4, 5e-3) * (1 - 2 * time)},
+        'aligned, through zero tilt': {
+            'tilt': each(5e-4, 5e-3) * (1 - 2 * time), 'lateral': 0.0, 'yaw': 0.0,
+            'heading': 0.5 * np.pi * rng.integers(0, 4, (PATHS, 1))},
+        'yaw': {'yaw': np.pi * time * each(0.1, 1.0), 'depth': 0.01 * size[2]},
+        'sliding': {'lateral': each(-0.4, 0.4, 2) + each(-0.8, 0.8, 2) * time[..., None] / 2},
+        'deepening': {'depth': 0.1 * min(size) * 10.0**(-5.0 * (1 - time))},
+        'rolling': {'heading': each(-np.pi, np.pi) + 2 * np.pi * time}}[name]
+    return swaying(rng, size, **motion)
+
+
+@pytest.mark.parametrize('size', [poses.CONTAINER, poses.CUBE], ids=['containers', 'cubes'])
+@pytest.mark.parametrize('name', ['landing', 'through zero tilt', 'aligned, through zero tilt',
+                                  'yaw', 'sliding', 'deepening', 'rolling'])
+def test_continuity_along_smooth_paths(committee, name, size):
+    """Per frame the point moves at most as far as the exact one plus a jump."""
+    pairs = path(name, np.random.default_rng(12), size)
+    steps = []
+    for model in (committee, EXACT):
+        point = solve(model, pairs).point.reshape(PATHS, FRAMES, 3)
+        steps.append(100.0 * np.linalg.norm(np.diff(point, axis=1), axis=2) / max(size))
+    beyond = steps[0] - steps[1]
+    beyond = beyond[np.isfinite(beyond)]
+    assert len(beyond) > 0.4 * PATHS * FRAMES
+    assert np.quantile(beyond, 0.999) <= JUMP_999
+    assert beyond.max() <= JUMP
+
+
+def test_a_face_that_comes_in_comes_in_smoothly(committee):
+    """A cube's corner nears the border of a face: where the overlap begins to be cut off there, no
+    step, as long as the order of axes stays."""
+    n = 3601
+    turn = poses.small_rotations(np.array([[1.0, -0.7, 0.2]]), np.array([0.6]))
+    b = np.tile(np.concatenate([(0, 0, 0), turn[0]]), (n, 1))
+    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
+    turned = poses.rotate(np.tile(turn, (8, 1)), corners)
+    lowest = turned[np.argmin(turned[:, 2])]
+    b[:, :3] = np.array([0.3, 0.0, 0.99]) - lowest
+    b[:, 1] += np.linspace(0.9, 0.99, n)
+    size = np.full((n, 3), 2.0)
+    pairs = Pairs(np.tile(poses.IDENTITY, (n, 1)), b, size, size)
+    steps = [np.linalg.norm(np.diff(solve(model, pairs).point, axis=0), axis=1)
+             for model in (committee, EXACT)]
+    # In the exact steps the face comes in with a kink, so the path did reach it.
+    assert np.ptp(steps[1][:3000]) < 1e-9 < np.ptp(steps[1][3000:])
+    assert steps[0].max() <= 1e-4 * 2.0  # of the edge; steps are a tenth of it
+
+
+# --- accuracy -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('name', SETS)
+def test_errors_are_within_the_limits(committee, name):
+    """Mean, 99th percentile and worst point error, on 20,000 pairs that nobody has trained on."""
+    pairs = SETS[name](np.random.default_rng([20270101, list(SETS).index(name)]), 20_000)
+    errors = percent(solve(committee, pairs).point, solve(EXACT, pairs).point, pairs)
+    assert len(errors) == len(pairs.pose_a)
+    assert errors.mean() <= LIMITS[name].mean
+    assert np.quantile(errors, 0.99) <= LIMITS[name].p99
+    assert errors.max() <= LIMITS[name].worst
+
+
+# --- network --------------------------------------------------------------------------------------
+
+
+def test_rational_tanh():
+    """Error below 1.4e-3 everywhere, odd, never beyond ±1 by more than two roundings, rising."""
+    x = np.linspace(-12, 12, 200_001).astype(np.float32)
+    y = np.array([rational_tanh(v) for v in x[:: 20]], dtype=np.float64)
+    assert np.abs(y - np.tanh(x[:: 20].astype(np.float64))).max() < 1.4e-3
+    assert np.abs(y).max() <= 1.0 + 2.0**-22
+    assert np.diff(y).min() >= -2.0**-22
+    assert np.array_equal(y, -np.array([rational_tanh(np.float32(-v)) for v in x[:: 20]]))
+    assert rational_tanh(np.float32(1e30)) == rational_tanh(np.float32(TANH_LIMIT))
+
+
+def test_forward_one_equals_forward_block():
+    """The first lane alone gives the bits that it gives in a block, and both what float64 gives."""
+    rng = np.random.default_rng(2)
+    widths = (INPUTS, 32, 32, OUTPUTS)
+    packed = []
+    for inputs, outputs in zip(widths, widths[1:]):
+        packed += [rng.normal(size=outputs * inputs) / np.sqrt(inputs), rng.normal(size=outputs)]
+    network = Network('point', widths, np.concatenate(packed).astype(np.float32))
+    numbers = block_numbers(network)
+    values = network_values(numbers)
+    wide = -(-INPUTS // 4) * 4
+    x = rng.uniform(-1, 1, (INPUTS, LANES)).astype(np.float32)
+
+    def load():
+        values[:INPUTS * LANES] = x.ravel()
+        values[INPUTS * LANES:wide * LANES] = 0.0
+
+    load()
+    forward_block(numbers)
+    block = values[:OUTPUTS * LANES].reshape(OUTPUTS, LANES).copy()
+    truth = x.astype(np.float64)
+    layers = unpacked(network)
+    for number, (weight, bias) in enumerate(layers):
+        truth = weight.astype(np.float64) @ truth + bias[:, None]
+        if number < len(layers) - 1:
+            s = np.clip(truth, -TANH_LIMIT, TANH_LIMIT)
+            truth = s * (945 + s**2 * (105 + s**2)) / (945 + s**2 * (420 + 15 * s**2))
+    assert np.abs(block - truth).max() < 1e-5
+    for lane in range(LANES):
+        load()
+        values[:INPUTS * LANES:LANES] = x[:, lane]
+        forward_one(numbers)
+        assert np.array_equal(values[:OUTPUTS * LANES:LANES], block[:, lane]), lane
+
+
+def test_missing_weights_name_the_model_that_needs_none(monkeypatch):
+    """`exact` is what a user without weights can go on with."""
+    def nowhere(*parts):
+        raise FileNotFoundError(parts)
+
+    monkeypatch.setattr('box_contact_ros.committee.resource_path', nowhere)
+    with pytest.raises(WeightsError, match="'exact'"):
+        ContactSolver(UNIT, UNIT, model='committee')
+
+
+def test_weights_of_another_model_are_refused(tmp_path):
+    """A network that is none of the committee's."""
+    path = tmp_path / 'other.safetensors'
+    rng = np.random.default_rng(1)
+    card = {'name': 'other', 'model': 'other', 'inputs': {}, 'outputs': [], 'sizes': [],
+            'architecture': [6, 4], 'data': {}, 'seed': 0, 'commit': '', 'metrics': {}}
+    save_weights(path, {'point': [(rng.normal(size=(4, 6)), rng.normal(size=4))]}, card)
+    with pytest.raises(WeightsError, match=f'{INPUTS} inputs and {OUTPUTS}'):
+        ContactSolver(UNIT, UNIT, model='committee', weights=str(path))
+
+
+def test_depths_in_the_sets_are_what_they_say():
+    """The accuracy above is of contacts that are as deep as they should be."""
+    pairs = SETS['random cubes'](np.random.default_rng(3), N)
+    depth = -solve(EXACT, pairs).separation
+    assert depth.min() == pytest.approx(2e-3, rel=0.05) and depth.max() <= 0.2 * (1 + 1e-9)
+    assert log_uniform(np.random.default_rng(0), 1.0, 2.0, 5).min() >= 1.0
+    assert np.abs(solve(EXACT, SETS['touching'](np.random.default_rng(3), N)).separation
+                  ).max() < 1e-14

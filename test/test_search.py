@@ -1,0 +1,200 @@
+"""The search: successive halving, its checkpoint, and the program `search`."""
+from __future__ import annotations
+
+import csv
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip('torch')
+pytest.importorskip('matplotlib')
+
+from box_contact_ros.training import committee, halving, search  # noqa: E402
+from box_contact_ros.training.halving import Candidate, CheckpointError, Rung  # noqa: E402
+
+QUICK = ['--quick', '--candidates', '48', '--seed', '2', '--device', 'cpu']
+
+
+class Toy:
+    """Error: |rate − 0.3| + 1 / total effort. A network is one number, the effort so far."""
+
+    name = 'toy'
+    seed = 5
+    rungs = (Rung(20, 1, 1, 4), Rung(8, 2, 1, 4), Rung(3, 4, 1, 4))
+
+    def __init__(self, stop_after: int | None = None) -> None:
+        self.trained: list[tuple[int, int]] = []
+        self.seeds: list[tuple[int, ...]] = []
+        self.stop_after = stop_after
+
+    def candidates(self) -> list[Candidate]:
+        return [Candidate(k, (4, 4 + k % 3), 0.05 * k, shipped=k == 19) for k in range(20)]
+
+    def cost(self, candidate: Candidate) -> int:
+        return candidate.hidden[0] * candidate.hidden[1]
+
+    def start(self, candidate: Candidate):
+        return [(np.zeros((1, 1), dtype=np.float32), np.zeros(1, dtype=np.float32))]
+
+    def train(self, number, group, start, seed):
+        if self.stop_after is not None and len(self.seeds) == self.stop_after:
+            raise KeyboardInterrupt
+        self.seeds.append(tuple(seed))
+        networks, scores = [], []
+        for one, network in zip(group, start):
+            self.trained.append((number, one.number))
+            effort = network[0][0] + self.rungs[number].effort
+            networks.append([(effort.reshape(1, 1), np.zeros(1, dtype=np.float32))])
+            error = abs(one.rate - 0.3) + 1.0 / float(effort[0])
+            scores.append({'error': float('nan') if one.number == 6 else error})
+        return networks, scores
+
+    def keep(self, ranked: Sequence[Candidate], count: int) -> list[Candidate]:
+        return list(ranked[:count])
+
+
+def test_the_better_part_goes_on_with_its_weights(tmp_path: Path) -> None:
+    """Rate 0.3 is number 6, which diverges; 5 and 7 are next; 19, in use, is kept though worst."""
+    toy = Toy()
+    done = halving.run(toy, tmp_path / 'c', progress=False)
+    assert [len(scores) for scores in done.scores] == [20, 8, 3]
+    assert set(done.scores[1]) == {2, 3, 4, 5, 7, 8, 9, 19}
+    assert set(done.scores[2]) == {5, 7, 19}
+    assert float(done.networks[2][5][0][0][0, 0]) == 1 + 2 + 4
+    assert len(set(toy.seeds)) == len(toy.seeds)  # no two groups see the same random numbers
+    costs = [[toy.cost(one) for one in group] for group in
+             halving.in_groups(toy.candidates(), toy, 4)]
+    flat = [cost for group in costs for cost in group]
+    assert flat == sorted(flat) and max(map(len, costs)) == 4
+
+
+@pytest.mark.parametrize('stop_after', range(8))
+def test_stopped_anywhere_it_ends_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+                                           stop_after: int) -> None:
+    monkeypatch.setattr(halving, 'SAVE_EVERY', 0.0)
+    whole = halving.run(Toy(), tmp_path / 'whole', progress=False)
+    path = tmp_path / 'stopped'
+    first = Toy(stop_after)
+    with pytest.raises(KeyboardInterrupt):
+        halving.run(first, path, progress=False)
+    second = Toy()
+    resumed = halving.run(second, path, progress=False)
+    assert not set(first.trained) & set(second.trained)  # nothing is done twice
+    assert len(first.trained) + len(second.trained) == 20 + 8 + 3
+    np.testing.assert_equal(resumed.scores, whole.scores)  # equal NaN included
+    np.testing.assert_equal(resumed.networks[2], whole.networks[2])
+
+
+def test_checkpoint_of_another_search_is_refused(tmp_path: Path) -> None:
+    halving.run(Toy(), tmp_path / 'c', progress=False)
+    other = Toy()
+    other.seed = 6
+    with pytest.raises(CheckpointError, match='with other options'):
+        halving.run(other, tmp_path / 'c', progress=False)
+    (tmp_path / 'c').write_bytes(b'not a checkpoint')
+    with pytest.raises(CheckpointError, match='cannot be read, remove it'):
+        halving.run(Toy(), tmp_path / 'c', progress=False)
+
+
+def test_frontier() -> None:
+    """Cheapest first, each better than all before; equal cost: the better one."""
+    assert search.frontier([3, 1, 2, 2, 5], [0.3, 0.9, 0.5, 0.4, 0.35]) == [1, 3, 0]
+
+
+def test_small_networks_are_kept_though_they_are_worse() -> None:
+    """Errors that fall with the size: of eight classes of cost each keeps its best."""
+    some = search.CommitteeSearch(seed=1, count=400, quick=True, device='cpu')
+    ranked = sorted(some.candidates(), key=some.cost, reverse=True)
+    kept = some.keep(ranked, 16)
+    classes = np.histogram(np.log([some.cost(one) for one in kept]), bins=8,
+                           range=np.log([264, 5632]))[0]
+    assert len(kept) == len({one.number for one in kept}) == 16
+    assert np.all(classes >= 1)
+
+
+def test_candidates_are_over_the_whole_range() -> None:
+    """Hidden units 8 to 64 by fours, small ones more often; the first is what is in use."""
+    found = search.CommitteeSearch(seed=1, count=2048, quick=False, device='cpu').candidates()
+    assert len(found) == 2048
+    assert found[0].shipped and found[0].hidden == committee.HIDDEN
+    units = {units for one in found for units in one.hidden}
+    assert units == set(range(8, 65, 4))
+    assert len({one.rate for one in found}) == 2048
+
+
+def start(folder: Path, *arguments: str, **options) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, '-m', 'box_contact_ros', 'search', *arguments, '--out', str(folder)],
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env={**os.environ, **options})
+
+
+def run(folder: Path, *arguments: str) -> str:
+    process = start(folder, *arguments)
+    output, _ = process.communicate(timeout=200)
+    assert process.returncode == 0, output
+    return output
+
+
+def table(folder: Path, name: str) -> str:
+    return (folder / f'{name}.csv').read_text('utf-8')
+
+
+@pytest.mark.parametrize(('what', 'name', 'networks'), [
+    ('committee', 'search', 48), ('paper', 'search_paper', 48)])
+def test_killed_and_started_again_it_ends_the_same(tmp_path: Path, what: str, name: str,
+                                                   networks: int) -> None:
+    """The program, killed when its first checkpoint is there; then the page, table and plot."""
+    whole, killed = tmp_path / 'whole', tmp_path / 'killed'
+    run(whole, what, *QUICK)
+    # A checkpoint after every group.
+    process = subprocess.Popen(
+        [sys.executable, '-c', 'import sys\n'
+         'from box_contact_ros.training import halving, search\n'
+         'halving.SAVE_EVERY = 0.0\n'
+         'sys.exit(search.main(sys.argv[1:]))', what, *QUICK, '--out', str(killed)],
+        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    deadline = time.monotonic() + 150
+    while not list(killed.glob('*.checkpoint')) and process.poll() is None:
+        assert time.monotonic() < deadline
+        time.sleep(0.002)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    if (killed / f'{name}.csv').exists():
+        pytest.skip('it was faster than the signal')
+    assert 'going on from' in run(killed, what, *QUICK)
+    assert table(killed, name) == table(whole, name)
+    rows = list(csv.DictReader(table(whole, name).splitlines()))
+    assert len(rows) == networks
+    assert {row['shipped'] for row in rows} == {'True', 'False'}
+    assert {int(row['rungs']) for row in rows} == {1, 2}
+    assert sorted(path.name for path in whole.iterdir()) == [
+        f'{name}.csv', f'{name}.md', f'{name}.png']
+    page = (whole / f'{name}.md').read_text('utf-8')
+    assert 'in use' in page and 'nan' not in page
+
+
+@pytest.mark.parametrize(('arguments', 'message'), [
+    (['committe'], 'invalid choice'),
+    (['paper', '--candidates', '3'], '--candidates 3 is too small'),
+    (['paper', '--seed', '-1'], '--seed -1 is too small'),
+])
+def test_refused_arguments(arguments: list[str], message: str,
+                           capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        search.main(arguments)
+    assert ended.value.code == 2
+    assert message in capsys.readouterr().err
+
+
+def test_a_checkpoint_of_other_options_is_said_in_one_line(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / 'search_0.checkpoint').write_bytes(b'x')
+    assert search.main(['committee', *QUICK, '--out', str(tmp_path)]) == 1
+    assert 'search_0.checkpoint cannot be read, remove it' in capsys.readouterr().err
