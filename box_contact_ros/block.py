@@ -78,6 +78,7 @@ OTHER = _rows(3)       # the other box's half extents [m]
 RANKS = _rows(3)       # place of axis q in the network's order
 MIRRORED = _rows(3)    # half extents, negative where an axis is mirrored [m]
 REACH = _rows(1)       # 1, or less where A∩B is almost symmetric about its middle
+SLANT = _rows(3)       # 1, or less where no face that cuts in is slanted along axis q
 CUTS = _rows(3)        # how far the two faces across axis f cut in, together
 FEATURES = _rows(21)   # the network's inputs
 IN_RANGE = _rows(1)    # 1.0 where the network may be asked

@@ -13,7 +13,8 @@ Stages of a block of pairs, each a loop without branches over structures of arra
    serves every pair of boxes. The cube's 48 symmetries are used up by the inside point: mirrored to
    positive components, sorted by size.
 5. `network.forward_block`: the offset of the centroid from the inside point, in float32; scaled
-   down where A∩B is almost symmetric about its middle (SYMMETRIC).
+   down where A∩B is almost symmetric about its middle (SYMMETRIC), and the point drawn to the
+   middle of an axis along which no face is slanted (STRAIGHT).
 6. `place_block`: the offset is cut to where a centroid can be (that of a convex body lies in the
    middle half of its bounding box: Bonnesen and Fenchel 1934, §34) and shortened where it would
    leave the other box. It starts inside A∩B, so it ends in both boxes, whatever the network says.
@@ -49,6 +50,7 @@ from .block import (
     REACH,
     ROTATION,
     SEPARATION,
+    SLANT,
     TOUCH,
     new_work,
 )
@@ -98,11 +100,16 @@ where there is none: an overlap that is its own mirror image through its middle,
 containers squarely stacked, has its centroid there. Without it, a container at rest had its point
 jump by the network's error whenever a rounding chose another of the cube's mirror images."""
 
+STRAIGHT = 0.02
+"""Slant of the cutting faces along an axis below which the point is drawn to the middle of that
+axis: an overlap whose faces all run along an axis is as long everywhere across it, as that of a
+container which lies on its stack with one long edge, and its centroid is in the middle."""
+
 CENTROID_REACH = 0.5
 """Farthest a centroid can be from the middle of its bounding box, in half extents."""
 
 INPUTS, OUTPUTS = 21, 3
-DESCRIPTION = 'cuts of the unit cube, scaled by reach'
+DESCRIPTION = 'cuts of the unit cube, scaled by reach and slant'
 """What the inputs and outputs mean; weights made for another meaning are refused."""
 WIDE_INPUTS = 24
 """Inputs as the kernels have them, in groups of four; the last three are zero."""
@@ -170,6 +177,10 @@ def _face_cuts(lanes, work, f, row):
         work[row + 3 * LANES + i] = p0 * less
         work[row + 4 * LANES + i] = p1 * less
         work[row + 5 * LANES + i] = p2 * less
+        more = abs(more)
+        work[SLANT + i] = max(work[SLANT + i], abs(nx) * more)
+        work[SLANT + LANES + i] = max(work[SLANT + LANES + i], abs(ny) * more)
+        work[SLANT + 2 * LANES + i] = max(work[SLANT + 2 * LANES + i], abs(nz) * more)
 
 
 @inlined
@@ -218,6 +229,9 @@ def _describe(lanes, work):
         work[MIRRORED + 2 * LANES + i] = hz if z >= 0.0 else -hz
         x, y, z = abs(x), abs(y), abs(z)
         work[REACH + i] = max(max(x, y), z)
+        work[SLANT + i] = 0.0
+        work[SLANT + LANES + i] = 0.0
+        work[SLANT + 2 * LANES + i] = 0.0
         k0 = (1.0 if y > x else 0.0) + (1.0 if z > x else 0.0)
         k1 = (1.0 if x >= y else 0.0) + (1.0 if z > y else 0.0)
         work[RANKS + i] = k0
@@ -234,6 +248,9 @@ def _describe(lanes, work):
     _face_cuts(lanes, work, 2 * LANES, FEATURES + 12 * LANES)
     for i in range(lanes):
         work[REACH + i] = min(1.0, work[REACH + i] * (1.0 / SYMMETRIC))
+        work[SLANT + i] = min(1.0, work[SLANT + i] * (1.0 / STRAIGHT))
+        work[SLANT + LANES + i] = min(1.0, work[SLANT + LANES + i] * (1.0 / STRAIGHT))
+        work[SLANT + 2 * LANES + i] = min(1.0, work[SLANT + 2 * LANES + i] * (1.0 / STRAIGHT))
     _in_order(lanes, work, 0, LANES, FEATURES, FEATURES + 6 * LANES)
     _in_order(lanes, work, LANES, 2 * LANES, FEATURES + 6 * LANES, FEATURES + 12 * LANES)
     _in_order(lanes, work, 0, LANES, FEATURES, FEATURES + 6 * LANES)
@@ -247,7 +264,8 @@ def _goal(work, offsets, q, i):
                    np.float64(offsets[2 * LANES + i]))
     inside = work[INSIDE + q + i]
     offset = work[REACH + i] * (offset if inside >= 0.0 else -offset)
-    return min(CENTROID_REACH, max(-CENTROID_REACH, inside + offset)) - inside
+    goal = work[SLANT + q + i] * (inside + offset)
+    return min(CENTROID_REACH, max(-CENTROID_REACH, goal)) - inside
 
 
 @inlined

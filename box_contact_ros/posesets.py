@@ -76,12 +76,17 @@ def any_pose(rng: np.random.Generator, size_a: np.ndarray, size_b: np.ndarray,
 
 
 def stacked(rng: np.random.Generator, size: tuple[float, float, float], tilt: np.ndarray,
-            yaw: np.ndarray, depth: np.ndarray, *, spread: float = 0.98) -> Pairs:
+            yaw: np.ndarray, depth: np.ndarray, *, spread: float = 0.98,
+            about: np.ndarray | None = None) -> Pairs:
     """One box on another of the same size, tilted about a random level axis, turned by yaw, [rad],
-    off its middle by up to `spread` of the size."""
+    off its middle by up to `spread` of the size.
+
+    about: the tilt's axis is within that angle (n,) [rad] of ±x, in place of anywhere.
+    """
     n = len(tilt)
     sizes = np.tile(np.array(size), (n, 1))
-    heading = rng.uniform(-np.pi, np.pi, n)
+    heading = rng.uniform(-np.pi, np.pi, n) if about is None else (
+        rng.choice([0.0, np.pi], n) + rng.choice([-1.0, 1.0], n) * about)
     level = np.stack([np.cos(heading), np.sin(heading), np.zeros(n)], axis=1)
     turn = quaternion_multiply(turns(level, tilt), turns((0.0, 0.0, 1.0), yaw))
     place = np.concatenate([spread * rng.uniform(-1, 1, (n, 2)) * sizes[:, :2],

@@ -115,9 +115,10 @@ def test_errors_while_training_are_the_solvers(data: contacts.Contacts, tmp_path
     pairs = size_pairs(np.random.default_rng(3), 500)
     trained = fit.point_errors(contacts.describe(pairs))[0]
     solved = committee.point_errors(pairs, path)
-    # The solver also shortens answers that would leave the other box: it can only be better.
-    assert np.mean(np.abs(trained - solved) < 1e-4) > 0.7
-    assert solved.mean() <= trained.mean() * 1.001
+    # The solver also shortens answers that would leave the other box, which seldom harms.
+    assert np.mean(np.abs(trained - solved) < 1e-4) > 0.3
+    assert np.mean(solved <= trained + 1e-4) > 0.95
+    assert solved.mean() <= trained.mean()
 
 
 @pytest.mark.parametrize('count', [1, 63, 65, 129])

@@ -16,6 +16,7 @@ from ..block import (
     RANKS,
     REACH,
     ROTATION,
+    SLANT,
     new_work,
 )
 from ..committee import (
@@ -43,6 +44,8 @@ from ..sat import query_block
 
 SizePair = tuple[tuple[float, float, float], tuple[float, float, float]]
 """Full extents of two boxes [m]."""
+LEARNT = 1e-6
+"""Scale below which an answer is next to the middle, whatever the network says."""
 PIECE = 100_000
 """Pairs that are made at a time."""
 
@@ -55,9 +58,9 @@ class Contacts(NamedTuple):
     offsets: np.ndarray
     """(n, 3) float32: exact centroid from the inside point, in units of `scale`."""
     inside: np.ndarray
-    """(n, 3) float32: the inside point, from the bounding box's middle, likewise."""
+    """(n, 3) float32: the inside point, from the bounding box's middle, in half extents."""
     scale: np.ndarray
-    """(n, 3) float32: half extents times REACH, by the smaller box's longest edge."""
+    """(n, 3) float32: half extents times REACH and SLANT, by the smaller box's longest edge."""
 
 
 @kernel
@@ -90,13 +93,15 @@ def _describe(poses_a, poses_b, sizes_a, sizes_b, work, values,
                 rank = int(work[RANKS + q * LANES + i])
                 half = work[HALF + q * LANES + i]
                 inside = work[INSIDE + q * LANES + i]
-                offset = (truth - work[MIDDLE + q * LANES + i]) / half - inside
-                # What the network is to say, before it is scaled by REACH, and the length that its
-                # error is of. Where there is next to no reach, there is nothing to learn.
+                # What the network is to say, before it is scaled by REACH and SLANT, and the length
+                # that its error is of. Where that is next to nothing, there is nothing to learn.
+                slant = work[SLANT + q * LANES + i]
                 reach = work[REACH + i]
-                told = offset / reach if reach > 1e-7 else 0.0
+                goal = (truth - work[MIDDLE + q * LANES + i]) / half
+                told = (goal / slant - inside) / reach if reach * slant > LEARNT else 0.0
+                reach *= slant
                 offsets[row, rank] = told if inside >= 0.0 else -told
-                insides[row, rank] = abs(inside) / max(reach, 1e-7)
+                insides[row, rank] = abs(inside)
                 halves[row, rank] = half * reach
 
 
@@ -130,7 +135,7 @@ def mixture(rng: np.random.Generator, n: int) -> Pairs:
     """About n pairs of the kinds that scenes have: equal cubes and random sizes in any pose, and
     with an edge of one almost along an edge of the other; stacks of boxes with a tilt of 1e-6 to
     0.3 rad, and containers; containers and cubes stacked squarely, almost in line and flat."""
-    share = n // 26
+    share = n // 28
     parts = []
     sizes = np.ones((4 * share, 3))
     parts.append(any_pose(rng, sizes, sizes, log_uniform(rng, 1e-5, 0.1, len(sizes))))
@@ -146,6 +151,11 @@ def mixture(rng: np.random.Generator, n: int) -> Pairs:
     cubes = np.ones((2 * share, 3))
     for one, other in ((cubes, cubes), random_sizes(rng, 2 * share)):
         parts.append(along_edges(rng, one, other, log_uniform(rng, 1e-4, 0.3, len(one))))
+    # A container that lies on its stack with a long edge or a face, as it does in every landing.
+    tilt = log_uniform(rng, 1e-4, 0.02, 2 * share)
+    parts.append(stacked(rng, CONTAINER, tilt, rng.uniform(-0.03, 0.03, 2 * share),
+                         2.438 * tilt * log_uniform(rng, 0.1, 3.0, 2 * share), spread=0.3,
+                         about=log_uniform(rng, 1e-4, 0.3, 2 * share)))
     for size in (CONTAINER, (1.0, 1.0, 1.0)):
         parts.append(stacked(rng, size, log_uniform(rng, 1e-7, 0.02, share),
                              rng.uniform(-0.03, 0.03, share),

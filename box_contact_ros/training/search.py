@@ -527,8 +527,8 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
         formatter_class=argparse.RawDescriptionHelpFormatter,
         description='Train thousands of networks at once, keep the best, train those longer.\n\n'
         'Measured on one core, without a GPU:\n'
-        "  committee  size and learning rate of the committee's network    6 minutes\n"
-        "  paper      the paper's search for its two networks              5 minutes\n\n"
+        "  committee  size and learning rate of the committee's network    5 minutes\n"
+        "  paper      the paper's search for its two networks              3 minutes\n\n"
         'Stopped, it goes on from its checkpoint file when it is started again with the same\n'
         'options, and ends with the same result.')
     parser.add_argument('what', choices=('committee', 'paper'), help='what is searched for')
