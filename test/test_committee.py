@@ -7,7 +7,14 @@ import pytest
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.block import LANES
-from box_contact_ros.committee import ASPECT_MAX, DEPTH_MAX, INPUTS, OUTPUTS, RATIO_MAX
+from box_contact_ros.committee import (
+    ASPECT_MAX,
+    DEPTH_MAX,
+    DESCRIPTION,
+    INPUTS,
+    OUTPUTS,
+    RATIO_MAX,
+)
 from box_contact_ros.network import (
     TANH_LIMIT,
     Network,
@@ -148,7 +155,8 @@ def garbage(rng, kind):
 
 def written(path, layers):
     """The weights file of these layers."""
-    card = {'name': path.stem, 'model': 'committee', 'inputs': {}, 'outputs': [], 'sizes': [],
+    card = {'name': path.stem, 'model': 'committee', 'outputs': [], 'sizes': [],
+            'inputs': {'description': DESCRIPTION},
             'architecture': [INPUTS, 32, 32, OUTPUTS], 'data': {}, 'seed': 0, 'commit': '',
             'metrics': {}}
     save_weights(path, {'point': layers}, card)

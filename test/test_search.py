@@ -50,9 +50,10 @@ class Toy:
         networks, scores = [], []
         for one, network in zip(group, start):
             self.trained.append((number, one.number))
-            effort = network[0][0] + self.rungs[number].effort
-            networks.append([(effort.reshape(1, 1), np.zeros(1, dtype=np.float32))])
-            error = abs(one.rate - 0.3) + 1.0 / float(effort[0])
+            effort = float(network[0][0][0, 0]) + self.rungs[number].effort
+            networks.append([(np.full((1, 1), effort, dtype=np.float32),
+                              np.zeros(1, dtype=np.float32))])
+            error = abs(one.rate - 0.3) + 1.0 / effort
             scores.append({'error': float('nan') if one.number == 6 else error})
         return networks, scores
 

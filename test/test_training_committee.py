@@ -10,6 +10,7 @@ import pytest
 torch = pytest.importorskip('torch')
 
 from box_contact_ros import ContactSolver  # noqa: E402
+from box_contact_ros.block import LANES  # noqa: E402
 from box_contact_ros.network import WeightsError, load_weights, save_weights, unpacked  # noqa: E402
 from box_contact_ros.posesets import Pairs, containers, cubes, size_pairs, tilted  # noqa: E402
 from box_contact_ros.training import committee, contacts, points, scene, train  # noqa: E402
@@ -183,15 +184,15 @@ def test_hidden_units_on_request(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(('arguments', 'message'), [
-    (['committee', '--hidden', '8', '65'], '--hidden 65 is not between 1 and 64'),
+    (['committee', '--hidden', '8', str(LANES + 1)], f'--hidden {LANES + 1} is not between 1 and'),
     (['committee', '--scene', 'x.yaml'], "leave out 'committee'"),
     (['--scene', 'x.yaml', '--hidden', '8', '8'], 'leave out --hidden'),
     (['--scene', 'no_such.yaml'], 'no_such.yaml cannot be read: No such file'),
 ])
-def test_refused_arguments(arguments: list[str], message: str,
+def test_refused_arguments(arguments: list[str], message: str, tmp_path: Path,
                            capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ended:
-        train.main(arguments)
+        train.main([*arguments, '--quick', '--out', str(tmp_path)])
     assert ended.value.code == 2
     assert message in capsys.readouterr().err
 

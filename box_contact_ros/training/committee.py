@@ -22,7 +22,7 @@ from ..solver import ContactSolver
 from .contacts import Contacts, SizePair, contacts, mixture, scene_mixture
 from .points import Fit, Settings, normalisation, unfolded
 
-HIDDEN = (20, 20)
+HIDDEN = (24, 24)
 """Hidden units: what fits the time that a batch has for the network (docs/search.md)."""
 PAIRS, STEPS, BATCH, RATE = 3_000_000, 320_000, 4096, 8e-3
 HARD_ROUNDS, HARD_POOL, HARD_PART, HARD_SHARE = (0.4, 0.55, 0.7, 0.85), 2_000_000, 0.01, 0.2

@@ -123,7 +123,8 @@ def run(search: Search, checkpoint: Path, *, progress: bool = True) -> Progress:
                 bar.set_postfix(rung=f'{number + 1}/{len(search.rungs)}', refresh=False)
                 if group[0].number in done.scores[number]:
                     bar.update(step)
-                    bar.initial += step  # what was done before tells nothing of the speed
+                    if progress:  # what was done before tells nothing of the speed
+                        bar.initial += step
                     continue
                 before = ([search.start(one) for one in group] if number == 0 else
                           [done.networks[number - 1][one.number] for one in group])

@@ -392,7 +392,7 @@ The frontier: no other finalist is both cheaper and better. Time: `network.forwa
 ![The frontier](search.png)
 
 **Why {_units(finalists[shipped])}.** A pair in a batch may cost 100 ns, of which pose, SAT, outline
-and the checks need about 70: some {NETWORK_TIME:.0f} ns are left for the network.
+and checks need some 70: about {NETWORK_TIME:.0f} ns are left for the network.
 {_units(finalists[shipped])} takes {times[shipped]:.0f} ns, with a p99 of {error:.2f} %; the best
 finalist within {NETWORK_TIME:.0f} ns, {_units(finalists[best])}, has
 {last[finalists[best].number]['error']:.2f} %; the best of any size, {_units(finalists[largest])}

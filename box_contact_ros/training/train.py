@@ -83,7 +83,7 @@ NAMES = (*JOBS, COMMITTEE)
 
 # `--quick`: enough to see the error fall, in seconds.
 QUICK_COUNTS = (1000, 500, 2000)
-QUICK_STARTS, QUICK_EPOCHS = 3, 40
+QUICK_STARTS, QUICK_EPOCHS = 3, 100
 
 
 def run(job: Job, *, seed: int, folder: Path, progress: bool = True) -> dict[str, Any]:
@@ -166,7 +166,7 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
         '  paper             two boxes of edge 2, with discontinuities     2 minutes\n'
         '  paper-continuous  the same without, one network per subset      3 minutes\n'
         '  containers        two boxes of 12.192 x 2.438 x 2.591 m         1 minute\n'
-        '  committee         any two boxes, the point alone                4 minutes\n'
+        '  committee         any two boxes, the point alone                6 minutes\n'
         '  --scene FILE      the boxes of one scene, from the committee    1 minute')
     parser.add_argument('what', nargs='*', metavar='what',
                         help=f'{", ".join(NAMES)}, or all (default)')
