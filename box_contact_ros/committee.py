@@ -4,20 +4,23 @@ Stages of a block of pairs, each a loop without branches over structures of arra
 
 1. `load_block`, `query_block`: verdict, separation, axis (`pose`, `sat`).
 2. `press`: pairs shallower than DEPTH_FLOOR are pressed in, as the point's definition says.
-3. `outline_block`: the exact bounding box of A∩B, in the frame of the box where it is smaller, and
-   a point inside (`outline`).
+3. `outline_block`: the exact bounding box of A∩B, in the frame of one of the boxes, and a point
+   inside (`outline`).
 4. `describe_block`: what the network sees. Scaled to its bounding box, A∩B is the cube [−1, 1]³ cut
    by the six faces of the other box. A face is described by its unit normal in these coordinates
    (unit in the sum of the absolute components), times how far it cuts into the cube; a face that
    cuts nothing off is zero and comes in smoothly. Sizes, units and the depth have gone: one network
-   serves every pair of boxes. The cube's 48 symmetries are used up by the inside point: mirrored to
-   positive components, sorted by size.
-5. `network.forward_block`: the offset of the centroid from the inside point, in float32; scaled
-   down where A∩B is almost symmetric about its middle (SYMMETRIC), and the point drawn to the
-   middle of an axis along which no face is slanted (STRAIGHT).
+   serves every pair of boxes. The cube's 48 symmetries are used up: along every axis the faces push
+   the centroid to the positive side (PUSH), and axes are sorted by how much the faces are slanted
+   along them (SLOPE). Both change over only where the overlap is nearly its own mirror image, so
+   that the network's error does not jump as boxes move.
+5. `network.forward_block`: the offset of the centroid from the cube's middle, in float32; scaled
+   down where A∩B is almost symmetric about its middle (SYMMETRIC), and along an axis along which no
+   face is slanted (STRAIGHT).
 6. `place_block`: the offset is cut to where a centroid can be (that of a convex body lies in the
-   middle half of its bounding box: Bonnesen and Fenchel 1934, §34) and shortened where it would
-   leave the other box. It starts inside A∩B, so it ends in both boxes, whatever the network says.
+   middle half of its bounding box: Bonnesen and Fenchel 1934, §34), and the way there from the
+   inside point is shortened where it would leave the other box. It starts inside A∩B, so it ends in
+   both boxes, whatever the network says.
 
 Outside the range that the network was trained for (ASPECT_MAX, RATIO_MAX, DEPTH_MAX) the answer is
 the exact one, and counted. So it is for boxes that the card of the weights does not list, if it
@@ -38,19 +41,23 @@ from .block import (
     IN_RANGE,
     INSIDE,
     LANES,
+    LESS,
     MIDDLE,
     MIRRORED,
+    MORE,
     NORMALS,
     OFFSET_A,
     OFFSET_B,
     OFFSETS,
     OTHER,
     POINT,
+    PUSH,
     RANKS,
     REACH,
     ROTATION,
     SEPARATION,
     SLANT,
+    SLOPE,
     TOUCH,
     new_work,
 )
@@ -108,24 +115,17 @@ container which lies on its stack with one long edge, and its centroid is in the
 CENTROID_REACH = 0.5
 """Farthest a centroid can be from the middle of its bounding box, in half extents."""
 
-INPUTS, OUTPUTS = 21, 3
-DESCRIPTION = 'cuts of the unit cube, scaled by reach and slant'
+INPUTS, OUTPUTS = 18, 3
+DESCRIPTION = 'cuts of the unit cube, mirrored by push, sorted by slope'
 """What the inputs and outputs mean; weights made for another meaning are refused."""
-WIDE_INPUTS = 24
-"""Inputs as the kernels have them, in groups of four; the last three are zero."""
+WIDE_INPUTS = 20
+"""Inputs as the kernels have them, in groups of four; the last two are zero."""
 
 
 @inlined
 def _pick(k0, k1, x0, x1, x2):
     """x0, x1 or x2: the one whose rank is asked for."""
     return x0 if k0 else (x1 if k1 else x2)
-
-
-@inlined
-def _half_width(work, f, i):
-    return ((abs(work[NORMALS + 3 * f + i]) * work[HALF + i]
-             + abs(work[NORMALS + 3 * f + LANES + i]) * work[HALF + LANES + i])
-            + abs(work[NORMALS + 3 * f + 2 * LANES + i]) * work[HALF + 2 * LANES + i])
 
 
 @inlined
@@ -148,14 +148,16 @@ def _frame_axis(lanes, work, f):
 
 
 @inlined
-def _face_cuts(lanes, work, f, row):
-    """The two faces across axis f as inputs, from `row` on: the one that cuts more first."""
+def _face_cuts(lanes, work, f):
+    """How far the two faces across axis f cut in, and whereto they push the centroid."""
     for i in range(lanes):
-        width = _half_width(work, f, i)
         offset = work[OFFSETS + f + i]
         half = work[OTHER + f + i]
+        x = work[NORMALS + 3 * f + i] * work[HALF + i]
+        y = work[NORMALS + 3 * f + LANES + i] * work[HALF + LANES + i]
+        z = work[NORMALS + 3 * f + 2 * LANES + i] * work[HALF + 2 * LANES + i]
+        inverse = 1.0 / ((abs(x) + abs(y)) + abs(z))
         # 1: the face goes through the cube's middle; 0: it just misses the cube; 2: nothing left.
-        inverse = 1.0 / width
         upper = min(2.0, max(0.0, 1.0 - (half - offset) * inverse))
         lower = min(2.0, max(0.0, 1.0 - (half + offset) * inverse))
         flip = upper < lower
@@ -163,24 +165,42 @@ def _face_cuts(lanes, work, f, row):
         less = (-upper if flip else lower) * inverse
         work[CUTS + f + i] = upper + lower
         work[REACH + i] = max(work[REACH + i], abs(upper - lower))
+        work[MORE + f + i] = more
+        work[LESS + f + i] = less
+        push = less - more
+        work[PUSH + i] += x * push
+        work[PUSH + LANES + i] += y * push
+        work[PUSH + 2 * LANES + i] += z * push
+        both = abs(more) + abs(less)
+        work[SLOPE + i] += abs(x) * both
+        work[SLOPE + LANES + i] += abs(y) * both
+        work[SLOPE + 2 * LANES + i] += abs(z) * both
+        more = abs(more)
+        work[SLANT + i] = max(work[SLANT + i], abs(x) * more)
+        work[SLANT + LANES + i] = max(work[SLANT + LANES + i], abs(y) * more)
+        work[SLANT + 2 * LANES + i] = max(work[SLANT + 2 * LANES + i], abs(z) * more)
+
+
+@inlined
+def _face_inputs(lanes, work, f, row):
+    """The two faces across axis f as inputs, from `row` on: the one that cuts more first."""
+    for i in range(lanes):
         k0 = work[RANKS + i]
         k1 = work[RANKS + LANES + i]
-        nx = work[NORMALS + 3 * f + i] * work[MIRRORED + i]
-        ny = work[NORMALS + 3 * f + LANES + i] * work[MIRRORED + LANES + i]
-        nz = work[NORMALS + 3 * f + 2 * LANES + i] * work[MIRRORED + 2 * LANES + i]
-        p0 = _pick(k0 == 0.0, k1 == 0.0, nx, ny, nz)
-        p1 = _pick(k0 == 1.0, k1 == 1.0, nx, ny, nz)
-        p2 = _pick(k0 == 2.0, k1 == 2.0, nx, ny, nz)
+        x = work[NORMALS + 3 * f + i] * work[MIRRORED + i]
+        y = work[NORMALS + 3 * f + LANES + i] * work[MIRRORED + LANES + i]
+        z = work[NORMALS + 3 * f + 2 * LANES + i] * work[MIRRORED + 2 * LANES + i]
+        p0 = _pick(k0 == 0.0, k1 == 0.0, x, y, z)
+        p1 = _pick(k0 == 1.0, k1 == 1.0, x, y, z)
+        p2 = _pick(k0 == 2.0, k1 == 2.0, x, y, z)
+        more = work[MORE + f + i]
+        less = work[LESS + f + i]
         work[row + i] = p0 * more
         work[row + LANES + i] = p1 * more
         work[row + 2 * LANES + i] = p2 * more
         work[row + 3 * LANES + i] = p0 * less
         work[row + 4 * LANES + i] = p1 * less
         work[row + 5 * LANES + i] = p2 * less
-        more = abs(more)
-        work[SLANT + i] = max(work[SLANT + i], abs(nx) * more)
-        work[SLANT + LANES + i] = max(work[SLANT + LANES + i], abs(ny) * more)
-        work[SLANT + 2 * LANES + i] = max(work[SLANT + 2 * LANES + i], abs(nz) * more)
 
 
 @inlined
@@ -222,62 +242,68 @@ def describe_block(count, work, inputs):
 @inlined
 def _describe(lanes, work):
     for i in range(lanes):
-        x, y, z = work[INSIDE + i], work[INSIDE + LANES + i], work[INSIDE + 2 * LANES + i]
+        work[REACH + i] = 0.0
+    for k in range(0, 3 * LANES, LANES):
+        for i in range(lanes):
+            work[PUSH + k + i] = 0.0
+            work[SLOPE + k + i] = 0.0
+            work[SLANT + k + i] = 0.0
+    _frame_axis(lanes, work, 0)
+    _frame_axis(lanes, work, LANES)
+    _frame_axis(lanes, work, 2 * LANES)
+    _face_cuts(lanes, work, 0)
+    _face_cuts(lanes, work, LANES)
+    _face_cuts(lanes, work, 2 * LANES)
+    for i in range(lanes):
+        x, y, z = work[PUSH + i], work[PUSH + LANES + i], work[PUSH + 2 * LANES + i]
         hx, hy, hz = work[HALF + i], work[HALF + LANES + i], work[HALF + 2 * LANES + i]
         work[MIRRORED + i] = hx if x >= 0.0 else -hx
         work[MIRRORED + LANES + i] = hy if y >= 0.0 else -hy
         work[MIRRORED + 2 * LANES + i] = hz if z >= 0.0 else -hz
-        x, y, z = abs(x), abs(y), abs(z)
-        work[REACH + i] = max(max(x, y), z)
-        work[SLANT + i] = 0.0
-        work[SLANT + LANES + i] = 0.0
-        work[SLANT + 2 * LANES + i] = 0.0
+        x, y, z = work[SLOPE + i], work[SLOPE + LANES + i], work[SLOPE + 2 * LANES + i]
         k0 = (1.0 if y > x else 0.0) + (1.0 if z > x else 0.0)
         k1 = (1.0 if x >= y else 0.0) + (1.0 if z > y else 0.0)
         work[RANKS + i] = k0
         work[RANKS + LANES + i] = k1
         work[RANKS + 2 * LANES + i] = 3.0 - (k0 + k1)
-        work[FEATURES + 18 * LANES + i] = _pick(k0 == 0.0, k1 == 0.0, x, y, z)
-        work[FEATURES + 19 * LANES + i] = _pick(k0 == 1.0, k1 == 1.0, x, y, z)
-        work[FEATURES + 20 * LANES + i] = _pick(k0 == 2.0, k1 == 2.0, x, y, z)
-    _frame_axis(lanes, work, 0)
-    _frame_axis(lanes, work, LANES)
-    _frame_axis(lanes, work, 2 * LANES)
-    _face_cuts(lanes, work, 0, FEATURES)
-    _face_cuts(lanes, work, LANES, FEATURES + 6 * LANES)
-    _face_cuts(lanes, work, 2 * LANES, FEATURES + 12 * LANES)
-    for i in range(lanes):
         work[REACH + i] = min(1.0, work[REACH + i] * (1.0 / SYMMETRIC))
         work[SLANT + i] = min(1.0, work[SLANT + i] * (1.0 / STRAIGHT))
         work[SLANT + LANES + i] = min(1.0, work[SLANT + LANES + i] * (1.0 / STRAIGHT))
         work[SLANT + 2 * LANES + i] = min(1.0, work[SLANT + 2 * LANES + i] * (1.0 / STRAIGHT))
+    _face_inputs(lanes, work, 0, FEATURES)
+    _face_inputs(lanes, work, LANES, FEATURES + 6 * LANES)
+    _face_inputs(lanes, work, 2 * LANES, FEATURES + 12 * LANES)
     _in_order(lanes, work, 0, LANES, FEATURES, FEATURES + 6 * LANES)
     _in_order(lanes, work, LANES, 2 * LANES, FEATURES + 6 * LANES, FEATURES + 12 * LANES)
     _in_order(lanes, work, 0, LANES, FEATURES, FEATURES + 6 * LANES)
 
 
 @inlined
-def _goal(work, offsets, q, i):
-    """Offset of the answer from the inside point along axis q, in half extents."""
+def asked(work, offsets, q, i):
+    """The network's answer along axis q, from the middle of the bounding box [m], cut to where a
+    centroid can be.
+
+    offsets: the network's outputs, 3 rows of LANES.
+    """
     rank = work[RANKS + q + i]
     offset = _pick(rank == 0.0, rank == 1.0, np.float64(offsets[i]), np.float64(offsets[LANES + i]),
                    np.float64(offsets[2 * LANES + i]))
-    inside = work[INSIDE + q + i]
-    offset = work[REACH + i] * (offset if inside >= 0.0 else -offset)
-    goal = work[SLANT + q + i] * (inside + offset)
-    return min(CENTROID_REACH, max(-CENTROID_REACH, goal)) - inside
+    offset *= work[REACH + i] * work[SLANT + q + i]
+    offset = min(CENTROID_REACH, max(-CENTROID_REACH, offset))
+    return work[MIRRORED + q + i] * offset
 
 
 @inlined
 def _share(work, f, i, dx, dy, dz):
-    """Share of the step (dx, dy, dz) [m] that stays between the other box's faces f."""
+    """Share of the step (dx, dy, dz) [m] from the inside point that stays between the other box's
+    faces f."""
     nx = work[NORMALS + 3 * f + i]
     ny = work[NORMALS + 3 * f + LANES + i]
     nz = work[NORMALS + 3 * f + 2 * LANES + i]
     start = work[OFFSETS + f + i] + (
-        (nx * (work[INSIDE + i] * work[HALF + i])
-         + ny * (work[INSIDE + LANES + i] * work[HALF + LANES + i]))
-        + nz * (work[INSIDE + 2 * LANES + i] * work[HALF + 2 * LANES + i]))
+        (nx * (work[INSIDE + i] - work[MIDDLE + i])
+         + ny * (work[INSIDE + LANES + i] - work[MIDDLE + LANES + i]))
+        + nz * (work[INSIDE + 2 * LANES + i] - work[MIDDLE + 2 * LANES + i]))
     step = (nx * dx + ny * dy) + nz * dz
     room = (work[OTHER + f + i] - start) if step >= 0.0 else (work[OTHER + f + i] + start)
     step = abs(step)
@@ -296,17 +322,16 @@ def place_block(count, work, offsets):
 @inlined
 def _place(lanes, work, offsets):
     for i in range(lanes):
-        dx = _goal(work, offsets, 0, i) * work[HALF + i]
-        dy = _goal(work, offsets, LANES, i) * work[HALF + LANES + i]
-        dz = _goal(work, offsets, 2 * LANES, i) * work[HALF + 2 * LANES + i]
+        dx = (work[MIDDLE + i] + asked(work, offsets, 0, i)) - work[INSIDE + i]
+        dy = (work[MIDDLE + LANES + i] + asked(work, offsets, LANES, i)) - work[INSIDE + LANES + i]
+        dz = (work[MIDDLE + 2 * LANES + i] + asked(work, offsets, 2 * LANES, i)
+              ) - work[INSIDE + 2 * LANES + i]
         share = min(min(_share(work, 0, i, dx, dy, dz),
                         _share(work, LANES, i, dx, dy, dz)),
                     _share(work, 2 * LANES, i, dx, dy, dz))
-        x = work[MIDDLE + i] + (work[INSIDE + i] * work[HALF + i] + share * dx)
-        y = work[MIDDLE + LANES + i] + (
-            work[INSIDE + LANES + i] * work[HALF + LANES + i] + share * dy)
-        z = work[MIDDLE + 2 * LANES + i] + (
-            work[INSIDE + 2 * LANES + i] * work[HALF + 2 * LANES + i] + share * dz)
+        x = work[INSIDE + i] + share * dx
+        y = work[INSIDE + LANES + i] + share * dy
+        z = work[INSIDE + 2 * LANES + i] + share * dz
         in_b = work[IN_B + i] > 0.5
         work[POINT + i] = (work[OFFSET_A + i] + ((work[ROTATION + i] * x
                                             + work[ROTATION + LANES + i] * y)

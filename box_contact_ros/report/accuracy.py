@@ -32,7 +32,6 @@ from ..block import (
     HALF,
     HALF_A,
     HALF_B,
-    INSIDE,
     LANES,
     NORMAL,
     NORMALS,
@@ -40,14 +39,13 @@ from ..block import (
     OFFSET_B,
     OFFSETS,
     OTHER,
-    RANKS,
     ROTATION,
     SEPARATION,
     SIZE,
     TOUCH,
     new_work,
 )
-from ..committee import INPUTS, WIDE_INPUTS, describe_block
+from ..committee import INPUTS, WIDE_INPUTS, asked, describe_block
 from ..contact import Contacts
 from ..jit import kernel
 from ..network import WeightsError, block_numbers, forward_block, load_weights, network_values
@@ -165,8 +163,8 @@ def _corrected(poses_a, poses_b, sizes_a, sizes_b, work, numbers, corrected):
         forward_block(numbers)
         for i in range(count):
             # The point as the network has it, from the middle of the bounding box.
-            p = (_asked(work, values, 0, i), _asked(work, values, 1, i),
-                 _asked(work, values, 2, i))
+            p = (asked(work, values, 0, i), asked(work, values, LANES, i),
+                 asked(work, values, 2 * LANES, i))
             out = False
             for f in range(3):
                 along = work[OFFSETS + f * LANES + i]
@@ -175,13 +173,6 @@ def _corrected(poses_a, poses_b, sizes_a, sizes_b, work, numbers, corrected):
                     out = out or abs(p[q]) > work[HALF + q * LANES + i] + OUTSIDE * work[SIZE + i]
                 out = out or abs(along) > work[OTHER + f * LANES + i] + OUTSIDE * work[SIZE + i]
             corrected[start + i] = out
-
-
-@kernel
-def _asked(work, values, q, i):
-    inside = work[INSIDE + q * LANES + i]
-    offset = np.float64(values[int(work[RANKS + q * LANES + i]) * LANES + i])
-    return (inside + (offset if inside >= 0.0 else -offset)) * work[HALF + q * LANES + i]
 
 
 def classify(pairs: Pairs) -> tuple[np.ndarray, np.ndarray]:

@@ -33,9 +33,8 @@ QUICK_PAIRS, QUICK_STEPS = 20_000, 400
 METRIC_PAIRS, QUICK_METRIC_PAIRS = 100_000, 2_000
 """Pairs of each set in the model card's metrics."""
 
-NAMES = ([f'axis {axis}, {which} face: n{k} × cut' for axis in range(3)
-          for which in ('deeper', 'other') for k in range(3)]
-         + [f'inside {k}' for k in range(3)])
+NAMES = [f'axis {axis}, {which} face: n{k} × cut' for axis in range(3)
+         for which in ('deeper', 'other') for k in range(3)]
 
 # Streams of random numbers, one each for the data, and for what is measured on.
 _DATA, _METRICS, _HARD = 0, 1, 2
@@ -157,7 +156,7 @@ def _card(path: Path, hidden: tuple[int, int], seed: int, commit: str, sizes: li
         'inputs': {'description': DESCRIPTION, 'names': NAMES,
                    'range': {'aspect': ASPECT_MAX, 'size ratio': RATIO_MAX,
                              'depth by the shortest edge': DEPTH_MAX}},
-        'outputs': ['centroid from the inside point, in half extents of the bounding box'],
+        'outputs': ['centroid from the middle of the bounding box, in half extents'],
         'data': {**data, 'pairs': len(fit.inputs)}, 'metrics': {},
         'training': {'algorithm': 'Adam', 'steps': s.steps, 'batch': s.batch, 'rate': s.rate,
                      'device': s.device, 'threads': torch.get_num_threads()}}

@@ -9,9 +9,9 @@ import numpy as np
 from ..block import (
     HALF,
     IN_B,
-    INSIDE,
     LANES,
     MIDDLE,
+    MIRRORED,
     OFFSET_A,
     RANKS,
     REACH,
@@ -56,16 +56,16 @@ class Contacts(NamedTuple):
     inputs: np.ndarray
     """(n, INPUTS) float32."""
     offsets: np.ndarray
-    """(n, 3) float32: exact centroid from the inside point, in units of `scale`."""
-    inside: np.ndarray
-    """(n, 3) float32: the inside point, from the bounding box's middle, in half extents."""
+    """(n, 3) float32: exact centroid from the bounding box's middle, in units of `scale`."""
+    used: np.ndarray
+    """(n, 3) float32: REACH times SLANT, by which the network's answer is scaled."""
     scale: np.ndarray
-    """(n, 3) float32: half extents times REACH and SLANT, by the smaller box's longest edge."""
+    """(n, 3) float32: half extents times `used`, by the smaller box's longest edge."""
 
 
 @kernel
 def _describe(poses_a, poses_b, sizes_a, sizes_b, work, values,
-              inputs, offsets, insides, halves):
+              inputs, offsets, used, halves):
     rows = poses_a.shape[0]
     for start in range(0, rows, LANES):
         count = min(LANES, rows - start)
@@ -92,17 +92,13 @@ def _describe(poses_a, poses_b, sizes_a, sizes_b, work, values,
                              * (z - work[OFFSET_A + 2 * LANES + i]))
                 rank = int(work[RANKS + q * LANES + i])
                 half = work[HALF + q * LANES + i]
-                inside = work[INSIDE + q * LANES + i]
                 # What the network is to say, before it is scaled by REACH and SLANT, and the length
                 # that its error is of. Where that is next to nothing, there is nothing to learn.
-                slant = work[SLANT + q * LANES + i]
-                reach = work[REACH + i]
-                goal = (truth - work[MIDDLE + q * LANES + i]) / half
-                told = (goal / slant - inside) / reach if reach * slant > LEARNT else 0.0
-                reach *= slant
-                offsets[row, rank] = told if inside >= 0.0 else -told
-                insides[row, rank] = abs(inside)
-                halves[row, rank] = half * reach
+                part = work[REACH + i] * work[SLANT + q * LANES + i]
+                goal = (truth - work[MIDDLE + q * LANES + i]) / work[MIRRORED + q * LANES + i]
+                offsets[row, rank] = goal / part if part > LEARNT else 0.0
+                used[row, rank] = part
+                halves[row, rank] = half * part
 
 
 def describe(pairs: Pairs) -> Contacts:
