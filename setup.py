@@ -76,6 +76,8 @@ setup(
         'soup': ['python-fcl'],
         'train': ['torch==2.13.0', 'tqdm'],
         'report': ['matplotlib', 'tqdm'],
+        # Engines that only the report `frontier` compares with.
+        'peers': ['coal', 'mujoco', 'pybullet', 'python-fcl'],
         # colcon test looks for pytest in here, and runs nothing without it.
         'test': [
             'catkin-pkg',

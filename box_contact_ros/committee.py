@@ -56,6 +56,7 @@ from .block import (
     REACH,
     ROTATION,
     SEPARATION,
+    SIZE,
     SLANT,
     SLOPE,
     TOUCH,
@@ -111,6 +112,11 @@ STRAIGHT = 0.02
 """Slant of the cutting faces along an axis below which the point is drawn to the middle of that
 axis: an overlap whose faces all run along an axis is as long everywhere across it, as that of a
 container which lies on its stack with one long edge, and its centroid is in the middle."""
+
+TIE = 1e-6
+"""Difference, of numbers about 1, that makes no difference: a corner pressed into a face is slanted
+alike along all three axes, and rounding must not choose between their orders; the longer side of
+the bounding box comes first then."""
 
 CENTROID_REACH = 0.5
 """Farthest a centroid can be from the middle of its bounding box, in half extents."""
@@ -215,7 +221,7 @@ def _in_order(lanes, work, f, g, row_f, row_g):
     """Order two axes' inputs: the one whose faces cut more first."""
     for i in range(lanes):
         cut_f, cut_g = work[CUTS + f + i], work[CUTS + g + i]
-        swap = cut_f < cut_g
+        swap = cut_f < (1.0 - TIE) * cut_g
         work[CUTS + f + i] = cut_g if swap else cut_f
         work[CUTS + g + i] = cut_f if swap else cut_g
         _exchange(work, row_f + i, row_g + i, swap)
@@ -257,10 +263,13 @@ def _describe(lanes, work):
     for i in range(lanes):
         x, y, z = work[PUSH + i], work[PUSH + LANES + i], work[PUSH + 2 * LANES + i]
         hx, hy, hz = work[HALF + i], work[HALF + LANES + i], work[HALF + 2 * LANES + i]
-        work[MIRRORED + i] = hx if x >= 0.0 else -hx
-        work[MIRRORED + LANES + i] = hy if y >= 0.0 else -hy
-        work[MIRRORED + 2 * LANES + i] = hz if z >= 0.0 else -hz
-        x, y, z = work[SLOPE + i], work[SLOPE + LANES + i], work[SLOPE + 2 * LANES + i]
+        work[MIRRORED + i] = hx if x >= -TIE else -hx
+        work[MIRRORED + LANES + i] = hy if y >= -TIE else -hy
+        work[MIRRORED + 2 * LANES + i] = hz if z >= -TIE else -hz
+        size = work[SIZE + i]
+        x = work[SLOPE + i] * (size + TIE * hx)
+        y = work[SLOPE + LANES + i] * (size + TIE * hy)
+        z = work[SLOPE + 2 * LANES + i] * (size + TIE * hz)
         k0 = (1.0 if y > x else 0.0) + (1.0 if z > x else 0.0)
         k1 = (1.0 if x >= y else 0.0) + (1.0 if z > y else 0.0)
         work[RANKS + i] = k0

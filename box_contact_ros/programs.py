@@ -71,6 +71,11 @@ PROGRAMS = {
         'point error of a model against the exact one, per set of poses and contact class',
         ('report',),
     ),
+    'frontier': Program(
+        'box_contact_ros.report.frontier:main',
+        'speed against error of every model and of the engines beside them, as table and picture',
+        ('report',),
+    ),
     'paper': Program(
         'box_contact_ros.report.paper:main',
         "redo the source paper's tables, its figures beside ours",
@@ -94,6 +99,7 @@ MODULES_OF_EXTRA = {
     'soup': ('fcl',),
     'train': ('torch', 'tqdm'),
     'report': ('matplotlib', 'tqdm'),
+    'peers': ('coal', 'pybullet'),
 }
 
 

@@ -56,7 +56,7 @@ def test_gradients_are_the_derivatives(data: contacts.Contacts) -> None:
         value = torch.tanh(value) if layer < 2 else value
     error = value - fit.offsets
     squared = (error.square() * fit.squared_scale).sum(dim=-1)
-    loss = (error.square().mean() + points.POINT_WEIGHT * squared.mean()
+    loss = ((error.square() * fit.squared_used).mean() + points.POINT_WEIGHT * squared.mean()
             + points.TAIL_WEIGHT * squared.square().mean())
     loss.backward()
     assert fit.run(1)[0] == pytest.approx(loss.item(), rel=0.02)
@@ -76,7 +76,7 @@ def test_the_activation_is_the_kernels() -> None:
 
 def test_a_narrow_network_beside_a_wide_one_is_the_narrow_one(data: contacts.Contacts) -> None:
     """Units that only fill up the matrices stay at zero: trained alone, the network is the same."""
-    start = [points.drawn(np.random.default_rng(k), (21, *hidden, 3))
+    start = [points.drawn(np.random.default_rng(k), (18, *hidden, 3))
              for k, hidden in enumerate([(8, 4), (12, 16)])]
     common = {'steps': 30, 'batch': 512, 'rate': 3e-3}
     alone = points.Fit(data, points.Settings(hidden=[(8, 4)], **common), start=start[:1])
@@ -95,7 +95,7 @@ def test_a_narrow_network_beside_a_wide_one_is_the_narrow_one(data: contacts.Con
 def test_normalisation_is_folded_in_and_out(data: contacts.Contacts) -> None:
     """`folded` serves raw inputs, and `unfolded` undoes it."""
     mean, deviation = points.normalisation(data.inputs)
-    layers = points.drawn(np.random.default_rng(0), (21, 8, 8, 3))
+    layers = points.drawn(np.random.default_rng(0), (18, 8, 8, 3))
     weight, bias = points.folded(layers, mean, deviation)[0]
     np.testing.assert_allclose(data.inputs @ weight.T + bias,
                                (data.inputs - mean) / deviation @ layers[0][0].T + layers[0][1],
@@ -154,14 +154,14 @@ def quick(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_quick_training(quick: Path, tmp_path: Path) -> None:
-    """Its error is a fraction of the inside point's, which a network of zeros answers with."""
+    """Its error is a fraction of the middle's, which a network of zeros answers with."""
     card = load_weights(quick).card
     assert (card['seed'], card['model'], card['sizes']) == (3, 'committee', [])
-    assert card['architecture'] == [21, *committee.HIDDEN, 3]
+    assert card['architecture'] == [18, *committee.HIDDEN, 3]
     pairs = cubes(np.random.default_rng(8), 2000)
     nothing = tmp_path / 'nothing.safetensors'
     save_weights(nothing, {'point': [(np.zeros((b, a)), np.zeros(b)) for a, b in (
-        (21, 4), (4, 4), (4, 3))]}, {**card, 'architecture': [21, 4, 4, 3]})
+        (18, 4), (4, 4), (4, 3))]}, {**card, 'architecture': [18, 4, 4, 3]})
     assert error_of(pairs, quick) < 0.5 * error_of(pairs, nothing)
     for name, figures in card['metrics'].items():
         assert 0.0 <= figures['mean'] <= figures['p99'] <= figures['worst'] < 60.0, name
@@ -180,7 +180,7 @@ def test_hidden_units_on_request(tmp_path: Path) -> None:
     arguments = ['committee', '--quick', '--hidden', '8', '12', '--out', str(tmp_path)]
     assert train.main(arguments) == 0
     weights = load_weights(tmp_path / 'committee.safetensors')
-    assert weights.networks['point'].widths == (21, 8, 12, 3)
+    assert weights.networks['point'].widths == (18, 8, 12, 3)
 
 
 @pytest.mark.parametrize(('arguments', 'message'), [
