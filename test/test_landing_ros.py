@@ -82,8 +82,8 @@ def test_lost_ticks_are_bridged(node, client, monkeypatch):
             answer(stamp, rows, received)
 
     monkeypatch.setattr(crane.feedback, 'answer', lossy)
-    crane_node._spin(crane, executor, crane.await_answers)
-    crane_node._spin(crane, executor, crane.lower)
+    crane_node.receive_while(crane, executor, crane.await_answers)
+    crane_node.receive_while(crane, executor, crane.lower)
     result = crane.landing()
     assert count > 4500
     assert len(crane.feedback.record.points) < 0.95 * sum(

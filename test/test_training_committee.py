@@ -177,9 +177,11 @@ def test_same_seed_same_weights(quick: Path, tmp_path: Path) -> None:
 
 
 def test_hidden_units_on_request(tmp_path: Path) -> None:
-    arguments = ['committee', '--quick', '--hidden', '8', '12', '--out', str(tmp_path)]
+    arguments = ['committee', '--quick', '--hidden', '8', '12', '--steps', '100', '--out',
+                 str(tmp_path)]
     assert train.main(arguments) == 0
-    weights = load_weights(tmp_path / 'committee.safetensors')
+    weights = load_weights(tmp_path / 'committee-8-12.safetensors')
+    assert weights.card['training']['steps'] == 100
     assert weights.networks['point'].widths == (18, 8, 12, 3)
 
 
@@ -187,6 +189,7 @@ def test_hidden_units_on_request(tmp_path: Path) -> None:
     (['committee', '--hidden', '8', str(LANES + 1)], f'--hidden {LANES + 1} is not between 1 and'),
     (['committee', '--scene', 'x.yaml'], "leave out 'committee'"),
     (['--scene', 'x.yaml', '--hidden', '8', '8'], 'leave out --hidden'),
+    (['--scene', 'x.yaml', '--steps', '8'], 'leave out --steps'),
     (['--scene', 'no_such.yaml'], 'no_such.yaml cannot be read: No such file'),
 ])
 def test_refused_arguments(arguments: list[str], message: str, tmp_path: Path,

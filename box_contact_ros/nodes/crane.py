@@ -157,7 +157,7 @@ def _stamp(message: Any) -> int:
     return message.header.stamp.sec * NANOSECONDS + message.header.stamp.nanosec
 
 
-def _spin(node: CraneNode, executor: Any, work: Callable[[], None]) -> None:
+def receive_while(node: CraneNode, executor: Any, work: Callable[[], None]) -> None:
     """Receive while `work` runs in a thread of its own; raise what it raises."""
     live = LiveReport(node.log)
     with ThreadPoolExecutor(max_workers=1) as pool:
@@ -186,8 +186,8 @@ def main(args: Sequence[str] | None = None) -> int:
         node = CraneNode(context)
         executor = make_executor(context)
         executor.add_node(node)
-        _spin(node, executor, node.await_answers)
-        _spin(node, executor, node.lower)
+        receive_while(node, executor, node.await_answers)
+        receive_while(node, executor, node.lower)
     except KeyboardInterrupt:
         signalled = 130  # 128 + SIGINT, as shells report it
     except Exception as error:

@@ -107,8 +107,10 @@ def contestants(quick: bool = False) -> tuple[list[Contestant], list[str]]:
     """All that can be measured here, and a line about each that cannot."""
     found: list[Contestant] = [Ours('exact'), Ours('committee')]
     for path in sorted(resource_path('weights').glob('committee-*.safetensors')):
-        widths = load_weights(path).card['architecture'][1:-1]
-        found.append(Ours('committee', f'committee {"-".join(map(str, widths))}', str(path)))
+        card = load_weights(path).card
+        if not card['sizes']:  # those of a scene are for its boxes alone
+            units = '-'.join(map(str, card['architecture'][1:-1]))
+            found.append(Ours('committee', f'committee {units}', str(path)))
     found += [Ours('paper'), Ours('paper-continuous')]
     peers, missing = installed()
     try:

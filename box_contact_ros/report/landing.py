@@ -3,7 +3,8 @@
 `python -m box_contact_ros.report.landing` runs a grid of landings (rope angle, tilt, overhang; yaw
 and headings drawn) for every model, rate and latency, the constants of the contact law being the
 same for all models, and writes landing.csv (a row per landing), landing.md (a row per model, rate
-and latency) and landing.png (one landing, the models side by side).
+and latency) and landing.png (one landing, the models side by side). With --dds the contacts come
+from a contact node in another process, in lockstep, and landing_dds.csv and .md are written.
 """
 from __future__ import annotations
 
@@ -13,9 +14,10 @@ import dataclasses
 import math
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
 
 import matplotlib
@@ -116,13 +118,37 @@ def table(results: Sequence[tuple[Job, LandingResult]]) -> str:
     return '\n'.join('| ' + ' | '.join(line) + ' |' for line in lines)
 
 
-def page(results: Sequence[tuple[Job, LandingResult]], command: str) -> str:
+def over_dds(jobs: Sequence[Job]) -> Iterator[tuple[Job, LandingResult]]:
+    """Run the landings one by one, their contacts from a contact node; in lockstep."""
+    from ..nodes.landing_flights import answering_node, fly_over_dds  # only here: needs ROS
+
+    for model, group in groupby(jobs, key=lambda job: job.model):
+        with answering_node(model, scenario_of(jobs[0].case)) as domain:
+            for job in group:
+                yield job, fly_over_dds(domain, scenario_of(job.case), rate_hz=job.rate_hz,
+                                        latency=job.latency)
+
+
+OFFLINE_END = """
+![One landing, the models side by side](landing.png)
+
+The same with the contacts from a contact node over DDS: [landing_dds.md](landing_dds.md).
+"""
+DDS_START = """
+The contacts of these landings come from a contact node in another process, over DDS, and act so
+much later than their poses were published; the simulation waits for every answer (lockstep), so
+that a busy machine changes nothing. None was lost. What is measured, and the same without ROS:
+[landing.md](landing.md).
+"""
+
+
+def page(results: Sequence[tuple[Job, LandingResult]], command: str, *, dds: bool = False) -> str:
     """The Markdown page."""
     count = len({job.number for job, _ in results})
-    return f"""# A container lands on one contact point per tick
+    return f"""# A container lands on one contact point per tick{', over DDS' if dds else ''}
 
 Made by `{command}`.
-
+{DDS_START if dds else ''}
 {count} landings a row: ropes 0.5 to 3° off the plumb line, box tilted by 0.5 to 3°, centres 0 to
 0.6 m apart at the first touch, yaw to 1°, every direction drawn. 20 t, 40 ft, no damping but that
 of contact and ropes; the same law and constants for every model (`contact_force`), one point,
@@ -134,9 +160,7 @@ neighbouring ticks, in the window or over the whole contact; beside it, the exac
 same poses. Every landing is a row of landing.csv.
 
 {table(results)}
-
-![One landing, the models side by side](landing.png)
-"""
+{'' if dds else OFFLINE_END}"""
 
 
 def draw(path: Path, models: Sequence[str], job: Job) -> None:
@@ -184,6 +208,8 @@ def main(args: Sequence[str] | None = None) -> int:
                         help='ticks a second, default: %(default)s')
     parser.add_argument('--latency', nargs='+', type=float, default=[0.0, 0.002], metavar='S',
                         help='from asking to acting [s], default: %(default)s')
+    parser.add_argument('--dds', action='store_true', help='contacts from a contact node, over '
+                        'DDS in lockstep; one landing at a time')
     parser.add_argument('--seed', type=int, default=1, help='of yaws and headings')
     parser.add_argument('--quick', action='store_true', help=f'every {QUICK}th landing only')
     parser.add_argument('--workers', type=int, default=os.cpu_count(), help='processes')
@@ -193,15 +219,20 @@ def main(args: Sequence[str] | None = None) -> int:
     jobs = jobs_of(options.models, options.rates, options.latency, seed=options.seed,
                    step=QUICK if options.quick else 1)
     options.out.mkdir(parents=True, exist_ok=True)
-    with ProcessPoolExecutor(options.workers) as pool:
-        results = list(tqdm(pool.map(run, jobs), total=len(jobs), desc='landings', unit=''))
-    write_csv(options.out / 'landing.csv', results)
+    if options.dds:
+        results = list(tqdm(over_dds(jobs), total=len(jobs), desc='landings', unit=''))
+    else:
+        with ProcessPoolExecutor(options.workers) as pool:
+            results = list(tqdm(pool.map(run, jobs), total=len(jobs), desc='landings', unit=''))
+    name = 'landing_dds' if options.dds else 'landing'
+    write_csv(options.out / f'{name}.csv', results)
     given = sys.argv[1:] if args is None else args
     command = ' '.join(['python -m box_contact_ros.report.landing', *given])
-    (options.out / 'landing.md').write_text(page(results, command))
-    shown = list(cases(seed=options.seed))[SHOWN]
-    draw(options.out / 'landing.png', options.models,
-         Job(options.models[0], options.rates[0], options.latency[0], SHOWN, shown))
+    (options.out / f'{name}.md').write_text(page(results, command, dds=options.dds))
+    if not options.dds:
+        shown = list(cases(seed=options.seed))[SHOWN]
+        draw(options.out / 'landing.png', options.models,
+             Job(options.models[0], options.rates[0], options.latency[0], SHOWN, shown))
     print(table(results))
     return 0
 

@@ -58,11 +58,11 @@ def figures(errors: np.ndarray) -> dict[str, float]:
 
 
 def train(path: Path, *, seed: int, commit: str, quick: bool = False,
-          hidden: tuple[int, int] = HIDDEN, device: str = 'cpu', progress: bool = True,
-          ) -> dict[str, Any]:
+          hidden: tuple[int, int] = HIDDEN, steps: int | None = None, device: str = 'cpu',
+          progress: bool = True) -> dict[str, Any]:
     """Train the general network and write it to `path`; returns its model card."""
     began = time.monotonic()
-    pairs, steps = (QUICK_PAIRS, QUICK_STEPS) if quick else (PAIRS, STEPS)
+    pairs, steps = (QUICK_PAIRS, steps or QUICK_STEPS) if quick else (PAIRS, steps or STEPS)
     data = contacts(mixture, [seed, _DATA], pairs, progress)
     fit = Fit(data, Settings(hidden=[hidden], steps=steps, batch=BATCH, rate=RATE, seed=seed,
                              device=device))

@@ -179,7 +179,10 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument('--epochs', type=int, help="passes through the training set, of the "
                         "paper's (default: 300 to 1000, by job)")
     parser.add_argument('--hidden', type=int, nargs=2, metavar='UNITS', help='of the committee: '
-                        'units of its two hidden layers (default: {} {})'.format(*committee.HIDDEN))
+                        'units of its two hidden layers (default: {} {}); the file is named after them'.format(
+            *committee.HIDDEN))
+    parser.add_argument('--steps', type=int, help='of the committee (default: '
+                        f'{committee.STEPS:,}; a third of them make errors a tenth larger)')
     parser.add_argument('--out', type=Path, help='folder to write to (default: weights/)')
     parser.add_argument('--fold', action=argparse.BooleanOptionalAction, help='for paper and '
                         'containers: data folded into the domain in which the solver asks, or as '
@@ -198,11 +201,12 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
         parser.error(f'{unknown[0]!r} is not one of {", ".join(NAMES)}, all')
     if options.scene and options.what:
         parser.error(f'--scene trains for the scene alone: leave out {options.what[0]!r}')
-    if options.scene and options.hidden:
-        parser.error('--scene goes on from the shipped network: leave out --hidden')
+    for name in ('hidden', 'steps'):
+        if options.scene and getattr(options, name):
+            parser.error(f'--scene goes on from the shipped network: leave out --{name}')
     if options.quick and options.out is None and not options.scene:
         parser.error('--quick would replace the weights in weights/: name a folder with --out')
-    for name in ('seed', 'starts', 'epochs', 'threads'):
+    for name in ('seed', 'starts', 'epochs', 'steps', 'threads'):
         value = getattr(options, name)
         if value is not None and value < (0 if name == 'seed' else 1):
             parser.error(f'--{name} {value} is too small')
@@ -249,8 +253,10 @@ def main(args: Sequence[str] | None = None) -> int:
         return 0
     for name in options.what:
         if name == COMMITTEE:
-            path = options.out / f'{COMMITTEE}.safetensors'
-            card = committee.train(path, hidden=tuple(options.hidden or committee.HIDDEN), **common)
+            units = ''.join(f'-{units}' for units in options.hidden or ())
+            path = options.out / f'{COMMITTEE}{units}.safetensors'
+            card = committee.train(path, hidden=tuple(options.hidden or committee.HIDDEN),
+                                   steps=options.steps, **common)
             print(f'{path}, {card["training"]["minutes"]} min\n{committee.table(card)}')
             continue
         job = JOBS[name]
