@@ -11,10 +11,11 @@ but the signs of their middles; a block takes them one after the other, a single
 Each piece is noted in both frames: in its own box's frame two of its coordinates are constant. A
 piece that is not there is NaN, which no comparison lets through.
 
-Of the two bounding boxes A's is chosen, or B's if it is clearly smaller. It follows the overlap's own direction: a
-corner pressed into a face, an edge lying across a face, two crossing edges all fill the better of
-the two well, whereas in a frame fixed to the touched face an edge that lies across it is a diagonal
-sliver (with the same network and data, errors were two to seven times larger).
+Of the two bounding boxes A's is chosen, or B's if it is clearly smaller. It follows the overlap's
+own direction: a corner pressed into a face, an edge lying across a face, two crossing edges all
+fill the better of the two well, whereas in a frame fixed to the touched face an edge that lies
+across it is a diagonal sliver (with the same network and data, errors were two to seven times
+larger).
 """
 from __future__ import annotations
 

@@ -290,7 +290,8 @@ def test_boxes_that_lie_on_each_other_keep_their_frame():
     rng = np.random.default_rng(6)
     n = 2000
     # Tilt and yaw of containers that have landed: docs/landing.csv.
-    turns = poses.small_rotations(rng.normal(size=(n, 3)) * (1.0, 0.1, 1.0), rng.uniform(0, 0.01, n))
+    axes = rng.normal(size=(n, 3)) * (1.0, 0.1, 1.0)
+    turns = poses.small_rotations(axes, rng.uniform(0, 0.01, n))
     a, b, size_a, size_b = sheared(rng, n, poses.CONTAINER, poses.CONTAINER, turns,
                                    np.full(n, 5e-3))
     assert not any(o['in_b'] for o in outlines(a, b, size_a, size_b))
