@@ -88,7 +88,7 @@ from .network import (
 from .outline import (
     outline_block,
 )
-from .overlap import centroid, press, repeat_pressed
+from .overlap import DEPTH_FLOOR, centroid, press, press_on, repeat_pressed
 from .pose import load_block, load_one, load_sizes
 from .resources import resource_path
 from .sat import query_block
@@ -101,6 +101,9 @@ DEPTH_MAX = 0.1
 """Depth by the shortest edge of the two boxes."""
 RANGE_SLACK = 1.0 + 1e-9
 """The limits of the range belong to it, rounding included."""
+
+FLAT = 0.25 * DEPTH_FLOOR
+"""Half extent of A∩B's bounding box, of the size, below which pressing in gave it no volume."""
 
 SYMMETRIC = 0.05
 """Asymmetry of A∩B in its bounding box below which the network's answer is scaled down, to nothing
@@ -373,7 +376,19 @@ def _range(lanes, work):
         excess = max(long_a / (ASPECT_MAX * short_a), long_b / (ASPECT_MAX * short_b))
         excess = max(excess, max(long_a, long_b) / (RATIO_MAX * min(long_a, long_b)))
         excess = max(excess, -work[SEPARATION + i] / (2.0 * DEPTH_MAX * min(short_a, short_b)))
-        work[IN_RANGE + i] = 1.0 if excess <= RANGE_SLACK else 0.0
+        # Where corners or edges touch exactly, B may need pressing along several axes (`press_on`);
+        # until then A∩B has no volume. Otherwise it holds a ball of radius depth / (2 √3).
+        thinnest = min(min(work[HALF + i], work[HALF + LANES + i]), work[HALF + 2 * LANES + i])
+        flat = thinnest < FLAT * work[SIZE + i]
+        work[IN_RANGE + i] = 0.0 if flat or not excess <= RANGE_SLACK else 1.0
+
+
+@kernel
+def _exact_point(work, i):
+    """What model `exact` answers for a pair that has been pressed in."""
+    if work[SEPARATION + i] > -DEPTH_FLOOR * work[SIZE + i]:
+        press_on(work, i)
+    return centroid(work, i)
 
 
 @kernel
@@ -411,7 +426,7 @@ def solve_committee(poses_a, poses_b, sizes_a, sizes_b, work, numbers, status, c
                 p = (work[POINT + i], work[POINT + LANES + i], work[POINT + 2 * LANES + i])
                 if work[IN_RANGE + i] == 0.0:
                     exact += 1
-                    p = centroid(work, i)
+                    p = _exact_point(work, i)
                 write_contact(work, i, start + i, sat_normal(work, i), p, colliding, separation,
                               normal, point)
             else:
@@ -433,13 +448,13 @@ def one_committee(work, numbers, pose_a, pose_b, normal, point):
         return APART, work[SEPARATION]
     press(work, 0)
     repeat_pressed(work)
+    outline_block(1, work)
     range_block(1, work)
     if work[IN_RANGE] == 0.0:
         work[EXACT_ANSWERS] += 1.0
-        write_one(work, centroid(work, 0), normal, point)
+        write_one(work, _exact_point(work, 0), normal, point)
         return TOUCHING, work[SEPARATION]
     values = network_values(numbers)
-    outline_block(1, work)
     describe_block(1, work, values)
     for k in range(INPUTS, WIDE_INPUTS):
         values[k * LANES] = 0.0

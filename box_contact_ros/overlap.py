@@ -41,10 +41,15 @@ from .block import (
     SIZE,
 )
 from .jit import kernel
+from .sat import PARALLEL
 
 DEPTH_FLOOR = 1e-9
 """Depth, as a fraction of the size, to which B is pressed in before the centroid is taken. At exact
 touch A∩B has no volume; at 1e-9 of the size its heights still have seven good digits."""
+
+PRESSES = 8
+"""Most moves of `press_on`: three axes at a corner, and some more because they are not at right
+angles."""
 
 _FACES = np.array([[0, 4, 6, 2], [1, 3, 7, 5],     # x = −, +; corner c has signs (c&1, c&2, c&4)
                    [0, 1, 5, 4], [2, 6, 7, 3],     # y = −, +
@@ -109,6 +114,65 @@ def press(work, i):
             work[OFFSET_B + k * LANES + i] -= move * (
                 work[ROTATION + k * LANES + i] * n0 + work[ROTATION + (3 + k) * LANES + i] * n1
                 + work[ROTATION + (6 + k) * LANES + i] * n2)
+
+
+@kernel
+def press_on(work, i):
+    """Go on where `press` left pair `i` with less than half of DEPTH_FLOOR.
+
+    Where a corner touches a corner or an edge, several axes have gap zero, and moving B along one
+    of them leaves the boxes touching along the others. B is moved along each in turn.
+    """
+    floor = DEPTH_FLOOR * work[SIZE + i]
+    for _ in range(PRESSES):
+        gap, n0, n1, n2 = _largest_gap(work, i)
+        if gap <= -0.5 * floor:
+            break
+        move = floor + gap
+        for k in range(3):
+            work[OFFSET_A + k * LANES + i] -= move * (n0 if k == 0 else (n1 if k == 1 else n2))
+            work[OFFSET_B + k * LANES + i] -= move * (
+                work[ROTATION + k * LANES + i] * n0 + work[ROTATION + (3 + k) * LANES + i] * n1
+                + work[ROTATION + (6 + k) * LANES + i] * n2)
+
+
+@kernel
+def _largest_gap(work, i):
+    """Largest gap over the fifteen axes as pair `i` stands now, and its axis, from A to B."""
+    best = -np.inf
+    b0, b1, b2 = 0.0, 0.0, 0.0
+    for number in range(15):
+        if number < 3:
+            n0, n1, n2 = (1.0 if number == 0 else 0.0, 1.0 if number == 1 else 0.0,
+                          1.0 if number == 2 else 0.0)
+        else:
+            j = (number - 3) % 3
+            r0, r1, r2 = (work[ROTATION + j * LANES + i], work[ROTATION + (3 + j) * LANES + i],
+                          work[ROTATION + (6 + j) * LANES + i])
+            if number < 6:
+                n0, n1, n2 = r0, r1, r2
+            else:
+                k = (number - 6) // 3
+                n0 = 0.0 if k == 0 else (r2 if k == 1 else -r1)
+                n1 = -r2 if k == 0 else (0.0 if k == 1 else r0)
+                n2 = r1 if k == 0 else (-r0 if k == 1 else 0.0)
+                length = np.sqrt(n0 * n0 + n1 * n1 + n2 * n2)
+                if length < PARALLEL:
+                    continue
+                n0, n1, n2 = n0 / length, n1 / length, n2 / length
+        width = (abs(n0) * work[HALF_A + i] + abs(n1) * work[HALF_A + LANES + i]
+                 + abs(n2) * work[HALF_A + 2 * LANES + i])
+        for j in range(3):
+            width += work[HALF_B + j * LANES + i] * abs(
+                n0 * work[ROTATION + j * LANES + i] + n1 * work[ROTATION + (3 + j) * LANES + i]
+                + n2 * work[ROTATION + (6 + j) * LANES + i])
+        along = (n0 * work[OFFSET_A + i] + n1 * work[OFFSET_A + LANES + i]
+                 + n2 * work[OFFSET_A + 2 * LANES + i])
+        if abs(along) - width > best:
+            best = abs(along) - width
+            side = 1.0 if along >= 0.0 else -1.0
+            b0, b1, b2 = side * n0, side * n1, side * n2
+    return best, b0, b1, b2
 
 
 @kernel

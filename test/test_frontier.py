@@ -75,6 +75,13 @@ def test_wrong_verdicts_show(containers: Pairs) -> None:
     assert frontier.judge(gaps, colliding, normals, points)[2:] == (0, 1)
 
 
+def test_at_exact_touch_either_verdict_is_right() -> None:
+    touching = SETS['touching'](np.random.default_rng(1), 60)
+    colliding, normals, points = answers(touching)
+    colliding[::2] ^= True
+    assert frontier.judge(touching, colliding, normals, points)[2:] == (0, 0)
+
+
 # --- contestants ----------------------------------------------------------------------------------
 
 

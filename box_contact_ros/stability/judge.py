@@ -1,12 +1,13 @@
 """A judge of contacts that shares no code with the solver: corners projected on 15 axes.
 
-`judge` does it in float64, by its own quaternions, corners and axes; whatever is within its own
-rounding of a threshold goes to `exact_gap`, which does the same in 60 digits. So a gate that it
-reports broken is broken, and one that it passes holds to the tolerance stated.
+`judge` does it in float64, by its own quaternions, corners and axes. Whatever is within its own
+rounding of a threshold, and whatever looks wrong, is settled by `exact_gap`, which does the same in
+60 digits. So a gate that is reported broken is broken.
 
 Any direction gives a valid bound, whatever rounding did to it: the gap between the projections of
 the sixteen corners on it. Boxes are apart if it is positive in one of them, and the depth is the
-least overlap over all directions; the separating-axis theorem says that the fifteen suffice.
+least overlap over all directions; the separating-axis theorem says that the fifteen suffice. What
+rounding may cost `judge` is the best direction, where edges are almost parallel.
 """
 from __future__ import annotations
 
@@ -19,8 +20,11 @@ TOLERANCE = 1e-12
 """What separations and depths have to keep, of the size."""
 COORDINATE_ULPS = 8.0
 """And far from the origin, of the coordinates' last place: poses are known no better."""
-PRESSED = 1e-9
-"""Contacts shallower than this, of the size, have the point of boxes pressed in so far."""
+DOUBT = 1e-14
+"""Gap, of the size, up to which its sign is not known in float64."""
+PRESSED = 3e-9
+"""Contacts shallower than a third of this, of the size, have the point of boxes pressed in: by so
+much at corners, along three axes."""
 INSIDE = 2.0**-43
 """How far outside a box a point may be, of the size and the coordinates: roundings."""
 TINY = 1e-140
@@ -38,11 +42,34 @@ class Verdict(NamedTuple):
     """What `judge` found for n pairs."""
 
     faults: np.ndarray
-    """(n,) sums of GATES' keys; a verdict near zero is not among them (see `doubtful`)."""
+    """(n,) sums of GATES' keys; of doubtful pairs only once they are settled."""
     doubtful: np.ndarray
-    """(n,) whether the verdict is too near zero for float64."""
+    """(n,) whether float64 is not enough."""
     depth_error: np.ndarray
     """(n,) |depth − true depth| by its tolerance, NaN where the solver says apart."""
+    tolerance: np.ndarray
+    """(n,) of depths [m]."""
+    along: np.ndarray
+    """(n,) gap along the solver's normal [m], NaN where it says apart."""
+
+    def settle(self, row: int, gap: float, found: tuple[np.ndarray, ...], touch: float) -> None:
+        """Judge a doubtful pair by its exact gap; gaps to `touch` [m] count as contact.
+
+        Between twice that and zero, rounding decides, and either verdict is right.
+        """
+        said, separation = found[0][row], found[1][row]
+        faults = self.faults[row] & ~(MISSED | PHANTOM | TOO_DEEP | TOO_SHALLOW | WRONG_AXIS)
+        if said and gap > 2.0 * touch:
+            faults |= PHANTOM
+        if not said and gap < -2.0 * touch:
+            faults |= MISSED
+        if said:
+            tolerance = self.tolerance[row]
+            self.depth_error[row] = abs(separation - gap) / tolerance
+            faults |= TOO_DEEP if separation < gap - tolerance else 0
+            faults |= TOO_SHALLOW if separation > gap + tolerance else 0
+            faults |= WRONG_AXIS if self.along[row] < gap - tolerance else 0
+        self.faults[row] = faults
 
 
 @numba.njit(cache=True)
@@ -128,7 +155,7 @@ def _beyond(m, size, place, point):
 
 @numba.njit(cache=True)
 def _judge(pose_a, pose_b, size_a, size_b, colliding, separation, normal, point, faults, doubtful,
-           depth_error):
+           depth_error, tolerances, gaps_along):
     ma, mb = np.empty((3, 3)), np.empty((3, 3))
     corners_a, corners_b, axis = np.empty((8, 3)), np.empty((8, 3)), np.empty(3)
     offset = np.empty(3)
@@ -148,9 +175,10 @@ def _judge(pose_a, pose_b, size_a, size_b, colliding, separation, normal, point,
         true = _greatest_gap(ma, mb, corners_a, corners_b, axis)
         found = 0
         said = colliding[row]
-        if abs(true) <= tolerance:
-            doubtful[row] = True
-        elif said and true > 0.0:
+        tolerances[row] = tolerance
+        # The offset is rounded once, corners and projections some ten times.
+        unsure = abs(true) <= DOUBT * size
+        if said and true > 0.0:
             found |= PHANTOM
         elif not said and true < 0.0:
             found |= MISSED
@@ -164,18 +192,22 @@ def _judge(pose_a, pose_b, size_a, size_b, colliding, separation, normal, point,
                     found |= TOO_DEEP
                 if s > true + tolerance:
                     found |= TOO_SHALLOW
-                if _along(n, corners_a, corners_b) < true - tolerance:
+                gaps_along[row] = _along(n, corners_a, corners_b)
+                if gaps_along[row] < true - tolerance:
                     found |= WRONG_AXIS
                 if abs(n[0]**2 + n[1]**2 + n[2]**2 - 1.0) > 1e-12:
                     found |= NOT_UNIT
                 # The point of a shallow contact is that of boxes pressed in.
-                slack = INSIDE * (size + reach) + max(0.0, PRESSED * size + s)
+                slack = INSIDE * (size + reach)
+                if s > -0.34 * PRESSED * size:
+                    slack += PRESSED * size
                 if (_beyond(ma, size_a[row], a, p) > slack
                         or _beyond(mb, size_b[row], b, p) > slack):
                     found |= OUTSIDE
         elif not separation[row] > 0.0:
             found |= NOT_FINITE
         faults[row] = found
+        doubtful[row] = unsure or found & (MISSED | PHANTOM | TOO_DEEP | TOO_SHALLOW | WRONG_AXIS)
 
 
 def judge(pose_a: np.ndarray, pose_b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
@@ -186,7 +218,7 @@ def judge(pose_a: np.ndarray, pose_b: np.ndarray, size_a: np.ndarray, size_b: np
     """
     n = len(pose_a)
     verdict = Verdict(np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.bool_),
-                      np.full(n, np.nan))
+                      np.full(n, np.nan), np.empty(n), np.full(n, np.nan))
     arrays = [np.ascontiguousarray(part) for part in (pose_a, pose_b, size_a, size_b, *found)]
     _judge(*arrays, *verdict)
     return verdict

@@ -1,0 +1,481 @@
+"""Families of hard poses, by what makes them hard: parallel, touching, deep, tied, thin, far.
+
+Each family is a generator of pairs in a plain frame; `variants` then turns them, swaps the boxes,
+renames their axes and scales them. What tests and reports use is not drawn anew but read from
+`families.npz`, doubles and all: at 1e-12 the rounding of the recipe is part of the case, and
+another machine's sine may round differently. `test/make_families.py` wrote that file, with the true
+gap and centroid in 60 digits.
+"""
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from ..posesets import Pairs
+
+FILE = Path(__file__).with_name('families.npz')
+CUBE = (2.0, 2.0, 2.0)
+FORTY, TWENTY, HIGH_CUBE = (12.192, 2.438, 2.591), (6.058, 2.438, 2.591), (12.192, 2.438, 2.896)
+X, Y, Z = np.eye(3)
+UPRIGHT = np.array([0.0, 0.0, 0.0, 1.0])
+
+Case = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+"""pose_a, pose_b (7,), size_a, size_b (3,)."""
+
+
+class Cases(NamedTuple):
+    """A family as stored: n pairs with their truth."""
+
+    pairs: Pairs
+    gap: np.ndarray
+    """(n,) largest gap over the fifteen axes, in 60 digits, rounded once [m]."""
+    centroid: np.ndarray
+    """(n, 3) of the overlap as it is, in 60 digits, from A's position [m]; NaN if it has no
+    volume or is shallower than what boxes are pressed in by."""
+
+
+# --- tools ----------------------------------------------------------------------------------------
+
+
+def turned(axis: tuple[float, ...] | np.ndarray, angle: float) -> np.ndarray:
+    """Quaternion xyzw of a rotation [rad]."""
+    axis = np.asarray(axis, dtype=np.float64)
+    return np.append(np.sin(0.5 * angle) * axis / np.linalg.norm(axis), np.cos(0.5 * angle))
+
+
+def product(p: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """Quaternion of p after q."""
+    u, w, v, s = p[:3], p[3], q[:3], q[3]
+    return np.append(w * v + s * u + np.cross(u, v), w * s - u @ v)
+
+
+def matrix(q: np.ndarray) -> np.ndarray:
+    """Rotation matrix (3, 3) of a unit quaternion."""
+    x, y, z, w = q
+    return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+                     [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+                     [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]])
+
+
+def right_angles() -> list[np.ndarray]:
+    """The 24 orientations that map axes on axes."""
+    found = [UPRIGHT]
+    for q in found:  # grows while it is gone through
+        for axis in (X, Y, Z):
+            new = product(q, turned(axis, 0.5 * np.pi))
+            if all(min(np.abs(new - p).max(), np.abs(new + p).max()) > 1e-6 for p in found):
+                found.append(new)
+    return found
+
+
+def placed(size_a: tuple[float, ...], size_b: tuple[float, ...], turn: np.ndarray,
+           along: np.ndarray, gap: float, lateral: tuple[float, ...] | np.ndarray = (0.0, 0.0, 0.0),
+           turn_a: np.ndarray = UPRIGHT) -> Case:
+    """A at the origin, B beyond it along a unit direction, `gap` between their projections."""
+    a, b = np.asarray(size_a, dtype=np.float64), np.asarray(size_b, dtype=np.float64)
+    reach = 0.5 * (np.abs(along @ matrix(turn_a)) @ a + np.abs(along @ matrix(turn)) @ b)
+    return (np.append(np.zeros(3), turn_a), np.append((reach + gap) * along + lateral, turn), a, b)
+
+
+def unit(vector: tuple[float, ...] | np.ndarray) -> np.ndarray:
+    """The vector, of length 1."""
+    return np.asarray(vector, dtype=np.float64) / np.linalg.norm(vector)
+
+
+def edge_crossing(gap: float, angle: float = 1.1, along: float = 0.0, size: float = 2.0,
+                  length: float = 2.0) -> Case:
+    """Two bars on edge, A's ridge up along x, B's ridge down, crossing at an angle; B is shifted
+    along A's ridge."""
+    a = turned(X, 0.25 * np.pi)
+    b = product(turned(Z, angle), turned(X, 0.25 * np.pi))
+    return placed((length, size, size), (length, size, size), b, Z, gap, (along, 0.0, 0.0), a)
+
+
+VERTEX_DOWN = product(turned(Y, -np.arctan(np.sqrt(0.5))), turned(X, 0.25 * np.pi))
+"""A cube on its corner: its body diagonal is vertical."""
+EDGE_DOWN = turned(X, 0.25 * np.pi)
+
+
+def feature_pairs(gap: float) -> list[Case]:
+    """The four ways in which two convex bodies touch, `gap` apart."""
+    return [placed(CUBE, CUBE, UPRIGHT, Z, gap, (0.3, 0.2, 0.0)),
+            placed(CUBE, CUBE, EDGE_DOWN, Z, gap, (0.1, 0.3, 0.0)),
+            placed(CUBE, CUBE, VERTEX_DOWN, Z, gap, (0.2, -0.1, 0.0)),
+            edge_crossing(gap)]
+
+
+# --- the families ---------------------------------------------------------------------------------
+
+Family = Callable[[np.random.Generator], Iterator[Case]]
+AXES = ((1, 0.5, 3), (1, 1, 1), (1, 0, 1), (1, 2, 3), (1, 0, 0))
+TILTS = (0.0, 1e-16, 1e-15, 1e-14, 1e-12, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 5e-3, 0.05)
+
+
+def a1_tilted_faces(rng: np.random.Generator) -> Iterator[Case]:
+    """Face on face, tilted about generic and in-face axes, overlapping."""
+    for tilt in TILTS:
+        for axis in AXES:
+            for overlap in (1e-9, 1e-5, 1e-2):
+                yield placed(FORTY, FORTY, turned(axis, tilt), Z, -12.192 * overlap,
+                             (*(rng.uniform(-0.8, 0.8, 2) * FORTY[:2]), 0.0))
+
+
+def a2_tilted_gaps(rng: np.random.Generator) -> Iterator[Case]:
+    """The same with a gap: what a constant added to |R| turns into contacts."""
+    for tilt in TILTS[::2]:
+        for gap in (1e-12, 1e-9, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3):
+            yield placed(FORTY, FORTY, turned(AXES[rng.integers(5)], tilt), Z, gap,
+                         (*(rng.uniform(-0.8, 0.8, 2) * FORTY[:2]), 0.0))
+
+
+def a3_parallel_edges(rng: np.random.Generator) -> Iterator[Case]:
+    """An edge direction in common to the last bit, faces at an angle."""
+    for angle in np.radians(np.arange(5.0, 90.0, 10.0)):
+        for offset in (0.0, 0.3, 0.9, 1.0, 1.1):
+            yield placed(FORTY, FORTY, turned(X, angle), Z, -10.0**rng.uniform(-6, -1),
+                         (offset * 12.192, rng.uniform(-1, 1), 0.0))
+
+
+def a4_ridges(rng: np.random.Generator) -> Iterator[Case]:
+    """Bars turned by 45°, ridge on ridge, crossing at small angles."""
+    for crossing in (0.0, 1e-7, 1e-5, 1e-3, 3e-3, 0.02, 0.05, 0.1, 0.2, 0.5):
+        for overlap in (0.001, 0.01, 0.05):
+            yield edge_crossing(-overlap, crossing, size=1.0, length=15.0)
+
+
+def a5_right_angles(rng: np.random.Generator) -> Iterator[Case]:
+    """All 24 right-angled orientations, and tilts about them."""
+    for base in right_angles():
+        for tilt in (0.0, 1e-15, 1e-12, 1e-9, 1e-6, 1e-3, 0.05, 0.25 * np.pi):
+            yield placed((3.0, 2.0, 1.0), (2.5, 1.5, 0.5), product(turned(rng.normal(size=3), tilt),
+                         base), (X, Y, Z)[rng.integers(3)], rng.choice([-1e-3, -1e-6, 1e-6]),
+                         rng.uniform(-0.2, 0.2, 3))
+
+
+def a6_float32_quaternions(rng: np.random.Generator) -> Iterator[Case]:
+    """Orientations that have been through float32: a tilt of 1e-7 in aligned stacks."""
+    for _ in range(30):
+        turn = unit(rng.normal(size=4))
+        a, b, size_a, size_b = placed(FORTY, FORTY, turn, matrix(turn)[:, 2],
+                                      rng.choice([-1e-2, -1e-4, 1e-4]), turn_a=turn)
+        b[3:] = turn.astype(np.float32)
+        yield a, b, size_a, size_b
+
+
+def b1_exact_touch(rng: np.random.Generator) -> Iterator[Case]:
+    """Touch with dyadic numbers: face, edge and corner on each other, nothing rounded."""
+    size = np.array(CUBE)
+    for place in ((2, 0, 0), (2, 1, 0.5), (2, 2, 0), (2, 2, 1), (2, 2, 2), (2, -2, 2), (0, 2, -2),
+                  (2, 0, 2)):
+        for turn in (UPRIGHT, np.array([0.5, 0.5, 0.5, 0.5]), np.array([1.0, 0, 0, 0])):
+            yield (np.append(np.zeros(3), UPRIGHT), np.append(np.array(place, float), turn), size,
+                   size)
+    yield from feature_pairs(0.0)
+
+
+def b2_shared_lines(rng: np.random.Generator) -> Iterator[Case]:
+    """Boxes on one floor that share a line of their sides, or a corner, but no area."""
+    for offset in (-1.0, -0.5, 0.0, 0.5, 1.0):
+        for gap in (0.0, 1e-15, -1e-15, 1e-9, -1e-9):
+            yield placed(FORTY, FORTY, UPRIGHT, Y, gap, (offset * 12.192, 0.0, 0.0))
+            yield placed(FORTY, TWENTY, UPRIGHT, X, gap, (0.0, 2.438 * offset, 2.591))
+
+
+def b3_ladder(rng: np.random.Generator) -> Iterator[Case]:
+    """Gaps and overlaps from 1e-15 of the size on, on each pair of features."""
+    rungs = 10.0**np.array([-15, -12, -9, -8, -7, -6, -5, -4, -3, -2, -1])
+    for step in (*-2.0 * rungs[::-1], *2.0 * rungs, 1.0, 1e2, 1e4, 1e8):
+        yield from feature_pairs(float(step))
+
+
+def b4_one_axis(rng: np.random.Generator) -> Iterator[Case]:
+    """Poses that one axis alone separates, for each of the fifteen, and the twins that overlap."""
+    for number in range(15):
+        wanted = 2
+        while wanted:
+            turn = unit(rng.normal(size=4))
+            size_a, size_b = np.exp(rng.uniform(-1, 1, (2, 3)))
+            r = matrix(turn)
+            axes = [*np.eye(3), *r.T, *(np.cross(e, f) for e in np.eye(3) for f in r.T)]
+            axes = [axis / np.linalg.norm(axis) for axis in axes]
+            n = axes[number]
+            lateral = rng.normal(size=3) * size_a
+            lateral -= n * (n @ lateral)
+            case = placed(size_a, size_b, turn, n, 1e-2, lateral)
+            gaps = [abs(axis @ case[1][:3]) - 0.5 * (np.abs(axis) @ size_a
+                                                     + np.abs(axis @ r) @ size_b) for axis in axes]
+            if all(gap < -2e-2 for k, gap in enumerate(gaps) if k != number):
+                wanted -= 1
+                yield case
+                yield placed(size_a, size_b, turn, n, -1e-2, lateral)
+
+
+def b5_beyond_an_end(rng: np.random.Generator) -> Iterator[Case]:
+    """Two edges whose lines cross beyond an edge's end."""
+    for share in np.linspace(0.95, 1.05, 21):
+        for gap in (-1e-3, 1e-3):
+            yield edge_crossing(gap, 0.5 * np.pi, along=share, length=2.0)
+
+
+def b6_spin(rng: np.random.Generator) -> Iterator[Case]:
+    """A gap of 1 cm, B turning about the normal, or tumbling."""
+    for degrees in range(0, 360, 15):
+        yield placed(FORTY, FORTY, turned(Z, np.radians(degrees)), Z, 0.01, (0.5, 0.3, 0.0))
+        yield placed(CUBE, CUBE, turned((1, 2, 3), np.radians(degrees)), Z, 0.01, (0.3, 0.1, 0.0))
+
+
+def b7_corner_gaps(rng: np.random.Generator) -> Iterator[Case]:
+    """Corners and edges apart in a direction that is no axis: the gap is less than the distance."""
+    for gap in (1e-9, 1e-6, 1e-3, 0.1):
+        for place in ((1, 1, 1), (1, 1, 0), (1, -1, 0.3)):
+            step = np.array(place) * np.where(np.abs(place) == 1, 2.0 + gap, 1.0)
+            yield (np.append(np.zeros(3), UPRIGHT), np.append(step, UPRIGHT), np.array(CUBE),
+                   np.array(CUBE))
+
+
+def c1_depths(rng: np.random.Generator) -> Iterator[Case]:
+    """Overlaps of 1 to 99 % of the extent, on each pair of features."""
+    for share in (0.01, 0.1, 0.3, 0.49, 0.51, 0.7, 0.9, 0.99):
+        yield from feature_pairs(-2.0 * share)
+
+
+def c2_half_through(rng: np.random.Generator) -> Iterator[Case]:
+    """A small box crosses the middle of a slab, where the normal turns round."""
+    for share in (0.4, 0.499, 0.4999999, 0.5, 0.5000001, 0.501, 0.6):
+        for turn in (UPRIGHT, turned((1, 2, 3), 0.4)):
+            yield placed((5.0, 4.0, 1.0), (0.2, 0.15, 0.1), turn, Z, -share, (0.2, 0.1, 0.0))
+
+
+def c3_contained(rng: np.random.Generator) -> Iterator[Case]:
+    """A box inside another, off its middle."""
+    for ratio in (2.0, 10.0, 100.0):
+        for share in (0.01, 0.3, 0.9):
+            for turn in (UPRIGHT, unit(rng.normal(size=4))):
+                size = np.array((2.0, 1.5, 1.2)) / ratio
+                place = share * 0.5 * (np.array(CUBE) - np.linalg.norm(size)) * (0.3, 0.7, 1.0)
+                yield (np.append(np.zeros(3), UPRIGHT), np.append(place, turn), np.array(CUBE),
+                       size)
+
+
+def c4_concentric(rng: np.random.Generator) -> Iterator[Case]:
+    """Centres at one place: the normal's sign is free."""
+    for size in (CUBE, (1.0, 1.0, 1.0), (3.0, 1.0, 0.5)):
+        for turn in (UPRIGHT, turned(Z, 0.25 * np.pi), unit(rng.normal(size=4))):
+            yield (np.append(np.zeros(3), UPRIGHT), np.append(np.zeros(3), turn), np.array(CUBE),
+                   np.array(size))
+
+
+def c5_identical(rng: np.random.Generator) -> Iterator[Case]:
+    """The same box twice, its axes renamed."""
+    for turn in right_angles():
+        size = np.array((3.0, 2.0, 1.0))
+        renamed = np.abs(matrix(turn).T.round()) @ size
+        yield np.append(np.zeros(3), UPRIGHT), np.append(np.zeros(3), turn), size, renamed
+
+
+def c6_bars_through(rng: np.random.Generator) -> Iterator[Case]:
+    """A thin bar goes through a wide box."""
+    for _ in range(15):
+        yield placed((4.0, 3.0, 1.0), (10.0, 0.1, 0.15), unit(rng.normal(size=4)), Z, -1.0,
+                     rng.uniform(-0.5, 0.5, 3))
+
+
+def d1_two_axes(rng: np.random.Generator) -> Iterator[Case]:
+    """Two axes with equal depth, and nearly."""
+    for nudge in (0.0, 1e-15, -1e-15, 1e-12, -1e-12, 1e-9, -1e-9, 1e-6, -1e-6):
+        for t in (1.999, 1.9, 1.0):
+            yield (np.append(np.zeros(3), UPRIGHT), np.append((t + 2 * nudge, t, 0.1), UPRIGHT),
+                   np.array(CUBE), np.array(CUBE))
+
+
+def d2_three_axes(rng: np.random.Generator) -> Iterator[Case]:
+    """Three."""
+    for nudge in (0.0, 1e-15, 1e-12, 1e-9, 1e-6):
+        for t in (1.999, 1.9, 1.0):
+            yield (np.append(np.zeros(3), UPRIGHT), np.append((t + nudge, t, t - nudge), UPRIGHT),
+                   np.array(CUBE), np.array(CUBE))
+
+
+def d3_eighth_turns(rng: np.random.Generator) -> Iterator[Case]:
+    """45°: an edge on a face, an edge on an edge, and the octagon between two squares."""
+    for nudge in (0.0, 1e-12, -1e-12, 1e-9, 1e-6, 1e-3, -1e-3):
+        angle = 0.25 * np.pi + nudge
+        yield placed(CUBE, CUBE, turned(X, angle), Z, -0.01, (0.2, 0.1, 0.0))
+        yield placed(CUBE, CUBE, turned(Z, angle), Z, -0.01)
+        yield placed(CUBE, CUBE, turned(X, angle), Z, -0.01, turn_a=turned(X, 0.25 * np.pi))
+
+
+def d4_diagonals(rng: np.random.Generator) -> Iterator[Case]:
+    """A body diagonal upright, and the common mistake of 45° twice."""
+    for turn in (VERTEX_DOWN, product(turned(Y, 0.25 * np.pi), turned(X, 0.25 * np.pi))):
+        for gap in (-0.1, -1e-3, -1e-9, 1e-9, 1e-3):
+            yield placed(CUBE, CUBE, turn, Z, gap, (0.2, 0.1, 0.0))
+
+
+def d5_edge_against_face(rng: np.random.Generator) -> Iterator[Case]:
+    """A shallow crossing of edges, a face axis within a few per cent of it: what libraries with a
+    preference for faces answer with the face."""
+    for angle in (0.3, 0.5, 0.7, 0.9, 1.1):
+        for depth in (0.02, 0.1, 0.2, 0.3):
+            yield edge_crossing(-depth, angle, along=0.6)
+
+
+def e1_thin(rng: np.random.Generator) -> Iterator[Case]:
+    """Plates, rods, cards: 1:10 to 1:10,000, stacked and leaning."""
+    for aspect in (10.0, 100.0, 1e3, 1e4):
+        for size in ((3.5, 2.0, 3.5 / aspect), (3.5, 3.5 / aspect, 3.5 / aspect)):
+            for turn in (UPRIGHT, turned(X, 1e-6), turned((1, 1, 0), 0.3),
+                         unit(rng.normal(size=4))):
+                yield placed(size, size, turn, Z, -0.1 * size[2],
+                             (0.1 * size[0], 0.1 * size[1], 0.0))
+
+
+def e2_small_on_large(rng: np.random.Generator) -> Iterator[Case]:
+    """Ratios of 100 to 1,000,000."""
+    for ratio in (1e2, 1e4, 1e6):
+        for turn in (UPRIGHT, turned(X, 1e-7), unit(rng.normal(size=4))):
+            for place in ((0.0, 0.0), (0.31, -0.47)):
+                yield placed((ratio, ratio, ratio), (1.0, 0.8, 0.6), turn, Z, -1e-2,
+                             (place[0] * ratio, place[1] * ratio, 0.0))
+
+
+def e3_scales(rng: np.random.Generator) -> Iterator[Case]:
+    """One shape at 1e-6 to 1e6 m."""
+    for scale in (1e-6, 1e-3, 1.0, 1e3, 1e6):
+        for case in feature_pairs(-2e-3):
+            yield scaled(case, scale)
+
+
+def e4_shallow_in_big(rng: np.random.Generator) -> Iterator[Case]:
+    """Overlaps at float32's rounding of a large pair, and far below."""
+    for overlap in (7e-8, 1e-12):
+        for turn in (UPRIGHT, turned((1, 2, 3), 1e-7), turned((1, 2, 0), 0.01),
+                     unit(rng.normal(size=4))):
+            yield placed(FORTY, FORTY, turn, Z, -12.192 * overlap, (0.5, 0.3, 0.0))
+
+
+def f_far(rng: np.random.Generator) -> Iterator[Case]:
+    """Far from the origin, UTM coordinates among them, turned about the far place."""
+    for far in ((1e3, 0, 0), (1e4, -1e4, 10), (1e5, 1e5, 0), (5e5, 5.8e6, 20), (1e7, -1e7, 1e7)):
+        for turn in (UPRIGHT, unit(rng.normal(size=4))):
+            for gap in (-0.1, -5e-3, -1e-6, 1e-6, 5e-3):
+                yield moved(placed(FORTY, FORTY, turned(AXES[rng.integers(5)], 10.0**rng.uniform(
+                    -9, -1)), Z, gap, (0.5, 0.3, 0.0)), np.array(far, dtype=np.float64), turn)
+
+
+def h1_stacks(rng: np.random.Generator) -> Iterator[Case]:
+    """40 on 40, 20 on 20, two 20s on a 40, at the gaps that yards have; twist-lock offsets."""
+    for gap in (-5e-3, -1e-3, -1e-4, 0.0, 1e-4, 1e-3, 5e-3, 0.025):
+        for below, above, shift in ((FORTY, FORTY, 0.0), (TWENTY, TWENTY, 0.0),
+                                    (FORTY, TWENTY, 3.067), (FORTY, TWENTY, -3.067),
+                                    (HIGH_CUBE, FORTY, 0.0)):
+            for misaligned in (0.0, 0.01, 0.05):
+                yaw = np.radians(rng.uniform(-0.5, 0.5)) * (misaligned > 0.0)
+                yield placed(below, above, turned(Z, yaw), Z, gap,
+                             (shift + misaligned, 0.5 * misaligned, 0.0))
+
+
+def h3_between_stacks(rng: np.random.Generator) -> Iterator[Case]:
+    """Lowered into a slot: side gaps of 20 to 150 mm, swaying until they close."""
+    for gap in (0.02, 0.05, 0.15):
+        for degrees in (0.1, 0.5, 1.0, 2.0, 5.0):
+            for axis in (X, Z, (1, 0.3, 1)):
+                turn = turned(axis, np.radians(degrees))
+                yield (np.append(np.zeros(3), UPRIGHT),
+                       np.append((0.3, 2.438 + gap, 1.2), turn), np.array(FORTY), np.array(FORTY))
+
+
+def h6_spreader(rng: np.random.Generator) -> Iterator[Case]:
+    """A thin spreader on a container, a trolley beam across it."""
+    for degrees in (0.0, 1e-5, 0.1, 1.0, 5.0):
+        for gap in (-0.01, -1e-4, 1e-4):
+            turn = turned((1, 0.2, 0.1), np.radians(degrees))
+            yield placed(FORTY, (12.0, 2.4, 0.3), turn, Z, gap, (0.05, 0.02, 0.0))
+            yield placed(FORTY, (30.0, 0.6, 0.9), product(turned(Z, 0.5 * np.pi), turn), Z, gap)
+
+
+def h7_bay(rng: np.random.Generator) -> Iterator[Case]:
+    """Neighbours of a bay that touch at shared planes."""
+    for step in ((0, 1, 0), (0, 0, 1), (1, 0, 0), (0, 1, 1), (0, 2, 0), (1, 1, 0)):
+        place = np.array(step) * FORTY
+        yield (np.append(np.zeros(3), UPRIGHT), np.append(place, UPRIGHT), np.array(FORTY),
+               np.array(FORTY))
+        yield (np.append(np.full(3, 100.3), UPRIGHT), np.append(place + 100.3, UPRIGHT),
+               np.array(FORTY), np.array(FORTY))
+
+
+FAMILIES: dict[str, Family] = {function.__name__: function for function in (
+    a1_tilted_faces, a2_tilted_gaps, a3_parallel_edges, a4_ridges, a5_right_angles,
+    a6_float32_quaternions, b1_exact_touch, b2_shared_lines, b3_ladder, b4_one_axis,
+    b5_beyond_an_end, b6_spin, b7_corner_gaps, c1_depths, c2_half_through, c3_contained,
+    c4_concentric, c5_identical, c6_bars_through, d1_two_axes, d2_three_axes, d3_eighth_turns,
+    d4_diagonals, d5_edge_against_face, e1_thin, e2_small_on_large, e3_scales, e4_shallow_in_big,
+    f_far, h1_stacks, h3_between_stacks, h6_spreader, h7_bay)}
+"""By name; the letter is the group: A parallel, B touching, C deep, D tied, E aspect and scale, F
+far from the origin, H a container yard. G is input that is no pose, and I is motion: tests of their
+own."""
+
+
+# --- variants -------------------------------------------------------------------------------------
+
+
+def scaled(case: Case, by: float) -> Case:
+    """All lengths times a factor."""
+    a, b, size_a, size_b = (part.copy() for part in case)
+    a[:3] *= by
+    b[:3] *= by
+    return a, b, size_a * by, size_b * by
+
+
+def moved(case: Case, shift: np.ndarray, turn: np.ndarray) -> Case:
+    """Both boxes turned about the origin, then shifted."""
+    poses = [np.append(matrix(turn) @ pose[:3] + shift, product(turn, pose[3:]))
+             for pose in case[:2]]
+    return poses[0], poses[1], case[2], case[3]
+
+
+def renamed(case: Case, box: int, turn: np.ndarray) -> Case:
+    """A box's axes called by other names, its extents along: the same body."""
+    parts = list(case)
+    parts[box] = np.append(case[box][:3], product(case[box][3:], turn))
+    parts[2 + box] = np.abs(matrix(turn).T.round()) @ case[2 + box]
+    return parts[0], parts[1], parts[2], parts[3]
+
+
+def swapped(case: Case) -> Case:
+    """B for A."""
+    return case[1], case[0], case[3], case[2]
+
+
+def variants(case: Case, rng: np.random.Generator) -> Iterator[Case]:
+    """The case as it is, and once turned, swapped, renamed or scaled, or several of it."""
+    yield case
+    other = case
+    if rng.random() < 0.6:
+        far = np.abs(case[0][:3]).max() > 100.0
+        other = moved(other, rng.uniform(-20, 20, 3) * (not far), unit(rng.normal(size=4)))
+    if rng.random() < 0.5:
+        other = swapped(other)
+    for box in (0, 1):
+        if rng.random() < 0.3:
+            other = renamed(other, box, right_angles()[rng.integers(24)])
+    if rng.random() < 0.3:
+        other = scaled(other, 10.0**rng.integers(-6, 7))
+    yield other
+
+
+def generate(name: str, seed: int = 2026) -> Pairs:
+    """The pairs of a family, each with a variant."""
+    rng = np.random.default_rng([seed, list(FAMILIES).index(name)])
+    cases = [variant for case in FAMILIES[name](rng) for variant in variants(case, rng)]
+    return Pairs(*(np.array(column, dtype=np.float64) for column in zip(*cases)))
+
+
+def load(path: Path = FILE) -> dict[str, Cases]:
+    """The families as stored."""
+    with np.load(path) as file:
+        return {name: Cases(Pairs(*(file[f'{name}.{part}'] for part in Pairs._fields)),
+                            file[f'{name}.gap'], file[f'{name}.centroid']) for name in FAMILIES}
