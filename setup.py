@@ -57,7 +57,7 @@ setup(
     maintainer_email='maintainers@box-contact-ros.org',
     license='Apache-2.0',
     packages=find_packages(exclude=['test', 'test.*']),
-    package_data={NAME: ['py.typed']},
+    package_data={NAME: ['py.typed', 'stability/*.npz']},
     data_files=data_files(),
     entry_points={'console_scripts': programs['entry_points']('box_contact_' if BY_PIP else '')},
     distclass=PipDistribution if BY_PIP else Distribution,
@@ -76,6 +76,7 @@ setup(
         'soup': ['python-fcl'],
         'train': ['torch==2.13.0', 'tqdm'],
         'report': ['matplotlib', 'tqdm'],
+        'fuzz': ['gmpy2', 'mpmath', 'tqdm'],
         # Engines that only the report `frontier` compares with.
         'peers': ['coal', 'mujoco', 'pybullet', 'python-fcl'],
         # colcon test looks for pytest in here, and runs nothing without it.

@@ -51,6 +51,7 @@ A_FIRST = _rows(1)     # 1.0 where A comes first in the order used for edge axes
 # sat.query_block.
 SEPARATION = _rows(1)  # signed separation [m]
 AXIS = _rows(1)        # winning axis: 0–2 faces of A, 3–5 faces of B, 6 + 3 i + j for a_i × b_j
+NEAR = _rows(1)        # squared sine of the widest angle between edges that are almost parallel
 FACE = _rows(1)        # best face axis, 0–5, whatever wins
 NORMAL = _rows(3)      # winning axis, unit, from A to B, in A's frame
 

@@ -76,6 +76,16 @@ PROGRAMS = {
         'speed against error of every model and of the engines beside them, as table and picture',
         ('report',),
     ),
+    'fuzz': Program(
+        'box_contact_ros.stability.fuzz:main',
+        'millions of random pairs, judged by an independent test; gates at zero',
+        ('report', 'fuzz'),
+    ),
+    'stability': Program(
+        'box_contact_ros.stability.report:main',
+        'what each model makes of families of hard poses',
+        ('report', 'soup'),
+    ),
     'paper': Program(
         'box_contact_ros.report.paper:main',
         "redo the source paper's tables, its figures beside ours",
@@ -100,6 +110,7 @@ MODULES_OF_EXTRA = {
     'train': ('torch', 'tqdm'),
     'report': ('matplotlib', 'tqdm'),
     'peers': ('coal', 'pybullet'),
+    'fuzz': ('mpmath',),
 }
 
 

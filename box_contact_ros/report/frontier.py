@@ -63,7 +63,7 @@ PAPER_ERROR = 34.0
 """The paper's MAE of 0.5624 rad in % of an edge: seen from 1.2 m, the mean distance of a touching
 cube's surface, it is a point error of 0.67 m, a third of the edge of 2 m."""
 VERDICT = 1e-9
-"""Gap or depth, of the size, from which on a verdict can be wrong: at exact touch both are right."""
+"""Gap or depth, of the size, from which on a verdict is wrong: at exact touch both are right."""
 SMALLEST_ERROR = 1e-2
 """Errors below this [%] are drawn here: those of `exact` are zero, being the reference."""
 
@@ -377,9 +377,9 @@ Times are those on containers with sway; normals and verdicts are over all sets.
 Point errors in % of the smaller box's longest edge, as median/p99/worst, per contact class
 ([accuracy](accuracy.md)). *Missed*: contacts of `exact` that were not reported; *invented*: the
 reverse; both only where the gap or depth is more than {VERDICT:g} of the size, as at exact touch
-either verdict is right. *Judged*: pairs asked; models with batches are asked for more. Random sizes are timed on
-{FEW_PAIRS} pairs of sizes. Engines that give several points are entered twice: their deepest, and
-the mean. `committee N-M` are networks of other sizes, trained alike.
+either verdict is right. *Judged*: pairs asked; models with batches are asked for more. Random sizes
+are timed on {FEW_PAIRS} pairs of sizes. Engines that give several points are entered twice: their
+deepest, and the mean. `committee N-M` are networks of other sizes, trained for 100,000 steps.
 
 """ + '\n\n'.join(f'### {name.capitalize()}\n\n{(ALL_SETS[name].__doc__ or "").strip()}\n\n'
                   f'{set_table(cells, name)}' for name in ALL_SETS) + '\n'

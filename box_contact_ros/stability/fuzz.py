@@ -106,9 +106,9 @@ def draw(name: str, rng: np.random.Generator, n: int) -> tuple[np.ndarray, ...]:
     Orientations: a third anything; a third one of the 24 right-angled ones, tilted by 0 or 1e-16 to
     0.1 rad; a third with one edge direction in common. Places: a third anywhere near; the others
     with features of both boxes (corner, middle of an edge or a face) brought together to a gap or
-    overlap of 1e-13 to 0.3 of the size, along one of the fifteen axes or anywhere; one in a hundred
-    of them to 0 or 1e-16 to 1e-13: those take 60 digits to judge. Half of
-    the pairs are then moved rigidly, a fifth of those far from the origin.
+    overlap of 1e-13 to 0.3 of the size, along one of the fifteen axes or anywhere, and mostly a
+    smaller one across; one in a hundred to 0 or 1e-16 to 1e-13: those take 60 digits to judge. Half
+    of the pairs are then moved rigidly, a fifth of those far from the origin.
     """
     size_a, size_b = CLASSES[name](rng, n)
     size = np.maximum(size_a, size_b).max(axis=1)
@@ -138,6 +138,9 @@ def draw(name: str, rng: np.random.Generator, n: int) -> tuple[np.ndarray, ...]:
     step = np.where(close, _log_uniform(rng, 1e-16, 1e-13, n) * (rng.random(n) < 0.5),
                     _log_uniform(rng, 1e-13, 0.3, n)) * rng.choice([-1.0, 1.0], n)
     place = at_a - at_b + along * (step * np.where(rng.random(n) < 0.5, size, least))[:, None]
+    # A step within a plane of contact leaves it as it is: mostly another one comes across.
+    across = _log_uniform(rng, 1e-12, 1e-2, n) * (rng.random(n) < 0.9) * ~close
+    place += _axes(rng, n) * (across * least)[:, None]
     anywhere = rng.random(n) < 1.0 / 3.0
     reach = 0.5 * (size_a + np.abs(np.einsum('nij,nj->nij', axes, size_b)).sum(axis=2))
     place = np.where(anywhere[:, None], reach * rng.uniform(-1.05, 1.05, (n, 3)), place)

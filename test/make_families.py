@@ -1,0 +1,48 @@
+"""Write box_contact_ros/stability/families.npz: the hard poses, with their truth in 60 digits.
+
+    python test/make_families.py
+
+Once written, the file is what tests and reports read (see `box_contact_ros.stability.families`).
+"""
+from __future__ import annotations
+
+import mpmath as mp
+import numpy as np
+import oracle
+from tqdm import tqdm
+
+from box_contact_ros.stability import families
+
+FLOOR = mp.mpf(10)**-9
+"""Depth, of the size, below which the point is that of boxes pressed in: no truth for it here."""
+
+
+def truth(a, b, size_a, size_b):
+    """Largest gap, and the overlap's centroid from A's position, of one pair."""
+    box_a, box_b = oracle.make_box(a, size_a), oracle.make_box(b, size_b)
+    gap = oracle.separation(box_a, box_b)
+    size = mp.mpf(float(max(*size_a, *size_b)))
+    centroid = None
+    if gap < -FLOOR * size:
+        centroid = oracle.overlap(box_a, box_b)[1]
+    if centroid is None:
+        return float(gap), [np.nan] * 3
+    return float(gap), oracle.as_array(oracle.add(centroid, box_a.centre, -1))
+
+
+def main():
+    """Generate all families and judge every case."""
+    arrays = {}
+    for name in tqdm(families.FAMILIES, unit='family'):
+        pairs = families.generate(name)
+        found = [truth(*row) for row in zip(*pairs)]
+        arrays |= {f'{name}.{part}': values for part, values in pairs._asdict().items()}
+        arrays[f'{name}.gap'] = np.array([gap for gap, _ in found])
+        arrays[f'{name}.centroid'] = np.array([centroid for _, centroid in found], dtype=float)
+    np.savez_compressed(families.FILE, **arrays)
+    total = sum(len(values) for key, values in arrays.items() if key.endswith('.gap'))
+    print(f'{families.FILE}: {total} cases, {families.FILE.stat().st_size / 1e6:.2f} MB')
+
+
+if __name__ == '__main__':
+    main()
