@@ -6,12 +6,31 @@ can bring in anything: every refusal names the field and the value.
 from __future__ import annotations
 
 import math
+import numbers
+import reprlib
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .pose import LENGTH_MAX, LENGTH_MIN, QUATERNION_MAX, QUATERNION_MIN
+
+SHOWN = 200
+"""Characters of a refused value that an error shows."""
+_REPR = reprlib.Repr()
+_REPR.maxlist = _REPR.maxtuple = 8  # a pose, and whether there is more
+_REPR.maxlevel = 3
+_REPR.maxstring = _REPR.maxother = SHOWN
+
+
+def shown(value: Any) -> str:
+    """`repr`, cut short: an error is to be read, whatever came in (a megabyte, a maze of YAML)."""
+    try:
+        text = _REPR.repr(value).replace('\n', ' ')
+    except ValueError:  # integers of more than 4,300 digits have no repr
+        return f'a {type(value).__name__}'
+    return text if len(text) <= SHOWN else f'{text[:SHOWN]}...'
 
 
 def pose_fault(pose: Sequence[float] | np.ndarray) -> str | None:
@@ -27,10 +46,10 @@ def pose_fault(pose: Sequence[float] | np.ndarray) -> str | None:
     text = f'quaternion (x={qx:g}, y={qy:g}, z={qz:g}, w={qw:g})'
     if not all(math.isfinite(value) for value in (qx, qy, qz, qw)):
         return f'{text} is not finite'
-    norm = math.hypot(qx, qy, qz, qw)
-    if norm < QUATERNION_MIN:
+    norm2 = (qx * qx + qy * qy) + (qz * qz + qw * qw)  # to the bit as the kernels have it
+    if norm2 < QUATERNION_MIN * QUATERNION_MIN:
         return f'{text} has zero length'
-    if norm > QUATERNION_MAX:
+    if norm2 > QUATERNION_MAX * QUATERNION_MAX:
         return f'{text} is longer than {QUATERNION_MAX:g}'
     return None
 
@@ -50,20 +69,32 @@ def size_fault(size: Sequence[float] | np.ndarray) -> str | None:
 
 def as_floats(value: ArrayLike, name: str, shapes: str, *accepted: tuple[int | None, ...],
               ) -> np.ndarray:
-    """`value` as a contiguous float64 array of one of the `accepted` shapes (None: any length).
+    """`value` as a float64 array of one of the `accepted` shapes (None: any length).
 
-    `shapes` is how the accepted shapes are called in the error.
+    It is contiguous and writable. `shapes` is how the accepted shapes are called in the error.
     """
     try:
-        array = np.ascontiguousarray(value, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f'{name} must be {shapes} of numbers, not {value!r}') from error
-    # ascontiguousarray makes a scalar one-dimensional, which no accepted shape mistakes.
+        array = np.asarray(value)
+        if not _holds_numbers(array):
+            raise TypeError(f'{array.dtype} is no kind of number')
+        with np.errstate(over='ignore', invalid='ignore'):  # infinity and NaN are refused later
+            # Of one kind to Numba, which would compile the kernels anew for read-only arrays.
+            array = np.require(array, np.float64, ('C', 'A', 'W'))
+    except (TypeError, ValueError, OverflowError) as error:
+        raise ValueError(f'{name} must be {shapes} of numbers, not {shown(value)}') from error
     for shape in accepted:
         if len(shape) == array.ndim and all(
                 want is None or want == have for want, have in zip(shape, array.shape)):
             return array
-    raise ValueError(f'{name} must be {shapes}, not an array of shape {np.shape(value)}')
+    raise ValueError(f'{name} must be {shapes}, not an array of shape {array.shape}')
+
+
+def _holds_numbers(array: np.ndarray) -> bool:
+    """Real numbers only. NumPy would also take '1' for 1, None for NaN, a date for a number, and
+    drop imaginary parts."""
+    if array.dtype.kind == 'O':  # also what integers beyond 64 bits come as
+        return all(isinstance(v, numbers.Real) and not isinstance(v, bool) for v in array.flat)
+    return array.dtype.kind in 'fiu'
 
 
 def as_size(size: ArrayLike, name: str) -> np.ndarray:

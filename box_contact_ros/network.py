@@ -89,6 +89,8 @@ def load_weights(path: Path | str) -> Weights:
     """Read and check a weights file; raises `WeightsError` that says what is wrong with it."""
     path = Path(path)
     try:
+        if path.exists() and not path.is_file():
+            raise OSError('it is no regular file')  # opening a FIFO would wait for its writer
         with safe_open(path, framework='numpy') as file:
             metadata = file.metadata() or {}
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118

@@ -81,6 +81,11 @@ def rotation_entries(x, y, z, w):
 
 
 @inlined
+def _squared_norm(x, y, z, w):
+    return (x * x + y * y) + (z * z + w * w)
+
+
+@inlined
 def _pose_valid(x, y, z, norm2):
     # Written so that NaN fails every comparison. An overflown square is infinite, and fails too.
     return (abs(x) <= LENGTH_MAX and abs(y) <= LENGTH_MAX and abs(z) <= LENGTH_MAX
@@ -90,7 +95,9 @@ def _pose_valid(x, y, z, norm2):
 
 @inlined
 def _size_valid(x, y, z):
-    return min(min(x, y), z) >= LENGTH_MIN and max(max(x, y), z) <= LENGTH_MAX
+    # Likewise; min and max would lose a NaN in y or z.
+    return (x >= LENGTH_MIN and y >= LENGTH_MIN and z >= LENGTH_MIN
+            and x <= LENGTH_MAX and y <= LENGTH_MAX and z <= LENGTH_MAX)
 
 
 @kernel
@@ -193,11 +200,11 @@ def _prepare(lanes, work):
     for i in range(lanes):
         x, y, z, w = (work[TURN_A + i], work[TURN_A + LANES + i], work[TURN_A + 2 * LANES + i],
                       work[TURN_A + 3 * LANES + i])
-        norm2_a = (x * x + y * y) + (z * z + w * w)
+        norm2_a = _squared_norm(x, y, z, w)
         a00, a01, a02, a10, a11, a12, a20, a21, a22 = rotation_entries(x, y, z, w)
         x, y, z, w = (work[TURN_B + i], work[TURN_B + LANES + i], work[TURN_B + 2 * LANES + i],
                       work[TURN_B + 3 * LANES + i])
-        norm2_b = (x * x + y * y) + (z * z + w * w)
+        norm2_b = _squared_norm(x, y, z, w)
         b00, b01, b02, b10, b11, b12, b20, b21, b22 = rotation_entries(x, y, z, w)
         ax, ay, az = (work[ORIGIN_A + i], work[ORIGIN_A + LANES + i],
                       work[ORIGIN_A + 2 * LANES + i])
@@ -251,9 +258,8 @@ def _fault(work, i):
     for box in range(2):
         origin = ORIGIN_A if box == 0 else ORIGIN_B
         turn = TURN_A if box == 0 else TURN_B
-        norm2 = 0.0
-        for k in range(4):
-            norm2 += work[turn + k * LANES + i]**2
+        norm2 = _squared_norm(work[turn + i], work[turn + LANES + i], work[turn + 2 * LANES + i],
+                              work[turn + 3 * LANES + i])
         if not _pose_valid(work[origin + i], work[origin + LANES + i],
                            work[origin + 2 * LANES + i], norm2):
             return BAD_POSE_A + box

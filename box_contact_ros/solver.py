@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .block import BAD_POSE_A, BAD_POSE_B, BAD_SIZE_A
-from .checks import as_floats, as_size, pose_fault, size_fault
+from .checks import as_floats, as_size, pose_fault, shown, size_fault
 from .committee import Committee
 from .contact import TOUCHING, Contact, Contacts
 from .exact import Exact
@@ -64,10 +64,12 @@ def soup_divisions(name: str) -> int | None:
     if not name.startswith('soup-'):
         return None
     text = name.removeprefix('soup-')
-    if text.isascii() and text.isdecimal() and 1 <= int(text) <= MOST_SOUP_DIVISIONS:
+    # Not any length: int() refuses thousands of digits in words of its own.
+    if (text.isascii() and text.isdecimal() and len(text) < 10
+            and 1 <= int(text) <= MOST_SOUP_DIVISIONS):
         return int(text)
-    raise ValueError(f'model {name!r}: the divisions N of soup-N must be a whole number from 1 to '
-                     f'{MOST_SOUP_DIVISIONS}')
+    raise ValueError(f'model {shown(name)}: the divisions N of soup-N must be a whole number from '
+                     f'1 to {MOST_SOUP_DIVISIONS}')
 
 
 def make_model(name: str, size_a: np.ndarray, size_b: np.ndarray, weights: str | None) -> Model:
@@ -92,7 +94,7 @@ def make_model(name: str, size_a: np.ndarray, size_b: np.ndarray, weights: str |
         from .soup import Soup  # likewise
 
         return Soup(divisions)
-    raise ValueError(f'model {name!r} is not one of: {", ".join(MODELS)}')
+    raise ValueError(f'model {shown(name)} is not one of: {", ".join(MODELS)}')
 
 
 class ContactSolver:
@@ -133,7 +135,7 @@ class ContactSolver:
         normal, point = _empty(3), _empty(3)
         try:
             verdict, separation = self._one(pose_a, pose_b, normal, point)
-        except TypeError:
+        except (TypeError, ValueError):  # the latter, without the field, for an empty list
             return self._converted(pose_a, pose_b)
         if verdict < 0:
             return self._converted(pose_a, pose_b)  # which knows the words

@@ -20,12 +20,20 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import PointCloud2
 
-from ..checks import pose_fault
+from ..checks import pose_fault, shown
 from ..pairing import PAIRINGS
 from ..solver import MODELS, ContactSolver, soup_divisions
-from .messages import StampedPose, make_cloud, make_header, make_normal, make_point, read_pose
+from .messages import (
+    StampedPose,
+    header_fault,
+    make_cloud,
+    make_header,
+    make_normal,
+    make_point,
+    read_pose,
+)
 from .parameters import Setting, answer_help, checked, declare, numbers, one_of, text
-from .runtime import CONTACT_QOS, POSE_QOS, run_node
+from .runtime import CONTACT_QOS, LOG_SECONDS, POSE_QOS, run_node
 
 
 def model_name(name: str, value: Any) -> str:
@@ -45,7 +53,6 @@ PARAMETERS = {
 }
 PAIR = 0                  # id of the only pair
 UNMATCHED_SECONDS = 1.0   # poses without a partner for this long are worth a warning
-LOG_SECONDS = 1.0         # the same complaint is logged at most this often
 
 
 class ContactNode(Node):
@@ -115,13 +122,18 @@ class ContactNode(Node):
     def _pose_callback(self, box: int) -> Any:
         def callback(message: PoseStamped) -> None:
             try:
-                self._take(box, read_pose(message))
+                self._take(box, message)
             except Exception as error:  # a callback must not end the node, whatever happens
                 self._refuse('internal error', f'{type(error).__name__}: {error}')
         return callback
 
-    def _take(self, box: int, pose: StampedPose) -> None:
+    def _take(self, box: int, message: PoseStamped) -> None:
         self.counts['poses'] += 1
+        fault = header_fault(message.header)
+        if fault:
+            self._refuse('bad header', f'box_{"ab"[box]}/pose: {fault}')
+            return
+        pose = read_pose(message)
         fault = pose_fault(pose.numbers)
         if fault:
             self._refuse('bad pose', f'box_{"ab"[box]}/pose: {fault}')
@@ -135,7 +147,8 @@ class ContactNode(Node):
         self._waiting_since = None
         if a.frame_id != b.frame_id:
             self._refuse('frame_id differs',
-                         f'box_a/pose is in frame {a.frame_id!r}, box_b/pose in {b.frame_id!r}')
+                         f'box_a/pose is in frame {shown(a.frame_id)}, box_b/pose in '
+                         f'{shown(b.frame_id)}')
             return
         self._answer(a, b)
 

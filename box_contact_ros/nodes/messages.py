@@ -10,6 +10,7 @@ from geometry_msgs.msg import PointStamped, PoseStamped, Vector3Stamped
 from sensor_msgs.msg import PointCloud2, PointField
 from std_msgs.msg import Header
 
+from ..checks import shown
 from ..contact import Contact
 
 NANOSECONDS = 1_000_000_000
@@ -31,6 +32,15 @@ class StampedPose:
     numbers: np.ndarray
     frame_id: str
     stamp: int
+
+
+def header_fault(header: Header) -> str | None:
+    """Why an answer cannot carry this stamp and frame as they came, or None."""
+    if header.stamp.nanosec >= NANOSECONDS:
+        return f'stamp has {header.stamp.nanosec} nanoseconds, a second or more'
+    if '\N{REPLACEMENT CHARACTER}' in header.frame_id:  # rclpy's word for bytes it cannot decode
+        return f'frame_id {shown(header.frame_id)} is not UTF-8'
+    return None
 
 
 def read_pose(message: PoseStamped) -> StampedPose:

@@ -14,6 +14,8 @@ from typing import Any
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 
+from ..checks import shown
+
 Check = Callable[[str, Any], Any]
 """From a parameter's name and value to the value as the node uses it; ValueError if it is wrong."""
 
@@ -27,11 +29,15 @@ class Setting:
     check: Check
 
 
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
 def number(low: float, high: float) -> Check:
     """A number within [low, high]; integers are as good as floats."""
     def check(name: str, value: Any) -> float:
-        if isinstance(value, bool) or not isinstance(value, (int, float)):
-            raise ValueError(f'{name} must be a number, not {value!r}')
+        if not _is_number(value):
+            raise ValueError(f'{name} must be a number, not {shown(value)}')
         if not low <= value <= high:
             raise ValueError(f'{name} must lie within {low:g} and {high:g}, not {value:g}')
         return float(value)
@@ -41,20 +47,18 @@ def number(low: float, high: float) -> Check:
 def numbers(count: int) -> Check:
     """So many finite numbers."""
     def check(name: str, value: Any) -> tuple[float, ...]:
-        try:
-            found = tuple(float(entry) for entry in value)
-        except (TypeError, ValueError):
-            found = ()
-        if len(found) != count or not all(map(math.isfinite, found)) or isinstance(value, str):
-            raise ValueError(f'{name} must be {count} finite numbers, not {value!r}')
-        return found
+        found = value if isinstance(value, Sequence) else ()
+        if len(found) != count or not all(map(_is_number, found)) or not all(
+                map(math.isfinite, found)):
+            raise ValueError(f'{name} must be {count} finite numbers, not {shown(value)}')
+        return tuple(map(float, found))
     return check
 
 
 def text(name: str, value: Any) -> str:
     """Any string."""
     if not isinstance(value, str):
-        raise ValueError(f'{name} must be a string, not {value!r}')
+        raise ValueError(f'{name} must be a string, not {shown(value)}')
     return value
 
 
@@ -62,7 +66,7 @@ def one_of(choices: Iterable[str]) -> Check:
     """One of some strings."""
     def check(name: str, value: Any) -> str:
         if text(name, value) not in choices:
-            raise ValueError(f'{name} {value!r} is not one of: {", ".join(choices)}')
+            raise ValueError(f'{name} {shown(value)} is not one of: {", ".join(choices)}')
         return value
     return check
 
@@ -70,7 +74,7 @@ def one_of(choices: Iterable[str]) -> Check:
 def flag(name: str, value: Any) -> bool:
     """true or false."""
     if not isinstance(value, bool):
-        raise ValueError(f'{name} must be true or false, not {value!r}')
+        raise ValueError(f'{name} must be true or false, not {shown(value)}')
     return value
 
 

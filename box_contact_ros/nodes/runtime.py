@@ -26,6 +26,8 @@ CONTACT_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 """Contact outputs."""
 SPIN_SECONDS = 1.0
 """EventsExecutor hangs when it spins without a timeout, so it is spun in slices."""
+LOG_SECONDS = 1.0
+"""The same complaint is logged at most this often."""
 
 
 def make_executor(context: Context) -> Any:
@@ -39,12 +41,23 @@ def make_executor(context: Context) -> Any:
 
 
 def spin(node: Node) -> None:
-    """Serve a node until its context is shut down (SIGINT, SIGTERM, or `context.shutdown()`)."""
+    """Serve a node until its context is shut down (SIGINT, SIGTERM, or `context.shutdown()`).
+
+    An exception out of a callback is said, and ends nothing.
+    """
     executor = make_executor(node.context)
     try:
         executor.add_node(node)
         while node.context.ok():
-            executor.spin_once(timeout_sec=SPIN_SECONDS)
+            try:
+                executor.spin_once(timeout_sec=SPIN_SECONDS)
+            except ExternalShutdownException:
+                raise
+            except Exception as error:
+                # rclpy's own services are callbacks too, and raise on requests that they cannot
+                # read, such as a parameter of an unknown type.
+                node.get_logger().error(f'a request failed: {type(error).__name__}: {error}',
+                                        throttle_duration_sec=LOG_SECONDS)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     finally:

@@ -1,0 +1,433 @@
+"""Bad input at the doors without ROS: the Python API, weights and scene files.
+
+The policy is the table "Bad input" in docs/conventions.md; test_hygiene_ros.py has the node's.
+"""
+from __future__ import annotations
+
+import math
+import os
+import warnings
+from decimal import Decimal
+from fractions import Fraction
+
+import numpy as np
+import poses
+import pytest
+import yaml
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from box_contact_ros import ContactSolver
+from box_contact_ros.checks import pose_fault, size_fault
+from box_contact_ros.exact import solve_exact
+from box_contact_ros.pose import LENGTH_MAX, LENGTH_MIN, QUATERNION_MAX, QUATERNION_MIN
+from box_contact_ros.training.scene import SceneError, size_pairs
+
+MODELS = ('exact', 'committee')
+SOLVERS = {model: ContactSolver(poses.CUBE, poses.CUBE, model=model) for model in MODELS}
+ABOVE = np.array([0.5, 0.25, 1.875, 0, 0, 0, 1])
+TURN = np.array([0.1, -0.2, 0.3, 0.9]) / np.linalg.norm([0.1, -0.2, 0.3, 0.9])
+TILTED = np.r_[0.3, 0.2, 2.0, TURN]
+
+few = settings(max_examples=200, derandomize=True, deadline=None)
+every_model = pytest.mark.parametrize('model', MODELS)
+
+
+def both_ways(model, pose_a, pose_b, size_a=poses.CUBE, size_b=poses.CUBE):
+    """The contact of a pair, seen to be the same to the bit from a single call and from a batch."""
+    one = ContactSolver(size_a, size_b, model=model)(pose_a, pose_b)
+    many = SOLVERS[model].batch([pose_a] * 2, [pose_b] * 2, size_a=[size_a] * 2, size_b=size_b)
+    for row in range(2):
+        assert one.colliding == many.colliding[row]
+        assert one.separation == many.separation[row]
+        assert np.array_equal(one.normal, many.normal[row], equal_nan=True)
+        assert np.array_equal(one.point, many.point[row], equal_nan=True)
+    return one
+
+
+def assert_sound(contact):
+    """What every answer is, whatever was asked."""
+    assert type(contact.colliding) is bool and type(contact.separation) is float
+    assert math.isfinite(contact.separation)
+    if contact.colliding:
+        assert abs(np.linalg.norm(contact.normal) - 1.0) < 1e-12
+        assert np.isfinite(contact.point).all()
+    else:
+        assert contact.separation > 0.0
+        assert np.isnan(contact.normal).all() and np.isnan(contact.point).all()
+
+
+# --- quaternions ----------------------------------------------------------------------------------
+
+
+@every_model
+@pytest.mark.parametrize('norm', [1e-8, 0.5, 0.999, 1.001, 2.0, 1e8, 1e-99, 1e99] + [
+    1.0 + sign * 10.0**-k for k in range(3, 16) for sign in (1, -1)])
+def test_a_quaternion_is_normalised(model, norm):
+    """Norms off by drift (1e-15 to 1e-3) or by far: verdict, separation and normal of the unit one
+    to rounding; so is the point of `exact`."""
+    wanted = both_ways(model, poses.IDENTITY, TILTED)
+    scaled = np.r_[TILTED[:3], norm * TURN]
+    found = both_ways(model, poses.IDENTITY * norm, scaled)  # A's position is 0
+    assert found.colliding is wanted.colliding is True
+    assert found.separation == pytest.approx(wanted.separation, abs=4e-15)
+    assert found.normal == pytest.approx(wanted.normal, abs=4e-15)
+    # The network of `committee` runs in float32.
+    assert found.point == pytest.approx(wanted.point, abs=1e-13 if model == 'exact' else 1e-5)
+
+
+@every_model
+@few
+@given(st.lists(st.floats(-2, 2), min_size=14, max_size=14), st.booleans(), st.booleans())
+def test_minus_q_is_q(model, numbers, minus_a, minus_b):
+    """q and −q are one rotation: every bit of the answer is the same."""
+    a, b = np.array(numbers[:7]), np.array(numbers[7:])
+    if pose_fault(a) or pose_fault(b):
+        return
+    flipped = [np.r_[pose[:3], -pose[3:] if minus else pose[3:]]
+               for pose, minus in ((a, minus_a), (b, minus_b))]
+    one, two = SOLVERS[model](a, b), SOLVERS[model](*flipped)
+    for mine, theirs in zip(one, two):
+        assert np.array_equal(mine, theirs, equal_nan=True)
+
+
+@pytest.mark.parametrize('norm', [QUATERNION_MIN, QUATERNION_MAX])
+def test_the_limits_of_a_quaternion_are_one(norm):
+    """Checks and kernels draw the line at the same bit. They did not, and a quaternion within a
+    few ulp of it was refused as 'pose_b None', or as a bad size."""
+    rng = np.random.default_rng(5)
+    verdicts = set()
+    for _ in range(300):
+        turn = rng.normal(size=4)
+        turn *= norm / np.linalg.norm(turn) * (1.0 + rng.integers(-3, 4) * 2.0**-52)
+        pose = np.r_[ABOVE[:3], turn]
+        fault = pose_fault(pose)
+        verdicts.add(fault is None)
+        for ask, name in ((lambda p: SOLVERS['exact'](poses.IDENTITY, p), 'pose_b'),
+                          (lambda p: SOLVERS['exact'].batch([poses.IDENTITY], [p]), 'poses_b[0]')):
+            if fault is None:
+                ask(pose)
+            else:
+                with pytest.raises(ValueError) as refusal:
+                    ask(pose)
+                assert str(refusal.value) == f'{name} {fault}'
+    assert verdicts == {True, False}
+
+
+# --- values ---------------------------------------------------------------------------------------
+
+BAD_NUMBERS = [math.nan, math.inf, -math.inf]
+BAD_EXTENTS = [*BAD_NUMBERS, 0.0, -0.0, -2.0, 5e-324, 1e-310, 1e-51, 1e51, 1e200, 1e308]
+
+
+@every_model
+@pytest.mark.parametrize('value', [*BAD_NUMBERS, 1e308, -1e308])
+@pytest.mark.parametrize('place', range(7))
+def test_a_bad_number_in_a_pose(model, place, value):
+    """NaN, infinity and what would overflow, in every place of a pose: the field and the value."""
+    bad = TILTED.copy()
+    bad[place] = value
+    words = f'{value:g}'.replace('+', r'\+')
+    for kind in (np.array, list):
+        with pytest.raises(ValueError, match=f'^pose_a (position|quaternion) .*{words}'):
+            SOLVERS[model](kind(bad), kind(ABOVE))
+        with pytest.raises(ValueError, match=f'^pose_b (position|quaternion) .*{words}'):
+            SOLVERS[model](kind(ABOVE), kind(bad))
+    rows = np.tile(ABOVE, (11, 1))
+    rows[9] = bad
+    with pytest.raises(ValueError, match=rf'^poses_b\[9\] (position|quaternion) .*{words}'):
+        SOLVERS[model].batch(np.tile(ABOVE, (11, 1)), rows)
+
+
+@every_model
+@pytest.mark.parametrize('axes', [(0,), (1,), (2,), (0, 1), (1, 2), (0, 1, 2)])
+@pytest.mark.parametrize('value', BAD_EXTENTS)
+def test_a_bad_extent(model, axes, value):
+    """No plates, rods or points, nothing negative, not finite, or beyond the limits, on any axis,
+    in the solver or in a row of a batch. (A NaN on y or z got through a batch, into the answer.)"""
+    bad = np.array(poses.CUBE)
+    bad[list(axes)] = value
+    words = f'{value:g}'.replace('+', r'\+')
+    for name, sizes in (('size_a', (bad, poses.CUBE)), ('size_b', (poses.CUBE, bad))):
+        with pytest.raises(ValueError, match=rf'^{name} \(.*{words}.*\) is '):
+            ContactSolver(*sizes, model=model)
+        rows = np.tile(poses.CUBE, (11, 1))
+        rows[9] = bad
+        good = np.tile(ABOVE, (11, 1))
+        with pytest.raises(ValueError, match=rf'^{name}\[9\] \(.*{words}.*\) is '):
+            SOLVERS[model].batch(good, good, **{name: rows})
+        with pytest.raises(ValueError, match=rf'^{name} \(.*{words}.*\) is '):
+            SOLVERS[model].batch(good, good, **{name: bad})
+
+
+# Every kind of float, and those that get past the checks often enough.
+any_float = st.one_of(st.floats(), st.floats(-3, 3),
+                      st.sampled_from([0.0, -0.0, 1.0, 5e-324, 1e-310, 1e-160, 1e160, -1e308]))
+any_extent = st.one_of(st.floats(), st.floats(0.5, 4), st.floats(LENGTH_MIN, LENGTH_MAX))
+
+
+def numbers(kind, count):
+    return st.lists(kind, min_size=count, max_size=count)
+
+
+@every_model
+@settings(few, max_examples=400)
+@given(numbers(any_float, 7), numbers(any_float, 7), numbers(any_extent, 3),
+       numbers(any_extent, 3))
+@example([0, 0, 0, 0, 0, 0, 1], [0, 0, 1, 0, 0, 0, 1], [1, math.nan, 1], [1, 1, 1])
+def test_whatever_comes_in(model, pose_a, pose_b, size_a, size_b):
+    """Any twenty floats: refused where the checks say so, else a sound answer; and no warning,
+    which would be an error here."""
+    bad = any(map(pose_fault, (pose_a, pose_b))) or any(map(size_fault, (size_a, size_b)))
+    if not bad:
+        assert_sound(both_ways(model, pose_a, pose_b, size_a, size_b))
+        return
+    with pytest.raises(ValueError, match='^(pose_a|pose_b|size_a|size_b) .* (is|has|exceeds) '):
+        ContactSolver(size_a, size_b, model=model)(pose_a, pose_b)
+    with pytest.raises(ValueError, match=r'^(poses_a\[0\]|poses_b\[0\]|size_a|size_b) '):
+        SOLVERS[model].batch([pose_a], [pose_b], size_a=[size_a], size_b=[size_b])
+
+
+exponent = math.log10(LENGTH_MAX)
+any_good_extent = st.floats(-exponent, exponent).map(
+    lambda x: min(max(10.0**x, LENGTH_MIN), LENGTH_MAX))
+
+
+@every_model
+@few
+@given(numbers(any_good_extent, 3), numbers(any_good_extent, 3),
+       numbers(st.floats(-1, 1), 3), numbers(any_float, 8))
+def test_every_accepted_size_is_answered(model, size_a, size_b, offset, turns):
+    """A hundred orders of magnitude between two extents, boxes near each other: a sound answer."""
+    turns = [turn if not pose_fault([0, 0, 0, *turn]) else TURN for turn in (turns[:4], turns[4:])]
+    position = np.clip(np.multiply(offset, np.minimum(size_a, size_b)), -LENGTH_MAX, LENGTH_MAX)
+    assert_sound(both_ways(model, [0, 0, 0, *turns[0]], [*position, *turns[1]], size_a, size_b))
+
+
+# --- kinds ----------------------------------------------------------------------------------------
+
+
+def read_only(array):
+    array = array.copy()
+    array.flags.writeable = False
+    return array
+
+
+def off_by_a_byte(array):
+    memory = np.zeros(array.nbytes + 1, dtype=np.uint8)[1:]
+    memory[:] = np.frombuffer(array.tobytes(), dtype=np.uint8)
+    return memory.view(float)
+
+
+def field(array):
+    rows = np.zeros(len(array), dtype=[('byte', 'i1'), ('number', 'f8')])
+    rows['number'] = array
+    return rows['number']
+
+
+GOOD_KINDS = {
+    'list': list, 'tuple': tuple, 'read-only': read_only, 'field': field,
+    'unaligned': off_by_a_byte, 'broadcast': lambda v: np.broadcast_to(v, v.shape),
+    'reversed view': lambda v: v[::-1].copy()[::-1],
+    'column': lambda v: np.tile(v[:, None], 3)[:, 1],
+    'every other': lambda v: np.repeat(v, 2)[::2],
+    'float16': lambda v: v.astype(np.float16), 'float32': lambda v: v.astype(np.float32),
+    'longdouble': lambda v: v.astype(np.longdouble), 'big-endian': lambda v: v.astype('>f8'),
+    'objects': lambda v: v.astype(object), 'fractions': lambda v: [Fraction(x) for x in v],
+    'scalars': lambda v: [np.float32(x) for x in v], '0-d arrays': lambda v: list(map(np.array, v)),
+    'buffer': memoryview,
+}
+
+
+@every_model
+@pytest.mark.parametrize('kind', GOOD_KINDS.values(), ids=GOOD_KINDS)
+def test_numbers_of_any_kind(model, kind):
+    """Whatever holds real numbers is taken as float64, in single calls and batches alike, and no
+    kernel is compiled for it (which took seconds, in mid-stream, for read-only arrays)."""
+    SOLVERS['exact'].batch([ABOVE], [ABOVE])
+    compiled = len(solve_exact.signatures)
+    wanted = SOLVERS[model](poses.IDENTITY, ABOVE)
+    size = kind(np.array(poses.CUBE))
+    for solver in (SOLVERS[model], ContactSolver(size, size, model=model)):
+        found = solver(kind(poses.IDENTITY), kind(ABOVE))
+        many = solver.batch([kind(poses.IDENTITY)], [kind(ABOVE)], size_a=size, size_b=[size])
+        for mine, row, theirs in zip(found, many, wanted):
+            assert np.array_equal(mine, theirs) and np.array_equal(row[0], theirs)
+    assert len(solve_exact.signatures) == compiled
+
+
+@every_model
+def test_integers_are_numbers(model):
+    for kind in (int, np.int8, np.uint64):
+        pose = np.array([0, 0, 1, 0, 0, 0, 1]).astype(kind)
+        assert both_ways(model, poses.IDENTITY, pose).separation == -1.0
+        assert both_ways(model, poses.IDENTITY, list(pose)).separation == -1.0
+    assert not both_ways(model, poses.IDENTITY, [2**70, 0, 0, 0, 0, 0, 1]).colliding
+
+
+@every_model
+@pytest.mark.parametrize('strange', [
+    None, 'pose', '0000001', b'1234567', 1.0, True, [], {}, set(), {1: 2}, 1 + 2j, object(),
+    ['0'] * 6 + ['1'], [0.0] * 6 + [None], [0.0] * 6 + ['1'], [0.0] * 6 + [1j],
+    [0.0] * 6 + [Decimal(1)], [True] * 7, np.ones(7, bool), np.ones(7, complex),
+    np.ones(7, 'U1'), np.ones(7, 'm8[s]'), np.ones(7, 'M8[s]'), np.array([None] * 7),
+    np.zeros(7, [('x', float)]), [[1], [1, 2]], [10**400] + [1] * 6, [10**5000] + [1] * 6,
+    np.ones((7, 1)), np.ones((1, 1, 7)), np.ones(6), np.ones(8), np.array(1.0), np.array('pose'),
+    (x for x in ABOVE), iter([1.0] * 7), range(6)], ids=lambda value: type(value).__name__)
+def test_what_is_no_pose(model, strange):
+    """Other kinds and shapes: one line with the field, from single calls, batches and sizes.
+
+    NumPy alone would read '1' as 1, None as NaN and a date as a number, and drop imaginary parts.
+    """
+    solver = SOLVERS[model]
+    for ask, field in ((lambda: solver(strange, ABOVE), 'pose_a'),
+                       (lambda: solver(ABOVE, strange), 'pose_b'),
+                       (lambda: solver.batch([strange], [ABOVE]), 'poses_a'),
+                       (lambda: solver.batch(strange, [ABOVE]), 'poses_a'),
+                       (lambda: solver.batch([ABOVE], [strange]), 'poses_b'),
+                       (lambda: solver.batch([ABOVE], [ABOVE], size_b=[strange]), 'size_b'),
+                       (lambda: ContactSolver(strange, poses.CUBE, model=model), 'size_a')):
+        with pytest.raises(ValueError) as refusal:
+            ask()
+        text = str(refusal.value)
+        assert text.startswith(f'{field} must be ') and '\n' not in text and len(text) < 1000
+
+
+def test_a_long_double_beyond_float64():
+    """It becomes infinite and is refused as such, without NumPy's RuntimeWarning."""
+    if np.finfo(np.longdouble).max == np.finfo(float).max:
+        pytest.skip('long double is double here')
+    bad = np.r_[np.longdouble('1e4000'), ABOVE[1:].astype(np.longdouble)]
+    with pytest.raises(ValueError, match=r'^pose_b position \(inf, .*is not finite'):
+        SOLVERS['exact'](poses.IDENTITY, bad)
+
+
+def test_a_refusal_leaves_no_trace():
+    """Good, bad, good: the second good answer is the first."""
+    solver = ContactSolver(poses.CUBE, poses.CUBE)
+    wanted = solver(poses.IDENTITY, ABOVE)
+    for bad in (np.full(7, math.nan), np.zeros(7), None, []):
+        with pytest.raises(ValueError):
+            solver(bad, ABOVE)
+        with pytest.raises(ValueError):
+            solver.batch([ABOVE, ABOVE], [ABOVE, np.full(7, math.inf)])
+        for mine, theirs in zip(solver(poses.IDENTITY, ABOVE), wanted):
+            assert np.array_equal(mine, theirs)
+
+
+# --- names and files ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('name', ['', 'exakt', 'soup-0', 'soup-' + '9' * 5000, 'x' * 100_000])
+def test_a_model_that_is_none(name):
+    """One short line, whatever the name. int() had words of its own for thousands of digits."""
+    with pytest.raises(ValueError, match="^model '") as refusal:
+        ContactSolver(poses.CUBE, poses.CUBE, model=name)
+    assert len(str(refusal.value)) < 400
+
+
+def test_weights_that_are_no_file(tmp_path):
+    """A folder, a FIFO (which kept the reader waiting for a writer, for ever), a name too long."""
+    fifo = tmp_path / 'fifo'
+    os.mkfifo(fifo)
+    for path in (tmp_path, fifo, '/dev/null', 'x' * 5000, 'a\0b', tmp_path / 'nothing'):
+        with pytest.raises(ValueError, match='weights file .* (cannot be read|does not exist)'):
+            ContactSolver(poses.CUBE, poses.CUBE, weights=str(path))
+
+
+def scene_of(path, content):
+    """What `size_pairs` makes of a file: a SceneError that begins with its name, or sizes."""
+    path.write_bytes(content.encode('utf-8', 'surrogatepass') if isinstance(content, str)
+                     else content)
+    try:
+        found = size_pairs(path)
+    except SceneError as error:
+        assert str(error).startswith(f'{path}') and '\n' not in str(error)
+        assert len(str(error)) < 1000
+        return str(error).removeprefix(f'{path}').removeprefix(': ')
+    assert found
+    for pair in found:
+        for size in pair:
+            assert size_fault(size) is None and tuple(sorted(size, reverse=True)) == size
+    return found
+
+
+@pytest.mark.parametrize(('text', 'words'), [
+    ('', 'boxes: is missing'), ('7', 'boxes: is missing'), ('[]', 'boxes: is missing'),
+    ('boxes: {}\npairs: []', 'pairs: lists none'),
+    ('boxes: [1, 2]', 'boxes: must be a map of names to boxes, not [1, 2]'),
+    ('boxes: {a: 3}', 'boxes.a.size: is missing'),
+    ('boxes: {a: {size: 3}}', 'boxes.a.size: must be three full extents [m], not 3'),
+    ('boxes: {a: {size: [1, 2, "3"]}}', 'boxes.a.size: must be three full extents [m], not [1,'),
+    ('boxes: {a: {size: [1, 2, yes]}}', 'boxes.a.size: must be three full extents [m], not [1,'),
+    ('boxes: {a: {size: [1, 2, .nan]}}', 'boxes.a.size: (1, 2, nan) is not finite'),
+    ('boxes: {a: {size: [1, -.inf, 2]}}', 'boxes.a.size: (1, -inf, 2) is not finite'),
+    ('boxes: {a: {size: [1, 2, -0.0]}}', 'boxes.a.size: (1, 2, -0) is not positive'),
+    ('boxes: {a: {size: [1, 2, 5.0e-324]}}', 'boxes.a.size: (1, 2, 4.94066e-324) is outside'),
+    (f'boxes: {{a: {{size: [1, 2, 1{"0" * 400}]}}}}', 'boxes.a.size: must be three full extents'),
+    (f'boxes: {{a: {{size: [1, 2, 1{"0" * 5000}]}}}}', ' is no YAML: Exceeds the limit'),
+    ('boxes: {a: {size: [1, 1, 1]}}\npairs: [3]', 'pairs[0].a: is missing'),
+    ('boxes: {a: {size: [1, 1, 1]}}\npairs: [{a: a, b: [a]}]', 'pairs[0].b: must be the name'),
+    ('boxes: {a: {size: [1, 1, 1]}}\npairs: [{a: a, b: c}]', "pairs[0].b: there is no box 'c'"),
+    ('boxes: {a: {size: [1, 1, 1]}, a: {size: [2, 2, 2]}}', " is no YAML: 'a' is there twice"),
+    ('boxes: {}\nboxes: {}', " is no YAML: 'boxes' is there twice"),
+    ('boxes: {a: {size: [1, 1, 1], size: [2, 2, 2]}}', " is no YAML: 'size' is there twice"),
+    ('boxes: {? [1] : 2}', ' is no YAML'), ('a: 2026-02-30', ' is no YAML'),
+    ('a: !!timestamp x', ' is no YAML'), ('a: !!int x', ' is no YAML'),
+    ('a: !!python/object/apply:os.getcwd []', ' is no YAML'), ('[' * 5000, ' is no YAML'),
+    ('a: \x07', ' is no YAML'), ('a: \udc80', ' is no YAML'), (b'\xff\xfe\xff', ' is no YAML')])
+def test_a_bad_scene(tmp_path, text, words):
+    """File and field, whatever is wrong; PyYAML itself raises ten kinds of exceptions, and takes
+    the last of two boxes of one name."""
+    assert scene_of(tmp_path / 'scene.yaml', text).startswith(words)
+
+
+def test_a_maze_of_yaml(tmp_path):
+    """Lists of lists of lists, ten of each in the next, by reference: 10^12 numbers, if one were to
+    print them. The error is short, and takes no time."""
+    maze = '\n'.join(f'l{i + 1}: &l{i + 1} [{", ".join([f"*l{i}"] * 10)}]' for i in range(12))
+    assert scene_of(tmp_path / 'scene.yaml', f'l0: &l0 1.0\n{maze}\nboxes: *l12').startswith(
+        'boxes: must be a map of names to boxes, not [[')
+
+
+def test_a_scene_that_is_no_file(tmp_path):
+    for path in (tmp_path, tmp_path / 'nothing.yaml'):
+        with pytest.raises(SceneError, match='cannot be read'):
+            size_pairs(path)
+
+
+scalars = st.one_of(st.none(), st.booleans(), st.integers(), st.floats(), st.text(max_size=3),
+                    st.dates(), st.binary(max_size=3), st.sampled_from(['a', 'b', 'size', 10**400]))
+anything = st.recursive(scalars, lambda inner: st.one_of(
+    st.lists(inner, max_size=4), st.dictionaries(st.sampled_from(['a', 'b', 'size', 1]), inner)),
+    max_leaves=8)
+scenes = st.fixed_dictionaries({}, optional={
+    'boxes': st.one_of(anything, st.dictionaries(
+        st.one_of(st.sampled_from(['a', 'b']), scalars),
+        st.one_of(anything, st.fixed_dictionaries({'size': st.one_of(
+            anything, numbers(st.one_of(scalars, st.floats(0.5, 4)), 3),
+            numbers(st.floats(0.5, 4), 3))})), max_size=3)),
+    'pairs': st.one_of(anything, st.lists(st.one_of(anything, st.fixed_dictionaries(
+        {'a': st.one_of(st.just('a'), anything), 'b': st.one_of(st.just('b'), anything)})),
+        max_size=3))})
+
+
+@few
+@given(st.one_of(anything, scenes))
+def test_scenes_of_wrong_things(tmp_path_factory, scene):
+    """Anything that YAML can say, in the places of boxes, sizes and names: SceneError, or sizes."""
+    scene_of(tmp_path_factory.getbasetemp() / 'scene.yaml', yaml.safe_dump(scene))
+
+
+@few
+@given(st.one_of(st.text(), st.binary(),
+                 st.text(alphabet='{}[]:,-?&*!|>%@#\'" \n\tab01.', max_size=60)))
+def test_scenes_of_garbage(tmp_path_factory, content):
+    """Any text, any bytes, and what looks like YAML: SceneError."""
+    assert isinstance(scene_of(tmp_path_factory.getbasetemp() / 'scene.yaml', content), str)
+
+
+def test_warnings_would_fail_here():
+    """The tests above rely on it."""
+    with pytest.raises(RuntimeWarning):
+        warnings.warn('seen', RuntimeWarning, stacklevel=1)

@@ -1,0 +1,306 @@
+"""Bad input at the contact node's doors: raw bytes and poses on topics, requests to services.
+
+The policy is the table "Bad input" in docs/conventions.md. The node runs as a process of its own,
+as it does for users; what is sent is CDR, byte by byte, so that nothing on this side repairs it.
+"""
+from __future__ import annotations
+
+import math
+import struct
+import time
+
+import numpy as np
+import poses
+import pytest
+from geometry_msgs.msg import PoseStamped
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+from rcl_interfaces.srv import SetParameters, SetParametersAtomically
+from rclpy.qos import QoSProfile
+from ros_client import Client
+
+from box_contact_ros import ContactSolver
+from box_contact_ros.nodes.messages import read_cloud
+
+ORIGIN = poses.IDENTITY
+TOUCHING = np.array([0.5, 0.25, 1.875, 0, 0, 0, 1])  # 0.125 m deep
+APART = np.array([0.5, 0.25, 2.5, 0, 0, 0, 1])
+LITTLE_ENDIAN = b'\0\1\0\0'
+
+
+def cdr(pose, stamp, frame=b'map\0'):
+    """A serialised PoseStamped; `stamp` is (sec, nanosec), `frame` the string with its zero."""
+    head = struct.pack('<iII', *stamp, len(frame)) + frame
+    return LITTLE_ENDIAN + head + b'\0' * (-len(head) % 8) + struct.pack('<7d', *pose)
+
+
+class RawClient(Client):
+    """Sends bytes, and hears what arrives on the wire."""
+
+    def __init__(self):
+        super().__init__()
+        self.wire = []
+        for box in 'ab':
+            self.node.create_subscription(PoseStamped, f'box_{box}/pose', self.wire.append,
+                                          QoSProfile(depth=10_000), raw=True)
+
+    def send_raw(self, *payloads):
+        """Publish each payload on both topics."""
+        for payload in payloads:
+            for publisher in self.publishers:
+                publisher.publish(payload)
+
+    def heard(self, count):
+        """Wait for so many messages on the wire; whether they came, and no more."""
+        return self.spin(lambda: len(self.wire) >= count, 10.0) and len(self.wire) == count
+
+    def answered(self, stamp):
+        """Wait for the answer to a stamp [ns]; whether it came."""
+        return self.spin(lambda: stamp in self.clouds, 5.0)
+
+    def send_pair(self, pose_a, pose_b, frame=b'map\0'):
+        """Publish a pair as bytes; returns its stamp [ns]."""
+        stamp = self.next_stamp()
+        for publisher, pose in zip(self.publishers, (pose_a, pose_b)):
+            publisher.publish(cdr(pose, divmod(stamp, 10**9), frame))
+        return stamp
+
+    def assert_answered(self):
+        """The node lives, and answers a good pair, and rightly."""
+        row, = read_cloud(self.clouds[self.ask(ORIGIN, TOUCHING)])
+        assert row['depth'] == 0.125
+        assert (row['normal_x'], row['normal_y'], row['normal_z']) == (0, 0, 1)
+        assert (row['x'], row['y'], row['z']) == (0.25, 0.125, 0.9375)
+
+
+@pytest.fixture
+def client():
+    client = RawClient()
+    yield client
+    client.close()
+
+
+@pytest.fixture
+def node(program, client):
+    """A contact node for two cubes of edge 2, matched with the client."""
+    running = program('contact_node', '--ros-args', '-p', 'size_a:=[2.0, 2.0, 2.0]',
+                      '-p', 'size_b:=[2.0, 2.0, 2.0]', '-p', 'model:=exact')
+    running.wait_for_output('ready', 120)
+    client.offer_until_answered(ORIGIN, APART)
+    return running
+
+
+def test_cdr_is_what_rclpy_writes(client):
+    """The bytes below differ from a good message only in what is said of them."""
+    from rclpy.serialization import deserialize_message
+
+    message = deserialize_message(cdr(TOUCHING, (5, 7), b'yard\0'), PoseStamped)
+    assert (message.header.stamp.sec, message.header.stamp.nanosec) == (5, 7)
+    assert message.header.frame_id == 'yard'
+    assert message.pose.position.z == 1.875 and message.pose.orientation.w == 1.0
+
+
+GOOD = cdr(TOUCHING, (5, 7))
+
+
+def test_bytes_that_are_no_message(node, client):
+    """Cut short at every length, garbage, absurd lengths, other encapsulations: the middleware
+    drops what is no PoseStamped before the node hears of it; the next good pair is answered."""
+    rng = np.random.default_rng(1)
+    cut = [GOOD[:length] for length in range(len(GOOD))]
+    garbage = [rng.bytes(length) for length in (1, 3, 4, 5, 8, 12, 16, 40, 76, 77, 200, 5000)]
+    garbage += [LITTLE_ENDIAN + rng.bytes(length) for length in (8, 12, 16, 40, 72, 200, 5000)]
+    lengths = [GOOD[:12] + struct.pack('<I', n) + GOOD[16:] for n in (61, 2**16, 2**31, 2**32 - 1)]
+    headers = [bytes(head) + GOOD[4:] for head in ((0, 0, 0, 0), (0, 2, 0, 0), (1, 1, 0, 0),
+                                                   (255, 255, 255, 255))]
+    for payloads in (cut[:20], cut[20:50], cut[50:], garbage, lengths, headers):
+        before = len(client.wire)
+        client.send_raw(*payloads)
+        client.assert_answered()
+        # All of it has been on the wire, before the good pair.
+        assert client.heard(before + 2 * len(payloads) + 2)
+        assert sorted(map(len, client.wire[before:-2])) == sorted(2 * list(map(len, payloads)))
+    assert 'Traceback' not in node.output
+
+
+def test_messages_with_flipped_bytes(node, client):
+    """Good messages with 1 to 8 bytes changed: some are poses, some are none, some are refused.
+    Whatever is answered is sound."""
+    rng = np.random.default_rng(2)
+    for _ in range(10):
+        for _ in range(20):
+            payload = bytearray(cdr(TOUCHING, divmod(client.next_stamp(), 10**9)))
+            for place in rng.integers(4, len(payload), rng.integers(1, 9)):
+                payload[place] = rng.integers(256)
+            client.send_raw(bytes(payload))
+        client.assert_answered()
+    for cloud in client.clouds.values():
+        for row in read_cloud(cloud):
+            assert all(map(math.isfinite, row))
+            assert np.linalg.norm([row[f'normal_{axis}'] for axis in 'xyz']) == pytest.approx(1)
+    assert 'internal error' not in node.output and 'Traceback' not in node.output
+
+
+def test_frames(node, client):
+    """Any UTF-8 up to the first NUL is a frame, of any length that arrives; bytes that are no
+    UTF-8, which rclpy replaces, so that two of them look alike, are refused and counted."""
+    for raw, frame in ((b'\0', ''), (b'', ''), (b'yard\0', 'yard'), (b'yard', 'yard'),
+                       ('Köln 港\0'.encode(), 'Köln 港'), (b'yard\0east\0', 'yard'),
+                       (b'y' * 50_000 + b'\0', 'y' * 50_000)):
+        stamp = client.send_pair(ORIGIN, TOUCHING, raw)
+        assert client.answered(stamp), raw
+        assert client.clouds[stamp].header.frame_id == frame
+        assert client.points[stamp].header.frame_id == frame
+    client.send_pair(ORIGIN, TOUCHING, b'y' * 1_000_000 + b'\0')  # may be lost: best effort
+    client.assert_answered()
+    refused = [client.send_pair(ORIGIN, TOUCHING, raw) for raw in (
+        b'\xff\xfe\0', b'map\xc3\0', b'\xed\xa0\x80\0', b'\xf8\x88\x80\x80\x80\0')]
+    client.assert_answered()
+    assert not any(stamp in client.clouds for stamp in refused)
+    assert client.diagnostic('refused: bad header') == '8'
+    assert 'is not UTF-8; refused' in node.output
+
+
+def test_stamps(node, client):
+    """Any second of int32 is a stamp; a nanosecond part of a second or more is refused: the sum may
+    not fit, and was published as another stamp, 136 years off."""
+    for sec, nanosec in ((0, 1), (-1, 5), (-2**31, 0), (2**31 - 1, 10**9 - 1)):
+        client.send_raw(cdr(ORIGIN, (sec, nanosec)))
+        stamp = sec * 10**9 + nanosec
+        assert client.answered(stamp)
+    before = set(client.clouds)
+    for sec, nanosec in ((0, 10**9), (0, 2**32 - 1), (2**31 - 1, 10**9), (-2**31, 2**32 - 1)):
+        client.send_raw(cdr(ORIGIN, (sec, nanosec)))
+    client.assert_answered()
+    assert len(set(client.clouds) - before) == 1
+    assert client.diagnostic('refused: bad header') == '8'
+
+
+def test_good_poses_among_bad_ones(node, client):
+    """Shuffled: the good are answered as the solver does, the bad are counted and never answered.
+
+    All zero bytes are what a sender of another language may publish by default."""
+    good = [TOUCHING, APART, [0, 0, 1.5, 5e-324, 0, 0, 1], [1e-310, 0, 1.5, 0, 0, 0, -1e-8],
+            [0, 0, 2, 0, 0, 1e8, 1e8], [1e50, -1e50, 0, 0, 0, 0, 1], [-0.0, -0.0, 1, -0.0, 0, 0, 1]]
+    bad = [[0] * 7, [math.nan] * 7, [0, 0, 0, 5e-324, 0, 0, 1e-310], [0, 0, 0, 0, 0, 0, 1e308],
+           [0, math.nan, 0, 0, 0, 0, 1], [0, 0, -math.inf, 0, 0, 0, 1],
+           [0, 0, 0, 0, 0, math.inf, 1], [1e308, 0, 0, 0, 0, 0, 1],
+           [0, -1e308, 0, 0, 0, 0, 1], [0, 0, 2e50, 0, 0, 0, 1]]
+    queue = [(pose, swap, is_good) for group, is_good in ((good, True), (bad, False))
+             for pose in group for swap in (False, True)]
+    sent = []
+    for index in np.random.default_rng(3).permutation(len(queue)):
+        pose, swap, is_good = queue[index]
+        pair = (pose, ORIGIN) if swap else (ORIGIN, pose)
+        sent.append((client.send_pair(*pair), pair, is_good))
+    client.assert_answered()
+    solver = ContactSolver(poses.CUBE, poses.CUBE, model='exact')
+    for stamp, pair, is_good in sent:
+        assert (stamp in client.clouds) is is_good
+        if is_good:
+            wanted = solver(*pair)
+            rows = read_cloud(client.clouds[stamp])
+            assert len(rows) == wanted.colliding == (stamp in client.points)
+            for row in rows:
+                assert tuple(row) == (*wanted.point, *wanted.normal, -wanted.separation, 0)
+    assert client.diagnostic('refused: bad pose') == str(2 * len(bad))
+    assert 'internal error' not in node.output
+
+
+# --- parameters -----------------------------------------------------------------------------------
+
+
+def call(client, kind, name, parameters, timeout=10.0):
+    """The reply of a parameter service of the node, or None."""
+    service = client.node.create_client(kind, f'/contact_node/{name}')
+    assert client.spin(service.service_is_ready, 15.0)
+    future = service.call_async(kind.Request(parameters=[
+        Parameter(name=key, value=value) for key, value in parameters]))
+    client.spin(future.done, timeout)
+    reply = future.result() if future.done() else None
+    client.node.destroy_client(service)
+    return reply
+
+
+def value(kind, **field):
+    return ParameterValue(type=getattr(ParameterType, f'PARAMETER_{kind}'), **field)
+
+
+def doubles(*numbers):
+    return value('DOUBLE_ARRAY', double_array_value=list(map(float, numbers)))
+
+
+def string(text):
+    return value('STRING', string_value=text)
+
+
+NO_SIZES = [
+    (doubles(2, 2, math.nan), 'must be 3 finite numbers'),
+    (doubles(2, math.inf, 2), 'must be 3 finite numbers'),
+    (doubles(2, -2, 2), '(2, -2, 2) is not positive'), (doubles(2, 0, 2), 'is not positive'),
+    (doubles(-0.0, 2, 2), 'is not positive'), (doubles(2, 5e-324, 2), 'is outside'),
+    (doubles(2, 2, 1e200), 'is outside'), (doubles(2, 2), 'must be 3 finite numbers'),
+    (doubles(), 'must be 3 finite numbers'), (doubles(*range(1, 5)), 'must be 3 finite numbers'),
+    (value('DOUBLE', double_value=2.0), 'must be 3 finite numbers'),
+    (value('NOT_SET'), 'must be 3 finite numbers, not None'),
+    (string('[2, 2, 2]'), 'must be 3 finite numbers'),
+    # float('2'), float(True) and float(b'2') are numbers to Python.
+    (value('STRING_ARRAY', string_array_value=['2', '2', '2']), 'must be 3 finite numbers'),
+    (value('BOOL_ARRAY', bool_array_value=[True] * 3), 'must be 3 finite numbers'),
+    (value('BYTE_ARRAY', byte_array_value=[b'2'] * 3), 'must be 3 finite numbers'),
+    (value('INTEGER_ARRAY', integer_array_value=[2, 2, -2**63]), 'is not positive')]
+NO_NAMES = [
+    ('model', string(''), "model '' is not one of"), ('model', string('soup-0'), 'model '),
+    ('model', string('soup-' + '9' * 5000), "model 'soup-999"),
+    ('model', string('x' * 100_000), "model 'xxx"), ('model', value('NOT_SET'), 'not None'),
+    ('model', doubles(1), 'model must be a string'), ('pairing', string('first'), "'first' is not"),
+    ('pairing', value('BOOL', bool_value=True), 'pairing must be a string, not True'),
+    ('weights', value('INTEGER', integer_value=1), 'weights must be a string, not 1')]
+
+
+def test_parameters_while_it_runs(node, client):
+    """Each bad value is refused with the field and the reason, and the old one goes on."""
+    cases = [(name, bad, f'{name} {words}' if words.startswith('must') else words)
+             for name in ('size_a', 'size_b') for bad, words in NO_SIZES] + NO_NAMES
+    for name, bad, words in cases:
+        reply = call(client, SetParameters, 'set_parameters', [(name, bad)])
+        result, = reply.results
+        assert not result.successful and words in result.reason and len(result.reason) < 1000
+        client.assert_answered()
+    # Of several at once, atomically, none is taken over if one is bad.
+    reply = call(client, SetParametersAtomically, 'set_parameters_atomically',
+                 [('size_a', doubles(4, 4, 4)), ('size_b', doubles(4, 4, -4))])
+    assert not reply.result.successful and 'size_b (4, 4, -4)' in reply.result.reason
+    client.assert_answered()
+
+
+def test_weights_while_it_runs(node, client, tmp_path):
+    """A model that reads weights, and files that are none."""
+    garbage = tmp_path / 'garbage.safetensors'
+    garbage.write_bytes(np.random.default_rng(4).bytes(1000))
+    for path in (tmp_path, tmp_path / 'nothing', garbage, 'x' * 5000):
+        reply = call(client, SetParametersAtomically, 'set_parameters_atomically', [
+            ('model', string('committee')), ('weights', string(str(path)))])
+        assert not reply.result.successful and reply.result.reason.startswith('weights file ')
+        client.assert_answered()
+
+
+def test_a_request_that_rclpy_cannot_read(node, client):
+    """A parameter of a type that there is none of: rclpy's own service raises ValueError, out of
+    the executor. Without the guard in `runtime.spin` the node ended there, with status 1; now it
+    says so, gives no reply, and goes on."""
+    for kind, name in ((SetParameters, 'set_parameters'),
+                       (SetParametersAtomically, 'set_parameters_atomically')):
+        reply = call(client, kind, name, [('size_a', ParameterValue(type=77))], timeout=1.0)
+        assert reply is None
+        client.assert_answered()
+    assert 'a request failed: ValueError: 77 is not a valid Parameter.Type' in node.output
+    reply = call(client, SetParameters, 'set_parameters', [('size_a', doubles(2, 2, 3))])
+    assert reply.results[0].successful
+
+
+def test_it_ends_after_all_that(node, client):
+    """The guard does not keep a signal from ending the node, at once and with status 0."""
+    call(client, SetParameters, 'set_parameters', [('model', ParameterValue(type=77))], timeout=0.5)
+    started = time.monotonic()
+    node.end()
+    assert node.process.returncode == 0 and time.monotonic() - started < 5.0
