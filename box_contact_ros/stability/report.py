@@ -90,7 +90,8 @@ def examine(model: str, family: str, cases: Cases) -> Row:
     row.verdicts = int(((found.colliding != (gap <= 0.0)) & (np.abs(gap) > unsure(pairs))).sum())
     touching = found.colliding & (gap <= unsure(pairs))
     # What the judge settles by its own gap is settled here by the stored one.
-    row.normals = int((touching & (~(verdict.along >= gap - allowed)
+    # A contact with NaN counts as that alone.
+    row.normals = int((touching & ((verdict.along < gap - allowed)
                                    | (verdict.faults & NOT_UNIT > 0))).sum())
     row.outside = int((verdict.faults[touching] & OUTSIDE > 0).sum())
     row.not_finite = int((verdict.faults[touching] & NOT_FINITE > 0).sum())

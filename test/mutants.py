@@ -1,0 +1,128 @@
+"""Do the laws bite? Each mutant is one line of the package made wrong; a test has to fail for it.
+
+    python test/mutants.py [NAME ...]
+
+Every mutant is a copy of the checkout with kernels of its own, which are compiled anew: about a
+minute each, so this is no part of the suite. Prints which test killed which mutant; the exit status
+is 1 if one survived.
+"""
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import NamedTuple
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+class Mutant(NamedTuple):
+    """What is replaced in which file, and the tests that should notice."""
+
+    file: str
+    old: str
+    new: str
+    tests: str
+
+
+FAMILIES = 'test/test_families.py'
+MUTANTS = {
+    'normal flipped': Mutant(
+        'sat.py', 's = 1.0 if along >= 0.0 else -1.0', 's = -1.0 if along >= 0.0 else 1.0',
+        f'{FAMILIES} -k gates'),
+    'axis dropped': Mutant(
+        'sat.py', 'max(g6, max(g7, g8))', 'max(g6, g7)', f'{FAMILIES} -k gates'),
+    'cross product not normalised': Mutant(
+        'sat.py', '- width) / math.sqrt(length2)', '- width)', f'{FAMILIES} -k gates'),
+    'constant added to |R|': Mutant(
+        'sat.py', 'width = ((h1 * abs(u2) + h2 * abs(u1))',
+        'width = ((h1 * (abs(u2) + 1e-6) + h2 * (abs(u1) + 1e-6))', f'{FAMILIES} -k gates'),
+    'float32 too early': Mutant(
+        'pose.py', 'tx, ty, tz = bx - ax, by - ay, bz - az',
+        'tx, ty, tz = bx - ax, by - ay, np.float64(np.float32(bz - az))', f'{FAMILIES} -k gates'),
+    'poses subtracted in float32': Mutant(
+        'pose.py', 'tx, ty, tz = bx - ax, by - ay, bz - az',
+        'tx, ty, tz = bx - ax, by - ay, np.float64(np.float32(bz) - np.float32(az))',
+        f'{FAMILIES} -k f_far'),
+    'frame of A for all edge axes': Mutant(
+        'sat.py', 'first = work[A_FIRST + i] > 0.5\n        t0', 'first = True\n        t0',
+        f'{FAMILIES} -k swap'),
+    'grazing edges left as they are': Mutant(
+        'sat.py', '        if grazing(work, i):\n', '        if False:\n',
+        f'{FAMILIES} -k edges_along_each_other'),
+    'corners pressed along one axis': Mutant(
+        'exact.py', 'press_on(work, i)\n', 'pass\n', f'{FAMILIES} -k exact_touch'),
+    'one face for every centroid': Mutant(
+        'overlap.py', 'if kept < CANCELLED:', 'if False:', f'{FAMILIES} -k thin_plates'),
+    'absolute tolerance': Mutant(
+        'overlap.py', 'move = DEPTH_FLOOR * work[SIZE + i] + work[SEPARATION + i]',
+        'move = DEPTH_FLOOR + work[SEPARATION + i]', f'{FAMILIES} -k scale'),
+    'a shared face counted': Mutant(
+        'overlap.py', 'above = above and work[corner + 2] >= 0.0', 'above = False',
+        f'{FAMILIES} -k exact_point'),
+    'quaternion taken for a unit one': Mutant(
+        'pose.py', 's = 2.0 /', 's = 2.0 + 0.0 *', 'test/test_fuzz.py -k gates_are'),
+    'point left outside': Mutant(
+        'committee.py', 'return max(0.0, room) / step if step > max(0.0, room) else 1.0',
+        'return 1.0', 'test/test_committee.py -k "untrained or inside"'),
+    'smaller bounding box, always': Mutant(
+        'outline.py', '_ALIKE = 0.2', '_ALIKE = 1e-6',
+        'test/test_outline.py -k "keep_their_frame"'),
+    'order of axes left to rounding': Mutant(
+        'committee.py', 'TIE = 1e-6', 'TIE = 0.0', 'test/test_committee.py -k rigid_motion'),
+}
+
+
+def copied(folder: Path) -> Path:
+    """The checkout without what is generated."""
+    copy = folder / 'checkout'
+    shutil.copytree(ROOT, copy, ignore=shutil.ignore_patterns(
+        '.*', '__pycache__', 'build', 'install', 'log', '*.egg-info'))
+    return copy
+
+
+def run(checkout: Path, tests: str) -> tuple[bool, str]:
+    """Whether tests pass, and the first that fails."""
+    env = os.environ | {'PYTHONPATH': str(checkout),
+                        'NUMBA_CACHE_DIR': str(checkout.parent / 'kernels')}
+    words = [sys.executable, '-m', 'pytest', '-x', '-q', '-p', 'no:cacheprovider',
+             *re.findall(r'"[^"]*"|\S+', tests)]
+    done = subprocess.run([word.strip('"') for word in words], cwd=checkout, env=env, text=True,
+                          stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    failed = re.search(r'^(?:FAILED|ERROR) (\S+)', done.stdout, re.MULTILINE)
+    if done.returncode not in (0, 1) and not failed:
+        raise RuntimeError(done.stdout)
+    return done.returncode == 0, failed.group(1) if failed else ''
+
+
+def main() -> int:
+    """Try the mutants named, or all."""
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('names', nargs='*', metavar='NAME', help=', '.join(MUTANTS))
+    names = parser.parse_args().names or list(MUTANTS)
+    survivors = []
+    for name in names:
+        mutant = MUTANTS[name]
+        with tempfile.TemporaryDirectory() as folder:
+            checkout = copied(Path(folder))
+            file = checkout / 'box_contact_ros' / mutant.file
+            text = file.read_text()
+            if mutant.old not in text:
+                raise SystemExit(f'{name}: {mutant.file} has no {mutant.old!r}')
+            file.write_text(text.replace(mutant.old, mutant.new))
+            passed, killer = run(checkout, mutant.tests)
+        print(f'{name:<32} {"SURVIVED" if passed else "killed by " + killer}', flush=True)
+        if passed:
+            survivors.append(name)
+    print(f'{len(names) - len(survivors)} of {len(names)} killed')
+    return 1 if survivors else 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())
