@@ -51,7 +51,7 @@ A_FIRST = _rows(1)     # 1.0 where A comes first in the order used for edge axes
 # sat.query_block.
 SEPARATION = _rows(1)  # signed separation [m]
 AXIS = _rows(1)        # winning axis: 0–2 faces of A, 3–5 faces of B, 6 + 3 i + j for a_i × b_j
-NEAR = _rows(1)        # squared sine of the widest angle between edges that are almost parallel
+GRAZING = _rows(1)     # 1.0 where rounding of an edge axis may matter: see `grazing`
 FACE = _rows(1)        # best face axis, 0–5, whatever wins
 NORMAL = _rows(3)      # winning axis, unit, from A to B, in A's frame
 
@@ -118,6 +118,8 @@ SLANT = _rows(3)       # 1, or less where no face that cuts in is slanted along 
 FEATURES = _rows(18)   # the network's inputs
 IN_RANGE = _rows(1)    # 1.0 where the network may be asked
 POINT = _rows(3)       # contact point in A's frame [m]
+WORLD_NORMAL = _rows(3)  # both in the common frame
+WORLD_POINT = _rows(3)
 
 # Signs, written once by `new_work`: of lane i, where lanes are pairs and where they are edges.
 MINUS = _rows(1)

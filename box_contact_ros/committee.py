@@ -67,10 +67,10 @@ from .contact import (
     REFUSED,
     TOUCHING,
     Contacts,
-    sat_normal,
+    to_common_frame,
     write_apart,
-    write_contact,
     write_faults,
+    write_found,
     write_nothing,
     write_one,
 )
@@ -421,14 +421,17 @@ def solve_committee(poses_a, poses_b, sizes_a, sizes_b, work, numbers, status, c
             forward_block(numbers)
             place_block(LANES, work, values)
             range_block(LANES, work)
-        for i in range(count):
-            if work[SEPARATION + i] <= work[TOUCH + i]:
-                p = (work[POINT + i], work[POINT + LANES + i], work[POINT + 2 * LANES + i])
-                if work[IN_RANGE + i] == 0.0:
+            for i in range(count):
+                if work[IN_RANGE + i] == 0.0 and work[SEPARATION + i] <= work[TOUCH + i]:
                     exact += 1
                     p = _exact_point(work, i)
-                write_contact(work, i, start + i, sat_normal(work, i), p, colliding, separation,
-                              normal, point)
+                    work[POINT + i] = p[0]
+                    work[POINT + LANES + i] = p[1]
+                    work[POINT + 2 * LANES + i] = p[2]
+            to_common_frame(work)
+        for i in range(count):
+            if work[SEPARATION + i] <= work[TOUCH + i]:
+                write_found(work, i, start + i, colliding, separation, normal, point)
             else:
                 write_apart(work, i, start + i, colliding, separation, normal, point)
     return bad, exact

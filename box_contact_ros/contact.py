@@ -12,7 +12,10 @@ from .block import (
     LANES,
     NORMAL,
     ORIGIN_A,
+    POINT,
     SEPARATION,
+    WORLD_NORMAL,
+    WORLD_POINT,
 )
 from .jit import kernel
 
@@ -57,6 +60,34 @@ def write_contact(work, i, row, n, p, colliding, separation, normal, point):
         a2 = work[AXES_A + (3 * k + 2) * LANES + i]
         normal[row, k] = a0 * n[0] + a1 * n[1] + a2 * n[2]
         point[row, k] = work[ORIGIN_A + k * LANES + i] + (a0 * p[0] + a1 * p[1] + a2 * p[2])
+
+
+@kernel
+def to_common_frame(work):
+    """NORMAL and POINT of a block to WORLD_NORMAL and WORLD_POINT."""
+    for k in range(0, 3 * LANES, LANES):
+        for i in range(LANES):
+            a0 = work[AXES_A + 3 * k + i]
+            a1 = work[AXES_A + 3 * k + LANES + i]
+            a2 = work[AXES_A + 3 * k + 2 * LANES + i]
+            work[WORLD_NORMAL + k + i] = (a0 * work[NORMAL + i] + a1 * work[NORMAL + LANES + i]
+                                          + a2 * work[NORMAL + 2 * LANES + i])
+            work[WORLD_POINT + k + i] = work[ORIGIN_A + k + i] + (
+                a0 * work[POINT + i] + a1 * work[POINT + LANES + i]
+                + a2 * work[POINT + 2 * LANES + i])
+
+
+@kernel
+def write_found(work, i, row, colliding, separation, normal, point):
+    """Write pair `i` of a block, brought to the common frame, to row `row` of the results."""
+    colliding[row] = True
+    separation[row] = work[SEPARATION + i]
+    normal[row, 0] = work[WORLD_NORMAL + i]
+    normal[row, 1] = work[WORLD_NORMAL + LANES + i]
+    normal[row, 2] = work[WORLD_NORMAL + 2 * LANES + i]
+    point[row, 0] = work[WORLD_POINT + i]
+    point[row, 1] = work[WORLD_POINT + LANES + i]
+    point[row, 2] = work[WORLD_POINT + 2 * LANES + i]
 
 
 @kernel

@@ -1,9 +1,8 @@
 """Grazing contacts of almost parallel edges, with twice the digits.
 
 Where two edges almost along each other meet, their cross product is what is left of a cancellation:
-at an angle of θ its direction is good to 1e-16/θ. That does not matter as long as a face axis wins
-by more, and an edge axis can better the best face axis by about θ times the size at most. So it
-matters where boxes overlap by less than that, and there phantom contacts and depths wrong by up to
+at an angle of θ its direction is good to 1e-16/θ. That does not matter as long as another axis wins
+by more than the gap along it may be wrong. Where not, phantom contacts and depths wrong by up to
 1e-8 of the size were found. Those pairs, and no others, are evaluated again here: rotation, offset
 and all fifteen gaps from the very doubles of the poses, every number the sum of two doubles
 (Dekker 1971; Knuth, TAOCP 2, 4.2.2), 32 digits.
@@ -19,23 +18,19 @@ from .block import (
     HALF_A,
     HALF_B,
     LANES,
-    NEAR,
     NORMAL,
     ORIGIN_A,
     ORIGIN_B,
     SEPARATION,
     SIZE,
-    TOUCH,
     TURN_A,
     TURN_B,
 )
-from .jit import kernel
+from .jit import inlined, kernel
 
 REACH = 8.0
-"""By how many times θ · size an edge axis may better the best face axis: edges of both boxes, at
-both ends, lean by θ."""
-ROUNDING = 1e-15
-"""Error of an angle between axes in float64: the least θ."""
+"""By how many times θ · size an axis that is skipped may better the best face axis: edges of both
+boxes, at both ends, lean by θ."""
 LEAST = 1e-15
 """Length of a cross product from which it is an axis: what shorter ones could better is less than
 the rounding of a gap. From here on 17 digits are left of 32, so that the gap has the same bits
@@ -47,12 +42,17 @@ GRID = 2.0**-22
 _SPLIT = 134217729.0  # 2²⁷ + 1
 
 
-@kernel
-def grazing(work, i):
-    """Whether the axis that `query_block` found for a pair may be wrong."""
-    return (work[SEPARATION + i] <= work[TOUCH + i] and
-            -work[SEPARATION + i] < REACH * (math.sqrt(work[NEAR + i]) + ROUNDING)
-            * work[SIZE + i])
+@inlined
+def grazing(separation, touch, size, hope, skipped):
+    """1.0 where the axis that was found may be wrong.
+
+    hope: what the largest gap on an axis of almost parallel edges may be, rounding included [m];
+    skipped: squared sine of the widest angle between edges whose axis was skipped.
+    """
+    reach = REACH * size
+    near = skipped > LEAST * LEAST and (
+        separation >= 0.0 or separation * separation < reach * reach * skipped)
+    return 1.0 if separation <= touch and (hope > separation or near) else 0.0
 
 
 @kernel
