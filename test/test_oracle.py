@@ -1,6 +1,8 @@
 """The oracle itself, against closed forms and against sampling."""
 from __future__ import annotations
 
+import itertools
+
 import mpmath as mp
 import numpy as np
 import oracle
@@ -65,3 +67,33 @@ def test_overlap_against_sampling():
             assert np.all(np.abs(error) < 5 * points[inside].std(axis=0) / np.sqrt(inside.sum()))
         assert (volume > 0) == (oracle.separation(box_a, box_b) < 0)
     assert hits >= 4
+
+
+def hull_depth(a, b):
+    """Depth by the hull of the 64 differences of corners: the distance from the origin to the
+    nearest of the planes through three of them that have all the others on one side."""
+    def corners(box):
+        return np.array([[float(v) for v in p] for s in (-1, 1) for p in box.face(2, s)])
+
+    points = (corners(a)[:, None] - corners(b)[None]).reshape(-1, 3)
+    i, j, k = np.array(list(itertools.combinations(range(64), 3))).T
+    normals = np.cross(points[j] - points[i], points[k] - points[i])
+    lengths = np.linalg.norm(normals, axis=1)
+    keep = lengths > 1e-6
+    normals, place = normals[keep] / lengths[keep, None], points[i[keep]]
+    heights = normals @ points.T - np.sum(normals * place, axis=1)[:, None]
+    outer = (heights.max(axis=1) < 1e-9) | (heights.min(axis=1) > -1e-9)
+    return np.abs(np.sum(normals * place, axis=1))[outer].min()
+
+
+@pytest.mark.parametrize('seed', range(8))
+def test_depth_against_the_hull_of_differences(seed):
+    """Fifteen axes say what the hull of all differences of corners says."""
+    found = 0
+    for row in zip(*poses.random_pairs(np.random.default_rng(900 + seed), 6)):
+        a, b = oracle.make_box(row[0], row[2]), oracle.make_box(row[1], row[3])
+        depth = -float(oracle.separation(a, b))
+        if depth > 0.0:
+            found += 1
+            assert hull_depth(a, b) == pytest.approx(depth, abs=1e-9)
+    assert found

@@ -43,9 +43,9 @@ SINGLE_PAIRS, QUICK_SINGLE_PAIRS = 1_000, 40
 """Pairs on which the others are judged, and on which all are timed call by call."""
 FEW_PAIRS = 16
 """Pairs of sizes in the timing of a set that has others in every row: each needs a solver."""
-SECONDS, QUICK_SECONDS = 1.5, 0.05
+SECONDS, QUICK_SECONDS = 1.0, 0.05
 """Time that a contestant has for a set, once for its answers and once for its timing."""
-ROUNDS, QUICK_ROUNDS = 6, 2
+ROUNDS, QUICK_ROUNDS = 5, 2
 """Rounds in which the contestants are timed in turn, so that a slow moment hits all of them."""
 LEAST_PAIRS = 10
 """Pairs judged and timed whatever they take."""
@@ -63,7 +63,8 @@ PAPER_ERROR = 34.0
 """The paper's MAE of 0.5624 rad in % of an edge: seen from 1.2 m, the mean distance of a touching
 cube's surface, it is a point error of 0.67 m, a third of the edge of 2 m."""
 VERDICT = 1e-9
-"""Gap or depth, of the size, from which on a verdict is wrong: at exact touch both are right."""
+"""Gap or depth, of the size, from which on verdicts and normals are judged: at exact touch both
+verdicts are right, and a normal may be any that keeps the boxes apart."""
 SMALLEST_ERROR = 1e-2
 """Errors below this [%] are drawn here: those of `exact` are zero, being the reference."""
 
@@ -202,13 +203,14 @@ def judge(pairs: Pairs, colliding: np.ndarray, normals: np.ndarray, points: np.n
             if len(part):
                 p50, p99, worst = np.quantile(part, (0.5, 0.99, 1.0))
                 found[label] = (len(part), float(p50), float(p99), float(worst))
-        one, other = normals[both], truth.normal[both]
+    size = np.maximum(pairs.size_a.max(axis=1), pairs.size_b.max(axis=1))
+    clear = np.abs(truth.separation) > VERDICT * size
+    if (both & clear).any():
+        one, other = normals[both & clear], truth.normal[both & clear]
         # By the chord: the cosine of a small angle is 1 to the last digit.
         angles = 2.0 * DEGREES * np.arcsin(np.clip(
             0.5 * np.linalg.norm(one - other, axis=1), 0.0, 1.0))
         normal = (float(np.quantile(angles, 0.99)), float(angles.max()))
-    size = np.maximum(pairs.size_a.max(axis=1), pairs.size_b.max(axis=1))
-    clear = np.abs(truth.separation) > VERDICT * size
     return (found, normal, int((truth.colliding & ~colliding & clear).sum()),
             int((colliding & ~truth.colliding & clear).sum()))
 
@@ -376,10 +378,11 @@ Times are those on containers with sway; normals and verdicts are over all sets.
 
 Point errors in % of the smaller box's longest edge, as median/p99/worst, per contact class
 ([accuracy](accuracy.md)). *Missed*: contacts of `exact` that were not reported; *invented*: the
-reverse; both only where the gap or depth is more than {VERDICT:g} of the size, as at exact touch
-either verdict is right. *Judged*: pairs asked; models with batches are asked for more. Random sizes
-are timed on {FEW_PAIRS} pairs of sizes. Engines that give several points are entered twice: their
-deepest, and the mean. `committee N-M` are networks of other sizes, trained for 100,000 steps.
+reverse; these and normals only where the gap or depth is more than {VERDICT:g} of the size, as at
+exact touch either verdict is right, and many normals. *Judged*: pairs asked; models with batches
+are asked for more. Random sizes are timed on {FEW_PAIRS} pairs of sizes. Engines that give several
+points are entered twice: their deepest, and the mean. `committee N-M` are networks of other sizes,
+trained for 100,000 steps.
 
 """ + '\n\n'.join(f'### {name.capitalize()}\n\n{(ALL_SETS[name].__doc__ or "").strip()}\n\n'
                   f'{set_table(cells, name)}' for name in ALL_SETS) + '\n'
