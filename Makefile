@@ -72,7 +72,7 @@ clean:
 # Kernels are compiled at their first use, which would take half of the demo's minute; here once, and
 # again when one of the package's own modules has changed.
 .venv/.compiled: $(wildcard box_contact_ros/*.py) | .venv/.installed-demo
-	@printf 'compiling the kernels (about 40 s) '
+	@printf 'compiling the kernels (about a minute) '
 	SECONDS=0
 	$(VENV_PYTHON) -c 'from box_contact_ros import ContactSolver as S; [S((2, 2, 2), (2, 2, 2), model=m).batch([[0, 0, 0, 0, 0, 0, 1]], [[0, 0, 1.9, 0, 0, 0, 1]]) for m in ("committee", "exact")]'
 	printf ' done in %s s\n' "$$SECONDS"
