@@ -39,7 +39,7 @@ MUTANTS = {
         'sat.py', 'max(g6, max(g7, g8))', 'max(g6, g7)', f'{FAMILIES} -k gates'),
     'cross product not normalised': Mutant(
         'sat.py', 'inverse = 1.0 / math.sqrt(length2)', 'inverse = 1.0', f'{FAMILIES} -k gates'),
-    'constant added to |R|': Mutant(
+    "constant added to R's entries": Mutant(
         'sat.py', 'width = ((h1 * abs(u2) + h2 * abs(u1))',
         'width = ((h1 * (abs(u2) + 1e-6) + h2 * (abs(u1) + 1e-6))', f'{FAMILIES} -k gates'),
     'float32 too early': Mutant(
@@ -58,9 +58,9 @@ MUTANTS = {
     'absolute tolerance': Mutant(
         'overlap.py', 'move = DEPTH_FLOOR * work[SIZE + i] + work[SEPARATION + i]',
         'move = DEPTH_FLOOR + work[SEPARATION + i]', f'{FAMILIES} -k scale'),
-    'a shared face counted': Mutant(
-        'overlap.py', 'above = above and work[corner + 2] >= 0.0', 'above = False',
-        f'{FAMILIES} -k exact_point'),
+    'contact plane not clipped': Mutant(
+        'overlap.py', 'count = _clip(work, one, 4, two, 2, 1.0, 0.0)',
+        'count = _clip(work, one, 4, two, 2, 1.0, 1e300)', f'{FAMILIES} -k exact_point'),
     'quaternion taken for a unit one': Mutant(
         'pose.py', 's = 2.0 /', 's = 2.0 + 0.0 *', 'test/test_fuzz.py -k gates_are'),
     'point left outside': Mutant(
