@@ -386,8 +386,7 @@ def _range(lanes, work):
 @kernel
 def _exact_point(work, i):
     """What model `exact` answers for a pair that has been pressed in."""
-    if work[SEPARATION + i] > -DEPTH_FLOOR * work[SIZE + i]:
-        press_on(work, i)
+    press_on(work, i)
     return centroid(work, i)
 
 

@@ -67,13 +67,13 @@ def main(args: Sequence[str] | None = None) -> int:
     processes: list[subprocess.Popen] = []
     with tempfile.TemporaryFile() as node_output:
         try:
-            processes.append(_start('contact_node', sizes + model, env, node_output))
-            processes.append(_start('crane', sizes + crane, env, None))
+            processes.append(start('contact_node', sizes + model, env, node_output))
+            processes.append(start('crane', sizes + crane, env, None))
             status = _watch(*processes, deadline)
         except KeyboardInterrupt:
             return 128 + signal.SIGINT
         finally:
-            _end(processes)
+            end(processes)
         if status:
             node_output.seek(0)
             text = node_output.read().decode(errors='replace').rstrip()
@@ -123,7 +123,7 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
     return options
 
 
-def _start(program: str, parameters: list[str], env: dict[str, str], output) -> subprocess.Popen:
+def start(program: str, parameters: list[str], env: dict[str, str], output) -> subprocess.Popen:
     """Start a program of this package in a process group of its own; `output` None passes it on."""
     command = [sys.executable, '-m', 'box_contact_ros', program, '--ros-args']
     for parameter in parameters:
@@ -145,7 +145,7 @@ def _watch(node: subprocess.Popen, crane: subprocess.Popen, deadline: float) -> 
     return status if status >= 0 else 128 - status
 
 
-def _end(processes: list[subprocess.Popen]) -> None:
+def end(processes: list[subprocess.Popen]) -> None:
     """End whole process groups: ask first, then kill what is left of them."""
     for process in processes:
         _signal_group(process, signal.SIGTERM)

@@ -6,7 +6,6 @@ import numpy as np
 from .block import (
     LANES,
     SEPARATION,
-    SIZE,
     TOUCH,
     new_work,
 )
@@ -23,7 +22,7 @@ from .contact import (
     write_one,
 )
 from .jit import kernel
-from .overlap import DEPTH_FLOOR, centroid, press, press_on
+from .overlap import centroid, press, press_on
 from .pose import load_block, load_one, load_sizes
 from .sat import query_block
 
@@ -44,8 +43,7 @@ def solve_exact(poses_a, poses_b, sizes_a, sizes_b, work, status, colliding, sep
         for i in range(count):
             if work[SEPARATION + i] <= work[TOUCH + i]:
                 press(work, i)
-                if work[SEPARATION + i] > -DEPTH_FLOOR * work[SIZE + i]:
-                    press_on(work, i)
+                press_on(work, i)
                 write_contact(work, i, start + i, sat_normal(work, i), centroid(work, i),
                               colliding, separation, normal, point)
             else:
@@ -66,8 +64,7 @@ def one_exact(work, pose_a, pose_b, normal, point):
         write_nothing(normal, point)
         return APART, work[SEPARATION]
     press(work, 0)
-    if work[SEPARATION] > -DEPTH_FLOOR * work[SIZE]:
-        press_on(work, 0)
+    press_on(work, 0)
     write_one(work, centroid(work, 0), normal, point)
     return TOUCHING, work[SEPARATION]
 

@@ -36,7 +36,8 @@ LEAST = 1e-15
 the rounding of a gap. From here on 17 digits are left of 32, so that the gap has the same bits
 whichever box is called A."""
 TIE = 2.0**-46
-"""As in `sat`: gaps closer than this fraction of the size are equal, the earlier axis wins."""
+"""Gaps closer than this fraction of the size (1.4e-14, some 64 roundings) count as equal: the
+rounding error of a gap is below 12 units of 2⁻⁵³ of the size, and twice that must not decide."""
 GRID = 2.0**-22
 """Times the size: added and taken away again, it rounds a gap to 2⁻⁷⁴ of the size."""
 _SPLIT = 134217729.0  # 2²⁷ + 1

@@ -40,7 +40,7 @@ from .block import (
     SINGLE,
     SIZE,
 )
-from .jit import kernel
+from .jit import inlined, kernel
 from .sat import PARALLEL
 
 DEPTH_FLOOR = 1e-9
@@ -111,32 +111,35 @@ def press(work, i):
     """
     move = DEPTH_FLOOR * work[SIZE + i] + work[SEPARATION + i]
     if move > 0.0:
-        n0, n1, n2 = work[NORMAL + i], work[NORMAL + LANES + i], work[NORMAL + 2 * LANES + i]
-        for k in range(3):
-            work[OFFSET_A + k * LANES + i] -= move * (n0 if k == 0 else (n1 if k == 1 else n2))
-            work[OFFSET_B + k * LANES + i] -= move * (
-                work[ROTATION + k * LANES + i] * n0 + work[ROTATION + (3 + k) * LANES + i] * n1
-                + work[ROTATION + (6 + k) * LANES + i] * n2)
+        _move(work, i, move, work[NORMAL + i], work[NORMAL + LANES + i],
+              work[NORMAL + 2 * LANES + i])
+
+
+@inlined
+def _move(work, i, move, n0, n1, n2):
+    """Move B against a direction (n0, n1, n2), given in A's frame."""
+    for k in range(3):
+        work[OFFSET_A + k * LANES + i] -= move * (n0 if k == 0 else (n1 if k == 1 else n2))
+        work[OFFSET_B + k * LANES + i] -= move * (
+            work[ROTATION + k * LANES + i] * n0 + work[ROTATION + (3 + k) * LANES + i] * n1
+            + work[ROTATION + (6 + k) * LANES + i] * n2)
 
 
 @kernel
 def press_on(work, i):
-    """Go on where `press` left pair `i` with less than half of DEPTH_FLOOR.
+    """Go on where `press` had to move pair `i` and left it with less than half of DEPTH_FLOOR.
 
     Where a corner touches a corner or an edge, several axes have gap zero, and moving B along one
     of them leaves the boxes touching along the others. B is moved along each in turn.
     """
     floor = DEPTH_FLOOR * work[SIZE + i]
+    if work[SEPARATION + i] <= -floor:
+        return
     for _ in range(PRESSES):
         gap, n0, n1, n2 = _largest_gap(work, i)
         if gap <= -0.5 * floor:
             break
-        move = floor + gap
-        for k in range(3):
-            work[OFFSET_A + k * LANES + i] -= move * (n0 if k == 0 else (n1 if k == 1 else n2))
-            work[OFFSET_B + k * LANES + i] -= move * (
-                work[ROTATION + k * LANES + i] * n0 + work[ROTATION + (3 + k) * LANES + i] * n1
-                + work[ROTATION + (6 + k) * LANES + i] * n2)
+        _move(work, i, floor + gap, n0, n1, n2)
 
 
 @kernel

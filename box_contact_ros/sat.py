@@ -41,7 +41,7 @@ from .block import (
     SIZE,
     TOUCH,
 )
-from .grazing import grazing, refine
+from .grazing import TIE, grazing, refine
 from .jit import inlined, kernel
 
 PARALLEL = 1e-8
@@ -56,10 +56,6 @@ ALMOST_PARALLEL = 1e-3
 DOUBT = 2.0**-47
 """Error of a gap times the sine [of the size]: entries of R are good to 2⁻⁵¹, so at an angle θ the
 axis's direction is good to 2⁻⁵¹/θ, and levers are up to the size on both sides."""
-
-TIE = 2.0**-46
-"""Gaps closer than this fraction of the size (1.4e-14, some 64 roundings) count as equal: the
-rounding error of a gap is below 12 units of 2⁻⁵³ of the size, and twice that must not decide."""
 
 
 @inlined

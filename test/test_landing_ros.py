@@ -11,10 +11,12 @@ import rclpy  # noqa: E402
 from rclpy.context import Context  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 
-from box_contact_ros.landing import LANDING_DURATION  # noqa: E402
+from box_contact_ros.landing import LANDING_DURATION, cases, land, scenario_of  # noqa: E402
 from box_contact_ros.nodes import crane as crane_node  # noqa: E402
 from box_contact_ros.nodes import crane_feedback  # noqa: E402
+from box_contact_ros.nodes.landing_flights import answering_node, fly_over_dds  # noqa: E402
 from box_contact_ros.nodes.runtime import make_executor  # noqa: E402
+from box_contact_ros.solver import ContactSolver  # noqa: E402
 
 EXACT = ('--ros-args', '-p', 'model:=exact')
 HARD = {'rope_angle': 3.0, 'rope_heading': 100.0, 'pitch': 2.0, 'roll': -2.0, 'yaw': 1.0,
@@ -43,6 +45,17 @@ def test_lands_in_lockstep_faster_than_real_time(program, node):
     assert 'at rest' in crane.output and 'NOT AT REST' not in crane.output
     assert 'messages lost .......... 0 ' in crane.output
     assert took < LANDING_DURATION, f'{took:.1f} s for {LANDING_DURATION:g} s of motion'
+
+
+def test_a_flight_of_the_report_is_the_landing_offline():
+    """What `report.landing --dds` runs: in lockstep the transport changes nothing."""
+    scenario = scenario_of(next(cases()))
+    with answering_node('exact', scenario) as domain:
+        flown = fly_over_dds(domain, scenario, rate_hz=200.0, latency=0.002)
+    solver = ContactSolver(scenario.size, scenario.stack_size, model='exact')
+    offline = land(scenario, solver, rate_hz=200.0, latency=0.002).judge()
+    assert flown.at_rest
+    assert flown == offline
 
 
 def test_a_landing_that_does_not_rest_fails(program, node):

@@ -7,9 +7,7 @@ from __future__ import annotations
 
 import os
 import random
-import signal
 import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -18,7 +16,7 @@ from rclpy.context import Context
 from rclpy.parameter import Parameter
 
 from ..crane import CraneScenario
-from ..demo import DOMAINS
+from ..demo import DOMAINS, end, start
 from ..landing import LandingResult
 from .crane import CraneNode, receive_while
 from .crane_parameters import PARAMETERS, SCENARIO
@@ -26,8 +24,6 @@ from .runtime import make_executor
 
 PATIENCE = 120.0
 """For the node to answer [s]: its kernels may have to be compiled."""
-END_PATIENCE = 5.0
-"""For the node to end when asked to [s]; then it is killed."""
 
 
 @contextmanager
@@ -36,24 +32,12 @@ def answering_node(model: str, scenario: CraneScenario) -> Iterator[int]:
     domain = random.choice(DOMAINS)
     sizes = [f'{name}:=[{",".join(map(str, size))}]' for name, size in (
         ('size_a', scenario.size), ('size_b', scenario.stack_size))]
-    command = [sys.executable, '-m', 'box_contact_ros', 'contact_node', '--ros-args']
-    for parameter in (f'model:={model}', *sizes):
-        command += ['-p', parameter]
-    node = subprocess.Popen(command, env=_environment(domain), start_new_session=True,
-                            stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+    env = os.environ | {'ROS_DOMAIN_ID': str(domain), 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
+    node = start('contact_node', [f'model:={model}', *sizes], env, subprocess.DEVNULL)
     try:
         yield domain
     finally:
-        os.killpg(node.pid, signal.SIGTERM)
-        try:
-            node.wait(END_PATIENCE)
-        except subprocess.TimeoutExpired:
-            os.killpg(node.pid, signal.SIGKILL)
-            node.wait()
-
-
-def _environment(domain: int) -> dict[str, str]:
-    return os.environ | {'ROS_DOMAIN_ID': str(domain), 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
+        end([node])
 
 
 def fly_over_dds(domain: int, scenario: CraneScenario, *, rate_hz: float, latency: float,

@@ -335,13 +335,14 @@ def paper_table(errors: dict[str, np.ndarray], drawn: int) -> str:
         label = 'our network of Table 1' if model == 'paper' else f'`{model}`'
         rows.append([label, *[f'{overall[name] + 0.0:.3g}' for name in PAPER[1]],
                      *[f'{half["MAE"]:.3g}' for half in halves], f'{len(wrong):,} of {drawn:,}'])
-    return _markdown(rows)
+    return markdown(rows)
 
 
 # --- the report -----------------------------------------------------------------------------------
 
 
-def _markdown(rows: Sequence[Sequence[str]]) -> str:
+def markdown(rows: Sequence[Sequence[str]]) -> str:
+    """Rows as a Markdown table, the first one its head; figures to the right."""
     lines = [rows[0], ['---', *['---:'] * (len(rows[0]) - 1)], *rows[1:]]
     return '\n'.join('| ' + ' | '.join(line) + ' |' for line in lines)
 
@@ -364,7 +365,7 @@ def table(results: Sequence[Result]) -> str:
             limit, f'{100.0 * r.exact_share:.3g} %', str(r.verdict_errors),
             f'{r.normal_difference:.2g}', f'{r.separation_difference:.2g}', corrected,
             f'{r.outside:.1g}'])
-    return _markdown(rows)
+    return markdown(rows)
 
 
 def class_table(results: Sequence[Result]) -> str:
@@ -376,7 +377,7 @@ def class_table(results: Sequence[Result]) -> str:
         rows.append([f'{r.model}, {r.set}', *[
             f'{_three(parts[name])} ({100.0 * len(parts[name]) / len(r.errors):.0f} %)'
             if name in parts else '–' for name in names]])
-    return _markdown(rows)
+    return markdown(rows)
 
 
 def write_csv(path: Path, results: Sequence[Result]) -> None:

@@ -29,7 +29,7 @@ from ..network import load_weights
 from ..posesets import CONTAINER, SETS, Generator, Pairs, any_pose, log_uniform, pressed, stacked
 from ..resources import resource_path
 from ..solver import ContactSolver
-from .accuracy import CLASSES, classify
+from .accuracy import CLASSES, classify, markdown
 from .paper import processor
 from .paper_soup import PAPER as PAPER_SOUP
 from .paper_soup import PAPER_NETWORK
@@ -270,11 +270,6 @@ def measure_all(found: Sequence[Contestant], *, seed: int = 3, quick: bool = Fal
 # --- the report -----------------------------------------------------------------------------------
 
 
-def _markdown(rows: Sequence[Sequence[str]]) -> str:
-    lines = [rows[0], ['---', *['---:'] * (len(rows[0]) - 1)], *rows[1:]]
-    return '\n'.join('| ' + ' | '.join(line) + ' |' for line in lines)
-
-
 def _number(value: float, digits: int = 3) -> str:
     """A figure with so many digits, never in powers of ten."""
     if math.isnan(value):
@@ -307,7 +302,7 @@ def ten_lines(cells: Sequence[Cell]) -> str:
             _number(max(worst)) if worst else '–',
             f'{sum(c.missed for c in mine)} of {sum(c.judged for c in mine):,}',
             str(sum(c.invented for c in mine))])
-    return _markdown(rows)
+    return markdown(rows)
 
 
 def set_table(cells: Sequence[Cell], name: str) -> str:
@@ -323,7 +318,7 @@ def set_table(cells: Sequence[Cell], name: str) -> str:
                 *['/'.join(_number(v) for v in cell.points[label][1:]) if label in cell.points
                   else '–' for label in ('all', *CLASSES)],
                 '/'.join(_number(v) for v in cell.normal), str(cell.missed), str(cell.invented)])
-    return _markdown(rows)
+    return markdown(rows)
 
 
 def honesty(cells: Sequence[Cell]) -> str:
