@@ -67,36 +67,6 @@ HIGH_B = _rows(3)
 # twice the middle along the axis [m²], and lengths with the signs of the other two axes.
 SUMS_A = _rows(12)
 SUMS_B = _rows(12)
-IN_B = _rows(3)    # position of B, common frame [m]
-TURN_A = _rows(4)      # quaternions xyzw
-TURN_B = _rows(4)
-FAULT = _rows(1)       # 0, or why the pair cannot be evaluated (BAD_…)
-AXES_A = _rows(9)      # rotation of A, common frame, row-major (columns are A's axes)
-OFFSET_A = _rows(3)    # B − A in A's frame [m]
-OFFSET_B = _rows(3)    # B − A in B's frame [m]
-ROTATION = _rows(9)    # R, orientation of B in A's frame
-SIZE = _rows(1)        # largest full extent of the pair [m]
-TOUCH = _rows(1)       # separation up to which the boxes touch [m]: see pose.CONTACT_ULPS
-A_FIRST = _rows(1)     # 1.0 where A comes first in the order used for edge axes (see sat)
-
-# sat.query_block.
-SEPARATION = _rows(1)  # signed separation [m]
-AXIS = _rows(1)        # winning axis: 0–2 faces of A, 3–5 faces of B, 6 + 3 i + j for a_i × b_j
-FACE = _rows(1)        # best face axis, 0–5, whatever wins
-NORMAL = _rows(3)      # winning axis, unit, from A to B, in A's frame
-
-# outline.outline_block. "Half extents" below are those of the bounding box chosen.
-INVERSE = _rows(9)     # 1 / R
-CENTRE_A = _rows(3)    # A's centre in B's frame [m]
-CENTRE_B = _rows(3)    # B's centre in A's frame [m]
-LOW_A = _rows(3)       # bounding box of A∩B in A's frame [m]
-HIGH_A = _rows(3)
-LOW_B = _rows(3)       # and in B's, from B's centre
-HIGH_B = _rows(3)
-# Pieces of edges, apart for the four signs of an edge: 4 lengths [m], 4 × 3 sums of length times
-# twice the middle [m²], of A's edges in B's frame and of B's in A's.
-PIECES_A = _rows(16)
-PIECES_B = _rows(16)
 IN_B = _rows(1)        # 1.0 where the frame chosen is B's
 MIDDLE = _rows(3)      # middle of the bounding box, in its frame [m]
 HALF = _rows(3)        # its half extents [m]
