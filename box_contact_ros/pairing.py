@@ -1,53 +1,232 @@
-"""Which poses belong together: two streams of stamped poses, paired by stamp or by arrival."""
+"""Which poses belong together: streams of stamped poses of several boxes, joined to ticks.
+
+Time is what the stamps say. No clock is asked, so a recording, a simulation that is paused and one
+that runs at ten times real time are treated alike.
+"""
 from __future__ import annotations
 
-from collections import OrderedDict
-from typing import Generic, TypeVar
+from collections import Counter, OrderedDict
+from typing import NamedTuple
 
-Pose = TypeVar('Pose')
+import numpy as np
 
-WAITING_POSES = 128
-"""Poses kept per box while their partner is out: 128 ms at 1 kHz, far more than the executor or
-the transport ever lets the two streams drift apart, and a bound on memory."""
+from .scene import Scene
+
+WAITING_TICKS = 128
+"""Ticks that wait for poses: 128 ms at 1 kHz, far more than the executor or the transport ever lets
+two streams drift apart, and a bound on memory."""
+REMEMBERED_STAMPS = 1024
+"""Stamps per box that are known to have been taken, so that none is answered twice."""
+RESET = 1_000_000_000
+"""A pose whose stamp lies this far [ns] before an earlier one of its box has not been late: time
+has been set back, as by a simulation that starts again."""
+NO_PARTNER = 'dropped: no partner'
+REPEATED = 'refused: repeated stamp'
+OLD = 'refused: older than the last'
+RESETS = 'time went back'
 
 
-class StampPairing(Generic[Pose]):
-    """Pairs poses of equal stamp, whichever comes first; each stamp is answered once.
+class StampedPose(NamedTuple):
+    """A pose as it came."""
 
-    A pose that finds no partner is dropped when WAITING_POSES newer ones of its box wait, and
-    counted in `dropped`.
+    numbers: np.ndarray
+    """(7,) `x y z qx qy qz qw`."""
+    frame_id: str
+    stamp: int
+    """[ns]"""
+
+
+Tick = list['StampedPose | None']
+"""A pose of each of `scene.moving`, None for a box that has none recent enough."""
+
+
+class _Pairing:
+    """What both policies share: the newest stamp of each box, staleness, and time going back."""
+
+    def __init__(self, scene: Scene, *, tolerance: int = 0, max_age: int = 0) -> None:
+        """tolerance: stamps this far apart [ns] still belong together (policy `stamp`);
+        max_age: a pose further than this [ns] from the tick is not used, 0: any is."""
+        self.tolerance, self.max_age = tolerance, max_age
+        self.counts: Counter[str] = Counter()
+        self._newest: dict[str, int] = {}
+        self.set_scene(scene)
+
+    def set_scene(self, scene: Scene) -> None:
+        """Go over to another scene; what is known of boxes that stay, stays."""
+        self.boxes = scene.moving
+        moving = set(scene.moving)
+        self._partners = [tuple({pair.a, pair.b} & moving) for pair in scene.pairs]
+        self._newest = {box: stamp for box, stamp in self._newest.items() if box in moving}
+
+    def reset(self) -> None:
+        """Forget all poses and stamps, as when time is set back."""
+        self._newest.clear()
+
+    def stale(self) -> list[str]:
+        """Boxes without a pose that is recent enough, by the newest stamp of all."""
+        if not self._newest:
+            return []
+        now = max(self._newest.values())
+        return [box for box in self.boxes if self._is_stale(box, now)]
+
+    def _is_stale(self, box: str, now: int) -> bool:
+        raise NotImplementedError
+
+    def _went_back(self, box: str, stamp: int) -> bool:
+        if stamp < self._newest.get(box, stamp) - RESET:
+            self.counts[RESETS] += 1
+            self.reset()
+            return True
+        return False
+
+    def _evaluable(self, poses: dict[str, StampedPose]) -> bool:
+        return any(all(box in poses for box in partners) for partners in self._partners)
+
+
+class StampPairing(_Pairing):
+    """A tick is complete when every box has given a pose of its stamp, in whatever order they come;
+    each stamp is answered once.
+
+    It does not wait for a box that is stale, nor, once a tick has been answered, for one that was
+    never seen. A tick that stays incomplete is given up when WAITING_TICKS newer ones wait, or when
+    what it lacks is stale: if it has a pair of which all poses are there, it is answered late and
+    without the others, else dropped.
     """
 
-    def __init__(self) -> None:
-        self._waiting: tuple[OrderedDict[int, Pose], OrderedDict[int, Pose]] = (
-            OrderedDict(), OrderedDict())
-        self.dropped = 0
+    def __init__(self, scene: Scene, *, tolerance: int = 0, max_age: int = 0) -> None:
+        self._waiting: OrderedDict[int, dict[str, StampedPose]] = OrderedDict()
+        self._taken: dict[str, OrderedDict[int, None]] = {}
+        self._missing_since: dict[str, int] = {}  # stamp of the first tick that a box lacks
+        self._answered = False
+        super().__init__(scene, tolerance=tolerance, max_age=max_age)
 
-    def add(self, box: int, stamp: int, pose: Pose) -> tuple[Pose, Pose] | None:
-        """Take a pose of box 0 or 1 with its stamp [ns]; the pair (box 0, box 1) if complete."""
-        partner = self._waiting[1 - box].pop(stamp, None)
-        if partner is not None:
-            return (pose, partner) if box == 0 else (partner, pose)
-        waiting = self._waiting[box]
-        waiting[stamp] = pose
-        if len(waiting) > WAITING_POSES:
-            waiting.popitem(last=False)
-            self.dropped += 1
+    def set_scene(self, scene: Scene) -> None:
+        """Go over to another scene; poses that wait go on waiting."""
+        super().set_scene(scene)
+        self._missing_since = {box: stamp for box, stamp in self._missing_since.items()
+                               if box in self.boxes}
+        self._taken = {box: self._taken.get(box, OrderedDict()) for box in self.boxes}
+
+    def reset(self) -> None:
+        """Forget all poses and stamps."""
+        super().reset()
+        self.counts[NO_PARTNER] += sum(map(len, self._waiting.values()))
+        self._waiting.clear()
+        self._missing_since.clear()
+        self._answered = False
+        for taken in self._taken.values():
+            taken.clear()
+
+    def add(self, box: str, pose: StampedPose) -> Tick | None:
+        """Take a pose; the tick that it completes, or that is given up for it."""
+        stamp = pose.stamp
+        self._went_back(box, stamp)
+        taken = self._taken[box]
+        if stamp in taken:
+            self.counts[REPEATED] += 1
+            return None
+        if len(taken) >= REMEMBERED_STAMPS:
+            if stamp < next(iter(taken)):
+                self.counts[OLD] += 1
+                return None
+            taken.popitem(last=False)
+        taken[stamp] = None
+        self._note(box, stamp)
+        key = self._slot(box, stamp)
+        poses = self._waiting.get(key)
+        if poses is None:
+            poses = self._waiting[key] = {}
+        poses[box] = pose
+        if len(poses) < len(self.boxes) and self._is_awaiting(poses):
+            return self._give_up()
+        del self._waiting[key]
+        self._answered = True
+        return self._tick(poses)
+
+    def _tick(self, poses: dict[str, StampedPose]) -> Tick:
+        return [poses.get(box) for box in self.boxes]
+
+    def _slot(self, box: str, stamp: int) -> int:
+        """Stamp of the tick that a pose belongs to: its own, or the nearest within tolerance."""
+        if not self.tolerance or stamp in self._waiting:
+            return stamp
+        near = [key for key, poses in self._waiting.items()
+                if box not in poses and abs(key - stamp) <= self.tolerance]
+        return min(near, key=lambda key: abs(key - stamp), default=stamp)
+
+    def _note(self, box: str, stamp: int) -> None:
+        self._newest[box] = max(stamp, self._newest.get(box, stamp))
+        self._missing_since.pop(box, None)
+        for other in self.boxes:
+            if other not in self._missing_since and (
+                    other not in self._newest or stamp > self._newest[other]):
+                self._missing_since[other] = stamp
+
+    def _is_stale(self, box: str, now: int) -> bool:
+        # Not counted from the box's last pose: after a pause of all boxes, one of them is the
+        # first, and the others are not stale for that.
+        return 0 < self.max_age < now - self._missing_since.get(box, now)
+
+    def _is_awaiting(self, poses: dict[str, StampedPose]) -> bool:
+        """Whether a tick with these poses waits for another box."""
+        missing = [box for box in self.boxes if box not in poses and (
+            box in self._newest or not self._answered)]
+        if not missing:
+            return False
+        now = max(self._newest.values())
+        return not all(self._is_stale(box, now) for box in missing)
+
+    def _give_up(self) -> Tick | None:
+        """The oldest tick, if it has waited enough and one of its pairs can be evaluated."""
+        if len(self._waiting) == 1:
+            return None
+        stamp, poses = next(iter(self._waiting.items()))
+        if len(self._waiting) <= WAITING_TICKS and self._is_awaiting(poses):
+            return None
+        del self._waiting[stamp]
+        if self._evaluable(poses):
+            return self._tick(poses)
+        self.counts[NO_PARTNER] += len(poses)
         return None
 
 
-class LatestPairing(Generic[Pose]):
-    """Pairs every pose that arrives with the last one of the other box."""
+class LatestPairing(_Pairing):
+    """Every pose that arrives makes a tick, with the last pose of each other box.
 
-    def __init__(self) -> None:
-        self._last: list[Pose | None] = [None, None]
-        self.dropped = 0
+    A pose older than the last one of its box is refused; one of the same stamp is not, as there are
+    publishers that do not stamp.
+    """
 
-    def add(self, box: int, stamp: int, pose: Pose) -> tuple[Pose, Pose] | None:
-        """Take a pose of box 0 or 1; the pair (box 0, box 1) once both have been seen."""
+    def __init__(self, scene: Scene, *, tolerance: int = 0, max_age: int = 0) -> None:
+        self._last: dict[str, StampedPose] = {}
+        super().__init__(scene, tolerance=tolerance, max_age=max_age)
+
+    def set_scene(self, scene: Scene) -> None:
+        """Go over to another scene; the last poses of boxes that stay are kept."""
+        super().set_scene(scene)
+        self._last = {box: pose for box, pose in self._last.items() if box in self.boxes}
+
+    def reset(self) -> None:
+        """Forget all poses."""
+        super().reset()
+        self._last.clear()
+
+    def add(self, box: str, pose: StampedPose) -> Tick | None:
+        """Take a pose; the tick that it makes, once both boxes of a pair have been seen."""
+        self._went_back(box, pose.stamp)
+        if pose.stamp < self._newest.get(box, pose.stamp):
+            self.counts[OLD] += 1
+            return None
+        self._newest[box] = pose.stamp
         self._last[box] = pose
-        first, second = self._last
-        return None if first is None or second is None else (first, second)
+        if not self._evaluable(self._last):
+            return None
+        return [None if self._is_stale(other, pose.stamp) else self._last.get(other)
+                for other in self.boxes]
+
+    def _is_stale(self, box: str, now: int) -> bool:
+        newest = self._newest.get(box)
+        return newest is None or 0 < self.max_age < abs(now - newest)
 
 
 PAIRINGS = {'stamp': StampPairing, 'latest': LatestPairing}

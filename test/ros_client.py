@@ -109,6 +109,12 @@ class Client:
         values = {entry.key: entry.value for entry in self.diagnostics[-1].status[0].values}
         return values.get(key, '')
 
+    def counts(self) -> dict[str, int]:
+        """All whole numbers of a diagnostic that was sent after this call."""
+        self.diagnostic('')
+        return {entry.key: int(entry.value) for entry in self.diagnostics[-1].status[0].values
+                if entry.value.isdecimal()}
+
     def close(self) -> None:
         self.executor.shutdown()
         self.node.destroy_node()

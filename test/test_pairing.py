@@ -3,38 +3,189 @@ from __future__ import annotations
 
 import random
 
-from box_contact_ros.pairing import WAITING_POSES, LatestPairing, StampPairing
+import numpy as np
+import pytest
+
+from box_contact_ros.pairing import (
+    NO_PARTNER,
+    OLD,
+    REMEMBERED_STAMPS,
+    REPEATED,
+    RESET,
+    RESETS,
+    WAITING_TICKS,
+    LatestPairing,
+    StampedPose,
+    StampPairing,
+)
+from box_contact_ros.scene import Box, Pair, Scene, two_boxes
+
+TWO = two_boxes((2, 2, 2), (2, 2, 2))
+MS = 1_000_000  # ns
+
+
+def scene(moving='abc', pairs=('ab', 'bc')):
+    """Boxes that move, and pairs of them; `F` is a fixed one."""
+    boxes = {name: Box(name, (1.0, 1.0, 1.0), pose_topic=f'{name}/pose') for name in moving}
+    boxes['F'] = Box('F', (1.0, 1.0, 1.0), (0, 0, 0, 0, 0, 0, 1))
+    return Scene(boxes, tuple(Pair(n, pair, *pair) for n, pair in enumerate(pairs)))
+
+
+def pose(stamp):
+    return StampedPose(np.zeros(7), 'map', stamp)
+
+
+def stamps(tick):
+    return tick and [entry and entry.stamp for entry in tick]
 
 
 def test_stamps_pair_in_any_order():
     """Two streams, each in any order within the ring: every stamp is answered exactly once."""
     rng = random.Random(1)
-    pairing: StampPairing[str] = StampPairing()
-    events = [(box, stamp) for stamp in range(1000) for box in (0, 1)]
+    pairing = StampPairing(TWO)
+    events = [(box, stamp) for stamp in range(1000) for box in ('box_a', 'box_b')]
     events.sort(key=lambda event: event[1] + rng.uniform(0, 50))
     answered = []
     for box, stamp in events:
-        pair = pairing.add(box, stamp, f'{"ab"[box]}{stamp}')
-        if pair is not None:
-            assert pair == (f'a{stamp}', f'b{stamp}')
+        tick = pairing.add(box, pose(stamp))
+        if tick is not None:
+            assert stamps(tick) == [stamp, stamp]
             answered.append(stamp)
     assert sorted(answered) == list(range(1000))
-    assert pairing.dropped == 0
+    assert not pairing.counts
 
 
 def test_poses_without_partner_are_dropped_and_counted():
-    """Memory is bounded: the oldest waiting pose goes, the newest WAITING_POSES still pair."""
-    pairing: StampPairing[int] = StampPairing()
-    for stamp in range(WAITING_POSES + 10):
-        assert pairing.add(0, stamp, stamp) is None
-    assert pairing.dropped == 10
-    assert pairing.add(1, 9, -1) is None
-    assert pairing.add(1, 10, -2) == (10, -2)
+    """Memory is bounded: the oldest waiting pose goes, the newest WAITING_TICKS still pair."""
+    pairing = StampPairing(TWO)
+    for stamp in range(WAITING_TICKS + 10):
+        assert pairing.add('box_a', pose(stamp)) is None
+    assert pairing.counts == {NO_PARTNER: 10}
+    assert pairing.add('box_b', pose(10)) is not None
+    assert pairing.add('box_b', pose(9)) is None
+
+
+def test_no_stamp_is_answered_twice():
+    """Repeated messages, at once or long after, of one box or of both: one answer, and a count."""
+    pairing = StampPairing(TWO)
+    answers = 0
+    for stamp in range(3 * REMEMBERED_STAMPS):
+        for box in ('box_a', 'box_b'):
+            answers += pairing.add(box, pose(stamp)) is not None
+    for stamp in range(3 * REMEMBERED_STAMPS):
+        for box in ('box_a', 'box_b'):
+            assert pairing.add(box, pose(stamp)) is None
+    assert answers == 3 * REMEMBERED_STAMPS
+    assert pairing.counts[REPEATED] == 2 * REMEMBERED_STAMPS
+    assert pairing.counts[OLD] == 4 * REMEMBERED_STAMPS
+
+
+def test_tolerance_joins_the_nearest_stamps():
+    """Streams of different clocks: each pose is used once, with the nearest within tolerance."""
+    pairing = StampPairing(TWO, tolerance=3 * MS)
+    for stamp in (0, 10 * MS, 20 * MS):
+        assert pairing.add('box_a', pose(stamp)) is None
+    assert stamps(pairing.add('box_b', pose(9 * MS))) == [10 * MS, 9 * MS]
+    assert stamps(pairing.add('box_b', pose(22 * MS))) == [20 * MS, 22 * MS]
+    assert pairing.add('box_b', pose(14 * MS)) is None
+    assert stamps(StampPairing(TWO).add('box_a', pose(0)) or []) == []
+
+
+def test_a_box_that_fell_silent_is_waited_for_until_it_is_stale():
+    """Box b ends: a's ticks wait for max_age, then are answered at once without b, and b is said to
+    be stale; when it is back, it is waited for again."""
+    pairing = StampPairing(TWO, max_age=50 * MS)
+    pairing.add('box_a', pose(0))
+    assert stamps(pairing.add('box_b', pose(0))) == [0, 0]
+    answers = {stamp: pairing.add('box_a', pose(stamp * MS)) for stamp in range(1, 100)}
+    # The first tick that lacks b is that of 1 ms.
+    assert all(answers[stamp] is None for stamp in range(1, 52))
+    assert all(stamps(answers[stamp]) == [stamp * MS, None] for stamp in range(52, 100))
+    assert pairing.stale() == ['box_b']
+    pairing.add('box_b', pose(100 * MS))
+    assert stamps(pairing.add('box_a', pose(100 * MS))) == [100 * MS, 100 * MS]
+    assert pairing.stale() == []
+    assert pairing.add('box_a', pose(101 * MS)) is None
+
+
+def test_after_a_pause_nobody_is_stale():
+    """All boxes stop and go on later, a simulation that is paused: the first tick is whole."""
+    pairing = StampPairing(TWO, max_age=50 * MS)
+    for stamp in (0, MS, 1000 * MS, 5000 * MS):
+        assert pairing.add('box_a', pose(stamp)) is None
+        assert stamps(pairing.add('box_b', pose(stamp))) == [stamp, stamp]
+        assert pairing.stale() == []
+
+
+def test_a_silent_box_costs_the_others_no_tick():
+    """c ends; a and b go on at 1 kHz: each tick of theirs is answered once, with the pair of c
+    stale, late where c was waited for, then at once."""
+    pairing = StampPairing(scene(), max_age=500 * MS)
+    for box in 'abc':
+        tick = pairing.add(box, pose(0))
+    assert stamps(tick) == [0, 0, 0]
+    answered = []
+    for stamp in range(MS, 1000 * MS, MS):
+        for box in 'ab':
+            tick = pairing.add(box, pose(stamp))
+            if tick is not None:
+                assert tick[0].stamp == tick[1].stamp and tick[2] is None
+                answered.append(tick[0].stamp)
+    assert sorted(answered) == list(range(MS, 1000 * MS, MS)) and not pairing.counts
+
+
+def test_scene_changes_cost_the_others_no_tick():
+    """A box comes and goes while a and b stream: each of their stamps is answered once."""
+    pairing = StampPairing(scene('ab', ['ab']), max_age=1000 * MS)
+    answered = []
+    for stamp in range(300):
+        for box in 'ab':
+            tick = pairing.add(box, pose(stamp * MS))
+            if box == 'a' and stamp == 100:  # between the poses of a tick
+                pairing.set_scene(scene('abc', ['ab', 'bc']))
+            if box == 'a' and stamp == 200:
+                pairing.set_scene(scene('ab', ['ab']))
+            if tick:
+                answered.append(tick[0].stamp // MS)
+    assert answered == list(range(300))
+
+
+def test_time_set_back_begins_anew():
+    """A simulation that starts again: what waited is dropped and counted, the first tick of the new
+    time is answered, and no pose of the old time is."""
+    for pairing in (StampPairing(TWO, max_age=100 * MS), LatestPairing(TWO, max_age=100 * MS)):
+        for stamp in range(5 * RESET, 5 * RESET + 10 * MS, MS):
+            pairing.add('box_a', pose(stamp))
+            pairing.add('box_b', pose(stamp))
+        pairing.add('box_a', pose(6 * RESET))
+        assert pairing.add('box_a', pose(0)) is None  # not with the old pose of b
+        assert stamps(pairing.add('box_b', pose(0))) == [0, 0]
+        assert pairing.counts[RESETS] == 1
+    assert StampPairing(TWO).counts[NO_PARTNER] == 0
 
 
 def test_latest_answers_every_arrival():
-    pairing: LatestPairing[str] = LatestPairing()
-    assert pairing.add(0, 1, 'a1') is None
-    assert pairing.add(0, 2, 'a2') is None
-    assert pairing.add(1, 7, 'b7') == ('a2', 'b7')
-    assert pairing.add(0, 3, 'a3') == ('a3', 'b7')
+    pairing = LatestPairing(TWO)
+    assert pairing.add('box_a', pose(1)) is None
+    assert pairing.add('box_a', pose(2)) is None
+    assert stamps(pairing.add('box_b', pose(7))) == [2, 7]
+    assert stamps(pairing.add('box_a', pose(3))) == [3, 7]
+    assert stamps(pairing.add('box_a', pose(3))) == [3, 7]  # a publisher that does not stamp
+    assert pairing.add('box_a', pose(2)) is None
+    assert pairing.counts == {OLD: 1}
+
+
+@pytest.mark.parametrize('late', ['box_a', 'box_b'])
+def test_latest_never_answers_with_an_old_pose(late):
+    """Beyond max_age a box's last pose is None in the tick, whichever box is behind."""
+    other = {'box_a': 'box_b', 'box_b': 'box_a'}[late]
+    pairing = LatestPairing(TWO, max_age=100 * MS)
+    pairing.add(late, pose(0))
+    assert None not in pairing.add(other, pose(100 * MS))
+    tick = pairing.add(other, pose(101 * MS))
+    assert tick[late == 'box_b'] is None and pairing.stale() == [late]
+
+
+def test_fixed_boxes_are_not_waited_for():
+    pairing = StampPairing(scene('a', ['aF']))
+    assert stamps(pairing.add('a', pose(5))) == [5]

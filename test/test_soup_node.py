@@ -19,6 +19,7 @@ pytest.importorskip('fcl')
 from box_contact_ros import ContactSolver  # noqa: E402
 from box_contact_ros.nodes.contact import ContactNode  # noqa: E402
 from box_contact_ros.nodes.messages import read_cloud  # noqa: E402
+from box_contact_ros.nodes.contact import PARAMETERS as CONTACT_PARAMETERS  # noqa: E402
 from box_contact_ros.nodes.soup import PARAMETERS, SoupNode  # noqa: E402
 from box_contact_ros.resources import resource_path  # noqa: E402
 
@@ -154,7 +155,7 @@ def test_parameters_are_checked_before_they_are_applied(soup_node):
         assert not result.successful and words in result.reason
     for name in PARAMETERS:
         assert soup_node.describe_parameter(name).description
-    assert set(PARAMETERS) == {'size_a', 'size_b', 'divisions', 'pairing'}
+    assert set(PARAMETERS) == (set(CONTACT_PARAMETERS) - {'model', 'weights'}) | {'divisions'}
 
 
 def test_the_contact_node_knows_the_soup_too(client):

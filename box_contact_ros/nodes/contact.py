@@ -1,39 +1,56 @@
-"""The contact node: two box poses in, contact point and normal out.
+"""The contact node: box poses in, contact points and normals out.
 
 Subscribes box_a/pose and box_b/pose (geometry_msgs/PoseStamped). Publishes contact/point
 (PointStamped) and contact/normal (Vector3Stamped, from A to B) while the boxes touch, then
 contacts (sensor_msgs/PointCloud2, one row per contact) on every evaluation, and /diagnostics.
+
+With a scene file: <box>/pose of every moving box, and <pair>/contact/point, <pair>/contact/normal.
+It is a lifecycle node that configures and activates itself, unless autostart is false.
 """
 from __future__ import annotations
 
 import gc
+import time
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar
 
-import numpy as np
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import PointStamped, PoseStamped, Vector3Stamped
 from rcl_interfaces.msg import SetParametersResult
+from rclpy.clock import Clock, ClockType, JumpThreshold
 from rclpy.context import Context
-from rclpy.node import Node
+from rclpy.duration import Duration
+from rclpy.event_handler import SubscriptionEventCallbacks, UnsupportedEventTypeError
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
+from rclpy.publisher import Publisher
+from rclpy.qos import QoSProfile
+from rclpy.subscription import Subscription
 from sensor_msgs.msg import PointCloud2
 
-from ..checks import pose_fault, shown
-from ..pairing import PAIRINGS
-from ..solver import MODELS, ContactSolver, soup_divisions
-from .messages import (
-    StampedPose,
-    header_fault,
-    make_cloud,
-    make_header,
-    make_normal,
-    make_point,
-    read_pose,
+from ..checks import shown, size_fault
+from ..pairing import PAIRINGS, StampedPose, Tick
+from ..scene import Pair, Scene, SceneSolver, two_boxes
+from ..scene_file import read_scene
+from ..solver import MODELS, soup_divisions
+from .diagnostics import DIAGNOSTICS_SECONDS, Diagnostics
+from .messages import Refused, TypedMessages
+from .parameters import (
+    Setting,
+    answer_help,
+    checked,
+    declare,
+    flag,
+    number,
+    numbers,
+    one_of,
+    text,
 )
-from .parameters import Setting, answer_help, checked, declare, numbers, one_of, text
 from .runtime import CONTACT_QOS, LOG_SECONDS, POSE_QOS, run_node
+from .wire import RawMessages
+
+SERIALIZATIONS = {'raw': RawMessages, 'typed': TypedMessages}
+"""Values of the node parameter `serialization`."""
 
 
 def model_name(name: str, value: Any) -> str:
@@ -41,25 +58,51 @@ def model_name(name: str, value: Any) -> str:
     return value if soup_divisions(text(name, value)) else one_of(MODELS)(name, value)
 
 
+def extents(name: str, value: Any) -> tuple[float, ...]:
+    """Three full extents [m]."""
+    size = numbers(3)(name, value)
+    fault = size_fault(size)
+    if fault:
+        raise ValueError(f'{name} {fault}')
+    return size
+
+
 CONTAINER = (12.192, 2.438, 2.591)  # ISO 40 ft [m]
+LONGEST = 1e6  # s, about twelve days
 PARAMETERS = {
-    'size_a': Setting(CONTAINER, 'full extents of box A, three numbers > 0 [m]', numbers(3)),
-    'size_b': Setting(CONTAINER, 'full extents of box B, three numbers > 0 [m]', numbers(3)),
+    'size_a': Setting(CONTAINER, 'full extents of box A, three numbers > 0 [m]', extents),
+    'size_b': Setting(CONTAINER, 'full extents of box B, three numbers > 0 [m]', extents),
+    'scene': Setting('', 'scene file (or the scene itself, as text) with boxes and pairs; replaces '
+                         'size_a and size_b; set again, it is read again', text),
     'model': Setting('committee', f'how the contact point is found: {", ".join(MODELS)}',
                      model_name),
     'weights': Setting('', 'weights file to use in place of the shipped one', text),
     'pairing': Setting('stamp', 'stamp: answer once, when poses of equal stamp are in; latest: '
-                                "answer every pose with the other box's last", one_of(PAIRINGS)),
+                                "answer every pose with the other boxes' last", one_of(PAIRINGS)),
+    'tolerance': Setting(0.0, 'with pairing stamp: stamps this far apart still belong together [s]',
+                         number(0.0, LONGEST)),
+    'max_age': Setting(1.0, 'a pose further than this from the tick, by their stamps, is stale: '
+                            'its pairs are answered with NaN; 0: never [s]', number(0.0, LONGEST)),
+    'deadline': Setting(0.0, 'quality of service asked of pose publishers, who must offer as much: '
+                             'longest time between poses; 0: none [s]', number(0.0, LONGEST)),
+    'pair_topics': Setting(True, 'whether pairs have topics of their own beside the cloud', flag),
+    'serialization': Setting('raw', 'raw: read and write the bytes of messages; typed: message '
+                                    'objects, slower, the reference', one_of(SERIALIZATIONS)),
+    'autostart': Setting(True, 'whether the node configures and activates itself', flag),
 }
-PAIR = 0                  # id of the only pair
-UNMATCHED_SECONDS = 1.0   # poses without a partner for this long are worth a warning
+UNMATCHED_SECONDS = 1.0   # poses without an answer for this long are worth a warning
 
 
-class ContactNode(Node):
-    """Answers pairs of poses; every pose that is refused is counted and said, never answered.
+def nanoseconds(seconds: float) -> int:
+    """Whole nanoseconds."""
+    return round(1e9 * seconds)
+
+
+class ContactNode(LifecycleNode):
+    """Answers ticks of poses; every pose that is refused is counted and said, never answered.
 
     A node on another method derives from this one: it names itself, a prefix of its contact topics,
-    its parameters (with `size_a`, `size_b` and `pairing`), and makes the solver from them.
+    its parameters (all of these but `model` and `weights`), and makes the solver from them.
     """
 
     name: ClassVar[str] = 'contact_node'
@@ -67,138 +110,287 @@ class ContactNode(Node):
     parameters: ClassVar[Mapping[str, Setting]] = PARAMETERS
 
     def __init__(self, context: Context, **options: Any) -> None:
+        """Raises ValueError where parameters do not go together."""
         super().__init__(self.name, context=context, **options)
-        self._settings: dict[str, Any] = {}
-        self._apply(declare(self, self.parameters))
-        self.add_on_set_parameters_callback(self._set_parameters)
         self.counts: Counter[str] = Counter()
-        self._reported: Counter[str] = Counter()  # the counts of the last report
-        self._waiting_since: float | None = None
-        self._compute: list[float] = []
-        self._point, self._normal, self._contacts = (
-            self.create_publisher(kind, f'{self.prefix}{topic}', CONTACT_QOS)
-            for kind, topic in ((PointStamped, 'contact/point'),
-                                (Vector3Stamped, 'contact/normal'), (PointCloud2, 'contacts')))
-        self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
-        self.create_timer(1.0, self._report)
+        self._settings = declare(self, self.parameters)
+        self._solver: SceneSolver | None = None
+        self._subscriptions_of: dict[str, Subscription] = {}
+        self._publishers_of: dict[Pair, tuple[Publisher, Publisher]] = {}
+        self._ids: dict[int, Pair] = {}
+        self._fault: Exception | None = None
+        self._health = Diagnostics(self)
+        self.add_on_set_parameters_callback(self._set_parameters)
+        # On a clock of its own: simulated time may stand still.
+        self.create_timer(DIAGNOSTICS_SECONDS, self._report, clock=Clock(
+            clock_type=ClockType.STEADY_TIME))
+        self._jumps = self.get_clock().create_jump_callback(
+            JumpThreshold(min_forward=None, min_backward=Duration(nanoseconds=-1),
+                          on_clock_change=True), post_callback=self._clock_jumped)
+        if self._settings['autostart']:
+            for transition in (self.trigger_configure, self.trigger_activate):
+                if transition() != TransitionCallbackReturn.SUCCESS:
+                    raise self._fault or ValueError('the node did not start')
+
+    # --- lifecycle -------------------------------------------------------------------------------
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Read the scene, load and check weights, compile or load the kernels."""
+        return self._attempt(lambda: self._apply(self._settings))
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Start answering."""
+        return self._attempt(self._activate)
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Stop answering: poses are not listened to."""
+        self._unsubscribe(list(self._subscriptions_of))
+        self._pairing.reset()
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Let go of solver and topics."""
+        self._unpublish(list(self._publishers_of))
+        self.destroy_publisher(self._contacts)
+        self._solver = None
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Stop for good."""
+        self._unsubscribe(list(self._subscriptions_of))
+        return TransitionCallbackReturn.SUCCESS
+
+    def _attempt(self, action: Callable[[], None]) -> TransitionCallbackReturn:
+        self._fault = None
+        try:
+            action()
+        except (ValueError, ImportError) as error:  # a model's library may be missing
+            self._fault = error
+            if not self._settings['autostart']:
+                self.get_logger().error(str(error))
+            return TransitionCallbackReturn.FAILURE
+        return TransitionCallbackReturn.SUCCESS
+
+    def _activate(self) -> None:
         # Whatever start-up made stays for good: keep it out of later collections.
         gc.collect()
         gc.freeze()
-        for box, topic in enumerate(('box_a/pose', 'box_b/pose')):
-            self.create_subscription(PoseStamped, topic, self._pose_callback(box), POSE_QOS)
+        self._subscribe()
+        settings, scene = self._settings, self._solver.scene
         self.get_logger().info(
-            f'ready: model {self._solver.model!r}, pairing {self._settings["pairing"]!r}')
+            f'ready: model {self._solver.model!r}, pairing {settings["pairing"]!r}, '
+            f'{len(scene.pairs)} {"pair" if len(scene.pairs) == 1 else "pairs"}')
+
+    # --- parameters ------------------------------------------------------------------------------
 
     @staticmethod
-    def make_solver(settings: Mapping[str, Any]) -> ContactSolver:
+    def make_solver(settings: Mapping[str, Any], scene: Scene) -> SceneSolver:
         """The solver that checked parameters ask for; ValueError if there is none."""
-        return ContactSolver(settings['size_a'], settings['size_b'], model=settings['model'],
-                             weights=settings['weights'] or None)
-
-    def _now(self) -> float:
-        return self.get_clock().now().nanoseconds * 1e-9
+        return SceneSolver(scene, model=settings['model'], weights=settings['weights'] or None)
 
     def _set_parameters(self, parameters: list[Parameter]) -> SetParametersResult:
         changes = {p.name: p.value for p in parameters if p.name in self.parameters}
         try:
-            self._apply(checked(self.parameters, {**self._settings, **changes}))
-        except (ValueError, ImportError) as error:  # a model's library may be missing
+            settings = checked(self.parameters, {**self._settings, **changes})
+            # A scene that is set again may be another one by now.
+            if self._solver is not None and (settings != self._settings or 'scene' in changes):
+                self._apply(settings)
+            self._settings = settings
+        except (ValueError, ImportError) as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
 
     def _apply(self, settings: dict[str, Any]) -> None:
-        """Take settings over as a whole, or raise ValueError and keep the old."""
-        if settings == self._settings:
-            return
-        solver = self.make_solver(settings)
-        # Compiles, or loads, the kernels before they are needed. Only a corner overlaps: where
-        # faces coincide, a soup takes seconds.
-        corner = 0.49 * np.add(settings['size_a'], settings['size_b'])
-        solver(np.eye(7)[6], np.array((*corner, 0, 0, 0, 1)))
-        if settings['pairing'] != self._settings.get('pairing'):
-            self._pairing = PAIRINGS[settings['pairing']]()
-        self._solver, self._settings = solver, settings
+        """Take settings over as a whole, or raise ValueError and keep the old.
 
-    def _pose_callback(self, box: int) -> Any:
-        def callback(message: PoseStamped) -> None:
+        Boxes that stay keep their subscriptions and the poses that wait.
+        """
+        scene = (read_scene(settings['scene']) if settings['scene']
+                 else two_boxes(settings['size_a'], settings['size_b']))
+        self._check_ids(scene)
+        solver = self.make_solver(settings, scene)
+        running, old = self._solver is not None, self._settings
+        if self._solver is not None:
+            self.counts['outside the trained range'] += self._solver.exact_answers
+        times = {'tolerance': nanoseconds(settings['tolerance']),
+                 'max_age': nanoseconds(settings['max_age'])}
+        if running and settings['pairing'] == old['pairing']:
+            self._pairing.set_scene(scene)
+            self._pairing.tolerance, self._pairing.max_age = times.values()
+        else:
+            if running:
+                self.counts.update(self._pairing.counts)
+            self._pairing = PAIRINGS[settings['pairing']](scene, **times)
+        subscribed = bool(self._subscriptions_of)
+        if not running or settings['serialization'] != old['serialization']:
+            self._messages = SERIALIZATIONS[settings['serialization']]()
+        kept = running and all(
+            settings[name] == old[name] for name in ('serialization', 'deadline'))
+        self._unsubscribe([
+            box for box in self._subscriptions_of if not kept or box not in scene.moving
+            or scene.boxes[box].pose_topic != self._solver.scene.boxes[box].pose_topic])
+        self._solver, self._settings = solver, settings
+        self._ids |= {pair.id: pair for pair in scene.pairs if pair.name}
+        self._publish(running)
+        if subscribed:
+            self._subscribe()
+
+    def _check_ids(self, scene: Scene) -> None:
+        for pair in scene.pairs:
+            before = self._ids.get(pair.id, pair)
+            if pair.name and pair != before:
+                raise ValueError(f'scene: id {pair.id} of pair {pair.name} was given to '
+                                 f'{before.name} ({before.a}, {before.b}) before: ids are never '
+                                 f'used again while a node runs')
+
+    # --- topics ----------------------------------------------------------------------------------
+
+    def _publish(self, running: bool) -> None:
+        """Publishers of the scene's pairs, and none else."""
+        if not running:
+            self._contacts = self.create_publisher(
+                PointCloud2, f'{self.prefix}contacts', CONTACT_QOS)
+        wanted = self._solver.scene.pairs if self._settings['pair_topics'] else ()
+        self._unpublish([pair for pair in self._publishers_of if pair not in set(wanted)])
+        for pair in wanted:
+            if pair not in self._publishers_of:
+                topic = f'{self.prefix}{pair.name}{"/" if pair.name else ""}contact'
+                self._publishers_of[pair] = (
+                    self.create_publisher(PointStamped, f'{topic}/point', CONTACT_QOS),
+                    self.create_publisher(Vector3Stamped, f'{topic}/normal', CONTACT_QOS))
+
+    def _unpublish(self, pairs: Sequence[Pair]) -> None:
+        for pair in pairs:
+            for publisher in self._publishers_of.pop(pair):
+                self.destroy_publisher(publisher)
+
+    def _subscribe(self) -> None:
+        """Listen to the scene's moving boxes that are not listened to."""
+        deadline = self._settings['deadline']
+        qos = QoSProfile(depth=POSE_QOS.depth, reliability=POSE_QOS.reliability,
+                         **({'deadline': Duration(seconds=deadline)} if deadline else {}))
+        for box in self._solver.scene.moving:
+            if box in self._subscriptions_of:
+                continue
+            topic = self._solver.scene.boxes[box].pose_topic
+            events: dict[str, Any] = {'liveliness': self._on_liveliness(box),
+                                      'message_lost': self._on_lost}
+            if deadline:
+                events['deadline'] = self._on_deadline(box)
+            arguments = (PoseStamped, topic, self._pose_callback(box, topic), qos)
+            try:
+                subscription = self.create_subscription(
+                    *arguments, raw=self._messages.raw,
+                    event_callbacks=SubscriptionEventCallbacks(**events))
+            except UnsupportedEventTypeError:  # depends on the middleware
+                subscription = self.create_subscription(*arguments, raw=self._messages.raw)
+            self._subscriptions_of[box] = subscription
+
+    def _unsubscribe(self, boxes: Sequence[str]) -> None:
+        for box in boxes:
+            self.destroy_subscription(self._subscriptions_of.pop(box))
+
+    def _on_deadline(self, box: str) -> Callable[[Any], None]:
+        def callback(event: Any) -> None:
+            self.counts['deadlines missed'] += event.total_count_change
+            self.get_logger().warning(f'{box}: no pose within the deadline',
+                                      throttle_duration_sec=LOG_SECONDS)
+        return callback
+
+    def _on_liveliness(self, box: str) -> Callable[[Any], None]:
+        def callback(event: Any) -> None:
+            gone = max(0, -event.alive_count_change)
+            self.counts['publishers gone'] += gone
+            if gone:
+                self.get_logger().warning(f'{box}: a publisher of its poses is gone, '
+                                          f'{event.alive_count} left')
+        return callback
+
+    def _on_lost(self, event: Any) -> None:
+        self.counts['lost in transport'] += event.total_count_change
+
+    def _clock_jumped(self, _: Any) -> None:
+        if self._solver is not None:
+            self.counts['time went back'] += 1
+            self._pairing.reset()
+
+    # --- poses -----------------------------------------------------------------------------------
+
+    def _pose_callback(self, box: str, topic: str) -> Callable[[Any], None]:
+        def callback(message: Any) -> None:
             try:
                 self._take(box, message)
+            except Refused as refused:
+                self._refuse(refused.reason, f'{topic}: {refused}')
             except Exception as error:  # a callback must not end the node, whatever happens
                 self._refuse('internal error', f'{type(error).__name__}: {error}')
         return callback
 
-    def _take(self, box: int, message: PoseStamped) -> None:
+    def _take(self, box: str, message: Any) -> None:
         self.counts['poses'] += 1
-        fault = header_fault(message.header)
-        if fault:
-            self._refuse('bad header', f'box_{"ab"[box]}/pose: {fault}')
-            return
-        pose = read_pose(message)
-        fault = pose_fault(pose.numbers)
-        if fault:
-            self._refuse('bad pose', f'box_{"ab"[box]}/pose: {fault}')
-            return
-        if self._waiting_since is None:
-            self._waiting_since = self._now()
-        pair = self._pairing.add(box, pose.stamp, pose)
-        if pair is None:
-            return
-        a, b = pair
-        self._waiting_since = None
-        if a.frame_id != b.frame_id:
-            self._refuse('frame_id differs',
-                         f'box_a/pose is in frame {shown(a.frame_id)}, box_b/pose in '
-                         f'{shown(b.frame_id)}')
-            return
-        self._answer(a, b)
+        pose = self._messages.read_pose(message)
+        tick = self._pairing.add(box, pose)
+        if tick is not None:
+            self._answer(tick)
 
-    def _answer(self, a: StampedPose, b: StampedPose) -> None:
-        started = self.get_clock().now().nanoseconds
-        contact = self._solver(a.numbers, b.numbers)
-        self._compute.append((self.get_clock().now().nanoseconds - started) * 1e-3)
-        header = make_header(max(a.stamp, b.stamp), a.frame_id)
-        if contact.colliding:
-            self._point.publish(make_point(header, contact))
-            self._normal.publish(make_normal(header, contact))
-            self.counts['contacts'] += 1
-        self._contacts.publish(make_cloud(header, [(PAIR, contact)]))
+    def _answer(self, tick: Tick) -> None:
+        stamp, frame_id = self._header_of(tick)
+        started = time.perf_counter_ns()
+        answer = self._solver([pose and pose.numbers for pose in tick])
+        self._health.computed(time.perf_counter_ns() - started,
+                              evaluated=len(answer.stale) < len(self._solver.scene.pairs))
+        messages = self._messages
+        messages.begin(stamp, frame_id)
+        for pair, contact in answer.touching:
+            publishers = self._publishers_of.get(pair)
+            if publishers is not None:
+                publishers[0].publish(messages.point(contact))
+                publishers[1].publish(messages.normal(contact))
+        self._contacts.publish(messages.cloud(answer))
+        self.counts['contacts'] += len(answer.touching)
         self.counts['evaluations'] += 1
+        self.counts['stale pairs'] += len(answer.stale)
+
+    def _header_of(self, tick: Tick) -> tuple[int, str]:
+        """The newest stamp [ns] of a tick and its frame; raises Refused if frames differ."""
+        first: StampedPose | None = None
+        stamp = None
+        wanted = self._solver.scene.frame_id
+        for box, pose in zip(self._solver.scene.moving, tick):
+            if pose is None:
+                continue
+            if first is None:
+                first, of_first, stamp = pose, box, pose.stamp
+                if wanted and pose.frame_id != wanted:
+                    raise Refused('frame_id differs', f'{box} is in frame {shown(pose.frame_id)}, '
+                                                      f'the scene in {shown(wanted)}')
+            elif pose.frame_id != first.frame_id:
+                raise Refused('frame_id differs',
+                              f'{of_first} is in frame {shown(first.frame_id)}, {box} in '
+                              f'{shown(pose.frame_id)}')
+            stamp = max(stamp, pose.stamp)
+        return stamp, first.frame_id
 
     def _refuse(self, reason: str, text: str) -> None:
         self.counts[f'refused: {reason}'] += 1
         self.get_logger().warning(f'{text}; refused', throttle_duration_sec=LOG_SECONDS)
 
+    # --- diagnostics -----------------------------------------------------------------------------
+
     def _report(self) -> None:
         """Once a second: say what happened since the last time."""
-        arrived = self.counts['poses'] - self._reported['poses']
-        waiting = arrived > 0 and self._waiting_since is not None and (
-            self._now() - self._waiting_since > UNMATCHED_SECONDS)
-        if waiting:
+        if self._solver is None:
+            self._health.publish(self.counts, 0, ())
+            return
+        counts = self.counts + self._pairing.counts
+        counts['outside the trained range'] += self._solver.exact_answers
+        unanswered = self._health.publish(counts, len(self._solver.scene.pairs),
+                                          self._pairing.stale())
+        if unanswered > UNMATCHED_SECONDS:
             self.get_logger().warning(
                 f'poses arrive, but none could be answered for {UNMATCHED_SECONDS:g} s (pairing '
-                f'{self._settings["pairing"]!r}: do the stamps of both boxes agree?)',
+                f'{self._settings["pairing"]!r}: do the stamps of all boxes agree?)',
                 throttle_duration_sec=LOG_SECONDS)
-        compute, self._compute = self._compute, []
-        values = dict(self.counts)
-        values['dropped: no partner'] = self._pairing.dropped
-        values['rate [1/s]'] = len(compute)
-        if compute:
-            values |= {f'compute {name} [us]': f'{value:.1f}' for name, value in zip(
-                ('p50', 'p99', 'max'), np.percentile(compute, (50, 99, 100)))}
-        refused = sum(count - self._reported[name] for name, count in self.counts.items()
-                      if name.startswith('refused'))
-        self._reported = Counter(self.counts)
-        level, message = DiagnosticStatus.OK, 'answering' if compute else 'no poses'
-        if refused:
-            level, message = DiagnosticStatus.WARN, 'poses refused'
-        elif waiting:
-            level, message = DiagnosticStatus.WARN, 'poses without a partner'
-        status = DiagnosticStatus(
-            level=level, name=f'{self.get_fully_qualified_name()}: contacts', message=message,
-            hardware_id='none',
-            values=[KeyValue(key=key, value=str(value)) for key, value in values.items()])
-        header = make_header(self.get_clock().now().nanoseconds, '')
-        self._diagnostics.publish(DiagnosticArray(header=header, status=[status]))
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -19,7 +19,7 @@ from rclpy.context import Context
 from rclpy.node import Node
 from std_msgs.msg import Header
 
-from ..pairing import StampPairing
+from ..pairing import WAITING_TICKS
 from .messages import NANOSECONDS
 from .runtime import CONTACT_QOS, POSE_QOS, run_node
 
@@ -45,7 +45,7 @@ class EchoNode(Node):
 
     def __init__(self, context: Context, **options: Any) -> None:
         super().__init__('echo_node', context=context, **options)
-        self._pairing: StampPairing[bool] = StampPairing()
+        self._waiting: dict[int, int] = {}  # box by stamp, oldest first
         self._echo = self.create_publisher(Header, 'echo', CONTACT_QOS)
         gc.collect()
         gc.freeze()
@@ -55,10 +55,16 @@ class EchoNode(Node):
         self.get_logger().info('ready')
 
     def _pose_callback(self, box: int) -> Callable[[bytes], None]:
+        waiting = self._waiting
+
         def callback(data: bytes) -> None:
             stamp = raw_stamp(data)
-            if self._pairing.add(box, stamp, True):
+            if waiting.pop(stamp, box) != box:
                 self._echo.publish(raw_header(stamp))
+                return
+            waiting[stamp] = box
+            if len(waiting) > WAITING_TICKS:
+                del waiting[next(iter(waiting))]
         return callback
 
 

@@ -1,8 +1,11 @@
-"""Between messages and numbers: poses in; point, normal and the contacts cloud out."""
+"""Between messages and numbers: poses in; point, normal and the contacts cloud out.
+
+`TypedMessages` is the plain way, through rclpy's message objects; `wire.RawMessages` does the same
+with bytes, faster. Both answer alike, which a test compares.
+"""
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from builtin_interfaces.msg import Time
@@ -10,45 +13,43 @@ from geometry_msgs.msg import PointStamped, PoseStamped, Vector3Stamped
 from sensor_msgs.msg import PointCloud2, PointField
 from std_msgs.msg import Header
 
-from ..checks import shown
+from ..checks import pose_fault, shown
 from ..contact import Contact
+from ..pairing import StampedPose
+from ..scene import Answer
 
 NANOSECONDS = 1_000_000_000
 
 CLOUD_ROW = np.dtype([(name, '<f8') for name in (
     'x', 'y', 'z', 'normal_x', 'normal_y', 'normal_z', 'depth')] + [('pair', '<u4')])
-"""One row of the `contacts` cloud: a pair in contact. float64, because float32 loses half a metre
-in UTM coordinates; depth = −separation [m]."""
+"""One row of the `contacts` cloud: a pair in contact, or, all NaN but for its id, one that could
+not be evaluated. float64, because float32 loses half a metre in UTM coordinates; depth [m] is
+−separation."""
 _FIELDS = [
     PointField(name=name, offset=CLOUD_ROW.fields[name][1], count=1,
                datatype=PointField.UINT32 if name == 'pair' else PointField.FLOAT64)
     for name in CLOUD_ROW.names]
+_NAN = (float('nan'),) * 7
 
 
-@dataclass(frozen=True)
-class StampedPose:
-    """A pose as it came: 7 numbers `x y z qx qy qz qw`, frame and stamp [ns]."""
+class Refused(ValueError):
+    """A message that is not taken; `reason` is what it is counted as."""
 
-    numbers: np.ndarray
-    frame_id: str
-    stamp: int
-
-
-def header_fault(header: Header) -> str | None:
-    """Why an answer cannot carry this stamp and frame as they came, or None."""
-    if header.stamp.nanosec >= NANOSECONDS:
-        return f'stamp has {header.stamp.nanosec} nanoseconds, a second or more'
-    if '\N{REPLACEMENT CHARACTER}' in header.frame_id:  # rclpy's word for bytes it cannot decode
-        return f'frame_id {shown(header.frame_id)} is not UTF-8'
-    return None
+    def __init__(self, reason: str, text: str) -> None:
+        super().__init__(text)
+        self.reason = reason
 
 
-def read_pose(message: PoseStamped) -> StampedPose:
-    """The numbers of a message, unchecked."""
-    p, q = message.pose.position, message.pose.orientation
-    stamp = message.header.stamp
-    return StampedPose(np.array((p.x, p.y, p.z, q.x, q.y, q.z, q.w)), message.header.frame_id,
-                       stamp.sec * NANOSECONDS + stamp.nanosec)
+def checked_pose(numbers: Sequence[float], frame_id: str, sec: int, nanosec: int) -> StampedPose:
+    """A pose that can be answered; raises Refused for any other."""
+    if nanosec >= NANOSECONDS:
+        raise Refused('bad header', f'stamp has {nanosec} nanoseconds, a second or more')
+    if '\N{REPLACEMENT CHARACTER}' in frame_id:  # rclpy's word for bytes it cannot decode
+        raise Refused('bad header', f'frame_id {shown(frame_id)} is not UTF-8')
+    fault = pose_fault(numbers)
+    if fault:
+        raise Refused('bad pose', fault)
+    return StampedPose(np.array(numbers), frame_id, sec * NANOSECONDS + nanosec)
 
 
 def make_header(stamp: int, frame_id: str) -> Header:
@@ -73,16 +74,49 @@ def make_normal(header: Header, contact: Contact) -> Vector3Stamped:
     return message
 
 
-def make_cloud(header: Header, rows: Sequence[tuple[int, Contact]]) -> PointCloud2:
-    """`contacts`: a row for each (pair id, contact) that collides; none says 'no contact'."""
-    touching = [(*c.point, *c.normal, -c.separation, pair) for pair, c in rows if c.colliding]
-    data = np.array(touching, dtype=CLOUD_ROW)
-    return PointCloud2(header=header, height=1, width=len(touching), fields=_FIELDS,
+def make_cloud(header: Header, answer: Answer) -> PointCloud2:
+    """`contacts`: a row for each pair in contact, a row of NaN for each that is stale.
+
+    No row says 'no contact'.
+    """
+    rows = [(*c.point, *c.normal, -c.separation, pair.id) for pair, c in answer.touching]
+    rows += [(*_NAN, pair.id) for pair in answer.stale]
+    return PointCloud2(header=header, height=1, width=len(rows), fields=_FIELDS,
                        is_bigendian=False, point_step=CLOUD_ROW.itemsize,
-                       row_step=CLOUD_ROW.itemsize * len(touching), data=data.tobytes(),
-                       is_dense=True)
+                       row_step=CLOUD_ROW.itemsize * len(rows),
+                       data=np.array(rows, dtype=CLOUD_ROW).tobytes(),
+                       is_dense=not answer.stale)
 
 
 def read_cloud(message: PointCloud2) -> np.ndarray:
     """Rows of a `contacts` cloud as a structured array of CLOUD_ROW."""
     return np.frombuffer(bytes(message.data), dtype=CLOUD_ROW)
+
+
+class TypedMessages:
+    """The reference: messages as rclpy's objects."""
+
+    raw = False
+    """Whether subscriptions hand over bytes."""
+
+    def read_pose(self, message: PoseStamped) -> StampedPose:
+        """The pose of a message; raises Refused."""
+        p, q, header = message.pose.position, message.pose.orientation, message.header
+        return checked_pose((p.x, p.y, p.z, q.x, q.y, q.z, q.w), header.frame_id,
+                            header.stamp.sec, header.stamp.nanosec)
+
+    def begin(self, stamp: int, frame_id: str) -> None:
+        """What follows carries this stamp [ns] and frame."""
+        self._header = make_header(stamp, frame_id)
+
+    def point(self, contact: Contact) -> PointStamped:
+        """`contact/point`."""
+        return make_point(self._header, contact)
+
+    def normal(self, contact: Contact) -> Vector3Stamped:
+        """`contact/normal`."""
+        return make_normal(self._header, contact)
+
+    def cloud(self, answer: Answer) -> PointCloud2:
+        """`contacts`."""
+        return make_cloud(self._header, answer)

@@ -20,8 +20,9 @@ except ImportError:  # rclpy before 7.1.4
 
 REFUSALS = (ValueError, rclpy.exceptions.ParameterException, rclpy_implementation.RCLError)
 """What a node raises on parameters or arguments that it cannot start with."""
-POSE_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
-"""Pose inputs: best effort matches every publisher; the depth bridges 100 ms at 1 kHz."""
+POSE_QOS = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
+"""Pose inputs: best effort matches every publisher; the depth bridges a second at 1 kHz, in which a
+scene of a thousand pairs can be read."""
 CONTACT_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 """Contact outputs."""
 SPIN_SECONDS = 1.0

@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..solver import MOST_SOUP_DIVISIONS, SOUP_DIVISIONS, ContactSolver
+from ..scene import Scene, SceneSolver
+from ..solver import MOST_SOUP_DIVISIONS, SOUP_DIVISIONS
 from .contact import PARAMETERS as CONTACT_PARAMETERS
 from .contact import ContactNode
 from .parameters import Check, Setting, answer_help
@@ -26,13 +27,11 @@ def whole_number(low: int, high: int) -> Check:
 
 
 PARAMETERS = {
-    'size_a': CONTACT_PARAMETERS['size_a'],
-    'size_b': CONTACT_PARAMETERS['size_b'],
     'divisions': Setting(
         SOUP_DIVISIONS, f'squares along each edge of a face, 1 to {MOST_SOUP_DIVISIONS}; '
         'N make 12 N² triangles a box', whole_number(1, MOST_SOUP_DIVISIONS)),
-    'pairing': CONTACT_PARAMETERS['pairing'],
-}
+} | {name: setting for name, setting in CONTACT_PARAMETERS.items()
+     if name not in ('model', 'weights')}
 
 
 class SoupNode(ContactNode):
@@ -43,10 +42,9 @@ class SoupNode(ContactNode):
     parameters = PARAMETERS
 
     @staticmethod
-    def make_solver(settings: Mapping[str, Any]) -> ContactSolver:
+    def make_solver(settings: Mapping[str, Any], scene: Scene) -> SceneSolver:
         """A soup of so many divisions."""
-        return ContactSolver(settings['size_a'], settings['size_b'],
-                             model=f'soup-{settings["divisions"]}')
+        return SceneSolver(scene, model=f'soup-{settings["divisions"]}')
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -1,0 +1,163 @@
+"""Messages as the bytes that are sent (CDR), without message objects: `RawMessages`.
+
+A pose has a strict layout, and any bytes that do not are refused. Answers are patched together from
+what rclpy itself serialises once for each frame_id, so nothing here knows the layout of a cloud's
+constant parts.
+"""
+from __future__ import annotations
+
+import struct
+from typing import NamedTuple
+
+import numpy as np
+from rclpy.serialization import serialize_message
+
+from ..contact import Contact
+from ..pairing import StampedPose
+from ..pose import LENGTH_MAX, QUATERNION_MAX, QUATERNION_MIN
+from ..scene import Answer
+from .messages import (
+    CLOUD_ROW,
+    NANOSECONDS,
+    Refused,
+    checked_pose,
+    make_cloud,
+    make_header,
+    make_normal,
+    make_point,
+)
+
+ENCAPSULATION = 4
+"""Bytes before the body: 0, then 1 for little endian or 0 for big, then two that say nothing."""
+LITTLE = b'\0\1'
+_STAMP = struct.Struct('<iI')
+_POSE = struct.Struct('<7d')
+_ROW_END = struct.Struct('<dI')  # depth, pair
+_SIZES = struct.Struct('<II')
+FRAME_AT = ENCAPSULATION + _STAMP.size + 4
+"""Where frame_id's characters are: behind stamp and length."""
+KEPT_FRAMES = 64
+"""Frames whose layouts are kept; whoever sends more than these costs time, not memory."""
+_NAN_ROW = np.full(7, np.nan).tobytes()
+_NOTHING = Contact(False, 0.0, np.zeros(3), np.zeros(3))
+
+
+class _Answers(NamedTuple):
+    """What the answers in a frame have in common, between the bytes that change."""
+
+    head: bytes
+    point: bytes
+    normal: bytes
+    cloud_header: bytes
+    cloud_fields: bytes
+
+
+def numbers_at(length: int) -> int:
+    """Where the seven numbers are, behind a frame_id of so many bytes: doubles are aligned to 8."""
+    return ENCAPSULATION + -(-(FRAME_AT - ENCAPSULATION + length) // 8) * 8
+
+
+def parse_pose(data: bytes) -> tuple[tuple[float, ...], str, int, int]:
+    """Numbers, frame_id, seconds and nanoseconds of a serialised PoseStamped; raises Refused."""
+    if len(data) < FRAME_AT or data[0] != 0 or data[1] > 1:
+        raise Refused('not a PoseStamped', f'{len(data)} bytes that are no plain CDR message')
+    order = '<' if data[1] else '>'
+    sec, nanosec, length = struct.unpack_from(f'{order}iII', data, ENCAPSULATION)
+    at = numbers_at(length)
+    if len(data) != at + _POSE.size:
+        raise Refused('not a PoseStamped',
+                      f'{len(data)} bytes, where a frame_id of {length} needs {at + _POSE.size}')
+    frame = data[FRAME_AT:FRAME_AT + length]
+    if length and frame.find(b'\0') != length - 1:
+        raise Refused('not a PoseStamped', 'frame_id does not end with its first zero')
+    try:
+        frame_id = frame[:-1].decode('utf-8')
+    except UnicodeDecodeError:
+        raise Refused('bad header', f'frame_id {frame[:-1][:100]!r} is not UTF-8') from None
+    return struct.unpack_from(f'{order}7d', data, at), frame_id, sec, nanosec
+
+
+class RawMessages:
+    """The fast way. A reader for all boxes: its shortcut knows the frame of the last pose."""
+
+    raw = True
+    """Whether subscriptions hand over bytes."""
+
+    def __init__(self) -> None:
+        self._frame, self._frame_id = b'', ''
+        self._at = self._length = -1
+        self._answers: dict[str, _Answers] = {}
+
+    def read_pose(self, data: bytes) -> StampedPose:
+        """The pose of a serialised message; raises Refused."""
+        if (len(data) != self._length or data[:2] != LITTLE
+                or data[FRAME_AT - 4:FRAME_AT - 4 + len(self._frame)] != self._frame):
+            return self._read_slowly(data)
+        sec, nanosec = _STAMP.unpack_from(data, ENCAPSULATION)
+        numbers = _POSE.unpack_from(data, self._at)
+        x, y, z, qx, qy, qz, qw = numbers
+        # What is certainly good passes here (NaN fails every comparison); the rest is looked at.
+        if (nanosec < NANOSECONDS and -LENGTH_MAX < x < LENGTH_MAX
+                and -LENGTH_MAX < y < LENGTH_MAX and -LENGTH_MAX < z < LENGTH_MAX
+                and _LEAST < qx * qx + qy * qy + qz * qz + qw * qw < _MOST):
+            return StampedPose(np.array(numbers), self._frame_id, sec * NANOSECONDS + nanosec)
+        return checked_pose(numbers, self._frame_id, sec, nanosec)
+
+    def _read_slowly(self, data: bytes) -> StampedPose:
+        data = bytes(data)
+        numbers, frame_id, sec, nanosec = parse_pose(data)
+        pose = checked_pose(numbers, frame_id, sec, nanosec)
+        if data[:2] == LITTLE:
+            length = len(frame_id.encode()) + 1
+            if struct.unpack_from('<I', data, FRAME_AT - 4)[0] == length:  # not an empty one's 0
+                self._frame, self._frame_id = data[FRAME_AT - 4:FRAME_AT + length], frame_id
+                self._at, self._length = numbers_at(length), len(data)
+        return pose
+
+    def begin(self, stamp: int, frame_id: str) -> None:
+        """What follows carries this stamp [ns] and frame."""
+        answers = self._answers.get(frame_id)
+        if answers is None:
+            if len(self._answers) >= KEPT_FRAMES:
+                self._answers.clear()
+            answers = self._answers[frame_id] = _in_frame(frame_id)
+        self._in_frame = answers
+        self._stamp = answers.head + _STAMP.pack(*divmod(stamp, NANOSECONDS))
+
+    def point(self, contact: Contact) -> bytes:
+        """`contact/point`."""
+        return self._stamp + self._in_frame.point + contact.point.tobytes()
+
+    def normal(self, contact: Contact) -> bytes:
+        """`contact/normal`."""
+        return self._stamp + self._in_frame.normal + contact.normal.tobytes()
+
+    def cloud(self, answer: Answer) -> bytes:
+        """`contacts`."""
+        rows = b''.join([c.point.tobytes() + c.normal.tobytes() + _ROW_END.pack(-c.separation, p.id)
+                         for p, c in answer.touching])
+        if answer.stale:
+            rows += b''.join([_NAN_ROW + p.id.to_bytes(4, 'little') for p in answer.stale])
+        frame = self._in_frame
+        size = len(rows)
+        return b''.join((self._stamp, frame.cloud_header,
+                         (size // CLOUD_ROW.itemsize).to_bytes(4, 'little'), frame.cloud_fields,
+                         _SIZES.pack(size, size), rows, b'\0' if answer.stale else b'\1'))
+
+
+_LEAST, _MOST = QUATERNION_MIN * QUATERNION_MIN, QUATERNION_MAX * QUATERNION_MAX
+
+
+def _in_frame(frame_id: str) -> _Answers:
+    header = make_header(0, frame_id)
+    point = bytes(serialize_message(make_point(header, _NOTHING)))
+    normal = bytes(serialize_message(make_normal(header, _NOTHING)))
+    cloud = bytes(serialize_message(make_cloud(header, Answer([], [], 0))))
+    if point[:2] != LITTLE:
+        raise RuntimeError('rclpy does not serialise little-endian here: use serialization:=typed')
+    body = FRAME_AT - 4  # behind the stamp
+    frame_end = FRAME_AT + len(frame_id.encode()) + 1
+    width_at = -(-frame_end // 4) * 4 + 4  # height, width: aligned to 4, as the encapsulation is
+    # A cloud without rows ends with row_step, the number of bytes of data, and is_dense.
+    return _Answers(point[:ENCAPSULATION], point[body:-24], normal[body:-24],
+                    cloud[body:width_at], cloud[width_at + 4:-9])

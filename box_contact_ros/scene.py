@@ -1,0 +1,255 @@
+"""A scene: boxes, fixed or moving, the pairs of them that matter, and what one tick computes.
+
+Nothing outside the listed pairs is looked at. Of the listed ones, a cheap conservative test leaves
+those whose bounding boxes, along the axes of the common frame, come near each other; all of these
+go through the solver as one batch.
+"""
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from .checks import pose_fault, shown, size_fault
+from .contact import Contact
+from .jit import kernel
+from .pose import rotation_entries
+from .solver import ContactSolver
+
+NEAR = 1e-9
+"""Bounding boxes count as near up to a gap of this share of the largest coordinate or extent.
+
+Far above rounding (some 1e-15), far below what would cost time. It is conservative: boxes whose
+bounding boxes are a gap apart are that far apart themselves, and the largest gap on the SAT axes
+is never less than 1/√3 of the distance, so it exceeds the few ulp up to which boxes touch. (The
+facets' normals around a corner of the boxes' Minkowski difference are at right angles at most.)
+"""
+LARGEST_ID = 2**32 - 1
+"""Ids of pairs are uint32 in the cloud."""
+
+
+@dataclass(frozen=True)
+class Box:
+    """A box of the scene: fixed if it has a pose, else moving."""
+
+    name: str
+    size: tuple[float, float, float]
+    """Full extents [m]."""
+    pose: tuple[float, ...] | None = None
+    """`x y z qx qy qz qw` in the common frame, of a fixed box."""
+    pose_topic: str = ''
+    """Where a moving box's poses come from."""
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two boxes whose contact is asked for; the normal points from a to b."""
+
+    id: int
+    name: str
+    """Prefix of its topics; empty for a scene of two boxes without a file."""
+    a: str
+    b: str
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Boxes by name, and the pairs. Raises ValueError for anything that cannot be computed."""
+
+    boxes: Mapping[str, Box]
+    pairs: tuple[Pair, ...]
+    frame_id: str = ''
+    """The common frame that all poses must be in; empty: any, as long as it is the same."""
+
+    def __post_init__(self) -> None:
+        for place, reason in faults(self.boxes, self.pairs):
+            raise ValueError(f'{place}: {reason}')
+
+    @cached_property
+    def moving(self) -> tuple[str, ...]:
+        """Names of the moving boxes that occur in a pair, in the order of the boxes."""
+        listed = {name for pair in self.pairs for name in (pair.a, pair.b)}
+        return tuple(name for name, box in self.boxes.items()
+                     if box.pose is None and name in listed)
+
+
+def two_boxes(size_a: Sequence[float], size_b: Sequence[float]) -> Scene:
+    """The scene of one pair of moving boxes, box_a and box_b, of full extents [m]."""
+    boxes = {name: Box(name, tuple(map(float, size)), pose_topic=f'{name}/pose')
+             for name, size in (('box_a', size_a), ('box_b', size_b))}
+    return Scene(boxes, (Pair(0, '', 'box_a', 'box_b'),))
+
+
+def faults(boxes: Mapping[str, Box], pairs: Sequence[Pair]) -> Iterator[tuple[str, str]]:
+    """What is wrong with a scene, as (place, reason): `boxes.load.size` or `pairs[3].a`."""
+    for name, box in boxes.items():
+        fault = size_fault(box.size)
+        if fault:
+            yield f'boxes.{name}.size', fault
+        fault = box.pose and pose_fault(box.pose)
+        if fault:
+            yield f'boxes.{name}.pose', fault
+    if not pairs:
+        yield 'pairs', 'a scene needs at least one pair'
+    ids: dict[int, int] = {}
+    names: dict[str, int] = {}
+    couples: dict[frozenset[str], int] = {}
+    for number, pair in enumerate(pairs):
+        place = f'pairs[{number}]'
+        if not 0 <= pair.id <= LARGEST_ID:
+            yield f'{place}.id', f'{pair.id} is outside 0 to {LARGEST_ID}'
+        unknown = [side for side in ('a', 'b') if getattr(pair, side) not in boxes]
+        for side in unknown:
+            yield f'{place}.{side}', f'{shown(getattr(pair, side))} is none of the boxes'
+        if pair.a == pair.b:
+            yield f'{place}.b', f'{shown(pair.b)} is the same box as a'
+        elif not unknown and boxes[pair.a].pose and boxes[pair.b].pose:
+            yield place, f'{shown(pair.a)} and {shown(pair.b)} are both fixed'
+        for value, what, earlier in ((pair.id, 'id', ids), (pair.name, 'name', names),
+                                     (frozenset((pair.a, pair.b)), 'pair of boxes', couples)):
+            first = earlier.setdefault(value, number)
+            if first != number:
+                yield f'{place}.{what}' if what != 'pair of boxes' else place, (
+                    f'the same {what} as pairs[{first}]')
+
+
+class Answer(NamedTuple):
+    """What one tick found."""
+
+    touching: list[tuple[Pair, Contact]]
+    """The pairs in contact."""
+    stale: list[Pair]
+    """The pairs that could not be evaluated, because a box has no pose that is recent enough."""
+    near: int
+    """How many pairs the conservative test left to the solver."""
+
+
+@kernel
+def _bound(poses, half, boxes, low, high):
+    """Bounding boxes `low`, `high` (n, 3) [m], along the common frame's axes, of some boxes."""
+    for box in boxes:
+        r = rotation_entries(poses[box, 3], poses[box, 4], poses[box, 5], poses[box, 6])
+        for k in range(3):
+            reach = (abs(r[3 * k]) * half[box, 0] + abs(r[3 * k + 1]) * half[box, 1]) + abs(
+                r[3 * k + 2]) * half[box, 2]
+            low[box, k] = poses[box, k] - reach
+            high[box, k] = poses[box, k] + reach
+
+
+@kernel
+def _near_pairs(poses, half, moved, low, high, known, first, second, near, unknown):
+    """Numbers of the pairs that may touch to `near`, of those without poses to `unknown`.
+
+    Returns how many there are of each.
+    """
+    _bound(poses, half, moved, low, high)
+    count = 0
+    left_out = 0
+    for i in range(first.shape[0]):
+        a, b = first[i], second[i]
+        if not (known[a] and known[b]):
+            unknown[left_out] = i
+            left_out += 1
+            continue
+        gap = 0.0
+        scale = 0.0
+        for k in range(3):
+            gap = max(gap, max(low[a, k] - high[b, k], low[b, k] - high[a, k]))
+            scale = max(scale, max(max(abs(low[a, k]), abs(high[a, k])),
+                                   max(abs(low[b, k]), abs(high[b, k]))))
+            scale = max(scale, max(high[a, k] - low[a, k], high[b, k] - low[b, k]))
+        if gap <= NEAR * scale:
+            near[count] = i
+            count += 1
+    return count, left_out
+
+
+class SceneSolver:
+    """Contacts of all pairs of a scene, one tick at a time.
+
+    Raises ValueError for a model that does not go with one of the pairs' sizes. Keeps scratch
+    memory: use one per thread.
+    """
+
+    def __init__(self, scene: Scene, *, model: str = 'committee', weights: str | None = None,
+                 ) -> None:
+        self.scene = scene
+        self.model = model
+        numbers = {name: number for number, name in enumerate(scene.boxes)}
+        boxes = list(scene.boxes.values())
+        self._size = np.array([box.size for box in boxes])
+        self._half = 0.5 * self._size
+        self._first = np.array([numbers[pair.a] for pair in scene.pairs])
+        self._second = np.array([numbers[pair.b] for pair in scene.pairs])
+        self._moving = np.array([numbers[name] for name in scene.moving])
+        self._poses = np.array([box.pose or (0, 0, 0, 0, 0, 0, 1) for box in boxes], dtype=float)
+        self._known = np.array([box.pose is not None for box in boxes])
+        self._low, self._high = np.empty((2, len(boxes), 3))
+        # Fixed boxes are bounded here, once and for all.
+        _bound(self._poses, self._half, np.arange(len(boxes)), self._low, self._high)
+        self._near, self._unknown = np.empty((2, len(scene.pairs)), dtype=np.int64)
+        pair = scene.pairs[0]
+        self._solver = ContactSolver(scene.boxes[pair.a].size, scene.boxes[pair.b].size,
+                                     model=model, weights=weights)
+        # A single pair needs no test and no batch. Its sides: which of the poses, or a fixed one.
+        self._only = pair if len(scene.pairs) == 1 else None
+        self._sides = [(scene.moving.index(name), None) if name in scene.moving
+                       else (0, self._poses[numbers[name]]) for name in (pair.a, pair.b)]
+        self._warm_up()
+
+    @property
+    def exact_answers(self) -> int:
+        """Contacts so far that the model handed to `exact`: see `committee`."""
+        return self._solver.exact_answers - self._warm_up_answers
+
+    def _warm_up(self) -> None:
+        """Compile, or load, the kernels; let the model refuse sizes that it has no answer for.
+
+        Only a corner overlaps: where faces coincide, a soup takes seconds.
+        """
+        size_a, size_b = self._size[self._first], self._size[self._second]
+        _, first = np.unique(np.hstack((size_a, size_b)), axis=0, return_index=True)
+        a, b = np.zeros((2, len(first), 7))
+        a[:, 6] = b[:, 6] = 1.0
+        b[:, :3] = 0.49 * (size_a[first] + size_b[first])
+        self._solver.batch(a, b, size_a=size_a[first], size_b=size_b[first])
+        self._solver(a[0], b[0])
+        self([a[0]] * len(self.scene.moving))
+        self._warm_up_answers = self._solver.exact_answers
+
+    def __call__(self, poses: Sequence[np.ndarray | None]) -> Answer:
+        """One tick. poses: (7,) of each box of `scene.moving`, None where there is none.
+
+        Raises ValueError for numbers that are no pose.
+        """
+        if self._only is not None:
+            return self._one_pair(poses)
+        for number, pose in zip(self._moving, poses, strict=True):
+            self._known[number] = pose is not None
+            if pose is not None:
+                self._poses[number] = pose
+        count, left_out = _near_pairs(
+            self._poses, self._half, self._moving, self._low, self._high, self._known,
+            self._first, self._second, self._near, self._unknown)
+        pairs = self.scene.pairs
+        stale = [pairs[i] for i in self._unknown[:left_out]]
+        touching = []
+        if count:
+            near = self._near[:count]
+            first, second = self._first[near], self._second[near]
+            found = self._solver.batch(self._poses[first], self._poses[second],
+                                       size_a=self._size[first], size_b=self._size[second])
+            for row in np.flatnonzero(found.colliding):
+                touching.append((pairs[near[row]], Contact(
+                    True, float(found.separation[row]), found.normal[row], found.point[row])))
+        return Answer(touching, stale, int(count))
+
+    def _one_pair(self, poses: Sequence[np.ndarray | None]) -> Answer:
+        a, b = (poses[number] if fixed is None else fixed for number, fixed in self._sides)
+        if a is None or b is None:
+            return Answer([], [self._only], 0)
+        contact = self._solver(a, b)
+        return Answer([(self._only, contact)] if contact.colliding else [], [], 1)

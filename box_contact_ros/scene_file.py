@@ -1,0 +1,167 @@
+"""Scene files: YAML (or JSON, which is YAML) to a `Scene`; every refusal names line and field.
+
+The format is msg_schemas/scene.json. A file is data and nothing else: no tags, no anchors (a few
+lines of them expand to gigabytes), no key twice.
+"""
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from .checks import shown
+from .resources import resource_path
+from .scene import Box, Pair, Scene, faults
+
+LARGEST_FILE = 16 * 2**20
+"""Bytes that are read at most; some 100,000 pairs."""
+_Loader = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)  # in C where there is libyaml
+Path_ = tuple[Any, ...]
+
+
+class SceneError(ValueError):
+    """A scene that is refused: where, and why."""
+
+
+def read_scene(source: str) -> Scene:
+    """The scene of a file, or of a text that begins with `{` or has more than one line.
+
+    Raises SceneError, whose words name file, line and field.
+    """
+    if source.lstrip().startswith('{') or '\n' in source:
+        return parse_scene(source, 'scene')
+    path = Path(source)
+    try:
+        with path.open('rb') as file:
+            data = file.read(LARGEST_FILE + 1)
+        text = data.decode('utf-8')
+    except UnicodeDecodeError as error:
+        raise SceneError(f'{source}: not UTF-8 at byte {error.start}') from error
+    except (OSError, ValueError) as error:  # the latter: a NUL in the name
+        reason = getattr(error, 'strerror', None) or error
+        raise SceneError(f'scene {shown(source)} cannot be read: {reason}') from error
+    if len(data) > LARGEST_FILE:
+        raise SceneError(f'{source}: larger than {LARGEST_FILE} bytes')
+    return parse_scene(text, source)
+
+
+def parse_scene(text: str, name: str = 'scene') -> Scene:
+    """The scene that a text describes; `name` is how errors call it."""
+    lines: dict[Path_, int] = {}
+
+    def refusal(path: Path_, reason: str) -> SceneError:
+        line = next((lines[path[:n]] for n in range(len(path), -1, -1) if path[:n] in lines), 1)
+        return SceneError(f'{name}:{line}: {_dotted(path)}{": " if path else ""}{reason}')
+
+    try:
+        data = _plain(text, lines, refusal)
+    except yaml.YAMLError as error:
+        mark = getattr(error, 'problem_mark', None)
+        reason = getattr(error, 'problem', None) or str(error).replace('\n', ' ')
+        line = mark.line + 1 if mark else 1
+        raise SceneError(f'{name}:{line}: not YAML: {reason}') from error
+    except RecursionError:
+        raise SceneError(f'{name}: nested too deeply') from None
+    fault = _first_fault(data, lines)
+    if fault:
+        raise refusal(*fault)
+    boxes = {}
+    for key, box in data['boxes'].items():
+        topic = '' if 'pose' in box else box.get('pose_topic', f'{key}/pose')
+        try:
+            pose = tuple(map(float, box['pose'])) if 'pose' in box else None
+            boxes[key] = Box(key, tuple(map(float, box['size'])), pose, topic)
+        except OverflowError:
+            raise refusal(('boxes', key), 'a number is too large') from None
+    pairs = tuple(Pair(int(pair['id']), pair['name'], pair['a'], pair['b'])
+                  for pair in data['pairs'])
+    for place, reason in faults(boxes, pairs):
+        raise refusal(_path(place), reason)
+    return Scene(boxes, pairs, data.get('frame_id', ''))
+
+
+def _plain(text: str, lines: dict[Path_, int], refusal: Any) -> Any:
+    """The data of a YAML text; the line of each of its values goes to `lines`."""
+    loader = _Loader(text)
+    try:
+        root = loader.get_single_node()
+        seen: set[int] = set()
+
+        def value(node: Any, path: Path_) -> Any:
+            lines[path] = node.start_mark.line + 1
+            if id(node) in seen:
+                raise refusal(path, 'anchors and aliases are not accepted')
+            seen.add(id(node))
+            if isinstance(node, yaml.ScalarNode):
+                try:
+                    return loader.construct_object(node)
+                except ValueError as error:  # such as a date with month 13
+                    raise refusal(path, f'{shown(node.value)}: {error}') from error
+            if isinstance(node, yaml.SequenceNode):
+                return [value(item, (*path, n)) for n, item in enumerate(node.value)]
+            found: dict[str, Any] = {}
+            for key_node, item in node.value:
+                key = key_node.value if isinstance(key_node, yaml.ScalarNode) else None
+                if not isinstance(key, str):
+                    raise refusal(path, 'a key must be a name')
+                if key in found:
+                    lines[(*path, key)] = key_node.start_mark.line + 1
+                    raise refusal((*path, key), 'is there twice')
+                found[key] = value(item, (*path, key))
+            return found
+
+        if root is None:
+            raise refusal((), 'is empty')
+        return value(root, ())
+    finally:
+        loader.dispose()
+
+
+def _first_fault(data: Any, lines: dict[Path_, int]) -> tuple[Path_, str] | None:
+    """The first thing, by line, in which the data differs from the schema."""
+    from jsonschema import Draft202012Validator  # only here: it takes 0.1 s
+
+    schema = json.loads(resource_path('msg_schemas', 'scene.json').read_text('utf-8'))
+    found = [(tuple(error.absolute_path), error)
+             for error in Draft202012Validator(schema).iter_errors(data)]
+    if not found:
+        return None
+    path, error = min(found, key=lambda entry: (lines.get(entry[0], 0), entry[0] == ()))
+    return path, _words(error)
+
+
+def _words(error: Any) -> str:
+    value = shown(error.instance)
+    if error.validator == 'not':
+        return 'has both pose (it is fixed) and pose_topic (it moves)'
+    if error.validator in ('minItems', 'maxItems') and error.validator_value > 1:
+        return f'must be {error.validator_value} numbers, not {value}'
+    if error.validator == 'exclusiveMinimum':
+        return f'{value} is not positive'
+    if error.validator == 'type':
+        kinds = {'object': 'a mapping', 'array': 'a list', 'number': 'a number',
+                 'integer': 'a whole number', 'string': 'a string'}
+        return f'{value} is not {kinds.get(error.validator_value, error.validator_value)}'
+    if error.validator == 'pattern':
+        return f'{value} is no name that a topic can have'
+    if error.validator in ('required', 'additionalProperties'):
+        return str(error.message)
+    return f'{value}: {error.message}' if value not in error.message else str(error.message)
+
+
+def _dotted(path: Path_) -> str:
+    text = ''.join(f'[{part}]' if isinstance(part, int) else f'.{part}' for part in path)
+    return text.removeprefix('.')
+
+
+def _path(place: str) -> Path_:
+    """`boxes.load.size` or `pairs[3].a` as a path."""
+    parts: list[Any] = []
+    for part in place.split('.'):
+        head, _, rest = part.partition('[')
+        parts.append(head)
+        if rest:
+            parts.append(int(rest.rstrip(']')))
+    return tuple(parts)
