@@ -17,8 +17,10 @@ from .scene import Box, Pair, Scene, faults
 
 LARGEST_FILE = 16 * 2**20
 """Bytes that are read at most; some 100,000 pairs."""
+DEEPEST = 20
+"""Levels of nesting that are followed; a scene has four."""
 _Loader = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)  # in C where there is libyaml
-Path_ = tuple[Any, ...]
+Place = tuple[Any, ...]
 
 
 class SceneError(ValueError):
@@ -49,9 +51,9 @@ def read_scene(source: str) -> Scene:
 
 def parse_scene(text: str, name: str = 'scene') -> Scene:
     """The scene that a text describes; `name` is how errors call it."""
-    lines: dict[Path_, int] = {}
+    lines: dict[Place, int] = {}
 
-    def refusal(path: Path_, reason: str) -> SceneError:
+    def refusal(path: Place, reason: str) -> SceneError:
         line = next((lines[path[:n]] for n in range(len(path), -1, -1) if path[:n] in lines), 1)
         return SceneError(f'{name}:{line}: {_dotted(path)}{": " if path else ""}{reason}')
 
@@ -62,8 +64,6 @@ def parse_scene(text: str, name: str = 'scene') -> Scene:
         reason = getattr(error, 'problem', None) or str(error).replace('\n', ' ')
         line = mark.line + 1 if mark else 1
         raise SceneError(f'{name}:{line}: not YAML: {reason}') from error
-    except RecursionError:
-        raise SceneError(f'{name}: nested too deeply') from None
     fault = _first_fault(data, lines)
     if fault:
         raise refusal(*fault)
@@ -82,15 +82,24 @@ def parse_scene(text: str, name: str = 'scene') -> Scene:
     return Scene(boxes, pairs, data.get('frame_id', ''))
 
 
-def _plain(text: str, lines: dict[Path_, int], refusal: Any) -> Any:
+def _plain(text: str, lines: dict[Place, int], refusal: Any) -> Any:
     """The data of a YAML text; the line of each of its values goes to `lines`."""
+    depth = 0
+    for event in yaml.parse(text, Loader=_Loader):
+        depth += isinstance(event, yaml.CollectionStartEvent)
+        depth -= isinstance(event, yaml.CollectionEndEvent)
+        if depth > DEEPEST:  # the C loader, which descends, would end the process
+            lines[()] = event.start_mark.line + 1
+            raise refusal((), 'nested too deeply')
     loader = _Loader(text)
     try:
         root = loader.get_single_node()
         seen: set[int] = set()
 
-        def value(node: Any, path: Path_) -> Any:
-            lines[path] = node.start_mark.line + 1
+        def value(node: Any, path: Place) -> Any:
+            lines.setdefault(path, node.start_mark.line + 1)
+            if not node.tag.startswith('tag:yaml.org,2002:') or '/' in node.tag:
+                raise refusal(path, f'tag {shown(node.tag)} is not accepted')
             if id(node) in seen:
                 raise refusal(path, 'anchors and aliases are not accepted')
             seen.add(id(node))
@@ -106,8 +115,8 @@ def _plain(text: str, lines: dict[Path_, int], refusal: Any) -> Any:
                 key = key_node.value if isinstance(key_node, yaml.ScalarNode) else None
                 if not isinstance(key, str):
                     raise refusal(path, 'a key must be a name')
+                lines[(*path, key)] = key_node.start_mark.line + 1
                 if key in found:
-                    lines[(*path, key)] = key_node.start_mark.line + 1
                     raise refusal((*path, key), 'is there twice')
                 found[key] = value(item, (*path, key))
             return found
@@ -119,7 +128,7 @@ def _plain(text: str, lines: dict[Path_, int], refusal: Any) -> Any:
         loader.dispose()
 
 
-def _first_fault(data: Any, lines: dict[Path_, int]) -> tuple[Path_, str] | None:
+def _first_fault(data: Any, lines: dict[Place, int]) -> tuple[Place, str] | None:
     """The first thing, by line, in which the data differs from the schema."""
     from jsonschema import Draft202012Validator  # only here: it takes 0.1 s
 
@@ -151,12 +160,12 @@ def _words(error: Any) -> str:
     return f'{value}: {error.message}' if value not in error.message else str(error.message)
 
 
-def _dotted(path: Path_) -> str:
+def _dotted(path: Place) -> str:
     text = ''.join(f'[{part}]' if isinstance(part, int) else f'.{part}' for part in path)
     return text.removeprefix('.')
 
 
-def _path(place: str) -> Path_:
+def _path(place: str) -> Place:
     """`boxes.load.size` or `pairs[3].a` as a path."""
     parts: list[Any] = []
     for part in place.split('.'):

@@ -17,9 +17,9 @@ from sensor_msgs.msg import PointCloud2
 pytest.importorskip('fcl')
 
 from box_contact_ros import ContactSolver  # noqa: E402
+from box_contact_ros.nodes.contact import PARAMETERS as CONTACT_PARAMETERS  # noqa: E402
 from box_contact_ros.nodes.contact import ContactNode  # noqa: E402
 from box_contact_ros.nodes.messages import read_cloud  # noqa: E402
-from box_contact_ros.nodes.contact import PARAMETERS as CONTACT_PARAMETERS  # noqa: E402
 from box_contact_ros.nodes.soup import PARAMETERS, SoupNode  # noqa: E402
 from box_contact_ros.resources import resource_path  # noqa: E402
 
