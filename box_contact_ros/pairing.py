@@ -117,18 +117,18 @@ class StampPairing(_Pairing):
         for taken in self._taken.values():
             taken.clear()
 
-    def add(self, box: str, pose: StampedPose) -> Tick | None:
-        """Take a pose; the tick that it completes, or that is given up for it."""
+    def add(self, box: str, pose: StampedPose) -> list[Tick]:
+        """Take a pose; the tick that it completes, after those that are not waited for any more."""
         stamp = pose.stamp
         self._went_back(box, stamp)
         taken = self._taken[box]
         if stamp in taken:
             self.counts[REPEATED] += 1
-            return None
+            return []
         if len(taken) >= REMEMBERED_STAMPS:
             if stamp < next(iter(taken)):
                 self.counts[OLD] += 1
-                return None
+                return []
             taken.popitem(last=False)
         taken[stamp] = None
         self._note(box, stamp)
@@ -137,11 +137,12 @@ class StampPairing(_Pairing):
         if poses is None:
             poses = self._waiting[key] = {}
         poses[box] = pose
-        if len(poses) < len(self.boxes) and self._is_awaiting(poses):
-            return self._give_up()
-        del self._waiting[key]
-        self._answered = True
-        return self._tick(poses)
+        ticks = self._give_up(key) if len(self._waiting) > 1 else []
+        if len(poses) == len(self.boxes) or not self._is_awaiting(poses):
+            del self._waiting[key]
+            ticks.append(self._tick(poses))
+            self._answered = True
+        return ticks
 
     def _tick(self, poses: dict[str, StampedPose]) -> Tick:
         return [poses.get(box) for box in self.boxes]
@@ -176,18 +177,20 @@ class StampPairing(_Pairing):
         now = max(self._newest.values())
         return not all(self._is_stale(box, now) for box in missing)
 
-    def _give_up(self) -> Tick | None:
-        """The oldest tick, if it has waited enough and one of its pairs can be evaluated."""
-        if len(self._waiting) == 1:
-            return None
-        stamp, poses = next(iter(self._waiting.items()))
-        if len(self._waiting) <= WAITING_TICKS and self._is_awaiting(poses):
-            return None
-        del self._waiting[stamp]
-        if self._evaluable(poses):
-            return self._tick(poses)
-        self.counts[NO_PARTNER] += len(poses)
-        return None
+    def _give_up(self, key: int) -> list[Tick]:
+        """The oldest ticks, up to the one of `key`, that have waited enough; those of which no pair
+        can be evaluated are dropped."""
+        ticks = []
+        while (stamp := next(iter(self._waiting))) != key:
+            poses = self._waiting[stamp]
+            if len(self._waiting) <= WAITING_TICKS and self._is_awaiting(poses):
+                break
+            del self._waiting[stamp]
+            if self._evaluable(poses):
+                ticks.append(self._tick(poses))
+            else:
+                self.counts[NO_PARTNER] += len(poses)
+        return ticks
 
 
 class LatestPairing(_Pairing):
@@ -211,18 +214,18 @@ class LatestPairing(_Pairing):
         super().reset()
         self._last.clear()
 
-    def add(self, box: str, pose: StampedPose) -> Tick | None:
+    def add(self, box: str, pose: StampedPose) -> list[Tick]:
         """Take a pose; the tick that it makes, once both boxes of a pair have been seen."""
         self._went_back(box, pose.stamp)
         if pose.stamp < self._newest.get(box, pose.stamp):
             self.counts[OLD] += 1
-            return None
+            return []
         self._newest[box] = pose.stamp
         self._last[box] = pose
         if not self._evaluable(self._last):
-            return None
-        return [None if self._is_stale(other, pose.stamp) else self._last.get(other)
-                for other in self.boxes]
+            return []
+        return [[None if self._is_stale(other, pose.stamp) else self._last.get(other)
+                 for other in self.boxes]]
 
     def _is_stale(self, box: str, now: int) -> bool:
         newest = self._newest.get(box)

@@ -273,7 +273,8 @@ class ContactNode(LifecycleNode):
             if box in self._subscriptions_of:
                 continue
             topic = self._solver.scene.boxes[box].pose_topic
-            events: dict[str, Any] = {'liveliness': self._on_liveliness(box),
+            events: dict[str, Any] = {'matched': self._on_matched(box),
+                                      'liveliness': self._on_liveliness(box),
                                       'message_lost': self._on_lost}
             if deadline:
                 events['deadline'] = self._on_deadline(box)
@@ -297,13 +298,21 @@ class ContactNode(LifecycleNode):
                                       throttle_duration_sec=LOG_SECONDS)
         return callback
 
-    def _on_liveliness(self, box: str) -> Callable[[Any], None]:
+    def _on_matched(self, box: str) -> Callable[[Any], None]:
         def callback(event: Any) -> None:
-            gone = max(0, -event.alive_count_change)
+            gone = max(0, -event.current_count_change)
             self.counts['publishers gone'] += gone
             if gone:
                 self.get_logger().warning(f'{box}: a publisher of its poses is gone, '
-                                          f'{event.alive_count} left')
+                                          f'{event.current_count} left')
+        return callback
+
+    def _on_liveliness(self, box: str) -> Callable[[Any], None]:
+        def callback(event: Any) -> None:
+            lost = max(0, event.not_alive_count_change)
+            self.counts['liveliness lost'] += lost
+            if lost:
+                self.get_logger().warning(f'{box}: a publisher of its poses shows no life')
         return callback
 
     def _on_lost(self, event: Any) -> None:
@@ -329,8 +338,7 @@ class ContactNode(LifecycleNode):
     def _take(self, box: str, message: Any) -> None:
         self.counts['poses'] += 1
         pose = self._messages.read_pose(message)
-        tick = self._pairing.add(box, pose)
-        if tick is not None:
+        for tick in self._pairing.add(box, pose):
             self._answer(tick)
 
     def _answer(self, tick: Tick) -> None:

@@ -1,0 +1,308 @@
+"""A contact node with a scene over DDS: many boxes, changes while it runs, stale boxes, time."""
+from __future__ import annotations
+
+import math
+import time
+
+import numpy as np
+import poses
+import pytest
+from geometry_msgs.msg import PointStamped, PoseStamped
+from lifecycle_msgs.srv import ChangeState, GetState
+from rclpy.duration import Duration
+from rclpy.parameter import Parameter
+from rclpy.qos import QoSProfile
+from ros_client import Client, serving, stamp_of
+
+from box_contact_ros import ContactSolver
+from box_contact_ros.nodes.contact import ContactNode
+from box_contact_ros.nodes.messages import make_header, read_cloud
+
+MS = 1_000_000  # ns
+SCENE = """\
+boxes:
+  load: {size: [2, 2, 2]}
+  lorry: {size: [2, 2, 2], pose_topic: /traffic/lorry}
+  floor: {size: [20, 20, 1], pose: [0, 0, -0.5, 0, 0, 0, 1]}
+pairs:
+  - {id: 3, name: load_floor, a: floor, b: load}
+  - {id: 5, name: load_lorry, a: lorry, b: load}
+"""
+WITH_CRATE = SCENE.replace('pairs:\n', '  crate: {size: [2, 2, 2]}\npairs:\n') + (
+    '  - {id: 8, name: load_crate, a: crate, b: load}\n')
+ON_FLOOR = (0, 0, 0.9, 0, 0, 0, 1)    # 0.1 m deep
+ON_LORRY = (0, 0, 2.8, 0, 0, 0, 1)    # 0.2 m deep in a lorry on the floor
+LORRY = (0.5, 0, 1.0, 0, 0, 0, 1)     # touches nothing that is asked for but the load
+
+
+class SceneClient(Client):
+    """Publishes poses of boxes by name."""
+
+    def __init__(self):
+        super().__init__()
+        deep = QoSProfile(depth=10_000)
+        topics = {'load': 'load/pose', 'lorry': '/traffic/lorry', 'crate': 'crate/pose'}
+        self.boxes = {box: self.node.create_publisher(PoseStamped, topic, deep)
+                      for box, topic in topics.items()}
+        self.of_pair = {}
+        for pair in ('load_floor', 'load_lorry', 'load_crate'):
+            kept = self.of_pair[pair] = {}
+            self.node.create_subscription(PointStamped, f'{pair}/contact/point', lambda m, k=kept:
+                                          k.__setitem__(stamp_of(m), m), deep)
+
+    def tick(self, stamp=None, frame='map', **boxes):
+        """Publish poses of one stamp; returns it [ns]."""
+        stamp = self.next_stamp() if stamp is None else stamp
+        for box, pose in boxes.items():
+            message = PoseStamped(header=make_header(stamp, frame))
+            p, q = message.pose.position, message.pose.orientation
+            p.x, p.y, p.z, q.x, q.y, q.z, q.w = map(float, pose)
+            self.boxes[box].publish(message)
+        return stamp
+
+    def answered(self, stamp, timeout=5.0):
+        return self.spin(lambda: stamp in self.clouds, timeout)
+
+    def offer(self, **boxes):
+        """Tick until one is answered."""
+        deadline = time.monotonic() + 15
+        while not self.answered(self.tick(**boxes), 0.1):
+            assert time.monotonic() < deadline, 'no answer'
+        self.spin(lambda: False, 0.2)
+
+    def rows(self, stamp):
+        assert self.answered(stamp), 'no answer'
+        return {int(row['pair']): row for row in read_cloud(self.clouds[stamp])}
+
+
+@pytest.fixture
+def client():
+    client = SceneClient()
+    yield client
+    client.close()
+
+
+def scene_node(**parameters):
+    given = {'scene': SCENE, 'model': 'exact'} | parameters
+    return serving(lambda context: ContactNode(context, parameter_overrides=[
+        Parameter(name, value=value) for name, value in given.items()]))
+
+
+@pytest.fixture
+def node(client):
+    with scene_node() as node:
+        client.offer(load=ON_FLOOR, lorry=LORRY)
+        yield node
+
+
+def set_scene(node, text):
+    result, = node.set_parameters([Parameter('scene', value=text)])
+    return result
+
+
+@pytest.mark.parametrize('serialization', ['raw', 'typed'])
+def test_all_pairs_in_one_cloud(client, serialization):
+    """Every tick is one cloud with a row per contact; each pair has topics of its own; and only
+    what the pairs need is subscribed to."""
+    with scene_node(serialization=serialization) as node:
+        client.offer(load=ON_FLOOR, lorry=LORRY)
+        assert {entity.topic_name for entity in node.subscriptions} >= {'/load/pose',
+                                                                        '/traffic/lorry'}
+        assert not any('floor' in entity.topic_name for entity in node.subscriptions)
+        high = client.tick(load=(9, 9, 9, 0, 0, 0, 1), lorry=LORRY)
+        assert client.rows(high) == {}
+        both = client.tick(load=(0.5, 0, 0.9, 0, 0, 0, 1), lorry=LORRY)
+        rows = client.rows(both)
+        assert set(rows) == {3, 5}
+        cubes = ContactSolver(poses.CUBE, poses.CUBE, model='exact')
+        wanted = cubes(np.array(LORRY), np.array([0.5, 0, 0.9, 0, 0, 0, 1]))
+        assert rows[5]['depth'] == -wanted.separation
+        assert [rows[5][name] for name in 'xyz'] == pytest.approx(wanted.point)
+        assert rows[3]['depth'] == pytest.approx(0.1) and rows[3]['normal_z'] == 1
+        assert client.spin(lambda: all(both in client.of_pair[pair]
+                                       for pair in ('load_floor', 'load_lorry')), 5.0)
+        assert client.of_pair['load_lorry'][both].point.x == rows[5]['x']
+        assert high not in client.of_pair['load_floor']
+
+
+def test_without_pair_topics(client):
+    with scene_node(pair_topics=False) as node:
+        client.offer(load=ON_FLOOR, lorry=LORRY)
+        assert set(client.rows(client.tick(load=ON_FLOOR, lorry=LORRY))) >= {3}
+        assert not any('contact/' in entity.topic_name for entity in node.publishers)
+
+
+def test_boxes_come_and_go_and_no_tick_of_the_others_is_lost(node, client):
+    """The scene is set again and again in a stream of 200 Hz: each tick is answered once, and those
+    with a crate have its pair."""
+    stamps, started, scenes = [], time.monotonic(), 0
+    while (now := time.monotonic() - started) < 3.0:
+        stamps.append(client.tick(load=ON_FLOOR, lorry=LORRY, crate=LORRY))
+        if now > 0.3 * (scenes + 1):
+            scenes += 1
+            # As a service: the node's own thread serves it.
+            assert set_scene(node, WITH_CRATE if scenes % 2 else SCENE).successful
+        client.spin(lambda: False, max(0.0, 0.005 * len(stamps) - (time.monotonic() - started)))
+    assert scenes >= 6
+    assert client.spin(lambda: all(stamp in client.clouds for stamp in stamps), 5.0), sum(
+        stamp not in client.clouds for stamp in stamps)
+    assert all(3 in client.rows(stamp) for stamp in stamps)
+    crates = [8 in client.rows(stamp) for stamp in stamps]
+    assert any(crates) and not all(crates)
+
+
+def test_a_bad_scene_changes_nothing(node, client, tmp_path):
+    """Garbage, a file that is gone or was overwritten with garbage: refused with the line, and the
+    old scene goes on."""
+    path = tmp_path / 'scene.yaml'
+    path.write_text(WITH_CRATE)
+    assert set_scene(node, str(path)).successful
+    client.offer(load=ON_FLOOR, lorry=LORRY, crate=LORRY)
+    path.write_bytes(b'\x00\xff boxes')
+    for source, words in ((str(path), 'not UTF-8'), (SCENE + 'boxes', ':9: '),
+                          (SCENE.replace('[2, 2, 2]', '[2, 2]'), ':2: boxes.load.size'),
+                          (str(tmp_path / 'gone'), 'cannot be read'), ('{' * 10_000, 'scene')):
+        result = set_scene(node, source)
+        assert not result.successful and words in result.reason, result
+        assert set(client.rows(client.tick(load=ON_FLOOR, lorry=LORRY, crate=LORRY))) >= {3}
+
+
+def test_ids_are_never_used_again(node, client):
+    """Neither for other boxes nor under another name; the pair itself may come back."""
+    assert set_scene(node, WITH_CRATE).successful
+    assert set_scene(node, SCENE).successful
+    for changed in (WITH_CRATE.replace('name: load_crate', 'name: other'),
+                    WITH_CRATE.replace('a: crate, b: load}', 'a: crate, b: lorry}')):
+        result = set_scene(node, changed)
+        assert not result.successful and 'id 8' in result.reason
+    assert set_scene(node, WITH_CRATE).successful
+
+
+def test_a_stale_box_is_nan_and_never_an_old_contact(client):
+    """The lorry falls silent while the load lies on it: its pair becomes a row of NaN, the load and
+    the floor go on; when it is back, all is as before."""
+    with scene_node(max_age=0.2):
+        client.offer(load=ON_LORRY, lorry=LORRY)
+        assert 5 in client.rows(client.tick(load=ON_LORRY, lorry=LORRY))
+        started, stamps = time.monotonic(), []
+        while time.monotonic() - started < 1.0:
+            stamps.append(client.tick(load=ON_FLOOR))
+            client.spin(lambda: False, 0.02)
+        assert client.spin(lambda: all(stamp in client.clouds for stamp in stamps), 5.0)
+        for stamp in stamps:
+            rows = client.rows(stamp)
+            assert set(rows) == {3, 5} and rows[3]['depth'] == pytest.approx(0.1)
+            assert all(math.isnan(rows[5][name]) for name in ('x', 'normal_x', 'depth'))
+            assert not client.clouds[stamp].is_dense
+            assert stamp not in client.of_pair['load_lorry']
+        client.tick(load=ON_FLOOR)
+        assert client.diagnostic('stale boxes') == 'lorry'
+        assert client.diagnostics[-1].status[0].level == b'\x01' or client.diagnostics[
+            -1].status[0].message == 'no poses'
+        client.tick(lorry=LORRY)
+        rows = client.rows(client.tick(load=ON_LORRY, lorry=LORRY))
+        assert rows[5]['depth'] == pytest.approx(0.2)
+
+
+def test_latest_pairs_boxes_of_different_rates(client):
+    """A lorry at 5 Hz and a load at 100 Hz: every pose is answered with the other's last."""
+    with scene_node(pairing='latest', max_age=1.0):
+        client.offer(load=ON_LORRY, lorry=LORRY)
+        for i in range(100):
+            if i % 20 == 0:
+                client.tick(lorry=LORRY)
+            rows = client.rows(client.tick(load=ON_LORRY))
+            assert rows[5]['depth'] == pytest.approx(0.2)
+        stamp = client.tick(stamp=client.next_stamp() + 1500 * MS, load=ON_LORRY)
+        assert math.isnan(client.rows(stamp)[5]['depth'])
+
+
+def test_tolerance_joins_stamps_that_are_near(client):
+    with scene_node(tolerance=0.002):
+        client.offer(load=ON_LORRY, lorry=LORRY)
+        stamp = client.next_stamp()
+        client.tick(stamp=stamp, lorry=LORRY)
+        client.tick(stamp=stamp + 1 * MS, load=ON_LORRY)
+        assert client.rows(stamp + 1 * MS)[5]['depth'] == pytest.approx(0.2)  # the newer stamp
+        client.tick(stamp=stamp + 50 * MS, lorry=LORRY)
+        client.tick(stamp=stamp + 55 * MS, load=ON_LORRY)
+        assert not client.answered(stamp + 55 * MS, 0.5)
+
+
+def test_repeated_and_late_stamps_are_counted(node, client):
+    stamp = client.tick(load=ON_FLOOR, lorry=LORRY)
+    client.rows(stamp)
+    for _ in range(5):
+        client.tick(stamp=stamp, load=ON_LORRY, lorry=LORRY)
+    assert client.counts()['refused: repeated stamp'] == 10
+    assert client.rows(stamp)[3]['depth'] == pytest.approx(0.1)
+
+
+def test_time_that_goes_back_begins_anew(node, client):
+    """A simulation that starts again at 0: answered at once, and not with poses of before."""
+    early = client.tick(stamp=5 * MS, load=ON_LORRY)
+    assert not client.answered(early, 0.5)
+    client.tick(stamp=5 * MS, lorry=LORRY)
+    assert client.rows(early)[5]['depth'] == pytest.approx(0.2)
+    assert client.counts()['time went back'] == 1
+
+
+def test_frame_of_the_scene(client):
+    with scene_node(scene='frame_id: yard\n' + SCENE):
+        client.offer(load=ON_FLOOR, lorry=LORRY, frame='yard')
+        stamp = client.tick(load=ON_FLOOR, lorry=LORRY, frame='map')
+        client.rows(client.tick(load=ON_FLOOR, lorry=LORRY, frame='yard'))
+        assert stamp not in client.clouds
+        assert client.counts()['refused: frame_id differs'] == 1
+
+
+def test_deadlines_and_lost_publishers_are_reported(client):
+    """A publisher that offers a deadline and misses it; one that goes."""
+    with scene_node(deadline=0.1) as node:
+        qos = QoSProfile(depth=10, deadline=Duration(seconds=0.1))
+        client.boxes = {'load': client.node.create_publisher(PoseStamped, 'load/pose', qos),
+                        'lorry': client.node.create_publisher(PoseStamped, '/traffic/lorry', qos)}
+        client.offer(load=ON_FLOOR, lorry=LORRY)
+        client.spin(lambda: node.counts['deadlines missed'] >= 4, 5.0)
+        assert node.counts['deadlines missed'] >= 4
+        client.node.destroy_publisher(client.boxes['lorry'])
+        client.spin(lambda: node.counts['publishers gone'] >= 1, 5.0)
+        assert node.counts['publishers gone'] == 1
+
+
+def test_lifecycle(client):
+    """Without autostart: configure checks, activate answers, deactivate stops, all by service."""
+    with scene_node(autostart=False, scene=SCENE.replace('[20, 20, 1]', '[20, 20]')) as node:
+        change = client.node.create_client(ChangeState, '/contact_node/change_state')
+        state = client.node.create_client(GetState, '/contact_node/get_state')
+        assert client.spin(lambda: change.service_is_ready() and state.service_is_ready(), 15.0)
+
+        def transition(label):
+            request = ChangeState.Request()
+            request.transition.label = label
+            future = change.call_async(request)
+            assert client.spin(future.done, 60.0)
+            return future.result().success
+
+        def now():
+            future = state.call_async(GetState.Request())
+            assert client.spin(future.done, 10.0)
+            return future.result().current_state.label
+
+        assert now() == 'unconfigured'
+        assert not transition('configure') and now() == 'unconfigured'  # the scene is bad
+        assert set_scene(node, SCENE).successful
+        assert transition('configure') and now() == 'inactive'
+        client.tick(load=ON_FLOOR, lorry=LORRY)
+        client.spin(lambda: False, 0.5)
+        assert not client.clouds
+        assert transition('activate') and now() == 'active'
+        client.offer(load=ON_FLOOR, lorry=LORRY)
+        assert transition('deactivate')
+        stamp = client.tick(load=ON_FLOOR, lorry=LORRY)
+        assert not client.answered(stamp, 0.5)
+        assert transition('activate')
+        client.offer(load=ON_FLOOR, lorry=LORRY)
+        assert transition('deactivate') and transition('cleanup') and now() == 'unconfigured'
+        assert transition('configure') and transition('activate')
+        client.offer(load=ON_FLOOR, lorry=LORRY)
