@@ -1,6 +1,7 @@
 """Recordings: what is written can be read by others, and drives the nodes again."""
 from __future__ import annotations
 
+import errno
 import runpy
 import signal
 import time
@@ -8,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import rclpy
 import yaml
 from ros_client import Client, stamp_of
 
@@ -17,11 +19,13 @@ from geometry_msgs.msg import PoseStamped  # noqa: E402
 from make_recording import make  # noqa: E402
 from mcap.reader import make_reader  # noqa: E402
 from mcap_ros2.decoder import DecoderFactory  # noqa: E402
+from rclpy.context import Context  # noqa: E402
 from rclpy.serialization import serialize_message  # noqa: E402
 from test_bench import bench, rows_of  # noqa: E402
 
 from box_contact_ros import ContactSolver  # noqa: E402
 from box_contact_ros.nodes.messages import make_header, read_cloud  # noqa: E402
+from box_contact_ros.nodes.record import RecordNode  # noqa: E402
 from box_contact_ros.recording import (  # noqa: E402
     TOPICS,
     Recorder,
@@ -231,6 +235,22 @@ def test_bad_options(program, tmp_path, arguments, status, words):
     assert running.wait(60) == status
     assert words in running.output and 'Traceback' not in running.output
     assert not out.exists()
+
+
+def test_a_full_disk_ends_the_recording(tmp_path, monkeypatch):
+    """Not one message later, with the reason, and an error at the end."""
+    def full(*_):
+        raise OSError(errno.ENOSPC, 'No space left on device')
+
+    context = Context()
+    rclpy.init(context=context)
+    node = RecordNode(context, tmp_path / 'run', ['contacts'], {})
+    monkeypatch.setattr(node.recorder, 'write', full)
+    node._keep('/contacts')(b'')
+    assert not context.ok()
+    with pytest.raises(RecordingError, match='run is not complete: .*No space left'):
+        node.destroy_node()
+    node.recorder.close()
 
 
 # --- replay ---------------------------------------------------------------------------------------

@@ -21,7 +21,7 @@ from rclpy.utilities import remove_ros_args
 from sensor_msgs.msg import PointCloud2
 
 from ..checks import as_size
-from ..recording import NANOSECONDS, POSE, TOPICS, TYPES, Recorder, type_of
+from ..recording import NANOSECONDS, POSE, TOPICS, TYPES, Recorder, RecordingError, type_of
 from .runtime import REFUSALS, run_node
 
 MESSAGES = dict(zip(TYPES.values(), (PoseStamped, PointStamped, Vector3Stamped, PointCloud2)))
@@ -31,13 +31,14 @@ PROGRESS_SECONDS = 1.0
 
 
 class RecordNode(Node):
-    """Hands every message of its topics to a `Recorder`."""
+    """Hands every message of its topics to a `Recorder`; ends where that cannot write any more."""
 
     def __init__(self, context: Context, folder: Path, topics: Sequence[str],
                  about: Mapping[str, Any]) -> None:
         super().__init__('record', context=context)
         resolved = {topic: self.resolve_topic_name(topic) for topic in topics}
         self.folder, self.recorder = folder, Recorder(folder, list(resolved.values()), about)
+        self._fault: OSError | None = None
         for topic, name in resolved.items():
             kind = type_of(name)
             # Poses as the contact node takes them, from whatever publisher; contacts without loss.
@@ -55,7 +56,11 @@ class RecordNode(Node):
         def callback(data: bytes) -> None:
             if not recorder.counts[topic]:
                 print(f'receiving {topic}', flush=True)
-            recorder.write(topic, clock.now().nanoseconds, data)
+            try:
+                recorder.write(topic, clock.now().nanoseconds, data)
+            except OSError as error:  # a full disk
+                self._fault = error
+                self.context.try_shutdown()
         return callback
 
     def _show_progress(self) -> None:
@@ -67,13 +72,18 @@ class RecordNode(Node):
         return (last - first) / NANOSECONDS
 
     def destroy_node(self) -> None:
-        """Complete the bag, and say what is in it."""
-        self.recorder.close()
+        """Complete the bag, and say what is in it; RecordingError if it cannot be completed."""
+        super().destroy_node()
+        try:
+            if self._fault is not None:
+                raise self._fault
+            self.recorder.close()
+        except OSError as error:
+            raise RecordingError(f'the recording {self.folder} is not complete: {error}') from error
         print(f'\nrecorded {self.folder}: {self.recorder.counts.total()} messages in '
               f'{self._seconds():.2f} s')
         for topic, count in self.recorder.counts.items():
             print(f'  {topic} {count}', flush=True)
-        super().destroy_node()
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -81,13 +91,13 @@ def main(args: Sequence[str] | None = None) -> int:
     args = list(args or ())
     try:
         options = _options(remove_ros_args(args))
+        about = {name: value for name in ('size_a', 'size_b', 'model')
+                 if (value := getattr(options, name)) is not None}
+        return run_node(partial(RecordNode, folder=options.out, topics=options.topics, about=about),
+                        args)
     except REFUSALS as error:
         print(f'error: {error}', file=sys.stderr)
         return 1
-    about = {name: value for name in ('size_a', 'size_b', 'model')
-             if (value := getattr(options, name)) is not None}
-    return run_node(partial(RecordNode, folder=options.out, topics=options.topics, about=about),
-                    args)
 
 
 def _options(args: Sequence[str]) -> argparse.Namespace:
