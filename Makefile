@@ -65,7 +65,7 @@ clean:
 	touch $@
 
 .venv/.installed-test: .venv/.created $(INSTALL_INPUTS)
-	@$(call install,ros$(comma)sim$(comma)train$(comma)soup$(comma)report$(comma)test,\
+	@$(call install,ros$(comma)sim$(comma)bag$(comma)train$(comma)soup$(comma)report$(comma)test,\
 	    ROS 2 Jazzy$(comma) MuJoCo$(comma) Numba$(comma) PyTorch and the test tools,2 to 6 minutes)
 	touch $@ .venv/.installed-demo
 

@@ -40,7 +40,7 @@ def data_files() -> list[tuple[str, list[str]]]:
         'share/ament_index/resource_index/packages': [f'resource/{NAME}'],
         share: ['package.xml'],
     }
-    for folder in ('weights', 'msg_schemas', 'launch', 'config'):
+    for folder in ('weights', 'msg_schemas', 'launch', 'config', 'recordings'):
         for path in sorted(Path(folder).rglob('*')):
             # is_file() also drops links that colcon --symlink-install left to deleted files.
             if path.is_file() and '__pycache__' not in path.parts:
@@ -73,6 +73,7 @@ setup(
             'ros-jazzy-rmw-fastrtps-cpp',
         ],
         'sim': ['mujoco', 'rich'],
+        'bag': ['rosbags'],
         'soup': ['python-fcl'],
         'train': ['torch==2.13.0', 'tqdm'],
         'report': ['matplotlib', 'tqdm'],
@@ -85,6 +86,9 @@ setup(
             'gmpy2',
             'hypothesis',
             'jsonschema',
+            # Foxglove's own reader, for what `record` writes.
+            'mcap',
+            'mcap-ros2-support',
             'mpmath',
             'pytest',
             'pytest-timeout',

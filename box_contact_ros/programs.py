@@ -56,6 +56,11 @@ PROGRAMS = {
         'drive contact, soup and echo node with streams of poses: latency, losses, errors',
         ('ros', 'sim', 'soup', 'report'),
     ),
+    'record': Program(
+        'box_contact_ros.nodes.record:main',
+        'write poses and contacts of running nodes to a bag (MCAP) for Foxglove and ros2 bag',
+        ('ros', 'bag'),
+    ),
     'train': Program(
         'box_contact_ros.training.train:main',
         'make the data sets, fit the networks, write weights/',
@@ -106,6 +111,7 @@ MODULES_OF_EXTRA = {
         'std_msgs',
     ),
     'sim': ('mujoco', 'rich'),
+    'bag': ('rosbags',),
     'soup': ('fcl',),
     'train': ('torch', 'tqdm'),
     'report': ('matplotlib', 'tqdm'),

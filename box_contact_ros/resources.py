@@ -1,4 +1,4 @@
-"""Where the package's data files are: weights/, msg_schemas/, launch/, config/.
+"""Where the data files are: weights/, msg_schemas/, recordings/, launch/, config/.
 
 These folders stand at the top level of the repository, beside the Python package and not inside
 it, so `importlib.resources` does not see them. Every kind of install puts them somewhere else:

@@ -189,6 +189,8 @@ def test_arguments_reach_main_unchanged(
         ('contact_node', 'rclpy.node', 'ros'),
         ('contact_node', 'torch', 'ros,train'),
         ('crane', 'mujoco', 'ros,sim'),
+        ('record', 'rosbags.rosbag2', 'ros,bag'),
+        ('bench', 'rosbags', 'ros,sim,soup,report,bag'),
         ('train', 'torch', 'train'),
         ('train', 'tqdm', 'train'),
         ('paper', 'matplotlib.pyplot', 'report'),

@@ -4,7 +4,8 @@ Contact node, soup node and a bare echo node run as processes of their own, in a
 own on this host. Each stream goes to one of them after the other, so that they do not compete for
 cores. Every answer is paired by stamp with what was sent, and held against the exact contact. The
 streams for cubes come first; for the containers the nodes are restarted, with the other sizes.
-Prints two tables and writes bench.csv, bench.md and bench.png.
+With --replay the stream is a recording's pairs of poses of equal stamp, sent at --rate. Prints two
+tables and writes bench.csv, bench.md and bench.png.
 
 The exit status is 0 only if every node answered, the counts add up (sent = answered + lost), and
 the contact node lost nothing and gave no wrong verdict and no answer twice.
@@ -49,6 +50,7 @@ from .runtime import REFUSALS
 
 DOMAINS = range(1, 102)  # 0 is everybody's; beyond 101, ports run into those Linux hands out
 NODES = ('contact', 'soup', 'echo')
+SECONDS, LONGEST = 60.0, 3600.0  # of sending, in all: the default, and what is accepted
 QUICK_SECONDS = 0.5  # of every stream, with --quick
 
 
@@ -78,9 +80,10 @@ def main(args: Sequence[str] | None = None) -> int:
     context, node, bench = Context(), None, None
     try:
         subjects = _subjects(options)
-        groups = by_sizes(_streams(options))
+        streams = _streams(options)
+        groups = by_sizes(streams)
         truths = {stream.name: _truth(stream) for group in groups for stream in group}
-        about = _about(options, own, node_cores)
+        about = _about(options, streams, own, node_cores)
         print('\n'.join(f'{name}: {value}' for name, value in about.items()), flush=True)
         os.sched_setaffinity(0, own)  # before rclpy starts its threads, which inherit it
         rclpy.init(args=args, context=context, signal_handler_options=SignalHandlerOptions.NO)
@@ -113,11 +116,22 @@ def _options(args: Sequence[str]) -> argparse.Namespace:
         + '\n\nWhat follows --ros-args is for the bench itself, not for the nodes.')
     parser.add_argument('--rate', type=float, default=200.0, metavar='HZ',
                         help='pairs of poses sent per second (default: %(default)g)')
-    parser.add_argument('--duration', type=float, default=60.0, metavar='S',
+    parser.add_argument('--duration', type=float, metavar='S',
                         help='time in which poses are sent, split evenly over streams and nodes '
-                             '(default: %(default)g)')
-    parser.add_argument('--streams', nargs='+', choices=STREAMS, default=list(STREAMS),
+                             f'(default: {SECONDS:g}; of a replay, all of it)')
+    source = parser.add_mutually_exclusive_group()
+    source.add_argument('--streams', nargs='+', choices=STREAMS, default=list(STREAMS),
                         metavar='NAME', help='which of the streams below (default: all)')
+    source.add_argument('--replay', type=Path, metavar='BAG',
+                        help='a recording in place of the streams: the folder of a rosbag2 bag, or '
+                             'an .mcap file')
+    for box in 'ab':
+        parser.add_argument(f'--topic-{box}', default=f'box_{box}/pose', metavar='NAME',
+                            help=f'of the replay: poses of box {box.upper()} '
+                                 '(default: %(default)s)')
+        parser.add_argument(f'--size-{box}', type=float, nargs=3, metavar=('X', 'Y', 'Z'),
+                            help=f'of the replay: full extents of box {box.upper()} [m] '
+                                 '(default: as the recording says)')
     parser.add_argument('--nodes', nargs='+', choices=NODES, default=list(NODES), metavar='NODE',
                         help=f'which of: {", ".join(NODES)} (default: all)')
     parser.add_argument('--model', default=PARAMETERS['model'].default, metavar='NAME',
@@ -141,14 +155,21 @@ def _options(args: Sequence[str]) -> argparse.Namespace:
         PARAMETERS['model'].check('--model', options.model)
     except ValueError as error:
         parser.error(str(error))
-    for name, low, high in (('rate', 1.0, 4000.0), ('duration', 0.1, 3600.0),
+    if options.replay is None:
+        if options.size_a or options.size_b:
+            parser.error('--size-a and --size-b are of a --replay: streams have their sizes')
+        if options.duration is None:
+            options.duration = SECONDS
+    for name, low, high in (('rate', 1.0, 4000.0), ('duration', 0.1, LONGEST),
                             ('divisions', 1, MOST_SOUP_DIVISIONS), ('seed', 0, 2**32)):
-        if not low <= getattr(options, name) <= high:
-            parser.error(f'--{name} must lie in {low:g} to {high:g}, got {getattr(options, name)}')
-    options.streams = [name for name in STREAMS if name in options.streams]
+        value = getattr(options, name)
+        if value is not None and not low <= value <= high:
+            parser.error(f'--{name} must lie in {low:g} to {high:g}, got {value}')
+    options.streams = [name for name in STREAMS if name in options.streams and not options.replay]
     options.nodes = [name for name in NODES if name in options.nodes]
     if options.quick:
-        options.duration = min(options.duration, QUICK_SECONDS * len(options.streams))
+        quick = QUICK_SECONDS * max(1, len(options.streams))
+        options.duration = min(options.duration or quick, quick)
     if options.domain is None:
         options.domain = random.choice(DOMAINS)
     if not 0 <= options.domain <= DOMAINS[-1]:
@@ -180,8 +201,14 @@ def _subjects(options: argparse.Namespace) -> list[Subject]:
 
 
 def _streams(options: argparse.Namespace) -> list[Stream]:
-    shares = len(options.streams) * (1 if options.side_by_side else len(options.nodes))
-    count = max(2, round(options.rate * options.duration / shares))
+    shares = max(1, len(options.streams)) * (1 if options.side_by_side else len(options.nodes))
+    count = options.duration and max(2, round(options.rate * options.duration / shares))
+    if options.replay:
+        from ..recording import read_replay  # only here: rosbags is an extra
+
+        replay = read_replay(options.replay, options.topic_a, options.topic_b,
+                             size_a=options.size_a, size_b=options.size_b)
+        return [replay.thinned(count)]
     return [make_stream(name, count, options.seed)
             for name in tqdm(options.streams, desc='make streams', disable=None, leave=False)]
 
@@ -191,7 +218,8 @@ def _truth(stream: Stream) -> Contacts:
     return solver.batch(stream.pose_a, stream.pose_b)
 
 
-def _about(options: argparse.Namespace, own: set[int], node_cores: set[int]) -> dict[str, str]:
+def _about(options: argparse.Namespace, streams: list[Stream], own: set[int],
+           node_cores: set[int]) -> dict[str, str]:
     """Where and how it ran; in the output and in every row of the CSV."""
     def listed(cores: set[int]) -> str:
         return ' '.join(map(str, sorted(cores)))
@@ -204,7 +232,7 @@ def _about(options: argparse.Namespace, own: set[int], node_cores: set[int]) -> 
         'nodes run': 'side by side' if options.side_by_side else 'in turn',
         'set rate [Hz]': f'{options.rate:g}',
         'seed': str(options.seed),
-    }
+    } | ({'replay': f'{options.replay}: {streams[0].described}'} if options.replay else {})
 
 
 def _processor() -> str:
@@ -218,9 +246,10 @@ def _processor() -> str:
 def _report(options: argparse.Namespace, subjects: list[Subject], notes: list[str],
             about: dict[str, str], *, interrupted: bool) -> bool:
     """Print and write the results; whether the bench passed."""
-    order = list(STREAMS)
+    # A replay has a name that is not in the list, and is the only stream.
+    order = {name: number for number, name in enumerate(STREAMS)}
     results = sorted((result for subject in subjects for result in subject.log.results()),
-                     key=lambda r: (order.index(r.stream), options.nodes.index(r.node)))
+                     key=lambda r: (order.get(r.stream, 0), options.nodes.index(r.node)))
     lines = list(notes)
     for name in [subject.name for subject in subjects]:
         lines.append(f'{name}: {_sum(name, results)}')

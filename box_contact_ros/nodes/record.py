@@ -1,0 +1,126 @@
+"""Records poses and contacts of running nodes, as a rosbag2 bag with MCAP storage.
+
+`--out RUN` is a new folder with metadata.yaml and RUN.mcap: `ros2 bag play RUN` plays it, Foxglove
+opens RUN/RUN.mcap, and `bench --replay RUN` drives the nodes with it. Ctrl-C or SIGTERM ends the
+recording, and completes the bag. Messages are kept as the bytes that they came as.
+"""
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from geometry_msgs.msg import PointStamped, PoseStamped, Vector3Stamped
+from rclpy.context import Context
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.utilities import remove_ros_args
+from sensor_msgs.msg import PointCloud2
+
+from ..checks import as_size
+from ..recording import NANOSECONDS, POSE, TOPICS, TYPES, Recorder, RecordingError, type_of
+from .runtime import REFUSALS, run_node
+
+MESSAGES = dict(zip(TYPES.values(), (PoseStamped, PointStamped, Vector3Stamped, PointCloud2)))
+DEPTH = 1000
+"""What the DDS layer delivers while a chunk is compressed must not push out the rest."""
+PROGRESS_SECONDS = 1.0
+
+
+class RecordNode(Node):
+    """Hands every message of its topics to a `Recorder`; ends where that cannot write any more."""
+
+    def __init__(self, context: Context, folder: Path, topics: Sequence[str],
+                 about: Mapping[str, Any]) -> None:
+        super().__init__('record', context=context)
+        resolved = {topic: self.resolve_topic_name(topic) for topic in topics}
+        self.folder, self.recorder = folder, Recorder(folder, list(resolved.values()), about)
+        self._fault: OSError | None = None
+        for topic, name in resolved.items():
+            kind = type_of(name)
+            # Poses as the contact node takes them, from whatever publisher; contacts without loss.
+            reliability = (ReliabilityPolicy.BEST_EFFORT if kind == POSE
+                           else ReliabilityPolicy.RELIABLE)
+            self.create_subscription(MESSAGES[kind], topic, self._keep(name),
+                                     QoSProfile(depth=DEPTH, reliability=reliability), raw=True)
+        if sys.stderr.isatty():
+            self.create_timer(PROGRESS_SECONDS, self._show_progress)
+        print(f'recording to {folder}: {", ".join(resolved.values())}', flush=True)
+
+    def _keep(self, topic: str) -> Callable[[bytes], None]:
+        recorder, clock = self.recorder, self.get_clock()
+
+        def callback(data: bytes) -> None:
+            if not recorder.counts[topic]:
+                print(f'receiving {topic}', flush=True)
+            try:
+                recorder.write(topic, clock.now().nanoseconds, data)
+            except OSError as error:  # a full disk
+                self._fault = error
+                self.context.try_shutdown()
+        return callback
+
+    def _show_progress(self) -> None:
+        print(f'\r{self.recorder.counts.total()} messages in {self._seconds():.0f} s ', end='',
+              file=sys.stderr, flush=True)
+
+    def _seconds(self) -> float:
+        first, last = self.recorder.span or (0, 0)
+        return (last - first) / NANOSECONDS
+
+    def destroy_node(self) -> None:
+        """Complete the bag, and say what is in it; RecordingError if it cannot be completed."""
+        super().destroy_node()
+        try:
+            if self._fault is not None:
+                raise self._fault
+            self.recorder.close()
+        except OSError as error:
+            raise RecordingError(f'the recording {self.folder} is not complete: {error}') from error
+        print(f'\nrecorded {self.folder}: {self.recorder.counts.total()} messages in '
+              f'{self._seconds():.2f} s')
+        for topic, count in self.recorder.counts.items():
+            print(f'  {topic} {count}', flush=True)
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Record until SIGINT or SIGTERM."""
+    args = list(args or ())
+    try:
+        options = _options(remove_ros_args(args))
+        about = {name: value for name in ('size_a', 'size_b', 'model')
+                 if (value := getattr(options, name)) is not None}
+        return run_node(partial(RecordNode, folder=options.out, topics=options.topics, about=about),
+                        args)
+    except REFUSALS as error:
+        print(f'error: {error}', file=sys.stderr)
+        return 1
+
+
+def _options(args: Sequence[str]) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog='record', description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter,
+        epilog='Topics are remapped as those of any node: --ros-args -r box_a/pose:=/crane/pose')
+    parser.add_argument('--out', type=Path, required=True, metavar='RUN',
+                        help='folder of the bag; never overwritten')
+    parser.add_argument('--topics', nargs='+', default=list(TOPICS), metavar='NAME',
+                        help='what is recorded; a name says the type by its end: '
+                             f'{", ".join(TYPES)} (default: {" ".join(TOPICS)})')
+    for name in 'ab':
+        parser.add_argument(f'--size-{name}', type=float, nargs=3, metavar=('X', 'Y', 'Z'),
+                            help=f'full extents of box {name.upper()} [m], kept in the bag for '
+                                 'bench --replay: no message carries them')
+    parser.add_argument('--model', help='the model that gives the contacts, kept in the bag')
+    options = parser.parse_args(list(args))
+    try:
+        for topic in options.topics:
+            type_of(topic)
+        for name in ('size_a', 'size_b'):
+            if getattr(options, name) is not None:
+                as_size(getattr(options, name), f'--{name.replace("_", "-")}')
+    except ValueError as error:
+        parser.error(str(error))
+    return options

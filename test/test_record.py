@@ -1,0 +1,352 @@
+"""Recordings: what is written can be read by others, and drives the nodes again."""
+from __future__ import annotations
+
+import errno
+import runpy
+import signal
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rclpy
+import yaml
+from ros_client import Client, stamp_of
+
+pytest.importorskip('rosbags')
+
+from geometry_msgs.msg import PoseStamped  # noqa: E402
+from make_recording import make  # noqa: E402
+from mcap.reader import make_reader  # noqa: E402
+from mcap_ros2.decoder import DecoderFactory  # noqa: E402
+from rclpy.context import Context  # noqa: E402
+from rclpy.serialization import serialize_message  # noqa: E402
+from test_bench import bench, rows_of  # noqa: E402
+
+from box_contact_ros import ContactSolver  # noqa: E402
+from box_contact_ros.nodes.messages import make_header, read_cloud  # noqa: E402
+from box_contact_ros.nodes.record import RecordNode  # noqa: E402
+from box_contact_ros.recording import (  # noqa: E402
+    TOPICS,
+    Recorder,
+    RecordingError,
+    read_replay,
+    type_of,
+)
+from box_contact_ros.report.accuracy import LIMITS  # noqa: E402
+from box_contact_ros.resources import resource_path  # noqa: E402
+
+ROOT = Path(__file__).resolve().parents[1]
+SHIPPED = resource_path('recordings', 'crane_landing')
+CONTAINER = (12.192, 2.438, 2.591)
+STACK = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+COUNTS = {'/box_a/pose': 800, '/box_b/pose': 800, '/contact/point': 700, '/contact/normal': 700,
+          '/contacts': 800}
+
+
+def decoded(folder: Path) -> dict[str, dict[int, object]]:
+    """Messages by topic and stamp, as Foxglove's own reader decodes them from the definitions in
+    the file. Two under one stamp fail."""
+    found: dict[str, dict[int, object]] = {}
+    with (folder / f'{folder.name}.mcap').open('rb') as file:
+        for _, channel, _, message in make_reader(
+                file, validate_crcs=True,
+                decoder_factories=[DecoderFactory()]).iter_decoded_messages():
+            by_stamp = found.setdefault(channel.topic, {})
+            assert stamp_of(message) not in by_stamp
+            by_stamp[stamp_of(message)] = message
+    return found
+
+
+def numbers(message) -> list[float]:
+    """A pose as `x y z qx qy qz qw`."""
+    p, q = message.pose.position, message.pose.orientation
+    return [p.x, p.y, p.z, q.x, q.y, q.z, q.w]
+
+
+def vector(message) -> list[float]:
+    """The numbers of a point or a normal."""
+    v = message.point if hasattr(message, 'point') else message.vector
+    return [v.x, v.y, v.z]
+
+
+# --- the shipped recording ------------------------------------------------------------------------
+
+
+def test_others_can_read_it():
+    """Foxglove's reader finds the five topics, their types with definitions, and their counts; the
+    chunks are compressed, and all is less than a megabyte."""
+    with (SHIPPED / 'crane_landing.mcap').open('rb') as file:
+        reader = make_reader(file, validate_crcs=True)
+        assert reader.get_header().profile == 'ros2'
+        summary = reader.get_summary()
+    topics = {channel.topic: summary.schemas[channel.schema_id]
+              for channel in summary.channels.values()}
+    assert {name: schema.name for name, schema in topics.items()} == {
+        f'/{name}': type_of(name) for name in TOPICS}
+    assert all(schema.encoding == 'ros2msg' and schema.data for schema in topics.values())
+    assert {channel.topic: summary.statistics.channel_message_counts[number]
+            for number, channel in summary.channels.items()} == COUNTS
+    assert {chunk.compression for chunk in summary.chunk_indexes} == {'zstd'}
+    assert sum(path.stat().st_size for path in SHIPPED.iterdir()) < 1e6
+
+
+def test_the_folder_is_a_bag():
+    """metadata.yaml says what `ros2 bag` needs, and agrees with the file."""
+    about = yaml.safe_load((SHIPPED / 'metadata.yaml').read_text('utf-8'))[
+        'rosbag2_bagfile_information']
+    assert about['storage_identifier'] == 'mcap' and about['version'] == 9
+    assert about['relative_file_paths'] == ['crane_landing.mcap']
+    assert about['message_count'] == sum(COUNTS.values())
+    assert {topic['topic_metadata']['name']: topic['message_count']
+            for topic in about['topics_with_message_count']} == COUNTS
+
+
+def test_recorded_contacts_agree_with_the_exact_solver():
+    """Of every pair of recorded poses: verdict, depth and normal to rounding, the point within the
+    model's stated error; the point and the normal of the messages are those of the cloud."""
+    found = decoded(SHIPPED)
+    exact = ContactSolver(CONTAINER, CONTAINER, model='exact')
+    errors = []
+    for stamp, a in found['/box_a/pose'].items():
+        contact = exact(numbers(a), numbers(found['/box_b/pose'][stamp]))
+        rows = read_cloud(found['/contacts'][stamp])
+        assert len(rows) == contact.colliding
+        for topic in ('/contact/point', '/contact/normal'):
+            assert (stamp in found[topic]) == contact.colliding
+        if contact.colliding:
+            assert rows['depth'] == pytest.approx(-contact.separation, abs=1e-12)
+            normal, point = (vector(found[f'/contact/{name}'][stamp])
+                             for name in ('normal', 'point'))
+            assert normal == pytest.approx(contact.normal, abs=1e-12)
+            assert [*point, *normal] == list(rows[0])[:6]
+            errors.append(np.linalg.norm(point - contact.point))
+    assert len(errors) == COUNTS['/contact/point']
+    assert 100.0 * max(errors) / CONTAINER[0] < LIMITS['containers'].worst
+
+
+def test_it_can_be_made_again(tmp_path):
+    """The documented command makes the same landing: same counts, poses to 1 µm and 1e-6."""
+    assert dict(make(tmp_path / 'again').counts) == COUNTS
+    one, other = (read_replay(folder) for folder in (SHIPPED, tmp_path / 'again'))
+    assert np.array_equal(one.stamps, other.stamps)
+    assert np.abs(one.pose_a - other.pose_a).max() < 1e-6
+    assert np.array_equal(one.pose_b, other.pose_b)
+
+
+def test_it_is_installed(monkeypatch):
+    """setup.py takes it to share/."""
+    given: dict = {}
+    monkeypatch.setattr('setuptools.setup', given.update)
+    monkeypatch.chdir(ROOT)
+    runpy.run_path('setup.py')
+    assert set(dict(given['data_files'])['share/box_contact_ros/recordings/crane_landing']) == {
+        f'recordings/crane_landing/{name}' for name in ('crane_landing.mcap', 'metadata.yaml')}
+
+
+# --- recording ------------------------------------------------------------------------------------
+
+
+def recording(program, out: Path, *arguments: str):
+    """Start `record`, and wait until it listens."""
+    running = program('record', '--out', str(out), *arguments)
+    running.wait_for_output('recording to', 60)
+    return running
+
+
+def test_a_live_recording(program, tmp_path):
+    """Every message that a client sent and got is in the bag, once, under its stamp; Ctrl-C
+    completes it."""
+    out = tmp_path / 'run'
+    program('contact_node', '--ros-args', '-p', 'model:=exact').wait_for_output('ready', 120)
+    size = list(map(str, CONTAINER))
+    running = recording(program, out, '--size-a', *size, '--size-b', *size, '--model', 'exact')
+    client = Client()
+    try:
+        deadline = time.monotonic() + 60.0
+        while not all(f'receiving /{topic}\n' in running.output for topic in TOPICS):
+            assert time.monotonic() < deadline, running.output
+            client.send(STACK, (0.0, 0.0, 2.5, *STACK[3:]))
+            client.spin(lambda: False, 0.1)
+        asked = {client.ask(STACK, (0.01 * k, 0.0, 2.6 - 0.001 * k, *STACK[3:])): k
+                 for k in range(50)}
+        client.spin(lambda: False, 0.5)
+    finally:
+        client.close()
+    running.signal(signal.SIGINT)
+    assert running.wait(30) == 0, running.output
+    assert 'Traceback' not in running.output and '  /contacts ' in running.output
+    found = decoded(out)
+    for topic in ('/box_a/pose', '/box_b/pose', '/contacts'):
+        assert asked.keys() <= found[topic].keys(), topic
+    touching = {stamp for stamp, k in asked.items() if k >= 9}  # 2.591 m and below
+    for topic, kept in (('/contact/point', client.points), ('/contact/normal', client.normals)):
+        assert {stamp for stamp in found[topic] if stamp in asked} == touching
+        assert all(vector(found[topic][s]) == vector(kept[s]) for s in touching)
+    for stamp, k in asked.items():
+        assert numbers(found['/box_b/pose'][stamp])[:3] == [0.01 * k, 0.0, 2.6 - 0.001 * k]
+    replay = read_replay(out)
+    assert set(asked) <= set(replay.stamps)
+    assert replay.sizes == (CONTAINER, CONTAINER)
+
+
+def test_remapped_topics_and_sigterm(program, tmp_path):
+    """One topic under another name; SIGTERM completes the bag too."""
+    out = tmp_path / 'run'
+    running = recording(program, out, '--topics', 'box_a/pose', '--ros-args', '-r',
+                        'box_a/pose:=/yard/load/pose')
+    client = Client('/yard')
+    publisher = client.node.create_publisher(PoseStamped, '/yard/load/pose', 10)
+    try:
+        assert client.spin(lambda: publisher.get_subscription_count() == 1, 15.0)
+        client.spin(lambda: False, 0.5)
+        for k in range(5):
+            publisher.publish(PoseStamped(header=make_header(k, 'yard')))
+        client.spin(lambda: False, 0.5)
+    finally:
+        client.close()
+    running.signal(signal.SIGTERM)
+    assert running.wait(30) == 0, running.output
+    assert '  /yard/load/pose 5\n' in running.output
+    found = decoded(out)
+    assert list(found) == ['/yard/load/pose'] and list(found['/yard/load/pose']) == [*range(5)]
+
+
+def test_nothing_is_overwritten(program, tmp_path):
+    """A folder that exists is refused in one line, and left as it was."""
+    (tmp_path / 'kept').touch()
+    running = program('record', '--out', str(tmp_path))
+    assert running.wait(60) == 1
+    assert 'error: cannot record to' in running.output and 'exists' in running.output
+    assert 'Traceback' not in running.output
+    assert not (tmp_path / 'metadata.yaml').exists()
+
+
+@pytest.mark.parametrize('arguments, status, words', [
+    ('', 2, '--out'),
+    ('--out {} --topics box_a/pose scan', 2, "'scan': its type is known only if it ends in"),
+    ('--out {} --size-a 1 0 1', 2, '--size-a'),
+    ('--out {} --ros-args -r nonsense', 1, 'error: '),
+])
+def test_bad_options(program, tmp_path, arguments, status, words):
+    """Said in words; no folder is left behind."""
+    out = tmp_path / 'run'
+    running = program('record', *arguments.format(out).split())
+    assert running.wait(60) == status
+    assert words in running.output and 'Traceback' not in running.output
+    assert not out.exists()
+
+
+def test_a_full_disk_ends_the_recording(tmp_path, monkeypatch):
+    """Not one message later, with the reason, and an error at the end."""
+    def full(*_):
+        raise OSError(errno.ENOSPC, 'No space left on device')
+
+    context = Context()
+    rclpy.init(context=context)
+    node = RecordNode(context, tmp_path / 'run', ['contacts'], {})
+    monkeypatch.setattr(node.recorder, 'write', full)
+    node._keep('/contacts')(b'')
+    assert not context.ok()
+    with pytest.raises(RecordingError, match='run is not complete: .*No space left'):
+        node.destroy_node()
+    node.recorder.close()
+
+
+# --- replay ---------------------------------------------------------------------------------------
+
+
+def written(folder: Path, stamps_a, stamps_b, topics=('/box_a/pose', '/box_b/pose'),
+            **about) -> Path:
+    """A bag of poses whose x is their stamp [ns]."""
+    recorder = Recorder(folder, topics, about)
+    for topic, stamps in zip(topics, (stamps_a, stamps_b)):
+        for stamp in stamps:
+            message = PoseStamped(header=make_header(stamp, 'world'))
+            message.pose.position.x, message.pose.orientation.w = float(stamp), 1.0
+            recorder.write(topic, stamp, serialize_message(message))
+    recorder.close()
+    return folder
+
+
+def test_replay_pairs_by_stamp(tmp_path):
+    """Whatever the order in which poses came; what has no partner is left out."""
+    folder = written(tmp_path / 'bag', [5, 1, 2, 9], [2, 3, 9, 5], size_a=CONTAINER,
+                     size_b=(1, 2, 3))
+    replay = read_replay(folder)
+    assert replay.stamps.tolist() == [2, 5, 9] and len(replay) == 3
+    assert replay.pose_a[:, 0].tolist() == replay.pose_b[:, 0].tolist() == [2.0, 5.0, 9.0]
+    assert replay.pose_a[:, 6].tolist() == [1.0] * 3
+    assert replay.sizes == (CONTAINER, (1.0, 2.0, 3.0)) and replay.name == 'bag'
+    assert read_replay(folder, size_a=(4, 5, 6)).size_a == (4.0, 5.0, 6.0)
+    assert replay.thinned(2).stamps.tolist() == [2, 9] and replay.thinned(None) is replay
+    assert replay.described == '3 pairs of poses, recorded in 0.00 s'
+
+
+def test_an_mcap_file_alone(tmp_path):
+    """It has the poses but not the sizes, which have to be given; other topics can be named."""
+    folder = written(tmp_path / 'bag', [1, 2], [1, 2], ('/yard/load/pose', '/yard/s1/pose'),
+                     size_a=CONTAINER, size_b=CONTAINER)
+    file, topics = folder / 'bag.mcap', ('/yard/load/pose', 'yard/s1/pose')
+    with pytest.raises(RecordingError, match='does not say the size of box_a: give --size-a'):
+        read_replay(file, *topics)
+    with pytest.raises(RecordingError, match='box_b: give --size-b'):
+        read_replay(file, *topics, size_a=CONTAINER)
+    assert len(read_replay(file, *topics, size_a=CONTAINER, size_b=CONTAINER)) == 2
+
+
+def spoiled(tmp_path: Path, kind: str) -> Path:
+    """Something that is no recording, or none any more."""
+    path = tmp_path / 'spoiled'
+    if kind == 'folder':
+        path.mkdir()
+    elif kind != 'nothing':
+        path = path.with_suffix('.mcap')
+        data = (SHIPPED / 'crane_landing.mcap').read_bytes()
+        half = len(data) // 2
+        path.write_bytes({'empty': b'', 'text': b'no bag at all', 'cut off': data[:half],
+                          'a hole': data[:half] + bytes(1000) + data[half + 1000:]}[kind])
+    return path
+
+
+@pytest.mark.parametrize('kind', ['nothing', 'folder', 'empty', 'text', 'cut off', 'a hole'])
+def test_what_is_no_bag(tmp_path, kind):
+    with pytest.raises(RecordingError, match='spoiled.* cannot be read as a bag'):
+        read_replay(spoiled(tmp_path, kind), size_a=CONTAINER, size_b=CONTAINER)
+
+
+def test_what_cannot_be_replayed(tmp_path):
+    """No such topic, no poses on it, no pairs, sizes that are none."""
+    with pytest.raises(RecordingError, match="no topic 'box_c/pose'; it has: /box_a/pose, "):
+        read_replay(SHIPPED, 'box_c/pose')
+    with pytest.raises(RecordingError, match='contacts is sensor_msgs/msg/PointCloud2, not '):
+        read_replay(SHIPPED, topic_b='contacts')
+    with pytest.raises(RecordingError, match='no two poses of equal stamp: 2 stamps on box_a/pose'):
+        read_replay(written(tmp_path / 'apart', [1, 2], [3]))
+    with pytest.raises(ValueError, match='size_b'):
+        read_replay(SHIPPED, size_b=(1, -1, 1))
+
+
+def test_bench_replays_it(program, tmp_path):
+    """Contact and echo node answer all that is sent of it, with the recorded verdicts."""
+    running = bench(program, tmp_path, '--quick --rate 400 --nodes contact echo --replay '
+                                       f'{SHIPPED}')
+    assert running.wait(240) == 0, running.output
+    assert 'replay: ' in running.output and '100 pairs of poses, recorded in 4.0' in running.output
+    rows = rows_of(tmp_path)
+    assert list(rows) == [('crane_landing', 'contact'), ('crane_landing', 'echo')]
+    for row in rows.values():
+        assert (row['sent'], row['answered'], row['lost']) == ('100', '100', '0')
+    row = rows['crane_landing', 'contact']
+    assert row['wrong_verdicts'] == '0' and 80 < int(row['contacts']) < 95
+
+
+@pytest.mark.parametrize('arguments, status, words', [
+    ('--replay /no/such/bag', 1, 'error: /no/such/bag cannot be read as a bag'),
+    ('--replay x --streams crane', 2, 'not allowed with'),
+    ('--size-a 1 1 1', 2, 'are of a --replay'),
+])
+def test_bad_replay_options(program, arguments, status, words):
+    running = program('bench', *arguments.split())
+    assert running.wait(60) == status
+    assert words in running.output and 'Traceback' not in running.output

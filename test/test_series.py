@@ -1,0 +1,374 @@
+"""Motion, frame by frame: one contact per approach, no chatter, and a point that does not jump.
+
+What a simulator feels is not the error of a point but its steps. The series are runs of the crane
+at 1 kHz and family I of the hard cases: approaches at 100 Hz. Tests print what they measured:
+`python -m pytest test/test_series.py -rP`.
+"""
+from __future__ import annotations
+
+import dataclasses
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+import poses
+import pytest
+
+from box_contact_ros import ContactSolver
+from box_contact_ros.contact import Contacts
+from box_contact_ros.network import Network, load_weights
+from box_contact_ros.overlap import DEPTH_FLOOR
+from box_contact_ros.posesets import SETS, Pairs, log_uniform, pressed, quaternion_multiply, turns
+from box_contact_ros.resources import resource_path
+from box_contact_ros.stability.choices import solve_with_choices
+
+UNIT = (1.0, 1.0, 1.0)
+NETWORK = load_weights(resource_path('weights', 'committee.safetensors')).networks['point']
+
+K = 1.0
+"""|Δpoint| ≤ K · |Δpose| · size / depth, wherever the network is asked the same way before and
+after: see docs/testing.md, which has the figures measured."""
+
+
+class Series(NamedTuple):
+    """Frames of some motions of equal length, one motion after the other; A stands still."""
+
+    pairs: Pairs
+    motions: int
+
+
+def solve(model: str, pairs: Pairs) -> Contacts:
+    return ContactSolver(UNIT, UNIT, model=model).batch(
+        pairs.pose_a, pairs.pose_b, size_a=pairs.size_a, size_b=pairs.size_b)
+
+
+def contact_intervals(found: Contacts, motions: int) -> np.ndarray:
+    """(motions,) how many times contact begins in each."""
+    touching = found.colliding.reshape(motions, -1).astype(int)
+    return (np.diff(touching, axis=1, prepend=0) == 1).sum(axis=1)
+
+
+def steps(found: Contacts, motions: int) -> np.ndarray:
+    """(motions · (frames − 1),) |Δpoint| [m] from frame to frame, NaN without contact in both."""
+    return np.linalg.norm(np.diff(found.point.reshape(motions, -1, 3), axis=1), axis=2).ravel()
+
+
+def largest(pairs: Pairs) -> np.ndarray:
+    """(n,) size: the largest extent of the two boxes [m]."""
+    return np.maximum(pairs.size_a.max(axis=1), pairs.size_b.max(axis=1))
+
+
+def pose_steps(one: Pairs, other: Pairs) -> np.ndarray:
+    """(n,) |Δpose| [m]: how far that corner of B has moved that moved farthest."""
+    farthest = np.zeros(len(one.pose_b))
+    for signs in np.ndindex(2, 2, 2):
+        corner = (np.array(signs) - 0.5) * one.size_b
+        before, after = (pose[:, :3] + poses.rotate(pose[:, 3:], corner)
+                         for pose in (one.pose_b, other.pose_b))
+        farthest = np.maximum(farthest, np.linalg.norm(after - before, axis=1))
+    return farthest
+
+
+def slopes(one: Pairs, other: Pairs, before: Contacts, after: Contacts) -> np.ndarray:
+    """(n,) |Δpoint| / |Δpose| · depth / size, NaN without contact in both.
+
+    The depth is the lesser of the two, and DEPTH_FLOOR · size at least: boxes are pressed in to it.
+    """
+    size = largest(one)
+    depth = np.maximum(-np.maximum(before.separation, after.separation), DEPTH_FLOOR * size)
+    with np.errstate(invalid='ignore'):  # no step at all
+        return (np.linalg.norm(after.point - before.point, axis=1) / pose_steps(one, other)
+                * depth / size)
+
+
+def frames(whole: tuple, motions: int) -> tuple:
+    """All but the last frame of each motion, and all but the first, of a tuple of arrays."""
+    def cut(part: np.ndarray, rows: slice) -> np.ndarray:
+        by_motion = part.reshape(motions, -1, *part.shape[1:])[:, rows]
+        return by_motion.reshape(-1, *part.shape[1:])
+    return tuple(whole._make(cut(part, rows) for part in whole)
+                 for rows in (slice(None, -1), slice(1, None)))
+
+
+# --- the series -----------------------------------------------------------------------------------
+
+CRANE_RATE = 1000.0
+LOWERED = {f'lowered, seed {seed}': seed for seed in range(6)}
+"""Runs by seed of `CraneScenario.drawn`: lowered into the stack without force, and lifted."""
+LANDED = {f'landed, case {number}': number for number in (0, 5, 17, 31)}
+"""Closed loop by number of `landing.cases`: among them the hardest, see test_landing.py."""
+
+
+@cache
+def crane_series(name: str) -> Series:
+    """The poses of one run of the crane."""
+    pytest.importorskip('mujoco')
+    from box_contact_ros.crane import Crane, CraneScenario
+    from box_contact_ros.landing import cases, land, scenario_of
+
+    if name in LOWERED:
+        crane = Crane(CraneScenario.drawn(LOWERED[name]), CRANE_RATE)
+        scenario, load = crane.scenario, []
+        for _ in range(round(scenario.duration * CRANE_RATE)):
+            load.append(crane.load_pose)
+            crane.step()
+    else:
+        scenario = scenario_of(list(cases())[LANDED[name]])
+        crane = Crane(scenario, CRANE_RATE)
+        load = land(scenario, ContactSolver(scenario.size, scenario.stack_size, model='committee'),
+                    rate_hz=CRANE_RATE, latency=0.002).poses
+    n = len(load)
+    return Series(Pairs(np.tile(crane.stack_pose, (n, 1)), np.array(load),
+                        np.tile(scenario.stack_size, (n, 1)), np.tile(scenario.size, (n, 1))), 1)
+
+
+APPROACHES, FRAMES = 150, 401
+TURN = 0.5
+"""Largest angle [rad] by which a box turns in an approach."""
+
+
+@cache
+def approaches(name: str, turning: bool) -> Series:
+    """Family I: B comes down on a slanted line, rests for an instant, and goes off sideways; 4 s at
+    100 Hz, the speed smooth. Its orientation is fixed, or turns at a constant rate (slerp) and is
+    given as q or −q at random.
+
+    In the middle frame it has a pose of the set of that name, and so touches.
+    """
+    rng = np.random.default_rng(85)
+    met = SETS[name](rng, APPROACHES)
+    n = len(met.pose_a)
+    normal = solve('exact', met).normal
+    side = np.cross(normal, rng.normal(size=(n, 3)))
+    side /= np.linalg.norm(side, axis=1, keepdims=True)
+    reach = (largest(met) * rng.uniform(0.1, 0.5, (2, n)))[:, :, None]
+    come, go = reach[0] * (normal + rng.uniform(-1, 1, (n, 1)) * side), 2.0 * reach[1] * side
+    axis, angle = rng.normal(size=(n, 3)), TURN * turning * rng.uniform(0.1, 1.0, n)
+
+    def repeated(part: np.ndarray) -> np.ndarray:
+        return np.repeat(part, FRAMES, axis=0)
+
+    time = np.tile(np.linspace(-1.0, 1.0, FRAMES), n)
+    way = (np.abs(time) ** 2 * (3.0 - 2.0 * np.abs(time)))[:, None]
+    b = repeated(met.pose_b)
+    b[:, :3] += way * np.where(time[:, None] < 0.0, repeated(come), repeated(go))
+    if turning:
+        b[:, 3:] = quaternion_multiply(turns(repeated(axis), repeated(angle) * time), b[:, 3:])
+        b[:, 3:] *= rng.choice([-1.0, 1.0], (len(b), 1))
+    return Series(Pairs(repeated(met.pose_a), b, repeated(met.size_a), repeated(met.size_b)), n)
+
+
+SERIES = {name: (crane_series, name) for name in (*LOWERED, *LANDED)}
+SERIES |= {f'{name}, {"turning" if turning else "fixed"}': (approaches, name, turning)
+           for name in SETS for turning in (False, True)}
+
+
+@pytest.fixture(params=SERIES)
+def series(request: pytest.FixtureRequest) -> tuple[str, Series]:
+    make, *arguments = SERIES[request.param]
+    return request.param, make(*arguments)
+
+
+# --- what holds in every frame --------------------------------------------------------------------
+
+
+def test_one_contact_interval_per_approach(series):
+    """The boxes of a crane meet once and part once or never. So do boxes on a straight line that do
+    not turn (A ⊕ −B is convex), and on two that have a point of contact in common. While they turn,
+    `committee` begins as many contacts as `exact` does, in the same frames."""
+    name, (pairs, motions) = series
+    exact, committee = solve('exact', pairs), solve('committee', pairs)
+    assert np.array_equal(committee.colliding, exact.colliding)
+    begun = contact_intervals(exact, motions)
+    print(f'{name}: {exact.colliding.sum()} of {len(pairs.pose_a)} frames in contact, '
+          f'{begun.sum()} contacts in {motions} motions')
+    assert begun.min() == 1
+    if 'turning' not in name:
+        assert begun.max() == 1
+
+
+def test_chatter_is_counted():
+    """The test above would see a contact that breaks off for one frame."""
+    pairs, motions = approaches('containers', False)
+    exact = solve('exact', pairs)
+    exact.colliding[np.flatnonzero(exact.colliding)[1]] = False
+    assert sorted(contact_intervals(exact, motions))[-2:] == [1, 2]
+
+
+def test_frames_know_no_history(series):
+    """In random order, and with −q for q: the same bits."""
+    _, (pairs, _) = series
+    rng = np.random.default_rng(2)
+    order = rng.permutation(len(pairs.pose_a))
+    other = Pairs(*(part[order] for part in pairs))
+    other.pose_b[:, 3:] *= rng.choice([-1.0, 1.0], (len(order), 1))
+    for model in ('exact', 'committee'):
+        for one, two in zip(solve(model, pairs), solve(model, other)):
+            assert np.array_equal(one[order], two, equal_nan=True)
+
+
+def test_the_point_keeps_to_its_slope(series):
+    """The law of K from frame to frame: of `exact` always, of `committee` between frames in which
+    the network is asked the same way."""
+    name, (pairs, motions) = series
+    one, other = frames(pairs, motions)
+    exact = slopes(one, other, *frames(solve('exact', pairs), motions))
+    found, choices = solve_with_choices(NETWORK, pairs)
+    before, after = frames(choices, motions)
+    same = before.equal(after)
+    slope = slopes(one, other, *frames(found, motions))
+    print(f'{name}: K of exact {np.nanmax(exact):.2f}, of committee {np.nanmax(slope[same]):.2f} '
+          f'in {100 * same[np.isfinite(slope)].mean():.2f} % of the frames')
+    assert np.nanmax(exact) <= K
+    assert np.nanmax(slope[same]) <= K
+
+
+# --- what holds in almost every frame -------------------------------------------------------------
+
+
+def beyond_exact(model: str, series: Series) -> tuple[float, float]:
+    """Share of the steps between two contacts that are at most the exact point's plus 1 % of the
+    boxes' shortest edge, and the worst step beyond the exact point's by the smaller box's longest
+    edge."""
+    pairs, motions = series
+    excess = steps(solve(model, pairs), motions) - steps(solve('exact', pairs), motions)
+    first, _ = frames(pairs, motions)
+    shortest = np.minimum(first.size_a.min(axis=1), first.size_b.min(axis=1))
+    longest = np.minimum(first.size_a.max(axis=1), first.size_b.max(axis=1))
+    known = np.isfinite(excess)
+    return (float((excess <= 0.01 * shortest)[known].mean()),
+            float((excess / longest)[known].max()))
+
+
+def test_how_far_the_point_of_committee_steps(series):
+    """Of the crane's steps, 999 of 1,000 are the exact point's plus 1 % of the width at most
+    (measured: 99.91 % in the worst run), the worst is 1.1 % of the edge beyond; of family I, 99.7 %
+    and 2.4 %. The bounds leave room for other weights."""
+    name, motion = series
+    share, worst = beyond_exact('committee', motion)
+    print(f'{name}: {100 * share:.2f} % of the steps, worst {100 * worst:.2f} % of the edge')
+    least, most = (0.998, 0.025) if motion.motions == 1 else (0.994, 0.05)
+    assert share >= least
+    assert worst <= most
+
+
+def test_the_deepest_point_jumps_by_the_box(series):
+    """What the bounds above are worth: FCL's deepest point steps from corner to corner. It does so
+    rarely, at every change of the deepest corner, and then by up to the whole box."""
+    pytest.importorskip('fcl')
+    name, motion = series
+    share, worst = beyond_exact('fcl', motion)
+    print(f'{name}: {100 * share:.2f} % of the steps, worst {100 * worst:.2f} % of the edge')
+    if 'fixed' in name:
+        return  # boxes that do not turn: the deepest corner mostly stays
+    assert worst > 0.15
+    assert worst > 5.0 * beyond_exact('committee', motion)[1]
+
+
+# --- where the point may step, and where not ------------------------------------------------------
+
+N = 200_000
+SHALLOWEST, DEEPEST = 1e-6, 0.1
+"""Depths, of the shortest edge: well above DEPTH_FLOOR, and to the end of the trained range."""
+SHORTEST_STEP, LONGEST_STEP = 1e-7, 1e-3
+"""|Δpose|, of the size, about; a tenth of the depth at most, so that the law says something."""
+
+
+@cache
+def small_steps(name: str) -> tuple[Pairs, Pairs]:
+    """Contacts of a set, pressed to depths of all magnitudes, and these with B moved a little."""
+    rng = np.random.default_rng(9)
+    pairs = SETS[name](rng, N)
+    shortest = np.minimum(pairs.size_a.min(axis=1), pairs.size_b.min(axis=1))
+    pairs = pressed(pairs, shortest * log_uniform(rng, SHALLOWEST, DEEPEST, len(shortest)))
+    n, size = len(pairs.pose_a), largest(pairs)
+    step = np.minimum(size * log_uniform(rng, SHORTEST_STEP, LONGEST_STEP, n),
+                      -0.1 * solve('exact', pairs).separation)
+    way, axis = rng.normal(size=(2, n, 3))
+    way /= np.linalg.norm(way, axis=1, keepdims=True)
+    turned = rng.random(n)  # share of the step that is a turn
+    angle = turned * step / (0.5 * np.linalg.norm(pairs.size_b, axis=1))
+    moved = pairs.pose_b.copy()
+    moved[:, :3] += ((1.0 - turned) * step)[:, None] * way
+    moved[:, 3:] = quaternion_multiply(turns(axis, angle), moved[:, 3:])
+    return pairs, pairs._replace(pose_b=moved)
+
+
+@pytest.mark.parametrize('name', SETS)
+def test_exact_is_continuous(name):
+    """|Δpoint| ≤ K · |Δpose| · size / depth, in every step between two contacts."""
+    pairs, moved = small_steps(name)
+    slope = slopes(pairs, moved, solve('exact', pairs), solve('exact', moved))
+    print(f'{name}: K {np.nanmax(slope):.2f} in {np.isfinite(slope).sum()} steps')
+    assert np.isfinite(slope).sum() > 0.9 * N
+    assert np.nanmax(slope) <= K
+
+
+def walked(name: str, network: Network = NETWORK) -> tuple[np.ndarray, np.ndarray]:
+    """Slopes of small steps between two contacts, and whether the network was asked alike."""
+    pairs, moved = small_steps(name)
+    before, chosen = solve_with_choices(network, pairs)
+    after, chosen_then = solve_with_choices(network, moved)
+    both = before.colliding & after.colliding
+    return slopes(pairs, moved, before, after)[both], chosen.equal(chosen_then)[both]
+
+
+@pytest.mark.parametrize('name', SETS)
+def test_continuous_wherever_the_choices_are_equal(name):
+    """|Δpoint| ≤ K · |Δpose| · size / depth."""
+    slope, same = walked(name)
+    print(f'{name}: K {slope[same].max():.2f} in {100 * same.mean():.1f} % of {len(slope)} steps; '
+          f'in the others {slope[~same].max():.3g}')
+    assert len(slope) > 0.9 * N
+    assert same.mean() > 0.75  # the law is about most of the steps
+    assert slope[same].max() <= K
+
+
+def test_where_choices_change_the_point_steps():
+    """The law is not one of every step, and the choices are what it takes: without regard to them
+    it is broken by more than a factor of ten."""
+    slope, same = walked('stacks')
+    assert slope[~same].max() > 10.0 * K
+
+
+def test_a_rougher_network_breaks_the_law():
+    """Weights that are off by a third at random: the point is still continuous and inside both
+    boxes, but steeper than K."""
+    noise = np.random.default_rng(1).normal(size=NETWORK.packed.shape)
+    rough = dataclasses.replace(
+        NETWORK, packed=(NETWORK.packed * (1.0 + 0.3 * noise)).astype(np.float32))
+    slope, same = walked('containers', rough)
+    assert slope[same].max() > 1.5 * K
+
+
+def test_choices_are_those_of_the_answer():
+    """Solved with choices or without: the same contacts; outside the range no network is asked."""
+    pairs = SETS['random sizes'](np.random.default_rng(4), 1000)
+    deep = pairs._replace(pose_b=pairs.pose_b.copy())
+    deep.pose_b[::3, :3] = deep.pose_a[::3, :3]
+    found, choices = solve_with_choices(NETWORK, deep)
+    for one, other in zip(found, solve('committee', deep)):
+        assert np.array_equal(one, other, equal_nan=True)
+    assert not choices.network[::3].any() and choices.network[1::3].all()
+    assert choices.equal(choices)[1::3].all() and not choices.equal(choices)[::3].any()
+
+
+def test_each_choice_counts():
+    """Two answers that differ in one choice are not asked alike, unless it is one between faces
+    that cut nothing."""
+    _, choices = solve_with_choices(NETWORK, SETS['random cubes'](np.random.default_rng(4), 1000))
+    assert choices.equal(choices).all()
+    for name, other in (('network', ~choices.network), ('frame_b', ~choices.frame_b),
+                        ('mirrored', -choices.mirrored), ('ranks', choices.ranks[:, [1, 2, 0]]),
+                        ('sides', -choices.sides), ('faces', -choices.faces)):
+        assert not choices.equal(choices._replace(**{name: other})).any(), name
+    nothing = np.zeros_like(choices.sides)
+    assert choices.equal(choices._replace(sides=nothing, faces=nothing)).all()
+
+
+def test_a_batch_with_a_bad_pose_is_refused():
+    """No choices of a pair that is none."""
+    pairs = SETS['random cubes'](np.random.default_rng(4), 10)
+    pairs.pose_b[3, 0] = np.nan
+    with pytest.raises(ValueError, match='1 of the pairs from row 0 on'):
+        solve_with_choices(NETWORK, pairs)
