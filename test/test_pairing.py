@@ -64,7 +64,7 @@ def test_poses_without_partner_are_dropped_and_counted():
         assert not pairing.add('box_a', pose(stamp))
     assert pairing.counts == {NO_PARTNER: 10}
     assert pairing.add('box_b', pose(10))
-    assert pairing.add('box_b', pose(9))
+    assert not pairing.add('box_b', pose(9))
 
 
 def test_no_stamp_is_answered_twice():
