@@ -156,6 +156,10 @@ class StampPairing(_Pairing):
         return min(near, key=lambda key: abs(key - stamp), default=stamp)
 
     def _note(self, box: str, stamp: int) -> None:
+        if self._newest and 0 < self.max_age < stamp - max(self._newest.values()):
+            # Time has leapt, as after a pause of all boxes. This one is the first, and the others
+            # are not stale for that.
+            self._missing_since.clear()
         self._newest[box] = max(stamp, self._newest.get(box, stamp))
         self._missing_since.pop(box, None)
         for other in self.boxes:
@@ -164,8 +168,6 @@ class StampPairing(_Pairing):
                 self._missing_since[other] = stamp
 
     def _is_stale(self, box: str, now: int) -> bool:
-        # Not counted from the box's last pose: after a pause of all boxes, one of them is the
-        # first, and the others are not stale for that.
         return 0 < self.max_age < now - self._missing_since.get(box, now)
 
     def _is_awaiting(self, poses: dict[str, StampedPose]) -> bool:

@@ -14,7 +14,7 @@ import sys
 import tempfile
 import time
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -109,15 +109,16 @@ def program(tmp_path: Path) -> Iterator[Callable[..., RunningProgram]]:
     """Start `python -m box_contact_ros PROGRAM ...`; it is ended with the test, however that ends.
 
     `program('crane', '--ros-args', '-p', 'rate:=200.0', env={...})`: `env` is added to this
-    process's environment.
+    process's environment, `within` stands before the command, such as `ip netns exec NAME`.
     """
     started: list[RunningProgram] = []
 
-    def start(*args: str, env: dict[str, str] | None = None) -> RunningProgram:
+    def start(*args: str, env: dict[str, str] | None = None,
+              within: Sequence[str] = ()) -> RunningProgram:
         log = tmp_path / f'program_{len(started)}.log'
         with log.open('wb') as out:
             process = subprocess.Popen(
-                [sys.executable, '-u', '-m', 'box_contact_ros', *args],
+                [*within, sys.executable, '-u', '-m', 'box_contact_ros', *args],
                 stdin=subprocess.DEVNULL,
                 stdout=out,
                 stderr=subprocess.STDOUT,

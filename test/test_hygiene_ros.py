@@ -39,9 +39,9 @@ class RawClient(Client):
     def __init__(self):
         super().__init__()
         self.wire = []
-        for box in 'ab':
+        self.raw_subscriptions = [
             self.node.create_subscription(PoseStamped, f'box_{box}/pose', self.wire.append,
-                                          QoSProfile(depth=10_000), raw=True)
+                                          QoSProfile(depth=10_000), raw=True) for box in 'ab']
 
     def send_raw(self, *payloads):
         """Publish each payload on both topics."""

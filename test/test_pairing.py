@@ -118,6 +118,10 @@ def test_after_a_pause_nobody_is_stale():
         assert not pairing.add('box_a', pose(stamp))
         assert stamps(pairing.add('box_b', pose(stamp))) == [stamp, stamp]
         assert pairing.stale() == []
+    # Also where the last tick before it lacked one.
+    pairing.add('box_a', pose(5001 * MS))
+    assert not pairing.add('box_a', pose(9000 * MS))
+    assert stamps(pairing.add('box_b', pose(9000 * MS))) == [9000 * MS, 9000 * MS]
 
 
 def test_a_silent_box_costs_the_others_no_tick():

@@ -82,7 +82,8 @@ PARAMETERS = {
     'tolerance': Setting(0.0, 'with pairing stamp: stamps this far apart still belong together [s]',
                          number(0.0, LONGEST)),
     'max_age': Setting(1.0, 'a pose further than this from the tick, by their stamps, is stale: '
-                            'its pairs are answered with NaN; 0: never [s]', number(0.0, LONGEST)),
+                            'its pairs are answered with NaN; longer than the slowest '
+                            'period; 0: never [s]', number(0.0, LONGEST)),
     'deadline': Setting(0.0, 'quality of service asked of pose publishers, who must offer as much: '
                              'longest time between poses; 0: none [s]', number(0.0, LONGEST)),
     'pair_topics': Setting(True, 'whether pairs have topics of their own beside the cloud', flag),
@@ -131,6 +132,8 @@ class ContactNode(LifecycleNode):
             for transition in (self.trigger_configure, self.trigger_activate):
                 if transition() != TransitionCallbackReturn.SUCCESS:
                     raise self._fault or ValueError('the node did not start')
+        # Last: whoever waits for it may end the node at once, in the middle of a transition.
+        self._say_ready()
 
     # --- lifecycle -------------------------------------------------------------------------------
 
@@ -176,10 +179,15 @@ class ContactNode(LifecycleNode):
         gc.collect()
         gc.freeze()
         self._subscribe()
-        settings, scene = self._settings, self._solver.scene
+
+    def _say_ready(self) -> None:
+        if self._solver is None:
+            self.get_logger().info('unconfigured: autostart is false')
+            return
+        pairs = len(self._solver.scene.pairs)
         self.get_logger().info(
-            f'ready: model {self._solver.model!r}, pairing {settings["pairing"]!r}, '
-            f'{len(scene.pairs)} {"pair" if len(scene.pairs) == 1 else "pairs"}')
+            f'ready: model {self._solver.model!r}, pairing {self._settings["pairing"]!r}, '
+            f'{pairs} {"pair" if pairs == 1 else "pairs"}')
 
     # --- parameters ------------------------------------------------------------------------------
 

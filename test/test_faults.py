@@ -1,0 +1,283 @@
+"""What breaks around a contact node, and that nothing is lost, wrong or leaked by it.
+
+The node runs as a process of its own. Killed and restarted nodes and clients are in
+test_contact_node.py, weights and requests that cannot be read in test_hygiene_ros.py, scenes that
+are replaced by garbage in test_scene_node.py. `test/mutants.py` has a node without each guard.
+"""
+from __future__ import annotations
+
+import math
+import os
+import shutil
+import signal
+import subprocess
+import time
+
+import numpy as np
+import poses
+import pytest
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+from rcl_interfaces.srv import SetParameters
+from rclpy.qos import QoSProfile
+from rosgraph_msgs.msg import Clock
+from test_hygiene_ros import APART, GOOD, LITTLE_ENDIAN, ORIGIN, TOUCHING, RawClient, cdr
+
+from box_contact_ros.nodes.messages import make_header, read_cloud
+
+CUBES = ('--ros-args', '-p', 'size_a:=[2.0, 2.0, 2.0]', '-p', 'size_b:=[2.0, 2.0, 2.0]')
+LEAK = 2.0
+"""Growth [MB] of a node's memory that is taken for none: the allocator's arenas come in steps."""
+
+
+@pytest.fixture
+def client():
+    client = RawClient()
+    yield client
+    client.close()
+
+
+@pytest.fixture
+def start(program, client):
+    """Start a contact node for two cubes, matched with the client."""
+    def start(*parameters, **options):
+        words = [word for parameter in parameters for word in ('-p', parameter)]
+        running = program('contact_node', *CUBES, *words, **options)
+        running.wait_for_output('ready', 120)
+        client.offer_until_answered(ORIGIN, APART)
+        return running
+    return start
+
+
+def memory(running):
+    """Resident memory of a program [MB]."""
+    with open(f'/proc/{running.process.pid}/status') as file:
+        line, = (line for line in file if line.startswith('VmRSS:'))
+    return int(line.split()[1]) / 1024
+
+
+def rate_limited(count, rate):
+    """Numbers at a rate [Hz]."""
+    started = time.monotonic()
+    for number in range(count):
+        time.sleep(max(0.0, started + number / rate - time.monotonic()))
+        yield number
+
+
+def test_100_000_messages_that_are_none(start, client):
+    """Random bytes, messages cut short and messages with changed bytes at some 10 kHz: each that
+    arrives is counted, none ends the node, memory does not grow, and the next pair is answered."""
+    node = start()
+    rng = np.random.default_rng(1)
+    publish = [publisher.publish for publisher in client.publishers]
+    client.node.destroy_subscription(client.raw_subscriptions[0])
+    client.node.destroy_subscription(client.raw_subscriptions[1])
+
+    def payload(number):
+        if number % 4 == 0:
+            return rng.bytes(rng.integers(200))
+        if number % 4 == 1:
+            return LITTLE_ENDIAN + rng.bytes(rng.integers(200))
+        if number % 4 == 2:
+            return GOOD[:rng.integers(len(GOOD))]
+        changed = bytearray(GOOD)
+        changed[rng.integers(4, 16)] = rng.integers(256)  # stamp and length
+        changed[rng.integers(len(GOOD) - 56, len(GOOD))] = rng.integers(256)
+        return bytes(changed)
+
+    def storm(count):
+        for number in rate_limited(count, 10_000):
+            publish[number % 2](payload(number))
+            if number % 100 == 0:
+                client.spin(lambda: False, 0.0)
+
+    storm(20_000)
+    client.assert_answered()
+    before = memory(node)
+    storm(80_000)
+    client.assert_answered()
+    counts = client.counts()
+    assert memory(node) - before < LEAK
+    assert node.process.poll() is None and 'Traceback' not in node.output
+    # Best effort may lose some of a storm; half of all are no PoseStamped, the rest vary.
+    assert counts['poses'] > 50_000
+    assert counts['refused: not a PoseStamped'] > 0.7 * counts['poses']
+    assert 'refused: internal error' not in counts
+    for cloud in client.clouds.values():
+        for row in read_cloud(cloud):
+            assert math.isnan(row['depth']) or np.isfinite(list(row)).all()
+
+
+@pytest.mark.parametrize('serialization', ['raw', 'typed'])
+def test_half_of_the_poses_are_none(start, client, serialization):
+    """NaN, zero quaternions, infinities and denormals in every second pair, at 500 Hz: each good
+    pair is answered rightly, each bad pose counted, nothing bad is answered."""
+    start(f'serialization:={serialization}')
+    bad = [[math.nan] * 7, [0] * 7, [0, 0, math.inf, 0, 0, 0, 1], [0, 0, 1.9, 0, 0, 0, 5e-324],
+           [0, 0, 1e308, 0, 0, 0, 1], [0, 0, 0, math.nan, 0, 0, 1]]
+    good, refused = {}, []
+    for number in rate_limited(2000, 500):
+        if number % 2:
+            height = 1.9 + 0.0001 * (number % 1900)
+            good[client.send_pair(ORIGIN, (0, 0, height, 0, 0, 0, 1))] = height
+        else:
+            pair = (ORIGIN, bad[number // 2 % len(bad)])
+            refused.append(client.send_pair(*(pair if number % 4 else pair[::-1])))
+        client.spin(lambda: False, 0.0)
+    assert client.spin(lambda: all(stamp in client.clouds for stamp in good), 5.0), sum(
+        stamp not in client.clouds for stamp in good)
+    for stamp, height in good.items():
+        rows = read_cloud(client.clouds[stamp])
+        assert len(rows) == (height <= 2.0)
+        assert all(row['depth'] == pytest.approx(2.0 - height, abs=1e-14) for row in rows)
+    assert not any(stamp in client.clouds for stamp in refused)
+    assert client.counts()['refused: bad pose'] == len(refused)
+
+
+def test_memory_does_not_grow(start, client):
+    """10,000 pairs of which a third lacks its partner and a third is in a frame of its own."""
+    node = start()
+
+    def play(count):
+        for number in rate_limited(count, 2000):
+            if number % 3 == 0:
+                client.publishers[0].publish(cdr(ORIGIN, divmod(client.next_stamp(), 10**9)))
+            else:
+                frame = b'map\0' if number % 3 == 1 else b'frame %d\0' % number
+                client.send_pair(ORIGIN, TOUCHING, frame)
+            if number % 20 == 0:
+                client.spin(lambda: False, 0.0)
+
+    play(4000)
+    client.assert_answered()
+    before = memory(node)
+    play(10_000)
+    client.assert_answered()
+    assert memory(node) - before < LEAK
+
+
+def test_a_clock_that_jumps_back(start, client):
+    """Simulated time is set back by half a second, less than the stamps alone would tell: what
+    was known of the old time is dropped, and the new time is answered from its first tick."""
+    start('use_sim_time:=true')
+    clock = client.node.create_publisher(Clock, '/clock', 10)
+
+    def set_clock(stamp):
+        message = Clock(clock=make_header(stamp, '').stamp)
+        for _ in range(3):
+            clock.publish(message)
+            client.spin(lambda: False, 0.1)
+
+    def tick(stamp):
+        for publisher, pose in zip(client.publishers, (ORIGIN, TOUCHING)):
+            publisher.publish(cdr(pose, divmod(stamp, 10**9)))
+
+    start_of_time = client.next_stamp() + 10**12
+    client.spin(lambda: client.node.count_subscribers('/clock') > 0, 10.0)
+    set_clock(start_of_time + 5 * 10**8)
+    stamps = [start_of_time + 10**6 * number for number in range(500)]
+    for stamp in stamps:
+        tick(stamp)
+        client.spin(lambda: False, 0.002)
+    assert client.spin(lambda: all(stamp in client.clouds for stamp in stamps), 5.0)
+    client.clouds.clear()
+    set_clock(start_of_time)
+    for stamp in stamps[:100]:
+        tick(stamp)
+        client.spin(lambda: False, 0.002)
+    assert client.spin(lambda: all(stamp in client.clouds for stamp in stamps[:100]), 5.0), len(
+        client.clouds)
+    assert client.counts()['time went back'] >= 1
+
+
+def test_a_storm_of_parameters(start, client):
+    """Changes, good and bad, as fast as they are served, in a stream of 200 Hz: no tick is lost, each is answered with one
+    of the sizes that were set, and the last one stands."""
+    start()
+    service = client.node.create_client(SetParameters, '/contact_node/set_parameters')
+    assert client.spin(service.service_is_ready, 15.0)
+    futures, stamps = [], []
+
+    def change(number):
+        values = ([2.0, 2.0, 2.0], [2.0, 2.0, 2.2], [2.0, -2.0, 2.0], [math.nan] * 3)[number % 4]
+        kind = ParameterType.PARAMETER_DOUBLE_ARRAY
+        futures.append(service.call_async(SetParameters.Request(parameters=[Parameter(
+            name='size_b', value=ParameterValue(type=kind, double_array_value=values))])))
+
+    for number in rate_limited(600, 200):
+        stamps.append(client.send_pair(ORIGIN, (0, 0, 2.05, 0, 0, 0, 1)))
+        # One after the other: a service that is asked more than it answers drops requests.
+        if all(future.done() for future in futures[-1:]):
+            change(len(futures))
+        client.spin(lambda: False, 0.0)
+    assert client.spin(lambda: all(future.done() for future in futures), 30.0)
+    assert client.spin(lambda: all(stamp in client.clouds for stamp in stamps), 5.0), sum(
+        stamp not in client.clouds for stamp in stamps)
+    assert len(futures) > 100
+    success = [future.result().results[0].successful for future in futures]
+    assert success == [number % 4 < 2 for number in range(len(futures))]
+    depths = {round(float(row['depth']), 9) for stamp in stamps
+              for row in read_cloud(client.clouds[stamp])}
+    assert depths == {0.05}
+    change(0)  # the first of the four
+    assert client.spin(futures[-1].done, 5.0)
+    assert client.clouds[client.ask(ORIGIN, (0, 0, 2.05, 0, 0, 0, 1))].width == 0
+
+
+def test_a_subscriber_that_never_reads(start, client, program):
+    """A crane is stopped in its tracks (SIGSTOP) while it is subscribed to all contacts: everybody
+    else is answered as before, and the node's memory does not grow."""
+    node = start()
+    crane = program('crane', '--ros-args', '-p', 'size_a:=[2.0, 2.0, 2.0]',
+                    '-p', 'size_b:=[2.0, 2.0, 2.0]', '-p', 'duration:=30',
+                    '-r', 'box_a/pose:=other/a', '-r', 'box_b/pose:=other/b')
+    client.spin(lambda: client.node.count_subscribers('/contacts') > 1, 60.0)
+    crane.signal(signal.SIGSTOP)
+    before = memory(node)
+    stamps = []
+    for _ in rate_limited(2000, 500):
+        stamps.append(client.send_pair(ORIGIN, TOUCHING))
+        client.spin(lambda: False, 0.0)
+    assert client.spin(lambda: all(stamp in client.points for stamp in stamps), 5.0)
+    assert memory(node) - before < LEAK
+    client.assert_answered()
+    crane.signal(signal.SIGCONT)
+
+
+FULL = ('mount -t tmpfs -o size=64k none /dev/shm && head -c 1M /dev/zero > /dev/shm/full; '
+        'exec "$@"')
+
+
+def test_shared_memory_is_full(program):
+    """/dev/shm has no room, in a mount namespace of their own: node and crane talk without it, and
+    no message is lost (else the crane's status is not 0)."""
+    within = ['unshare', '--mount', 'sh', '-c', FULL, 'sh']
+    allowed = shutil.which('unshare') and subprocess.run(
+        [*within, 'true'], capture_output=True).returncode == 0
+    if not allowed:
+        pytest.skip('mount namespaces are not permitted here')
+    node = program('contact_node', *CUBES, within=within)
+    node.wait_for_output('ready', 120)
+    crane = program('crane', *CUBES, '-p', 'duration:=5', '-p', 'wait:=10', within=within)
+    assert crane.wait(120) == 0, crane.output
+    node.signal(signal.SIGINT)
+    assert node.wait(5) == 0 and 'Traceback' not in node.output
+
+
+def test_files_of_killed_nodes_do_not_add_up(start, client):
+    """kill -9 leaves shared-memory files behind; the next node works all the same, and a node that
+    ends by itself leaves none."""
+    if not os.path.isdir('/dev/shm'):
+        pytest.skip('no /dev/shm')
+
+    def files():
+        return {name for name in os.listdir('/dev/shm') if 'fastrtps' in name}
+
+    before = files()
+    node = start()
+    node.signal(signal.SIGKILL)
+    node.wait(5)
+    left = files() - before
+    ended = start()
+    ended.signal(signal.SIGTERM)
+    assert ended.wait(5) == 0
+    assert len(files() - before - left) == 0
