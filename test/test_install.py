@@ -23,8 +23,9 @@ from box_contact_ros.programs import PROGRAMS
 ROOT = Path(__file__).resolve().parents[1]
 NAME = 'box_contact_ros'
 DATA = ('weights', 'msg_schemas', 'launch', 'config')
-TRACKED = subprocess.run(['git', 'ls-files', '-z'], cwd=ROOT, capture_output=True, text=True,
-                         check=False).stdout.split('\0')[:-1]
+# Also those that are about to be added.
+TRACKED = subprocess.run(['git', 'ls-files', '-z', '--cached', '--others', '--exclude-standard'],
+                         cwd=ROOT, capture_output=True, text=True).stdout.split('\0')[:-1]
 # PYTHONPATH and the ament index must show the installation alone, not what runs the tests.
 # Without compilation: a copy elsewhere would not find the cached kernels, and take a minute.
 CLEAN = {name: value for name, value in os.environ.items()
@@ -50,9 +51,9 @@ class Installation:
     python: Path
     enter: tuple[str, ...] = ()
 
-    def ask(self, code: str) -> dict:
+    def ask(self, code: str, *args: str) -> dict:
         """Run Python code in it, away from any sources; the JSON object that the code prints."""
-        return json.loads(run(*self.enter, self.python, '-c', code, cwd=self.folder.parent))
+        return json.loads(run(*self.enter, self.python, '-c', code, *args, cwd=self.folder.parent))
 
 
 def copy_sources(to: Path) -> Path:
@@ -119,15 +120,16 @@ under_colcon = pytest.mark.parametrize('installed', [kind for kind in INSTALL if
 def test_data_files_are_there_and_load(installed: Installation) -> None:
     """Every data file of the repository is found, and none of another installation; weights and
     schemas can be read."""
-    found = installed.ask('''
-import json
+    found = installed.ask("""
+import json, sys
 import box_contact_ros
 from box_contact_ros.network import load_weights
 from box_contact_ros.resources import resource_path
 files = {}
-for folder in %r:
+for folder in sys.argv[1:]:
     top = resource_path(folder)
-    files[folder] = sorted(str(path.relative_to(top)) for path in top.rglob('*') if path.is_file())
+    files[folder] = sorted(str(path.relative_to(top)) for path in top.rglob('*')
+                           if path.is_file() and path.suffix != '.pyc')
 for name in files['weights']:
     if name.endswith('.safetensors'):
         load_weights(resource_path('weights', name))
@@ -136,22 +138,22 @@ for name in files['msg_schemas']:
         json.loads(resource_path('msg_schemas', name).read_text('utf-8'))
 places = [box_contact_ros.__file__, *(str(resource_path(folder)) for folder in files)]
 print(json.dumps({'files': files, 'places': places}))
-''' % (folders := [folder for folder in DATA if (ROOT / folder).is_dir()],))
+""", *DATA)
     assert found['files'] == {
         folder: sorted(str(Path(name).relative_to(folder)) for name in TRACKED
-                       if Path(name).parts[0] == folder) for folder in folders}
+                       if Path(name).parts[0] == folder) for folder in DATA}
     assert all(Path(place).is_relative_to(installed.folder) for place in found['places'])
 
 
 @all_kinds
 def test_contacts_can_be_asked_for(installed: Installation) -> None:
     """The default model, with the weights of the installation."""
-    answer = installed.ask('''
+    answer = installed.ask("""
 import json
 from box_contact_ros import ContactSolver
 contact = ContactSolver((2, 2, 2), (2, 2, 2))([0, 0, 0, 0, 0, 0, 1], [0, 0, 1.9, 0, 0, 0, 1])
 print(json.dumps({'separation': contact.separation, 'point': contact.point.tolist()}))
-''')
+""")
     assert answer['separation'] == pytest.approx(-0.1)
     assert answer['point'] == pytest.approx([0.0, 0.0, 0.95])
 
@@ -176,19 +178,17 @@ def test_ros2_run_finds_the_programs(installed: Installation) -> None:
     """`ros2 run` asks the ament index for the package's prefix, and takes an executable file of
     that name in its lib/<package>; `ros2 launch` and others ask for the share folder."""
     pytest.importorskip('ament_index_python')
-    index = installed.ask('''
+    index = installed.ask("""
 import json
 from ament_index_python.packages import get_package_prefix, get_package_share_directory
 print(json.dumps({'prefix': get_package_prefix('box_contact_ros'),
                   'share': get_package_share_directory('box_contact_ros')}))
-''')
+""")
     prefix = installed.folder / 'install' / NAME
     assert index == {'prefix': str(prefix), 'share': str(prefix / 'share' / NAME)}
     folder = prefix / 'lib' / NAME
     assert {path.name for path in folder.iterdir() if os.access(path, os.X_OK)} == set(PROGRAMS)
-    for data in DATA:
-        if (ROOT / data).is_dir():
-            assert (prefix / 'share' / NAME / data).is_dir()
+    assert all((prefix / 'share' / NAME / data).is_dir() for data in DATA)
 
 
 @under_colcon
