@@ -52,7 +52,7 @@ def fused_inlined(function: Callable[..., Any]) -> Any:
 
 def _compiled(function: Callable[..., Any], **options: Any) -> Any:
     global _warned
-    if numba.config.DISABLE_JIT:
+    if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]  # put there at run time
         return _interpreted(function)
     try:
         compiled = numba.njit(cache=True, error_model='numpy', **options)(function)
