@@ -58,7 +58,7 @@ lint: .venv/.installed-test
 coverage: .venv/.installed-test
 	@export NUMBA_DISABLE_JIT=1
 	$(VENV_PYTHON) -m coverage run -m pytest -W ignore::RuntimeWarning \
-	    $(addprefix test/test_,interpreted.py solver.py outline.py paper_models.py pairing.py contact_force.py network.py package.py) \
+	    $(addprefix test/test_,interpreted.py solver.py outline.py paper_models.py pairing.py scene.py contact_force.py network.py package.py) \
 	    -k 'not cache and not is_plain and not shipped and not docs and not program' $(ARGS)
 	$(VENV_PYTHON) -m coverage report
 
