@@ -6,7 +6,7 @@ SHELL := bash
 .ONESHELL:
 .NOTPARALLEL:
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint clean
+.PHONY: help demo test lint coverage clean
 
 # Arguments for the program behind the target: make test ARGS='-k sat -x'
 ARGS ?=
@@ -30,8 +30,9 @@ INSTALL_INPUTS := setup.py setup.cfg constraints.txt box_contact_ros/programs.py
 
 help:
 	@echo 'make demo     the crane, the contact node, and contacts live in this terminal'
-	echo 'make test     ruff and all tests'
-	echo 'make lint     ruff only'
+	echo 'make test     ruff, mypy and all tests'
+	echo 'make lint     ruff and mypy only'
+	echo 'make coverage share of the core that its own tests run'
 	echo 'make clean    remove .venv and everything that was generated'
 	echo
 	echo 'Each does its own set-up, in .venv. Arguments: make test ARGS="-k sat -x".'
@@ -43,11 +44,23 @@ demo: .venv/.installed-demo .venv/.compiled
 test: .venv/.installed-test
 	@echo 'ruff'
 	$(VENV_PYTHON) -m ruff check .
+	echo 'mypy'
+	$(VENV_PYTHON) -m mypy
 	echo 'pytest'
 	exec $(VENV_PYTHON) -m pytest $(ARGS)
 
 lint: .venv/.installed-test
-	@exec $(VENV_PYTHON) -m ruff check . $(ARGS)
+	@$(VENV_PYTHON) -m ruff check . $(ARGS)
+	exec $(VENV_PYTHON) -m mypy
+
+# Kernels as plain Python, where lines can be counted: some minutes for a fast part of the tests. Left
+# out are tests of the compiler's side, and those that ask for more contacts than this way can give.
+coverage: .venv/.installed-test
+	@export NUMBA_DISABLE_JIT=1
+	$(VENV_PYTHON) -m coverage run -m pytest -W ignore::RuntimeWarning \
+	    $(addprefix test/test_,interpreted.py solver.py outline.py paper_models.py pairing.py scene.py contact_force.py network.py package.py) \
+	    -k 'not cache and not is_plain and not shipped and not docs and not program' $(ARGS)
+	$(VENV_PYTHON) -m coverage report
 
 clean:
 	@if [ -e .venv ] && [ ! -e .venv/.made-by-make ]; then

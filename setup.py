@@ -83,6 +83,8 @@ setup(
         # colcon test looks for pytest in here, and runs nothing without it.
         'test': [
             'catkin-pkg',
+            'colcon-common-extensions',
+            'coverage',
             'gmpy2',
             'hypothesis',
             'jsonschema',
@@ -90,10 +92,13 @@ setup(
             'mcap',
             'mcap-ros2-support',
             'mpmath',
+            'mypy',
             'pytest',
+            'pytest-cov',
             'pytest-timeout',
             'pytest-xdist',
             'ruff',
+            'types-pyyaml',
         ],
     },
 )

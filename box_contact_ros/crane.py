@@ -25,9 +25,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import mujoco
 import numpy as np
+from numpy.typing import ArrayLike
 
 __all__ = ['CONTAINER_40FT', 'Crane', 'CraneScenario']
 
@@ -143,7 +145,7 @@ class CraneScenario:
             )
 
     @classmethod
-    def drawn(cls, seed: int, **fixed) -> CraneScenario:
+    def drawn(cls, seed: int, **fixed: Any) -> CraneScenario:
         """Draw offset, angles and heading at random from `seed`; 0 gives the defaults.
 
         Keywords in `fixed` are fields that are not drawn.
@@ -151,7 +153,7 @@ class CraneScenario:
         if seed == 0:
             return cls(**fixed)
         random = np.random.default_rng(seed)
-        drawn = {
+        drawn: dict[str, Any] = {
             'offset': tuple(random.uniform(-0.5, 0.5, 2)),
             'rope_angle': random.uniform(1.0, 2.0),
             'rope_heading': random.uniform(-180.0, 180.0),
@@ -244,7 +246,8 @@ class Crane:
         tensions[self._data.efc_id[rows]] = self._data.efc_force[rows]
         return tensions
 
-    def step(self, force=None, torque=None) -> None:
+    def step(self, force: ArrayLike | None = None,
+             torque: ArrayLike | None = None) -> None:
         """Advance one tick with a wrench held over it.
 
         force  -- N, world frame, acting at the load's centre of mass: (3,), None for none

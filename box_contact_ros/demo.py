@@ -19,6 +19,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Sequence
+from typing import IO
 
 from .crane import CONTAINER_40FT, CraneScenario
 from .landing import LANDING_DURATION
@@ -64,12 +65,12 @@ def main(args: Sequence[str] | None = None) -> int:
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, _exit_on_signal)
     deadline = time.monotonic() + TIME_LIMIT
-    processes: list[subprocess.Popen] = []
+    processes: list[subprocess.Popen[bytes]] = []
     with tempfile.TemporaryFile() as node_output:
         try:
             processes.append(start('contact_node', sizes + model, env, node_output))
             processes.append(start('crane', sizes + crane, env, None))
-            status = _watch(*processes, deadline)
+            status = _watch(processes[0], processes[1], deadline)
         except KeyboardInterrupt:
             return 128 + signal.SIGINT
         finally:
@@ -123,7 +124,8 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
     return options
 
 
-def start(program: str, parameters: list[str], env: dict[str, str], output) -> subprocess.Popen:
+def start(program: str, parameters: list[str], env: dict[str, str],
+          output: IO[bytes] | None) -> subprocess.Popen[bytes]:
     """Start a program of this package in a process group of its own; `output` None passes it on."""
     command = [sys.executable, '-m', 'box_contact_ros', program, '--ros-args']
     for parameter in parameters:
@@ -132,7 +134,8 @@ def start(program: str, parameters: list[str], env: dict[str, str], output) -> s
                             stderr=subprocess.STDOUT if output else None, start_new_session=True)
 
 
-def _watch(node: subprocess.Popen, crane: subprocess.Popen, deadline: float) -> int:
+def _watch(node: subprocess.Popen[bytes], crane: subprocess.Popen[bytes],
+           deadline: float) -> int:
     """Wait for the crane's exit status; an early end of the node or the time limit is a 1."""
     while (status := crane.poll()) is None:
         if node.poll() is not None:
@@ -145,7 +148,7 @@ def _watch(node: subprocess.Popen, crane: subprocess.Popen, deadline: float) -> 
     return status if status >= 0 else 128 - status
 
 
-def end(processes: list[subprocess.Popen]) -> None:
+def end(processes: list[subprocess.Popen[bytes]]) -> None:
     """End whole process groups: ask first, then kill what is left of them."""
     for process in processes:
         _signal_group(process, signal.SIGTERM)
@@ -160,14 +163,14 @@ def end(processes: list[subprocess.Popen]) -> None:
         process.wait()
 
 
-def _signal_group(process: subprocess.Popen, number: signal.Signals) -> None:
+def _signal_group(process: subprocess.Popen[bytes], number: signal.Signals) -> None:
     try:
         os.killpg(process.pid, number)
     except ProcessLookupError:
         pass  # nobody is left in it
 
 
-def _exit_on_signal(number: int, _frame) -> None:
+def _exit_on_signal(number: int, _frame: object) -> None:
     sys.exit(128 + number)
 
 

@@ -4,16 +4,20 @@ Kernels are Numba functions compiled at first use and cached on disk. Numba take
 for good as long as its own file is unchanged, even if a kernel that it calls has changed; here an
 edit anywhere in the package compiles all of them anew, so an upgrade in place cannot mix versions.
 Where no cache folder can be written (a read-only installation) kernels are compiled without one,
-and a single warning says so.
+and a single warning says so. With NUMBA_DISABLE_JIT=1 they are plain Python, a thousand times as
+slow, for a debugger or a coverage tool.
 """
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numba
+import numpy as np
 
 _warned = False
 _STAMP = tuple(sorted((path.name, path.stat().st_mtime_ns, path.stat().st_size)
@@ -48,6 +52,8 @@ def fused_inlined(function: Callable[..., Any]) -> Any:
 
 def _compiled(function: Callable[..., Any], **options: Any) -> Any:
     global _warned
+    if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]  # put there at run time
+        return _interpreted(function)
     try:
         compiled = numba.njit(cache=True, error_model='numpy', **options)(function)
         compiled._cache._cache_file._source_stamp = _STAMP
@@ -62,3 +68,15 @@ def _compiled(function: Callable[..., Any], **options: Any) -> Any:
                 'every process; set NUMBA_CACHE_DIR to a writable folder', RuntimeWarning,
                 stacklevel=4)
         return numba.njit(error_model='numpy', **options)(function)
+
+
+def _interpreted(function: Any) -> Any:
+    """The function itself, with what else is used of a compiled one."""
+    # math.sqrt gives a Python float, and that one's division by zero raises.
+    function.__globals__['math'] = _IEEE_MATH
+    function.py_func = function
+    function.disable_compile = lambda: None
+    return function
+
+
+_IEEE_MATH = SimpleNamespace(**{**vars(math), 'sqrt': np.sqrt})

@@ -17,9 +17,10 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import product
+from typing import Any
 
 import numpy as np
 
@@ -61,10 +62,10 @@ def touch_of(contact: Contact) -> Touch | None:
     return Touch(contact.point, contact.normal, max(0.0, -contact.separation))
 
 
-def landing_scenario(**fields) -> CraneScenario:
+def landing_scenario(**fields: Any) -> CraneScenario:
     """A scenario that sets the load down and leaves it; `fields` are those of CraneScenario."""
-    return CraneScenario(**({'land': True, 'overlap': LANDING_OVERLAP,
-                             'duration': LANDING_DURATION} | fields))
+    fields = {'land': True, 'overlap': LANDING_OVERLAP, 'duration': LANDING_DURATION} | fields
+    return CraneScenario(**fields)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,7 +87,8 @@ class LandingCase:
     yaw: float
 
 
-def cases(*, rope_angles=(0.5, 1.25, 2.0, 3.0), tilts=(0.5, 1.5, 3.0), overhangs=(0.0, 0.3, 0.6),
+def cases(*, rope_angles: Sequence[float] = (0.5, 1.25, 2.0, 3.0),
+          tilts: Sequence[float] = (0.5, 1.5, 3.0), overhangs: Sequence[float] = (0.0, 0.3, 0.6),
           seed: int = 1) -> Iterator[LandingCase]:
     """Every combination of rope angle, tilt and overhang; headings and yaw (to 1°) are drawn."""
     random = np.random.default_rng(seed)

@@ -131,7 +131,7 @@ def load_weights(path: Path | str) -> Weights:
 
 def _pack(name: str, tensors: dict[str, np.ndarray], path: Path) -> Network:
     widths: list[int] = []
-    parts = []
+    parts: list[np.ndarray] = []
     while f'{name}.{len(parts) // 2}.weight' in tensors:
         layer = f'{name}.{len(parts) // 2}'
         weight, bias = tensors[f'{layer}.weight'], tensors.get(f'{layer}.bias')

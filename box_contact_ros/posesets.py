@@ -11,6 +11,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .pose import quaternion_multiply, rotation_matrix
 from .solver import ContactSolver
@@ -38,7 +39,7 @@ def unit_quaternions(rng: np.random.Generator, n: int) -> np.ndarray:
     return q / np.linalg.norm(q, axis=1, keepdims=True)
 
 
-def turns(axes: np.ndarray, angles: np.ndarray) -> np.ndarray:
+def turns(axes: ArrayLike, angles: np.ndarray) -> np.ndarray:
     """Quaternions (n, 4) xyzw of rotations about axes (n, 3) or (3,) by angles (n,) [rad]."""
     axes = np.broadcast_to(np.asarray(axes, dtype=np.float64), (len(angles), 3))
     axes = axes / np.linalg.norm(axes, axis=1, keepdims=True)

@@ -1,8 +1,9 @@
 """ContactSolver: SAT first, then the contact point by the chosen model. Conventions: `pose`."""
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
-from typing import Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -43,6 +44,7 @@ class Model(Protocol):
         """
 
 
+@runtime_checkable
 class SingleModel(Model, Protocol):
     """A model that has a kernel of its own for single pairs."""
 
@@ -119,9 +121,9 @@ class ContactSolver:
         self._size_b = as_size(size_b, 'size_b')
         self.model = model
         self._solver = make_model(model, self._size_a, self._size_b, weights)
-        self._one = None
-        if hasattr(self._solver, 'one'):
-            one = self._solver.one
+        self._one: Callable[..., tuple[int, float]] | None = None
+        if isinstance(self._solver, SingleModel):
+            one: Any = self._solver.one  # a kernel
             self._one = partial(one, *self._solver.one_scratch)
             # After one call for float64 arrays no other kind is compiled: what is not one raises
             # TypeError, and is made one.

@@ -27,7 +27,8 @@ from box_contact_ros.programs import PROGRAMS
 from box_contact_ros.resources import resource_path
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGES = [ROOT / 'README.md', *sorted((ROOT / 'docs').rglob('*.md'))]
+PAGES = [ROOT / 'README.md', ROOT / 'CONTRIBUTING.md', ROOT / 'QUALITY_DECLARATION.md',
+         *sorted((ROOT / 'docs').rglob('*.md'))]
 FENCE = re.compile(r'^```(\w*)\n(.*?)^```$', re.MULTILINE | re.DOTALL)
 
 
@@ -107,7 +108,8 @@ def start(words: list[str], program, **_) -> None:
 def topic(words: list[str], **_) -> None:
     """The topic is one of the contact node's."""
     document = yaml.safe_load(resource_path('msg_schemas', 'asyncapi.yaml').read_text('utf-8'))
-    addresses = {channel['address'] for channel in document['channels'].values()}
+    addresses = {channel['address'].removeprefix('/')
+                 for channel in document['channels'].values()}
     assert words[3].removeprefix('/') in addresses
 
 
@@ -144,6 +146,13 @@ def apt(words: list[str], **_) -> None:
     assert set(words[3:]) <= {entry.text for entry in manifest.findall('exec_depend')}
 
 
+def launch(words: list[str], **_) -> None:
+    """The file exists and declares the arguments (not run: there is no wheel of `launch`)."""
+    assert words[2] == 'box_contact_ros'
+    text = (ROOT / 'launch' / words[3]).read_text('utf-8')
+    assert all(f"'{word.partition(':=')[0]}'" in text for word in words[4:])
+
+
 def colcon(words: list[str], **_) -> None:
     """Selects the package of package.xml."""
     name = ElementTree.parse(ROOT / 'package.xml').findtext('name')
@@ -161,6 +170,7 @@ COMMANDS = {
     r'box_contact_\w+( .*)?': start,
     r'ros2 topic echo \S+': topic,
     r'ros2 param set \S+ \S+ \S+': parameter,
+    r'ros2 launch \S+ \S+( .*)?': launch,
     r'pip install .+': pip,
     r'sudo apt install .+': apt,
     r'colcon build .+': colcon,
@@ -187,8 +197,11 @@ EXAMPLES = [pytest.param(text, id=f'{page.name}-{number}')
 
 
 @pytest.mark.parametrize('text', EXAMPLES)
-def test_python_example(text):
-    """It runs, and prints what the comments behind its prints say."""
+def test_python_example(text, program):
+    """It runs, beside a node if it is a client, and prints what the comments behind its prints
+    say."""
+    if 'rclpy' in text:
+        program('contact_node', '--ros-args', '-p', 'model:=exact').wait_for_output('ready', 120)
     with contextlib.redirect_stdout(io.StringIO()) as printed:
         exec(compile(text, 'example', 'exec'), {'__name__': 'example'})
     assert printed.getvalue().splitlines() == re.findall(r'^print\(.*\)  # (.*)$', text,

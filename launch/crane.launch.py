@@ -1,0 +1,49 @@
+"""The crane beside a contact node; on request a soup node and a view of the scene.
+
+    ros2 launch box_contact_ros crane.launch.py model:=exact rate:=500 soup:=true
+
+Ends with the crane. All arguments: ros2 launch box_contact_ros crane.launch.py --show-args
+"""
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument, Shutdown
+from launch.conditions import IfCondition
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
+
+PACKAGE = 'box_contact_ros'
+# Name: type, default, description.
+ARGUMENTS = {
+    'model': (str, 'committee', 'how the contact node finds the contact point'),
+    'scene': (str, '', 'scene file of the contact node; empty: the two boxes of the crane'),
+    'rate': (float, '200.0', 'pairs of poses that the crane publishes per second [Hz]'),
+    'seed': (int, '0', '0: the standard motion; n > 0: offset and angles drawn at random'),
+    'closed_loop': (bool, 'false', 'true: the contacts carry the load, and the crane lands it'),
+    'soup': (bool, 'false', 'true: a soup node answers the same poses under soup/'),
+    'view': (bool, 'false', 'true: show boxes and contacts in the browser'),
+}
+COMPILE_SECONDS = 180.0
+"""Patience of the crane: a first start of the contact node compiles its kernels."""
+
+
+def parameters(*names: str, **fixed: float) -> list[dict]:
+    """Launch arguments as parameters of the same names, and of the types that are meant."""
+    return [fixed | {name: ParameterValue(LaunchConfiguration(name), value_type=ARGUMENTS[name][0])
+                     for name in names}]
+
+
+def generate_launch_description() -> LaunchDescription:
+    """What `ros2 launch` asks for."""
+    return LaunchDescription([
+        *(DeclareLaunchArgument(name, default_value=default, description=description)
+          for name, (_, default, description) in ARGUMENTS.items()),
+        Node(package=PACKAGE, executable='contact_node', output='screen',
+             parameters=parameters('model', 'scene')),
+        Node(package=PACKAGE, executable='soup_node', output='screen',
+             condition=IfCondition(LaunchConfiguration('soup'))),
+        Node(package=PACKAGE, executable='view', output='screen',
+             condition=IfCondition(LaunchConfiguration('view'))),
+        Node(package=PACKAGE, executable='crane', output='screen', emulate_tty=True,
+             parameters=parameters('rate', 'seed', 'closed_loop', wait=COMPILE_SECONDS),
+             on_exit=Shutdown(reason='the crane has ended')),
+    ])

@@ -1,0 +1,182 @@
+"""launch/ and config/ name what exists: programs, parameters, boxes.
+
+PyPI has neither `launch` nor `launch_ros` (its `launch` is another project), so a launch file is
+loaded here with stand-ins that only note what they are called with: this shows that it is valid
+Python, what it declares and what it would start, not that ROS's own classes take it.
+"""
+from __future__ import annotations
+
+import importlib
+import runpy
+import sys
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from box_contact_ros.nodes.contact import PARAMETERS
+from box_contact_ros.programs import PROGRAMS
+from box_contact_ros.scene import Scene
+from box_contact_ros.scene_file import read_scene
+
+ROOT = Path(__file__).resolve().parents[1]
+
+# --- launch ---------------------------------------------------------------------------------------
+
+STAND_INS = {
+    'launch': ('LaunchDescription',),
+    'launch.actions': ('DeclareLaunchArgument', 'Shutdown'),
+    'launch.conditions': ('IfCondition',),
+    'launch.substitutions': ('LaunchConfiguration',),
+    'launch_ros': (),
+    'launch_ros.actions': ('Node',),
+    'launch_ros.parameter_descriptions': ('ParameterValue',),
+}
+
+
+def noting(kind: str) -> Any:
+    """A stand-in for a class: an object of it is what it was called with."""
+    return lambda *args, **options: SimpleNamespace(kind=kind, args=args, **options)
+
+
+@pytest.fixture
+def crane_launch(monkeypatch: pytest.MonkeyPatch) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Arguments by name, nodes by executable."""
+    for name, classes in STAND_INS.items():
+        module = ModuleType(name)
+        vars(module).update({kind: noting(kind) for kind in classes})
+        monkeypatch.setitem(sys.modules, name, module)
+    description = runpy.run_path(str(ROOT / 'launch' / 'crane.launch.py'))[
+        'generate_launch_description']()
+    entities = description.args[0]
+    assert {entity.kind for entity in entities} == {'DeclareLaunchArgument', 'Node'}
+    return ({entity.args[0]: entity for entity in entities if entity.kind != 'Node'},
+            {entity.executable: entity for entity in entities if entity.kind == 'Node'})
+
+
+def table_of(program: str) -> dict[str, Any]:
+    """The parameters of a program."""
+    if program == 'crane':
+        return importlib.import_module('box_contact_ros.nodes.crane_parameters').PARAMETERS
+    return importlib.import_module(PROGRAMS[program].target.partition(':')[0]).PARAMETERS
+
+
+def test_launch_arguments(crane_launch: Any) -> None:
+    """They are these, and each says what it is for."""
+    arguments, _ = crane_launch
+    assert set(arguments) == {'model', 'rate', 'seed', 'closed_loop', 'scene', 'soup', 'view'}
+    assert all(argument.description for argument in arguments.values())
+
+
+def test_launched_programs_exist(crane_launch: Any) -> None:
+    """Two always, two on request; the crane's end is everybody's."""
+    _, nodes = crane_launch
+    assert set(nodes) == {'contact_node', 'crane', 'soup_node', 'view'} <= set(PROGRAMS)
+    assert {node.package for node in nodes.values()} == {'box_contact_ros'}
+    conditions = {name: node.condition.args[0].args[0] for name, node in nodes.items()
+                  if hasattr(node, 'condition')}
+    assert conditions == {'soup_node': 'soup', 'view': 'view'}
+    assert nodes['crane'].on_exit.kind == 'Shutdown'
+
+
+def test_launched_parameters_are_declared_with_the_same_defaults(crane_launch: Any) -> None:
+    """An argument left alone changes nothing, and one that is given is taken, in its type."""
+    arguments, nodes = crane_launch
+    given: set[str] = set()
+    for program in ('contact_node', 'crane'):
+        table = table_of(program)
+        for name, value in nodes[program].parameters[0].items():
+            setting = table[name]
+            if name == 'wait':
+                assert setting.check(name, value) == value
+                continue
+            given.add(name)
+            assert value.args[0].args == (name,)
+            default = arguments[name].default_value
+            if value.value_type is not str:
+                default = yaml.safe_load(default)
+            assert default == setting.default
+            assert isinstance(default, value.value_type)
+    assert given == set(arguments) - {'soup', 'view'}
+
+
+# --- parameters -----------------------------------------------------------------------------------
+
+
+def test_parameter_file_is_complete() -> None:
+    """Every parameter of the node is in it, with its default, and no other."""
+    file = yaml.safe_load((ROOT / 'config' / 'contact_node.yaml').read_text('utf-8'))
+    values = file['/**']['ros__parameters']
+    assert {name: setting.check(name, values[name]) for name, setting in PARAMETERS.items()} == {
+        name: setting.default for name, setting in PARAMETERS.items()}
+    assert set(values) == set(PARAMETERS)
+
+
+def test_node_starts_with_the_parameter_file(program: Any, tmp_path: Path) -> None:
+    """Also under another name; and the file's values are the ones that count."""
+    text = (ROOT / 'config' / 'contact_node.yaml').read_text('utf-8')
+    file = tmp_path / 'contact_node.yaml'
+    file.write_text(text.replace('model: committee', 'model: exact'), 'utf-8')
+    node = program('contact_node', '--ros-args', '--params-file', str(file), '-r', '__ns:=/yard')
+    assert "model 'exact'" in node.wait_for_output('ready', 120)
+
+
+# --- scenes ---------------------------------------------------------------------------------------
+
+
+each_scene = pytest.mark.parametrize(
+    'path', sorted((ROOT / 'config' / 'scenes').glob('*.yaml')), ids=lambda path: path.stem)
+
+
+def scene(name: str) -> Scene:
+    return read_scene(str(ROOT / 'config' / 'scenes' / f'{name}.yaml'))
+
+
+@each_scene
+def test_scene_loads(path: Path) -> None:
+    """The loader takes it; a pair is called after its boxes; ids count from 0."""
+    found = read_scene(str(path))
+    assert [pair.id for pair in found.pairs] == list(range(len(found.pairs)))
+    assert all(pair.name == f'{pair.a}_{pair.b}' for pair in found.pairs)
+
+
+@each_scene
+def test_fixed_boxes_stand_beside_each_other(path: Path) -> None:
+    """Upright, on the ground or on each other: none in another, none that floats."""
+    fixed = [box for box in read_scene(str(path)).boxes.values() if box.pose]
+    low = np.array([np.subtract(box.pose[:3], np.divide(box.size, 2)) for box in fixed])
+    high = np.array([np.add(box.pose[:3], np.divide(box.size, 2)) for box in fixed])
+    for number, box in enumerate(fixed):
+        assert box.pose[3:] == (0, 0, 0, 1)
+        inside = ((low < high[number] - 1e-6) & (high > low[number] + 1e-6)).all(axis=1)
+        assert inside.sum() == 1, box.name  # itself
+        assert low[number, 2] == pytest.approx(0) or np.isclose(high[:, 2], low[number, 2]).any()
+
+
+def test_two_boxes_are_the_node_s_default() -> None:
+    """The file shows how the default would be written, and the crane's topics are heard."""
+    boxes = scene('two_boxes').boxes
+    assert {name: (box.size, box.pose_topic) for name, box in boxes.items()} == {
+        f'box_{letter}': (PARAMETERS[f'size_{letter}'].default, f'box_{letter}/pose')
+        for letter in 'ab'}
+    assert scene('two_boxes').frame_id == table_of('crane')['frame_id'].default
+
+
+def test_yard_bay_lists_what_the_load_can_reach() -> None:
+    """The rule in the file: tops, and what rises above a neighbouring row."""
+    bay = scene('yard_bay')
+    tiers: dict[int, int] = {}
+    for name, box in bay.boxes.items():
+        if name != 'load':
+            row, tier = (int(part[1:]) for part in name.split('_'))
+            tiers[row] = max(tier, tiers.get(row, 0))
+            assert box.pose[:3] == pytest.approx((0, 2.838 * (row - 1), 2.591 * (tier - 0.5)))
+    assert sum(tiers.values()) == len(bay.boxes) - 1 == 50
+    reachable = {
+        f'r{row:02}_t{tier}' for row, height in tiers.items() for tier in range(1, height + 1)
+        if tier == height or tier > min(tiers.get(row + side, height) for side in (-1, 1))}
+    assert {pair.b for pair in bay.pairs} == reachable
+    assert {pair.a for pair in bay.pairs} == {'load'}
