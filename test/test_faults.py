@@ -14,11 +14,9 @@ import subprocess
 import time
 
 import numpy as np
-import poses
 import pytest
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
-from rclpy.qos import QoSProfile
 from rosgraph_msgs.msg import Clock
 from test_hygiene_ros import APART, GOOD, LITTLE_ENDIAN, ORIGIN, TOUCHING, RawClient, cdr
 
