@@ -51,6 +51,16 @@ PROGRAMS = {
         'the same node on a polygon soup, under soup/: what the source paper compares with',
         ('ros', 'soup'),
     ),
+    'view': Program(
+        'box_contact_ros.nodes.view:main',
+        'a page in the browser: the crane, the boxes, the contact and its figures, live',
+        ('ros', 'sim', 'view'),
+    ),
+    'markers': Program(
+        'box_contact_ros.nodes.markers:main',
+        'draw boxes and contacts as markers for RViz',
+        ('ros',),
+    ),
     'bench': Program(
         'box_contact_ros.nodes.bench:main',
         'drive contact, soup and echo node with streams of poses: latency, losses, errors',
@@ -104,9 +114,11 @@ MODULES_OF_EXTRA = {
         'rcl_interfaces',
         'sensor_msgs',
         'std_msgs',
+        'visualization_msgs',
     ),
     'sim': ('mujoco', 'rich'),
     'soup': ('fcl',),
+    'view': ('viser',),
     'train': ('torch', 'tqdm'),
     'report': ('matplotlib', 'tqdm'),
     'peers': ('coal', 'pybullet'),
