@@ -21,7 +21,7 @@ from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
 from ..checks import pose_fault
-from .appearance import BOX_A, BOX_B, BOX_OPACITY, CONTACT, Colour, proportions
+from .appearance import BOX_A, BOX_B, BOX_OPACITY, CONTACT, STALE, Colour, proportions
 from .contact import CONTAINER
 from .messages import NANOSECONDS, StampedPose, header_fault, make_header, read_cloud, read_pose
 from .parameters import Setting, answer_help, checked, declare, number, size
@@ -32,8 +32,6 @@ PARAMETERS = {
     'size_b': Setting(CONTAINER, 'full extents of box B, three numbers > 0 [m]', size),
     'rate': Setting(30.0, 'most marker arrays published per second [Hz]', number(0.1, 1000)),
 }
-STALE = NANOSECONDS // 2
-"""Poses newer than the last answer by more than this [ns]: nobody answers, no contact is drawn."""
 BOXES = (('box_a', BOX_A), ('box_b', BOX_B))
 
 
