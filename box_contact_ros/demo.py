@@ -60,7 +60,9 @@ def main(args: Sequence[str] | None = None) -> int:
     print(f'A crane {what}, {options.duration:g} s in real time; it publishes both poses at '
           f'{options.rate:g} Hz.\nA contact node answers; {how}. Both are ROS 2 processes of their '
           f'own, in domain {options.domain} on this host.', flush=True)
-    unwind_on_signals()
+    # SIGTERM and SIGHUP must end the children as well, so let them unwind like Ctrl-C does.
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, _exit_on_signal)
     deadline = time.monotonic() + TIME_LIMIT
     processes: list[subprocess.Popen] = []
     with tempfile.TemporaryFile() as node_output:
@@ -158,20 +160,15 @@ def end(processes: list[subprocess.Popen]) -> None:
         process.wait()
 
 
-def unwind_on_signals() -> None:
-    """SIGTERM and SIGHUP must end the children as well, so let them unwind like Ctrl-C does."""
-    def leave(number: int, _frame) -> None:
-        sys.exit(128 + number)
-
-    for number in (signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, leave)
-
-
 def _signal_group(process: subprocess.Popen, number: signal.Signals) -> None:
     try:
         os.killpg(process.pid, number)
     except ProcessLookupError:
         pass  # nobody is left in it
+
+
+def _exit_on_signal(number: int, _frame) -> None:
+    sys.exit(128 + number)
 
 
 if __name__ == '__main__':

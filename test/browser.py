@@ -6,7 +6,9 @@ from __future__ import annotations
 
 import base64
 import json
+import os
 import shutil
+import signal
 import subprocess
 import tempfile
 import time
@@ -117,8 +119,6 @@ def _tab_address(browser: subprocess.Popen, profile: Path) -> str:
 
 
 def _end(browser: subprocess.Popen) -> None:
-    import os
-    import signal
     try:
         os.killpg(browser.pid, signal.SIGKILL)  # it has nothing to keep
     except ProcessLookupError:

@@ -11,7 +11,7 @@ BOX_A: Colour = (238, 150, 50)
 BOX_B: Colour = (70, 120, 170)
 CONTACT: Colour = (230, 20, 110)
 EXACT: Colour = (0, 130, 110)
-BOX_OPACITY = 0.55
+BOX_OPACITY = 0.4
 """The contact is inside the boxes, so they are translucent."""
 STALE = 500_000_000
 """Poses newer than the last answer by more than this [ns]: nobody answers, no contact is drawn."""

@@ -11,6 +11,7 @@ import argparse
 import os
 import queue
 import random
+import signal
 import subprocess
 import sys
 import tempfile
@@ -19,7 +20,7 @@ import time
 import webbrowser
 from collections.abc import Callable, Sequence
 from contextlib import contextmanager
-from typing import IO
+from typing import IO, Any
 
 import rclpy
 from rclpy.context import Context
@@ -27,7 +28,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
 from ..crane import CONTAINER_40FT
-from ..demo import DOMAINS, end, start, unwind_on_signals
+from ..demo import DOMAINS, end, start
 from .contact import PARAMETERS
 from .runtime import REFUSALS, make_executor
 from .view_node import ViewNode
@@ -48,7 +49,9 @@ class Simulation:
                                   'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
         self._sizes = [f'{name}:=[{",".join(map(str, CONTAINER_40FT))}]'
                        for name in ('size_a', 'size_b')]
-        self.landing, self.last_run = landing, ''
+        self.landing = landing
+        self.last_run: tuple[bool, str] | None = None
+        """Whether the last run that ended by itself passed, and the crane's report of it."""
         self._node_output, self._crane_output = (tempfile.TemporaryFile() for _ in range(2))
         self._crane: subprocess.Popen | None = None
         self._next_at = 0.0
@@ -62,7 +65,8 @@ class Simulation:
                                f'{_text(self._node_output)}')
         now = time.monotonic()
         if self._crane is not None and self._crane.poll() is not None:
-            self.last_run, self._crane = _text(self._crane_output), None
+            self.last_run = self._crane.returncode == 0, _text(self._crane_output)
+            self._crane = None
             self._next_at = now + PAUSE
             self.landing = Landing(self.landing.seed + 1, self.landing.rate,
                                    self.landing.closed_loop)
@@ -102,7 +106,7 @@ def _text(file: IO[bytes]) -> str:
 def listening(target: str, domain: int | None, args: Sequence[str]):
     """A ViewNode that is served by a thread; `domain` None is the environment's."""
     context = Context()
-    # No handlers: the signal has to reach the main thread, which ends the children.
+    # No handlers of rclpy's: what a signal ends first is for `main` to say.
     rclpy.init(args=list(args), context=context, domain_id=domain,
                signal_handler_options=SignalHandlerOptions.NO)
     node = ViewNode(context, target)
@@ -131,14 +135,17 @@ def listening(target: str, domain: int | None, args: Sequence[str]):
 
 
 def watch(node: ViewNode, page: Page, simulation: Simulation | None,
-          wishes: queue.SimpleQueue[Callable[[], None]]) -> None:
-    """Draw, and do what is wished for, until a signal comes."""
-    while True:
+          wishes: queue.SimpleQueue[Callable[[], None]], stop: threading.Event) -> None:
+    """Draw, and do what is wished for, until `stop` is set."""
+    frame_end = 0.0
+    while not stop.wait(max(0.0, frame_end - time.monotonic())):
         frame_end = time.monotonic() + FRAME_PERIOD
         while not wishes.empty():
             wishes.get()()
         if simulation is not None and simulation.step():
-            page.show_landing(simulation.landing, simulation.last_run)
+            page.show_landing(simulation.landing)
+            if simulation.last_run is not None:
+                page.show_last_run(*simulation.last_run)
             if node.log is not None:
                 node.log.start_anew()
         log, scene, figures = node.log, None, None
@@ -149,14 +156,21 @@ def watch(node: ViewNode, page: Page, simulation: Simulation | None,
             figures = log.figures(node.get_clock().now().nanoseconds)
         page.show(scene, figures, model=node.settings.get('model', ''), wish=node.wish,
                   refusal=node.refusal, connected=node.connected)
-        time.sleep(max(0.0, frame_end - time.monotonic()))
 
 
 def main(args: Sequence[str] | None = None) -> int:
-    """Serve the page until SIGINT (0) or SIGTERM; 1 if the contact node ends."""
+    """Serve the page until SIGINT (0), SIGTERM or SIGHUP (128 + number); 1 if the node ends."""
     args = list(sys.argv[1:] if args is None else args)
     options = _options(remove_ros_args(['view', *args])[1:])
-    unwind_on_signals()
+    stop, signalled = threading.Event(), []
+
+    def call_off(number: int, _frame: Any) -> None:
+        signalled.append(number)
+        stop.set()
+
+    # Flags and no exceptions, which might fall between a child's start and its being written down.
+    before = {number: signal.signal(number, call_off)
+              for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
     wishes: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
     landing = Landing(options.seed, options.rate, not options.open_loop)
     page = simulation = None
@@ -172,9 +186,7 @@ def main(args: Sequence[str] | None = None) -> int:
             print(f'view: {page.url}{where}; Ctrl-C ends it', flush=True)
             if not options.no_browser and _has_display():
                 webbrowser.open(page.url)
-            watch(node, page, simulation, wishes)
-    except KeyboardInterrupt:
-        return 0
+            watch(node, page, simulation, wishes, stop)
     except (*REFUSALS, RuntimeError, OSError) as error:
         print(f'error: {error}', file=sys.stderr)
         return 1
@@ -183,6 +195,9 @@ def main(args: Sequence[str] | None = None) -> int:
             simulation.close()
         if page is not None:
             page.close()
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    return 0 if signalled[0] == signal.SIGINT else 128 + signalled[0]
 
 
 def _has_display() -> bool:

@@ -22,13 +22,14 @@ from .appearance import BOX_A, BOX_B, BOX_OPACITY, CONTACT, EXACT, proportions
 from .view_log import Figures, Scene
 
 MODELS = ('committee', 'exact', 'soup', 'paper')
+CHART_LEAST, CHART_MOST = ({'pad': 0.1, 'soft': value, 'mode': 1} for value in (-20.0, 20.0))
+"""Of the separation [mm]: the chart shows at least this, so that it does not magnify noise."""
 READ_OUT_PERIOD = 0.2
 """Time [s] between new figures: faster, nobody can read them."""
 HISTORY = 12.0
 """Length [s] of the chart."""
-MOST_LINES = 14
-"""Of the last run's summary."""
-GROUND, LINES, BACKGROUND = (236, 238, 241), (206, 211, 217), (250, 251, 252)
+PANEL_WIDTH = 410  # pixels
+GROUND, LINES = (236, 238, 241), (206, 211, 217)
 
 
 @dataclass(frozen=True)
@@ -53,6 +54,7 @@ class Page:
         server.gui.configure_theme(show_logo=False, show_share_button=False, brand_color=CONTACT,
                                    control_width='large')
         server.gui.main_panel.dock_right()
+        server.gui.main_panel.set_width(PANEL_WIDTH)
         self._sizes: tuple = ()
         self._origin: np.ndarray | None = None
         self._set_stage()
@@ -61,14 +63,14 @@ class Page:
         self._chart = server.gui.add_uplot(
             (np.zeros(1), np.zeros(1)),
             ({'label': 's'}, {'label': 'separation', 'stroke': f'rgb{CONTACT}', 'width': 2}),
-            axes=({'label': 'time [s]'}, {'label': 'separation [mm]'}),
-            scales={'x': {'time': False}, 'y': {'auto': True}},
-            legend={'show': False}, height=190)
+            axes=({'label': 'time [s]', 'size': 30, 'labelSize': 18},
+                  {'label': 'separation [mm]', 'size': 56, 'labelSize': 18}),
+            scales={'x': {'time': False}, 'y': {'range': {'min': CHART_LEAST, 'max': CHART_MOST}}},
+            legend={'show': False}, height=160)
         self._next_read_out = 0.0
         self._model = server.gui.add_button_group('model', MODELS)
         self._model.on_click(lambda event: on_model(event.target.value))
         self._status = server.gui.add_html('')
-        self._last_run = None
         if landing is not None:
             self._add_crane(landing, on_land)
 
@@ -79,10 +81,10 @@ class Page:
         scene.add_light_hemisphere('/light/sky', sky_color=(255, 255, 255),
                                    ground_color=(190, 190, 195), intensity=2.2)
         scene.add_light_directional('/light/sun', color=(255, 250, 240), intensity=2.2,
-                                    position=(-6.0, -9.0, 14.0), cast_shadow=True)
+                                    position=(-6.0, -9.0, 14.0))
         self._ground = scene.add_grid('/ground', 60.0, 60.0, cell_size=1.0, section_size=5.0,
                                       cell_color=LINES, section_color=(176, 183, 191),
-                                      plane_color=GROUND, plane_opacity=1.0, shadow_opacity=0.25,
+                                      plane_color=GROUND, plane_opacity=1.0, shadow_opacity=0.0,
                                       fade_distance=60.0, visible=False)
         self._boxes, self._edges = [], []
         for name, colour in (('load', BOX_A), ('stack', BOX_B)):
@@ -92,7 +94,9 @@ class Page:
             self._edges.append(scene.add_line_segments(
                 f'/{name}/edges', np.zeros((12, 2, 3)), dark, line_width=2.0))
         self._point = scene.add_icosphere('/contact/point', 1.0, CONTACT, visible=False)
-        self._exact = scene.add_icosphere('/contact/exact', 1.0, EXACT, visible=False)
+        # A cross, so that it is seen through the sphere, which is often at the same place.
+        self._exact = scene.add_line_segments('/contact/exact', np.zeros((3, 2, 3)), EXACT,
+                                              line_width=3.0, visible=False)
         self._normal = scene.add_arrows('/contact/normal', np.array([[[0, 0, 0], [0, 0, 1.0]]]),
                                         CONTACT, visible=False)
 
@@ -107,7 +111,10 @@ class Page:
             gui.add_button('land again').on_click(lambda _: on_land(
                 Landing(int(seed.value), float(rate.value), closed_loop.value)))
             self._seed = seed
-            self._last_run = gui.add_html('')
+            self._verdict = gui.add_html('')
+            self._report = gui.add_folder('its report', expand_by_default=False, visible=False)
+            with self._report:
+                self._last_run = gui.add_html('')
 
     def set_sizes(self, size_a: Sequence[float], size_b: Sequence[float]) -> None:
         """Full extents [m]; where the scene is drawn about is found anew."""
@@ -119,10 +126,11 @@ class Page:
             box.dimensions = size
             edges.points = _edges(size)
         self._point.radius = look.point_radius
-        self._exact.radius = 0.8 * look.point_radius
-        self._normal.shaft_radius = 0.35 * look.point_radius
-        self._normal.head_radius = 0.9 * look.point_radius
-        self._normal.head_length = 2.2 * look.point_radius
+        self._exact.points = 2.5 * look.point_radius * np.stack([-np.eye(3), np.eye(3)], axis=1)
+        self._normal.points = np.array([[[0.0, 0.0, 0.0], [0.0, 0.0, look.normal_length]]])
+        self._normal.shaft_radius = 0.45 * look.point_radius
+        self._normal.head_radius = 1.1 * look.point_radius
+        self._normal.head_length = 2.6 * look.point_radius
 
     def draw(self, scene: Scene | None) -> None:
         """Show poses and contact."""
@@ -138,10 +146,8 @@ class Page:
             answer = scene.answer
             touching = answer is not None and answer.point is not None
             if touching:
-                point = answer.point - self._origin
-                self._point.position = point
-                reach = proportions(*self._sizes).normal_length
-                self._normal.points = np.array([[point, point + reach * answer.normal]])
+                self._point.position = self._normal.position = answer.point - self._origin
+                self._normal.wxyz = _turn_from_z(answer.normal)
             self._point.visible = self._normal.visible = touching
             if scene.exact.colliding:
                 self._exact.position = scene.exact.point - self._origin
@@ -158,7 +164,7 @@ class Page:
         top = np.array([0.0, 0.0, 0.8 * down])
         camera = self._server.initial_camera
         camera.look_at = top
-        camera.position = top + reach * np.array([-0.62, -0.95, 0.42])
+        camera.position = top + reach * np.array([-0.44, -0.66, 0.38])
         for client in self._server.get_clients().values():
             client.camera.look_at = camera.look_at
             client.camera.position = camera.position
@@ -177,24 +183,28 @@ class Page:
                 self._history.popleft()
             times, separations = np.array(self._history).T
             self._chart.data = times - now, separations
-        if not connected:
-            text, colour = 'the contact node does not answer', '#b00020'
-        elif wish:
-            text, colour = f'switching to {wish} …', '#555'
+        text = f'running: {model}'
+        if wish:
+            text = f'switching to {wish} …'
+        elif not connected:
+            text = 'the contact node does not answer'
         elif refusal:
-            text, colour = f'refused: {refusal}', '#b00020'
-        else:
-            text, colour = f'running: {model}', '#555'
-        self._status.content = (f'<div id="model-status" style="padding:0 0.6em 0.6em;'
-                                f'font-size:0.85em;color:{colour}">{html.escape(text)}</div>')
+            text = f'refused: {refusal}'
+        self._status.content = _line('model-status', text, bad=not wish and (
+            bool(refusal) or not connected))
 
-    def show_landing(self, landing: Landing, last_run: str) -> None:
-        """Which run is under way, and what the crane said of the one before."""
+    def show_landing(self, landing: Landing) -> None:
+        """Which run is under way."""
         self._seed.value = landing.seed
-        lines = html.escape('\n'.join(last_run.strip().splitlines()[-MOST_LINES:]))
+
+    def show_last_run(self, passed: bool, text: str) -> None:
+        """Whether the crane's last run passed, and its report."""
+        self._verdict.content = _line('last-run', f'last run: {"passed" if passed else "FAILED"}',
+                                      bad=not passed)
+        self._report.visible = True
         self._last_run.content = (
-            f'<pre id="last-run" style="margin:0;padding:0.4em 0.6em;font-size:0.68em;'
-            f'line-height:1.35;white-space:pre-wrap">{lines}</pre>')
+            f'<pre style="margin:0;padding:0.4em 0.6em;font-size:0.68em;line-height:1.35;'
+            f'white-space:pre-wrap">{html.escape(text)}</pre>')
 
     def close(self) -> None:
         """End the server."""
@@ -233,6 +243,11 @@ def read_out(scene: Scene | None, figures: Figures | None, model: str) -> str:
             f'line-height:1.5">{cells}</table>')
 
 
+def _line(name: str, text: str, *, bad: bool) -> str:
+    return (f'<div id="{name}" style="padding:0 0.7em 0.7em;font-size:0.85em;'
+            f'{"color:#c00020" if bad else "opacity:0.7"}">{html.escape(text)}</div>')
+
+
 def _text(value: float, form: str) -> str:
     return '–' if math.isnan(value) else format(value, form)
 
@@ -242,6 +257,14 @@ def _share(length: float, edge: float) -> str:
     if math.isnan(length):
         return '–'
     return f'{1e3 * length:.1f} mm = {100.0 * length / edge:.2f} %'
+
+
+def _turn_from_z(direction: np.ndarray) -> np.ndarray:
+    """The least turn that brings z to a unit vector, as w x y z."""
+    x, y, z = direction
+    turn = np.array([1.0 + z, -y, x, 0.0])
+    length = np.linalg.norm(turn)
+    return turn / length if length > 0.0 else np.array([0.0, 1.0, 0.0, 0.0])  # z to -z: about x
 
 
 def _edges(size: Sequence[float]) -> np.ndarray:
