@@ -357,12 +357,13 @@ def near(picture, colour, distance):
     return np.mean((saturation > 25) & (aligned > (1.0 - distance) * saturation))
 
 
+@pytest.mark.timeout(600)
 @pytest.mark.skipif(chromium() is None, reason='no Chromium here: apt install chromium')
 def test_the_page_in_a_browser(program):
     """It draws both boxes; the figures come and are sound; a button switches the running node."""
     _, url = start_view(program, '--model', 'exact', '--rate', '100')
     with open_page(url) as tab:
-        tab.wait_for('document.getElementById("verdict")?.innerText == "no contact"', 200)
+        tab.wait_for('document.getElementById("verdict")?.innerText == "no contact"', 400)
         assert float(tab.text('separation').split()[0]) > 0.0
         picture = np.array(Image.open(io.BytesIO(tab.picture())).convert('RGB'), float)
         scene = picture[:, :picture.shape[1] // 2]

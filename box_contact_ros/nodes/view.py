@@ -18,7 +18,7 @@ import tempfile
 import threading
 import time
 import webbrowser
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import IO, Any
 
@@ -37,16 +37,14 @@ from .view_page import Landing, Page
 FRAME_PERIOD = 1 / 30
 PAUSE = 1.5
 """Time [s] between the end of a run and the next, to see how it ended."""
-WAIT = 60.0
-"""The crane's patience [s] with a contact node that starts beside it."""
+WAIT = 300.0
+"""The crane's patience [s] with a contact node that starts beside it, and may have to compile."""
 
 
 class Simulation:
     """A contact node, and a crane that is started again whenever it has ended."""
 
-    def __init__(self, model: str, landing: Landing, domain: int) -> None:
-        self._env = os.environ | {'ROS_DOMAIN_ID': str(domain),
-                                  'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
+    def __init__(self, model: str, landing: Landing) -> None:
         self._sizes = [f'{name}:=[{",".join(map(str, CONTAINER_40FT))}]'
                        for name in ('size_a', 'size_b')]
         self.landing = landing
@@ -55,8 +53,8 @@ class Simulation:
         self._node_output, self._crane_output = (tempfile.TemporaryFile() for _ in range(2))
         self._crane: subprocess.Popen | None = None
         self._next_at = 0.0
-        self._node = start('contact_node', [f'model:={model}', *self._sizes], self._env,
-                           self._node_output)
+        self._node = start('contact_node', [f'model:={model}', *self._sizes],
+                           dict(os.environ), self._node_output)
 
     def step(self) -> bool:
         """Start a crane if it is time; whether one was. RuntimeError if the node has ended."""
@@ -88,7 +86,7 @@ class Simulation:
         self._crane = start('crane', [
             *self._sizes, f'seed:={self.landing.seed}', f'rate:={self.landing.rate}',
             f'closed_loop:={str(self.landing.closed_loop).lower()}', f'wait:={WAIT}',
-        ], self._env, self._crane_output)
+        ], dict(os.environ), self._crane_output)
 
     def close(self) -> None:
         """End everything."""
@@ -103,12 +101,11 @@ def _text(file: IO[bytes]) -> str:
 
 
 @contextmanager
-def listening(target: str, domain: int | None, args: Sequence[str]):
-    """A ViewNode that is served by a thread; `domain` None is the environment's."""
+def listening(target: str, args: Sequence[str]) -> Iterator[ViewNode]:
+    """A ViewNode that is served by a thread."""
     context = Context()
     # No handlers of rclpy's: what a signal ends first is for `main` to say.
-    rclpy.init(args=list(args), context=context, domain_id=domain,
-               signal_handler_options=SignalHandlerOptions.NO)
+    rclpy.init(args=list(args), context=context, signal_handler_options=SignalHandlerOptions.NO)
     node = ViewNode(context, target)
     executor = make_executor(context)
     executor.add_node(node)
@@ -173,11 +170,15 @@ def main(args: Sequence[str] | None = None) -> int:
               for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
     wishes: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
     landing = Landing(options.seed, options.rate, not options.open_loop)
+    if options.domain is not None:
+        os.environ['ROS_DOMAIN_ID'] = str(options.domain)
+    if not options.attach:  # nothing else on this network hears what is played here
+        os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
     page = simulation = None
     try:
-        with listening(options.node, options.domain, args) as node:
+        with listening(options.node, args) as node:
             if not options.attach:
-                simulation = Simulation(options.model, landing, options.domain)
+                simulation = Simulation(options.model, landing)
             page = Page(options.host, options.port, landing=None if options.attach else landing,
                         on_model=lambda name: wishes.put(lambda: node.set_model(name)),
                         on_land=lambda wish: wishes.put(lambda: simulation.land(wish)))

@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import html
 import io
+import logging
 import math
 import time
 from collections import deque
@@ -47,6 +48,8 @@ class Page:
     def __init__(self, host: str, port: int, *, landing: Landing | None,
                  on_model: Callable[[str], None], on_land: Callable[[Landing], None]) -> None:
         """Serve at a port, or the next that is free; `landing` None: no crane to be asked."""
+        # Browsers open connections on suspicion, and close them unused; that is no error.
+        logging.getLogger('websockets').setLevel(logging.CRITICAL)
         with contextlib.redirect_stdout(io.StringIO()):  # viser greets
             self._server = server = viser.ViserServer(host=host, port=port, verbose=False,
                                                       label='box_contact_ros')
@@ -57,6 +60,7 @@ class Page:
         server.gui.main_panel.set_width(PANEL_WIDTH)
         self._sizes: tuple = ()
         self._origin: np.ndarray | None = None
+        server.on_client_connect(self._aim)
         self._set_stage()
         self._read_out = server.gui.add_html('')
         self._history: deque[tuple[float, float]] = deque()
@@ -162,12 +166,19 @@ class Page:
         self._ground.visible = True
         reach = float(np.linalg.norm(self._sizes, axis=1).max())
         top = np.array([0.0, 0.0, 0.8 * down])
-        camera = self._server.initial_camera
-        camera.look_at = top
-        camera.position = top + reach * np.array([-0.44, -0.66, 0.38])
+        initial = self._server.initial_camera  # what the button "reset view" goes back to
+        initial.position = top + reach * np.array([-0.44, -0.66, 0.38])
+        initial.look_at = top
         for client in self._server.get_clients().values():
-            client.camera.look_at = camera.look_at
-            client.camera.position = camera.position
+            self._aim(client)
+
+    def _aim(self, client: viser.ClientHandle) -> None:
+        """Bring a browser's camera to where it is to start."""
+        if self._origin is None:
+            return
+        # In this order: setting the position moves the other along.
+        client.camera.position = self._server.initial_camera.position
+        client.camera.look_at = self._server.initial_camera.look_at
 
     def show(self, scene: Scene | None, figures: Figures | None, *, model: str, wish: str,
              refusal: str, connected: bool) -> None:
@@ -183,15 +194,16 @@ class Page:
                 self._history.popleft()
             times, separations = np.array(self._history).T
             self._chart.data = times - now, separations
-        text = f'running: {model}'
-        if wish:
+        text, bad = f'running: {model}', False
+        if not model:
+            text = 'waiting for the contact node …'
+        elif wish:
             text = f'switching to {wish} …'
         elif not connected:
-            text = 'the contact node does not answer'
+            text, bad = 'the contact node does not answer', True
         elif refusal:
-            text = f'refused: {refusal}'
-        self._status.content = _line('model-status', text, bad=not wish and (
-            bool(refusal) or not connected))
+            text, bad = f'refused: {refusal}', True
+        self._status.content = _line('model-status', text, bad=bad)
 
     def show_landing(self, landing: Landing) -> None:
         """Which run is under way."""
