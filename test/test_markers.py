@@ -122,11 +122,9 @@ def actions(array):
 
 
 def drawn(client, wanted):
-    """Wait for an array in which point, normal and depth have this action."""
-    seen = len(client.arrays)
-    return client.spin(lambda: any(
-        [actions(array).get(name) for name in ('point', 'normal', 'depth')] == [wanted] * 3
-        for array in client.arrays[seen:]), 10.0)
+    """Wait until point, normal and depth have this action in the last array."""
+    return client.spin(lambda: [actions(client.arrays[-1]).get(name)
+                                for name in ('point', 'normal', 'depth')] == [wanted] * 3, 10.0)
 
 
 def test_draws_what_the_contact_node_answers(client, node, contact_node):
@@ -144,7 +142,8 @@ def test_draws_what_the_contact_node_answers(client, node, contact_node):
     client.ask(poses.IDENTITY, APART)
     assert drawn(client, Marker.DELETE)
     assert actions(client.arrays[-1])['box_b'] == Marker.ADD
-    assert xyz(client.arrays[-1].markers[1].pose.position) == (0.5, 0.25, 2.5)
+    assert client.spin(lambda: xyz(client.arrays[-1].markers[1].pose.position) == (0.5, 0.25, 2.5),
+                       10.0)
 
 
 def test_nobody_answers_any_more(client, node):
