@@ -10,7 +10,7 @@ import pytest
 import yaml
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
-from ros_client import Client, serving
+from ros_client import MATCH_SECONDS, Client, serving
 from visualization_msgs.msg import Marker, MarkerArray
 
 from box_contact_ros import ContactSolver
@@ -121,6 +121,15 @@ def actions(array):
     return {marker.ns: marker.action for marker in array.markers}
 
 
+def offer_until_drawn(client, count):
+    """Send poses until so many markers are drawn: all that have to have matched."""
+    deadline = time.monotonic() + MATCH_SECONDS
+    while not (client.arrays and len(client.arrays[-1].markers) == count):
+        assert time.monotonic() < deadline, 'no markers'
+        client.send(poses.IDENTITY, APART)
+        client.spin(lambda: False, 0.1)
+
+
 def drawn(client, wanted):
     """Wait until point, normal and depth have this action in the last array."""
     return client.spin(lambda: [actions(client.arrays[-1]).get(name)
@@ -129,8 +138,7 @@ def drawn(client, wanted):
 
 def test_draws_what_the_contact_node_answers(client, node, contact_node):
     """In contact with its point; apart, taken away; the boxes in both cases."""
-    client.offer_until_answered(poses.IDENTITY, APART)
-    assert client.spin(lambda: client.arrays, 10.0)
+    offer_until_drawn(client, 5)
     stamp = client.ask(poses.IDENTITY, TOUCHING, frames=('yard', 'yard'))
     assert drawn(client, Marker.ADD)
     markers = {marker.ns: marker for marker in client.arrays[-1].markers}
@@ -151,8 +159,7 @@ def test_nobody_answers_any_more(client, node):
     with serving(lambda context: ContactNode(context, parameter_overrides=[
             Parameter(name, value=value)
             for name, value in (SETTINGS | {'model': 'exact'}).items()])):
-        client.offer_until_answered(poses.IDENTITY, APART)
-        assert client.spin(lambda: client.arrays, 10.0)
+        offer_until_drawn(client, 5)
         client.ask(poses.IDENTITY, TOUCHING)
         assert drawn(client, Marker.ADD)
     client.spin(lambda: False, 0.7)
@@ -164,8 +171,7 @@ def test_no_more_often_than_asked(client, node, contact_node):
     """Poses at some 500 Hz for a second: markers at the rate, and none while nothing is new."""
     result, = node.set_parameters([Parameter('rate', value=20)])
     assert result.successful
-    client.offer_until_answered(poses.IDENTITY, APART)
-    assert client.spin(lambda: client.arrays, 10.0)
+    offer_until_drawn(client, 5)
     client.arrays.clear()
     started = time.monotonic()
     while time.monotonic() - started < 1.0:
@@ -180,8 +186,7 @@ def test_no_more_often_than_asked(client, node, contact_node):
 
 def test_bad_poses_are_not_drawn(client, node):
     """NaN and a quaternion of zero length; the box stays where it was."""
-    while not client.spin(lambda: client.arrays, 0.1):
-        client.send(poses.IDENTITY, APART)
+    offer_until_drawn(client, 2)
     client.spin(lambda: False, 0.3)
     client.arrays.clear()
     for bad in ((math.nan, 0, 0, 0, 0, 0, 1), (0, 0, 0, 0, 0, 0, 0)):

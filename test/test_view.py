@@ -15,7 +15,7 @@ import numpy as np
 import poses
 import pytest
 from rclpy.parameter import Parameter
-from ros_client import Client, serving
+from ros_client import MATCH_SECONDS, Client, serving
 
 pytest.importorskip('viser')
 pytest.importorskip('mujoco')
@@ -246,9 +246,12 @@ def test_it_learns_what_the_contact_node_is_set_to(view, client):
 def test_it_hears_poses_and_answers(view, client):
     """And measures a latency; a pose of NaN, which the contact node refuses, is no pair."""
     client.offer_until_answered(ORIGIN, APART)
+    deadline = time.monotonic() + MATCH_SECONDS
+    while not (view.log.scene() and view.log.scene().answer):  # the view has to have matched too
+        assert time.monotonic() < deadline, 'nothing heard'
+        client.ask(ORIGIN, TOUCHING)
     stamp = client.ask(ORIGIN, TOUCHING)
-    assert client.spin(lambda: view.log.scene() and view.log.scene().answer
-                       and view.log.scene().answer.stamp == stamp, 10.0)
+    assert client.spin(lambda: view.log.scene().answer.stamp == stamp, 10.0)
     scene = view.log.scene()
     assert scene.answer.point == pytest.approx(scene.exact.point)
     assert 0.0 < scene.answer.latency < 5.0
