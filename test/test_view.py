@@ -285,6 +285,8 @@ def test_another_size_is_another_log(view, client, contact_node):
     view.log.pose(0, START, ORIGIN)
     view.log.pose(1, START, TOUCHING)
     assert view.log.scene().exact.separation == pytest.approx(1.875 - 2.5)
+    contact_node.set_parameters([Parameter('size_b', value=[2.0, 2.0, 2.5])])  # as others expect
+    assert client.spin(lambda: list(view.settings['size_b']) == [2.0, 2.0, 2.5], 10.0)
 
 
 # --- the program ----------------------------------------------------------------------------------
