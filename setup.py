@@ -73,6 +73,7 @@ setup(
             'ros-jazzy-rmw-fastrtps-cpp',
         ],
         'sim': ['mujoco', 'rich'],
+        'view': ['viser'],
         'bag': ['rosbags'],
         'soup': ['python-fcl'],
         'train': ['torch==2.13.0', 'tqdm'],

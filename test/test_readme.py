@@ -140,6 +140,12 @@ def pip(words: list[str], monkeypatch, **_) -> None:
             assert word in given['install_requires']
 
 
+def rviz(words: list[str], **_) -> None:
+    """The config is one that is installed."""
+    assert words[:2] == ['rviz2', '-d']
+    assert resource_path(*words[-1].rpartition('box_contact_ros)/')[2].split('/')).is_file()
+
+
 def apt(words: list[str], **_) -> None:
     """Packages that package.xml depends on."""
     manifest = ElementTree.parse(ROOT / 'package.xml')
@@ -171,6 +177,7 @@ COMMANDS = {
     r'ros2 topic echo \S+': topic,
     r'ros2 param set \S+ \S+ \S+': parameter,
     r'ros2 launch \S+ \S+( .*)?': launch,
+    r'rviz2 -d .+': rviz,
     r'pip install .+': pip,
     r'sudo apt install .+': apt,
     r'colcon build .+': colcon,

@@ -14,7 +14,7 @@ from typing import Any
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 
-from ..checks import shown
+from ..checks import shown, size_fault
 
 Check = Callable[[str, Any], Any]
 """From a parameter's name and value to the value as the node uses it; ValueError if it is wrong."""
@@ -53,6 +53,15 @@ def numbers(count: int) -> Check:
             raise ValueError(f'{name} must be {count} finite numbers, not {shown(value)}')
         return tuple(map(float, found))
     return check
+
+
+def size(name: str, value: Any) -> tuple[float, ...]:
+    """Three full extents [m]."""
+    extents = numbers(3)(name, value)
+    fault = size_fault(extents)
+    if fault:
+        raise ValueError(f'{name} {fault}')
+    return extents
 
 
 def text(name: str, value: Any) -> str:

@@ -1,0 +1,247 @@
+"""A page in the browser: the crane, both boxes, the contact and its figures, live.
+
+It starts a contact node and, again and again, a crane, in a ROS domain of their own; or, with
+--attach, listens to a contact node and a simulator that run already. On the page the contact node
+is switched from model to model while it runs, and the crane lands again with other settings. It
+ends with Ctrl-C, and what it has started with it.
+"""
+from __future__ import annotations
+
+import argparse
+import os
+import queue
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import webbrowser
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import IO, Any
+
+import rclpy
+from rclpy.context import Context
+from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import remove_ros_args
+
+from ..crane import CONTAINER_40FT
+from ..demo import DOMAINS, end, start
+from .contact import PARAMETERS
+from .runtime import REFUSALS, make_executor
+from .view_node import ViewNode
+from .view_page import Landing, Page
+
+FRAME_PERIOD = 1 / 30
+PAUSE = 1.5
+"""Time [s] between the end of a run and the next, to see how it ended."""
+WAIT = 300.0
+"""The crane's patience [s] with a contact node that starts beside it, and may have to compile."""
+
+
+class Simulation:
+    """A contact node, and a crane that is started again whenever it has ended."""
+
+    def __init__(self, model: str, landing: Landing) -> None:
+        self._sizes = [f'{name}:=[{",".join(map(str, CONTAINER_40FT))}]'
+                       for name in ('size_a', 'size_b')]
+        self.landing = landing
+        self.last_run: tuple[bool, str] | None = None
+        """Whether the last run that ended by itself passed, and the crane's report of it."""
+        self._node_output, self._crane_output = (tempfile.TemporaryFile() for _ in range(2))
+        self._crane: subprocess.Popen | None = None
+        self._next_at = 0.0
+        self._node = start('contact_node', [f'model:={model}', *self._sizes],
+                           dict(os.environ), self._node_output)
+
+    def step(self) -> bool:
+        """Start a crane if it is time; whether one was. RuntimeError if the node has ended."""
+        if self._node.poll() is not None:
+            raise RuntimeError(f'contact_node ended, status {self._node.returncode}; it printed:\n'
+                               f'{_text(self._node_output)}')
+        now = time.monotonic()
+        if self._crane is not None and self._crane.poll() is not None:
+            self.last_run = self._crane.returncode == 0, _text(self._crane_output)
+            self._crane = None
+            self._next_at = now + PAUSE
+            self.landing = Landing(self.landing.seed + 1, self.landing.rate,
+                                   self.landing.closed_loop)
+        if self._crane is not None or now < self._next_at:
+            return False
+        self._start_crane()
+        return True
+
+    def land(self, landing: Landing) -> None:
+        """End what is under way; `step` then starts this."""
+        if self._crane is not None:
+            end([self._crane])
+            self._crane = None
+        self.landing, self._next_at = landing, 0.0
+
+    def _start_crane(self) -> None:
+        self._crane_output.seek(0)
+        self._crane_output.truncate()
+        self._crane = start('crane', [
+            *self._sizes, f'seed:={self.landing.seed}', f'rate:={self.landing.rate}',
+            f'closed_loop:={str(self.landing.closed_loop).lower()}', f'wait:={WAIT}',
+        ], dict(os.environ), self._crane_output)
+
+    def close(self) -> None:
+        """End everything."""
+        end([process for process in (self._crane, self._node) if process is not None])
+        self._node_output.close()
+        self._crane_output.close()
+
+
+def _text(file: IO[bytes]) -> str:
+    file.seek(0)
+    return file.read().decode(errors='replace').rstrip()
+
+
+@contextmanager
+def listening(target: str, args: Sequence[str]) -> Iterator[ViewNode]:
+    """A ViewNode that is served by a thread."""
+    context = Context()
+    # No handlers of rclpy's: what a signal ends first is for `main` to say.
+    rclpy.init(args=list(args), context=context, signal_handler_options=SignalHandlerOptions.NO)
+    node = ViewNode(context, target)
+    executor = make_executor(context)
+    executor.add_node(node)
+    stop = threading.Event()
+
+    def serve() -> None:
+        while not stop.is_set():
+            try:
+                executor.spin_once(timeout_sec=0.1)
+            except Exception as error:  # one bad message does not end the view
+                node.get_logger().error(f'{type(error).__name__}: {error}',
+                                        throttle_duration_sec=1.0)
+
+    thread = threading.Thread(target=serve, name='ROS')
+    thread.start()
+    try:
+        yield node
+    finally:
+        stop.set()
+        thread.join()
+        executor.shutdown()
+        node.destroy_node()
+        context.try_shutdown()
+
+
+def watch(node: ViewNode, page: Page, simulation: Simulation | None,
+          wishes: queue.SimpleQueue[Callable[[], None]], stop: threading.Event) -> None:
+    """Draw, and do what is wished for, until `stop` is set."""
+    frame_end = 0.0
+    while not stop.wait(max(0.0, frame_end - time.monotonic())):
+        frame_end = time.monotonic() + FRAME_PERIOD
+        while not wishes.empty():
+            wishes.get()()
+        if simulation is not None and simulation.step():
+            page.show_landing(simulation.landing)
+            if simulation.last_run is not None:
+                page.show_last_run(*simulation.last_run)
+            if node.log is not None:
+                node.log.start_anew()
+        log, scene, figures = node.log, None, None
+        if log is not None:
+            page.set_sizes(node.settings['size_a'], node.settings['size_b'])
+            scene = log.scene()
+            page.draw(scene)
+            figures = log.figures(node.get_clock().now().nanoseconds)
+        page.show(scene, figures, model=node.settings.get('model', ''), wish=node.wish,
+                  refusal=node.refusal, connected=node.connected)
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Serve the page until SIGINT (0), SIGTERM or SIGHUP (128 + number); 1 if the node ends."""
+    args = list(sys.argv[1:] if args is None else args)
+    options = _options(remove_ros_args(['view', *args])[1:])
+    stop, signalled = threading.Event(), []
+
+    def call_off(number: int, _frame: Any) -> None:
+        signalled.append(number)
+        stop.set()
+
+    # Flags and no exceptions, which might fall between a child's start and its being written down.
+    before = {number: signal.signal(number, call_off)
+              for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    wishes: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+    landing = Landing(options.seed, options.rate, not options.open_loop)
+    if options.domain is not None:
+        os.environ['ROS_DOMAIN_ID'] = str(options.domain)
+    if not options.attach:  # nothing else on this network hears what is played here
+        os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+    page = simulation = None
+    try:
+        with listening(options.node, args) as node:
+            if not options.attach:
+                simulation = Simulation(options.model, landing)
+            page = Page(options.host, options.port, landing=None if options.attach else landing,
+                        on_model=lambda name: wishes.put(lambda: node.set_model(name)),
+                        on_land=lambda wish: wishes.put(lambda: simulation.land(wish)))
+            where = ('' if options.domain is None else
+                     f' (ROS_DOMAIN_ID={options.domain} for ros2 and RViz)')
+            print(f'view: {page.url}{where}; Ctrl-C ends it', flush=True)
+            if not options.no_browser and _has_display():
+                webbrowser.open(page.url)
+            watch(node, page, simulation, wishes, stop)
+    except (*REFUSALS, RuntimeError, OSError) as error:
+        print(f'error: {error}', file=sys.stderr)
+        return 1
+    finally:
+        if simulation is not None:
+            simulation.close()
+        if page is not None:
+            page.close()
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    return 0 if signalled[0] == signal.SIGINT else 128 + signalled[0]
+
+
+def _has_display() -> bool:
+    """Without one, a browser in the terminal might be opened, and wait for its user."""
+    return sys.platform == 'darwin' or any(
+        os.environ.get(name) for name in ('DISPLAY', 'WAYLAND_DISPLAY'))
+
+
+def _options(args: Sequence[str]) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog='view', description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter,
+        epilog='What follows --ros-args is for the view itself; with --attach, -r remaps topics.')
+    parser.add_argument('--host', default='127.0.0.1',
+                        help='address to serve at; whoever reaches it can change the model '
+                             '(default: %(default)s)')
+    parser.add_argument('--port', type=int, default=8080,
+                        help='to serve at, or the next that is free (default: %(default)s)')
+    parser.add_argument('--no-browser', action='store_true', help='do not open a browser')
+    parser.add_argument('--attach', action='store_true',
+                        help='start nothing: listen to nodes that run already')
+    parser.add_argument('--node', default='contact_node', metavar='NAME',
+                        help='of the contact node (default: %(default)s)')
+    parser.add_argument('--domain', type=int, metavar='ID',
+                        help=f'ROS domain, 0 to {DOMAINS[-1]} (default: drawn at random; with '
+                             '--attach, ROS_DOMAIN_ID)')
+    parser.add_argument('--model', default=PARAMETERS['model'].default, metavar='NAME',
+                        help='the contact node starts with (default: %(default)s)')
+    parser.add_argument('--seed', type=int, default=0, metavar='N',
+                        help='of the first landing (default: %(default)s)')
+    parser.add_argument('--rate', type=float, default=200.0, metavar='HZ',
+                        help='pairs of poses a second (default: %(default)g)')
+    parser.add_argument('--open-loop', action='store_true',
+                        help='contacts are shown, but do not carry the load')
+    options = parser.parse_args(list(args))
+    try:
+        PARAMETERS['model'].check('--model', options.model)
+    except ValueError as error:
+        parser.error(str(error))
+    for name, low, high in (('rate', 20, 1000), ('seed', 0, 2**31), ('port', 1, 65535)):
+        if not low <= getattr(options, name) <= high:
+            parser.error(f'--{name} must lie in {low} to {high}, got {getattr(options, name)}')
+    if options.domain is None and not options.attach:
+        options.domain = random.choice(DOMAINS)
+    if options.domain is not None and not 0 <= options.domain <= DOMAINS[-1]:
+        parser.error(f'--domain must lie in 0 to {DOMAINS[-1]}, got {options.domain}')
+    return options

@@ -1,0 +1,96 @@
+"""The view's ears, and its hand on the contact node: subscriptions, and the parameter `model`."""
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from geometry_msgs.msg import PoseStamped
+from rclpy.context import Context
+from rclpy.node import Node
+from rclpy.parameter import Parameter, parameter_value_to_python
+from rclpy.parameter_client import AsyncParameterClient
+from rclpy.task import Future
+from sensor_msgs.msg import PointCloud2
+
+from ..checks import pose_fault
+from .messages import NANOSECONDS, header_fault, read_cloud, read_pose
+from .runtime import POSE_QOS
+from .view_log import ViewLog
+
+ASK_PERIOD = 0.5
+"""Time [s] between looks at the contact node's parameters: somebody else may change them too."""
+ANSWER_PATIENCE = 3.0
+"""Without an answer for so long [s], the contact node is not there, or is busy."""
+ASKED = ('size_a', 'size_b', 'pairing', 'model')
+
+
+class ViewNode(Node):
+    """Writes what it hears to `log`, which there is once the contact node has named its sizes."""
+
+    def __init__(self, context: Context, target: str, **options: Any) -> None:
+        """`target` is the name of the contact node."""
+        super().__init__('view', context=context, **options)
+        self.log: ViewLog | None = None
+        self.settings: Mapping[str, Any] = {}
+        """The contact node's parameters, those of ASKED."""
+        self.wish = ''
+        """The model that was asked for last, until it is granted."""
+        self.refusal = ''
+        """Why the last model that was asked for was refused."""
+        self._answered = 0.0
+        self._question: Future | None = None
+        self._target = AsyncParameterClient(self, target)
+        for box, topic in enumerate(('box_a/pose', 'box_b/pose')):
+            self.create_subscription(PoseStamped, topic, self._pose_callback(box), POSE_QOS)
+        # Best effort: the view must never hold up the contact node.
+        self.create_subscription(PointCloud2, 'contacts', self._on_cloud, POSE_QOS)
+        self.create_timer(ASK_PERIOD, self._ask)
+
+    @property
+    def connected(self) -> bool:
+        """Whether the contact node answers questions."""
+        return time.monotonic() - self._answered < ANSWER_PATIENCE
+
+    def set_model(self, name: str) -> None:
+        """Ask the contact node for another model; `wish`, then `settings` or `refusal`, tell."""
+        self.wish, self.refusal = name, ''
+        future = self._target.set_parameters([Parameter('model', value=name)])
+
+        def done(future: Future) -> None:
+            result, = future.result().results
+            if self.wish == name:
+                self.wish, self.refusal = '', '' if result.successful else result.reason
+            if result.successful:
+                self.settings = {**self.settings, 'model': name}
+        future.add_done_callback(done)
+
+    def _ask(self) -> None:
+        if self._question is not None and not self.connected:
+            self._question = None  # lost with a node that has ended
+        if self._question is None and self._target.services_are_ready():
+            self._question = self._target.get_parameters(list(ASKED))
+            self._question.add_done_callback(self._on_parameters)
+
+    def _on_parameters(self, future: Future) -> None:
+        self._question, self._answered = None, time.monotonic()
+        settings = dict(zip(ASKED, map(parameter_value_to_python, future.result().values)))
+        old, self.settings = self.settings, settings
+        if self.log is None or any(list(settings[name]) != list(old[name])
+                                   for name in ('size_a', 'size_b', 'pairing')):
+            self.log = ViewLog(settings['size_a'], settings['size_b'], settings['pairing'])
+
+    def _pose_callback(self, box: int) -> Callable[[PoseStamped], None]:
+        def callback(message: PoseStamped) -> None:
+            if self.log is None or header_fault(message.header):
+                return
+            pose = read_pose(message)
+            if not pose_fault(pose.numbers):  # the contact node refuses it, and says so
+                self.log.pose(box, pose.stamp, pose.numbers)
+        return callback
+
+    def _on_cloud(self, message: PointCloud2) -> None:
+        received = self.get_clock().now().nanoseconds
+        stamp = message.header.stamp
+        if self.log is not None:
+            self.log.cloud(stamp.sec * NANOSECONDS + stamp.nanosec, read_cloud(message), received)

@@ -1,0 +1,385 @@
+"""The view: its figures by hand, its ears over DDS, the program, the page in a real browser."""
+from __future__ import annotations
+
+import io
+import math
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import poses
+import pytest
+from rclpy.parameter import Parameter
+from ros_client import MATCH_SECONDS, Client, serving
+
+pytest.importorskip('viser')
+pytest.importorskip('mujoco')
+
+from browser import chromium, open_page  # noqa: E402
+from PIL import Image  # noqa: E402
+
+from box_contact_ros import ContactSolver  # noqa: E402
+from box_contact_ros.nodes.appearance import BOX_A, BOX_B, STALE  # noqa: E402
+from box_contact_ros.nodes.contact import ContactNode  # noqa: E402
+from box_contact_ros.nodes.messages import CLOUD_ROW, NANOSECONDS  # noqa: E402
+from box_contact_ros.nodes.view_log import LOST_AFTER, ViewLog  # noqa: E402
+from box_contact_ros.nodes.view_node import ViewNode  # noqa: E402
+from box_contact_ros.nodes.view_page import _edges, _turn_from_z, read_out  # noqa: E402
+
+ORIGIN = poses.IDENTITY
+TOUCHING = np.array([0.5, 0.25, 1.875, 0, 0, 0, 1])
+APART = np.array([0.5, 0.25, 2.5, 0, 0, 0, 1])
+CUBE = (2.0, 2.0, 2.0)
+EXACT = ContactSolver(CUBE, CUBE, model='exact')(ORIGIN, TOUCHING)
+NO_ROWS = np.zeros(0, CLOUD_ROW)
+NOT_EVALUATED = np.array([(*[math.nan] * 7, 0)], CLOUD_ROW)
+START = 1_000 * NANOSECONDS
+MS = 1_000_000
+
+
+def rows(shift=0.0):
+    """A cloud's row: the exact contact, its point moved by `shift` [m]."""
+    x, y, z = EXACT.point
+    return np.array([(x + shift, y, z, *EXACT.normal, -EXACT.separation, 0)], CLOUD_ROW)
+
+
+@pytest.fixture
+def log():
+    return ViewLog(CUBE, CUBE, 'stamp')
+
+
+def send(log, stamp, b=TOUCHING):
+    log.pose(0, stamp, ORIGIN)
+    log.pose(1, stamp, b)
+
+
+# --- figures --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('cloud_at', [0, 1, 2])
+def test_an_answer_belongs_to_the_poses_of_its_stamp(log, cloud_at):
+    """Whichever of the three messages comes first; latency is from the stamp to the cloud."""
+    news = [lambda: log.pose(0, START, ORIGIN), lambda: log.pose(1, START, TOUCHING)]
+    news.insert(cloud_at, lambda: log.cloud(START, rows(), START + 3 * MS))
+    for one in news:
+        one()
+    scene, figures = log.scene(), log.figures(START + 4 * MS)
+    assert np.array_equal(scene.poses, (ORIGIN, TOUCHING))
+    assert np.array_equal(scene.answer.point, EXACT.point)
+    assert np.array_equal(scene.answer.normal, EXACT.normal)
+    assert scene.answer.depth == -EXACT.separation == -scene.exact.separation
+    assert figures.latency_median == pytest.approx(3e-3)
+    assert (figures.answered, figures.lost) == (1, 0)
+
+
+def test_point_errors_are_distances_from_the_exact_point(log):
+    """99 points 3 mm off and one 40 mm off: median 3 mm, and the p99 above it."""
+    for i in range(100):
+        stamp = START + 5 * MS * i
+        send(log, stamp)
+        log.cloud(stamp, rows(0.040 if i == 50 else 0.003), stamp + MS)
+    figures = log.figures(stamp + MS)
+    assert figures.point_error_median == pytest.approx(3e-3)
+    assert 3.1e-3 < figures.point_error_p99 < 40e-3
+    assert figures.edge == 2.0
+    assert figures.rate == 100
+
+
+def test_the_rate_ends_with_the_answers(log):
+    """What came more than a second ago is not counted."""
+    send(log, START)
+    log.cloud(START, rows(), START + MS)
+    assert log.figures(START + 2 * MS).rate == 1
+    assert log.figures(START + NANOSECONDS + 2 * MS).rate == 0
+
+
+@pytest.mark.parametrize('cloud', [NO_ROWS, NOT_EVALUATED])
+def test_no_contact_has_no_point_and_no_error(log, cloud):
+    """No row, or a row of NaN for what could not be evaluated."""
+    send(log, START, APART)
+    log.cloud(START, cloud, START + MS)
+    scene, figures = log.scene(), log.figures(START)
+    assert scene.answer.point is None and scene.exact.separation == pytest.approx(0.5)
+    assert math.isnan(figures.point_error_median) and figures.answered == 1
+
+
+def test_a_pair_without_an_answer_is_lost_in_the_end(log):
+    """Of five pairs the third has no answer: lost a second later, not before."""
+    for i in range(5):
+        stamp = START + 10 * MS * i
+        send(log, stamp)
+        if i != 2:
+            log.cloud(stamp, rows(), stamp + MS)
+    assert log.figures(stamp).lost == 0
+    send(log, START + 20 * MS + LOST_AFTER + 1)
+    assert (log.figures(stamp).answered, log.figures(stamp).lost) == (4, 1)
+
+
+def test_nothing_is_lost_before_the_first_answer_nor_on_the_way_to_the_view(log):
+    """Poses that nobody was there for, and a cloud whose poses the view has missed."""
+    for i in range(3):
+        send(log, START + 10 * MS * i)
+    stamp = START + 30 * MS
+    send(log, stamp)
+    log.cloud(stamp, rows(), stamp + MS)
+    log.cloud(stamp + 10 * MS, rows(), stamp + 11 * MS)
+    for i in range(3):
+        later = stamp + (i + 1) * 2 * LOST_AFTER
+        send(log, later)
+        log.cloud(later, rows(), later)
+    assert log.figures(later).lost == 0
+
+
+def test_boxes_move_on_when_nobody_answers(log):
+    """The last answer is drawn for half a second, then the poses without a contact."""
+    send(log, START)
+    log.cloud(START, rows(), START + MS)
+    send(log, START + STALE, APART)
+    assert np.array_equal(log.scene().poses[1], TOUCHING)
+    send(log, START + STALE + 1, APART)
+    scene = log.scene()
+    assert np.array_equal(scene.poses[1], APART) and scene.answer is None
+
+
+def test_a_run_starts_anew(log):
+    send(log, START)
+    log.cloud(START, rows(), START + MS)
+    log.start_anew()
+    assert log.scene() is None and log.figures(START).answered == 0
+
+
+def test_latest_pairing_answers_with_the_newer_stamp():
+    """A at 10 ms with B at 0 ms: the cloud carries 10 ms."""
+    log = ViewLog(CUBE, CUBE, 'latest')
+    log.pose(1, START, TOUCHING)
+    log.pose(0, START + 10 * MS, ORIGIN)
+    log.cloud(START + 10 * MS, rows(), START + 11 * MS)
+    assert np.array_equal(log.scene().answer.point, EXACT.point)
+
+
+# --- what is shown --------------------------------------------------------------------------------
+
+
+def shown(text, name):
+    return re.sub('<[^>]*>', '', re.search(rf'id="{name}"[^>]*>(.*?)</td>', text).group(1))
+
+
+def test_read_out_says_lengths_in_mm_and_shares_of_the_edge(log):
+    """3 mm of an edge of 2 m are 0.15 %."""
+    send(log, START)
+    log.cloud(START, rows(0.003), START + 2 * MS)
+    text = read_out(log.scene(), log.figures(START + 3 * MS), 'soup')
+    assert shown(text, 'verdict') == 'contact'
+    assert shown(text, 'separation') == '-125.00 mm'
+    assert shown(text, 'error') == '3.0 mm = 0.15 %'
+    assert shown(text, 'latency') == '2.00 ms'
+    assert shown(text, 'lost') == '0 of 1'
+    assert 'point error of soup' in text
+
+
+def test_read_out_without_contact_answer_or_poses(log):
+    """No figure is made up."""
+    assert shown(read_out(None, None, ''), 'verdict') == 'waiting for poses'
+    send(log, START, APART)
+    text = read_out(log.scene(), log.figures(START), 'exact')
+    assert (shown(text, 'verdict'), shown(text, 'error')) == ('no answer', '–')
+    log.cloud(START, NO_ROWS, START)
+    text = read_out(log.scene(), log.figures(START), 'exact')
+    assert (shown(text, 'verdict'), shown(text, 'error')) == ('no contact', '–')
+
+
+@pytest.mark.parametrize('direction', [
+    (0, 0, 1), (0, 0, -1), (1, 0, 0), (0, -1, 0), (0.36, 0.48, -0.8), (1e-12, 0, -1)])
+def test_the_arrow_is_turned_along_the_normal(direction):
+    """z turned by (w, v): v·(2 v_z) + z·(w² − v·v) + 2 w v × z, of a unit quaternion."""
+    w, *v = _turn_from_z(np.array(direction, float))
+    v, z = np.array(v), np.array([0.0, 0.0, 1.0])
+    assert w * w + v @ v == pytest.approx(1.0)
+    turned = 2 * v * v[2] + z * (w * w - v @ v) + 2 * w * np.cross(v, z)
+    assert turned == pytest.approx(np.array(direction, float), abs=1e-9)
+
+
+def test_a_box_has_twelve_edges():
+    """Four of each extent, all on the surface."""
+    edges = _edges((1.0, 2.0, 4.0))
+    lengths = np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)
+    assert sorted(lengths) == [1.0] * 4 + [2.0] * 4 + [4.0] * 4
+    assert (np.abs(edges) == [0.5, 1.0, 2.0]).all()
+
+
+# --- over DDS -------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope='module')
+def client():
+    client = Client()
+    yield client
+    client.close()
+
+
+@pytest.fixture(scope='module')
+def contact_node():
+    settings = {'size_a': list(CUBE), 'size_b': [2.0, 2.0, 2.5], 'model': 'exact'}
+    with serving(lambda context: ContactNode(context, parameter_overrides=[
+            Parameter(name, value=value) for name, value in settings.items()])) as node:
+        yield node
+
+
+@pytest.fixture(scope='module')
+def view(contact_node):
+    with serving(lambda context: ViewNode(context, 'contact_node')) as node:
+        yield node
+
+
+def test_it_learns_what_the_contact_node_is_set_to(view, client):
+    """Sizes and model, by its parameter services; and a change that somebody else makes."""
+    assert client.spin(lambda: view.log is not None, 15.0)
+    assert list(view.settings['size_b']) == [2.0, 2.0, 2.5]
+    assert view.settings['model'] == 'exact' and view.connected
+
+
+def test_it_hears_poses_and_answers(view, client):
+    """And measures a latency; a pose of NaN, which the contact node refuses, is no pair."""
+    client.offer_until_answered(ORIGIN, APART)
+    deadline = time.monotonic() + MATCH_SECONDS
+    while not (view.log.scene() and view.log.scene().answer):  # the view has to have matched too
+        assert time.monotonic() < deadline, 'nothing heard'
+        client.ask(ORIGIN, TOUCHING)
+    stamp = client.ask(ORIGIN, TOUCHING)
+    assert client.spin(lambda: view.log.scene().answer.stamp == stamp, 10.0)
+    scene = view.log.scene()
+    assert scene.answer.point == pytest.approx(scene.exact.point)
+    assert 0.0 < scene.answer.latency < 5.0
+    client.send(ORIGIN, (math.nan, 0, 0, 0, 0, 0, 1))
+    client.ask(ORIGIN, APART)
+    assert client.spin(lambda: view.log.scene().answer.point is None, 10.0)
+
+
+def test_it_switches_the_model_of_the_running_node(view, client, contact_node):
+    """Granted, or refused with the node's own words, and then the old one stays."""
+    assert client.spin(lambda: view.log is not None, 15.0)
+    view.set_model('committee')
+    assert client.spin(lambda: view.settings['model'] == 'committee' and not view.wish, 120.0)
+    assert contact_node.get_parameter('model').value == 'committee'
+    view.set_model('paper')  # it knows cubes and containers, not these sizes
+    assert client.spin(lambda: view.refusal, 60.0)
+    assert 'paper' in view.refusal and not view.wish
+    assert contact_node.get_parameter('model').value == 'committee'
+    view.set_model('exact')
+    assert not view.refusal
+    assert client.spin(lambda: view.settings['model'] == 'exact' and not view.wish, 60.0)
+
+
+def test_another_size_is_another_log(view, client, contact_node):
+    """Whoever sets it: the exact point is that of the new boxes."""
+    assert client.spin(lambda: view.log is not None, 15.0)
+    old = view.log
+    result, = contact_node.set_parameters([Parameter('size_b', value=[2.0, 2.0, 3.0])])
+    assert result.successful
+    assert client.spin(lambda: view.log is not old, 10.0)
+    view.log.pose(0, START, ORIGIN)
+    view.log.pose(1, START, TOUCHING)
+    assert view.log.scene().exact.separation == pytest.approx(1.875 - 2.5)
+    contact_node.set_parameters([Parameter('size_b', value=[2.0, 2.0, 2.5])])  # as others expect
+    assert client.spin(lambda: list(view.settings['size_b']) == [2.0, 2.0, 2.5], 10.0)
+
+
+# --- the program ----------------------------------------------------------------------------------
+
+
+def children(pid):
+    """Processes that a process has started, in whatever group they are."""
+    found = []
+    for stat in Path('/proc').glob('[0-9]*/stat'):
+        try:
+            if stat.read_text().rpartition(')')[2].split()[1] == str(pid):
+                found.append(int(stat.parent.name))
+        except (FileNotFoundError, ProcessLookupError):
+            continue
+    return found
+
+
+def start_view(program, *arguments):
+    """The program, and the address of its page; in this test's domain."""
+    running = program('view', '--no-browser', '--port', '8300', '--domain',
+                      os.environ['ROS_DOMAIN_ID'], *arguments)
+    output = running.wait_for_output('Ctrl-C', 60)
+    return running, re.search(r'http://127\.0\.0\.1:\d+', output).group()
+
+
+@pytest.mark.parametrize('number, status', [(signal.SIGINT, 0), (signal.SIGTERM, 143)])
+def test_no_process_is_left(program, number, status):
+    """Node and crane have groups of their own; the view alone gets the signal."""
+    running, _ = start_view(program, '--model', 'exact')
+    deadline = time.monotonic() + 20
+    while len(started := children(running.process.pid)) < 2 and time.monotonic() < deadline:
+        time.sleep(0.1)
+    assert len(started) == 2
+    running.process.send_signal(number)
+    assert running.wait(20) == status, running.output
+    assert not [pid for pid in started if Path(f'/proc/{pid}').exists()]
+    assert 'Traceback' not in running.output
+
+
+def test_attached_it_starts_nothing(program, contact_node):
+    """The page is served, for a node that runs already."""
+    running, url = start_view(program, '--attach')
+    time.sleep(1.0)
+    assert children(running.process.pid) == []
+    running.process.send_signal(signal.SIGINT)
+    assert running.wait(20) == 0, running.output
+    assert url
+
+
+def test_a_node_that_cannot_start_ends_the_view(program):
+    """With its own words; the paper's continuous networks know cubes only."""
+    running, _ = start_view(program, '--model', 'paper-continuous')
+    assert running.wait(120) == 1
+    assert 'contact_node ended' in running.output and 'paper-continuous' in running.output
+    assert 'Traceback' not in running.output
+
+
+@pytest.mark.parametrize('arguments', [
+    ('--model', 'crystal-ball'), ('--rate', '5000'), ('--port', '0'), ('--domain', '500'),
+    ('--spin',)])
+def test_bad_arguments(arguments):
+    done = subprocess.run([sys.executable, '-m', 'box_contact_ros', 'view', *arguments],
+                          capture_output=True, text=True, timeout=60)
+    assert done.returncode == 2 and arguments[0] in done.stderr
+
+
+def near(picture, colour, distance):
+    """Share of the pixels whose hue is that of a colour, however light or dark it got."""
+    hue = np.array(colour, float) - np.mean(colour)
+    offset = picture - picture.mean(axis=-1, keepdims=True)
+    saturation = np.linalg.norm(offset, axis=-1)
+    aligned = offset @ hue / np.linalg.norm(hue)
+    return np.mean((saturation > 25) & (aligned > (1.0 - distance) * saturation))
+
+
+@pytest.mark.timeout(600)
+@pytest.mark.skipif(chromium() is None, reason='no Chromium here: apt install chromium')
+def test_the_page_in_a_browser(program):
+    """It draws both boxes; the figures come and are sound; a button switches the running node."""
+    _, url = start_view(program, '--model', 'exact', '--rate', '100')
+    with open_page(url) as tab:
+        tab.wait_for('document.getElementById("verdict")?.innerText == "no contact"', 400)
+        assert float(tab.text('separation').split()[0]) > 0.0
+        picture = np.array(Image.open(io.BytesIO(tab.picture())).convert('RGB'), float)
+        scene = picture[:, :picture.shape[1] // 2]
+        assert len(np.unique(scene.reshape(-1, 3), axis=0)) > 50
+        assert near(scene, BOX_A, 0.1) > 0.02 and near(scene, BOX_B, 0.1) > 0.02
+        tab.wait_for('document.getElementById("verdict")?.innerText == "contact"', 60)
+        assert tab.wait_for('document.getElementById("error")?.innerText.startsWith("0.0 mm")')
+        assert float(tab.text('separation').split()[0]) < 0.0
+        assert 0.0 < float(tab.text('latency').split()[0]) < 1000.0
+        pytest.importorskip('fcl')
+        tab.click('soup')
+        tab.wait_for('document.getElementById("model-status").innerText == "running: soup"')
+        tab.click('land again')
+        tab.wait_for('document.getElementById("verdict").innerText == "no contact"')
