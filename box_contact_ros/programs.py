@@ -20,6 +20,7 @@ from __future__ import annotations
 import difflib
 import functools
 import importlib
+import os
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -142,6 +143,8 @@ def run(name: str, args: Sequence[str]) -> int:
         print(_unknown(name), file=sys.stderr)
         return 2
     module, _, function = PROGRAMS[name].target.partition(':')
+    if 'ros' in PROGRAMS[name].extras and not _shared_memory_has_room():
+        return 1
     # argparse takes the program's name from here: the same one in usage lines, however started.
     sys.argv = [name, *args]
     try:
@@ -155,6 +158,35 @@ def run(name: str, args: Sequence[str]) -> int:
     except KeyboardInterrupt:
         return 130  # what a shell reports for a program ended by Ctrl-C
     return int(status or 0)
+
+
+SHARED_MEMORY = '/dev/shm'
+LEAST_ROOM = 64 * 2**10
+"""Bytes: ROS 2's libraries write some pages of shared memory as they are loaded (for tracing), and
+where there are none they are killed by SIGBUS."""
+USUAL_ROOM = 4 * 2**20
+"""Bytes: Fast DDS allocates 0.7 MB as a process joins, or is killed in the same way. What it has,
+it keeps: shared memory that fills up later does no harm."""
+TRANSPORTS = 'FASTDDS_BUILTIN_TRANSPORTS'
+"""Environment variable of Fast DDS."""
+
+
+def _shared_memory_has_room() -> bool:
+    """Whether ROS 2 can start; where there is little room, Fast DDS is told to do without."""
+    try:
+        disk = os.statvfs(SHARED_MEMORY)
+    except (AttributeError, OSError):  # another system
+        return True
+    room = disk.f_bavail * disk.f_frsize
+    if room < LEAST_ROOM:
+        print(f'error: {SHARED_MEMORY} is full ({room} bytes left), and ROS 2 does not start '
+              f'without: make room there', file=sys.stderr)
+        return False
+    if room < USUAL_ROOM and TRANSPORTS not in os.environ:
+        print(f'warning: {SHARED_MEMORY} is almost full ({room} bytes left): going without shared '
+              f'memory ({TRANSPORTS}=UDPv4)', file=sys.stderr)
+        os.environ[TRANSPORTS] = 'UDPv4'
+    return True
 
 
 def usage() -> str:

@@ -115,6 +115,25 @@ class Client:
         return {entry.key: int(entry.value) for entry in self.diagnostics[-1].status[0].values
                 if entry.value.isdecimal()}
 
+    def poll(self) -> None:
+        """Serve what is there, without waiting."""
+        for _ in range(16):
+            self.executor.spin_once(timeout_sec=0.0)
+
+    def service(self, kind: Any, name: str) -> Any:
+        """A client of a service that has answered once.
+
+        It may be ready before the way back is: an answer is lost then, and the request is made
+        again.
+        """
+        service = self.node.create_client(kind, name)
+        assert self.spin(service.service_is_ready, MATCH_SECONDS), f'no service {name}'
+        for _ in range(10):
+            future = service.call_async(kind.Request())
+            if self.spin(future.done, 2.0):
+                return service
+        raise AssertionError(f'{name} does not answer')
+
     def close(self) -> None:
         self.executor.shutdown()
         self.node.destroy_node()

@@ -23,8 +23,9 @@ from test_hygiene_ros import APART, GOOD, LITTLE_ENDIAN, ORIGIN, TOUCHING, RawCl
 from box_contact_ros.nodes.messages import make_header, read_cloud
 
 CUBES = ('--ros-args', '-p', 'size_a:=[2.0, 2.0, 2.0]', '-p', 'size_b:=[2.0, 2.0, 2.0]')
-LEAK = 2.0
-"""Growth [MB] of a node's memory that is taken for none: the allocator's arenas come in steps."""
+LEAK = 8.0
+"""Growth [MB] of a node's memory that is taken for none, as the allocator's arenas come in steps: a
+leak of 100 bytes a message in the storms below."""
 
 
 @pytest.fixture
@@ -86,7 +87,7 @@ def test_100_000_messages_that_are_none(start, client):
         for number in rate_limited(count, 10_000):
             publish[number % 2](payload(number))
             if number % 100 == 0:
-                client.spin(lambda: False, 0.0)
+                client.poll()
 
     storm(20_000)
     client.assert_answered()
@@ -120,7 +121,7 @@ def test_half_of_the_poses_are_none(start, client, serialization):
         else:
             pair = (ORIGIN, bad[number // 2 % len(bad)])
             refused.append(client.send_pair(*(pair if number % 4 else pair[::-1])))
-        client.spin(lambda: False, 0.0)
+        client.poll()
     assert client.spin(lambda: all(stamp in client.clouds for stamp in good), 5.0), sum(
         stamp not in client.clouds for stamp in good)
     for stamp, height in good.items():
@@ -143,7 +144,7 @@ def test_memory_does_not_grow(start, client):
                 frame = b'map\0' if number % 3 == 1 else b'frame %d\0' % number
                 client.send_pair(ORIGIN, TOUCHING, frame)
             if number % 20 == 0:
-                client.spin(lambda: False, 0.0)
+                client.poll()
 
     play(4000)
     client.assert_answered()
@@ -188,11 +189,10 @@ def test_a_clock_that_jumps_back(start, client):
 
 
 def test_a_storm_of_parameters(start, client):
-    """Changes, good and bad, as fast as they are served, in a stream of 200 Hz: no tick is lost, each is answered with one
-    of the sizes that were set, and the last one stands."""
+    """Changes, good and bad, as fast as they are served, in a stream of 200 Hz: no tick is lost,
+    each is answered with one of the sizes that were set, and the last one stands."""
     start()
-    service = client.node.create_client(SetParameters, '/contact_node/set_parameters')
-    assert client.spin(service.service_is_ready, 15.0)
+    service = client.service(SetParameters, '/contact_node/set_parameters')
     futures, stamps = [], []
 
     def change(number):
@@ -201,12 +201,12 @@ def test_a_storm_of_parameters(start, client):
         futures.append(service.call_async(SetParameters.Request(parameters=[Parameter(
             name='size_b', value=ParameterValue(type=kind, double_array_value=values))])))
 
-    for number in rate_limited(600, 200):
+    for _ in rate_limited(600, 200):
         stamps.append(client.send_pair(ORIGIN, (0, 0, 2.05, 0, 0, 0, 1)))
         # One after the other: a service that is asked more than it answers drops requests.
         if all(future.done() for future in futures[-1:]):
             change(len(futures))
-        client.spin(lambda: False, 0.0)
+        client.poll()
     assert client.spin(lambda: all(future.done() for future in futures), 30.0)
     assert client.spin(lambda: all(stamp in client.clouds for stamp in stamps), 5.0), sum(
         stamp not in client.clouds for stamp in stamps)
@@ -234,48 +234,56 @@ def test_a_subscriber_that_never_reads(start, client, program):
     stamps = []
     for _ in rate_limited(2000, 500):
         stamps.append(client.send_pair(ORIGIN, TOUCHING))
-        client.spin(lambda: False, 0.0)
+        client.poll()
     assert client.spin(lambda: all(stamp in client.points for stamp in stamps), 5.0)
     assert memory(node) - before < LEAK
     client.assert_answered()
     crane.signal(signal.SIGCONT)
 
 
-FULL = ('mount -t tmpfs -o size=64k none /dev/shm && head -c 1M /dev/zero > /dev/shm/full; '
+FILL = ('mount -t tmpfs -o size=8m none /dev/shm && head -c {} /dev/zero > /dev/shm/full; '
         'exec "$@"')
 
 
-def test_shared_memory_is_full(program):
-    """/dev/shm has no room, in a mount namespace of their own: node and crane talk without it, and
-    no message is lost (else the crane's status is not 0)."""
-    within = ['unshare', '--mount', 'sh', '-c', FULL, 'sh']
-    allowed = shutil.which('unshare') and subprocess.run(
-        [*within, 'true'], capture_output=True).returncode == 0
-    if not allowed:
+def with_full_memory(filled):
+    """Command prefix: a mount namespace with 8 MB of shared memory, of which so many are taken."""
+    within = ['unshare', '--mount', 'sh', '-c', FILL.format(filled), 'sh']
+    if not shutil.which('unshare') or subprocess.run([*within, 'true'],
+                                                     capture_output=True).returncode:
         pytest.skip('mount namespaces are not permitted here')
+    return within
+
+
+def test_shared_memory_is_almost_full(program):
+    """Less room in /dev/shm than Fast DDS takes, which would be killed by SIGBUS: node and crane
+    talk without it, say so, and no message is lost (else the crane's status is not 0)."""
+    within = with_full_memory(8 * 2**20 - 200_000)
     node = program('contact_node', *CUBES, within=within)
-    node.wait_for_output('ready', 120)
+    assert 'going without shared memory' in node.wait_for_output('ready', 120)
     crane = program('crane', *CUBES, '-p', 'duration:=5', '-p', 'wait:=10', within=within)
     assert crane.wait(120) == 0, crane.output
     node.signal(signal.SIGINT)
     assert node.wait(5) == 0 and 'Traceback' not in node.output
 
 
-def test_files_of_killed_nodes_do_not_add_up(start, client):
-    """kill -9 leaves shared-memory files behind; the next node works all the same, and a node that
-    ends by itself leaves none."""
-    if not os.path.isdir('/dev/shm'):
-        pytest.skip('no /dev/shm')
+def test_shared_memory_is_full(program):
+    """No page left: ROS 2's libraries would be killed as they are loaded; a clear line instead."""
+    node = program('contact_node', *CUBES, within=with_full_memory(8 * 2**20))
+    assert node.wait(60) == 1
+    assert node.output.splitlines()[-1].startswith('error: /dev/shm is full')
 
-    def files():
-        return {name for name in os.listdir('/dev/shm') if 'fastrtps' in name}
 
-    before = files()
+def test_no_shared_memory_is_left_behind(start, client):
+    """A node that ends by itself leaves no segment of its own in /dev/shm (ports are shared with
+    others); one that is killed does, which docs/troubleshooting.md tells how to clear."""
+    before = set(os.listdir('/dev/shm')) if os.path.isdir('/dev/shm') else set()
     node = start()
-    node.signal(signal.SIGKILL)
-    node.wait(5)
-    left = files() - before
-    ended = start()
-    ended.signal(signal.SIGTERM)
-    assert ended.wait(5) == 0
-    assert len(files() - before - left) == 0
+    with open(f'/proc/{node.process.pid}/maps') as file:
+        mapped = {line.split()[-1] for line in file if '/dev/shm/fastrtps_' in line}
+    segments = {path for path in mapped
+                if 'port' not in path and os.path.basename(path) not in before}
+    if not segments:
+        pytest.skip('Fast DDS uses no shared memory here')
+    node.signal(signal.SIGTERM)
+    assert node.wait(5) == 0
+    assert not any(os.path.exists(path) for path in segments)

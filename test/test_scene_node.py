@@ -274,8 +274,8 @@ def test_lifecycle(client):
     """Without autostart: configure checks, activate answers, deactivate stops, all by service."""
     with scene_node(autostart=False, scene=SCENE.replace('[20, 20, 1]', '[20, 20]')) as node:
         change = client.node.create_client(ChangeState, '/contact_node/change_state')
-        state = client.node.create_client(GetState, '/contact_node/get_state')
-        assert client.spin(lambda: change.service_is_ready() and state.service_is_ready(), 15.0)
+        state = client.service(GetState, '/contact_node/get_state')
+        assert client.spin(change.service_is_ready, 15.0)
 
         def transition(label):
             request = ChangeState.Request()

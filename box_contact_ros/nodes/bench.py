@@ -46,7 +46,7 @@ from .bench_log import (
     write_csv,
 )
 from .contact import PARAMETERS
-from .runtime import REFUSALS, avoid_full_shared_memory
+from .runtime import REFUSALS
 
 DOMAINS = range(1, 102)  # 0 is everybody's; beyond 101, ports run into those Linux hands out
 NODES = ('contact', 'soup', 'echo')
@@ -86,7 +86,6 @@ def main(args: Sequence[str] | None = None) -> int:
         about = _about(options, streams, own, node_cores)
         print('\n'.join(f'{name}: {value}' for name, value in about.items()), flush=True)
         os.sched_setaffinity(0, own)  # before rclpy starts its threads, which inherit it
-        avoid_full_shared_memory()
         rclpy.init(args=args, context=context, signal_handler_options=SignalHandlerOptions.NO)
         clock = Clock()
         node = BenchNode(context, subjects, clock)

@@ -28,7 +28,7 @@ from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import PointCloud2
 
-from ..checks import shown, size_fault
+from ..checks import shown
 from ..pairing import PAIRINGS, StampedPose, Tick
 from ..scene import Pair, Scene, SceneSolver, two_boxes
 from ..scene_file import read_scene
@@ -42,8 +42,8 @@ from .parameters import (
     declare,
     flag,
     number,
-    numbers,
     one_of,
+    size,
     text,
 )
 from .runtime import CONTACT_QOS, LOG_SECONDS, POSE_QOS, run_node
@@ -58,20 +58,11 @@ def model_name(name: str, value: Any) -> str:
     return value if soup_divisions(text(name, value)) else one_of(MODELS)(name, value)
 
 
-def extents(name: str, value: Any) -> tuple[float, ...]:
-    """Three full extents [m]."""
-    size = numbers(3)(name, value)
-    fault = size_fault(size)
-    if fault:
-        raise ValueError(f'{name} {fault}')
-    return size
-
-
 CONTAINER = (12.192, 2.438, 2.591)  # ISO 40 ft [m]
 LONGEST = 1e6  # s, about twelve days
 PARAMETERS = {
-    'size_a': Setting(CONTAINER, 'full extents of box A, three numbers > 0 [m]', extents),
-    'size_b': Setting(CONTAINER, 'full extents of box B, three numbers > 0 [m]', extents),
+    'size_a': Setting(CONTAINER, 'full extents of box A, three numbers > 0 [m]', size),
+    'size_b': Setting(CONTAINER, 'full extents of box B, three numbers > 0 [m]', size),
     'scene': Setting('', 'scene file (or the scene itself, as text) with boxes and pairs; replaces '
                          'size_a and size_b; set again, it is read again', text),
     'model': Setting('committee', f'how the contact point is found: {", ".join(MODELS)}',

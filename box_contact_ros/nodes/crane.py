@@ -33,7 +33,7 @@ from .crane_log import CraneLog, LiveReport, cloud_rows
 from .crane_parameters import PARAMETERS, scenario_from
 from .messages import NANOSECONDS
 from .parameters import answer_help, declare
-from .runtime import REFUSALS, avoid_full_shared_memory, make_executor
+from .runtime import REFUSALS, make_executor
 
 OFFER_PERIOD = 0.1  # s between the pairs that only ask whether anyone answers
 DRAIN = 1.0  # s of patience for the last answers
@@ -181,7 +181,6 @@ def main(args: Sequence[str] | None = None) -> int:
     context, started, node, executor, signalled = Context(), False, None, None, 0
     try:
         # Handlers have to be asked for where the context is not the default one.
-        avoid_full_shared_memory()
         rclpy.init(args=args, context=context, signal_handler_options=SignalHandlerOptions.ALL)
         started = True
         node = CraneNode(context)

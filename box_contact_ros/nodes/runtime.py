@@ -1,7 +1,6 @@
 """What every node here needs from rclpy: an executor that keeps up, and a clean end."""
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -28,28 +27,8 @@ CONTACT_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 """Contact outputs."""
 SPIN_SECONDS = 1.0
 """EventsExecutor hangs when it spins without a timeout, so it is spun in slices."""
-SHARED_MEMORY = '/dev/shm'
-SHARED_MEMORY_LEAST = 4 * 2**20
-"""Bytes free: a process takes 0.7 MB, more with each of its larger messages."""
-TRANSPORTS = 'FASTDDS_BUILTIN_TRANSPORTS'
-"""Environment variable of Fast DDS."""
 LOG_SECONDS = 1.0
 """The same complaint is logged at most this often."""
-
-
-def avoid_full_shared_memory() -> None:
-    """Where /dev/shm has no room, let Fast DDS do without: it would be killed by SIGBUS.
-
-    It allocates its segments as a whole, when a process joins; filled up later, nothing happens.
-    """
-    try:
-        room = os.statvfs(SHARED_MEMORY)
-    except OSError:
-        return
-    if room.f_bavail * room.f_frsize < SHARED_MEMORY_LEAST and TRANSPORTS not in os.environ:
-        os.environ[TRANSPORTS] = 'UDPv4'
-        print(f'warning: {SHARED_MEMORY} is full: going without shared memory '
-              f'({TRANSPORTS}=UDPv4)', file=sys.stderr)
 
 
 def make_executor(context: Context) -> Any:
@@ -89,7 +68,6 @@ def spin(node: Node) -> None:
 
 def run_node(make_node: Callable[[Context], Node], args: Sequence[str] | None) -> int:
     """Start a node and serve it: 0 after a clean end, 1 (with one line) if it refuses to start."""
-    avoid_full_shared_memory()
     context = Context()
     node, joined = None, False
     try:
