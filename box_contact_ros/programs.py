@@ -72,6 +72,11 @@ PROGRAMS = {
         'write poses and contacts of running nodes to a bag (MCAP) for Foxglove and ros2 bag',
         ('ros', 'bag'),
     ),
+    'soak': Program(
+        'box_contact_ros.nodes.soak:main',
+        'ten minutes at 1 kHz: losses, mispairs, memory, latency beside a bare echo node',
+        ('ros', 'sim', 'report'),
+    ),
     'train': Program(
         'box_contact_ros.training.train:main',
         'make the data sets, fit the networks, write weights/',

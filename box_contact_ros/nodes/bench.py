@@ -13,28 +13,19 @@ the contact node lost nothing and gave no wrong verdict and no answer twice.
 from __future__ import annotations
 
 import argparse
-import contextlib
-import os
-import platform
 import random
-import signal
 import sys
-import threading
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import rclpy
-from rclpy.context import Context
-from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 from tqdm import tqdm
 
 from ..contact import Contacts
 from ..solver import MODELS, MOST_SOUP_DIVISIONS, SOUP_DIVISIONS, ContactSolver
 from ..streams import STREAMS, Stream, by_sizes, make_stream
-from .bench_drive import Bench, BenchNode, Clock, Subject
+from .bench_drive import Subject, about_the_machine, open_bench
 from .bench_log import (
     CONTACT_MESSAGES,
     ECHO_MESSAGES,
@@ -62,50 +53,20 @@ def main(args: Sequence[str] | None = None) -> int:
     except REFUSALS as error:
         print(f'error: {error}', file=sys.stderr)
         return 1
-    stop, signalled = threading.Event(), []
-
-    def call_off(number: int, _frame: Any) -> None:
-        signalled.append(number)
-        stop.set()
-
-    # First of all: whenever a signal comes, the nodes are ended and the results are kept.
-    before = {number: signal.signal(number, call_off)
-              for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
-    # Nodes inherit both; nothing else on this network hears what is measured.
-    os.environ['ROS_DOMAIN_ID'] = str(options.domain)
-    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
-    cores = os.sched_getaffinity(0)
-    own = {max(cores)} if len(cores) > 1 else cores
-    node_cores = cores - own or cores
-    context, node, bench = Context(), None, None
+    subjects = _subjects(options)
     try:
-        subjects = _subjects(options)
-        streams = _streams(options)
-        groups = by_sizes(streams)
-        truths = {stream.name: _truth(stream) for group in groups for stream in group}
-        about = _about(options, streams, own, node_cores)
-        print('\n'.join(f'{name}: {value}' for name, value in about.items()), flush=True)
-        os.sched_setaffinity(0, own)  # before rclpy starts its threads, which inherit it
-        rclpy.init(args=args, context=context, signal_handler_options=SignalHandlerOptions.NO)
-        clock = Clock()
-        node = BenchNode(context, subjects, clock)
-        bench = Bench(node, subjects, rate=options.rate, clock=clock, stop=stop,
-                      node_cores=node_cores)
-        bench.run(groups, truths)
+        with open_bench(subjects, args, rate=options.rate, domain=options.domain) as bench:
+            streams = _streams(options)
+            groups = by_sizes(streams)
+            truths = {stream.name: _truth(stream) for group in groups for stream in group}
+            about = _about(options, streams, bench.node_cores)
+            print('\n'.join(f'{name}: {value}' for name, value in about.items()), flush=True)
+            bench.run(groups, truths)
     except REFUSALS as error:
         print(f'error: {error}', file=sys.stderr)
         return 1
-    finally:
-        if bench is not None:
-            bench.close()
-        if node is not None:
-            node.destroy_node()
-        context.try_shutdown()
-        os.sched_setaffinity(0, cores)
-        for number, handler in before.items():
-            signal.signal(number, handler)
-    passed = _report(options, subjects, bench.notes, about, interrupted=bool(signalled))
-    return 128 + signalled[0] if signalled else 0 if passed else 1
+    passed = _report(options, subjects, bench.notes, about, interrupted=bool(bench.signals))
+    return 128 + bench.signals[0] if bench.signals else 0 if passed else 1
 
 
 def _options(args: Sequence[str]) -> argparse.Namespace:
@@ -218,29 +179,14 @@ def _truth(stream: Stream) -> Contacts:
     return solver.batch(stream.pose_a, stream.pose_b)
 
 
-def _about(options: argparse.Namespace, streams: list[Stream], own: set[int],
-           node_cores: set[int]) -> dict[str, str]:
+def _about(options: argparse.Namespace, streams: list[Stream], node_cores: set[int],
+           ) -> dict[str, str]:
     """Where and how it ran; in the output and in every row of the CSV."""
-    def listed(cores: set[int]) -> str:
-        return ' '.join(map(str, sorted(cores)))
-
-    return {
-        'machine': f'{platform.node()}: {_processor()}, {os.cpu_count()} cores',
-        'cores': f'bench on {listed(own)}, nodes on {listed(node_cores)}',
-        'load at start': f'{os.getloadavg()[0]:.2f}',
-        'python': platform.python_version(),
+    return about_the_machine(node_cores) | {
         'nodes run': 'side by side' if options.side_by_side else 'in turn',
         'set rate [Hz]': f'{options.rate:g}',
         'seed': str(options.seed),
     } | ({'replay': f'{options.replay}: {streams[0].described}'} if options.replay else {})
-
-
-def _processor() -> str:
-    with contextlib.suppress(OSError):
-        for line in Path('/proc/cpuinfo').read_text().splitlines():
-            if line.startswith('model name'):
-                return line.partition(':')[2].strip()
-    return platform.machine()
 
 
 def _report(options: argparse.Namespace, subjects: list[Subject], notes: list[str],

@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import gc
 import os
+import platform
 import signal
 import struct
 import subprocess
@@ -18,13 +19,16 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from pathlib import Path
 from typing import IO, Any
 
+import rclpy
 from geometry_msgs.msg import PointStamped, PoseStamped, Vector3Stamped
 from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message, serialize_message
+from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header
 from tqdm import tqdm
@@ -131,6 +135,8 @@ class Bench:
         """rate: pairs a second [Hz]; stop: set to call all off; node_cores: of the nodes."""
         self.node, self.subjects, self.rate, self.clock = node, subjects, rate, clock
         self.stop, self.node_cores = stop, node_cores
+        self.signals: list[int] = []
+        """That called it off."""
         self.notes: list[str] = []
         """What went wrong with the nodes as such."""
         self.executor = make_executor(node.context)
@@ -323,6 +329,68 @@ class Bench:
         """End everything that still runs."""
         self._end()
         self.executor.shutdown()
+
+
+@contextlib.contextmanager
+def open_bench(subjects: list[Subject], args: Sequence[str], *, rate: float, domain: int,
+               kind: type[Bench] = Bench) -> Iterator[Bench]:
+    """A bench of its own ROS domain and cores. Afterwards all is as it was, and no node is left.
+
+    args: what follows the program's name, for rclpy. SIGINT, SIGTERM and SIGHUP set `bench.stop`
+    and are kept in `bench.signals`, so that the nodes are ended and the results kept.
+    """
+    stop, signals = threading.Event(), []
+
+    def call_off(number: int, _frame: Any) -> None:
+        signals.append(number)
+        stop.set()
+
+    before = {number: signal.signal(number, call_off)
+              for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    # Nodes inherit both; nothing else on this network hears what is measured.
+    os.environ['ROS_DOMAIN_ID'] = str(domain)
+    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+    cores = os.sched_getaffinity(0)
+    own = {max(cores)} if len(cores) > 1 else cores
+    context, node, bench = Context(), None, None
+    try:
+        os.sched_setaffinity(0, own)  # before rclpy starts its threads, which inherit it
+        rclpy.init(args=list(args), context=context,
+                   signal_handler_options=SignalHandlerOptions.NO)
+        clock = Clock()
+        node = BenchNode(context, subjects, clock)
+        bench = kind(node, subjects, rate=rate, clock=clock, stop=stop,
+                     node_cores=cores - own or cores)
+        bench.signals = signals
+        yield bench
+    finally:
+        if bench is not None:
+            bench.close()
+        if node is not None:
+            node.destroy_node()
+        context.try_shutdown()
+        os.sched_setaffinity(0, cores)
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def about_the_machine(node_cores: set[int]) -> dict[str, str]:
+    """Where a bench runs; called in one."""
+    def listed(cores: set[int]) -> str:
+        return ' '.join(map(str, sorted(cores)))
+
+    return {'machine': f'{platform.node()}: {_processor()}, {os.cpu_count()} cores',
+            'cores': f'bench on {listed(os.sched_getaffinity(0))}, nodes on {listed(node_cores)}',
+            'load at start': f'{os.getloadavg()[0]:.2f}',
+            'python': platform.python_version()}
+
+
+def _processor() -> str:
+    with contextlib.suppress(OSError):
+        for line in Path('/proc/cpuinfo').read_text().splitlines():
+            if line.startswith('model name'):
+                return line.partition(':')[2].strip()
+    return platform.machine()
 
 
 def _unanswered(turn: list[Subject], offers: set[int]) -> int:

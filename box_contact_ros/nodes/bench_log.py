@@ -292,7 +292,7 @@ def latency_table(results: Sequence[StreamResult]) -> str:
         lines.append([r.stream, r.node, *map(str, (r.sent, r.answered, r.lost, r.duplicates)),
                       wrong, *map(_ms, times), str(len(r.latencies)), *map(_ms, tail),
                       '' if math.isnan(ratio) else f'{ratio:.2f}'])
-    return _markdown(lines, left=2)
+    return markdown(lines, left=2)
 
 
 def error_table(results: Sequence[StreamResult]) -> str:
@@ -307,7 +307,7 @@ def error_table(results: Sequence[StreamResult]) -> str:
         lines.append([r.stream, r.node, r.model, str(r.contacts),
                       *(_figure(1e3 * value) for value in points),
                       *(_figure(value) for value in normals)])
-    return _markdown(lines, left=3)
+    return markdown(lines, left=3)
 
 
 def _ms(seconds: float) -> str:
@@ -318,7 +318,7 @@ def _figure(value: float) -> str:
     return '' if math.isnan(value) else f'{value:.3g}'
 
 
-def _markdown(lines: Sequence[Sequence[str]], left: int) -> str:
+def markdown(lines: Sequence[Sequence[str]], left: int) -> str:
     """Cells as a Markdown table that is also readable as it is; `left` columns are words."""
     widths = [max(3, *(len(line[column]) for line in lines)) for column in range(len(lines[0]))]
     rule = ['-' * width if column < left else '-' * (width - 1) + ':'

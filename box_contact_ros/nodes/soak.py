@@ -1,0 +1,227 @@
+"""The soak: a contact node at 1 kHz for ten minutes, with a bare echo node in between.
+
+Both run as processes of their own, in a ROS domain of their own on this host. Blocks of a few
+seconds go to the one and then to the other, so that what disturbs the machine disturbs both. Every
+answer is held against what the same model says of the same two poses: an answer that was put
+together from poses of two ticks is found. Prints a table, and writes soak.csv and soak.md.
+
+The exit status is 0 only if nothing was lost, mispaired, answered twice or wrong, and the contact
+node's memory grew by less than 1 MB after its first block.
+"""
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import random
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rclpy.utilities import remove_ros_args
+
+from ..contact import Contacts
+from ..solver import MODELS, ContactSolver
+from ..streams import Stream, make_stream
+from .bench import DOMAINS
+from .bench_drive import Bench, Subject, about_the_machine, open_bench
+from .bench_log import (
+    CONTACT_MESSAGES,
+    ECHO_MESSAGES,
+    NodeLog,
+    markdown,
+    write_csv,
+)
+from .contact import PARAMETERS
+from .runtime import REFUSALS
+
+BLOCK_SECONDS = 10.0
+ECHO_SHARE = 0.25
+"""Of a block, for the echo node."""
+SAME_POINT = 1e-9
+"""How far [m] the node's point may lie from the one that the model gives here: another processor
+may round differently. Poses of the streams that follow each other differ by millimetres and more.
+"""
+GROWTH_LIMIT = 1.0
+"""Of the contact node's resident memory after its first block [MB]."""
+P50_LIMIT, P99_LIMIT, START_LIMIT = 1.25, 1.5, 2.5
+"""Aims: ratios to the echo node's latencies, and seconds from start to first answer."""
+STREAMS = ('containers', 'crane')
+"""Played in turn: unrelated poses, and a motion. For boxes of one size, so that nobody restarts."""
+
+
+class SoakBench(Bench):
+    """A bench that sends some nodes less, and looks at their memory after every block."""
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        self.memory: list[float] = []
+        """Of the contact node after each block [MB]."""
+        self.first_answers: dict[str, float] = {}
+        """Seconds from start to first answer."""
+
+    def _play(self, stream: Stream, truth: Contacts, turn: list[Subject]) -> None:
+        if turn[0].name == 'echo':
+            rows = slice(0, round(ECHO_SHARE * len(stream)))
+            stream = dataclasses.replace(
+                stream, pose_a=stream.pose_a[rows], pose_b=stream.pose_b[rows])
+            truth = Contacts(*(column[rows] for column in truth))
+        super()._play(stream, truth, turn)
+        for running in self._running:
+            if running.subject is turn[0] and turn[0].name == 'contact':
+                self.memory.append(resident(running.process.pid))
+
+    def _start(self, stream: Stream) -> None:
+        self._started = time.monotonic()
+        super()._start(stream)
+
+    def _decode(self) -> int:
+        count = super()._decode()
+        for subject in self.subjects:
+            if subject.log.offers_answered:
+                self.first_answers.setdefault(subject.name, time.monotonic() - self._started)
+        return count
+
+
+def resident(pid: int) -> float:
+    """Resident memory of a process [MB], NaN where it is not told."""
+    try:
+        for line in Path(f'/proc/{pid}/status').read_text().splitlines():
+            if line.startswith('VmRSS:'):
+                return int(line.split()[1]) / 1024
+    except OSError:
+        pass
+    return float('nan')
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the soak; 0 only if all was right."""
+    args = list(args or ())
+    options = _options(remove_ros_args(args))
+    subjects = [
+        Subject('contact', ['-m', 'box_contact_ros', 'contact_node', '--ros-args',
+                            '-p', f'model:={options.model}'],
+                NodeLog('contact', options.model, CONTACT_MESSAGES), poses='for_contact/'),
+        Subject('echo', ['-m', 'box_contact_ros.nodes.echo', '--ros-args'],
+                NodeLog('echo', '', ECHO_MESSAGES), poses='for_echo/', has_sizes=False)]
+    try:
+        with open_bench(subjects, args, rate=options.rate, domain=options.domain,
+                        kind=SoakBench) as bench:
+            blocks, truths = _blocks(options)
+            about = about_the_machine(bench.node_cores) | {
+                'set rate [Hz]': f'{options.rate:g}', 'model': options.model}
+            print('\n'.join(f'{name}: {value}' for name, value in about.items()), flush=True)
+            bench.run([blocks], truths)
+    except REFUSALS as error:
+        print(f'error: {error}', file=sys.stderr)
+        return 1
+    passed = _report(options, subjects, bench, about)
+    return 128 + bench.signals[0] if bench.signals else 0 if passed else 1
+
+
+def _options(args: Sequence[str]) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog='soak', description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('--minutes', type=float, default=10.0, metavar='MIN',
+                        help='of poses to the contact node; the echo node takes a quarter as long, '
+                             'beside (default: %(default)g)')
+    parser.add_argument('--rate', type=float, default=1000.0, metavar='HZ',
+                        help='pairs of poses sent per second (default: %(default)g)')
+    parser.add_argument('--model', default=PARAMETERS['model'].default, choices=MODELS,
+                        metavar='NAME', help=f'one of: {", ".join(MODELS)} (default: %(default)s)')
+    parser.add_argument('--out', type=Path, default=Path('soak-results'), metavar='FOLDER',
+                        help='for soak.csv and soak.md (default: %(default)s/)')
+    parser.add_argument('--quick', action='store_true', help='two blocks of a second')
+    parser.add_argument('--domain', type=int, default=random.choice(DOMAINS), metavar='ID',
+                        help=f'ROS domain, 0 to {DOMAINS[-1]} (default: drawn at random)')
+    options = parser.parse_args(list(args))
+    for name, low, high in (('minutes', 0.02, 24 * 60), ('rate', 1.0, 4000.0),
+                            ('domain', 0, DOMAINS[-1])):
+        if not low <= getattr(options, name) <= high:
+            parser.error(f'--{name} must lie in {low:g} to {high:g}, got {getattr(options, name)}')
+    options.seconds = 2.0 if options.quick else 60.0 * options.minutes
+    return options
+
+
+def _blocks(options: argparse.Namespace) -> tuple[list[Stream], dict[str, Contacts]]:
+    """The blocks in the order they are played, and what the model answers to each."""
+    count = max(2, round(options.seconds / BLOCK_SECONDS))
+    rows = round(options.rate * options.seconds / count)
+    streams = [make_stream(name, rows) for name in STREAMS]
+    solver = ContactSolver(*streams[0].sizes, model=options.model)
+    answers = [solver.batch(stream.pose_a, stream.pose_b) for stream in streams]
+    blocks, truths = [], {}
+    for number in range(count):
+        which = number % len(streams)
+        name = f'{number:03d} {streams[which].name}'
+        blocks.append(dataclasses.replace(streams[which], name=name))
+        truths[name] = answers[which]
+    return blocks, truths
+
+
+def _report(options: argparse.Namespace, subjects: list[Subject], bench: SoakBench,
+            about: dict[str, str]) -> bool:
+    """Print and write what was found; whether all was right."""
+    results = {subject.name: subject.log.results() for subject in subjects}
+    contact, echo = results['contact'], results['echo']
+    if not contact or not echo:
+        print('\n'.join(['nothing was sent', *bench.notes]))
+        return False
+    growth = float(max(bench.memory) - bench.memory[0]) if bench.memory else float('nan')
+    mispaired = sum(mispairs(subjects[0].log))
+    counts = {'sent': sum(r.sent for r in contact), 'lost': sum(r.lost for r in contact),
+              'mispaired or wrong': mispaired + sum(r.wrong_verdicts for r in contact),
+              'answered twice, or to no pose': sum(r.duplicates + r.strangers for r in contact),
+              'contradictions between cloud, point and normal': sum(
+                  r.contradictions for r in contact)}
+    mine, floor = (1e3 * np.concatenate([r.latencies for r in of]) for of in (contact, echo))
+    table = [['latency [ms]', 'contact node', 'echo node', 'ratio', 'aim']]
+    for name, percent, aim in (('p50', 50, P50_LIMIT), ('p99', 99, P99_LIMIT), ('p99.9', 99.9, 0)):
+        pair = [float(np.percentile(of, percent)) for of in (mine, floor)]
+        table.append([name, *(f'{value:.3f}' for value in pair), f'{pair[0] / pair[1]:.2f}',
+                      f'{aim:g}' if aim else ''])
+    table.append(['worst', f'{mine.max():.3f}', f'{floor.max():.3f}', '', ''])
+    lines = [f'{name}: {value}' for name, value in counts.items()]
+    lines.append(f'memory: {bench.memory[0]:.1f} MB after the first block, grown by at most '
+                 f'{growth:.2f} MB (limit {GROWTH_LIMIT:g})')
+    lines += [f'start to first answer, {name} node: {seconds:.1f} s'
+              + (f' (aim {START_LIMIT:g}, from warm caches)' if name == 'contact' else '')
+              for name, seconds in bench.first_answers.items()]
+    ratios = [[a[0] / b[0], a[1] / b[1]] for a, b in zip(*(
+        [np.percentile(r.latencies, (50, 99)) if r.answered else (np.nan, np.nan) for r in of]
+        for of in (contact, echo)))]
+    middle = np.nanmedian(ratios, axis=0)
+    lines.append(f'block by block, the ratio is {middle[0]:.2f} at p50 and {middle[1]:.2f} at p99 '
+                 f'(median of {len(ratios)} blocks)')
+    lines.append(f'the soak itself was late by at most '
+                 f'{1e3 * max(r.lateness_max for r in contact):.1f} ms')
+    lines += bench.notes
+    text = '\n'.join(f'- {line}' for line in lines)
+    print(f'\n{markdown(table, left=1)}\n\n{text}', flush=True)
+    options.out.mkdir(parents=True, exist_ok=True)
+    write_csv(options.out / 'soak.csv', [*contact, *echo], about)
+    where = '\n'.join(f'- {name}: {value}' for name, value in about.items())
+    (options.out / 'soak.md').write_text(
+        '# Soak\n\nMade by `python -m box_contact_ros soak`: blocks of poses to the contact node '
+        'and to a bare echo node in turn.\nLatencies run from the stamp of the poses to the later '
+        f'of point and normal.\n\n{where}\n\n{markdown(table, left=1)}\n\n{text}\n', 'utf-8')
+    print(f'results: {options.out}/soak.csv, soak.md')
+    faultless = not any(value for name, value in counts.items() if name != 'sent')
+    adds_up = all(r.adds_up for r in [*contact, *echo]) and all(s.log.adds_up for s in subjects)
+    return faultless and adds_up and not bench.notes and not growth >= GROWTH_LIMIT
+
+
+def mispairs(log: NodeLog) -> list[int]:
+    """Answers of each stream whose point is not the model's for the two poses of that stamp."""
+    found = []
+    for stream in log.streams:
+        rows = len(stream.stamps)
+        here = (stream.received['point'][:rows] > 0) & stream.truth.colliding[:rows]
+        apart = np.linalg.norm(stream.values['point'][:rows] - stream.truth.point[:rows], axis=1)
+        depth = np.abs(stream.values['cloud'][:rows, 6] + stream.truth.separation[:rows])
+        found.append(int(np.count_nonzero(
+            here & ~((apart <= SAME_POINT) & (depth <= SAME_POINT)))))
+    return found
+
