@@ -21,6 +21,8 @@ RESET = 1_000_000_000
 """A pose whose stamp lies this far [ns] before an earlier one of its box has not been late: time
 has been set back, as by a simulation that starts again."""
 NO_PARTNER = 'dropped: no partner'
+NEVER = -2**63
+"""Before any stamp [ns]."""
 REPEATED = 'refused: repeated stamp'
 OLD = 'refused: older than the last'
 RESETS = 'time went back'
@@ -48,7 +50,8 @@ class _Pairing:
         max_age: a pose further than this [ns] from the tick is not used, 0: any is."""
         self.tolerance, self.max_age = tolerance, max_age
         self.counts: Counter[str] = Counter()
-        self._newest: dict[str, int] = {}
+        self._newest: dict[str, int] = {}  # stamp, by box
+        self._now = NEVER                  # of all boxes
         self.set_scene(scene)
 
     def set_scene(self, scene: Scene) -> None:
@@ -61,23 +64,21 @@ class _Pairing:
     def reset(self) -> None:
         """Forget all poses and stamps, as when time is set back."""
         self._newest.clear()
+        self._now = NEVER
 
     def stale(self) -> list[str]:
         """Boxes without a pose that is recent enough, by the newest stamp of all."""
-        if not self._newest:
+        if self._now == NEVER:
             return []
-        now = max(self._newest.values())
-        return [box for box in self.boxes if self._is_stale(box, now)]
+        return [box for box in self.boxes if self._is_stale(box, self._now)]
 
     def _is_stale(self, box: str, now: int) -> bool:
         raise NotImplementedError
 
-    def _went_back(self, box: str, stamp: int) -> bool:
-        if stamp < self._newest.get(box, stamp) - RESET:
+    def _look_back(self, box: str, stamp: int) -> None:
+        if stamp < self._newest.get(box, NEVER) - RESET:
             self.counts[RESETS] += 1
             self.reset()
-            return True
-        return False
 
     def _evaluable(self, poses: dict[str, StampedPose]) -> bool:
         return any(all(box in poses for box in partners) for partners in self._partners)
@@ -120,7 +121,7 @@ class StampPairing(_Pairing):
     def add(self, box: str, pose: StampedPose) -> list[Tick]:
         """Take a pose; the tick that it completes, after those that are not waited for any more."""
         stamp = pose.stamp
-        self._went_back(box, stamp)
+        self._look_back(box, stamp)
         taken = self._taken[box]
         if stamp in taken:
             self.counts[REPEATED] += 1
@@ -156,16 +157,19 @@ class StampPairing(_Pairing):
         return min(near, key=lambda key: abs(key - stamp), default=stamp)
 
     def _note(self, box: str, stamp: int) -> None:
-        if self._newest and 0 < self.max_age < stamp - max(self._newest.values()):
-            # Time has leapt, as after a pause of all boxes. This one is the first, and the others
-            # are not stale for that.
-            self._missing_since.clear()
-        self._newest[box] = max(stamp, self._newest.get(box, stamp))
-        self._missing_since.pop(box, None)
+        if stamp > self._now:
+            if 0 < self.max_age < stamp - self._now:
+                # Time has leapt, as after a pause of all boxes. This one is the first, and the
+                # others are not stale for that.
+                self._missing_since.clear()
+            self._now = stamp
+        newest, missing = self._newest, self._missing_since
+        if stamp > newest.get(box, NEVER):
+            newest[box] = stamp
+        missing.pop(box, None)
         for other in self.boxes:
-            if other not in self._missing_since and (
-                    other not in self._newest or stamp > self._newest[other]):
-                self._missing_since[other] = stamp
+            if stamp > newest.get(other, NEVER) and other not in missing:
+                missing[other] = stamp
 
     def _is_stale(self, box: str, now: int) -> bool:
         return 0 < self.max_age < now - self._missing_since.get(box, now)
@@ -176,8 +180,7 @@ class StampPairing(_Pairing):
             box in self._newest or not self._answered)]
         if not missing:
             return False
-        now = max(self._newest.values())
-        return not all(self._is_stale(box, now) for box in missing)
+        return not all(self._is_stale(box, self._now) for box in missing)
 
     def _give_up(self, key: int) -> list[Tick]:
         """The oldest ticks, up to the one of `key`, that have waited enough; those of which no pair
@@ -218,11 +221,12 @@ class LatestPairing(_Pairing):
 
     def add(self, box: str, pose: StampedPose) -> list[Tick]:
         """Take a pose; the tick that it makes, once both boxes of a pair have been seen."""
-        self._went_back(box, pose.stamp)
+        self._look_back(box, pose.stamp)
         if pose.stamp < self._newest.get(box, pose.stamp):
             self.counts[OLD] += 1
             return []
         self._newest[box] = pose.stamp
+        self._now = max(self._now, pose.stamp)
         self._last[box] = pose
         if not self._evaluable(self._last):
             return []

@@ -248,7 +248,9 @@ class SceneSolver:
         return Answer(touching, stale, int(count))
 
     def _one_pair(self, poses: Sequence[np.ndarray | None]) -> Answer:
-        a, b = (poses[number] if fixed is None else fixed for number, fixed in self._sides)
+        (first, fixed_a), (second, fixed_b) = self._sides
+        a = poses[first] if fixed_a is None else fixed_a
+        b = poses[second] if fixed_b is None else fixed_b
         if a is None or b is None:
             return Answer([], [self._only], 0)
         contact = self._solver(a, b)

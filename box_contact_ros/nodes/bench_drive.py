@@ -39,7 +39,7 @@ from .bench_log import NodeLog
 from .crane_log import cloud_rows
 from .echo import raw_stamp
 from .messages import NANOSECONDS, make_header
-from .runtime import make_executor
+from .runtime import let_callbacks_finish, make_executor
 
 # Bounds on everything that waits, so that a bench always ends.
 START_LIMIT = 120.0  # s until a node answers; a first start compiles its kernels
@@ -141,6 +141,7 @@ class Bench:
         """What went wrong with the nodes as such."""
         self.executor = make_executor(node.context)
         self.executor.add_node(node)
+        let_callbacks_finish()
         self._running: list[Running] = []
         self._last = 0
 

@@ -108,7 +108,7 @@ class ContactNode(LifecycleNode):
         self._settings = declare(self, self.parameters)
         self._solver: SceneSolver | None = None
         self._subscriptions_of: dict[str, Subscription] = {}
-        self._publishers_of: dict[Pair, tuple[Publisher, Publisher]] = {}
+        self._publishers_of: dict[int, tuple[Publisher, Publisher, Pair]] = {}  # by pair's id
         self._ids: dict[int, Pair] = {}
         self._fault: Exception | None = None
         self._health = Diagnostics(self)
@@ -144,7 +144,7 @@ class ContactNode(LifecycleNode):
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Let go of solver and topics."""
-        self._unpublish(list(self._publishers_of))
+        self._unpublish([entry[2] for entry in self._publishers_of.values()])
         self.destroy_publisher(self._contacts)
         self._solver = None
         return TransitionCallbackReturn.SUCCESS
@@ -250,17 +250,19 @@ class ContactNode(LifecycleNode):
             self._contacts = self.create_publisher(
                 PointCloud2, f'{self.prefix}contacts', CONTACT_QOS)
         wanted = self._solver.scene.pairs if self._settings['pair_topics'] else ()
-        self._unpublish([pair for pair in self._publishers_of if pair not in set(wanted)])
+        kept = set(wanted)
+        self._unpublish([entry[2] for entry in self._publishers_of.values()
+                         if entry[2] not in kept])
         for pair in wanted:
-            if pair not in self._publishers_of:
+            if pair.id not in self._publishers_of:
                 topic = f'{self.prefix}{pair.name}{"/" if pair.name else ""}contact'
-                self._publishers_of[pair] = (
+                self._publishers_of[pair.id] = (
                     self.create_publisher(PointStamped, f'{topic}/point', CONTACT_QOS),
-                    self.create_publisher(Vector3Stamped, f'{topic}/normal', CONTACT_QOS))
+                    self.create_publisher(Vector3Stamped, f'{topic}/normal', CONTACT_QOS), pair)
 
     def _unpublish(self, pairs: Sequence[Pair]) -> None:
         for pair in pairs:
-            for publisher in self._publishers_of.pop(pair):
+            for publisher in self._publishers_of.pop(pair.id)[:2]:
                 self.destroy_publisher(publisher)
 
     def _subscribe(self) -> None:
@@ -344,19 +346,22 @@ class ContactNode(LifecycleNode):
         stamp, frame_id = self._header_of(tick)
         started = time.perf_counter_ns()
         answer = self._solver([pose and pose.numbers for pose in tick])
-        self._health.computed(time.perf_counter_ns() - started,
-                              evaluated=len(answer.stale) < len(self._solver.scene.pairs))
+        took = time.perf_counter_ns() - started
         messages = self._messages
         messages.begin(stamp, frame_id)
         for pair, contact in answer.touching:
-            publishers = self._publishers_of.get(pair)
+            publishers = self._publishers_of.get(pair.id)
             if publishers is not None:
                 publishers[0].publish(messages.point(contact))
                 publishers[1].publish(messages.normal(contact))
         self._contacts.publish(messages.cloud(answer))
-        self.counts['contacts'] += len(answer.touching)
-        self.counts['evaluations'] += 1
-        self.counts['stale pairs'] += len(answer.stale)
+        # What nobody waits for comes last.
+        stale = len(answer.stale)
+        self._health.computed(took, evaluated=stale < len(self._solver.scene.pairs))
+        counts = self.counts
+        counts['contacts'] += len(answer.touching)
+        counts['evaluations'] += 1
+        counts['stale pairs'] += stale
 
     def _header_of(self, tick: Tick) -> tuple[int, str]:
         """The newest stamp [ns] of a tick and its frame; raises Refused if frames differ."""

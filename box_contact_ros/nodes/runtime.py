@@ -1,7 +1,10 @@
 """What every node here needs from rclpy: an executor that keeps up, and a clean end."""
 from __future__ import annotations
 
+import contextlib
+import os
 import sys
+import threading
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -41,6 +44,24 @@ def make_executor(context: Context) -> Any:
     return EventsExecutor(context=context)
 
 
+def let_callbacks_finish() -> None:
+    """Keep this process's other threads from interrupting the one that calls this (Linux).
+
+    Every reliable publish wakes two or three threads of the middleware (timers, acknowledgements),
+    which the scheduler then runs at once if they share a core: measured, that made publishing point
+    and normal take 55 µs in place of some 20. As batch threads they wait until this one is idle,
+    which it is for most of a millisecond.
+    """
+    try:
+        mine = threading.get_native_id()
+        for name in os.listdir('/proc/self/task'):
+            if int(name) != mine:
+                with contextlib.suppress(ProcessLookupError):
+                    os.sched_setscheduler(int(name), os.SCHED_BATCH, os.sched_param(0))
+    except (AttributeError, OSError):  # another system, or it is not permitted: slower, no more
+        pass
+
+
 def spin(node: Node) -> None:
     """Serve a node until its context is shut down (SIGINT, SIGTERM, or `context.shutdown()`).
 
@@ -49,6 +70,7 @@ def spin(node: Node) -> None:
     executor = make_executor(node.context)
     try:
         executor.add_node(node)
+        let_callbacks_finish()
         while node.context.ok():
             try:
                 executor.spin_once(timeout_sec=SPIN_SECONDS)
