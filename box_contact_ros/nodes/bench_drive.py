@@ -145,15 +145,19 @@ class Bench:
         self._running: list[Running] = []
         self._last = 0
 
-    def run(self, groups: list[list[Stream]], truths: dict[str, Contacts]) -> None:
-        """Play all streams; what was done when `stop` is set stays in the logs."""
+    def run(self, groups: list[list[Stream]], truths: dict[str, Contacts], *, play: bool = True,
+            ) -> None:
+        """Play all streams; what was done when `stop` is set stays in the logs.
+
+        play: otherwise the nodes are only started, until they answer.
+        """
         for streams in groups:
             if self.stop.is_set():
                 return
             try:
                 self._start(streams[0])
                 self._await_answers(streams[0])
-                for stream in streams:
+                for stream in streams if play else ():
                     for turn in self._turns():
                         self._play(stream, truths[stream.name], turn)
             finally:
