@@ -25,11 +25,13 @@ from box_contact_ros.nodes.messages import (
     make_point,
 )
 from box_contact_ros.recording import TOPICS, Recorder
+from box_contact_ros.scene import Answer, two_boxes
 
 FOLDER = Path(__file__).resolve().parents[1] / 'recordings' / 'crane_landing'
 CASE = LandingCase(rope_angle=1.25, rope_heading=35.0, tilt=1.5, tilt_heading=120.0, overhang=0.3,
                    overhang_heading=-60.0, yaw=0.6)
 MODEL, RATE = 'committee', 200.0
+PAIR, = two_boxes((1, 1, 1), (1, 1, 1)).pairs
 BEFORE, AFTER = 0.5, 3.5  # s, from the first touch
 START = 1_767_225_600 * NANOSECONDS  # 2026-01-01; a stamp of zero means no time to some tools
 
@@ -49,7 +51,8 @@ def make(folder: Path) -> Recorder:
     for tick, load in zip(ticks, record.poses[ticks.start:ticks.stop]):
         stamp = START + round((tick - ticks.start) / RATE * NANOSECONDS)
         header, contact = make_header(stamp, 'world'), solver(load, stack)
-        messages = [_pose(header, load), _pose(header, stack), make_cloud(header, [(0, contact)])]
+        answer = Answer([(PAIR, contact)] if contact.colliding else [], [], 1)
+        messages = [_pose(header, load), _pose(header, stack), make_cloud(header, answer)]
         if contact.colliding:
             messages[2:2] = [make_point(header, contact), make_normal(header, contact)]
         topics = TOPICS if contact.colliding else (*TOPICS[:2], TOPICS[4])

@@ -232,7 +232,7 @@ def test_a_subscriber_that_never_reads(start, client, program):
     crane.signal(signal.SIGSTOP)
     before = memory(node)
     stamps = []
-    for _ in rate_limited(2000, 500):
+    for _ in rate_limited(8000, 1000):  # the middleware keeps 5,000 where all is to be kept
         stamps.append(client.send_pair(ORIGIN, TOUCHING))
         client.poll()
     assert client.spin(lambda: all(stamp in client.points for stamp in stamps), 5.0)

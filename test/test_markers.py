@@ -21,7 +21,8 @@ from box_contact_ros.nodes.markers import (
     box_marker,
     contact_markers,
 )
-from box_contact_ros.nodes.messages import CLOUD_ROW, StampedPose, make_header
+from box_contact_ros.nodes.messages import CLOUD_ROW, make_header
+from box_contact_ros.pairing import StampedPose
 from box_contact_ros.resources import resource_path
 
 SLAB, CUBE = (2.0, 4.0, 1.0), (2.0, 2.0, 2.0)

@@ -27,9 +27,10 @@ from ros_client import Client, serving
 from sensor_msgs.msg import PointField
 
 from box_contact_ros.nodes.contact import PARAMETERS, ContactNode
-from box_contact_ros.nodes.messages import read_cloud
+from box_contact_ros.nodes.messages import make_cloud, make_header, read_cloud
 from box_contact_ros.pose import LENGTH_MAX, QUATERNION_MAX
 from box_contact_ros.resources import resource_path
+from box_contact_ros.scene import Answer, Pair
 
 ROOT = Path(__file__).resolve().parents[1]
 FOLDER = resource_path('msg_schemas')
@@ -336,6 +337,18 @@ def test_missing_and_extra_fields_do_not_validate(live, address):
     for name in message:
         assert not check.is_valid({key: message[key] for key in message if key != name}), name
     assert not check.is_valid(message | {'extra': 1})
+
+
+def test_stale_rows_validate():
+    """All NaN but the id, or no stale row."""
+    check = validator(SCHEMAS['contacts.json'], 'stale_row')
+    answer = Answer([], [Pair(7, 'p', 'a', 'b')], 0)
+    cloud = make_cloud(make_header(0, 'map'), answer)
+    row, = rows(cloud)
+    assert check.is_valid(row) and not cloud.is_dense
+    assert validator(SCHEMAS['contacts.json']).is_valid(plain(cloud))
+    assert not check.is_valid(row | {'depth': 0.0})
+    assert not validator(SCHEMAS['contacts.json'], 'row').is_valid(row)
 
 
 def test_wrong_rows_do_not_validate(live):

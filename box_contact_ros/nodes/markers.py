@@ -6,6 +6,7 @@ config/contact.rviz shows them.
 """
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -20,10 +21,10 @@ from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
-from ..checks import pose_fault
+from ..pairing import StampedPose
 from .appearance import BOX_A, BOX_B, BOX_OPACITY, CONTACT, STALE, Colour, proportions
 from .contact import CONTAINER
-from .messages import NANOSECONDS, StampedPose, header_fault, make_header, read_cloud, read_pose
+from .messages import NANOSECONDS, Refused, TypedMessages, make_header, read_cloud
 from .parameters import Setting, answer_help, checked, declare, number, size
 from .runtime import CONTACT_QOS, POSE_QOS, run_node
 
@@ -120,12 +121,12 @@ class MarkersNode(Node):
         return SetParametersResult(successful=True)
 
     def _pose_callback(self, box: int) -> Callable[[PoseStamped], None]:
+        read = TypedMessages().read_pose
+
         def callback(message: PoseStamped) -> None:
-            pose = read_pose(message)
             # The contact node counts and reports what is refused; here it is only not drawn.
-            if header_fault(message.header) or pose_fault(pose.numbers):
-                return
-            self._poses[box], self._news = pose, True
+            with contextlib.suppress(Refused):
+                self._poses[box], self._news = read(message), True
         return callback
 
     def _on_cloud(self, message: PointCloud2) -> None:

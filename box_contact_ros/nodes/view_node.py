@@ -1,6 +1,7 @@
 """The view's ears, and its hand on the contact node: subscriptions, and the parameter `model`."""
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -13,8 +14,7 @@ from rclpy.parameter_client import AsyncParameterClient
 from rclpy.task import Future
 from sensor_msgs.msg import PointCloud2
 
-from ..checks import pose_fault
-from .messages import NANOSECONDS, header_fault, read_cloud, read_pose
+from .messages import NANOSECONDS, Refused, TypedMessages, read_cloud
 from .runtime import POSE_QOS
 from .view_log import ViewLog
 
@@ -81,11 +81,13 @@ class ViewNode(Node):
             self.log = ViewLog(settings['size_a'], settings['size_b'], settings['pairing'])
 
     def _pose_callback(self, box: int) -> Callable[[PoseStamped], None]:
+        read = TypedMessages().read_pose
+
         def callback(message: PoseStamped) -> None:
-            if self.log is None or header_fault(message.header):
+            if self.log is None:
                 return
-            pose = read_pose(message)
-            if not pose_fault(pose.numbers):  # the contact node refuses it, and says so
+            with contextlib.suppress(Refused):  # by the contact node too, which says so
+                pose = read(message)
                 self.log.pose(box, pose.stamp, pose.numbers)
         return callback
 
