@@ -12,7 +12,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from rosbags.rosbag2 import (
@@ -28,7 +28,7 @@ from rosbags.typesys import Stores, get_typestore
 from .checks import as_size, shown
 from .streams import Size, Stream
 
-BAG_VERSION = 9
+BAG_VERSION: Final = 9
 """Of rosbag2's metadata: what Jazzy writes and reads."""
 NANOSECONDS = 1_000_000_000
 POSE = 'geometry_msgs/msg/PoseStamped'
@@ -140,7 +140,8 @@ def read_replay(path: Path, topic_a: str = TOPICS[0], topic_b: str = TOPICS[1], 
             option = name.replace('_', '-')
             raise RecordingError(f'{path} does not say the size of box_{name[-1]}: give --{option}')
         size = json.loads(known[name]) if given is None else given
-        sizes.append(tuple(map(float, as_size(size, name).ravel())))
+        x, y, z = map(float, as_size(size, name).ravel())
+        sizes.append((x, y, z))
     pose_a, pose_b = (np.array([poses[stamp] for stamp in stamps]) for poses in (one, other))
     return Replay(path.stem, sizes[0], sizes[1], pose_a, pose_b, np.array(stamps))
 
@@ -154,7 +155,7 @@ def _poses(reader: Reader, path: Path, topic: str) -> dict[int, tuple[float, ...
     if any(c.msgtype != POSE for c in found):
         raise RecordingError(f'{path}: {topic} is {found[0].msgtype}, not {POSE}')
     types = get_typestore(Stores.ROS2_JAZZY)
-    poses = {}
+    poses: dict[int, tuple[float, ...]] = {}
     for _, _, data in reader.messages(found):
         message: Any = types.deserialize_cdr(data, POSE)
         stamp, p, q = message.header.stamp, message.pose.position, message.pose.orientation

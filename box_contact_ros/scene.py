@@ -36,8 +36,8 @@ class Box:
     """A box of the scene: fixed if it has a pose, else moving."""
 
     name: str
-    size: tuple[float, float, float]
-    """Full extents [m]."""
+    size: tuple[float, ...]
+    """Three full extents [m]."""
     pose: tuple[float, ...] | None = None
     """`x y z qx qy qz qw` in the common frame, of a fixed box."""
     pose_topic: str = ''
@@ -89,14 +89,13 @@ def faults(boxes: Mapping[str, Box], pairs: Sequence[Pair]) -> Iterator[tuple[st
         fault = size_fault(box.size)
         if fault:
             yield f'boxes.{name}.size', fault
-        fault = box.pose and pose_fault(box.pose)
+        fault = pose_fault(box.pose) if box.pose else None
         if fault:
             yield f'boxes.{name}.pose', fault
     if not pairs:
         yield 'pairs', 'a scene needs at least one pair'
-    ids: dict[int, int] = {}
-    names: dict[str, int] = {}
-    couples: dict[frozenset[str], int] = {}
+    # Number of the first pair with an id, a name, a couple of boxes.
+    seen: dict[tuple[str, object], int] = {}
     for number, pair in enumerate(pairs):
         place = f'pairs[{number}]'
         if not 0 <= pair.id <= LARGEST_ID:
@@ -108,9 +107,9 @@ def faults(boxes: Mapping[str, Box], pairs: Sequence[Pair]) -> Iterator[tuple[st
             yield f'{place}.b', f'{shown(pair.b)} is the same box as a'
         elif not unknown and boxes[pair.a].pose and boxes[pair.b].pose:
             yield place, f'{shown(pair.a)} and {shown(pair.b)} are both fixed'
-        for value, what, earlier in ((pair.id, 'id', ids), (pair.name, 'name', names),
-                                     (frozenset((pair.a, pair.b)), 'pair of boxes', couples)):
-            first = earlier.setdefault(value, number)
+        for what, value in (('id', pair.id), ('name', pair.name),
+                            ('pair of boxes', frozenset((pair.a, pair.b)))):
+            first = seen.setdefault((what, value), number)
             if first != number:
                 yield f'{place}.{what}' if what != 'pair of boxes' else place, (
                     f'the same {what} as pairs[{first}]')
@@ -226,7 +225,7 @@ class SceneSolver:
         Raises ValueError for numbers that are no pose.
         """
         if self._only is not None:
-            return self._one_pair(poses)
+            return self._one_pair(self._only, poses)
         for number, pose in zip(self._moving, poses, strict=True):
             self._known[number] = pose is not None
             if pose is not None:
@@ -247,11 +246,11 @@ class SceneSolver:
                     True, float(found.separation[row]), found.normal[row], found.point[row])))
         return Answer(touching, stale, int(count))
 
-    def _one_pair(self, poses: Sequence[np.ndarray | None]) -> Answer:
+    def _one_pair(self, pair: Pair, poses: Sequence[np.ndarray | None]) -> Answer:
         (first, fixed_a), (second, fixed_b) = self._sides
         a = poses[first] if fixed_a is None else fixed_a
         b = poses[second] if fixed_b is None else fixed_b
         if a is None or b is None:
-            return Answer([], [self._only], 0)
+            return Answer([], [pair], 0)
         contact = self._solver(a, b)
-        return Answer([(self._only, contact)] if contact.colliding else [], [], 1)
+        return Answer([(pair, contact)] if contact.colliding else [], [], 1)

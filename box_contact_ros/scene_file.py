@@ -89,7 +89,7 @@ def _plain(text: str, lines: dict[Place, int], refusal: Any) -> Any:
         depth += isinstance(event, yaml.CollectionStartEvent)
         depth -= isinstance(event, yaml.CollectionEndEvent)
         if depth > DEEPEST:  # the C loader, which descends, would end the process
-            lines[()] = event.start_mark.line + 1
+            lines[()] = event.start_mark.line + 1 if event.start_mark else 1
             raise refusal((), 'nested too deeply')
     loader = _Loader(text)
     try:

@@ -123,8 +123,9 @@ def test_bytes_that_are_no_message(node, client):
     sent = 2 * (len(cut) + len(garbage) + len(lengths) + len(headers))
     counts = client.counts()
     assert 0.9 * sent < counts['refused: not a PoseStamped'] <= sent
-    assert counts['poses'] == counts['refused: not a PoseStamped'] + 2 * counts['evaluations'] + (
-        counts.get('dropped: no partner', 0))
+    good = 2 * counts['evaluations'] + counts.get('dropped: no partner', 0)
+    waiting = counts['poses'] - counts['refused: not a PoseStamped'] - good
+    assert 0 <= waiting < 50  # from when only one of the topics was matched
     assert 'Traceback' not in node.output and 'internal error' not in node.output
 
 
