@@ -16,7 +16,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..contact import Contact
-from ..pairing import PAIRINGS
+from ..pairing import PAIRINGS, StampedPose
+from ..scene import two_boxes
 from ..solver import ContactSolver
 from .appearance import STALE
 from .messages import NANOSECONDS
@@ -82,6 +83,7 @@ class ViewLog:
         """For boxes of these full extents [m], and a contact node of this `pairing`."""
         self._exact = ContactSolver(size_a, size_b, model='exact')
         self._edge = min(max(size_a), max(size_b))
+        self._scene = two_boxes(size_a, size_b)
         self._new_pairing = PAIRINGS[pairing]
         self._lock = threading.Lock()
         self.start_anew()
@@ -89,7 +91,7 @@ class ViewLog:
     def start_anew(self) -> None:
         """Forget everything: another run begins."""
         with self._lock:
-            self._pairing = self._new_pairing()
+            self._pairing = self._new_pairing(self._scene)
             self._pairs: OrderedDict[int, Poses] = OrderedDict()  # not answered yet
             self._clouds: OrderedDict[int, tuple[np.ndarray, int]] = OrderedDict()  # no pair yet
             self._answers: deque[Answer] = deque(maxlen=KEPT)
@@ -99,19 +101,21 @@ class ViewLog:
     def pose(self, box: int, stamp: int, numbers: np.ndarray) -> None:
         """A pose (7,) of box 0 (A) or 1 (B)."""
         with self._lock:
-            pair = self._pairing.add(box, stamp, (stamp, numbers))
-            if pair is None:
-                return
-            (stamp_a, a), (stamp_b, b) = pair
-            stamp = max(stamp_a, stamp_b)
-            if self._newest is None or stamp >= self._newest[0]:
-                self._newest = stamp, (a, b)
-            early = self._clouds.pop(stamp, None)
-            if early is not None:
-                self._answer(stamp, (a, b), *early)
-            else:
-                self._pairs[stamp] = a, b
-            self._give_up(stamp)
+            for tick in self._pairing.add(self._scene.moving[box],
+                                          StampedPose(numbers, '', stamp)):
+                if all(pose is not None for pose in tick):
+                    self._take(max(pose.stamp for pose in tick),
+                               tuple(pose.numbers for pose in tick))
+
+    def _take(self, stamp: int, poses: Poses) -> None:
+        if self._newest is None or stamp >= self._newest[0]:
+            self._newest = stamp, poses
+        early = self._clouds.pop(stamp, None)
+        if early is not None:
+            self._answer(stamp, poses, *early)
+        else:
+            self._pairs[stamp] = poses
+        self._give_up(stamp)
 
     def cloud(self, stamp: int, rows: np.ndarray, received: int) -> None:
         """The rows of a `contacts` cloud (messages.CLOUD_ROW), received at this time [ns].
