@@ -29,18 +29,25 @@ if not IS_WORKER:
     os.environ['NUMBA_CACHE_DIR'] = tempfile.mkdtemp(prefix='box_contact_numba_')
 
 
-def _domain_id() -> int:
+def _domain_id(module: str = '') -> int:
     # Two runs at once must not hear each other, nor two workers of a run. 1 to 101: 0 is where
     # everybody's real nodes are, and above 101 ports collide with the ephemeral ones of Linux.
     run = os.environ.get('PYTEST_XDIST_TESTRUNUID', str(os.getpid()))
     worker = int(os.environ.get('PYTEST_XDIST_WORKER', 'gw0').removeprefix('gw'))
-    return 1 + (zlib.crc32(run.encode()) + worker) % 101
+    return 1 + (zlib.crc32(run.encode()) + worker + zlib.crc32(module.encode())) % 101
 
 
 os.environ['ROS_DOMAIN_ID'] = str(_domain_id())
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 # Without it rclpy publishes np.float32 or an int in a float field as garbage, silently.
 os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'
+
+
+@pytest.fixture(scope='module', autouse=True)
+def own_domain(request: pytest.FixtureRequest) -> None:
+    """A ROS domain for each module: processes that were killed leave shared memory of theirs behind,
+    in which later ones may wait for the dead."""
+    os.environ['ROS_DOMAIN_ID'] = str(_domain_id(request.module.__name__))
 
 
 def pytest_unconfigure() -> None:

@@ -246,6 +246,7 @@ def test_it_learns_what_the_contact_node_is_set_to(view, client):
 def test_it_hears_poses_and_answers(view, client):
     """And measures a latency; a pose of NaN, which the contact node refuses, is no pair."""
     client.offer_until_answered(ORIGIN, APART)
+    assert client.spin(lambda: view.log is not None, 15.0)
     deadline = time.monotonic() + MATCH_SECONDS
     while not (view.log.scene() and view.log.scene().answer):  # the view has to have matched too
         assert time.monotonic() < deadline, 'nothing heard'
