@@ -236,7 +236,7 @@ def live(node, client) -> dict[str, list[Any]]:
     for topic in ('box_a/pose', 'box_b/pose'):
         client.node.create_subscription(PoseStamped, topic, got[topic].append, 100)
     got['/diagnostics'] = client.diagnostics
-    assert client.spin(lambda: len(client.diagnostics) > 1, 15.0)  # before the first pose
+    assert client.spin(lambda: len(client.diagnostics) > 1, 60.0)  # before the first pose
     client.offer_until_answered(ORIGIN, APART)
     client.spin(lambda: got['box_a/pose'] and got['box_b/pose'], 5.0)
     for _ in range(3):

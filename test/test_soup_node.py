@@ -73,7 +73,7 @@ def client(soup_node):
     with serving(lambda context: ContactNode(
             context, parameter_overrides=overrides(model='exact'))):
         client.offer_until_answered(ORIGIN, APART)
-        assert client.spin(lambda: client.soup['contacts'] or not client.send(ORIGIN, APART), 15.0)
+        assert client.spin(lambda: client.soup['contacts'] or not client.send(ORIGIN, APART), 60.0)
         yield client
     client.close()
 

@@ -238,7 +238,7 @@ def view(contact_node):
 
 def test_it_learns_what_the_contact_node_is_set_to(view, client):
     """Sizes and model, by its parameter services; and a change that somebody else makes."""
-    assert client.spin(lambda: view.log is not None, 15.0)
+    assert client.spin(lambda: view.log is not None, 60.0)
     assert list(view.settings['size_b']) == [2.0, 2.0, 2.5]
     assert view.settings['model'] == 'exact' and view.connected
 
@@ -246,7 +246,7 @@ def test_it_learns_what_the_contact_node_is_set_to(view, client):
 def test_it_hears_poses_and_answers(view, client):
     """And measures a latency; a pose of NaN, which the contact node refuses, is no pair."""
     client.offer_until_answered(ORIGIN, APART)
-    assert client.spin(lambda: view.log is not None, 15.0)
+    assert client.spin(lambda: view.log is not None, 60.0)
     deadline = time.monotonic() + MATCH_SECONDS
     while not (view.log.scene() and view.log.scene().answer):  # the view has to have matched too
         assert time.monotonic() < deadline, 'nothing heard'
@@ -263,7 +263,7 @@ def test_it_hears_poses_and_answers(view, client):
 
 def test_it_switches_the_model_of_the_running_node(view, client, contact_node):
     """Granted, or refused with the node's own words, and then the old one stays."""
-    assert client.spin(lambda: view.log is not None, 15.0)
+    assert client.spin(lambda: view.log is not None, 60.0)
     view.set_model('committee')
     assert client.spin(lambda: view.settings['model'] == 'committee' and not view.wish, 120.0)
     assert contact_node.get_parameter('model').value == 'committee'
@@ -278,7 +278,7 @@ def test_it_switches_the_model_of_the_running_node(view, client, contact_node):
 
 def test_another_size_is_another_log(view, client, contact_node):
     """Whoever sets it: the exact point is that of the new boxes."""
-    assert client.spin(lambda: view.log is not None, 15.0)
+    assert client.spin(lambda: view.log is not None, 60.0)
     old = view.log
     result, = contact_node.set_parameters([Parameter('size_b', value=[2.0, 2.0, 3.0])])
     assert result.successful
