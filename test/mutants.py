@@ -94,7 +94,7 @@ MUTANTS = {
         'pairing.py', 'if stamp < self._newest.get(box, NEVER) - RESET:', 'if False:',
         'test/test_pairing.py -k set_back'),
     'a clock that jumps is not heard': Mutant(
-        'nodes/contact.py', "self.counts['time went back'] += 1\n            self._pairing.reset()",
+        'nodes/contact.py', 'self.counts[RESETS] += 1\n            self._pairing.reset()',
         'pass', 'test/test_faults.py -k clock'),
     'a pose of any age': Mutant(
         'pairing.py', 'return newest is None or 0 < self.max_age < abs(now - newest)',

@@ -29,11 +29,11 @@ from rclpy.subscription import Subscription
 from sensor_msgs.msg import PointCloud2
 
 from ..checks import shown
-from ..pairing import PAIRINGS, StampedPose, Tick
+from ..pairing import PAIRINGS, RESETS, StampedPose, Tick
 from ..scene import Pair, Scene, SceneSolver, two_boxes
 from ..scene_file import read_scene
 from ..solver import MODELS, soup_divisions
-from .diagnostics import DIAGNOSTICS_SECONDS, Diagnostics
+from .diagnostics import DIAGNOSTICS_SECONDS, UNMATCHED_SECONDS, Diagnostics
 from .messages import Refused, TypedMessages
 from .parameters import (
     Setting,
@@ -82,7 +82,6 @@ PARAMETERS = {
                                     'objects, slower, the reference', one_of(SERIALIZATIONS)),
     'autostart': Setting(True, 'whether the node configures and activates itself', flag),
 }
-UNMATCHED_SECONDS = 1.0   # poses without an answer for this long are worth a warning
 
 
 def nanoseconds(seconds: float) -> int:
@@ -321,7 +320,7 @@ class ContactNode(LifecycleNode):
 
     def _clock_jumped(self, _: Any) -> None:
         if self._solver is not None:
-            self.counts['time went back'] += 1
+            self.counts[RESETS] += 1
             self._pairing.reset()
 
     # --- poses -----------------------------------------------------------------------------------

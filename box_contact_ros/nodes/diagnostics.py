@@ -12,6 +12,8 @@ from rclpy.node import Node
 from .messages import make_header
 
 DIAGNOSTICS_SECONDS = 1.0
+UNMATCHED_SECONDS = 1.0
+"""Poses without an answer for this long are worth a warning."""
 KEPT_TIMES = 4096
 """Evaluations whose computing times are kept for a report: more a second than any node makes."""
 
@@ -54,7 +56,7 @@ class Diagnostics:
         unanswered = time.monotonic() - self._answered_at if new['poses'] else 0.0
         level, message = DiagnosticStatus.WARN, 'poses refused'
         if not any(new[name] for name in new if name.startswith('refused')):
-            if unanswered > DIAGNOSTICS_SECONDS:
+            if unanswered > UNMATCHED_SECONDS:
                 message = 'poses without a partner'
             elif stale:
                 message = 'stale boxes'
