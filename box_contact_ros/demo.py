@@ -13,25 +13,22 @@ from __future__ import annotations
 import argparse
 import os
 import random
-import signal
 import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Sequence
-from typing import IO
 
 from .crane import CONTAINER_40FT, CraneScenario
 from .landing import LANDING_DURATION
+from .nodes.children import DOMAINS, Stop, asked_to_end, end, on_this_host, start
 
 DOMAIN_VARIABLE = 'BOX_CONTACT_DEMO_DOMAIN'
-DOMAINS = range(1, 102)  # 0 is everybody's; beyond 101, ports run into those Linux hands out
 
 TIME_LIMIT = 58.0  # s for everything: a demo ends within a minute, whatever happens
 OVERHEAD = 8.0  # s of it for starting, for the last answers and for the summary
 LANDING_LEAST = 22.0  # s: a shorter landing ends before it can be judged
 LANDING_MODEL = 'committee'  # the closed loop's default: it needs a point without jumps
-END_PATIENCE = 2.0  # s between asking a process group to end and killing it
 
 NEXT = """
 Next:
@@ -44,10 +41,7 @@ Next:
 def main(args: Sequence[str] | None = None) -> int:
     """Run the demonstration and return the crane's exit status."""
     options = _options(args)
-    env = os.environ | {
-        'ROS_DOMAIN_ID': str(options.domain),
-        'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
-    }
+    env = os.environ | on_this_host(options.domain)
     sizes = [f'{name}:=[{",".join(map(str, CONTAINER_40FT))}]' for name in ('size_a', 'size_b')]
     model = [f'model:={options.model}'] if options.model else []
     crane = [
@@ -61,20 +55,18 @@ def main(args: Sequence[str] | None = None) -> int:
     print(f'A crane {what}, {options.duration:g} s in real time; it publishes both poses at '
           f'{options.rate:g} Hz.\nA contact node answers; {how}. Both are ROS 2 processes of their '
           f'own, in domain {options.domain} on this host.', flush=True)
-    # SIGTERM and SIGHUP must end the children as well, so let them unwind like Ctrl-C does.
-    for number in (signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, _exit_on_signal)
     deadline = time.monotonic() + TIME_LIMIT
     processes: list[subprocess.Popen[bytes]] = []
     with tempfile.TemporaryFile() as node_output:
-        try:
-            processes.append(start('contact_node', sizes + model, env, node_output))
-            processes.append(start('crane', sizes + crane, env, None))
-            status = _watch(processes[0], processes[1], deadline)
-        except KeyboardInterrupt:
-            return 128 + signal.SIGINT
-        finally:
-            end(processes)
+        with asked_to_end() as stop:
+            try:
+                processes.append(start('contact_node', sizes + model, env, node_output))
+                processes.append(start('crane', sizes + crane, env, None))
+                status = _watch(processes[0], processes[1], deadline, stop)
+            finally:
+                end(processes)
+        if stop.is_set():
+            return stop.status
         if status:
             node_output.seek(0)
             text = node_output.read().decode(errors='replace').rstrip()
@@ -124,19 +116,10 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
     return options
 
 
-def start(program: str, parameters: list[str], env: dict[str, str],
-          output: IO[bytes] | None) -> subprocess.Popen[bytes]:
-    """Start a program of this package in a process group of its own; `output` None passes it on."""
-    command = [sys.executable, '-m', 'box_contact_ros', program, '--ros-args']
-    for parameter in parameters:
-        command += ['-p', parameter]
-    return subprocess.Popen(command, env=env, stdin=subprocess.DEVNULL, stdout=output,
-                            stderr=subprocess.STDOUT if output else None, start_new_session=True)
-
-
 def _watch(node: subprocess.Popen[bytes], crane: subprocess.Popen[bytes],
-           deadline: float) -> int:
-    """Wait for the crane's exit status; an early end of the node or the time limit is a 1."""
+           deadline: float, stop: Stop) -> int:
+    """Wait for the crane's exit status; an early end of the node, the time limit, or being asked to
+    end is a 1."""
     while (status := crane.poll()) is None:
         if node.poll() is not None:
             print(f'demo: contact_node ended early, status {node.returncode}', file=sys.stderr)
@@ -144,34 +127,9 @@ def _watch(node: subprocess.Popen[bytes], crane: subprocess.Popen[bytes],
         if time.monotonic() > deadline:
             print(f'demo: not done within {TIME_LIMIT:g} s', file=sys.stderr)
             return 1
-        time.sleep(0.05)
+        if stop.wait(0.05):
+            return 1
     return status if status >= 0 else 128 - status
-
-
-def end(processes: list[subprocess.Popen[bytes]]) -> None:
-    """End whole process groups: ask first, then kill what is left of them."""
-    for process in processes:
-        _signal_group(process, signal.SIGTERM)
-    deadline = time.monotonic() + END_PATIENCE
-    for process in processes:
-        try:
-            process.wait(max(0.0, deadline - time.monotonic()))
-        except subprocess.TimeoutExpired:
-            pass
-        # Also where the first process is gone: children of its own may be left in the group.
-        _signal_group(process, signal.SIGKILL)
-        process.wait()
-
-
-def _signal_group(process: subprocess.Popen[bytes], number: signal.Signals) -> None:
-    try:
-        os.killpg(process.pid, number)
-    except ProcessLookupError:
-        pass  # nobody is left in it
-
-
-def _exit_on_signal(number: int, _frame: object) -> None:
-    sys.exit(128 + number)
 
 
 if __name__ == '__main__':

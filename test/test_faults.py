@@ -15,10 +15,10 @@ import time
 
 import numpy as np
 import pytest
+from raw_client import APART, GOOD, LITTLE_ENDIAN, ORIGIN, TOUCHING, RawClient, cdr
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
 from rosgraph_msgs.msg import Clock
-from test_hygiene_ros import APART, GOOD, LITTLE_ENDIAN, ORIGIN, TOUCHING, RawClient, cdr
 
 from box_contact_ros.nodes.messages import make_header, read_cloud
 

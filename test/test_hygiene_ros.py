@@ -13,63 +13,12 @@ import numpy as np
 import poses
 import pytest
 from geometry_msgs.msg import PoseStamped
+from raw_client import APART, GOOD, LITTLE_ENDIAN, ORIGIN, TOUCHING, RawClient, cdr
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters, SetParametersAtomically
-from rclpy.qos import QoSProfile
-from ros_client import Client
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.nodes.messages import read_cloud
-
-ORIGIN = poses.IDENTITY
-TOUCHING = np.array([0.5, 0.25, 1.875, 0, 0, 0, 1])  # 0.125 m deep
-APART = np.array([0.5, 0.25, 2.5, 0, 0, 0, 1])
-LITTLE_ENDIAN = b'\0\1\0\0'
-
-
-def cdr(pose, stamp, frame=b'map\0'):
-    """A serialised PoseStamped; `stamp` is (sec, nanosec), `frame` the string with its zero."""
-    head = struct.pack('<iII', *stamp, len(frame)) + frame
-    return LITTLE_ENDIAN + head + b'\0' * (-len(head) % 8) + struct.pack('<7d', *pose)
-
-
-class RawClient(Client):
-    """Sends bytes, and hears what arrives on the wire."""
-
-    def __init__(self):
-        super().__init__()
-        self.wire = []
-        self.raw_subscriptions = [
-            self.node.create_subscription(PoseStamped, f'box_{box}/pose', self.wire.append,
-                                          QoSProfile(depth=10_000), raw=True) for box in 'ab']
-
-    def send_raw(self, *payloads):
-        """Publish each payload on both topics."""
-        for payload in payloads:
-            for publisher in self.publishers:
-                publisher.publish(payload)
-
-    def heard(self, count):
-        """Wait for so many messages on the wire; whether they came, and no more."""
-        return self.spin(lambda: len(self.wire) >= count, 10.0) and len(self.wire) == count
-
-    def answered(self, stamp):
-        """Wait for the answer to a stamp [ns]; whether it came."""
-        return self.spin(lambda: stamp in self.clouds, 5.0)
-
-    def send_pair(self, pose_a, pose_b, frame=b'map\0'):
-        """Publish a pair as bytes; returns its stamp [ns]."""
-        stamp = self.next_stamp()
-        for publisher, pose in zip(self.publishers, (pose_a, pose_b)):
-            publisher.publish(cdr(pose, divmod(stamp, 10**9), frame))
-        return stamp
-
-    def assert_answered(self):
-        """The node lives, and answers a good pair, and rightly."""
-        row, = read_cloud(self.clouds[self.ask(ORIGIN, TOUCHING)])
-        assert row['depth'] == 0.125
-        assert (row['normal_x'], row['normal_y'], row['normal_z']) == (0, 0, 1)
-        assert (row['x'], row['y'], row['z']) == (0.25, 0.125, 0.9375)
 
 
 @pytest.fixture
@@ -97,9 +46,6 @@ def test_cdr_is_what_rclpy_writes(client):
     assert (message.header.stamp.sec, message.header.stamp.nanosec) == (5, 7)
     assert message.header.frame_id == 'yard'
     assert message.pose.position.z == 1.875 and message.pose.orientation.w == 1.0
-
-
-GOOD = cdr(TOUCHING, (5, 7))
 
 
 def test_bytes_that_are_no_message(node, client):

@@ -36,10 +36,10 @@ from .bench_log import (
     latency_table,
     write_csv,
 )
+from .children import DOMAINS
 from .contact import PARAMETERS
 from .runtime import REFUSALS
 
-DOMAINS = range(1, 102)  # 0 is everybody's; beyond 101, ports run into those Linux hands out
 NODES = ('contact', 'soup', 'echo')
 SECONDS, LONGEST = 60.0, 3600.0  # of sending, in all: the default, and what is accepted
 QUICK_SECONDS = 0.5  # of every stream, with --quick
@@ -65,8 +65,8 @@ def main(args: Sequence[str] | None = None) -> int:
     except REFUSALS as error:
         print(f'error: {error}', file=sys.stderr)
         return 1
-    passed = _report(options, subjects, bench.notes, about, interrupted=bool(bench.signals))
-    return 128 + bench.signals[0] if bench.signals else 0 if passed else 1
+    passed = _report(options, subjects, bench.notes, about, interrupted=bench.stop.is_set())
+    return bench.stop.status or (0 if passed else 1)
 
 
 def _options(args: Sequence[str]) -> argparse.Namespace:

@@ -9,7 +9,6 @@ import contextlib
 import gc
 import os
 import platform
-import signal
 import struct
 import subprocess
 import sys
@@ -36,6 +35,7 @@ from tqdm import tqdm
 from ..contact import Contacts
 from ..streams import Stream
 from .bench_log import NodeLog
+from .children import Stop, asked_to_end, end, on_this_host
 from .crane_log import cloud_rows
 from .echo import raw_stamp
 from .messages import NANOSECONDS, make_header
@@ -47,7 +47,6 @@ OFFER_PERIOD = 0.1  # s between the pairs that only ask whether anyone answers
 WARM_UP = 100  # pairs sent at the rate, and not counted, before the first stream of a group
 DRAIN_SILENCE = 1.0  # s without an answer: what is still out is lost
 DRAIN_LIMIT = 15.0  # s for the last answers of a node that has fallen behind
-END_PATIENCE = 3.0  # s between asking a process group to end and killing it
 SLICE = 0.05  # s between looks at whether the bench was called off
 
 # Deep: what the DDS layer delivers while Python is busy must not push out the rest.
@@ -131,12 +130,10 @@ class Bench:
     """One run: starts the nodes group by group, plays the streams, keeps the logs."""
 
     def __init__(self, node: BenchNode, subjects: list[Subject], *, rate: float, clock: Clock,
-                 stop: threading.Event, node_cores: set[int]) -> None:
+                 stop: Stop, node_cores: set[int]) -> None:
         """rate: pairs a second [Hz]; stop: set to call all off; node_cores: of the nodes."""
         self.node, self.subjects, self.rate, self.clock = node, subjects, rate, clock
         self.stop, self.node_cores = stop, node_cores
-        self.signals: list[int] = []
-        """That called it off."""
         self.notes: list[str] = []
         """What went wrong with the nodes as such."""
         self.executor = make_executor(node.context)
@@ -225,18 +222,12 @@ class Bench:
         self.notes.append(f'{running.subject.name} {why}{last}')
 
     def _end(self) -> None:
-        """End the processes: ask their groups, then kill what is left of them."""
+        """End the processes."""
         for running in self._running:
             if running.process.poll() is not None and not running.subject.failed:
                 self._fail(running, f'ended early with status {running.process.returncode}')
-            _signal_group(running.process, signal.SIGINT)
-        deadline = time.monotonic() + END_PATIENCE
+        end([running.process for running in self._running])
         for running in self._running:
-            with contextlib.suppress(subprocess.TimeoutExpired):
-                running.process.wait(max(0.0, deadline - time.monotonic()))
-            # Also where the first process is gone: children of its own may be left in the group.
-            _signal_group(running.process, signal.SIGKILL)
-            running.process.wait()
             running.output.close()
         self._running = []
 
@@ -341,42 +332,31 @@ def open_bench(subjects: list[Subject], args: Sequence[str], *, rate: float, dom
                kind: type[Bench] = Bench) -> Iterator[Bench]:
     """A bench of its own ROS domain and cores. Afterwards all is as it was, and no node is left.
 
-    args: what follows the program's name, for rclpy. SIGINT, SIGTERM and SIGHUP set `bench.stop`
-    and are kept in `bench.signals`, so that the nodes are ended and the results kept.
+    args: what follows the program's name, for rclpy. SIGINT, SIGTERM and SIGHUP set `bench.stop`,
+    so that the nodes are ended and the results kept.
     """
-    stop, signals = threading.Event(), []
-
-    def call_off(number: int, _frame: Any) -> None:
-        signals.append(number)
-        stop.set()
-
-    before = {number: signal.signal(number, call_off)
-              for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
-    # Nodes inherit both; nothing else on this network hears what is measured.
-    os.environ['ROS_DOMAIN_ID'] = str(domain)
-    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+    # Nodes inherit it; nothing else on this network hears what is measured.
+    os.environ |= on_this_host(domain)
     cores = os.sched_getaffinity(0)
     own = {max(cores)} if len(cores) > 1 else cores
     context, node, bench = Context(), None, None
-    try:
-        os.sched_setaffinity(0, own)  # before rclpy starts its threads, which inherit it
-        rclpy.init(args=list(args), context=context,
-                   signal_handler_options=SignalHandlerOptions.NO)
-        clock = Clock()
-        node = BenchNode(context, subjects, clock)
-        bench = kind(node, subjects, rate=rate, clock=clock, stop=stop,
-                     node_cores=cores - own or cores)
-        bench.signals = signals
-        yield bench
-    finally:
-        if bench is not None:
-            bench.close()
-        if node is not None:
-            node.destroy_node()
-        context.try_shutdown()
-        os.sched_setaffinity(0, cores)
-        for number, handler in before.items():
-            signal.signal(number, handler)
+    with asked_to_end() as stop:
+        try:
+            os.sched_setaffinity(0, own)  # before rclpy starts its threads, which inherit it
+            rclpy.init(args=list(args), context=context,
+                       signal_handler_options=SignalHandlerOptions.NO)
+            clock = Clock()
+            node = BenchNode(context, subjects, clock)
+            bench = kind(node, subjects, rate=rate, clock=clock, stop=stop,
+                         node_cores=cores - own or cores)
+            yield bench
+        finally:
+            if bench is not None:
+                bench.close()
+            if node is not None:
+                node.destroy_node()
+            context.try_shutdown()
+            os.sched_setaffinity(0, cores)
 
 
 def about_the_machine(node_cores: set[int]) -> dict[str, str]:
@@ -448,8 +428,3 @@ def _bar(total: int, text: str, unit: str) -> tqdm:
 def _lengths(stream: Stream) -> str:
     return ' and '.join('×'.join(f'{extent:g}' for extent in size)
                         for size in dict.fromkeys(stream.sizes)) + ' m'
-
-
-def _signal_group(process: subprocess.Popen, number: signal.Signals) -> None:
-    with contextlib.suppress(ProcessLookupError):  # nobody is left in it
-        os.killpg(process.pid, number)

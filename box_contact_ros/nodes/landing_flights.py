@@ -16,8 +16,8 @@ from rclpy.context import Context
 from rclpy.parameter import Parameter
 
 from ..crane import CraneScenario
-from ..demo import DOMAINS, end, start
 from ..landing import LandingResult
+from .children import DOMAINS, end, on_this_host, start
 from .crane import CraneNode, receive_while
 from .crane_parameters import PARAMETERS, SCENARIO
 from .runtime import make_executor
@@ -32,8 +32,8 @@ def answering_node(model: str, scenario: CraneScenario) -> Iterator[int]:
     domain = random.choice(DOMAINS)
     sizes = [f'{name}:=[{",".join(map(str, size))}]' for name, size in (
         ('size_a', scenario.size), ('size_b', scenario.stack_size))]
-    env = os.environ | {'ROS_DOMAIN_ID': str(domain), 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
-    node = start('contact_node', [f'model:={model}', *sizes], env, subprocess.DEVNULL)
+    node = start('contact_node', [f'model:={model}', *sizes], os.environ | on_this_host(domain),
+                 subprocess.DEVNULL)
     try:
         yield domain
     finally:

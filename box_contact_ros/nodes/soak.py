@@ -26,7 +26,6 @@ from rclpy.utilities import remove_ros_args
 from ..contact import Contacts
 from ..solver import MODELS, ContactSolver
 from ..streams import Stream, make_stream
-from .bench import DOMAINS
 from .bench_drive import Bench, Subject, about_the_machine, open_bench
 from .bench_log import (
     CONTACT_MESSAGES,
@@ -36,6 +35,7 @@ from .bench_log import (
     markdown,
     write_csv,
 )
+from .children import DOMAINS
 from .contact import PARAMETERS
 from .runtime import REFUSALS
 
@@ -120,8 +120,7 @@ def main(args: Sequence[str] | None = None) -> int:
         print(f'error: {error}', file=sys.stderr)
         return 1
     passed = _report(options, subjects, bench, first.first_answer, about)
-    signals = first.signals + bench.signals
-    return 128 + signals[0] if signals else 0 if passed else 1
+    return first.stop.status or bench.stop.status or (0 if passed else 1)
 
 
 def _contact(options: argparse.Namespace) -> Subject:

@@ -20,7 +20,7 @@ import time
 import webbrowser
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import IO, Any
+from typing import IO
 
 import rclpy
 from rclpy.context import Context
@@ -28,7 +28,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
 from ..crane import CONTAINER_40FT
-from ..demo import DOMAINS, end, start
+from .children import DOMAINS, Stop, asked_to_end, end, on_this_host, start
 from .contact import PARAMETERS
 from .runtime import REFUSALS, make_executor
 from .view_node import ViewNode
@@ -159,21 +159,23 @@ def main(args: Sequence[str] | None = None) -> int:
     """Serve the page until SIGINT (0), SIGTERM or SIGHUP (128 + number); 1 if the node ends."""
     args = list(sys.argv[1:] if args is None else args)
     options = _options(remove_ros_args(['view', *args])[1:])
-    stop, signalled = threading.Event(), []
+    if not options.attach:  # nothing else on this network hears what is played here
+        os.environ |= on_this_host(options.domain)
+    elif options.domain is not None:
+        os.environ['ROS_DOMAIN_ID'] = str(options.domain)
+    with asked_to_end() as stop:
+        try:
+            serve(options, args, stop)
+        except (*REFUSALS, RuntimeError, OSError) as error:
+            print(f'error: {error}', file=sys.stderr)
+            return 1
+    return 0 if stop.signals[0] == signal.SIGINT else stop.status
 
-    def call_off(number: int, _frame: Any) -> None:
-        signalled.append(number)
-        stop.set()
 
-    # Flags and no exceptions, which might fall between a child's start and its being written down.
-    before = {number: signal.signal(number, call_off)
-              for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+def serve(options: argparse.Namespace, args: Sequence[str], stop: Stop) -> None:
+    """Serve the page until `stop` is set; RuntimeError if the contact node ends."""
     wishes: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
     landing = Landing(options.seed, options.rate, not options.open_loop)
-    if options.domain is not None:
-        os.environ['ROS_DOMAIN_ID'] = str(options.domain)
-    if not options.attach:  # nothing else on this network hears what is played here
-        os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
     page = simulation = None
     try:
         with listening(options.node, args) as node:
@@ -188,17 +190,11 @@ def main(args: Sequence[str] | None = None) -> int:
             if not options.no_browser and _has_display():
                 webbrowser.open(page.url)
             watch(node, page, simulation, wishes, stop)
-    except (*REFUSALS, RuntimeError, OSError) as error:
-        print(f'error: {error}', file=sys.stderr)
-        return 1
     finally:
         if simulation is not None:
             simulation.close()
         if page is not None:
             page.close()
-        for number, handler in before.items():
-            signal.signal(number, handler)
-    return 0 if signalled[0] == signal.SIGINT else 128 + signalled[0]
 
 
 def _has_display() -> bool:
