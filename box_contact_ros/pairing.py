@@ -5,7 +5,7 @@ that runs at ten times real time are treated alike.
 """
 from __future__ import annotations
 
-from collections import Counter, OrderedDict
+from collections import Counter, OrderedDict, deque
 from typing import NamedTuple
 
 import numpy as np
@@ -96,7 +96,7 @@ class StampPairing(_Pairing):
 
     def __init__(self, scene: Scene, *, tolerance: int = 0, max_age: int = 0) -> None:
         self._waiting: OrderedDict[int, dict[str, StampedPose]] = OrderedDict()
-        self._taken: dict[str, OrderedDict[int, None]] = {}
+        self._taken: dict[str, deque[int]] = {}
         self._missing_since: dict[str, int] = {}  # stamp of the first tick that a box lacks
         self._answered = False
         super().__init__(scene, tolerance=tolerance, max_age=max_age)
@@ -106,7 +106,8 @@ class StampPairing(_Pairing):
         super().set_scene(scene)
         self._missing_since = {box: stamp for box, stamp in self._missing_since.items()
                                if box in self.boxes}
-        self._taken = {box: self._taken.get(box, OrderedDict()) for box in self.boxes}
+        self._taken = {box: self._taken.get(box, deque(maxlen=REMEMBERED_STAMPS))
+                       for box in self.boxes}
 
     def reset(self) -> None:
         """Forget all poses and stamps."""
@@ -121,66 +122,74 @@ class StampPairing(_Pairing):
     def add(self, box: str, pose: StampedPose) -> list[Tick]:
         """Take a pose; the tick that it completes, after those that are not waited for any more."""
         stamp = pose.stamp
-        self._look_back(box, stamp)
-        taken = self._taken[box]
-        if stamp in taken:
-            self.counts[REPEATED] += 1
+        newest = self._newest
+        if stamp <= newest.get(box, NEVER) and self._refuses(box, stamp):
             return []
-        if len(taken) >= REMEMBERED_STAMPS:
-            if stamp < next(iter(taken)):
-                self.counts[OLD] += 1
-                return []
-            taken.popitem(last=False)
-        taken[stamp] = None
-        self._note(box, stamp)
-        key = self._slot(box, stamp)
-        poses = self._waiting.get(key)
+        if stamp > newest.get(box, NEVER):
+            newest[box] = stamp
+        self._taken[box].append(stamp)
+        self._missing_since.pop(box, None)
+        if stamp > self._now:
+            self._advance(stamp)
+        waiting = self._waiting
+        key = self._slot(box, stamp) if self.tolerance else stamp
+        poses = waiting.get(key)
         if poses is None:
-            poses = self._waiting[key] = {}
+            poses = waiting[key] = {}
+            self._note_missing(stamp)
         poses[box] = pose
-        ticks = self._give_up(key) if len(self._waiting) > 1 else []
+        ticks = self._give_up(key) if len(waiting) > 1 else []
         if len(poses) == len(self.boxes) or not self._is_awaiting(poses):
-            del self._waiting[key]
-            ticks.append(self._tick(poses))
+            del waiting[key]
+            ticks.append([poses.get(box) for box in self.boxes])
             self._answered = True
         return ticks
 
-    def _tick(self, poses: dict[str, StampedPose]) -> Tick:
-        return [poses.get(box) for box in self.boxes]
+    def _refuses(self, box: str, stamp: int) -> bool:
+        """Whether a stamp that is not later than the last of its box has been taken before, or is
+        too old to tell."""
+        self._look_back(box, stamp)
+        taken = self._taken[box]
+        if len(taken) == REMEMBERED_STAMPS and stamp < taken[0]:
+            self.counts[OLD] += 1
+            return True
+        if stamp in taken:
+            self.counts[REPEATED] += 1
+            return True
+        return False
 
     def _slot(self, box: str, stamp: int) -> int:
         """Stamp of the tick that a pose belongs to: its own, or the nearest within tolerance."""
-        if not self.tolerance or stamp in self._waiting:
+        if stamp in self._waiting:
             return stamp
         near = [key for key, poses in self._waiting.items()
                 if box not in poses and abs(key - stamp) <= self.tolerance]
         return min(near, key=lambda key: abs(key - stamp), default=stamp)
 
-    def _note(self, box: str, stamp: int) -> None:
-        if stamp > self._now:
-            if 0 < self.max_age < stamp - self._now:
-                # Time has leapt, as after a pause of all boxes. This one is the first, and the
-                # others are not stale for that.
-                self._missing_since.clear()
-            self._now = stamp
+    def _advance(self, stamp: int) -> None:
+        if 0 < self.max_age < stamp - self._now:
+            # Time has leapt, as after a pause of all boxes. This one is the first, and the others
+            # are not stale for that.
+            self._missing_since.clear()
+        self._now = stamp
+
+    def _note_missing(self, stamp: int) -> None:
+        """A tick has begun: boxes that have given no pose as late as this lack one."""
         newest, missing = self._newest, self._missing_since
-        if stamp > newest.get(box, NEVER):
-            newest[box] = stamp
-        missing.pop(box, None)
-        for other in self.boxes:
-            if stamp > newest.get(other, NEVER) and other not in missing:
-                missing[other] = stamp
+        for box in self.boxes:
+            if stamp > newest.get(box, NEVER) and box not in missing:
+                missing[box] = stamp
 
     def _is_stale(self, box: str, now: int) -> bool:
         return 0 < self.max_age < now - self._missing_since.get(box, now)
 
     def _is_awaiting(self, poses: dict[str, StampedPose]) -> bool:
         """Whether a tick with these poses waits for another box."""
-        missing = [box for box in self.boxes if box not in poses and (
-            box in self._newest or not self._answered)]
-        if not missing:
-            return False
-        return not all(self._is_stale(box, self._now) for box in missing)
+        for box in self.boxes:
+            if (box not in poses and (box in self._newest or not self._answered)
+                    and not self._is_stale(box, self._now)):
+                return True
+        return False
 
     def _give_up(self, key: int) -> list[Tick]:
         """The oldest ticks, up to the one of `key`, that have waited enough; those of which no pair
@@ -192,7 +201,7 @@ class StampPairing(_Pairing):
                 break
             del self._waiting[stamp]
             if self._evaluable(poses):
-                ticks.append(self._tick(poses))
+                ticks.append([poses.get(box) for box in self.boxes])
             else:
                 self.counts[NO_PARTNER] += len(poses)
         return ticks

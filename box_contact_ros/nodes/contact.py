@@ -29,7 +29,7 @@ from rclpy.subscription import Subscription
 from sensor_msgs.msg import PointCloud2
 
 from ..checks import shown
-from ..pairing import PAIRINGS, RESETS, StampedPose, Tick
+from ..pairing import NEVER, PAIRINGS, RESETS, Tick
 from ..scene import Pair, Scene, SceneSolver, two_boxes
 from ..scene_file import read_scene
 from ..solver import MODELS, soup_divisions
@@ -364,23 +364,23 @@ class ContactNode(LifecycleNode):
 
     def _header_of(self, tick: Tick) -> tuple[int, str]:
         """The newest stamp [ns] of a tick and its frame; raises Refused if frames differ."""
-        first: StampedPose | None = None
-        stamp = None
-        wanted = self._solver.scene.frame_id
-        for box, pose in zip(self._solver.scene.moving, tick):
-            if pose is None:
-                continue
-            if first is None:
-                first, of_first, stamp = pose, box, pose.stamp
-                if wanted and pose.frame_id != wanted:
-                    raise Refused('frame_id differs', f'{box} is in frame {shown(pose.frame_id)}, '
-                                                      f'the scene in {shown(wanted)}')
-            elif pose.frame_id != first.frame_id:
-                raise Refused('frame_id differs',
-                              f'{of_first} is in frame {shown(first.frame_id)}, {box} in '
-                              f'{shown(pose.frame_id)}')
-            stamp = max(stamp, pose.stamp)
-        return stamp, first.frame_id
+        stamp, frame_id = NEVER, self._solver.scene.frame_id or None
+        for pose in tick:
+            if pose is not None:
+                if frame_id is None:
+                    frame_id = pose.frame_id
+                elif pose.frame_id != frame_id:
+                    raise Refused('frame_id differs', self._frames(tick))
+                if pose.stamp > stamp:
+                    stamp = pose.stamp
+        return stamp, frame_id
+
+    def _frames(self, tick: Tick) -> str:
+        """What frames a tick has, in words."""
+        scene = self._solver.scene
+        frames = {'the scene': scene.frame_id} if scene.frame_id else {}
+        frames |= {box: pose.frame_id for box, pose in zip(scene.moving, tick) if pose is not None}
+        return ', '.join(f'{who} is in frame {shown(frame)}' for who, frame in frames.items())
 
     def _refuse(self, reason: str, text: str) -> None:
         self.counts[f'refused: {reason}'] += 1

@@ -32,6 +32,9 @@ ENCAPSULATION = 4
 LITTLE = b'\0\1'
 _STAMP = struct.Struct('<iI')
 _POSE = struct.Struct('<7d')
+_LAYOUT = '<2s2xiI{}s{}x7d'
+"""Of a whole little-endian pose, by the sizes of frame_id, its length included, and of what aligns
+the numbers."""
 _ROW_END = struct.Struct('<dI')  # depth, pair
 _SIZES = struct.Struct('<II')
 FRAME_AT = ENCAPSULATION + _STAMP.size + 4
@@ -84,17 +87,18 @@ class RawMessages:
     """Whether subscriptions hand over bytes."""
 
     def __init__(self) -> None:
-        self._frame, self._frame_id = b'', ''
-        self._at = self._length = -1
+        self._frame: bytes | None = None
+        self._frame_id = ''
+        self._layout = struct.Struct(_LAYOUT.format(0, 0))
         self._answers: dict[str, _Answers] = {}
 
     def read_pose(self, data: bytes) -> StampedPose:
         """The pose of a serialised message; raises Refused."""
-        if (len(data) != self._length or data[:2] != LITTLE
-                or data[FRAME_AT - 4:FRAME_AT - 4 + len(self._frame)] != self._frame):
+        if len(data) != self._layout.size:
             return self._read_slowly(data)
-        sec, nanosec = _STAMP.unpack_from(data, ENCAPSULATION)
-        numbers = _POSE.unpack_from(data, self._at)
+        order, sec, nanosec, frame, *numbers = self._layout.unpack(data)
+        if order != LITTLE or frame != self._frame:
+            return self._read_slowly(data)
         x, y, z, qx, qy, qz, qw = numbers
         # What is certainly good passes here (NaN fails every comparison); the rest is looked at.
         if (nanosec < NANOSECONDS and -LENGTH_MAX < x < LENGTH_MAX
@@ -110,8 +114,10 @@ class RawMessages:
         if data[:2] == LITTLE:
             length = len(frame_id.encode()) + 1
             if struct.unpack_from('<I', data, FRAME_AT - 4)[0] == length:  # not an empty one's 0
-                self._frame, self._frame_id = data[FRAME_AT - 4:FRAME_AT + length], frame_id
-                self._at, self._length = numbers_at(length), len(data)
+                start, end = FRAME_AT - 4, FRAME_AT + length
+                self._frame, self._frame_id = data[start:end], frame_id
+                self._layout = struct.Struct(
+                    _LAYOUT.format(end - start, numbers_at(length) - end))
         return pose
 
     def begin(self, stamp: int, frame_id: str) -> None:
