@@ -225,7 +225,13 @@ class SceneSolver:
         Raises ValueError for numbers that are no pose.
         """
         if self._only is not None:
-            return self._one_pair(self._only, poses)
+            (first, fixed_a), (second, fixed_b) = self._sides
+            a = poses[first] if fixed_a is None else fixed_a
+            b = poses[second] if fixed_b is None else fixed_b
+            if a is None or b is None:
+                return Answer([], [self._only], 0)
+            contact = self._solver(a, b)
+            return Answer([(self._only, contact)] if contact.colliding else [], [], 1)
         for number, pose in zip(self._moving, poses, strict=True):
             self._known[number] = pose is not None
             if pose is not None:
@@ -245,12 +251,3 @@ class SceneSolver:
                 touching.append((pairs[near[row]], Contact(
                     True, float(found.separation[row]), found.normal[row], found.point[row])))
         return Answer(touching, stale, int(count))
-
-    def _one_pair(self, pair: Pair, poses: Sequence[np.ndarray | None]) -> Answer:
-        (first, fixed_a), (second, fixed_b) = self._sides
-        a = poses[first] if fixed_a is None else fixed_a
-        b = poses[second] if fixed_b is None else fixed_b
-        if a is None or b is None:
-            return Answer([], [pair], 0)
-        contact = self._solver(a, b)
-        return Answer([(pair, contact)] if contact.colliding else [], [], 1)

@@ -4,25 +4,20 @@ ROS 2's own distribution (DDS) does all of it; this shows that nothing here stan
 """
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import signal
 import subprocess
 import sys
 import uuid
+from pathlib import Path
 
+import numpy as np
 import pytest
 
 CUBES = ('-p', 'size_a:=[2.0, 2.0, 2.0]', '-p', 'size_b:=[2.0, 2.0, 2.0]')
 SUBNET = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET'}
-SCENE = """\
-boxes:
-  box_a: {{size: [2, 2, 2]}}
-  box_b: {{size: [2, 2, 2]}}
-  floor: {{size: [50, 50, 1], pose: [0, 0, -0.5, 0, 0, 0, 1]}}
-pairs:
-  - {{id: {id}, name: {name}, a: {a}, b: {b}}}
-"""
 
 
 def ip(*words):
@@ -30,8 +25,8 @@ def ip(*words):
 
 
 @pytest.fixture
-def hosts():
-    """Command prefixes of two hosts, joined by a virtual cable."""
+def unjoined():
+    """Names of two hosts: command prefixes and names of network devices for them."""
     if not shutil.which('ip'):
         pytest.skip('two hosts need `ip` (iproute2)')
     tag = uuid.uuid4().hex[:6]
@@ -40,30 +35,69 @@ def hosts():
     try:
         if len(made) < 2:
             pytest.skip('network namespaces are not permitted here')
-        ends = [f'v{side}{tag}' for side in 'ab']
-        joined = ip('link', 'add', ends[0], 'type', 'veth', 'peer', 'name', ends[1])
-        if joined.returncode:
-            pytest.skip(f'virtual cables are not permitted here: {joined.stderr.strip()}')
-        for number, (name, end) in enumerate(zip(names, ends), 1):
-            for words in (['link', 'set', end, 'netns', name],
-                          ['-n', name, 'addr', 'add', f'10.77.0.{number}/24', 'dev', end],
-                          ['-n', name, 'link', 'set', end, 'up'],
-                          ['-n', name, 'link', 'set', 'lo', 'up'],
-                          ['-n', name, 'route', 'add', '224.0.0.0/4', 'dev', end]):
-                done = ip(*words)
-                assert done.returncode == 0, done.stderr
-        yield [['ip', 'netns', 'exec', name] for name in names], ends
+        yield names, [f'v{side}{tag}' for side in 'ab']
     finally:
         for name in made:
             ip('netns', 'delete', name)
 
 
-def impair(host, end, *words):
-    """Loss and delay on one end of the cable; skips where the kernel knows none."""
-    done = subprocess.run([*host, 'tc', 'qdisc', 'add', 'dev', end, 'root', 'netem', *words],
-                          capture_output=True, text=True)
-    if done.returncode:
-        pytest.skip(f'tc netem is not available here: {done.stderr.strip()}')
+def join(names, ends):
+    """Give each host its end of a cable; returns the hosts' command prefixes."""
+    for number, (name, end) in enumerate(zip(names, ends), 1):
+        for words in (['link', 'set', end, 'netns', name],
+                      ['-n', name, 'addr', 'add', f'10.77.0.{number}/24', 'dev', end],
+                      ['-n', name, 'link', 'set', end, 'up'],
+                      ['-n', name, 'link', 'set', 'lo', 'up'],
+                      ['-n', name, 'route', 'add', '224.0.0.0/4', 'dev', end]):
+            done = ip(*words)
+            assert done.returncode == 0, done.stderr
+    return [['ip', 'netns', 'exec', name] for name in names]
+
+
+def virtual_cable(ends):
+    """A cable that loses nothing."""
+    made = ip('link', 'add', ends[0], 'type', 'veth', 'peer', 'name', ends[1])
+    if made.returncode:
+        pytest.skip(f'virtual cables are not permitted here: {made.stderr.strip()}')
+
+
+@pytest.fixture
+def hosts(unjoined):
+    """Command prefixes of two hosts, joined by a virtual cable."""
+    names, ends = unjoined
+    virtual_cable(ends)
+    return join(names, ends)
+
+
+LOSS, DELAY = 0.02, 0.005
+
+
+@pytest.fixture
+def far_hosts(unjoined):
+    """Two hosts joined by a cable with LOSS and DELAY [s] each way: by `tc` where the kernel has
+    netem, else by a process that carries the frames."""
+    names, ends = unjoined
+    virtual_cable(ends)
+    hosts = join(names, ends)
+    netem = ['root', 'netem', 'loss', f'{100 * LOSS:g}%', 'delay', f'{1000 * DELAY:g}ms']
+    if shutil.which('tc') and all(subprocess.run(
+            [*host, 'tc', 'qdisc', 'add', 'dev', end, *netem], capture_output=True).returncode == 0
+            for host, end in zip(hosts, ends)):
+        yield hosts
+        return
+    ip('-n', names[0], 'link', 'delete', ends[0])
+    carrier = subprocess.Popen(
+        [sys.executable, Path(__file__).with_name('cable.py'), *ends, str(LOSS), str(DELAY)],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        if carrier.stdout.readline() != 'ready\n':
+            carrier.kill()
+            pytest.skip('neither netem nor TAP devices here: '
+                        f'{carrier.stderr.read().strip().splitlines()[-1]}')
+        yield join(names, ends)
+    finally:
+        carrier.kill()
+        carrier.communicate()
 
 
 def numbers_of(line):
@@ -74,7 +108,7 @@ def numbers_of(line):
 def test_simulator_and_node_on_two_hosts(program, hosts):
     """A crane on one host, the node on the other: all of 1,000 evaluations come back (else the
     crane's status is not 0)."""
-    (here, there), _ = hosts
+    here, there = hosts
     node = program('contact_node', '--ros-args', *CUBES, env=SUBNET, within=there)
     node.wait_for_output('ready', 120)
     crane = program('crane', '--ros-args', *CUBES, '-p', 'duration:=5', '-p', 'wait:=20',
@@ -85,71 +119,47 @@ def test_simulator_and_node_on_two_hosts(program, hosts):
     assert node.wait(5) == 0
 
 
-def test_a_bad_cable(program, hosts):
+def test_a_bad_cable(program, far_hosts):
     """2 % loss and 5 ms delay each way: poses are lost, since they are sent best effort and one
-    that is late is worth nothing; every contact that is found is delivered, since those are
-    reliable; and what is not answered is told as lost, not made up."""
-    (here, there), ends = hosts
+    that is late is worth nothing. Point and normal, of which 4 in 100 would lack one, are sent
+    again, as long as they are among the last ten, which here is 50 ms. What is not answered is told
+    as lost, not made up."""
+    here, there = far_hosts
     node = program('contact_node', '--ros-args', *CUBES, env=SUBNET, within=there)
     node.wait_for_output('ready', 120)
-    impair(here, ends[0], 'loss', '2%', 'delay', '5ms')
-    impair(there, ends[1], 'loss', '2%', 'delay', '5ms')
     crane = program('crane', '--ros-args', *CUBES, '-p', 'duration:=8', '-p', 'wait:=20',
                     '-p', 'report:=true', env=SUBNET, within=here)
     crane.wait(120)
     lost, = (line for line in crane.output.splitlines() if 'messages lost' in line)
     _, evaluations, contacts = numbers_of(lost)
-    assert 0 < evaluations < 200  # of 1,600; 4 % of them lack one pose or the other
-    assert contacts == 0
+    assert 0 < evaluations < 200  # of 1,600; 4 % lack one pose or the other, 2 % the cloud
+    assert contacts < 25  # of some 870; measured 10 to 12
     assert 'wrong verdicts ......... 0' in crane.output
 
 
-def test_a_scene_shared_by_two_nodes(program, hosts, tmp_path):
-    """Each of two nodes on two hosts has its share of a scene's pairs, and both hear the same
-    poses: that is how a scene grows past one machine."""
-    (here, there), _ = hosts
+def test_a_yard_shared_by_two_hosts(program, hosts, tmp_path):
+    """1,000 pairs of a load and a yard, half of them with a node on each host, which hear the same
+    poses: together they answer every tick as one node with all of them would. That is how a scene
+    grows past one machine."""
+    here, there = hosts
+    size = [12.192, 2.438, 2.591]
+    boxes = {'load': {'size': size}} | {
+        f's{n}': {'size': size, 'pose': [12.7 * i, 2.7 * j, 2.591 * k, 0, 0, 0, 1]}
+        for n, (i, j, k) in enumerate(np.ndindex(10, 20, 5))}
+    pairs = [{'id': n, 'name': f'load_s{n}', 'a': f's{n}', 'b': 'load'} for n in range(1000)]
     nodes = []
-    for number, (host, a, b) in enumerate(((there, 'box_a', 'box_b'), (here, 'floor', 'box_a'))):
+    for number, host in enumerate((here, there)):
         path = tmp_path / f'share_{number}.yaml'
-        path.write_text(SCENE.format(id=number, name=f'pair_{number}', a=a, b=b))
+        path.write_text(json.dumps({'boxes': boxes, 'pairs': pairs[number::2]}))
         nodes.append(program('contact_node', '--ros-args', '-p', f'scene:={path}',
-                             '-r', f'__node:=share_{number}', env=SUBNET, within=host))
+                             '-p', 'pair_topics:=false', '-r', f'__node:=share_{number}',
+                             env=SUBNET, within=host))
+    whole = tmp_path / 'whole.yaml'
+    whole.write_text(json.dumps({'boxes': boxes, 'pairs': pairs}))
     for node in nodes:
         node.wait_for_output('ready', 120)
-    listener = subprocess.run(
-        [*here, sys.executable, '-c', LISTEN],
-        env=os.environ | SUBNET, capture_output=True, text=True, timeout=120)
-    assert listener.returncode == 0, listener.stdout + listener.stderr
-    assert 'pairs {0, 1}' in listener.stdout
-
-
-LISTEN = """
-import time
-import rclpy
-from geometry_msgs.msg import PoseStamped
-from rclpy.node import Node
-from sensor_msgs.msg import PointCloud2
-from box_contact_ros.nodes.messages import make_header, read_cloud
-from box_contact_ros.nodes.runtime import make_executor
-context = rclpy.Context()
-rclpy.init(context=context)
-node = Node('listener', context=context)
-executor = make_executor(context)
-executor.add_node(node)
-pairs = set()
-node.create_subscription(PointCloud2, 'contacts',
-                         lambda m: pairs.update(int(row['pair']) for row in read_cloud(m)), 10)
-boxes = [node.create_publisher(PoseStamped, f'box_{box}/pose', 10) for box in 'ab']
-deadline = time.monotonic() + 30
-while pairs != {0, 1} and time.monotonic() < deadline:
-    header = make_header(time.time_ns(), 'map')
-    for publisher, height in zip(boxes, (0.9, 2.8)):
-        message = PoseStamped(header=header)
-        message.pose.position.z = height
-        publisher.publish(message)
-    executor.spin_once(timeout_sec=0.05)
-print('pairs', pairs)
-executor.shutdown()
-node.destroy_node()
-context.try_shutdown()
-"""
+    script = Path(__file__).with_name('shared_scene.py')
+    played = subprocess.run([*here, sys.executable, script, whole, '2', '600'],
+                            env=os.environ | SUBNET, capture_output=True, text=True, timeout=180)
+    print(played.stdout)
+    assert played.returncode == 0, played.stdout + played.stderr

@@ -328,18 +328,15 @@ class ContactNode(LifecycleNode):
     def _pose_callback(self, box: str, topic: str) -> Callable[[Any], None]:
         def callback(message: Any) -> None:
             try:
-                self._take(box, message)
+                self.counts['poses'] += 1
+                pose = self._messages.read_pose(message)
+                for tick in self._pairing.add(box, pose):
+                    self._answer(tick)
             except Refused as refused:
                 self._refuse(refused.reason, f'{topic}: {refused}')
             except Exception as error:  # a callback must not end the node, whatever happens
                 self._refuse('internal error', f'{type(error).__name__}: {error}')
         return callback
-
-    def _take(self, box: str, message: Any) -> None:
-        self.counts['poses'] += 1
-        pose = self._messages.read_pose(message)
-        for tick in self._pairing.add(box, pose):
-            self._answer(tick)
 
     def _answer(self, tick: Tick) -> None:
         stamp, frame_id = self._header_of(tick)

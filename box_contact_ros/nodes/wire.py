@@ -42,6 +42,7 @@ FRAME_AT = ENCAPSULATION + _STAMP.size + 4
 KEPT_FRAMES = 64
 """Frames whose layouts are kept; whoever sends more than these costs time, not memory."""
 _NAN_ROW = np.full(7, np.nan).tobytes()
+_new_tuple = tuple.__new__  # a named tuple's own constructor is Python code
 _NOTHING = Contact(False, 0.0, np.zeros(3), np.zeros(3))
 
 
@@ -104,7 +105,8 @@ class RawMessages:
         if (nanosec < NANOSECONDS and -LENGTH_MAX < x < LENGTH_MAX
                 and -LENGTH_MAX < y < LENGTH_MAX and -LENGTH_MAX < z < LENGTH_MAX
                 and _LEAST < qx * qx + qy * qy + qz * qz + qw * qw < _MOST):
-            return StampedPose(np.array(numbers), self._frame_id, sec * NANOSECONDS + nanosec)
+            return _new_tuple(
+                StampedPose, (np.array(numbers), self._frame_id, sec * NANOSECONDS + nanosec))
         return checked_pose(numbers, self._frame_id, sec, nanosec)
 
     def _read_slowly(self, data: bytes) -> StampedPose:

@@ -1,0 +1,88 @@
+"""A load over a yard, answered by several nodes, each with its share of the pairs.
+
+`python shared_scene.py SCENE NODES TICKS`: plays the load's poses at 200 Hz, and holds the rows of
+all nodes together against what the whole scene gives here. Exit status 0 if all are there, and
+the same. For test_two_hosts.py, where it runs on one of the hosts.
+"""
+from __future__ import annotations
+
+import sys
+import time
+from collections import defaultdict
+
+import numpy as np
+import rclpy
+from geometry_msgs.msg import PoseStamped
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from sensor_msgs.msg import PointCloud2
+
+from box_contact_ros.nodes.messages import make_header, read_cloud
+from box_contact_ros.nodes.runtime import make_executor
+from box_contact_ros.scene import SceneSolver
+from box_contact_ros.scene_file import read_scene
+
+PERIOD = 0.005
+PATIENCE = 60.0
+SAME = 1e-9
+"""Of a coordinate [m], as another node may have it."""
+
+
+def main(path: str, nodes: int, ticks: int) -> int:
+    """Play, listen, compare."""
+    solver = SceneSolver(read_scene(path))
+    context = rclpy.Context()
+    rclpy.init(context=context)
+    node = Node('listener', context=context)
+    executor = make_executor(context)
+    executor.add_node(node)
+    clouds: dict[int, list[np.ndarray]] = defaultdict(list)
+
+    def keep(message: PointCloud2) -> None:
+        stamp = message.header.stamp
+        clouds[stamp.sec * 10**9 + stamp.nanosec].append(read_cloud(message))
+
+    node.create_subscription(PointCloud2, 'contacts', keep, QoSProfile(depth=1000))
+    publisher = node.create_publisher(PoseStamped, 'load/pose', QoSProfile(depth=1000))
+
+    def send(pose: np.ndarray) -> int:
+        stamp = time.time_ns()
+        message = PoseStamped(header=make_header(stamp, 'map'))
+        p, q = message.pose.position, message.pose.orientation
+        p.x, p.y, p.z, q.x, q.y, q.z, q.w = map(float, pose)
+        publisher.publish(message)
+        until = time.monotonic() + PERIOD
+        while (left := until - time.monotonic()) > 0.0:
+            executor.spin_once(timeout_sec=left)
+        return stamp
+
+    # 10 mm into the tops of the stacks, along and across them: on up to four at a time.
+    way = np.linspace(0.0, 1.0, ticks)
+    load = np.tile([0.0, 0, 4.5 * 2.591 + 0.5 * 2.591 - 0.01, 0, 0, 0, 1], (ticks, 1))
+    load[:, 0], load[:, 1] = 20.0 + 60.0 * way, 5.0 + 40.0 * way
+    deadline = time.monotonic() + PATIENCE
+    while len(clouds[send(load[0])]) < nodes and time.monotonic() < deadline:
+        pass
+    sent = [(send(pose), pose) for pose in load]
+    end = time.monotonic() + 5.0
+    while any(len(clouds[stamp]) < nodes for stamp, _ in sent) and time.monotonic() < end:
+        executor.spin_once(timeout_sec=0.05)
+    executor.shutdown()
+    node.destroy_node()
+    context.try_shutdown()
+
+    lost = sum(len(clouds[stamp]) < nodes for stamp, _ in sent)
+    wrong = contacts = most = 0
+    for stamp, pose in sent:
+        found = {int(row['pair']): row for rows in clouds[stamp] for row in rows}
+        wanted = {pair.id: contact for pair, contact in solver([pose]).touching}
+        contacts, most = contacts + len(wanted), max(most, len(wanted))
+        wrong += found.keys() != wanted.keys() or any(
+            not np.allclose(list(found[key])[:7], [*c.point, *c.normal, -c.separation], rtol=0,
+                            atol=SAME) for key, c in wanted.items())
+    print(f'{ticks} ticks, {lost} lost, {wrong} wrong, {contacts} contacts, up to {most} at a time')
+    return 0 if not lost and not wrong and most >= 4 else 1
+
+
+if __name__ == '__main__':
+    sys.exit(main(sys.argv[1], *map(int, sys.argv[2:4])))
