@@ -5,6 +5,8 @@ import copy
 import json
 import math
 import re
+import shutil
+import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -168,6 +170,51 @@ ASYNCAPI = {
 
 def test_document_has_asyncapis_structure():
     assert [error.message for error in Draft202012Validator(ASYNCAPI).iter_errors(DOCUMENT)] == []
+
+
+PARSER = '@asyncapi/parser@3.6.3'
+
+
+@pytest.fixture(scope='module')
+def parse(tmp_path_factory):
+    """AsyncAPI's own parser, from npm: takes a folder with asyncapi.yaml."""
+    place = tmp_path_factory.mktemp('npm')
+    if not (shutil.which('npm') and shutil.which('node')):
+        pytest.skip("AsyncAPI's own parser needs npm and node")
+    installed = subprocess.run(['npm', 'install', '--no-audit', '--no-fund', '--ignore-scripts',
+                                '--prefix', place, PARSER], capture_output=True, timeout=300)
+    if installed.returncode:
+        pytest.skip(f'npm could not fetch {PARSER}')
+    script = shutil.copy(ROOT / 'test' / 'asyncapi_parser.mjs', place)
+
+    def parse(folder: Path) -> dict[str, list[str]]:
+        ran = subprocess.run(['node', script, folder / 'asyncapi.yaml'], capture_output=True,
+                             text=True, timeout=120)
+        assert ran.returncode == 0, ran.stderr
+        return json.loads(ran.stdout)
+    return parse
+
+
+def test_asyncapis_own_parser(parse, tmp_path):
+    """Its schema of the ros2 binding misspells one value, `realiable`, where the binding's text
+    says reliable. Nothing else is said against the document, and with that word nothing at all."""
+    said = parse(FOLDER)['complaints']
+    assert said and all('realiable' in text or 'match "then" schema' in text for text in said), said
+    folder = shutil.copytree(FOLDER, tmp_path / 'msg_schemas')
+    text = (folder / 'asyncapi.yaml').read_text('utf-8')
+    (folder / 'asyncapi.yaml').write_text(
+        text.replace('reliability: reliable', 'reliability: realiable'), 'utf-8')
+    assert parse(folder) == {'complaints': [], 'channels': list(ADDRESSES)}
+
+
+def test_the_parser_complains(parse, tmp_path):
+    """An unknown action, a channel that is not there."""
+    folder = shutil.copytree(FOLDER, tmp_path / 'msg_schemas')
+    text = (folder / 'asyncapi.yaml').read_text('utf-8')
+    for right, wrong in (('action: receive', 'action: hear'), ('#/channels/contacts', '#/none')):
+        assert right in text
+        (folder / 'asyncapi.yaml').write_text(text.replace(right, wrong), 'utf-8')
+        assert len(parse(folder)['complaints']) > len(parse(FOLDER)['complaints'])
 
 
 def test_every_reference_resolves():
