@@ -85,7 +85,7 @@ MUTANTS = {
         'nodes/wire.py', 'and _LEAST < qx * qx + qy * qy + qz * qz + qw * qw < _MOST):', '):',
         'test/test_faults.py -k half_of_the_poses'),
     'frames not compared': Mutant(
-        'nodes/contact.py', 'elif pose.frame_id != first.frame_id:', 'elif False:',
+        'nodes/contact.py', 'elif pose.frame_id != frame_id:', 'elif False:',
         'test/test_contact_node.py -k frames_must'),
     'a stamp answered again': Mutant(
         'pairing.py', 'if stamp in taken:', 'if False:',
