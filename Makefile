@@ -119,7 +119,7 @@ comma := ,
 define compile
 printf 'compiling the kernels (about a minute) '
 SECONDS=0
-$(VENV_PYTHON) -c 'from box_contact_ros import ContactSolver as S; [S((2, 2, 2), (2, 2, 2), model=m).batch([[0, 0, 0, 0, 0, 0, 1]], [[0, 0, 1.9, 0, 0, 0, 1]]) for m in ($(strip $(1)))]'
+$(VENV_PYTHON) -c 'import logging; logging.disable(); from box_contact_ros import ContactSolver as S; [S((2, 2, 2), (2, 2, 2), model=m).batch([[0, 0, 0, 0, 0, 0, 1]], [[0, 0, 1.9, 0, 0, 0, 1]]) for m in ($(strip $(1)))]'
 printf ' done in %s s\n' "$$SECONDS"
 endef
 

@@ -63,7 +63,7 @@ setup(
     distclass=PipDistribution if BY_PIP else Distribution,
     zip_safe=False,
     python_requires='>=3.10',
-    install_requires=['numba', 'numpy', 'pyyaml', 'safetensors'],
+    install_requires=['jsonschema', 'numba', 'numpy', 'pyyaml', 'safetensors'],
     # Kept apart, so that a user with an apt-installed ROS never gets the ROS wheels, and nobody
     # gets torch by only wanting contacts.
     extras_require={
@@ -88,7 +88,6 @@ setup(
             'coverage',
             'gmpy2',
             'hypothesis',
-            'jsonschema',
             # Foxglove's own reader, for what `record` writes.
             'mcap',
             'mcap-ros2-support',

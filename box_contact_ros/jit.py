@@ -9,6 +9,7 @@ slow, for a debugger or a coverage tool.
 """
 from __future__ import annotations
 
+import logging
 import math
 import warnings
 from collections.abc import Callable
@@ -18,11 +19,31 @@ from typing import Any
 
 import numba
 import numpy as np
+from numba.core import event
 
 _warned = False
 _STAMP = tuple(sorted((path.name, path.stat().st_mtime_ns, path.stat().st_size)
                       for path in Path(__file__).parent.glob('*.py')))
 """What the cached kernels are made from: the package's own modules."""
+
+
+class _Notice(event.Listener):
+    """Says once a process that it compiles, which takes long enough to be taken for hanging."""
+
+    said = False
+
+    def on_start(self, event: Any) -> None:
+        function = getattr(event.data.get('dispatcher'), 'py_func', None)
+        if not self.said and getattr(function, '__module__', '').startswith(__package__):
+            self.said = True
+            logging.getLogger(__package__).warning(
+                'compiling the kernels: up to a minute; later starts load them')
+
+    def on_end(self, event: Any) -> None:
+        pass
+
+
+event.register('numba:compile', _Notice())  # type: ignore[no-untyped-call]
 
 
 def kernel(function: Callable[..., Any]) -> Any:

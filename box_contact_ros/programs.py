@@ -20,6 +20,7 @@ from __future__ import annotations
 import difflib
 import functools
 import importlib
+import importlib.util
 import os
 import sys
 from collections.abc import Sequence
@@ -239,13 +240,15 @@ def _missing_module(name: str, module: str) -> str | None:
     if not bring_it:
         return None
     # All extras of the program at once: naming only the missing one would make the user fail twice.
-    extras = list(PROGRAMS[name].extras)
+    # But not a ROS that is here: in a workspace it comes from apt, and wheels do not go with it.
+    extras = [extra for extra in PROGRAMS[name].extras
+              if extra != 'ros' or 'ros' in bring_it or not importlib.util.find_spec('rclpy')]
     if not set(extras) & set(bring_it):
         extras.append(bring_it[0])
     listed = ','.join(extras)
     text = (
         f'box_contact_ros: {name} needs the Python module {module!r}, which is not installed: '
-        f"pip install 'box_contact_ros[{listed}]' (in a checkout: pip install -e '.[{listed}]')"
+        f"in the checkout, pip install -c constraints.txt '.[{listed}]'"
     )
     if 'ros' in bring_it:
         text += ', or apt install ros-jazzy-ros-base and source /opt/ros/jazzy/setup.bash'

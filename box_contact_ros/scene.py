@@ -225,9 +225,9 @@ class SceneSolver:
         Raises ValueError for numbers that are no pose.
         """
         if self._only is not None:
-            (first, fixed_a), (second, fixed_b) = self._sides
-            a = poses[first] if fixed_a is None else fixed_a
-            b = poses[second] if fixed_b is None else fixed_b
+            (place_a, fixed_a), (place_b, fixed_b) = self._sides
+            a = poses[place_a] if fixed_a is None else fixed_a
+            b = poses[place_b] if fixed_b is None else fixed_b
             if a is None or b is None:
                 return Answer([], [self._only], 0)
             contact = self._solver(a, b)

@@ -6,6 +6,7 @@ lines of them expand to gigabytes), no key twice.
 from __future__ import annotations
 
 import json
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -30,12 +31,16 @@ class SceneError(ValueError):
 def read_scene(source: str) -> Scene:
     """The scene of a file, or of a text that begins with `{` or has more than one line.
 
+    A path that leads to no file from here may be one of the package's own: config/scenes/….
     Raises SceneError, whose words name file, line and field.
     """
     if source.lstrip().startswith('{') or '\n' in source:
         return parse_scene(source, 'scene')
     path = Path(source)
     try:
+        if not path.is_absolute() and not path.exists():
+            with suppress(FileNotFoundError):
+                path = resource_path(source)
         with path.open('rb') as file:
             data = file.read(LARGEST_FILE + 1)
         text = data.decode('utf-8')

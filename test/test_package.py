@@ -213,11 +213,17 @@ def test_missing_extra_is_one_line_that_names_it(
     fake = type(sys)('fake')
     fake.main = main
     monkeypatch.setattr(programs.importlib, 'import_module', lambda _: fake)
+    monkeypatch.setattr(programs.importlib.util, 'find_spec', lambda _: None)
     assert programs.run(name, []) == 1
     message = capsys.readouterr().err
     assert message.count('\n') == 1
-    assert f"pip install 'box_contact_ros[{extras}]'" in message
+    assert f"pip install -c constraints.txt '.[{extras}]'" in message
     assert ('apt install ros-jazzy-ros-base' in message) == module.startswith('rclpy')
+    # Where there is a ROS, perhaps apt's, its wheels are not recommended.
+    monkeypatch.undo()
+    monkeypatch.setattr(programs.importlib, 'import_module', lambda _: fake)
+    programs.run(name, [])
+    assert f"'.[{extras.removeprefix('ros,')}]'" in capsys.readouterr().err
 
 
 def test_missing_module_of_our_own_keeps_its_traceback(

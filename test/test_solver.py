@@ -200,3 +200,14 @@ def test_warnings_are_errors_here():
     """The suite runs with warnings as errors, so none hides."""
     with pytest.raises(UserWarning):
         warnings.warn('seen', UserWarning, stacklevel=1)
+
+
+def test_compiling_is_said_once(tmp_path):
+    """A minute without a word is taken for hanging. Once compiled, nothing is said."""
+    script = ('from box_contact_ros.pose import rotation_entries\n'
+              'rotation_entries(0.0, 0.0, 0.0, 1.0)\n'
+              'rotation_entries(0, 0, 0, 1)')
+    said = [subprocess.run([sys.executable, '-c', script], capture_output=True, text=True,
+                           env={**os.environ, 'NUMBA_CACHE_DIR': str(tmp_path)}).stderr
+            for _ in range(2)]
+    assert said == ['compiling the kernels: up to a minute; later starts load them\n', '']

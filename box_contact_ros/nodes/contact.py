@@ -303,8 +303,8 @@ class ContactNode(LifecycleNode):
             gone = max(0, -event.current_count_change)
             self.counts['publishers gone'] += gone
             if gone:
-                self.get_logger().warning(f'{box}: a publisher of its poses is gone, '
-                                          f'{event.current_count} left')
+                self.get_logger().info(f'{box}: a publisher of its poses is gone, '
+                                       f'{event.current_count} left')
         return callback
 
     def _on_liveliness(self, box: str) -> Callable[[Any], None]:

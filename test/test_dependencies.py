@@ -1,0 +1,95 @@
+"""What setup.py asks for is enough: nothing that only the tests' environment has is used."""
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+RUN = """
+import re, runpy, sys
+from importlib.metadata import PackageNotFoundError, packages_distributions, requires
+
+NEEDED, PROGRAM = {needed!r}, {program!r}
+
+
+def name_of(requirement):
+    return re.match(r'[A-Za-z0-9._-]+', requirement)[0].lower().replace('_', '-')
+
+
+found, open_ = set(), [name_of(requirement) for requirement in NEEDED]
+while open_:
+    name = open_.pop()
+    if name not in found:
+        found.add(name)
+        try:
+            open_ += [name_of(r) for r in requires(name) or () if 'extra ==' not in r]
+        except PackageNotFoundError:  # of another platform
+            pass
+refused = {{module for module, names in packages_distributions().items()
+           if not found & {{name.lower().replace('_', '-') for name in names}}}}
+refused -= {{'box_contact_ros', '_ros_wheels_bootstrap'}}
+
+
+class Refusing:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition('.')[0] in refused:
+            raise ModuleNotFoundError(f'No module named {{name!r}} here', name=name)
+
+
+sys.meta_path.insert(0, Refusing())
+exec(PROGRAM)
+"""
+SOLVER = """
+from box_contact_ros import ContactSolver
+from box_contact_ros.scene import SceneSolver
+from box_contact_ros.scene_file import read_scene
+for model in ('exact', 'committee', 'paper'):
+    ContactSolver((2, 2, 2), (2, 2, 2), model=model)([0] * 6 + [1], [0] * 6 + [1])
+SceneSolver(read_scene('config/scenes/yard_bay.yaml'))
+"""
+NODE = """
+import rclpy
+from rclpy.parameter import Parameter
+from box_contact_ros.nodes.contact import ContactNode
+context = rclpy.Context()
+rclpy.init(context=context)
+ContactNode(context, parameter_overrides=[
+    Parameter('scene', value='config/scenes/yard_bay.yaml')]).destroy_node()
+context.try_shutdown()
+"""
+
+
+def extras() -> dict[str, list[str]]:
+    """What setup.py installs, by extra; '' always."""
+    script = ('import json, setuptools; setuptools.setup = lambda **kw: print(json.dumps('
+              '{"": kw["install_requires"], **kw["extras_require"]})); '
+              'exec(open("setup.py").read())')
+    root = Path(__file__).resolve().parents[1]
+    done = subprocess.run([sys.executable, '-c', '__file__ = "setup.py"; ' + script], cwd=root,
+                          capture_output=True, text=True, check=True)
+    return json.loads(done.stdout)
+
+
+@pytest.mark.parametrize('names, program', [(('',), SOLVER), (('', 'ros'), NODE)],
+                         ids=['solver', 'node'])
+def test_installed_without_extras(names, program, tmp_path):
+    """From another folder than the checkout, too: scenes of the package's own are found."""
+    needed = [requirement for name in names for requirement in extras()[name]]
+    script = RUN.format(needed=needed, program=program)
+    done = subprocess.run([sys.executable, '-c', script], cwd=tmp_path, capture_output=True,
+                          text=True, env={**os.environ, 'PYTHONPATH': str(Path(
+                              __file__).resolve().parents[1])}, timeout=300)
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_module_that_is_not_asked_for_is_refused(tmp_path):
+    """The test above can fail."""
+    script = RUN.format(needed=extras()[''], program='import pytest')
+    done = subprocess.run([sys.executable, '-c', script], cwd=tmp_path, capture_output=True,
+                          text=True)
+    assert done.returncode == 1
+    assert "No module named 'pytest' here" in done.stderr
