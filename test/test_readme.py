@@ -166,8 +166,17 @@ def colcon(words: list[str], **_) -> None:
 
 
 def sourced(words: list[str], **_) -> None:
-    """ROS's own set-up files: not on this machine."""
-    assert words[1] in ('/opt/ros/jazzy/setup.bash', 'install/setup.bash')
+    """ROS's own set-up files: not on this machine. Or that of the environment made before."""
+    assert words[1] in ('/opt/ros/jazzy/setup.bash', 'install/setup.bash', f'{VENV}/bin/activate')
+
+
+VENV = '.venv-contact'
+
+
+def venv(words: list[str], **_) -> None:
+    """A folder of its own, which git ignores."""
+    assert words[3] == VENV
+    assert VENV in (ROOT / '.gitignore').read_text('utf-8')
 
 
 COMMANDS = {
@@ -182,6 +191,7 @@ COMMANDS = {
     r'sudo apt install .+': apt,
     r'colcon build .+': colcon,
     r'source \S+': sourced,
+    r'python3 -m venv \S+': venv,
 }
 
 
@@ -213,6 +223,21 @@ def test_python_example(text, program):
         exec(compile(text, 'example', 'exec'), {'__name__': 'example'})
     assert printed.getvalue().splitlines() == re.findall(r'^print\(.*\)  # (.*)$', text,
                                                          re.MULTILINE)
+
+
+def test_extras_of_every_program():
+    """The README's table has every program once, with the extras that it needs."""
+    text = (ROOT / 'README.md').read_text('utf-8').split('| Program | What | Extras |', 1)[1]
+    listed = {}
+    for line in re.search(r'(?:^\|.*\n)+', text, re.MULTILINE).group().splitlines()[1:]:
+        programs, _, extras = (cell.strip() for cell in line.strip('|').split('|'))
+        names = re.findall(r'`(\w+)`', programs)
+        needed = [set(PROGRAMS[name].extras) for name in names]
+        assert set(extras.strip('`').split(',')) >= set().union(*needed), line
+        if len(names) == 1:
+            assert set(extras.strip('`').split(',')) == needed[0], line
+        listed |= dict.fromkeys(names)
+    assert set(listed) == set(PROGRAMS)
 
 
 def anchors(page: Path) -> set[str]:

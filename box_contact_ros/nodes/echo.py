@@ -1,10 +1,13 @@
-"""The bare echo node: answers every pair of poses with its stamp, and computes nothing.
+"""The echo node: answers every pair of poses with its stamp, and computes nothing.
 
 It is the floor of the bench: what transport and executor alone cost. It subscribes box_a/pose and
 box_b/pose as the contact node does, and answers on echo (std_msgs/Header) once poses of equal stamp
 are in. Messages stay the bytes they come as; no faster answer can be given from Python.
 
-`python -m box_contact_ros.nodes.echo`; for the bench, not a program of its own.
+It is served as the contact node is, or, with --bare, as any node on this executor: without
+`runtime.let_callbacks_finish`.
+
+`python -m box_contact_ros.nodes.echo [--bare]`; for bench and soak, not a program of its own.
 """
 from __future__ import annotations
 
@@ -69,4 +72,5 @@ class EchoNode(Node):
 
 
 if __name__ == '__main__':
-    sys.exit(run_node(EchoNode, sys.argv[1:]))
+    bare = sys.argv[1:2] == ['--bare']
+    sys.exit(run_node(EchoNode, sys.argv[1 + bare:], undisturbed=not bare))

@@ -62,15 +62,17 @@ def let_callbacks_finish() -> None:
         pass
 
 
-def spin(node: Node) -> None:
+def spin(node: Node, *, undisturbed: bool = True) -> None:
     """Serve a node until its context is shut down (SIGINT, SIGTERM, or `context.shutdown()`).
 
-    An exception out of a callback is said, and ends nothing.
+    An exception out of a callback is said, and ends nothing. `undisturbed`: see
+    `let_callbacks_finish`.
     """
     executor = make_executor(node.context)
     try:
         executor.add_node(node)
-        let_callbacks_finish()
+        if undisturbed:
+            let_callbacks_finish()
         while node.context.ok():
             try:
                 executor.spin_once(timeout_sec=SPIN_SECONDS)
@@ -88,8 +90,9 @@ def spin(node: Node) -> None:
         executor.shutdown()
 
 
-def run_node(make_node: Callable[[Context], Node], args: Sequence[str] | None) -> int:
-    """Start a node and serve it: 0 after a clean end, 1 (with one line) if it refuses to start."""
+def run_node(make_node: Callable[[Context], Node], args: Sequence[str] | None, *,
+             undisturbed: bool = True) -> int:
+    """Start a node and `spin`: 0 after a clean end, 1 (with one line) if it refuses to start."""
     context = Context()
     node, joined = None, False
     try:
@@ -98,7 +101,7 @@ def run_node(make_node: Callable[[Context], Node], args: Sequence[str] | None) -
                    signal_handler_options=SignalHandlerOptions.ALL)
         joined = True
         node = make_node(context)
-        spin(node)
+        spin(node, undisturbed=undisturbed)
     except REFUSALS as error:
         # Where a signal has ended the context, whatever was under way fails for that.
         if context.ok() or not joined:

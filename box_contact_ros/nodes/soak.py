@@ -1,9 +1,11 @@
-"""The soak: a contact node at 1 kHz for ten minutes, with a bare echo node in between.
+"""The soak: a contact node at 1 kHz for ten minutes, with echo nodes in between.
 
-Both run as processes of their own, in a ROS domain of their own on this host. Blocks of a few
-seconds go to the one and then to the other, so that what disturbs the machine disturbs both. Every
-answer is held against what the same model says of the same two poses: an answer that was put
-together from poses of two ticks is found. Prints a table, and writes soak.csv and soak.md.
+There are two, which compute nothing: a bare one, and one served as the contact node is, with the
+middleware's threads kept from interrupting it. All run as processes of their own, in a ROS domain
+of their own on this host. Blocks of a few seconds go to the one and then to the others, so that
+what disturbs the machine disturbs all. Every answer is held against what the same model says of the
+same two poses: an answer that was put together from poses of two ticks is found. Prints a table,
+and writes soak.csv and soak.md.
 
 The exit status is 0 only if nothing was lost, mispaired, answered twice or wrong, and the contact
 node's memory grew by less than 1 MB after its first block.
@@ -32,6 +34,7 @@ from .bench_log import (
     ECHO_MESSAGES,
     NodeLog,
     StreamLog,
+    StreamResult,
     markdown,
     write_csv,
 )
@@ -41,7 +44,7 @@ from .runtime import REFUSALS
 
 BLOCK_SECONDS = 10.0
 ECHO_SHARE = 0.25
-"""Of a block, for the echo node."""
+"""Of a block, for each echo node."""
 SAME_POINT = 1e-9
 """How far [m] the node's point may lie from the one that the model gives here: another processor
 may round differently. Poses of the streams that follow each other differ by millimetres and more.
@@ -49,7 +52,7 @@ may round differently. Poses of the streams that follow each other differ by mil
 GROWTH_LIMIT = 1.0
 """Of the contact node's resident memory after its first block [MB]."""
 P50_LIMIT, P99_LIMIT, START_LIMIT = 1.25, 1.5, 2.5
-"""Aims: ratios to the echo node's latencies, and seconds from start to first answer."""
+"""Aims: ratios to the bare echo node's latencies, and seconds from start to first answer."""
 STREAMS = ('containers', 'crane')
 """Played in turn: unrelated poses, and a motion. For boxes of one size, so that nobody restarts."""
 
@@ -65,7 +68,7 @@ class SoakBench(Bench):
         """Seconds from the start of the node to its first answer, to a tenth."""
 
     def _play(self, stream: Stream, truth: Contacts, turn: list[Subject]) -> None:
-        if turn[0].name == 'echo':
+        if turn[0].name != 'contact':
             rows = slice(0, round(ECHO_SHARE * len(stream)))
             stream = dataclasses.replace(
                 stream, pose_a=stream.pose_a[rows], pose_b=stream.pose_b[rows])
@@ -101,9 +104,7 @@ def main(args: Sequence[str] | None = None) -> int:
     """Run the soak; 0 only if all was right."""
     args = list(args or ())
     options = _options(remove_ros_args(args))
-    subjects = [_contact(options), Subject(
-        'echo', ['-m', 'box_contact_ros.nodes.echo', '--ros-args'],
-        NodeLog('echo', '', ECHO_MESSAGES), poses='for_echo/', has_sizes=False)]
+    subjects = [_contact(options), _echo('bare echo', 'bare/', '--bare'), _echo('echo', 'served/')]
     try:
         blocks, truths = _blocks(options)
         # Once by itself, so that no other node starts on the same core.
@@ -129,11 +130,17 @@ def _contact(options: argparse.Namespace) -> Subject:
                    NodeLog('contact', options.model, CONTACT_MESSAGES), poses='for_contact/')
 
 
+def _echo(name: str, prefix: str, *options: str) -> Subject:
+    return Subject(name, ['-m', 'box_contact_ros.nodes.echo', *options, '--ros-args',
+                          '-r', f'echo:={prefix}echo'],
+                   NodeLog(name, '', ECHO_MESSAGES), prefix, poses=f'for_{prefix}', has_sizes=False)
+
+
 def _options(args: Sequence[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog='soak', description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('--minutes', type=float, default=10.0, metavar='MIN',
-                        help='of poses to the contact node; the echo node takes a quarter as long, '
+                        help='of poses to the contact node; each echo node takes a quarter as long '
                              'beside (default: %(default)g)')
     parser.add_argument('--rate', type=float, default=1000.0, metavar='HZ',
                         help='pairs of poses sent per second (default: %(default)g)')
@@ -173,8 +180,8 @@ def _report(options: argparse.Namespace, subjects: list[Subject], bench: SoakBen
             first_answer: float, about: dict[str, str]) -> bool:
     """Print and write what was found; whether all was right."""
     results = {subject.name: subject.log.results() for subject in subjects}
-    contact, echo = results['contact'], results['echo']
-    if not contact or not echo:
+    contact, bare, echo = (results[name] for name in ('contact', 'bare echo', 'echo'))
+    if not (contact and bare and echo):
         print('\n'.join(['nothing was sent', *bench.notes]))
         return False
     growth = float(max(bench.memory) - bench.memory[0]) if bench.memory else float('nan')
@@ -184,43 +191,53 @@ def _report(options: argparse.Namespace, subjects: list[Subject], bench: SoakBen
               'answered twice, or to no pose': sum(r.duplicates + r.strangers for r in contact),
               'contradictions between cloud, point and normal': sum(
                   r.contradictions for r in contact)}
-    mine, floor = (1e3 * np.concatenate([r.latencies for r in of]) for of in (contact, echo))
+    mine, plain, floor = (1e3 * np.concatenate([r.latencies for r in of])
+                          for of in (contact, bare, echo))
     clouds = 1e3 * np.concatenate([without_contact(log) for log in subjects[0].log.streams])
-    table = [['latency [ms]', 'contact node', 'of it, no contact: one message', 'echo node',
-              'contact / echo', 'aim']]
+    table = [['latency [ms]', 'contact node', 'of it, no contact: one message', 'bare echo',
+              'contact / bare echo', 'aim', 'echo, served alike', 'contact / echo']]
     for name, percent, aim in (('p50', 50, P50_LIMIT), ('p99', 99, P99_LIMIT), ('p99.9', 99.9, 0),
                                ('worst', 100, 0)):
-        one, other, echoed = (float(np.percentile(of, percent)) if of.size else math.nan
-                              for of in (mine, clouds, floor))
-        table.append([name, f'{one:.3f}', f'{other:.3f}', f'{echoed:.3f}', f'{one / echoed:.2f}',
-                      f'{aim:g}' if aim else ''])
+        one, other, lone, echoed = (float(np.percentile(of, percent)) if of.size else math.nan
+                                    for of in (mine, clouds, plain, floor))
+        table.append([name, f'{one:.3f}', f'{other:.3f}', f'{lone:.3f}', f'{one / lone:.2f}',
+                      f'{aim:g}' if aim else '', f'{echoed:.3f}', f'{one / echoed:.2f}'])
     lines = [f'{name}: {value}' for name, value in counts.items()]
     lines.append(f'memory: {bench.memory[0]:.1f} MB after the first block, grown by at most '
                  f'{growth:.2f} MB (limit {GROWTH_LIMIT:g})')
     lines.append(f'start of the contact node to its first answer: {first_answer:.1f} s '
                  f'(aim {START_LIMIT:g}, from warm caches)')
-    ratios = [[a[0] / b[0], a[1] / b[1]] for a, b in zip(*(
-        [np.percentile(r.latencies, (50, 99)) if r.answered else (np.nan, np.nan) for r in of]
-        for of in (contact, echo)))]
-    middle = np.nanmedian(ratios, axis=0)
-    lines.append(f'block by block, the ratio is {middle[0]:.2f} at p50 and {middle[1]:.2f} at p99 '
-                 f'(median of {len(ratios)} blocks)')
+    for name, of in (('bare echo', bare), ('echo', echo)):
+        p50, p99 = _ratio_by_block(contact, of)
+        lines.append(f'block by block, contact / {name} is {p50:.2f} at p50 and {p99:.2f} at p99 '
+                     f'(median of {len(of)} blocks)')
     lines.append(f'the soak itself was late by at most '
                  f'{1e3 * max(r.lateness_max for r in contact):.1f} ms')
     lines += bench.notes
     text = '\n'.join(f'- {line}' for line in lines)
     print(f'\n{markdown(table, left=1)}\n\n{text}', flush=True)
     options.out.mkdir(parents=True, exist_ok=True)
-    write_csv(options.out / 'soak.csv', [*contact, *echo], about)
+    write_csv(options.out / 'soak.csv', [*contact, *bare, *echo], about)
     where = '\n'.join(f'- {name}: {value}' for name, value in about.items())
     (options.out / 'soak.md').write_text(
         '# Soak\n\nMade by `python -m box_contact_ros soak`: blocks of poses to the contact node '
-        'and to a bare echo node in turn.\nLatencies run from the stamp of the poses to the later '
-        f'of point and normal.\n\n{where}\n\n{markdown(table, left=1)}\n\n{text}\n', 'utf-8')
+        'and to two echo nodes in turn,\na bare one and one whose threads are scheduled as the '
+        "contact node's are. Latencies run from the stamp of the\nposes to the later of point and "
+        f'normal.\n\n{where}\n\n{markdown(table, left=1)}\n\n{text}\n', 'utf-8')
     print(f'results: {options.out}/soak.csv, soak.md')
     faultless = not any(value for name, value in counts.items() if name != 'sent')
-    adds_up = all(r.adds_up for r in [*contact, *echo]) and all(s.log.adds_up for s in subjects)
+    adds_up = (all(r.adds_up for r in [*contact, *bare, *echo])
+               and all(s.log.adds_up for s in subjects))
     return faultless and adds_up and not bench.notes and not growth >= GROWTH_LIMIT
+
+
+def _ratio_by_block(ours: Sequence[StreamResult], theirs: Sequence[StreamResult],
+                    ) -> tuple[float, float]:
+    """Medians of the ratios of p50 and of p99, of blocks that were sent one after the other."""
+    ours_theirs = [[np.percentile(r.latencies, (50, 99)) if r.answered else (np.nan, np.nan)
+                    for r in of] for of in (ours, theirs)]
+    p50, p99 = np.nanmedian([a / b for a, b in zip(*map(np.asarray, ours_theirs))], axis=0)
+    return float(p50), float(p99)
 
 
 def without_contact(stream: StreamLog) -> np.ndarray:
