@@ -75,7 +75,7 @@ PROGRAMS = {
     ),
     'soak': Program(
         'box_contact_ros.nodes.soak:main',
-        'ten minutes at 1 kHz: losses, mispairs, memory, latency beside a bare echo node',
+        'ten minutes at 1 kHz: losses, mispairs, memory, latency beside echo nodes',
         ('ros', 'sim', 'report'),
     ),
     'train': Program(

@@ -1,6 +1,6 @@
 """The bench: drives the nodes with named streams of poses at a set rate, and measures the answers.
 
-Contact node, soup node and a bare echo node run as processes of their own, in a ROS domain of their
+Contact node, soup node and an echo node run as processes of their own, in a ROS domain of their
 own on this host. Each stream goes to one of them after the other, so that they do not compete for
 cores. Every answer is paired by stamp with what was sent, and held against the exact contact. The
 streams for cubes come first; for the containers the nodes are restarted, with the other sizes.
