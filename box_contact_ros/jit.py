@@ -34,10 +34,12 @@ class _Notice(event.Listener):
 
     def on_start(self, event: Any) -> None:
         function = getattr(event.data.get('dispatcher'), 'py_func', None)
-        if not self.said and getattr(function, '__module__', '').startswith(__package__):
+        module = getattr(function, '__module__', None) or ''  # others may have none
+        if not self.said and module.partition('.')[0] == __package__:
             self.said = True
             logging.getLogger(__package__).warning(
-                'compiling the kernels: up to a minute; later starts load them')
+                'compiling the kernels: up to a minute%s',
+                '' if _warned else '; later starts load them')
 
     def on_end(self, event: Any) -> None:
         pass

@@ -102,8 +102,13 @@ class StampPairing(_Pairing):
         super().__init__(scene, tolerance=tolerance, max_age=max_age)
 
     def set_scene(self, scene: Scene) -> None:
-        """Go over to another scene; poses that wait go on waiting."""
+        """Go over to another scene; poses of boxes that stay go on waiting."""
         super().set_scene(scene)
+        for key, poses in list(self._waiting.items()):
+            for gone in poses.keys() - set(self.boxes):
+                del poses[gone]
+            if not poses:
+                del self._waiting[key]
         self._missing_since = {box: stamp for box, stamp in self._missing_since.items()
                                if box in self.boxes}
         self._taken = {box: self._taken.get(box, deque(maxlen=REMEMBERED_STAMPS))
@@ -121,13 +126,13 @@ class StampPairing(_Pairing):
 
     def add(self, box: str, pose: StampedPose) -> list[Tick]:
         """Take a pose; the tick that it completes, after those that are not waited for any more."""
-        stamp = pose.stamp
+        stamp, taken = pose.stamp, self._taken[box]
         newest = self._newest
         if stamp <= newest.get(box, NEVER) and self._refuses(box, stamp):
             return []
         if stamp > newest.get(box, NEVER):
             newest[box] = stamp
-        self._taken[box].append(stamp)
+        taken.append(stamp)
         self._missing_since.pop(box, None)
         if stamp > self._now:
             self._advance(stamp)
@@ -174,7 +179,11 @@ class StampPairing(_Pairing):
         self._now = stamp
 
     def _note_missing(self, stamp: int) -> None:
-        """A tick has begun: boxes that have given no pose as late as this lack one."""
+        """A tick has begun: boxes that have given no pose as late as this lack one.
+
+        Once a tick is enough. A box that gives an older pose in the middle of one, and then no
+        more, is missing from the next one on.
+        """
         newest, missing = self._newest, self._missing_since
         for box in self.boxes:
             if stamp > newest.get(box, NEVER) and box not in missing:

@@ -220,8 +220,7 @@ def test_missing_extra_is_one_line_that_names_it(
     assert f"pip install -c constraints.txt '.[{extras}]'" in message
     assert ('apt install ros-jazzy-ros-base' in message) == module.startswith('rclpy')
     # Where there is a ROS, perhaps apt's, its wheels are not recommended.
-    monkeypatch.undo()
-    monkeypatch.setattr(programs.importlib, 'import_module', lambda _: fake)
+    monkeypatch.setattr(programs.importlib.util, 'find_spec', lambda _: object())
     programs.run(name, [])
     assert f"'.[{extras.removeprefix('ros,')}]'" in capsys.readouterr().err
 

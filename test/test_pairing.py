@@ -155,6 +155,16 @@ def test_scene_changes_cost_the_others_no_tick():
     assert answered == list(range(300))
 
 
+def test_a_box_that_went_counts_for_no_tick():
+    """Its pose waits with b's when it goes and c comes: the tick waits for c all the same."""
+    pairing = StampPairing(scene('ax', ['ax']))
+    assert pairing.add('x', pose(MS)) == []
+    pairing.set_scene(scene('abc', ['ab', 'bc']))
+    assert pairing.add('a', pose(MS)) == []
+    assert pairing.add('b', pose(MS)) == []
+    assert stamps(pairing.add('c', pose(MS))) == [MS, MS, MS]
+
+
 def test_time_set_back_begins_anew():
     """A simulation that starts again: what waited is dropped and counted, the first tick of the new
     time is answered, and no pose of the old time is."""

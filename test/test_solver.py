@@ -209,6 +209,7 @@ def test_compiling_is_said_once(tmp_path):
               'rotation_entries(0.0, 0.0, 0.0, 1.0)\n'
               'rotation_entries(0, 0, 0, 1)')
     said = [subprocess.run([sys.executable, '-c', script], capture_output=True, text=True,
-                           env={**os.environ, 'NUMBA_CACHE_DIR': str(tmp_path)}).stderr
+                           env={**os.environ, 'NUMBA_CACHE_DIR': str(tmp_path),
+                                'NUMBA_DISABLE_JIT': '0'}).stderr
             for _ in range(2)]
     assert said == ['compiling the kernels: up to a minute; later starts load them\n', '']

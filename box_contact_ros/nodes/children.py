@@ -9,7 +9,6 @@ import os
 import signal
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Iterator, Sequence
 from typing import IO, Any
@@ -18,6 +17,8 @@ DOMAINS = range(1, 102)
 """To draw from: 0 is everybody's; beyond 101, ports run into those that Linux hands out."""
 END_PATIENCE = 3.0
 """Time [s] between asking a process group to end and killing it."""
+LOOK_PERIOD = 0.05
+"""Time [s] after which a signal is noticed, at most."""
 
 
 def on_this_host(domain: int) -> dict[str, str]:
@@ -53,12 +54,26 @@ def _signal_group(process: subprocess.Popen[bytes], number: signal.Signals) -> N
         os.killpg(process.pid, number)
 
 
-class Stop(threading.Event):
-    """Set when this process was asked to end, by `signals`; the first of them says how."""
+class Stop:
+    """Set when this process was asked to end, by `signals`; the first of them says how.
+
+    No `threading.Event`: a signal's handler runs in the main thread, perhaps while that holds the
+    event's lock, and would wait for itself.
+    """
 
     def __init__(self) -> None:
-        super().__init__()
         self.signals: list[int] = []
+
+    def is_set(self) -> bool:
+        """Whether a signal came."""
+        return bool(self.signals)
+
+    def wait(self, seconds: float) -> bool:
+        """Sleep so long, or until a signal came; whether one did."""
+        end = time.monotonic() + seconds
+        while not self.signals and (left := end - time.monotonic()) > 0.0:
+            time.sleep(min(left, LOOK_PERIOD))  # which goes on after a handler has run
+        return self.is_set()
 
     @property
     def status(self) -> int:
@@ -76,7 +91,6 @@ def asked_to_end() -> Iterator[Stop]:
 
     def take(number: int, _frame: Any) -> None:
         stop.signals.append(number)
-        stop.set()
 
     before = {number: signal.signal(number, take)
               for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}

@@ -29,7 +29,7 @@ from rclpy.subscription import Subscription
 from sensor_msgs.msg import PointCloud2
 
 from ..checks import shown
-from ..pairing import NEVER, PAIRINGS, RESETS, Tick
+from ..pairing import NEVER, PAIRINGS, RESETS, StampedPose, Tick
 from ..scene import Pair, Scene, SceneSolver, two_boxes
 from ..scene_file import read_scene
 from ..solver import MODELS, soup_divisions
@@ -367,17 +367,18 @@ class ContactNode(LifecycleNode):
                 if frame_id is None:
                     frame_id = pose.frame_id
                 elif pose.frame_id != frame_id:
-                    raise Refused('frame_id differs', self._frames(tick))
+                    raise Refused('frame_id differs', self._frames(tick, pose))
                 if pose.stamp > stamp:
                     stamp = pose.stamp
         return stamp, frame_id
 
-    def _frames(self, tick: Tick) -> str:
-        """What frames a tick has, in words."""
+    def _frames(self, tick: Tick, odd: StampedPose) -> str:
+        """Which frame a tick has, by the scene or the first box, and which the pose `odd`."""
         scene = self._solver.scene
-        frames = {'the scene': scene.frame_id} if scene.frame_id else {}
-        frames |= {box: pose.frame_id for box, pose in zip(scene.moving, tick) if pose is not None}
-        return ', '.join(f'{who} is in frame {shown(frame)}' for who, frame in frames.items())
+        first, pose = next((box, pose) for box, pose in zip(scene.moving, tick) if pose is not None)
+        one, frame = ('the scene', scene.frame_id) if scene.frame_id else (first, pose.frame_id)
+        box = next(box for box, pose in zip(scene.moving, tick) if pose is odd)
+        return f'{one} is in frame {shown(frame)}, {box} in {shown(odd.frame_id)}'
 
     def _refuse(self, reason: str, text: str) -> None:
         self.counts[f'refused: {reason}'] += 1

@@ -132,7 +132,7 @@ def listening(target: str, args: Sequence[str]) -> Iterator[ViewNode]:
 
 
 def watch(node: ViewNode, page: Page, simulation: Simulation | None,
-          wishes: queue.SimpleQueue[Callable[[], None]], stop: threading.Event) -> None:
+          wishes: queue.SimpleQueue[Callable[[], None]], stop: Stop) -> None:
     """Draw, and do what is wished for, until `stop` is set."""
     frame_end = 0.0
     while not stop.wait(max(0.0, frame_end - time.monotonic())):
