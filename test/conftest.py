@@ -7,6 +7,7 @@ which read it once, and so that every process that a test starts inherits it.
 from __future__ import annotations
 
 import os
+import runpy
 import shutil
 import signal
 import subprocess
@@ -17,6 +18,7 @@ import zlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -54,6 +56,17 @@ def pytest_unconfigure() -> None:
     """Remove the kernel cache of this run."""
     if not IS_WORKER:
         shutil.rmtree(os.environ['NUMBA_CACHE_DIR'], ignore_errors=True)
+
+
+@pytest.fixture
+def setup_arguments(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+    """What setup.py hands to setuptools."""
+    given: dict[str, Any] = {}
+    with monkeypatch.context() as patch:
+        patch.setattr('setuptools.setup', given.update)
+        patch.chdir(Path(__file__).resolve().parents[1])
+        runpy.run_path('setup.py')
+    return given
 
 
 @dataclass

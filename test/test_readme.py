@@ -11,7 +11,6 @@ import contextlib
 import io
 import os
 import re
-import runpy
 import shlex
 import subprocess
 import sys
@@ -120,12 +119,8 @@ def parameter(words: list[str], **_) -> None:
     PARAMETERS[name].check(name, yaml.safe_load(value))
 
 
-def pip(words: list[str], monkeypatch, **_) -> None:
+def pip(words: list[str], setup_arguments, **_) -> None:
     """Names a checkout's existing extras, files that exist, or requirements of this package."""
-    given: dict = {}
-    monkeypatch.setattr('setuptools.setup', given.update)
-    monkeypatch.chdir(ROOT)
-    runpy.run_path('setup.py')
     expected = 'file'
     for word in words[2:]:
         if word == '-c':
@@ -135,9 +130,10 @@ def pip(words: list[str], monkeypatch, **_) -> None:
             expected = 'file'
         elif word.startswith('.'):
             extras = re.fullmatch(r'\.(?:\[([\w,]+)\])?', word).group(1)
-            assert set(extras.split(',') if extras else ()) <= set(given['extras_require'])
+            assert set(extras.split(',') if extras else ()) <= set(
+                setup_arguments['extras_require'])
         elif not word.startswith('-'):
-            assert word in given['install_requires']
+            assert word in setup_arguments['install_requires']
 
 
 def rviz(words: list[str], **_) -> None:
@@ -196,10 +192,10 @@ COMMANDS = {
 
 
 @pytest.mark.parametrize('command', commands())
-def test_command(command, program, monkeypatch):
+def test_command(command, program, setup_arguments):
     matching = [check for pattern, check in COMMANDS.items() if re.fullmatch(pattern, command)]
     assert len(matching) == 1, f'no check, or several, for: {command}'
-    matching[0](shlex.split(command), program=program, monkeypatch=monkeypatch)
+    matching[0](shlex.split(command), program=program, setup_arguments=setup_arguments)
 
 
 def test_first_commands_are_demo_and_test():

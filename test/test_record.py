@@ -2,7 +2,6 @@
 from __future__ import annotations
 
 import errno
-import runpy
 import signal
 import time
 from pathlib import Path
@@ -134,13 +133,10 @@ def test_it_can_be_made_again(tmp_path):
     assert np.array_equal(one.pose_b, other.pose_b)
 
 
-def test_it_is_installed(monkeypatch):
+def test_it_is_installed(setup_arguments):
     """setup.py takes it to share/."""
-    given: dict = {}
-    monkeypatch.setattr('setuptools.setup', given.update)
-    monkeypatch.chdir(ROOT)
-    runpy.run_path('setup.py')
-    assert set(dict(given['data_files'])['share/box_contact_ros/recordings/crane_landing']) == {
+    files = dict(setup_arguments['data_files'])
+    assert set(files['share/box_contact_ros/recordings/crane_landing']) == {
         f'recordings/crane_landing/{name}' for name in ('crane_landing.mcap', 'metadata.yaml')}
 
 

@@ -26,7 +26,7 @@ def ip(*words):
 
 @pytest.fixture
 def unjoined():
-    """Names of two hosts: command prefixes and names of network devices for them."""
+    """Names of two hosts, and of the network devices that will join them."""
     if not shutil.which('ip'):
         pytest.skip('two hosts need `ip` (iproute2)')
     tag = uuid.uuid4().hex[:6]
