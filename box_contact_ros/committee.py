@@ -152,7 +152,7 @@ def _frame_axis(lanes, work, f):
         # n·t is t's component in B's frame; in B's frame A's centre is at −t, likewise.
         centre = -work[OFFSET_A + f + i] if in_b else work[OFFSET_B + f + i]
         work[OFFSETS + f + i] = ((x * work[MIDDLE + i] + y * work[MIDDLE + LANES + i])
-                                  + z * work[MIDDLE + 2 * LANES + i]) - centre
+                                 + z * work[MIDDLE + 2 * LANES + i]) - centre
         work[OTHER + f + i] = work[HALF_A + f + i] if in_b else work[HALF_B + f + i]
 
 
@@ -345,9 +345,9 @@ def _place(lanes, work, offsets):
         y = work[INSIDE + LANES + i] + share * dy
         z = work[INSIDE + 2 * LANES + i] + share * dz
         in_b = work[IN_B + i] > 0.5
-        work[POINT + i] = (work[OFFSET_A + i] + ((work[ROTATION + i] * x
-                                            + work[ROTATION + LANES + i] * y)
-                                           + work[ROTATION + 2 * LANES + i] * z)) if in_b else x
+        work[POINT + i] = (work[OFFSET_A + i] + (
+            (work[ROTATION + i] * x + work[ROTATION + LANES + i] * y)
+            + work[ROTATION + 2 * LANES + i] * z)) if in_b else x
         work[POINT + LANES + i] = (work[OFFSET_A + LANES + i] + (
             (work[ROTATION + 3 * LANES + i] * x + work[ROTATION + 4 * LANES + i] * y)
             + work[ROTATION + 5 * LANES + i] * z)) if in_b else y

@@ -262,4 +262,3 @@ def mispairs(log: NodeLog) -> list[int]:
         found.append(int(np.count_nonzero(
             here & ~((apart <= SAME_POINT) & (depth <= SAME_POINT)))))
     return found
-

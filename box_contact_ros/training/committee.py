@@ -109,7 +109,7 @@ def train_scene(path: Path, sizes: Sequence[SizePair], *, seed: int, commit: str
         sample = scene_mixture(np.random.default_rng([seed, _METRICS, number]),
                                QUICK_METRIC_PAIRS if quick else METRIC_PAIRS, [pair])
         card['metrics'][text(pair)] = {'before': figures(point_errors(sample, general)),
-                                        'after': figures(point_errors(sample, path))}
+                                       'after': figures(point_errors(sample, path))}
     save_weights(path, layers, card)
     return card
 

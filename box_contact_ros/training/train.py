@@ -179,8 +179,8 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument('--epochs', type=int, help="passes through the training set, of the "
                         "paper's (default: 300 to 1000, by job)")
     parser.add_argument('--hidden', type=int, nargs=2, metavar='UNITS', help='of the committee: '
-                        'units of its two hidden layers (default: {} {}), named in the file'.format(
-            *committee.HIDDEN))
+                        'units of its two hidden layers (default: {} {}), named in the file'
+                        .format(*committee.HIDDEN))
     parser.add_argument('--steps', type=int, help='of the committee (default: '
                         f'{committee.STEPS:,}; a third of them make errors a tenth larger)')
     parser.add_argument('--out', type=Path, help='folder to write to (default: weights/)')
