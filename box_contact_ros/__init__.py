@@ -1,4 +1,4 @@
-"""Box-box contact for simulators: do two boxes touch, where, and which way do they push?"""
+"""Box-box contact for simulators: whether two boxes touch, where, and which way they push."""
 from .contact import Contact, Contacts
 from .solver import MODELS, ContactSolver
 

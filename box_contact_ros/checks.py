@@ -90,8 +90,10 @@ def as_floats(value: ArrayLike, name: str, shapes: str, *accepted: tuple[int | N
 
 
 def _holds_numbers(array: np.ndarray) -> bool:
-    """Real numbers only. NumPy would also take '1' for 1, None for NaN, a date for a number, and
-    drop imaginary parts."""
+    """Whether an array holds real numbers only.
+
+    NumPy would also take '1' for 1, None for NaN, a date for a number, and drop imaginary parts.
+    """
     if array.dtype.kind == 'O':  # also what integers beyond 64 bits come as
         return all(isinstance(v, numbers.Real) and not isinstance(v, bool) for v in array.flat)
     return array.dtype.kind in 'fiu'

@@ -292,10 +292,9 @@ def _describe(lanes, work):
 
 @inlined
 def asked(work, offsets, q, i):
-    """The network's answer along axis q, from the middle of the bounding box [m], cut to where a
-    centroid can be.
+    """The network's answer along axis q [m], cut to where a centroid can be.
 
-    offsets: the network's outputs, 3 rows of LANES.
+    It is from the middle of the bounding box. offsets: the network's outputs, 3 rows of LANES.
     """
     rank = work[RANKS + q + i]
     offset = _pick(rank == 0.0, rank == 1.0, np.float64(offsets[i]), np.float64(offsets[LANES + i]),
@@ -307,8 +306,10 @@ def asked(work, offsets, q, i):
 
 @inlined
 def _share(work, f, i, dx, dy, dz):
-    """Share of the step (dx, dy, dz) [m] from the inside point that stays between the other box's
-    faces f."""
+    """Share of the step (dx, dy, dz) [m] that stays between the other box's faces f.
+
+    The step is from the inside point.
+    """
     nx = work[NORMALS + 3 * f + i]
     ny = work[NORMALS + 3 * f + LANES + i]
     nz = work[NORMALS + 3 * f + 2 * LANES + i]
@@ -485,8 +486,10 @@ def _listed_sizes(weights: Weights) -> np.ndarray | None:
 
 
 class Committee:
-    """SAT and a network for the point, for any sizes or those that the weights' card lists; sizes
-    (2, 3) are those of single calls."""
+    """SAT and a network for the point, for any sizes or those that the weights' card lists.
+
+    Sizes (2, 3) are those of single calls.
+    """
 
     def __init__(self, sizes: np.ndarray, weights: str | None = None) -> None:
         try:

@@ -92,7 +92,7 @@ def write_found(work, i, row, colliding, separation, normal, point):
 
 @kernel
 def sat_normal(work, i):
-    """SAT's normal of pair `i`, in A's frame."""
+    """Normal of pair `i` by SAT, in A's frame."""
     return work[NORMAL + i], work[NORMAL + LANES + i], work[NORMAL + 2 * LANES + i]
 
 

@@ -114,9 +114,11 @@ class ContactLaw:
 
     @classmethod
     def for_load(cls, mass: float, size: tuple[float, float, float], rate_hz: float) -> ContactLaw:
-        """Constants for a load of `mass` [kg] and full extents [m] that asks `rate_hz` times a
-        second: scaled with the mass, and down where the rate demands it (40 ft, 20 t: at 200 Hz k
-        to 1.9e7 N/m, c to 2.7e5 N s/m, the pitch damper to 83 %; at 1 kHz nothing).
+        """Constants for a load of `mass` [kg] and `size` [m] that asks `rate_hz` times a second.
+
+        `size` is its full extents. The constants are scaled with the mass, and down where the rate
+        demands it (40 ft, 20 t: at 200 Hz k to 1.9e7 N/m, c to 2.7e5 N s/m, the pitch damper to
+        83 %; at 1 kHz nothing).
         """
         length, width, height = size
         corner = effective_mass(mass, size)
@@ -195,6 +197,6 @@ class HeldWrench:
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """a × b of vectors (3,); np.cross takes ten times as long on single vectors."""
+    """Product a × b of vectors (3,); np.cross takes ten times as long on single vectors."""
     return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2],
                      a[0] * b[1] - a[1] * b[0]])

@@ -259,8 +259,7 @@ class Crane:
         self.step_under(lambda _: wrench)
 
     def step_under(self, wrench: Callable[[float], np.ndarray]) -> None:
-        """Advance one tick under a wrench that may change within it, from one physics step to the
-        next.
+        """Advance one tick under a wrench that may change from one physics step to the next.
 
         wrench -- from a simulated time in s, the start of a physics step, to the force in N and the
                   torque in N m (6,) over that step, world frame, at the load's centre of mass

@@ -118,8 +118,10 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
 
 def _watch(node: subprocess.Popen[bytes], crane: subprocess.Popen[bytes],
            deadline: float, stop: Stop) -> int:
-    """Wait for the crane's exit status; an early end of the node, the time limit, or being asked to
-    end is a 1."""
+    """Wait for the crane's exit status.
+
+    An early end of the node, the time limit, or being asked to end is a 1.
+    """
     while (status := crane.poll()) is None:
         if node.poll() is not None:
             print(f'demo: contact_node ended early, status {node.returncode}', file=sys.stderr)

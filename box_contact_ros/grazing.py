@@ -58,7 +58,7 @@ def grazing(separation, touch, size, hope, skipped):
 
 @kernel
 def _sum(a, b):
-    """a + b exactly, as a sum of two."""
+    """The sum a + b exactly, as a sum of two."""
     s = a + b
     c = s - a
     return s, (a - (s - c)) + (b - c)
@@ -66,7 +66,7 @@ def _sum(a, b):
 
 @kernel
 def _times(a, b):
-    """a · b exactly."""
+    """The product a · b exactly."""
     p = a * b
     c = _SPLIT * a
     ah = c - (c - a)

@@ -63,8 +63,11 @@ def inlined(function: Callable[..., Any]) -> Any:
 
 
 def fused_kernel(function: Callable[..., Any]) -> Any:
-    """Like `kernel`, for the float32 networks only: a·b + c is rounded once, and a / b is a times a
-    refined estimate of 1 / b, right to a few units of 2⁻²⁴."""
+    """Like `kernel`, for the float32 networks only.
+
+    In it a·b + c is rounded once, and a / b is a times a refined estimate of 1 / b, right to a few
+    units of 2⁻²⁴.
+    """
     return _compiled(function, fastmath={'contract', 'arcp'})
 
 

@@ -153,7 +153,7 @@ TANH_LIMIT = 3.6467
 
 @fused_inlined
 def rational_tanh(x):
-    """tanh as the fifth convergent of its continued fraction (Lambert 1770): error below 1.4e-3.
+    """The fifth convergent of tanh's continued fraction (Lambert 1770): error below 1.4e-3.
 
     Networks are trained with this very function, so its error is none of the network's.
     """

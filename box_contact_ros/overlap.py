@@ -211,8 +211,10 @@ def centroid(work, i):
 
 @kernel
 def _centroid_from(work, i, face):
-    """The centroid with a face axis (0–5) as the reference, and what part of the integrals' volume
-    is left of them in the sum."""
+    """The centroid with a face axis (0–5) as the reference, and what part of the volume is left.
+
+    That is the part of the integrals' volume which is left of them in the sum.
+    """
     of_a = face < 3
     k = face if of_a else face - 3
     a = (k + 1) % 3

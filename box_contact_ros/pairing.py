@@ -46,8 +46,11 @@ class _Pairing:
     """What both policies share: the newest stamp of each box, staleness, and time going back."""
 
     def __init__(self, scene: Scene, *, tolerance: int = 0, max_age: int = 0) -> None:
-        """tolerance: stamps this far apart [ns] still belong together (policy `stamp`);
-        max_age: a pose further than this [ns] from the tick is not used, 0: any is."""
+        """Begin without poses.
+
+        tolerance: stamps this far apart [ns] still belong together (policy `stamp`);
+        max_age: a pose further than this [ns] from the tick is not used, 0: any is.
+        """
         self.tolerance, self.max_age = tolerance, max_age
         self.counts: Counter[str] = Counter()
         self._newest: dict[str, int] = {}  # stamp, by box
@@ -85,13 +88,14 @@ class _Pairing:
 
 
 class StampPairing(_Pairing):
-    """A tick is complete when every box has given a pose of its stamp, in whatever order they come;
-    each stamp is answered once.
+    """A tick is complete when every box has given a pose of its stamp, in whatever order they come.
 
-    It does not wait for a box that is stale, nor, once a tick has been answered, for one that was
-    never seen. A tick that stays incomplete is given up when WAITING_TICKS newer ones wait, or when
-    what it lacks is stale: if it has a pair of which all poses are there, it is answered late and
-    without the others, else dropped.
+    Each stamp is answered once.
+
+    The pairing does not wait for a box that is stale, nor, once a tick has been answered, for one
+    that was never seen. A tick that stays incomplete is given up when WAITING_TICKS newer ones
+    wait, or when what it lacks is stale: if it has a pair of which all poses are there, it is
+    answered late and without the others, else dropped.
     """
 
     def __init__(self, scene: Scene, *, tolerance: int = 0, max_age: int = 0) -> None:
@@ -151,8 +155,10 @@ class StampPairing(_Pairing):
         return ticks
 
     def _refuses(self, box: str, stamp: int) -> bool:
-        """Whether a stamp that is not later than the last of its box has been taken before, or is
-        too old to tell."""
+        """Whether a stamp has been taken before, or is too old to tell.
+
+        It is not later than the last of its box.
+        """
         self._look_back(box, stamp)
         taken = self._taken[box]
         if len(taken) == REMEMBERED_STAMPS and stamp < taken[0]:
@@ -201,8 +207,10 @@ class StampPairing(_Pairing):
         return False
 
     def _give_up(self, key: int) -> list[Tick]:
-        """The oldest ticks, up to the one of `key`, that have waited enough; those of which no pair
-        can be evaluated are dropped."""
+        """The oldest ticks, up to the one of `key`, that have waited enough.
+
+        Those of which no pair can be evaluated are dropped.
+        """
         ticks = []
         while (stamp := next(iter(self._waiting))) != key:
             poses = self._waiting[stamp]

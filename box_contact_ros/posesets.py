@@ -49,7 +49,7 @@ def turns(axes: ArrayLike, angles: np.ndarray) -> np.ndarray:
 
 def log_uniform(rng: np.random.Generator, low: float, high: float, n: int | tuple[int, ...],
                 ) -> np.ndarray:
-    """n numbers whose logarithms are uniform."""
+    """Numbers of shape `n` whose logarithms are uniform."""
     return np.exp(rng.uniform(np.log(low), np.log(high), n))
 
 
@@ -79,8 +79,9 @@ def any_pose(rng: np.random.Generator, size_a: np.ndarray, size_b: np.ndarray,
 def stacked(rng: np.random.Generator, size: tuple[float, float, float], tilt: np.ndarray,
             yaw: np.ndarray, depth: np.ndarray, *, spread: float = 0.98,
             about: np.ndarray | None = None) -> Pairs:
-    """One box on another of the same size, tilted about a random level axis, turned by yaw, [rad],
-    off its middle by up to `spread` of the size.
+    """One box on another of the same size, tilted about a random level axis, turned by yaw.
+
+    Both angles are in [rad]; the box is off the other's middle by up to `spread` of the size.
 
     about: the tilt's axis is within that angle (n,) [rad] of ±x, in place of anywhere.
     """
@@ -98,8 +99,10 @@ def stacked(rng: np.random.Generator, size: tuple[float, float, float], tilt: np
 
 def laid(rng: np.random.Generator, size_a: np.ndarray, size_b: np.ndarray, tilt: np.ndarray,
          depth: np.ndarray) -> Pairs:
-    """B on A, sizes (n, 3), any axis of either box up, turned by any yaw, tilted about a random
-    level axis [rad], anywhere on it."""
+    """B anywhere on A, tilted about a random level axis [rad], turned by any yaw.
+
+    Any axis of either box is up; sizes (n, 3).
+    """
     n = len(tilt)
     orders = np.array([[0, 1, 2], [1, 2, 0], [2, 0, 1]])
     size_a = np.take_along_axis(size_a, orders[rng.integers(0, 3, n)], axis=1)

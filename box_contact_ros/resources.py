@@ -22,7 +22,7 @@ _SHARE = Path('share', 'box_contact_ros')
 
 
 def resource_path(*parts: str) -> Path:
-    """Return the path of a data file or folder: `resource_path('weights', 'x.safetensors')`.
+    """Return the path of a data file or folder by its parts, as `'weights', 'x.safetensors'`.
 
     The first place that has it wins: the checkout, the prefix this package was installed into,
     the ament prefixes (`AMENT_PREFIX_PATH`), Python's own prefix. `FileNotFoundError` names all of

@@ -100,7 +100,7 @@ def make_model(name: str, size_a: np.ndarray, size_b: np.ndarray, weights: str |
 
 
 class ContactSolver:
-    """Do two boxes touch, where, and which way do they push?
+    """Whether two boxes touch, where, and which way they push.
 
     ```python
     solver = ContactSolver(size_a=(12.192, 2.438, 2.591), size_b=(12.192, 2.438, 2.591))

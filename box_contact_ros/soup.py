@@ -54,8 +54,10 @@ class Mesh(NamedTuple):
 
 
 def triangles(size: Sequence[float] | np.ndarray, divisions: int) -> np.ndarray:
-    """Corners (12 N², 3, 3) of a box's triangles in its own frame [m], counter-clockwise as seen
-    from outside; size: three full extents [m]."""
+    """Corners (12 N², 3, 3) [m] of a box's triangles, counter-clockwise as seen from outside.
+
+    They are in the box's own frame. size: three full extents [m].
+    """
     half = 0.5 * np.asarray(size, dtype=np.float64)
     faces = []
     for axis in range(3):
@@ -98,8 +100,11 @@ def _move(soup: fcl.CollisionObject, position: np.ndarray, quaternion: np.ndarra
 
 
 def collide(first: fcl.CollisionObject, second: fcl.CollisionObject) -> list[fcl.Contact]:
-    """All contacts of two soups: `b1`, `b2` number the triangles, `pos` [m] is in the frame in
-    which they were placed, `normal` points from the first to the second."""
+    """All contacts of two soups.
+
+    `b1`, `b2` number the triangles, `pos` [m] is in the frame in which the soups were placed,
+    `normal` points from the first to the second.
+    """
     most = FIRST_CONTACTS
     while True:
         result = fcl.CollisionResult()
@@ -112,8 +117,10 @@ def collide(first: fcl.CollisionObject, second: fcl.CollisionObject) -> list[fcl
 
 def point_and_normal(contacts: Sequence[fcl.Contact], areas_a: np.ndarray, areas_b: np.ndarray,
                      ) -> tuple[np.ndarray, np.ndarray] | None:
-    """Area-weighted mean point (3,) [m] and normal (3,) of contacts, in their frame; None where
-    there are none or the normals cancel."""
+    """Area-weighted mean point (3,) [m] and normal (3,) of contacts, in their frame.
+
+    None where there are no contacts or the normals cancel.
+    """
     if not contacts:
         return None
     weights = np.minimum(areas_a[[contact.b1 for contact in contacts]],
@@ -150,10 +157,10 @@ class Soup:
 
     def place(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
               ) -> tuple[fcl.CollisionObject, fcl.CollisionObject]:
-        """Soups of full extents (3,) at poses (7,), about A's centre in the common frame's
-        directions; until the next call.
+        """Soups of full extents (3,) at poses (7,), about A's centre; until the next call.
 
-        B − A is formed in float64 here, so that FCL adds no rounding far from the origin.
+        Directions are the common frame's. B − A is formed in float64 here, so that FCL adds no
+        rounding far from the origin.
         """
         first, second = self._object(tuple(size_a), 0), self._object(tuple(size_b), 1)
         _move(first, np.zeros(3), a[3:])

@@ -47,8 +47,11 @@ os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'
 
 @pytest.fixture(scope='module', autouse=True)
 def own_domain(request: pytest.FixtureRequest) -> None:
-    """A ROS domain for each module: processes that were killed leave shared memory of theirs
-    behind, in which later ones may wait for the dead."""
+    """A ROS domain for each module.
+
+    Processes that were killed leave shared memory of theirs behind, in which later ones may wait
+    for the dead.
+    """
     os.environ['ROS_DOMAIN_ID'] = str(_domain_id(request.module.__name__))
 
 

@@ -1,6 +1,6 @@
 """Take docs/view.png: the page of `view`, in a headless Chromium, while the load settles.
 
-    python test/make_view_picture.py [--out FILE]
+Run as `python test/make_view_picture.py [--out FILE]`.
 """
 from __future__ import annotations
 

@@ -95,8 +95,10 @@ class FaultyRelay(Node):
 
 
 def test_planted_faults_show_up(program, tmp_path):
-    """Of 400 answers one point is dropped, one shifted by 1 cm, one normal flipped, one cloud sent
-    twice: each is in the results, and the exit status is not 0."""
+    """Each fault planted in 400 answers is in the results, and the exit status is not 0.
+
+    One point is dropped, one shifted by 1 cm, one normal flipped, one cloud sent twice.
+    """
     out = tmp_path / 'results'
     with serving(FaultyRelay):
         running = bench(

@@ -47,8 +47,9 @@ def send(log: NodeLog, name: str = 'random', rows: int = PAIRS, first: int = STA
 
 def answer(log: NodeLog, row: int, *, lost: tuple[str, ...] = (), delay: int = MS, shift=0.0,
            normal=DOWN, touching: bool | None = None, first: int = START) -> None:
-    """Answer a row rightly but for what is planted: point after half the delay, normal after all of
-    it, then the cloud.
+    """Answer a row rightly but for what is planted.
+
+    The point comes after half the delay, the normal after all of it, then the cloud.
 
     lost -- kinds that do not come; shift -- added to the point [m]; touching -- the verdict
     """
@@ -83,8 +84,10 @@ def only(log: NodeLog):
 
 
 def test_a_faultless_run():
-    """100 pairs at 200 Hz, half in contact, each answered after 1 ms: the cloud, which comes 1 ms
-    after point and normal, does not count as the answer to a contact."""
+    """100 pairs at 200 Hz, half in contact, each answered after 1 ms.
+
+    The cloud, which comes 1 ms after point and normal, does not count as the answer to a contact.
+    """
     result = only(played())
     assert (result.sent, result.answered, result.lost, result.contacts) == (100, 100, 0, 50)
     assert result.faults == []
@@ -287,8 +290,10 @@ def test_the_echo_has_latencies_and_losses_only():
 
 
 def test_tables_and_files(tmp_path):
-    """The words of `ros2 topic delay`, the ratio to the echo; the CSV has every figure, units in
-    its head, and empty cells where there is none."""
+    """The words of `ros2 topic delay`, and the ratio to the echo.
+
+    The CSV has every figure, units in its head, and empty cells where there is none.
+    """
     results = [only(played()), echo()]
     table = latency_table(results)
     for word in ('mean', 'min', 'max', 'std dev', 'window'):

@@ -189,8 +189,11 @@ def test_the_point_is_in_both_boxes(committee, pairs):
 
 
 def test_points_of_an_aligned_stack_are_inside(committee):
-    """Two containers exactly above each other, turned anywhere. All their sides lie in pairs of one
-    plane, and rounding put the edges of each outside the other: no outline, a point 6 m off."""
+    """Two containers exactly above each other, turned anywhere.
+
+    All their sides lie in pairs of one plane, and rounding put the edges of each outside the other:
+    no outline, a point 6 m off.
+    """
     rng = np.random.default_rng(8)
     n = 5000
     b = np.tile((0, 0, poses.CONTAINER[2] - 1e-3, 0, 0, 0, 1.0), (n, 1))
@@ -287,8 +290,10 @@ def test_a_row_does_not_know_its_neighbours(committee, count, first):
 
 
 def test_rows_apart_refused_or_out_of_range_do_not_disturb_neighbours(committee):
-    """Within one block, contacts between rows of all other kinds keep their bits; a refused row
-    raises, and the next call is right again."""
+    """Within one block, contacts between rows of all other kinds keep their bits.
+
+    A refused row raises, and the next call is right again.
+    """
     rng = np.random.default_rng(7)
     pairs = SETS['random sizes'](rng, LANES)
     clean = solve(committee, pairs)
@@ -453,9 +458,11 @@ def test_continuity_along_smooth_paths(committee, name, size):
 
 
 def test_a_face_that_comes_in_comes_in_smoothly(committee):
-    """A cube's corner nears the border of a face: where the overlap begins to be cut off there, no
-    step but that of the order of axes, which a corner's single cut leaves open and the second one
-    settles: 0.03 % of the edge."""
+    """A cube's corner nears the border of a face, where the overlap begins to be cut off.
+
+    There is no step there but that of the order of axes, which a corner's single cut leaves open
+    and the second one settles: 0.03 % of the edge.
+    """
     n = 3601
     turn = poses.small_rotations(np.array([[1.0, -0.7, 0.2]]), np.array([0.6]))
     b = np.tile(np.concatenate([(0, 0, 0), turn[0]]), (n, 1))

@@ -35,9 +35,7 @@ def test_no_contact_is_no_wrench():
 
 
 def test_static_penetration_carries_the_weight():
-    """F_n = k·depth at rest: depth = m g / k, 5 mm where the rate allows it; no torque under the
-    centre.
-    """
+    """Depth at rest is F_n/k = m g/k, 5 mm where the rate allows it; no torque under the centre."""
     depth = WEIGHT / FAST.stiffness
     assert depth == pytest.approx(STATIC_PENETRATION, rel=1e-12)
     wrench = FAST.wrench(Touch(UNDER, DOWN, depth), LEVEL, STILL)
@@ -92,8 +90,9 @@ def test_torsion_opposes_the_spin(spin):
 
 
 def test_rocking_damper_works_in_the_loads_own_axes():
-    """Torque −2c(W²/12)ω_roll, −2c(L²/12)ω_pitch, with a load turned by 90° about the vertical; the
-    point lies so that nothing else turns it.
+    """Torque −2c(W²/12)ω_roll, −2c(L²/12)ω_pitch, with a load turned by 90° about the vertical.
+
+    The point lies so that nothing else turns it.
     """
     turned = np.array([1.0, 2.0, 3.0, 0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5)])
     assert rotation_matrix(turned[3:])[:, 0] == pytest.approx([0, 1, 0])
@@ -105,8 +104,9 @@ def test_rocking_damper_works_in_the_loads_own_axes():
 
 
 def test_a_bounce_never_gains_energy():
-    """A heaving load dropped onto the spring and damper, stepped as finely as to be continuous: its
-    energy m v²/2 + k depth²/2 + m g z never grows, and it comes to rest at m g / k.
+    """A heaving load dropped onto the spring and damper comes to rest at m g / k.
+
+    Stepped as finely as to be continuous, its energy m v²/2 + k depth²/2 + m g z never grows.
     """
     step, height, speed = 2e-5, 0.002, -0.3
 
@@ -136,8 +136,7 @@ def test_a_corner_is_the_lightest_place():
 @pytest.mark.parametrize('mass, size', [(MASS, CONTAINER), (500.0, (2.0, 2.0, 2.0)),
                                         (4000.0, (6.0, 2.4, 0.5))])
 def test_the_rate_limits_the_constants(rate, mass, size):
-    """k < 0.25 m_eff/Δt² and c ≤ 0.35 m_eff/Δt, rocking by its own inertia; never more than
-    nominal."""
+    """At most nominal, k < 0.25 m_eff/Δt² and c ≤ 0.35 m_eff/Δt, rocking by its own inertia."""
     law, corner = ContactLaw.for_load(mass, size, rate), effective_mass(mass, size)
     nominal = mass * GRAVITY / STATIC_PENETRATION
     assert law.stiffness < 0.25 * corner * rate**2
@@ -150,8 +149,10 @@ def test_the_rate_limits_the_constants(rate, mass, size):
 
 
 def test_the_constants_for_20_t():
-    """The known law: 3.9e7 N/m and 8.9e5 N s/m at 1 kHz, scaled down at 200 Hz, in proportion to
-    the mass at every rate."""
+    """The known law: 3.9e7 N/m and 8.9e5 N s/m at 1 kHz, scaled down at 200 Hz.
+
+    It is in proportion to the mass at every rate.
+    """
     assert FAST.stiffness == pytest.approx(3.9e7, rel=0.01)
     assert FAST.damping == pytest.approx(8.9e5, rel=0.01)
     slow = ContactLaw.for_load(MASS, CONTAINER, 200.0)

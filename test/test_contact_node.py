@@ -222,8 +222,10 @@ def answered(client, stamps):
 
 
 def test_node_killed_and_restarted(program, client):
-    """kill -9 of the node in mid-stream: a new one is matched within 5 s of being ready, and every
-    pair sent while matched is answered."""
+    """After kill -9 of the node in mid-stream a new one is matched within 5 s of being ready.
+
+    Every pair sent while matched is answered.
+    """
     for _ in range(2):
         running = program('contact_node', *arguments())
         running.wait_for_output('ready', 120)
@@ -236,8 +238,10 @@ def test_node_killed_and_restarted(program, client):
 
 
 def test_client_killed_and_restarted(program):
-    """kill -9 of the crane in mid-stream: a new one is matched within 5 s, and of the pairs it
-    sends none is lost (else its exit status is not 0)."""
+    """After kill -9 of the crane in mid-stream a new one is matched within 5 s.
+
+    Of the pairs it sends none is lost (else its exit status is not 0).
+    """
     parameters = ['--ros-args', '-p', 'size_a:=[2.0, 2.0, 2.0]', '-p', 'size_b:=[2.0, 2.0, 2.0]']
     node = program('contact_node', *arguments())
     node.wait_for_output('ready', 120)

@@ -170,7 +170,7 @@ def test_a_wrench_acts_at_the_centre_of_mass_in_the_world_frame(rate_hz):
 
 
 def test_velocity_is_the_derivative_of_the_pose():
-    """v = dx/dt; the world-frame rate w follows from R(t + dt) R(t)^T = 1 + [w] dt."""
+    """Here v = dx/dt; the world-frame rate w follows from R(t + dt) R(t)^T = 1 + [w] dt."""
     crane = Crane(CraneScenario(yaw=15.0, roll=5.0, pitch=-4.0, rope_spread=0.4), rate_hz=2000.0)
     for _ in range(3000):
         crane.step()

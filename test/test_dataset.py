@@ -178,7 +178,7 @@ def test_folded_boxes_touch_where_the_folded_label_says(how: int, cubes: Placeme
 
 @pytest.mark.parametrize('size', [CUBE, CONTAINER])
 def test_octant(size: tuple[float, float, float]) -> None:
-    """t ≥ 0 and angles in [−π/2, π/2]: the domain of the networks."""
+    """The domain of the networks: t ≥ 0 and angles in [−π/2, π/2]."""
     inputs = dataset.fold(draw(size), OCTANT).inputs
     assert np.all(inputs[:, :3] >= 0.0)
     assert np.all(np.abs(inputs[:, 3:]) <= np.pi / 2)

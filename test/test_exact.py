@@ -17,8 +17,10 @@ FAMILIES = {'random': poses.random_pairs, 'near-parallel': poses.near_parallel_p
 @pytest.mark.parametrize('chunk', range(10))
 @pytest.mark.parametrize('family', FAMILIES)
 def test_agrees_with_the_oracle(family, chunk):
-    """Verdict beyond 1e-12·size; depth and axis to 1e-12·size; centroid to
-    max(1e-9, 1e-14·size/depth)·size."""
+    """Verdict beyond 1e-12·size; depth and axis to 1e-12·size.
+
+    The centroid to max(1e-9, 1e-14·size/depth)·size.
+    """
     rng = np.random.default_rng([2026, chunk])
     a, b, size_a, size_b = FAMILIES[family](rng, CHUNK)
     found = SOLVER.batch(a, b, size_a=size_a, size_b=size_b)
@@ -49,8 +51,11 @@ def test_agrees_with_the_oracle(family, chunk):
 @pytest.mark.parametrize('gap', [-0.1, -0.01, -1e-3, -1e-6, -1e-9])
 @pytest.mark.parametrize('shift', [(0.0, 0.0), (6.096, 0.0), (0.0, 1.219), (6.096, 1.219)])
 def test_flush_containers(gap, shift):
-    """A container on another, sides exactly in one plane (or half overhanging): the middle of the
-    patch, at half the depth. Counting a shared side twice would move it."""
+    """A container on another, sides exactly in one plane (or half overhanging).
+
+    The point is the middle of the patch, at half the depth. Counting a shared side twice would move
+    it.
+    """
     length, width, height = poses.CONTAINER
     solver = ContactSolver(poses.CONTAINER, poses.CONTAINER, model='exact')
     contact = solver(poses.IDENTITY, (*shift, height + gap, 0, 0, 0, 1))
@@ -75,8 +80,7 @@ def test_vertex_on_face_at_touch_is_the_vertex():
 
 
 def test_edges_crossing_at_touch_is_the_crossing():
-    """Two edges exactly crossing: roof ridge along x on roof ridge along y, touching at one point.
-    """
+    """Two edges exactly crossing: roof ridge along x on one along y, touching at one point."""
     up = poses.small_rotations(np.array([[1.0, 0, 0], [0, 1.0, 0]]), np.full(2, np.pi / 4))
     a = np.concatenate([(0, 0, 0), up[0]])
     b = np.concatenate([(0.25, -0.5, 2 * np.sqrt(2)), up[1]])

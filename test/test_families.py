@@ -79,8 +79,10 @@ def test_families_reach_what_they_are_for():
 @pytest.mark.parametrize('model', MODELS)
 @pytest.mark.parametrize('name', families.FAMILIES)
 def test_gates(name, model):
-    """No wrong verdict, no wrong normal, depth to 1e-12 of the size (or the coordinates' rounding),
-    every point in both boxes, nothing that is not finite."""
+    """No wrong verdict, no wrong normal, every point in both boxes, nothing that is not finite.
+
+    Depth to 1e-12 of the size (or the coordinates' rounding).
+    """
     row = report.examine(model, name, CASES[name])
     assert (row.verdicts, row.normals, row.outside, row.not_finite) == (0, 0, 0, 0)
     pairs = CASES[name].pairs
@@ -138,8 +140,10 @@ def everything():
 
 @pytest.mark.parametrize('model', MODELS)
 def test_swap(everything, model):
-    """Verdict and separation to the bit (boxes with one centre: to rounding, as nothing says which
-    comes first). The normal may only differ where axes tie."""
+    """Verdict and separation to the bit; the normal may only differ where axes tie.
+
+    Boxes with one centre: to rounding, as nothing says which comes first.
+    """
     one = solve(model, everything)
     other = Pairs(everything.pose_b, everything.pose_a, everything.size_b, everything.size_a)
     two = solve(model, other)
@@ -195,8 +199,11 @@ def test_reflection(everything, model):
 
 @pytest.mark.parametrize('model', MODELS)
 def test_free_after_moving_by_the_depth(everything, model):
-    """Moved by depth + m along the normal B is free, by depth − m it is not; in between the depth
-    falls by what it was moved. m = max(1e-9 · depth, 8 ulp of the coordinates)."""
+    """Moved by depth + m along the normal B is free, by depth − m it is not.
+
+    In between the depth falls by what it was moved. m = max(1e-9 · depth, 8 ulp of the
+    coordinates).
+    """
     one = solve(model, everything)
     rows = one.colliding & (one.separation < -1e-7 * size_of(everything))
     depth = -one.separation[:, None]
@@ -279,15 +286,17 @@ def test_a_box_inside_another_is_a_contact():
 
 
 def test_exact_touch_is_finite():
-    """libccd answers NaN."""
+    """Here libccd answers NaN."""
     found = solve('exact', CASES['b1_exact_touch'].pairs)
     assert found.colliding.all()
     assert np.isfinite(found.normal).all() and np.isfinite(found.point).all()
 
 
 def test_corners_that_touch_have_their_corner_for_a_point():
-    """Pressed in along one axis only, two cubes corner on corner had no overlap, and the point was
-    up to a quarter of the size outside."""
+    """Pressed in along one axis only, two cubes corner on corner had no overlap.
+
+    The point was up to a quarter of the size outside.
+    """
     size = (2.0, 2.0, 2.0)
     for model in MODELS:
         contact = ContactSolver(size, size, model=model)(

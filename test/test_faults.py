@@ -63,8 +63,11 @@ def rate_limited(count, rate):
 
 
 def test_100_000_messages_that_are_none(start, client):
-    """Random bytes, messages cut short and messages with changed bytes at some 10 kHz: each that
-    arrives is counted, none ends the node, memory does not grow, and the next pair is answered."""
+    """Random bytes, messages cut short and messages with changed bytes at some 10 kHz.
+
+    Each that arrives is counted, none ends the node, memory does not grow, and the next pair is
+    answered.
+    """
     node = start()
     rng = np.random.default_rng(1)
     publish = [publisher.publish for publisher in client.publishers]
@@ -108,8 +111,10 @@ def test_100_000_messages_that_are_none(start, client):
 
 @pytest.mark.parametrize('serialization', ['raw', 'typed'])
 def test_half_of_the_poses_are_none(start, client, serialization):
-    """NaN, zero quaternions, infinities and denormals in every second pair, at 500 Hz: each good
-    pair is answered rightly, each bad pose counted, nothing bad is answered."""
+    """NaN, zero quaternions, infinities and denormals in every second pair, at 500 Hz.
+
+    Each good pair is answered rightly, each bad pose counted, nothing bad is answered.
+    """
     start(f'serialization:={serialization}')
     bad = [[math.nan] * 7, [0] * 7, [0, 0, math.inf, 0, 0, 0, 1], [0, 0, 1.9, 0, 0, 0, 5e-324],
            [0, 0, 1e308, 0, 0, 0, 1], [0, 0, 0, math.nan, 0, 0, 1]]
@@ -155,8 +160,10 @@ def test_memory_does_not_grow(start, client):
 
 
 def test_a_clock_that_jumps_back(start, client):
-    """Simulated time is set back by half a second, less than the stamps alone would tell: what
-    was known of the old time is dropped, and the new time is answered from its first tick."""
+    """Simulated time is set back by half a second, less than the stamps alone would tell.
+
+    What was known of the old time is dropped, and the new time is answered from its first tick.
+    """
     start('use_sim_time:=true')
     clock = client.node.create_publisher(Clock, '/clock', 10)
 
@@ -189,8 +196,10 @@ def test_a_clock_that_jumps_back(start, client):
 
 
 def test_a_storm_of_parameters(start, client):
-    """Changes, good and bad, as fast as they are served, in a stream of 200 Hz: no tick is lost,
-    each is answered with one of the sizes that were set, and the last one stands."""
+    """Changes, good and bad, as fast as they are served, in a stream of 200 Hz.
+
+    No tick is lost, each is answered with one of the sizes that were set, and the last one stands.
+    """
     start()
     service = client.service(SetParameters, '/contact_node/set_parameters')
     futures, stamps = [], []
@@ -222,8 +231,10 @@ def test_a_storm_of_parameters(start, client):
 
 
 def test_a_subscriber_that_never_reads(start, client, program):
-    """A crane is stopped in its tracks (SIGSTOP) while it is subscribed to all contacts: everybody
-    else is answered as before, and the node's memory does not grow."""
+    """A crane is stopped in its tracks (SIGSTOP) while it is subscribed to all contacts.
+
+    Everybody else is answered as before, and the node's memory does not grow.
+    """
     node = start()
     crane = program('crane', '--ros-args', '-p', 'size_a:=[2.0, 2.0, 2.0]',
                     '-p', 'size_b:=[2.0, 2.0, 2.0]', '-p', 'duration:=30',
@@ -255,8 +266,11 @@ def with_full_memory(filled):
 
 
 def test_shared_memory_is_almost_full(program):
-    """Less room in /dev/shm than Fast DDS takes, which would be killed by SIGBUS: node and crane
-    talk without it, say so, and no message is lost (else the crane's status is not 0)."""
+    """Less room in /dev/shm than Fast DDS takes, which would be killed by SIGBUS.
+
+    Node and crane talk without it, say so, and no message is lost (else the crane's status is not
+    0).
+    """
     within = with_full_memory(8 * 2**20 - 200_000)
     node = program('contact_node', *CUBES, within=within)
     assert 'going without shared memory' in node.wait_for_output('ready', 120)
@@ -274,8 +288,11 @@ def test_shared_memory_is_full(program):
 
 
 def test_no_shared_memory_is_left_behind(start, client):
-    """A node that ends by itself leaves no segment of its own in /dev/shm (ports are shared with
-    others); one that is killed does, which docs/troubleshooting.md tells how to clear."""
+    """A node that ends by itself leaves no segment of its own in /dev/shm.
+
+    Ports are shared with others. One that is killed does leave segments, which
+    docs/troubleshooting.md tells how to clear.
+    """
     before = set(os.listdir('/dev/shm')) if os.path.isdir('/dev/shm') else set()
     node = start()
     with open(f'/proc/{node.process.pid}/maps') as file:

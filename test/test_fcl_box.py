@@ -39,8 +39,11 @@ def test_the_normal_points_from_a_to_b(axis, sign):
 
 
 def test_the_normal_is_sats_up_to_the_axis_chosen():
-    """Moving B by depth along the normal parts the boxes: so it points away from A and is deep
-    enough, whatever axis FCL prefers among nearly equal ones."""
+    """Moving B by depth along the normal parts the boxes.
+
+    So the normal points away from A and the depth is enough, whatever axis FCL prefers among nearly
+    equal ones.
+    """
     def above(rng, count):
         return np.column_stack([rng.uniform(-1, 1, (count, 2)), rng.uniform(1.8, 1.95, count)])
 
@@ -58,8 +61,10 @@ def test_the_normal_is_sats_up_to_the_axis_chosen():
 
 
 def test_the_point_is_the_deepest_corner():
-    """B, 0.1 m deep in A's top, tipped by 0.01 rad about y: of the patch's corners those at +x are
-    deepest, whereas the exact point is well inside."""
+    """B, 0.1 m deep in A's top, is tipped by 0.01 rad about y.
+
+    Of the patch's corners those at +x are deepest, whereas the exact point is well inside.
+    """
     size = poses.CONTAINER
     b = np.array([0.0, 0.0, size[2] - 0.1, 0.0, np.sin(0.005), 0.0, np.cos(0.005)])
     deepest = ContactSolver(size, size, model='fcl')(IDENTITY, b)

@@ -87,9 +87,11 @@ def test_at_exact_touch_either_verdict_is_right() -> None:
 
 @pytest.mark.parametrize('contestant', [Ours('exact'), *PEERS], ids=lambda c: c.name)
 def test_conventions(contestant: Contestant) -> None:
-    """Two containers, 20 mm deep, under any rigid motion: the normal is from A to B, the point is
-    in the patch, thickened by the depth. An order of axes or of a quaternion that is wrong would
-    show in either."""
+    """Two containers, 20 mm deep, under any rigid motion.
+
+    The normal is from A to B, the point is in the patch, thickened by the depth. An order of axes
+    or of a quaternion that is wrong would show in either.
+    """
     rng = np.random.default_rng(3)
     turn = rng.normal(size=(20, 4))
     turn /= np.linalg.norm(turn, axis=1, keepdims=True)

@@ -64,8 +64,11 @@ def assert_sound(contact):
 @pytest.mark.parametrize('norm', [1e-8, 0.5, 0.999, 1.001, 2.0, 1e8, 1e-99, 1e99] + [
     1.0 + sign * 10.0**-k for k in range(3, 16) for sign in (1, -1)])
 def test_a_quaternion_is_normalised(model, norm):
-    """Norms off by drift (1e-15 to 1e-3) or by far: verdict, separation and normal of the unit one
-    to rounding; so is the point of `exact`."""
+    """Norms off by drift (1e-15 to 1e-3) or by far.
+
+    Verdict, separation and normal are those of the unit one to rounding; so is the point of
+    `exact`.
+    """
     wanted = both_ways(model, poses.IDENTITY, TILTED)
     scaled = np.r_[TILTED[:3], norm * TURN]
     found = both_ways(model, poses.IDENTITY * norm, scaled)  # A's position is 0
@@ -80,7 +83,7 @@ def test_a_quaternion_is_normalised(model, norm):
 @few
 @given(st.lists(st.floats(-2, 2), min_size=14, max_size=14), st.booleans(), st.booleans())
 def test_minus_q_is_q(model, numbers, minus_a, minus_b):
-    """q and −q are one rotation: every bit of the answer is the same."""
+    """As q and −q are one rotation, every bit of the answer is the same."""
     a, b = np.array(numbers[:7]), np.array(numbers[7:])
     if pose_fault(a) or pose_fault(b):
         return
@@ -93,8 +96,11 @@ def test_minus_q_is_q(model, numbers, minus_a, minus_b):
 
 @pytest.mark.parametrize('norm', [QUATERNION_MIN, QUATERNION_MAX])
 def test_the_limits_of_a_quaternion_are_one(norm):
-    """Checks and kernels draw the line at the same bit. They did not, and a quaternion within a
-    few ulp of it was refused as 'pose_b None', or as a bad size."""
+    """Checks and kernels draw the line at the same bit.
+
+    They did not, and a quaternion within a few ulp of it was refused as 'pose_b None', or as a bad
+    size.
+    """
     rng = np.random.default_rng(5)
     verdicts = set()
     for _ in range(300):
@@ -143,8 +149,11 @@ def test_a_bad_number_in_a_pose(model, place, value):
 @pytest.mark.parametrize('axes', [(0,), (1,), (2,), (0, 1), (1, 2), (0, 1, 2)])
 @pytest.mark.parametrize('value', BAD_EXTENTS)
 def test_a_bad_extent(model, axes, value):
-    """No plates, rods or points, nothing negative, not finite, or beyond the limits, on any axis,
-    in the solver or in a row of a batch. (A NaN on y or z got through a batch, into the answer.)"""
+    """No plates, rods or points, nothing negative, not finite, or beyond the limits, on any axis.
+
+    They are refused in the solver and in a row of a batch. (A NaN on y or z got through a batch,
+    into the answer.)
+    """
     bad = np.array(poses.CUBE)
     bad[list(axes)] = value
     words = f'{value:g}'.replace('+', r'\+')
@@ -174,9 +183,11 @@ def numbers(kind, count):
        st.dictionaries(st.integers(0, 19), any_float))
 @example([0, 0, 0, 0, 0, 0, 1, 0, 0, 1, 0, 0, 0, 1], [1, 1, 1, 1, 1, 1], {15: math.nan})
 def test_whatever_comes_in(model, two_poses, two_sizes, changes):
-    """Good poses and sizes with none, some or all of the twenty numbers replaced by any float:
-    refused where the checks say so, else a sound answer; and no warning, which is an error here.
-    (Of 400, some 200 are answered.)"""
+    """Good poses and sizes with none, some or all of the twenty numbers replaced by any float.
+
+    Refused where the checks say so, else a sound answer; and no warning, which is an error here.
+    (Of 400, some 200 are answered.)
+    """
     values = [changes.get(place, value) for place, value in enumerate(two_poses + two_sizes)]
     pose_a, pose_b, size_a, size_b = values[:7], values[7:14], values[14:17], values[17:]
     bad = any(map(pose_fault, (pose_a, pose_b))) or any(map(size_fault, (size_a, size_b)))
@@ -243,8 +254,10 @@ GOOD_KINDS = {
 @every_model
 @pytest.mark.parametrize('kind', GOOD_KINDS.values(), ids=GOOD_KINDS)
 def test_numbers_of_any_kind(model, kind):
-    """Whatever holds real numbers is taken as float64, in single calls and batches alike, and no
-    kernel is compiled for it (which took seconds, in mid-stream, for read-only arrays)."""
+    """Whatever holds real numbers is taken as float64, in single calls and batches alike.
+
+    No kernel is compiled for it (which took seconds, in mid-stream, for read-only arrays).
+    """
     SOLVERS['exact'].batch([ABOVE], [ABOVE])
     compiled = len(solve_exact.signatures)
     wanted = SOLVERS[model](poses.IDENTITY, ABOVE)
@@ -378,14 +391,18 @@ def scene_of(path, content):
     ('a: !!python/object/apply:os.getcwd []', ' is no YAML'), ('[' * 5000, ' is no YAML'),
     ('a: \x07', ' is no YAML'), ('a: \udc80', ' is no YAML'), (b'\xff\xfe\xff', ' is no YAML')])
 def test_a_bad_scene(tmp_path, text, words):
-    """File and field, whatever is wrong; PyYAML itself raises ten kinds of exceptions, and takes
-    the last of two boxes of one name."""
+    """File and field are named, whatever is wrong.
+
+    PyYAML itself raises ten kinds of exceptions, and takes the last of two boxes of one name.
+    """
     assert scene_of(tmp_path / 'scene.yaml', text).startswith(words)
 
 
 def test_a_maze_of_yaml(tmp_path):
-    """Lists of lists of lists, ten of each in the next, by reference: 10^12 numbers, if one were to
-    print them. The error is short, and takes no time."""
+    """Lists of lists of lists, ten of each in the next, by reference.
+
+    They are 10^12 numbers, if one were to print them. The error is short, and takes no time.
+    """
     maze = '\n'.join(f'l{i + 1}: &l{i + 1} [{", ".join([f"*l{i}"] * 10)}]' for i in range(12))
     assert scene_of(tmp_path / 'scene.yaml', f'l0: &l0 1.0\n{maze}\nboxes: *l12').startswith(
         'boxes: must be a map of names to boxes, not [[')

@@ -49,8 +49,10 @@ def test_cdr_is_what_rclpy_writes(client):
 
 
 def test_bytes_that_are_no_message(node, client):
-    """Cut short at every length, garbage, absurd lengths, other encapsulations: each is refused and
-    counted, and the next good pair is answered."""
+    """Cut short at every length, garbage, absurd lengths, other encapsulations.
+
+    Each is refused and counted, and the next good pair is answered.
+    """
     rng = np.random.default_rng(1)
     cut = [GOOD[:length] for length in range(len(GOOD))]
     garbage = [rng.bytes(length) for length in (1, 3, 4, 5, 8, 12, 16, 40, 76, 77, 200, 5000)]
@@ -77,7 +79,9 @@ def test_bytes_that_are_no_message(node, client):
 
 def test_messages_with_flipped_bytes(node, client):
     """Good messages with 1 to 8 bytes changed: some are poses, some are none, some are refused.
-    Whatever is answered is sound."""
+
+    Whatever is answered is sound.
+    """
     rng = np.random.default_rng(2)
     for _ in range(10):
         for _ in range(20):
@@ -98,8 +102,11 @@ def test_messages_with_flipped_bytes(node, client):
 
 
 def test_frames(node, client):
-    """Any UTF-8 is a frame, of any length that arrives; bytes that are no UTF-8, and strings that
-    do not end with their first NUL, are refused and counted."""
+    """Any UTF-8 is a frame, of any length that arrives.
+
+    Bytes that are no UTF-8, and strings that do not end with their first NUL, are refused and
+    counted.
+    """
     for raw, frame in ((b'\0', ''), (b'', ''), (b'yard\0', 'yard'),
                        ('Köln 港\0'.encode(), 'Köln 港'), (b'y' * 50_000 + b'\0', 'y' * 50_000)):
         stamp = client.send_pair(ORIGIN, TOUCHING, raw)
@@ -121,8 +128,10 @@ def test_frames(node, client):
 
 
 def test_stamps(node, client):
-    """Any second of int32 is a stamp; a nanosecond part of a second or more is refused: the sum may
-    not fit, and was published as another stamp, 136 years off."""
+    """Any second of int32 is a stamp; a nanosecond part of a second or more is refused.
+
+    The sum may not fit, and was published as another stamp, 136 years off.
+    """
     for sec, nanosec in ((0, 1), (-1, 5), (-2**31, 0), (2**31 - 1, 10**9 - 1)):
         client.send_raw(cdr(ORIGIN, (sec, nanosec)))
         stamp = sec * 10**9 + nanosec
@@ -138,7 +147,8 @@ def test_stamps(node, client):
 def test_good_poses_among_bad_ones(node, client):
     """Shuffled: the good are answered as the solver does, the bad are counted and never answered.
 
-    All zero bytes are what a sender of another language may publish by default."""
+    All zero bytes are what a sender of another language may publish by default.
+    """
     good = [TOUCHING, APART, [0, 0, 1.5, 5e-324, 0, 0, 1], [1e-310, 0, 1.5, 0, 0, 0, -1e-8],
             [0, 0, 2, 0, 0, 1e8, 1e8], [1e50, -1e50, 0, 0, 0, 0, 1], [-0.0, -0.0, 1, -0.0, 0, 0, 1]]
     bad = [[0] * 7, [math.nan] * 7, [0, 0, 0, 5e-324, 0, 0, 1e-310], [0, 0, 0, 0, 0, 0, 1e308],
@@ -245,9 +255,11 @@ def test_weights_while_it_runs(node, client, tmp_path):
 
 
 def test_a_request_that_rclpy_cannot_read(node, client):
-    """A parameter of a type that there is none of: rclpy's own service raises ValueError, out of
-    the executor. Without the guard in `runtime.spin` the node ended there, with status 1; now it
-    says so, gives no reply, and goes on."""
+    """A parameter of a type that there is none of.
+
+    rclpy's own service raises ValueError, out of the executor. Without the guard in `runtime.spin`
+    the node ended there, with status 1; now it says so, gives no reply, and goes on.
+    """
     for kind, name in ((SetParameters, 'set_parameters'),
                        (SetParametersAtomically, 'set_parameters_atomically')):
         reply = call(client, kind, name, [('size_a', ParameterValue(type=77))], timeout=1.0)

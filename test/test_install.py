@@ -118,8 +118,10 @@ under_colcon = pytest.mark.parametrize('installed', [kind for kind in INSTALL if
 
 @all_kinds
 def test_data_files_are_there_and_load(installed: Installation) -> None:
-    """Every data file of the repository is found, and none of another installation; weights and
-    schemas can be read."""
+    """Every data file of the repository is found, and none of another installation.
+
+    Weights and schemas can be read.
+    """
     found = installed.ask("""
 import json, sys
 import box_contact_ros
@@ -175,8 +177,11 @@ def test_colcon_knows_the_package_type(tmp_path: Path) -> None:
 
 @under_colcon
 def test_ros2_run_finds_the_programs(installed: Installation) -> None:
-    """`ros2 run` asks the ament index for the package's prefix, and takes an executable file of
-    that name in its lib/<package>; `ros2 launch` and others ask for the share folder."""
+    """`ros2 run` and `ros2 launch` find their files by way of the ament index.
+
+    `ros2 run` asks it for the package's prefix, and takes an executable file of the program's name
+    in its lib/<package>; `ros2 launch` and others ask for the share folder.
+    """
     pytest.importorskip('ament_index_python')
     index = installed.ask("""
 import json

@@ -44,8 +44,11 @@ def answers(model: str) -> np.ndarray:
 
 @pytest.mark.parametrize('model', ['exact', 'committee'])
 def test_plain_python_gives_the_same(model: str, tmp_path: Path) -> None:
-    """Verdicts to the bit. The rest up to rounding, which differs where the compiler joins a
-    multiplication and an addition, or a network's sums are taken in another order."""
+    """Verdicts to the bit, the rest up to rounding.
+
+    Rounding differs where the compiler joins a multiplication and an addition, or a network's sums
+    are taken in another order.
+    """
     compiled = answers(model)
     file = tmp_path / 'answers.npy'
     code = (f'import numpy, test_interpreted; '

@@ -45,8 +45,7 @@ def test_the_grid_covers_what_is_asked_for():
 
 @pytest.mark.parametrize('number', [5, HANGING_OVER, 31])
 def test_the_exact_point_lands_at_200_hz_with_latency(number):
-    """Among the hardest of the grid: with twice the stiffness, none of these three comes to
-    rest."""
+    """Among the hardest of the grid: at twice the stiffness, none of these three comes to rest."""
     result = landed(number, rate_hz=200.0, latency=0.002)
     assert result.at_rest, f'\n{result}'
     assert result.overhang == pytest.approx(CASES[number].overhang, abs=0.01)
@@ -63,7 +62,7 @@ def test_the_exact_point_lands_at_either_rate(rate_hz, latency):
 
 @pytest.mark.parametrize('rate_hz', [200.0, 1000.0])
 def test_the_deepest_point_does_not_land(rate_hz):
-    """FCL's deepest contact jumps from corner to corner, metres a tick, and the load rattles."""
+    """The deepest contact of FCL jumps between corners, metres a tick, and the load rattles."""
     pytest.importorskip('fcl')
     result = landed(HANGING_OVER, 'fcl', rate_hz=rate_hz)
     assert not result.at_rest
@@ -73,8 +72,10 @@ def test_the_deepest_point_does_not_land(rate_hz):
 
 
 def test_lost_answers_are_bridged_by_the_last_wrench():
-    """Every tenth answer lost at random: at rest with the wrench held. With no force on lost ticks
-    instead, it is not."""
+    """Every tenth answer lost at random: at rest with the wrench held.
+
+    With no force on lost ticks instead, it is not.
+    """
     scenario = scenario_of(CASES[4])
     solver = ContactSolver(scenario.size, scenario.stack_size, model='exact')
     far = solver(np.array([0, 0, 1e3, 0, 0, 0, 1.0]), np.array([0, 0, 0, 0, 0, 0, 1.0]))
@@ -114,8 +115,7 @@ def test_every_criterion_counts():
 
 
 def test_corner_speeds_and_tilts_are_rigid_motion():
-    """Spinning at ω about the vertical, the corners move at ω·√(L² + W²)/2; a pitch of θ tilts by
-    θ."""
+    """Spinning at ω about the vertical, corners move at ω·√(L² + W²)/2; a pitch of θ tilts by θ."""
     scenario = landing_scenario()
     record = LandingRecord(scenario, 200.0)
     record.poses = [np.array([1.0, 2, 3, 0, math.sin(0.1), 0, math.cos(0.1)]),

@@ -105,7 +105,7 @@ def test_lost_ticks_are_bridged(node, client, monkeypatch):
 
 
 def test_answers_that_say_nothing_are_held_over(client, monkeypatch):
-    """NaN rows are no answer, an empty cloud is "no contact", a contact pushes up."""
+    """Rows of NaN are no answer, an empty cloud is "no contact", a contact pushes up."""
     crane, _ = client
     monkeypatch.setattr(crane_feedback, 'LOCKSTEP_PATIENCE', 0.01)
     feedback, simulated = crane.feedback, crane_node.Crane(crane.scenario, crane.rate)

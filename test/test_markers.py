@@ -186,7 +186,7 @@ def test_no_more_often_than_asked(client, node, contact_node):
 
 
 def test_bad_poses_are_not_drawn(client, node):
-    """NaN and a quaternion of zero length; the box stays where it was."""
+    """Neither NaN nor a quaternion of zero length; the box stays where it was."""
     offer_until_drawn(client, 2)
     client.spin(lambda: False, 0.3)
     client.arrays.clear()

@@ -177,7 +177,7 @@ PARSER = '@asyncapi/parser@3.6.3'
 
 @pytest.fixture(scope='module')
 def parse(tmp_path_factory):
-    """AsyncAPI's own parser, from npm: takes a folder with asyncapi.yaml."""
+    """The parser of AsyncAPI itself, from npm: takes a folder with asyncapi.yaml."""
     place = tmp_path_factory.mktemp('npm')
     if not (shutil.which('npm') and shutil.which('node')):
         pytest.skip("AsyncAPI's own parser needs npm and node")
@@ -198,8 +198,11 @@ def parse(tmp_path_factory):
 
 
 def test_asyncapis_own_parser(parse, tmp_path):
-    """Its schema of the ros2 binding misspells one value, `realiable`, where the binding's text
-    says reliable. Nothing else is said against the document, and with that word nothing at all."""
+    """Its schema of the ros2 binding misspells one value, `realiable`.
+
+    The binding's text says reliable. Nothing else is said against the document, and with the
+    misspelt word nothing at all.
+    """
     said = parse(FOLDER)['complaints']
     assert said and all('realiable' in text or 'match "then" schema' in text for text in said), said
     folder = shutil.copytree(FOLDER, tmp_path / 'msg_schemas')
@@ -220,8 +223,10 @@ def test_the_parser_complains(parse, tmp_path):
 
 
 def test_every_reference_resolves():
-    """In the document, and in each schema; every schema but the scene file's belongs to a message
-    of its title."""
+    """In the document, and in each schema.
+
+    Every schema but the scene file's belongs to a message of its title.
+    """
     for reference in references(DOCUMENT):
         assert follow(reference)
     for schema in SCHEMAS.values():
@@ -249,8 +254,7 @@ def test_schema_is_valid(name):
 
 
 def test_shared_definitions_agree():
-    """Every file stands alone, so what they share is written out in each; the limits are those of
-    the code."""
+    """Files stand alone, so what they share is written out in each; the limits are the code's."""
     shared: dict[str, Any] = {}
     for schema in SCHEMAS.values():
         for name, definition in schema['$defs'].items():
@@ -427,8 +431,10 @@ def declared_qos(operation: dict[str, Any]) -> QoSProfile:
 
 @pytest.mark.parametrize('name', OPERATIONS)
 def test_qos_is_the_documents(node, client, live, name):
-    """As the ROS graph reports the node's endpoint; the graph knows no history and no depth, so
-    those are taken from the endpoint itself."""
+    """As the ROS graph reports the node's endpoint.
+
+    The graph knows no history and no depth, so those are taken from the endpoint itself.
+    """
     operation = OPERATIONS[name]
     address = follow(operation['channel']['$ref'])['address']
     sends = operation['action'] == 'send'

@@ -250,8 +250,10 @@ def cells(page: str) -> list[str]:
 
 
 def test_tables_in_the_docs_are_the_shipped_weights(tmp_path: Path) -> None:
-    """Tables 1 and 2 of docs/paper_tables.md, the first ones there, are what the program writes;
-    figures may differ by their rounding. (The others hold times: see test_paper_soup.)"""
+    """Tables 1 and 2 of docs/paper_tables.md, the first ones there, are what the program writes.
+
+    Figures may differ by their rounding. (The other tables hold times: see test_paper_soup.)
+    """
     docs = Path(__file__).parents[1] / 'docs' / 'paper_tables.md'
     assert paper.main(['--table', '1', '--table', '2',
                        '--out', str(tmp_path / 'new' / 'page.md')]) == 0

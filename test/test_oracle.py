@@ -31,8 +31,10 @@ def test_shared_faces_count_once(offset):
 
 
 def test_corner_pyramid():
-    """A cube standing on its corner, pressed by d into a face, cuts off a corner: the centroid of
-    that tetrahedron lies at d/4 from the face, its volume is d³ √3/2."""
+    """A cube standing on its corner, pressed by d into a face, cuts off a corner.
+
+    The centroid of that tetrahedron lies at d/4 from the face, its volume is d³ √3/2.
+    """
     turn = poses.multiply(poses.small_rotations(np.array([[1.0, -1, 0]]),
                                                 np.array([np.arccos(1 / np.sqrt(3))])),
                           np.array([[0.0, 0, 0, 1]]))[0]
@@ -70,8 +72,11 @@ def test_overlap_against_sampling():
 
 
 def hull_depth(a, b):
-    """Depth by the hull of the 64 differences of corners: the distance from the origin to the
-    nearest of the planes through three of them that have all the others on one side."""
+    """Depth by the hull of the 64 differences of corners.
+
+    It is the distance from the origin to the nearest of the planes through three of them that have
+    all the others on one side.
+    """
     def corners(box):
         return np.array([[float(v) for v in p] for s in (-1, 1) for p in box.face(2, s)])
 

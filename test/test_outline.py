@@ -229,8 +229,11 @@ def outlines(a, b, size_a, size_b):
 
 
 def bound(outline):
-    """Accuracy of the bounding box [m]: max(1e-9, 3e-14·size/depth)·size. A wedge of tilt θ is
-    longer by FLUSH·size/θ where its slabs are wider by FLUSH·size, and its depth is θ·length."""
+    """Accuracy of the bounding box [m]: max(1e-9, 3e-14·size/depth)·size.
+
+    A wedge of tilt θ is longer by FLUSH·size/θ where its slabs are wider by FLUSH·size, and its
+    depth is θ·length.
+    """
     depth = max(-outline['separation'], DEPTH_FLOOR * outline['size'])
     return max(1e-9, 3e-14 * outline['size'] / depth) * outline['size']
 
@@ -298,9 +301,12 @@ def test_boxes_that_lie_on_each_other_keep_their_frame():
 
 
 def test_an_aligned_stack_has_its_whole_patch():
-    """Containers exactly one on the other, turned anywhere: every side of one lies in a side's
-    plane of the other, and rounding alone says whose edges are outside. Without wider slabs nothing
-    or one side was left, and the point was half a container off, outside both."""
+    """Containers exactly one on the other, turned anywhere.
+
+    Every side of one lies in a side's plane of the other, and rounding alone says whose edges are
+    outside. Without wider slabs nothing or one side was left, and the point was half a container
+    off, outside both.
+    """
     rng = np.random.default_rng(9)
     n = 2000
     turns = np.tile(poses.IDENTITY[3:], (n, 1))

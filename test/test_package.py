@@ -250,7 +250,7 @@ def test_program_fixture_ends_the_whole_group(program) -> None:
 
 
 def test_versions_agree() -> None:
-    """catkin's release tools rewrite both, so both are written out; here they are compared."""
+    """The release tools of catkin rewrite both, so both are written out; here they are compared."""
     manifest = ElementTree.parse(ROOT / 'package.xml').getroot()
     done = _run('setup.py', '--name', '--version')
     assert done.stdout.split() == [manifest.findtext('name'), manifest.findtext('version')]
@@ -270,7 +270,7 @@ def test_manifest_is_valid() -> None:
     ('env', 'prefix'), [({}, ''), ({'PIP_BUILD_TRACKER': '/tmp'}, 'box_contact_')]
 )
 def test_program_names_under_colcon_and_pip(env: dict[str, str], prefix: str) -> None:
-    """colcon gets the bare names in lib/box_contact_ros, pip the prefixed ones in bin/."""
+    """Bare names in lib/box_contact_ros for colcon, the prefixed ones in bin/ for pip."""
     done = _run(
         '-c',
         'import json\n'

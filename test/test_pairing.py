@@ -93,8 +93,10 @@ def test_tolerance_joins_the_nearest_stamps():
 
 
 def test_a_box_that_fell_silent_is_waited_for_until_it_is_stale():
-    """Box b ends: a's ticks wait for max_age, then are answered at once without b, and b is said to
-    be stale; when it is back, it is waited for again."""
+    """Box b ends: a's ticks wait for max_age, then are answered at once without b.
+
+    Then b is said to be stale; when it is back, it is waited for again.
+    """
     pairing = StampPairing(TWO, max_age=50 * MS)
     pairing.add('box_a', pose(0))
     assert stamps(pairing.add('box_b', pose(0))) == [0, 0]
@@ -125,8 +127,10 @@ def test_after_a_pause_nobody_is_stale():
 
 
 def test_a_silent_box_costs_the_others_no_tick():
-    """c ends; a and b go on at 1 kHz: each tick of theirs is answered once, with the pair of c
-    stale, late where c was waited for, then at once."""
+    """Box c ends; a and b go on at 1 kHz: each tick of theirs is answered once.
+
+    It is answered with the pair of c stale, late where c was waited for, then at once.
+    """
     pairing = StampPairing(scene(), max_age=500 * MS)
     for box in 'abc':
         ticks = pairing.add(box, pose(0))
@@ -166,8 +170,10 @@ def test_a_box_that_went_counts_for_no_tick():
 
 
 def test_time_set_back_begins_anew():
-    """A simulation that starts again: what waited is dropped and counted, the first tick of the new
-    time is answered, and no pose of the old time is."""
+    """A simulation that starts again: what waited is dropped and counted.
+
+    The first tick of the new time is answered, and no pose of the old time is.
+    """
     for pairing in (StampPairing(TWO, max_age=100 * MS), LatestPairing(TWO, max_age=100 * MS)):
         for stamp in range(5 * RESET, 5 * RESET + 10 * MS, MS):
             pairing.add('box_a', pose(stamp))

@@ -64,8 +64,10 @@ def test_error_on_touching_boxes(name):
 
 @pytest.mark.parametrize('name', MODELS)
 def test_contracts(name):
-    """Finite, unit normal, verdict and separation of SAT, point on the touching box's surface,
-    rows as single calls."""
+    """Finite, unit normal, verdict and separation of SAT, point on the touching box's surface.
+
+    Rows are as single calls.
+    """
     solver, exact, size = make(name)
     a, b = touching(np.array(size), n=300, depth=0.05)
     b[::3, :3] += 20.0
@@ -154,7 +156,7 @@ def rotations(n, seed=2):
 
 
 def test_fold_octant_reaches_the_domain():
-    """t' ≥ 0, R' proper with angles in [−π/2, π/2], and unfold undoes the fold."""
+    """The fold has t' ≥ 0, R' proper with angles in [−π/2, π/2], and unfold undoes it."""
     rng, offsets, turns = rotations(2000)
     fold = np.zeros(FOLD_SIZE)
     for t, r in zip(offsets, turns):
@@ -170,8 +172,10 @@ def test_fold_octant_reaches_the_domain():
 
 @pytest.mark.parametrize('axis', [0, 1, 2, *range(6, 15)])
 def test_fold_features_reaches_the_reference_features(axis):
-    """The face becomes +x and the corner that looks at it (−, −, −); or the edges become those of
-    z at (+, +) and y at (−, −); angles stay within ±π/2."""
+    """The face becomes +x and the corner that looks at it (−, −, −).
+
+    Or the edges become those of z at (+, +) and y at (−, −); angles stay within ±π/2.
+    """
     rng, offsets, turns = rotations(500)
     fold = np.zeros(FOLD_SIZE)
     for t, r in zip(offsets, turns):

@@ -60,7 +60,9 @@ def test_touching_poses_are_the_patterns(small):
 
 def test_the_search_alone_finds_every_pair():
     """Asked for one contact and for costs, FCL goes on to the end: there is a cost of every pair.
-    (FCL keeps one of those that are equal; in poses like these few are.)"""
+
+    FCL keeps one of those that are equal; in poses like these few are.
+    """
     a, b = np.array([[0, 0, 0, 0.3, -0.2, 0.1, 1], [0.5, 0.25, 1.5, 0.1, 0.2, 0.3, 1]])
     pair = soup.Soup(8).place(a, b, poses.CUBE, poses.CUBE)
     pairs = paper_soup.pair_count(soup.collide(*pair))

@@ -87,8 +87,10 @@ def program_and_arguments(words: list[str]) -> tuple[str, list[str]]:
 
 
 def start(words: list[str], program, **_) -> None:
-    """A node starts and says 'ready'; a crane, shortened, gets its answers; others know the options
-    (their work takes minutes, and other tests do a little of it)."""
+    """A node starts and says 'ready'; a crane, shortened, gets its answers.
+
+    Others know the options (their work takes minutes, and other tests do a little of it).
+    """
     name, arguments = program_and_arguments(words)
     assert name in PROGRAMS
     if name == 'contact_node':
@@ -162,7 +164,7 @@ def colcon(words: list[str], **_) -> None:
 
 
 def sourced(words: list[str], **_) -> None:
-    """ROS's own set-up files: not on this machine. Or that of the environment made before."""
+    """Set-up files of ROS itself: not on this machine. Or that of the environment made before."""
     assert words[1] in ('/opt/ros/jazzy/setup.bash', 'install/setup.bash', f'{VENV}/bin/activate')
 
 
@@ -211,8 +213,7 @@ EXAMPLES = [pytest.param(text, id=f'{page.name}-{number}')
 
 @pytest.mark.parametrize('text', EXAMPLES)
 def test_python_example(text, program):
-    """It runs, beside a node if it is a client, and prints what the comments behind its prints
-    say."""
+    """It runs, beside a node if a client, and prints what the comments behind its prints say."""
     if 'rclpy' in text:
         program('contact_node', '--ros-args', '-p', 'model:=exact').wait_for_output('ready', 120)
     with contextlib.redirect_stdout(io.StringIO()) as printed:

@@ -44,8 +44,10 @@ COUNTS = {'/box_a/pose': 800, '/box_b/pose': 800, '/contact/point': 700, '/conta
 
 
 def decoded(folder: Path) -> dict[str, dict[int, object]]:
-    """Messages by topic and stamp, as Foxglove's own reader decodes them from the definitions in
-    the file. Two under one stamp fail."""
+    """Messages by topic and stamp, as Foxglove's own reader decodes them.
+
+    It does so from the definitions in the file. Two under one stamp fail.
+    """
     found: dict[str, dict[int, object]] = {}
     with (folder / f'{folder.name}.mcap').open('rb') as file:
         for _, channel, _, message in make_reader(
@@ -73,8 +75,10 @@ def vector(message) -> list[float]:
 
 
 def test_others_can_read_it():
-    """Foxglove's reader finds the five topics, their types with definitions, and their counts; the
-    chunks are compressed, and all is less than a megabyte."""
+    """Foxglove's reader finds the five topics, their types with definitions, and their counts.
+
+    The chunks are compressed, and all is less than a megabyte.
+    """
     with (SHIPPED / 'crane_landing.mcap').open('rb') as file:
         reader = make_reader(file, validate_crcs=True)
         assert reader.get_header().profile == 'ros2'
@@ -102,8 +106,11 @@ def test_the_folder_is_a_bag():
 
 
 def test_recorded_contacts_agree_with_the_exact_solver():
-    """Of every pair of recorded poses: verdict, depth and normal to rounding, the point within the
-    model's stated error; the point and the normal of the messages are those of the cloud."""
+    """Of every pair of recorded poses: verdict, depth and normal to rounding.
+
+    The point is within the model's stated error; the point and the normal of the messages are those
+    of the cloud.
+    """
     found = decoded(SHIPPED)
     exact = ContactSolver(CONTAINER, CONTAINER, model='exact')
     errors = []
@@ -151,8 +158,7 @@ def recording(program, out: Path, *arguments: str):
 
 
 def test_a_live_recording(program, tmp_path):
-    """Every message that a client sent and got is in the bag, once, under its stamp; Ctrl-C
-    completes it."""
+    """All that a client sent and got is in the bag, once, under its stamp; Ctrl-C completes it."""
     out = tmp_path / 'run'
     program('contact_node', '--ros-args', '-p', 'model:=exact').wait_for_output('ready', 120)
     size = list(map(str, CONTAINER))

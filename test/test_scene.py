@@ -55,8 +55,10 @@ def assert_same(answer, wanted):
 @pytest.mark.parametrize('model', ['exact', 'committee'])
 @pytest.mark.parametrize('origin', [0.0, 5e6])
 def test_a_tick_is_every_pair_alone(model, origin):
-    """Random boxes, a third of them fixed, half of the pairs listed, near and far: the same
-    contacts as one solver per pair, whatever the conservative test leaves out."""
+    """Random boxes, a third of them fixed, half of the pairs listed, near and far.
+
+    The same contacts as one solver per pair, whatever the conservative test leaves out.
+    """
     rng = np.random.default_rng(1)
     contacts = stale = left_out = 0
     for _ in range(20):

@@ -102,8 +102,10 @@ def set_scene(node, text):
 
 @pytest.mark.parametrize('serialization', ['raw', 'typed'])
 def test_all_pairs_in_one_cloud(client, serialization):
-    """Every tick is one cloud with a row per contact; each pair has topics of its own; and only
-    what the pairs need is subscribed to."""
+    """Every tick is one cloud with a row per contact; each pair has topics of its own.
+
+    Only what the pairs need is subscribed to.
+    """
     with scene_node(serialization=serialization) as node:
         client.offer(load=ON_FLOOR, lorry=LORRY)
         assert {entity.topic_name for entity in node.subscriptions} >= {'/load/pose',
@@ -133,8 +135,10 @@ def test_without_pair_topics(client):
 
 
 def test_boxes_come_and_go_and_no_tick_of_the_others_is_lost(node, client):
-    """The scene is set again and again in a stream of 200 Hz: each tick is answered once, and those
-    with a crate have its pair."""
+    """The scene is set again and again in a stream of 200 Hz: each tick is answered once.
+
+    Those with a crate have its pair.
+    """
     stamps, started, scenes = [], time.monotonic(), 0
     while (now := time.monotonic() - started) < 3.0:
         stamps.append(client.tick(load=ON_FLOOR, lorry=LORRY, crate=LORRY))
@@ -152,8 +156,10 @@ def test_boxes_come_and_go_and_no_tick_of_the_others_is_lost(node, client):
 
 
 def test_a_bad_scene_changes_nothing(node, client, tmp_path):
-    """Garbage, a file that is gone or was overwritten with garbage: refused with the line, and the
-    old scene goes on."""
+    """Garbage, a file that is gone or was overwritten with garbage: refused with the line.
+
+    The old scene goes on.
+    """
     path = tmp_path / 'scene.yaml'
     path.write_text(WITH_CRATE)
     assert set_scene(node, str(path)).successful
@@ -179,8 +185,10 @@ def test_ids_are_never_used_again(node, client):
 
 
 def test_a_stale_box_is_nan_and_never_an_old_contact(client):
-    """The lorry falls silent while the load lies on it: its pair becomes a row of NaN, the load and
-    the floor go on; when it is back, all is as before."""
+    """The lorry falls silent while the load lies on it: its pair becomes a row of NaN.
+
+    The load and the floor go on; when the lorry is back, all is as before.
+    """
     with scene_node(max_age=0.2):
         client.offer(load=ON_LORRY, lorry=LORRY)
         assert 5 in client.rows(client.tick(load=ON_LORRY, lorry=LORRY))
@@ -285,8 +293,10 @@ def test_lifecycle(client):
             raise AssertionError('no state')
 
         def transition(label):
-            """Whether it succeeded. A reply may be lost as long as the way back is not matched:
-            then the state tells."""
+            """Whether it succeeded.
+
+            A reply may be lost as long as the way back is not matched: then the state tells.
+            """
             before = now()
             request = ChangeState.Request()
             request.transition.label = label

@@ -129,9 +129,10 @@ TURN = 0.5
 
 @cache
 def approaches(name: str, turning: bool) -> Series:
-    """Family I: B comes down on a slanted line, rests for an instant, and goes off sideways; 4 s at
-    100 Hz, the speed smooth. Its orientation is fixed, or turns at a constant rate (slerp) and is
-    given as q or −q at random.
+    """Family I: B comes down on a slanted line, rests for an instant, and goes off sideways.
+
+    It takes 4 s at 100 Hz, the speed smooth. Its orientation is fixed, or turns at a constant rate
+    (slerp) and is given as q or −q at random.
 
     In the middle frame it has a pose of the set of that name, and so touches.
     """
@@ -173,9 +174,12 @@ def series(request: pytest.FixtureRequest) -> tuple[str, Series]:
 
 
 def test_one_contact_interval_per_approach(series):
-    """The boxes of a crane meet once and part once or never. So do boxes on a straight line that do
-    not turn (A ⊕ −B is convex), and on two that have a point of contact in common. While they turn,
-    `committee` begins as many contacts as `exact` does, in the same frames."""
+    """The boxes of a crane meet once and part once or never.
+
+    So do boxes on a straight line that do not turn (A ⊕ −B is convex), and on two that have a point
+    of contact in common. While they turn, `committee` begins as many contacts as `exact` does, in
+    the same frames.
+    """
     name, (pairs, motions) = series
     exact, committee = solve('exact', pairs), solve('committee', pairs)
     assert np.array_equal(committee.colliding, exact.colliding)
@@ -208,8 +212,10 @@ def test_frames_know_no_history(series):
 
 
 def test_the_point_keeps_to_its_slope(series):
-    """The law of K from frame to frame: of `exact` always, of `committee` between frames in which
-    the network is asked the same way."""
+    """The law of K from frame to frame: of `exact` always.
+
+    Of `committee` between frames in which the network is asked the same way.
+    """
     name, (pairs, motions) = series
     one, other = frames(pairs, motions)
     exact = slopes(one, other, *frames(solve('exact', pairs), motions))
@@ -227,9 +233,11 @@ def test_the_point_keeps_to_its_slope(series):
 
 
 def beyond_exact(model: str, series: Series) -> tuple[float, float]:
-    """Share of the steps between two contacts that are at most the exact point's plus 1 % of the
-    boxes' shortest edge, and the worst step beyond the exact point's by the smaller box's longest
-    edge."""
+    """Share of the steps between two contacts within a bound, and the worst step.
+
+    The bound is the exact point's step plus 1 % of the boxes' shortest edge; the worst is what a
+    step has beyond the exact point's, by the smaller box's longest edge.
+    """
     pairs, motions = series
     excess = steps(solve(model, pairs), motions) - steps(solve('exact', pairs), motions)
     first, _ = frames(pairs, motions)
@@ -241,9 +249,11 @@ def beyond_exact(model: str, series: Series) -> tuple[float, float]:
 
 
 def test_how_far_the_point_of_committee_steps(series):
-    """Of the crane's steps, 999 of 1,000 are the exact point's plus 1 % of the width at most
-    (measured: 99.91 % in the worst run), the worst is 1.1 % of the edge beyond; of family I, 99.7 %
-    and 2.4 %. The bounds leave room for other weights."""
+    """Of the crane's steps, 999 of 1,000 are the exact point's plus 1 % of the width at most.
+
+    Measured: 99.91 % in the worst run; the worst is 1.1 % of the edge beyond. Of family I, 99.7 %
+    and 2.4 %. The bounds leave room for other weights.
+    """
     name, motion = series
     share, worst = beyond_exact('committee', motion)
     print(f'{name}: {100 * share:.2f} % of the steps, worst {100 * worst:.2f} % of the edge')
@@ -253,8 +263,10 @@ def test_how_far_the_point_of_committee_steps(series):
 
 
 def test_the_deepest_point_jumps_by_the_box(series):
-    """What the bounds above are worth: FCL's deepest point steps from corner to corner. It does so
-    rarely, at every change of the deepest corner, and then by up to the whole box."""
+    """What the bounds above are worth: FCL's deepest point steps from corner to corner.
+
+    It does so rarely, at every change of the deepest corner, and then by up to the whole box.
+    """
     pytest.importorskip('fcl')
     name, motion = series
     share, worst = beyond_exact('fcl', motion)
@@ -325,15 +337,19 @@ def test_continuous_wherever_the_choices_are_equal(name):
 
 
 def test_where_choices_change_the_point_steps():
-    """The law is not one of every step, and the choices are what it takes: without regard to them
-    it is broken by more than a factor of ten."""
+    """The law is not one of every step, and the choices are what it takes.
+
+    Without regard to them it is broken by more than a factor of ten.
+    """
     slope, same = walked('stacks')
     assert slope[~same].max() > 10.0 * K
 
 
 def test_a_rougher_network_breaks_the_law():
-    """Weights that are off by a third at random: the point is still continuous and inside both
-    boxes, but steeper than K."""
+    """Weights that are off by a third at random make the point steeper than K.
+
+    It is still continuous and inside both boxes.
+    """
     noise = np.random.default_rng(1).normal(size=NETWORK.packed.shape)
     rough = dataclasses.replace(
         NETWORK, packed=(NETWORK.packed * (1.0 + 0.3 * noise)).astype(np.float32))
@@ -354,8 +370,10 @@ def test_choices_are_those_of_the_answer():
 
 
 def test_each_choice_counts():
-    """Two answers that differ in one choice are not asked alike, unless it is one between faces
-    that cut nothing."""
+    """Two answers that differ in one choice are not asked alike.
+
+    The exception is a choice between faces that cut nothing.
+    """
     _, choices = solve_with_choices(NETWORK, SETS['random cubes'](np.random.default_rng(4), 1000))
     assert choices.equal(choices).all()
     for name, other in (('network', ~choices.network), ('frame_b', ~choices.frame_b),

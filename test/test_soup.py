@@ -48,8 +48,11 @@ def overlapping(n=60, depth=1e-3, seed=4):
 
 @pytest.mark.parametrize('divisions', [1, 2, 8, 22])
 def test_triangles_cover_the_box_once(divisions):
-    """12 N² of them, the box's area; normals leave the box, and every edge is met once from either
-    side, so that there are no holes, no doubles, and one sense of winding."""
+    """12 N² of them, the box's area; normals leave the box.
+
+    Every edge is met once from either side, so that there are no holes, no doubles, and one sense
+    of winding.
+    """
     size = np.array(poses.CONTAINER)
     corners = soup.triangles(size, divisions)
     assert corners.shape == (12 * divisions**2, 3, 3)
@@ -99,8 +102,10 @@ def test_the_error_shrinks_with_the_triangles():
 @pytest.mark.parametrize('axis', range(3))
 @pytest.mark.parametrize('sign', [1.0, -1.0])
 def test_the_normal_points_from_a_to_b(axis, sign):
-    """B 1.9 m beside A along an axis and off centre: that axis, in either order, about which the
-    side faces' normals lie evenly enough."""
+    """B 1.9 m beside A along an axis and off centre: that axis, in either order.
+
+    The side faces' normals lie evenly enough about it.
+    """
     b = np.array([0.31, 0.31, 0.31, 0, 0, 0, 1])
     b[axis] = sign * 1.9
     for first, second, way in ((IDENTITY, b, 1.0), (b, IDENTITY, -1.0)):

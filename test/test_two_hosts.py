@@ -74,8 +74,10 @@ LOSS, DELAY = 0.02, 0.005
 
 @pytest.fixture
 def far_hosts(unjoined):
-    """Two hosts joined by a cable with LOSS and DELAY [s] each way: by `tc` where the kernel has
-    netem, else by a process that carries the frames."""
+    """Two hosts joined by a cable with LOSS and DELAY [s] each way.
+
+    By `tc` where the kernel has netem, else by a process that carries the frames.
+    """
     names, ends = unjoined
     virtual_cable(ends)
     hosts = join(names, ends)
@@ -106,8 +108,10 @@ def numbers_of(line):
 
 
 def test_simulator_and_node_on_two_hosts(program, hosts):
-    """A crane on one host, the node on the other: all of 1,000 evaluations come back (else the
-    crane's status is not 0)."""
+    """A crane on one host, the node on the other: all of 1,000 evaluations come back.
+
+    Else the crane's status is not 0.
+    """
     here, there = hosts
     node = program('contact_node', '--ros-args', *CUBES, env=SUBNET, within=there)
     node.wait_for_output('ready', 120)
@@ -120,10 +124,12 @@ def test_simulator_and_node_on_two_hosts(program, hosts):
 
 
 def test_a_bad_cable(program, far_hosts):
-    """2 % loss and 5 ms delay each way: poses are lost, since they are sent best effort and one
-    that is late is worth nothing. Point and normal, of which 4 in 100 would lack one, are sent
-    again, as long as they are among the last ten, which here is 50 ms. What is not answered is told
-    as lost, not made up."""
+    """2 % loss and 5 ms delay each way: what is not answered is told as lost, not made up.
+
+    Poses are lost, since they are sent best effort and one that is late is worth nothing. Point and
+    normal, of which 4 in 100 would lack one, are sent again, as long as they are among the last
+    ten, which here is 50 ms.
+    """
     here, there = far_hosts
     node = program('contact_node', '--ros-args', *CUBES, env=SUBNET, within=there)
     node.wait_for_output('ready', 120)
@@ -138,9 +144,11 @@ def test_a_bad_cable(program, far_hosts):
 
 
 def test_a_yard_shared_by_two_hosts(program, hosts, tmp_path):
-    """1,000 pairs of a load and a yard, half of them with a node on each host, which hear the same
-    poses: together they answer every tick as one node with all of them would. That is how a scene
-    grows past one machine."""
+    """1,000 pairs of a load and a yard, half of them with a node on each host.
+
+    The nodes hear the same poses: together they answer every tick as one node with all of the pairs
+    would. That is how a scene grows past one machine.
+    """
     here, there = hosts
     size = [12.192, 2.438, 2.591]
     boxes = {'load': {'size': size}} | {

@@ -196,7 +196,7 @@ def test_read_out_without_contact_answer_or_poses(log):
 @pytest.mark.parametrize('direction', [
     (0, 0, 1), (0, 0, -1), (1, 0, 0), (0, -1, 0), (0.36, 0.48, -0.8), (1e-12, 0, -1)])
 def test_the_arrow_is_turned_along_the_normal(direction):
-    """z turned by (w, v): v·(2 v_z) + z·(w² − v·v) + 2 w v × z, of a unit quaternion."""
+    """Turned by a unit quaternion (w, v), z is v·(2 v_z) + z·(w² − v·v) + 2 w v × z."""
     w, *v = _turn_from_z(np.array(direction, float))
     v, z = np.array(v), np.array([0.0, 0.0, 1.0])
     assert w * w + v @ v == pytest.approx(1.0)

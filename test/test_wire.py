@@ -42,8 +42,11 @@ def outcome(read, *arguments):
 @given(st.lists(st.tuples(st.one_of(st.tuples(*[FLOATS] * 7), st.tuples(*[BOUNDED] * 7)), FRAMES,
                           STAMPS), min_size=1, max_size=5))
 def test_poses_are_read_alike(poses):
-    """Any numbers, frames and stamps, one after another: bytes and objects give the same pose to
-    the bit, or the same refusal. The raw reader keeps what it knows of the frame before."""
+    """Bytes and objects give the same pose to the bit, or the same refusal.
+
+    Any numbers, frames and stamps, one after another: the raw reader keeps what it knows of the
+    frame before.
+    """
     raw, typed = RawMessages(), TypedMessages()
     for numbers, frame_id, stamp in [*poses, *poses]:
         one = message(numbers, frame_id, stamp)
@@ -58,8 +61,10 @@ def contact(draw):
 
 @given(st.data(), STAMPS, FRAMES, st.integers(0, 4), st.integers(0, 3))
 def test_answers_are_written_alike(data, stamp, frame_id, touching, stale):
-    """Decoded, the bytes are the objects: any number of rows, any frame (its length moves all that
-    follows), rows of NaN for stale pairs."""
+    """Decoded, the bytes are the objects.
+
+    Any number of rows, any frame (its length moves all that follows), rows of NaN for stale pairs.
+    """
     pairs = [Pair(n * 10**9 % 2**32, 'p', 'a', 'b') for n in range(touching + stale)]
     answer = Answer([(pair, contact(data.draw)) for pair in pairs[:touching]], pairs[touching:], 0)
     raw, typed = RawMessages(), TypedMessages()

@@ -116,8 +116,7 @@ class NodeLog:
 
     @property
     def adds_up(self) -> bool:
-        """Whether every message that came is a first answer, a duplicate, a stranger or an offer's.
-        """
+        """Whether each message is a first answer, a duplicate, a stranger or an offer's."""
         others = sum(log.duplicates + log.strangers for log in self.streams)
         return self.messages == self.matched + others + self.offer_messages
 

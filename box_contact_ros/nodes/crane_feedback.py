@@ -35,7 +35,7 @@ class CraneFeedback:
 
     def __init__(self, scenario: CraneScenario, rate_hz: float, *, latency: float,
                  lockstep: bool, stop: threading.Event) -> None:
-        """latency -- [s] after asking, before which no contact acts; stop ends every waiting."""
+        """No contact acts before `latency` [s] after asking; `stop` ends every waiting."""
         self.record = LandingRecord(scenario, rate_hz)
         self._law = ContactLaw.for_load(scenario.mass, scenario.size, rate_hz)
         self._rate_hz, self._latency, self._lockstep = rate_hz, latency, lockstep

@@ -177,13 +177,13 @@ class CraneLog:
         self._renew(stamp_ns, exchange)
 
     def point(self, stamp_ns: int, point, received_ns: int) -> None:
-        """Note a contact point (3,) in m and when it arrived."""
+        """Note the point of a contact, (3,) in m, and when it arrived."""
         if (exchange := self._find(stamp_ns)) is not None:
             exchange.point, exchange.point_ns = np.array(point, dtype=float), received_ns
             self._renew(stamp_ns, exchange)
 
     def normal(self, stamp_ns: int, normal, received_ns: int) -> None:
-        """Note a contact normal (3,), a unit vector from A to B, and when it arrived."""
+        """Note the normal of a contact, a unit vector (3,) from A to B, and when it arrived."""
         if (exchange := self._find(stamp_ns)) is not None:
             exchange.normal, exchange.normal_ns = np.array(normal, dtype=float), received_ns
             self._renew(stamp_ns, exchange)

@@ -49,8 +49,9 @@ SCENARIO = {name: {'size_a': 'size', 'size_b': 'stack_size'}.get(name, name) for
 
 
 def scenario_from(values: Mapping[str, Any]) -> CraneScenario:
-    """The scenario of checked parameters: what is left at its default may be drawn by the seed, or
-    be what a landing needs.
+    """The scenario of checked parameters.
+
+    What is left at its default may be drawn by the seed, or be what a landing needs.
     """
     given = {field: values[name] for name, field in SCENARIO.items()
              if values[name] != PARAMETERS[name].default}

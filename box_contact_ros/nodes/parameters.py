@@ -81,7 +81,7 @@ def one_of(choices: Iterable[str]) -> Check:
 
 
 def flag(name: str, value: Any) -> bool:
-    """true or false."""
+    """Either true or false."""
     if not isinstance(value, bool):
         raise ValueError(f'{name} must be true or false, not {shown(value)}')
     return value

@@ -99,7 +99,7 @@ class ViewLog:
             self._answered = self._lost = 0
 
     def pose(self, box: int, stamp: int, numbers: np.ndarray) -> None:
-        """A pose (7,) of box 0 (A) or 1 (B)."""
+        """A pose of box 0 (A) or 1 (B), as numbers (7,)."""
         with self._lock:
             for tick in self._pairing.add(self._scene.moving[box],
                                           StampedPose(numbers, '', stamp)):
@@ -118,7 +118,7 @@ class ViewLog:
         self._give_up(stamp)
 
     def cloud(self, stamp: int, rows: np.ndarray, received: int) -> None:
-        """The rows of a `contacts` cloud (messages.CLOUD_ROW), received at this time [ns].
+        """The rows (messages.CLOUD_ROW) of a `contacts` cloud, received at this time [ns].
 
         A row of NaN says that the pair could not be evaluated, which is an answer without contact.
         """

@@ -147,7 +147,7 @@ def _corners_through(work, i):
 
 @kernel
 def _corrected(poses_a, poses_b, sizes_a, sizes_b, work, numbers, corrected):
-    """Of every row: was the network's own point outside a box, so that it had to be moved?"""
+    """Whether the network's own point of each row was outside a box, so that it had to be moved."""
     rows = poses_a.shape[0]
     values = network_values(numbers)
     for start in range(0, rows, LANES):
@@ -381,8 +381,10 @@ def class_table(results: Sequence[Result]) -> str:
 
 
 def write_csv(path: Path, results: Sequence[Result]) -> None:
-    """A row per model, set and part: errors in %, differences of the size; the row of a whole set
-    ends with what is known of the set only."""
+    """A row per model, set and part: errors in %, differences of the size.
+
+    The row of a whole set ends with what is known of the set only.
+    """
     with path.open('w', newline='') as file:
         writer = csv.writer(file, lineterminator='\n')
         writer.writerow(['model', 'set', 'part', 'pairs', 'mean', 'p50', 'p99', 'worst',

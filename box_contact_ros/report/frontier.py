@@ -70,8 +70,7 @@ SMALLEST_ERROR = 1e-2
 
 
 def apart(rng: np.random.Generator, n: int) -> Pairs:
-    """Boxes that do not touch: half containers almost stacked, half cubes in any pose; gaps of
-    1e-6 to 0.1 m."""
+    """Boxes 1e-6 to 0.1 m apart: half containers almost stacked, half cubes in any pose."""
     half = n // 2
     size = np.tile((2.0, 2.0, 2.0), (half, 1))
     cubes = any_pose(rng, size, size, np.full(half, 0.01))

@@ -1,4 +1,4 @@
-"""Landings by model: does the container come to rest on one contact point per tick?
+"""Landings by model: whether the container comes to rest on one contact point per tick.
 
 `python -m box_contact_ros.report.landing` runs a grid of landings (rope angle, tilt, overhang; yaw
 and headings drawn) for every model, rate and latency, the constants of the contact law being the
@@ -78,8 +78,9 @@ def jobs_of(models: Sequence[str], rates: Sequence[float], latencies: Sequence[f
 
 
 def write_csv(path: Path, results: Sequence[tuple[Job, LandingResult]]) -> None:
-    """A row per landing: what was run, whether it rests, every figure; SI units, angles of cases
-    in degrees.
+    """A row per landing: what was run, whether it rests, every figure.
+
+    SI units; angles of cases in degrees.
     """
     with path.open('w', newline='') as file:
         writer = csv.writer(file, lineterminator='\n')

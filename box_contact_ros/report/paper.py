@@ -248,8 +248,7 @@ def draw_figure_9(path: Path) -> None:
 
 def report(tables: Collection[int], drawn: Collection[int], *, quick: bool = False,
            folder: Path | None = None) -> str:
-    """The page with some of the tables and figures; pictures and CSV are written to `folder`, or
-    not at all."""
+    """The page with some of the tables and figures; pictures and CSV go to `folder`, if any."""
     sections = [intro(quick)]
     if {1, 2} & set(tables):
         sections += sections_1_and_2(tables, QUICK if quick else 1)

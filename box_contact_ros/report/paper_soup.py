@@ -137,8 +137,11 @@ def near_parallel(rng: np.random.Generator, n: int) -> Poses:
 
 
 def coplanar(rng: np.random.Generator, n: int) -> Poses:
-    """One cube on the other, faces in one plane to the last bit. One in ten stands exactly on top;
-    the others anywhere on it, half of them with their sides parallel, half under any yaw."""
+    """One cube on the other, faces in one plane to the last bit.
+
+    One in ten stands exactly on top; the others anywhere on it, half of them with their sides
+    parallel, half under any yaw.
+    """
     exactly = np.zeros((math.ceil(n / 10), 7))
     exactly[:, 2], exactly[:, 6] = CUBE[2], 1.0
     parallel = (n - len(exactly)) // 2
@@ -192,7 +195,7 @@ def undisturbed() -> Iterator[None]:
 
 
 def search(first: fcl.CollisionObject, second: fcl.CollisionObject) -> None:
-    """FCL's search for all pairs, of which one is handed over: see the module's docstring."""
+    """The search of FCL for all pairs, of which one is handed over: see the module's docstring."""
     fcl.collide(first, second, fcl.CollisionRequest(num_max_contacts=1, enable_contact=True,
                                                     enable_cost=True), fcl.CollisionResult())
 
@@ -285,8 +288,10 @@ def judge_rival(model: str, poses: Poses, exact: Contacts) -> Rival:
 
 
 def crossing(errors: Mapping[int, float], level: float) -> float:
-    """The N at which the error falls to `level`, straight on log-log paper between those measured;
-    0 if it is below from the first on, infinite if it never is."""
+    """The N at which the error falls to `level`, straight on log-log paper between those measured.
+
+    It is 0 if the error is below from the first on, infinite if it never is.
+    """
     divisions = sorted(errors)
     if errors[divisions[0]] <= level:
         return 0.0

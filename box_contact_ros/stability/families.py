@@ -53,7 +53,7 @@ def product(p: np.ndarray, q: np.ndarray) -> np.ndarray:
 
 
 def matrix(q: np.ndarray) -> np.ndarray:
-    """Rotation matrix (3, 3) of a unit quaternion."""
+    """The (3, 3) rotation matrix of a unit quaternion."""
     x, y, z, w = q
     return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
                      [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
@@ -87,8 +87,10 @@ def unit(vector: tuple[float, ...] | np.ndarray) -> np.ndarray:
 
 def edge_crossing(gap: float, angle: float = 1.1, along: float = 0.0, size: float = 2.0,
                   length: float = 2.0) -> Case:
-    """Two bars on edge, A's ridge up along x, B's ridge down, crossing at an angle; B is shifted
-    along A's ridge."""
+    """Two bars on edge, A's ridge up along x, B's ridge down, crossing at an angle.
+
+    B is shifted along A's ridge.
+    """
     a = turned(X, 0.25 * np.pi)
     b = product(turned(Z, angle), turned(X, 0.25 * np.pi))
     return placed((length, size, size), (length, size, size), b, Z, gap, (along, 0.0, 0.0), a)
@@ -316,8 +318,10 @@ def d4_diagonals(rng: np.random.Generator) -> Iterator[Case]:
 
 
 def d5_edge_against_face(rng: np.random.Generator) -> Iterator[Case]:
-    """A shallow crossing of edges, a face axis within a few per cent of it: what libraries with a
-    preference for faces answer with the face."""
+    """A shallow crossing of edges, a face axis within a few per cent of it.
+
+    Libraries with a preference for faces answer it with the face.
+    """
     for angle in (0.3, 0.5, 0.7, 0.9, 1.1):
         for depth in (0.02, 0.1, 0.2, 0.3):
             yield edge_crossing(-depth, angle, along=0.6)

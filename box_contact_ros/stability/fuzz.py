@@ -101,7 +101,7 @@ CLASSES: dict[str, Sizes] = {'cube': _cube, 'container': _container, 'slab': _sl
 
 
 def draw(name: str, rng: np.random.Generator, n: int) -> tuple[np.ndarray, ...]:
-    """n pairs of a class: pose_a, pose_b (n, 7), size_a, size_b (n, 3).
+    """Pairs of a class, n of them: pose_a, pose_b (n, 7), size_a, size_b (n, 3).
 
     Orientations: a third anything; a third one of the 24 right-angled ones, tilted by 0 or 1e-16 to
     0.1 rad; a third with one edge direction in common. Places: a third anywhere near; the others

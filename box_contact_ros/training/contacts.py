@@ -128,9 +128,12 @@ def contacts(make: Callable[..., Pairs], seed: Sequence[int], n: int, progress: 
 
 
 def mixture(rng: np.random.Generator, n: int) -> Pairs:
-    """About n pairs of the kinds that scenes have: equal cubes and random sizes in any pose, and
-    with an edge of one almost along an edge of the other; stacks of boxes with a tilt of 1e-6 to
-    0.3 rad, and containers; containers and cubes stacked squarely, almost in line and flat."""
+    """About n pairs of the kinds that scenes have.
+
+    Equal cubes and random sizes in any pose, and with an edge of one almost along an edge of the
+    other; stacks of boxes with a tilt of 1e-6 to 0.3 rad, and containers; containers and cubes
+    stacked squarely, almost in line and flat.
+    """
     share = n // 28
     parts = []
     sizes = np.ones((4 * share, 3))
@@ -161,8 +164,9 @@ def mixture(rng: np.random.Generator, n: int) -> Pairs:
 
 def along_edges(rng: np.random.Generator, size_a: np.ndarray, size_b: np.ndarray,
                 tilt: np.ndarray) -> Pairs:
-    """An edge direction of B within about `tilt` (n,) [rad] of one of A's, turned about it by any
-    angle: edges that lie along each other, or on a face.
+    """An edge direction of B within about `tilt` (n,) [rad] of one of A's, at any angle about it.
+
+    These are edges that lie along each other, or on a face.
 
     Of boxes in any pose one in ten thousand is of this kind, and the errors were largest there.
     """
@@ -181,8 +185,11 @@ def along_edges(rng: np.random.Generator, size_a: np.ndarray, size_b: np.ndarray
 
 
 def scene_mixture(rng: np.random.Generator, n: int, sizes: Sequence[SizePair]) -> Pairs:
-    """About n pairs of the sizes listed, each in turn as A: half in any pose, half one on the
-    other, any of their axes up, with a tilt of 1e-6 to 0.3 rad."""
+    """About n pairs of the sizes listed, each in turn as A.
+
+    Half are in any pose, half one on the other, any of their axes up, with a tilt of 1e-6 to
+    0.3 rad.
+    """
     share = max(1, n // (4 * len(sizes)))
     parts = []
     for pair in sizes:

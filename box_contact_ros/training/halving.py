@@ -103,8 +103,7 @@ def in_groups(candidates: Sequence[Candidate], search: Search, size: int) -> lis
 
 
 def run(search: Search, checkpoint: Path, *, progress: bool = True) -> Progress:
-    """Go through all rungs, from where the checkpoint stands; it is left for the caller to remove.
-    """
+    """Go through all rungs, from where the checkpoint stands; the caller is to remove it."""
     from tqdm import tqdm
 
     done = _read(checkpoint, search) or Progress([{}], [{}])

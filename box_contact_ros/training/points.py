@@ -41,7 +41,7 @@ class Settings:
 
 
 def device_of(name: str) -> str:
-    """PyTorch's device for `cpu`, `cuda` or `auto`: a GPU where there is one."""
+    """The device of PyTorch for `cpu`, `cuda` or `auto`: a GPU where there is one."""
     return ('cuda' if torch.cuda.is_available() else 'cpu') if name == 'auto' else name
 
 
@@ -117,8 +117,7 @@ class Fit:
 
     def __init__(self, data: Contacts, settings: Settings, *, start: Sequence[Layers] | None = None,
                  ) -> None:
-        """`start`, if given, has the layers of every network for normalised inputs, in place of
-        random ones."""
+        """`start`: the layers of every network for normalised inputs, in place of random ones."""
         s = self.settings = settings
         self.device = torch.device(s.device)
         self.mean, self.deviation = normalisation(data.inputs)
@@ -151,8 +150,7 @@ class Fit:
         return torch.tensor((inputs - self.mean) / self.deviation, device=self.device)
 
     def layers(self, inputs: torch.Tensor) -> list[torch.Tensor]:
-        """Activations of every layer, inputs (patterns, units) first, each (networks, patterns,
-        units)."""
+        """Activations (networks, patterns, units) of all layers, inputs (patterns, units) first."""
         p = self.parameters
         found = [inputs.expand(p[0].shape[0], -1, -1)]
         for layer in range(3):
