@@ -20,6 +20,7 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from inspect import getdoc
 from pathlib import Path
 from typing import Any
 
@@ -378,7 +379,7 @@ are asked for more. Random sizes are timed on {FEW_PAIRS} pairs of sizes. Engine
 points are entered twice: their deepest, and the mean. `committee N-M` are networks of other sizes,
 trained for 100,000 steps.
 
-""" + '\n\n'.join(f'### {name.capitalize()}\n\n{(ALL_SETS[name].__doc__ or "").strip()}\n\n'
+""" + '\n\n'.join(f'### {name.capitalize()}\n\n{getdoc(ALL_SETS[name])}\n\n'
                   f'{set_table(cells, name)}' for name in ALL_SETS) + '\n'
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from inspect import getdoc
 from pathlib import Path
 from typing import Any
 
@@ -68,7 +69,7 @@ def train(path: Path, *, seed: int, commit: str, quick: bool = False,
                              device=device))
     _run(fit, data, path.stem, progress, [seed, _HARD], QUICK_PAIRS if quick else HARD_POOL,
          mixture)
-    card = _card(path, hidden, seed, commit, [], fit, {'recipe': mixture.__doc__})
+    card = _card(path, hidden, seed, commit, [], fit, {'recipe': getdoc(mixture)})
     card['training']['minutes'] = round((time.monotonic() - began) / 60.0, 2)
     layers = {'point': fit.export(0)}
     save_weights(path, layers, card)
@@ -101,7 +102,7 @@ def train_scene(path: Path, sizes: Sequence[SizePair], *, seed: int, commit: str
     _run(fit, data, path.stem, progress, [seed, _HARD], QUICK_PAIRS if quick else HARD_POOL // 2,
          scene_mixture, sizes)
     card = _card(path, hidden, seed, commit, [[list(a), list(b)] for a, b in sizes], fit,
-                 {'recipe': scene_mixture.__doc__, 'started from': weights.card['sha256']})
+                 {'recipe': getdoc(scene_mixture), 'started from': weights.card['sha256']})
     card['training']['minutes'] = round((time.monotonic() - began) / 60.0, 2)
     layers = {'point': fit.export(0)}
     save_weights(path, layers, card)
