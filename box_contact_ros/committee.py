@@ -6,18 +6,8 @@ Stages of a block of pairs, each a loop without branches over structures of arra
 2. `press`: pairs shallower than DEPTH_FLOOR are pressed in, as the point's definition says.
 3. `outline_block`: the exact bounding box of A∩B, in the frame of one of the boxes, and a point
    inside (`outline`).
-4. `describe_block`: what the network sees. Scaled to its bounding box, A∩B is the cube [−1, 1]³ cut
-   by the six faces of the other box. A face is described by its unit normal in these coordinates
-   (unit in the sum of the absolute components), times how far it cuts into the cube; a face that
-   cuts nothing off is zero and comes in smoothly. Sizes, units and the depth have gone: one network
-   serves every pair of boxes. The cube's 48 symmetries are used up: along every axis the faces push
-   the centroid to the positive side (PUSH), and axes are sorted by how much the faces are slanted
-   along them (SLOPE). Both change over only where the overlap is nearly its own mirror image, so
-   that the network's error does not jump as boxes move.
-5. `network.forward_block`: the offset of the centroid from the cube's middle, in float32; scaled
-   down where A∩B is almost symmetric about its middle (SYMMETRIC), and along an axis along which no
-   face is slanted (STRAIGHT).
-6. `place_block`: the offset is cut to where a centroid can be (that of a convex body lies in the
+4. `centroid_block`: a network says where in this bounding box the centroid is (`sites`).
+5. `place_block`: the answer is cut to where a centroid can be (that of a convex body lies in the
    middle half of its bounding box: Bonnesen and Fenchel 1934, §34), and the way there from the
    inside point is shortened where it would leave the other box. It starts inside A∩B, so it ends in
    both boxes, whatever the network says.
@@ -31,9 +21,8 @@ from __future__ import annotations
 import numpy as np
 
 from .block import (
-    CUTS,
+    CENTROID,
     EXACT_ANSWERS,
-    FEATURES,
     HALF,
     HALF_A,
     HALF_B,
@@ -41,24 +30,15 @@ from .block import (
     IN_RANGE,
     INSIDE,
     LANES,
-    LESS,
     MIDDLE,
-    MIRRORED,
-    MORE,
     NORMALS,
     OFFSET_A,
-    OFFSET_B,
     OFFSETS,
     OTHER,
     POINT,
-    PUSH,
-    RANKS,
-    REACH,
     ROTATION,
     SEPARATION,
     SIZE,
-    SLANT,
-    SLOPE,
     TOUCH,
     new_work,
 )
@@ -76,15 +56,7 @@ from .contact import (
 )
 from .exact import solve_exact
 from .jit import inlined, kernel
-from .network import (
-    Weights,
-    WeightsError,
-    block_numbers,
-    forward_block,
-    forward_one,
-    load_weights,
-    network_values,
-)
+from .network import Weights, WeightsError, load_weights
 from .outline import (
     outline_block,
 )
@@ -92,6 +64,15 @@ from .overlap import DEPTH_FLOOR, centroid, press, press_on, repeat_pressed
 from .pose import load_block, load_one, load_sizes
 from .resources import resource_path
 from .sat import query_block
+from .sites import (
+    DESCRIPTION,
+    INPUTS,
+    OUTPUTS,
+    UNITS_MAX,
+    centroid_block,
+    centroid_one,
+    site_numbers,
+)
 
 ASPECT_MAX = 20.0
 """Longest by shortest edge of either box up to which the network is asked."""
@@ -105,203 +86,17 @@ RANGE_SLACK = 1.0 + 1e-9
 FLAT = 0.25 * DEPTH_FLOOR
 """Half extent of A∩B's bounding box, of the size, below which pressing in gave it no volume."""
 
-SYMMETRIC = 0.05
-"""Asymmetry of A∩B in its bounding box below which the network's answer is scaled down, to nothing
-where there is none: an overlap that is its own mirror image through its middle, as that of any two
-containers squarely stacked, has its centroid there. Without it, a container at rest had its point
-jump by the network's error whenever a rounding chose another of the cube's mirror images."""
-
-STRAIGHT = 0.02
-"""Slant of the cutting faces along an axis below which the point is drawn to the middle of that
-axis: an overlap whose faces all run along an axis is as long everywhere across it, as that of a
-container which lies on its stack with one long edge, and its centroid is in the middle."""
-
-TIE = 1e-6
-"""Difference, of numbers about 1, that makes no difference: a corner pressed into a face is slanted
-alike along all three axes, and rounding must not choose between their orders; the longer side of
-the bounding box comes first then."""
-
 CENTROID_REACH = 0.5
 """Farthest a centroid can be from the middle of its bounding box, in half extents."""
 
-INPUTS, OUTPUTS = 18, 3
-DESCRIPTION = 'cuts of the unit cube, mirrored by push, sorted by slope'
-"""What the inputs and outputs mean; weights made for another meaning are refused."""
-WIDE_INPUTS = 20
-"""Inputs as the kernels have them, in groups of four; the last two are zero."""
-
 
 @inlined
-def _pick(k0, k1, x0, x1, x2):
-    """x0, x1 or x2: the one whose rank is asked for."""
-    return x0 if k0 else (x1 if k1 else x2)
-
-
-@inlined
-def _frame_axis(lanes, work, f):
-    """The other box's axis f (a row offset) in the frame chosen."""
-    for i in range(lanes):
-        in_b = work[IN_B + i] > 0.5
-        x = work[ROTATION + 3 * f + i] if in_b else work[ROTATION + f + i]
-        y = work[ROTATION + 3 * f + LANES + i] if in_b else work[ROTATION + 3 * LANES + f + i]
-        z = work[ROTATION + 3 * f + 2 * LANES + i] if in_b else work[ROTATION + 6 * LANES + f + i]
-        work[NORMALS + 3 * f + i] = x
-        work[NORMALS + 3 * f + LANES + i] = y
-        work[NORMALS + 3 * f + 2 * LANES + i] = z
-        # Along its own axis the other box's centre is at n·c: in A's frame B's centre is at t, and
-        # n·t is t's component in B's frame; in B's frame A's centre is at −t, likewise.
-        centre = -work[OFFSET_A + f + i] if in_b else work[OFFSET_B + f + i]
-        work[OFFSETS + f + i] = ((x * work[MIDDLE + i] + y * work[MIDDLE + LANES + i])
-                                 + z * work[MIDDLE + 2 * LANES + i]) - centre
-        work[OTHER + f + i] = work[HALF_A + f + i] if in_b else work[HALF_B + f + i]
-
-
-@inlined
-def _face_cuts(lanes, work, f):
-    """How far the two faces across axis f cut in, and whereto they push the centroid."""
-    for i in range(lanes):
-        offset = work[OFFSETS + f + i]
-        half = work[OTHER + f + i]
-        x = work[NORMALS + 3 * f + i] * work[HALF + i]
-        y = work[NORMALS + 3 * f + LANES + i] * work[HALF + LANES + i]
-        z = work[NORMALS + 3 * f + 2 * LANES + i] * work[HALF + 2 * LANES + i]
-        inverse = 1.0 / ((abs(x) + abs(y)) + abs(z))
-        # 1: the face goes through the cube's middle; 0: it just misses the cube; 2: nothing left.
-        upper = min(2.0, max(0.0, 1.0 - (half - offset) * inverse))
-        lower = min(2.0, max(0.0, 1.0 - (half + offset) * inverse))
-        flip = upper < lower
-        more = (-lower if flip else upper) * inverse
-        less = (-upper if flip else lower) * inverse
-        work[CUTS + f + i] = upper + lower
-        work[REACH + i] = max(work[REACH + i], abs(upper - lower))
-        work[MORE + f + i] = more
-        work[LESS + f + i] = less
-        push = less - more
-        work[PUSH + i] += x * push
-        work[PUSH + LANES + i] += y * push
-        work[PUSH + 2 * LANES + i] += z * push
-        both = abs(more) + abs(less)
-        work[SLOPE + i] += abs(x) * both
-        work[SLOPE + LANES + i] += abs(y) * both
-        work[SLOPE + 2 * LANES + i] += abs(z) * both
-        more = abs(more)
-        work[SLANT + i] = max(work[SLANT + i], abs(x) * more)
-        work[SLANT + LANES + i] = max(work[SLANT + LANES + i], abs(y) * more)
-        work[SLANT + 2 * LANES + i] = max(work[SLANT + 2 * LANES + i], abs(z) * more)
-
-
-@inlined
-def _face_inputs(lanes, work, f, row):
-    """The two faces across axis f as inputs, from `row` on: the one that cuts more first."""
-    for i in range(lanes):
-        k0 = work[RANKS + i]
-        k1 = work[RANKS + LANES + i]
-        x = work[NORMALS + 3 * f + i] * work[MIRRORED + i]
-        y = work[NORMALS + 3 * f + LANES + i] * work[MIRRORED + LANES + i]
-        z = work[NORMALS + 3 * f + 2 * LANES + i] * work[MIRRORED + 2 * LANES + i]
-        p0 = _pick(k0 == 0.0, k1 == 0.0, x, y, z)
-        p1 = _pick(k0 == 1.0, k1 == 1.0, x, y, z)
-        p2 = _pick(k0 == 2.0, k1 == 2.0, x, y, z)
-        more = work[MORE + f + i]
-        less = work[LESS + f + i]
-        work[row + i] = p0 * more
-        work[row + LANES + i] = p1 * more
-        work[row + 2 * LANES + i] = p2 * more
-        work[row + 3 * LANES + i] = p0 * less
-        work[row + 4 * LANES + i] = p1 * less
-        work[row + 5 * LANES + i] = p2 * less
-
-
-@inlined
-def _exchange(work, one, two, swap):
-    p, q = work[one], work[two]
-    work[one] = q if swap else p
-    work[two] = p if swap else q
-
-
-@inlined
-def _in_order(lanes, work, f, g, row_f, row_g):
-    """Order two axes' inputs: the one whose faces cut more first."""
-    for i in range(lanes):
-        cut_f, cut_g = work[CUTS + f + i], work[CUTS + g + i]
-        swap = cut_f < (1.0 - TIE) * cut_g
-        work[CUTS + f + i] = cut_g if swap else cut_f
-        work[CUTS + g + i] = cut_f if swap else cut_g
-        _exchange(work, row_f + i, row_g + i, swap)
-        _exchange(work, row_f + LANES + i, row_g + LANES + i, swap)
-        _exchange(work, row_f + 2 * LANES + i, row_g + 2 * LANES + i, swap)
-        _exchange(work, row_f + 3 * LANES + i, row_g + 3 * LANES + i, swap)
-        _exchange(work, row_f + 4 * LANES + i, row_g + 4 * LANES + i, swap)
-        _exchange(work, row_f + 5 * LANES + i, row_g + 5 * LANES + i, swap)
-
-
-@kernel
-def describe_block(count, work, inputs):
-    """The network's inputs of a block of `count` pairs: INPUTS rows of LANES float32."""
-    if count == 1:
-        _describe(1, work)
-        for k in range(0, INPUTS * LANES, LANES):
-            inputs[k] = work[FEATURES + k]
-    else:
-        _describe(LANES, work)
-        for k in range(INPUTS * LANES):
-            inputs[k] = work[FEATURES + k]
-
-
-@inlined
-def _describe(lanes, work):
-    for i in range(lanes):
-        work[REACH + i] = 0.0
-    for k in range(0, 3 * LANES, LANES):
-        for i in range(lanes):
-            work[PUSH + k + i] = 0.0
-            work[SLOPE + k + i] = 0.0
-            work[SLANT + k + i] = 0.0
-    _frame_axis(lanes, work, 0)
-    _frame_axis(lanes, work, LANES)
-    _frame_axis(lanes, work, 2 * LANES)
-    _face_cuts(lanes, work, 0)
-    _face_cuts(lanes, work, LANES)
-    _face_cuts(lanes, work, 2 * LANES)
-    for i in range(lanes):
-        x, y, z = work[PUSH + i], work[PUSH + LANES + i], work[PUSH + 2 * LANES + i]
-        hx, hy, hz = work[HALF + i], work[HALF + LANES + i], work[HALF + 2 * LANES + i]
-        work[MIRRORED + i] = hx if x >= -TIE else -hx
-        work[MIRRORED + LANES + i] = hy if y >= -TIE else -hy
-        work[MIRRORED + 2 * LANES + i] = hz if z >= -TIE else -hz
-        size = work[SIZE + i]
-        x = work[SLOPE + i] * (size + TIE * hx)
-        y = work[SLOPE + LANES + i] * (size + TIE * hy)
-        z = work[SLOPE + 2 * LANES + i] * (size + TIE * hz)
-        k0 = (1.0 if y > x else 0.0) + (1.0 if z > x else 0.0)
-        k1 = (1.0 if x >= y else 0.0) + (1.0 if z > y else 0.0)
-        work[RANKS + i] = k0
-        work[RANKS + LANES + i] = k1
-        work[RANKS + 2 * LANES + i] = 3.0 - (k0 + k1)
-        work[REACH + i] = min(1.0, work[REACH + i] * (1.0 / SYMMETRIC))
-        work[SLANT + i] = min(1.0, work[SLANT + i] * (1.0 / STRAIGHT))
-        work[SLANT + LANES + i] = min(1.0, work[SLANT + LANES + i] * (1.0 / STRAIGHT))
-        work[SLANT + 2 * LANES + i] = min(1.0, work[SLANT + 2 * LANES + i] * (1.0 / STRAIGHT))
-    _face_inputs(lanes, work, 0, FEATURES)
-    _face_inputs(lanes, work, LANES, FEATURES + 6 * LANES)
-    _face_inputs(lanes, work, 2 * LANES, FEATURES + 12 * LANES)
-    _in_order(lanes, work, 0, LANES, FEATURES, FEATURES + 6 * LANES)
-    _in_order(lanes, work, LANES, 2 * LANES, FEATURES + 6 * LANES, FEATURES + 12 * LANES)
-    _in_order(lanes, work, 0, LANES, FEATURES, FEATURES + 6 * LANES)
-
-
-@inlined
-def asked(work, offsets, q, i):
+def asked(work, q, i):
     """The network's answer along axis q [m], cut to where a centroid can be.
 
-    It is from the middle of the bounding box. offsets: the network's outputs, 3 rows of LANES.
+    It is from the middle of the bounding box.
     """
-    rank = work[RANKS + q + i]
-    offset = _pick(rank == 0.0, rank == 1.0, np.float64(offsets[i]), np.float64(offsets[LANES + i]),
-                   np.float64(offsets[2 * LANES + i]))
-    offset *= work[REACH + i] * work[SLANT + q + i]
-    offset = min(CENTROID_REACH, max(-CENTROID_REACH, offset))
-    return work[MIRRORED + q + i] * offset
+    return work[HALF + q + i] * min(CENTROID_REACH, max(-CENTROID_REACH, work[CENTROID + q + i]))
 
 
 @inlined
@@ -324,20 +119,20 @@ def _share(work, f, i, dx, dy, dz):
 
 
 @kernel
-def place_block(count, work, offsets):
-    """Points in A's frame [m], 3 rows of LANES, from the network's offsets, 3 rows of LANES."""
+def place_block(count, work):
+    """POINT of a block, from the network's answer."""
     if count == 1:
-        _place(1, work, offsets)
+        _place(1, work)
     else:
-        _place(LANES, work, offsets)
+        _place(LANES, work)
 
 
 @inlined
-def _place(lanes, work, offsets):
+def _place(lanes, work):
     for i in range(lanes):
-        dx = (work[MIDDLE + i] + asked(work, offsets, 0, i)) - work[INSIDE + i]
-        dy = (work[MIDDLE + LANES + i] + asked(work, offsets, LANES, i)) - work[INSIDE + LANES + i]
-        dz = (work[MIDDLE + 2 * LANES + i] + asked(work, offsets, 2 * LANES, i)
+        dx = (work[MIDDLE + i] + asked(work, 0, i)) - work[INSIDE + i]
+        dy = (work[MIDDLE + LANES + i] + asked(work, LANES, i)) - work[INSIDE + LANES + i]
+        dz = (work[MIDDLE + 2 * LANES + i] + asked(work, 2 * LANES, i)
               ) - work[INSIDE + 2 * LANES + i]
         share = min(min(_share(work, 0, i, dx, dy, dz),
                         _share(work, LANES, i, dx, dy, dz)),
@@ -396,12 +191,11 @@ def solve_committee(poses_a, poses_b, sizes_a, sizes_b, work, numbers, status, c
                     separation, normal, point):
     """Model `committee` for all rows; returns the numbers of rows refused and answered exactly.
 
-    numbers: see `network.block_numbers`.
+    numbers: see `sites.site_numbers`.
     """
     bad = 0
     exact = 0
     rows = poses_a.shape[0]
-    values = network_values(numbers)
     for start in range(0, rows, LANES):
         count = min(LANES, rows - start)
         refused = load_block(poses_a, poses_b, sizes_a, sizes_b, start, count, work)
@@ -416,10 +210,8 @@ def solve_committee(poses_a, poses_b, sizes_a, sizes_b, work, numbers, status, c
                 press(work, i)
         if touching > 0:
             outline_block(LANES, work)
-            describe_block(LANES, work, values)
-            values[INPUTS * LANES:WIDE_INPUTS * LANES] = 0.0
-            forward_block(numbers)
-            place_block(LANES, work, values)
+            centroid_block(work, numbers)
+            place_block(LANES, work)
             range_block(LANES, work)
             for i in range(count):
                 if work[IN_RANGE + i] == 0.0 and work[SEPARATION + i] <= work[TOUCH + i]:
@@ -457,12 +249,8 @@ def one_committee(work, numbers, pose_a, pose_b, normal, point):
         work[EXACT_ANSWERS] += 1.0
         write_one(work, _exact_point(work, 0), normal, point)
         return TOUCHING, work[SEPARATION]
-    values = network_values(numbers)
-    describe_block(1, work, values)
-    for k in range(INPUTS, WIDE_INPUTS):
-        values[k * LANES] = 0.0
-    forward_one(numbers)
-    place_block(1, work, values)
+    centroid_one(work, numbers)
+    place_block(1, work)
     write_one(work, (work[POINT], work[POINT + LANES], work[POINT + 2 * LANES]), normal, point)
     return TOUCHING, work[SEPARATION]
 
@@ -504,15 +292,16 @@ class Committee:
             raise WeightsError(
                 f"weights file {path} has no network 'point' with {INPUTS} inputs and {OUTPUTS} "
                 f"outputs, which model 'committee' needs")
-        if max(network.widths) > LANES:
-            raise WeightsError(f'weights file {path}: no layer may have more than {LANES} units')
+        if len(network.widths) != 3 or network.widths[1] > UNITS_MAX:
+            raise WeightsError(f"weights file {path}: network 'point' must have one hidden layer, "
+                               f'of at most {UNITS_MAX} units')
         if self.weights.card['inputs'].get('description') != DESCRIPTION:
             raise WeightsError(f'weights file {path} is for other inputs than this version has')
         self._exact_answers = 0
-        self._numbers = block_numbers(network)
+        self._numbers = site_numbers(network)
         self._work = new_work()
         # A memory of its own, so that a single call finds its sizes in it.
-        self.one_scratch = (new_work(), block_numbers(network))
+        self.one_scratch = (new_work(), site_numbers(network))
         load_sizes(sizes, self.one_scratch[0])
         self._listed = _listed_sizes(self.weights)
         self._looked_up = (b'', np.zeros(1, dtype=np.bool_))

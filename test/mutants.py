@@ -69,8 +69,9 @@ MUTANTS = {
     'smaller bounding box, always': Mutant(
         'outline.py', '_ALIKE = 0.2', '_ALIKE = 1e-6',
         'test/test_outline.py -k keep_their_frame'),
-    'order of axes left to rounding': Mutant(
-        'committee.py', 'TIE = 1e-6', 'TIE = 0.0', 'test/test_committee.py -k rigid_motion'),
+    'side of a couple of faces taken as it comes': Mutant(
+        'sites.py', 'numbers[(STRENGTHS + f) * LANES + i] = abs(push)',
+        'numbers[(STRENGTHS + f) * LANES + i] = push', 'test/test_committee.py -k box_symmetries'),
     # Guards of the nodes against faults.
     'weights taken as they are': Mutant(
         'network.py', "if tensors_digest(tensors) != card['sha256']:", 'if False:',

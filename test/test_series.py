@@ -229,7 +229,7 @@ def test_the_point_keeps_to_its_slope(series):
     assert np.nanmax(slope[same]) <= K
 
 
-# --- what holds in almost every frame -------------------------------------------------------------
+# --- how far the point steps ----------------------------------------------------------------------
 
 
 def beyond_exact(model: str, series: Series) -> tuple[float, float]:
@@ -249,15 +249,17 @@ def beyond_exact(model: str, series: Series) -> tuple[float, float]:
 
 
 def test_how_far_the_point_of_committee_steps(series):
-    """Of the crane's steps, 999 of 1,000 are the exact point's plus 1 % of the width at most.
+    """While the crane lowers and lifts: no farther than the exact point plus 1 % of the width.
 
-    Measured: 99.91 % in the worst run; the worst is 1.1 % of the edge beyond. Of family I, 99.7 %
-    and 2.4 %. The bounds leave room for other weights.
+    Landings and family I have frames in which the exact point itself crosses much of the box,
+    and the network's does so by more than that otherwise: one in 36,000, and one in 6,000. The
+    bounds leave room for other weights.
     """
     name, motion = series
     share, worst = beyond_exact('committee', motion)
-    print(f'{name}: {100 * share:.2f} % of the steps, worst {100 * worst:.2f} % of the edge')
-    least, most = (0.998, 0.025) if motion.motions == 1 else (0.994, 0.05)
+    print(f'{name}: {100 * share:.3f} % of the steps, worst {100 * worst:.2f} % of the edge')
+    least, most = ((1.0, 0.002) if name in LOWERED else
+                   (0.9995, 0.01) if name in LANDED else (0.998, 0.025))
     assert share >= least
     assert worst <= most
 
@@ -332,27 +334,22 @@ def test_continuous_wherever_the_choices_are_equal(name):
     print(f'{name}: K {slope[same].max():.2f} in {100 * same.mean():.1f} % of {len(slope)} steps; '
           f'in the others {slope[~same].max():.3g}')
     assert len(slope) > 0.9 * N
-    assert same.mean() > 0.75  # the law is about most of the steps
+    assert same.mean() > 0.998  # the law is about almost all steps
     assert slope[same].max() <= K
 
 
 def test_where_choices_change_the_point_steps():
-    """The law is not one of every step, and the choices are what it takes.
-
-    Without regard to them it is broken by more than a factor of ten.
-    """
-    slope, same = walked('stacks')
-    assert slope[~same].max() > 10.0 * K
+    """The law is not one of every step, and the choices are what it takes."""
+    slope, same = walked('tilted stacks')
+    assert slope[~same].max() > 1.5 * K
 
 
 def test_a_rougher_network_breaks_the_law():
-    """Weights that are off by a third at random make the point steeper than K.
+    """Weights that are all ten times as large make the point steeper than K.
 
     It is still continuous and inside both boxes.
     """
-    noise = np.random.default_rng(1).normal(size=NETWORK.packed.shape)
-    rough = dataclasses.replace(
-        NETWORK, packed=(NETWORK.packed * (1.0 + 0.3 * noise)).astype(np.float32))
+    rough = dataclasses.replace(NETWORK, packed=10.0 * NETWORK.packed)
     slope, same = walked('containers', rough)
     assert slope[same].max() > 1.5 * K
 
@@ -370,18 +367,11 @@ def test_choices_are_those_of_the_answer():
 
 
 def test_each_choice_counts():
-    """Two answers that differ in one choice are not asked alike.
-
-    The exception is a choice between faces that cut nothing.
-    """
+    """Two answers that differ in one choice are not asked alike."""
     _, choices = solve_with_choices(NETWORK, SETS['random cubes'](np.random.default_rng(4), 1000))
     assert choices.equal(choices).all()
-    for name, other in (('network', ~choices.network), ('frame_b', ~choices.frame_b),
-                        ('mirrored', -choices.mirrored), ('ranks', choices.ranks[:, [1, 2, 0]]),
-                        ('sides', -choices.sides), ('faces', -choices.faces)):
-        assert not choices.equal(choices._replace(**{name: other})).any(), name
-    nothing = np.zeros_like(choices.sides)
-    assert choices.equal(choices._replace(sides=nothing, faces=nothing)).all()
+    for name, chosen in zip(choices._fields, choices):
+        assert not choices.equal(choices._replace(**{name: ~chosen})).any(), name
 
 
 def test_a_batch_with_a_bad_pose_is_refused():

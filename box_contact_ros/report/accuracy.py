@@ -45,16 +45,17 @@ from ..block import (
     TOUCH,
     new_work,
 )
-from ..committee import INPUTS, WIDE_INPUTS, asked, describe_block
+from ..committee import asked
 from ..contact import Contacts
 from ..jit import kernel
-from ..network import WeightsError, block_numbers, forward_block, load_weights, network_values
+from ..network import WeightsError, load_weights
 from ..outline import outline_block
 from ..overlap import DEPTH_FLOOR, press
 from ..pose import load_block, rotation_matrix
 from ..posesets import SETS, Pairs
 from ..resources import resource_path
 from ..sat import query_block
+from ..sites import centroid_block, site_numbers
 from ..solver import MODELS, ContactSolver
 from ..training import dataset
 from ..training.errors import errors_of, figures, wrapped
@@ -149,7 +150,6 @@ def _corners_through(work, i):
 def _corrected(poses_a, poses_b, sizes_a, sizes_b, work, numbers, corrected):
     """Whether the network's own point of each row was outside a box, so that it had to be moved."""
     rows = poses_a.shape[0]
-    values = network_values(numbers)
     for start in range(0, rows, LANES):
         count = min(LANES, rows - start)
         load_block(poses_a, poses_b, sizes_a, sizes_b, start, count, work)
@@ -158,13 +158,10 @@ def _corrected(poses_a, poses_b, sizes_a, sizes_b, work, numbers, corrected):
             if work[SEPARATION + i] <= work[TOUCH + i]:
                 press(work, i)
         outline_block(LANES, work)
-        describe_block(LANES, work, values)
-        values[INPUTS * LANES:WIDE_INPUTS * LANES] = 0.0
-        forward_block(numbers)
+        centroid_block(work, numbers)
         for i in range(count):
             # The point as the network has it, from the middle of the bounding box.
-            p = (asked(work, values, 0, i), asked(work, values, LANES, i),
-                 asked(work, values, 2 * LANES, i))
+            p = (asked(work, 0, i), asked(work, LANES, i), asked(work, 2 * LANES, i))
             out = False
             for f in range(3):
                 along = work[OFFSETS + f * LANES + i]
@@ -187,7 +184,7 @@ def share_corrected(pairs: Pairs, weights: Path | str) -> float:
     """Share of the network's points that were outside a box and were moved in."""
     corrected = np.zeros(len(pairs.pose_a), dtype=np.bool_)
     _corrected(*(np.ascontiguousarray(part) for part in pairs), new_work(),
-               block_numbers(load_weights(weights).networks['point']), corrected)
+               site_numbers(load_weights(weights).networks['point']), corrected)
     return float(corrected.mean())
 
 

@@ -15,27 +15,25 @@ from typing import Any
 import numpy as np
 import torch
 
-from ..committee import ASPECT_MAX, DEPTH_MAX, DESCRIPTION, INPUTS, OUTPUTS, RATIO_MAX
+from ..committee import ASPECT_MAX, DEPTH_MAX, RATIO_MAX
 from ..network import load_weights, save_weights, unpacked
 from ..posesets import SETS, Pairs
 from ..resources import resource_path
+from ..sites import DESCRIPTION, INPUTS, NAMES, OUTPUTS
 from ..solver import ContactSolver
 from .contacts import Contacts, SizePair, contacts, mixture, scene_mixture
 from .points import Fit, Settings, normalisation, unfolded
 
-HIDDEN = (24, 24)
+HIDDEN = (8,)
 """Hidden units: what fits the time that a batch has for the network (docs/search.md)."""
-PAIRS, STEPS, BATCH, RATE = 3_000_000, 320_000, 4096, 8e-3
+PAIRS, STEPS, BATCH, RATE = 1_500_000, 150_000, 4096, 2e-2
 HARD_ROUNDS, HARD_POOL, HARD_PART, HARD_SHARE = (0.4, 0.55, 0.7, 0.85), 2_000_000, 0.01, 0.2
 """After each of these parts of the steps, a pool of fresh pairs is searched for the hardest part,
 and from then on all that were found so far make up that share of what is learned from."""
-SCENE_PAIRS, SCENE_STEPS, SCENE_RATE = 1_000_000, 40_000, 1e-3
+SCENE_PAIRS, SCENE_STEPS, SCENE_RATE = 1_000_000, 25_000, 3e-3
 QUICK_PAIRS, QUICK_STEPS = 20_000, 400
 METRIC_PAIRS, QUICK_METRIC_PAIRS = 100_000, 2_000
 """Pairs of each set in the model card's metrics."""
-
-NAMES = [f'axis {axis}, {which} face: n{k} × cut' for axis in range(3)
-         for which in ('deeper', 'other') for k in range(3)]
 
 # Streams of random numbers, one each for the data, and for what is measured on.
 _DATA, _METRICS, _HARD = 0, 1, 2
@@ -59,7 +57,7 @@ def figures(errors: np.ndarray) -> dict[str, float]:
 
 
 def train(path: Path, *, seed: int, commit: str, quick: bool = False,
-          hidden: tuple[int, int] = HIDDEN, steps: int | None = None, device: str = 'cpu',
+          hidden: tuple[int, ...] = HIDDEN, steps: int | None = None, device: str = 'cpu',
           progress: bool = True) -> dict[str, Any]:
     """Train the general network and write it to `path`; returns its model card."""
     began = time.monotonic()
@@ -93,7 +91,7 @@ def train_scene(path: Path, sizes: Sequence[SizePair], *, seed: int, commit: str
     general = resource_path('weights', 'committee.safetensors')
     weights = load_weights(general)
     start = weights.networks['point']
-    hidden = (start.widths[1], start.widths[2])
+    hidden = start.widths[1:-1]
     pairs, steps = (QUICK_PAIRS, QUICK_STEPS) if quick else (SCENE_PAIRS, SCENE_STEPS)
     data = contacts(scene_mixture, [seed, _DATA], pairs, progress, sizes)
     fit = Fit(data, Settings(hidden=[hidden], steps=steps, batch=BATCH, rate=SCENE_RATE, seed=seed,
@@ -148,16 +146,16 @@ def _joined(parts: Sequence[Contacts]) -> Contacts:
     return Contacts(*(np.concatenate(columns) for columns in zip(*parts)))
 
 
-def _card(path: Path, hidden: tuple[int, int], seed: int, commit: str, sizes: list[Any],
+def _card(path: Path, hidden: tuple[int, ...], seed: int, commit: str, sizes: list[Any],
           fit: Fit, data: dict[str, Any]) -> dict[str, Any]:
     s = fit.settings
     return {
         'name': path.stem, 'model': 'committee', 'architecture': [INPUTS, *hidden, OUTPUTS],
-        'activation': 'rational tanh', 'seed': seed, 'commit': commit, 'sizes': sizes,
+        'activation': 'softsign', 'seed': seed, 'commit': commit, 'sizes': sizes,
         'inputs': {'description': DESCRIPTION, 'names': NAMES,
                    'range': {'aspect': ASPECT_MAX, 'size ratio': RATIO_MAX,
                              'depth by the shortest edge': DEPTH_MAX}},
-        'outputs': ['centroid from the middle of the bounding box, in half extents'],
+        'outputs': ['of the push', 'of the pull along the faces', 'of what others pass on'],
         'data': {**data, 'pairs': len(fit.inputs)}, 'metrics': {},
         'training': {'algorithm': 'Adam', 'steps': s.steps, 'batch': s.batch, 'rate': s.rate,
                      'device': s.device, 'threads': torch.get_num_threads()}}

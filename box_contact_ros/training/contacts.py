@@ -11,17 +11,9 @@ from ..block import (
     IN_B,
     LANES,
     MIDDLE,
-    MIRRORED,
     OFFSET_A,
-    RANKS,
-    REACH,
     ROTATION,
-    SLANT,
     new_work,
-)
-from ..committee import (
-    INPUTS,
-    describe_block,
 )
 from ..jit import kernel
 from ..outline import (
@@ -41,31 +33,40 @@ from ..posesets import (
     turns,
 )
 from ..sat import query_block
+from ..sites import (
+    INPUTS,
+    INPUTS_OF,
+    OUTPUTS,
+    ROWS,
+    SITE,
+    SITES,
+    describe_block,
+    site_inputs,
+    site_vectors,
+)
 
 SizePair = tuple[tuple[float, float, float], tuple[float, float, float]]
 """Full extents of two boxes [m]."""
-LEARNT = 1e-6
-"""Scale below which an answer is next to the middle, whatever the network says."""
 PIECE = 100_000
 """Pairs that are made at a time."""
 
 
 class Contacts(NamedTuple):
-    """n contacts in the network's own coordinates and order of axes."""
+    """n contacts as the network sees them: at SITES sites each, f · 3 + q."""
 
     inputs: np.ndarray
-    """(n, INPUTS) float32."""
+    """(n, SITES, INPUTS) float32."""
+    vectors: np.ndarray
+    """(n, SITES, OUTPUTS) float32: what outputs are multiplied with; their sum over outputs and f
+    is the answer along q."""
     offsets: np.ndarray
-    """(n, 3) float32: exact centroid from the bounding box's middle, in units of `scale`."""
-    used: np.ndarray
-    """(n, 3) float32: REACH times SLANT, by which the network's answer is scaled."""
+    """(n, 3) float32: exact centroid from the bounding box's middle, in half extents."""
     scale: np.ndarray
-    """(n, 3) float32: half extents times `used`, by the smaller box's longest edge."""
+    """(n, 3) float32: half extents, by the smaller box's longest edge."""
 
 
 @kernel
-def _describe(poses_a, poses_b, sizes_a, sizes_b, work, values,
-              inputs, offsets, used, halves):
+def _describe(poses_a, poses_b, sizes_a, sizes_b, work, numbers, inputs, vectors, offsets, halves):
     rows = poses_a.shape[0]
     for start in range(0, rows, LANES):
         count = min(LANES, rows - start)
@@ -75,11 +76,19 @@ def _describe(poses_a, poses_b, sizes_a, sizes_b, work, values,
             press(work, i)
         # Always a whole block: the short way of a single pair needs a pair prepared for it.
         outline_block(LANES, work)
-        describe_block(LANES, work, values.reshape(-1))
+        describe_block(work, numbers)
         for i in range(count):
             row = start + i
-            for k in range(INPUTS):
-                inputs[row, k] = values[k, i]
+            for site in range(SITES):
+                f, q = site // 3, site % 3
+                own = site_inputs(numbers, f, q, (q + 1) % 3, (q + 2) % 3, i)
+                for k in range(4):
+                    numbers[(SITE + k) * LANES + i] = own[k]
+                for k in range(INPUTS):
+                    inputs[row, site, k] = numbers[INPUTS_OF[site, k] * LANES + i]
+                multiplied = site_vectors(numbers, f, q, i)
+                for k in range(OUTPUTS):
+                    vectors[row, site, k] = multiplied[k]
             x, y, z = centroid(work, i)
             in_b = work[IN_B + i] > 0.5
             for q in range(3):
@@ -90,24 +99,18 @@ def _describe(poses_a, poses_b, sizes_a, sizes_b, work, values,
                              * (y - work[OFFSET_A + LANES + i])
                              + work[ROTATION + (6 + q) * LANES + i]
                              * (z - work[OFFSET_A + 2 * LANES + i]))
-                rank = int(work[RANKS + q * LANES + i])
                 half = work[HALF + q * LANES + i]
-                # What the network is to say, before it is scaled by REACH and SLANT, and the length
-                # that its error is of. Where that is next to nothing, there is nothing to learn.
-                part = work[REACH + i] * work[SLANT + q * LANES + i]
-                goal = (truth - work[MIDDLE + q * LANES + i]) / work[MIRRORED + q * LANES + i]
-                offsets[row, rank] = goal / part if part > LEARNT else 0.0
-                used[row, rank] = part
-                halves[row, rank] = half * part
+                offsets[row, q] = (truth - work[MIDDLE + q * LANES + i]) / half
+                halves[row, q] = half
 
 
 def describe(pairs: Pairs) -> Contacts:
     """The contacts of pairs that overlap."""
     n = len(pairs.pose_a)
-    found = Contacts(np.empty((n, INPUTS), dtype=np.float32),
-                     *(np.empty((n, 3), dtype=np.float32) for _ in range(3)))
+    found = Contacts(*(np.empty((n, *shape), dtype=np.float32) for shape in (
+        (SITES, INPUTS), (SITES, OUTPUTS), (3,), (3,))))
     _describe(*(np.ascontiguousarray(part) for part in pairs), new_work(),
-              np.zeros((INPUTS, LANES), dtype=np.float32), *found)
+              np.zeros(ROWS * LANES, dtype=np.float32), *found)
     edge = np.minimum(pairs.size_a.max(axis=1), pairs.size_b.max(axis=1))
     return found._replace(scale=(found.scale / edge[:, None]).astype(np.float32))
 

@@ -38,7 +38,7 @@ class Candidate:
     """Settings of one training."""
 
     number: int
-    hidden: tuple[int, int]
+    hidden: tuple[int, ...]
     rate: float
     momentum: float = 0.0
     initial: float = 1.0

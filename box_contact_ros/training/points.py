@@ -1,12 +1,12 @@
 """Fit networks for model `committee`: many at once, of any hidden widths, by Adam.
 
 All networks of a call are one batch of matrices with a leading dimension `networks`, as in `fit`;
-hidden layers are as wide as the widest network needs (`batched`). What is learned is the offset of
-the centroid from the middle of the bounding box, in half extents (`committee`), before it is scaled
-by REACH and SLANT; what is minimised weighs its error three ways: as it is used, that is scaled, as
-the error of the point in edges of the smaller box, and that to the fourth power, because the worst
-cases are what a simulation trips over. (With the error unscaled in the first, contacts whose answer
-is hardly used took a share of the network, and all errors were a fifth larger.)
+hidden layers are as wide as the widest network needs (`batched`), and all have as many of them. A
+contact is SITES patterns for the network; what it says there, times the contact's vectors, is added
+up to the offset of the centroid from the middle of the bounding box, in half extents (`sites`).
+What is minimised weighs the error of that offset three ways: as it is, as the error of the point in
+edges of the smaller box, and that to the fourth power, because the worst cases are what a
+simulation trips over.
 """
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
-from ..network import TANH_LIMIT
+from ..sites import INPUTS, OUTPUTS
 from .contacts import Contacts
 
 POINT_WEIGHT, TAIL_WEIGHT = 10.0, 3e3
@@ -30,8 +30,8 @@ BETA1, BETA2, TINY = 0.9, 0.999, 1e-8  # Adam's usual constants (Kingma and Ba 2
 class Settings:
     """One training. Sequences have an entry per network."""
 
-    hidden: Sequence[tuple[int, int]]
-    """Units of the two hidden layers of each network."""
+    hidden: Sequence[tuple[int, ...]]
+    """Units of the hidden layers of each network, all with as many layers."""
     steps: int
     batch: int = 4096
     rate: float | Sequence[float] = 4e-3
@@ -84,9 +84,10 @@ def unbatched(parameters: Sequence[torch.Tensor], networks: Sequence[Sequence[in
 
 
 def normalisation(inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Mean and deviation (inputs,) that the training scales inputs (n, inputs) by."""
-    # An input that never varies stays as it is.
-    return inputs.mean(axis=0), inputs.std(axis=0) + np.float32(1e-6)
+    """Mean and deviation (inputs,) that the training scales inputs (n, sites, inputs) by."""
+    # An input that never varies stays as it is. Summed in float64: there are tens of millions.
+    mean, deviation = (of(inputs, axis=(0, 1), dtype=np.float64) for of in (np.mean, np.std))
+    return mean.astype(np.float32), (deviation + 1e-6).astype(np.float32)
 
 
 def folded(layers: Layers, mean: np.ndarray, deviation: np.ndarray) -> Layers:
@@ -103,13 +104,9 @@ def unfolded(layers: Layers, mean: np.ndarray, deviation: np.ndarray) -> Layers:
     return [((weight * deviation).astype(np.float32), bias.astype(np.float32)), *layers[1:]]
 
 
-def rational_tanh(x: torch.Tensor) -> torch.Tensor:
-    """The networks' activation, as in `network.rational_tanh`; x is overwritten."""
-    x.clamp_(-TANH_LIMIT, TANH_LIMIT)
-    s = x * x
-    above = (s + 105.0).mul_(s).add_(945.0)
-    below = s.mul(15.0).add_(420.0).mul_(s).add_(945.0)
-    return x.mul_(above).div_(below)
+def softsign(x: torch.Tensor) -> torch.Tensor:
+    """The networks' activation, as in `sites.softsign`; x is overwritten."""
+    return x.div_(x.abs().add_(1.0))
 
 
 class Fit:
@@ -124,8 +121,7 @@ class Fit:
         self.batch = min(s.batch, len(data.inputs))
         self._places = np.random.default_rng([s.seed, 1])
         self.feed(data)
-        self.widths = [(data.inputs.shape[1], *hidden, data.offsets.shape[1])
-                       for hidden in s.hidden]
+        self.widths = [(INPUTS, *hidden, OUTPUTS) for hidden in s.hidden]
         if start is None:
             start = [drawn(np.random.default_rng([s.seed, 2, k]), widths)
                      for k, widths in enumerate(self.widths)]
@@ -142,51 +138,60 @@ class Fit:
         # be gathered in every step (a third of its time).
         order = np.random.default_rng([self.settings.seed, 0]).permutation(len(data.inputs))
         self.inputs = self._normalised(data.inputs[order])
-        self.offsets = torch.tensor(data.offsets[order], device=self.device)
-        self.squared_used = torch.tensor(data.used[order], device=self.device).square_()
-        self.squared_scale = torch.tensor(data.scale[order], device=self.device).square_()
+        self.vectors, self.offsets, self.squared_scale = (
+            torch.tensor(part[order], device=self.device)
+            for part in (data.vectors, data.offsets, data.scale))
+        self.squared_scale.square_()
 
     def _normalised(self, inputs: np.ndarray) -> torch.Tensor:
         return torch.tensor((inputs - self.mean) / self.deviation, device=self.device)
 
     def layers(self, inputs: torch.Tensor) -> list[torch.Tensor]:
-        """Activations (networks, patterns, units) of all layers, inputs (patterns, units) first."""
+        """Activations (networks, n · SITES, units) of all layers for inputs (n, SITES, inputs)."""
         p = self.parameters
-        found = [inputs.expand(p[0].shape[0], -1, -1)]
-        for layer in range(3):
-            total = torch.baddbmm(p[3 + layer], found[-1], p[layer])
-            found.append(rational_tanh(total) if layer < 2 else total)
+        count = len(p) // 2
+        found = [inputs.reshape(1, -1, INPUTS).expand(p[0].shape[0], -1, -1)]
+        for layer in range(count):
+            total = torch.baddbmm(p[count + layer], found[-1], p[layer])
+            found.append(softsign(total) if layer < count - 1 else total)
         return found
+
+    @staticmethod
+    def answers(outputs: torch.Tensor, vectors: torch.Tensor) -> torch.Tensor:
+        """Offsets (networks, n, 3) from outputs (networks, n · SITES, OUTPUTS)."""
+        products = outputs.view(len(outputs), *vectors.shape) * vectors
+        return products.view(len(outputs), len(vectors), 3, 3, OUTPUTS).sum(dim=(2, 4))
 
     def run(self, steps: int) -> np.ndarray:
         """Take so many steps (at most to the end); returns the last loss (networks,)."""
         s, p = self.settings, self.parameters
+        count = len(p) // 2
         loss = torch.full((len(p[0]),), math.nan)
         steps = min(steps, s.steps - self.step)
         places = self._places.integers(0, len(self.inputs) - self.batch + 1, steps)
         for place in places.tolist():
             rows = slice(place, place + self.batch)
             layers = self.layers(self.inputs[rows])
-            error = layers[-1] - self.offsets[rows]
+            error = self.answers(layers[-1], self.vectors[rows]) - self.offsets[rows]
             squared_scale = self.squared_scale[rows]
             squared = (error.square() * squared_scale).sum(dim=-1, keepdim=True)
             # The gradient of what `loss` is below, written out: half the time of automatic
             # differentiation.
-            used = self.squared_used[rows] / error.shape[-1]
-            delta = squared_scale * (squared.mul(4.0 * TAIL_WEIGHT).add_(2.0 * POINT_WEIGHT))
-            delta.add_(used, alpha=2.0).mul_(error).mul_(1.0 / self.batch)
-            gradients: list[torch.Tensor] = [torch.empty(0)] * 6
-            for layer in (2, 1, 0):
+            slope = squared_scale * (squared.mul(4.0 * TAIL_WEIGHT).add_(2.0 * POINT_WEIGHT))
+            slope.add_(2.0 / error.shape[-1]).mul_(error).mul_(1.0 / self.batch)
+            delta = (slope[:, :, None, :, None]
+                     * self.vectors[rows].view(-1, 3, 3, OUTPUTS)).view(layers[-1].shape)
+            gradients: list[torch.Tensor] = [torch.empty(0)] * (2 * count)
+            for layer in reversed(range(count)):
                 gradients[layer] = torch.bmm(layers[layer].transpose(1, 2), delta)
-                gradients[3 + layer] = delta.sum(dim=1, keepdim=True)
+                gradients[count + layer] = delta.sum(dim=1, keepdim=True)
                 if layer:
-                    # The slope of tanh, which is that of the rational one to 1e-3.
-                    slope = layers[layer].square_().neg_().add_(1.0)
+                    # The slope of y = softsign(x) is (1 − |y|)².
+                    slope = layers[layer].abs_().neg_().add_(1.0).square_()
                     delta = torch.bmm(delta, p[layer].transpose(1, 2)).mul_(slope)
             self._adam(gradients)
         if steps:
-            loss = ((error.square() * used).sum(dim=-1).mean(dim=1)
-                    + POINT_WEIGHT * squared.mean(dim=(1, 2))
+            loss = (error.square().mean(dim=(1, 2)) + POINT_WEIGHT * squared.mean(dim=(1, 2))
                     + TAIL_WEIGHT * squared.square().mean(dim=(1, 2)))
         return loss.cpu().numpy()
 
@@ -213,8 +218,9 @@ class Fit:
         found = []
         for start in range(0, len(data.inputs), self.batch):
             rows = slice(start, start + self.batch)
-            offsets, scale = (torch.tensor(part[rows], device=self.device)
-                              for part in (data.offsets, data.scale))
-            error = self.layers(self._normalised(data.inputs[rows]))[-1].sub_(offsets)
+            vectors, offsets, scale = (torch.tensor(part[rows], device=self.device)
+                                       for part in (data.vectors, data.offsets, data.scale))
+            outputs = self.layers(self._normalised(data.inputs[rows]))[-1]
+            error = self.answers(outputs, vectors).sub_(offsets)
             found.append(error.mul_(scale).norm(dim=-1).cpu())
         return torch.cat(found, dim=1).numpy()

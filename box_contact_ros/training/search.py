@@ -23,19 +23,17 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from ..block import LANES
-from ..committee import INPUTS, OUTPUTS
+from ..block import LANES, new_work
 from ..jit import kernel
 from ..network import (
     Network,
     WeightsError,
-    block_numbers,
-    forward_block,
     load_weights,
     unpacked,
 )
 from ..report.paper import processor
 from ..resources import resource_path
+from ..sites import INPUTS, OUTPUTS, SITES, UNITS_MAX, centroid_block, site_numbers
 from . import committee, dataset, train
 from .contacts import Contacts, contacts, mixture
 from .fit import Settings as PaperSettings
@@ -62,11 +60,11 @@ from .points import (
     unfolded,
 )
 
-UNITS = np.arange(8, 65, 4)
-"""Hidden units of a layer that are tried: the kernel takes units by fours."""
-NETWORK_TIME = 30.0
-"""What the network may take of the 100 ns that a pair has in a batch [ns]: the outline, SAT and
-the checks need the rest."""
+UNITS = np.arange(4, UNITS_MAX + 1, 4)
+"""Hidden units that are tried: the kernel takes units by fours."""
+NETWORK_TIME = 45.0
+"""What describing and asking may take of the 100 ns that a pair has in a batch [ns]: the outline,
+SAT and the checks need the rest."""
 
 # Streams of random numbers beside those of `halving`, whose seeds are (seed, rung, group).
 _CANDIDATES, _START, _TRAINING, _CHECKING = 1001, 1002, 1003, 1004
@@ -75,6 +73,15 @@ _CANDIDATES, _START, _TRAINING, _CHECKING = 1001, 1002, 1003, 1004
 def multiply_adds(widths: Sequence[int]) -> int:
     """Multiplications of a network with these widths for one input."""
     return sum(a * b for a, b in zip(widths, widths[1:]))
+
+
+def site_multiply_adds(units: int) -> int:
+    """Multiplications of a committee's network for one pair, at all sites.
+
+    Two in three of a site's inputs are those of its faces or its axis, summed once for these.
+    """
+    own, shared = INPUTS // 3, INPUTS - INPUTS // 3
+    return units * (3 * shared + SITES * (own + OUTPUTS))
 
 
 def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
@@ -89,19 +96,19 @@ class CommitteeSearch:
     """Hidden units and learning rate of the committee's network."""
 
     name = 'committee'
-    bins = 8
+    bins = 4
     """Classes of cost, equally wide in its logarithm. In each the best go on: a small network is
     never as good as a large one, and the small ones are what is looked for."""
 
     def __init__(self, *, seed: int, count: int, quick: bool, device: str) -> None:
         self.seed, self.quick, self.device = seed, quick, device
         plan = ([(count, 10, 128), (max(count // 4, 8), 20, 128)] if quick else
-                [(count, 200, 256), (max(count // 4, 64), 800, 256),
-                 (max(count // 16, 48), 3000, 256), (max(count // 64, 32), 6000, 1024)])
+                [(count, 200, 64), (max(count // 4, 64), 800, 64),
+                 (max(count // 16, 48), 3000, 64), (max(count // 64, 32), 6000, 256)])
         # On a CPU groups small enough for its caches (twice as many took twice as long for each); a
         # GPU wants as much as it can get.
         inputs = 4096 if device == 'cpu' else 131_072
-        self.rungs = [Rung(*entry, group=inputs // entry[2]) for entry in plan]
+        self.rungs = [Rung(*entry, group=max(1, inputs // (SITES * entry[2]))) for entry in plan]
         self._data: tuple[Contacts, Contacts] | None = None
 
     def widths(self, candidate: Candidate) -> tuple[int, ...]:
@@ -110,16 +117,16 @@ class CommitteeSearch:
 
     def cost(self, candidate: Candidate) -> int:
         """Multiply-adds of its network."""
-        return multiply_adds(self.widths(candidate))
+        return site_multiply_adds(candidate.hidden[0])
 
     def candidates(self) -> list[Candidate]:
         """Units uniform in their logarithm, so that half of the candidates are small."""
         found = [Candidate(0, committee.HIDDEN, committee.RATE, shipped=True)]
         for number in range(1, self.rungs[0].candidates):
             rng = np.random.default_rng([self.seed, _CANDIDATES, number])
-            units = [int(UNITS[np.argmin(np.abs(np.log(UNITS / log_uniform(rng, 8, 64))))])
-                     for _ in range(2)]
-            found.append(Candidate(number, (units[0], units[1]), log_uniform(rng, 1e-3, 3e-2)))
+            units = log_uniform(rng, UNITS[0], UNITS[-1])
+            nearest = int(UNITS[np.argmin(np.abs(np.log(UNITS / units)))])
+            found.append(Candidate(number, (nearest,), log_uniform(rng, 1e-3, 1e-1)))
         return found
 
     def start(self, candidate: Candidate) -> Layers:
@@ -153,8 +160,7 @@ class CommitteeSearch:
 
     def keep(self, ranked: Sequence[Candidate], count: int) -> list[Candidate]:
         """The best of every class of cost in turn."""
-        costs = np.log([multiply_adds((INPUTS, units, units, OUTPUTS))
-                        for units in (UNITS[0], UNITS[-1])])
+        costs = np.log([site_multiply_adds(units) for units in (UNITS[0], UNITS[-1])])
         edges = np.linspace(*costs, self.bins + 1)[1:-1]
         places: dict[int, int] = {}
         turns = []
@@ -177,7 +183,7 @@ def _shipped_error(search: CommitteeSearch) -> float | None:
         return None  # there may be none yet
     training, checking = search.data
     network = weights.networks['point']
-    fit = Fit(training, Settings(hidden=[network.widths[1:3]], steps=0, device=search.device),
+    fit = Fit(training, Settings(hidden=[network.widths[1:-1]], steps=0, device=search.device),
               start=[unfolded(unpacked(network), *normalisation(training.inputs))])
     return 100.0 * float(np.quantile(fit.point_errors(checking), 0.99))
 
@@ -192,22 +198,24 @@ def frontier(costs: Sequence[float], errors: Sequence[float]) -> list[int]:
 
 
 @kernel
-def _repeat(numbers, times):
+def _repeat(work, numbers, times):
     for _ in range(times):
-        forward_block(numbers)
+        centroid_block(work, numbers)
 
 
-def network_time(hidden: tuple[int, int], rounds: int = 30) -> float:
-    """Least time of `network.forward_block` with these hidden units [ns a pair]."""
+def network_time(hidden: tuple[int, ...], rounds: int = 30) -> float:
+    """Least time of `sites.centroid_block` with these hidden units [ns a pair]."""
     rng = np.random.default_rng(0)
     widths = (INPUTS, *hidden, OUTPUTS)
     packed = np.concatenate([0.1 * rng.normal(size=a * b + b) for a, b in zip(widths, widths[1:])])
-    numbers = block_numbers(Network('point', widths, packed.astype(np.float32)))
-    _repeat(numbers, 10)
+    numbers = site_numbers(Network('point', widths, packed.astype(np.float32)))
+    work = new_work()
+    work[:] = 0.5  # nothing in particular, and no NaN
+    _repeat(work, numbers, 10)
     best = math.inf
     for _ in range(rounds):
         began = time.perf_counter()
-        _repeat(numbers, 100)
+        _repeat(work, numbers, 100)
         best = min(best, time.perf_counter() - began)
     return 1e9 * best / (100 * LANES)
 
@@ -314,7 +322,7 @@ def write_csv(path: Path, searches: Iterable[tuple[Search, Progress]]) -> None:
             units = entry.pop('hidden')
             count, scores = last[one.number]
             rows.append({'search': search.name, 'number': entry.pop('number'),
-                         'hidden_1': units[0], 'hidden_2': units[1],
+                         **{f'hidden_{k}': width for k, width in enumerate(units, start=1)},
                          'multiply_adds': search.cost(one),
                          **{key: f'{value:.6g}' if isinstance(value, float) else value
                             for key, value in entry.items()},
@@ -338,7 +346,7 @@ def _rungs(search: Search, unit: str) -> str:
 
 
 def _units(one: Candidate) -> str:
-    return f'{one.hidden[0]}-{one.hidden[1]}'
+    return '-'.join(map(str, one.hidden))
 
 
 def _measured(seconds: float, device: str, command: str) -> str:
@@ -375,8 +383,8 @@ def committee_page(search: CommitteeSearch, done: Progress, header: str) -> str:
 
 {header}
 
-{len(done.scores[0]):,} networks with two hidden layers of {UNITS[0]} to {UNITS[-1]} units, in
-steps of {UNITS[1] - UNITS[0]}, and learning rates of 0.001 to 0.03 were trained by successive
+{len(done.scores[0]):,} networks with {UNITS[0]} to {UNITS[-1]} hidden units, in
+steps of {UNITS[1] - UNITS[0]}, and learning rates of 0.001 to 0.1 were trained by successive
 halving: all of them a little, then the best of every class of cost longer. Error: point error
 against `exact` on {len(search.data[1].inputs):,} contacts of the training mixture, in % of the
 smaller box's longest edge, after the last rung. These trainings are short (`train` takes
@@ -384,7 +392,8 @@ smaller box's longest edge, after the last rung. These trainings are short (`tra
 
 {_rungs(search, 'steps')}
 
-The frontier: no other finalist is both cheaper and better. Time: `network.forward_block`, one core.
+The frontier: no other finalist is both cheaper and better. Time: `sites.centroid_block`, one core,
+which describes an overlap and asks the network at its nine sites.
 
 {_table(['hidden units', 'multiply-adds', 'ns a pair', 'learning rate', 'mean', 'p99', 'worst'],
         rows)}
@@ -392,7 +401,7 @@ The frontier: no other finalist is both cheaper and better. Time: `network.forwa
 ![The frontier](search.png)
 
 **Why {_units(finalists[shipped])}.** A pair in a batch may cost 100 ns, of which pose, SAT, outline
-and checks need some 70: about {NETWORK_TIME:.0f} ns are left for the network.
+and checks need some 55: about {NETWORK_TIME:.0f} ns are left for description and network.
 {_units(finalists[shipped])} takes {times[shipped]:.0f} ns, with a p99 of {error:.2f} %; the best
 finalist within {NETWORK_TIME:.0f} ns, {_units(finalists[best])}, has
 {last[finalists[best].number]['error']:.2f} %; the best of any size, {_units(finalists[largest])}
@@ -426,7 +435,7 @@ def committee_plot(path: Path, search: CommitteeSearch, done: Progress) -> None:
               label=f'in use: {_units(all_of_them[0])}')
     axes.set(xscale='log', yscale='log', xlabel='multiply-adds of the network',
              ylabel='p99 of the point error, % of the edge')
-    for axis, ticks in ((axes.xaxis, (300, 600, 1000, 2000, 4000)),
+    for axis, ticks in ((axes.xaxis, (350, 700, 1400, 2800, 5600)),
                         (axes.yaxis, (1, 2, 5, 10, 20))):
         axis.set_ticks(ticks, [f'{tick:,}' for tick in ticks])
         axis.set_ticks([], minor=True)

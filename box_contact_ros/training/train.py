@@ -17,9 +17,9 @@ from typing import Any
 
 import torch
 
-from ..block import LANES
 from ..network import load_weights, save_weights
 from ..resources import resource_path
+from ..sites import UNITS_MAX
 from . import committee, dataset
 from .errors import errors_of, figures_by_part
 from .fit import Settings, fit
@@ -178,9 +178,8 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
                         "is kept, of the paper's (default: 24 to 96, by job)")
     parser.add_argument('--epochs', type=int, help="passes through the training set, of the "
                         "paper's (default: 300 to 1000, by job)")
-    parser.add_argument('--hidden', type=int, nargs=2, metavar='UNITS', help='of the committee: '
-                        'units of its two hidden layers (default: {} {}), named in the file'
-                        .format(*committee.HIDDEN))
+    parser.add_argument('--hidden', type=int, metavar='UNITS', help='of the committee: units of '
+                        f'its hidden layer (default: {committee.HIDDEN[0]}), named in the file')
     parser.add_argument('--steps', type=int, help='of the committee (default: '
                         f'{committee.STEPS:,}; a third of them make errors a tenth larger)')
     parser.add_argument('--out', type=Path, help='folder to write to (default: weights/)')
@@ -210,9 +209,8 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
         value = getattr(options, name)
         if value is not None and value < (0 if name == 'seed' else 1):
             parser.error(f'--{name} {value} is too small')
-    for units in options.hidden or ():
-        if not 1 <= units <= LANES:
-            parser.error(f'--hidden {units} is not between 1 and {LANES}')
+    if options.hidden is not None and not 1 <= options.hidden <= UNITS_MAX:
+        parser.error(f'--hidden {options.hidden} is not between 1 and {UNITS_MAX}')
     options.what = NAMES if 'all' in wanted else [name for name in NAMES if name in wanted]
     options.sizes = None
     if options.scene:
@@ -253,9 +251,10 @@ def main(args: Sequence[str] | None = None) -> int:
         return 0
     for name in options.what:
         if name == COMMITTEE:
-            units = ''.join(f'-{units}' for units in options.hidden or ())
+            units = f'-{options.hidden}' if options.hidden else ''
             path = options.out / f'{COMMITTEE}{units}.safetensors'
-            card = committee.train(path, hidden=tuple(options.hidden or committee.HIDDEN),
+            hidden = (options.hidden,) if options.hidden else committee.HIDDEN
+            card = committee.train(path, hidden=hidden,
                                    steps=options.steps, **common)
             print(f'{path}, {card["training"]["minutes"]} min\n{committee.table(card)}')
             continue
