@@ -8,17 +8,18 @@ boxes.
 
 The cube has 48 symmetries, faces may be counted in any order, and each couple from either side.
 The answer has all of these symmetries exactly, so nothing needs to be chosen first, and no answer
-steps where a choice would change. The network is asked at nine sites, a couple of faces f and an
-axis q of the cube each. Its inputs there are magnitudes and products, which no symmetry changes but
-that they go along with f and q; its three outputs are multiplied with three vectors' components q:
+steps where a choice would change. The network is asked at nine sites: for each couple of faces f,
+each axis q of the cube. Its inputs there are magnitudes and products, which symmetries only take to
+another site; its three outputs are multiplied with the components q of three vectors, which turn
+along:
 
 1. the push of the faces f, along their normal;
 2. the push of the other faces as far as it goes along the faces f, times their cut;
 3. what the normals of the other faces have of the push of the faces f, times their cuts.
 
-The sum over all f is the offset of the centroid along q. An overlap that is its own mirror image,
-or through whose faces no axis q runs at a slant, has nothing in any of the three along q: there the
-answer is the middle, whatever the weights. (Vectors times a network of invariants: Villar et al.,
+The sum over all f is the offset of the centroid along q. Where an overlap is its own mirror image
+through the middle, or no face is slanted along q, all three are zero along q, and the answer is the
+middle, whatever the weights. (Vectors times a network of invariants: Villar et al.,
 Scalars are universal, 2021.)
 
 There is one layer of hidden units. What they sum over inputs that sites share is computed once for
@@ -198,6 +199,7 @@ def _describe(lanes, work, numbers):
 
 @inlined
 def _couple(lanes, numbers):
+    """What the three couples of faces, a, b and c, have to do with each other."""
     for i in range(lanes):
         ax, ay, az = (numbers[SLANTS * LANES + i], numbers[(SLANTS + 1) * LANES + i],
                       numbers[(SLANTS + 2) * LANES + i])

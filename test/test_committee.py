@@ -329,7 +329,7 @@ def test_minus_q_is_q(committee, pairs):
 def close(one, other, pairs):
     """The same point in every row, up to roundings of the network's float32 [% of the edge].
 
-    Measured: 1.2e-5 at worst. A rounding could choose another of the two frames only where the
+    Measured: 1.6e-5 at worst. A rounding could choose another of the two frames only where the
     bounding boxes tie, which none of these pairs does.
     """
     apart = percent(one, other, pairs)
@@ -375,9 +375,9 @@ def test_box_symmetries(committee, named_set):
 # --- continuity -----------------------------------------------------------------------------------
 
 PATHS, FRAMES = 100, 400
-JUMP = 3.0
-"""Bound of a step of the point beyond the exact point's [% of the edge]. Measured: 2.1, where
-containers roll from one edge to the next and the exact point itself moves by much of the box."""
+JUMP = 4.0
+"""Bound of a step of the point beyond the exact point's [% of the edge]. Measured: 2.6, where the
+frame changes, or the exact point itself moves by much of the box."""
 JUMP_999 = 1.3
 """999 steps of 1,000 [%]; measured: 0.9 on the worst path."""
 
