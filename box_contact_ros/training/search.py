@@ -103,12 +103,12 @@ class CommitteeSearch:
     def __init__(self, *, seed: int, count: int, quick: bool, device: str) -> None:
         self.seed, self.quick, self.device = seed, quick, device
         plan = ([(count, 10, 128), (max(count // 4, 8), 20, 128)] if quick else
-                [(count, 200, 64), (max(count // 4, 64), 800, 64),
-                 (max(count // 16, 48), 3000, 64), (max(count // 64, 32), 6000, 256)])
+                [(count, 100, 64), (max(count // 4, 64), 400, 64),
+                 (max(count // 16, 48), 1500, 64), (max(count // 64, 32), 3000, 256)])
         # On a CPU groups small enough for its caches (twice as many took twice as long for each); a
         # GPU wants as much as it can get.
         inputs = 4096 if device == 'cpu' else 131_072
-        self.rungs = [Rung(*entry, group=max(1, inputs // (SITES * entry[2]))) for entry in plan]
+        self.rungs = [Rung(*entry, group=inputs // entry[2]) for entry in plan]
         self._data: tuple[Contacts, Contacts] | None = None
 
     def widths(self, candidate: Candidate) -> tuple[int, ...]:
