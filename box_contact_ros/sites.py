@@ -43,6 +43,7 @@ from .block import (
     OFFSETS,
     OTHER,
     ROTATION,
+    aligned,
 )
 from .jit import fused_inlined, fused_kernel, inlined, kernel
 from .network import Network, unpacked
@@ -121,7 +122,8 @@ def site_numbers(network: Network) -> np.ndarray:
     groups = [np.concatenate([
         wide_bias[four], wide[four, 4:8].ravel(), wide[four, 8:12].ravel(), wide[four, :4].ravel(),
         wide_last[:, four].ravel()]) for four in (slice(k, k + 4) for k in range(0, units, 4))]
-    return np.concatenate([np.zeros(ROWS * LANES), [units], last_bias, *groups]).astype(np.float32)
+    return aligned(np.concatenate(
+        [np.zeros(ROWS * LANES), [units], last_bias, *groups]).astype(np.float32))
 
 
 @inlined
@@ -279,6 +281,26 @@ def as_table(numbers):
     return numbers[:ROWS * LANES].reshape(ROWS, LANES)
 
 
+@inlined
+def _at(table, row, i):
+    """Number i of a row, of the table or of the flat array that it is a view of.
+
+    A block's rows follow from the unit, and only of a table does the compiler know then that they
+    are in range. A single pair's are constants, and of a flat array it knows that none overlap.
+    """
+    if table.ndim == 1:
+        return table[row * LANES + i]
+    return table[row, i]
+
+
+@inlined
+def _put(table, row, i, value):
+    if table.ndim == 1:
+        table[row * LANES + i] = value
+    else:
+        table[row, i] = value
+
+
 @fused_inlined
 def _shared(lanes, table, r0, r1, r2, r3, biases, weights, to):
     """Four hidden units' sums over four inputs, rows r0 to r3, to four rows from `to` on."""
@@ -288,11 +310,12 @@ def _shared(lanes, table, r0, r1, r2, r3, biases, weights, to):
     s0, s1, s2, s3 = weights[8], weights[9], weights[10], weights[11]
     t0, t1, t2, t3 = weights[12], weights[13], weights[14], weights[15]
     for i in range(lanes):
-        x0, x1, x2, x3 = table[r0, i], table[r1, i], table[r2, i], table[r3, i]
-        table[to, i] = (((b0 + p0 * x0) + p1 * x1) + p2 * x2) + p3 * x3
-        table[to + 1, i] = (((b1 + q0 * x0) + q1 * x1) + q2 * x2) + q3 * x3
-        table[to + 2, i] = (((b2 + s0 * x0) + s1 * x1) + s2 * x2) + s3 * x3
-        table[to + 3, i] = (((b3 + t0 * x0) + t1 * x1) + t2 * x2) + t3 * x3
+        x0, x1 = _at(table, r0, i), _at(table, r1, i)
+        x2, x3 = _at(table, r2, i), _at(table, r3, i)
+        _put(table, to, i, (((b0 + p0 * x0) + p1 * x1) + p2 * x2) + p3 * x3)
+        _put(table, to + 1, i, (((b1 + q0 * x0) + q1 * x1) + q2 * x2) + q3 * x3)
+        _put(table, to + 2, i, (((b2 + s0 * x0) + s1 * x1) + s2 * x2) + s3 * x3)
+        _put(table, to + 3, i, (((b3 + t0 * x0) + t1 * x1) + t2 * x2) + t3 * x3)
 
 
 _NO_BIASES = (np.float32(0.0), np.float32(0.0), np.float32(0.0), np.float32(0.0))
@@ -322,25 +345,31 @@ def _four_units(lanes, table, x, of_faces, of_axes, group):
     v0, v1, v2, v3 = group[56], group[57], group[58], group[59]
     w0, w1, w2, w3 = group[60], group[61], group[62], group[63]
     for i in range(lanes):
-        x0, x1, x2, x3 = table[x, i], table[x + 1, i], table[x + 2, i], table[x + 3, i]
-        h0 = softsign(((((table[of_faces, i] + table[of_axes, i])
+        x0, x1 = _at(table, x, i), _at(table, x + 1, i)
+        x2, x3 = _at(table, x + 2, i), _at(table, x + 3, i)
+        h0 = softsign(((((_at(table, of_faces, i) + _at(table, of_axes, i))
                          + p0 * x0) + p1 * x1) + p2 * x2) + p3 * x3)
-        h1 = softsign(((((table[of_faces + 1, i] + table[of_axes + 1, i])
+        h1 = softsign(((((_at(table, of_faces + 1, i) + _at(table, of_axes + 1, i))
                          + q0 * x0) + q1 * x1) + q2 * x2) + q3 * x3)
-        h2 = softsign(((((table[of_faces + 2, i] + table[of_axes + 2, i])
+        h2 = softsign(((((_at(table, of_faces + 2, i) + _at(table, of_axes + 2, i))
                          + s0 * x0) + s1 * x1) + s2 * x2) + s3 * x3)
-        h3 = softsign(((((table[of_faces + 3, i] + table[of_axes + 3, i])
+        h3 = softsign(((((_at(table, of_faces + 3, i) + _at(table, of_axes + 3, i))
                          + t0 * x0) + t1 * x1) + t2 * x2) + t3 * x3)
-        table[ANSWERS, i] = (((table[ANSWERS, i] + u0 * h0) + u1 * h1) + u2 * h2) + u3 * h3
-        table[ANSWERS + 1, i] = (((table[ANSWERS + 1, i] + v0 * h0) + v1 * h1) + v2 * h2) + v3 * h3
-        table[ANSWERS + 2, i] = (((table[ANSWERS + 2, i] + w0 * h0) + w1 * h1) + w2 * h2) + w3 * h3
+        _put(table, ANSWERS, i, (((
+            _at(table, ANSWERS, i) + u0 * h0) + u1 * h1) + u2 * h2) + u3 * h3)
+        _put(table, ANSWERS + 1, i, (((
+            _at(table, ANSWERS + 1, i) + v0 * h0) + v1 * h1) + v2 * h2) + v3 * h3)
+        _put(table, ANSWERS + 2, i, (((
+            _at(table, ANSWERS + 2, i) + w0 * h0) + w1 * h1) + w2 * h2) + w3 * h3)
 
 
 @inlined
 def _begin_answers(lanes, table, biases):
     b0, b1, b2 = biases[0], biases[1], biases[2]
     for i in range(lanes):
-        table[ANSWERS, i], table[ANSWERS + 1, i], table[ANSWERS + 2, i] = b0, b1, b2
+        _put(table, ANSWERS, i, b0)
+        _put(table, ANSWERS + 1, i, b1)
+        _put(table, ANSWERS + 2, i, b2)
 
 
 @fused_kernel
@@ -413,13 +442,13 @@ def centroid_block(work, numbers):
 @fused_kernel
 def answers_one(numbers):
     """ANSWERS at all sites of a single pair, side by side: the same sums in the same order."""
-    table, weights = as_table(numbers), numbers[ROWS * LANES:]
-    _begin_answers(NARROW, table, weights[1:4])
+    weights = numbers[ROWS * LANES:]
+    _begin_answers(NARROW, numbers, weights[1:4])
     for unit in range(0, int(weights[0]), 4):
         group = weights[4 + unit // 4 * GROUP:]
-        _of_faces(NARROW, table, ONE + 4, ONE + 5, ONE + 6, ONE + 7, group, SUMS + OF_FACES)
-        _of_axes(NARROW, table, ONE + 8, ONE + 9, ONE + 10, ONE + 11, group, SUMS + OF_AXES)
-        _four_units(NARROW, table, ONE, SUMS + OF_FACES, SUMS + OF_AXES, group)
+        _of_faces(NARROW, numbers, ONE + 4, ONE + 5, ONE + 6, ONE + 7, group, SUMS + OF_FACES)
+        _of_axes(NARROW, numbers, ONE + 8, ONE + 9, ONE + 10, ONE + 11, group, SUMS + OF_AXES)
+        _four_units(NARROW, numbers, ONE, SUMS + OF_FACES, SUMS + OF_AXES, group)
 
 
 @inlined
