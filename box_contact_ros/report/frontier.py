@@ -376,8 +376,8 @@ Point errors in % of the smaller box's longest edge, as median/p99/worst, per co
 reverse; these and normals only where the gap or depth is more than {VERDICT:g} of the size, as at
 exact touch either verdict is right, and many normals. *Judged*: pairs asked; models with batches
 are asked for more. Random sizes are timed on {FEW_PAIRS} pairs of sizes. Engines that give several
-points are entered twice: their deepest, and the mean. `committee N-M` are networks of other sizes,
-trained for 100,000 steps.
+points are entered twice: their deepest, and the mean. `committee N` are networks of N hidden units,
+trained for 60,000 steps.
 
 """ + '\n\n'.join(f'### {name.capitalize()}\n\n{getdoc(ALL_SETS[name])}\n\n'
                   f'{set_table(cells, name)}' for name in ALL_SETS) + '\n'
