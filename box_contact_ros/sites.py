@@ -479,9 +479,11 @@ def _lay_out_along(numbers, q, r, s):
 
 @inlined
 def _add_up(work, numbers, q):
-    total = 0.0 + _answer(numbers, 0, q, 0, q)
-    total += _answer(numbers, 1, q, 0, 3 + q)
-    work[CENTROID + q * LANES] = total + _answer(numbers, 2, q, 0, 6 + q)
+    # In float64, as a block's answers are.
+    work[CENTROID + q * LANES] = 0.0
+    work[CENTROID + q * LANES] += _answer(numbers, 0, q, 0, q)
+    work[CENTROID + q * LANES] += _answer(numbers, 1, q, 0, 3 + q)
+    work[CENTROID + q * LANES] += _answer(numbers, 2, q, 0, 6 + q)
 
 
 @kernel
