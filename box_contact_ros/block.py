@@ -72,7 +72,7 @@ MIDDLE = _rows(3)      # middle of the bounding box, in its frame [m]
 HALF = _rows(3)        # its half extents [m]
 INSIDE = _rows(3)      # a point inside A∩B, in that frame [m]
 
-# committee.describe_block and place_block.
+# sites.describe_block and centroid_block, then committee.
 NORMALS = _rows(9)     # the other box's axis f in the frame chosen: 3 f + component
 OFFSETS = _rows(3)     # middle of the bounding box along axis f, from the other box's centre [m]
 OTHER = _rows(3)       # the other box's half extents [m]

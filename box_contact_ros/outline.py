@@ -51,7 +51,7 @@ from .jit import inlined, kernel
 _PARALLEL = 1e-90
 """Least magnitude that is inverted: an edge exactly along a slab must not give 0 · ∞, and three of
 them multiplied must not underflow."""
-_FLUSH = 2.0**-46
+FLUSH = 2.0**-46
 """Slabs are wider by this fraction of the size (1.4e-14). Where faces of both boxes lie in one
 plane, rounding may put either box's edges outside the other: of an aligned stack nothing, or one
 side, would be left. The rounding of a corner's place is below 32 units of 2⁻⁵³ of the size, and
@@ -122,7 +122,7 @@ def _four_edges(work, half_x, half_y, centre, along, across, low_x, high_x, low_
         ix = work[INVERSE + j * along + i]
         iy = work[INVERSE + across + j * along + i]
         iz = work[INVERSE + 2 * across + j * along + i]
-        slack = _FLUSH * work[SIZE + i]
+        slack = FLUSH * work[SIZE + i]
         wx = (work[half_y + i] + slack) * abs(ix)
         wy = (work[half_y + LANES + i] + slack) * abs(iy)
         wz = (work[half_y + 2 * LANES + i] + slack) * abs(iz)
@@ -187,7 +187,7 @@ def _side_by_side(work, half_x, half_y, centre, along, across, low_x, high_x, lo
         ix = work[INVERSE + j * along + i]
         iy = work[INVERSE + across + j * along + i]
         iz = work[INVERSE + 2 * across + j * along + i]
-        slack = _FLUSH * work[SIZE + i]
+        slack = FLUSH * work[SIZE + i]
         x = work[centre + i] + (ga * work[ROTATION + a * along + i]
                                 + gb * work[ROTATION + b * along + i])
         y = work[centre + LANES + i] + (ga * work[ROTATION + across + a * along + i]

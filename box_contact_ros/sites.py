@@ -43,10 +43,12 @@ from .block import (
     OFFSETS,
     OTHER,
     ROTATION,
+    SIZE,
     aligned,
 )
 from .jit import fused_inlined, fused_kernel, inlined, kernel
 from .network import Network, unpacked
+from .outline import FLUSH
 
 SITES = 9
 """For each of the other box's axes, and so couple of faces f, each axis q of the cube: 3 f + q."""
@@ -150,7 +152,8 @@ def _face_cuts(lanes, work, numbers, f):
     """How far the two faces across axis f cut into the cube, and at which slant."""
     for i in range(lanes):
         offset = work[OFFSETS + f * LANES + i]
-        half = work[OTHER + f * LANES + i]
+        # As wide as the outline took it: a face in one plane with the cube's cuts nothing.
+        half = work[OTHER + f * LANES + i] + FLUSH * work[SIZE + i]
         x = work[NORMALS + 3 * f * LANES + i] * work[HALF + i]
         y = work[NORMALS + (3 * f + 1) * LANES + i] * work[HALF + LANES + i]
         z = work[NORMALS + (3 * f + 2) * LANES + i] * work[HALF + 2 * LANES + i]
