@@ -93,18 +93,20 @@ SHIFT = _rows(3)       # push
 SHIFTS = _rows(3)      # |push|
 LARGER = _rows(3)      # slant · cut along that other axis where it is larger
 WHOLE = _rows(2)       # cut of all faces; |push of all| along all axes
-SITE = _rows(4)        # inputs that only the site under way has
+SITE = _rows(36)       # inputs that a site has for itself: at SITE + 4 · site + input
+# Of the four hidden units under way: what they sum over inputs that sites share.
+OF_FACES = _rows(12)   # of the couple of faces f at OF_FACES + 4 f + unit
+OF_AXES = _rows(12)    # of the axis q
+ANSWERS = _rows(27)    # of a site at ANSWERS + 3 · site + output
 ONE = _rows(INPUTS)    # inputs of a single pair, whose sites lie side by side
-ANSWERS = _rows(OUTPUTS)
-SUMS = _next           # for every four hidden units: what they sum over these inputs,
-OF_FACES, OF_AXES, OF_BOTH = 0, 12, 24  # of each couple of faces, and of each axis
-ROWS = SUMS + UNITS_MAX // 4 * OF_BOTH
+ROWS = _next
 
 GROUP = 64
 """Weights of four hidden units: 4 biases; 16 each, units first, for the inputs of faces, of axes,
 of sites; 12 to the outputs, outputs first. Before the first: the number of units, 3 biases of the
 outputs."""
-INPUTS_OF = np.array([[*range(SITE, SITE + 4), CUTS + f, STRENGTHS + f, AGREED + f, WHOLE,
+INPUTS_OF = np.array([[*range(SITE + 4 * (3 * f + q), SITE + 4 * (3 * f + q + 1)),
+                       CUTS + f, STRENGTHS + f, AGREED + f, WHOLE,
                        SLANTED + q, SHIFTS + q, LARGER + q, WHOLE + 1]
                       for f in range(3) for q in range(3)])
 """(SITES, INPUTS) rows of each site's inputs."""
@@ -187,8 +189,11 @@ def _faces_together(numbers, f, i, cut, push, along):
 
 @kernel
 def describe_block(work, numbers):
-    """What the sites of a block of pairs have in common."""
+    """All inputs of a block of pairs."""
     _describe(LANES, work, numbers)
+    _sites_along(numbers, 0, 1, 2)
+    _sites_along(numbers, 1, 2, 0)
+    _sites_along(numbers, 2, 0, 1)
 
 
 @inlined
@@ -251,7 +256,7 @@ def _couple(lanes, numbers):
 
 
 @inlined
-def site_inputs(numbers, f, q, r, s, i):
+def _site_inputs(numbers, f, q, r, s, i):
     """The four inputs that only the site of faces f and axis q has; r, s are the other axes."""
     cut = numbers[(CUTS + f) * LANES + i]
     slant = numbers[(SLANTS + 3 * f + q) * LANES + i]
@@ -259,6 +264,24 @@ def site_inputs(numbers, f, q, r, s, i):
     return (abs(slant) * cut, abs(push), push * (numbers[(SHIFT + q) * LANES + i] - push),
             max(abs(numbers[(SLANTS + 3 * f + r) * LANES + i]),
                 abs(numbers[(SLANTS + 3 * f + s) * LANES + i])) * cut)
+
+
+@inlined
+def _site(numbers, f, q, r, s):
+    row = SITE + 4 * (3 * f + q)
+    for i in range(LANES):
+        slanted, push, agreed, larger = _site_inputs(numbers, f, q, r, s, i)
+        numbers[row * LANES + i] = slanted
+        numbers[(row + 1) * LANES + i] = push
+        numbers[(row + 2) * LANES + i] = agreed
+        numbers[(row + 3) * LANES + i] = larger
+
+
+@inlined
+def _sites_along(numbers, q, r, s):
+    _site(numbers, 0, q, r, s)
+    _site(numbers, 1, q, r, s)
+    _site(numbers, 2, q, r, s)
 
 
 @inlined
@@ -278,34 +301,12 @@ def softsign(x):
     return x / (np.float32(1.0) + abs(x))
 
 
-@kernel
-def as_table(numbers):
-    """The rows of `site_numbers`, (ROWS, LANES)."""
-    return numbers[:ROWS * LANES].reshape(ROWS, LANES)
-
-
-@inlined
-def _at(table, row, i):
-    """Number i of a row, of the table or of the flat array that it is a view of.
-
-    A block's rows follow from the unit, and only of a table does the compiler know then that they
-    are in range. A single pair's are constants, and of a flat array it knows that none overlap.
-    """
-    if table.ndim == 1:
-        return table[row * LANES + i]
-    return table[row, i]
-
-
-@inlined
-def _put(table, row, i, value):
-    if table.ndim == 1:
-        table[row * LANES + i] = value
-    else:
-        table[row, i] = value
-
+# Of `numbers` as one flat array with rows at constant places the compiler knows that no two rows
+# overlap. With rows that follow from the unit under way it tested that, before every loop: half of
+# the network's time.
 
 @fused_inlined
-def _shared(lanes, table, r0, r1, r2, r3, biases, weights, to):
+def _shared(lanes, numbers, r0, r1, r2, r3, biases, weights, to):
     """Four hidden units' sums over four inputs, rows r0 to r3, to four rows from `to` on."""
     b0, b1, b2, b3 = biases
     p0, p1, p2, p3 = weights[0], weights[1], weights[2], weights[3]
@@ -313,30 +314,31 @@ def _shared(lanes, table, r0, r1, r2, r3, biases, weights, to):
     s0, s1, s2, s3 = weights[8], weights[9], weights[10], weights[11]
     t0, t1, t2, t3 = weights[12], weights[13], weights[14], weights[15]
     for i in range(lanes):
-        x0, x1 = _at(table, r0, i), _at(table, r1, i)
-        x2, x3 = _at(table, r2, i), _at(table, r3, i)
-        _put(table, to, i, (((b0 + p0 * x0) + p1 * x1) + p2 * x2) + p3 * x3)
-        _put(table, to + 1, i, (((b1 + q0 * x0) + q1 * x1) + q2 * x2) + q3 * x3)
-        _put(table, to + 2, i, (((b2 + s0 * x0) + s1 * x1) + s2 * x2) + s3 * x3)
-        _put(table, to + 3, i, (((b3 + t0 * x0) + t1 * x1) + t2 * x2) + t3 * x3)
+        x0, x1 = numbers[r0 * LANES + i], numbers[r1 * LANES + i]
+        x2, x3 = numbers[r2 * LANES + i], numbers[r3 * LANES + i]
+        numbers[to * LANES + i] = (((b0 + p0 * x0) + p1 * x1) + p2 * x2) + p3 * x3
+        numbers[(to + 1) * LANES + i] = (((b1 + q0 * x0) + q1 * x1) + q2 * x2) + q3 * x3
+        numbers[(to + 2) * LANES + i] = (((b2 + s0 * x0) + s1 * x1) + s2 * x2) + s3 * x3
+        numbers[(to + 3) * LANES + i] = (((b3 + t0 * x0) + t1 * x1) + t2 * x2) + t3 * x3
 
 
 _NO_BIASES = (np.float32(0.0), np.float32(0.0), np.float32(0.0), np.float32(0.0))
 
 
 @fused_inlined
-def _of_faces(lanes, table, r0, r1, r2, r3, group, to):
-    _shared(lanes, table, r0, r1, r2, r3, (group[0], group[1], group[2], group[3]), group[4:20], to)
+def _of_faces(lanes, numbers, r0, r1, r2, r3, group, to):
+    _shared(lanes, numbers, r0, r1, r2, r3, (group[0], group[1], group[2], group[3]), group[4:20],
+            to)
 
 
 @fused_inlined
-def _of_axes(lanes, table, r0, r1, r2, r3, group, to):
-    _shared(lanes, table, r0, r1, r2, r3, _NO_BIASES, group[20:36], to)
+def _of_axes(lanes, numbers, r0, r1, r2, r3, group, to):
+    _shared(lanes, numbers, r0, r1, r2, r3, _NO_BIASES, group[20:36], to)
 
 
 @fused_inlined
-def _four_units(lanes, table, x, of_faces, of_axes, group):
-    """Add to ANSWERS what four hidden units say of the inputs in four rows from x on.
+def _four_units(lanes, numbers, x, of_faces, of_axes, answers, group):
+    """Add to three rows from `answers` on what four hidden units say of inputs in four from x on.
 
     of_faces, of_axes: first rows of what these units have summed before.
     """
@@ -348,117 +350,121 @@ def _four_units(lanes, table, x, of_faces, of_axes, group):
     v0, v1, v2, v3 = group[56], group[57], group[58], group[59]
     w0, w1, w2, w3 = group[60], group[61], group[62], group[63]
     for i in range(lanes):
-        x0, x1 = _at(table, x, i), _at(table, x + 1, i)
-        x2, x3 = _at(table, x + 2, i), _at(table, x + 3, i)
-        h0 = softsign(((((_at(table, of_faces, i) + _at(table, of_axes, i))
+        x0, x1 = numbers[x * LANES + i], numbers[(x + 1) * LANES + i]
+        x2, x3 = numbers[(x + 2) * LANES + i], numbers[(x + 3) * LANES + i]
+        h0 = softsign(((((numbers[of_faces * LANES + i] + numbers[of_axes * LANES + i])
                          + p0 * x0) + p1 * x1) + p2 * x2) + p3 * x3)
-        h1 = softsign(((((_at(table, of_faces + 1, i) + _at(table, of_axes + 1, i))
+        h1 = softsign(((((numbers[(of_faces + 1) * LANES + i] + numbers[(of_axes + 1) * LANES + i])
                          + q0 * x0) + q1 * x1) + q2 * x2) + q3 * x3)
-        h2 = softsign(((((_at(table, of_faces + 2, i) + _at(table, of_axes + 2, i))
+        h2 = softsign(((((numbers[(of_faces + 2) * LANES + i] + numbers[(of_axes + 2) * LANES + i])
                          + s0 * x0) + s1 * x1) + s2 * x2) + s3 * x3)
-        h3 = softsign(((((_at(table, of_faces + 3, i) + _at(table, of_axes + 3, i))
+        h3 = softsign(((((numbers[(of_faces + 3) * LANES + i] + numbers[(of_axes + 3) * LANES + i])
                          + t0 * x0) + t1 * x1) + t2 * x2) + t3 * x3)
-        _put(table, ANSWERS, i, (((
-            _at(table, ANSWERS, i) + u0 * h0) + u1 * h1) + u2 * h2) + u3 * h3)
-        _put(table, ANSWERS + 1, i, (((
-            _at(table, ANSWERS + 1, i) + v0 * h0) + v1 * h1) + v2 * h2) + v3 * h3)
-        _put(table, ANSWERS + 2, i, (((
-            _at(table, ANSWERS + 2, i) + w0 * h0) + w1 * h1) + w2 * h2) + w3 * h3)
+        numbers[answers * LANES + i] = (((
+            numbers[answers * LANES + i] + u0 * h0) + u1 * h1) + u2 * h2) + u3 * h3
+        numbers[(answers + 1) * LANES + i] = (((
+            numbers[(answers + 1) * LANES + i] + v0 * h0) + v1 * h1) + v2 * h2) + v3 * h3
+        numbers[(answers + 2) * LANES + i] = (((
+            numbers[(answers + 2) * LANES + i] + w0 * h0) + w1 * h1) + w2 * h2) + w3 * h3
 
 
 @inlined
-def _begin_answers(lanes, table, biases):
+def _begin_answers(lanes, numbers, answers, biases):
     b0, b1, b2 = biases[0], biases[1], biases[2]
     for i in range(lanes):
-        _put(table, ANSWERS, i, b0)
-        _put(table, ANSWERS + 1, i, b1)
-        _put(table, ANSWERS + 2, i, b2)
+        numbers[answers * LANES + i] = b0
+        numbers[(answers + 1) * LANES + i] = b1
+        numbers[(answers + 2) * LANES + i] = b2
+
+
+@inlined
+def _begin_faces(numbers, f, biases):
+    _begin_answers(LANES, numbers, ANSWERS + 9 * f, biases)
+    _begin_answers(LANES, numbers, ANSWERS + 9 * f + 3, biases)
+    _begin_answers(LANES, numbers, ANSWERS + 9 * f + 6, biases)
+
+
+@fused_inlined
+def _at_faces(numbers, f, group):
+    """Add to the answers at the three sites of the faces f what four hidden units say."""
+    _four_units(LANES, numbers, SITE + 12 * f, OF_FACES + 4 * f, OF_AXES, ANSWERS + 9 * f, group)
+    _four_units(LANES, numbers, SITE + 12 * f + 4, OF_FACES + 4 * f, OF_AXES + 4,
+                ANSWERS + 9 * f + 3, group)
+    _four_units(LANES, numbers, SITE + 12 * f + 8, OF_FACES + 4 * f, OF_AXES + 8,
+                ANSWERS + 9 * f + 6, group)
+
+
+@fused_inlined
+def _sums(numbers, k, group):
+    """What four hidden units sum over the inputs of the faces k, and of the axis k."""
+    _of_faces(LANES, numbers, CUTS + k, STRENGTHS + k, AGREED + k, WHOLE, group, OF_FACES + 4 * k)
+    _of_axes(LANES, numbers, SLANTED + k, SHIFTS + k, LARGER + k, WHOLE + 1, group,
+             OF_AXES + 4 * k)
 
 
 @fused_kernel
-def shared_block(numbers):
-    """What hidden units sum over inputs that sites share, for a block."""
-    table, weights = as_table(numbers), numbers[ROWS * LANES:]
+def answers_block(numbers):
+    """ANSWERS of a block, at all sites."""
+    weights = numbers[ROWS * LANES:]
+    _begin_faces(numbers, 0, weights[1:4])
+    _begin_faces(numbers, 1, weights[1:4])
+    _begin_faces(numbers, 2, weights[1:4])
     for unit in range(0, int(weights[0]), 4):
         group = weights[4 + unit // 4 * GROUP:]
-        sums = SUMS + unit // 4 * OF_BOTH
-        for k in range(3):
-            _of_faces(LANES, table, CUTS + k, STRENGTHS + k, AGREED + k, WHOLE, group,
-                      sums + OF_FACES + 4 * k)
-            _of_axes(LANES, table, SLANTED + k, SHIFTS + k, LARGER + k, WHOLE + 1, group,
-                     sums + OF_AXES + 4 * k)
-
-
-@fused_kernel
-def answers_block(numbers, f, q):
-    """ANSWERS of a block at the site of the faces f and the axis q (0, 1, 2)."""
-    table, weights = as_table(numbers), numbers[ROWS * LANES:]
-    _begin_answers(LANES, table, weights[1:4])
-    for unit in range(0, int(weights[0]), 4):
-        sums = SUMS + unit // 4 * OF_BOTH
-        _four_units(LANES, table, SITE, sums + OF_FACES + 4 * f, sums + OF_AXES + 4 * q,
-                    weights[4 + unit // 4 * GROUP:])
+        _sums(numbers, 0, group)
+        _sums(numbers, 1, group)
+        _sums(numbers, 2, group)
+        _at_faces(numbers, 0, group)
+        _at_faces(numbers, 1, group)
+        _at_faces(numbers, 2, group)
 
 
 @inlined
-def _answer(numbers, f, q, i, at):
-    """What a site adds to the offset along q; `at`: the lane of its answers."""
+def _answer(numbers, f, q, i, answers, at):
+    """What a site adds to the offset along q; its answers are three rows, in lane `at`."""
     pushed, pulled, passed = site_vectors(numbers, f, q, i)
-    return (numbers[ANSWERS * LANES + at] * pushed
-            + numbers[(ANSWERS + 1) * LANES + at] * pulled
-            ) + numbers[(ANSWERS + 2) * LANES + at] * passed
+    return (numbers[answers * LANES + at] * pushed
+            + numbers[(answers + 1) * LANES + at] * pulled
+            ) + numbers[(answers + 2) * LANES + at] * passed
 
 
 @inlined
-def _site(work, numbers, f, q, r, s):
-    """Add the answers at a site to CENTROID; f, q, r, s are constants."""
+def _add_up(work, numbers, q):
     for i in range(LANES):
-        slanted, push, agreed, larger = site_inputs(numbers, f, q, r, s, i)
-        numbers[SITE * LANES + i] = slanted
-        numbers[(SITE + 1) * LANES + i] = push
-        numbers[(SITE + 2) * LANES + i] = agreed
-        numbers[(SITE + 3) * LANES + i] = larger
-    answers_block(numbers, f, q)
-    for i in range(LANES):
-        work[CENTROID + q * LANES + i] += _answer(numbers, f, q, i, i)
-
-
-@inlined
-def _sites_along(work, numbers, q, r, s):
-    for i in range(LANES):
+        # In float64, as a single pair's.
         work[CENTROID + q * LANES + i] = 0.0
-    _site(work, numbers, 0, q, r, s)
-    _site(work, numbers, 1, q, r, s)
-    _site(work, numbers, 2, q, r, s)
+        work[CENTROID + q * LANES + i] += _answer(numbers, 0, q, i, ANSWERS + 3 * q, i)
+        work[CENTROID + q * LANES + i] += _answer(numbers, 1, q, i, ANSWERS + 9 + 3 * q, i)
+        work[CENTROID + q * LANES + i] += _answer(numbers, 2, q, i, ANSWERS + 18 + 3 * q, i)
 
 
 @kernel
 def centroid_block(work, numbers):
     """CENTROID of a block: where the network says that it is, from the cube's middle."""
     describe_block(work, numbers)
-    shared_block(numbers)
-    _sites_along(work, numbers, 0, 1, 2)
-    _sites_along(work, numbers, 1, 2, 0)
-    _sites_along(work, numbers, 2, 0, 1)
+    answers_block(numbers)
+    _add_up(work, numbers, 0)
+    _add_up(work, numbers, 1)
+    _add_up(work, numbers, 2)
 
 
 @fused_kernel
 def answers_one(numbers):
     """ANSWERS at all sites of a single pair, side by side: the same sums in the same order."""
     weights = numbers[ROWS * LANES:]
-    _begin_answers(NARROW, numbers, weights[1:4])
+    _begin_answers(NARROW, numbers, ANSWERS, weights[1:4])
     for unit in range(0, int(weights[0]), 4):
         group = weights[4 + unit // 4 * GROUP:]
-        _of_faces(NARROW, numbers, ONE + 4, ONE + 5, ONE + 6, ONE + 7, group, SUMS + OF_FACES)
-        _of_axes(NARROW, numbers, ONE + 8, ONE + 9, ONE + 10, ONE + 11, group, SUMS + OF_AXES)
-        _four_units(NARROW, numbers, ONE, SUMS + OF_FACES, SUMS + OF_AXES, group)
+        _of_faces(NARROW, numbers, ONE + 4, ONE + 5, ONE + 6, ONE + 7, group, OF_FACES)
+        _of_axes(NARROW, numbers, ONE + 8, ONE + 9, ONE + 10, ONE + 11, group, OF_AXES)
+        _four_units(NARROW, numbers, ONE, OF_FACES, OF_AXES, ANSWERS, group)
 
 
 @inlined
 def _lay_out(numbers, f, q, r, s):
     """A single pair's inputs at a site."""
     site = 3 * f + q
-    slanted, push, agreed, larger = site_inputs(numbers, f, q, r, s, 0)
+    slanted, push, agreed, larger = _site_inputs(numbers, f, q, r, s, 0)
     numbers[ONE * LANES + site] = slanted
     numbers[(ONE + 1) * LANES + site] = push
     numbers[(ONE + 2) * LANES + site] = agreed
@@ -481,12 +487,11 @@ def _lay_out_along(numbers, q, r, s):
 
 
 @inlined
-def _add_up(work, numbers, q):
-    # In float64, as a block's answers are.
+def _add_up_one(work, numbers, q):
     work[CENTROID + q * LANES] = 0.0
-    work[CENTROID + q * LANES] += _answer(numbers, 0, q, 0, q)
-    work[CENTROID + q * LANES] += _answer(numbers, 1, q, 0, 3 + q)
-    work[CENTROID + q * LANES] += _answer(numbers, 2, q, 0, 6 + q)
+    work[CENTROID + q * LANES] += _answer(numbers, 0, q, 0, ANSWERS, q)
+    work[CENTROID + q * LANES] += _answer(numbers, 1, q, 0, ANSWERS, 3 + q)
+    work[CENTROID + q * LANES] += _answer(numbers, 2, q, 0, ANSWERS, 6 + q)
 
 
 @kernel
@@ -497,6 +502,6 @@ def centroid_one(work, numbers):
     _lay_out_along(numbers, 1, 2, 0)
     _lay_out_along(numbers, 2, 0, 1)
     answers_one(numbers)
-    _add_up(work, numbers, 0)
-    _add_up(work, numbers, 1)
-    _add_up(work, numbers, 2)
+    _add_up_one(work, numbers, 0)
+    _add_up_one(work, numbers, 1)
+    _add_up_one(work, numbers, 2)

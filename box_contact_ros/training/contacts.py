@@ -38,10 +38,8 @@ from ..sites import (
     INPUTS_OF,
     OUTPUTS,
     ROWS,
-    SITE,
     SITES,
     describe_block,
-    site_inputs,
     site_vectors,
 )
 
@@ -81,9 +79,6 @@ def _describe(poses_a, poses_b, sizes_a, sizes_b, work, numbers, inputs, vectors
             row = start + i
             for site in range(SITES):
                 f, q = site // 3, site % 3
-                own = site_inputs(numbers, f, q, (q + 1) % 3, (q + 2) % 3, i)
-                for k in range(4):
-                    numbers[(SITE + k) * LANES + i] = own[k]
                 for k in range(INPUTS):
                     inputs[row, site, k] = numbers[INPUTS_OF[site, k] * LANES + i]
                 multiplied = site_vectors(numbers, f, q, i)
