@@ -65,6 +65,7 @@ from .pose import load_block, load_one, load_sizes
 from .resources import resource_path
 from .sat import query_block
 from .sites import (
+    ACTIVATION,
     DESCRIPTION,
     INPUTS,
     OUTPUTS,
@@ -297,6 +298,9 @@ class Committee:
                                f'of at most {UNITS_MAX} units')
         if self.weights.card['inputs'].get('description') != DESCRIPTION:
             raise WeightsError(f'weights file {path} is for other inputs than this version has')
+        if self.weights.card.get('activation') != ACTIVATION:
+            raise WeightsError(f"weights file {path}: this version's units are {ACTIVATION!r}, not "
+                               f"{self.weights.card.get('activation')!r}")
         self._exact_answers = 0
         self._numbers = site_numbers(network)
         self._work = new_work()

@@ -1,7 +1,7 @@
 """Multilayer perceptrons: the file format of their weights, and the forward kernel.
 
 A weights file is `safetensors`: tensors `<network>.<layer>.weight` (outputs × inputs) and
-`<network>.<layer>.bias`, float32, layers counted from 0; hidden units are softsign, in the
+`<network>.<layer>.bias`, float32, layers counted from 0; hidden units are rectified, in the
 paper's networks tanh; the output is linear. Inputs and outputs are in SI units: any scaling is
 folded into the weights. The metadata entry `card` is the model card, a JSON object: name, model,
 architecture, inputs and outputs with their ranges, sizes it was trained for, data recipe and seed,

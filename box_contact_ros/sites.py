@@ -63,6 +63,8 @@ NAMES = (
 """Inputs at a site: four of its own, four that all sites of its faces have, four of its axis."""
 DESCRIPTION = 'cuts of the unit cube, at nine sites'
 """What the inputs and outputs mean; weights made for another meaning are refused."""
+ACTIVATION = 'relu'
+"""Of the hidden units; weights made for another one are refused."""
 UNITS_MAX = 64
 """Most hidden units: what `numbers` has room for."""
 NARROW = 16
@@ -293,12 +295,12 @@ def site_vectors(numbers, f, q, i):
 
 
 @fused_inlined
-def softsign(x):
-    """The activation x / (1 + |x|): odd, rising, within ±1 as tanh is, and cheaper.
+def relu(x):
+    """The activation: one instruction, and continuous as the answer has to be.
 
-    Bergstra et al., Quadratic polynomials learn better image features, 2009.
+    With as many units errors are a tenth smaller than with x / (1 + |x|).
     """
-    return x / (np.float32(1.0) + abs(x))
+    return max(x, np.float32(0.0))
 
 
 # Of `numbers` as one flat array with rows at constant places the compiler knows that no two rows
@@ -352,14 +354,14 @@ def _four_units(lanes, numbers, x, of_faces, of_axes, answers, group):
     for i in range(lanes):
         x0, x1 = numbers[x * LANES + i], numbers[(x + 1) * LANES + i]
         x2, x3 = numbers[(x + 2) * LANES + i], numbers[(x + 3) * LANES + i]
-        h0 = softsign(((((numbers[of_faces * LANES + i] + numbers[of_axes * LANES + i])
-                         + p0 * x0) + p1 * x1) + p2 * x2) + p3 * x3)
-        h1 = softsign(((((numbers[(of_faces + 1) * LANES + i] + numbers[(of_axes + 1) * LANES + i])
-                         + q0 * x0) + q1 * x1) + q2 * x2) + q3 * x3)
-        h2 = softsign(((((numbers[(of_faces + 2) * LANES + i] + numbers[(of_axes + 2) * LANES + i])
-                         + s0 * x0) + s1 * x1) + s2 * x2) + s3 * x3)
-        h3 = softsign(((((numbers[(of_faces + 3) * LANES + i] + numbers[(of_axes + 3) * LANES + i])
-                         + t0 * x0) + t1 * x1) + t2 * x2) + t3 * x3)
+        h0 = relu(((((numbers[of_faces * LANES + i] + numbers[of_axes * LANES + i])
+                     + p0 * x0) + p1 * x1) + p2 * x2) + p3 * x3)
+        h1 = relu(((((numbers[(of_faces + 1) * LANES + i] + numbers[(of_axes + 1) * LANES + i])
+                     + q0 * x0) + q1 * x1) + q2 * x2) + q3 * x3)
+        h2 = relu(((((numbers[(of_faces + 2) * LANES + i] + numbers[(of_axes + 2) * LANES + i])
+                     + s0 * x0) + s1 * x1) + s2 * x2) + s3 * x3)
+        h3 = relu(((((numbers[(of_faces + 3) * LANES + i] + numbers[(of_axes + 3) * LANES + i])
+                     + t0 * x0) + t1 * x1) + t2 * x2) + t3 * x3)
         numbers[answers * LANES + i] = (((
             numbers[answers * LANES + i] + u0 * h0) + u1 * h1) + u2 * h2) + u3 * h3
         numbers[(answers + 1) * LANES + i] = (((

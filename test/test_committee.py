@@ -1,6 +1,8 @@
 """Model `committee`: what it promises whatever its network says, and how good its network is."""
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import poses
 import pytest
@@ -12,7 +14,7 @@ from box_contact_ros.network import WeightsError, save_weights
 from box_contact_ros.overlap import DEPTH_FLOOR
 from box_contact_ros.posesets import SETS, Pairs, log_uniform, quaternion_multiply, turns
 from box_contact_ros.report.accuracy import LIMITS
-from box_contact_ros.sites import DESCRIPTION, INPUTS, OUTPUTS, UNITS_MAX
+from box_contact_ros.sites import ACTIVATION, DESCRIPTION, INPUTS, OUTPUTS, UNITS_MAX
 
 N = 10_000
 UNIT = (1.0, 1.0, 1.0)
@@ -487,17 +489,37 @@ def test_missing_weights_name_the_model_that_needs_none(monkeypatch):
         ContactSolver(UNIT, UNIT, model='committee')
 
 
+def card_of(widths: tuple[int, ...]) -> dict[str, Any]:
+    """A model card that the committee takes."""
+    return {'name': 'other', 'model': 'committee', 'inputs': {'description': DESCRIPTION},
+            'activation': ACTIVATION, 'outputs': [], 'sizes': [], 'architecture': list(widths),
+            'data': {}, 'seed': 0, 'commit': '', 'metrics': {}}
+
+
 @pytest.mark.parametrize('hidden', [(), (8, 8), (UNITS_MAX + 1,)])
 def test_layers_that_the_kernels_do_not_have_are_refused(tmp_path, hidden):
     """None or two hidden layers, or too many units."""
     widths = (INPUTS, *hidden, OUTPUTS)
     layers = [(np.zeros((b, a)), np.zeros(b)) for a, b in zip(widths, widths[1:])]
     path = tmp_path / 'other.safetensors'
-    card = {'name': 'other', 'model': 'committee', 'inputs': {'description': DESCRIPTION},
-            'outputs': [], 'sizes': [], 'architecture': list(widths), 'data': {}, 'seed': 0,
-            'commit': '', 'metrics': {}}
-    save_weights(path, {'point': layers}, card)
+    save_weights(path, {'point': layers}, card_of(widths))
     with pytest.raises(WeightsError, match=f'one hidden layer, of at most {UNITS_MAX} units'):
+        ContactSolver(UNIT, UNIT, model='committee', weights=str(path))
+
+
+@pytest.mark.parametrize('change, words', [
+    ({'inputs': {'description': 'something else'}}, 'for other inputs than this version has'),
+    ({'activation': 'softsign'}, "units are 'relu', not 'softsign'"),
+    ({'activation': None}, "units are 'relu', not None")])
+def test_weights_with_another_meaning_are_refused(tmp_path, change, words):
+    """They would be taken without complaint, and answer nonsense."""
+    widths = (INPUTS, 4, OUTPUTS)
+    layers = [(np.zeros((b, a)), np.zeros(b)) for a, b in zip(widths, widths[1:])]
+    path = tmp_path / 'other.safetensors'
+    save_weights(path, {'point': layers}, card_of(widths))
+    ContactSolver(UNIT, UNIT, model='committee', weights=str(path))
+    save_weights(path, {'point': layers}, card_of(widths) | change)
+    with pytest.raises(WeightsError, match=words):
         ContactSolver(UNIT, UNIT, model='committee', weights=str(path))
 
 

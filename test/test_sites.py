@@ -96,7 +96,7 @@ def reference(network: Network, normal: np.ndarray, upper: np.ndarray, lower: np
                   slanted[:, q].sum(), abs(push[:, q].sum()), slanted.sum(axis=0)[beside].max(),
                   np.abs(push.sum(axis=0)).sum()]
         hidden = first @ np.array(inputs) + bias
-        outputs = last @ (hidden / (1.0 + np.abs(hidden))) + last_bias
+        outputs = last @ np.maximum(hidden, 0.0) + last_bias
         passed = sum(normal[g, q] * cut[g] * (normal[g] @ push[f]) for g in others)
         answer[q] += outputs @ [push[f, q], normal[f, q] * cut[f] * along, passed]
     return answer

@@ -52,7 +52,7 @@ def test_gradients_are_the_derivatives(data: contacts.Contacts) -> None:
     value = fit.inputs.clone()
     for layer in range(3):
         value = value @ before[layer][0] + before[3 + layer][0, 0]
-        value = torch.nn.functional.softsign(value) if layer < 2 else value
+        value = torch.nn.functional.relu(value) if layer < 2 else value
     answer = torch.stack([(value[:, q::3] * fit.vectors[:, q::3]).sum(dim=(1, 2))
                           for q in range(3)], dim=1)  # sites are 3 f + q
     error = answer - fit.offsets
@@ -67,12 +67,12 @@ def test_gradients_are_the_derivatives(data: contacts.Contacts) -> None:
 
 
 def test_the_activation_is_the_kernels() -> None:
-    """`points.softsign` beside `sites.softsign`, from −6 to 6."""
-    from box_contact_ros.sites import softsign
+    """`points.relu` beside `sites.relu`, from −6 to 6."""
+    from box_contact_ros.sites import relu
 
     x = np.linspace(-6.0, 6.0, 2001, dtype=np.float32)
-    found = points.softsign(torch.tensor(x)).numpy()
-    np.testing.assert_allclose(found, [softsign(value) for value in x], atol=1e-6)
+    found = points.relu(torch.tensor(x)).numpy()
+    np.testing.assert_allclose(found, [relu(value) for value in x], atol=1e-6)
 
 
 def test_a_narrow_network_beside_a_wide_one_is_the_narrow_one(data: contacts.Contacts) -> None:

@@ -19,12 +19,12 @@ from ..committee import ASPECT_MAX, DEPTH_MAX, RATIO_MAX
 from ..network import load_weights, save_weights, unpacked
 from ..posesets import SETS, Pairs
 from ..resources import resource_path
-from ..sites import DESCRIPTION, INPUTS, NAMES, OUTPUTS
+from ..sites import ACTIVATION, DESCRIPTION, INPUTS, NAMES, OUTPUTS
 from ..solver import ContactSolver
 from .contacts import Contacts, SizePair, contacts, mixture, scene_mixture
 from .points import Fit, Settings, normalisation, unfolded
 
-HIDDEN = (12,)
+HIDDEN = (32,)
 """Hidden units: what fits the time that a batch has for the network (docs/search.md)."""
 PAIRS, STEPS, BATCH, RATE = 1_500_000, 80_000, 4096, 2e-2
 HARD_ROUNDS, HARD_POOL, HARD_PART, HARD_SHARE = (0.4, 0.55, 0.7, 0.85), 2_000_000, 0.01, 0.2
@@ -151,7 +151,7 @@ def _card(path: Path, hidden: tuple[int, ...], seed: int, commit: str, sizes: li
     s = fit.settings
     return {
         'name': path.stem, 'model': 'committee', 'architecture': [INPUTS, *hidden, OUTPUTS],
-        'activation': 'softsign', 'seed': seed, 'commit': commit, 'sizes': sizes,
+        'activation': ACTIVATION, 'seed': seed, 'commit': commit, 'sizes': sizes,
         'inputs': {'description': DESCRIPTION, 'names': NAMES,
                    'range': {'aspect': ASPECT_MAX, 'size ratio': RATIO_MAX,
                              'depth by the shortest edge': DEPTH_MAX}},

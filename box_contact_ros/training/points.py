@@ -104,9 +104,9 @@ def unfolded(layers: Layers, mean: np.ndarray, deviation: np.ndarray) -> Layers:
     return [((weight * deviation).astype(np.float32), bias.astype(np.float32)), *layers[1:]]
 
 
-def softsign(x: torch.Tensor) -> torch.Tensor:
-    """The networks' activation, as in `sites.softsign`; x is overwritten."""
-    return x.div_(x.abs().add_(1.0))
+def relu(x: torch.Tensor) -> torch.Tensor:
+    """The networks' activation, as in `sites.relu`; x is overwritten."""
+    return x.relu_()
 
 
 class Fit:
@@ -153,7 +153,7 @@ class Fit:
         found = [inputs.reshape(1, -1, INPUTS).expand(p[0].shape[0], -1, -1)]
         for layer in range(count):
             total = torch.baddbmm(p[count + layer], found[-1], p[layer])
-            found.append(softsign(total) if layer < count - 1 else total)
+            found.append(relu(total) if layer < count - 1 else total)
         return found
 
     @staticmethod
@@ -186,9 +186,7 @@ class Fit:
                 gradients[layer] = torch.bmm(layers[layer].transpose(1, 2), delta)
                 gradients[count + layer] = delta.sum(dim=1, keepdim=True)
                 if layer:
-                    # The slope of y = softsign(x) is (1 − |y|)².
-                    slope = layers[layer].abs_().neg_().add_(1.0).square_()
-                    delta = torch.bmm(delta, p[layer].transpose(1, 2)).mul_(slope)
+                    delta = torch.bmm(delta, p[layer].transpose(1, 2)).mul_(layers[layer] > 0.0)
             self._adam(gradients)
         if steps:
             loss = (error.square().mean(dim=(1, 2)) + POINT_WEIGHT * squared.mean(dim=(1, 2))
