@@ -138,13 +138,16 @@ def garbage(rng, kind):
     return layers
 
 
+def card_of(widths: tuple[int, ...]) -> dict[str, Any]:
+    """A model card that the committee takes."""
+    return {'name': 'other', 'model': 'committee', 'inputs': {'description': DESCRIPTION},
+            'activation': ACTIVATION, 'outputs': [], 'sizes': [], 'architecture': list(widths),
+            'data': {}, 'seed': 0, 'commit': '', 'metrics': {}}
+
+
 def written(path, layers):
     """The weights file of these layers."""
-    card = {'name': path.stem, 'model': 'committee', 'outputs': [], 'sizes': [],
-            'inputs': {'description': DESCRIPTION},
-            'architecture': [INPUTS, 32, OUTPUTS], 'data': {}, 'seed': 0, 'commit': '',
-            'metrics': {}}
-    save_weights(path, {'point': layers}, card)
+    save_weights(path, {'point': layers}, card_of((INPUTS, 32, OUTPUTS)))
     return str(path)
 
 
@@ -487,13 +490,6 @@ def test_missing_weights_name_the_model_that_needs_none(monkeypatch):
     monkeypatch.setattr('box_contact_ros.committee.resource_path', nowhere)
     with pytest.raises(WeightsError, match="'exact'"):
         ContactSolver(UNIT, UNIT, model='committee')
-
-
-def card_of(widths: tuple[int, ...]) -> dict[str, Any]:
-    """A model card that the committee takes."""
-    return {'name': 'other', 'model': 'committee', 'inputs': {'description': DESCRIPTION},
-            'activation': ACTIVATION, 'outputs': [], 'sizes': [], 'architecture': list(widths),
-            'data': {}, 'seed': 0, 'commit': '', 'metrics': {}}
 
 
 @pytest.mark.parametrize('hidden', [(), (8, 8), (UNITS_MAX + 1,)])

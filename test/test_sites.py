@@ -31,8 +31,10 @@ ROUNDING = 2e-5
 
 
 def random_network(rng: np.random.Generator, units: int) -> Network:
+    """Weights of a size that leaves units about one."""
     widths = (sites.INPUTS, units, sites.OUTPUTS)
-    packed = np.concatenate([rng.normal(size=a * b + b) for a, b in zip(widths, widths[1:])])
+    packed = np.concatenate([rng.normal(size=a * b + b) / np.sqrt(a)
+                             for a, b in zip(widths, widths[1:])])
     return Network('point', widths, packed.astype(np.float32))
 
 
