@@ -66,7 +66,7 @@ DESCRIPTION = 'cuts of the unit cube, at nine sites'
 ACTIVATION = 'relu'
 """Of the hidden units; weights made for another one are refused."""
 UNITS_MAX = 64
-"""Most hidden units: what `numbers` has room for."""
+"""Most hidden units: as far as the search for their number goes."""
 NARROW = 16
 """Lanes that hold a single pair's sites: a multiple of every vector width."""
 
