@@ -45,7 +45,7 @@ SINGLE_PAIRS, QUICK_SINGLE_PAIRS = 1_000, 40
 FEW_PAIRS = 16
 """Pairs of sizes in the timing of a set that has others in every row: each needs a solver."""
 SECONDS, QUICK_SECONDS = 1.0, 0.05
-"""Time that a contestant has for a set, once for its answers and once for its timing."""
+"""Time that a contestant has to be asked on a set, once for answers and once for timing."""
 ROUNDS, QUICK_ROUNDS = 5, 2
 """Rounds in which the contestants are timed in turn, so that a slow moment hits all of them."""
 LEAST_PAIRS = 10
@@ -220,11 +220,12 @@ def _head(pairs: Pairs, count: int) -> Pairs:
 
 
 def _answers(contestant: Contestant, pairs: Pairs, seconds: float) -> tuple[np.ndarray, ...]:
-    """Answers (n,), (n, 3), (n, 3) of as many pairs as there is time for."""
+    """Answers (n,), (n, 3), (n, 3) of as many pairs as there is time to ask."""
     colliding, normals, points = [], [], []
-    began = time.monotonic()
     nothing = np.full(3, math.nan)
-    for arguments in contestant.prepare(pairs):
+    prepared = contestant.prepare(pairs)
+    began = time.monotonic()
+    for arguments in prepared:
         answer = contestant.read(contestant.ask(*arguments))
         colliding.append(answer.touching)
         normals.append(nothing if answer.normal is None else answer.normal)
