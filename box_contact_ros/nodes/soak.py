@@ -52,7 +52,7 @@ may round differently. Poses of the streams that follow each other differ by mil
 GROWTH_LIMIT = 1.0
 """Of the contact node's resident memory after its first block [MB]."""
 P50_LIMIT, P99_LIMIT, START_LIMIT = 1.25, 1.5, 2.5
-"""Aims: ratios to the latencies of an echo node, and seconds from start to first answer."""
+"""Aims: ratios to the bare echo node's latencies, and seconds from start to first answer."""
 STREAMS = ('containers', 'crane')
 """Played in turn: unrelated poses, and a motion. For boxes of one size, so that nobody restarts."""
 
