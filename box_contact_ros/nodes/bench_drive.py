@@ -39,7 +39,7 @@ from .children import Stop, asked_to_end, end, on_this_host
 from .crane_log import cloud_rows
 from .echo import raw_stamp
 from .messages import NANOSECONDS, make_header
-from .runtime import let_callbacks_finish, make_executor
+from .runtime import let_callbacks_finish, make_executor, spin_for
 
 # Bounds on everything that waits, so that a bench always ends.
 START_LIMIT = 120.0  # s until a node answers; a first start compiles its kernels
@@ -291,8 +291,9 @@ class Bench:
 
     def _spin(self, until: float) -> None:
         """Receive until that time."""
-        while (left := until - time.monotonic()) > 0.0:
-            self.executor.spin_once(timeout_sec=left)
+        left = until - time.monotonic()
+        if left > 0.0:
+            spin_for(self.executor, left)
 
     def _drain(self, outstanding: Callable[[], int]) -> None:
         """Wait for the last answers: until nothing is out, or nothing comes any more."""

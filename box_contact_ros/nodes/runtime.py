@@ -15,6 +15,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
 
 try:
     from rclpy.experimental.events_executor import EventsExecutor
@@ -42,6 +43,16 @@ def make_executor(context: Context) -> Any:
     if EventsExecutor is None:
         return SingleThreadedExecutor(context=context)
     return EventsExecutor(context=context)
+
+
+def spin_for(executor: Any, seconds: float) -> None:
+    """Serve callbacks for so long, or until the executor's context is shut down.
+
+    Unlike `spin_once` this stays in the executor from one callback to the next, which takes some
+    5 µs less for each message. An exception out of a callback comes out of here.
+    """
+    # A new one each time: the executor leaves a callback with it.
+    executor.spin_until_future_complete(Future(), seconds)
 
 
 def let_callbacks_finish() -> None:
@@ -75,7 +86,7 @@ def spin(node: Node, *, undisturbed: bool = True) -> None:
             let_callbacks_finish()
         while node.context.ok():
             try:
-                executor.spin_once(timeout_sec=SPIN_SECONDS)
+                spin_for(executor, SPIN_SECONDS)
             except ExternalShutdownException:
                 raise
             except Exception as error:
