@@ -30,6 +30,8 @@ facets' normals around a corner of the boxes' Minkowski difference are at right 
 LARGEST_ID = 2**32 - 1
 """Ids of pairs are uint32 in the cloud."""
 
+_new_tuple = tuple.__new__  # a named tuple's own constructor is Python code
+
 
 @dataclass(frozen=True)
 class Box:
@@ -193,10 +195,12 @@ class SceneSolver:
         pair = scene.pairs[0]
         self._solver = ContactSolver(scene.boxes[pair.a].size, scene.boxes[pair.b].size,
                                      model=model, weights=weights)
-        # A single pair needs no test and no batch. Its sides: which of the poses, or a fixed one.
+        # A single pair needs no test and no batch. Its sides: which of the poses, or a fixed one;
+        # None if they are the poses as they come.
         self._only = pair if len(scene.pairs) == 1 else None
-        self._sides = [(scene.moving.index(name), None) if name in scene.moving
-                       else (0, self._poses[numbers[name]]) for name in (pair.a, pair.b)]
+        self._sides = None if scene.moving == (pair.a, pair.b) else [
+            (scene.moving.index(name), None) if name in scene.moving
+            else (0, self._poses[numbers[name]]) for name in (pair.a, pair.b)]
         self._warm_up()
 
     @property
@@ -219,19 +223,22 @@ class SceneSolver:
         self([a[0]] * len(self.scene.moving))
         self._warm_up_answers = self._solver.exact_answers
 
+    def _both(self, poses: Sequence[np.ndarray | None]) -> list[np.ndarray | None]:
+        """The two poses of the only pair."""
+        return [poses[place] if fixed is None else fixed for place, fixed in self._sides]
+
     def __call__(self, poses: Sequence[np.ndarray | None]) -> Answer:
         """One tick. poses: (7,) of each box of `scene.moving`, None where there is none.
 
         Raises ValueError for numbers that are no pose.
         """
         if self._only is not None:
-            (place_a, fixed_a), (place_b, fixed_b) = self._sides
-            a = poses[place_a] if fixed_a is None else fixed_a
-            b = poses[place_b] if fixed_b is None else fixed_b
+            a, b = poses if self._sides is None else self._both(poses)
             if a is None or b is None:
                 return Answer([], [self._only], 0)
             contact = self._solver(a, b)
-            return Answer([(self._only, contact)] if contact.colliding else [], [], 1)
+            return _new_tuple(
+                Answer, ([(self._only, contact)] if contact.colliding else [], [], 1))
         for number, pose in zip(self._moving, poses, strict=True):
             self._known[number] = pose is not None
             if pose is not None:

@@ -7,6 +7,7 @@ constant parts.
 from __future__ import annotations
 
 import struct
+from math import hypot
 from typing import NamedTuple
 
 import numpy as np
@@ -41,7 +42,10 @@ FRAME_AT = ENCAPSULATION + _STAMP.size + 4
 """Where frame_id's characters are: behind stamp and length."""
 KEPT_FRAMES = 64
 """Frames whose layouts are kept; whoever sends more than these costs time, not memory."""
+_LEAST, _MOST = 2.0 * QUATERNION_MIN, 0.5 * QUATERNION_MAX
+"""Norms of quaternions that are certainly good, whatever the rounding."""
 _NAN_ROW = np.full(7, np.nan).tobytes()
+_array = np.array
 _new_tuple = tuple.__new__  # a named tuple's own constructor is Python code
 _NOTHING = Contact(False, 0.0, np.zeros(3), np.zeros(3))
 
@@ -90,24 +94,22 @@ class RawMessages:
     def __init__(self) -> None:
         self._frame: bytes | None = None
         self._frame_id = ''
-        self._layout = struct.Struct(_LAYOUT.format(0, 0))
+        self._unpack = struct.Struct(_LAYOUT.format(0, 0)).unpack
         self._answers: dict[str, _Answers] = {}
 
     def read_pose(self, data: bytes) -> StampedPose:
         """The pose of a serialised message; raises Refused."""
-        if len(data) != self._layout.size:
+        try:
+            order, sec, nanosec, frame, x, y, z, qx, qy, qz, qw = self._unpack(data)
+        except struct.error:  # another length
             return self._read_slowly(data)
-        order, sec, nanosec, frame, *numbers = self._layout.unpack(data)
-        if order != LITTLE or frame != self._frame:
-            return self._read_slowly(data)
-        x, y, z, qx, qy, qz, qw = numbers
         # What is certainly good passes here (NaN fails every comparison); the rest is looked at.
-        if (nanosec < NANOSECONDS and -LENGTH_MAX < x < LENGTH_MAX
-                and -LENGTH_MAX < y < LENGTH_MAX and -LENGTH_MAX < z < LENGTH_MAX
-                and _LEAST < qx * qx + qy * qy + qz * qz + qw * qw < _MOST):
-            return _new_tuple(
-                StampedPose, (np.array(numbers), self._frame_id, sec * NANOSECONDS + nanosec))
-        return checked_pose(numbers, self._frame_id, sec, nanosec)
+        if (frame == self._frame and order == LITTLE and nanosec < NANOSECONDS
+                and hypot(x, y, z) < LENGTH_MAX
+                and _LEAST < hypot(qx, qy, qz, qw) < _MOST):
+            return _new_tuple(StampedPose, (_array((x, y, z, qx, qy, qz, qw)), self._frame_id,
+                                            sec * NANOSECONDS + nanosec))
+        return self._read_slowly(data)
 
     def _read_slowly(self, data: bytes) -> StampedPose:
         data = bytes(data)
@@ -118,8 +120,8 @@ class RawMessages:
             if struct.unpack_from('<I', data, FRAME_AT - 4)[0] == length:  # not an empty one's 0
                 start, end = FRAME_AT - 4, FRAME_AT + length
                 self._frame, self._frame_id = data[start:end], frame_id
-                self._layout = struct.Struct(
-                    _LAYOUT.format(end - start, numbers_at(length) - end))
+                self._unpack = struct.Struct(
+                    _LAYOUT.format(end - start, numbers_at(length) - end)).unpack
         return pose
 
     def begin(self, stamp: int, frame_id: str) -> None:
@@ -151,9 +153,6 @@ class RawMessages:
         return b''.join((self._stamp, frame.cloud_header,
                          (size // CLOUD_ROW.itemsize).to_bytes(4, 'little'), frame.cloud_fields,
                          _SIZES.pack(size, size), rows, b'\0' if answer.stale else b'\1'))
-
-
-_LEAST, _MOST = QUATERNION_MIN * QUATERNION_MIN, QUATERNION_MAX * QUATERNION_MAX
 
 
 def _in_frame(frame_id: str) -> _Answers:
