@@ -195,12 +195,11 @@ class SceneSolver:
         pair = scene.pairs[0]
         self._solver = ContactSolver(scene.boxes[pair.a].size, scene.boxes[pair.b].size,
                                      model=model, weights=weights)
-        # A single pair needs no test and no batch. Its sides: which of the poses, or a fixed one;
-        # None if they are the poses as they come.
+        # A single pair needs no test and no batch. Its sides: which of the poses, or a fixed one.
         self._only = pair if len(scene.pairs) == 1 else None
-        self._sides = None if scene.moving == (pair.a, pair.b) else [
-            (scene.moving.index(name), None) if name in scene.moving
-            else (0, self._poses[numbers[name]]) for name in (pair.a, pair.b)]
+        self._sides = [(scene.moving.index(name), None) if name in scene.moving
+                       else (0, self._poses[numbers[name]]) for name in (pair.a, pair.b)]
+        self._in_order = scene.moving == (pair.a, pair.b)
         self._warm_up()
 
     @property
@@ -233,7 +232,7 @@ class SceneSolver:
         Raises ValueError for numbers that are no pose.
         """
         if self._only is not None:
-            a, b = poses if self._sides is None else self._both(poses)
+            a, b = poses if self._in_order else self._both(poses)
             if a is None or b is None:
                 return Answer([], [self._only], 0)
             contact = self._solver(a, b)

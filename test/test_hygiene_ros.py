@@ -144,6 +144,18 @@ def test_stamps(node, client):
     assert client.diagnostic('refused: bad header') == '8'
 
 
+def test_stamps_are_blamed_only_for_their_own_faults(node, client):
+    """Poses that come, and no answer: the reason is in the log, and no other one."""
+    for pose, apart, blamed in ((np.full(7, np.nan), 0, False), (TOUCHING, 1, True)):
+        end = time.monotonic() + 2.5
+        while time.monotonic() < end:
+            stamp = client.next_stamp()
+            for box, publisher in enumerate(client.publishers):
+                publisher.publish(cdr(pose, divmod(stamp + box * apart, 10**9)))
+            client.spin(lambda: False, 0.05)
+        assert ('none could be answered' in node.output) == blamed
+
+
 def test_good_poses_among_bad_ones(node, client):
     """Shuffled: the good are answered as the solver does, the bad are counted and never answered.
 
@@ -241,6 +253,16 @@ def test_parameters_while_it_runs(node, client):
                  [('size_a', doubles(4, 4, 4)), ('size_b', doubles(4, 4, -4))])
     assert not reply.result.successful and 'size_b (4, 4, -4)' in reply.result.reason
     client.assert_answered()
+
+
+def test_a_parameter_that_there_is_not(program):
+    """Misspelt at the start it is said, with what may have been meant; not that of a topic."""
+    running = program('contact_node', '--ros-args', '-p', 'sizea:=[1.0, 1.0, 1.0]', '-p',
+                      'qos_overrides./contacts.publisher.depth:=5', '-p', 'use_sim_time:=false')
+    printed = running.wait_for_output('ready', 120)
+    assert "there is no parameter 'sizea', its value is ignored (did you mean size_a" in printed
+    assert printed.count('there is no parameter') == 1
+    assert 'poses from /box_a/pose, /box_b/pose' in running.output
 
 
 def test_weights_while_it_runs(node, client, tmp_path):

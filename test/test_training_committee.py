@@ -295,7 +295,7 @@ def test_scene_says_what_it_saves_and_how_to_use_it(
     for pair in ('12.192 × 2.591 × 2.438 on 12.192 × 2.591 × 2.438',
                  '12.192 × 2.591 × 2.438 on 12.192 × 2.438 × 0.8'):
         row = next(line for line in printed.splitlines() if line.strip().startswith(pair))
-        assert 'general' in row and row.count('%') == 3
+        assert 'general' in row and ': saved ' in row and row.count('%') == 3
 
 
 def test_scene_card(expert: Path) -> None:

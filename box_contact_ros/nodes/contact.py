@@ -58,6 +58,8 @@ def model_name(name: str, value: Any) -> str:
     return value if soup_divisions(text(name, value)) else one_of(MODELS)(name, value)
 
 
+NAMED_TOPICS = 3
+"""How many pose topics the node names when it is ready."""
 CONTAINER = (12.192, 2.438, 2.591)  # ISO 40 ft [m]
 LONGEST = 1e6  # s, about twelve days
 PARAMETERS = {
@@ -174,10 +176,15 @@ class ContactNode(LifecycleNode):
         if self._solver is None:
             self.get_logger().info('unconfigured: autostart is false')
             return
-        pairs = len(self._solver.scene.pairs)
+        scene = self._solver.scene
+        pairs = len(scene.pairs)
+        topics = [subscription.topic_name for subscription in self._subscriptions_of.values()]
+        more = len(topics) - NAMED_TOPICS
+        frame = f' in frame {shown(scene.frame_id)}' if scene.frame_id else ''
         self.get_logger().info(
             f'ready: model {self._solver.model!r}, pairing {self._settings["pairing"]!r}, '
-            f'{pairs} {"pair" if pairs == 1 else "pairs"}')
+            f'{pairs} {"pair" if pairs == 1 else "pairs"}; poses{frame} from '
+            f'{", ".join(topics[:NAMED_TOPICS])}{f" and {more} more" if more > 0 else ""}')
 
     # --- parameters ------------------------------------------------------------------------------
 

@@ -39,7 +39,8 @@ class Diagnostics:
     def publish(self, counts: Counter[str], pairs: int, stale: Sequence[str]) -> float:
         """Publish `counts` and what happened since the last time.
 
-        Returns for how long [s] poses have been coming in without one that could be answered.
+        Returns for how long [s] poses have been coming in without one that could be answered, or 0
+        if some were refused since the last time: for these the reason has been said.
         """
         new = Counter(counts)
         new.subtract(self._reported)
@@ -53,9 +54,10 @@ class Diagnostics:
             values |= {f'compute {name} [us]': f'{value:.1f}' for name, value in zip(
                 ('p50', 'p99', 'max'),
                 np.percentile(self._times[:min(ticks, KEPT_TIMES)], (50, 99, 100)))}
-        unanswered = time.monotonic() - self._answered_at if new['poses'] else 0.0
+        refused = any(new[name] for name in new if name.startswith('refused'))
+        unanswered = time.monotonic() - self._answered_at if new['poses'] and not refused else 0.0
         level, message = DiagnosticStatus.WARN, 'poses refused'
-        if not any(new[name] for name in new if name.startswith('refused')):
+        if not refused:
             if unanswered > UNMATCHED_SECONDS:
                 message = 'poses without a partner'
             elif stale:

@@ -9,6 +9,7 @@ import argparse
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 from typing import Any
 
 from rcl_interfaces.msg import ParameterDescriptor
@@ -89,12 +90,22 @@ def flag(name: str, value: Any) -> bool:
 
 def declare(node: Node, settings: Mapping[str, Setting], *, fixed: bool = False,
             ) -> dict[str, Any]:
-    """Declare and check a node's parameters; `fixed` ones cannot be changed while it runs."""
+    """Declare and check a node's parameters; `fixed` ones cannot be changed while it runs.
+
+    rclpy ignores values for names that no one declares. They are said, not refused, since a file of
+    parameters may be meant for several nodes.
+    """
     values = {}
     for name, setting in settings.items():
         default = list(setting.default) if isinstance(setting.default, tuple) else setting.default
         values[name] = node.declare_parameter(name, default, ParameterDescriptor(
             description=setting.description, dynamic_typing=True, read_only=fixed)).value
+    for name in getattr(node, '_parameter_overrides', {}):  # rclpy has no public name for them
+        # Those of topics are declared with the topics.
+        if not node.has_parameter(name) and not name.startswith('qos_overrides.'):
+            near = ' or '.join(get_close_matches(name, settings))
+            node.get_logger().warning(f'there is no parameter {shown(name)}, its value is ignored'
+                                      + (f' (did you mean {near}?)' if near else ''))
     return checked(settings, values)
 
 

@@ -116,8 +116,7 @@ def main(args: Sequence[str] | None = None) -> int:
             return first.stop.status
         with open_bench(subjects, args, rate=options.rate, domain=options.domain,
                         kind=SoakBench) as bench:
-            about = about_the_machine(bench.node_cores) | {
-                'set rate [Hz]': f'{options.rate:g}', 'model': options.model}
+            about = about_the_machine(bench.node_cores) | {'set rate [Hz]': f'{options.rate:g}'}
             print('\n'.join(f'{name}: {value}' for name, value in about.items()), flush=True)
             bench.run([blocks], truths)
     except REFUSALS as error:
@@ -206,6 +205,7 @@ def _report(options: argparse.Namespace, subjects: list[Subject], bench: SoakBen
         table.append([name, f'{one:.3f}', f'{other:.3f}', f'{echoed:.3f}', f'{one / echoed:.2f}',
                       f'{aim:g}' if aim else '', f'{lone:.3f}', f'{one / lone:.2f}'])
     lines = [f'{name}: {value}' for name, value in counts.items()]
+    lines[0] += f' to the contact node, {sum(r.sent for r in echo)} to each echo node'
     lines.append(f'memory: {bench.memory[0]:.1f} MB after the first block, grown by at most '
                  f'{growth:.2f} MB (limit {GROWTH_LIMIT:g})')
     lines.append(f'start of the contact node to its first answer: {first_answer:.1f} s '
@@ -221,12 +221,15 @@ def _report(options: argparse.Namespace, subjects: list[Subject], bench: SoakBen
     print(f'\n{markdown(table, left=1)}\n\n{text}', flush=True)
     options.out.mkdir(parents=True, exist_ok=True)
     write_csv(options.out / 'soak.csv', [*contact, *bare, *echo], about)
-    where = '\n'.join(f'- {name}: {value}' for name, value in about.items())
+    where = '\n'.join(f'- {name}: {value}' for name, value in {
+        **about, 'model': options.model}.items())
     (options.out / 'soak.md').write_text(
         '# Soak\n\nMade by `python -m box_contact_ros soak`: blocks of poses to the contact node '
         'and to two echo nodes in turn,\na bare one and one whose threads are scheduled as the '
         "contact node's are. Latencies run from the stamp of the\nposes to the later of point and "
-        f'normal.\n\n{where}\n\n{markdown(table, left=1)}\n\n{text}\n', 'utf-8')
+        'normal. The aims are for the ratio to the echo node served alike. Errors in soak.csv are\n'
+        f"against the same model's answers.\n\n{where}\n\n{markdown(table, left=1)}\n\n{text}\n",
+        'utf-8')
     print(f'results: {options.out}/soak.csv, soak.md')
     faultless = not any(value for name, value in counts.items() if name != 'sent')
     adds_up = (all(r.adds_up for r in [*contact, *bare, *echo])

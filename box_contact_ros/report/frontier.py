@@ -490,12 +490,14 @@ def main(args: Sequence[str] | None = None) -> int:
     """Measure, print, write."""
     parser = argparse.ArgumentParser(prog='frontier', description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--out', type=Path, default=Path('docs'), metavar='DIR',
-                        help='folder for frontier.md, .csv, .png (default: %(default)s)')
+    parser.add_argument('--out', type=Path, metavar='DIR',
+                        help='folder for frontier.md, .csv, .png (default: docs, or quick-results '
+                             'with --quick)')
     parser.add_argument('--quick', action='store_true', help='few pairs, to try it out')
     parser.add_argument('--seed', type=int, default=3, help='of the sets (default: %(default)s)')
     parser.add_argument('--core', type=int, help='core to run on (default: the last one)')
     options = parser.parse_args(args)
+    options.out = options.out or Path('quick-results' if options.quick else 'docs')
     restore = _pinned(options.core, parser.error)
     try:
         found, missing = contestants(options.quick)

@@ -80,11 +80,11 @@ def jobs_of(models: Sequence[str], rates: Sequence[float], latencies: Sequence[f
 def write_csv(path: Path, results: Sequence[tuple[Job, LandingResult]]) -> None:
     """A row per landing: what was run, whether it rests, every figure.
 
-    SI units; angles of cases in degrees.
+    SI units; angles of cases in degrees, their columns begin with case_.
     """
     with path.open('w', newline='') as file:
         writer = csv.writer(file, lineterminator='\n')
-        case_fields = [field.name for field in dataclasses.fields(LandingCase)]
+        case_fields = [f'case_{field.name}' for field in dataclasses.fields(LandingCase)]
         figures = [field.name for field in dataclasses.fields(LandingResult)]
         writer.writerow(['model', 'rate_hz', 'latency', 'case', *case_fields, 'at_rest', *figures])
         for job, result in results:
@@ -158,7 +158,7 @@ normal and depth per tick. At rest means, from {SETTLING:g} s after the first to
 the weight at every tick, tilt < 0.5°; and always depth < 1 % of the height, gap after the first
 touch < 20 mm. Figures are the worst of the row's landings. A point step is |Δpoint| between
 neighbouring ticks, in the window or over the whole contact; beside it, the exact point's on the
-same poses. Every landing is a row of landing.csv.
+same poses. Every landing is a row of {'landing_dds' if dds else 'landing'}.csv.
 
 {table(results)}
 {'' if dds else OFFLINE_END}"""
@@ -214,9 +214,11 @@ def main(args: Sequence[str] | None = None) -> int:
     parser.add_argument('--seed', type=int, default=1, help='of yaws and headings')
     parser.add_argument('--quick', action='store_true', help=f'every {QUICK}th landing only')
     parser.add_argument('--workers', type=int, default=os.cpu_count(), help='processes')
-    parser.add_argument('--out', type=Path, default=Path('docs'), metavar='DIR',
-                        help='folder for landing.csv, landing.md, landing.png')
+    parser.add_argument('--out', type=Path, metavar='DIR',
+                        help='folder for landing.csv, landing.md, landing.png (default: docs, or '
+                             'quick-results with --quick)')
     options = parser.parse_args(args)
+    options.out = options.out or Path('quick-results' if options.quick else 'docs')
     jobs = jobs_of(options.models, options.rates, options.latency, seed=options.seed,
                    step=QUICK if options.quick else 1)
     options.out.mkdir(parents=True, exist_ok=True)

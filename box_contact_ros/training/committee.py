@@ -187,7 +187,8 @@ def table(card: dict[str, Any]) -> str:
             lines.append(f'  {name:<{width}}  {_shown(entry)}')
             continue
         before, after = entry['before'], entry['after']
-        saved = ' / '.join(f'{100.0 * (after[key] / before[key] - 1.0):+.0f} %'
+        saved = ' / '.join(f'{100.0 * (1.0 - after[key] / before[key]):.0f} %'
                            for key in ('mean', 'p99', 'worst'))
-        lines.append(f'  {name:<{width}}  general {_shown(before)}, this {_shown(after)}: {saved}')
+        lines.append(f'  {name:<{width}}  general {_shown(before)}, this {_shown(after)}: '
+                     f'saved {saved}')
     return '\n'.join(lines)
