@@ -166,8 +166,8 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
         '  paper             two boxes of edge 2, with discontinuities     2 minutes\n'
         '  paper-continuous  the same without, one network per subset      3 minutes\n'
         '  containers        two boxes of 12.192 x 2.438 x 2.591 m         1 minute\n'
-        '  committee         any two boxes, the point alone                6 minutes\n'
-        '  --scene FILE      the boxes of one scene, from the committee    1 minute')
+        '  committee         any two boxes, the point alone                11 minutes\n'
+        '  --scene FILE      the boxes of one scene, from the committee    3 minutes')
     parser.add_argument('what', nargs='*', metavar='what',
                         help=f'{", ".join(NAMES)}, or all (default)')
     parser.add_argument('--scene', type=Path, metavar='FILE', help='train a committee for the '
@@ -188,8 +188,8 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
                         'drawn (default: folded)')
     parser.add_argument('--quick', action='store_true',
                         help='small sets and few epochs, to try it out; needs --out')
-    parser.add_argument('--threads', type=int, default=1, help='of PyTorch (default 1; '
-                        'matrices this small gain nothing from more)')
+    parser.add_argument('--threads', type=int, default=1, help='of PyTorch (default 1; two '
+                        'train the committee in 7 minutes, the others gain nothing)')
     parser.add_argument('--device', choices=('cpu', 'cuda', 'auto'), default='cpu',
                         help='of the committee (default cpu: the same weights everywhere; matrices '
                         'this small gain little from a GPU)')
