@@ -83,7 +83,7 @@ MUTANTS = {
         'nodes/wire.py', 'if len(data) != at + _POSE.size:', 'if False:',
         'test/test_wire.py -k other_bytes'),
     'numbers of a pose not checked': Mutant(
-        'nodes/wire.py', 'and _LEAST < qx * qx + qy * qy + qz * qz + qw * qw < _MOST):', '):',
+        'nodes/wire.py', 'and _LEAST < hypot(qx, qy, qz, qw) < _MOST):', '):',
         'test/test_faults.py -k half_of_the_poses'),
     'frames not compared': Mutant(
         'nodes/contact.py', 'elif pose.frame_id != frame_id:', 'elif False:',
