@@ -90,23 +90,27 @@ def flag(name: str, value: Any) -> bool:
 
 def declare(node: Node, settings: Mapping[str, Setting], *, fixed: bool = False,
             ) -> dict[str, Any]:
-    """Declare and check a node's parameters; `fixed` ones cannot be changed while it runs.
-
-    rclpy ignores values for names that no one declares. They are said, not refused, since a file of
-    parameters may be meant for several nodes.
-    """
+    """Declare and check a node's parameters; `fixed` ones cannot be changed while it runs."""
     values = {}
     for name, setting in settings.items():
         default = list(setting.default) if isinstance(setting.default, tuple) else setting.default
         values[name] = node.declare_parameter(name, default, ParameterDescriptor(
             description=setting.description, dynamic_typing=True, read_only=fixed)).value
+    _say_unknown(node, settings)
+    return checked(settings, values)
+
+
+def _say_unknown(node: Node, settings: Mapping[str, Setting]) -> None:
+    """Warn of values given at the start for names that nobody has declared; rclpy ignores them.
+
+    They are not refused, since a file of parameters may be meant for several nodes.
+    """
     for name in getattr(node, '_parameter_overrides', {}):  # rclpy has no public name for them
         # Those of topics are declared with the topics.
         if not node.has_parameter(name) and not name.startswith('qos_overrides.'):
             near = ' or '.join(get_close_matches(name, settings))
             node.get_logger().warning(f'there is no parameter {shown(name)}, its value is ignored'
                                       + (f' (did you mean {near}?)' if near else ''))
-    return checked(settings, values)
 
 
 def checked(settings: Mapping[str, Setting], values: Mapping[str, Any]) -> dict[str, Any]:

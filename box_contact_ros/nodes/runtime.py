@@ -51,7 +51,7 @@ def spin_for(executor: Any, seconds: float) -> None:
     """Serve callbacks for so long, or until the executor's context is shut down.
 
     Unlike `spin_once` this stays in the executor from one callback to the next, which takes some
-    5 µs less for each message. An exception out of a callback comes out of here.
+    5 µs less for a tick of two poses. An exception out of a callback comes out of here.
     """
     # A new one each time: the executor leaves a callback with it.
     executor.spin_until_future_complete(Future(), seconds)

@@ -116,7 +116,8 @@ def main(args: Sequence[str] | None = None) -> int:
             return first.stop.status
         with open_bench(subjects, args, rate=options.rate, domain=options.domain,
                         kind=SoakBench) as bench:
-            about = about_the_machine(bench.node_cores) | {'set rate [Hz]': f'{options.rate:g}'}
+            about = about_the_machine(bench.node_cores) | {
+                'set rate [Hz]': f'{options.rate:g}', 'model': options.model}
             print('\n'.join(f'{name}: {value}' for name, value in about.items()), flush=True)
             bench.run([blocks], truths)
     except REFUSALS as error:
@@ -188,7 +189,7 @@ def _report(options: argparse.Namespace, subjects: list[Subject], bench: SoakBen
         return False
     growth = float(max(bench.memory) - bench.memory[0]) if bench.memory else float('nan')
     mispaired = sum(mispairs(subjects[0].log))
-    counts = {'sent': sum(r.sent for r in contact), 'lost': sum(r.lost for r in contact),
+    counts = {'lost': sum(r.lost for r in contact),
               'mispaired or wrong': mispaired + sum(r.wrong_verdicts for r in contact),
               'answered twice, or to no pose': sum(r.duplicates + r.strangers for r in contact),
               'contradictions between cloud, point and normal': sum(
@@ -204,8 +205,9 @@ def _report(options: argparse.Namespace, subjects: list[Subject], bench: SoakBen
                                     for of in (mine, clouds, plain, floor))
         table.append([name, f'{one:.3f}', f'{other:.3f}', f'{echoed:.3f}', f'{one / echoed:.2f}',
                       f'{aim:g}' if aim else '', f'{lone:.3f}', f'{one / lone:.2f}'])
-    lines = [f'{name}: {value}' for name, value in counts.items()]
-    lines[0] += f' to the contact node, {sum(r.sent for r in echo)} to each echo node'
+    lines = [f'sent: {sum(r.sent for r in contact)} to the contact node, '
+             f'{sum(r.sent for r in echo)} to each echo node']
+    lines += [f'{name}: {value}' for name, value in counts.items()]
     lines.append(f'memory: {bench.memory[0]:.1f} MB after the first block, grown by at most '
                  f'{growth:.2f} MB (limit {GROWTH_LIMIT:g})')
     lines.append(f'start of the contact node to its first answer: {first_answer:.1f} s '
@@ -220,9 +222,9 @@ def _report(options: argparse.Namespace, subjects: list[Subject], bench: SoakBen
     text = '\n'.join(f'- {line}' for line in lines)
     print(f'\n{markdown(table, left=1)}\n\n{text}', flush=True)
     options.out.mkdir(parents=True, exist_ok=True)
-    write_csv(options.out / 'soak.csv', [*contact, *bare, *echo], about)
-    where = '\n'.join(f'- {name}: {value}' for name, value in {
-        **about, 'model': options.model}.items())
+    write_csv(options.out / 'soak.csv', [*contact, *bare, *echo],
+              {name: value for name, value in about.items() if name != 'model'})  # a column already
+    where = '\n'.join(f'- {name}: {value}' for name, value in about.items())
     (options.out / 'soak.md').write_text(
         '# Soak\n\nMade by `python -m box_contact_ros soak`: blocks of poses to the contact node '
         'and to two echo nodes in turn,\na bare one and one whose threads are scheduled as the '
@@ -231,7 +233,7 @@ def _report(options: argparse.Namespace, subjects: list[Subject], bench: SoakBen
         f"against the same model's answers.\n\n{where}\n\n{markdown(table, left=1)}\n\n{text}\n",
         'utf-8')
     print(f'results: {options.out}/soak.csv, soak.md')
-    faultless = not any(value for name, value in counts.items() if name != 'sent')
+    faultless = not any(counts.values())
     adds_up = (all(r.adds_up for r in [*contact, *bare, *echo])
                and all(s.log.adds_up for s in subjects))
     return faultless and adds_up and not bench.notes and not growth >= GROWTH_LIMIT

@@ -59,6 +59,7 @@ from ..sites import centroid_block, site_numbers
 from ..solver import MODELS, ContactSolver
 from ..training import dataset
 from ..training.errors import errors_of, figures, wrapped
+from . import add_out, results_folder
 from .paper import PAPER, processor
 
 
@@ -510,11 +511,9 @@ def main(args: Sequence[str] | None = None) -> int:
     parser.add_argument('--pairs', type=int, default=PAIRS, help='a set, default: %(default)s')
     parser.add_argument('--quick', action='store_true', help=f'{QUICK_PAIRS} pairs a set')
     parser.add_argument('--seed', type=int, default=2, help='of the sets, default: %(default)s')
-    parser.add_argument('--out', type=Path, metavar='DIR',
-                        help='folder for accuracy.md, accuracy.csv, accuracy.png, default: docs, '
-                             'or quick-results with --quick')
+    add_out(parser, 'accuracy.md, accuracy.csv, accuracy.png')
     options = parser.parse_args(args)
-    options.out = options.out or Path('quick-results' if options.quick else 'docs')
+    options.out = results_folder(options)
     if options.pairs < 1:
         parser.error('--pairs must be at least 1')
     count = min(options.pairs, QUICK_PAIRS) if options.quick else options.pairs

@@ -30,6 +30,7 @@ from ..network import load_weights
 from ..posesets import CONTAINER, SETS, Generator, Pairs, any_pose, log_uniform, pressed, stacked
 from ..resources import resource_path
 from ..solver import ContactSolver
+from . import add_out, results_folder
 from .accuracy import CLASSES, classify, markdown
 from .paper import processor
 from .paper_soup import PAPER as PAPER_SOUP
@@ -491,14 +492,12 @@ def main(args: Sequence[str] | None = None) -> int:
     """Measure, print, write."""
     parser = argparse.ArgumentParser(prog='frontier', description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--out', type=Path, metavar='DIR',
-                        help='folder for frontier.md, .csv, .png (default: docs, or quick-results '
-                             'with --quick)')
+    add_out(parser, 'frontier.md, .csv, .png')
     parser.add_argument('--quick', action='store_true', help='few pairs, to try it out')
     parser.add_argument('--seed', type=int, default=3, help='of the sets (default: %(default)s)')
     parser.add_argument('--core', type=int, help='core to run on (default: the last one)')
     options = parser.parse_args(args)
-    options.out = options.out or Path('quick-results' if options.quick else 'docs')
+    options.out = results_folder(options)
     restore = _pinned(options.core, parser.error)
     try:
         found, missing = contestants(options.quick)

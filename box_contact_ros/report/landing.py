@@ -36,6 +36,7 @@ from ..landing import (
     scenario_of,
 )
 from ..solver import MODELS, ContactSolver
+from . import add_out, results_folder
 
 matplotlib.use('Agg')
 from matplotlib import pyplot as plt  # noqa: E402
@@ -143,6 +144,11 @@ that a busy machine changes nothing. None was lost. What is measured, and the sa
 """
 
 
+def _stem(dds: bool) -> str:
+    """Name of the files, without its ending."""
+    return 'landing_dds' if dds else 'landing'
+
+
 def page(results: Sequence[tuple[Job, LandingResult]], command: str, *, dds: bool = False) -> str:
     """The Markdown page."""
     count = len({job.number for job, _ in results})
@@ -158,7 +164,7 @@ normal and depth per tick. At rest means, from {SETTLING:g} s after the first to
 the weight at every tick, tilt < 0.5°; and always depth < 1 % of the height, gap after the first
 touch < 20 mm. Figures are the worst of the row's landings. A point step is |Δpoint| between
 neighbouring ticks, in the window or over the whole contact; beside it, the exact point's on the
-same poses. Every landing is a row of {'landing_dds' if dds else 'landing'}.csv.
+same poses. Every landing is a row of {_stem(dds)}.csv.
 
 {table(results)}
 {'' if dds else OFFLINE_END}"""
@@ -214,11 +220,9 @@ def main(args: Sequence[str] | None = None) -> int:
     parser.add_argument('--seed', type=int, default=1, help='of yaws and headings')
     parser.add_argument('--quick', action='store_true', help=f'every {QUICK}th landing only')
     parser.add_argument('--workers', type=int, default=os.cpu_count(), help='processes')
-    parser.add_argument('--out', type=Path, metavar='DIR',
-                        help='folder for landing.csv, landing.md, landing.png (default: docs, or '
-                             'quick-results with --quick)')
+    add_out(parser, 'landing.csv, landing.md, landing.png')
     options = parser.parse_args(args)
-    options.out = options.out or Path('quick-results' if options.quick else 'docs')
+    options.out = results_folder(options)
     jobs = jobs_of(options.models, options.rates, options.latency, seed=options.seed,
                    step=QUICK if options.quick else 1)
     options.out.mkdir(parents=True, exist_ok=True)
@@ -227,7 +231,7 @@ def main(args: Sequence[str] | None = None) -> int:
     else:
         with ProcessPoolExecutor(options.workers) as pool:
             results = list(tqdm(pool.map(run, jobs), total=len(jobs), desc='landings', unit=''))
-    name = 'landing_dds' if options.dds else 'landing'
+    name = _stem(options.dds)
     write_csv(options.out / f'{name}.csv', results)
     given = sys.argv[1:] if args is None else args
     command = ' '.join(['python -m box_contact_ros.report.landing', *given])
