@@ -80,3 +80,60 @@ def near_parallel_pairs(rng, n, size=CONTAINER):
     turn[~far] = IDENTITY[3:]
     shift = rng.uniform(-20, 20, (n, 3)) * far[:, None]
     return moved(a, shift, turn), moved(b, shift, turn), sizes, sizes
+
+
+def flush_pairs(rng, n, size=CONTAINER, ulps=60, tilts=(-17, -11)):
+    """Stacked boxes with sides in one plane, but for some ulps and a tilt of 10**tilts rad.
+
+    The upper one is as large, or half as long and at one end. A third of the pairs is turned.
+    """
+    size = np.asarray(size)
+    size_a, size_b = np.tile(size, (n, 1)), np.tile(size, (n, 1))
+    halved = rng.random(n) < 0.5
+    size_b[halved, 0] /= 2
+    along = rng.choice([0.0, 0.5, -0.5], (n, 2)) * size[:2]
+    along[halved, 0] = rng.choice([-0.25, 0.25], int(halved.sum())) * size[0]
+    along += rng.integers(-ulps, ulps + 1, (n, 2)) * np.spacing(size.max()) / 2
+    axes = rng.normal(size=(n, 3))
+    kind = rng.integers(0, 4, n)
+    for k, axis in enumerate(np.eye(3)):
+        axes[kind == k] = axis
+    angles = 10.0**rng.uniform(*tilts, n) * rng.choice([-1.0, 0.0, 1.0], n, p=[0.45, 0.1, 0.45])
+    deep = 10.0**rng.uniform(-9, 0, n)
+    b = np.concatenate([along, (size[2] - deep)[:, None], small_rotations(axes, angles)],
+                       axis=1)
+    a = np.tile(IDENTITY, (n, 1))
+    turn = unit_quaternions(rng, n)
+    turn[rng.random(n) < 0.67] = IDENTITY[3:]
+    return (*(moved(pose, np.zeros((n, 3)), turn) for pose in (a, b)), size_a, size_b)
+
+
+def ridges(rng, n):
+    """A box with an edge down on another's face, turned, and cut off by the face's rim.
+
+    Most are hardly inclined: of such slivers, as thin as they are deep, a millionth of their length
+    and less, the oblique ends have to be right too.
+    """
+    size_a, size_b = np.exp(rng.uniform(-1, 1, (2, n, 3)))
+    x, y, z = (np.tile(axis, (n, 1)) for axis in np.eye(3))
+    inclined = 10.0**rng.uniform(-10, -1, n) * rng.choice([-1, 0, 1], n)
+    turn = multiply(small_rotations(z, rng.uniform(-np.pi, np.pi, n)), multiply(
+        small_rotations(y, inclined), small_rotations(x, rng.uniform(0.2, 1.37, n))))
+    signs = np.array([[a, b, c] for a in (-0.5, 0.5) for b in (-0.5, 0.5) for c in (-0.5, 0.5)])
+    lowest = np.min([rotate(turn, sign * size_b)[:, 2] for sign in signs], axis=0)
+    deep = 10.0**rng.uniform(-9, -2, n) * rng.choice([0, 1], n, p=[0.2, 0.8])
+    along = rng.uniform(-0.6, 0.6, (n, 2)) * size_a[:, :2]
+    b = np.concatenate([along, (0.5 * size_a[:, 2] - lowest - deep)[:, None], turn], axis=1)
+    whole = unit_quaternions(rng, n)
+    return (*(moved(pose, np.zeros((n, 3)), whole)
+              for pose in (np.tile(IDENTITY, (n, 1)), b)), size_a, size_b)
+
+
+def cards(rng, n):
+    """Plates of 1e-6 to 0.1 of their size, through each other: rods, cut off obliquely."""
+    size_a, size_b = np.exp(rng.uniform(-1, 1, (2, n, 3)))
+    size_a[:, 0] *= 10.0**rng.uniform(-6, -1, n)
+    size_b[:, 2] *= 10.0**rng.uniform(-6, -1, n)
+    a, b = (np.concatenate([place, unit_quaternions(rng, n)], axis=1)
+            for place in (np.zeros((n, 3)), rng.normal(size=(n, 3)) * 0.3))
+    return a, b, size_a, size_b

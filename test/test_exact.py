@@ -1,4 +1,7 @@
-"""Model `exact` against the 60-digit oracle: 10,000 random and near-parallel pairs."""
+"""Model `exact` against the 60-digit oracle.
+
+10,000 random and near-parallel pairs, and 3,000 of slivers, rods and sides flush to some ulps.
+"""
 from __future__ import annotations
 
 import mpmath as mp
@@ -12,6 +15,7 @@ from box_contact_ros import ContactSolver
 CHUNK = 500
 SOLVER = ContactSolver((1, 1, 1), (1, 1, 1), model='exact')
 FAMILIES = {'random': poses.random_pairs, 'near-parallel': poses.near_parallel_pairs}
+THIN = {'ridges': poses.ridges, 'cards': poses.cards, 'flush': poses.flush_pairs}
 
 
 @pytest.mark.parametrize('chunk', range(10))
@@ -21,11 +25,25 @@ def test_agrees_with_the_oracle(family, chunk):
 
     The centroid to max(1e-9, 1e-14·size/depth)·size.
     """
-    rng = np.random.default_rng([2026, chunk])
-    a, b, size_a, size_b = FAMILIES[family](rng, CHUNK)
+    colliding = check(family, chunk, *FAMILIES[family](np.random.default_rng([2026, chunk]), CHUNK))
+    assert 0.2 < colliding.mean() < 0.9  # both verdicts are really tested
+
+
+@pytest.mark.parametrize('chunk', range(2))
+@pytest.mark.parametrize('family', THIN)
+def test_thin_overlaps(family, chunk):
+    """Overlaps a millionth as thick as long, cut off obliquely; sides in one plane but for ulps.
+
+    A centroid from sums over edges (docs/method.md) is far off in a quarter of the first.
+    """
+    colliding = check(family, chunk, *THIN[family](np.random.default_rng([2027, chunk]), CHUNK))
+    assert colliding.mean() > 0.4
+
+
+def check(family, chunk, a, b, size_a, size_b):
+    """All that `exact` says of these pairs; returns which of them touch (n,)."""
     found = SOLVER.batch(a, b, size_a=size_a, size_b=size_b)
-    assert 0.2 < found.colliding.mean() < 0.9  # both verdicts are really tested
-    for i in range(CHUNK):
+    for i in range(len(a)):
         size = max(size_a[i].max(), size_b[i].max())
         box_a, box_b = oracle.make_box(a[i], size_a[i]), oracle.make_box(b[i], size_b[i])
         gaps = oracle.axis_gaps(box_a, box_b)
@@ -46,6 +64,7 @@ def test_agrees_with_the_oracle(family, chunk):
         depth = max(-float(separation), 1e-9 * size)
         bound = max(1e-9, 1e-14 * size / depth) * size
         assert np.abs(point - found.point[i]).max() <= bound, where
+    return found.colliding
 
 
 @pytest.mark.parametrize('gap', [-0.1, -0.01, -1e-3, -1e-6, -1e-9])
