@@ -137,3 +137,19 @@ def cards(rng, n):
     a, b = (np.concatenate([place, unit_quaternions(rng, n)], axis=1)
             for place in (np.zeros((n, 3)), rng.normal(size=(n, 3)) * 0.3))
     return a, b, size_a, size_b
+
+
+def sharing_an_axis(rng, n):
+    """Boxes turned about an axis of both, with an edge of one exactly in a side of the other.
+
+    Or the two edges on each other; in a third of the pairs two more faces are in one plane.
+    """
+    size_a, size_b = np.exp(rng.uniform(-1, 1, (2, n, 3)))
+    turn = small_rotations(np.tile((0.0, 0.0, 1.0), (n, 1)), rng.uniform(-np.pi, np.pi, n))
+    on_a, on_b = (rng.choice([-0.5, 0.5], (n, 3)) * size for size in (size_a, size_b))
+    on_b[:, 0] *= np.where(rng.random(n) < 0.5, rng.uniform(-1, 1, n), 1.0)
+    offset = on_a - rotate(turn, on_b)
+    flush = rng.random(n) < 1 / 3
+    offset[:, 2] = np.where(flush, rng.choice([-0.5, 0.5], n) * (size_a - size_b)[:, 2],
+                            rng.uniform(-0.45, 0.45, n) * (size_a + size_b)[:, 2])
+    return (np.tile(IDENTITY, (n, 1)), np.concatenate([offset, turn], axis=1), size_a, size_b)
