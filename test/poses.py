@@ -82,26 +82,25 @@ def near_parallel_pairs(rng, n, size=CONTAINER):
     return moved(a, shift, turn), moved(b, shift, turn), sizes, sizes
 
 
-def flush_pairs(rng, n, size=CONTAINER, ulps=60, tilts=(-17, -11)):
-    """Stacked boxes with sides in one plane, but for some ulps and a tilt of 10**tilts rad.
+def flush_pairs(rng, n):
+    """Stacked containers with sides in one plane, but for 60 ulps and a tilt of 1e-17 to 1e-11 rad.
 
     The upper one is as large, or half as long and at one end. A third of the pairs is turned.
     """
-    size = np.asarray(size)
+    size = np.array(CONTAINER)
     size_a, size_b = np.tile(size, (n, 1)), np.tile(size, (n, 1))
     halved = rng.random(n) < 0.5
     size_b[halved, 0] /= 2
     along = rng.choice([0.0, 0.5, -0.5], (n, 2)) * size[:2]
     along[halved, 0] = rng.choice([-0.25, 0.25], int(halved.sum())) * size[0]
-    along += rng.integers(-ulps, ulps + 1, (n, 2)) * np.spacing(size.max()) / 2
+    along += rng.integers(-60, 61, (n, 2)) * np.spacing(size.max()) / 2
     axes = rng.normal(size=(n, 3))
     kind = rng.integers(0, 4, n)
     for k, axis in enumerate(np.eye(3)):
         axes[kind == k] = axis
-    angles = 10.0**rng.uniform(*tilts, n) * rng.choice([-1.0, 0.0, 1.0], n, p=[0.45, 0.1, 0.45])
+    angles = 10.0**rng.uniform(-17, -11, n) * rng.choice([-1.0, 0.0, 1.0], n, p=[0.45, 0.1, 0.45])
     deep = 10.0**rng.uniform(-9, 0, n)
-    b = np.concatenate([along, (size[2] - deep)[:, None], small_rotations(axes, angles)],
-                       axis=1)
+    b = np.concatenate([along, (size[2] - deep)[:, None], small_rotations(axes, angles)], axis=1)
     a = np.tile(IDENTITY, (n, 1))
     turn = unit_quaternions(rng, n)
     turn[rng.random(n) < 0.67] = IDENTITY[3:]
@@ -115,15 +114,15 @@ def ridges(rng, n):
     and less, the oblique ends have to be right too.
     """
     size_a, size_b = np.exp(rng.uniform(-1, 1, (2, n, 3)))
-    x, y, z = (np.tile(axis, (n, 1)) for axis in np.eye(3))
+    x, y, z = np.eye(3)[:, None]
     inclined = 10.0**rng.uniform(-10, -1, n) * rng.choice([-1, 0, 1], n)
     turn = multiply(small_rotations(z, rng.uniform(-np.pi, np.pi, n)), multiply(
         small_rotations(y, inclined), small_rotations(x, rng.uniform(0.2, 1.37, n))))
-    signs = np.array([[a, b, c] for a in (-0.5, 0.5) for b in (-0.5, 0.5) for c in (-0.5, 0.5)])
-    lowest = np.min([rotate(turn, sign * size_b)[:, 2] for sign in signs], axis=0)
+    reach = 0.5 * sum(abs(rotate(turn, axis)[:, 2]) * extent
+                      for axis, extent in zip((x, y, z), size_b.T))
     deep = 10.0**rng.uniform(-9, -2, n) * rng.choice([0, 1], n, p=[0.2, 0.8])
     along = rng.uniform(-0.6, 0.6, (n, 2)) * size_a[:, :2]
-    b = np.concatenate([along, (0.5 * size_a[:, 2] - lowest - deep)[:, None], turn], axis=1)
+    b = np.concatenate([along, (0.5 * size_a[:, 2] + reach - deep)[:, None], turn], axis=1)
     whole = unit_quaternions(rng, n)
     return (*(moved(pose, np.zeros((n, 3)), whole)
               for pose in (np.tile(IDENTITY, (n, 1)), b)), size_a, size_b)
@@ -145,7 +144,7 @@ def sharing_an_axis(rng, n):
     Or the two edges on each other; in a third of the pairs two more faces are in one plane.
     """
     size_a, size_b = np.exp(rng.uniform(-1, 1, (2, n, 3)))
-    turn = small_rotations(np.tile((0.0, 0.0, 1.0), (n, 1)), rng.uniform(-np.pi, np.pi, n))
+    turn = small_rotations(np.eye(3)[None, 2], rng.uniform(-np.pi, np.pi, n))
     on_a, on_b = (rng.choice([-0.5, 0.5], (n, 3)) * size for size in (size_a, size_b))
     on_b[:, 0] *= np.where(rng.random(n) < 0.5, rng.uniform(-1, 1, n), 1.0)
     offset = on_a - rotate(turn, on_b)

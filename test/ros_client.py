@@ -121,7 +121,7 @@ class Client:
         for _ in range(16):
             self.executor.spin_once(timeout_sec=0.0)
 
-    def server_of(self, kind: Any, name: str) -> Any:
+    def client_of(self, kind: Any, name: str) -> Any:
         """A client of a service that has found its server.
 
         Once, in the middle of the suite, one never did, while another of the same node answered:
@@ -140,7 +140,7 @@ class Client:
         It may be ready before the way back is: an answer is lost then, and the request is made
         again.
         """
-        service = self.server_of(kind, name)
+        service = self.client_of(kind, name)
         for _ in range(10):
             future = service.call_async(kind.Request())
             if self.spin(future.done, 2.0):

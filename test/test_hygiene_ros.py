@@ -193,8 +193,7 @@ def test_good_poses_among_bad_ones(node, client):
 
 def call(client, kind, name, parameters, timeout=10.0):
     """The reply of a parameter service of the node, or None."""
-    service = client.node.create_client(kind, f'/contact_node/{name}')
-    assert client.spin(service.service_is_ready, 60.0)
+    service = client.client_of(kind, f'/contact_node/{name}')
     future = service.call_async(kind.Request(parameters=[
         Parameter(name=key, value=value) for key, value in parameters]))
     client.spin(future.done, timeout)

@@ -281,7 +281,7 @@ def test_deadlines_and_lost_publishers_are_reported(client):
 def test_lifecycle(client):
     """Without autostart: configure checks, activate answers, deactivate stops, all by service."""
     with scene_node(autostart=False, scene=SCENE.replace('[20, 20, 1]', '[20, 20]')) as node:
-        change = client.server_of(ChangeState, '/contact_node/change_state')
+        change = client.client_of(ChangeState, '/contact_node/change_state')
         state = client.service(GetState, '/contact_node/get_state')
 
         def now():
