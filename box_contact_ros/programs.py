@@ -159,6 +159,8 @@ def run(name: str, args: Sequence[str]) -> int:
         message = _missing_module(name, error.name or '')
         if message is None:
             raise
+        if {'-h', '--help'} & set(args):
+            print(f'{name}: {PROGRAMS[name].description}\n')
         print(message, file=sys.stderr)
         return 1
     except KeyboardInterrupt:

@@ -199,6 +199,18 @@ def test_ends_cleanly(program, number):
     assert 'Traceback' not in running.output
 
 
+@pytest.mark.parametrize('pause', [0.02, 0.06, 0.12])
+def test_interrupted_twice(program, pause):
+    """Ctrl-C once more while the node leaves the network: it killed the process, status -2."""
+    running = program('contact_node', *arguments())
+    running.wait_for_output('ready', 120)
+    running.signal(signal.SIGINT)
+    time.sleep(pause)
+    running.signal(signal.SIGINT)
+    assert running.wait(5) == 0
+    assert 'Traceback' not in running.output
+
+
 def test_messages_are_checked_in_tests(client):
     """ROS_PYTHON_CHECK_FIELDS is on: an np.float32 in a message would fail, not turn to garbage."""
     with pytest.raises(AssertionError):

@@ -33,7 +33,7 @@ from .crane_log import CraneLog, LiveReport, cloud_rows
 from .crane_parameters import PARAMETERS, scenario_from
 from .messages import NANOSECONDS
 from .parameters import answer_help, declare
-from .runtime import REFUSALS, make_executor
+from .runtime import REFUSALS, make_executor, uninterrupted
 
 OFFER_PERIOD = 0.1  # s between the pairs that only ask whether anyone answers
 DRAIN = 1.0  # s of patience for the last answers
@@ -199,11 +199,12 @@ def main(args: Sequence[str] | None = None) -> int:
         else:
             raise
     finally:
-        if executor is not None:
-            executor.shutdown()
-        if node is not None:
-            node.destroy_node()
-        context.try_shutdown()
+        with uninterrupted():
+            if executor is not None:
+                executor.shutdown()
+            if node is not None:
+                node.destroy_node()
+            context.try_shutdown()
     if node is None or not node.log.exchanges:
         return signalled
     edge = min(max(node.scenario.size), max(node.scenario.stack_size))

@@ -1,12 +1,14 @@
 """What every node here needs from rclpy: an executor that keeps up, and a clean end."""
 from __future__ import annotations
 
+import atexit
 import contextlib
 import ctypes
 import os
+import signal
 import sys
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import rclpy
@@ -107,6 +109,24 @@ def spin(node: Node, *, undisturbed: bool = True) -> None:
         ctypes.pythonapi.Py_IncRef(ctypes.py_object(executor))
 
 
+@contextlib.contextmanager
+def uninterrupted() -> Iterator[None]:
+    """Ignore SIGINT, so that who presses Ctrl-C twice gets the clean end that is under way.
+
+    rclpy takes its handlers back after the first. Another one while the node leaves the network,
+    or while the interpreter ends, 130 ms in all, would kill the process.
+    """
+    if threading.current_thread() is not threading.main_thread():  # only that one may
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+        atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)
+
+
 def run_node(make_node: Callable[[Context], Node], args: Sequence[str] | None, *,
              undisturbed: bool = True) -> int:
     """Start a node and `spin`: 0 after a clean end, 1 (with one line) if it refuses to start."""
@@ -127,7 +147,8 @@ def run_node(make_node: Callable[[Context], Node], args: Sequence[str] | None, *
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     finally:
-        if node is not None:
-            node.destroy_node()
-        context.try_shutdown()
+        with uninterrupted():
+            if node is not None:
+                node.destroy_node()
+            context.try_shutdown()
     return 0
