@@ -21,6 +21,7 @@ RESET = 1_000_000_000
 """A pose whose stamp lies this far [ns] before an earlier one of its box has not been late: time
 has been set back, as by a simulation that starts again."""
 NO_PARTNER = 'dropped: no partner'
+TOO_LATE = 'dropped: tick answered before'
 NEVER = -2**63
 """Before any stamp [ns]."""
 REPEATED = 'refused: repeated stamp'
@@ -90,7 +91,7 @@ class _Pairing:
 class StampPairing(_Pairing):
     """A tick is complete when every box has given a pose of its stamp, in whatever order they come.
 
-    Each stamp is answered once.
+    Each stamp is answered once: a pose that comes after its tick was answered without it is dropped.
 
     The pairing does not wait for a box that is stale, nor, once a tick has been answered, for one
     that was never seen. A tick that stays incomplete is given up when WAITING_TICKS newer ones
@@ -102,7 +103,10 @@ class StampPairing(_Pairing):
         self._waiting: OrderedDict[int, dict[str, StampedPose]] = OrderedDict()
         self._taken: dict[str, deque[int]] = {}
         self._missing_since: dict[str, int] = {}  # stamp of the first tick that a box lacks
+        self._went_without: dict[str, deque[int]] = {}  # ticks answered without a box, by stamp
         self._answered = False
+        self._were_stale: set[str] = set()
+        self._changed = False  # a tick may wait for nothing any more: time to look all of them over
         super().__init__(scene, tolerance=tolerance, max_age=max_age)
 
     def set_scene(self, scene: Scene) -> None:
@@ -115,8 +119,10 @@ class StampPairing(_Pairing):
                 del self._waiting[key]
         self._missing_since = {box: stamp for box, stamp in self._missing_since.items()
                                if box in self.boxes}
-        self._taken = {box: self._taken.get(box, deque(maxlen=REMEMBERED_STAMPS))
-                       for box in self.boxes}
+        self._taken, self._went_without = (
+            {box: kept.get(box, deque(maxlen=REMEMBERED_STAMPS)) for box in self.boxes}
+            for kept in (self._taken, self._went_without))
+        self._changed = True
 
     def reset(self) -> None:
         """Forget all poses and stamps."""
@@ -125,8 +131,8 @@ class StampPairing(_Pairing):
         self._waiting.clear()
         self._missing_since.clear()
         self._answered = False
-        for taken in self._taken.values():
-            taken.clear()
+        for stamps in (*self._taken.values(), *self._went_without.values()):
+            stamps.clear()
 
     def add(self, box: str, pose: StampedPose) -> list[Tick]:
         """Take a pose; the tick that it completes, after those that are not waited for any more."""
@@ -144,15 +150,31 @@ class StampPairing(_Pairing):
         key = self._slot(box, stamp) if self.tolerance else stamp
         poses = waiting.get(key)
         if poses is None:
+            if self._went_without[box] and self._is_too_late(box, stamp):
+                self.counts[TOO_LATE] += 1
+                return []
             poses = waiting[key] = {}
             self._note_missing(stamp)
         poses[box] = pose
         ticks = self._give_up(key) if len(waiting) > 1 else []
         if len(poses) == len(self.boxes) or not self._is_awaiting(poses):
-            del waiting[key]
-            ticks.append([poses.get(box) for box in self.boxes])
-            self._answered = True
+            ticks.append(self._answer(key))
+            if not self._answered:
+                self._answered = self._changed = True
         return ticks
+
+    def _answer(self, key: int) -> Tick:
+        """A waiting tick, which waits no more."""
+        poses = self._waiting.pop(key)
+        if len(poses) < len(self.boxes):
+            for box in self.boxes:
+                if box not in poses:
+                    self._went_without[box].append(key)
+        return [poses.get(box) for box in self.boxes]
+
+    def _is_too_late(self, box: str, stamp: int) -> bool:
+        """Whether the tick of a pose was answered without its box."""
+        return any(abs(key - stamp) <= self.tolerance for key in self._went_without[box])
 
     def _refuses(self, box: str, stamp: int) -> bool:
         """Whether a stamp has been taken before, or is too old to tell.
@@ -183,6 +205,9 @@ class StampPairing(_Pairing):
             # are not stale for that.
             self._missing_since.clear()
         self._now = stamp
+        stale = {box for box in self._missing_since if self._is_stale(box, stamp)}
+        self._changed |= not stale <= self._were_stale
+        self._were_stale = stale
 
     def _note_missing(self, stamp: int) -> None:
         """A tick has begun: boxes that have given no pose as late as this lack one.
@@ -207,20 +232,24 @@ class StampPairing(_Pairing):
         return False
 
     def _give_up(self, key: int) -> list[Tick]:
-        """The oldest ticks, up to the one of `key`, that have waited enough.
+        """The ticks other than that of `key` that have waited enough.
 
         Those of which no pair can be evaluated are dropped.
         """
+        waiting, over = self._waiting, []
+        if self._changed:
+            over = [stamp for stamp, poses in waiting.items() if not self._is_awaiting(poses)]
+            self._changed = False
+        if len(waiting) > WAITING_TICKS and not over:
+            over = [next(iter(waiting))]
         ticks = []
-        while (stamp := next(iter(self._waiting))) != key:
-            poses = self._waiting[stamp]
-            if len(self._waiting) <= WAITING_TICKS and self._is_awaiting(poses):
-                break
-            del self._waiting[stamp]
-            if self._evaluable(poses):
-                ticks.append([poses.get(box) for box in self.boxes])
+        for stamp in over:
+            if stamp == key:
+                continue
+            if self._evaluable(waiting[stamp]):
+                ticks.append(self._answer(stamp))
             else:
-                self.counts[NO_PARTNER] += len(poses)
+                self.counts[NO_PARTNER] += len(waiting.pop(stamp))
         return ticks
 
 

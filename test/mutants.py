@@ -104,8 +104,14 @@ MUTANTS = {
         'pairing.py', 'return 0 < self.max_age < now - self._missing_since.get(box, now)',
         'return False', 'test/test_scene_node.py -k stale_box'),
     'ticks wait without bound': Mutant(
-        'pairing.py', 'if len(self._waiting) <= WAITING_TICKS and', 'if',
+        'pairing.py', 'if len(waiting) > WAITING_TICKS and not over:', 'if False:',
         'test/test_pairing.py -k dropped'),
+    'ticks held up by one that lacks a pose': Mutant(
+        'pairing.py', 'self._changed |= not stale <= self._were_stale', 'pass',
+        'test/test_pairing.py -k hold_up'),
+    'a tick answered again': Mutant(
+        'pairing.py', 'return any(abs(key - stamp) <= self.tolerance for key in self._went_without[box])',
+        'return False', 'test/test_pairing.py -k answered_again'),
     'a change forgets what waits': Mutant(
         'nodes/contact.py', "if running and settings['pairing'] == old['pairing']:", 'if False:',
         'test/test_scene_node.py -k come_and_go'),

@@ -13,6 +13,7 @@ from box_contact_ros.pairing import (
     REPEATED,
     RESET,
     RESETS,
+    TOO_LATE,
     WAITING_TICKS,
     LatestPairing,
     StampedPose,
@@ -142,6 +143,39 @@ def test_a_silent_box_costs_the_others_no_tick():
                 assert tick[0].stamp == tick[1].stamp and tick[2] is None
                 answered.append(tick[0].stamp)
     assert answered == list(range(MS, 1000 * MS, MS)) and not pairing.counts
+
+
+@pytest.mark.parametrize('lost', ['a', 'b'])
+def test_a_lost_pose_does_not_hold_up_ticks_that_wait_for_a_stale_box(lost):
+    """Both boxes have pairs with a fixed one. A tick lacks a pose of one box; later b falls silent.
+
+    That tick may still be completed, by a pose that comes late. The others are not kept by it.
+    """
+    pairing = StampPairing(scene('ab', ['aF', 'bF']), max_age=10 * MS)
+    answered = []
+    for stamp in range(MS, 60 * MS, MS):
+        for box in 'ab' if stamp < 30 * MS else 'a':
+            if (box, stamp) != (lost, 20 * MS):
+                answered += [{entry.stamp // MS for entry in tick if entry}
+                             for tick in pairing.add(box, pose(stamp))]
+    assert all(len(stamps) == 1 for stamps in answered)
+    assert [stamp for tick in answered for stamp in tick if stamp != 20] == [
+        stamp for stamp in range(1, 60) if stamp != 20]
+
+
+@pytest.mark.parametrize('tolerance', [0, MS // 4])
+def test_a_tick_that_was_answered_is_not_answered_again(tolerance):
+    """Box b is stale, and its poses come after all: their ticks have been answered without it."""
+    pairing = StampPairing(scene('ab', ['aF', 'bF']), max_age=3 * MS, tolerance=tolerance)
+    answered = []
+    for stamp in range(MS, 30 * MS, MS):
+        for box in 'ba' if stamp < 5 * MS or stamp >= 20 * MS else 'a':
+            answered += [tick[0].stamp // MS for tick in pairing.add(box, pose(stamp))]
+        if stamp == 12 * MS:
+            for late in (5, 6, 7):
+                assert not pairing.add('b', pose(late * MS + tolerance))
+    assert answered == list(range(1, 30))
+    assert pairing.counts == {TOO_LATE: 3}
 
 
 def test_scene_changes_cost_the_others_no_tick():

@@ -10,6 +10,7 @@ import pytest
 from geometry_msgs.msg import PointStamped, PoseStamped
 from lifecycle_msgs.srv import ChangeState, GetState
 from rclpy.duration import Duration
+from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from ros_client import Client, serving, stamp_of
@@ -276,6 +277,55 @@ def test_deadlines_and_lost_publishers_are_reported(client):
         client.node.destroy_publisher(client.boxes['lorry'])
         client.spin(lambda: node.counts['publishers gone'] >= 1, 5.0)
         assert node.counts['publishers gone'] == 1
+
+
+def test_a_refused_tick_keeps_back_no_other(client):
+    """The lorry falls silent; of the ticks that waited for it, one is in another frame."""
+    with scene_node(scene='frame_id: yard\n' + SCENE, max_age=0.05):
+        client.offer(load=ON_FLOOR, lorry=LORRY, frame='yard')
+        first = client.next_stamp() + 100 * MS
+        stamps = [first + 10 * MS * n for n in range(8)]
+        for n, stamp in enumerate(stamps):
+            client.tick(stamp=stamp, load=ON_FLOOR, frame='map' if n == 2 else 'yard')
+        assert client.answered(stamps[-1])
+        assert [client.answered(stamp, 1.0) for stamp in stamps] == [n != 2 for n in range(8)]
+        assert client.counts()['refused: frame_id differs'] == 1
+
+
+@pytest.mark.parametrize('long', ['pose_topic: /' + 'x' * 250, 'name: ' + 'x' * 101])
+def test_a_name_that_is_too_long_changes_nothing(node, client, long):
+    """It took the node's subscriptions with it, and the old scene did not bring them back."""
+    kind, _, name = long.partition(': ')
+    text = (SCENE.replace('/traffic/lorry', name) if kind == 'pose_topic'
+            else SCENE.replace('load_lorry', name))
+    result = set_scene(node, text)
+    assert not result.successful
+    assert 'length should not exceed' in result.reason or 'is too long' in result.reason
+    assert client.rows(client.tick(load=ON_FLOOR, lorry=LORRY)).keys() == {3, 5}
+    assert set_scene(node, SCENE).successful
+    assert client.rows(client.tick(load=ON_FLOOR, lorry=LORRY)).keys() == {3, 5}
+
+
+def test_autostart_is_for_the_start(node):
+    result, = node.set_parameters([Parameter('autostart', value=False)])
+    assert not result.successful and 'read-only' in result.reason
+
+
+def test_counts_outlive_cleanup(node, client, capfd):
+    """Deactivated, cleaned up, configured again: first by a bad file, which is said."""
+    client.rows(client.tick(stamp=(stamp := client.next_stamp()), load=ON_FLOOR, lorry=LORRY))
+    client.tick(stamp=stamp, load=ON_FLOOR, lorry=LORRY)
+    assert client.counts()['refused: repeated stamp'] == 2
+    node.trigger_deactivate()
+    node.trigger_cleanup()
+    node.set_parameters([Parameter('scene', value='nowhere.yaml')])
+    assert node.trigger_configure() != TransitionCallbackReturn.SUCCESS
+    assert 'nowhere.yaml' in capfd.readouterr().err
+    node.set_parameters([Parameter('scene', value=SCENE)])
+    node.trigger_configure()
+    node.trigger_activate()
+    client.offer(load=ON_FLOOR, lorry=LORRY)
+    assert client.counts()['refused: repeated stamp'] == 2
 
 
 def test_lifecycle(client):

@@ -46,7 +46,7 @@ from .parameters import (
     size,
     text,
 )
-from .runtime import CONTACT_QOS, LOG_SECONDS, POSE_QOS, run_node
+from .runtime import CONTACT_QOS, LOG_SECONDS, POSE_QOS, RCLError, run_node
 from .wire import RawMessages
 
 SERIALIZATIONS = {'raw': RawMessages, 'typed': TypedMessages}
@@ -82,7 +82,8 @@ PARAMETERS = {
     'pair_topics': Setting(True, 'whether pairs have topics of their own beside the cloud', flag),
     'serialization': Setting('raw', 'raw: read and write the bytes of messages; typed: message '
                                     'objects, slower, the reference', one_of(SERIALIZATIONS)),
-    'autostart': Setting(True, 'whether the node configures and activates itself', flag),
+    'autostart': Setting(True, 'whether the node configures and activates itself', flag,
+                         fixed=True),
 }
 
 
@@ -111,6 +112,7 @@ class ContactNode(LifecycleNode):
         self._subscriptions_of: dict[str, Subscription] = {}
         self._publishers_of: dict[int, tuple[Publisher, Publisher, Pair]] = {}  # by pair's id
         self._ids: dict[int, Pair] = {}
+        self._active = self._started = False
         self._fault: Exception | None = None
         self._health = Diagnostics(self)
         self.add_on_set_parameters_callback(self._set_parameters)
@@ -124,6 +126,7 @@ class ContactNode(LifecycleNode):
             for transition in (self.trigger_configure, self.trigger_activate):
                 if transition() != TransitionCallbackReturn.SUCCESS:
                     raise self._fault or ValueError('the node did not start')
+        self._started = True
         # Last: whoever waits for it may end the node at once, in the middle of a transition.
         self._say_ready()
 
@@ -139,6 +142,7 @@ class ContactNode(LifecycleNode):
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Stop answering: poses are not listened to."""
+        self._active = False
         self._unsubscribe(list(self._subscriptions_of))
         self._pairing.reset()
         return TransitionCallbackReturn.SUCCESS
@@ -147,11 +151,14 @@ class ContactNode(LifecycleNode):
         """Let go of solver and topics."""
         self._unpublish([entry[2] for entry in self._publishers_of.values()])
         self.destroy_publisher(self._contacts)
+        self.counts.update(self._pairing.counts)
+        self.counts['outside the trained range'] += self._solver.exact_answers
         self._solver = None
         return TransitionCallbackReturn.SUCCESS
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Stop for good."""
+        self._active = False
         self._unsubscribe(list(self._subscriptions_of))
         return TransitionCallbackReturn.SUCCESS
 
@@ -161,7 +168,7 @@ class ContactNode(LifecycleNode):
             action()
         except (ValueError, ImportError) as error:  # a model's library may be missing
             self._fault = error
-            if not self._settings['autostart']:
+            if self._started or not self._settings['autostart']:  # else it is raised
                 self.get_logger().error(str(error))
             return TransitionCallbackReturn.FAILURE
         return TransitionCallbackReturn.SUCCESS
@@ -170,6 +177,7 @@ class ContactNode(LifecycleNode):
         # Whatever start-up made stays for good: keep it out of later collections.
         gc.collect()
         gc.freeze()
+        self._active = True
         self._subscribe()
 
     def _say_ready(self) -> None:
@@ -213,6 +221,7 @@ class ContactNode(LifecycleNode):
         scene = (read_scene(settings['scene']) if settings['scene']
                  else two_boxes(settings['size_a'], settings['size_b']))
         self._check_ids(scene)
+        self._check_topics(scene, settings['pair_topics'])
         solver = self.make_solver(settings, scene)
         running, old = self._solver is not None, self._settings
         if self._solver is not None:
@@ -226,7 +235,6 @@ class ContactNode(LifecycleNode):
             if running:
                 self.counts.update(self._pairing.counts)
             self._pairing = PAIRINGS[settings['pairing']](scene, **times)
-        subscribed = bool(self._subscriptions_of)
         if not running or settings['serialization'] != old['serialization']:
             self._messages = SERIALIZATIONS[settings['serialization']]()
         kept = running and all(
@@ -237,7 +245,7 @@ class ContactNode(LifecycleNode):
         self._solver, self._settings = solver, settings
         self._ids |= {pair.id: pair for pair in scene.pairs if pair.name}
         self._publish(running)
-        if subscribed:
+        if self._active:
             self._subscribe()
 
     def _check_ids(self, scene: Scene) -> None:
@@ -248,7 +256,23 @@ class ContactNode(LifecycleNode):
                                  f'{before.name} ({before.a}, {before.b}) before: ids are never '
                                  f'used again while a node runs')
 
+    def _check_topics(self, scene: Scene, pair_topics: bool) -> None:
+        """ValueError where a name, in this node's namespace and remapped, cannot be a topic's."""
+        topics = [scene.boxes[box].pose_topic for box in scene.moving]
+        if pair_topics:
+            topics += [f'{self._prefix(pair)}/normal' for pair in scene.pairs]
+        for topic in topics:
+            try:
+                self.resolve_topic_name(topic)
+            except RCLError as error:
+                reason = str(error).partition(', at ')[0]
+                raise ValueError(f'scene: {shown(topic)}: {reason}') from error
+
     # --- topics ----------------------------------------------------------------------------------
+
+    def _prefix(self, pair: Pair) -> str:
+        """What the topics of a pair begin with."""
+        return f'{self.prefix}{pair.name}{"/" if pair.name else ""}contact'
 
     def _publish(self, running: bool) -> None:
         """Publishers of the scene's pairs, and none else."""
@@ -261,7 +285,7 @@ class ContactNode(LifecycleNode):
                          if entry[2] not in kept])
         for pair in wanted:
             if pair.id not in self._publishers_of:
-                topic = f'{self.prefix}{pair.name}{"/" if pair.name else ""}contact'
+                topic = self._prefix(pair)
                 self._publishers_of[pair.id] = (
                     self.create_publisher(PointStamped, f'{topic}/point', CONTACT_QOS),
                     self.create_publisher(Vector3Stamped, f'{topic}/normal', CONTACT_QOS), pair)
@@ -334,15 +358,17 @@ class ContactNode(LifecycleNode):
 
     def _pose_callback(self, box: str, topic: str) -> Callable[[Any], None]:
         def callback(message: Any) -> None:
+            self.counts['poses'] += 1
             try:
-                self.counts['poses'] += 1
-                pose = self._messages.read_pose(message)
-                for tick in self._pairing.add(box, pose):
+                ticks = self._pairing.add(box, self._messages.read_pose(message))
+            except Exception as error:
+                self._refuse(error, topic)
+                return
+            for tick in ticks:
+                try:
                     self._answer(tick)
-            except Refused as refused:
-                self._refuse(refused.reason, f'{topic}: {refused}')
-            except Exception as error:  # a callback must not end the node, whatever happens
-                self._refuse('internal error', f'{type(error).__name__}: {error}')
+                except Exception as error:  # one tick that is refused keeps back no other
+                    self._refuse(error, topic)
         return callback
 
     def _answer(self, tick: Tick) -> None:
@@ -387,8 +413,11 @@ class ContactNode(LifecycleNode):
         box = next(box for box, pose in zip(scene.moving, tick) if pose is odd)
         return f'{one} is in frame {shown(frame)}, {box} in {shown(odd.frame_id)}'
 
-    def _refuse(self, reason: str, text: str) -> None:
-        self.counts[f'refused: {reason}'] += 1
+    def _refuse(self, error: Exception, topic: str) -> None:
+        """Count and say it: a callback must not end the node, whatever happens."""
+        refused = isinstance(error, Refused)
+        self.counts[f'refused: {error.reason if refused else "internal error"}'] += 1
+        text = f'{topic}: {error}' if refused else f'{type(error).__name__}: {error}'
         self.get_logger().warning(f'{text}; refused', throttle_duration_sec=LOG_SECONDS)
 
     # --- diagnostics -----------------------------------------------------------------------------

@@ -28,6 +28,8 @@ class Setting:
     default: Any
     description: str
     check: Check
+    fixed: bool = False
+    """Whether it is for the start only."""
 
 
 def _is_number(value: Any) -> bool:
@@ -90,12 +92,13 @@ def flag(name: str, value: Any) -> bool:
 
 def declare(node: Node, settings: Mapping[str, Setting], *, fixed: bool = False,
             ) -> dict[str, Any]:
-    """Declare and check a node's parameters; `fixed` ones cannot be changed while it runs."""
+    """Declare and check a node's parameters; `fixed`: none can be changed while it runs."""
     values = {}
     for name, setting in settings.items():
         default = list(setting.default) if isinstance(setting.default, tuple) else setting.default
         values[name] = node.declare_parameter(name, default, ParameterDescriptor(
-            description=setting.description, dynamic_typing=True, read_only=fixed)).value
+            description=setting.description, dynamic_typing=True,
+            read_only=fixed or setting.fixed)).value
     _say_unknown(node, settings)
     return checked(settings, values)
 

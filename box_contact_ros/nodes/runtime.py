@@ -25,7 +25,8 @@ try:
 except ImportError:  # rclpy before 7.1.4
     EventsExecutor = None
 
-REFUSALS = (ValueError, rclpy.exceptions.ParameterException, rclpy_implementation.RCLError)
+RCLError = rclpy_implementation.RCLError
+REFUSALS = (ValueError, rclpy.exceptions.ParameterException, RCLError)
 """What a node raises on parameters or arguments that it cannot start with."""
 POSE_QOS = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
 """Pose inputs: best effort matches every publisher; the depth bridges a second at 1 kHz, in which a
