@@ -62,7 +62,7 @@ setup(
     entry_points={'console_scripts': programs['entry_points']('box_contact_' if BY_PIP else '')},
     distclass=PipDistribution if BY_PIP else Distribution,
     zip_safe=False,
-    python_requires='>=3.10',
+    python_requires='>=3.11',
     install_requires=['jsonschema', 'numba', 'numpy', 'pyyaml', 'safetensors'],
     # Kept apart, so that a user with an apt-installed ROS never gets the ROS wheels, and nobody
     # gets torch by only wanting contacts.

@@ -11,6 +11,7 @@ came through, nothing was lost, and, closed loop, the load came to rest.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
 import random
 import subprocess
@@ -18,6 +19,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Sequence
+from pathlib import Path
 
 from .crane import CONTAINER_40FT, CraneScenario
 from .landing import LANDING_DURATION
@@ -32,10 +34,20 @@ LANDING_MODEL = 'committee'  # the closed loop's default: it needs a point witho
 
 NEXT = """
 Next:
-  python -m box_contact_ros                  lists all programs
-  python -m box_contact_ros contact_node --ros-args -p size_a:=[12.192,2.438,2.591] \\
-      -p size_b:=[12.192,2.438,2.591]        starts the node for your own box_a/pose, box_b/pose
-  README.md                                  topics, parameters, figures"""
+  {python} -m box_contact_ros
+      lists all programs
+  {python} -m box_contact_ros contact_node --ros-args \\
+          -p size_a:=[12.192,2.438,2.591] -p size_b:=[12.192,2.438,2.591]
+      starts the node for your own box_a/pose, box_b/pose
+  README.md
+      topics, parameters, figures"""
+
+
+def _python() -> str:
+    """This Python as it is called from here: that of `make demo` is no other program's."""
+    with contextlib.suppress(ValueError):
+        return str(Path(sys.executable).relative_to(Path.cwd()))
+    return sys.executable
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -73,7 +85,7 @@ def main(args: Sequence[str] | None = None) -> int:
             print(f'demo: failed with status {status}; what contact_node printed:\n'
                   f'{text or "(nothing)"}', file=sys.stderr)
             return status
-    print(NEXT)
+    print(NEXT.format(python=_python()))
     return 0
 
 

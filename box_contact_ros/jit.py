@@ -2,13 +2,15 @@
 
 Kernels are Numba functions compiled at first use and cached on disk. Numba takes a cached kernel
 for good as long as its own file is unchanged, even if a kernel that it calls has changed; here an
-edit anywhere in the package compiles all of them anew, so an upgrade in place cannot mix versions.
+edit at the top of the package compiles all of them anew, one in a folder below it those of that
+folder, so an upgrade in place cannot mix versions.
 Where no cache folder can be written (a read-only installation) kernels are compiled without one,
 and a single warning says so. With NUMBA_DISABLE_JIT=1 they are plain Python, a thousand times as
 slow, for a debugger or a coverage tool.
 """
 from __future__ import annotations
 
+import functools
 import logging
 import math
 import warnings
@@ -22,9 +24,14 @@ import numpy as np
 from numba.core import event
 
 _warned = False
-_STAMP = tuple(sorted((path.name, path.stat().st_mtime_ns, path.stat().st_size)
-                      for path in Path(__file__).parent.glob('*.py')))
-"""What the cached kernels are made from: the package's own modules."""
+
+
+@functools.cache
+def _stamp(folder: Path) -> tuple[tuple[str, int, int], ...]:
+    """What kernels of a folder are made from: its modules, and those at the top of the package."""
+    return tuple(sorted((str(path), path.stat().st_mtime_ns, path.stat().st_size)
+                        for place in {folder, Path(__file__).parent}
+                        for path in place.glob('*.py')))
 
 
 class _Notice(event.Listener):
@@ -82,7 +89,8 @@ def _compiled(function: Callable[..., Any], **options: Any) -> Any:
         return _interpreted(function)
     try:
         compiled = numba.njit(cache=True, error_model='numpy', **options)(function)
-        compiled._cache._cache_file._source_stamp = _STAMP
+        compiled._cache._cache_file._source_stamp = _stamp(
+            Path(function.__code__.co_filename).parent)
         return compiled
     except RuntimeError as error:  # numba: 'cannot cache function ...: no locator available'
         if 'cannot cache' not in str(error):

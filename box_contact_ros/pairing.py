@@ -91,7 +91,7 @@ class _Pairing:
 class StampPairing(_Pairing):
     """A tick is complete when every box has given a pose of its stamp, in whatever order they come.
 
-    Each stamp is answered once: a pose that comes after its tick was answered without it is dropped.
+    Each stamp is answered once: a pose that comes when its tick was answered without it is dropped.
 
     The pairing does not wait for a box that is stale, nor, once a tick has been answered, for one
     that was never seen. A tick that stays incomplete is given up when WAITING_TICKS newer ones

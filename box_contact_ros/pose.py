@@ -81,12 +81,12 @@ def rotation_entries(x, y, z, w):
 
 
 @inlined
-def _squared_norm(x, y, z, w):
+def squared_norm(x, y, z, w):
     return (x * x + y * y) + (z * z + w * w)
 
 
 @inlined
-def _pose_valid(x, y, z, norm2):
+def pose_valid(x, y, z, norm2):
     # Written so that NaN fails every comparison. An overflown square is infinite, and fails too.
     return (abs(x) <= LENGTH_MAX and abs(y) <= LENGTH_MAX and abs(z) <= LENGTH_MAX
             and norm2 >= QUATERNION_MIN * QUATERNION_MIN
@@ -200,11 +200,11 @@ def _prepare(lanes, work):
     for i in range(lanes):
         x, y, z, w = (work[TURN_A + i], work[TURN_A + LANES + i], work[TURN_A + 2 * LANES + i],
                       work[TURN_A + 3 * LANES + i])
-        norm2_a = _squared_norm(x, y, z, w)
+        norm2_a = squared_norm(x, y, z, w)
         a00, a01, a02, a10, a11, a12, a20, a21, a22 = rotation_entries(x, y, z, w)
         x, y, z, w = (work[TURN_B + i], work[TURN_B + LANES + i], work[TURN_B + 2 * LANES + i],
                       work[TURN_B + 3 * LANES + i])
-        norm2_b = _squared_norm(x, y, z, w)
+        norm2_b = squared_norm(x, y, z, w)
         b00, b01, b02, b10, b11, b12, b20, b21, b22 = rotation_entries(x, y, z, w)
         ax, ay, az = (work[ORIGIN_A + i], work[ORIGIN_A + LANES + i],
                       work[ORIGIN_A + 2 * LANES + i])
@@ -212,7 +212,7 @@ def _prepare(lanes, work):
                       work[ORIGIN_B + 2 * LANES + i])
         ha0, ha1, ha2 = work[HALF_A + i], work[HALF_A + LANES + i], work[HALF_A + 2 * LANES + i]
         hb0, hb1, hb2 = work[HALF_B + i], work[HALF_B + LANES + i], work[HALF_B + 2 * LANES + i]
-        valid = (_pose_valid(ax, ay, az, norm2_a) and _pose_valid(bx, by, bz, norm2_b)
+        valid = (pose_valid(ax, ay, az, norm2_a) and pose_valid(bx, by, bz, norm2_b)
                  and _size_valid(2.0 * ha0, 2.0 * ha1, 2.0 * ha2)
                  and _size_valid(2.0 * hb0, 2.0 * hb1, 2.0 * hb2))
         work[FAULT + i] = OK if valid else BAD_POSE_A  # which one, is looked up where it is so
@@ -258,9 +258,9 @@ def _fault(work, i):
     for box in range(2):
         origin = ORIGIN_A if box == 0 else ORIGIN_B
         turn = TURN_A if box == 0 else TURN_B
-        norm2 = _squared_norm(work[turn + i], work[turn + LANES + i], work[turn + 2 * LANES + i],
+        norm2 = squared_norm(work[turn + i], work[turn + LANES + i], work[turn + 2 * LANES + i],
                               work[turn + 3 * LANES + i])
-        if not _pose_valid(work[origin + i], work[origin + LANES + i],
+        if not pose_valid(work[origin + i], work[origin + LANES + i],
                            work[origin + 2 * LANES + i], norm2):
             return BAD_POSE_A + box
     half = HALF_A

@@ -46,8 +46,9 @@ from .jit import inlined, kernel
 
 PARALLEL = 1e-8
 """Edge axes shorter than this (sine of the angle between the edges) are skipped. Boxes that share
-an edge direction are separated by a face axis if at all, and what is lost below is at most 1e-8 of
-the size; the common alternatives are worse: a constant added to |R| reports contacts across real
+an edge direction are separated by a face axis if at all, and of an overlap what is lost below is
+at most 1e-8 of the size (of a gap up to 30 %, which leaves a lower bound of the distance); the
+common alternatives are worse: a constant added to |R| reports contacts across real
 gaps, no guard at all misses 17–23 % of stacked containers at a tilt of 1e-16 rad."""
 
 ALMOST_PARALLEL = 1e-3

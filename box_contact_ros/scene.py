@@ -16,7 +16,7 @@ import numpy as np
 from .checks import pose_fault, shown, size_fault
 from .contact import Contact
 from .jit import kernel
-from .pose import rotation_entries
+from .pose import pose_valid, rotation_entries, squared_norm
 from .solver import ContactSolver
 
 NEAR = 1e-9
@@ -144,8 +144,12 @@ def _bound(poses, half, boxes, low, high):
 def _near_pairs(poses, half, moved, low, high, known, first, second, near, unknown):
     """Numbers of the pairs that may touch to `near`, of those without poses to `unknown`.
 
-    Returns how many there are of each.
+    Returns how many there are of each; or −1 and the box whose pose is none.
     """
+    for box in moved:
+        norm2 = squared_norm(poses[box, 3], poses[box, 4], poses[box, 5], poses[box, 6])
+        if known[box] and not pose_valid(poses[box, 0], poses[box, 1], poses[box, 2], norm2):
+            return -1, box
     _bound(poses, half, moved, low, high)
     count = 0
     left_out = 0
@@ -245,6 +249,9 @@ class SceneSolver:
         count, left_out = _near_pairs(
             self._poses, self._half, self._moving, self._low, self._high, self._known,
             self._first, self._second, self._near, self._unknown)
+        if count < 0:
+            box = list(self.scene.boxes)[left_out]
+            raise ValueError(f'pose of {box}: {pose_fault(self._poses[left_out])}')
         pairs = self.scene.pairs
         stale = [pairs[i] for i in self._unknown[:left_out]]
         touching = []

@@ -15,7 +15,6 @@ PACKAGE = 'box_contact_ros'
 # Name: type, default, description.
 ARGUMENTS = {
     'model': (str, 'committee', 'how the contact node finds the contact point'),
-    'scene': (str, '', 'scene file of the contact node; empty: the two boxes of the crane'),
     'rate': (float, '200.0', 'pairs of poses that the crane publishes per second [Hz]'),
     'seed': (int, '0', '0: the standard motion; n > 0: offset and angles drawn at random'),
     'closed_loop': (bool, 'false', 'true: the contacts carry the load, and the crane lands it'),
@@ -38,10 +37,10 @@ def generate_launch_description() -> LaunchDescription:
         *(DeclareLaunchArgument(name, default_value=default, description=description)
           for name, (_, default, description) in ARGUMENTS.items()),
         Node(package=PACKAGE, executable='contact_node', output='screen',
-             parameters=parameters('model', 'scene')),
+             parameters=parameters('model')),
         Node(package=PACKAGE, executable='soup_node', output='screen',
              condition=IfCondition(LaunchConfiguration('soup'))),
-        Node(package=PACKAGE, executable='view', output='screen',
+        Node(package=PACKAGE, executable='view', output='screen', arguments=['--attach'],
              condition=IfCondition(LaunchConfiguration('view'))),
         Node(package=PACKAGE, executable='crane', output='screen', emulate_tty=True,
              parameters=parameters('rate', 'seed', 'closed_loop', wait=COMPILE_SECONDS),

@@ -67,7 +67,7 @@ def table_of(program: str) -> dict[str, Any]:
 def test_launch_arguments(crane_launch: Any) -> None:
     """They are these, and each says what it is for."""
     arguments, _ = crane_launch
-    assert set(arguments) == {'model', 'rate', 'seed', 'closed_loop', 'scene', 'soup', 'view'}
+    assert set(arguments) == {'model', 'rate', 'seed', 'closed_loop', 'soup', 'view'}
     assert all(argument.description for argument in arguments.values())
 
 
@@ -80,6 +80,7 @@ def test_launched_programs_exist(crane_launch: Any) -> None:
                   if hasattr(node, 'condition')}
     assert conditions == {'soup_node': 'soup', 'view': 'view'}
     assert nodes['crane'].on_exit.kind == 'Shutdown'
+    assert nodes['view'].arguments == ['--attach']  # else it starts a scene of its own
 
 
 def test_launched_parameters_are_declared_with_the_same_defaults(crane_launch: Any) -> None:
@@ -157,7 +158,7 @@ def test_fixed_boxes_stand_beside_each_other(path: Path) -> None:
 
 
 def test_two_boxes_are_the_node_s_default() -> None:
-    """The file shows how the default would be written, and the crane's topics are heard."""
+    """The file shows how the default would be written: its boxes, and where their poses come."""
     boxes = scene('two_boxes').boxes
     assert {name: (box.size, box.pose_topic) for name, box in boxes.items()} == {
         f'box_{letter}': (PARAMETERS[f'size_{letter}'].default, f'box_{letter}/pose')

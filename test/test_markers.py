@@ -11,9 +11,11 @@ import yaml
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from ros_client import MATCH_SECONDS, Client, serving
+from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import Marker, MarkerArray
 
 from box_contact_ros import ContactSolver
+from box_contact_ros.contact import Contact
 from box_contact_ros.nodes.contact import ContactNode
 from box_contact_ros.nodes.markers import (
     PARAMETERS,
@@ -21,9 +23,10 @@ from box_contact_ros.nodes.markers import (
     box_marker,
     contact_markers,
 )
-from box_contact_ros.nodes.messages import CLOUD_ROW, make_header
+from box_contact_ros.nodes.messages import CLOUD_ROW, make_cloud, make_header
 from box_contact_ros.pairing import StampedPose
 from box_contact_ros.resources import resource_path
+from box_contact_ros.scene import Answer, Pair
 
 SLAB, CUBE = (2.0, 4.0, 1.0), (2.0, 2.0, 2.0)
 HEADER = make_header(1_500_000_000, 'yard')
@@ -166,6 +169,21 @@ def test_nobody_answers_any_more(client, node):
     client.spin(lambda: False, 0.7)
     client.send(poses.IDENTITY, TOUCHING)
     assert drawn(client, Marker.DELETE)
+
+
+def test_contacts_of_another_scene_are_not_drawn(client, node, capfd):
+    """A row of a pair that is not the two boxes', and two rows: said, and no point put anywhere."""
+    offer_until_drawn(client, 2)
+    publisher = client.node.create_publisher(PointCloud2, 'contacts', 10)
+    assert client.spin(lambda: publisher.get_subscription_count() > 1, 10.0)  # ours, and markers'
+    contact = Contact(True, -0.1, np.array([0.0, 0.0, 1.0]), np.zeros(3))
+    for pairs in ([Pair(3, 'p', 'a', 'b')], [Pair(0, 'p', 'a', 'b'), Pair(1, 'q', 'a', 'c')]):
+        publisher.publish(make_cloud(make_header(client.next_stamp(), 'map'), Answer(
+            [(pair, contact) for pair in pairs], [], len(pairs))))
+        client.send(poses.IDENTITY, TOUCHING)
+        client.spin(lambda: False, 0.3)
+        assert drawn(client, Marker.DELETE)
+    assert 'with other pairs' in capfd.readouterr().err
 
 
 def test_no_more_often_than_asked(client, node, contact_node):

@@ -253,7 +253,10 @@ def test_versions_agree() -> None:
     """The release tools of catkin rewrite both, so both are written out; here they are compared."""
     manifest = ElementTree.parse(ROOT / 'package.xml').getroot()
     done = _run('setup.py', '--name', '--version')
-    assert done.stdout.split() == [manifest.findtext('name'), manifest.findtext('version')]
+    name, version = manifest.findtext('name'), manifest.findtext('version')
+    assert done.stdout.split() == [name, version]
+    for file in ('CITATION.cff', 'msg_schemas/asyncapi.yaml'):
+        assert f'version: {version}\n' in (ROOT / file).read_text('utf-8'), file
 
 
 def test_manifest_is_valid() -> None:

@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 
 import numpy as np
@@ -128,6 +129,19 @@ def test_one_pair_with_a_fixed_box():
     assert contact.separation == pytest.approx(-0.1)
     assert contact.point == pytest.approx([1, 2, -0.05])
     assert solver([None]).stale == [pair]
+
+
+@pytest.mark.parametrize('pose, words', [
+    ((math.nan, 5, 0, 0, 0, 0, 1), 'is not finite'), ((1e60, 0, 0, 0, 0, 0, 1), 'exceeds'),
+    ((0, 0, 0, 0, 0, 0, 0), 'zero length')])
+def test_numbers_that_are_no_pose_are_refused(pose, words):
+    """With many pairs as with one; NaN was near nothing, and so "no contact"."""
+    scene = yard()
+    solver = SceneSolver(scene, model='exact')
+    with pytest.raises(ValueError, match=f'pose of load: .*{words}'):
+        solver([np.array(pose, dtype=float)])
+    assert len(solver([None]).stale) == len(scene.pairs)
+    assert solver([np.array([63.0, 27.0, 20.0, 0, 0, 0, 1.0])]).near == 0
 
 
 def test_two_boxes_is_the_solver():

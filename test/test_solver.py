@@ -3,9 +3,11 @@ from __future__ import annotations
 
 import math
 import os
+import shutil
 import subprocess
 import sys
 import warnings
+from pathlib import Path
 
 import numpy as np
 import poses
@@ -17,6 +19,7 @@ from box_contact_ros import Contact, ContactSolver
 from box_contact_ros.checks import pose_fault
 from box_contact_ros.pose import quaternion_from_matrix, quaternion_multiply, rotation_matrix
 
+ROOT = Path(__file__).resolve().parents[1]
 SOLVER = ContactSolver(poses.CUBE, poses.CUBE, model='exact')
 ABOVE = [0.5, 0.25, 1.875, 0, 0, 0, 1]
 
@@ -195,6 +198,32 @@ def test_works_without_a_writable_cache():
                             text=True, timeout=240, check=False)
     assert result.stdout.strip() == '-0.5', result.stderr
     assert result.stderr.count('compiled anew') == 1
+
+
+def test_an_edit_compiles_what_is_made_from_it(tmp_path):
+    """Of a copy of the package: an edit at its top compiles all anew, one in a folder that folder.
+
+    Numba looks at a kernel's own file only: a constant changed beside it went unnoticed.
+    """
+    package = tmp_path / 'box_contact_ros'
+    shutil.copytree(ROOT / 'box_contact_ros', package, ignore=shutil.ignore_patterns('__pycache__'))
+    (package / 'training' / 'one.py').write_text('NUMBER = 1.0\n')
+    (package / 'training' / 'two.py').write_text(
+        'from ..jit import kernel\nfrom .one import NUMBER\n\n\n'
+        '@kernel\ndef number():\n    return NUMBER\n\n\nprint(number())\n')
+
+    def run():
+        done = subprocess.run(
+            [sys.executable, '-c', 'import box_contact_ros.training.two'], capture_output=True,
+            text=True, cwd=tmp_path, check=True, timeout=240, env={
+                **os.environ, 'NUMBA_CACHE_DIR': str(tmp_path / 'cache'), 'NUMBA_DISABLE_JIT': '0'})
+        return float(done.stdout), 'compiling' in done.stderr
+
+    assert [run(), run()] == [(1.0, True), (1.0, False)]
+    (package / 'training' / 'one.py').write_text('NUMBER = 22.0\n')
+    assert [run(), run()] == [(22.0, True), (22.0, False)]
+    (package / 'checks.py').write_text((package / 'checks.py').read_text() + '# edited\n')
+    assert [run(), run()] == [(22.0, True), (22.0, False)]
 
 
 def test_warnings_are_errors_here():

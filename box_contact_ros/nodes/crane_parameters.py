@@ -6,7 +6,7 @@ from typing import Any
 
 from ..crane import LANDING_OVERLAP, CraneScenario
 from ..landing import LANDING_DURATION
-from .parameters import Setting, flag, number, numbers, text
+from .parameters import Setting, flag, number, numbers, size, text, whole_number
 
 STANDARD = CraneScenario()
 PARAMETERS = {
@@ -22,9 +22,9 @@ PARAMETERS = {
     'latency': Setting(0.0, 'closed loop: a contact acts no earlier than this after its poses were '
                        'published [s]', number(0, 1)),
     'seed': Setting(0, '0: the standard scenario; n > 0: offset and angles drawn at random',
-                    number(0, 2**31)),
-    'size_a': Setting(STANDARD.size, 'full extents of the load [m]', numbers(3)),
-    'size_b': Setting(STANDARD.stack_size, 'full extents of the stack [m]', numbers(3)),
+                    whole_number(0, 2**31)),
+    'size_a': Setting(STANDARD.size, 'full extents of the load [m]', size),
+    'size_b': Setting(STANDARD.stack_size, 'full extents of the stack [m]', size),
     'offset': Setting(STANDARD.offset, 'x, y of the trolley from the centre of the stack [m]',
                       numbers(2)),
     'rope_angle': Setting(STANDARD.rope_angle, 'ropes from the plumb line at the start [deg]',
@@ -57,4 +57,4 @@ def scenario_from(values: Mapping[str, Any]) -> CraneScenario:
              if values[name] != PARAMETERS[name].default}
     if values['closed_loop']:
         given = {'land': True, 'overlap': LANDING_OVERLAP, 'duration': LANDING_DURATION} | given
-    return CraneScenario.drawn(int(values['seed']), **given)
+    return CraneScenario.drawn(values['seed'], **given)

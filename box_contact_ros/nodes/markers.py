@@ -24,9 +24,17 @@ from visualization_msgs.msg import Marker, MarkerArray
 from ..pairing import StampedPose
 from .appearance import BOX_A, BOX_B, BOX_OPACITY, CONTACT, STALE, Colour, proportions
 from .contact import CONTAINER
-from .messages import NANOSECONDS, Refused, TypedMessages, make_header, read_cloud
+from .messages import (
+    NANOSECONDS,
+    OTHER_SCENE,
+    Refused,
+    TypedMessages,
+    is_of_two_boxes,
+    make_header,
+    read_cloud,
+)
 from .parameters import Setting, answer_help, checked, declare, number, size
-from .runtime import CONTACT_QOS, POSE_QOS, run_node
+from .runtime import CONTACT_QOS, LOG_SECONDS, POSE_QOS, run_node
 
 PARAMETERS = {
     'size_a': Setting(CONTAINER, 'full extents of box A, three numbers > 0 [m]', size),
@@ -131,8 +139,12 @@ class MarkersNode(Node):
 
     def _on_cloud(self, message: PointCloud2) -> None:
         stamp = message.header.stamp.sec * NANOSECONDS + message.header.stamp.nanosec
-        # The default scene has one pair; a row of NaN says that it could not be evaluated.
-        row = next((row for row in read_cloud(message) if math.isfinite(row['depth'])), None)
+        rows = read_cloud(message)
+        if not is_of_two_boxes(rows):
+            self.get_logger().warning(OTHER_SCENE, throttle_duration_sec=LOG_SECONDS)
+            return
+        # A row of NaN says that the pair could not be evaluated.
+        row = next((row for row in rows if math.isfinite(row['depth'])), None)
         self._answer, self._news = (message.header, stamp, row), True
 
     def _publish(self) -> None:

@@ -93,6 +93,15 @@ def read_cloud(message: PointCloud2) -> np.ndarray:
     return np.frombuffer(bytes(message.data), dtype=CLOUD_ROW)
 
 
+OTHER_SCENE = ('the contacts are those of a scene with other pairs than the default one: not '
+               'drawn, only two boxes are')
+
+
+def is_of_two_boxes(rows: np.ndarray) -> bool:
+    """Whether rows of a cloud may be those of the default scene, which has pair 0 alone."""
+    return len(rows) <= 1 and not rows['pair'].any()
+
+
 class TypedMessages:
     """The reference: messages as rclpy's objects."""
 

@@ -47,6 +47,16 @@ def number(low: float, high: float) -> Check:
     return check
 
 
+def whole_number(low: int, high: int) -> Check:
+    """A whole number within [low, high]."""
+    def check(name: str, value: Any) -> int:
+        if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+            raise ValueError(f'{name} must be a whole number from {low} to {high}, '
+                             f'not {shown(value)}')
+        return value
+    return check
+
+
 def numbers(count: int) -> Check:
     """So many finite numbers."""
     def check(name: str, value: Any) -> tuple[float, ...]:

@@ -13,18 +13,8 @@ from ..scene import Scene, SceneSolver
 from ..solver import MOST_SOUP_DIVISIONS, SOUP_DIVISIONS
 from .contact import PARAMETERS as CONTACT_PARAMETERS
 from .contact import ContactNode
-from .parameters import Check, Setting, answer_help
+from .parameters import Setting, answer_help, whole_number
 from .runtime import run_node
-
-
-def whole_number(low: int, high: int) -> Check:
-    """A whole number within [low, high]."""
-    def check(name: str, value: Any) -> int:
-        if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-            raise ValueError(f'{name} must be a whole number from {low} to {high}, not {value!r}')
-        return value
-    return check
-
 
 PARAMETERS = {
     'divisions': Setting(

@@ -14,8 +14,15 @@ from rclpy.parameter_client import AsyncParameterClient
 from rclpy.task import Future
 from sensor_msgs.msg import PointCloud2
 
-from .messages import NANOSECONDS, Refused, TypedMessages, read_cloud
-from .runtime import POSE_QOS
+from .messages import (
+    NANOSECONDS,
+    OTHER_SCENE,
+    Refused,
+    TypedMessages,
+    is_of_two_boxes,
+    read_cloud,
+)
+from .runtime import LOG_SECONDS, POSE_QOS
 from .view_log import ViewLog
 
 ASK_PERIOD = 0.5
@@ -68,6 +75,7 @@ class ViewNode(Node):
     def _ask(self) -> None:
         if self._question is not None and not self.connected:
             self._question = None  # lost with a node that has ended
+            self.wish = '' if self._answered else self.wish
         if self._question is None and self._target.services_are_ready():
             self._question = self._target.get_parameters(list(ASKED))
             self._question.add_done_callback(self._on_parameters)
@@ -94,5 +102,8 @@ class ViewNode(Node):
     def _on_cloud(self, message: PointCloud2) -> None:
         received = self.get_clock().now().nanoseconds
         stamp = message.header.stamp
-        if self.log is not None:
-            self.log.cloud(stamp.sec * NANOSECONDS + stamp.nanosec, read_cloud(message), received)
+        rows = read_cloud(message)
+        if not is_of_two_boxes(rows):
+            self.get_logger().warning(OTHER_SCENE, throttle_duration_sec=LOG_SECONDS)
+        elif self.log is not None:
+            self.log.cloud(stamp.sec * NANOSECONDS + stamp.nanosec, rows, received)

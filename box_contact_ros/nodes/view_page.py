@@ -197,10 +197,10 @@ class Page:
         text, bad = f'running: {model}', False
         if not model:
             text = 'waiting for the contact node …'
-        elif wish:
-            text = f'switching to {wish} …'
         elif not connected:
             text, bad = 'the contact node does not answer', True
+        elif wish:
+            text = f'switching to {wish} …'
         elif refusal:
             text, bad = f'refused: {refusal}', True
         self._status.content = _line('model-status', text, bad=bad)

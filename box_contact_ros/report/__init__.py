@@ -4,11 +4,24 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from ..checks import shown
+from ..solver import MODELS, soup_divisions
+
 
 def add_out(parser: argparse.ArgumentParser, files: str) -> None:
     """Add `--out`, of a program that has `--quick`; `results_folder` reads it."""
     parser.add_argument('--out', type=Path, metavar='DIR',
                         help=f'folder for {files} (default: docs, or quick-results with --quick)')
+
+
+def model_name(text: str) -> str:
+    """The name of a model, as a program's argument."""
+    try:
+        if text in MODELS or soup_divisions(text):
+            return text
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+    raise argparse.ArgumentTypeError(f'{shown(text)} is not one of: {", ".join(MODELS)}')
 
 
 def results_folder(options: argparse.Namespace) -> Path:

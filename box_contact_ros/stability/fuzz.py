@@ -21,6 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..report import model_name
 from ..solver import ContactSolver
 from .judge import GATES, exact_gap, judge
 
@@ -371,7 +372,8 @@ def main(args: Sequence[str] | None = None) -> int:
     parser.add_argument('--seed', type=int, default=1, help='default: %(default)s')
     parser.add_argument('--classes', nargs='+', choices=list(CLASSES), default=list(CLASSES),
                         metavar='CLASS', help=f'of {", ".join(CLASSES)} (default: all)')
-    parser.add_argument('--models', nargs='+', default=list(MODELS), metavar='MODEL',
+    parser.add_argument('--models', nargs='+', type=model_name, default=list(MODELS),
+                        metavar='MODEL',
                         help='default: %(default)s')
     parser.add_argument('--workers', type=int, default=os.cpu_count() or 1, help='processes')
     parser.add_argument('--out', type=Path, metavar='FILE', help='CSV with the tallies')

@@ -19,11 +19,14 @@ from pathlib import Path
 import numpy as np
 
 from ..posesets import Pairs
+from ..report import model_name
 from ..solver import MODELS, ContactSolver
 from .families import FAMILIES, Cases, load
 from .fuzz import TOUCH_ULPS
 from .judge import COORDINATE_ULPS, NOT_FINITE, NOT_UNIT, OUTSIDE, TOLERANCE, judge
 
+REPORTED = ('exact', 'committee', 'fcl', 'soup-8')
+"""Models in docs/stability.md."""
 CHILDREN = ('fcl', 'soup')
 """Models (before a dash) that run in a process of their own."""
 PATIENCE = 300.0
@@ -243,13 +246,17 @@ def main(args: Sequence[str] | None = None) -> int:
 
     parser = argparse.ArgumentParser(prog='stability', description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--models', nargs='+', default=['exact', 'committee', 'fcl', 'soup-8'],
-                        metavar='MODEL', help=f'of {", ".join(MODELS)} (default: %(default)s)')
+    parser.add_argument('--models', nargs='+', type=model_name, default=list(REPORTED),
+                        metavar='MODEL',
+                        help=f'of {", ".join(MODELS)} (default: {" ".join(REPORTED)})')
     parser.add_argument('--families', nargs='+', default=list(FAMILIES), choices=list(FAMILIES),
                         metavar='FAMILY', help='default: all')
-    parser.add_argument('--out', type=Path, default=Path('docs'), metavar='DIR',
-                        help='folder for stability.md and stability.csv (default: %(default)s)')
+    parser.add_argument('--out', type=Path, metavar='DIR',
+                        help='folder for stability.md and stability.csv (default: docs, or '
+                             'quick-results with fewer models or families than that)')
     options = parser.parse_args(args)
+    whole = set(options.models) >= set(REPORTED) and set(options.families) == set(FAMILIES)
+    folder = options.out or Path('docs' if whole else 'quick-results')
     cases, rows = load(), []
     with tqdm(total=len(options.models) * len(options.families), desc='stability',
               unit='family') as bar:
@@ -260,9 +267,9 @@ def main(args: Sequence[str] | None = None) -> int:
                 rows.append((examine_apart if apart else examine)(model, name, cases[name]))
                 bar.update()
     given = sys.argv[1:] if args is None else args
-    options.out.mkdir(parents=True, exist_ok=True)
-    write_csv(options.out / 'stability.csv', rows)
-    (options.out / 'stability.md').write_text(
+    folder.mkdir(parents=True, exist_ok=True)
+    write_csv(folder / 'stability.csv', rows)
+    (folder / 'stability.md').write_text(
         page(rows, ' '.join(['python -m box_contact_ros stability', *given])), encoding='utf-8')
     for model in options.models:
         print(f'\n{model}\n{table([row for row in rows if row.model == model])}')
