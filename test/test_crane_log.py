@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from box_contact_ros.nodes.crane_log import CraneLog, LiveReport, cloud_rows, live_line
+from box_contact_ros.nodes.crane_log import CraneLog, LiveReport, live_line
 
 MS = 1_000_000  # ns
 START = 1_700_000_000_000_000_000  # ns: stamps as large as real ones
@@ -182,36 +182,6 @@ def test_without_contacts_a_run_fails(ticks):
     assert math.isnan(summary.latency_p50)
     assert not summary.passed
     assert 'nan' not in str(summary)
-
-
-@pytest.mark.parametrize('order', ['<', '>'])
-def test_a_cloud_is_read_by_its_field_names(order):
-    """Fields may come in any order, with padding, in either byte order; float64 stays exact."""
-    layout = np.dtype({
-        'names': ['pair', 'depth', 'x'], 'formats': [order + 'u4', order + 'f8', order + 'f8'],
-        'offsets': [0, 8, 24], 'itemsize': 40,
-    })
-    rows = np.zeros(2, dtype=layout)
-    rows['pair'], rows['depth'], rows['x'] = [7, 9], [0.01, math.nan], [4_000_000.123456789, 1.0]
-    cloud = SimpleNamespace(
-        is_bigendian=order == '>', point_step=40, width=2, height=1, data=rows.tobytes(),
-        fields=[SimpleNamespace(name='pair', offset=0, datatype=6),
-                SimpleNamespace(name='depth', offset=8, datatype=8),
-                SimpleNamespace(name='x', offset=24, datatype=8)],
-    )
-    read = cloud_rows(cloud)
-    assert read['pair'].tolist() == [7, 9]
-    assert read['depth'][0] == 0.01 and math.isnan(read['depth'][1])
-    assert read['x'][0] == 4_000_000.123456789
-
-
-def test_an_empty_cloud_has_no_rows():
-    """Width 0 says: evaluated, no contact."""
-    cloud = SimpleNamespace(
-        is_bigendian=False, point_step=60, width=0, height=1, data=b'',
-        fields=[SimpleNamespace(name='depth', offset=48, datatype=8)],
-    )
-    assert cloud_rows(cloud)['depth'].size == 0
 
 
 def test_a_live_line_has_millimetres_and_no_minus_zero():

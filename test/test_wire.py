@@ -1,7 +1,9 @@
 """Messages as bytes: read and written as rclpy's own objects are, and nothing else is taken."""
 from __future__ import annotations
 
+import math
 import struct
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,7 +14,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import PointCloud2
 
 from box_contact_ros.contact import Contact
-from box_contact_ros.nodes.messages import Refused, TypedMessages, make_header
+from box_contact_ros.nodes.messages import Refused, TypedMessages, make_header, read_cloud
 from box_contact_ros.nodes.wire import KEPT_FRAMES, RawMessages
 from box_contact_ros.scene import Answer, Pair
 
@@ -127,3 +129,33 @@ def test_memory_for_frames_is_bounded():
     for number in range(10 * KEPT_FRAMES):
         messages.begin(number, f'frame {number}')
     assert len(messages._answers) <= KEPT_FRAMES
+
+
+@pytest.mark.parametrize('order', ['<', '>'])
+def test_a_cloud_is_read_by_its_field_names(order):
+    """Fields may come in any order, with padding, in either byte order; float64 stays exact."""
+    layout = np.dtype({
+        'names': ['pair', 'depth', 'x'], 'formats': [order + 'u4', order + 'f8', order + 'f8'],
+        'offsets': [0, 8, 24], 'itemsize': 40,
+    })
+    rows = np.zeros(2, dtype=layout)
+    rows['pair'], rows['depth'], rows['x'] = [7, 9], [0.01, math.nan], [4_000_000.123456789, 1.0]
+    cloud = SimpleNamespace(
+        is_bigendian=order == '>', point_step=40, width=2, height=1, data=rows.tobytes(),
+        fields=[SimpleNamespace(name='pair', offset=0, datatype=6),
+                SimpleNamespace(name='depth', offset=8, datatype=8),
+                SimpleNamespace(name='x', offset=24, datatype=8)],
+    )
+    read = read_cloud(cloud)
+    assert read['pair'].tolist() == [7, 9]
+    assert read['depth'][0] == 0.01 and math.isnan(read['depth'][1])
+    assert read['x'][0] == 4_000_000.123456789
+
+
+def test_an_empty_cloud_has_no_rows():
+    """Width 0 says: evaluated, no contact."""
+    cloud = SimpleNamespace(
+        is_bigendian=False, point_step=60, width=0, height=1, data=b'',
+        fields=[SimpleNamespace(name='depth', offset=48, datatype=8)],
+    )
+    assert read_cloud(cloud)['depth'].size == 0

@@ -36,9 +36,8 @@ from ..contact import Contacts
 from ..streams import Stream
 from .bench_log import NodeLog
 from .children import Stop, asked_to_end, end, on_this_host
-from .crane_log import cloud_rows
 from .echo import raw_stamp
-from .messages import NANOSECONDS, make_header
+from .messages import NANOSECONDS, make_header, read_cloud
 from .runtime import let_callbacks_finish, make_executor, spin_for
 
 # Bounds on everything that waits, so that a bench always ends.
@@ -386,7 +385,7 @@ def _unanswered(turn: list[Subject], offers: set[int]) -> int:
 
 def _values(kind: str, message: Any) -> Sequence[float]:
     if kind == 'cloud':
-        rows = cloud_rows(message)  # of pair 0, the only one
+        rows = read_cloud(message)  # of pair 0, the only one
         return [float(rows[0][name]) for name in CLOUD_COLUMNS] if len(rows) else ()
     vector = message.point if kind == 'point' else message.vector
     return vector.x, vector.y, vector.z

@@ -26,6 +26,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogFormatter
 
 from ..contact import Contacts
+from .figures import angles, percentile
 
 CONTACT_MESSAGES = ('cloud', 'point', 'normal')
 """Kinds of message that a contact node answers with."""
@@ -218,7 +219,7 @@ def _result(node: NodeLog, log: StreamLog) -> StreamResult:
         measured = np.flatnonzero(contact & real)
         point_errors = np.linalg.norm(
             log.values['point'][measured] - log.truth.point[measured], axis=1)
-        normal_errors = _angles(log.values['normal'][measured], log.truth.normal[measured])
+        normal_errors = angles(log.values['normal'][measured], log.truth.normal[measured])
     latencies = (finished - stamps)[complete] * 1e-9
     lateness = np.array(log.lateness)
     span = (stamps[-1] - stamps[0]) * 1e-9
@@ -232,30 +233,20 @@ def _result(node: NodeLog, log: StreamLog) -> StreamResult:
         contacts=int(np.count_nonzero(contact)), latency_mean=_of(np.mean, latencies),
         latency_min=_of(np.min, latencies), latency_max=_of(np.max, latencies),
         latency_std=_of(np.std, latencies),
-        **{name: _percentile(latencies, percent) for name, percent in PERCENTILES.items()},
-        point_error_median=_percentile(point_errors, 50.0),
-        point_error_p99=_percentile(point_errors, 99.0),
+        **{name: percentile(latencies, percent) for name, percent in PERCENTILES.items()},
+        point_error_median=percentile(point_errors, 50.0),
+        point_error_p99=percentile(point_errors, 99.0),
         point_error_max=_of(np.max, point_errors),
-        normal_error_median=_percentile(normal_errors, 50.0),
-        normal_error_p99=_percentile(normal_errors, 99.0),
+        normal_error_median=percentile(normal_errors, 50.0),
+        normal_error_p99=percentile(normal_errors, 99.0),
         normal_error_max=_of(np.max, normal_errors),
         rate=(sent - 1) / span if span else math.nan,
-        lateness_p99=_percentile(lateness, 99.0), lateness_max=_of(np.max, lateness),
+        lateness_p99=percentile(lateness, 99.0), lateness_max=_of(np.max, lateness),
         latencies=latencies)
-
-
-def _angles(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Angles between rows of vectors (n, 3) [deg]; by atan2, because acos loses small angles."""
-    sines = np.linalg.norm(np.cross(first, second), axis=1)
-    return np.degrees(np.arctan2(sines, np.sum(first * second, axis=1)))
 
 
 def _of(figure, values: np.ndarray) -> float:
     return float(figure(values)) if values.size else math.nan
-
-
-def _percentile(values: np.ndarray, percent: float) -> float:
-    return float(np.percentile(values, percent)) if values.size else math.nan
 
 
 def write_csv(path: Path, results: Iterable[StreamResult], about: dict[str, str]) -> None:

@@ -29,9 +29,9 @@ from ..crane import Crane
 from ..landing import LandingResult
 from ..solver import ContactSolver
 from .crane_feedback import CraneFeedback
-from .crane_log import CraneLog, LiveReport, cloud_rows
+from .crane_log import CraneLog, LiveReport
 from .crane_parameters import PARAMETERS, scenario_from
-from .messages import NANOSECONDS
+from .messages import NANOSECONDS, read_cloud
 from .parameters import answer_help, declare
 from .runtime import REFUSALS, make_executor, uninterrupted
 
@@ -147,7 +147,7 @@ class CraneNode(Node):
         self.log.normal(_stamp(message), normal, self.get_clock().now().nanoseconds)
 
     def _on_cloud(self, message: PointCloud2) -> None:
-        received, rows = self.get_clock().now().nanoseconds, cloud_rows(message)
+        received, rows = self.get_clock().now().nanoseconds, read_cloud(message)
         if self.feedback:  # before the log: here somebody waits
             self.feedback.answer(_stamp(message), rows, received)
         self.log.cloud(_stamp(message), rows['depth'])

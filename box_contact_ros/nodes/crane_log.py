@@ -13,12 +13,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-__all__ = ['CraneLog', 'CraneSummary', 'LIVE_HEADER', 'LiveReport', 'cloud_rows', 'live_line']
+from .figures import angles, percentile
+
+__all__ = ['CraneLog', 'CraneSummary', 'LIVE_HEADER', 'LiveReport', 'live_line']
 
 LIVE_PERIOD = 0.2  # s between live lines
-
-# sensor_msgs/PointField datatypes used by the contacts cloud.
-_POINT_FIELD_TYPES = {6: 'u4', 7: 'f4', 8: 'f8'}
 
 LIVE_HEADER = (
     '   time   separation              point (x, y, z)                 normal (x, y, z)\n'
@@ -35,18 +34,6 @@ def live_line(time: float, separation: float, point, normal) -> str:
     place = ' '.join(f'{round(float(value), 4) + 0.0:9.4f}' for value in point)
     direction = ' '.join(f'{round(float(value), 5) + 0.0:9.5f}' for value in normal)
     return f'{time:7.2f} {1e3 * separation:+12.3f}   {place}    {direction}'
-
-
-def cloud_rows(cloud) -> np.ndarray:
-    """Rows of a sensor_msgs/PointCloud2 as a structured array, whatever the order of its fields."""
-    order = '>' if cloud.is_bigendian else '<'
-    layout = np.dtype({
-        'names': [entry.name for entry in cloud.fields],
-        'formats': [order + _POINT_FIELD_TYPES[entry.datatype] for entry in cloud.fields],
-        'offsets': [entry.offset for entry in cloud.fields],
-        'itemsize': cloud.point_step,
-    })
-    return np.frombuffer(bytes(cloud.data), dtype=layout, count=cloud.width * cloud.height)
 
 
 @dataclass
@@ -215,7 +202,7 @@ class CraneLog:
         received_points = np.array([e.point for e in both]).reshape(-1, 3)[real]
         received_normals = np.array([e.normal for e in both]).reshape(-1, 3)[real]
         point_errors = np.linalg.norm(received_points - points[real], axis=1)
-        normal_errors = np.degrees(_angles(received_normals, normals[real]))
+        normal_errors = angles(received_normals, normals[real])
         return CraneSummary(
             sent=len(exchanges),
             evaluated=len(answered),
@@ -225,12 +212,12 @@ class CraneLog:
             not_evaluated=refused,
             strangers=self.strangers,
             wrong_verdicts=int(wrong),
-            latency_p50=_percentile(latencies, 50.0),
-            latency_p99=_percentile(latencies, 99.0),
-            point_error_median=_percentile(point_errors, 50.0),
-            point_error_p99=_percentile(point_errors, 99.0),
-            normal_error_median=_percentile(normal_errors, 50.0),
-            normal_error_p99=_percentile(normal_errors, 99.0),
+            latency_p50=percentile(latencies, 50.0),
+            latency_p99=percentile(latencies, 99.0),
+            point_error_median=percentile(point_errors, 50.0),
+            point_error_p99=percentile(point_errors, 99.0),
+            normal_error_median=percentile(normal_errors, 50.0),
+            normal_error_p99=percentile(normal_errors, 99.0),
             edge=edge,
         )
 
@@ -274,13 +261,3 @@ def _reference(solver, exchanges: list[_Exchange]) -> tuple[np.ndarray, np.ndarr
         np.array([e.pose_a for e in exchanges]), np.array([e.pose_b for e in exchanges])
     )
     return np.asarray(truth.colliding), np.asarray(truth.point), np.asarray(truth.normal)
-
-
-def _angles(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Angles between rows of vectors (n, 3), rad; by atan2, because acos loses small angles."""
-    sines = np.linalg.norm(np.cross(first, second), axis=1)
-    return np.arctan2(sines, np.sum(first * second, axis=1))
-
-
-def _percentile(values: np.ndarray, percent: float) -> float:
-    return float(np.percentile(values, percent)) if values.size else math.nan

@@ -29,6 +29,7 @@ _FIELDS = [
     PointField(name=name, offset=CLOUD_ROW.fields[name][1], count=1,
                datatype=PointField.UINT32 if name == 'pair' else PointField.FLOAT64)
     for name in CLOUD_ROW.names]
+_NUMBERS = {PointField.UINT32: 'u4', PointField.FLOAT32: 'f4', PointField.FLOAT64: 'f8'}
 _NAN = (float('nan'),) * 7
 
 
@@ -89,8 +90,17 @@ def make_cloud(header: Header, answer: Answer) -> PointCloud2:
 
 
 def read_cloud(message: PointCloud2) -> np.ndarray:
-    """Rows of a `contacts` cloud as a structured array of CLOUD_ROW."""
-    return np.frombuffer(bytes(message.data), dtype=CLOUD_ROW)
+    """Rows of a `contacts` cloud as a structured array with the fields of CLOUD_ROW.
+
+    Whatever their order, padding and the order of their bytes: as the message says.
+    """
+    order = '>' if message.is_bigendian else '<'
+    layout = np.dtype({
+        'names': [field.name for field in message.fields],
+        'formats': [order + _NUMBERS[field.datatype] for field in message.fields],
+        'offsets': [field.offset for field in message.fields],
+        'itemsize': message.point_step})
+    return np.frombuffer(bytes(message.data), layout, count=message.width * message.height)
 
 
 OTHER_SCENE = ('the contacts are those of a scene with other pairs than the default one: not '

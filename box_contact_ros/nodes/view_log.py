@@ -20,6 +20,7 @@ from ..pairing import PAIRINGS, StampedPose
 from ..scene import two_boxes
 from ..solver import ContactSolver
 from .appearance import STALE
+from .figures import percentile
 from .messages import NANOSECONDS
 
 WINDOW = 2.0
@@ -132,8 +133,9 @@ class ViewLog:
     def _answer(self, stamp: int, poses: Poses, rows: np.ndarray, received: int) -> None:
         contact: tuple = (None, None, None)
         if len(rows) and math.isfinite(rows[0]['depth']):
-            values = np.array(rows[0].tolist()[:7])
-            contact = values[:3], values[3:6], float(values[6])
+            x, y, z, nx, ny, nz, depth = (float(rows[0][name]) for name in (
+                'x', 'y', 'z', 'normal_x', 'normal_y', 'normal_z', 'depth'))
+            contact = np.array([x, y, z]), np.array([nx, ny, nz]), depth
         if not self._answered:
             self._first = stamp
         self._answers.append(Answer(stamp, received, poses, *contact))
@@ -170,9 +172,9 @@ class ViewLog:
         latencies = np.array([answer.latency for answer in answers])
         errors = self._point_errors(answers)
         return Figures(
-            latency_median=_percentile(latencies, 50.0), latency_p99=_percentile(latencies, 99.0),
-            point_error_median=_percentile(errors, 50.0),
-            point_error_p99=_percentile(errors, 99.0), edge=self._edge,
+            latency_median=percentile(latencies, 50.0), latency_p99=percentile(latencies, 99.0),
+            point_error_median=percentile(errors, 50.0),
+            point_error_p99=percentile(errors, 99.0), edge=self._edge,
             rate=sum(now - answer.received < NANOSECONDS for answer in answers),
             answered=answered, lost=lost)
 
@@ -185,7 +187,3 @@ class ViewLog:
                                     for box in (0, 1)))
         errors = np.linalg.norm(np.array([a.point for a in touching]) - exact.point, axis=1)
         return errors[exact.colliding]
-
-
-def _percentile(values: np.ndarray, percent: float) -> float:
-    return float(np.percentile(values, percent)) if values.size else math.nan
