@@ -5,14 +5,17 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
-from box_contact_ros.programs import run, usage
+from box_contact_ros.programs import reader_is_gone, run, usage
 
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the program named by the first argument; without one, list the programs."""
     args = sys.argv[1:] if args is None else args
     if not args or args[0] in ('-h', '--help'):
-        print(usage())
+        try:
+            print(usage(), flush=True)
+        except BrokenPipeError:
+            return reader_is_gone()
         return 0
     return run(args[0], args[1:])
 

@@ -155,6 +155,7 @@ def run(name: str, args: Sequence[str]) -> int:
     sys.argv = [name, *args]
     try:
         status = getattr(importlib.import_module(module), function)(list(args))
+        sys.stdout.flush()
     except ModuleNotFoundError as error:
         message = _missing_module(name, error.name or '')
         if message is None:
@@ -165,7 +166,18 @@ def run(name: str, args: Sequence[str]) -> int:
         return 1
     except KeyboardInterrupt:
         return 130  # what a shell reports for a program ended by Ctrl-C
+    except BrokenPipeError:
+        return reader_is_gone()
     return int(status or 0)
+
+
+def reader_is_gone() -> int:
+    """The status of a program whose output nobody reads to the end, such as `| head`.
+
+    What is left of it goes nowhere.
+    """
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return 141  # what a shell reports for a program ended by SIGPIPE
 
 
 SHARED_MEMORY = '/dev/shm'

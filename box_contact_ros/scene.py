@@ -222,6 +222,8 @@ class SceneSolver:
         a[:, 6] = b[:, 6] = 1.0
         b[:, :3] = 0.49 * (size_a[first] + size_b[first])
         self._solver.batch(a, b, size_a=size_a[first], size_b=size_b[first])
+        self.sizes_answered_exactly = self._solver.exact_answers
+        """Pairs of sizes that a `committee` was not trained for."""
         self._solver(a[0], b[0])
         self([a[0]] * len(self.scene.moving))
         self._warm_up_answers = self._solver.exact_answers
@@ -233,8 +235,11 @@ class SceneSolver:
     def __call__(self, poses: Sequence[np.ndarray | None]) -> Answer:
         """One tick. poses: (7,) of each box of `scene.moving`, None where there is none.
 
-        Raises ValueError for numbers that are no pose.
+        Raises ValueError for numbers that are no pose, and for more or fewer poses than that.
         """
+        if len(poses) != len(self.scene.moving):
+            raise ValueError(f'{len(poses)} poses, but {len(self.scene.moving)} boxes move: '
+                             f'{shown(list(self.scene.moving))}')
         if self._only is not None:
             a, b = poses if self._in_order else self._both(poses)
             if a is None or b is None:

@@ -24,6 +24,8 @@ MODELS = {
     'soup': 'polygon soup on FCL, 8 divisions an edge, or N: soup-N; needs python-fcl; a baseline',
 }
 """Models by name, with a line about each."""
+MODEL_NAMES = ', '.join([*MODELS, 'soup-N'])
+"""For those who choose."""
 
 SOUP_DIVISIONS, MOST_SOUP_DIVISIONS = 8, 64
 """Divisions of an edge in model `soup`, and the most that are accepted (49,152 triangles a box)."""
@@ -96,7 +98,7 @@ def make_model(name: str, size_a: np.ndarray, size_b: np.ndarray, weights: str |
         from .soup import Soup  # likewise
 
         return Soup(divisions)
-    raise ValueError(f'model {shown(name)} is not one of: {", ".join(MODELS)}')
+    raise ValueError(f'model {shown(name)} is not one of: {MODEL_NAMES}')
 
 
 class ContactSolver:

@@ -246,6 +246,21 @@ def test_program_fixture_ends_the_whole_group(program) -> None:
         os.killpg(running.process.pid, 0)
 
 
+def test_a_reader_that_ends_early_is_no_error() -> None:
+    """As in `| head -1`: no traceback, and the status that a shell reports for SIGPIPE."""
+    for arguments in ('--help', 'contact_node --help'):
+        done = subprocess.run(
+            ['bash', '-c', f'set -o pipefail; "$1" -m box_contact_ros {arguments} | true', 'bash',
+             sys.executable], capture_output=True, text=True, timeout=120, check=False)
+        assert done.stderr == '' and done.returncode in (0, 141), done
+
+
+def test_parameters_before_ros_args_are_explained() -> None:
+    done = _run('-m', 'box_contact_ros', 'contact_node', '-p', 'model:=exact')
+    assert done.returncode == 2
+    assert '-p model:=exact (parameters stand after --ros-args)' in done.stderr
+
+
 # --- metadata -------------------------------------------------------------------------------------
 
 

@@ -144,6 +144,17 @@ def test_numbers_that_are_no_pose_are_refused(pose, words):
     assert solver([np.array([63.0, 27.0, 20.0, 0, 0, 0, 1.0])]).near == 0
 
 
+@pytest.mark.parametrize('pairs', [1, 2])
+def test_as_many_poses_as_boxes_that_move(pairs):
+    boxes = {name: Box(name, (1.0, 1.0, 1.0), pose_topic=name) for name in 'abc'[:pairs + 1]}
+    scene = Scene(boxes, (Pair(0, 'ab', 'a', 'b'), Pair(1, 'bc', 'b', 'c'))[:pairs])
+    solver = SceneSolver(scene, model='exact')
+    assert len(solver([None] * (pairs + 1)).stale) == pairs
+    for count in (pairs, pairs + 2):
+        with pytest.raises(ValueError, match=f"{count} poses, but {pairs + 1} boxes move: .'a'"):
+            solver([poses.IDENTITY] * count)
+
+
 def test_two_boxes_is_the_solver():
     rng = np.random.default_rng(2)
     solver = SceneSolver(two_boxes(poses.CUBE, poses.CONTAINER))

@@ -196,7 +196,10 @@ def _report(options: argparse.Namespace, subjects: list[Subject], notes: list[st
     order = {name: number for number, name in enumerate(STREAMS)}
     results = sorted((result for subject in subjects for result in subject.log.results()),
                      key=lambda r: (order.get(r.stream, 0), options.nodes.index(r.node)))
-    lines = list(notes)
+    if interrupted and not results:
+        print('\ninterrupted before the first stream had been answered: no results')
+        return False
+    lines = [*notes, *(['interrupted: of streams that ended before'] if interrupted else [])]
     for name in [subject.name for subject in subjects]:
         lines.append(f'{name}: {_sum(name, results)}')
     adds_up = all(r.adds_up for r in results) and all(s.log.adds_up for s in subjects)

@@ -32,7 +32,7 @@ from ..checks import shown
 from ..pairing import NEVER, PAIRINGS, RESETS, StampedPose, Tick
 from ..scene import Pair, Scene, SceneSolver, two_boxes
 from ..scene_file import read_scene
-from ..solver import MODELS, soup_divisions
+from ..solver import MODEL_NAMES, MODELS, soup_divisions
 from .diagnostics import DIAGNOSTICS_SECONDS, UNMATCHED_SECONDS, Diagnostics
 from .messages import Refused, TypedMessages
 from .parameters import (
@@ -55,9 +55,13 @@ SERIALIZATIONS = {'raw': RawMessages, 'typed': TypedMessages}
 
 def model_name(name: str, value: Any) -> str:
     """One of the models, or soup-N."""
-    return value if soup_divisions(text(name, value)) else one_of(MODELS)(name, value)
+    if not soup_divisions(text(name, value)) and value not in MODELS:
+        raise ValueError(f'{name} {shown(value)} is not one of: {MODEL_NAMES}')
+    return value
 
 
+WEIGHED = ('committee', 'paper', 'paper-continuous')
+"""Models that read `weights`."""
 NAMED_TOPICS = 3
 """How many pose topics the node names when it is ready."""
 CONTAINER = (12.192, 2.438, 2.591)  # ISO 40 ft [m]
@@ -67,7 +71,7 @@ PARAMETERS = {
     'size_b': Setting(CONTAINER, 'full extents of box B, three numbers > 0 [m]', size),
     'scene': Setting('', 'scene file (or the scene itself, as text) with boxes and pairs; replaces '
                          'size_a and size_b; set again, it is read again', text),
-    'model': Setting('committee', f'how the contact point is found: {", ".join(MODELS)}',
+    'model': Setting('committee', f'how the contact point is found: {MODEL_NAMES}',
                      model_name),
     'weights': Setting('', 'weights file to use in place of the shipped one', text),
     'pairing': Setting('stamp', 'stamp: answer once, when poses of equal stamp are in; latest: '
@@ -184,13 +188,23 @@ class ContactNode(LifecycleNode):
         if self._solver is None:
             self.get_logger().info('unconfigured: autostart is false')
             return
+        self._say('ready')
+
+    def _say(self, what: str) -> None:
         scene = self._solver.scene
         pairs = len(scene.pairs)
         topics = [subscription.topic_name for subscription in self._subscriptions_of.values()]
+        if self._settings.get('weights') and self._solver.model not in WEIGHED:
+            self.get_logger().warning(f'model {self._solver.model!r} uses no weights: '
+                                      f'{shown(self._settings["weights"])} is ignored')
+        elif self._solver.model == 'committee' and self._solver.sizes_answered_exactly:
+            self.get_logger().warning(
+                f'pairs of sizes that the weights are not for: '
+                f'{self._solver.sizes_answered_exactly}; the exact model answers them')
         more = len(topics) - NAMED_TOPICS
         frame = f' in frame {shown(scene.frame_id)}' if scene.frame_id else ''
         self.get_logger().info(
-            f'ready: model {self._solver.model!r}, pairing {self._settings["pairing"]!r}, '
+            f'{what}: model {self._solver.model!r}, pairing {self._settings["pairing"]!r}, '
             f'{pairs} {"pair" if pairs == 1 else "pairs"}; poses{frame} from '
             f'{", ".join(topics[:NAMED_TOPICS])}{f" and {more} more" if more > 0 else ""}')
 
@@ -208,6 +222,7 @@ class ContactNode(LifecycleNode):
             # A scene that is set again may be another one by now.
             if self._solver is not None and (settings != self._settings or 'scene' in changes):
                 self._apply(settings)
+                self._say('changed')
             self._settings = settings
         except (ValueError, ImportError) as error:
             return SetParametersResult(successful=False, reason=str(error))

@@ -141,7 +141,10 @@ def answer_help(program: str, doc: str | None, settings: Mapping[str, Setting],
         prog=program, description=doc, formatter_class=argparse.RawDescriptionHelpFormatter,
         usage=f'{program} [-h] [--ros-args -p NAME:=VALUE ... -r FROM:=TO ...]',
         epilog='parameters (--ros-args -p NAME:=VALUE):\n' + '\n'.join(lines))
-    parser.parse_args(list(_outside_ros_args(args or ())))
+    _, unknown = parser.parse_known_args(list(_outside_ros_args(args or ())))
+    if unknown:
+        hint = ' (parameters stand after --ros-args)' if '-p' in unknown else ''
+        parser.error(f'unrecognized arguments: {" ".join(unknown)}{hint}')
 
 
 def _outside_ros_args(args: Sequence[str]) -> Iterator[str]:

@@ -5,7 +5,7 @@ import argparse
 from pathlib import Path
 
 from ..checks import shown
-from ..solver import MODELS, soup_divisions
+from ..solver import MODEL_NAMES, MODELS, soup_divisions
 
 
 def add_out(parser: argparse.ArgumentParser, files: str) -> None:
@@ -21,7 +21,7 @@ def model_name(text: str) -> str:
             return text
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from error
-    raise argparse.ArgumentTypeError(f'{shown(text)} is not one of: {", ".join(MODELS)}')
+    raise argparse.ArgumentTypeError(f'{shown(text)} is not one of: {MODEL_NAMES}')
 
 
 def results_folder(options: argparse.Namespace) -> Path:
