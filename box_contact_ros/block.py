@@ -88,13 +88,14 @@ PLUS = _rows(1)
 EVEN_ODD = _rows(1)    # −, +, −, +
 HALVES = _rows(1)      # −, −, +, +
 
-# overlap.centroid, one pair at a time: 8 corners, and two polygons to clip from one to the other,
-# each with room for a quadrilateral clipped by six planes; all as u, v, w.
+# overlap.centroid, one pair at a time: 8 corners, two polygons to clip from one to the other, each
+# with room for a quadrilateral clipped by six planes, and a triangle; all as u, v, w.
 CORNERS = _row * LANES
 _POLYGON = 3 * 12
 POLYGONS = (CORNERS + 3 * 8, CORNERS + 3 * 8 + _POLYGON)
+TRIANGLE = CORNERS + 3 * 8 + 2 * _POLYGON
 
-EXACT_ANSWERS = CORNERS + 3 * 8 + 2 * _POLYGON  # committee: single calls outside the range so far
+EXACT_ANSWERS = TRIANGLE + 3 * 3  # committee: single calls outside the range so far
 
 WORK_SIZE = EXACT_ANSWERS + 1
 

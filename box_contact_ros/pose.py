@@ -86,6 +86,11 @@ def squared_norm(x, y, z, w):
 
 
 @inlined
+def _unless_zero(one, other):
+    return one if one != 0.0 else other
+
+
+@inlined
 def pose_valid(x, y, z, norm2):
     # Written so that NaN fails every comparison. An overflown square is infinite, and fails too.
     return (abs(x) <= LENGTH_MAX and abs(y) <= LENGTH_MAX and abs(z) <= LENGTH_MAX
@@ -246,10 +251,13 @@ def _prepare(lanes, work):
         reach = max(max(max(abs(ax), abs(ay)), abs(az)), max(max(abs(bx), abs(by)), abs(bz)))
         work[SIZE + i] = size
         work[TOUCH + i] = CONTACT_ULPS * ulp(max(reach, size))
-        # The sign of B − A changes on a swap, so its first component that is not zero says which
-        # box comes first; for concentric boxes any order will do.
-        later = ty > 0.0 or (ty == 0.0 and tz >= 0.0)
-        work[A_FIRST + i] = 1.0 if (tx > 0.0 or (tx == 0.0 and later)) else 0.0
+        # Differences change their sign on a swap, so the first that is not zero says which box comes
+        # first: of the positions, of concentric boxes' sizes, or of their axes.
+        order = _unless_zero(_unless_zero(tx, ty), tz)
+        order = _unless_zero(_unless_zero(order, hb0 - ha0), _unless_zero(hb1 - ha1, hb2 - ha2))
+        order = _unless_zero(order, _unless_zero(_unless_zero(b00 - a00, b10 - a10), b20 - a20))
+        order = _unless_zero(order, _unless_zero(_unless_zero(b01 - a01, b11 - a11), b21 - a21))
+        work[A_FIRST + i] = 1.0 if order >= 0.0 else 0.0
     return good
 
 

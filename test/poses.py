@@ -107,6 +107,26 @@ def flush_pairs(rng, n):
     return (*(moved(pose, np.zeros((n, 3)), turn) for pose in (a, b)), size_a, size_b)
 
 
+def equal_thickness(rng, n):
+    """Boxes of one thickness, turned about a common axis, flush on both sides, in any orientation.
+
+    Half have the same middle, half of those the same size too, and some the same pose. Rounding
+    makes a saddle of a face that lies in the other box's far face.
+    """
+    size_a, size_b = np.exp(rng.uniform(-1, 1, (2, n, 3)))
+    kind = rng.integers(0, 4, n)
+    size_b[kind < 2] = size_a[kind < 2]
+    size_b[:, 2] = size_a[:, 2] = size_a[:, 2] * rng.choice([1.0, 0.1], n)
+    reach = np.minimum(size_a[:, :2], size_b[:, :2]).min(axis=1)
+    place = np.zeros((n, 3))
+    place[:, :2] = (rng.uniform(-0.5, 0.5, (n, 2)) * reach[:, None]) * (kind % 2)[:, None]
+    yaw = rng.uniform(-np.pi, np.pi, n) * (rng.random(n) < 0.8)
+    b = np.concatenate([place, small_rotations(np.tile([0.0, 0, 1], (n, 1)), yaw)], axis=1)
+    a = np.tile(IDENTITY, (n, 1))
+    turn, zero = unit_quaternions(rng, n), np.zeros((n, 3))
+    return moved(a, zero, turn), moved(b, zero, turn), size_a, size_b
+
+
 def ridges(rng, n):
     """A box with an edge down on another's face, turned, and cut off by the face's rim.
 

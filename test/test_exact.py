@@ -1,7 +1,7 @@
 """Model `exact` against the 60-digit oracle.
 
-10,000 random and near-parallel pairs, and 4,000 of slivers, rods, sides flush to some ulps and
-edges in sides.
+10,000 random and near-parallel pairs, and 5,000 of slivers, rods, sides flush to some ulps, edges
+in sides, and plates of one thickness.
 """
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ CHUNK = 500
 SOLVER = ContactSolver((1, 1, 1), (1, 1, 1), model='exact')
 FAMILIES = {'random': poses.random_pairs, 'near-parallel': poses.near_parallel_pairs}
 THIN = {'ridges': poses.ridges, 'cards': poses.cards, 'flush': poses.flush_pairs,
-        'sharing an axis': poses.sharing_an_axis}
+        'sharing an axis': poses.sharing_an_axis, 'equal thickness': poses.equal_thickness}
 
 
 @pytest.mark.parametrize('chunk', range(10))
@@ -57,8 +57,12 @@ def check(family, chunk, a, b, size_a, size_b):
         if not found.colliding[i]:
             assert np.isnan(found.normal[i]).all() and np.isnan(found.point[i]).all(), where
             continue
-        # The normal is one of the axes whose gap is within 1e-12·size of the largest.
-        best = [oracle.as_array(axis) for _, axis, gap in gaps if gap >= separation - 1e-12 * size]
+        # The normal is one of the axes whose gap is within 1e-12·size of the largest; either way
+        # along it where B's centre is neither ahead nor behind.
+        offset = oracle.add(box_b.centre, box_a.centre, -1)
+        best = [oracle.as_array(oracle.scaled(axis, sign)) for _, axis, gap in gaps
+                for sign in (1, -1) if gap >= separation - 1e-12 * size
+                and (sign == 1 or abs(oracle.dot(offset, axis)) <= 1e-12 * size)]
         assert min(np.abs(axis - found.normal[i]).max() for axis in best) < 1e-9, where
         assert abs(np.linalg.norm(found.normal[i]) - 1) < 1e-14, where
         axis = tuple(mp.mpf(float(v)) for v in found.normal[i])
@@ -67,6 +71,23 @@ def check(family, chunk, a, b, size_a, size_b):
         bound = max(1e-9, 1e-14 * size / depth) * size
         assert np.abs(point - found.point[i]).max() <= bound, where
     return found.colliding
+
+
+def test_concentric_boxes_meet_in_their_middle():
+    """Flush on both sides, in any orientation, 100,000 pairs: the point is where both centres are.
+
+    Where a face lies in the other box's far face, rounding lets its corners be below and above it
+    by turns; cut in two as a whole, its middle was in both parts: 8 % of the size off.
+    """
+    a, b, size_a, size_b = poses.equal_thickness(np.random.default_rng(5), 200_000)
+    middle = (b[:, :3] == 0).all(axis=1)
+    a, b, size_a, size_b = (part[middle] for part in (a, b, size_a, size_b))
+    assert len(a) > 90_000
+    for model in ('exact', 'committee'):
+        found = ContactSolver((1, 1, 1), (1, 1, 1), model=model).batch(
+            a, b, size_a=size_a, size_b=size_b)
+        assert found.colliding.all()
+        assert np.abs(found.point).max() < 1e-13
 
 
 @pytest.mark.parametrize('gap', [-0.1, -0.01, -1e-3, -1e-6, -1e-9])

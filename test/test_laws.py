@@ -62,6 +62,18 @@ def test_swap(pairs):
     assert np.all(error[deep] <= 2 * point_bound(one, size)[deep])
 
 
+def test_swap_of_concentric_boxes():
+    """No offset says which box comes first: their sizes do, or their axes."""
+    rng = np.random.default_rng(12)
+    a, b = (np.concatenate([np.ones((20_000, 3)), poses.unit_quaternions(rng, 20_000)], axis=1)
+            for _ in range(2))
+    sizes = np.exp(rng.uniform(-1, 1, (2, 20_000, 3)))
+    for size_a, size_b in (sizes, sizes[[0, 0]], np.ones_like(sizes)):
+        one, two = solve(a, b, size_a, size_b), solve(b, a, size_b, size_a)
+        assert one.colliding.all()
+        assert np.array_equal(one.separation, two.separation)
+
+
 def test_rigid_motion(pairs):
     """Moved together, verdict and separation stay, normal and point move along."""
     a, b, size_a, size_b = pairs
