@@ -251,8 +251,8 @@ def _prepare(lanes, work):
         reach = max(max(max(abs(ax), abs(ay)), abs(az)), max(max(abs(bx), abs(by)), abs(bz)))
         work[SIZE + i] = size
         work[TOUCH + i] = CONTACT_ULPS * ulp(max(reach, size))
-        # Differences change their sign on a swap, so the first that is not zero says which box comes
-        # first: of the positions, of concentric boxes' sizes, or of their axes.
+        # Differences change their sign on a swap, so the first that is not zero says which box
+        # comes first: of the positions, of concentric boxes' sizes, or of their axes.
         order = _unless_zero(_unless_zero(tx, ty), tz)
         order = _unless_zero(_unless_zero(order, hb0 - ha0), _unless_zero(hb1 - ha1, hb2 - ha2))
         order = _unless_zero(order, _unless_zero(_unless_zero(b00 - a00, b10 - a10), b20 - a20))

@@ -41,6 +41,8 @@ def read_scene(source: str) -> Scene:
         if not path.is_absolute() and not path.exists():
             with suppress(FileNotFoundError):
                 path = resource_path(source)
+        if path.exists() and not path.is_file() and not path.is_dir():
+            raise OSError('it is no regular file')  # opening a FIFO would wait for its writer
         with path.open('rb') as file:
             data = file.read(LARGEST_FILE + 1)
         text = data.decode('utf-8')
@@ -63,7 +65,10 @@ def parse_scene(text: str, name: str = 'scene') -> Scene:
         return SceneError(f'{name}:{line}: {_dotted(path)}{": " if path else ""}{reason}')
 
     try:
+        text.encode('utf-8')
         data = _plain(text, lines, refusal)
+    except UnicodeEncodeError as error:
+        raise SceneError(f'{name}: not UTF-8 at character {error.start}') from error
     except yaml.YAMLError as error:
         mark = getattr(error, 'problem_mark', None)
         reason = getattr(error, 'problem', None) or str(error).replace('\n', ' ')
@@ -93,21 +98,22 @@ def _plain(text: str, lines: dict[Place, int], refusal: Any) -> Any:
     for event in yaml.parse(text, Loader=_Loader):
         depth += isinstance(event, yaml.CollectionStartEvent)
         depth -= isinstance(event, yaml.CollectionEndEvent)
-        if depth > DEEPEST:  # the C loader, which descends, would end the process
+        reason, tag = '', getattr(event, 'tag', None)
+        if getattr(event, 'anchor', None):
+            reason = 'anchors and aliases are not accepted'
+        elif tag:
+            reason = f'tag {shown(tag)} is not accepted'
+        elif depth > DEEPEST:  # the C loader, which descends, would end the process
+            reason = 'nested too deeply'
+        if reason:
             lines[()] = event.start_mark.line + 1 if event.start_mark else 1
-            raise refusal((), 'nested too deeply')
+            raise refusal((), reason)
     loader = _Loader(text)
     try:
         root = loader.get_single_node()
-        seen: set[int] = set()
 
         def value(node: Any, path: Place) -> Any:
             lines.setdefault(path, node.start_mark.line + 1)
-            if not node.tag.startswith('tag:yaml.org,2002:') or '/' in node.tag:
-                raise refusal(path, f'tag {shown(node.tag)} is not accepted')
-            if id(node) in seen:
-                raise refusal(path, 'anchors and aliases are not accepted')
-            seen.add(id(node))
             if isinstance(node, yaml.ScalarNode):
                 try:
                     return loader.construct_object(node)

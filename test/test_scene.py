@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from pathlib import Path
 
 import numpy as np
@@ -228,6 +229,10 @@ def test_a_box_in_no_pair_is_not_listened_to():
      ':4: boxes.spreader: has both pose'),
     ('pose_topic: /crane/spreader', 'size: [1, 1, 1]', ':6: boxes.spreader.size: is there twice'),
     ('size: [6, 2.4, 0.5]', 'size: &s [6, 2.4, 0.5]\n    pose: *s', 'anchors and aliases'),
+    ('size: [6, 2.4, 0.5]', 'size: [&s 6, 2.4, 0.5]', 'anchors and aliases'),
+    ('size: [6, 2.4, 0.5]', 'size: [!!float 6, 2.4, 0.5]', 'tag'),
+    ('size: [6, 2.4, 0.5]', 'size: [!!int "", 2.4, 0.5]', 'tag'),
+    ('size: [6, 2.4, 0.5]', 'size: [!!bool foo, 2.4, 0.5]', 'tag'),
     ('size: [6, 2.4, 0.5]', 'size: !!python/tuple [6, 2.4, 0.5]', ':5: '),
     ('a: spreader', 'a: lorry', ":12: pairs[1].a: 'lorry' is none of the boxes"),
     ('a: spreader', 'a: load', ":12: pairs[1].b: 'load' is the same box as a"),
@@ -235,6 +240,7 @@ def test_a_box_in_no_pair_is_not_listened_to():
     ('id: 4', 'id: 4294967296', ':12: pairs[1].id: 4294967296'),
     ('id: 4', 'id: four', ":12: pairs[1].id: 'four' is not a whole number"),
     ('name: grip', 'name: load_s1', ':12: pairs[1].name: the same name as pairs[0]'),
+    ('name: grip', 'name: "grip\\n"', ":12: pairs[1].name: 'grip\\n' is no name"),
     ('name: grip', 'name: load/s1', ":12: pairs[1].name: 'load/s1' is no name"),
     ('a: spreader, b: load', 'a: s1, b: load', ':12: pairs[1]: the same pair of boxes as pairs[0]'),
     ('  load: {size: [12.192, 2.438, 2.591]}', '  load: {size: [1, 1, 1], pose: '
@@ -257,10 +263,13 @@ def test_a_refusal_names_line_and_field(old, new, words, tmp_path):
 
 def test_files_that_cannot_be_read(tmp_path):
     (tmp_path / 'latin').write_bytes(b'boxes: \xff')
+    fifo = tmp_path / 'fifo'  # opening it would wait for a writer
+    os.mkfifo(fifo)
     for source, words in ((tmp_path / 'none.yaml', 'cannot be read: No such file'),
                           (tmp_path, 'cannot be read: Is a directory'),
                           (tmp_path / 'latin', 'not UTF-8 at byte 7'),
-                          ('a\0b', 'cannot be read'), ('x' * 10_000, 'cannot be read')):
+                          ('a\0b', 'cannot be read'), ('x' * 10_000, 'cannot be read'),
+                          (fifo, 'no regular file'), ('{\ud800}', 'not UTF-8')):
         with pytest.raises(SceneError, match=words):
             read_scene(str(source))
 

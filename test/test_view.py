@@ -313,6 +313,13 @@ def start_view(program, *arguments):
     return running, re.search(r'http://127\.0\.0\.1:\d+', output).group()
 
 
+def test_an_address_that_is_none_ends_it(program):
+    """It waited for ever for a server that could not start, and no signal ended it."""
+    running = program('view', '--no-browser', '--host', '1.2.3.4.5')
+    assert running.wait(60) == 1
+    assert 'error: ' in running.output and 'Traceback' not in running.output
+
+
 @pytest.mark.parametrize('number, status', [(signal.SIGINT, 0), (signal.SIGTERM, 143)])
 def test_no_process_is_left(program, number, status):
     """Node and crane have groups of their own; the view alone gets the signal."""

@@ -54,7 +54,7 @@ class Diagnostics:
             values |= {f'compute {name} [us]': f'{value:.1f}' for name, value in zip(
                 ('p50', 'p99', 'max'),
                 np.percentile(self._times[:min(ticks, KEPT_TIMES)], (50, 99, 100)))}
-        refused = any(new[name] for name in new if name.startswith('refused'))
+        refused = any(new[name] > 0 for name in new if name.startswith('refused'))
         unanswered = time.monotonic() - self._answered_at if new['poses'] and not refused else 0.0
         level, message = DiagnosticStatus.WARN, 'poses refused'
         if not refused:

@@ -10,6 +10,7 @@ import html
 import io
 import logging
 import math
+import socket
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
@@ -48,6 +49,9 @@ class Page:
     def __init__(self, host: str, port: int, *, landing: Landing | None,
                  on_model: Callable[[str], None], on_land: Callable[[Landing], None]) -> None:
         """Serve at a port, or the next that is free; `landing` None: no crane to be asked."""
+        # viser would wait for ever for a server that cannot start.
+        with socket.create_server((host, 0), family=socket.getaddrinfo(host, 0)[0][0]):
+            pass
         # Browsers open connections on suspicion, and close them unused; that is no error.
         logging.getLogger('websockets').setLevel(logging.CRITICAL)
         with contextlib.redirect_stdout(io.StringIO()):  # viser greets

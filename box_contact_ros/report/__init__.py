@@ -24,6 +24,13 @@ def model_name(text: str) -> str:
     raise argparse.ArgumentTypeError(f'{shown(text)} is not one of: {MODEL_NAMES}')
 
 
+def seed_number(text: str) -> int:
+    """A seed of random numbers, as a program's argument: a whole number from 0."""
+    if not text.isascii() or not text.isdecimal() or len(text) > 18:
+        raise argparse.ArgumentTypeError(f'{shown(text)} is no whole number from 0')
+    return int(text)
+
+
 def results_folder(options: argparse.Namespace) -> Path:
     """Where results are written: a quick run never replaces those of a full one unasked."""
     return options.out or Path('quick-results' if options.quick else 'docs')

@@ -59,7 +59,7 @@ from ..sites import centroid_block, site_numbers
 from ..solver import MODELS, ContactSolver
 from ..training import dataset
 from ..training.errors import errors_of, figures, wrapped
-from . import add_out, results_folder
+from . import add_out, results_folder, seed_number
 from .paper import PAPER, processor
 
 
@@ -510,7 +510,8 @@ def main(args: Sequence[str] | None = None) -> int:
     parser.add_argument('--weights', help='weights file of committee, default: the shipped one')
     parser.add_argument('--pairs', type=int, default=PAIRS, help='a set, default: %(default)s')
     parser.add_argument('--quick', action='store_true', help=f'{QUICK_PAIRS} pairs a set')
-    parser.add_argument('--seed', type=int, default=2, help='of the sets, default: %(default)s')
+    parser.add_argument('--seed', type=seed_number, default=2,
+                        help='of the sets, default: %(default)s')
     add_out(parser, 'accuracy.md, accuracy.csv, accuracy.png')
     options = parser.parse_args(args)
     options.out = results_folder(options)

@@ -30,7 +30,7 @@ from ..network import load_weights
 from ..posesets import CONTAINER, SETS, Generator, Pairs, any_pose, log_uniform, pressed, stacked
 from ..resources import resource_path
 from ..solver import ContactSolver
-from . import add_out, results_folder
+from . import add_out, results_folder, seed_number
 from .accuracy import CLASSES, classify, markdown
 from .paper import processor
 from .paper_soup import PAPER as PAPER_SOUP
@@ -494,7 +494,8 @@ def main(args: Sequence[str] | None = None) -> int:
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     add_out(parser, 'frontier.md, .csv, .png')
     parser.add_argument('--quick', action='store_true', help='few pairs, to try it out')
-    parser.add_argument('--seed', type=int, default=3, help='of the sets (default: %(default)s)')
+    parser.add_argument('--seed', type=seed_number, default=3,
+                        help='of the sets (default: %(default)s)')
     parser.add_argument('--core', type=int, help='core to run on (default: the last one)')
     options = parser.parse_args(args)
     options.out = results_folder(options)

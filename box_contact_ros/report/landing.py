@@ -36,7 +36,7 @@ from ..landing import (
     scenario_of,
 )
 from ..solver import MODELS, ContactSolver
-from . import add_out, results_folder
+from . import add_out, results_folder, seed_number
 
 matplotlib.use('Agg')
 from matplotlib import pyplot as plt  # noqa: E402
@@ -217,7 +217,7 @@ def main(args: Sequence[str] | None = None) -> int:
                         help='from asking to acting [s], default: %(default)s')
     parser.add_argument('--dds', action='store_true', help='contacts from a contact node, over '
                         'DDS in lockstep; one landing at a time')
-    parser.add_argument('--seed', type=int, default=1, help='of yaws and headings')
+    parser.add_argument('--seed', type=seed_number, default=1, help='of yaws and headings')
     parser.add_argument('--quick', action='store_true', help=f'every {QUICK}th landing only')
     parser.add_argument('--workers', type=int, default=os.cpu_count(), help='processes')
     add_out(parser, 'landing.csv, landing.md, landing.png')

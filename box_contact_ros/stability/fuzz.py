@@ -21,7 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..report import model_name
+from ..report import model_name, seed_number
 from ..solver import ContactSolver
 from .judge import GATES, exact_gap, judge
 
@@ -369,7 +369,7 @@ def main(args: Sequence[str] | None = None) -> int:
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('--pairs', type=int, default=PAIRS, help='in all (default: %(default)s)')
     parser.add_argument('--quick', action='store_true', help=f'{QUICK_PAIRS:,} pairs')
-    parser.add_argument('--seed', type=int, default=1, help='default: %(default)s')
+    parser.add_argument('--seed', type=seed_number, default=1, help='default: %(default)s')
     parser.add_argument('--classes', nargs='+', choices=list(CLASSES), default=list(CLASSES),
                         metavar='CLASS', help=f'of {", ".join(CLASSES)} (default: all)')
     parser.add_argument('--models', nargs='+', type=model_name, default=list(MODELS),
