@@ -86,11 +86,6 @@ def squared_norm(x, y, z, w):
 
 
 @inlined
-def _unless_zero(one, other):
-    return one if one != 0.0 else other
-
-
-@inlined
 def pose_valid(x, y, z, norm2):
     # Written so that NaN fails every comparison. An overflown square is infinite, and fails too.
     return (abs(x) <= LENGTH_MAX and abs(y) <= LENGTH_MAX and abs(z) <= LENGTH_MAX
@@ -201,7 +196,7 @@ def _replace_bad(work, count):
 @inlined
 def _prepare(lanes, work):
     """From poses and sizes to what the axes are tested on; returns the number of good pairs."""
-    good = 0
+    good = concentric = 0
     for i in range(lanes):
         x, y, z, w = (work[TURN_A + i], work[TURN_A + LANES + i], work[TURN_A + 2 * LANES + i],
                       work[TURN_A + 3 * LANES + i])
@@ -251,14 +246,34 @@ def _prepare(lanes, work):
         reach = max(max(max(abs(ax), abs(ay)), abs(az)), max(max(abs(bx), abs(by)), abs(bz)))
         work[SIZE + i] = size
         work[TOUCH + i] = CONTACT_ULPS * ulp(max(reach, size))
-        # Differences change their sign on a swap, so the first that is not zero says which box
-        # comes first: of the positions, of concentric boxes' sizes, or of their axes.
-        order = _unless_zero(_unless_zero(tx, ty), tz)
-        order = _unless_zero(_unless_zero(order, hb0 - ha0), _unless_zero(hb1 - ha1, hb2 - ha2))
-        order = _unless_zero(order, _unless_zero(_unless_zero(b00 - a00, b10 - a10), b20 - a20))
-        order = _unless_zero(order, _unless_zero(_unless_zero(b01 - a01, b11 - a11), b21 - a21))
-        work[A_FIRST + i] = 1.0 if order >= 0.0 else 0.0
+        # The sign of B − A changes on a swap, so its first component that is not zero says which
+        # box comes first.
+        later = ty > 0.0 or (ty == 0.0 and tz >= 0.0)
+        work[A_FIRST + i] = 1.0 if (tx > 0.0 or (tx == 0.0 and later)) else 0.0
+        concentric += 1 if (tx == 0.0 and ty == 0.0 and tz == 0.0) else 0
+    if concentric > 0:
+        _order_concentric(lanes, work)
     return good
+
+
+@kernel
+def _order_concentric(lanes, work):
+    """A_FIRST of boxes with the same middle: by their sizes, or else by their axes."""
+    for i in range(lanes):
+        if (work[OFFSET_A + i] == 0.0 and work[OFFSET_A + LANES + i] == 0.0
+                and work[OFFSET_A + 2 * LANES + i] == 0.0):
+            order = 0.0
+            for k in range(3):
+                if order == 0.0:
+                    order = work[HALF_B + k * LANES + i] - work[HALF_A + k * LANES + i]
+            a = rotation_entries(work[TURN_A + i], work[TURN_A + LANES + i],
+                                 work[TURN_A + 2 * LANES + i], work[TURN_A + 3 * LANES + i])
+            b = rotation_entries(work[TURN_B + i], work[TURN_B + LANES + i],
+                                 work[TURN_B + 2 * LANES + i], work[TURN_B + 3 * LANES + i])
+            for k in range(9):
+                if order == 0.0:
+                    order = b[k] - a[k]
+            work[A_FIRST + i] = 1.0 if order >= 0.0 else 0.0
 
 
 @kernel
