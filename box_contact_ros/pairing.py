@@ -104,6 +104,7 @@ class StampPairing(_Pairing):
         self._taken: dict[str, deque[int]] = {}
         self._missing_since: dict[str, int] = {}  # stamp of the first tick that a box lacks
         self._went_without: dict[str, deque[int]] = {}  # ticks answered without a box, by stamp
+        self._newest_without = NEVER                    # of all boxes
         self._answered = False
         self._were_stale: set[str] = set()
         self._changed = False  # a tick may wait for nothing any more: time to look all of them over
@@ -131,6 +132,7 @@ class StampPairing(_Pairing):
         self._waiting.clear()
         self._missing_since.clear()
         self._answered = False
+        self._newest_without = NEVER
         for stamps in (*self._taken.values(), *self._went_without.values()):
             stamps.clear()
 
@@ -150,7 +152,7 @@ class StampPairing(_Pairing):
         key = self._slot(box, stamp) if self.tolerance else stamp
         poses = waiting.get(key)
         if poses is None:
-            if self._went_without[box] and self._is_too_late(box, stamp):
+            if stamp <= self._newest_without + self.tolerance and self._is_too_late(box, stamp):
                 self.counts[TOO_LATE] += 1
                 return []
             poses = waiting[key] = {}
@@ -167,6 +169,7 @@ class StampPairing(_Pairing):
         """A waiting tick, which waits no more."""
         poses = self._waiting.pop(key)
         if len(poses) < len(self.boxes):
+            self._newest_without = max(self._newest_without, key)
             for box in self.boxes:
                 if box not in poses:
                     self._went_without[box].append(key)
