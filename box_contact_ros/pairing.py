@@ -152,7 +152,7 @@ class StampPairing(_Pairing):
         key = self._slot(box, stamp) if self.tolerance else stamp
         poses = waiting.get(key)
         if poses is None:
-            if stamp <= self._newest_without + self.tolerance and self._is_too_late(box, stamp):
+            if self._is_too_late(box, stamp):
                 self.counts[TOO_LATE] += 1
                 return []
             poses = waiting[key] = {}
@@ -177,7 +177,8 @@ class StampPairing(_Pairing):
 
     def _is_too_late(self, box: str, stamp: int) -> bool:
         """Whether the tick of a pose was answered without its box."""
-        return any(abs(key - stamp) <= self.tolerance for key in self._went_without[box])
+        return stamp <= self._newest_without + self.tolerance and any(
+            abs(key - stamp) <= self.tolerance for key in self._went_without[box])
 
     def _refuses(self, box: str, stamp: int) -> bool:
         """Whether a stamp has been taken before, or is too old to tell.
