@@ -282,9 +282,9 @@ def _fault(work, i):
         origin = ORIGIN_A if box == 0 else ORIGIN_B
         turn = TURN_A if box == 0 else TURN_B
         norm2 = squared_norm(work[turn + i], work[turn + LANES + i], work[turn + 2 * LANES + i],
-                              work[turn + 3 * LANES + i])
+                             work[turn + 3 * LANES + i])
         if not pose_valid(work[origin + i], work[origin + LANES + i],
-                           work[origin + 2 * LANES + i], norm2):
+                          work[origin + 2 * LANES + i], norm2):
             return BAD_POSE_A + box
     half = HALF_A
     if not _size_valid(2.0 * work[half + i], 2.0 * work[half + LANES + i],

@@ -272,7 +272,7 @@ class ContactNode(LifecycleNode):
                                  f'used again while a node runs')
 
     def _check_topics(self, scene: Scene, pair_topics: bool) -> None:
-        """ValueError where a name, in this node's namespace and remapped, cannot be a topic's."""
+        """Raise ValueError for a name that, in this namespace and remapped, can be no topic's."""
         topics = [scene.boxes[box].pose_topic for box in scene.moving]
         if pair_topics:
             topics += [f'{self._prefix(pair)}/normal' for pair in scene.pairs]
