@@ -51,13 +51,13 @@ test: .venv/.installed-test
 	echo 'mypy'
 	$(VENV_PYTHON) -m mypy
 	echo 'pytest'
-	# The page's and the soup node's tests in a process of their own: after two thousand others in one
-	# process, with their nodes and libraries, their nodes were seen to hear nothing.
+	# The page's tests in a process of their own: after two thousand others in one process, with their
+	# nodes and libraries, its node was seen to hear nothing.
 	if [ -n '$(subst ','\'',$(ARGS))' ]; then
 	    exec $(VENV_PYTHON) -m pytest $(ARGS)
 	fi
-	$(VENV_PYTHON) -m pytest --ignore=test/test_view.py --ignore=test/test_soup_node.py
-	exec $(VENV_PYTHON) -m pytest test/test_soup_node.py test/test_view.py
+	$(VENV_PYTHON) -m pytest --ignore=test/test_view.py
+	exec $(VENV_PYTHON) -m pytest test/test_view.py
 
 lint: .venv/.installed-test
 	@$(VENV_PYTHON) -m ruff check . $(ARGS)

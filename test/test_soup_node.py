@@ -1,7 +1,6 @@
 """The soup node: beside the contact node on one input, and as a process of its own."""
 from __future__ import annotations
 
-import contextlib
 import math
 import signal
 
@@ -69,20 +68,11 @@ def soup_node():
 
 @pytest.fixture(scope='module')
 def client(soup_node):
-    """With a contact node beside the soup node; both have answered.
-
-    Once, in the middle of the suite, the contact node and a client never found each other, as in
-    `Client.client_of`: another client is made then.
-    """
+    """With a contact node beside the soup node; both have answered."""
+    client = BothClient()
     with serving(lambda context: ContactNode(
             context, parameter_overrides=overrides(model='exact'))):
-        client = BothClient()
-        with contextlib.suppress(AssertionError):
-            client.offer_until_answered(ORIGIN, APART, timeout=20.0)
-        if not client.clouds:
-            client.close()
-            client = BothClient()
-            client.offer_until_answered(ORIGIN, APART)
+        client.offer_until_answered(ORIGIN, APART)
         assert client.spin(lambda: client.soup['contacts'] or not client.send(ORIGIN, APART), 60.0)
         yield client
     client.close()

@@ -199,7 +199,9 @@ def _report(options: argparse.Namespace, subjects: list[Subject], notes: list[st
     if interrupted and not results:
         print('\ninterrupted before the first stream had been answered: no results')
         return False
-    lines = [*notes, *(['interrupted: of streams that ended before'] if interrupted else [])]
+    lines = list(notes)
+    if interrupted:
+        lines.append('interrupted: figures are of the streams that ended before')
     for name in [subject.name for subject in subjects]:
         lines.append(f'{name}: {_sum(name, results)}')
     adds_up = all(r.adds_up for r in results) and all(s.log.adds_up for s in subjects)
