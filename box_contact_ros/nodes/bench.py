@@ -22,6 +22,7 @@ import numpy as np
 from rclpy.utilities import remove_ros_args
 from tqdm import tqdm
 
+from ..arguments import make_folder
 from ..contact import Contacts
 from ..solver import MODELS, MOST_SOUP_DIVISIONS, SOUP_DIVISIONS, ContactSolver
 from ..streams import STREAMS, Stream, by_sizes, make_stream
@@ -135,6 +136,7 @@ def _options(args: Sequence[str]) -> argparse.Namespace:
         options.domain = random.choice(DOMAINS)
     if not 0 <= options.domain <= DOMAINS[-1]:
         parser.error(f'--domain must lie in 0 to {DOMAINS[-1]}, got {options.domain}')
+    make_folder(parser, options.out)
     return options
 
 
@@ -218,7 +220,6 @@ def _report(options: argparse.Namespace, subjects: list[Subject], notes: list[st
     print(f'\n{text}')
     print('\n'.join(lines), flush=True)
     if results:
-        options.out.mkdir(parents=True, exist_ok=True)
         write_csv(options.out / 'bench.csv', results, about)
         where = '\n'.join(f'- {name}: {value}' for name, value in about.items())
         found = '\n'.join(f'- {line}' for line in lines)

@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 from rclpy.utilities import remove_ros_args
 
+from ..arguments import make_folder
 from ..contact import Contacts
 from ..solver import MODELS, ContactSolver
 from ..streams import Stream, make_stream
@@ -159,6 +160,7 @@ def _options(args: Sequence[str]) -> argparse.Namespace:
                             ('domain', 0, DOMAINS[-1])):
         if not low <= getattr(options, name) <= high:
             parser.error(f'--{name} must lie in {low:g} to {high:g}, got {getattr(options, name)}')
+    make_folder(parser, options.out)
     options.seconds = 2.0 if options.quick else 60.0 * options.minutes
     return options
 
@@ -221,7 +223,6 @@ def _report(options: argparse.Namespace, subjects: list[Subject], bench: SoakBen
     lines += bench.notes
     text = '\n'.join(f'- {line}' for line in lines)
     print(f'\n{markdown(table, left=1)}\n\n{text}', flush=True)
-    options.out.mkdir(parents=True, exist_ok=True)
     write_csv(options.out / 'soak.csv', [*contact, *bare, *echo],
               {name: value for name, value in about.items() if name != 'model'})  # a column already
     where = '\n'.join(f'- {name}: {value}' for name, value in about.items())

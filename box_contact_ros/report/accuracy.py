@@ -26,6 +26,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..arguments import seed_number
 from ..block import (
     AXIS,
     FACE,
@@ -59,7 +60,7 @@ from ..sites import centroid_block, site_numbers
 from ..solver import MODELS, ContactSolver
 from ..training import dataset
 from ..training.errors import errors_of, figures, wrapped
-from . import add_out, results_folder, seed_number
+from . import add_out, results_folder
 from .paper import PAPER, processor
 
 
@@ -514,7 +515,7 @@ def main(args: Sequence[str] | None = None) -> int:
                         help='of the sets, default: %(default)s')
     add_out(parser, 'accuracy.md, accuracy.csv, accuracy.png')
     options = parser.parse_args(args)
-    options.out = results_folder(options)
+    options.out = results_folder(parser, options)
     if options.pairs < 1:
         parser.error('--pairs must be at least 1')
     count = min(options.pairs, QUICK_PAIRS) if options.quick else options.pairs
@@ -534,7 +535,6 @@ def main(args: Sequence[str] | None = None) -> int:
             broken.append(f"committee, the paper's external set: "
                           f'{drawn - len(errors["committee"])} contacts missed')
     given = sys.argv[1:] if args is None else args
-    options.out.mkdir(parents=True, exist_ok=True)
     write_csv(options.out / 'accuracy.csv', results)
     command = ' '.join(['python -m box_contact_ros accuracy', *given])
     (options.out / 'accuracy.md').write_text(

@@ -26,11 +26,12 @@ from typing import Any
 
 import numpy as np
 
+from ..arguments import seed_number
 from ..network import load_weights
 from ..posesets import CONTAINER, SETS, Generator, Pairs, any_pose, log_uniform, pressed, stacked
 from ..resources import resource_path
 from ..solver import ContactSolver
-from . import add_out, results_folder, seed_number
+from . import add_out, results_folder
 from .accuracy import CLASSES, classify, markdown
 from .paper import processor
 from .paper_soup import PAPER as PAPER_SOUP
@@ -498,7 +499,7 @@ def main(args: Sequence[str] | None = None) -> int:
                         help='of the sets (default: %(default)s)')
     parser.add_argument('--core', type=int, help='core to run on (default: the last one)')
     options = parser.parse_args(args)
-    options.out = results_folder(options)
+    options.out = results_folder(parser, options)
     restore = _pinned(options.core, parser.error)
     try:
         found, missing = contestants(options.quick)
@@ -508,7 +509,6 @@ def main(args: Sequence[str] | None = None) -> int:
     finally:
         restore()
     given = sys.argv[1:] if args is None else args
-    options.out.mkdir(parents=True, exist_ok=True)
     write_csv(options.out / 'frontier.csv', cells)
     (options.out / 'frontier.md').write_text(
         page(cells, missing, ' '.join(['python -m box_contact_ros frontier', *given])),

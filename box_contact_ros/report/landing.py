@@ -24,6 +24,7 @@ import matplotlib
 import numpy as np
 from tqdm import tqdm
 
+from ..arguments import seed_number
 from ..contact_force import GRAVITY
 from ..landing import (
     SETTLING,
@@ -36,7 +37,7 @@ from ..landing import (
     scenario_of,
 )
 from ..solver import MODELS, ContactSolver
-from . import add_out, results_folder, seed_number
+from . import add_out, results_folder
 
 matplotlib.use('Agg')
 from matplotlib import pyplot as plt  # noqa: E402
@@ -222,10 +223,9 @@ def main(args: Sequence[str] | None = None) -> int:
     parser.add_argument('--workers', type=int, default=os.cpu_count(), help='processes')
     add_out(parser, 'landing.csv, landing.md, landing.png')
     options = parser.parse_args(args)
-    options.out = results_folder(options)
+    options.out = results_folder(parser, options)
     jobs = jobs_of(options.models, options.rates, options.latency, seed=options.seed,
                    step=QUICK if options.quick else 1)
-    options.out.mkdir(parents=True, exist_ok=True)
     if options.dds:
         results = list(tqdm(over_dds(jobs), total=len(jobs), desc='landings', unit=''))
     else:

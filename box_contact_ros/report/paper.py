@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..arguments import make_room
 from ..network import Weights, WeightsError, load_weights
 from ..resources import resource_path
 from ..training import dataset
@@ -295,8 +296,7 @@ def main(args: Sequence[str] | None = None) -> int:
     drawn = options.figure or (() if chosen else FIGURES)
     folder = Path() if options.figure else None
     if options.out is not None:
-        folder = options.out.parent
-        folder.mkdir(parents=True, exist_ok=True)
+        folder = make_room(parser, options.out).parent
     try:
         page = report(tables, drawn, quick=options.quick, folder=folder)
     except (WeightsError, FileNotFoundError) as error:

@@ -19,6 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..arguments import make_folder
 from ..posesets import CUBE, SETS, Pairs
 from ..solver import ContactSolver
 
@@ -184,6 +185,8 @@ def main(args: Sequence[str] | None = None) -> int:
     parser.add_argument('--quick', action='store_true', help='few rounds, to try it out')
     parser.add_argument('--core', type=int, help='core to run on (default: the last one)')
     options = parser.parse_args(args)
+    if options.out:
+        make_folder(parser, options.out)
     cores = sorted(os.sched_getaffinity(0))
     core = cores[-1] if options.core is None else options.core
     os.sched_setaffinity(0, {core})
@@ -206,7 +209,6 @@ def main(args: Sequence[str] | None = None) -> int:
         'batches, and a cost that is the same for every pose.\n')
     print(page)
     if options.out:
-        options.out.mkdir(parents=True, exist_ok=True)
         (options.out / 'speed.md').write_text(page)
         with (options.out / 'speed.csv').open('w', newline='') as file:
             writer = csv.writer(file)

@@ -21,7 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..report import model_name, seed_number
+from ..arguments import make_room, model_name, seed_number
 from ..solver import ContactSolver
 from .judge import GATES, exact_gap, judge
 
@@ -352,7 +352,6 @@ def _mapped(jobs: Sequence[tuple], workers: int) -> Iterator[list[Tally]]:
 
 def write_csv(path: Path, tallies: dict[tuple[str, str], Tally]) -> None:
     """A row per class and model."""
-    path.parent.mkdir(parents=True, exist_ok=True)
     with path.open('w', newline='') as file:
         writer = csv.writer(file, lineterminator='\n')
         gates = list(next(iter(tallies.values())).faults)
@@ -381,6 +380,8 @@ def main(args: Sequence[str] | None = None) -> int:
     for name in ('pairs', 'workers'):
         if getattr(options, name) < 1:
             parser.error(f'--{name} must be at least 1')
+    if options.out:
+        make_room(parser, options.out)
     began = time.monotonic()
     tallies = fuzz(QUICK_PAIRS if options.quick else options.pairs, seed=options.seed,
                    classes=options.classes, models=options.models, workers=options.workers)

@@ -18,8 +18,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ..arguments import make_folder, model_name
 from ..posesets import Pairs
-from ..report import model_name
 from ..solver import MODELS, ContactSolver
 from .families import FAMILIES, Cases, load
 from .fuzz import TOUCH_ULPS
@@ -256,7 +256,7 @@ def main(args: Sequence[str] | None = None) -> int:
                              'quick-results with fewer models or families than that)')
     options = parser.parse_args(args)
     whole = set(options.models) >= set(REPORTED) and set(options.families) == set(FAMILIES)
-    folder = options.out or Path('docs' if whole else 'quick-results')
+    folder = make_folder(parser, options.out or Path('docs' if whole else 'quick-results'))
     cases, rows = load(), []
     with tqdm(total=len(options.models) * len(options.families), desc='stability',
               unit='family') as bar:
@@ -267,7 +267,6 @@ def main(args: Sequence[str] | None = None) -> int:
                 rows.append((examine_apart if apart else examine)(model, name, cases[name]))
                 bar.update()
     given = sys.argv[1:] if args is None else args
-    folder.mkdir(parents=True, exist_ok=True)
     write_csv(folder / 'stability.csv', rows)
     (folder / 'stability.md').write_text(
         page(rows, ' '.join(['python -m box_contact_ros stability', *given])), encoding='utf-8')

@@ -15,7 +15,6 @@ import csv
 import dataclasses
 import math
 import sys
-import tempfile
 import time
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -23,6 +22,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
+from ..arguments import make_folder
 from ..block import LANES, new_work
 from ..jit import kernel
 from ..network import (
@@ -557,12 +557,7 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
         if getattr(options, name) < least:
             parser.error(f'--{name} {getattr(options, name)} is too small: {least} or more')
     options.device = device_of(options.device)
-    try:
-        options.out.mkdir(parents=True, exist_ok=True)
-        tempfile.TemporaryFile(dir=options.out).close()
-    except OSError as error:  # said now, not after minutes of training
-        parser.error(
-            f'cannot write to {options.out} ({error.strerror}): name a folder with --out')
+    make_folder(parser, options.out)
     return options
 
 

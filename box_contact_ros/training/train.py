@@ -9,7 +9,6 @@ import argparse
 import dataclasses
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -17,6 +16,7 @@ from typing import Any
 
 import torch
 
+from ..arguments import make_folder
 from ..network import load_weights, save_weights
 from ..resources import resource_path
 from ..sites import UNITS_MAX
@@ -225,13 +225,7 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
         if not options.sizes:
             parser.error(f'{options.scene}: no pair of sizes is within the range of the committee')
     shipped = resource_path('package.xml').parent / 'weights'
-    options.out = options.out or (Path() if options.scene else shipped)
-    try:
-        options.out.mkdir(parents=True, exist_ok=True)
-        tempfile.TemporaryFile(dir=options.out).close()
-    except OSError as error:  # said now, not after minutes of training
-        parser.error(
-            f'cannot write to {options.out} ({error.strerror}): name a folder with --out')
+    options.out = make_folder(parser, options.out or (Path() if options.scene else shipped))
     options.device = device_of(options.device)
     return options
 
