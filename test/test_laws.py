@@ -1,6 +1,7 @@
 """Laws that a right answer obeys, over random and near-parallel pairs."""
 from __future__ import annotations
 
+import functools
 import itertools
 
 import numpy as np
@@ -8,6 +9,7 @@ import poses
 import pytest
 
 from box_contact_ros import ContactSolver
+from box_contact_ros.stability import fuzz
 
 N = 2000
 SOLVER = ContactSolver((1, 1, 1), (1, 1, 1), model='exact')
@@ -176,6 +178,49 @@ def test_point_lies_in_both_boxes(pairs):
         inverse = pose[:, 3:] * (-1, -1, -1, 1)
         local = np.abs(poses.rotate(inverse, found.point - pose[:, :3]))
         assert np.all((local - size / 2).max(axis=1)[found.colliding] <= slack[found.colliding])
+
+
+def parts_of(rng, pose, size):
+    """Boxes (pose, size) each cut in two across one of its axes: the parts, as two such pairs."""
+    n = len(pose)
+    across = np.eye(3)[rng.integers(0, 3, n)]
+    cut = rng.uniform(0.02, 0.98, n)[:, None]
+    turn = pose[:, 3:] / np.linalg.norm(pose[:, 3:], axis=1, keepdims=True)
+    for begin, end in ((np.zeros((n, 1)), cut), (cut, np.ones((n, 1)))):
+        part = pose.copy()
+        part[:, :3] += poses.rotate(turn, across * size * (0.5 * (begin + end) - 0.5))
+        yield part, np.where(across > 0, size * (end - begin), size)
+
+
+PARTED = {**{name: functools.partial(fuzz.draw, name) for name in fuzz.CLASSES},
+          **{kind.__name__: kind for kind in (poses.random_pairs, poses.near_parallel_pairs,
+                                              poses.equal_thickness)}}
+
+
+@pytest.mark.parametrize('kind', PARTED)
+def test_the_point_is_between_those_of_the_parts(kind):
+    """B is cut in two: the centroid of the whole lies on the way between the parts' centroids.
+
+    100,000 pairs. It needs no oracle, so that it can be asked of as many as one likes.
+    """
+    rng = np.random.default_rng(21)
+    a, b, size_a, size_b = PARTED[kind](rng, 100_000)
+    size = largest(size_a, size_b)
+    whole = solve(a, b, size_a, size_b)
+    # Far from the origin, cutting would round the parts' places.
+    rows = whole.colliding & (np.abs(a[:, :3]).max(axis=1) < 20.0 * size)
+    points, bound = [], point_bound(whole, size)
+    for part, its_size in parts_of(rng, b, size_b):
+        found = solve(a, part, size_a, its_size)
+        rows &= found.colliding & (found.separation < -1e-7 * size)  # else it has been pressed in
+        points.append(found.point)
+        bound += point_bound(found, size)
+    assert rows.sum() > 15_000
+    one, two, point = points[0][rows], points[1][rows], whole.point[rows]
+    way = two - one
+    share = np.sum((point - one) * way, axis=1) / np.sum(way * way, axis=1)
+    off = np.linalg.norm(one + np.clip(share, 0.0, 1.0)[:, None] * way - point, axis=1)
+    assert np.all(off <= bound[rows])
 
 
 def test_reflection(pairs):
