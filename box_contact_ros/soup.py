@@ -150,6 +150,10 @@ class Soup:
         # for A and for B.
         self._object = functools.lru_cache(maxsize=64)(new_object)
 
+    def __reduce__(self) -> tuple[type[Soup], tuple[int]]:
+        """Pickled without what is kept, which FCL cannot write: for pools of processes."""
+        return Soup, (self.divisions,)
+
     @property
     def exact_answers(self) -> int:
         """`soup_misses`, under the name that all models have for it."""

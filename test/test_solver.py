@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import math
 import os
+import pickle
 import shutil
 import subprocess
 import sys
@@ -18,6 +19,7 @@ from hypothesis import strategies as st
 from box_contact_ros import Contact, ContactSolver
 from box_contact_ros.checks import pose_fault
 from box_contact_ros.pose import quaternion_from_matrix, quaternion_multiply, rotation_matrix
+from box_contact_ros.solver import MODELS
 
 ROOT = Path(__file__).resolve().parents[1]
 SOLVER = ContactSolver(poses.CUBE, poses.CUBE, model='exact')
@@ -42,6 +44,18 @@ def test_results_are_not_shared():
     kept = one.point.copy()
     SOLVER(poses.IDENTITY, [0, 0, 1.5, 0, 0, 0, 1])
     assert np.array_equal(one.point, kept)
+
+
+@pytest.mark.parametrize('model', MODELS)
+def test_a_solver_goes_to_other_processes(model):
+    """Pickled and back, for a pool of processes, it answers the same."""
+    solver = ContactSolver((1, 2, 3), poses.CUBE, model=model) if 'paper' not in model else (
+        ContactSolver(poses.CUBE, poses.CUBE, model=model))
+    other = pickle.loads(pickle.dumps(solver))
+    assert other.model == model
+    above = [0.1, 0.05, 1.9, 0.02, 0.01, 0, 1]
+    for one, two in zip(solver(poses.IDENTITY, above), other(poses.IDENTITY, above)):
+        assert np.array_equal(one, two)
 
 
 @pytest.mark.parametrize('gap, colliding', [
