@@ -193,8 +193,9 @@ def parts_of(rng, pose, size):
 
 
 PARTED = {**{name: functools.partial(fuzz.draw, name) for name in fuzz.CLASSES},
-          **{kind.__name__: kind for kind in (poses.random_pairs, poses.near_parallel_pairs,
-                                              poses.equal_thickness)}}
+          **{kind.__name__: kind for kind in (
+              poses.random_pairs, poses.near_parallel_pairs, poses.flush_pairs,
+              poses.equal_thickness, poses.ridges, poses.cards, poses.sharing_an_axis)}}
 
 
 @pytest.mark.parametrize('kind', PARTED)
@@ -212,10 +213,10 @@ def test_the_point_is_between_those_of_the_parts(kind):
     points, bound = [], point_bound(whole, size)
     for part, its_size in parts_of(rng, b, size_b):
         found = solve(a, part, size_a, its_size)
-        rows &= found.colliding & (found.separation < -1e-7 * size)  # else it has been pressed in
+        rows &= found.colliding & (found.separation < -1e-8 * size)  # else it has been pressed in
         points.append(found.point)
         bound += point_bound(found, size)
-    assert rows.sum() > 15_000
+    assert rows.sum() > 5_000
     one, two, point = points[0][rows], points[1][rows], whole.point[rows]
     way = two - one
     share = np.sum((point - one) * way, axis=1) / np.sum(way * way, axis=1)
