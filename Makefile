@@ -51,13 +51,7 @@ test: .venv/.installed-test
 	echo 'mypy'
 	$(VENV_PYTHON) -m mypy
 	echo 'pytest'
-	# The page's tests in a process of their own: after two thousand others in one process, with their
-	# nodes and libraries, its node was seen to hear nothing.
-	if [ -n '$(subst ','\'',$(ARGS))' ]; then
-	    exec $(VENV_PYTHON) -m pytest $(ARGS)
-	fi
-	$(VENV_PYTHON) -m pytest --ignore=test/test_view.py
-	exec $(VENV_PYTHON) -m pytest test/test_view.py
+	exec $(VENV_PYTHON) -m pytest $(ARGS)
 
 lint: .venv/.installed-test
 	@$(VENV_PYTHON) -m ruff check . $(ARGS)
