@@ -170,8 +170,24 @@ def _component(work, i, p0, p1, p2, p3):
 
 
 @kernel
+def _to_unit_size(work, turn, i):
+    """Scale a quaternion by a power of two to a largest component in [½, 1).
+
+    Its length may be anything, and fourth powers of it must not leave the range of a double.
+    """
+    largest = 0.0
+    for k in range(4):
+        largest = max(largest, abs(work[turn + k * LANES + i]))
+    exponent = math.frexp(largest)[1]
+    for k in range(4):
+        work[turn + k * LANES + i] = math.ldexp(work[turn + k * LANES + i], -exponent)
+
+
+@kernel
 def refine(work, i):
     """Evaluate pair `i` anew: SEPARATION, AXIS and NORMAL."""
+    _to_unit_size(work, TURN_A, i)
+    _to_unit_size(work, TURN_B, i)
     r, a, t, tb = np.empty((9, 2)), np.empty((9, 2)), np.empty((3, 2)), np.empty((3, 2))
     # conj(A) ⊗ B. Products are numbered 4 k + j + 1 for component k of A, j of B (x, y, z, w).
     _rotation(_component(work, i, 13, -4, -7, 10), _component(work, i, 14, 3, -8, -9),

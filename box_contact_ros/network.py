@@ -101,10 +101,14 @@ def load_weights(path: Path | str) -> Weights:
         if not isinstance(card, dict):
             raise TypeError('the card is no JSON object')
         missing = [field for field in CARD_FIELDS if field not in card]
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, RecursionError) as error:
         raise WeightsError(f'weights file {path} has no readable model card') from error
     if missing:
         raise WeightsError(f'weights file {path}: the model card lacks {", ".join(missing)}')
+    for field, kind in (('inputs', dict), ('sizes', list)):
+        if not isinstance(card[field], kind):
+            raise WeightsError(f'weights file {path}: {field} of the model card is no '
+                               f'{"object" if kind is dict else "list"}')
     for name, array in tensors.items():
         if array.dtype != np.float32:
             raise WeightsError(f'weights file {path}: {name} is {array.dtype}, not float32')

@@ -157,6 +157,8 @@ class StampPairing(_Pairing):
                 return []
             poses = waiting[key] = {}
             self._note_missing(stamp)
+        if box in poses:  # with a tolerance: an earlier pose that was near the stamp of this one
+            self.counts[NO_PARTNER] += 1
         poses[box] = pose
         ticks = self._give_up(key) if len(waiting) > 1 else []
         if len(poses) == len(self.boxes) or not self._is_awaiting(poses):

@@ -31,6 +31,7 @@ from .block import (
     TOUCH,
     new_work,
 )
+from .checks import as_size
 from .contact import Contacts, sat_normal, write_apart, write_contact, write_faults
 from .jit import kernel
 from .network import Network, Weights, WeightsError, forward, load_weights
@@ -173,7 +174,11 @@ class Paper:
         self._check_equal(size_a, size_b)
         self.weights = self._load(size, weights)
         networks = [self._network(name) for name in self.experts]
-        self._size = np.array(self.weights.card['sizes'][0], dtype=np.float64)
+        try:
+            self._size = as_size(self.weights.card['sizes'][0], 'size')[0]
+        except (IndexError, ValueError) as error:
+            raise WeightsError(f'weights file {self.weights.path}: the sizes in its card are no '
+                               f'list of three extents') from error
         self._cubes = _is_cube(self._size)
         self._check_sizes(size_a, size_b)
         self._packed = np.stack([network.packed for network in networks])

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .checks import pose_fault, shown, size_fault
+from .checks import as_floats, pose_fault, shown, size_fault
 from .contact import Contact
 from .jit import kernel
 from .pose import pose_valid, rotation_entries, squared_norm
@@ -250,6 +250,9 @@ class SceneSolver:
         for number, pose in zip(self._moving, poses, strict=True):
             self._known[number] = pose is not None
             if pose is not None:
+                if type(pose) is not np.ndarray or pose.dtype != np.float64 or len(pose) != 7:
+                    box = list(self.scene.boxes)[number]
+                    pose = as_floats(pose, f'pose of {box}', 'a pose (7,)', (7,))
                 self._poses[number] = pose
         count, left_out = _near_pairs(
             self._poses, self._half, self._moving, self._low, self._high, self._known,

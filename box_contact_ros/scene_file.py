@@ -6,6 +6,8 @@ lines of them expand to gigabytes), no key twice.
 from __future__ import annotations
 
 import json
+import os
+import re
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -20,7 +22,14 @@ LARGEST_FILE = 16 * 2**20
 """Bytes that are read at most; some 100,000 pairs."""
 DEEPEST = 20
 """Levels of nesting that are followed; a scene has four."""
-_Loader = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)  # in C where there is libyaml
+
+
+class _Loader(getattr(yaml, 'CSafeLoader', yaml.SafeLoader)):  # type: ignore[misc]
+    """In C where there is libyaml. It takes JSON's numbers too: 1e-05 is a word in YAML 1.1."""
+
+
+_Loader.add_implicit_resolver('tag:yaml.org,2002:float',
+                              re.compile(r'[-+]?\d+(\.\d*)?[eE][-+]?\d+$'), list('-+0123456789'))
 Place = tuple[Any, ...]
 
 
@@ -28,19 +37,18 @@ class SceneError(ValueError):
     """A scene that is refused: where, and why."""
 
 
-def read_scene(source: str) -> Scene:
+def read_scene(source: str | os.PathLike[str]) -> Scene:
     """The scene of a file, or of a text that begins with `{` or has more than one line.
 
     A path that leads to no file from here may be one of the package's own: config/scenes/….
     Raises SceneError, whose words name file, line and field.
     """
-    if source.lstrip().startswith('{') or '\n' in source:
+    if not isinstance(source, str):
+        source = os.fspath(source)
+    elif source.lstrip().startswith('{') or '\n' in source:
         return parse_scene(source, 'scene')
-    path = Path(source)
     try:
-        if not path.is_absolute() and not path.exists():
-            with suppress(FileNotFoundError):
-                path = resource_path(source)
+        path = scene_path(source)
         if path.exists() and not path.is_file() and not path.is_dir():
             raise OSError('it is no regular file')  # opening a FIFO would wait for its writer
         with path.open('rb') as file:
@@ -54,6 +62,15 @@ def read_scene(source: str) -> Scene:
     if len(data) > LARGEST_FILE:
         raise SceneError(f'{source}: larger than {LARGEST_FILE} bytes')
     return parse_scene(text, source)
+
+
+def scene_path(source: str) -> Path:
+    """The path of a scene file: as it is, or, where there is none, one of the package's own."""
+    path = Path(source)
+    if not path.is_absolute() and not path.exists():
+        with suppress(FileNotFoundError):
+            path = resource_path(source)
+    return path
 
 
 def parse_scene(text: str, name: str = 'scene') -> Scene:

@@ -1,6 +1,7 @@
 """ContactSolver: SAT first, then the contact point by the chosen model. Conventions: `pose`."""
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from functools import partial
 from typing import Any, Protocol, runtime_checkable
@@ -81,6 +82,10 @@ def make_model(name: str, size_a: np.ndarray, size_b: np.ndarray, weights: str |
 
     Raises ValueError for a name, sizes or weights that do not fit.
     """
+    if not isinstance(name, str):
+        raise ValueError(f'model {shown(name)} is not one of: {MODEL_NAMES}')
+    if weights is not None and not isinstance(weights, (str, os.PathLike)):
+        raise ValueError(f'weights must be the path of a file, not {shown(weights)}')
     if name == 'committee':
         return Committee(np.concatenate([size_a, size_b]), weights)
     if name == 'exact':

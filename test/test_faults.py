@@ -15,9 +15,12 @@ import time
 
 import numpy as np
 import pytest
+from geometry_msgs.msg import PoseStamped
 from raw_client import APART, GOOD, LITTLE_ENDIAN, ORIGIN, TOUCHING, RawClient, cdr
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
+from rclpy.duration import Duration
+from rclpy.qos import QoSProfile
 from rosgraph_msgs.msg import Clock
 
 from box_contact_ros.nodes.messages import make_header, read_cloud
@@ -254,6 +257,30 @@ def test_a_subscriber_that_never_reads(start, client, program):
     assert memory(node) - before < LEAK
     client.assert_answered()
     crane.signal(signal.SIGCONT)
+
+
+def test_scenes_change_while_deadlines_are_missed(start, client):
+    """Topics come and go with events of their publishers under way: the node lives and answers.
+
+    Served as events of EventsExecutor these ended the process, most often at the first change.
+    """
+    node = start('deadline:=0.002')
+    sparse = [client.node.create_publisher(PoseStamped, f'box_{box}/pose', QoSProfile(
+        depth=10, deadline=Duration(seconds=0.001))) for box in 'ab']
+    scenes = ('{boxes: {box_c: {size: [2, 2, 2]}, box_d: {size: [2, 2, 2]}}, '
+              'pairs: [{id: 3, name: c_d, a: box_c, b: box_d}]}', '')
+    service = client.service(SetParameters, '/contact_node/set_parameters')
+    for number in range(20):
+        future = service.call_async(SetParameters.Request(parameters=[Parameter(
+            name='scene', value=ParameterValue(type=ParameterType.PARAMETER_STRING,
+                                               string_value=scenes[number % 2]))]))
+        assert client.spin(future.done, 10.0), node.output
+        assert future.result().results[0].successful
+        for publisher in sparse:
+            publisher.publish(GOOD)
+        client.spin(lambda: False, 0.1)
+    assert client.counts()['deadlines missed'] > 0
+    assert node.process.poll() is None
 
 
 FILL = ('mount -t tmpfs -o size=8m none /dev/shm && head -c {} /dev/zero > /dev/shm/full; '

@@ -76,6 +76,19 @@ def test_swap_of_concentric_boxes():
         assert np.array_equal(one.separation, two.separation)
 
 
+@pytest.mark.parametrize('power', [-330, -270, -266, -250, 250, 266, 330])
+def test_quaternions_of_any_length(power):
+    """Both scaled by 2^k, to lengths of 1e-99 to 1e99: everything is the same to the bit.
+
+    Grazing containers, which are evaluated with 32 digits.
+    """
+    a, b, size_a, size_b = fuzz.draw('container', np.random.default_rng(13), 20_000)
+    scaling = np.array([1.0] * 3 + [2.0**power] * 4)
+    one, two = solve(a, b, size_a, size_b), solve(a * scaling, b * scaling, size_a, size_b)
+    for name, left, right in zip(one._fields, one, two):
+        assert np.array_equal(left, right, equal_nan=True), name
+
+
 def test_rigid_motion(pairs):
     """Moved together, verdict and separation stay, normal and point move along."""
     a, b, size_a, size_b = pairs

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from safetensors.numpy import save_file
+from safetensors.numpy import load_file, save_file
 
+from box_contact_ros import ContactSolver
 from box_contact_ros.network import (
     CARD_FIELDS,
     WeightsError,
@@ -38,7 +39,8 @@ def layers(seed: int = 0) -> list[tuple[np.ndarray, np.ndarray]]:
 
 
 def card(**changes: object) -> dict[str, object]:
-    return {**dict.fromkeys(CARD_FIELDS, 'x'), 'architecture': list(WIDTHS), **changes}
+    return {**dict.fromkeys(CARD_FIELDS, 'x'), 'inputs': {}, 'sizes': [],
+            'architecture': list(WIDTHS), **changes}
 
 
 def tensors() -> dict[str, np.ndarray]:
@@ -143,7 +145,24 @@ def test_architecture_of_the_card(tmp_path: Path, architecture: object) -> None:
         load_weights(write(tmp_path / 'x', tensors(), architecture=architecture))
 
 
-@pytest.mark.parametrize('text', [None, '', '{', '3', '"name"', json.dumps(CARD_FIELDS)])
+@pytest.mark.parametrize(('field', 'value'), [('inputs', []), ('inputs', 'x'), ('sizes', {})])
+def test_fields_of_another_kind(tmp_path: Path, field: str, value: object) -> None:
+    with pytest.raises(WeightsError, match=f'{field} of the model card is no'):
+        load_weights(write(tmp_path / 'x', tensors(), **{field: value}))
+
+
+@pytest.mark.parametrize('sizes', [[], [5], [None], [[2, 2]], [[2, 2, -1]], ['abc']])
+def test_sizes_that_are_none(tmp_path: Path, sizes: object) -> None:
+    """The paper's networks are for the boxes of their card."""
+    shipped = resource_path('weights', 'paper.safetensors')
+    card = {**load_weights(shipped).card, 'sizes': sizes}
+    save_file(load_file(shipped), tmp_path / 'x', metadata={'card': json.dumps(card)})
+    with pytest.raises(WeightsError, match='no list of three extents'):
+        ContactSolver((2, 2, 2), (2, 2, 2), model='paper', weights=str(tmp_path / 'x'))
+
+
+@pytest.mark.parametrize('text', [None, '', '{', '3', '"name"', json.dumps(CARD_FIELDS),
+                                  '[' * 200_000])
 def test_no_card(tmp_path: Path, text: str | None) -> None:
     metadata = {} if text is None else {'card': text}
     save_file(tensors(), tmp_path / 'x', metadata=metadata)

@@ -93,6 +93,16 @@ def test_tolerance_joins_the_nearest_stamps():
     assert not pairing.add('box_b', pose(14 * MS))
 
 
+def test_a_pose_that_gives_way_to_a_nearer_one_is_counted():
+    """Two poses of a box within tolerance of one tick: that of its very stamp is answered."""
+    pairing = StampPairing(scene(), tolerance=10)
+    assert not pairing.add('b', pose(100))
+    assert not pairing.add('a', pose(95))
+    assert not pairing.add('a', pose(100))
+    assert stamps(pairing.add('c', pose(100))) == [100, 100, 100]
+    assert pairing.counts == {NO_PARTNER: 1}
+
+
 def test_a_box_that_fell_silent_is_waited_for_until_it_is_stale():
     """Box b ends: a's ticks wait for max_age, then are answered at once without b.
 

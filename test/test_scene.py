@@ -145,6 +145,30 @@ def test_numbers_that_are_no_pose_are_refused(pose, words):
     assert solver([np.array([63.0, 27.0, 20.0, 0, 0, 0, 1.0])]).near == 0
 
 
+@pytest.mark.parametrize('bad', [
+    5.0, [1.0], '1', [True] * 7, ['0'] * 7, [1j] * 7, [10**400] * 7, np.ones((1, 7)), np.ones(8),
+    np.array(['2020'] * 7, 'datetime64[Y]')], ids=repr)
+@pytest.mark.parametrize('pairs', [1, 2])
+def test_what_is_no_pose_is_refused(bad, pairs):
+    """With many pairs as with one: nothing is broadcast, and text is no number."""
+    boxes = {name: Box(name, (1.0, 1.0, 1.0), pose_topic=name) for name in 'abc'[:pairs + 1]}
+    scene = Scene(boxes, (Pair(0, 'ab', 'a', 'b'), Pair(1, 'bc', 'b', 'c'))[:pairs])
+    with pytest.raises(ValueError, match='pose'):
+        SceneSolver(scene, model='exact')([bad] + [poses.IDENTITY] * pairs)
+
+
+def test_numbers_as_json_writes_them(tmp_path):
+    """1e-05, which YAML 1.1 takes for a word; and a file may be named by a Path."""
+    text = json.dumps({'boxes': {'a': {'size': [1e16, 1.5e-3, 1]}, 'b': {
+        'size': [1, 1, 1], 'pose': [0, -1e-05, 1e22, 0, 0, 0, 1]}},
+        'pairs': [{'id': 0, 'name': 'ab', 'a': 'a', 'b': 'b'}]})
+    assert 'e-05' in text and 'e+16' in text
+    (tmp_path / 'scene.json').write_text(text)
+    for scene in (parse_scene(text), read_scene(tmp_path / 'scene.json')):
+        assert scene.boxes['a'].size == (1e16, 1.5e-3, 1.0)
+        assert scene.boxes['b'].pose == (0, -1e-05, 1e22, 0, 0, 0, 1)
+
+
 @pytest.mark.parametrize('pairs', [1, 2])
 def test_as_many_poses_as_boxes_that_move(pairs):
     boxes = {name: Box(name, (1.0, 1.0, 1.0), pose_topic=name) for name in 'abc'[:pairs + 1]}

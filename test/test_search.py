@@ -183,7 +183,7 @@ def test_killed_and_started_again_it_ends_the_same(tmp_path: Path, what: str, na
 @pytest.mark.parametrize(('arguments', 'message'), [
     (['committe'], 'invalid choice'),
     (['paper', '--candidates', '3'], '--candidates 3 is too small'),
-    (['paper', '--seed', '-1'], '--seed -1 is too small'),
+    (['paper', '--seed', '-1'], "'-1' is no whole number from 0"),
 ])
 def test_refused_arguments(arguments: list[str], message: str,
                            capsys: pytest.CaptureFixture[str]) -> None:

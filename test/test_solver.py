@@ -142,6 +142,12 @@ def test_unequal_batches_are_refused():
         SOLVER.batch(np.tile(poses.IDENTITY, (2, 1)), np.tile(poses.IDENTITY, (3, 1)))
 
 
+@pytest.mark.parametrize(('name', 'value'), [('model', None), ('model', 3), ('weights', 3)])
+def test_names_that_are_none(name, value):
+    with pytest.raises(ValueError, match=name):
+        ContactSolver(poses.CUBE, poses.CUBE, **{name: value})
+
+
 def test_empty_batch():
     found = SOLVER.batch(np.zeros((0, 7)), np.zeros((0, 7)))
     assert found.colliding.shape == found.separation.shape == (0,)

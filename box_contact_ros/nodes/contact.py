@@ -20,7 +20,7 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType, JumpThreshold
 from rclpy.context import Context
 from rclpy.duration import Duration
-from rclpy.event_handler import SubscriptionEventCallbacks, UnsupportedEventTypeError
+from rclpy.event_handler import EventHandler, SubscriptionEventCallbacks, UnsupportedEventTypeError
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
@@ -62,6 +62,8 @@ def model_name(name: str, value: Any) -> str:
 
 WEIGHED = ('committee', 'paper', 'paper-continuous')
 """Models that read `weights`."""
+CHANGES = ('total_count_change', 'current_count_change', 'not_alive_count_change')
+"""What events count since they were last looked at, each some of these."""
 NAMED_TOPICS = 3
 """How many pose topics the node names when it is ready."""
 CONTAINER = (12.192, 2.438, 2.591)  # ISO 40 ft [m]
@@ -96,6 +98,18 @@ def nanoseconds(seconds: float) -> int:
     return round(1e9 * seconds)
 
 
+def look_at(handler: EventHandler) -> None:
+    """Call a handler that no executor serves, if there is something new."""
+    handler._ready_to_take_data = True
+    event = handler.take_data()
+    if event is not None and any(getattr(event, change, 0) for change in CHANGES):
+        handler.callback(event)
+
+
+def _unheard(_: Any) -> None:
+    pass
+
+
 class ContactNode(LifecycleNode):
     """Answers ticks of poses; every pose that is refused is counted and said, never answered.
 
@@ -114,6 +128,7 @@ class ContactNode(LifecycleNode):
         self._settings = declare(self, self.parameters)
         self._solver: SceneSolver | None = None
         self._subscriptions_of: dict[str, Subscription] = {}
+        self._events_of: dict[str, list[EventHandler]] = {}
         self._publishers_of: dict[int, tuple[Publisher, Publisher, Pair]] = {}  # by pair's id
         self._ids: dict[int, Pair] = {}
         self._active = self._started = False
@@ -193,7 +208,8 @@ class ContactNode(LifecycleNode):
     def _say(self, what: str) -> None:
         scene = self._solver.scene
         pairs = len(scene.pairs)
-        topics = [subscription.topic_name for subscription in self._subscriptions_of.values()]
+        topics = [subscription.topic_name for subscription in self._subscriptions_of.values()
+                  ] or ['nowhere, as the node is not active']
         if self._settings.get('weights') and self._solver.model not in WEIGHED:
             self.get_logger().warning(f'model {self._solver.model!r} uses no weights: '
                                       f'{shown(self._settings["weights"])} is ignored')
@@ -226,6 +242,9 @@ class ContactNode(LifecycleNode):
             self._settings = settings
         except (ValueError, ImportError) as error:
             return SetParametersResult(successful=False, reason=str(error))
+        except Exception as error:  # whoever asked would wait for ever
+            return SetParametersResult(successful=False,
+                                       reason=f'{type(error).__name__}: {error}')
         return SetParametersResult(successful=True)
 
     def _apply(self, settings: dict[str, Any]) -> None:
@@ -269,7 +288,7 @@ class ContactNode(LifecycleNode):
             if pair.name and pair != before:
                 raise ValueError(f'scene: id {pair.id} of pair {pair.name} was given to '
                                  f'{before.name} ({before.a}, {before.b}) before: ids are never '
-                                 f'used again while a node runs')
+                                 f'used again while a node runs (start it anew)')
 
     def _check_topics(self, scene: Scene, pair_topics: bool) -> None:
         """Raise ValueError for a name that, in this namespace and remapped, can be no topic's."""
@@ -332,10 +351,21 @@ class ContactNode(LifecycleNode):
             except UnsupportedEventTypeError:  # depends on the middleware
                 subscription = self.create_subscription(*arguments, raw=self._messages.raw)
             self._subscriptions_of[box] = subscription
+            # Events are looked at once a second, and never served: if one waits in EventsExecutor's
+            # queue while its subscription goes, the process ends (SIGSEGV, rclpy 7.1: what the
+            # event holds is released without Python's lock).
+            self._events_of[box], subscription.event_handlers = subscription.event_handlers, []
+            for handler in self._events_of[box]:
+                self.remove_waitable(handler)
 
     def _unsubscribe(self, boxes: Sequence[str]) -> None:
         for box in boxes:
-            self.destroy_subscription(self._subscriptions_of.pop(box))
+            subscription = self._subscriptions_of.pop(box)
+            subscription.callback = _unheard  # of what is under way
+            for handler in self._events_of.pop(box):
+                look_at(handler)
+                handler.destroy()
+            self.destroy_subscription(subscription)
 
     def _on_deadline(self, box: str) -> Callable[[Any], None]:
         def callback(event: Any) -> None:
@@ -439,6 +469,9 @@ class ContactNode(LifecycleNode):
 
     def _report(self) -> None:
         """Once a second: say what happened since the last time."""
+        for handlers in self._events_of.values():
+            for handler in handlers:
+                look_at(handler)
         if self._solver is None:
             self._health.publish(self.counts, 0, ())
             return

@@ -36,10 +36,10 @@ class RecordNode(Node):
     def __init__(self, context: Context, folder: Path, topics: Sequence[str],
                  about: Mapping[str, Any]) -> None:
         super().__init__('record', context=context)
-        resolved = {topic: self.resolve_topic_name(topic) for topic in topics}
-        self.folder, self.recorder = folder, Recorder(folder, list(resolved.values()), about)
+        resolved = {self.resolve_topic_name(topic): topic for topic in topics}
+        self.folder, self.recorder = folder, Recorder(folder, list(resolved), about)
         self._fault: OSError | None = None
-        for topic, name in resolved.items():
+        for name, topic in resolved.items():
             kind = type_of(name)
             # Poses as the contact node takes them, from whatever publisher; contacts without loss.
             reliability = (ReliabilityPolicy.BEST_EFFORT if kind == POSE
@@ -48,7 +48,7 @@ class RecordNode(Node):
                                      QoSProfile(depth=DEPTH, reliability=reliability), raw=True)
         if sys.stderr.isatty():
             self.create_timer(PROGRESS_SECONDS, self._show_progress)
-        print(f'recording to {folder}: {", ".join(resolved.values())}', flush=True)
+        print(f'recording to {folder}: {", ".join(resolved)}', flush=True)
 
     def _keep(self, topic: str) -> Callable[[bytes], None]:
         recorder, clock = self.recorder, self.get_clock()

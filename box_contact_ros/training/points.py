@@ -41,7 +41,12 @@ class Settings:
 
 
 def device_of(name: str) -> str:
-    """The device of PyTorch for `cpu`, `cuda` or `auto`: a GPU where there is one."""
+    """The device of PyTorch for `cpu`, `cuda` or `auto`: a GPU where there is one.
+
+    Raises ValueError for a GPU that there is not.
+    """
+    if name == 'cuda' and not torch.cuda.is_available():
+        raise ValueError('--device cuda: PyTorch finds no GPU here')
     return ('cuda' if torch.cuda.is_available() else 'cpu') if name == 'auto' else name
 
 

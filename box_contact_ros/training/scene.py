@@ -8,6 +8,7 @@ from typing import Any
 import yaml
 
 from ..checks import as_size, shown
+from ..scene_file import scene_path
 from .contacts import SizePair
 
 
@@ -37,7 +38,7 @@ def size_pairs(path: Path) -> list[SizePair]:
     which of their axes is called x, y, z: extents are sorted, longest first.
     """
     try:
-        scene = yaml.load(path.read_text('utf-8'), _Loader)
+        scene = yaml.load(scene_path(str(path)).read_text('utf-8'), _Loader)
     except OSError as error:
         raise SceneError(f'{path} cannot be read: {error.strerror}') from error
     except Exception as error:  # PyYAML raises anything: ValueError for a 30th of February

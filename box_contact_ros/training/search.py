@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from ..arguments import make_folder
+from ..arguments import make_folder, seed_number
 from ..block import LANES, new_work
 from ..jit import kernel
 from ..network import (
@@ -543,7 +543,8 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument('what', choices=('committee', 'paper'), help='what is searched for')
     parser.add_argument('--candidates', type=int, default=2048, metavar='N',
                         help='networks to begin with (default 2048); the time grows with them')
-    parser.add_argument('--seed', type=int, default=1, help='of everything random (default 1)')
+    parser.add_argument('--seed', type=seed_number, default=1,
+                        help='of everything random (default 1)')
     parser.add_argument('--out', type=Path, default=Path(), help='folder for the page, the table, '
                         'the plot and, until the end, the checkpoint (default: the current one)')
     parser.add_argument('--device', choices=('auto', 'cpu', 'cuda'), default='auto',
@@ -553,10 +554,13 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument('--quick', action='store_true',
                         help='little data and two short rungs, to try it out in seconds')
     options = parser.parse_args(args)
-    for name, least in (('candidates', 16), ('seed', 0), ('threads', 1)):
+    for name, least in (('candidates', 16), ('threads', 1)):
         if getattr(options, name) < least:
             parser.error(f'--{name} {getattr(options, name)} is too small: {least} or more')
-    options.device = device_of(options.device)
+    try:
+        options.device = device_of(options.device)
+    except ValueError as error:
+        parser.error(str(error))
     make_folder(parser, options.out)
     return options
 

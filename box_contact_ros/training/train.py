@@ -16,7 +16,7 @@ from typing import Any
 
 import torch
 
-from ..arguments import make_folder
+from ..arguments import make_folder, seed_number
 from ..network import load_weights, save_weights
 from ..resources import resource_path
 from ..sites import UNITS_MAX
@@ -173,7 +173,8 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument('--scene', type=Path, metavar='FILE', help='train a committee for the '
                         'sizes of the pairs in this scene file alone, and say how much error that '
                         'saves; writes committee-FILE.safetensors to the current folder, or --out')
-    parser.add_argument('--seed', type=int, default=1, help='of data and weights (default 1)')
+    parser.add_argument('--seed', type=seed_number, default=1,
+                        help='of data and weights (default 1)')
     parser.add_argument('--starts', type=int, help='networks trained at once, of which the best '
                         "is kept, of the paper's (default: 24 to 96, by job)")
     parser.add_argument('--epochs', type=int, help="passes through the training set, of the "
@@ -205,9 +206,9 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
             parser.error(f'--scene goes on from the shipped network: leave out --{name}')
     if options.quick and options.out is None and not options.scene:
         parser.error('--quick would replace the weights in weights/: name a folder with --out')
-    for name in ('seed', 'starts', 'epochs', 'steps', 'threads'):
+    for name in ('starts', 'epochs', 'steps', 'threads'):
         value = getattr(options, name)
-        if value is not None and value < (0 if name == 'seed' else 1):
+        if value is not None and value < 1:
             parser.error(f'--{name} {value} is too small')
     if options.hidden is not None and not 1 <= options.hidden <= UNITS_MAX:
         parser.error(f'--hidden {options.hidden} is not between 1 and {UNITS_MAX}')
@@ -226,7 +227,10 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
             parser.error(f'{options.scene}: no pair of sizes is within the range of the committee')
     shipped = resource_path('package.xml').parent / 'weights'
     options.out = make_folder(parser, options.out or (Path() if options.scene else shipped))
-    options.device = device_of(options.device)
+    try:
+        options.device = device_of(options.device)
+    except ValueError as error:
+        parser.error(str(error))
     return options
 
 
