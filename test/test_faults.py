@@ -259,12 +259,13 @@ def test_a_subscriber_that_never_reads(start, client, program):
     crane.signal(signal.SIGCONT)
 
 
-def test_scenes_change_while_deadlines_are_missed(start, client):
+def test_scenes_change_while_deadlines_are_missed(program, client):
     """Topics come and go with events of their publishers under way: the node lives and answers.
 
     Served as events of EventsExecutor these ended the process, most often at the first change.
     """
-    node = start('deadline:=0.002')
+    node = program('contact_node', *CUBES, '-p', 'deadline:=0.002')
+    node.wait_for_output('ready', 120)
     sparse = [client.node.create_publisher(PoseStamped, f'box_{box}/pose', QoSProfile(
         depth=10, deadline=Duration(seconds=0.001))) for box in 'ab']
     scenes = ('{boxes: {box_c: {size: [2, 2, 2]}, box_d: {size: [2, 2, 2]}}, '
