@@ -105,10 +105,8 @@ def load_weights(path: Path | str) -> Weights:
         raise WeightsError(f'weights file {path} has no readable model card') from error
     if missing:
         raise WeightsError(f'weights file {path}: the model card lacks {", ".join(missing)}')
-    for field, kind in (('inputs', dict), ('sizes', list)):
-        if not isinstance(card[field], kind):
-            raise WeightsError(f'weights file {path}: {field} of the model card is no '
-                               f'{"object" if kind is dict else "list"}')
+    if not isinstance(card['inputs'], dict):
+        raise WeightsError(f'weights file {path}: inputs of the model card is no object')
     for name, array in tensors.items():
         if array.dtype != np.float32:
             raise WeightsError(f'weights file {path}: {name} is {array.dtype}, not float32')

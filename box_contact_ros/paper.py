@@ -176,7 +176,7 @@ class Paper:
         networks = [self._network(name) for name in self.experts]
         try:
             self._size = as_size(self.weights.card['sizes'][0], 'size')[0]
-        except (IndexError, ValueError) as error:
+        except (LookupError, TypeError, ValueError) as error:
             raise WeightsError(f'weights file {self.weights.path}: the sizes in its card are no '
                                f'list of three extents') from error
         self._cubes = _is_cube(self._size)

@@ -145,13 +145,13 @@ def test_architecture_of_the_card(tmp_path: Path, architecture: object) -> None:
         load_weights(write(tmp_path / 'x', tensors(), architecture=architecture))
 
 
-@pytest.mark.parametrize(('field', 'value'), [('inputs', []), ('inputs', 'x'), ('sizes', {})])
-def test_fields_of_another_kind(tmp_path: Path, field: str, value: object) -> None:
-    with pytest.raises(WeightsError, match=f'{field} of the model card is no'):
-        load_weights(write(tmp_path / 'x', tensors(), **{field: value}))
+@pytest.mark.parametrize('inputs', [[], 'x', None])
+def test_inputs_of_another_kind(tmp_path: Path, inputs: object) -> None:
+    with pytest.raises(WeightsError, match='inputs of the model card is no object'):
+        load_weights(write(tmp_path / 'x', tensors(), inputs=inputs))
 
 
-@pytest.mark.parametrize('sizes', [[], [5], [None], [[2, 2]], [[2, 2, -1]], ['abc']])
+@pytest.mark.parametrize('sizes', [[], {}, None, 5, [5], [None], [[2, 2]], [[2, 2, -1]], ['abc']])
 def test_sizes_that_are_none(tmp_path: Path, sizes: object) -> None:
     """The paper's networks are for the boxes of their card."""
     shipped = resource_path('weights', 'paper.safetensors')
