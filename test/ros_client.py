@@ -166,7 +166,10 @@ def serving(make_node: Callable[[Context], Node]) -> Iterator[Node]:
 
     def serve() -> None:
         while not stop.is_set():
-            executor.spin_once(timeout_sec=0.05)
+            try:
+                executor.spin_once(timeout_sec=0.05)
+            except Exception as error:  # as `runtime.spin`: a client that is gone before its reply
+                node.get_logger().error(f'a request failed: {type(error).__name__}: {error}')
 
     thread = Thread(target=serve)
     thread.start()
