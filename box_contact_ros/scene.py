@@ -250,7 +250,7 @@ class SceneSolver:
         for number, pose in zip(self._moving, poses, strict=True):
             self._known[number] = pose is not None
             if pose is not None:
-                if type(pose) is not np.ndarray or pose.dtype != np.float64 or len(pose) != 7:
+                if type(pose) is not np.ndarray or pose.dtype != np.float64 or pose.shape != (7,):
                     box = list(self.scene.boxes)[number]
                     pose = as_floats(pose, f'pose of {box}', 'a pose (7,)', (7,))
                 self._poses[number] = pose

@@ -147,6 +147,7 @@ def test_numbers_that_are_no_pose_are_refused(pose, words):
 
 @pytest.mark.parametrize('bad', [
     5.0, [1.0], '1', [True] * 7, ['0'] * 7, [1j] * 7, [10**400] * 7, np.ones((1, 7)), np.ones(8),
+    np.array(1.0), np.ones((7, 3)),
     np.array(['2020'] * 7, 'datetime64[Y]')], ids=repr)
 @pytest.mark.parametrize('pairs', [1, 2])
 def test_what_is_no_pose_is_refused(bad, pairs):
