@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import math
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import poses
@@ -65,9 +66,10 @@ class SceneClient(Client):
         return self.spin(lambda: stamp in self.clouds, timeout)
 
     def offer(self, **boxes):
-        """Tick until one is answered."""
+        """Tick until one is answered from all these boxes: no pair is stale."""
         deadline = time.monotonic() + 60
-        while not self.answered(self.tick(**boxes), 0.1):
+        while not self.answered(stamp := self.tick(**boxes), 0.1) or any(
+                math.isnan(row['depth']) for row in self.rows(stamp).values()):
             assert time.monotonic() < deadline, 'no answer'
         self.spin(lambda: False, 0.2)
 
@@ -277,6 +279,15 @@ def test_deadlines_and_lost_publishers_are_reported(client):
         client.node.destroy_publisher(client.boxes['lorry'])
         client.spin(lambda: node.counts['publishers gone'] >= 1, 5.0)
         assert node.counts['publishers gone'] == 1
+
+
+def test_publishers_that_come_and_go_between_two_looks_are_counted(node):
+    """Events are looked at once a second: what went is what came less what is more than before."""
+    for came, more, gone in ((1, 1, 0), (1, 0, 1), (0, -1, 1), (3, -2, 5)):
+        before = node.counts['publishers gone']
+        node._on_matched('lorry')(SimpleNamespace(
+            total_count_change=came, current_count_change=more, current_count=1))
+        assert node.counts['publishers gone'] == before + gone
 
 
 def test_a_refused_tick_keeps_back_no_other(client):

@@ -376,7 +376,8 @@ class ContactNode(LifecycleNode):
 
     def _on_matched(self, box: str) -> Callable[[Any], None]:
         def callback(event: Any) -> None:
-            gone = max(0, -event.current_count_change)
+            # Those that came and went since the last look are in no count of the current ones.
+            gone = event.total_count_change - event.current_count_change
             self.counts['publishers gone'] += gone
             if gone:
                 self.get_logger().info(f'{box}: a publisher of its poses is gone, '
