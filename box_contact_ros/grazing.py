@@ -14,6 +14,7 @@ import math
 import numpy as np
 
 from .block import (
+    A_FIRST,
     AXIS,
     HALF_A,
     HALF_B,
@@ -33,13 +34,10 @@ REACH = 8.0
 boxes, at both ends, lean by θ."""
 LEAST = 1e-15
 """Length of a cross product from which it is an axis: what shorter ones could better is less than
-the rounding of a gap. From here on 17 digits are left of 32, so that the gap has the same bits
-whichever box is called A."""
+the rounding of a gap. From here on 17 digits are left of 32."""
 TIE = 2.0**-46
 """Gaps closer than this fraction of the size (1.4e-14, some 64 roundings) count as equal: the
 rounding error of a gap is below 12 units of 2⁻⁵³ of the size, and twice that must not decide."""
-GRID = 2.0**-22
-"""Times the size: added and taken away again, it rounds a gap to 2⁻⁷⁴ of the size."""
 _SPLIT = 134217729.0  # 2²⁷ + 1
 
 
@@ -158,13 +156,13 @@ def _rotation(x, y, z, w, m):
 
 
 @kernel
-def _component(work, i, p0, p1, p2, p3):
-    """Sum of four products of quaternion components of A and B: ±1 .. ±4 index both."""
+def _component(work, one, other, i, p0, p1, p2, p3):
+    """Sum of four products of components of two quaternions: ±1 .. ±16 index both."""
     total = (0.0, 0.0)
     for p in (p0, p1, p2, p3):
         k = (abs(p) - 1) // 4
         j = (abs(p) - 1) % 4
-        value = _times(work[TURN_A + k * LANES + i], work[TURN_B + j * LANES + i])
+        value = _times(work[one + k * LANES + i], work[other + j * LANES + i])
         total = _add(total, value if p > 0 else _neg(value))
     return total
 
@@ -185,68 +183,71 @@ def _to_unit_size(work, turn, i):
 
 @kernel
 def refine(work, i):
-    """Evaluate pair `i` anew: SEPARATION, AXIS and NORMAL."""
-    _to_unit_size(work, TURN_A, i)
-    _to_unit_size(work, TURN_B, i)
-    r, a, t, tb = np.empty((9, 2)), np.empty((9, 2)), np.empty((3, 2)), np.empty((3, 2))
-    # conj(A) ⊗ B. Products are numbered 4 k + j + 1 for component k of A, j of B (x, y, z, w).
-    _rotation(_component(work, i, 13, -4, -7, 10), _component(work, i, 14, 3, -8, -9),
-              _component(work, i, 15, -2, 5, -12), _component(work, i, 16, 1, 6, 11), r)
-    _rotation((work[TURN_A + i], 0.0), (work[TURN_A + LANES + i], 0.0),
-              (work[TURN_A + 2 * LANES + i], 0.0), (work[TURN_A + 3 * LANES + i], 0.0), a)
+    """Evaluate pair `i` anew: SEPARATION, AXIS and NORMAL.
+
+    All gaps are those of the box that comes first and the other, which have the same bits whichever
+    of the two is called A; axes are counted, and the normal is given, from A.
+    """
+    a_first = work[A_FIRST + i] > 0.5
+    one, other = (TURN_A, TURN_B) if a_first else (TURN_B, TURN_A)
+    here, there = (ORIGIN_A, ORIGIN_B) if a_first else (ORIGIN_B, ORIGIN_A)
+    _to_unit_size(work, one, i)
+    _to_unit_size(work, other, i)
+    r, axes = np.empty((9, 2)), np.empty((9, 2))
+    t, t_other = np.empty((3, 2)), np.empty((3, 2))  # the offset, in the frame of either
+    # conj(one) ⊗ other. Products are numbered 4 k + j + 1 for component k of one, j of the other.
+    _rotation(_component(work, one, other, i, 13, -4, -7, 10),
+              _component(work, one, other, i, 14, 3, -8, -9),
+              _component(work, one, other, i, 15, -2, 5, -12),
+              _component(work, one, other, i, 16, 1, 6, 11), r)
+    _rotation((work[one + i], 0.0), (work[one + LANES + i], 0.0),
+              (work[one + 2 * LANES + i], 0.0), (work[one + 3 * LANES + i], 0.0), axes)
     for k in range(3):
         total = (0.0, 0.0)
         for j in range(3):
-            step = _sum(work[ORIGIN_B + j * LANES + i], -work[ORIGIN_A + j * LANES + i])
-            total = _add(total, _mul(_get(a, 3 * j + k), step))
+            step = _sum(work[there + j * LANES + i], -work[here + j * LANES + i])
+            total = _add(total, _mul(_get(axes, 3 * j + k), step))
         _set(t, k, total)
     for k in range(3):
         total = (0.0, 0.0)
         for j in range(3):
             total = _add(total, _mul(_get(r, 3 * j + k), _get(t, j)))
-        _set(tb, k, total)
+        _set(t_other, k, total)
 
     best, largest, axis = -math.inf, -math.inf, 0
     tie = TIE * work[SIZE + i]
     for number in range(15):
-        gap = _gap(work, i, number, r, t, tb)
+        gap = _gap(work, i, a_first, number if a_first else _swapped(number), r, t, t_other)
         largest = max(largest, gap)
         if gap > best + tie:
             best, axis = gap, number
     if not math.isfinite(largest):
         return  # beyond what can be split: what the query found stands
-    # Of a gap that cancels to nearly nothing the last bits would depend on which box is called A.
-    grid = GRID * work[SIZE + i]
-    work[SEPARATION + i] = (largest + grid) - grid
+    work[SEPARATION + i] = largest
     work[AXIS + i] = float(axis)
-    n = np.zeros(3)
-    if axis < 3:
-        n[axis] = 1.0
-    elif axis < 6:
-        for k in range(3):
-            n[k] = r[3 * k + axis - 3, 0]
-    else:
-        k, j = (axis - 6) // 3, (axis - 6) % 3
-        n[(k + 1) % 3] = -r[3 * ((k + 2) % 3) + j, 0]
-        n[(k + 2) % 3] = r[3 * ((k + 1) % 3) + j, 0]
-    n /= math.sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2])
-    along = n[0] * t[0, 0] + n[1] * t[1, 0] + n[2] * t[2, 0]
-    for k in range(3):
-        work[NORMAL + k * LANES + i] = n[k] if along >= 0.0 else -n[k]
+    _normal(work, i, a_first, axis, r, t, t_other)
 
 
 @kernel
-def _gap(work, i, number, r, t, tb):
-    """Gap on an axis, rounded once; −∞ where there is none."""
+def _swapped(number):
+    """The number of an axis if the boxes change names."""
+    if number < 6:
+        return (number + 3) % 6
+    return 6 + 3 * ((number - 6) % 3) + (number - 6) // 3
+
+
+@kernel
+def _gap(work, i, a_first, number, r, t, t_other):
+    """Gap on an axis, counted from the first box, rounded once; −∞ where there is none."""
+    one, other = (HALF_A, HALF_B) if a_first else (HALF_B, HALF_A)
     total = (0.0, 0.0)
     if number < 6:
         k = number % 3
-        own = HALF_A if number < 3 else HALF_B
-        other = HALF_B if number < 3 else HALF_A
-        total = _add(_abs(_get(t if number < 3 else tb, k)), (-work[own + k * LANES + i], 0.0))
+        own, across = (one, other) if number < 3 else (other, one)
+        total = _add(_abs(_get(t if number < 3 else t_other, k)), (-work[own + k * LANES + i], 0.0))
         for j in range(3):
             entry = _get(r, 3 * k + j if number < 3 else 3 * j + k)
-            total = _add(total, _mul(_abs(entry), (-work[other + j * LANES + i], 0.0)))
+            total = _add(total, _mul(_abs(entry), (-work[across + j * LANES + i], 0.0)))
         return total[0]
     k, j = (number - 6) // 3, (number - 6) % 3
     k1, k2, j1, j2 = (k + 1) % 3, (k + 2) % 3, (j + 1) % 3, (j + 2) % 3
@@ -255,8 +256,33 @@ def _gap(work, i, number, r, t, tb):
     if not length[0] > LEAST:
         return -math.inf
     total = _abs(_add(_mul(_get(t, k2), u), _neg(_mul(_get(t, k1), v))))
-    total = _add(total, _mul(_abs(v), (-work[HALF_A + k1 * LANES + i], 0.0)))
-    total = _add(total, _mul(_abs(u), (-work[HALF_A + k2 * LANES + i], 0.0)))
-    total = _add(total, _mul(_abs(_get(r, 3 * k + j2)), (-work[HALF_B + j1 * LANES + i], 0.0)))
-    total = _add(total, _mul(_abs(_get(r, 3 * k + j1)), (-work[HALF_B + j2 * LANES + i], 0.0)))
+    total = _add(total, _mul(_abs(v), (-work[one + k1 * LANES + i], 0.0)))
+    total = _add(total, _mul(_abs(u), (-work[one + k2 * LANES + i], 0.0)))
+    total = _add(total, _mul(_abs(_get(r, 3 * k + j2)), (-work[other + j1 * LANES + i], 0.0)))
+    total = _add(total, _mul(_abs(_get(r, 3 * k + j1)), (-work[other + j2 * LANES + i], 0.0)))
     return _div(total, length)[0]
+
+
+@kernel
+def _normal(work, i, a_first, axis, r, t, t_other):
+    """NORMAL: an axis, counted from A, as a unit vector from A to B in A's frame."""
+    # Orientation of B and offset to B, in A's frame.
+    turn, offset = np.empty((3, 3)), np.empty(3)
+    for k in range(3):
+        offset[k] = t[k, 0] if a_first else -t_other[k, 0]
+        for j in range(3):
+            turn[k, j] = r[3 * k + j if a_first else 3 * j + k, 0]
+    n = np.zeros(3)
+    if axis < 3:
+        n[axis] = 1.0
+    elif axis < 6:
+        for k in range(3):
+            n[k] = turn[k, axis - 3]
+    else:
+        k, j = (axis - 6) // 3, (axis - 6) % 3
+        n[(k + 1) % 3] = -turn[(k + 2) % 3, j]
+        n[(k + 2) % 3] = turn[(k + 1) % 3, j]
+    n /= math.sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2])
+    along = n[0] * offset[0] + n[1] * offset[1] + n[2] * offset[2]
+    for k in range(3):
+        work[NORMAL + k * LANES + i] = n[k] if along >= 0.0 else -n[k]

@@ -18,8 +18,9 @@ that separates them.
    bits, get the face normal.
 
 The separation is the largest gap itself, tie or not, and it has the same bits when the boxes are
-swapped: face gaps because their formulas are symmetric, edge gaps because they are evaluated in
-the frame of the box that comes first in an order of the data, not of the call.
+swapped: face gaps because their formulas are symmetric, edge gaps (and all gaps of `grazing` pairs)
+because they are evaluated in the frame of the box that comes first in an order of the data, not of
+the call.
 """
 from __future__ import annotations
 

@@ -51,6 +51,9 @@ MUTANTS = {
     'grazing edges left as they are': Mutant(
         'sat.py', '        if work[GRAZING + i] > 0.5:\n', '        if False:\n',
         f'{FAMILIES} -k edges_along_each_other'),
+    'frame of A for grazing pairs': Mutant(
+        'grazing.py', 'a_first = work[A_FIRST + i] > 0.5', 'a_first = True',
+        'test/test_laws.py -k swap_of_grazing'),
     'corners pressed along one axis': Mutant(
         'exact.py', 'press_on(work, i)\n', 'pass\n', f'{FAMILIES} -k exact_touch'),
     'one face for every centroid': Mutant(
