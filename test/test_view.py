@@ -354,7 +354,7 @@ def test_a_node_that_cannot_start_ends_the_view(program):
 
 @pytest.mark.parametrize('arguments', [
     ('--model', 'crystal-ball'), ('--rate', '5000'), ('--port', '0'), ('--domain', '500'),
-    ('--spin',)])
+    ('--spin',), ('--rate', '100', '--attach'), ('--open-loop', '--attach')])
 def test_bad_arguments(arguments):
     done = subprocess.run([sys.executable, '-m', 'box_contact_ros', 'view', *arguments],
                           capture_output=True, text=True, timeout=60)

@@ -229,6 +229,10 @@ def _options(args: Sequence[str]) -> argparse.Namespace:
     parser.add_argument('--open-loop', action='store_true',
                         help='contacts are shown, but do not carry the load')
     options = parser.parse_args(list(args))
+    for name in ('model', 'seed', 'rate', 'open_loop'):
+        if options.attach and getattr(options, name) != parser.get_default(name):
+            parser.error(f'--{name.replace("_", "-")} is for what the view starts itself, and '
+                         '--attach starts nothing')
     try:
         PARAMETERS['model'].check('--model', options.model)
     except ValueError as error:
