@@ -132,6 +132,18 @@ MUTANTS = {
     'answers kept for whoever does not read': Mutant(
         'nodes/runtime.py', 'CONTACT_QOS = QoSProfile(depth=10,',
         'CONTACT_QOS = QoSProfile(history=2,', 'test/test_faults.py -k never_reads'),
+    'events of poses served': Mutant(
+        'nodes/contact.py', 'self._keep_events(subscription)',
+        'self._events_of[subscription] = []', 'test/test_faults.py -k deadlines'),
+    'events of contacts served': Mutant(
+        'nodes/contact.py', 'self._keep_events(self._contacts)',
+        'self._events_of[self._contacts] = []', 'test/test_faults.py -k topics_go'),
+    "events of pairs' contacts served": Mutant(
+        'nodes/contact.py', 'PublisherEventCallbacks(use_default_callbacks=False)',
+        'PublisherEventCallbacks()', 'test/test_faults.py -k topics_go'),
+    'publishers gone by what is left': Mutant(
+        'nodes/contact.py', 'event.total_count_change - event.current_count_change',
+        'max(0, -event.current_count_change)', 'test/test_scene_node.py -k come_and_go_between'),
     'room in shared memory not asked for': Mutant(
         'programs.py', 'room < LEAST_ROOM', 'False', 'test/test_faults.py -k memory_is_full'),
     'little shared memory used': Mutant(

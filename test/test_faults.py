@@ -12,16 +12,21 @@ import shutil
 import signal
 import subprocess
 import time
+from threading import Event, Thread
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import PointStamped, PoseStamped
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
 from raw_client import APART, GOOD, LITTLE_ENDIAN, ORIGIN, TOUCHING, RawClient, cdr
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
 from rclpy.duration import Duration
-from rclpy.qos import QoSProfile
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import PointCloud2
 
 from box_contact_ros.nodes.messages import make_header, read_cloud
 
@@ -259,6 +264,15 @@ def test_a_subscriber_that_never_reads(start, client, program):
     crane.signal(signal.SIGCONT)
 
 
+def set_scene(client, service, text):
+    """Ask a node for a scene, and wait until it has it."""
+    future = service.call_async(SetParameters.Request(parameters=[Parameter(
+        name='scene', value=ParameterValue(type=ParameterType.PARAMETER_STRING,
+                                           string_value=text))]))
+    assert client.spin(future.done, 10.0), 'no reply'
+    assert future.result().results[0].successful
+
+
 def test_scenes_change_while_deadlines_are_missed(program, client):
     """Topics come and go with events of their publishers under way: the node lives and answers.
 
@@ -272,16 +286,57 @@ def test_scenes_change_while_deadlines_are_missed(program, client):
               'pairs: [{id: 3, name: c_d, a: box_c, b: box_d}]}', '')
     service = client.service(SetParameters, '/contact_node/set_parameters')
     for number in range(20):
-        future = service.call_async(SetParameters.Request(parameters=[Parameter(
-            name='scene', value=ParameterValue(type=ParameterType.PARAMETER_STRING,
-                                               string_value=scenes[number % 2]))]))
-        assert client.spin(future.done, 10.0), node.output
-        assert future.result().results[0].successful
+        set_scene(client, service, scenes[number % 2])
         for publisher in sparse:
             publisher.publish(GOOD)
         client.spin(lambda: False, 0.1)
     assert client.counts()['deadlines missed'] > 0
     assert node.process.poll() is None
+
+
+def test_topics_go_while_others_ask_for_what_they_do_not_offer(start, client):
+    """Subscribers of another quality of service come and go as pairs do, and the node's contacts.
+
+    Served as events of EventsExecutor these ended the process at one of the first changes.
+    """
+    node = start()
+    boxes = ', '.join(f'b{k}: {{size: [2, 2, 2]}}' for k in range(12))
+    scenes = [f'{{boxes: {{{boxes}}}, pairs: [' + ', '.join(
+        f'{{id: {100 * n + k}, name: p{n}_{k}, a: b{k}, b: b{k + 1}}}' for k in range(11)) + ']}'
+        for n in (1, 2)]
+    topics = ['contacts'] + [f'p{n}_{k}/contact/point' for n in (1, 2) for k in range(11)]
+    late = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    others = Node('others', context=client.context)
+    stop = Event()
+
+    def come_and_go():
+        while not stop.is_set():
+            subscriptions = [others.create_subscription(
+                PointCloud2 if topic == 'contacts' else PointStamped, topic, print, late)
+                for topic in topics]
+            time.sleep(0.02)
+            for subscription in subscriptions:
+                others.destroy_subscription(subscription)
+
+    thread = Thread(target=come_and_go)
+    thread.start()
+    try:
+        service = client.service(SetParameters, '/contact_node/set_parameters')
+        for number in range(20):
+            set_scene(client, service, scenes[number % 2])
+        state = client.client_of(ChangeState, '/contact_node/change_state')
+        for _ in range(5):
+            for label in ('deactivate', 'cleanup', 'configure', 'activate'):
+                future = state.call_async(ChangeState.Request(transition=Transition(label=label)))
+                client.spin(future.done, 5.0)  # a reply may be lost before the way back is matched
+                assert node.process.poll() is None
+    finally:
+        stop.set()
+        thread.join()
+        others.destroy_node()
+    set_scene(client, service, '')
+    client.offer_until_answered(ORIGIN, APART)
+    client.assert_answered()
 
 
 FILL = ('mount -t tmpfs -o size=8m none /dev/shm && head -c {} /dev/zero > /dev/shm/full; '

@@ -20,7 +20,12 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType, JumpThreshold
 from rclpy.context import Context
 from rclpy.duration import Duration
-from rclpy.event_handler import EventHandler, SubscriptionEventCallbacks, UnsupportedEventTypeError
+from rclpy.event_handler import (
+    EventHandler,
+    PublisherEventCallbacks,
+    SubscriptionEventCallbacks,
+    UnsupportedEventTypeError,
+)
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
@@ -128,7 +133,7 @@ class ContactNode(LifecycleNode):
         self._settings = declare(self, self.parameters)
         self._solver: SceneSolver | None = None
         self._subscriptions_of: dict[str, Subscription] = {}
-        self._events_of: dict[str, list[EventHandler]] = {}
+        self._events_of: dict[Publisher | Subscription, list[EventHandler]] = {}
         self._publishers_of: dict[int, tuple[Publisher, Publisher, Pair]] = {}  # by pair's id
         self._ids: dict[int, Pair] = {}
         self._active = self._started = False
@@ -169,6 +174,7 @@ class ContactNode(LifecycleNode):
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Let go of solver and topics."""
         self._unpublish([entry[2] for entry in self._publishers_of.values()])
+        self._end_events(self._contacts)
         self.destroy_publisher(self._contacts)
         self.counts.update(self._pairing.counts)
         self.counts['outside the trained range'] += self._solver.exact_answers
@@ -313,6 +319,7 @@ class ContactNode(LifecycleNode):
         if not running:
             self._contacts = self.create_publisher(
                 PointCloud2, f'{self.prefix}contacts', CONTACT_QOS)
+            self._keep_events(self._contacts)
         wanted = self._solver.scene.pairs if self._settings['pair_topics'] else ()
         kept = set(wanted)
         self._unpublish([entry[2] for entry in self._publishers_of.values()
@@ -320,9 +327,12 @@ class ContactNode(LifecycleNode):
         for pair in wanted:
             if pair.id not in self._publishers_of:
                 topic = self._prefix(pair)
+                # Too many to look at; who asks for other QoS is told by the own node.
+                events = {'event_callbacks': PublisherEventCallbacks(use_default_callbacks=False)}
                 self._publishers_of[pair.id] = (
-                    self.create_publisher(PointStamped, f'{topic}/point', CONTACT_QOS),
-                    self.create_publisher(Vector3Stamped, f'{topic}/normal', CONTACT_QOS), pair)
+                    self.create_publisher(PointStamped, f'{topic}/point', CONTACT_QOS, **events),
+                    self.create_publisher(Vector3Stamped, f'{topic}/normal', CONTACT_QOS,
+                                          **events), pair)
 
     def _unpublish(self, pairs: Sequence[Pair]) -> None:
         for pair in pairs:
@@ -351,21 +361,29 @@ class ContactNode(LifecycleNode):
             except UnsupportedEventTypeError:  # depends on the middleware
                 subscription = self.create_subscription(*arguments, raw=self._messages.raw)
             self._subscriptions_of[box] = subscription
-            # Events are looked at once a second, and never served: if one waits in EventsExecutor's
-            # queue while its subscription goes, the process ends (SIGSEGV, rclpy 7.1: what the
-            # event holds is released without Python's lock).
-            self._events_of[box], subscription.event_handlers = subscription.event_handlers, []
-            for handler in self._events_of[box]:
-                self.remove_waitable(handler)
+            self._keep_events(subscription)
 
     def _unsubscribe(self, boxes: Sequence[str]) -> None:
         for box in boxes:
             subscription = self._subscriptions_of.pop(box)
             subscription.callback = _unheard  # of what is under way
-            for handler in self._events_of.pop(box):
-                look_at(handler)
-                handler.destroy()
+            self._end_events(subscription)
             self.destroy_subscription(subscription)
+
+    def _keep_events(self, entity: Publisher | Subscription) -> None:
+        """Have events of what may go looked at once a second, and never served.
+
+        If one waits in EventsExecutor's queue while its publisher or subscription goes, the process
+        ends (SIGSEGV, rclpy 7.1: what the event holds is released without Python's lock).
+        """
+        self._events_of[entity], entity.event_handlers = entity.event_handlers, []
+        for handler in self._events_of[entity]:
+            self.remove_waitable(handler)
+
+    def _end_events(self, entity: Publisher | Subscription) -> None:
+        for handler in self._events_of.pop(entity):
+            look_at(handler)
+            handler.destroy()
 
     def _on_deadline(self, box: str) -> Callable[[Any], None]:
         def callback(event: Any) -> None:
