@@ -6,17 +6,15 @@ import tempfile
 from pathlib import Path
 
 from .checks import shown
-from .solver import MODEL_NAMES, MODELS, soup_divisions
+from .solver import check_model
 
 
 def model_name(text: str) -> str:
     """The name of a model, as a program's argument."""
     try:
-        if text in MODELS or soup_divisions(text):
-            return text
+        return check_model('model', text)
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from error
-    raise argparse.ArgumentTypeError(f'{shown(text)} is not one of: {MODEL_NAMES}')
 
 
 def seed_number(text: str) -> int:

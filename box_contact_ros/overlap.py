@@ -315,11 +315,11 @@ def _centroid_from(work, i, face):
         count = _clip(work, one, count, two, 0, -1.0, hu + middle_u)
         count = _clip(work, two, count, one, 1, 1.0, hv - middle_v)
         count = _clip(work, one, count, two, 1, -1.0, hv + middle_v)
+        # 3. and 4. Integrate.
         if through:
             d0, du, dv, dw = _lifted_moments(work, two, count, one, -2.0 * hw)
         else:
             d0, du, dv, dw = _moments(work, two, count)
-        # 3. Sum.
         volume += d0
         gross += abs(d0)
         mu += du

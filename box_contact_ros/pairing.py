@@ -13,8 +13,8 @@ import numpy as np
 from .scene import Scene
 
 WAITING_TICKS = 128
-"""Ticks that wait for poses: 128 ms at 1 kHz, far more than the executor or the transport ever lets
-two streams drift apart, and a bound on memory."""
+"""So many of the newest ticks wait for poses: 128 ms at 1 kHz, far more than the executor or the
+transport ever lets two streams drift apart, and a bound on memory."""
 REMEMBERED_STAMPS = 1024
 """Stamps per box that are known to have been taken, so that none is answered twice."""
 RESET = 1_000_000_000
@@ -41,6 +41,13 @@ class StampedPose(NamedTuple):
 
 Tick = list['StampedPose | None']
 """A pose of each of `scene.moving`, None for a box that has none recent enough."""
+
+
+class _Poses(dict[str, StampedPose]):
+    """What a tick has so far, by box."""
+
+    number: int
+    """How many ticks began before."""
 
 
 class _Pairing:
@@ -95,16 +102,19 @@ class StampPairing(_Pairing):
 
     The pairing does not wait for a box that is stale, nor, once a tick has been answered, for one
     that was never seen. A tick that stays incomplete is given up when WAITING_TICKS newer ones
-    wait, or when what it lacks is stale: if it has a pair of which all poses are there, it is
+    have begun, or when what it lacks is stale: if it has a pair of which all poses are there, it is
     answered late and without the others, else dropped.
     """
 
     def __init__(self, scene: Scene, *, tolerance: int = 0, max_age: int = 0) -> None:
-        self._waiting: OrderedDict[int, dict[str, StampedPose]] = OrderedDict()
+        self._waiting: OrderedDict[int, _Poses] = OrderedDict()
+        self._begun = 0  # ticks so far
         self._taken: dict[str, deque[int]] = {}
         self._missing_since: dict[str, int] = {}  # stamp of the first tick that a box lacks
         self._went_without: dict[str, deque[int]] = {}  # ticks answered without a box, by stamp
         self._newest_without = NEVER                    # of all boxes
+        self._newest_answered = NEVER
+        self._joined: dict[str, int] = {}  # newest tick that was answered before a box was there
         self._answered = False
         self._were_stale: set[str] = set()
         self._changed = False  # a tick may wait for nothing any more: time to look all of them over
@@ -123,6 +133,7 @@ class StampPairing(_Pairing):
         self._taken, self._went_without = (
             {box: kept.get(box, deque(maxlen=REMEMBERED_STAMPS)) for box in self.boxes}
             for kept in (self._taken, self._went_without))
+        self._joined = {box: self._joined.get(box, self._newest_answered) for box in self.boxes}
         self._changed = True
 
     def reset(self) -> None:
@@ -132,7 +143,8 @@ class StampPairing(_Pairing):
         self._waiting.clear()
         self._missing_since.clear()
         self._answered = False
-        self._newest_without = NEVER
+        self._newest_without = self._newest_answered = NEVER
+        self._joined = dict.fromkeys(self.boxes, NEVER)
         for stamps in (*self._taken.values(), *self._went_without.values()):
             stamps.clear()
 
@@ -155,7 +167,9 @@ class StampPairing(_Pairing):
             if self._is_too_late(box, stamp):
                 self.counts[TOO_LATE] += 1
                 return []
-            poses = waiting[key] = {}
+            poses = waiting[key] = _Poses()
+            poses.number = self._begun
+            self._begun += 1
             self._note_missing(stamp)
         if box in poses:  # with a tolerance: an earlier pose that was near the stamp of this one
             self.counts[NO_PARTNER] += 1
@@ -170,6 +184,8 @@ class StampPairing(_Pairing):
     def _answer(self, key: int) -> Tick:
         """A waiting tick, which waits no more."""
         poses = self._waiting.pop(key)
+        if key > self._newest_answered:
+            self._newest_answered = key
         if len(poses) < len(self.boxes):
             self._newest_without = max(self._newest_without, key)
             for box in self.boxes:
@@ -178,8 +194,10 @@ class StampPairing(_Pairing):
         return [poses.get(box) for box in self.boxes]
 
     def _is_too_late(self, box: str, stamp: int) -> bool:
-        """Whether the tick of a pose was answered without its box."""
-        return stamp <= self._newest_without + self.tolerance and any(
+        """Whether the tick of a pose was answered without its box, or before that had joined."""
+        if stamp > max(self._newest_without, self._joined[box]) + self.tolerance:
+            return False
+        return stamp <= self._joined[box] + self.tolerance or any(
             abs(key - stamp) <= self.tolerance for key in self._went_without[box])
 
     def _refuses(self, box: str, stamp: int) -> bool:
@@ -243,11 +261,13 @@ class StampPairing(_Pairing):
         Those of which no pair can be evaluated are dropped.
         """
         waiting, over = self._waiting, []
-        if self._changed:
-            over = [stamp for stamp, poses in waiting.items() if not self._is_awaiting(poses)]
-            self._changed = False
-        if len(waiting) > WAITING_TICKS and not over:
-            over = [next(iter(waiting))]
+        for stamp, poses in waiting.items():  # as they began
+            if poses.number + WAITING_TICKS < self._begun or (
+                    self._changed and not self._is_awaiting(poses)):
+                over.append(stamp)
+            elif not self._changed:
+                break
+        self._changed = False
         ticks = []
         for stamp in over:
             if stamp == key:

@@ -154,8 +154,10 @@ def run(name: str, args: Sequence[str]) -> int:
     # argparse takes the program's name from here: the same one in usage lines, however started.
     sys.argv = [name, *args]
     try:
-        status = getattr(importlib.import_module(module), function)(list(args))
-        sys.stdout.flush()
+        try:
+            status = getattr(importlib.import_module(module), function)(list(args))
+        finally:  # --help, too, which leaves by SystemExit
+            sys.stdout.flush()
     except ModuleNotFoundError as error:
         message = _missing_module(name, error.name or '')
         if message is None:

@@ -214,13 +214,15 @@ class SceneSolver:
     def _warm_up(self) -> None:
         """Compile, or load, the kernels; let the model refuse sizes that it has no answer for.
 
-        Only a corner overlaps: where faces coincide, a soup takes seconds.
+        Only a corner overlaps: where faces coincide, a soup takes seconds. And by little: it is not
+        the depth that a committee was not trained for.
         """
         size_a, size_b = self._size[self._first], self._size[self._second]
         _, first = np.unique(np.hstack((size_a, size_b)), axis=0, return_index=True)
         a, b = np.zeros((2, len(first), 7))
         a[:, 6] = b[:, 6] = 1.0
-        b[:, :3] = 0.49 * (size_a[first] + size_b[first])
+        b[:, :3] = 0.5 * (size_a[first] + size_b[first]) - 0.02 * np.minimum(
+            size_a[first], size_b[first])
         self._solver.batch(a, b, size_a=size_a[first], size_b=size_b[first])
         self.sizes_answered_exactly = self._solver.exact_answers
         """Pairs of sizes that a `committee` was not trained for."""

@@ -27,6 +27,8 @@ MODELS = {
 """Models by name, with a line about each."""
 MODEL_NAMES = ', '.join([*MODELS, 'soup-N'])
 """For those who choose."""
+NETWORKS = ('committee', 'paper', 'paper-continuous')
+"""Models that read weights."""
 
 SOUP_DIVISIONS, MOST_SOUP_DIVISIONS = 8, 64
 """Divisions of an edge in model `soup`, and the most that are accepted (49,152 triangles a box)."""
@@ -77,13 +79,19 @@ def soup_divisions(name: str) -> int | None:
                      f'1 to {MOST_SOUP_DIVISIONS}')
 
 
+def check_model(where: str, name: object) -> str:
+    """The name of a model; ValueError, which begins with `where`, for what is none."""
+    if isinstance(name, str) and (name in MODELS or soup_divisions(name)):
+        return name
+    raise ValueError(f'{where} {shown(name)} is not one of: {MODEL_NAMES}')
+
+
 def make_model(name: str, size_a: np.ndarray, size_b: np.ndarray, weights: str | None) -> Model:
     """The model of that name for boxes of full extents (1, 3); `weights` names a file or is None.
 
     Raises ValueError for a name, sizes or weights that do not fit.
     """
-    if not isinstance(name, str):
-        raise ValueError(f'model {shown(name)} is not one of: {MODEL_NAMES}')
+    check_model('model', name)
     if weights is not None and not isinstance(weights, (str, os.PathLike)):
         raise ValueError(f'weights must be the path of a file, not {shown(weights)}')
     if name == 'committee':
@@ -99,11 +107,11 @@ def make_model(name: str, size_a: np.ndarray, size_b: np.ndarray, weights: str |
 
         return FclBox()
     divisions = soup_divisions(name)
-    if divisions is not None:
+    if divisions:
         from .soup import Soup  # likewise
 
         return Soup(divisions)
-    raise ValueError(f'model {shown(name)} is not one of: {MODEL_NAMES}')
+    raise NotImplementedError(name)
 
 
 class ContactSolver:

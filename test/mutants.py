@@ -107,8 +107,20 @@ MUTANTS = {
         'pairing.py', 'return 0 < self.max_age < now - self._missing_since.get(box, now)',
         'return False', 'test/test_scene_node.py -k stale_box'),
     'ticks wait without bound': Mutant(
-        'pairing.py', 'if len(waiting) > WAITING_TICKS and not over:', 'if False:',
+        'pairing.py', 'poses.number + WAITING_TICKS < self._begun', 'False',
         'test/test_pairing.py -k dropped'),
+    'ticks that were answered do not count': Mutant(
+        'pairing.py', 'poses.number + WAITING_TICKS < self._begun',
+        'len(waiting) > WAITING_TICKS and not over', 'test/test_pairing.py -k further_behind'),
+    'a box that joins opens old ticks': Mutant(
+        'pairing.py', 'return stamp <= self._joined[box] + self.tolerance or any(', 'return any(',
+        'test/test_pairing.py -k joins'),
+    'a scene that fails half way stays': Mutant(
+        'nodes/contact.py', 'self._take_over(old, old_settings)', 'pass',
+        'test/test_scene_node.py -k half_way'),
+    "poses looked for on the node's own topics": Mutant(
+        'nodes/contact.py', 'if self._resolved(topic) in taken:', 'if False:',
+        'test/test_scene_node.py -k topic_of_the_node'),
     'a face in the far face counts twice': Mutant(
         'overlap.py', '        if highest > floor:', '        if True:',
         'test/test_exact.py -k concentric'),
@@ -125,7 +137,7 @@ MUTANTS = {
         'nodes/contact.py', "if running and settings['pairing'] == old['pairing']:", 'if False:',
         'test/test_scene_node.py -k come_and_go'),
     'a bad scene goes through': Mutant(
-        'nodes/contact.py', 'return SetParametersResult(successful=False, reason=str(error))',
+        'nodes/contact.py', 'return SetParametersResult(successful=False, reason=_reason(error))',
         'return SetParametersResult(successful=True)', 'test/test_scene_node.py -k bad_scene'),
     'nesting without limit': Mutant(
         'scene_file.py', 'if depth > DEEPEST:', 'if False:', 'test/test_scene.py -k refusal_names'),

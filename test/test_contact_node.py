@@ -207,7 +207,7 @@ def test_interrupted_twice(program, pause):
     running.signal(signal.SIGINT)
     time.sleep(pause)
     running.signal(signal.SIGINT)
-    assert running.wait(5) == 0
+    assert running.wait(60) == 0
     assert 'Traceback' not in running.output
 
 

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from geometry_msgs.msg import PointStamped, PoseStamped
 from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import ChangeState
+from lifecycle_msgs.srv import ChangeState, GetState
 from raw_client import APART, GOOD, LITTLE_ENDIAN, ORIGIN, TOUCHING, RawClient, cdr
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
@@ -324,12 +324,22 @@ def test_topics_go_while_others_ask_for_what_they_do_not_offer(start, client):
         service = client.service(SetParameters, '/contact_node/set_parameters')
         for number in range(20):
             set_scene(client, service, scenes[number % 2])
-        state = client.client_of(ChangeState, '/contact_node/change_state')
+        change = client.client_of(ChangeState, '/contact_node/change_state')
+        state = client.service(GetState, '/contact_node/get_state')
+
+        def now():
+            future = state.call_async(GetState.Request())
+            assert client.spin(future.done, 10.0), node.output
+            return future.result().current_state.label
+
         for _ in range(5):
-            for label in ('deactivate', 'cleanup', 'configure', 'activate'):
-                future = state.call_async(ChangeState.Request(transition=Transition(label=label)))
-                client.spin(future.done, 5.0)  # a reply may be lost before the way back is matched
-                assert node.process.poll() is None
+            for label, goal in (('deactivate', 'inactive'), ('cleanup', 'unconfigured'),
+                                ('configure', 'inactive'), ('activate', 'active')):
+                # A reply may be lost as long as the way back is not matched: the state tells.
+                change.call_async(ChangeState.Request(transition=Transition(label=label)))
+                deadline = time.monotonic() + 20.0
+                while now() != goal:
+                    assert time.monotonic() < deadline, label
     finally:
         stop.set()
         thread.join()

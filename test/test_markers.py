@@ -180,9 +180,11 @@ def test_contacts_of_another_scene_are_not_drawn(client, node, capfd):
     for pairs in ([Pair(3, 'p', 'a', 'b')], [Pair(0, 'p', 'a', 'b'), Pair(1, 'q', 'a', 'c')]):
         publisher.publish(make_cloud(make_header(client.next_stamp(), 'map'), Answer(
             [(pair, contact) for pair in pairs], [], len(pairs))))
+        client.spin(lambda: False, 0.2)
+        client.arrays.clear()
         client.send(poses.IDENTITY, TOUCHING)
-        client.spin(lambda: False, 0.3)
-        assert 'point' not in actions(client.arrays[-1])
+        assert client.spin(lambda: client.arrays, 5.0)
+        assert not any('point' in actions(array) for array in client.arrays)
     assert 'with other pairs' in capfd.readouterr().err
 
 

@@ -155,6 +155,20 @@ def test_a_silent_box_costs_the_others_no_tick():
     assert answered == list(range(MS, 1000 * MS, MS)) and not pairing.counts
 
 
+def test_no_tick_is_answered_further_behind_than_the_newest_that_wait():
+    """Both boxes have pairs with a fixed one. Of b one pose in 1000 is lost: it delays one tick."""
+    pairing = StampPairing(scene('ab', ['aF', 'bF']), max_age=1000 * MS)
+    answered = []
+    for stamp in range(5000):
+        for box in 'ab':
+            if (box, stamp % 1000) != ('b', 500):
+                for tick in pairing.add(box, pose(stamp * MS)):
+                    answered.append(tick[0].stamp // MS)
+                    assert stamp - answered[-1] <= WAITING_TICKS
+    assert sorted(answered) == list(range(5000))
+    assert not pairing.counts
+
+
 @pytest.mark.parametrize('lost', ['a', 'b'])
 def test_a_lost_pose_does_not_hold_up_ticks_that_wait_for_a_stale_box(lost):
     """Both boxes have pairs with a fixed one. A tick lacks a pose of one box; later b falls silent.
@@ -201,6 +215,24 @@ def test_scene_changes_cost_the_others_no_tick():
                 pairing.set_scene(scene('ab', ['ab']))
             answered += [tick[0].stamp // MS for tick in ticks]
     assert answered == list(range(300))
+
+
+@pytest.mark.parametrize('tolerance', [0, MS // 4])
+def test_a_box_that_joins_has_no_stamp_answered_again(tolerance):
+    """Its first poses are of ticks that were answered before it was there; the next are in time."""
+    pairing = StampPairing(scene('ab', ['ab']), max_age=1000 * MS, tolerance=tolerance)
+    answered = []
+    for stamp in range(100):
+        if stamp == 50:
+            pairing.set_scene(scene('abc', ['ab', 'cF']))
+            for early in (40, 49):
+                assert not pairing.add('c', pose(early * MS + tolerance))
+        for box in 'abc' if stamp >= 50 else 'ab':
+            answered += pairing.add(box, pose(stamp * MS))
+    assert [tick[0].stamp // MS for tick in answered] == list(range(100))
+    assert all(len(tick) == 2 for tick in answered[:50])
+    assert all(None not in tick for tick in answered[50:])
+    assert pairing.counts == {TOO_LATE: 2}
 
 
 def test_a_box_that_went_counts_for_no_tick():

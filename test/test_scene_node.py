@@ -1,6 +1,7 @@
 """A contact node with a scene over DDS: many boxes, changes while it runs, stale boxes, time."""
 from __future__ import annotations
 
+import gc
 import math
 import time
 from types import SimpleNamespace
@@ -8,8 +9,10 @@ from types import SimpleNamespace
 import numpy as np
 import poses
 import pytest
+import rclpy
 from geometry_msgs.msg import PointStamped, PoseStamped
 from lifecycle_msgs.srv import ChangeState, GetState
+from rclpy.context import Context
 from rclpy.duration import Duration
 from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.parameter import Parameter
@@ -19,6 +22,7 @@ from ros_client import Client, serving, stamp_of
 from box_contact_ros import ContactSolver
 from box_contact_ros.nodes.contact import ContactNode
 from box_contact_ros.nodes.messages import make_header, read_cloud
+from box_contact_ros.nodes.runtime import RCLError
 
 MS = 1_000_000  # ns
 SCENE = """\
@@ -301,6 +305,68 @@ def test_a_refused_tick_keeps_back_no_other(client):
         assert client.answered(stamps[-1])
         assert [client.answered(stamp, 1.0) for stamp in stamps] == [n != 2 for n in range(8)]
         assert client.counts()['refused: frame_id differs'] == 1
+
+
+@pytest.mark.parametrize('topic', [
+    'contacts', '/load_floor/contact/point', '/rosout', '/contact_node/transition_event'])
+def test_a_topic_of_the_node_is_no_pose_topic(node, client, topic):
+    """Of another type, it cannot be subscribed to: the scene went half, and the node was deaf."""
+    refused = set_scene(node, SCENE.replace('/traffic/lorry', topic))
+    assert not refused.successful
+    assert refused.reason.startswith(f"scene: pose_topic '{topic}' of box lorry")
+    assert client.rows(client.tick(load=ON_LORRY, lorry=LORRY))[5]['depth'] == pytest.approx(0.2)
+
+
+def refuse(name, node, monkeypatch):
+    """A topic that the middleware does not let a node subscribe to."""
+    create = node.create_subscription
+
+    def create_subscription(kind, topic, *arguments, **options):
+        if topic == name:
+            raise RCLError('not today')
+        return create(kind, topic, *arguments, **options)
+
+    monkeypatch.setattr(node, 'create_subscription', create_subscription)
+
+
+def test_a_scene_that_fails_half_way_is_taken_back(node, client, monkeypatch):
+    refuse('crate/pose', node, monkeypatch)
+    refused = set_scene(node, WITH_CRATE.replace('/traffic/lorry', '/traffic/van'))
+    assert not refused.successful and refused.reason == 'RCLError: not today'
+    client.offer(load=ON_LORRY, lorry=LORRY)
+    assert client.rows(client.tick(load=ON_LORRY, lorry=LORRY))[5]['depth'] == pytest.approx(0.2)
+    topics = {entity.topic_name for entity in (*node.subscriptions, *node.publishers)}
+    assert not any('crate' in topic or 'van' in topic for topic in topics)
+
+
+def test_a_node_that_cannot_activate_says_why(client, monkeypatch, capfd):
+    """It stays inactive, deaf, and can be activated when what was in the way is gone."""
+    with scene_node(autostart=False) as node:
+        assert node.trigger_configure() == TransitionCallbackReturn.SUCCESS
+        refuse('/traffic/lorry', node, monkeypatch)
+        assert node.trigger_activate() == TransitionCallbackReturn.FAILURE
+        assert 'RCLError: not today' in capfd.readouterr().err
+        assert not any('pose' in entity.topic_name for entity in node.subscriptions)
+        monkeypatch.undo()
+        assert node.trigger_activate() == TransitionCallbackReturn.SUCCESS
+        client.offer(load=ON_FLOOR, lorry=LORRY)
+
+
+def test_a_destroyed_node_leaves_the_network(client):
+    """As one of several in a process, which goes on."""
+    context = Context()
+    rclpy.init(context=context)
+    node = ContactNode(context, parameter_overrides=[Parameter('scene', value=SCENE)])
+    counted = client.node.count_publishers, client.node.count_subscribers
+    try:
+        assert client.spin(lambda: counted[0]('/contacts') == 1, 60.0)
+        assert client.spin(lambda: counted[1]('/traffic/lorry') == 1, 60.0)
+    finally:
+        node.destroy_node()
+    assert client.spin(lambda: counted[0]('/contacts') == 0, 10.0)
+    assert client.spin(lambda: counted[1]('/traffic/lorry') == 0, 10.0)
+    context.try_shutdown()
+    gc.unfreeze()
 
 
 @pytest.mark.parametrize('long', ['pose_topic: /' + 'x' * 250, 'name: ' + 'x' * 101])

@@ -315,7 +315,7 @@ def start_view(program, *arguments):
 
 def test_an_address_that_is_none_ends_it(program):
     """It waited for ever for a server that could not start, and no signal ended it."""
-    running = program('view', '--no-browser', '--host', '1.2.3.4.5')
+    running = program('view', '--no-browser', '--host', '192.0.2.1')  # of nobody
     assert running.wait(60) == 1
     assert 'error: ' in running.output and 'Traceback' not in running.output
 

@@ -37,7 +37,7 @@ from ..checks import shown
 from ..pairing import NEVER, PAIRINGS, RESETS, StampedPose, Tick
 from ..scene import Pair, Scene, SceneSolver, two_boxes
 from ..scene_file import read_scene
-from ..solver import MODEL_NAMES, MODELS, soup_divisions
+from ..solver import MODEL_NAMES, NETWORKS, check_model
 from .diagnostics import DIAGNOSTICS_SECONDS, UNMATCHED_SECONDS, Diagnostics
 from .messages import Refused, TypedMessages
 from .parameters import (
@@ -56,19 +56,10 @@ from .wire import RawMessages
 
 SERIALIZATIONS = {'raw': RawMessages, 'typed': TypedMessages}
 """Values of the node parameter `serialization`."""
-
-
-def model_name(name: str, value: Any) -> str:
-    """One of the models, or soup-N."""
-    if not soup_divisions(text(name, value)) and value not in MODELS:
-        raise ValueError(f'{name} {shown(value)} is not one of: {MODEL_NAMES}')
-    return value
-
-
-WEIGHED = ('committee', 'paper', 'paper-continuous')
-"""Models that read `weights`."""
 CHANGES = ('total_count_change', 'current_count_change', 'not_alive_count_change')
 """What events count since they were last looked at, each some of these."""
+TOPICS_OF_EVERY_NODE = ('/diagnostics', '/parameter_events', '/rosout', '/clock')
+"""Topics of other types than poses."""
 NAMED_TOPICS = 3
 """How many pose topics the node names when it is ready."""
 CONTAINER = (12.192, 2.438, 2.591)  # ISO 40 ft [m]
@@ -79,7 +70,7 @@ PARAMETERS = {
     'scene': Setting('', 'scene file (or the scene itself, as text) with boxes and pairs; replaces '
                          'size_a and size_b; set again, it is read again', text),
     'model': Setting('committee', f'how the contact point is found: {MODEL_NAMES}',
-                     model_name),
+                     check_model),
     'weights': Setting('', 'weights file to use in place of the shipped one', text),
     'pairing': Setting('stamp', 'stamp: answer once, when poses of equal stamp are in; latest: '
                                 "answer every pose with the other boxes' last", one_of(PAIRINGS)),
@@ -104,11 +95,20 @@ def nanoseconds(seconds: float) -> int:
 
 
 def look_at(handler: EventHandler) -> None:
-    """Call a handler that no executor serves, if there is something new."""
+    """Call a handler that no executor serves, if there is something new.
+
+    As rclpy 7.1 has it: what an executor would have found ready is taken.
+    """
     handler._ready_to_take_data = True
     event = handler.take_data()
     if event is not None and any(getattr(event, change, 0) for change in CHANGES):
         handler.callback(event)
+
+
+def _reason(error: Exception) -> str:
+    """What was refused, in its own words; a model's library may be missing."""
+    known = isinstance(error, (ValueError, ImportError))
+    return str(error) if known else f'{type(error).__name__}: {error}'
 
 
 def _unheard(_: Any) -> None:
@@ -134,6 +134,7 @@ class ContactNode(LifecycleNode):
         self._solver: SceneSolver | None = None
         self._subscriptions_of: dict[str, Subscription] = {}
         self._events_of: dict[Publisher | Subscription, list[EventHandler]] = {}
+        self._contacts: Publisher | None = None
         self._publishers_of: dict[int, tuple[Publisher, Publisher, Pair]] = {}  # by pair's id
         self._ids: dict[int, Pair] = {}
         self._active = self._started = False
@@ -173,12 +174,9 @@ class ContactNode(LifecycleNode):
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Let go of solver and topics."""
-        self._unpublish([entry[2] for entry in self._publishers_of.values()])
-        self._end_events(self._contacts)
-        self.destroy_publisher(self._contacts)
         self.counts.update(self._pairing.counts)
         self.counts['outside the trained range'] += self._solver.exact_answers
-        self._solver = None
+        self._let_go()
         return TransitionCallbackReturn.SUCCESS
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -191,10 +189,10 @@ class ContactNode(LifecycleNode):
         self._fault = None
         try:
             action()
-        except (ValueError, ImportError) as error:  # a model's library may be missing
+        except Exception as error:  # out of here, rclpy would swallow it
             self._fault = error
             if self._started or not self._settings['autostart']:  # else it is raised
-                self.get_logger().error(str(error))
+                self.get_logger().error(_reason(error))
             return TransitionCallbackReturn.FAILURE
         return TransitionCallbackReturn.SUCCESS
 
@@ -202,8 +200,27 @@ class ContactNode(LifecycleNode):
         # Whatever start-up made stays for good: keep it out of later collections.
         gc.collect()
         gc.freeze()
+        try:
+            self._subscribe()
+        except RCLError:
+            self._unsubscribe(list(self._subscriptions_of))
+            raise
         self._active = True
-        self._subscribe()
+
+    def _let_go(self) -> None:
+        self._unpublish([entry[2] for entry in self._publishers_of.values()])
+        if self._contacts is not None:
+            self._end_events(self._contacts)
+            self.destroy_publisher(self._contacts)
+        self._contacts = self._solver = None
+
+    def destroy_node(self) -> None:
+        """Leave the network: events that are looked at would keep their topics there."""
+        for handlers in self._events_of.values():
+            for handler in handlers:
+                handler.destroy()
+        self._events_of.clear()
+        super().destroy_node()
 
     def _say_ready(self) -> None:
         if self._solver is None:
@@ -216,7 +233,7 @@ class ContactNode(LifecycleNode):
         pairs = len(scene.pairs)
         topics = [subscription.topic_name for subscription in self._subscriptions_of.values()
                   ] or ['nowhere, as the node is not active']
-        if self._settings.get('weights') and self._solver.model not in WEIGHED:
+        if self._settings.get('weights') and self._solver.model not in NETWORKS:
             self.get_logger().warning(f'model {self._solver.model!r} uses no weights: '
                                       f'{shown(self._settings["weights"])} is ignored')
         elif self._solver.model == 'committee' and self._solver.sizes_answered_exactly:
@@ -246,11 +263,8 @@ class ContactNode(LifecycleNode):
                 self._apply(settings)
                 self._say('changed')
             self._settings = settings
-        except (ValueError, ImportError) as error:
-            return SetParametersResult(successful=False, reason=str(error))
         except Exception as error:  # whoever asked would wait for ever
-            return SetParametersResult(successful=False,
-                                       reason=f'{type(error).__name__}: {error}')
+            return SetParametersResult(successful=False, reason=_reason(error))
         return SetParametersResult(successful=True)
 
     def _apply(self, settings: dict[str, Any]) -> None:
@@ -263,9 +277,21 @@ class ContactNode(LifecycleNode):
         self._check_ids(scene)
         self._check_topics(scene, settings['pair_topics'])
         solver = self.make_solver(settings, scene)
-        running, old = self._solver is not None, self._settings
-        if self._solver is not None:
-            self.counts['outside the trained range'] += self._solver.exact_answers
+        old, old_settings = self._solver, self._settings
+        try:
+            self._take_over(solver, settings)
+        except RCLError:
+            if old is None:
+                self._let_go()
+            else:
+                self._take_over(old, old_settings)
+            raise
+        if old is not None:
+            self.counts['outside the trained range'] += old.exact_answers
+
+    def _take_over(self, solver: SceneSolver, settings: dict[str, Any]) -> None:
+        """Go over from one solver and its topics, or from none, to another."""
+        scene, old, running = solver.scene, self._settings, self._solver is not None
         times = {'tolerance': nanoseconds(settings['tolerance']),
                  'max_age': nanoseconds(settings['max_age'])}
         if running and settings['pairing'] == old['pairing']:
@@ -283,10 +309,10 @@ class ContactNode(LifecycleNode):
             box for box in self._subscriptions_of if not kept or box not in scene.moving
             or scene.boxes[box].pose_topic != self._solver.scene.boxes[box].pose_topic])
         self._solver, self._settings = solver, settings
-        self._ids |= {pair.id: pair for pair in scene.pairs if pair.name}
         self._publish(running)
         if self._active:
             self._subscribe()
+        self._ids |= {pair.id: pair for pair in scene.pairs if pair.name}
 
     def _check_ids(self, scene: Scene) -> None:
         for pair in scene.pairs:
@@ -298,15 +324,24 @@ class ContactNode(LifecycleNode):
 
     def _check_topics(self, scene: Scene, pair_topics: bool) -> None:
         """Raise ValueError for a name that, in this namespace and remapped, can be no topic's."""
-        topics = [scene.boxes[box].pose_topic for box in scene.moving]
+        own = [f'{self.prefix}contacts', '~/transition_event', *TOPICS_OF_EVERY_NODE]
         if pair_topics:
-            topics += [f'{self._prefix(pair)}/normal' for pair in scene.pairs]
-        for topic in topics:
-            try:
-                self.resolve_topic_name(topic)
-            except RCLError as error:
-                reason = str(error).partition(', at ')[0]
-                raise ValueError(f'scene: {shown(topic)}: {reason}') from error
+            own += [f'{self._prefix(pair)}/{topic}' for pair in scene.pairs
+                    for topic in ('point', 'normal')]
+        taken = {self._resolved(topic) for topic in own}
+        for box in scene.moving:
+            topic = scene.boxes[box].pose_topic
+            if self._resolved(topic) in taken:
+                raise ValueError(f'scene: pose_topic {shown(topic)} of box {box} is a topic of '
+                                 'this node that carries no poses')
+
+    def _resolved(self, topic: str) -> str:
+        """A topic's full name; ValueError if it can have none."""
+        try:
+            return self.resolve_topic_name(topic)
+        except RCLError as error:
+            reason = str(error).partition(', at ')[0]
+            raise ValueError(f'scene: {shown(topic)}: {reason}') from error
 
     # --- topics ----------------------------------------------------------------------------------
 
@@ -327,7 +362,7 @@ class ContactNode(LifecycleNode):
         for pair in wanted:
             if pair.id not in self._publishers_of:
                 topic = self._prefix(pair)
-                # Too many to look at; who asks for other QoS is told by the own node.
+                # No events: too many to look at. Who asks for another QoS is told by its own node.
                 events = {'event_callbacks': PublisherEventCallbacks(use_default_callbacks=False)}
                 self._publishers_of[pair.id] = (
                     self.create_publisher(PointStamped, f'{topic}/point', CONTACT_QOS, **events),
@@ -381,7 +416,7 @@ class ContactNode(LifecycleNode):
             self.remove_waitable(handler)
 
     def _end_events(self, entity: Publisher | Subscription) -> None:
-        for handler in self._events_of.pop(entity):
+        for handler in self._events_of.pop(entity, ()):
             look_at(handler)
             handler.destroy()
 
@@ -488,7 +523,7 @@ class ContactNode(LifecycleNode):
 
     def _report(self) -> None:
         """Once a second: say what happened since the last time."""
-        for handlers in self._events_of.values():
+        for handlers in list(self._events_of.values()):
             for handler in handlers:
                 look_at(handler)
         if self._solver is None:

@@ -10,6 +10,7 @@ simulation trips over.
 """
 from __future__ import annotations
 
+import argparse
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -41,12 +42,9 @@ class Settings:
 
 
 def device_of(name: str) -> str:
-    """The device of PyTorch for `cpu`, `cuda` or `auto`: a GPU where there is one.
-
-    Raises ValueError for a GPU that there is not.
-    """
+    """What a program's argument --device names: `auto` is a GPU where PyTorch finds one."""
     if name == 'cuda' and not torch.cuda.is_available():
-        raise ValueError('--device cuda: PyTorch finds no GPU here')
+        raise argparse.ArgumentTypeError('cuda: PyTorch finds no GPU here')
     return ('cuda' if torch.cuda.is_available() else 'cpu') if name == 'auto' else name
 
 

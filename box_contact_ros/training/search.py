@@ -547,8 +547,8 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
                         help='of everything random (default 1)')
     parser.add_argument('--out', type=Path, default=Path(), help='folder for the page, the table, '
                         'the plot and, until the end, the checkpoint (default: the current one)')
-    parser.add_argument('--device', choices=('auto', 'cpu', 'cuda'), default='auto',
-                        help='auto: a GPU where there is one (default)')
+    parser.add_argument('--device', choices=('auto', 'cpu', 'cuda'), type=device_of,
+                        default='auto', help='auto: a GPU where there is one (default)')
     parser.add_argument('--threads', type=int, default=1, help='of PyTorch (default 1; matrices '
                         'this small gain little from more)')
     parser.add_argument('--quick', action='store_true',
@@ -557,10 +557,6 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
     for name, least in (('candidates', 16), ('threads', 1)):
         if getattr(options, name) < least:
             parser.error(f'--{name} {getattr(options, name)} is too small: {least} or more')
-    try:
-        options.device = device_of(options.device)
-    except ValueError as error:
-        parser.error(str(error))
     make_folder(parser, options.out)
     return options
 

@@ -191,9 +191,9 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
                         help='small sets and few epochs, to try it out; needs --out')
     parser.add_argument('--threads', type=int, default=1, help='of PyTorch (default 1; two '
                         'train the committee in 7 minutes, the others gain nothing)')
-    parser.add_argument('--device', choices=('cpu', 'cuda', 'auto'), default='cpu',
-                        help='of the committee (default cpu: the same weights everywhere; matrices '
-                        'this small gain little from a GPU)')
+    parser.add_argument('--device', choices=('cpu', 'cuda', 'auto'), type=device_of,
+                        default='cpu', help='of the committee (default cpu: the same weights '
+                        'everywhere; matrices this small gain little from a GPU)')
     options = parser.parse_args(args)
     wanted = options.what or ['all']
     unknown = [name for name in wanted if name not in (*NAMES, 'all')]
@@ -227,10 +227,6 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
             parser.error(f'{options.scene}: no pair of sizes is within the range of the committee')
     shipped = resource_path('package.xml').parent / 'weights'
     options.out = make_folder(parser, options.out or (Path() if options.scene else shipped))
-    try:
-        options.device = device_of(options.device)
-    except ValueError as error:
-        parser.error(str(error))
     return options
 
 
