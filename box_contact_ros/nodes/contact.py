@@ -323,7 +323,10 @@ class ContactNode(LifecycleNode):
                                  f'used again while a node runs (start it anew)')
 
     def _check_topics(self, scene: Scene, pair_topics: bool) -> None:
-        """Raise ValueError for a name that, in this namespace and remapped, can be no topic's."""
+        """Raise ValueError for names that, in this namespace and remapped, can be no topics'.
+
+        Or that are of another type: the topics that the node itself has.
+        """
         own = [f'{self.prefix}contacts', '~/transition_event', *TOPICS_OF_EVERY_NODE]
         if pair_topics:
             own += [f'{self._prefix(pair)}/{topic}' for pair in scene.pairs

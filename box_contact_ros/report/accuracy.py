@@ -515,9 +515,9 @@ def main(args: Sequence[str] | None = None) -> int:
                         help='of the sets, default: %(default)s')
     add_out(parser, 'accuracy.md, accuracy.csv, accuracy.png')
     options = parser.parse_args(args)
-    options.out = results_folder(parser, options)
     if options.pairs < 1:
         parser.error('--pairs must be at least 1')
+    options.out = results_folder(parser, options)
     count = min(options.pairs, QUICK_PAIRS) if options.quick else options.pairs
     try:
         results = _measure_all(options.model, count, options.seed, options.weights)

@@ -19,12 +19,13 @@ import torch
 from ..arguments import make_folder, seed_number
 from ..network import load_weights, save_weights
 from ..resources import resource_path
+from ..scene_file import SceneError
 from ..sites import UNITS_MAX
 from . import committee, dataset
 from .errors import errors_of, figures_by_part
 from .fit import Settings, fit
 from .points import device_of
-from .scene import SceneError, size_pairs
+from .scene import size_pairs
 
 
 @dataclasses.dataclass(frozen=True)
