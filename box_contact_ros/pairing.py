@@ -46,6 +46,8 @@ Tick = list['StampedPose | None']
 class _Poses(dict[str, StampedPose]):
     """What a tick has so far, by box."""
 
+    __slots__ = ('number',)
+
     number: int
     """How many ticks began before."""
 
@@ -112,9 +114,9 @@ class StampPairing(_Pairing):
         self._taken: dict[str, deque[int]] = {}
         self._missing_since: dict[str, int] = {}  # stamp of the first tick that a box lacks
         self._went_without: dict[str, deque[int]] = {}  # ticks answered without a box, by stamp
-        self._newest_without = NEVER                    # of all boxes
         self._newest_answered = NEVER
         self._joined: dict[str, int] = {}  # newest tick that was answered before a box was there
+        self._newest_closed = NEVER        # of all of these
         self._answered = False
         self._were_stale: set[str] = set()
         self._changed = False  # a tick may wait for nothing any more: time to look all of them over
@@ -134,6 +136,7 @@ class StampPairing(_Pairing):
             {box: kept.get(box, deque(maxlen=REMEMBERED_STAMPS)) for box in self.boxes}
             for kept in (self._taken, self._went_without))
         self._joined = {box: self._joined.get(box, self._newest_answered) for box in self.boxes}
+        self._newest_closed = max(self._newest_closed, *self._joined.values())
         self._changed = True
 
     def reset(self) -> None:
@@ -143,7 +146,7 @@ class StampPairing(_Pairing):
         self._waiting.clear()
         self._missing_since.clear()
         self._answered = False
-        self._newest_without = self._newest_answered = NEVER
+        self._newest_answered = self._newest_closed = NEVER
         self._joined = dict.fromkeys(self.boxes, NEVER)
         for stamps in (*self._taken.values(), *self._went_without.values()):
             stamps.clear()
@@ -187,7 +190,7 @@ class StampPairing(_Pairing):
         if key > self._newest_answered:
             self._newest_answered = key
         if len(poses) < len(self.boxes):
-            self._newest_without = max(self._newest_without, key)
+            self._newest_closed = max(self._newest_closed, key)
             for box in self.boxes:
                 if box not in poses:
                     self._went_without[box].append(key)
@@ -195,7 +198,7 @@ class StampPairing(_Pairing):
 
     def _is_too_late(self, box: str, stamp: int) -> bool:
         """Whether the tick of a pose was answered without its box, or before that had joined."""
-        if stamp > max(self._newest_without, self._joined[box]) + self.tolerance:
+        if stamp > self._newest_closed + self.tolerance:
             return False
         return stamp <= self._joined[box] + self.tolerance or any(
             abs(key - stamp) <= self.tolerance for key in self._went_without[box])
