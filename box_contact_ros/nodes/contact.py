@@ -56,6 +56,13 @@ from .wire import RawMessages
 
 SERIALIZATIONS = {'raw': RawMessages, 'typed': TypedMessages}
 """Values of the node parameter `serialization`."""
+
+
+def model(name: str, value: Any) -> str:
+    """One of the models."""
+    return check_model(name, text(name, value))
+
+
 CHANGES = ('total_count_change', 'current_count_change', 'not_alive_count_change')
 """What events count since they were last looked at, each some of these."""
 TOPICS_OF_EVERY_NODE = ('/diagnostics', '/parameter_events', '/rosout', '/clock')
@@ -70,7 +77,7 @@ PARAMETERS = {
     'scene': Setting('', 'scene file (or the scene itself, as text) with boxes and pairs; replaces '
                          'size_a and size_b; set again, it is read again', text),
     'model': Setting('committee', f'how the contact point is found: {MODEL_NAMES}',
-                     check_model),
+                     model),
     'weights': Setting('', 'weights file to use in place of the shipped one', text),
     'pairing': Setting('stamp', 'stamp: answer once, when poses of equal stamp are in; latest: '
                                 "answer every pose with the other boxes' last", one_of(PAIRINGS)),
