@@ -358,26 +358,49 @@ def scene_of(path, content):
     except SceneError as error:
         assert str(error).startswith(f'{path}:') and '\n' not in str(error)
         assert len(str(error)) < 1000
-        return str(error)
+        return str(error).removeprefix(f'{path}')
     assert found.pairs and not any(size_fault(box.size) for box in found.boxes.values())
     return found
 
 
-@pytest.mark.parametrize('text', [
-    '', '7', '[]', 'boxes: {}\npairs: []', 'boxes: [1, 2]', 'boxes: {a: 3}',
-    'boxes: {a: {size: 3}}',
-    *(f'boxes: {{a: {{size: [1, 2, {number}]}}, b: {{size: [1, 1, 1]}}}}\n'
-      'pairs: [{id: 0, name: p, a: a, b: b}]' for number in (
-          '"3"', 'yes', '.nan', '-.inf', '-0.0', '5.0e-324', '1' + 400 * '0', '1' + 5000 * '0')),
-    *(f'boxes: {{a: {{size: [1, 1, 1]}}, b: {{size: [1, 1, 1]}}}}\npairs: [{pair}]' for pair in (
-        '3', '{id: 0, name: p, a: a, b: [a]}', '{id: 0, name: p, a: a, b: c}')),
-    'boxes: {a: {size: [1, 1, 1]}, a: {size: [2, 2, 2]}}', 'boxes: {}\nboxes: {}',
-    'boxes: {a: {size: [1, 1, 1], size: [2, 2, 2]}}', 'boxes: {? [1] : 2}', 'a: 2026-02-30',
-    'a: !!timestamp x', 'a: !!int x', 'a: !!python/object/apply:os.getcwd []', '[' * 5000,
-    'a: \x07', 'a: \udc80', b'\xff\xfe\xff'])
-def test_a_bad_scene(tmp_path, text):
-    """Whatever is wrong, of which PyYAML itself raises ten kinds of exceptions, or nothing."""
-    assert isinstance(scene_of(tmp_path / 'scene.yaml', text), str)
+CUBES = 'boxes: {a: {size: [1, 1, 1]}, b: {size: [1, 1, 1]}}\n'
+PAIR = 'pairs: [{id: 0, name: p, a: a, b: b}]'
+
+
+@pytest.mark.parametrize(('text', 'words'), [
+    ('', ':1: is empty'), ('7', ':1: 7 is not a mapping'), ('[]', ':1: [] is not a mapping'),
+    ('boxes: {}\npairs: []', ':1: boxes: {} should be non-empty'),
+    (f'{CUBES}pairs: []', ':2: pairs: [] should be non-empty'),
+    (f'{CUBES}pairs: {{}}', ':2: pairs: {} is not a list'),
+    ('boxes: [1, 2]', ':1: boxes: [1, 2] is not a mapping'),
+    ('boxes: {a: 3}', ':1: boxes.a: 3 is not a mapping'),
+    ('boxes: {a: {size: 3}}', ':1: boxes.a.size: 3 is not a list'),
+    *((CUBES.replace('1]', f'{number}]', 1) + PAIR, f':1: boxes.a{words}') for number, words in (
+        ('"3"', ".size[2]: '3' is not a number"), ('yes', '.size[2]: True is not a number'),
+        ('.nan', '.size: (1, 1, nan) is not finite'), ('-.inf', '.size[2]: -inf is not positive'),
+        ('-0.0', '.size[2]: -0.0 is not positive'),
+        ('5.0e-324', '.size: (1, 1, 4.94066e-324) is outside'),
+        ('1' + 400 * '0', ': a number is too large'), ('1' + 5000 * '0', ".size[2]: '1000"))),
+    *((f'{CUBES}pairs: [{pair}]', f':2: pairs[0]{words}') for pair, words in (
+        ('3', ': 3 is not a mapping'),
+        ('{id: 0, name: p, a: a, b: [a]}', ".b: ['a'] is not a string"),
+        ('{id: 0, name: p, a: a, b: c}', ".b: 'c' is none of the boxes"))),
+    ('boxes: {a: {size: [1, 1, 1]}, a: {size: [2, 2, 2]}}', ':1: boxes.a: is there twice'),
+    ('boxes: {}\nboxes: {}', ':2: boxes: is there twice'),
+    ('boxes: {a: {size: [1, 1, 1], size: [2, 2, 2]}}', ':1: boxes.a.size: is there twice'),
+    ('boxes: {? [1] : 2}', ':1: boxes: a key must be a name'),
+    ('a: 2026-02-30', ":1: a: '2026-02-30': day is out of range"),
+    ('a: !!timestamp x', ":1: tag 'tag:yaml.org,2002:timestamp' is not accepted"),
+    ('a: !!int x', ":1: tag 'tag:yaml.org,2002:int' is not accepted"),
+    ('a: !!python/object/apply:os.getcwd []', ":1: tag 'tag:yaml.org,2002:python/object"),
+    ('[' * 5000, ':1: nested too deeply'), ('a: \x07', ':1: not YAML'),
+    ('a: \udc80', ': not UTF-8 at byte 3'), (b'\xff\xfe\xff', ': not UTF-8 at byte 0')])
+def test_a_bad_scene(tmp_path, text, words):
+    """File, line and field are named, whatever is wrong.
+
+    PyYAML itself raises ten kinds of exceptions, and takes the last of two boxes of one name.
+    """
+    assert scene_of(tmp_path / 'scene.yaml', text).startswith(words)
 
 
 def test_a_maze_of_yaml(tmp_path):
@@ -386,8 +409,14 @@ def test_a_maze_of_yaml(tmp_path):
     They are 10^12 numbers, if one were to print them. The error is short, and takes no time.
     """
     maze = '\n'.join(f'l{i + 1}: &l{i + 1} [{", ".join([f"*l{i}"] * 10)}]' for i in range(12))
-    assert 'anchors and aliases are not accepted' in scene_of(
-        tmp_path / 'scene.yaml', f'l0: &l0 1.0\n{maze}\nboxes: *l12')
+    assert scene_of(tmp_path / 'scene.yaml', f'l0: &l0 1.0\n{maze}\nboxes: *l12') == (
+        ':1: anchors and aliases are not accepted')
+
+
+def test_a_scene_that_is_no_file(tmp_path):
+    for path in (tmp_path, tmp_path / 'nothing.yaml'):
+        with pytest.raises(SceneError, match='cannot be read'):
+            read_scene(path)
 
 
 scalars = st.one_of(st.none(), st.booleans(), st.integers(), st.floats(), st.text(max_size=3),

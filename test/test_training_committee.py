@@ -241,6 +241,13 @@ def test_distinct_pairs_of_sizes(tmp_path: Path) -> None:
 @pytest.mark.parametrize(('before', 'after', 'message'), [
     ('boxes:', 'box:', "'box' was unexpected"),
     ('[12.192, 2.438, 0.8]', '[12.192, 0.0, 0.8]', 'boxes.spreader.size[1]: 0.0 is not positive'),
+    ('[12.192, 2.438, 0.8]', '[12.192, 2.438]', 'boxes.spreader.size: must be 3 numbers'),
+    ('[12.192, 2.438, 0.8]', '[12.192, 2.438, high]',
+     "boxes.spreader.size[2]: 'high' is not a number"),
+    ('{size: [12.192, 2.438, 2.591]}', '{}', "boxes.load: 'size' is a required property"),
+    (', b: stack_1', '', "pairs[0]: 'b' is a required property"),
+    ('pairs:\n', 'pairs: []\nmore:\n', "'more' was unexpected"),
+    ('pairs:\n', 'pairs: {}\nmore:\n', "'more' was unexpected"),
     ('a: spreader', 'a: spreder', "pairs[2].a: 'spreder' is none of the boxes"),
     ('boxes:', 'boxes: [', 'not YAML'),
 ])
