@@ -94,12 +94,12 @@ clean:
 # Kernels are compiled at their first use, which would take half of the demo's minute; here once, and
 # again when one of the package's own modules has changed.
 .venv/.compiled: $(wildcard box_contact_ros/*.py) | .venv/.installed-demo
-	@$(call compile,"committee"$(comma) "exact")
+	@$(call compile,"mlp"$(comma) "exact")
 	touch $@
 
 # Those that the view can switch to as well.
 .venv/.compiled-view: $(wildcard box_contact_ros/*.py) | .venv/.installed-view
-	@$(call compile,"committee"$(comma) "exact"$(comma) "paper")
+	@$(call compile,"mlp"$(comma) "exact"$(comma) "paper")
 	touch $@ .venv/.compiled
 
 # An environment holds the project's path in many places, and lives on the Python it was made with.

@@ -6,7 +6,7 @@ row each, `work[NAME + k * LANES + i]`. One array with constant strides is what 
 see that rows do not overlap, and turn loops over `i` to vector instructions.
 
 The stages of a block, and the rows they write, in order: `pose.load_block`, `sat.query_block`,
-then a builder of the point: `overlap.centroid`, pair by pair; `outline`, `committee`; or `paper`.
+then a builder of the point: `overlap.centroid`, pair by pair; `outline`, `mlp`; or `paper`.
 Each stage exists twice, compiled for LANES pairs and for one: with a variable number of pairs,
 loops took five times as long. A block that is not full is filled up with boxes far apart. A single
 pair is copied to SINGLE lanes, so that what is done four times for a pair is done once for four.
@@ -72,7 +72,7 @@ MIDDLE = _rows(3)      # middle of the bounding box, in its frame [m]
 HALF = _rows(3)        # its half extents [m]
 INSIDE = _rows(3)      # a point inside A∩B, in that frame [m]
 
-# sites.describe_block and centroid_block, then committee.
+# sites.describe_block and centroid_block, then mlp.
 NORMALS = _rows(9)     # the other box's axis f in the frame chosen: 3 f + component
 OFFSETS = _rows(3)     # middle of the bounding box along axis f, from the other box's centre [m]
 OTHER = _rows(3)       # the other box's half extents [m]
@@ -95,7 +95,7 @@ _POLYGON = 3 * 12
 POLYGONS = (CORNERS + 3 * 8, CORNERS + 3 * 8 + _POLYGON)
 TRIANGLE = CORNERS + 3 * 8 + 2 * _POLYGON
 
-EXACT_ANSWERS = TRIANGLE + 3 * 3  # committee: single calls outside the range so far
+EXACT_ANSWERS = TRIANGLE + 3 * 3  # mlp: single calls outside the range so far
 
 WORK_SIZE = EXACT_ANSWERS + 1
 

@@ -30,7 +30,7 @@ DOMAIN_VARIABLE = 'BOX_CONTACT_DEMO_DOMAIN'
 TIME_LIMIT = 60.0 - END_PATIENCE  # s: a demo ends within a minute, whatever happens
 OVERHEAD = 8.0  # s of it for starting, for the last answers and for the summary
 LANDING_LEAST = 22.0  # s: a shorter landing ends before it can be judged
-LANDING_MODEL = 'committee'  # the closed loop's default: it needs a point without jumps
+LANDING_MODEL = 'mlp'  # the closed loop's default: it needs a point without jumps
 
 NEXT = """
 Next:

@@ -179,7 +179,7 @@ class SceneSolver:
     memory: use one per thread.
     """
 
-    def __init__(self, scene: Scene, *, model: str = 'committee', weights: str | None = None,
+    def __init__(self, scene: Scene, *, model: str = 'mlp', weights: str | None = None,
                  ) -> None:
         self.scene = scene
         self.model = model
@@ -208,14 +208,14 @@ class SceneSolver:
 
     @property
     def exact_answers(self) -> int:
-        """Contacts so far that the model handed to `exact`: see `committee`."""
+        """Contacts so far that the model handed to `exact`: see `mlp`."""
         return self._solver.exact_answers - self._warm_up_answers
 
     def _warm_up(self) -> None:
         """Compile, or load, the kernels; let the model refuse sizes that it has no answer for.
 
         Only a corner overlaps: where faces coincide, a soup takes seconds. And by little: it is not
-        the depth that a committee was not trained for.
+        the depth that an MLP was not trained for.
         """
         size_a, size_b = self._size[self._first], self._size[self._second]
         _, first = np.unique(np.hstack((size_a, size_b)), axis=0, return_index=True)
@@ -225,7 +225,7 @@ class SceneSolver:
             size_a[first], size_b[first])
         self._solver.batch(a, b, size_a=size_a[first], size_b=size_b[first])
         self.sizes_answered_exactly = self._solver.exact_answers
-        """Pairs of sizes that a `committee` was not trained for."""
+        """Pairs of sizes that a `mlp` was not trained for."""
         self._solver(a[0], b[0])
         self([a[0]] * len(self.scene.moving))
         self._warm_up_answers = self._solver.exact_answers

@@ -1,4 +1,4 @@
-"""The committee's network: what it sees of an overlap, and what it says.
+"""The MLP: what it sees of an overlap, and what it says.
 
 Scaled to its bounding box, A∩B is the cube [−1, 1]³ cut by the six faces of the other box. Two
 opposite faces f share their unit normal in these coordinates (unit in the sum of the absolute

@@ -11,13 +11,13 @@ from numpy.typing import ArrayLike
 
 from .block import BAD_POSE_A, BAD_POSE_B, BAD_SIZE_A
 from .checks import as_floats, as_size, pose_fault, shown, size_fault
-from .committee import Committee
+from .mlp import Mlp
 from .contact import TOUCHING, Contact, Contacts
 from .exact import Exact
 from .paper import Paper, PaperContinuous
 
 MODELS = {
-    'committee': 'SAT, and a network for the point; any sizes; constant cost; the default',
+    'mlp': 'SAT, and a network for the point; any sizes; constant cost; the default',
     'exact': 'SAT and the exact centroid of the overlap; any sizes; the reference',
     'paper': "the paper's network 6-20-18-4; two equal cubes, or the crane's containers",
     'paper-continuous': "the paper's networks 6-20-17-4 on subsets without jumps; two equal cubes",
@@ -27,7 +27,7 @@ MODELS = {
 """Models by name, with a line about each."""
 MODEL_NAMES = ', '.join([*MODELS, 'soup-N'])
 """For those who choose."""
-NETWORKS = ('committee', 'paper', 'paper-continuous')
+NETWORKS = ('mlp', 'paper', 'paper-continuous')
 """Models that read weights."""
 
 SOUP_DIVISIONS, MOST_SOUP_DIVISIONS = 8, 64
@@ -94,8 +94,8 @@ def make_model(name: str, size_a: np.ndarray, size_b: np.ndarray, weights: str |
     check_model('model', name)
     if weights is not None and not isinstance(weights, (str, os.PathLike)):
         raise ValueError(f'weights must be the path of a file, not {shown(weights)}')
-    if name == 'committee':
-        return Committee(np.concatenate([size_a, size_b]), weights)
+    if name == 'mlp':
+        return Mlp(np.concatenate([size_a, size_b]), weights)
     if name == 'exact':
         return Exact(np.concatenate([size_a, size_b]))
     if name == 'paper':
@@ -130,7 +130,7 @@ class ContactSolver:
     model: one of `MODELS`, or soup-N; weights: a file to use in place of the shipped weights.
     """
 
-    def __init__(self, size_a: ArrayLike, size_b: ArrayLike, *, model: str = 'committee',
+    def __init__(self, size_a: ArrayLike, size_b: ArrayLike, *, model: str = 'mlp',
                  weights: str | None = None) -> None:
         self._size_a = as_size(size_a, 'size_a')
         self._size_b = as_size(size_b, 'size_b')
@@ -160,7 +160,7 @@ class ContactSolver:
 
     @property
     def exact_answers(self) -> int:
-        """Contacts so far that the model handed to `exact`: see `committee`."""
+        """Contacts so far that the model handed to `exact`: see `mlp`."""
         return int(getattr(self._solver, 'exact_answers', 0))
 
     def _converted(self, pose_a: ArrayLike, pose_b: ArrayLike) -> Contact:

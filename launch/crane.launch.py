@@ -14,7 +14,7 @@ from launch_ros.parameter_descriptions import ParameterValue
 PACKAGE = 'box_contact_ros'
 # Name: type, default, description.
 ARGUMENTS = {
-    'model': (str, 'committee', 'how the contact node finds the contact point'),
+    'model': (str, 'mlp', 'how the contact node finds the contact point'),
     'rate': (float, '200.0', 'pairs of poses that the crane publishes per second [Hz]'),
     'seed': (int, '0', '0: the standard motion; n > 0: offset and angles drawn at random'),
     'closed_loop': (bool, 'false', 'true: the contacts carry the load, and the crane lands it'),

@@ -30,7 +30,7 @@ from box_contact_ros.scene import Answer, two_boxes
 FOLDER = Path(__file__).resolve().parents[1] / 'recordings' / 'crane_landing'
 CASE = LandingCase(rope_angle=1.25, rope_heading=35.0, tilt=1.5, tilt_heading=120.0, overhang=0.3,
                    overhang_heading=-60.0, yaw=0.6)
-MODEL, RATE = 'committee', 200.0
+MODEL, RATE = 'mlp', 200.0
 PAIR, = two_boxes((1, 1, 1), (1, 1, 1)).pairs
 BEFORE, AFTER = 0.5, 3.5  # s, from the first touch
 START = 1_767_225_600 * NANOSECONDS  # 2026-01-01; a stamp of zero means no time to some tools

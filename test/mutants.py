@@ -67,14 +67,14 @@ MUTANTS = {
     'quaternion taken for a unit one': Mutant(
         'pose.py', 's = 2.0 /', 's = 2.0 + 0.0 *', 'test/test_fuzz.py -k gates_are'),
     'point left outside': Mutant(
-        'committee.py', 'return max(0.0, room) / step if step > max(0.0, room) else 1.0',
-        'return 1.0', 'test/test_committee.py -k garbage_for_weights'),
+        'mlp.py', 'return max(0.0, room) / step if step > max(0.0, room) else 1.0',
+        'return 1.0', 'test/test_mlp.py -k garbage_for_weights'),
     'smaller bounding box, always': Mutant(
         'outline.py', '_ALIKE = 0.2', '_ALIKE = 1e-6',
         'test/test_outline.py -k keep_their_frame'),
     'side of a couple of faces taken as it comes': Mutant(
         'sites.py', 'numbers[(STRENGTHS + f) * LANES + i] = abs(push)',
-        'numbers[(STRENGTHS + f) * LANES + i] = push', 'test/test_committee.py -k box_symmetries'),
+        'numbers[(STRENGTHS + f) * LANES + i] = push', 'test/test_mlp.py -k box_symmetries'),
     # Guards of the nodes against faults.
     'weights taken as they are': Mutant(
         'network.py', "if tensors_digest(tensors) != card['sha256']:", 'if False:',

@@ -9,7 +9,7 @@ import pytest
 from box_contact_ros import arguments
 from box_contact_ros.programs import PROGRAMS
 
-FOLDERS = ('accuracy', 'bench', 'frontier', 'search committee', 'soak', 'speed', 'stability',
+FOLDERS = ('accuracy', 'bench', 'frontier', 'search mlp', 'soak', 'speed', 'stability',
            'train')
 FILES = ('fuzz', 'paper')
 

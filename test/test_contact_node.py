@@ -213,14 +213,14 @@ def test_interrupted_twice(program, pause):
 
 def test_weights_that_nobody_reads_are_said(capfd):
     """Otherwise a file that was trained for the scene does nothing, quietly."""
-    given = overrides(weights='committee-yard.safetensors')
+    given = overrides(weights='mlp-yard.safetensors')
     with serving(lambda context: ContactNode(context, parameter_overrides=given)) as node:
-        assert "'exact' uses no weights: 'committee-yard.safetensors'" in capfd.readouterr().err
+        assert "'exact' uses no weights: 'mlp-yard.safetensors'" in capfd.readouterr().err
         result, = node.set_parameters([Parameter('weights', value='')])
         assert result.successful
         said = capfd.readouterr().err
         assert "changed: model 'exact'" in said and 'uses no weights' not in said
-        node.set_parameters([Parameter('model', value='committee')])
+        node.set_parameters([Parameter('model', value='mlp')])
         assert 'the weights are not for' not in capfd.readouterr().err
         node.set_parameters([Parameter('size_a', value=[1.0, 30.0, 1.0])])  # aspect 30
         assert 'the weights are not for: 1' in capfd.readouterr().err

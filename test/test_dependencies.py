@@ -46,7 +46,7 @@ SOLVER = """
 from box_contact_ros import ContactSolver
 from box_contact_ros.scene import SceneSolver
 from box_contact_ros.scene_file import read_scene
-for model in ('exact', 'committee', 'paper'):
+for model in ('exact', 'mlp', 'paper'):
     ContactSolver((2, 2, 2), (2, 2, 2), model=model)([0] * 6 + [1], [0] * 6 + [1])
 SceneSolver(read_scene('config/scenes/yard_bay.yaml'))
 """

@@ -1,4 +1,4 @@
-"""Gates at zero on the stored families of hard poses, for `exact` and `committee`."""
+"""Gates at zero on the stored families of hard poses, for `exact` and `mlp`."""
 from __future__ import annotations
 
 import mpmath as mp
@@ -12,10 +12,10 @@ from box_contact_ros.posesets import Pairs
 from box_contact_ros.stability import families, judge, report
 
 CASES = families.load()
-MODELS = ('exact', 'committee')
+MODELS = ('exact', 'mlp')
 EPS = np.finfo(float).eps
 STATED = 4.0
-"""Error of the committee's point [% of the smaller box's longest edge] that nothing here exceeds;
+"""Error of the MLP's point [% of the smaller box's longest edge] that nothing here exceeds;
 docs/accuracy.md has 2.9 as the worst of 600,000."""
 
 
@@ -107,9 +107,9 @@ def test_exact_point(name):
 
 
 @pytest.mark.parametrize('name', families.FAMILIES)
-def test_committee_point(name):
+def test_mlp_point(name):
     """To the stated error."""
-    row = report.examine('committee', name, CASES[name])
+    row = report.examine('mlp', name, CASES[name])
     assert row.point_worst <= STATED
 
 
@@ -247,7 +247,7 @@ def test_float32_poses_have_float32_errors(everything):
     near = Pairs(*(part[np.abs(everything.pose_a[:, :3]).max(axis=1) < 100] for part in everything))
     rounded = near._replace(pose_a=near.pose_a.astype(np.float32).astype(float),
                             pose_b=near.pose_b.astype(np.float32).astype(float))
-    one, two = solve('committee', near), solve('committee', rounded)
+    one, two = solve('mlp', near), solve('mlp', rounded)
     reach = np.maximum(np.abs(near.pose_a[:, :3]), np.abs(near.pose_b[:, :3])).max(axis=1)
     moved = 8 * np.finfo(np.float32).eps * (size_of(near) + reach)
     assert (np.abs(one.separation - two.separation) <= moved).all()

@@ -145,9 +145,9 @@ def test_quick_run(tmp_path: Path) -> None:
     assert frontier.main(['--quick', '--out', str(tmp_path)]) == 0
     with (tmp_path / 'frontier.csv').open() as file:
         rows = list(csv.DictReader(file))
-    assert {'exact', 'committee', 'paper', 'fcl', 'soup-8'} <= {row['contestant'] for row in rows}
+    assert {'exact', 'mlp', 'paper', 'fcl', 'soup-8'} <= {row['contestant'] for row in rows}
     assert {row['set'] for row in rows} == set(frontier.ALL_SETS)
-    ours = [row for row in rows if row['contestant'].split()[0] in ('exact', 'committee')]
+    ours = [row for row in rows if row['contestant'].split()[0] in ('exact', 'mlp')]
     for row in ours:
         assert (row['missed'], row['invented']) == ('0', '0')
         assert row['set'] in ('just apart', 'touching') or float(row['normal_worst']) == 0.0
@@ -173,5 +173,5 @@ def test_the_readme_has_the_table_of_the_report() -> None:
 def test_the_committed_report_has_all_of_them() -> None:
     with (ROOT / 'docs' / 'frontier.csv').open() as file:
         names = {row['contestant'] for row in csv.DictReader(file)}
-    assert {*frontier.IN_SHORT, 'committee 8', 'committee 64', 'paper-continuous',
+    assert {*frontier.IN_SHORT, 'mlp 8', 'mlp 64', 'paper-continuous',
             *(f'soup-{n}' for n in frontier.SOUPS)} <= names

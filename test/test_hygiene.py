@@ -23,7 +23,7 @@ from box_contact_ros.exact import solve_exact
 from box_contact_ros.pose import LENGTH_MAX, LENGTH_MIN, QUATERNION_MAX, QUATERNION_MIN
 from box_contact_ros.scene_file import SceneError, read_scene
 
-MODELS = ('exact', 'committee')
+MODELS = ('exact', 'mlp')
 SOLVERS = {model: ContactSolver(poses.CUBE, poses.CUBE, model=model) for model in MODELS}
 ABOVE = np.array([0.5, 0.25, 1.875, 0, 0, 0, 1])
 TURN = np.array([0.1, -0.2, 0.3, 0.9]) / np.linalg.norm([0.1, -0.2, 0.3, 0.9])
@@ -75,7 +75,7 @@ def test_a_quaternion_is_normalised(model, norm):
     assert found.colliding is wanted.colliding is True
     assert found.separation == pytest.approx(wanted.separation, abs=4e-15)
     assert found.normal == pytest.approx(wanted.normal, abs=4e-15)
-    # The network of `committee` runs in float32.
+    # The network of `mlp` runs in float32.
     assert found.point == pytest.approx(wanted.point, abs=1e-13 if model == 'exact' else 1e-5)
 
 

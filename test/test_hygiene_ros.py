@@ -270,7 +270,7 @@ def test_weights_while_it_runs(node, client, tmp_path):
     garbage.write_bytes(np.random.default_rng(4).bytes(1000))
     for path in (tmp_path, tmp_path / 'nothing', garbage, 'x' * 5000):
         reply = call(client, SetParametersAtomically, 'set_parameters_atomically', [
-            ('model', string('committee')), ('weights', string(str(path)))])
+            ('model', string('mlp')), ('weights', string(str(path)))])
         assert not reply.result.successful and reply.result.reason.startswith('weights file ')
         client.assert_answered()
 

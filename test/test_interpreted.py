@@ -42,7 +42,7 @@ def answers(model: str) -> np.ndarray:
     return np.concatenate(rows)
 
 
-@pytest.mark.parametrize('model', ['exact', 'committee'])
+@pytest.mark.parametrize('model', ['exact', 'mlp'])
 def test_plain_python_gives_the_same(model: str, tmp_path: Path) -> None:
     """Verdicts to the bit, the rest up to rounding.
 

@@ -120,7 +120,7 @@ def test_node_starts_with_the_parameter_file(program: Any, tmp_path: Path) -> No
     """Also under another name; and the file's values are the ones that count."""
     text = (ROOT / 'config' / 'contact_node.yaml').read_text('utf-8')
     file = tmp_path / 'contact_node.yaml'
-    file.write_text(text.replace('model: committee', 'model: exact'), 'utf-8')
+    file.write_text(text.replace('model: mlp', 'model: exact'), 'utf-8')
     node = program('contact_node', '--ros-args', '--params-file', str(file), '-r', '__ns:=/yard')
     assert "model 'exact'" in node.wait_for_output('ready', 120)
 

@@ -54,7 +54,7 @@ def assert_same(answer, wanted):
         assert np.allclose(contact.point, other.point, rtol=4e-16, atol=1e-15)
 
 
-@pytest.mark.parametrize('model', ['exact', 'committee'])
+@pytest.mark.parametrize('model', ['exact', 'mlp'])
 @pytest.mark.parametrize('origin', [0.0, 5e6])
 def test_a_tick_is_every_pair_alone(model, origin):
     """Random boxes, a third of them fixed, half of the pairs listed, near and far.
@@ -193,9 +193,9 @@ def test_two_boxes_is_the_solver():
 
 
 @pytest.mark.parametrize(('size', 'exactly'), [(12.0, 0), (19.9, 0), (20.1, 1)])
-def test_sizes_that_a_committee_was_not_trained_for(size, exactly):
+def test_sizes_that_a_mlp_was_not_trained_for(size, exactly):
     """Cubes up to 20 times as large as the other are within its range, whatever is asked first."""
-    solver = SceneSolver(two_boxes((1, 1, 1), (size,) * 3), model='committee')
+    solver = SceneSolver(two_boxes((1, 1, 1), (size,) * 3), model='mlp')
     assert solver.sizes_answered_exactly == exactly
 
 

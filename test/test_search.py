@@ -16,7 +16,7 @@ import pytest
 torch = pytest.importorskip('torch')
 pytest.importorskip('matplotlib')
 
-from box_contact_ros.training import committee, halving, search  # noqa: E402
+from box_contact_ros.training import mlp, halving, search  # noqa: E402
 from box_contact_ros.training.halving import Candidate, CheckpointError, Rung  # noqa: E402
 
 QUICK = ['--quick', '--candidates', '48', '--seed', '2', '--device', 'cpu']
@@ -111,7 +111,7 @@ def test_frontier() -> None:
 
 def test_small_networks_are_kept_though_they_are_worse() -> None:
     """Errors that fall with the size: of four classes of cost each keeps its best."""
-    some = search.CommitteeSearch(seed=1, count=400, quick=True, device='cpu')
+    some = search.MlpSearch(seed=1, count=400, quick=True, device='cpu')
     ranked = sorted(some.candidates(), key=some.cost, reverse=True)
     kept = some.keep(ranked, 16)
     classes = np.bincount(np.searchsorted([8, 16, 32], [one.hidden[0] for one in kept]))
@@ -121,9 +121,9 @@ def test_small_networks_are_kept_though_they_are_worse() -> None:
 
 def test_candidates_are_over_the_whole_range() -> None:
     """Hidden units 4 to 64 by fours, small ones more often; the first is what is in use."""
-    found = search.CommitteeSearch(seed=1, count=2048, quick=False, device='cpu').candidates()
+    found = search.MlpSearch(seed=1, count=2048, quick=False, device='cpu').candidates()
     assert len(found) == 2048
-    assert found[0].shipped and found[0].hidden == committee.HIDDEN
+    assert found[0].shipped and found[0].hidden == mlp.HIDDEN
     units = {units for one in found for units in one.hidden}
     assert units == set(range(4, 65, 4))
     assert len({one.rate for one in found}) == 2048
@@ -147,7 +147,7 @@ def table(folder: Path, name: str) -> str:
 
 
 @pytest.mark.parametrize(('what', 'name', 'networks'), [
-    ('committee', 'search', 48), ('paper', 'search_paper', 48)])
+    ('mlp', 'search', 48), ('paper', 'search_paper', 48)])
 def test_killed_and_started_again_it_ends_the_same(tmp_path: Path, what: str, name: str,
                                                    networks: int) -> None:
     """The program, killed when its first checkpoint is there; then the page, table and plot."""
@@ -196,5 +196,5 @@ def test_refused_arguments(arguments: list[str], message: str,
 def test_a_checkpoint_of_other_options_is_said_in_one_line(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / 'search_0.checkpoint').write_bytes(b'x')
-    assert search.main(['committee', *QUICK, '--out', str(tmp_path)]) == 1
+    assert search.main(['mlp', *QUICK, '--out', str(tmp_path)]) == 1
     assert 'search_0.checkpoint cannot be read, remove it' in capsys.readouterr().err

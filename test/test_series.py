@@ -23,7 +23,7 @@ from box_contact_ros.resources import resource_path
 from box_contact_ros.stability.choices import solve_with_choices
 
 UNIT = (1.0, 1.0, 1.0)
-NETWORK = load_weights(resource_path('weights', 'committee.safetensors')).networks['point']
+NETWORK = load_weights(resource_path('weights', 'mlp.safetensors')).networks['point']
 
 K = 1.0
 """|Δpoint| ≤ K · |Δpose| · size / depth, wherever the network is asked the same way before and
@@ -115,7 +115,7 @@ def crane_series(name: str) -> Series:
     else:
         scenario = scenario_of(list(cases())[LANDED[name]])
         crane = Crane(scenario, CRANE_RATE)
-        load = land(scenario, ContactSolver(scenario.size, scenario.stack_size, model='committee'),
+        load = land(scenario, ContactSolver(scenario.size, scenario.stack_size, model='mlp'),
                     rate_hz=CRANE_RATE, latency=0.002).poses
     n = len(load)
     return Series(Pairs(np.tile(crane.stack_pose, (n, 1)), np.array(load),
@@ -177,12 +177,12 @@ def test_one_contact_interval_per_approach(series):
     """The boxes of a crane meet once and part once or never.
 
     So do boxes on a straight line that do not turn (A ⊕ −B is convex), and on two that have a point
-    of contact in common. While they turn, `committee` begins as many contacts as `exact` does, in
+    of contact in common. While they turn, `mlp` begins as many contacts as `exact` does, in
     the same frames.
     """
     name, (pairs, motions) = series
-    exact, committee = solve('exact', pairs), solve('committee', pairs)
-    assert np.array_equal(committee.colliding, exact.colliding)
+    exact, mlp = solve('exact', pairs), solve('mlp', pairs)
+    assert np.array_equal(mlp.colliding, exact.colliding)
     begun = contact_intervals(exact, motions)
     print(f'{name}: {exact.colliding.sum()} of {len(pairs.pose_a)} frames in contact, '
           f'{begun.sum()} contacts in {motions} motions')
@@ -206,7 +206,7 @@ def test_frames_know_no_history(series):
     order = rng.permutation(len(pairs.pose_a))
     other = Pairs(*(part[order] for part in pairs))
     other.pose_b[:, 3:] *= rng.choice([-1.0, 1.0], (len(order), 1))
-    for model in ('exact', 'committee'):
+    for model in ('exact', 'mlp'):
         for one, two in zip(solve(model, pairs), solve(model, other)):
             assert np.array_equal(one[order], two, equal_nan=True)
 
@@ -214,7 +214,7 @@ def test_frames_know_no_history(series):
 def test_the_point_keeps_to_its_slope(series):
     """The law of K from frame to frame: of `exact` always.
 
-    Of `committee` between frames in which the network is asked the same way.
+    Of `mlp` between frames in which the network is asked the same way.
     """
     name, (pairs, motions) = series
     one, other = frames(pairs, motions)
@@ -223,7 +223,7 @@ def test_the_point_keeps_to_its_slope(series):
     before, after = frames(choices, motions)
     same = before.equal(after)
     slope = slopes(one, other, *frames(found, motions))
-    print(f'{name}: K of exact {np.nanmax(exact):.2f}, of committee {np.nanmax(slope[same]):.2f} '
+    print(f'{name}: K of exact {np.nanmax(exact):.2f}, of MLP {np.nanmax(slope[same]):.2f} '
           f'in {100 * same[np.isfinite(slope)].mean():.2f} % of the frames')
     assert np.nanmax(exact) <= K
     assert np.nanmax(slope[same]) <= K
@@ -248,7 +248,7 @@ def beyond_exact(model: str, series: Series) -> tuple[float, float]:
             float((excess / longest)[known].max()))
 
 
-def test_how_far_the_point_of_committee_steps(series):
+def test_how_far_the_point_of_mlp_steps(series):
     """While the crane lowers and lifts: no farther than the exact point plus 1 % of the width.
 
     So in landings; but there the worst step comes close. Of family I one frame in 17,000 steps
@@ -256,7 +256,7 @@ def test_how_far_the_point_of_committee_steps(series):
     and after differ by more than that. The bounds leave room for other weights.
     """
     name, motion = series
-    share, worst = beyond_exact('committee', motion)
+    share, worst = beyond_exact('mlp', motion)
     print(f'{name}: {100 * share:.3f} % of the steps, worst {100 * worst:.2f} % of the edge')
     least, most = ((1.0, 0.002) if name in LOWERED else
                    (0.9995, 0.01) if name in LANDED else (0.998, 0.025))
@@ -276,7 +276,7 @@ def test_the_deepest_point_jumps_by_the_box(series):
     if 'fixed' in name:
         return  # boxes that do not turn: the deepest corner mostly stays
     assert worst > 0.15
-    assert worst > 5.0 * beyond_exact('committee', motion)[1]
+    assert worst > 5.0 * beyond_exact('mlp', motion)[1]
 
 
 # --- where the point may step, and where not ------------------------------------------------------
@@ -360,7 +360,7 @@ def test_choices_are_those_of_the_answer():
     deep = pairs._replace(pose_b=pairs.pose_b.copy())
     deep.pose_b[::3, :3] = deep.pose_a[::3, :3]
     found, choices = solve_with_choices(NETWORK, deep)
-    for one, other in zip(found, solve('committee', deep)):
+    for one, other in zip(found, solve('mlp', deep)):
         assert np.array_equal(one, other, equal_nan=True)
     assert not choices.network[::3].any() and choices.network[1::3].all()
     assert choices.equal(choices)[1::3].all() and not choices.equal(choices)[::3].any()

@@ -1,4 +1,4 @@
-"""The committee's network: its symmetries, against a slow reference, with any weights."""
+"""The MLP: its symmetries, against a slow reference, with any weights."""
 from __future__ import annotations
 
 import itertools
@@ -25,7 +25,7 @@ from box_contact_ros.posesets import SETS, Pairs
 from box_contact_ros.resources import resource_path
 from box_contact_ros.sat import query_block
 
-SHIPPED = load_weights(resource_path('weights', 'committee.safetensors')).networks['point']
+SHIPPED = load_weights(resource_path('weights', 'mlp.safetensors')).networks['point']
 ROUNDING = 2e-5
 """Of float32 sums of some ten numbers about one, with weights up to some ten."""
 

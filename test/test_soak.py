@@ -45,7 +45,7 @@ def test_answers_of_other_poses_are_found(shift):
     solver = ContactSolver(*stream.sizes)
     truth = solver.batch(stream.pose_a, stream.pose_b)
     answers = solver.batch(stream.pose_a, np.roll(stream.pose_b, shift, axis=0))
-    log = NodeLog('contact', 'committee')
+    log = NodeLog('contact', 'mlp')
     opened = log.open('containers', truth)
     start = time.time_ns()
     for row in range(200):

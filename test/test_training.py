@@ -177,7 +177,7 @@ def test_a_folder_that_cannot_be_written_is_said_at_once(
     (['--quick'], 'name a folder with --out'),
     *([] if torch.cuda.is_available() else [
         (['paper', '--out', '.', '--device', 'cuda'], '--device: cuda: PyTorch finds no GPU')]),
-    (['papers'], "'papers' is not one of paper, paper-continuous, containers, committee, all"),
+    (['papers'], "'papers' is not one of paper, paper-continuous, containers, mlp, all"),
     (['paper', '--starts', '0'], '--starts 0 is too small'),
     (['paper', '--seed', '-1'], "'-1' is no whole number from 0"),
 ])

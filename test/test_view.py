@@ -264,13 +264,13 @@ def test_it_hears_poses_and_answers(view, client):
 def test_it_switches_the_model_of_the_running_node(view, client, contact_node):
     """Granted, or refused with the node's own words, and then the old one stays."""
     assert client.spin(lambda: view.log is not None, 60.0)
-    view.set_model('committee')
-    assert client.spin(lambda: view.settings['model'] == 'committee' and not view.wish, 120.0)
-    assert contact_node.get_parameter('model').value == 'committee'
+    view.set_model('mlp')
+    assert client.spin(lambda: view.settings['model'] == 'mlp' and not view.wish, 120.0)
+    assert contact_node.get_parameter('model').value == 'mlp'
     view.set_model('paper')  # it knows cubes and containers, not these sizes
     assert client.spin(lambda: view.refusal, 60.0)
     assert 'paper' in view.refusal and not view.wish
-    assert contact_node.get_parameter('model').value == 'committee'
+    assert contact_node.get_parameter('model').value == 'mlp'
     view.set_model('exact')
     assert not view.refusal
     assert client.spin(lambda: view.settings['model'] == 'exact' and not view.wish, 60.0)

@@ -76,7 +76,7 @@ PARAMETERS = {
     'size_b': Setting(CONTAINER, 'full extents of box B, three numbers > 0 [m]', size),
     'scene': Setting('', 'scene file (or the scene itself, as text) with boxes and pairs; replaces '
                          'size_a and size_b; set again, it is read again', text),
-    'model': Setting('committee', f'how the contact point is found: {MODEL_NAMES}',
+    'model': Setting('mlp', f'how the contact point is found: {MODEL_NAMES}',
                      model),
     'weights': Setting('', 'weights file to use in place of the shipped one', text),
     'pairing': Setting('stamp', 'stamp: answer once, when poses of equal stamp are in; latest: '
@@ -243,7 +243,7 @@ class ContactNode(LifecycleNode):
         if self._settings.get('weights') and self._solver.model not in NETWORKS:
             self.get_logger().warning(f'model {self._solver.model!r} uses no weights: '
                                       f'{shown(self._settings["weights"])} is ignored')
-        elif self._solver.model == 'committee' and self._solver.sizes_answered_exactly:
+        elif self._solver.model == 'mlp' and self._solver.sizes_answered_exactly:
             self.get_logger().warning(
                 f'pairs of sizes that the weights are not for: '
                 f'{self._solver.sizes_answered_exactly}; the exact model answers them')

@@ -23,7 +23,7 @@ from ..pose import rotation_matrix
 from .appearance import BOX_A, BOX_B, BOX_OPACITY, CONTACT, EXACT, proportions
 from .view_log import Figures, Scene
 
-MODELS = ('committee', 'exact', 'soup', 'paper')
+MODELS = ('mlp', 'exact', 'soup', 'paper')
 CHART_LEAST, CHART_MOST = ({'pad': 0.1, 'soft': value, 'mode': 1} for value in (-20.0, 20.0))
 """Of the separation [mm]: the chart shows at least this, so that it does not magnify noise."""
 READ_OUT_PERIOD = 0.2

@@ -2,7 +2,7 @@
 
 Every set of `posesets` is drawn anew from `--seed`; model `exact` gives the truth. Written are
 accuracy.csv (a row per model, set and part of the set), accuracy.md and accuracy.png. The exit
-status is 1 if `committee` breaks one of the limits in `LIMITS`, its separations or normals are not
+status is 1 if `mlp` breaks one of the limits in `LIMITS`, its separations or normals are not
 those of `exact`, a point lies outside a box, or a pair was handed to `exact`.
 
 Classes. The features that meet are told from the pose, not from which SAT axis wins: in stacks
@@ -46,7 +46,7 @@ from ..block import (
     TOUCH,
     new_work,
 )
-from ..committee import asked
+from ..mlp import asked
 from ..contact import Contacts
 from ..jit import kernel
 from ..network import WeightsError, load_weights
@@ -80,9 +80,9 @@ LIMITS = {
     'tilted stacks': Limit(0.8, 3.0, 8.0),
     'containers': Limit(0.6, 3.5, 8.0),
 }
-"""What model `committee` has to keep, by set."""
+"""What model `mlp` has to keep, by set."""
 MAE_LIMIT = 0.005
-"""Mean absolute error [rad] of `committee` on the paper's external set."""
+"""Mean absolute error [rad] of `mlp` on the paper's external set."""
 OUTSIDE = 2.0**-44
 """How far outside a box a point may be, of the size (5.7e-14), beside what B is pressed in."""
 
@@ -244,7 +244,7 @@ def measure(model: str, name: str, pairs: Pairs, truth: Contacts, weights: str |
         solver = ContactSolver(cube, cube, model=model, weights=weights)
         found = solver.batch(pairs.pose_a, pairs.pose_b, size_a=pairs.size_a, size_b=pairs.size_b)
     except ValueError:
-        if model == 'committee':
+        if model == 'mlp':
             raise
         return None  # the paper's models are for two equal boxes of few sizes
     both = truth.colliding & found.colliding
@@ -260,9 +260,9 @@ def measure(model: str, name: str, pairs: Pairs, truth: Contacts, weights: str |
         float(np.abs(found.normal[both] - truth.normal[both]).max(initial=0.0)),
         float((np.abs(found.separation - truth.separation) / size).max(initial=0.0)),
         outside(pairs, found))
-    if model == 'committee':
+    if model == 'mlp':
         result.corrected_share = share_corrected(
-            touching, weights or resource_path('weights', 'committee.safetensors'))
+            touching, weights or resource_path('weights', 'mlp.safetensors'))
         result.broken = _broken(result)
     return result
 
@@ -314,7 +314,7 @@ def paper_errors(models: Sequence[str], weights: str | None = None, step: int = 
     found = {'paper': errors_of(file.networks['contact'], inputs, outputs)}
     for model in models:
         solver = ContactSolver(size, size, model=model,
-                               weights=weights if model == 'committee' else None)
+                               weights=weights if model == 'mlp' else None)
         contact = solver.batch(pose_a, pose_b)
         angles = np.concatenate([dataset.spherical(contact.point),
                                  dataset.spherical(contact.normal)], axis=1)
@@ -356,7 +356,7 @@ def table(results: Sequence[Result]) -> str:
     rows = [['model, set', 'pairs', 'mean', 'p99', 'worst', 'limits', 'answered by exact',
              'verdicts wrong', 'normal off', 'separation off', 'corrected', 'outside']]
     for r in results:
-        limit = '/'.join(f'{value:g}' for value in LIMITS[r.set]) if r.model == 'committee' else ''
+        limit = '/'.join(f'{value:g}' for value in LIMITS[r.set]) if r.model == 'mlp' else ''
         mean, p99, worst = statistics(r.errors)
         corrected = '' if math.isnan(r.corrected_share) else f'{100.0 * r.corrected_share:.2g} %'
         rows.append([
@@ -395,7 +395,7 @@ def write_csv(path: Path, results: Sequence[Result]) -> None:
                 mean, p99, worst = statistics(errors)
                 more = [''] * 9
                 if part == 'all':
-                    limits = LIMITS[r.set] if r.model == 'committee' else [''] * 3
+                    limits = LIMITS[r.set] if r.model == 'mlp' else [''] * 3
                     corrected = '' if math.isnan(r.corrected_share) else f'{r.corrected_share:.5g}'
                     more = [*limits, f'{r.exact_share:.5g}', r.verdict_errors,
                             f'{r.normal_difference:.3g}', f'{r.separation_difference:.3g}',
@@ -438,13 +438,13 @@ are pairs of edges although faces meet.
 
 Errors [rad] over azimuth and elevation of the impact point, seen from the first box's centre, and
 of the normal, on the external set of the weights of model `paper` (cubes of edge 2 that just touch,
-as labelled when they were drawn). {MAE_LIMIT:g} is the limit of `committee`'s MAE.
+as labelled when they were drawn). {MAE_LIMIT:g} is the limit of `mlp`'s MAE.
 
 {paper_table(errors, drawn)}
 
 The labels are the points of touch; `exact` presses B in by 1e-9 of the size and takes the centroid
 of what overlaps. Its figures are the difference between the two definitions, and the floor of what
-`committee` could reach.
+`mlp` could reach.
 """
 
 
@@ -470,9 +470,9 @@ def draw(path: Path, results: Sequence[Result]) -> None:
         for r in results:
             if r.set != name:
                 continue
-            colour = 'C0' if r.model == 'committee' else f'C{5 + models.index(r.model) % 5}'
+            colour = 'C0' if r.model == 'mlp' else f'C{5 + models.index(r.model) % 5}'
             _curve(axis, r.errors, linewidth=1.6, color=colour, label=r.model)
-            if r.model != 'committee':
+            if r.model != 'mlp':
                 continue
             for k, part in enumerate(CLASSES):
                 _curve(axis, r.errors[r.classes == k], linewidth=0.8, linestyle='--',
@@ -496,7 +496,7 @@ def draw(path: Path, results: Sequence[Result]) -> None:
         axis.set_xlabel("point error [% of the smaller box's longest edge]")
     for axis in axes[:, 0]:
         axis.set_ylabel('share of pairs with a larger error')
-    figure.suptitle('Point error against exact; dashed: committee per class; '
+    figure.suptitle('Point error against exact; dashed: mlp per class; '
                     '▼ its limits, dotted: of its mean')
     figure.savefig(path, dpi=110)
     plt.close(figure)
@@ -506,9 +506,9 @@ def main(args: Sequence[str] | None = None) -> int:
     """Measure, print, write; 1 if a limit is broken."""
     parser = argparse.ArgumentParser(prog='accuracy', description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--model', nargs='+', default=['committee'], choices=list(MODELS),
-                        metavar='MODEL', help=f'of {", ".join(MODELS)}; default: committee')
-    parser.add_argument('--weights', help='weights file of committee, default: the shipped one')
+    parser.add_argument('--model', nargs='+', default=['mlp'], choices=list(MODELS),
+                        metavar='MODEL', help=f'of {", ".join(MODELS)}; default: mlp')
+    parser.add_argument('--weights', help='weights file of MLP, default: the shipped one')
     parser.add_argument('--pairs', type=int, default=PAIRS, help='a set, default: %(default)s')
     parser.add_argument('--quick', action='store_true', help=f'{QUICK_PAIRS} pairs a set')
     parser.add_argument('--seed', type=seed_number, default=2,
@@ -521,19 +521,19 @@ def main(args: Sequence[str] | None = None) -> int:
     count = min(options.pairs, QUICK_PAIRS) if options.quick else options.pairs
     try:
         results = _measure_all(options.model, count, options.seed, options.weights)
-        errors, drawn = paper_errors(['exact', *(m for m in options.model if m == 'committee')],
+        errors, drawn = paper_errors(['exact', *(m for m in options.model if m == 'mlp')],
                                      options.weights, 10 if options.quick else 1)
     except WeightsError as error:
         print(f'accuracy: {error}', file=sys.stderr)
         return 1
     broken = [text for result in results for text in result.broken]
-    if 'committee' in errors:
-        mae = figures(errors['committee'])['MAE']
+    if 'mlp' in errors:
+        mae = figures(errors['mlp'])['MAE']
         if not mae <= MAE_LIMIT:
-            broken.append(f"committee, the paper's external set: MAE {mae:.4f} > {MAE_LIMIT:g} rad")
-        if len(errors['committee']) != drawn:
-            broken.append(f"committee, the paper's external set: "
-                          f'{drawn - len(errors["committee"])} contacts missed')
+            broken.append(f"mlp, the paper's external set: MAE {mae:.4f} > {MAE_LIMIT:g} rad")
+        if len(errors['mlp']) != drawn:
+            broken.append(f"mlp, the paper's external set: "
+                          f'{drawn - len(errors["mlp"])} contacts missed')
     given = sys.argv[1:] if args is None else args
     write_csv(options.out / 'accuracy.csv', results)
     command = ' '.join(['python -m box_contact_ros accuracy', *given])
@@ -561,7 +561,7 @@ def _measure_all(models: Sequence[str], count: int, seed: int, weights: str | No
             for model in models:
                 bar.set_postfix_str(f'{model}, {name}')
                 result = measure(model, name, pairs, truth,
-                                 weights if model == 'committee' else None)
+                                 weights if model == 'mlp' else None)
                 if result is not None:
                     results.append(result)
                 bar.update()

@@ -54,10 +54,10 @@ LEAST_PAIRS = 10
 """Pairs judged and timed whatever they take."""
 BATCHES = 3
 """Batches timed in a round."""
-BATCH_MODELS = ('exact', 'committee', 'paper', 'paper-continuous')
+BATCH_MODELS = ('exact', 'mlp', 'paper', 'paper-continuous')
 """Models whose batch is more than a loop."""
 DEGREES = 180.0 / math.pi
-IN_SHORT = ('exact', 'committee', 'paper', 'fcl', 'soup-8', 'soup-22', 'MuJoCo mj_geomDistance',
+IN_SHORT = ('exact', 'mlp', 'paper', 'fcl', 'soup-8', 'soup-22', 'MuJoCo mj_geomDistance',
             'MuJoCo mj_collision, mean', 'python-fcl collide, deepest', 'Coal collide',
             'PyBullet getClosestPoints, mean')
 """Rows of the table in the README."""
@@ -114,13 +114,13 @@ class Cell:
 
 def contestants(quick: bool = False) -> tuple[list[Contestant], list[str]]:
     """All that can be measured here, and a line about each that cannot."""
-    found: list[Contestant] = [Ours('exact'), Ours('committee')]
+    found: list[Contestant] = [Ours('exact'), Ours('mlp')]
     sizes = {}
-    for path in resource_path('weights').glob('committee-*.safetensors'):
+    for path in resource_path('weights').glob('mlp-*.safetensors'):
         card = load_weights(path).card
         if not card['sizes']:  # those of a scene are for its boxes alone
             sizes[tuple(card['architecture'][1:-1])] = str(path)
-    found += [Ours('committee', f'committee {"-".join(map(str, units))}', path)
+    found += [Ours('mlp', f'mlp {"-".join(map(str, units))}', path)
               for units, path in sorted(sizes.items())]
     found += [Ours('paper'), Ours('paper-continuous')]
     peers, missing = installed()
@@ -328,17 +328,17 @@ def set_table(cells: Sequence[Cell], name: str) -> str:
 def honesty(cells: Sequence[Cell]) -> str:
     """Where the network loses and what it is for, with this run's figures."""
     by = {(cell.name, cell.set): cell for cell in cells}
-    exact, net = (by[name, 'containers'] for name in ('exact', 'committee'))
-    medians = {name: [by[name, s].batch for s in SETS] for name in ('exact', 'committee')}
+    exact, net = (by[name, 'containers'] for name in ('exact', 'mlp'))
+    medians = {name: [by[name, s].batch for s in SETS] for name in ('exact', 'mlp')}
     spread = {name: max(values) / min(values) for name, values in medians.items()}
     lines = [
         f'- **In single calls the network loses.** `exact` takes '
-        f'{exact.single[0] / net.single[0]:.2f} of the time of `committee`, and has no error. From '
+        f'{exact.single[0] / net.single[0]:.2f} of the time of `mlp`, and has no error. From '
         'Python most of either is the call itself.',
         f'- **What it is for is batches and a constant cost.** A pair in a batch takes '
         f'{net.batch / exact.batch:.2f} of the time of `exact` on containers, '
-        f'{by["committee", "stacks"].batch / by["exact", "stacks"].batch:.2f} on stacks; from the '
-        f'cheapest set to the dearest its cost grows by a factor of {spread["committee"]:.2f}, '
+        f'{by["mlp", "stacks"].batch / by["exact", "stacks"].batch:.2f} on stacks; from the '
+        f'cheapest set to the dearest its cost grows by a factor of {spread["mlp"]:.2f}, '
         f'that of `exact` by {spread["exact"]:.2f}.',
         '- **What neither shares with the engines is the centroid.** The error of an engine is '
         'mostly not a fault: it gives a deepest point or the corners of a patch, which is another '
@@ -350,7 +350,7 @@ def honesty(cells: Sequence[Cell]) -> str:
             f"- **The paper's own network is not a contact model.** Its median point error is "
             f'{paper.points["all"][1]:.0f} % of the edge on random cubes, because a smooth network '
             'answers with something between both sides of a jump; its time is as constant as the '
-            "committee's.")
+            "mlp's.")
     return '\n'.join(lines)
 
 
@@ -380,7 +380,7 @@ Point errors in % of the smaller box's longest edge, as median/p99/worst, per co
 reverse; these and normals only where the gap or depth is more than {VERDICT:g} of the size, as at
 exact touch either verdict is right, and many normals. *Judged*: pairs asked; models with batches
 are asked for more. Random sizes are timed on {FEW_PAIRS} pairs of sizes. Engines that give several
-points are entered twice: their deepest, and the mean. `committee N` are networks of N hidden units,
+points are entered twice: their deepest, and the mean. `mlp N` are networks of N hidden units,
 trained for 60,000 steps.
 
 """ + '\n\n'.join(f'### {name.capitalize()}\n\n{getdoc(ALL_SETS[name])}\n\n'
@@ -413,7 +413,7 @@ def pareto(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
     return found
 
 
-STYLES = {'exact': ('C0', 'o'), 'committee': ('C1', 'o'), 'paper': ('C2', 'X'),
+STYLES = {'exact': ('C0', 'o'), 'mlp': ('C1', 'o'), 'paper': ('C2', 'X'),
           'paper-continuous': ('C2', 'P'), 'fcl': ('C3', 's'), 'soup': ('C4', 'D'),
           'MuJoCo mj_geomDistance': ('C5', 'v'), 'MuJoCo mj_collision, deepest': ('C5', '^'),
           'MuJoCo mj_collision, mean': ('C5', 'p'), 'python-fcl collide, deepest': ('C6', 'v'),
@@ -484,8 +484,8 @@ def draw(path: Path, cells: Sequence[Cell]) -> None:
 
 def _label(axis: Any, text: str, at: tuple[float, float]) -> None:
     """Networks by their size, soups by their divisions at both ends."""
-    if text in (f'soup-{SOUPS[0]}', f'soup-{SOUPS[-1]}') or text.startswith('committee '):
-        axis.annotate(text.replace('committee ', '').replace('soup-', 'N = '), at, xytext=(5, 3),
+    if text in (f'soup-{SOUPS[0]}', f'soup-{SOUPS[-1]}') or text.startswith('mlp '):
+        axis.annotate(text.replace('mlp ', '').replace('soup-', 'N = '), at, xytext=(5, 3),
                       textcoords='offset points', fontsize=7)
 
 

@@ -27,12 +27,12 @@ PAIRS = 2000          # single calls per round
 BATCH = 16_000        # pairs of a batch, per set
 ROUNDS = 40
 QUICK_ROUNDS = 3
-LIMITS = {('committee', 'single'): 0.85, ('exact', 'single'): 1.0, ('committee', 'batch'): 0.055,
+LIMITS = {('mlp', 'single'): 0.85, ('exact', 'single'): 1.0, ('mlp', 'batch'): 0.055,
           ('exact', 'batch'): 0.42}
 """By the median time of MuJoCo's distance query with its pose update."""
-COMMITTEE_BY_FCL = 0.5
+MLP_BY_FCL = 0.5
 CONSTANT_COST = 1.1
-"""Slowest set by the median set, batch of `committee`."""
+"""Slowest set by the median set, batch of `mlp`."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ def single_calls(pairs: Pairs) -> dict[str, Callable[[], None]]:
                 solver(a, b)
         return run
 
-    found = {model: ours(model) for model in ('committee', 'exact')}
+    found = {model: ours(model) for model in ('mlp', 'exact')}
     split = [(a[:3].copy(), b[:3].copy(), np.roll(a[3:], 1), np.roll(b[3:], 1)) for a, b in poses]
     try:
         found['mujoco mj_geomDistance'] = _mujoco(split)
@@ -130,7 +130,7 @@ def _fcl(split: list[tuple[np.ndarray, ...]]) -> Callable[[], None]:
 def batches(sets: dict[str, Pairs]) -> dict[str, Callable[[], None]]:
     """Contestants for batches: each model on each set, every row its own sizes."""
     found = {}
-    for model in ('committee', 'exact'):
+    for model in ('mlp', 'exact'):
         solver = ContactSolver(CUBE, CUBE, model=model)
         for name, (a, b, size_a, size_b) in sets.items():
             found[f'{model}: {name}'] = (
@@ -163,16 +163,16 @@ def table(timings: list[Timing]) -> tuple[str, bool]:
                      f'{t.quantile(0.99):.0f} | {ratio:.3f} | {"" if limit is None else limit} |')
     fcl = by_name.get(('python-fcl collide', 'single'))
     if fcl:
-        ratio = by_name['committee', 'single'].quantile(0.5) / fcl.quantile(0.5)
-        holds &= ratio <= COMMITTEE_BY_FCL
-        lines += ['', f'A single call of `committee` takes {ratio:.2f} of one of python-fcl (limit '
-                      f'{COMMITTEE_BY_FCL}).']
-    sets = [t.quantile(0.5) for t in timings if t.name.startswith('committee:')]
+        ratio = by_name['mlp', 'single'].quantile(0.5) / fcl.quantile(0.5)
+        holds &= ratio <= MLP_BY_FCL
+        lines += ['', f'A single call of `mlp` takes {ratio:.2f} of one of python-fcl (limit '
+                      f'{MLP_BY_FCL}).']
+    sets = [t.quantile(0.5) for t in timings if t.name.startswith('mlp:')]
     if sets:
         ratio = max(sets) / float(np.median(sets))
         holds &= ratio <= CONSTANT_COST
         lines += ['', f'The slowest set takes {ratio:.2f} of the median set in a batch of '
-                      f'`committee` (limit {CONSTANT_COST}): constant cost.']
+                      f'`mlp` (limit {CONSTANT_COST}): constant cost.']
     return '\n'.join(lines), holds
 
 
@@ -205,7 +205,7 @@ def main(args: Sequence[str] | None = None) -> int:
         f'{rounds} rounds, the contestants in turn; quantiles are over rounds of {PAIRS} calls or '
         'one batch. Every time is from poses to a result in Python, for MuJoCo and FCL with the '
         f'update of both poses.\n\n{text}\n\n'
-        'In single calls the exact model costs less than the committee. What the network is for is '
+        'In single calls the exact model costs less than the MLP. What the network is for is '
         'batches, and a cost that is the same for every pose.\n')
     print(page)
     if options.out:

@@ -1,7 +1,7 @@
-"""What model `committee` chose on its way to a point: where its answer may step.
+"""What model `mlp` chose on its way to a point: where its answer may step.
 
 Two things are chosen by a comparison: in which of the two boxes' frames the network sees the
-overlap (`outline`), and whether it is asked at all, or the exact answer given (`committee`). Where
+overlap (`outline`), and whether it is asked at all, or the exact answer given (`mlp`). Where
 the two sides of a comparison are equal, the answers before and after are two values within the
 network's error. Everywhere else the point is a continuous function of the poses.
 `solve_with_choices` tells the two apart: it solves, and reads from a block's memory what was
@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..block import IN_B, IN_RANGE, LANES, new_work
-from ..committee import solve_committee
+from ..mlp import solve_mlp
 from ..contact import Contacts
 from ..network import Network
 from ..posesets import Pairs
@@ -43,7 +43,7 @@ def solve_with_choices(network: Network, pairs: Pairs) -> tuple[Contacts, Choice
     numbers, work = site_numbers(network), new_work()
     for start in range(0, n, LANES):
         rows = slice(start, min(n, start + LANES))
-        refused, _ = solve_committee(*(part[rows] for part in pairs), work, numbers,
+        refused, _ = solve_mlp(*(part[rows] for part in pairs), work, numbers,
                                      np.zeros(LANES, dtype=np.int8),
                                      *(part[rows] for part in found))
         if refused:

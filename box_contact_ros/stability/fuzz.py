@@ -28,7 +28,7 @@ from .judge import GATES, exact_gap, judge
 PAIRS, QUICK_PAIRS = 10_000_000, 60_000
 PIECE = 50_000
 """Pairs that are drawn and judged at a time."""
-MODELS = ('exact', 'committee')
+MODELS = ('exact', 'mlp')
 TOUCH_ULPS = 8.0
 """A gap of up to so many units in the last place of the largest coordinate or size is a touch:
 the package's convention, which the judge has to know."""

@@ -25,7 +25,7 @@ from .families import FAMILIES, Cases, load
 from .fuzz import TOUCH_ULPS
 from .judge import COORDINATE_ULPS, NOT_FINITE, NOT_UNIT, OUTSIDE, TOLERANCE, judge
 
-REPORTED = ('exact', 'committee', 'fcl', 'soup-8')
+REPORTED = ('exact', 'mlp', 'fcl', 'soup-8')
 """Models in docs/stability.md."""
 CHILDREN = ('fcl', 'soup')
 """Models (before a dash) that run in a process of their own."""
@@ -195,10 +195,10 @@ def _all(rows: Sequence[Row]) -> Row:
 
 
 def gates(rows: Sequence[Row]) -> list[str]:
-    """What is broken of what `exact` and `committee` promise."""
+    """What is broken of what `exact` and `mlp` promise."""
     broken = []
     for row in rows:
-        if row.model not in ('exact', 'committee'):
+        if row.model not in ('exact', 'mlp'):
             continue
         for name in ('verdicts', 'normals', 'outside', 'not_finite'):
             if getattr(row, name):
@@ -213,7 +213,7 @@ def page(rows: Sequence[Row], command: str) -> str:
     parts = [f"""# Numerical stability
 
 Made by `{command}`. {"BROKEN: " + "; ".join(broken) + "." if broken else
-"Of `exact` and `committee`, every verdict and normal is right, and every point in both boxes."}
+"Of `exact` and `mlp`, every verdict and normal is right, and every point in both boxes."}
 
 Families of poses that break collision tests (`box_contact_ros/stability/families.py` says what each
 is), every case also turned, swapped, renamed or scaled; stored as doubles, the truth in 60 digits.

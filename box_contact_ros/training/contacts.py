@@ -1,4 +1,4 @@
-"""Training data of model `committee`: contacts of all kinds, as the network sees them."""
+"""Training data of model `mlp`: contacts of all kinds, as the network sees them."""
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence

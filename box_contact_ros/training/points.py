@@ -1,4 +1,4 @@
-"""Fit networks for model `committee`: many at once, of any hidden widths, by Adam.
+"""Fit networks for model `mlp`: many at once, of any hidden widths, by Adam.
 
 All networks of a call are one batch of matrices with a leading dimension `networks`, as in `fit`;
 hidden layers are as wide as the widest network needs (`batched`), and all have as many of them. A
@@ -211,7 +211,7 @@ class Fit:
         return unbatched(self.parameters, self.widths)
 
     def export(self, network: int) -> Layers:
-        """The layers of one network, for inputs as `committee` has them."""
+        """The layers of one network, for inputs as `mlp` has them."""
         return folded(self.networks()[network], self.mean, self.deviation)
 
     def point_errors(self, data: Contacts) -> np.ndarray:

@@ -1,6 +1,6 @@
 """Program `search`: which size and settings a network should have, by training thousands at once.
 
-- `search committee`: hidden units and learning rate of the committee's network. What is kept is
+- `search mlp`: hidden units and learning rate of the MLP. What is kept is
   the frontier of speed against error, and the size in use is shown on it.
 - `search paper`: the paper's own search for its two networks, over what it names: learning rate,
   momentum, hidden units, range of the initial weights; and where the settings in use rank.
@@ -34,7 +34,7 @@ from ..network import (
 from ..report.paper import processor
 from ..resources import resource_path
 from ..sites import INPUTS, OUTPUTS, SITES, UNITS_MAX, centroid_block, site_numbers
-from . import committee, dataset, train
+from . import mlp, dataset, train
 from .contacts import Contacts, contacts, mixture
 from .fit import Settings as PaperSettings
 from .fit import fit, outputs_of, wrapped
@@ -76,7 +76,7 @@ def multiply_adds(widths: Sequence[int]) -> int:
 
 
 def site_multiply_adds(units: int) -> int:
-    """Multiplications of a committee's network for one pair, at all sites.
+    """Multiplications of a MLP for one pair, at all sites.
 
     Two in three of a site's inputs are those of its faces or its axis, summed once for these.
     """
@@ -89,13 +89,13 @@ def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
     return float(math.exp(rng.uniform(math.log(low), math.log(high))))
 
 
-# --- the committee --------------------------------------------------------------------------------
+# --- the MLP --------------------------------------------------------------------------------
 
 
-class CommitteeSearch:
-    """Hidden units and learning rate of the committee's network."""
+class MlpSearch:
+    """Hidden units and learning rate of the MLP."""
 
-    name = 'committee'
+    name = 'mlp'
     bins = 4
     """Classes of cost, equally wide in its logarithm. In each the best go on: a small network is
     never as good as a large one, and the small ones are what is looked for."""
@@ -121,7 +121,7 @@ class CommitteeSearch:
 
     def candidates(self) -> list[Candidate]:
         """Units uniform in their logarithm, so that half of the candidates are small."""
-        found = [Candidate(0, committee.HIDDEN, committee.RATE, shipped=True)]
+        found = [Candidate(0, mlp.HIDDEN, mlp.RATE, shipped=True)]
         for number in range(1, self.rungs[0].candidates):
             rng = np.random.default_rng([self.seed, _CANDIDATES, number])
             units = log_uniform(rng, UNITS[0], UNITS[-1])
@@ -175,10 +175,10 @@ def _single(seed: Sequence[int]) -> int:
     return int(np.random.SeedSequence(list(seed)).generate_state(1)[0])
 
 
-def _shipped_error(search: CommitteeSearch) -> float | None:
+def _shipped_error(search: MlpSearch) -> float | None:
     """The 99th percentile of the shipped weights' error on what candidates are measured on."""
     try:
-        weights = load_weights(resource_path('weights', 'committee.safetensors'))
+        weights = load_weights(resource_path('weights', 'mlp.safetensors'))
     except (FileNotFoundError, WeightsError):
         return None  # there may be none yet
     training, checking = search.data
@@ -356,7 +356,7 @@ def _measured(seconds: float, device: str, command: str) -> str:
     return f'Made by `{command}` {place}.'
 
 
-def committee_page(search: CommitteeSearch, done: Progress, header: str) -> str:
+def mlp_page(search: MlpSearch, done: Progress, header: str) -> str:
     """The frontier of speed against error as a page of Markdown."""
     last = done.scores[-1]
     finalists = [one for one in search.candidates() if one.number in last]
@@ -379,7 +379,7 @@ def committee_page(search: CommitteeSearch, done: Progress, header: str) -> str:
     trained = ('' if shipped_p99 is None else
                f'\nThe weights in use, trained to the end, have {shipped_p99:.2f} % on the same '
                f'contacts.')
-    return f"""# How large the committee's network should be
+    return f"""# How large the MLP should be
 
 {header}
 
@@ -388,7 +388,7 @@ steps of {UNITS[1] - UNITS[0]}, and learning rates of 0.001 to 0.1 were trained 
 halving: all of them a little, then the best of every class of cost longer. Error: point error
 against `exact` on {len(search.data[1].inputs):,} contacts of the training mixture, in % of the
 smaller box's longest edge, after the last rung. These trainings are short (`train` takes
-{committee.STEPS:,} steps of {committee.BATCH:,} contacts): what counts is how sizes compare.
+{mlp.STEPS:,} steps of {mlp.BATCH:,} contacts): what counts is how sizes compare.
 
 {_rungs(search, 'steps')}
 
@@ -412,7 +412,7 @@ All candidates: [search.csv](search.csv). The search for the paper's networks:
 """
 
 
-def committee_plot(path: Path, search: CommitteeSearch, done: Progress) -> None:
+def mlp_plot(path: Path, search: MlpSearch, done: Progress) -> None:
     """Error against cost of all candidates, with the frontier of the finalists."""
     pyplot = _pyplot()
     figure, axes = pyplot.subplots(figsize=(8.0, 4.0), layout='constrained')
@@ -488,7 +488,7 @@ The settings in use are {rank} of {len(ranked)} finalists (after the first rung 
 {len(early):,}); the best has an RMSE of {best['error'] / in_use['error']:.2f} times theirs.
 """)
     parts.append("""All candidates: [search_paper.csv](search_paper.csv). The search for the \
-committee's network:
+MLP:
 [search.md](search.md).
 """)
     return '\n'.join(parts)
@@ -536,11 +536,11 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
         formatter_class=argparse.RawDescriptionHelpFormatter,
         description='Train thousands of networks at once, keep the best, train those longer.\n\n'
         'Measured on one core, without a GPU:\n'
-        "  committee  size and learning rate of the committee's network    5 minutes\n"
+        "  mlp  size and learning rate of the MLP    5 minutes\n"
         "  paper      the paper's search for its two networks              3 minutes\n\n"
         'Stopped, it goes on from its checkpoint file when it is started again with the same\n'
         'options, and ends with the same result.')
-    parser.add_argument('what', choices=('committee', 'paper'), help='what is searched for')
+    parser.add_argument('what', choices=('mlp', 'paper'), help='what is searched for')
     parser.add_argument('--candidates', type=int, default=2048, metavar='N',
                         help='networks to begin with (default 2048); the time grows with them')
     parser.add_argument('--seed', type=seed_number, default=1,
@@ -571,9 +571,9 @@ def main(args: Sequence[str] | None = None) -> int:
     # On a CPU its own time counts, whatever else the machine does.
     clock = time.process_time if options.device == 'cpu' else time.monotonic
     began = clock()
-    searches: list[Search] = ([CommitteeSearch(**common)] if options.what == 'committee' else
+    searches: list[Search] = ([MlpSearch(**common)] if options.what == 'mlp' else
                               [*paper_searches(**common)])
-    name = 'search' if options.what == 'committee' else 'search_paper'
+    name = 'search' if options.what == 'mlp' else 'search_paper'
     results, checkpoints = [], []
     for number, search in enumerate(searches):
         path = options.out / f'{name}_{number}.checkpoint'
@@ -589,9 +589,9 @@ def main(args: Sequence[str] | None = None) -> int:
         f' --{key} {getattr(options, key)}' for key, usual in (('candidates', 2048), ('seed', 1))
         if getattr(options, key) != usual) + (' --quick' if options.quick else '')
     header = _measured(clock() - began, options.device, command)
-    if options.what == 'committee':
-        committee_plot(options.out / f'{name}.png', *results[0])
-        text = committee_page(*results[0], header)
+    if options.what == 'mlp':
+        mlp_plot(options.out / f'{name}.png', *results[0])
+        text = mlp_page(*results[0], header)
     else:
         paper_plot(options.out / f'{name}.png', results)
         text = paper_page(results, header)

@@ -1,7 +1,7 @@
 """Program `train`: make the data sets, fit the networks, write weights/ with model cards.
 
 What is trained, and with which settings, stands in `JOBS` for the paper's networks and in
-`committee` for the committee's; everything else follows from the seed.
+`mlp` for the MLP's; everything else follows from the seed.
 """
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from ..network import load_weights, save_weights
 from ..resources import resource_path
 from ..scene_file import SceneError
 from ..sites import UNITS_MAX
-from . import committee, dataset
+from . import mlp, dataset
 from .errors import errors_of, figures_by_part
 from .fit import Settings, fit
 from .points import device_of
@@ -78,8 +78,8 @@ JOBS = {
         _DRAWN),
 }
 
-COMMITTEE = 'committee'
-NAMES = (*JOBS, COMMITTEE)
+MLP = 'mlp'
+NAMES = (*JOBS, MLP)
 """What can be asked for."""
 
 # `--quick`: enough to see the error fall, in seconds.
@@ -167,23 +167,23 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
         '  paper             two boxes of edge 2, with discontinuities     2 minutes\n'
         '  paper-continuous  the same without, one network per subset      3 minutes\n'
         '  containers        two boxes of 12.192 x 2.438 x 2.591 m         1 minute\n'
-        '  committee         any two boxes, the point alone                11 minutes\n'
-        '  --scene FILE      the boxes of one scene, from the committee    3 minutes')
+        '  mlp         any two boxes, the point alone                11 minutes\n'
+        '  --scene FILE      the boxes of one scene, from the MLP    3 minutes')
     parser.add_argument('what', nargs='*', metavar='what',
                         help=f'{", ".join(NAMES)}, or all (default)')
-    parser.add_argument('--scene', type=Path, metavar='FILE', help='train a committee for the '
+    parser.add_argument('--scene', type=Path, metavar='FILE', help='train an MLP for the '
                         'sizes of the pairs in this scene file alone, and say how much error that '
-                        'saves; writes committee-FILE.safetensors to the current folder, or --out')
+                        'saves; writes mlp-FILE.safetensors to the current folder, or --out')
     parser.add_argument('--seed', type=seed_number, default=1,
                         help='of data and weights (default 1)')
     parser.add_argument('--starts', type=int, help='networks trained at once, of which the best '
                         "is kept, of the paper's (default: 24 to 96, by job)")
     parser.add_argument('--epochs', type=int, help="passes through the training set, of the "
                         "paper's (default: 300 to 1000, by job)")
-    parser.add_argument('--hidden', type=int, metavar='UNITS', help='of the committee: units of '
-                        f'its hidden layer (default: {committee.HIDDEN[0]}), named in the file')
-    parser.add_argument('--steps', type=int, help='of the committee (default: '
-                        f'{committee.STEPS:,}; a third of them make errors a tenth larger)')
+    parser.add_argument('--hidden', type=int, metavar='UNITS', help='of the MLP: units of '
+                        f'its hidden layer (default: {mlp.HIDDEN[0]}), named in the file')
+    parser.add_argument('--steps', type=int, help='of the MLP (default: '
+                        f'{mlp.STEPS:,}; a third of them make errors a tenth larger)')
     parser.add_argument('--out', type=Path, help='folder to write to (default: weights/)')
     parser.add_argument('--fold', action=argparse.BooleanOptionalAction, help='for paper and '
                         'containers: data folded into the domain in which the solver asks, or as '
@@ -191,9 +191,9 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument('--quick', action='store_true',
                         help='small sets and few epochs, to try it out; needs --out')
     parser.add_argument('--threads', type=int, default=1, help='of PyTorch (default 1; two '
-                        'train the committee in 7 minutes, the others gain nothing)')
+                        'train the MLP in 7 minutes, the others gain nothing)')
     parser.add_argument('--device', choices=('cpu', 'cuda', 'auto'), type=device_of,
-                        default='cpu', help='of the committee (default cpu: the same weights '
+                        default='cpu', help='of the MLP (default cpu: the same weights '
                         'everywhere; matrices this small gain little from a GPU)')
     options = parser.parse_args(args)
     wanted = options.what or ['all']
@@ -220,12 +220,12 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
             options.sizes = size_pairs(options.scene)
         except SceneError as error:
             parser.error(str(error))
-        outside = [pair for pair in options.sizes if not committee.in_range(pair)]
+        outside = [pair for pair in options.sizes if not mlp.in_range(pair)]
         for pair in outside:
-            print(f'left out, as the committee always answers them exactly: {committee.text(pair)}')
+            print(f'left out, as the MLP always answers them exactly: {mlp.text(pair)}')
             options.sizes.remove(pair)
         if not options.sizes:
-            parser.error(f'{options.scene}: no pair of sizes is within the range of the committee')
+            parser.error(f'{options.scene}: no pair of sizes is within the range of the mlp')
     shipped = resource_path('package.xml').parent / 'weights'
     options.out = make_folder(parser, options.out or (Path() if options.scene else shipped))
     return options
@@ -238,20 +238,20 @@ def main(args: Sequence[str] | None = None) -> int:
     common = {'seed': options.seed, 'commit': _commit(), 'quick': options.quick,
               'device': options.device}
     if options.scene:
-        path = options.out / f'committee-{options.scene.stem}.safetensors'
-        card = committee.train_scene(path, options.sizes, **common)
-        print(f'{path}, {card["training"]["minutes"]} min\n{committee.table(card)}\n'
-              f'use it: ros2 run box_contact_ros contact_node --ros-args -p model:=committee '
+        path = options.out / f'mlp-{options.scene.stem}.safetensors'
+        card = mlp.train_scene(path, options.sizes, **common)
+        print(f'{path}, {card["training"]["minutes"]} min\n{mlp.table(card)}\n'
+              f'use it: ros2 run box_contact_ros contact_node --ros-args -p model:=mlp '
               f'-p weights:={path.resolve()}')
         return 0
     for name in options.what:
-        if name == COMMITTEE:
+        if name == MLP:
             units = f'-{options.hidden}' if options.hidden else ''
-            path = options.out / f'{COMMITTEE}{units}.safetensors'
-            hidden = (options.hidden,) if options.hidden else committee.HIDDEN
-            card = committee.train(path, hidden=hidden,
+            path = options.out / f'{MLP}{units}.safetensors'
+            hidden = (options.hidden,) if options.hidden else mlp.HIDDEN
+            card = mlp.train(path, hidden=hidden,
                                    steps=options.steps, **common)
-            print(f'{path}, {card["training"]["minutes"]} min\n{committee.table(card)}')
+            print(f'{path}, {card["training"]["minutes"]} min\n{mlp.table(card)}')
             continue
         job = JOBS[name]
         starts, epochs = job.settings.networks, job.settings.epochs

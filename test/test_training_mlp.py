@@ -1,4 +1,4 @@
-"""Training of the committee for all boxes, and for a scene's; how a solver uses the latter."""
+"""Training of the MLP for all boxes, and for a scene's; how a solver uses the latter."""
 from __future__ import annotations
 
 import re
@@ -13,7 +13,7 @@ from box_contact_ros import ContactSolver  # noqa: E402
 from box_contact_ros.network import WeightsError, load_weights, save_weights, unpacked  # noqa: E402
 from box_contact_ros.posesets import Pairs, containers, cubes, size_pairs, tilted  # noqa: E402
 from box_contact_ros.sites import UNITS_MAX  # noqa: E402
-from box_contact_ros.training import committee, contacts, points, scene, train  # noqa: E402
+from box_contact_ros.training import mlp, contacts, points, scene, train  # noqa: E402
 
 SCENE = """\
 boxes:
@@ -31,7 +31,7 @@ CONTAINER, SPREADER = (12.192, 2.591, 2.438), (12.192, 2.438, 0.8)
 
 
 def error_of(pairs: Pairs, weights: Path) -> float:
-    return float(committee.point_errors(pairs, weights).mean())
+    return float(mlp.point_errors(pairs, weights).mean())
 
 
 @pytest.fixture(scope='module')
@@ -111,12 +111,12 @@ def test_errors_while_training_are_the_solvers(data: contacts.Contacts, tmp_path
     """`Fit.point_errors` beside the written file behind `ContactSolver`."""
     fit = points.Fit(data, points.Settings(hidden=[(8,)], steps=200, batch=1024))
     fit.run(200)
-    path = tmp_path / 'committee.safetensors'
-    card = committee._card(path, (8,), 0, 'none', [], fit, {})
+    path = tmp_path / 'mlp.safetensors'
+    card = mlp._card(path, (8,), 0, 'none', [], fit, {})
     save_weights(path, {'point': fit.export(0)}, card)
     pairs = size_pairs(np.random.default_rng(3), 500)
     trained = fit.point_errors(contacts.describe(pairs))[0]
-    solved = committee.point_errors(pairs, path)
+    solved = mlp.point_errors(pairs, path)
     # The solver also shortens answers that would leave the other box, which seldom harms.
     assert np.mean(np.abs(trained - solved) < 1e-4) > 0.3
     assert np.mean(solved <= trained + 1e-4) > 0.95
@@ -135,11 +135,11 @@ def test_description_does_not_depend_on_the_block(count: int) -> None:
 
 def test_hard_contacts_are_those_with_the_largest_errors(data: contacts.Contacts) -> None:
     fit = points.Fit(data, points.Settings(hidden=[(8,)], steps=1, batch=1024))
-    hard = committee._hardest(fit, data, 0.02)
+    hard = mlp._hardest(fit, data, 0.02)
     errors = fit.point_errors(data)[0]
     assert len(hard.inputs) == round(0.02 * len(data.inputs))
     assert fit.point_errors(hard)[0].min() >= np.sort(errors)[-len(hard.inputs)] - 1e-6
-    fit.feed(committee._joined([data, hard]))
+    fit.feed(mlp._joined([data, hard]))
     assert len(fit.inputs) == len(data.inputs) + len(hard.inputs)
     np.testing.assert_allclose(fit.point_errors(data)[0], errors, atol=1e-6)
 
@@ -150,15 +150,15 @@ def test_hard_contacts_are_those_with_the_largest_errors(data: contacts.Contacts
 @pytest.fixture(scope='module')
 def quick(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp('quick')
-    assert train.main(['committee', '--quick', '--seed', '3', '--out', str(folder)]) == 0
-    return folder / 'committee.safetensors'
+    assert train.main(['mlp', '--quick', '--seed', '3', '--out', str(folder)]) == 0
+    return folder / 'mlp.safetensors'
 
 
 def test_quick_training(quick: Path, tmp_path: Path) -> None:
     """Its error is a fraction of the middle's, which a network of zeros answers with."""
     card = load_weights(quick).card
-    assert (card['seed'], card['model'], card['sizes']) == (3, 'committee', [])
-    assert card['architecture'] == [12, *committee.HIDDEN, 3]
+    assert (card['seed'], card['model'], card['sizes']) == (3, 'mlp', [])
+    assert card['architecture'] == [12, *mlp.HIDDEN, 3]
     pairs = cubes(np.random.default_rng(8), 2000)
     nothing = tmp_path / 'nothing.safetensors'
     save_weights(nothing, {'point': [(np.zeros((b, a)), np.zeros(b)) for a, b in (
@@ -170,25 +170,25 @@ def test_quick_training(quick: Path, tmp_path: Path) -> None:
 
 def test_same_seed_same_weights(quick: Path, tmp_path: Path) -> None:
     for seed in ('3', '4'):
-        assert train.main(['committee', '--quick', '--seed', seed, '--out', str(tmp_path)]) == 0
-        card = load_weights(tmp_path / 'committee.safetensors').card
+        assert train.main(['mlp', '--quick', '--seed', seed, '--out', str(tmp_path)]) == 0
+        card = load_weights(tmp_path / 'mlp.safetensors').card
         first = load_weights(quick).card
         assert (card['sha256'] == first['sha256']) == (seed == '3')
         assert (card['metrics'] == first['metrics']) == (seed == '3')
 
 
 def test_hidden_units_on_request(tmp_path: Path) -> None:
-    arguments = ['committee', '--quick', '--hidden', '12', '--steps', '100', '--out',
+    arguments = ['mlp', '--quick', '--hidden', '12', '--steps', '100', '--out',
                  str(tmp_path)]
     assert train.main(arguments) == 0
-    weights = load_weights(tmp_path / 'committee-12.safetensors')
+    weights = load_weights(tmp_path / 'mlp-12.safetensors')
     assert weights.card['training']['steps'] == 100
     assert weights.networks['point'].widths == (12, 12, 3)
 
 
 @pytest.mark.parametrize(('arguments', 'message'), [
-    (['committee', '--hidden', str(UNITS_MAX + 1)], f'--hidden {UNITS_MAX + 1} is not between 1'),
-    (['committee', '--scene', 'x.yaml'], "leave out 'committee'"),
+    (['mlp', '--hidden', str(UNITS_MAX + 1)], f'--hidden {UNITS_MAX + 1} is not between 1'),
+    (['mlp', '--scene', 'x.yaml'], "leave out 'mlp'"),
     (['--scene', 'x.yaml', '--hidden', '8'], 'leave out --hidden'),
     (['--scene', 'x.yaml', '--steps', '8'], 'leave out --steps'),
     (['--scene', 'no_such.yaml'], "'no_such.yaml' cannot be read: No such file"),
@@ -209,7 +209,7 @@ def test_refused_arguments(arguments: list[str], message: str, tmp_path: Path,
     (containers, 0.6, 3.5, 8.0)])
 def test_shipped_weights_keep_their_limits(make, mean: float, p99: float, worst: float) -> None:
     """In % of the smaller box's longest edge, on poses of another seed than the card's."""
-    errors = 100.0 * committee.point_errors(make(np.random.default_rng(77), 10_000), None)
+    errors = 100.0 * mlp.point_errors(make(np.random.default_rng(77), 10_000), None)
     assert errors.mean() < mean
     assert np.quantile(errors, 0.99) < p99
     assert errors.max() < worst
@@ -229,7 +229,7 @@ def test_the_example_in_the_docs(tmp_path: Path) -> None:
     page = (Path(__file__).parents[1] / 'docs' / 'training.md').read_text('utf-8')
     text = re.search(r'^```yaml\n(.*?)^```$', page, re.MULTILINE | re.DOTALL).group(1)
     sizes = scene.size_pairs(write(tmp_path, text))
-    assert len(sizes) == 3 and all(map(committee.in_range, sizes))
+    assert len(sizes) == 3 and all(map(mlp.in_range, sizes))
 
 
 def test_distinct_pairs_of_sizes(tmp_path: Path) -> None:
@@ -280,7 +280,7 @@ def expert(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp('scene')
     path = write(folder, SCENE)
     assert train.main(['--scene', str(path), '--quick', '--out', str(folder)]) == 0
-    return folder / 'committee-yard.safetensors'
+    return folder / 'mlp-yard.safetensors'
 
 
 def test_scene_says_what_it_saves_and_how_to_use_it(
@@ -291,7 +291,7 @@ def test_scene_says_what_it_saves_and_how_to_use_it(
     monkeypatch.chdir(tmp_path)
     assert train.main(['--scene', str(path), '--quick']) == 0
     printed = capsys.readouterr().out
-    assert f'-p weights:={tmp_path}/committee-yard.safetensors' in printed
+    assert f'-p weights:={tmp_path}/mlp-yard.safetensors' in printed
     for pair in ('12.192 × 2.591 × 2.438 on 12.192 × 2.591 × 2.438',
                  '12.192 × 2.591 × 2.438 on 12.192 × 2.438 × 0.8'):
         row = next(line for line in printed.splitlines() if line.strip().startswith(pair))
@@ -301,8 +301,8 @@ def test_scene_says_what_it_saves_and_how_to_use_it(
 def test_scene_card(expert: Path) -> None:
     card = load_weights(expert).card
     assert card['sizes'] == [[list(CONTAINER)] * 2, [list(CONTAINER), list(SPREADER)]]
-    assert card['architecture'] == load_weights(committee.resource_path(
-        'weights', 'committee.safetensors')).card['architecture']
+    assert card['architecture'] == load_weights(mlp.resource_path(
+        'weights', 'mlp.safetensors')).card['architecture']
 
 
 def poses(n: int) -> tuple[np.ndarray, np.ndarray]:
@@ -312,7 +312,7 @@ def poses(n: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def solver(weights: Path | None, size_a=CONTAINER, size_b=CONTAINER) -> ContactSolver:
-    return ContactSolver(size_a, size_b, model='committee', weights=weights and str(weights))
+    return ContactSolver(size_a, size_b, model='mlp', weights=weights and str(weights))
 
 
 ALL_THE_SAME = [(CONTAINER, CONTAINER), ((2.438, 12.192, 2.591), CONTAINER),

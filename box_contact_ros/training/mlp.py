@@ -1,8 +1,8 @@
-"""Train the network of model `committee`, for all boxes or for the boxes of one scene.
+"""Train the network of model `mlp`, for all boxes or for the boxes of one scene.
 
 The general network learns from `contacts.mixture`: it serves any two boxes. A scene's network
 starts from it and goes on with the scene's own pairs of sizes only; it is then asked for these
-sizes alone, and the exact answer is given for others (`committee`).
+sizes alone, and the exact answer is given for others (`mlp`).
 """
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from ..committee import ASPECT_MAX, DEPTH_MAX, RATIO_MAX
+from ..mlp import ASPECT_MAX, DEPTH_MAX, RATIO_MAX
 from ..network import load_weights, save_weights, unpacked
 from ..posesets import SETS, Pairs
 from ..resources import resource_path
@@ -40,9 +40,9 @@ _DATA, _METRICS, _HARD = 0, 1, 2
 
 
 def point_errors(pairs: Pairs, weights: Path | str | None) -> np.ndarray:
-    """(n,) point error of `committee` against `exact`, in edges of the smaller box's longest."""
+    """(n,) point error of `mlp` against `exact`, in edges of the smaller box's longest."""
     found = []
-    for model, file in (('exact', None), ('committee', weights)):
+    for model, file in (('exact', None), ('mlp', weights)):
         solver = ContactSolver((1, 1, 1), (1, 1, 1), model=model, weights=file and str(file))
         found.append(solver.batch(pairs.pose_a, pairs.pose_b, size_a=pairs.size_a,
                                   size_b=pairs.size_b).point)
@@ -88,7 +88,7 @@ def train_scene(path: Path, sizes: Sequence[SizePair], *, seed: int, commit: str
     with this one ('after'), on pairs that it was not trained on.
     """
     began = time.monotonic()
-    general = resource_path('weights', 'committee.safetensors')
+    general = resource_path('weights', 'mlp.safetensors')
     weights = load_weights(general)
     start = weights.networks['point']
     hidden = start.widths[1:-1]
@@ -150,7 +150,7 @@ def _card(path: Path, hidden: tuple[int, ...], seed: int, commit: str, sizes: li
           fit: Fit, data: dict[str, Any]) -> dict[str, Any]:
     s = fit.settings
     return {
-        'name': path.stem, 'model': 'committee', 'architecture': [INPUTS, *hidden, OUTPUTS],
+        'name': path.stem, 'model': 'mlp', 'architecture': [INPUTS, *hidden, OUTPUTS],
         'activation': ACTIVATION, 'seed': seed, 'commit': commit, 'sizes': sizes,
         'inputs': {'description': DESCRIPTION, 'names': NAMES,
                    'range': {'aspect': ASPECT_MAX, 'size ratio': RATIO_MAX,
@@ -162,7 +162,7 @@ def _card(path: Path, hidden: tuple[int, ...], seed: int, commit: str, sizes: li
 
 
 def in_range(pair: SizePair) -> bool:
-    """Whether the committee's network may be asked for boxes of these sizes at all."""
+    """Whether the MLP may be asked for boxes of these sizes at all."""
     longest, shortest = [max(size) for size in pair], [min(size) for size in pair]
     return (all(one <= ASPECT_MAX * other for one, other in zip(longest, shortest))
             and max(longest) <= RATIO_MAX * min(longest))

@@ -1,4 +1,4 @@
-"""Model `committee`: what it promises whatever its network says, and how good its network is."""
+"""Model `mlp`: what it promises whatever its network says, and how good its network is."""
 from __future__ import annotations
 
 from typing import Any
@@ -9,7 +9,7 @@ import pytest
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.block import LANES
-from box_contact_ros.committee import ASPECT_MAX, DEPTH_MAX, RATIO_MAX
+from box_contact_ros.mlp import ASPECT_MAX, DEPTH_MAX, RATIO_MAX
 from box_contact_ros.network import WeightsError, save_weights
 from box_contact_ros.overlap import DEPTH_FLOOR
 from box_contact_ros.posesets import SETS, Pairs, log_uniform, quaternion_multiply, turns
@@ -44,8 +44,8 @@ def aligned(rng, n):
 
 
 @pytest.fixture(scope='module')
-def committee():
-    return ContactSolver(UNIT, UNIT, model='committee')
+def mlp():
+    return ContactSolver(UNIT, UNIT, model='mlp')
 
 
 @pytest.fixture(params=FAMILIES)
@@ -78,7 +78,7 @@ def percent(one, other, pairs):
 
 
 def in_range(pairs, found):
-    """Rows that the committee must answer itself, worked out the plain way."""
+    """Rows that the MLP must answer itself, worked out the plain way."""
     aspect = np.maximum(pairs.size_a.max(axis=1) / pairs.size_a.min(axis=1),
                         pairs.size_b.max(axis=1) / pairs.size_b.min(axis=1))
     ratio = largest(pairs) / edge(pairs)
@@ -109,9 +109,9 @@ def is_inside(pairs, found):
 # --- what SAT gives -------------------------------------------------------------------------------
 
 
-def test_verdict_separation_and_normal_are_those_of_exact(committee, pairs):
+def test_verdict_separation_and_normal_are_those_of_exact(mlp, pairs):
     """Bit for bit; the network has no say in them."""
-    one, other = solve(committee, pairs), solve(EXACT, pairs)
+    one, other = solve(mlp, pairs), solve(EXACT, pairs)
     for name in ('colliding', 'separation', 'normal'):
         assert np.array_equal(getattr(one, name), getattr(other, name), equal_nan=True), name
     assert np.array_equal(np.isnan(one.point), np.isnan(other.point))
@@ -139,8 +139,8 @@ def garbage(rng, kind):
 
 
 def card_of(widths: tuple[int, ...]) -> dict[str, Any]:
-    """A model card that the committee takes."""
-    return {'name': 'other', 'model': 'committee', 'inputs': {'description': DESCRIPTION},
+    """A model card that the MLP takes."""
+    return {'name': 'other', 'model': 'mlp', 'inputs': {'description': DESCRIPTION},
             'activation': ACTIVATION, 'outputs': [], 'sizes': [], 'architecture': list(widths),
             'data': {}, 'seed': 0, 'commit': '', 'metrics': {}}
 
@@ -156,7 +156,7 @@ def written(path, layers):
 def test_the_point_is_in_both_boxes_even_with_garbage_for_weights(tmp_path, kind):
     """Weights that nobody trained: points are wrong, finite, and inside."""
     file = written(tmp_path / 'garbage.safetensors', garbage(np.random.default_rng(4), kind))
-    solver = ContactSolver(UNIT, UNIT, model='committee', weights=file)
+    solver = ContactSolver(UNIT, UNIT, model='mlp', weights=file)
     for name, make in FAMILIES.items():
         pairs = Pairs(*make(np.random.default_rng(31), N))
         assert is_inside(pairs, solve(solver, pairs)), name
@@ -167,16 +167,16 @@ def test_garbage_for_weights_is_really_asked(tmp_path):
     file = written(tmp_path / 'garbage.safetensors',
                    garbage(np.random.default_rng(4), 'one direction'))
     pairs = SETS['stacks'](np.random.default_rng(31), N)
-    found = solve(ContactSolver(UNIT, UNIT, model='committee', weights=file), pairs)
+    found = solve(ContactSolver(UNIT, UNIT, model='mlp', weights=file), pairs)
     assert np.median(percent(found.point, solve(EXACT, pairs).point, pairs)) > 10.0
 
 
-def test_the_point_is_in_both_boxes(committee, pairs):
+def test_the_point_is_in_both_boxes(mlp, pairs):
     """With the shipped weights."""
-    assert is_inside(pairs, solve(committee, pairs))
+    assert is_inside(pairs, solve(mlp, pairs))
 
 
-def test_points_of_an_aligned_stack_are_inside(committee):
+def test_points_of_an_aligned_stack_are_inside(mlp):
     """Two containers exactly above each other, turned anywhere.
 
     All their sides lie in pairs of one plane, and rounding put the edges of each outside the other:
@@ -189,7 +189,7 @@ def test_points_of_an_aligned_stack_are_inside(committee):
     size = np.tile(poses.CONTAINER, (n, 1))
     pairs = Pairs(poses.moved(np.tile(poses.IDENTITY, (n, 1)), shift, turn),
                   poses.moved(b, shift, turn), size, size)
-    found = solve(committee, pairs)
+    found = solve(mlp, pairs)
     assert is_inside(pairs, found)
     assert percent(found.point, solve(EXACT, pairs).point, pairs).max() < 3.0
 
@@ -197,7 +197,7 @@ def test_points_of_an_aligned_stack_are_inside(committee):
 @pytest.mark.parametrize('size_a, size_b', [((1e-9,) * 3, (1e-9,) * 3), ((1e9,) * 3, (1e9,) * 3),
                                             (UNIT, (1e-6,) * 3), ((1e-50,) * 3, (1e-50,) * 3),
                                             ((1e50,) * 3, (1e50,) * 3)])
-def test_extreme_sizes_are_finite_and_inside(committee, size_a, size_b):
+def test_extreme_sizes_are_finite_and_inside(mlp, size_a, size_b):
     """From the smallest to the largest that is accepted: nothing over- or underflows."""
     n = 64
     reach = 0.5 * (size_a[2] + size_b[2])
@@ -206,7 +206,7 @@ def test_extreme_sizes_are_finite_and_inside(committee, size_a, size_b):
     b[:, :2] = 0.1 * size_b[0]
     pairs = Pairs(np.tile(poses.IDENTITY, (n, 1)), b, np.tile(size_a, (n, 1)),
                   np.tile(size_b, (n, 1)))
-    found = solve(committee, pairs)
+    found = solve(mlp, pairs)
     assert found.colliding.all() and is_inside(pairs, found)
 
 
@@ -215,7 +215,7 @@ def test_extreme_sizes_are_finite_and_inside(committee, size_a, size_b):
 
 def test_outside_the_range_the_point_is_the_exact_one_and_counted(pairs):
     """To the bit; inside the range the network answers, and nothing is counted."""
-    solver = ContactSolver(UNIT, UNIT, model='committee')
+    solver = ContactSolver(UNIT, UNIT, model='mlp')
     assert solver.exact_answers == 0
     found, exact = solve(solver, pairs), solve(EXACT, pairs)
     out = found.colliding & ~in_range(pairs, found)
@@ -225,8 +225,8 @@ def test_outside_the_range_the_point_is_the_exact_one_and_counted(pairs):
 
 @pytest.mark.parametrize('name', SETS)
 def test_the_sets_are_inside_the_range(name):
-    """A committee that hands the hard half to `exact` has not been built."""
-    solver = ContactSolver(UNIT, UNIT, model='committee')
+    """An MLP that hands the hard half to `exact` has not been built."""
+    solver = ContactSolver(UNIT, UNIT, model='mlp')
     solve(solver, SETS[name](np.random.default_rng(5), N))
     assert solver.exact_answers == 0
 
@@ -244,7 +244,7 @@ def test_the_limits_belong_to_the_range(what, size_a, size_b, depth):
         deep = depth * (factor if what == 'depth' else 1.0)
         b = (0.2, 0.1, 0.5 * (mine[2] + size_b[2]) - deep, 0, 0, 0, 1)
         for call in ('single', 'batch'):
-            solver = ContactSolver(mine, size_b, model='committee')
+            solver = ContactSolver(mine, size_b, model='mlp')
             one = (solver(poses.IDENTITY, b) if call == 'single'
                    else solver.batch([poses.IDENTITY], [b]))
             assert np.all(one.colliding) and solver.exact_answers == counted, (what, factor, call)
@@ -253,14 +253,14 @@ def test_the_limits_belong_to_the_range(what, size_a, size_b, depth):
 # --- laws -----------------------------------------------------------------------------------------
 
 
-def test_batch_equals_single_calls(committee, pairs):
+def test_batch_equals_single_calls(mlp, pairs):
     """Row i of a batch is the single call of row i, to the bit."""
-    many = solve(committee, pairs)
+    many = solve(mlp, pairs)
     solver, sizes = None, None
     for i in range(0, len(pairs.pose_a), 29):
         if sizes != (tuple(pairs.size_a[i]), tuple(pairs.size_b[i])):
             sizes = (tuple(pairs.size_a[i]), tuple(pairs.size_b[i]))
-            solver = ContactSolver(*sizes, model='committee')
+            solver = ContactSolver(*sizes, model='mlp')
         one = solver(pairs.pose_a[i], pairs.pose_b[i])
         for name, single, row in zip(one._fields, one, (field[i] for field in many)):
             assert np.array_equal(single, row, equal_nan=True), (name, i)
@@ -268,43 +268,43 @@ def test_batch_equals_single_calls(committee, pairs):
 
 @pytest.mark.parametrize('count', [1, 2, LANES - 1, LANES, LANES + 1, 2 * LANES + 2])
 @pytest.mark.parametrize('first', [0, 5])
-def test_a_row_does_not_know_its_neighbours(committee, count, first):
+def test_a_row_does_not_know_its_neighbours(mlp, count, first):
     """Blocks that are not full, and rows at other places of a block: the same bits."""
     pairs = Pairs(*poses.near_parallel_pairs(np.random.default_rng(6), 200))
-    all_rows = solve(committee, pairs)
-    some = solve(committee, Pairs(*(part[first:first + count] for part in pairs)))
+    all_rows = solve(mlp, pairs)
+    some = solve(mlp, Pairs(*(part[first:first + count] for part in pairs)))
     for name, one, many in zip(some._fields, some, all_rows):
         assert np.array_equal(one, many[first:first + count], equal_nan=True), name
 
 
-def test_rows_apart_refused_or_out_of_range_do_not_disturb_neighbours(committee):
+def test_rows_apart_refused_or_out_of_range_do_not_disturb_neighbours(mlp):
     """Within one block, contacts between rows of all other kinds keep their bits.
 
     A refused row raises, and the next call is right again.
     """
     rng = np.random.default_rng(7)
     pairs = SETS['random sizes'](rng, LANES)
-    clean = solve(committee, pairs)
+    clean = solve(mlp, pairs)
     mixed = Pairs(*(part.copy() for part in pairs))
     mixed.pose_b[1::4, :3] += 1e3                       # far apart
     mixed.size_a[2::4] = (1.0, 1e-3, 1.0)               # out of range
     mixed.pose_b[3::8] = mixed.pose_a[3::8]             # one in the other
-    found = solve(committee, mixed)
+    found = solve(mlp, mixed)
     assert np.array_equal(found.point[::4], clean.point[::4])
     assert not found.colliding[1::4].any() and np.isnan(found.point[1::4]).all()
     for bad in ((np.nan, 0, 0, 0, 0, 0, 1), (0, 0, 0, 0, 0, 0, 0)):
         refused = Pairs(*(part.copy() for part in pairs))
         refused.pose_b[17] = bad
         with pytest.raises(ValueError, match=r'poses_b\[17\]'):
-            solve(committee, refused)
-        again = solve(committee, pairs)
+            solve(mlp, refused)
+        again = solve(mlp, pairs)
         assert np.array_equal(again.point, clean.point)
 
 
 def test_same_input_same_bits(pairs):
     """Two solvers, one of them after other work, rows in another order."""
-    one = ContactSolver(UNIT, UNIT, model='committee')
-    two = ContactSolver(UNIT, UNIT, model='committee')
+    one = ContactSolver(UNIT, UNIT, model='mlp')
+    two = ContactSolver(UNIT, UNIT, model='mlp')
     solve(two, Pairs(*poses.random_pairs(np.random.default_rng(0), 300)))
     order = np.random.default_rng(1).permutation(len(pairs.pose_a))
     shuffled = solve(two, Pairs(*(part[order] for part in pairs)))
@@ -313,21 +313,21 @@ def test_same_input_same_bits(pairs):
 
 
 @pytest.mark.parametrize('power', [-30, 1, 30])
-def test_scale_by_powers_of_two_is_exact(committee, pairs, power):
+def test_scale_by_powers_of_two_is_exact(mlp, pairs, power):
     """Everything scaled by 2^k: the point scales to the bit."""
     factor = 2.0**power
     scaling = np.array([factor] * 3 + [1.0] * 4)
     scaled = Pairs(pairs.pose_a * scaling, pairs.pose_b * scaling, pairs.size_a * factor,
                    pairs.size_b * factor)
-    assert np.array_equal(solve(committee, pairs).point * factor, solve(committee, scaled).point,
+    assert np.array_equal(solve(mlp, pairs).point * factor, solve(mlp, scaled).point,
                           equal_nan=True)
 
 
-def test_minus_q_is_q(committee, pairs):
+def test_minus_q_is_q(mlp, pairs):
     """To the bit."""
     minus = np.array([1, 1, 1, -1, -1, -1, -1.0])
     other = pairs._replace(pose_a=pairs.pose_a * minus, pose_b=pairs.pose_b * minus)
-    for name, left, right in zip(Pairs._fields, solve(committee, pairs), solve(committee, other)):
+    for name, left, right in zip(Pairs._fields, solve(mlp, pairs), solve(mlp, other)):
         assert np.array_equal(left, right, equal_nan=True), name
 
 
@@ -342,16 +342,16 @@ def close(one, other, pairs):
     assert apart.max() < 1e-4
 
 
-def test_swap(committee, named_set):
+def test_swap(mlp, named_set):
     """B against A: another frame, and so another answer within the stated error."""
     name, pairs = named_set
     other = Pairs(pairs.pose_b, pairs.pose_a, pairs.size_b, pairs.size_a)
-    one, two = solve(committee, pairs).point, solve(committee, other).point
+    one, two = solve(mlp, pairs).point, solve(mlp, other).point
     assert percent(one, two, pairs).max() <= 2.0 * LIMITS[name].worst
     assert percent(one, two, pairs).mean() <= 2.0 * LIMITS[name].mean
 
 
-def test_rigid_motion(committee, named_set):
+def test_rigid_motion(mlp, named_set):
     """Moved together, the point moves along."""
     _, pairs = named_set
     rng = np.random.default_rng(3)
@@ -359,14 +359,14 @@ def test_rigid_motion(committee, named_set):
     turn, shift = poses.unit_quaternions(rng, n), rng.uniform(-5, 5, (n, 3))
     moved = pairs._replace(pose_a=poses.moved(pairs.pose_a, shift, turn),
                            pose_b=poses.moved(pairs.pose_b, shift, turn))
-    close(poses.rotate(turn, solve(committee, pairs).point) + shift,
-          solve(committee, moved).point, pairs)
+    close(poses.rotate(turn, solve(mlp, pairs).point) + shift,
+          solve(mlp, moved).point, pairs)
 
 
-def test_box_symmetries(committee, named_set):
+def test_box_symmetries(mlp, named_set):
     """A box's axes relabelled: a quarter turn about each of its axes, extents along."""
     _, pairs = named_set
-    one = solve(committee, pairs).point
+    one = solve(mlp, pairs).point
     half = np.sqrt(0.5)
     for axis, order in (((half, 0, 0, half), (0, 2, 1)), ((0, half, 0, half), (2, 1, 0)),
                         ((0, 0, half, half), (1, 0, 2))):
@@ -374,7 +374,7 @@ def test_box_symmetries(committee, named_set):
             turned = getattr(pairs, pose).copy()
             turned[:, 3:] = poses.multiply(turned[:, 3:], np.tile(axis, (len(turned), 1)))
             other = pairs._replace(**{pose: turned, size: getattr(pairs, size)[:, order]})
-            close(one, solve(committee, other).point, pairs)
+            close(one, solve(mlp, other).point, pairs)
 
 
 # --- continuity -----------------------------------------------------------------------------------
@@ -429,11 +429,11 @@ def path(name, rng, size):
 @pytest.mark.parametrize('size', [poses.CONTAINER, poses.CUBE], ids=['containers', 'cubes'])
 @pytest.mark.parametrize('name', ['landing', 'through zero tilt', 'aligned, through zero tilt',
                                   'yaw', 'sliding', 'deepening', 'rolling'])
-def test_continuity_along_smooth_paths(committee, name, size):
+def test_continuity_along_smooth_paths(mlp, name, size):
     """Per frame the point moves at most as far as the exact one plus a jump."""
     pairs = path(name, np.random.default_rng(12), size)
     steps = []
-    for model in (committee, EXACT):
+    for model in (mlp, EXACT):
         point = solve(model, pairs).point.reshape(PATHS, FRAMES, 3)
         steps.append(100.0 * np.linalg.norm(np.diff(point, axis=1), axis=2) / max(size))
     beyond = steps[0] - steps[1]
@@ -443,7 +443,7 @@ def test_continuity_along_smooth_paths(committee, name, size):
     assert beyond.max() <= JUMP
 
 
-def test_a_face_that_comes_in_comes_in_smoothly(committee):
+def test_a_face_that_comes_in_comes_in_smoothly(mlp):
     """A cube's corner nears the border of a face, where the overlap begins to be cut off.
 
     There is no step there.
@@ -459,7 +459,7 @@ def test_a_face_that_comes_in_comes_in_smoothly(committee):
     size = np.full((n, 3), 2.0)
     pairs = Pairs(np.tile(poses.IDENTITY, (n, 1)), b, size, size)
     steps = [np.linalg.norm(np.diff(solve(model, pairs).point, axis=0), axis=1)
-             for model in (committee, EXACT)]
+             for model in (mlp, EXACT)]
     # In the exact steps the face comes in with a kink, so the path did reach it.
     assert np.ptp(steps[1][:3000]) < 1e-9 < np.ptp(steps[1][3000:])
     assert steps[0].max() <= 5e-4 * 2.0  # of the edge
@@ -469,10 +469,10 @@ def test_a_face_that_comes_in_comes_in_smoothly(committee):
 
 
 @pytest.mark.parametrize('name', SETS)
-def test_errors_are_within_the_limits(committee, name):
+def test_errors_are_within_the_limits(mlp, name):
     """Mean, 99th percentile and worst point error, on 20,000 pairs that nobody has trained on."""
     pairs = SETS[name](np.random.default_rng([20270101, list(SETS).index(name)]), 20_000)
-    errors = percent(solve(committee, pairs).point, solve(EXACT, pairs).point, pairs)
+    errors = percent(solve(mlp, pairs).point, solve(EXACT, pairs).point, pairs)
     assert len(errors) == len(pairs.pose_a)
     assert errors.mean() <= LIMITS[name].mean
     assert np.quantile(errors, 0.99) <= LIMITS[name].p99
@@ -487,9 +487,9 @@ def test_missing_weights_name_the_model_that_needs_none(monkeypatch):
     def nowhere(*parts):
         raise FileNotFoundError(parts)
 
-    monkeypatch.setattr('box_contact_ros.committee.resource_path', nowhere)
+    monkeypatch.setattr('box_contact_ros.mlp.resource_path', nowhere)
     with pytest.raises(WeightsError, match="'exact'"):
-        ContactSolver(UNIT, UNIT, model='committee')
+        ContactSolver(UNIT, UNIT, model='mlp')
 
 
 @pytest.mark.parametrize('hidden', [(), (8, 8), (UNITS_MAX + 1,)])
@@ -500,7 +500,7 @@ def test_layers_that_the_kernels_do_not_have_are_refused(tmp_path, hidden):
     path = tmp_path / 'other.safetensors'
     save_weights(path, {'point': layers}, card_of(widths))
     with pytest.raises(WeightsError, match=f'one hidden layer, of at most {UNITS_MAX} units'):
-        ContactSolver(UNIT, UNIT, model='committee', weights=str(path))
+        ContactSolver(UNIT, UNIT, model='mlp', weights=str(path))
 
 
 @pytest.mark.parametrize('change, words', [
@@ -513,21 +513,21 @@ def test_weights_with_another_meaning_are_refused(tmp_path, change, words):
     layers = [(np.zeros((b, a)), np.zeros(b)) for a, b in zip(widths, widths[1:])]
     path = tmp_path / 'other.safetensors'
     save_weights(path, {'point': layers}, card_of(widths))
-    ContactSolver(UNIT, UNIT, model='committee', weights=str(path))
+    ContactSolver(UNIT, UNIT, model='mlp', weights=str(path))
     save_weights(path, {'point': layers}, card_of(widths) | change)
     with pytest.raises(WeightsError, match=words):
-        ContactSolver(UNIT, UNIT, model='committee', weights=str(path))
+        ContactSolver(UNIT, UNIT, model='mlp', weights=str(path))
 
 
 def test_weights_of_another_model_are_refused(tmp_path):
-    """A network that is none of the committee's."""
+    """A network that is none of the MLP's."""
     path = tmp_path / 'other.safetensors'
     rng = np.random.default_rng(1)
     card = {'name': 'other', 'model': 'other', 'inputs': {}, 'outputs': [], 'sizes': [],
             'architecture': [6, 4], 'data': {}, 'seed': 0, 'commit': '', 'metrics': {}}
     save_weights(path, {'point': [(rng.normal(size=(4, 6)), rng.normal(size=4))]}, card)
     with pytest.raises(WeightsError, match=f'{INPUTS} inputs and {OUTPUTS}'):
-        ContactSolver(UNIT, UNIT, model='committee', weights=str(path))
+        ContactSolver(UNIT, UNIT, model='mlp', weights=str(path))
 
 
 def test_depths_in_the_sets_are_what_they_say():

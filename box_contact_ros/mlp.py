@@ -1,4 +1,4 @@
-"""Model `committee`: SAT decides and gives normal and depth exactly; a network gives the point.
+"""Model `mlp`: SAT decides and gives normal and depth exactly; a network gives the point.
 
 Stages of a block of pairs, each a loop without branches over structures of arrays:
 
@@ -188,9 +188,9 @@ def _exact_point(work, i):
 
 
 @kernel
-def solve_committee(poses_a, poses_b, sizes_a, sizes_b, work, numbers, status, colliding,
+def solve_mlp(poses_a, poses_b, sizes_a, sizes_b, work, numbers, status, colliding,
                     separation, normal, point):
-    """Model `committee` for all rows; returns the numbers of rows refused and answered exactly.
+    """Model `mlp` for all rows; returns the numbers of rows refused and answered exactly.
 
     numbers: see `sites.site_numbers`.
     """
@@ -231,7 +231,7 @@ def solve_committee(poses_a, poses_b, sizes_a, sizes_b, work, numbers, status, c
 
 
 @kernel
-def one_committee(work, numbers, pose_a, pose_b, normal, point):
+def one_mlp(work, numbers, pose_a, pose_b, normal, point):
     """A single pair, poses (7,): writes normal (3,) and point (3,).
 
     Returns APART, TOUCHING or REFUSED, and the separation.
@@ -274,7 +274,7 @@ def _listed_sizes(weights: Weights) -> np.ndarray | None:
     return np.sort(sizes, axis=-1) if listed else None
 
 
-class Committee:
+class Mlp:
     """SAT and a network for the point, for any sizes or those that the weights' card lists.
 
     Sizes (2, 3) are those of single calls.
@@ -282,17 +282,17 @@ class Committee:
 
     def __init__(self, sizes: np.ndarray, weights: str | None = None) -> None:
         try:
-            path = weights or resource_path('weights', 'committee.safetensors')
+            path = weights or resource_path('weights', 'mlp.safetensors')
         except FileNotFoundError as error:
             raise WeightsError(
-                "model 'committee' has no weights: train them, name a file with `weights`, or use "
+                "model 'mlp' has no weights: train them, name a file with `weights`, or use "
                 "model 'exact', which needs none") from error
         self.weights = load_weights(path)
         network = self.weights.networks.get('point')
         if network is None or (network.widths[0], network.widths[-1]) != (INPUTS, OUTPUTS):
             raise WeightsError(
                 f"weights file {path} has no network 'point' with {INPUTS} inputs and {OUTPUTS} "
-                f"outputs, which model 'committee' needs")
+                f"outputs, which model 'mlp' needs")
         if len(network.widths) != 3 or network.widths[1] > UNITS_MAX:
             raise WeightsError(f"weights file {path}: network 'point' must have one hidden layer, "
                                f'of at most {UNITS_MAX} units')
@@ -312,7 +312,7 @@ class Committee:
         # Single calls have no test of the sizes: a solver for boxes that are not listed has no
         # `one`, and all its calls end in `solve`.
         if self._in_card(sizes[:1], sizes[1:]).all():
-            self.one = one_committee
+            self.one = one_mlp
 
     @property
     def exact_answers(self) -> int:
@@ -326,7 +326,7 @@ class Committee:
             asked = self._in_card(size_a, size_b)
             if not asked.all():
                 return self._solve_partly(a, b, size_a, size_b, status, found, asked)
-        bad, exact = solve_committee(a, b, size_a, size_b, self._work, self._numbers, status,
+        bad, exact = solve_mlp(a, b, size_a, size_b, self._work, self._numbers, status,
                                      *found)
         self._exact_answers += exact
         return int(bad)
@@ -344,7 +344,7 @@ class Committee:
             part = Contacts(*(whole[rows] for whole in found))
             reasons = np.zeros(len(rows), dtype=np.int8)
             if by_network:
-                bad, exact = solve_committee(a[rows], b[rows], *sizes, self._work, self._numbers,
+                bad, exact = solve_mlp(a[rows], b[rows], *sizes, self._work, self._numbers,
                                              reasons, *part)
             else:
                 bad = solve_exact(a[rows], b[rows], *sizes, self._work, reasons, *part)
