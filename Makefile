@@ -6,7 +6,7 @@ SHELL := bash
 .ONESHELL:
 .NOTPARALLEL:
 .DEFAULT_GOAL := help
-.PHONY: help demo view test lint coverage clean
+.PHONY: help demo view test test-arm lint coverage clean
 
 # Arguments for the program behind the target: make test ARGS='-k sat -x'
 ARGS ?=
@@ -26,12 +26,14 @@ export PYTHONUNBUFFERED := 1
 
 VENV_PYTHON := .venv/bin/python
 # What the installation is made from: a change of one of these installs again.
-INSTALL_INPUTS := setup.py setup.cfg constraints.txt box_contact_ros/programs.py
+INSTALL_INPUTS := setup.py setup.cfg pyproject.toml constraints.txt box_contact_ros/programs.py \
+    $(shell find box_contact_ros -name '*.[ch]pp')
 
 help:
 	@echo 'make demo     the crane, the contact node, and contacts live in this terminal'
 	echo 'make view     the same in the browser, with models to switch and runs to repeat'
 	echo 'make test     ruff, mypy and all tests'
+	echo 'make test-arm the C++ test on an emulated 64-bit ARM'
 	echo 'make lint     ruff, mypy and ament'\''s linters only'
 	echo 'make coverage share of the core that its own tests run'
 	echo 'make clean    remove .venv and everything that was generated'
@@ -39,10 +41,10 @@ help:
 	echo 'Each does its own set-up, in .venv. Arguments: make test ARGS="-k sat -x".'
 	echo 'The set-up looks for Python 3.11 or 3.12; another place: make demo PYTHON=/path/to/python3.12'
 
-demo: .venv/.installed-demo .venv/.compiled
+demo: .venv/.installed-demo
 	@exec $(VENV_PYTHON) -m box_contact_ros.demo $(ARGS)
 
-view: .venv/.installed-view .venv/.compiled-view
+view: .venv/.installed-view
 	@exec $(VENV_PYTHON) -m box_contact_ros view $(ARGS)
 
 test: .venv/.installed-test
@@ -53,18 +55,18 @@ test: .venv/.installed-test
 	echo 'pytest'
 	exec $(VENV_PYTHON) -m pytest $(ARGS)
 
+test-arm: .venv/.installed-test
+	@exec bash test/core/arm.sh $(VENV_PYTHON)
+
 lint: .venv/.installed-test
 	@$(VENV_PYTHON) -m ruff check . $(ARGS)
 	$(VENV_PYTHON) -m mypy
 	exec $(VENV_PYTHON) -m pytest test/test_ament.py
 
-# Kernels as plain Python, where lines can be counted: some minutes for a fast part of the tests. Left
-# out are tests of the compiler's side, and those that ask for more contacts than this way can give.
+# Lines of the core's Python side, the solver and scenes, that their own tests run.
 coverage: .venv/.installed-test
-	@export NUMBA_DISABLE_JIT=1
-	$(VENV_PYTHON) -m coverage run -m pytest -W ignore::RuntimeWarning \
-	    $(addprefix test/test_,interpreted.py solver.py outline.py paper_models.py pairing.py scene.py contact_force.py network.py package.py) \
-	    -k 'not cache and not is_plain and not shipped and not docs and not program' $(ARGS)
+	@$(VENV_PYTHON) -m coverage run -m pytest \
+	    $(addprefix test/test_,solver.py paper_models.py pairing.py scene.py contact_force.py network.py package.py mlp.py hygiene.py) $(ARGS)
 	$(VENV_PYTHON) -m coverage report
 
 clean:
@@ -74,56 +76,39 @@ clean:
 	    rm -rf .venv
 	fi
 	rm -rf build dist install log box_contact_ros.egg-info
+	find box_contact_ros -name '*.so' -delete
 	rm -rf .pytest_cache .ruff_cache .mypy_cache .hypothesis
 	find box_contact_ros test launch -name __pycache__ -type d -prune -exec rm -rf {} + 2>/dev/null || true
 
 # Stamps are written last: a set-up that was interrupted is taken up again by the next call.
 .venv/.installed-demo: .venv/.created $(INSTALL_INPUTS)
-	@$(call install,ros$(comma)sim,ROS 2 Jazzy$(comma) MuJoCo$(comma) Numba,1 to 3 minutes)
+	@$(call install,ros$(comma)sim,ROS 2 Jazzy and MuJoCo,1 to 3 minutes)
 	touch $@
 
 .venv/.installed-view: .venv/.created $(INSTALL_INPUTS)
-	@$(call install,ros$(comma)sim$(comma)view$(comma)soup,ROS 2 Jazzy$(comma) MuJoCo$(comma) Numba$(comma) viser,1 to 3 minutes)
+	@$(call install,ros$(comma)sim$(comma)view$(comma)soup,ROS 2 Jazzy$(comma) MuJoCo$(comma) viser,1 to 3 minutes)
 	touch $@ .venv/.installed-demo
 
 .venv/.installed-test: .venv/.created $(INSTALL_INPUTS)
 	@$(call install,ros$(comma)sim$(comma)view$(comma)bag$(comma)train$(comma)soup$(comma)report$(comma)test,\
-	    ROS 2 Jazzy$(comma) MuJoCo$(comma) Numba$(comma) PyTorch and the test tools,2 to 6 minutes)
+	    ROS 2 Jazzy$(comma) MuJoCo$(comma) PyTorch and the test tools,2 to 6 minutes)
 	touch $@ .venv/.installed-demo .venv/.installed-view
-
-# Kernels are compiled at their first use, which would take half of the demo's minute; here once, and
-# again when one of the package's own modules has changed.
-.venv/.compiled: $(wildcard box_contact_ros/*.py) | .venv/.installed-demo
-	@$(call compile,"mlp"$(comma) "exact")
-	touch $@
-
-# Those that the view can switch to as well.
-.venv/.compiled-view: $(wildcard box_contact_ros/*.py) | .venv/.installed-view
-	@$(call compile,"mlp"$(comma) "exact"$(comma) "paper")
-	touch $@ .venv/.compiled
 
 # An environment holds the project's path in many places, and lives on the Python it was made with.
 # After a move, in a copy, or without that Python it is made anew. The stamps have to go while make
 # reads this file, before it looks at what is up to date.
 ifneq ($(wildcard .venv/.created),)
 $(shell { [ "$$(cat .venv/.created)" = "$$(pwd -P)" ] && $(VENV_PYTHON) -c ''; } 2>/dev/null || \
-    rm -f .venv/.created .venv/.installed-* .venv/.compiled*)
+    rm -f .venv/.created .venv/.installed-*)
 endif
 
 comma := ,
-define compile
-printf 'compiling the kernels (about a minute) '
-SECONDS=0
-$(VENV_PYTHON) -c 'import logging; logging.disable(); from box_contact_ros import ContactSolver as S; [S((2, 2, 2), (2, 2, 2), model=m).batch([[0, 0, 0, 0, 0, 0, 1]], [[0, 0, 1.9, 0, 0, 0, 1]]) for m in ($(strip $(1)))]'
-printf ' done in %s s\n' "$$SECONDS"
-endef
-
 define install
 SECONDS=0
 printf 'installing %s into .venv (about $(strip $(3)); log: .venv/setup.log) ' '$(strip $(2))'
 rm -f $@
 # Without build isolation the pinned setuptools is used, and not fetched a second time.
-if ! { $(VENV_PYTHON) -m pip install -c constraints.txt pip setuptools wheel &&
+if ! { $(VENV_PYTHON) -m pip install -c constraints.txt pip setuptools wheel numpy &&
     $(VENV_PYTHON) -m pip install -c constraints.txt --no-build-isolation -e '.[$(strip $(1))]'
     } 2>&1 | tee .venv/setup.log |
     awk '/^Collecting/ {printf "."} /^Installing collected/ {printf " unpacking"} {fflush()}'

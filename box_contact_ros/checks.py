@@ -1,6 +1,6 @@
 """What is accepted as a pose and as a size, and the words in which the rest is refused.
 
-The same limits as in the kernels (`pose.load_block`), for the places where a person or a message
+The same limits as in the core (core/poses.hpp), for the places where a person or a message
 can bring in anything: every refusal names the field and the value.
 """
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .pose import LENGTH_MAX, LENGTH_MIN, QUATERNION_MAX, QUATERNION_MIN
+from .core import LENGTH_MAX, LENGTH_MIN, QUATERNION_MAX, QUATERNION_MIN
 
 SHOWN = 200
 """Characters of a refused value that an error shows."""
@@ -71,15 +71,14 @@ def as_floats(value: ArrayLike, name: str, shapes: str, *accepted: tuple[int | N
               ) -> np.ndarray:
     """`value` as a float64 array of one of the `accepted` shapes (None: any length).
 
-    It is contiguous and writable. `shapes` is how the accepted shapes are called in the error.
+    It is contiguous. `shapes` is how the accepted shapes are called in the error.
     """
     try:
         array = np.asarray(value)
         if not _holds_numbers(array):
             raise TypeError(f'{array.dtype} is no kind of number')
         with np.errstate(over='ignore', invalid='ignore'):  # infinity and NaN are refused later
-            # Of one kind to Numba, which would compile the kernels anew for read-only arrays.
-            array = np.require(array, np.float64, ('C', 'A', 'W'))
+            array = np.require(array, np.float64, ('C', 'A'))
     except (TypeError, ValueError, OverflowError) as error:
         raise ValueError(f'{name} must be {shapes} of numbers, not {shown(value)}') from error
     for shape in accepted:

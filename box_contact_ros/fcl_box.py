@@ -17,7 +17,6 @@ import functools
 import fcl
 import numpy as np
 
-from .block import OK
 from .contact import Contacts
 from .exact import Exact
 
@@ -29,14 +28,14 @@ class FclBox:
     """FCL's box-box collide, deepest contact; any sizes."""
 
     def __init__(self) -> None:
-        self._exact = Exact(np.ones((2, 3)))
+        self._exact = Exact()
         self._request = fcl.CollisionRequest(num_max_contacts=MOST_CONTACTS, enable_contact=True)
 
     def solve(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
-              status: np.ndarray, found: Contacts) -> int:
-        """Fill `found` for poses (n, 7), sizes (n or 1, 3); returns how many rows are refused."""
-        refused = self._exact.solve(a, b, size_a, size_b, status, found)
-        for row in np.flatnonzero(found.colliding & (status == OK)):
+              threads: int = 1) -> tuple[Contacts, int]:
+        """Return contacts for poses (n, 7), sizes (n or 1, 3), and the first refused row or −1."""
+        found, refused = self._exact.solve(a, b, size_a, size_b, threads)
+        for row in np.flatnonzero(found.colliding) if refused < 0 else ():
             # B − A is formed in float64 here, so that FCL adds no rounding far from the origin.
             first = _place(size_a[row % len(size_a)], np.zeros(3), a[row, 3:])
             second = _place(size_b[row % len(size_b)], b[row, :3] - a[row, :3], b[row, 3:])
@@ -48,7 +47,7 @@ class FclBox:
             found.separation[row] = -deepest.penetration_depth
             found.normal[row] = deepest.normal
             found.point[row] = a[row, :3] + deepest.pos
-        return refused
+        return found, refused
 
 
 def _place(size: np.ndarray, position: np.ndarray, quaternion: np.ndarray) -> fcl.CollisionObject:

@@ -1,4 +1,4 @@
-"""Multilayer perceptrons: the file format of their weights, and the forward kernel.
+"""Multilayer perceptrons: the file format of their weights.
 
 A weights file is `safetensors`: tensors `<network>.<layer>.weight` (outputs × inputs) and
 `<network>.<layer>.bias`, float32, layers counted from 0; hidden units are rectified, in the
@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,8 +18,6 @@ from typing import Any
 import numpy as np
 from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save
-
-from .jit import kernel
 
 CARD_FIELDS = ('name', 'model', 'architecture', 'inputs', 'outputs', 'sizes', 'data', 'seed',
                'commit', 'metrics', 'sha256')
@@ -33,7 +30,7 @@ not."""
 
 @dataclass(frozen=True)
 class Network:
-    """One perceptron, packed for the kernel."""
+    """One perceptron, its numbers in one array."""
 
     name: str
     widths: tuple[int, ...]
@@ -155,26 +152,3 @@ def unpacked(network: Network) -> list[tuple[np.ndarray, np.ndarray]]:
                        network.packed[end:end + outputs]))
         place = end + outputs
     return layers
-
-
-@kernel
-def forward(packed, widths, activation):
-    """Run the network on the inputs in `activation[0]`; the outputs are left in the row returned.
-
-    packed: float32, widths: (layers + 1,) int64, activation: (2, widest) float32 scratch.
-    """
-    here = 0
-    place = 0
-    layers = len(widths) - 1
-    for layer in range(layers):
-        inputs = widths[layer]
-        outputs = widths[layer + 1]
-        bias = place + inputs * outputs
-        for row in range(outputs):
-            total = packed[bias + row]
-            for column in range(inputs):
-                total += packed[place + row * inputs + column] * activation[here, column]
-            activation[1 - here, row] = total if layer == layers - 1 else math.tanh(total)
-        place = bias + outputs
-        here = 1 - here
-    return here

@@ -15,18 +15,9 @@ import numpy as np
 
 from .checks import as_floats, pose_fault, shown, size_fault
 from .contact import Contact
-from .jit import kernel
-from .pose import pose_valid, rotation_entries, squared_norm
+from .core import native
 from .solver import ContactSolver
 
-NEAR = 1e-9
-"""Bounding boxes count as near up to a gap of this share of the largest coordinate or extent.
-
-Far above rounding (some 1e-15), far below what would cost time. It is conservative: boxes whose
-bounding boxes are a gap apart are that far apart themselves, and the largest gap on the SAT axes
-is never less than 1/√3 of the distance, so it exceeds the few ulp up to which boxes touch. (The
-facets' normals around a corner of the boxes' Minkowski difference are at right angles at most.)
-"""
 LARGEST_ID = 2**32 - 1
 """Ids of pairs are uint32 in the cloud."""
 
@@ -128,55 +119,11 @@ class Answer(NamedTuple):
     """How many pairs the conservative test left to the solver."""
 
 
-@kernel
-def _bound(poses, half, boxes, low, high):
-    """Bounding boxes `low`, `high` (n, 3) [m], along the common frame's axes, of some boxes."""
-    for box in boxes:
-        r = rotation_entries(poses[box, 3], poses[box, 4], poses[box, 5], poses[box, 6])
-        for k in range(3):
-            reach = (abs(r[3 * k]) * half[box, 0] + abs(r[3 * k + 1]) * half[box, 1]) + abs(
-                r[3 * k + 2]) * half[box, 2]
-            low[box, k] = poses[box, k] - reach
-            high[box, k] = poses[box, k] + reach
-
-
-@kernel
-def _near_pairs(poses, half, moved, low, high, known, first, second, near, unknown):
-    """Numbers of the pairs that may touch to `near`, of those without poses to `unknown`.
-
-    Returns how many there are of each; or −1 and the box whose pose is none.
-    """
-    for box in moved:
-        norm2 = squared_norm(poses[box, 3], poses[box, 4], poses[box, 5], poses[box, 6])
-        if known[box] and not pose_valid(poses[box, 0], poses[box, 1], poses[box, 2], norm2):
-            return -1, box
-    _bound(poses, half, moved, low, high)
-    count = 0
-    left_out = 0
-    for i in range(first.shape[0]):
-        a, b = first[i], second[i]
-        if not (known[a] and known[b]):
-            unknown[left_out] = i
-            left_out += 1
-            continue
-        gap = 0.0
-        scale = 0.0
-        for k in range(3):
-            gap = max(gap, max(low[a, k] - high[b, k], low[b, k] - high[a, k]))
-            scale = max(scale, max(max(abs(low[a, k]), abs(high[a, k])),
-                                   max(abs(low[b, k]), abs(high[b, k]))))
-            scale = max(scale, max(high[a, k] - low[a, k], high[b, k] - low[b, k]))
-        if gap <= NEAR * scale:
-            near[count] = i
-            count += 1
-    return count, left_out
-
-
 class SceneSolver:
     """Contacts of all pairs of a scene, one tick at a time.
 
-    Raises ValueError for a model that does not go with one of the pairs' sizes. Keeps scratch
-    memory: use one per thread.
+    Raises ValueError for a model that does not go with one of the pairs' sizes. Keeps the last
+    poses: use one per thread.
     """
 
     def __init__(self, scene: Scene, *, model: str = 'mlp', weights: str | None = None,
@@ -185,17 +132,16 @@ class SceneSolver:
         self.model = model
         numbers = {name: number for number, name in enumerate(scene.boxes)}
         boxes = list(scene.boxes.values())
-        self._size = np.array([box.size for box in boxes])
-        self._half = 0.5 * self._size
+        self._size = np.array([box.size for box in boxes], dtype=float)
         self._first = np.array([numbers[pair.a] for pair in scene.pairs])
         self._second = np.array([numbers[pair.b] for pair in scene.pairs])
         self._moving = np.array([numbers[name] for name in scene.moving])
         self._poses = np.array([box.pose or (0, 0, 0, 0, 0, 0, 1) for box in boxes], dtype=float)
         self._known = np.array([box.pose is not None for box in boxes])
         self._low, self._high = np.empty((2, len(boxes), 3))
-        # Fixed boxes are bounded here, once and for all.
-        _bound(self._poses, self._half, np.arange(len(boxes)), self._low, self._high)
         self._near, self._unknown = np.empty((2, len(scene.pairs)), dtype=np.int64)
+        # Fixed boxes are bounded here, once and for all.
+        self._near_pairs(np.flatnonzero(self._known))
         pair = scene.pairs[0]
         self._solver = ContactSolver(scene.boxes[pair.a].size, scene.boxes[pair.b].size,
                                      model=model, weights=weights)
@@ -211,8 +157,17 @@ class SceneSolver:
         """Contacts so far that the model handed to `exact`: see `mlp`."""
         return self._solver.exact_answers - self._warm_up_answers
 
+    def _near_pairs(self, moved: np.ndarray) -> tuple[int, int]:
+        """Bound the boxes `moved` anew, then write to `_near` which pairs may touch.
+
+        Pairs without poses go to `_unknown`. Returns how many there are of each; or −1, and the
+        number of a box whose pose is not valid.
+        """
+        return native.near_pairs(self._poses, self._size, moved, self._low, self._high, self._known,
+                                 self._first, self._second, self._near, self._unknown)
+
     def _warm_up(self) -> None:
-        """Compile, or load, the kernels; let the model refuse sizes that it has no answer for.
+        """Let the model refuse sizes that it has no answer for.
 
         Only a corner overlaps: where faces coincide, a soup takes seconds. And by little: it is not
         the depth that an MLP was not trained for.
@@ -256,9 +211,7 @@ class SceneSolver:
                     box = list(self.scene.boxes)[number]
                     pose = as_floats(pose, f'pose of {box}', 'a pose (7,)', (7,))
                 self._poses[number] = pose
-        count, left_out = _near_pairs(
-            self._poses, self._half, self._moving, self._low, self._high, self._known,
-            self._first, self._second, self._near, self._unknown)
+        count, left_out = self._near_pairs(self._moving)
         if count < 0:
             box = list(self.scene.boxes)[left_out]
             raise ValueError(f'pose of {box}: {pose_fault(self._poses[left_out])}')

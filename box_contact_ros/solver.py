@@ -4,16 +4,16 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from functools import partial
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .block import BAD_POSE_A, BAD_POSE_B, BAD_SIZE_A
 from .checks import as_floats, as_size, pose_fault, shown, size_fault
-from .mlp import Mlp
-from .contact import TOUCHING, Contact, Contacts
+from .contact import Contact, Contacts
+from .core import native
 from .exact import Exact
+from .mlp import Mlp
 from .paper import Paper, PaperContinuous
 
 MODELS = {
@@ -34,33 +34,18 @@ SOUP_DIVISIONS, MOST_SOUP_DIVISIONS = 8, 64
 """Divisions of an edge in model `soup`, and the most that are accepted (49,152 triangles a box)."""
 
 
-# Looked up once: a single call takes little more than a microsecond.
-_empty, _new_tuple = np.empty, tuple.__new__
-
-
 class Model(Protocol):
-    """What a model behind `ContactSolver` is."""
+    """A model behind `ContactSolver`.
+
+    It may have `single`, the native model of single calls with its network, and `exact_answers`,
+    the contacts that it handed to `exact`.
+    """
 
     def solve(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
-              status: np.ndarray, found: Contacts) -> int:
-        """Fill `found` for poses (n, 7) and full extents (n or 1, 3).
+              threads: int = 1) -> tuple[Contacts, int]:
+        """Return the contacts of poses (n, 7) and full extents (n or 1, 3).
 
-        Returns the number of rows that are refused, with their reasons (`block.BAD_…`) in `status`.
-        """
-
-
-@runtime_checkable
-class SingleModel(Model, Protocol):
-    """A model that has a kernel of its own for single pairs."""
-
-    one_scratch: tuple[np.ndarray, ...]
-    """Arrays that are handed to `one` on every call; they know the sizes."""
-
-    @staticmethod
-    def one(*scratch_poses_normal_point: np.ndarray) -> tuple[int, float]:
-        """(contact.APART, TOUCHING or REFUSED, separation) of a single pair.
-
-        Arguments: `one_scratch`, then two poses (7,), and normal (3,) and point (3,) to write.
+        The number of the first row that is refused comes with them, or −1.
         """
 
 
@@ -95,9 +80,9 @@ def make_model(name: str, size_a: np.ndarray, size_b: np.ndarray, weights: str |
     if weights is not None and not isinstance(weights, (str, os.PathLike)):
         raise ValueError(f'weights must be the path of a file, not {shown(weights)}')
     if name == 'mlp':
-        return Mlp(np.concatenate([size_a, size_b]), weights)
+        return Mlp(size_a, size_b, weights)
     if name == 'exact':
-        return Exact(np.concatenate([size_a, size_b]))
+        return Exact()
     if name == 'paper':
         return Paper(size_a, size_b, weights)
     if name == 'paper-continuous':
@@ -114,7 +99,7 @@ def make_model(name: str, size_a: np.ndarray, size_b: np.ndarray, weights: str |
     raise NotImplementedError(name)
 
 
-class ContactSolver:
+class ContactSolver(native.PairSolver):
     """Whether two boxes touch, where, and which way they push.
 
     ```python
@@ -124,10 +109,10 @@ class ContactSolver:
     ```
 
     Sizes are three full extents [m]; poses are `x y z qx qy qz qw` in a common frame. Raises
-    `ValueError`, with the field and the value, for anything that is not a size or a pose.
-    A solver keeps scratch memory: use one per thread.
+    `ValueError`, with the field and the value, for anything that is not a size or a pose. A solver
+    may be called from several threads.
 
-    model: one of `MODELS`, or soup-N; weights: a file to use in place of the shipped weights.
+    model: one of `MODELS`, or soup-N; weights: a file to use instead of the shipped weights.
     """
 
     def __init__(self, size_a: ArrayLike, size_b: ArrayLike, *, model: str = 'mlp',
@@ -135,36 +120,32 @@ class ContactSolver:
         self._size_a = as_size(size_a, 'size_a')
         self._size_b = as_size(size_b, 'size_b')
         self.model = model
+        self._weights = weights
         self._solver = make_model(model, self._size_a, self._size_b, weights)
-        self._one: Callable[..., tuple[int, float]] | None = None
-        if isinstance(self._solver, SingleModel):
-            one: Any = self._solver.one  # a kernel
-            self._one = partial(one, *self._solver.one_scratch)
-            # After one call for float64 arrays no other kind is compiled: what is not one raises
-            # TypeError, and is made one.
-            self._one(np.zeros(7), np.zeros(7), np.empty(3), np.empty(3))
-            one.disable_compile()
+        single, network = getattr(self._solver, 'single', (None, None))
+        # Single calls are made by the base class, in C++; it calls `converted` for the rest.
+        super().__init__(single, tuple(self._size_a[0]), tuple(self._size_b[0]), network)
 
-    def __call__(self, pose_a: ArrayLike, pose_b: ArrayLike) -> Contact:
-        """Contact of one pair; poses are (7,)."""
-        if self._one is None:
-            return self._converted(pose_a, pose_b)
-        normal, point = _empty(3), _empty(3)
-        try:
-            verdict, separation = self._one(pose_a, pose_b, normal, point)
-        except (TypeError, ValueError):  # the latter, without the field, for an empty list
-            return self._converted(pose_a, pose_b)
-        if verdict < 0:
-            return self._converted(pose_a, pose_b)  # which knows the words
-        return _new_tuple(Contact, (verdict == TOUCHING, separation, normal, point))
+    def __reduce__(self) -> tuple[Callable[..., ContactSolver], tuple[Any, ...]]:
+        """Pickle the arguments."""
+        return (partial(ContactSolver, model=self.model, weights=self._weights),
+                (self._size_a[0], self._size_b[0]))
 
     @property
     def exact_answers(self) -> int:
         """Contacts so far that the model handed to `exact`: see `mlp`."""
-        return int(getattr(self._solver, 'exact_answers', 0))
+        return self.answered_exactly + int(getattr(self._solver, 'exact_answers', 0))
 
-    def _converted(self, pose_a: ArrayLike, pose_b: ArrayLike) -> Contact:
-        """A single call for poses of any kind, or the reason why they are refused."""
+    @property
+    def clipped(self) -> int:
+        """Contacts so far that model `exact` clipped, because its certificate did not hold."""
+        return super().clipped + int(getattr(self._solver, 'clipped', 0))
+
+    def converted(self, pose_a: ArrayLike, pose_b: ArrayLike) -> Contact:
+        """Return the contact of one pair whose poses (7,) are of any kind of numbers.
+
+        Raises ValueError, with field and value, for poses that are refused.
+        """
         a = as_floats(pose_a, 'pose_a', 'a pose (7,)', (7,)).reshape(1, 7)
         b = as_floats(pose_b, 'pose_b', 'a pose (7,)', (7,)).reshape(1, 7)
         found = self._solve(a, b, self._size_a, self._size_b, ('pose_a', 'pose_b'))
@@ -172,16 +153,18 @@ class ContactSolver:
                        found.point[0])
 
     def batch(self, poses_a: ArrayLike, poses_b: ArrayLike, *, size_a: ArrayLike | None = None,
-              size_b: ArrayLike | None = None) -> Contacts:
-        """Contacts of n pairs: row i is what a single call gives for row i.
+              size_b: ArrayLike | None = None, threads: int = 1) -> Contacts:
+        """Return the contacts of n pairs: row i is what a single call gives for row i.
 
         poses_a, poses_b are (n, 7); size_a, size_b replace the solver's sizes, (3,) for all rows
-        or (n, 3) for every row its own.
+        or (n, 3) for every row its own. `threads` share the rows; no bit depends on their number.
         """
         a = as_floats(poses_a, 'poses_a', 'poses (n, 7)', (None, 7))
         b = as_floats(poses_b, 'poses_b', 'poses (n, 7)', (None, 7))
         if len(a) != len(b):
             raise ValueError(f'poses_a and poses_b must be equally many, not {len(a)} and {len(b)}')
+        if isinstance(threads, bool) or not isinstance(threads, (int, np.integer)) or threads < 1:
+            raise ValueError(f'threads must be a whole number from 1 on, not {shown(threads)}')
         sizes = []
         for size, name, default in ((size_a, 'size_a', self._size_a),
                                     (size_b, 'size_b', self._size_b)):
@@ -190,29 +173,24 @@ class ContactSolver:
                 continue
             array = as_floats(size, name, f'full extents (3,) or ({len(a)}, 3)', (3,), (len(a), 3))
             sizes.append(as_size(array, name) if array.ndim == 1 else array)
-        return self._solve(a, b, sizes[0], sizes[1], ('poses_a', 'poses_b'))
+        return self._solve(a, b, sizes[0], sizes[1], ('poses_a', 'poses_b'),
+                           min(int(threads), 1 + len(a)))
 
     def _solve(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
-               names: tuple[str, str]) -> Contacts:
-        rows = len(a)
-        found = Contacts(np.empty(rows, dtype=np.bool_), np.empty(rows), np.empty((rows, 3)),
-                         np.empty((rows, 3)))
-        status = np.zeros(rows, dtype=np.int8)
-        if self._solver.solve(a, b, size_a, size_b, status, found):
-            _refuse(a, b, size_a, size_b, status, names)
+               names: tuple[str, str], threads: int = 1) -> Contacts:
+        found, refused = self._solver.solve(a, b, size_a, size_b, threads)
+        if refused >= 0:
+            raise ValueError(_refusal(a, b, size_a, size_b, refused, names))
         return found
 
 
-def _refuse(a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
-            status: np.ndarray, names: tuple[str, str]) -> None:
-    """Raise for the first row that the kernel refused."""
-    row = int(np.flatnonzero(status)[0])
-    code = status[row]
-    if code in (BAD_POSE_A, BAD_POSE_B):
-        poses, name = (a, names[0]) if code == BAD_POSE_A else (b, names[1])
-        fault = pose_fault(poses[row])
-    else:
-        sizes, name = (size_a, 'size_a') if code == BAD_SIZE_A else (size_b, 'size_b')
-        fault = size_fault(sizes[0 if len(sizes) == 1 else row])
-    where = f'{name}[{row}]' if name.startswith('poses') or len(status) > 1 else name
-    raise ValueError(f'{where} {fault}')
+def _refusal(a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray, row: int,
+             names: tuple[str, str]) -> str:
+    """Return why a row is refused: the first of its poses and sizes that has a fault."""
+    for values, name, fault_of in ((a, names[0], pose_fault), (b, names[1], pose_fault),
+                                   (size_a, 'size_a', size_fault), (size_b, 'size_b', size_fault)):
+        fault = fault_of(values[0 if len(values) == 1 else row])
+        if fault:
+            numbered = name.startswith('poses') or len(a) > 1
+            return f'{name}[{row}] {fault}' if numbered else f'{name} {fault}'
+    raise AssertionError(f'row {row} was refused without a fault')

@@ -30,7 +30,6 @@ from typing import NamedTuple
 import fcl
 import numpy as np
 
-from .block import OK
 from .contact import Contacts
 from .exact import Exact
 
@@ -141,7 +140,7 @@ class Soup:
     def __init__(self, divisions: int) -> None:
         self.divisions = divisions
         self.soup_misses = 0
-        self._exact = Exact(np.ones((2, 3)))
+        self._exact = Exact()
 
         def new_object(size: tuple[float, ...], box: int) -> fcl.CollisionObject:
             return fcl.CollisionObject(mesh(size, divisions).model)
@@ -172,10 +171,10 @@ class Soup:
         return first, second
 
     def solve(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
-              status: np.ndarray, found: Contacts) -> int:
-        """Fill `found` for poses (n, 7), sizes (n or 1, 3); returns how many rows are refused."""
-        refused = self._exact.solve(a, b, size_a, size_b, status, found)
-        for row in np.flatnonzero(found.colliding & (status == OK)):
+              threads: int = 1) -> tuple[Contacts, int]:
+        """Return contacts for poses (n, 7), sizes (n or 1, 3), and the first refused row or −1."""
+        found, refused = self._exact.solve(a, b, size_a, size_b, threads)
+        for row in np.flatnonzero(found.colliding) if refused < 0 else ():
             sizes = size_a[row % len(size_a)], size_b[row % len(size_b)]
             contacts = collide(*self.place(a[row], b[row], *sizes))
             answer = point_and_normal(
@@ -185,4 +184,4 @@ class Soup:
                 continue
             found.point[row] = a[row, :3] + answer[0]
             found.normal[row] = answer[1]
-        return refused
+        return found, refused

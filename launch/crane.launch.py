@@ -21,8 +21,8 @@ ARGUMENTS = {
     'soup': (bool, 'false', 'true: a soup node answers the same poses under soup/'),
     'view': (bool, 'false', 'true: show boxes and contacts in the browser'),
 }
-COMPILE_SECONDS = 180.0
-"""Patience of the crane: a first start of the contact node compiles its kernels."""
+PATIENCE = 30.0
+"""How long the crane waits for the contact node [s]: a busy machine starts nodes slowly."""
 
 
 def parameters(*names: str, **fixed: float) -> list[dict]:
@@ -43,6 +43,6 @@ def generate_launch_description() -> LaunchDescription:
         Node(package=PACKAGE, executable='view', output='screen', arguments=['--attach'],
              condition=IfCondition(LaunchConfiguration('view'))),
         Node(package=PACKAGE, executable='crane', output='screen', emulate_tty=True,
-             parameters=parameters('rate', 'seed', 'closed_loop', wait=COMPILE_SECONDS),
+             parameters=parameters('rate', 'seed', 'closed_loop', wait=PATIENCE),
              on_exit=Shutdown(reason='the crane has ended')),
     ])

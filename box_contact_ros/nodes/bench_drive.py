@@ -41,7 +41,7 @@ from .messages import NANOSECONDS, make_header, read_cloud
 from .runtime import let_callbacks_finish, make_executor, spin_for
 
 # Bounds on everything that waits, so that a bench always ends.
-START_LIMIT = 120.0  # s until a node answers; a first start compiles its kernels
+START_LIMIT = 30.0  # s until a node answers
 OFFER_PERIOD = 0.1  # s between the pairs that only ask whether anyone answers
 WARM_UP = 100  # pairs sent at the rate, and not counted, before the first stream of a group
 DRAIN_SILENCE = 1.0  # s without an answer: what is still out is lost
@@ -411,7 +411,7 @@ def _serialised(stream: Stream, rows: Sequence[int]) -> list[tuple[tuple[bytes, 
 
 @contextlib.contextmanager
 def _no_collection() -> Iterator[None]:
-    """A full collection with Numba loaded takes 10 ms, which would be taken for a node's."""
+    """A full collection takes milliseconds, which would be taken for a node's."""
     gc.collect()
     gc.freeze()
     gc.disable()

@@ -165,7 +165,7 @@ class ContactNode(LifecycleNode):
     # --- lifecycle -------------------------------------------------------------------------------
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Read the scene, load and check weights, compile or load the kernels."""
+        """Read the scene, load and check the weights."""
         return self._attempt(lambda: self._apply(self._settings))
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:

@@ -43,7 +43,7 @@ class CraneNode(Node):
     """Publishes the crane's poses and gathers the answers in a `CraneLog`."""
 
     def __init__(self, context: Context, **options: Any) -> None:
-        """Read the parameters, compile the reference; `options` go to Node."""
+        """Read the parameters, make the reference; `options` go to Node."""
         super().__init__('crane', context=context, **options)
         values = declare(self, PARAMETERS, fixed=True)
         self.rate, self.wait = values['rate'], values['wait']
@@ -56,7 +56,6 @@ class CraneNode(Node):
             self.scenario, self.rate, latency=values['latency'], lockstep=values['lockstep'],
             stop=self.stop) if values['closed_loop'] else None
         self.solver = ContactSolver(self.scenario.size, self.scenario.stack_size, model='exact')
-        self.solver.batch(*[[[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]]] * 2)  # compile before the start
 
         # Deep queues: what the DDS layer delivers while Python is busy must not push out the rest.
         reliable = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
@@ -96,7 +95,7 @@ class CraneNode(Node):
         """Run the whole motion, then wait a moment for the last answers."""
         crane = Crane(self.scenario, self.rate)
         gc.collect()
-        gc.freeze()  # a full collection with Numba loaded would hold up the poses for 10 ms
+        gc.freeze()  # a full collection would hold up the poses for milliseconds
         start = time.perf_counter()
         for tick in range(round(self.scenario.duration * self.rate)):
             # The schedule is absolute: lateness of one tick is not handed on to the next.

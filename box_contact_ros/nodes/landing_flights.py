@@ -22,8 +22,8 @@ from .crane import CraneNode, receive_while
 from .crane_parameters import PARAMETERS, SCENARIO
 from .runtime import make_executor
 
-PATIENCE = 120.0
-"""For the node to answer [s]: its kernels may have to be compiled."""
+PATIENCE = 30.0
+"""For the node to answer [s]."""
 
 
 @contextmanager

@@ -37,8 +37,8 @@ from .view_page import Landing, Page
 FRAME_PERIOD = 1 / 30
 PAUSE = 1.5
 """Time [s] between the end of a run and the next, to see how it ended."""
-WAIT = 300.0
-"""The crane's patience [s] with a contact node that starts beside it, and may have to compile."""
+WAIT = 60.0
+"""How long the crane waits for the contact node that starts beside it [s]."""
 
 
 class Simulation:

@@ -14,8 +14,8 @@ import numpy as np
 from rclpy.serialization import serialize_message
 
 from ..contact import Contact
+from ..core import LENGTH_MAX, QUATERNION_MAX, QUATERNION_MIN
 from ..pairing import StampedPose
-from ..pose import LENGTH_MAX, QUATERNION_MAX, QUATERNION_MIN
 from ..scene import Answer
 from .messages import (
     CLOUD_ROW,

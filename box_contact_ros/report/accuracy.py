@@ -21,47 +21,25 @@ import math
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..arguments import seed_number
-from ..block import (
-    AXIS,
-    FACE,
-    HALF,
-    HALF_A,
-    HALF_B,
-    LANES,
-    NORMAL,
-    NORMALS,
-    OFFSET_A,
-    OFFSET_B,
-    OFFSETS,
-    OTHER,
-    ROTATION,
-    SEPARATION,
-    SIZE,
-    TOUCH,
-    new_work,
-)
-from ..mlp import asked
 from ..contact import Contacts
-from ..jit import kernel
+from ..core import CENTROID_REACH, DEPTH_FLOOR, Stages, native, stages
+from ..mlp import core_numbers
 from ..network import WeightsError, load_weights
-from ..outline import outline_block
-from ..overlap import DEPTH_FLOOR, press
-from ..pose import load_block, rotation_matrix
+from ..pose import rotation_matrix
 from ..posesets import SETS, Pairs
 from ..resources import resource_path
-from ..sat import query_block
-from ..sites import centroid_block, site_numbers
 from ..solver import MODELS, ContactSolver
 from ..training import dataset
 from ..training.errors import errors_of, figures, wrapped
-from . import add_out, results_folder
-from .paper import PAPER, processor
+from . import add_out, processor, results_folder, versions
+from .paper import PAPER
 
 
 class Limit(NamedTuple):
@@ -102,96 +80,50 @@ FACE_LIKE = math.cos(math.radians(6.0))
 # --- one set --------------------------------------------------------------------------------------
 
 
-@kernel
-def _classify(poses_a, poses_b, sizes_a, sizes_b, work, classes, winners):
-    """Indices into CLASSES and WINNERS of every row."""
-    rows = poses_a.shape[0]
-    for start in range(0, rows, LANES):
-        count = min(LANES, rows - start)
-        load_block(poses_a, poses_b, sizes_a, sizes_b, start, count, work)
-        query_block(LANES, work)
-        for i in range(count):
-            edges = work[AXIS + i] >= 6.0
-            winners[start + i] = 1 if edges else 0
-            steepest = 0.0
-            for k in range(3):
-                along_b = 0.0
-                for j in range(3):
-                    along_b += work[NORMAL + j * LANES + i] * work[ROTATION + (3 * j + k) * LANES
-                                                                   + i]
-                steepest = max(steepest, max(abs(work[NORMAL + k * LANES + i]), abs(along_b)))
-            if edges and steepest < FACE_LIKE:
-                classes[start + i] = 1
-                continue
-            press(work, i)
-            through = _corners_through(work, i)
-            classes[start + i] = 0 if through <= 1 else (2 if through == 2 else 3)
-
-
-@kernel
-def _corners_through(work, i):
-    """How many of the incident box's corners are below the plane of the best face."""
-    face = int(work[FACE + i])
-    of_a = face < 3
-    k = face % 3
-    centre = work[(OFFSET_A if of_a else OFFSET_B) + k * LANES + i]
-    top = abs(centre) - work[(HALF_A if of_a else HALF_B) + k * LANES + i]
-    through = 0
-    for corner in range(8):
-        height = top
-        for j in range(3):
-            entry = work[ROTATION + ((3 * k + j) if of_a else (3 * j + k)) * LANES + i]
-            reach = entry * work[(HALF_B if of_a else HALF_A) + j * LANES + i]
-            height += reach if corner >> j & 1 else -reach
-        if height < 0.0:
-            through += 1
-    return through
-
-
-@kernel
-def _corrected(poses_a, poses_b, sizes_a, sizes_b, work, numbers, corrected):
-    """Whether the network's own point of each row was outside a box, so that it had to be moved."""
-    rows = poses_a.shape[0]
-    for start in range(0, rows, LANES):
-        count = min(LANES, rows - start)
-        load_block(poses_a, poses_b, sizes_a, sizes_b, start, count, work)
-        query_block(LANES, work)
-        for i in range(count):
-            if work[SEPARATION + i] <= work[TOUCH + i]:
-                press(work, i)
-        outline_block(LANES, work)
-        centroid_block(work, numbers)
-        for i in range(count):
-            # The point as the network has it, from the middle of the bounding box.
-            p = (asked(work, 0, i), asked(work, LANES, i), asked(work, 2 * LANES, i))
-            out = False
-            for f in range(3):
-                along = work[OFFSETS + f * LANES + i]
-                for q in range(3):
-                    along += work[NORMALS + (3 * f + q) * LANES + i] * p[q]
-                    out = out or abs(p[q]) > work[HALF + q * LANES + i] + OUTSIDE * work[SIZE + i]
-                out = out or abs(along) > work[OTHER + f * LANES + i] + OUTSIDE * work[SIZE + i]
-            corrected[start + i] = out
-
-
 def classify(pairs: Pairs) -> tuple[np.ndarray, np.ndarray]:
-    """Indices (n,) into CLASSES and into WINNERS of pairs that touch: see the module."""
-    n = len(pairs.pose_a)
-    classes, winners = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
-    _classify(*(np.ascontiguousarray(part) for part in pairs), new_work(), classes, winners)
+    """Return indices (n,) into CLASSES and into WINNERS of pairs that touch: see the module."""
+    found = stages(*pairs, names=('axis', 'face', 'normal', 'rotation', 'pressed_offset_a',
+                                  'pressed_offset_b'))
+    winners = (found.axis >= 6).astype(np.int64)
+    normal_in_b = np.einsum('nij,ni->nj', found.rotation, found.normal)
+    steepest = np.abs(np.hstack([found.normal, normal_in_b])).max(axis=1)
+    through = _corners_through(pairs, found)
+    classes = np.where(through <= 1, 0, np.where(through == 2, 2, 3))
+    classes[(winners == 1) & (steepest < FACE_LIKE)] = 1
     return classes, winners
 
 
+def _corners_through(pairs: Pairs, found: Stages) -> np.ndarray:
+    """Return how many corners (n,) of the incident box are below the plane of the best face."""
+    rows, of_a, k = np.arange(len(found.face)), found.face < 3, found.face % 3
+    rotation = np.where(of_a[:, None, None], found.rotation, found.rotation.swapaxes(1, 2))
+    offset = np.where(of_a[:, None], found.pressed_offset_a, found.pressed_offset_b)
+    reference, incident = (0.5 * np.where(of_a[:, None], one, other) for one, other in (
+        (pairs.size_a, pairs.size_b), (pairs.size_b, pairs.size_a)))
+    top = np.abs(offset[rows, k]) - reference[rows, k]
+    reach = rotation[rows, k] * incident
+    through = np.zeros(len(rows), dtype=np.int64)
+    for x, y, z in product((-1.0, 1.0), repeat=3):
+        through += ((top + x * reach[:, 0]) + y * reach[:, 1]) + z * reach[:, 2] < 0.0
+    return through
+
+
 def share_corrected(pairs: Pairs, weights: Path | str) -> float:
-    """Share of the network's points that were outside a box and were moved in."""
-    corrected = np.zeros(len(pairs.pose_a), dtype=np.bool_)
-    _corrected(*(np.ascontiguousarray(part) for part in pairs), new_work(),
-               site_numbers(load_weights(weights).networks['point']), corrected)
-    return float(corrected.mean())
+    """Return the share of the network's points that were outside a box and were moved in.
+
+    The network's points are in the bounding box, so it is the other box that a point can leave.
+    """
+    found = stages(*pairs, names=('answer', 'bounds_half', 'other_axes', 'other_offset',
+                                  'other_half', 'size'),
+                   network=core_numbers(load_weights(weights).networks['point']))
+    from_middle = found.bounds_half * np.clip(found.answer, -CENTROID_REACH, CENTROID_REACH)
+    from_other = found.other_offset + np.einsum('nfq,nq->nf', found.other_axes, from_middle)
+    beyond = np.abs(from_other) - found.other_half > OUTSIDE * found.size[:, None]
+    return float(beyond.any(axis=1).mean())
 
 
 def outside(pairs: Pairs, found: Contacts) -> float:
-    """Largest distance of a point from a box, of the size, beyond what B is pressed in by."""
+    """Return the largest distance of a point from a box, of the size, beyond the pressing."""
     size = np.maximum(pairs.size_a.max(axis=1), pairs.size_b.max(axis=1))
     farthest = np.full(len(size), -np.inf)
     for pose, extents in ((pairs.pose_a, pairs.size_a), (pairs.pose_b, pairs.size_b)):
@@ -411,7 +343,8 @@ def page(results: Sequence[Result], errors: dict[str, np.ndarray], drawn: int, c
                'BROKEN: ' + '; '.join(broken) + '.')
     return f"""# Point error against the exact centroid
 
-Made by `{command}` on {processor()}; seed {seed}. {verdict}
+Made by `{command}` on {processor()},
+{native.instruction_set}; {versions()}; seed {seed}. {verdict}
 
 Errors are distances between a model's contact point and that of model `exact`, in % of the longest
 edge of the smaller box. `answered by exact`: pairs outside the network's range. Verdicts, normals

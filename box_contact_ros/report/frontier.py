@@ -15,7 +15,6 @@ import csv
 import gc
 import math
 import os
-import platform
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -27,13 +26,13 @@ from typing import Any
 import numpy as np
 
 from ..arguments import seed_number
+from ..core import native
 from ..network import load_weights
 from ..posesets import CONTAINER, SETS, Generator, Pairs, any_pose, log_uniform, pressed, stacked
 from ..resources import resource_path
 from ..solver import ContactSolver
-from . import add_out, results_folder
+from . import add_out, processor, results_folder, versions
 from .accuracy import CLASSES, classify, markdown
-from .paper import processor
 from .paper_soup import PAPER as PAPER_SOUP
 from .paper_soup import PAPER_NETWORK
 from .peers import Contestant, Ours, installed
@@ -359,7 +358,7 @@ def page(cells: Sequence[Cell], missing: Sequence[str], command: str) -> str:
     skipped = ''.join(f'\n\nLeft out: {line}.' for line in missing)
     return f"""# Speed against error
 
-Made by `{command}` on one core of {processor()}, Python {platform.python_version()}.
+Made by `{command}` on one core of {processor()}, {native.instruction_set}; {versions()}.
 Times are from two poses to a result in Python; a call's includes the two readings of the clock
 (about 0.05 µs). Ratios within this run are what to trust.{skipped}
 

@@ -1,14 +1,13 @@
 """Program `paper`: the source paper's Tables 1 to 4 and Figures 9 and 10, redone, as Markdown.
 
 Tables 1 and 2, Figure 9: the data sets are made again from the seed in each model card, and the
-shipped weights are run on them by the kernel that the solver uses. Nothing is copied from the
+shipped weights are run on them by the code that the solver uses. Nothing is copied from the
 cards, and PyTorch is not used. Tables 3 and 4, Figure 10: see `paper_soup`; they need python-fcl.
 """
 from __future__ import annotations
 
 import argparse
 import functools
-import platform
 import sys
 import textwrap
 from collections.abc import Collection, Mapping, Sequence
@@ -22,6 +21,7 @@ from ..resources import resource_path
 from ..training import dataset
 from ..training.dataset import SETS, Patterns
 from ..training.errors import PARTS, errors_of, figures, figures_by_part, predict
+from . import processor
 
 PAPER = {
     1: {'ME': (0.0332, 0.0259, -0.0005), 'MAE': (0.4161, 0.4383, 0.5624),
@@ -123,18 +123,6 @@ def by_part(columns: Mapping[str, Errors]) -> str:
 
 def _external(weights: Weights, network: str) -> Patterns:
     return _sets_of(weights.path)[network]['external']
-
-
-def processor() -> str:
-    """Name of the machine's processor."""
-    try:
-        text = Path('/proc/cpuinfo').read_text()
-    except OSError:
-        text = ''
-    for line in text.splitlines():
-        if line.startswith('model name'):
-            return line.partition(':')[2].strip()
-    return platform.processor() or platform.machine()
 
 
 def filled(page: str) -> str:

@@ -1,11 +1,9 @@
 """What model `mlp` chose on its way to a point: where its answer may step.
 
-Two things are chosen by a comparison: in which of the two boxes' frames the network sees the
-overlap (`outline`), and whether it is asked at all, or the exact answer given (`mlp`). Where
-the two sides of a comparison are equal, the answers before and after are two values within the
-network's error. Everywhere else the point is a continuous function of the poses.
-`solve_with_choices` tells the two apart: it solves, and reads from a block's memory what was
-chosen.
+Comparisons choose two things. One chooses the frame, of A or of B, in which the network sees the
+overlap (core/overlap_bounds.hpp). The other chooses between network and exact method
+(core/mlp.hpp). Where a comparison changes its result, the point steps by up to the network's error.
+Everywhere else the point is a continuous function of the poses.
 """
 from __future__ import annotations
 
@@ -13,41 +11,35 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..block import IN_B, IN_RANGE, LANES, new_work
-from ..mlp import solve_mlp
 from ..contact import Contacts
+from ..core import native, stages
+from ..mlp import core_numbers
 from ..network import Network
 from ..posesets import Pairs
-from ..sites import site_numbers
+
+_UNIT = (1.0, 1.0, 1.0)
 
 
 class Choices(NamedTuple):
-    """Of n pairs; rows without contact have no meaning."""
+    """The choices for n pairs; rows without contact have no meaning."""
 
     network: np.ndarray
-    """(n,) whether the network was asked; where not, the answer is the exact one."""
+    """(n,) whether the network answered; where not, the answer is the exact one."""
     frame_b: np.ndarray
     """(n,) whether the bounding box is that in B's frame."""
 
     def equal(self, other: Choices) -> np.ndarray:
-        """(n,) whether the network was asked, and in the same frame."""
+        """Return whether (n,) the network answered both, in the same frame."""
         return self.network & other.network & (self.frame_b == other.frame_b)
 
 
 def solve_with_choices(network: Network, pairs: Pairs) -> tuple[Contacts, Choices]:
-    """Contacts of n pairs of boxes, and what was chosen on the way."""
-    n = len(pairs.pose_a)
-    found = Contacts(np.zeros(n, dtype=np.bool_), np.full(n, np.nan), np.full((n, 3), np.nan),
-                     np.full((n, 3), np.nan))
-    choices = Choices(*np.zeros((2, n), dtype=np.bool_))
-    numbers, work = site_numbers(network), new_work()
-    for start in range(0, n, LANES):
-        rows = slice(start, min(n, start + LANES))
-        refused, _ = solve_mlp(*(part[rows] for part in pairs), work, numbers,
-                                     np.zeros(LANES, dtype=np.int8),
-                                     *(part[rows] for part in found))
-        if refused:
-            raise ValueError(f'{refused} of the pairs from row {start} on cannot be evaluated')
-        for chosen, place in zip(choices, (IN_RANGE, IN_B)):
-            chosen[rows] = work[place:place + rows.stop - start] > 0.5
-    return found, choices
+    """Return the contacts of n pairs by this network, and the choices.
+
+    Raises ValueError for a row that is refused.
+    """
+    numbers = core_numbers(network)
+    found = stages(*pairs, names=('in_range', 'frame_b'))
+    solver = native.PairSolver('mlp', _UNIT, _UNIT, numbers)
+    *contacts, _ = solver.solve(*map(np.ascontiguousarray, pairs), 1)
+    return Contacts(*contacts), Choices(found.in_range, found.frame_b)

@@ -1,4 +1,4 @@
-"""A judge of contacts that shares no code with the solver: corners projected on 15 axes.
+"""A judge of contacts that shares no code with the core: corners projected on 15 axes.
 
 `judge` does it in float64, by its own quaternions, corners and axes. Whatever is within its own
 rounding of a threshold, and whatever looks wrong, is settled by `exact_gap`, which does the same in
@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
 TOLERANCE = 1e-12
@@ -36,6 +35,10 @@ GATES = {MISSED: 'missed contact', PHANTOM: 'phantom contact', TOO_DEEP: 'too de
          TOO_SHALLOW: 'too shallow', WRONG_AXIS: 'wrong axis', NOT_UNIT: 'normal not unit',
          OUTSIDE: 'point outside', NOT_FINITE: 'NaN'}
 """Faults by bit; `judge` returns sums of them."""
+PIECE = 2048
+"""Pairs that are judged at a time: their corners fit a processor's caches."""
+_SIGNS = np.array([[0.5 if k >> c & 1 else -0.5 for c in range(3)] for k in range(8)])
+"""(8, 3) corners of a box of edge 1."""
 
 
 class Verdict(NamedTuple):
@@ -55,7 +58,7 @@ class Verdict(NamedTuple):
     def settle(self, row: int, gap: float, found: tuple[np.ndarray, ...], touch: float) -> None:
         """Judge a doubtful pair by its exact gap; gaps to `touch` [m] count as contact.
 
-        Between twice that and zero, rounding decides, and either verdict is right.
+        Between zero and twice `touch`, rounding decides, and either verdict is right.
         """
         said, separation = found[0][row], found[1][row]
         faults = self.faults[row] & ~(MISSED | PHANTOM | TOO_DEEP | TOO_SHALLOW | WRONG_AXIS)
@@ -72,161 +75,108 @@ class Verdict(NamedTuple):
         self.faults[row] = faults
 
 
-@numba.njit(cache=True)
-def _matrix(q, m):
-    x, y, z, w = q
-    n = 2.0 / (x * x + y * y + z * z + w * w)
-    m[0, 0] = 1.0 - n * (y * y + z * z)
-    m[0, 1] = n * (x * y - z * w)
-    m[0, 2] = n * (x * z + y * w)
-    m[1, 0] = n * (x * y + z * w)
-    m[1, 1] = 1.0 - n * (x * x + z * z)
-    m[1, 2] = n * (y * z - x * w)
-    m[2, 0] = n * (x * z - y * w)
-    m[2, 1] = n * (y * z + x * w)
-    m[2, 2] = 1.0 - n * (x * x + y * y)
-
-
-@numba.njit(cache=True)
-def _corners(m, size, shift, corners):
-    for k in range(8):
-        for r in range(3):
-            total = shift[r]
-            for c in range(3):
-                total += m[r, c] * (0.5 * size[c] if k >> c & 1 else -0.5 * size[c])
-            corners[k, r] = total
-
-
-@numba.njit(cache=True)
-def _gap(axis, corners_a, corners_b):
-    """Gap between the projections on ± a unit axis, whichever is larger."""
-    low_a = low_b = np.inf
-    high_a = high_b = -np.inf
-    for k in range(8):
-        a = axis[0] * corners_a[k, 0] + axis[1] * corners_a[k, 1] + axis[2] * corners_a[k, 2]
-        b = axis[0] * corners_b[k, 0] + axis[1] * corners_b[k, 1] + axis[2] * corners_b[k, 2]
-        low_a, high_a = min(low_a, a), max(high_a, a)
-        low_b, high_b = min(low_b, b), max(high_b, b)
-    return max(low_b - high_a, low_a - high_b)
-
-
-@numba.njit(cache=True)
-def _along(axis, corners_a, corners_b):
-    """Gap from A to B along a direction: how far B's least is beyond A's most."""
-    low_b, high_a = np.inf, -np.inf
-    for k in range(8):
-        a = axis[0] * corners_a[k, 0] + axis[1] * corners_a[k, 1] + axis[2] * corners_a[k, 2]
-        b = axis[0] * corners_b[k, 0] + axis[1] * corners_b[k, 1] + axis[2] * corners_b[k, 2]
-        low_b, high_a = min(low_b, b), max(high_a, a)
-    return low_b - high_a
-
-
-@numba.njit(cache=True)
-def _greatest_gap(ma, mb, corners_a, corners_b, axis):
-    best = -np.inf
-    for number in range(15):
-        if number < 3:
-            axis[:] = ma[:, number]
-        elif number < 6:
-            axis[:] = mb[:, number - 3]
-        else:
-            i, j = (number - 6) // 3, (number - 6) % 3
-            axis[0] = ma[1, i] * mb[2, j] - ma[2, i] * mb[1, j]
-            axis[1] = ma[2, i] * mb[0, j] - ma[0, i] * mb[2, j]
-            axis[2] = ma[0, i] * mb[1, j] - ma[1, i] * mb[0, j]
-        length = np.sqrt(axis[0]**2 + axis[1]**2 + axis[2]**2)
-        if length > TINY:
-            axis /= length
-            best = max(best, _gap(axis, corners_a, corners_b))
-    return best
-
-
-@numba.njit(cache=True)
-def _beyond(m, size, place, point):
-    """By how much a point is outside a box."""
-    most = -np.inf
-    for c in range(3):
-        along = 0.0
-        for r in range(3):
-            along += m[r, c] * (point[r] - place[r])
-        most = max(most, abs(along) - 0.5 * size[c])
-    return most
-
-
-@numba.njit(cache=True)
-def _judge(pose_a, pose_b, size_a, size_b, colliding, separation, normal, point, faults, doubtful,
-           depth_error, tolerances, gaps_along):
-    ma, mb = np.empty((3, 3)), np.empty((3, 3))
-    corners_a, corners_b, axis = np.empty((8, 3)), np.empty((8, 3)), np.empty(3)
-    offset = np.empty(3)
-    origin = np.zeros(3)
-    for row in range(len(pose_a)):
-        a, b = pose_a[row], pose_b[row]
-        size = max(size_a[row].max(), size_b[row].max())
-        reach = 0.0
-        for r in range(3):
-            offset[r] = b[r] - a[r]
-            reach = max(reach, abs(a[r]), abs(b[r]))
-        _matrix(a[3:], ma)
-        _matrix(b[3:], mb)
-        _corners(ma, size_a[row], origin, corners_a)
-        _corners(mb, size_b[row], offset, corners_b)
-        tolerance = TOLERANCE * size + COORDINATE_ULPS * 2.2204460492503131e-16 * reach
-        true = _greatest_gap(ma, mb, corners_a, corners_b, axis)
-        found = 0
-        said = colliding[row]
-        tolerances[row] = tolerance
-        # The offset is rounded once, corners and projections some ten times.
-        unsure = abs(true) <= DOUBT * size
-        if said and true > 0.0:
-            found |= PHANTOM
-        elif not said and true < 0.0:
-            found |= MISSED
-        if said:
-            s, n, p = separation[row], normal[row], point[row]
-            if not (np.isfinite(s) and np.isfinite(n).all() and np.isfinite(p).all()):
-                found |= NOT_FINITE
-            else:
-                depth_error[row] = abs(s - true) / tolerance
-                if s < true - tolerance:
-                    found |= TOO_DEEP
-                if s > true + tolerance:
-                    found |= TOO_SHALLOW
-                gaps_along[row] = _along(n, corners_a, corners_b)
-                if gaps_along[row] < true - tolerance:
-                    found |= WRONG_AXIS
-                if abs(n[0]**2 + n[1]**2 + n[2]**2 - 1.0) > 1e-12:
-                    found |= NOT_UNIT
-                # The point of a shallow contact is that of boxes pressed in.
-                slack = INSIDE * (size + reach)
-                if s > -0.34 * PRESSED * size:
-                    slack += PRESSED * size
-                if (_beyond(ma, size_a[row], a, p) > slack
-                        or _beyond(mb, size_b[row], b, p) > slack):
-                    found |= OUTSIDE
-        elif not separation[row] > 0.0:
-            found |= NOT_FINITE
-        faults[row] = found
-        doubtful[row] = unsure or found & (MISSED | PHANTOM | TOO_DEEP | TOO_SHALLOW | WRONG_AXIS)
-
-
 def judge(pose_a: np.ndarray, pose_b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
           found: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]) -> Verdict:
     """Judge answers for poses (n, 7) and full extents (n, 3).
 
     found: colliding (n,), separation (n,) [m], normal (n, 3), point (n, 3), as a solver's batch.
     """
-    n = len(pose_a)
-    verdict = Verdict(np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.bool_),
-                      np.full(n, np.nan), np.empty(n), np.full(n, np.nan))
-    arrays = [np.ascontiguousarray(part) for part in (pose_a, pose_b, size_a, size_b, *found)]
-    _judge(*arrays, *verdict)
-    return verdict
+    arrays = [np.asarray(part) for part in (pose_a, pose_b, size_a, size_b, *found[:4])]
+    pieces = [_judge(*(part[start:start + PIECE] for part in arrays))
+              for start in range(0, max(1, len(pose_a)), PIECE)]
+    return Verdict(*(np.concatenate(parts) for parts in zip(*pieces)))
+
+
+def _judge(pose_a: np.ndarray, pose_b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
+           colliding: np.ndarray, separation: np.ndarray, normal: np.ndarray, point: np.ndarray,
+           ) -> Verdict:
+    """Judge one piece."""
+    size = np.maximum(size_a, size_b).max(axis=1)
+    reach = np.abs(np.hstack([pose_a[:, :3], pose_b[:, :3]])).max(axis=1)
+    tolerance = TOLERANCE * size + COORDINATE_ULPS * 2.0**-52 * reach
+    # From here on vectors are (3, n), and A's centre is the origin: loops are over components.
+    axes_a, axes_b = _axes(pose_a[:, 3:].T), _axes(pose_b[:, 3:].T)
+    corners_a = _corners(axes_a, size_a.T, np.zeros((3, len(size))))
+    corners_b = _corners(axes_b, size_b.T, (pose_b[:, :3] - pose_a[:, :3]).T)
+    true = _greatest_gap(axes_a, axes_b, corners_a, corners_b)
+    with np.errstate(invalid='ignore'):  # NaN is what some of the answers are
+        along = _gap_along(normal.T, corners_a, corners_b)
+        # The point of a shallow contact is that of boxes pressed in.
+        slack = (INSIDE * (size + reach)
+                 + np.where(separation > -0.34 * PRESSED * size, PRESSED * size, 0.0))
+        beyond = np.maximum(_beyond(axes_a, size_a.T, (point - pose_a[:, :3]).T),
+                            _beyond(axes_b, size_b.T, (point - pose_b[:, :3]).T))
+        finite = (np.isfinite(separation) & np.isfinite(normal).all(axis=1)
+                  & np.isfinite(point).all(axis=1))
+        sound = colliding & finite
+        faults = sum(np.where(rows, bit, 0) for bit, rows in (
+            (PHANTOM, colliding & (true > 0.0)),
+            (MISSED, ~colliding & (true < 0.0)),
+            (NOT_FINITE, np.where(colliding, ~finite, ~(separation > 0.0))),
+            (TOO_DEEP, sound & (separation < true - tolerance)),
+            (TOO_SHALLOW, sound & (separation > true + tolerance)),
+            (WRONG_AXIS, sound & (along < true - tolerance)),
+            (NOT_UNIT, sound & (np.abs((normal**2).sum(axis=1) - 1.0) > 1e-12)),
+            (OUTSIDE, sound & (beyond > slack))))
+        depth_error = np.where(sound, np.abs(separation - true) / tolerance, np.nan)
+    # The offset is rounded once, corners and projections some ten times.
+    unsure = np.abs(true) <= DOUBT * size
+    wrong = faults & (MISSED | PHANTOM | TOO_DEEP | TOO_SHALLOW | WRONG_AXIS) > 0
+    return Verdict(faults, unsure | wrong, depth_error, tolerance, np.where(sound, along, np.nan))
+
+
+def _axes(quaternions: np.ndarray) -> np.ndarray:
+    """Return a box's axes (axis 3, component 3, n) for quaternions xyzw (4, n) of any length."""
+    x, y, z, w = quaternions
+    n = 2.0 / (x * x + y * y + z * z + w * w)
+    return np.array([[1.0 - n * (y * y + z * z), n * (x * y + z * w), n * (x * z - y * w)],
+                     [n * (x * y - z * w), 1.0 - n * (x * x + z * z), n * (y * z + x * w)],
+                     [n * (x * z + y * w), n * (y * z - x * w), 1.0 - n * (x * x + y * y)]])
+
+
+def _corners(axes: np.ndarray, size: np.ndarray, centre: np.ndarray) -> np.ndarray:
+    """Return the corners (component 3, corner 8, n) of a box of extents (3, n)."""
+    steps = axes * size[:, None]
+    corners = np.repeat(centre[:, None], 8, axis=1)
+    for c in range(3):
+        corners += steps[c][:, None] * _SIGNS[:, c, None]
+    return corners
+
+
+def _gap_along(axis: np.ndarray, corners_a: np.ndarray, corners_b: np.ndarray) -> np.ndarray:
+    """Return gaps (n,) from A to B along axes (3, n): B's least projection minus A's greatest."""
+    return _dot(axis, corners_b).min(axis=0) - _dot(axis, corners_a).max(axis=0)
+
+
+def _greatest_gap(axes_a: np.ndarray, axes_b: np.ndarray, corners_a: np.ndarray,
+                  corners_b: np.ndarray) -> np.ndarray:
+    """Return the greatest gaps (n,) over the fifteen axes, taken in both directions."""
+    crosses = [np.cross(u, v, axis=0) for u in axes_a for v in axes_b]
+    best = np.full(axes_a.shape[2], -np.inf)
+    for axis in (*axes_a, *axes_b, *crosses):
+        length = np.sqrt((axis**2).sum(axis=0))
+        usable = length > TINY
+        unit = axis / np.where(usable, length, 1.0)
+        a, b = _dot(unit, corners_a), _dot(unit, corners_b)
+        gap = np.maximum(b.min(axis=0) - a.max(axis=0), a.min(axis=0) - b.max(axis=0))
+        best = np.where(usable, np.maximum(best, gap), best)
+    return best
+
+
+def _beyond(axes: np.ndarray, size: np.ndarray, offset: np.ndarray) -> np.ndarray:
+    """Return by how much (n,) points are outside a box; offset (3, n) is from its centre."""
+    along = [np.abs(_dot(axis, offset)) for axis in axes]
+    return np.max(np.array(along) - 0.5 * size, axis=0)
+
+
+def _dot(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Return the scalar products of vectors whose components stand first."""
+    return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
 
 
 def exact_gap(pose_a: np.ndarray, pose_b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
               ) -> float:
-    """The largest gap over the fifteen axes, in 60 digits, rounded once; one pair."""
+    """Return the largest gap of a pair over the fifteen axes, in 60 digits, rounded once."""
     from mpmath import mp, mpf
 
     with mp.workdps(60):

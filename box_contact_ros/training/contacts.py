@@ -1,26 +1,13 @@
-"""Training data of model `mlp`: contacts of all kinds, as the network sees them."""
+"""Training samples of model `mlp`: contacts of all kinds, as the network is asked about them."""
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from dataclasses import dataclass, fields
 
 import numpy as np
 
-from ..block import (
-    HALF,
-    IN_B,
-    LANES,
-    MIDDLE,
-    OFFSET_A,
-    ROTATION,
-    new_work,
-)
-from ..jit import kernel
-from ..outline import (
-    outline_block,
-)
-from ..overlap import centroid, press
-from ..pose import load_block, quaternion_multiply, rotation_matrix
+from ..core import stages
+from ..pose import quaternion_multiply, rotation_matrix
 from ..posesets import (
     CONTAINER,
     Pairs,
@@ -32,16 +19,6 @@ from ..posesets import (
     stacked,
     turns,
 )
-from ..sat import query_block
-from ..sites import (
-    INPUTS,
-    INPUTS_OF,
-    OUTPUTS,
-    ROWS,
-    SITES,
-    describe_block,
-    site_vectors,
-)
 
 SizePair = tuple[tuple[float, float, float], tuple[float, float, float]]
 """Full extents of two boxes [m]."""
@@ -49,70 +26,56 @@ PIECE = 100_000
 """Pairs that are made at a time."""
 
 
-class Contacts(NamedTuple):
-    """n contacts as the network sees them: at SITES sites each, f · 3 + q."""
+@dataclass(frozen=True, kw_only=True)
+class MlpSamples:
+    """Features and exact answers of n contacts, each at SITES sites, counted f · 3 + q."""
 
-    inputs: np.ndarray
-    """(n, SITES, INPUTS) float32."""
+    features: np.ndarray
+    """(n, SITES, FEATURES) float32."""
     vectors: np.ndarray
-    """(n, SITES, OUTPUTS) float32: what outputs are multiplied with; their sum over outputs and f
-    is the answer along q."""
+    """(n, SITES, OUTPUTS) float32: the factors of the outputs. The answer along q is the sum of
+    the products over all outputs and f."""
     offsets: np.ndarray
-    """(n, 3) float32: exact centroid from the bounding box's middle, in half extents."""
+    """(n, 3) float32: exact centroid from the middle of the bounding box [half extents]."""
     scale: np.ndarray
-    """(n, 3) float32: half extents, by the smaller box's longest edge."""
+    """(n, 3) float32: half extents [longest edge of the smaller box]."""
+
+    def __len__(self) -> int:
+        """Return n."""
+        return len(self.offsets)
+
+    def rows(self, rows: np.ndarray | slice) -> MlpSamples:
+        """Return some of the samples."""
+        return MlpSamples(**{field.name: getattr(self, field.name)[rows] for field in fields(self)})
+
+    @staticmethod
+    def joined(parts: Sequence[MlpSamples]) -> MlpSamples:
+        """Return the samples of all parts, one part after the other."""
+        return MlpSamples(**{field.name: np.concatenate([getattr(part, field.name)
+                                                         for part in parts])
+                             for field in fields(MlpSamples)})
 
 
-@kernel
-def _describe(poses_a, poses_b, sizes_a, sizes_b, work, numbers, inputs, vectors, offsets, halves):
-    rows = poses_a.shape[0]
-    for start in range(0, rows, LANES):
-        count = min(LANES, rows - start)
-        load_block(poses_a, poses_b, sizes_a, sizes_b, start, count, work)
-        query_block(count, work)
-        for i in range(count):
-            press(work, i)
-        # Always a whole block: the short way of a single pair needs a pair prepared for it.
-        outline_block(LANES, work)
-        describe_block(work, numbers)
-        for i in range(count):
-            row = start + i
-            for site in range(SITES):
-                f, q = site // 3, site % 3
-                for k in range(INPUTS):
-                    inputs[row, site, k] = numbers[INPUTS_OF[site, k] * LANES + i]
-                multiplied = site_vectors(numbers, f, q, i)
-                for k in range(OUTPUTS):
-                    vectors[row, site, k] = multiplied[k]
-            x, y, z = centroid(work, i)
-            in_b = work[IN_B + i] > 0.5
-            for q in range(3):
-                truth = x if q == 0 else (y if q == 1 else z)
-                if in_b:
-                    truth = (work[ROTATION + q * LANES + i] * (x - work[OFFSET_A + i])
-                             + work[ROTATION + (3 + q) * LANES + i]
-                             * (y - work[OFFSET_A + LANES + i])
-                             + work[ROTATION + (6 + q) * LANES + i]
-                             * (z - work[OFFSET_A + 2 * LANES + i]))
-                half = work[HALF + q * LANES + i]
-                offsets[row, q] = (truth - work[MIDDLE + q * LANES + i]) / half
-                halves[row, q] = half
+def describe(pairs: Pairs) -> MlpSamples:
+    """Return the samples of pairs that overlap."""
+    found = stages(*pairs, names=(
+        'features', 'vectors', 'centroid', 'frame_b', 'rotation', 'pressed_offset_a',
+        'bounds_middle', 'bounds_half'))
+    from_b = np.einsum('nji,nj->ni', found.rotation, found.centroid - found.pressed_offset_a)
+    centroid = np.where(found.frame_b[:, None], from_b, found.centroid)
+    edge = np.minimum(pairs.size_a.max(axis=1), pairs.size_b.max(axis=1))[:, None]
+    offsets = (centroid - found.bounds_middle) / found.bounds_half
+    return MlpSamples(features=found.features, vectors=found.vectors,
+                      offsets=offsets.astype(np.float32),
+                      scale=(found.bounds_half / edge).astype(np.float32))
 
 
-def describe(pairs: Pairs) -> Contacts:
-    """The contacts of pairs that overlap."""
-    n = len(pairs.pose_a)
-    found = Contacts(*(np.empty((n, *shape), dtype=np.float32) for shape in (
-        (SITES, INPUTS), (SITES, OUTPUTS), (3,), (3,))))
-    _describe(*(np.ascontiguousarray(part) for part in pairs), new_work(),
-              np.zeros(ROWS * LANES, dtype=np.float32), *found)
-    edge = np.minimum(pairs.size_a.max(axis=1), pairs.size_b.max(axis=1))
-    return found._replace(scale=(found.scale / edge[:, None]).astype(np.float32))
+def draw_samples(make: Callable[..., Pairs], seed: Sequence[int], n: int, progress: bool = False,
+                 *rest: object) -> MlpSamples:
+    """Return the samples of about n pairs of `make(rng, n, *rest)`.
 
-
-def contacts(make: Callable[..., Pairs], seed: Sequence[int], n: int, progress: bool = False,
-             *rest: object) -> Contacts:
-    """Contacts of about n pairs of `make(rng, n, *rest)`, in pieces, each with its own seed."""
+    Each piece of PIECE pairs has its own seed.
+    """
     from tqdm import tqdm
 
     parts = []
@@ -122,11 +85,11 @@ def contacts(make: Callable[..., Pairs], seed: Sequence[int], n: int, progress: 
             count = min(PIECE, n - start)
             parts.append(describe(make(np.random.default_rng([*seed, start]), count, *rest)))
             bar.update(count)
-    return Contacts(*(np.concatenate(columns) for columns in zip(*parts)))
+    return MlpSamples.joined(parts)
 
 
 def mixture(rng: np.random.Generator, n: int) -> Pairs:
-    """About n pairs of the kinds that scenes have.
+    """Draw about n pairs of the kinds that scenes have.
 
     Equal cubes and random sizes in any pose, and with an edge of one almost along an edge of the
     other; stacks of boxes with a tilt of 1e-6 to 0.3 rad, and containers; containers and cubes
@@ -162,11 +125,10 @@ def mixture(rng: np.random.Generator, n: int) -> Pairs:
 
 def along_edges(rng: np.random.Generator, size_a: np.ndarray, size_b: np.ndarray,
                 tilt: np.ndarray) -> Pairs:
-    """An edge direction of B within about `tilt` (n,) [rad] of one of A's, at any angle about it.
+    """Draw n pairs with an edge direction of B within about `tilt` (n,) [rad] of one of A's.
 
-    These are edges that lie along each other, or on a face.
-
-    Of boxes in any pose one in ten thousand is of this kind, and the errors were largest there.
+    B has any angle about this edge: the edges lie along each other, or on a face. Of boxes in any
+    pose one in ten thousand is of this kind, and the errors were largest there.
     """
     n = len(tilt)
     axis = np.eye(3)[rng.integers(0, 3, n)]
@@ -183,7 +145,7 @@ def along_edges(rng: np.random.Generator, size_a: np.ndarray, size_b: np.ndarray
 
 
 def scene_mixture(rng: np.random.Generator, n: int, sizes: Sequence[SizePair]) -> Pairs:
-    """About n pairs of the sizes listed, each in turn as A.
+    """Draw about n pairs of the sizes listed, each in turn as A.
 
     Half are in any pose, half one on the other, any of their axes up, with a tilt of 1e-6 to
     0.3 rad.

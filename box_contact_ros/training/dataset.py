@@ -1,26 +1,25 @@
 """The data of the paper's section 3: pairs of boxes that just touch, and where they do.
 
-1. Placements. The first box stays at the origin. Its trihedron is its faces +x, +y, +z; the second
-   box's is its faces −x, −y, −z, with the corner (−, −, −) and 7 vertices.
-   - vertex-face: a point drawn uniformly by area on the first trihedron; roll, pitch and yaw drawn
-     uniformly in [−π/2, π/2]; one of the 7 vertices is placed on the point. The normal is the
-     face's.
-   - edge-edge: points drawn uniformly by length on the 9 edges of either trihedron; the angles as
-     above; the second point is placed on the first. The normal is the cross product of the edges,
-     from the first box to the second.
-   Placements in which the boxes interpenetrate are thrown away. In what is left the plane through
-   the point that keeps the boxes apart is unique, so the label belongs to the pose and does not
-   depend on how the pose was found.
-2. Patterns. Inputs: the offset t of the second box [m] and its roll, pitch, yaw [rad], in the first
-   box's frame (R = Rz(yaw) Ry(pitch) Rx(roll)). Outputs: azimuth and elevation [rad] of the impact
-   point's direction from the first box's centre, then of the normal.
-   - `paper`: folded into the domain in which the network is asked later (`symmetry.fold_octant`:
-     t ≥ 0, angles in [−π/2, π/2]), or left as drawn.
-   - `continuous`: for cubes. SAT of the pose says which features meet, hence which subset, and
-     `symmetry.fold_features` brings them to the reference features. How a pose was drawn is not
-     asked: the same pose always falls in the same subset.
+1. Placements. The first box stays at the origin. Its trihedron is its faces +x, +y, +z. The second
+   box's trihedron is its faces −x, −y, −z, with the corner (−, −, −) and 7 vertices. Roll, pitch
+   and yaw of the second box are drawn uniformly in [−π/2, π/2].
+   - vertex-face: a point is drawn uniformly by area on the first trihedron. One of the 7 vertices
+     is placed on the point. The normal is the face's.
+   - edge-edge: a point is drawn uniformly by length on the 9 edges of each trihedron. The second
+     point is placed on the first. The normal is the cross product of the edges, from the first box
+     to the second.
+   Placements in which the boxes interpenetrate are thrown away. In all others, one plane through
+   the point separates the boxes. So the label depends on the pose alone.
+2. Patterns. Inputs are the second box's offset t [m], and its roll, pitch and yaw [rad], in the
+   first box's frame: R = Rz(yaw) Ry(pitch) Rx(roll). Outputs are azimuth and elevation [rad] of the
+   impact point's direction from the first box's centre, then of the normal.
+   - `paper`: folded into the network's domain, or left as drawn. The fold is `symmetry.OCTANT`:
+     t ≥ 0, angles in [−π/2, π/2].
+   - `continuous`: for cubes. The features that meet, by SAT, choose the subset. The fold
+     `symmetry.FEATURES` brings them to the reference features. The same pose always falls in the
+     same subset, however it was drawn.
 
-Everything is drawn from one seed, every set from a stream of its own, so that any set can be made
+Everything is drawn from one seed, every set from a stream of its own. So any set can be made
 without the others.
 """
 from __future__ import annotations
@@ -31,32 +30,10 @@ from typing import Any
 
 import numpy as np
 
-from ..block import (
-    AXIS,
-    LANES,
-    OFFSET_A,
-    ROTATION,
-    SEPARATION,
-    new_work,
-)
-from ..contact import sat_normal
-from ..jit import kernel
-from ..pose import (
-    load_block,
-    quaternion_multiply,
-    rotation_matrix,
-)
-from ..sat import query_block
-from ..symmetry import (
-    EDGE_EDGE,
-    FOLD_SIZE,
-    OFFSET,
-    VERTEX_FACE,
-    euler_angles,
-    fold_features,
-    fold_octant,
-    folded,
-)
+from ..core import Stages, stages
+from ..pose import quaternion_multiply, rotation_matrix
+from ..symmetry import EDGE_EDGE, FEATURES, NO_FOLD, OCTANT, VERTEX_FACE
+from ..symmetry import fold as fold_pairs
 
 CUBE = (2.0, 2.0, 2.0)
 """The paper's boxes: cubes with edges of length 2."""
@@ -74,13 +51,13 @@ INPUTS = ('t_x', 't_y', 't_z', 'roll', 'pitch', 'yaw')
 OUTPUTS = ('point azimuth', 'point elevation', 'normal azimuth', 'normal elevation')
 
 INTERPENETRATION = 1e-12
-"""Depth, as a fraction of the largest extent, from which on boxes interpenetrate. A placement made
-to touch has a depth of some 1e-16 of it by rounding; of the random placements that overlap, one in
-1e11 would be let through."""
+"""Depth, as a fraction of the largest extent, from which on boxes interpenetrate. Rounding gives a
+placement made to touch a depth of some 1e-16. Of the random placements that overlap, one in 1e11
+would be let through."""
 
 POLE = 1e-12
-"""Sine of the angle to the z axis below which a direction is the pole and its azimuth is 0: far
-above the rounding of a unit vector, far below anything that is drawn."""
+"""Sine of the angle to the z axis below which a direction is the pole and its azimuth is 0. It is
+far above the rounding of a unit vector, and far below anything that is drawn."""
 
 CHUNK = 1 << 15
 """Candidates drawn at a time."""
@@ -218,79 +195,13 @@ def mixed(rng: np.random.Generator, count: int, size: Sequence[float], edge_shar
 # --- 2. patterns ----------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Query:
-    """What SAT says of n placements; frame: the first box's."""
-
-    separation: np.ndarray
-    """(n,) [m]."""
-    axis: np.ndarray
-    """(n,) winning axis, see `pose.AXIS`."""
-    normal: np.ndarray
-    """(n, 3) unit vector along it, from the first box to the second."""
-    offset: np.ndarray
-    """(n, 3) of the second box [m]."""
-    turn: np.ndarray
-    """(n, 9) orientation of the second box, row-major."""
-
-
-@kernel
-def _query(poses_a, poses_b, size, work, separation, axis, normal, offset, turn):
-    bad = 0
-    rows = poses_a.shape[0]
-    for start in range(0, rows, LANES):
-        count = min(LANES, rows - start)
-        bad += load_block(poses_a, poses_b, size, size, start, count, work)
-        query_block(count, work)
-        for i in range(count):
-            row = start + i
-            separation[row] = work[SEPARATION + i]
-            axis[row] = int(work[AXIS + i])
-            n = sat_normal(work, i)
-            for k in range(3):
-                normal[row, k] = n[k]
-                offset[row, k] = work[OFFSET_A + k * LANES + i]
-            for k in range(9):
-                turn[row, k] = work[ROTATION + k * LANES + i]
-    return bad
-
-
-def query(placements: Placements) -> Query:
-    """SAT of every placement."""
-    n = len(placements)
-    found = Query(np.empty(n), np.empty(n, dtype=np.int64), np.empty((n, 3)), np.empty((n, 3)),
-                  np.empty((n, 9)))
-    poses_a = np.zeros((n, 7))
-    poses_a[:, 6] = 1.0
+def query(placements: Placements) -> Stages:
+    """Return separation, axis, normal, offset_a and rotation of every placement, by SAT."""
+    first = np.zeros_like(placements.pose)
+    first[:, 6] = 1.0
     size = np.array([placements.size])
-    bad = _query(poses_a, np.ascontiguousarray(placements.pose), size, new_work(),
-                 found.separation, found.axis, found.normal,
-                 found.offset, found.turn)
-    if bad:
-        raise ValueError(f'{bad} placements are no valid poses')
-    return found
-
-
-NO_FOLD, OCTANT, FEATURES = 0, 1, 2
-"""Ways to bring a pose into a network's domain: as it is, by `fold_octant`, by `fold_features`."""
-
-
-@kernel
-def _fold(how, offset, turn, axis, sat_normal, point, normal, fold, inputs, out_point, out_normal,
-          subset):
-    for row in range(offset.shape[0]):
-        if how == FEATURES:
-            subset[row] = fold_features(offset[row], turn[row], axis[row], sat_normal[row], fold)
-        else:
-            fold_octant(offset[row], turn[row], fold)
-        angles = euler_angles(fold)
-        p = folded(fold, point[row, 0], point[row, 1], point[row, 2])
-        n = folded(fold, normal[row, 0], normal[row, 1], normal[row, 2])
-        for k in range(3):
-            inputs[row, k] = fold[OFFSET + k]
-            inputs[row, 3 + k] = angles[k]
-            out_point[row, k] = p[k]
-            out_normal[row, k] = n[k]
+    return stages(first, placements.pose, size, size,
+                  names=('separation', 'axis', 'normal', 'offset_a', 'rotation'))
 
 
 @dataclass(frozen=True)
@@ -304,7 +215,7 @@ class Folded:
     normal: np.ndarray
     """(n, 3)."""
     subset: np.ndarray
-    """(n,) VERTEX_FACE or EDGE_EDGE after `fold_features`, else −1."""
+    """(n,) VERTEX_FACE or EDGE_EDGE after FEATURES, else −1."""
 
     def patterns(self, rows: np.ndarray | slice = slice(None)) -> Patterns:
         """Inputs and outputs of some rows."""
@@ -314,16 +225,7 @@ class Folded:
 
 def fold(placements: Placements, how: int) -> Folded:
     """Bring placements into a network's domain by NO_FOLD, OCTANT or FEATURES."""
-    n = len(placements)
     sat = query(placements)
-    result = Folded(np.empty((n, 6)), np.empty((n, 3)), np.empty((n, 3)), np.full(n, -1))
-    if how == NO_FOLD:
-        turn = sat.turn.T
-        roll = np.arctan2(turn[7], turn[8])
-        pitch = np.arcsin(np.clip(-turn[6], -1.0, 1.0))
-        yaw = np.arctan2(turn[3], turn[0])
-        inputs = np.column_stack([sat.offset, roll, pitch, yaw])
-        return Folded(inputs, placements.point, placements.normal, result.subset)
     if how == FEATURES:
         if len(set(placements.size)) != 1:
             raise ValueError(f'features are folded for cubes, not for {placements.size}')
@@ -331,9 +233,13 @@ def fold(placements: Placements, how: int) -> Folded:
         # The second box's trihedron is the one whose vertices are placed, so it never happens.
         if np.any((sat.axis >= 3) & (sat.axis < 6)):
             raise ValueError('a face of the second box won')
-    _fold(how, sat.offset, sat.turn, sat.axis, sat.normal, placements.point, placements.normal,
-          np.empty(FOLD_SIZE), result.inputs, result.point, result.normal, result.subset)
-    return result
+    folds = fold_pairs(how, sat.offset_a, sat.rotation, axis=sat.axis, normal=sat.normal)
+    point, normal = placements.point, placements.normal
+    # Without a fold, zeros keep the signs that tell the azimuths π and −π apart.
+    if how != NO_FOLD:
+        point, normal = folds.folded(point), folds.folded(normal)
+    return Folded(np.concatenate([folds.offset, folds.angles], axis=1), point, normal,
+                  folds.subset)
 
 
 def spherical(direction: np.ndarray) -> np.ndarray:
@@ -367,7 +273,7 @@ def paper(seed: int, *, size: Sequence[float] = CUBE, counts: Sequence[int] = PA
           progress: bool = False) -> dict[str, Patterns]:
     """The sets with discontinuities, for two boxes of full extents `size` [m].
 
-    `folded_in`: in the domain of `symmetry.fold_octant`, as at inference; otherwise as drawn.
+    `folded_in`: in the domain of `symmetry.OCTANT`, as at inference; otherwise as drawn.
     `edge_share` of the patterns are edge-edge.
     """
     how = OCTANT if folded_in else NO_FOLD
@@ -382,8 +288,8 @@ def continuous(seed: int, *, counts: Sequence[int] = CONTINUOUS_COUNTS, edge_sha
     result: dict[str, dict[str, Patterns]] = {subset: {} for subset in SUBSETS}
     for name, count, rng in _streams(seed, counts, sets, progress):
         found: dict[str, list[Patterns]] = {subset: [] for subset in SUBSETS}
-        # Which subset a placement falls in is known only after SAT, so they are drawn until the
-        # smaller subset is full; what the larger has too much is dropped.
+        # Only SAT tells a placement's subset. Placements are drawn until the smaller subset is
+        # full; the larger one is cut to the same number.
         while min(sum(map(len, parts)) for parts in found.values()) < count:
             some = fold(mixed(rng, 2 * count, CUBE, edge_share), FEATURES)
             for subset, number in SUBSETS.items():

@@ -1,8 +1,8 @@
 """Train the network of model `mlp`, for all boxes or for the boxes of one scene.
 
-The general network learns from `contacts.mixture`: it serves any two boxes. A scene's network
-starts from it and goes on with the scene's own pairs of sizes only; it is then asked for these
-sizes alone, and the exact answer is given for others (`mlp`).
+The general network learns from `contacts.mixture` and serves any two boxes. A scene's network
+starts from the general one and goes on with the scene's own pairs of sizes only. The solver then
+asks it for these sizes alone, and answers others exactly (box_contact_ros/mlp.py).
 """
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 import torch
 
-from ..mlp import ASPECT_MAX, DEPTH_MAX, RATIO_MAX
+from ..core import ASPECT_MAX, DEPTH_MAX, FEATURES, OUTPUTS, SIZE_RATIO_MAX
+from ..mlp import ACTIVATION, DESCRIPTION, FEATURE_NAMES
 from ..network import load_weights, save_weights, unpacked
 from ..posesets import SETS, Pairs
 from ..resources import resource_path
-from ..sites import ACTIVATION, DESCRIPTION, INPUTS, NAMES, OUTPUTS
 from ..solver import ContactSolver
-from .contacts import Contacts, SizePair, contacts, mixture, scene_mixture
+from .contacts import MlpSamples, SizePair, draw_samples, mixture, scene_mixture
 from .points import Fit, Settings, normalisation, unfolded
 
 HIDDEN = (32,)
@@ -40,7 +40,7 @@ _DATA, _METRICS, _HARD = 0, 1, 2
 
 
 def point_errors(pairs: Pairs, weights: Path | str | None) -> np.ndarray:
-    """(n,) point error of `mlp` against `exact`, in edges of the smaller box's longest."""
+    """Return point errors (n,) of `mlp` against `exact` [longest edge of the smaller box]."""
     found = []
     for model, file in (('exact', None), ('mlp', weights)):
         solver = ContactSolver((1, 1, 1), (1, 1, 1), model=model, weights=file and str(file))
@@ -51,7 +51,7 @@ def point_errors(pairs: Pairs, weights: Path | str | None) -> np.ndarray:
 
 
 def figures(errors: np.ndarray) -> dict[str, float]:
-    """Mean, 99th percentile and worst, in per cent."""
+    """Return mean, 99th percentile and worst, in per cent."""
     return {'mean': 100.0 * float(errors.mean()), 'p99': 100.0 * float(np.quantile(errors, 0.99)),
             'worst': 100.0 * float(errors.max())}
 
@@ -62,7 +62,7 @@ def train(path: Path, *, seed: int, commit: str, quick: bool = False,
     """Train the general network and write it to `path`; returns its model card."""
     began = time.monotonic()
     pairs, steps = (QUICK_PAIRS, steps or QUICK_STEPS) if quick else (PAIRS, steps or STEPS)
-    data = contacts(mixture, [seed, _DATA], pairs, progress)
+    data = draw_samples(mixture, [seed, _DATA], pairs, progress)
     fit = Fit(data, Settings(hidden=[hidden], steps=steps, batch=BATCH, rate=RATE, seed=seed,
                              device=device))
     _run(fit, data, path.stem, progress, [seed, _HARD], QUICK_PAIRS if quick else HARD_POOL,
@@ -93,10 +93,10 @@ def train_scene(path: Path, sizes: Sequence[SizePair], *, seed: int, commit: str
     start = weights.networks['point']
     hidden = start.widths[1:-1]
     pairs, steps = (QUICK_PAIRS, QUICK_STEPS) if quick else (SCENE_PAIRS, SCENE_STEPS)
-    data = contacts(scene_mixture, [seed, _DATA], pairs, progress, sizes)
+    data = draw_samples(scene_mixture, [seed, _DATA], pairs, progress, sizes)
     fit = Fit(data, Settings(hidden=[hidden], steps=steps, batch=BATCH, rate=SCENE_RATE, seed=seed,
                              device=device),
-              start=[unfolded(unpacked(start), *normalisation(data.inputs))])
+              start=[unfolded(unpacked(start), *normalisation(data.features))])
     _run(fit, data, path.stem, progress, [seed, _HARD], QUICK_PAIRS if quick else HARD_POOL // 2,
          scene_mixture, sizes)
     card = _card(path, hidden, seed, commit, [[list(a), list(b)] for a, b in sizes], fit,
@@ -113,47 +113,43 @@ def train_scene(path: Path, sizes: Sequence[SizePair], *, seed: int, commit: str
     return card
 
 
-def _run(fit: Fit, data: Contacts, title: str, progress: bool, seed: Sequence[int], pool: int,
+def _run(fit: Fit, data: MlpSamples, title: str, progress: bool, seed: Sequence[int], pool: int,
          make: Callable[..., Pairs], *rest: object) -> None:
     """Train to the end, with a progress bar, and harder data from time to time."""
     from tqdm import tqdm
 
     steps = fit.settings.steps
     chunk = max(1, steps // 200)
-    hard: list[Contacts] = []
+    hard: list[MlpSamples] = []
     with tqdm(total=steps, desc=title, unit='step', mininterval=1.0, disable=not progress) as bar:
         while fit.step < steps:
             if len(hard) < len(HARD_ROUNDS) and fit.step >= HARD_ROUNDS[len(hard)] * steps:
-                fresh = contacts(make, [*seed, len(hard)], pool, False, *rest)
+                fresh = draw_samples(make, [*seed, len(hard)], pool, False, *rest)
                 hard.append(_hardest(fit, fresh, HARD_PART))
-                found = _joined(hard)
-                times = HARD_SHARE / (1.0 - HARD_SHARE) * len(data.inputs) / len(found.inputs)
-                fit.feed(_joined([data, *[found] * max(1, round(times))]))
+                found = MlpSamples.joined(hard)
+                times = HARD_SHARE / (1.0 - HARD_SHARE) * len(data) / len(found)
+                fit.feed(MlpSamples.joined([data, *[found] * max(1, round(times))]))
             before = fit.step
             loss = fit.run(chunk)
             bar.set_postfix(loss=f'{loss.min():.2e}', refresh=False)
             bar.update(fit.step - before)
 
 
-def _hardest(fit: Fit, data: Contacts, part: float) -> Contacts:
-    """The part of the contacts in which the network errs most."""
+def _hardest(fit: Fit, data: MlpSamples, part: float) -> MlpSamples:
+    """Return the part of the samples in which the network errs most."""
     errors = fit.point_errors(data)[0]
-    rows = np.sort(np.argsort(errors, kind='stable')[-max(1, round(part * len(errors))):])
-    return Contacts(*(column[rows] for column in data))
-
-
-def _joined(parts: Sequence[Contacts]) -> Contacts:
-    return Contacts(*(np.concatenate(columns) for columns in zip(*parts)))
+    count = max(1, round(part * len(errors)))
+    return data.rows(np.sort(np.argsort(errors, kind='stable')[-count:]))
 
 
 def _card(path: Path, hidden: tuple[int, ...], seed: int, commit: str, sizes: list[Any],
           fit: Fit, data: dict[str, Any]) -> dict[str, Any]:
     s = fit.settings
     return {
-        'name': path.stem, 'model': 'mlp', 'architecture': [INPUTS, *hidden, OUTPUTS],
+        'name': path.stem, 'model': 'mlp', 'architecture': [FEATURES, *hidden, OUTPUTS],
         'activation': ACTIVATION, 'seed': seed, 'commit': commit, 'sizes': sizes,
-        'inputs': {'description': DESCRIPTION, 'names': NAMES,
-                   'range': {'aspect': ASPECT_MAX, 'size ratio': RATIO_MAX,
+        'inputs': {'description': DESCRIPTION, 'names': FEATURE_NAMES,
+                   'range': {'aspect': ASPECT_MAX, 'size ratio': SIZE_RATIO_MAX,
                              'depth by the shortest edge': DEPTH_MAX}},
         'outputs': ['of the push', 'of the pull along the faces', 'of what others pass on'],
         'data': {**data, 'pairs': len(fit.inputs)}, 'metrics': {},
@@ -165,7 +161,7 @@ def in_range(pair: SizePair) -> bool:
     """Whether the MLP may be asked for boxes of these sizes at all."""
     longest, shortest = [max(size) for size in pair], [min(size) for size in pair]
     return (all(one <= ASPECT_MAX * other for one, other in zip(longest, shortest))
-            and max(longest) <= RATIO_MAX * min(longest))
+            and max(longest) <= SIZE_RATIO_MAX * min(longest))
 
 
 def text(pair: SizePair) -> str:

@@ -1,12 +1,13 @@
 """Fit networks for model `mlp`: many at once, of any hidden widths, by Adam.
 
-All networks of a call are one batch of matrices with a leading dimension `networks`, as in `fit`;
-hidden layers are as wide as the widest network needs (`batched`), and all have as many of them. A
-contact is SITES patterns for the network; what it says there, times the contact's vectors, is added
-up to the offset of the centroid from the middle of the bounding box, in half extents (`sites`).
-What is minimised weighs the error of that offset three ways: as it is, as the error of the point in
-edges of the smaller box, and that to the fourth power, because the worst cases are what a
-simulation trips over.
+All networks of a call are one batch of matrices with a leading dimension `networks`, as in `fit`.
+They have equally many hidden layers, as wide as the widest network needs (`batched`). A contact is
+SITES patterns for the network. The outputs, times the contact's vectors, add up to an offset in
+half extents: the centroid from the middle of the bounding box (core/mlp.hpp).
+
+The loss has three terms: the squared offset error, the squared point error in edges of the smaller
+box, and the fourth power of the point error. A simulation trips over the worst cases, hence the
+last.
 """
 from __future__ import annotations
 
@@ -18,8 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
-from ..sites import INPUTS, OUTPUTS
-from .contacts import Contacts
+from ..core import FEATURES, OUTPUTS
+from .contacts import MlpSamples
 
 POINT_WEIGHT, TAIL_WEIGHT = 10.0, 3e3
 """Weights of the squared point error, and of its square, beside the squared offset error. Ten makes
@@ -87,7 +88,7 @@ def unbatched(parameters: Sequence[torch.Tensor], networks: Sequence[Sequence[in
 
 
 def normalisation(inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Mean and deviation (inputs,) that the training scales inputs (n, sites, inputs) by."""
+    """Return mean and deviation (inputs,) that normalise inputs (n, sites, inputs)."""
     # An input that never varies stays as it is. Summed in float64: there are tens of millions.
     mean, deviation = (of(inputs, axis=(0, 1), dtype=np.float64) for of in (np.mean, np.std))
     return mean.astype(np.float32), (deviation + 1e-6).astype(np.float32)
@@ -108,23 +109,23 @@ def unfolded(layers: Layers, mean: np.ndarray, deviation: np.ndarray) -> Layers:
 
 
 def relu(x: torch.Tensor) -> torch.Tensor:
-    """The networks' activation, as in `sites.relu`; x is overwritten."""
+    """Return the hidden units' activation, that of core/mlp.hpp; x is overwritten."""
     return x.relu_()
 
 
 class Fit:
     """A training that can be run step by step, and asked for its errors in between."""
 
-    def __init__(self, data: Contacts, settings: Settings, *, start: Sequence[Layers] | None = None,
-                 ) -> None:
-        """`start`: the layers of every network for normalised inputs, in place of random ones."""
+    def __init__(self, data: MlpSamples, settings: Settings, *,
+                 start: Sequence[Layers] | None = None) -> None:
+        """`start`: the layers of every network for normalised inputs, instead of random ones."""
         s = self.settings = settings
         self.device = torch.device(s.device)
-        self.mean, self.deviation = normalisation(data.inputs)
-        self.batch = min(s.batch, len(data.inputs))
+        self.mean, self.deviation = normalisation(data.features)
+        self.batch = min(s.batch, len(data))
         self._places = np.random.default_rng([s.seed, 1])
         self.feed(data)
-        self.widths = [(INPUTS, *hidden, OUTPUTS) for hidden in s.hidden]
+        self.widths = [(FEATURES, *hidden, OUTPUTS) for hidden in s.hidden]
         if start is None:
             start = [drawn(np.random.default_rng([s.seed, 2, k]), widths)
                      for k, widths in enumerate(self.widths)]
@@ -135,12 +136,12 @@ class Fit:
         self._rate = torch.tensor(rate, device=self.device).reshape(-1, 1, 1)
         self.step = 0
 
-    def feed(self, data: Contacts) -> None:
+    def feed(self, data: MlpSamples) -> None:
         """Go on with these data; the normalisation of the inputs stays that of the first ones."""
         # Batches are slices from a random place on: the data are shuffled once, and rows need not
         # be gathered in every step (a third of its time).
-        order = np.random.default_rng([self.settings.seed, 0]).permutation(len(data.inputs))
-        self.inputs = self._normalised(data.inputs[order])
+        order = np.random.default_rng([self.settings.seed, 0]).permutation(len(data))
+        self.inputs = self._normalised(data.features[order])
         self.vectors, self.offsets, self.squared_scale = (
             torch.tensor(part[order], device=self.device)
             for part in (data.vectors, data.offsets, data.scale))
@@ -153,7 +154,7 @@ class Fit:
         """Activations (networks, n · SITES, units) of all layers for inputs (n, SITES, inputs)."""
         p = self.parameters
         count = len(p) // 2
-        found = [inputs.reshape(1, -1, INPUTS).expand(p[0].shape[0], -1, -1)]
+        found = [inputs.reshape(1, -1, FEATURES).expand(p[0].shape[0], -1, -1)]
         for layer in range(count):
             total = torch.baddbmm(p[count + layer], found[-1], p[layer])
             found.append(relu(total) if layer < count - 1 else total)
@@ -214,14 +215,14 @@ class Fit:
         """The layers of one network, for inputs as `mlp` has them."""
         return folded(self.networks()[network], self.mean, self.deviation)
 
-    def point_errors(self, data: Contacts) -> np.ndarray:
-        """(networks, n) point errors in edges of the smaller box, before the solver clamps."""
+    def point_errors(self, data: MlpSamples) -> np.ndarray:
+        """Return point errors (networks, n) in edges of the smaller box, before the clamp."""
         found = []
-        for start in range(0, len(data.inputs), self.batch):
+        for start in range(0, len(data), self.batch):
             rows = slice(start, start + self.batch)
             vectors, offsets, scale = (torch.tensor(part[rows], device=self.device)
                                        for part in (data.vectors, data.offsets, data.scale))
-            outputs = self.layers(self._normalised(data.inputs[rows]))[-1]
+            outputs = self.layers(self._normalised(data.features[rows]))[-1]
             error = self.answers(outputs, vectors).sub_(offsets)
             found.append(error.mul_(scale).norm(dim=-1).cpu())
         return torch.cat(found, dim=1).numpy()

@@ -17,11 +17,11 @@ from typing import Any
 import torch
 
 from ..arguments import make_folder, seed_number
+from ..mlp import UNITS_MAX
 from ..network import load_weights, save_weights
 from ..resources import resource_path
 from ..scene_file import SceneError
-from ..sites import UNITS_MAX
-from . import mlp, dataset
+from . import dataset, mlp
 from .errors import errors_of, figures_by_part
 from .fit import Settings, fit
 from .points import device_of
@@ -120,7 +120,7 @@ def run(job: Job, *, seed: int, folder: Path, progress: bool = True) -> dict[str
             'best_epoch': int(fitted.epoch[fitted.error.argmin()])}
         card['metrics'][network] = {}
     card['training']['minutes'] = round((time.monotonic() - began) / 60.0, 2)
-    # What is measured is what was written: float32 weights, read back, run by the solver's kernel.
+    # What is measured is what was written: float32 weights, read back, run as the solver runs them.
     path = folder / f'{job.name}.safetensors'
     save_weights(path, networks, card)
     written = load_weights(path).networks
@@ -167,8 +167,8 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
         '  paper             two boxes of edge 2, with discontinuities     2 minutes\n'
         '  paper-continuous  the same without, one network per subset      3 minutes\n'
         '  containers        two boxes of 12.192 x 2.438 x 2.591 m         1 minute\n'
-        '  mlp         any two boxes, the point alone                11 minutes\n'
-        '  --scene FILE      the boxes of one scene, from the MLP    3 minutes')
+        '  mlp               any two boxes, the point alone                11 minutes\n'
+        '  --scene FILE      the boxes of one scene, from the general mlp  3 minutes')
     parser.add_argument('what', nargs='*', metavar='what',
                         help=f'{", ".join(NAMES)}, or all (default)')
     parser.add_argument('--scene', type=Path, metavar='FILE', help='train an MLP for the '
@@ -249,8 +249,7 @@ def main(args: Sequence[str] | None = None) -> int:
             units = f'-{options.hidden}' if options.hidden else ''
             path = options.out / f'{MLP}{units}.safetensors'
             hidden = (options.hidden,) if options.hidden else mlp.HIDDEN
-            card = mlp.train(path, hidden=hidden,
-                                   steps=options.steps, **common)
+            card = mlp.train(path, hidden=hidden, steps=options.steps, **common)
             print(f'{path}, {card["training"]["minutes"]} min\n{mlp.table(card)}')
             continue
         job = JOBS[name]

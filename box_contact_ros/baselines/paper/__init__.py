@@ -1,0 +1,1 @@
+"""The networks of the source paper, in C++: see networks.hpp and symmetry.hpp."""

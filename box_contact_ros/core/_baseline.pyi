@@ -1,0 +1,42 @@
+# What every extension of the core offers; see binding/module.cpp.
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..contact import Contact
+
+LENGTH_MIN: float
+LENGTH_MAX: float
+QUATERNION_MIN: float
+QUATERNION_MAX: float
+CONTACT_ULPS: float
+DEPTH_FLOOR: float
+ASPECT_MAX: float
+SIZE_RATIO_MAX: float
+DEPTH_MAX: float
+CENTROID_REACH: float
+
+instruction_set: str
+lanes: int
+compiler: str
+
+class PairSolver:
+    def __init__(self, model: str | None, size_a: tuple[float, float, float],
+                 size_b: tuple[float, float, float], network: np.ndarray | None = None) -> None: ...
+    def __call__(self, pose_a: object, pose_b: object) -> Contact: ...
+    def solve(self, poses_a: np.ndarray, poses_b: np.ndarray, sizes_a: np.ndarray,
+              sizes_b: np.ndarray, threads: int, /,
+              ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, int]: ...
+    @property
+    def clipped(self) -> int: ...
+    @property
+    def answered_exactly(self) -> int: ...
+
+def supported() -> tuple[str, ...]: ...
+def use_contact_type(type: type[tuple[object, ...]], /) -> None: ...
+def stages(poses_a: np.ndarray, poses_b: np.ndarray, sizes_a: np.ndarray, sizes_b: np.ndarray,
+           network: np.ndarray | None, names: Sequence[str], /,
+           ) -> tuple[dict[str, np.ndarray], int]: ...
+def near_pairs(poses: np.ndarray, sizes: np.ndarray, moved: np.ndarray, low: np.ndarray,
+               high: np.ndarray, known: np.ndarray, first: np.ndarray, second: np.ndarray,
+               near: np.ndarray, unknown: np.ndarray, /) -> tuple[int, int]: ...

@@ -1,0 +1,90 @@
+// NumPy arrays as arguments and results of the extensions.
+#pragma once
+
+#define PY_SSIZE_T_CLEAN
+#include <Python.h>
+#define NPY_NO_DEPRECATED_API NPY_1_20_API_VERSION
+#include <numpy/arrayobject.h>
+
+#include <cstdint>
+#include <initializer_list>
+#include <memory>
+#include <type_traits>
+
+#include "../lanes.hpp"
+
+namespace box_contact::binding {
+
+// An owned reference.
+struct Release {
+  void operator()(PyObject* object) const { Py_DECREF(object); }
+};
+using Owned = std::unique_ptr<PyObject, Release>;
+
+template <class Number>
+constexpr int numpy_type = std::is_same_v<Number, double>    ? NPY_DOUBLE
+                           : std::is_same_v<Number, float>   ? NPY_FLOAT
+                           : std::is_same_v<Number, int64_t> ? NPY_INT64
+                                                             : NPY_BOOL;
+
+// An array of numbers in C order.
+template <class Number>
+struct Array {
+  Owned object;
+  Number* numbers = nullptr;
+
+  void take(PyObject* array) {
+    object.reset(array);
+    if (array)
+      numbers = static_cast<Number*>(PyArray_DATA(reinterpret_cast<PyArrayObject*>(array)));
+  }
+  npy_intp length(int axis) const {
+    return PyArray_DIM(reinterpret_cast<PyArrayObject*>(object.get()), axis);
+  }
+};
+
+using Shape = std::initializer_list<npy_intp>;
+constexpr npy_intp any_length = -1;
+
+// Take an argument. Returns false with a Python error if its kind or shape differs.
+template <class Number>
+bool read(PyObject* argument, const char* name, Shape shape, Array<Number>& array) {
+  array.take(PyArray_FROM_OTF(argument, numpy_type<Number>, NPY_ARRAY_CARRAY_RO));
+  if (!array.object) return false;
+  auto* given = reinterpret_cast<PyArrayObject*>(array.object.get());
+  bool fits = PyArray_NDIM(given) == int(shape.size());
+  for (size_t axis = 0; fits && axis < shape.size(); ++axis) {
+    npy_intp wanted = shape.begin()[axis];
+    fits = wanted == any_length || wanted == PyArray_DIM(given, int(axis));
+  }
+  if (!fits) PyErr_Format(PyExc_ValueError, "%s has the wrong shape", name);
+  return fits;
+}
+
+template <class Number>
+bool make(Shape shape, Array<Number>& array) {
+  array.take(PyArray_SimpleNew(int(shape.size()), const_cast<npy_intp*>(shape.begin()),
+                               numpy_type<Number>));
+  return bool(array.object);
+}
+
+inline Vec<double> vector_at(const double* numbers) { return {numbers[0], numbers[1], numbers[2]}; }
+inline Mat<double> matrix_at(const double* numbers) {
+  Mat<double> m;
+  std::memcpy(m.m, numbers, sizeof(m.m));
+  return m;
+}
+inline void write(const Vec<double>& v, double* numbers) { std::memcpy(numbers, v.v, sizeof(v.v)); }
+inline void write(const Mat<double>& m, double* numbers) { std::memcpy(numbers, m.m, sizeof(m.m)); }
+
+inline PyObject* fail(PyObject* kind, const char* message) {
+  PyErr_SetString(kind, message);
+  return nullptr;
+}
+
+template <class Function>
+PyCFunction fastcall(Function* function) {
+  return reinterpret_cast<PyCFunction>(reinterpret_cast<void (*)()>(function));
+}
+
+}  // namespace box_contact::binding

@@ -1,0 +1,128 @@
+// What every stage of a pair computes, as named arrays: for training, reports and tests.
+#pragma once
+
+#include "../mlp.hpp"
+
+namespace box_contact {
+
+// Arrays with a row for each pair, nullptr where one is not wanted. core/stages.py documents them.
+struct StageArrays {
+  bool *colliding{}, *frame_b{}, *in_range{}, *certain{};
+  int64_t *axis{}, *face{};
+  double *separation{}, *touch{}, *size{}, *normal{}, *rotation{}, *offset_a{}, *offset_b{};
+  double *pressed_offset_a{}, *pressed_offset_b{}, *centroid{}, *clipped_centroid{};
+  double *bounds_middle{}, *bounds_half{}, *inside{};
+  double *other_axes{}, *other_offset{}, *other_half{}, *answer{};
+  float *features{}, *vectors{};
+
+  // Call visit(name, pointer, shape of a row) for each array.
+  template <class Visit>
+  void each(Visit visit) {
+    visit("colliding", colliding, {});
+    visit("frame_b", frame_b, {});
+    visit("in_range", in_range, {});
+    visit("certain", certain, {});
+    visit("axis", axis, {});
+    visit("face", face, {});
+    visit("separation", separation, {});
+    visit("touch", touch, {});
+    visit("size", size, {});
+    visit("normal", normal, {3});
+    visit("rotation", rotation, {3, 3});
+    visit("offset_a", offset_a, {3});
+    visit("offset_b", offset_b, {3});
+    visit("pressed_offset_a", pressed_offset_a, {3});
+    visit("pressed_offset_b", pressed_offset_b, {3});
+    visit("centroid", centroid, {3});
+    visit("clipped_centroid", clipped_centroid, {3});
+    visit("bounds_middle", bounds_middle, {3});
+    visit("bounds_half", bounds_half, {3});
+    visit("inside", inside, {3});
+    visit("other_axes", other_axes, {3, 3});
+    visit("other_offset", other_offset, {3});
+    visit("other_half", other_half, {3});
+    visit("answer", answer, {3});
+    visit("features", features, {site_count, site_features});
+    visit("vectors", vectors, {site_count, site_outputs});
+  }
+};
+
+template <class Number, class Value>
+inline void put(Number* array, long row, Value value) {
+  if (array) array[row] = Number(value);
+}
+inline void put(double* array, long row, const Vec<double>& v) {
+  for (int k = 0; array && k < 3; ++k) array[3 * row + k] = v[k];
+}
+inline void put(double* array, long row, const Mat<double>& m) {
+  for (int i = 0; array && i < 3; ++i)
+    for (int j = 0; j < 3; ++j) array[9 * row + 3 * i + j] = m[i][j];
+}
+
+inline void put_features(const StageArrays& arrays, long row, const CutCube<double>& cube) {
+  CutCube<float> narrow_cube;
+  for (int f = 0; f < 3; ++f) {
+    for (int k = 0; k < 3; ++k) narrow_cube.slant[f][k] = float(cube.slant[f][k]);
+    narrow_cube.cut[f] = float(cube.cut[f]);
+    narrow_cube.push[f] = float(cube.push[f]);
+  }
+  SiteFeatures<float> features;
+  SiteVectors<float> vectors;
+  describe(narrow_cube, features, vectors);
+  for (int f = 0; f < 3; ++f)
+    for (int q = 0; q < 3; ++q) {
+      long site = site_count * row + 3 * f + q;
+      for (int k = 0; arrays.features && k < 4; ++k) {
+        float* at = arrays.features + site_features * site + k;
+        at[0] = features.of_site[f][q][k];
+        at[4] = features.of_faces[f][k];
+        at[8] = features.of_axis[q][k];
+      }
+      for (int k = 0; arrays.vectors && k < site_outputs; ++k)
+        arrays.vectors[site_outputs * site + k] = vectors.along[f][q][k];
+    }
+}
+
+// Fill one row. Returns false if its poses or sizes are refused. `network` may be nullptr.
+inline bool fill_stages(const Rows& rows, long row, const Network* network,
+                        const StageArrays& arrays) {
+  Query<double> q = query_rows<double>(rows, row, row + 1);
+  if (!q.pair.valid) return false;
+  put(arrays.colliding, row, q.touching);
+  put(arrays.axis, row, q.axis.axis);
+  put(arrays.face, row, q.axis.face);
+  put(arrays.separation, row, q.axis.separation);
+  put(arrays.touch, row, q.pair.touch);
+  put(arrays.size, row, q.pair.size);
+  put(arrays.normal, row, q.axis.normal);
+  put(arrays.rotation, row, q.pair.rotation);
+  put(arrays.offset_a, row, q.pair.offset_a);
+  put(arrays.offset_b, row, q.pair.offset_b);
+  if (arrays.centroid || arrays.certain) {
+    Counts counts;
+    put(arrays.centroid, row, ExactModel{}.points(q, counts));
+    put(arrays.certain, row, counts.clipped == 0);
+  }
+  Pair<double> pressed = q.pair;
+  bool was_pressed = press(pressed, q.axis);
+  if (arrays.clipped_centroid)
+    put(arrays.clipped_centroid, row,
+        clipped_overlap(pressed, int(q.axis.face), was_pressed).centroid);
+  put(arrays.pressed_offset_a, row, pressed.offset_a);
+  put(arrays.pressed_offset_b, row, pressed.offset_b);
+  OverlapBounds<double> bounds = overlap_bounds(pressed);
+  put(arrays.frame_b, row, bounds.in_b);
+  put(arrays.in_range, row, in_range(pressed, q.axis.separation, bounds));
+  put(arrays.bounds_middle, row, bounds.middle);
+  put(arrays.bounds_half, row, bounds.half);
+  put(arrays.inside, row, bounds.inside);
+  put(arrays.other_axes, row, bounds.other_axes);
+  put(arrays.other_offset, row, bounds.other_offset);
+  put(arrays.other_half, row, bounds.other_half);
+  CutCube<double> cube = cut_cube(bounds, q.pair.size);
+  if (network) put(arrays.answer, row, ask(*network, cube));
+  if (arrays.features || arrays.vectors) put_features(arrays, row, cube);
+  return true;
+}
+
+}  // namespace box_contact

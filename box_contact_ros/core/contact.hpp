@@ -1,0 +1,224 @@
+// From poses to contacts: the stages of a pair, and of rows of pairs.
+//
+// 1. `prepare`: poses and sizes become offsets and a rotation (poses.hpp).
+// 2. `separating_axis`: verdict, separation and normal (separating_axis.hpp), again with 32 digits
+//    where rounding could decide (near_parallel_edges.hpp).
+// 3. `press`: pairs at exact touch get their least depth (pressing.hpp).
+// 4. The point, by a model: `ExactModel` here, or `MlpModel` (mlp.hpp).
+//
+// All stages are templates over the lanes T, so a row of a batch has the bits of a single call.
+#pragma once
+
+#include <algorithm>
+
+#include "near_parallel_edges.hpp"
+#include "overlap_clipping.hpp"
+#include "overlap_face_sums.hpp"
+#include "pressing.hpp"
+
+namespace box_contact {
+
+// One pair: frame of the poses. Without contact, normal and point are NaN.
+struct Contact {
+  bool colliding;       // separation ≤ 8 ulp of the largest coordinate or size
+  double separation;    // [m]; negative: depth along the normal; positive: largest SAT gap
+  Vec<double> normal;   // unit vector from A to B
+  Vec<double> point;    // centroid of A∩B [m]
+};
+
+// How many contacts took another way than most.
+struct Counts {
+  long clipped = 0;  // by model `exact`: clipped, because the certificate did not hold
+  long exact = 0;    // by model `mlp`: answered by `exact`, because outside the trained range
+
+  Counts& operator+=(const Counts& other) {
+    clipped += other.clipped;
+    exact += other.exact;
+    return *this;
+  }
+};
+
+// Pairs whose axis has been found.
+template <class T>
+struct Query {
+  Pair<T> pair;
+  SeparatingAxis<T> axis;
+  Mask<T> touching;  // valid and in contact
+};
+
+template <class T>
+[[gnu::always_inline]] inline Query<T> query(const Pose<T>& a, const Pose<T>& b,
+                                             const Vec<T>& half_a, const Vec<T>& half_b) {
+  Query<T> q;
+  q.pair = prepare(a, b, half_a, half_b);
+  q.axis = separating_axis(q.pair);
+  Mask<T> doubtful = q.axis.doubtful & q.pair.valid;
+  if (any(doubtful)) {
+    for (int i = 0; i < width<T>; ++i) {
+      if (!lane(doubtful, i)) continue;
+      Pose<double> one_a{lane(a.position, i), {}}, one_b{lane(b.position, i), {}};
+      for (int k = 0; k < 4; ++k) {
+        one_a.quaternion[k] = lane(a.quaternion[k], i);
+        one_b.quaternion[k] = lane(b.quaternion[k], i);
+      }
+      SeparatingAxis<double> one{lane(q.axis.separation, i), lane(q.axis.axis, i),
+                                 lane(q.axis.face, i), lane(q.axis.normal, i), true};
+      refine(lane(q.pair, i), one_a, one_b, one);
+      set_lane(q.axis.separation, i, one.separation);
+      set_lane(q.axis.axis, i, one.axis);
+      set_lane(q.axis.normal, i, one.normal);
+    }
+  }
+  q.touching = (q.axis.separation <= q.pair.touch) & q.pair.valid;
+  return q;
+}
+
+template <class T>
+[[gnu::always_inline]] inline Query<double> lane(const Query<T>& q, int i) {
+  return {lane(q.pair, i),
+          {lane(q.axis.separation, i), lane(q.axis.axis, i), lane(q.axis.face, i),
+           lane(q.axis.normal, i), lane(q.axis.doubtful, i) != 0},
+          lane(q.touching, i) != 0};
+}
+
+// The same pair with the box that comes first in the order of the data as A.
+template <class T>
+[[gnu::always_inline]] inline Pair<T> first_as_a(const Pair<T>& pair) {
+  Pair<T> ordered = pair;
+  ordered.half_a = select(pair.a_first, pair.half_a, pair.half_b);
+  ordered.half_b = select(pair.a_first, pair.half_b, pair.half_a);
+  ordered.offset_a = select(pair.a_first, pair.offset_a, -pair.offset_b);
+  ordered.offset_b = select(pair.a_first, pair.offset_b, -pair.offset_a);
+  ordered.rotation = select(pair.a_first, pair.rotation, transpose(pair.rotation));
+  return ordered;
+}
+
+// The exact overlap of a single pair that `press` has moved.
+inline Overlap clipped_overlap(Pair<double> pair, int face, bool pressed) {
+  if (pressed) press_on(pair);
+  return overlap_by_clipping(pair, face);
+}
+
+// Model `exact`: the centroid of A∩B by face sums, or by clipping where these are not certain.
+struct ExactModel {
+  // Contact points in A's frame [m], for the pairs that touch.
+  template <class T>
+  [[gnu::always_inline]] Vec<T> points(const Query<T>& q, Counts& counts) const {
+    Pair<T> pair = q.pair;
+    Mask<T> pressed = press(pair, q.axis) & q.touching;
+    Mask<T> fallback = pressed;
+    if (any(pressed)) fallback &= has_too_little_depth(pair);
+    T depth = max(-q.axis.separation, depth_floor * pair.size);
+    CertifiedOverlap<T> overlap = overlap_by_face_sums(first_as_a(pair), depth);
+    Vec<T> points = select(pair.a_first, overlap.centroid,
+                           pair.offset_a + pair.rotation * overlap.centroid);
+    fallback |= (overlap.certain == 0) & q.touching;
+    if (any(fallback)) {
+      for (int i = 0; i < width<T>; ++i) {
+        if (!lane(fallback, i)) continue;
+        ++counts.clipped;
+        Overlap clipped = clipped_overlap(lane(pair, i), int(lane(q.axis.face, i)),
+                                          lane(pressed, i) != 0);
+        set_lane(points, i, clipped.centroid);
+      }
+    }
+    return points;
+  }
+};
+
+// Rows of pairs in memory. A step of 0 gives all rows the same sizes, one of 3 each row its own.
+struct Rows {
+  const double *poses_a, *poses_b;  // 7 numbers a row: x y z qx qy qz qw
+  const double *sizes_a, *sizes_b;  // full extents [m]
+  long size_step_a, size_step_b;
+};
+
+// Where results go: one row a pair, normals and points three numbers a row.
+struct Results {
+  bool* colliding;
+  double *separation, *normal, *point;
+};
+
+// Rows `first` to `last` side by side. Lanes beyond them repeat the last one.
+template <class T>
+[[gnu::always_inline]] inline Query<T> query_rows(const Rows& rows, long first, long last) {
+  alignas(sizeof(T)) double a[7][width<T>], b[7][width<T>], sizes[6][width<T>];
+  for (int i = 0; i < width<T>; ++i) {
+    long row = std::min(first + i, last - 1);
+    for (int k = 0; k < 7; ++k) a[k][i] = rows.poses_a[7 * row + k];
+    for (int k = 0; k < 7; ++k) b[k][i] = rows.poses_b[7 * row + k];
+    for (int k = 0; k < 3; ++k) sizes[k][i] = rows.sizes_a[rows.size_step_a * row + k];
+    for (int k = 0; k < 3; ++k) sizes[3 + k][i] = rows.sizes_b[rows.size_step_b * row + k];
+  }
+  auto lanes_of = [](const double (&numbers)[width<T>]) {
+    T x;
+    std::memcpy(&x, numbers, sizeof(T));
+    return x;
+  };
+  Pose<T> pose_a, pose_b;
+  Vec<T> half_a, half_b;
+  for (int k = 0; k < 3; ++k) {
+    pose_a.position[k] = lanes_of(a[k]);
+    pose_b.position[k] = lanes_of(b[k]);
+    half_a[k] = 0.5 * lanes_of(sizes[k]);
+    half_b[k] = 0.5 * lanes_of(sizes[3 + k]);
+  }
+  for (int k = 0; k < 4; ++k) {
+    pose_a.quaternion[k] = lanes_of(a[3 + k]);
+    pose_b.quaternion[k] = lanes_of(b[3 + k]);
+  }
+  return query(pose_a, pose_b, half_a, half_b);
+}
+
+// Solve rows `begin` to `end`. Returns the first row whose poses or sizes are refused, or −1; what
+// is written to such a row has no meaning.
+template <class T, class Model>
+long solve_rows(const Model& model, const Rows& rows, long begin, long end, const Results& results,
+                Counts& counts) {
+  long refused = -1;
+  for (long first = begin; first < end; first += width<T>) {
+    Query<T> q = query_rows<T>(rows, first, end);
+    int count = int(std::min<long>(width<T>, end - first));
+    T separation = q.axis.separation;
+    Vec<T> normal = direction_in_common_frame(q.pair, q.axis.normal), point;
+    // Lanes that repeat the last row are not counted.
+    for (int i = count; i < width<T>; ++i) set_lane(q.touching, i, 0);
+    if (any(q.touching)) point = point_in_common_frame(q.pair, model.points(q, counts));
+    T nothing = splat<T>(std::numeric_limits<double>::quiet_NaN());
+    normal = select(q.touching, normal, Vec<T>{nothing, nothing, nothing});
+    point = select(q.touching, point, Vec<T>{nothing, nothing, nothing});
+    for (int i = 0; i < count; ++i) {
+      long row = first + i;
+      results.colliding[row] = lane(q.touching, i) != 0;
+      results.separation[row] = lane(separation, i);
+      for (int k = 0; k < 3; ++k) results.normal[3 * row + k] = lane(normal[k], i);
+      for (int k = 0; k < 3; ++k) results.point[3 * row + k] = lane(point[k], i);
+      if (!lane(q.pair.valid, i) && refused < 0) refused = row;
+    }
+  }
+  return refused;
+}
+
+// Solve one pair; `half_a`, `half_b` are half extents. Returns false if poses or sizes are refused.
+template <class Model>
+[[gnu::always_inline]] inline bool solve_one(const Model& model, const double* pose_a,
+                                             const double* pose_b, const Vec<double>& half_a,
+                                             const Vec<double>& half_b, Contact& contact,
+                                             Counts& counts) {
+  Pose<double> a{{pose_a[0], pose_a[1], pose_a[2]}, {pose_a[3], pose_a[4], pose_a[5], pose_a[6]}};
+  Pose<double> b{{pose_b[0], pose_b[1], pose_b[2]}, {pose_b[3], pose_b[4], pose_b[5], pose_b[6]}};
+  Query<double> q = query(a, b, half_a, half_b);
+  if (!q.pair.valid) return false;
+  contact.colliding = q.touching;
+  contact.separation = q.axis.separation;
+  if (q.touching) {
+    contact.normal = direction_in_common_frame(q.pair, q.axis.normal);
+    contact.point = point_in_common_frame(q.pair, model.points(q, counts));
+  } else {
+    double nothing = std::numeric_limits<double>::quiet_NaN();
+    contact.normal = contact.point = {nothing, nothing, nothing};
+  }
+  return true;
+}
+
+}  // namespace box_contact

@@ -1,0 +1,244 @@
+// Lanes: the numbers of one pair of boxes, or of W pairs side by side, and small vectors of them.
+//
+// Every algorithm of the core is one template over T. T is `double` for a single pair, or
+// `Lanes<double, W>`, a vector of the compiler, with one pair in each of its W lanes. All functions
+// here work on each lane alone, so a pair has the same bits in every lane of every width.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <type_traits>
+#include <utility>
+#if defined(__SSE2__)
+#include <immintrin.h>
+#endif
+
+// Vectors wider than the machine's registers are passed between inlined functions only.
+#pragma GCC diagnostic ignored "-Wpsabi"
+#if defined(__clang__)
+// Masks are bool or vectors, and the operators & and | combine both.
+#pragma clang diagnostic ignored "-Wbool-operation"
+#endif
+
+namespace box_contact {
+
+template <class Number, int width>
+struct LanesOf {
+  static_assert(width > 1, "one lane is a plain number");
+  typedef Number type __attribute__((vector_size(width * sizeof(Number))));
+};
+template <class Number, int width>
+using Lanes = typename LanesOf<Number, width>::type;
+
+template <class T>
+constexpr bool is_scalar = std::is_arithmetic_v<T>;
+
+template <class T, bool = is_scalar<T>>
+struct NumberOf {
+  using type = T;
+};
+template <class T>
+struct NumberOf<T, false> {
+  using type = std::decay_t<decltype(std::declval<T&>()[0])>;
+};
+// The type of one lane of T.
+template <class T>
+using Number = typename NumberOf<T>::type;
+
+template <class T>
+constexpr int width = sizeof(T) / sizeof(Number<T>);
+
+// What a comparison of T gives: bool, or a vector of integers, 0 or −1.
+template <class T>
+using Mask = decltype(T() < T());
+
+// The same number in every lane.
+template <class T>
+[[gnu::always_inline]] inline T splat(Number<T> x) {
+  return T{} + x;
+}
+
+template <class T>
+[[gnu::always_inline]] inline T select(Mask<T> mask, T if_true, T if_false) {
+  return mask ? if_true : if_false;
+}
+
+// Of two equal numbers, or with a NaN in `a` or `b`, min and max return b.
+template <class T>
+[[gnu::always_inline]] inline T min(T a, T b) {
+  return a < b ? a : b;
+}
+template <class T>
+[[gnu::always_inline]] inline T max(T a, T b) {
+  return a > b ? a : b;
+}
+
+template <class T>
+[[gnu::always_inline]] inline T abs(T x) {
+  if constexpr (is_scalar<T>) {
+    return std::fabs(x);
+  } else {
+    using Bits = Mask<T>;
+    constexpr auto sign = Number<Bits>(1) << (8 * sizeof(Number<Bits>) - 1);
+    return (T)((Bits)x & ~sign);
+  }
+}
+
+template <class T>
+[[gnu::always_inline]] inline T sqrt(T x) {
+  if constexpr (is_scalar<T>) {
+    return std::sqrt(x);
+#if defined(__AVX512F__)
+  } else if constexpr (std::is_same_v<T, Lanes<double, 8>>) {
+    return (T)_mm512_mask_sqrt_pd((__m512d)x, 0xff, (__m512d)x);
+#endif
+#if defined(__AVX__)
+  } else if constexpr (std::is_same_v<T, Lanes<double, 4>>) {
+    return (T)_mm256_sqrt_pd((__m256d)x);
+#endif
+#if defined(__SSE2__)
+  } else if constexpr (std::is_same_v<T, Lanes<double, 2>>) {
+    return (T)_mm_sqrt_pd((__m128d)x);
+#endif
+  } else {
+    T root{};
+    for (int i = 0; i < width<T>; ++i) root[i] = std::sqrt(x[i]);
+    return root;
+  }
+}
+
+template <class T>
+[[gnu::always_inline]] inline auto lane(const T& x, int i) {
+  if constexpr (is_scalar<T>) {
+    return x;
+  } else {
+    return x[i];
+  }
+}
+template <class T, class N>
+[[gnu::always_inline]] inline void set_lane(T& x, int i, N value) {
+  if constexpr (is_scalar<T>) {
+    x = value;
+  } else {
+    x[i] = value;
+  }
+}
+
+template <class M>
+[[gnu::always_inline]] inline bool any(M mask) {
+  if constexpr (is_scalar<M>) {
+    return mask;
+  } else {
+    Number<M> found = 0;
+    for (int i = 0; i < width<M>; ++i) found |= mask[i];
+    return found != 0;
+  }
+}
+
+template <class T>
+struct Vec {
+  T v[3];
+
+  [[gnu::always_inline]] T& operator[](int k) { return v[k]; }
+  [[gnu::always_inline]] const T& operator[](int k) const { return v[k]; }
+};
+
+template <class T>
+[[gnu::always_inline]] inline Vec<T> operator+(const Vec<T>& a, const Vec<T>& b) {
+  return {a[0] + b[0], a[1] + b[1], a[2] + b[2]};
+}
+template <class T>
+[[gnu::always_inline]] inline Vec<T> operator-(const Vec<T>& a, const Vec<T>& b) {
+  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+}
+template <class T>
+[[gnu::always_inline]] inline Vec<T> operator-(const Vec<T>& a) {
+  return {-a[0], -a[1], -a[2]};
+}
+template <class T>
+[[gnu::always_inline]] inline Vec<T> operator*(T factor, const Vec<T>& a) {
+  return {factor * a[0], factor * a[1], factor * a[2]};
+}
+template <class T>
+[[gnu::always_inline]] inline T dot(const Vec<T>& a, const Vec<T>& b) {
+  return (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2];
+}
+template <class T>
+[[gnu::always_inline]] inline Vec<T> abs(const Vec<T>& a) {
+  return {abs(a[0]), abs(a[1]), abs(a[2])};
+}
+template <class T>
+[[gnu::always_inline]] inline T largest(const Vec<T>& a) {
+  return max(max(a[0], a[1]), a[2]);
+}
+template <class T>
+[[gnu::always_inline]] inline T smallest(const Vec<T>& a) {
+  return min(min(a[0], a[1]), a[2]);
+}
+// The nearest point of the box of half extents `half` about the origin.
+template <class T>
+[[gnu::always_inline]] inline Vec<T> clamp(const Vec<T>& x, const Vec<T>& half) {
+  return {min(half[0], max(-half[0], x[0])), min(half[1], max(-half[1], x[1])),
+          min(half[2], max(-half[2], x[2]))};
+}
+template <class T>
+[[gnu::always_inline]] inline Vec<T> select(Mask<T> mask, const Vec<T>& a, const Vec<T>& b) {
+  return {select<T>(mask, a[0], b[0]), select<T>(mask, a[1], b[1]), select<T>(mask, a[2], b[2])};
+}
+
+// A 3 × 3 matrix, row by row: m[i][j].
+template <class T>
+struct Mat {
+  T m[3][3];
+
+  [[gnu::always_inline]] T* operator[](int i) { return m[i]; }
+  [[gnu::always_inline]] const T* operator[](int i) const { return m[i]; }
+};
+
+template <class T>
+[[gnu::always_inline]] inline Vec<T> row(const Mat<T>& m, int i) {
+  return {m[i][0], m[i][1], m[i][2]};
+}
+template <class T>
+[[gnu::always_inline]] inline Vec<T> column(const Mat<T>& m, int j) {
+  return {m[0][j], m[1][j], m[2][j]};
+}
+template <class T>
+[[gnu::always_inline]] inline Mat<T> transpose(const Mat<T>& m) {
+  return {{{m[0][0], m[1][0], m[2][0]}, {m[0][1], m[1][1], m[2][1]}, {m[0][2], m[1][2], m[2][2]}}};
+}
+template <class T>
+[[gnu::always_inline]] inline Vec<T> operator*(const Mat<T>& m, const Vec<T>& a) {
+  return {dot(row(m, 0), a), dot(row(m, 1), a), dot(row(m, 2), a)};
+}
+// mᵀ · a.
+template <class T>
+[[gnu::always_inline]] inline Vec<T> transposed_times(const Mat<T>& m, const Vec<T>& a) {
+  return {dot(column(m, 0), a), dot(column(m, 1), a), dot(column(m, 2), a)};
+}
+template <class T>
+[[gnu::always_inline]] inline Mat<T> select(Mask<T> mask, const Mat<T>& a, const Mat<T>& b) {
+  Mat<T> m;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) m[i][j] = select<T>(mask, a[i][j], b[i][j]);
+  return m;
+}
+
+template <class T>
+[[gnu::always_inline]] inline Vec<Number<T>> lane(const Vec<T>& a, int i) {
+  return {lane(a[0], i), lane(a[1], i), lane(a[2], i)};
+}
+template <class T>
+[[gnu::always_inline]] inline Mat<Number<T>> lane(const Mat<T>& m, int i) {
+  Mat<Number<T>> found;
+  for (int r = 0; r < 3; ++r)
+    for (int c = 0; c < 3; ++c) found[r][c] = lane(m[r][c], i);
+  return found;
+}
+template <class T, class N>
+[[gnu::always_inline]] inline void set_lane(Vec<T>& a, int i, const Vec<N>& value) {
+  for (int k = 0; k < 3; ++k) set_lane(a[k], i, value[k]);
+}
+
+}  // namespace box_contact

@@ -1,0 +1,328 @@
+// The exact moments of the overlap A∩B without a branch, and a certificate that they are right.
+//
+// The overlap is bounded by parts of the twelve faces of both boxes. By the divergence theorem its
+// volume and first moments are sums over these parts of their areas and first moments; by Stokes'
+// theorem, applied once more, those are sums over the parts' edges. Every edge of the overlap is a
+// piece of one of the 24 edges of the boxes, or of one of the 36 lines in which a face of A meets a
+// face of B. Each piece is what slabs leave of a line (Kay and Kajiya 1986), a fixed sequence of
+// multiplications and comparisons. The cost is the same for every pair.
+//
+// Rounding may decide twice, and differently, which face an edge meets first. Then a part of a face
+// counts twice or not at all. Four steps make the sums sound:
+//
+// 1. `unflush` moves faces of B that lie in a plane with faces of A inwards, by a few roundings, so
+//    that which one bounds the overlap is decided once.
+// 2. Faces that cross at so small an angle that rounding is mirrored are left to clipping.
+// 3. The origin is not the middle of the overlap, where mirrored errors would cancel.
+// 4. The certificate: ∫ x nᵀ dA over the surface is the volume times the identity, and ∫ n dA is
+//    zero. Twelve equations hold to a share of the accuracy that is asked of the centroid.
+//
+// In 36.5 million pairs of 29 families of hard poses, no centroid that passed was off by more than
+// 0.14 of `centroid_error`. What does not pass is clipped.
+#pragma once
+
+#include "edge_pieces.hpp"
+#include "overlap_clipping.hpp"
+#include "separating_axis.hpp"
+
+namespace box_contact {
+
+// What is asked of the centroid: an error of size · max(1e-9, 1e-14 · size / depth).
+constexpr double least_centroid_error = 1e-9, centroid_rounding = 1e-14;
+
+namespace face_sums {
+
+// Squared sine below which two faces meet in no line.
+constexpr double least_sine2 = 1e-26;
+
+// `unflush`: faces within the rounding of their places count as in one plane, if that is this small
+// a part of the boxes' thickness there (needles broke a limit by the size).
+constexpr double place_rounding = 0x1p-47, flush_limit = 4e-10;
+// Faces that cross at less than this share of the accuracy are left to clipping.
+constexpr double mirrored_rounding = 1e-15;
+
+// Rounding moves the areas of faces by about 2⁻⁵³ · size · L, with L the length of all edges, and so
+// the centroid by L² / volume times that. In slivers cut off obliquely the areas of the end faces
+// may be wrong by opposite amounts, which no equation shows. Of 255,227 slivers that passed without
+// this limit, the 191 that were wrong moved by at least 80 times the accuracy by this measure.
+// Overlaps of ordinary scenes stay below 0.3.
+constexpr double area_rounding = 0x1p-53, sliver_limit = 24.0;
+
+// Depth [of the size] below which the centroid may be outside a box by rounding. The centroid is at
+// least 0.14 · depth from every face, and off by at most 1.4e-15 · size² / depth; the two are equal
+// at a depth of 1e-7 of the size.
+constexpr double safely_inside = 1e-6;
+// Distance from a box [of the size] up to which rounding alone puts a point outside.
+constexpr double outside_by_rounding = 0x1p-48;
+
+// Shares of the accuracy that the twelve equations may be off by.
+constexpr double off_diagonal_share = 0.03, diagonal_share = 0.3, closure_share = 0.1;
+
+// Weights of the edges' pieces in the mean, so that it is not the middle of a symmetric overlap.
+constexpr EdgeWeights weights_a{0.058, 0.078, 0.043}, weights_b{0.023, 0.043, 0.013};
+
+enum class Side { sigma, tau };
+
+// Sums over the edges of the parts of a box's six faces, by the axis across the face: twice the
+// area, and three times the first moments along the two axes that follow. `side` is the sign that
+// tells a face from the opposite one. Terms of the other sign are added last, in the same order for
+// one pair and for W.
+template <class T, Side side>
+struct FaceSums {
+  Four<T> sums[3][3][steps<T>]{};
+
+  // Add a piece at step n, where the face's side is the sign `given`.
+  template <Side given>
+  [[gnu::always_inline]] void add(int face, int n, Four<T> twice_area, Four<T> y, Four<T> z) {
+    Four<T> terms[3] = {twice_area, twice_area * y, twice_area * z};
+    int place = n;
+    if constexpr (given != side) {  // σ and τ change places: steps or lanes 1 and 2
+      if constexpr (is_scalar<T>) {
+        for (Four<T>& term : terms) term = __builtin_shufflevector(term, term, 0, 2, 1, 3);
+      } else {
+        place = (n & 1) << 1 | n >> 1;
+      }
+    }
+    for (int k = 0; k < 3; ++k) sums[face][k][place] += terms[k];
+  }
+  // The total of face −, sign 0, or +, sign 1, across an axis.
+  [[gnu::always_inline]] T operator()(int face, int sign, int what) const {
+    auto term = [&](int n) -> T {
+      if constexpr (is_scalar<T>) {
+        return sums[face][what][0][n];
+      } else {
+        return sums[face][what][n];
+      }
+    };
+    if constexpr (side == Side::sigma) {
+      return term(sign) + term(sign + 2);
+    } else {
+      return term(2 * sign) + term(2 * sign + 1);
+    }
+  }
+};
+
+// Add the pieces of a box's own edges. `origin`: in the box's frame.
+template <class T, Side side>
+[[gnu::always_inline]] inline void add_edges(const EdgePieces<T>& pieces, const Vec<T>& half,
+                                             const Vec<T>& origin, FaceSums<T, side>& faces) {
+#pragma GCC unroll 3
+  for (int j = 0; j < 3; ++j) {
+    int a = (j + 1) % 3, b = (j + 2) % 3;
+#pragma GCC unroll 4
+    for (int n = 0; n < steps<T>; ++n) {
+      Four<T> f = sigma<T>(n) * half[a] - origin[a], g = tau<T>(n) * half[b] - origin[b];
+      Four<T> s = pieces.s[j][n], t = pieces.t[j][n];
+      Four<T> length = max(t - s, Four<T>{}), middle = 0.5 * (s + t) - origin[j];
+      faces.template add<Side::sigma>(a, n, tau<T>(n) * (length * g), g, middle);
+      faces.template add<Side::tau>(b, n, sigma<T>(n) * (length * f), middle, f);
+    }
+  }
+}
+
+// Add the pieces of the 36 lines in which a face of A, at the sign σ of axis i, meets a face of B,
+// at τ of axis j. `origin_a`, `origin_b`: the origin in A's frame and in B's.
+template <class T>
+[[gnu::always_inline]] inline void add_lines(const Pair<T>& pair, const Mat<T>& inverse,
+                                             const Vec<T>& origin_a, const Vec<T>& origin_b,
+                                             FaceSums<T, Side::sigma>& faces_a,
+                                             FaceSums<T, Side::tau>& faces_b) {
+  const Mat<T>& r = pair.rotation;
+#pragma GCC unroll 3
+  for (int i = 0; i < 3; ++i) {
+    int y = (i + 1) % 3, z = (i + 2) % 3;
+#pragma GCC unroll 3
+    for (int j = 0; j < 3; ++j) {
+      int k = (j + 1) % 3, l = (j + 2) % 3;
+      T cosine = r[i][j], sine2 = r[y][j] * r[y][j] + r[z][j] * r[z][j];
+      Mask<T> there = sine2 > least_sine2;
+      T scale = 1.0 / select<T>(there, sine2, splat<T>(1.0));
+      sine2 = select<T>(there, sine2, T{});
+      // Along d = a_i × b_j coordinates change by entries of R: −r_zj, r_yj in A, r_il, −r_ik in B.
+      T along_y = -inverse[z][j], along_z = inverse[y][j];
+      T along_k = inverse[i][l], along_l = -inverse[i][k];
+      T slab_y = pair.half_a[y] * abs(along_y), slab_z = pair.half_a[z] * abs(along_z);
+      T slab_k = pair.half_b[k] * abs(along_k), slab_l = pair.half_b[l] * abs(along_l);
+#pragma GCC unroll 4
+      for (int n = 0; n < steps<T>; ++n) {
+        Four<T> f = sigma<T>(n) * pair.half_a[i] - origin_a[i];
+        Four<T> g = tau<T>(n) * pair.half_b[j] - origin_b[j];
+        // The point of the line nearest to the origin: p a_i + q b_j.
+        Four<T> p = (f - cosine * g) * scale, q = (g - cosine * f) * scale;
+        Four<T> at_y = q * r[y][j], at_z = q * r[z][j], at_k = p * r[i][k], at_l = p * r[i][l];
+        Four<T> y_by = (origin_a[y] + at_y) * along_y, z_by = (origin_a[z] + at_z) * along_z;
+        Four<T> k_by = (origin_b[k] + at_k) * along_k, l_by = (origin_b[l] + at_l) * along_l;
+        Four<T> from = max(max(-y_by - slab_y, -z_by - slab_z), max(-k_by - slab_k, -l_by - slab_l));
+        Four<T> to = min(min(slab_y - y_by, slab_z - z_by), min(slab_k - k_by, slab_l - l_by));
+        Four<T> length = sine2 * max(to - from, Four<T>{}), middle = 0.5 * (from + to);
+        faces_a.template add<Side::sigma>(i, n, tau<T>(n) * (length * q),
+                                          at_y - middle * r[z][j], at_z + middle * r[y][j]);
+        faces_b.template add<Side::tau>(j, n, sigma<T>(n) * (length * p),
+                                        at_k + middle * r[i][l], at_l - middle * r[i][k]);
+      }
+    }
+  }
+}
+
+// Over a box's six faces, in its own frame and about the origin.
+template <class T>
+struct SurfaceIntegrals {
+  Mat<T> x_n;       // ∫ x nᵀ dA; rows are components of x
+  Vec<T> first;     // Σ distance of the face · ∫ x dA
+  Vec<T> normal;    // 2 ∫ n dA
+  Vec<T> area;      // of both faces across each axis, signed sums: about their area
+};
+
+template <class T, Side side>
+[[gnu::always_inline]] inline SurfaceIntegrals<T> integrate(const FaceSums<T, side>& faces,
+                                                            const Vec<T>& half,
+                                                            const Vec<T>& origin) {
+  SurfaceIntegrals<T> sum;
+  sum.first = {};
+  for (int i = 0; i < 3; ++i) {
+    int y = (i + 1) % 3, z = (i + 2) % 3;
+    T low = -half[i] - origin[i], high = half[i] - origin[i];
+    T area_low = faces(i, 0, 0), area_high = faces(i, 1, 0);
+    T x_low = low * (0.5 * area_low), x_high = high * (0.5 * area_high);
+    T y_low = faces(i, 0, 1) * (1.0 / 3.0), y_high = faces(i, 1, 1) * (1.0 / 3.0);
+    T z_low = faces(i, 0, 2) * (1.0 / 3.0), z_high = faces(i, 1, 2) * (1.0 / 3.0);
+    sum.x_n[i][i] = x_high - x_low;
+    sum.x_n[y][i] = y_high - y_low;
+    sum.x_n[z][i] = z_high - z_low;
+    sum.first[i] += high * x_high - low * x_low;
+    sum.first[y] += high * y_high - low * y_low;
+    sum.first[z] += high * z_high - low * z_low;
+    sum.normal[i] = area_high - area_low;
+    sum.area[i] = 0.5 * abs(area_low + area_high);
+  }
+  return sum;
+}
+
+// Move faces of B that may lie in the plane of a face of A, and look the same way, inwards until
+// they are clear of it. Returns where rounding may be mirrored instead.
+template <class T>
+[[gnu::always_inline]] inline Mask<T> unflush(Pair<T>& pair, T depth) {
+  T rounding = place_rounding * pair.size;
+  T mirrored = mirrored_rounding * min(pair.size * (1.0 / least_centroid_error),
+                                       (1.0 / centroid_rounding) * depth);
+  Mask<T> risky = depth != depth;
+#pragma GCC unroll 3
+  for (int j = 0; j < 3; ++j) {
+    int k = (j + 1) % 3, l = (j + 2) % 3;
+    T plus = pair.half_b[j], minus = plus;
+#pragma GCC unroll 3
+    for (int i = 0; i < 3; ++i) {
+      const T(&entry)[3] = pair.rotation.m[i];
+      T thickness = min(pair.half_a[i], pair.half_b[j]);
+      T tolerance = rounding + (pair.half_b[k] * abs(entry[k]) + pair.half_b[l] * abs(entry[l]));
+      Mask<T> flat = tolerance <= flush_limit * thickness + 2.0 * rounding;
+      Mask<T> doubtful = (abs(entry[k]) + abs(entry[l])) * thickness < mirrored;
+      if (!any(flat | doubtful)) continue;
+      T middle = pair.half_b[j] * abs(entry[j]) - pair.half_a[i];
+      T shift = select<T>(entry[j] > 0.0, pair.offset_a[i], -pair.offset_a[i]);
+      T beyond_plus = middle + shift, beyond_minus = middle - shift;
+      Mask<T> flush_plus = abs(beyond_plus) <= tolerance, flush_minus = abs(beyond_minus) <= tolerance;
+      risky |= (flush_plus | flush_minus) & doubtful & (flat == 0);
+      plus = select<T>(flat & flush_plus, pair.half_b[j] - (beyond_plus + tolerance), plus);
+      minus = select<T>(flat & flush_minus, pair.half_b[j] - (beyond_minus + tolerance), minus);
+    }
+    T shift = 0.5 * (plus - minus);
+    pair.half_b[j] = 0.5 * (plus + minus);
+    pair.offset_b[j] += shift;
+    pair.offset_a = pair.offset_a + shift * column(pair.rotation, j);
+  }
+  return risky;
+}
+
+// The twelve equations, and that the overlap is no sliver. `x_n`, `normal`: over all faces, in A's
+// frame; `length`: of all edges.
+template <class T>
+[[gnu::always_inline]] inline Mask<T> certificate(const Mat<T>& x_n, const Vec<T>& normal,
+                                                  const Vec<T>& area, T length, T volume, T size,
+                                                  T depth) {
+  T error = size * max(splat<T>(least_centroid_error), centroid_rounding * size / depth);
+  Mask<T> holds = volume > 0.0;
+  holds &= area_rounding * size * (length * length * length) <= sliver_limit * error * volume;
+  for (int j = 0; j < 3; ++j) {
+    int k = (j + 1) % 3, l = (j + 2) % 3;
+    holds &= max(abs(x_n[k][j]), abs(x_n[l][j])) <= off_diagonal_share * error * area[j];
+    holds &= abs(x_n[j][j] - volume) * size <= diagonal_share * error * volume;
+    holds &= 0.5 * abs(normal[j]) * size <= closure_share * error * area[j];
+  }
+  return holds;
+}
+
+// Move a point of A's frame into both boxes, by the nearest points of each in turn. Returns where
+// that succeeds.
+template <class T>
+inline Mask<T> move_inside(const Pair<T>& pair, Vec<T>& point) {
+  Vec<T> outside;
+  for (int round = 0; round < 3; ++round) {
+    point = clamp(point, pair.half_a);
+    Vec<T> in_b = transposed_times(pair.rotation, point) - pair.offset_b;
+    Vec<T> back = clamp(in_b, pair.half_b) - in_b;
+    point = point + pair.rotation * back;
+    outside = abs(point) - pair.half_a;
+  }
+  return largest(outside) <= outside_by_rounding * pair.size;
+}
+
+}  // namespace face_sums
+
+template <class T>
+struct CertifiedOverlap {
+  T volume;         // [m³]
+  Vec<T> centroid;  // A's frame [m]
+  Mask<T> certain;  // the certificate holds
+};
+
+// The overlap of a pair that has been pressed in to `depth` [m].
+template <class T>
+[[gnu::always_inline]] inline CertifiedOverlap<T> overlap_by_face_sums(const Pair<T>& given,
+                                                                       T depth) {
+  using namespace face_sums;
+  Pair<T> pair = given;
+  Mask<T> risky = unflush(pair, depth);
+  const Mat<T>& r = pair.rotation;
+  Mat<T> inverse = reciprocals(r);
+  EdgePieces<T> edges_a = cut_edges(transpose(r), transpose(inverse), -pair.offset_b, pair.half_a,
+                                    pair.half_b, weights_a);
+  EdgePieces<T> edges_b =
+      cut_edges(r, inverse, pair.offset_a, pair.half_b, pair.half_a, weights_b);
+  // The origin is a point inside the overlap: a weighted mean of its edges.
+  T scale = 1.0 / (edges_a.length + edges_b.length);
+  Vec<T> origin_a =
+      scale * (edges_a.mean + (r * edges_b.mean + edges_b.length * pair.offset_a));
+  Vec<T> origin_b = transposed_times(r, origin_a) - pair.offset_b;
+  FaceSums<T, Side::sigma> faces_a;
+  FaceSums<T, Side::tau> faces_b;
+  add_edges(edges_a, pair.half_a, origin_a, faces_a);
+  add_edges(edges_b, pair.half_b, origin_b, faces_b);
+  add_lines(pair, inverse, origin_a, origin_b, faces_a, faces_b);
+  SurfaceIntegrals<T> of_a = integrate(faces_a, pair.half_a, origin_a);
+  SurfaceIntegrals<T> of_b = integrate(faces_b, pair.half_b, origin_b);
+
+  Mat<T> turned, x_n;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) turned[i][j] = dot(row(r, i), column(of_b.x_n, j));
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) x_n[i][j] = of_a.x_n[i][j] + dot(row(turned, i), row(r, j));
+  CertifiedOverlap<T> found;
+  found.volume = (x_n[0][0] + x_n[1][1] + x_n[2][2]) * (1.0 / 3.0);
+  found.centroid = origin_a + (0.25 / found.volume) * (of_a.first + r * of_b.first);
+  Vec<T> area, normal = of_a.normal + r * of_b.normal;
+  for (int i = 0; i < 3; ++i) area[i] = of_a.area[i] + dot(abs(row(r, i)), of_b.area);
+  T length = edges_a.length + edges_b.length;
+  found.certain = certificate(x_n, normal, area, length, found.volume, pair.size, depth);
+  found.certain &= risky == 0;
+  Mask<T> shallow = depth < safely_inside * pair.size;
+  if (any(shallow)) {
+    Vec<T> moved = found.centroid;
+    Mask<T> inside = move_inside(given, moved);
+    found.centroid = select(shallow, moved, found.centroid);
+    found.certain &= inside | (shallow == 0);
+  }
+  return found;
+}
+
+}  // namespace box_contact

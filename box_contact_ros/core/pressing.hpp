@@ -1,0 +1,86 @@
+// Pressing: the least depth at which the overlap of two boxes has a volume.
+//
+// At exact touch A∩B has no volume. The contact point is then that of the boxes after B was pressed
+// in against the normal, to a depth of `depth_floor` of the size. The separation stays as it was.
+#pragma once
+
+#include <limits>
+
+#include "separating_axis.hpp"
+
+namespace box_contact {
+
+// Least depth [of the size]: the heights of the overlap still have seven good digits there.
+constexpr double depth_floor = 1e-9;
+
+// Most moves of `press_on`: three axes at a corner, and more because they are not at right angles.
+constexpr int most_presses = 8;
+
+// Enforce the minimum depth along the normal. Returns where B had to be moved.
+template <class T>
+[[gnu::always_inline]] inline Mask<T> press(Pair<T>& pair, const SeparatingAxis<T>& axis) {
+  T distance = max(depth_floor * pair.size + axis.separation, T{});
+  move_against(pair, distance, axis.normal);
+  return distance > 0.0;
+}
+
+struct Gap {
+  double gap;             // [m]
+  Vec<double> direction;  // unit vector from A to B, in A's frame
+};
+
+// The largest gap over the fifteen axes, as the pair stands.
+inline Gap largest_gap(const Pair<double>& pair) {
+  Gap best{-std::numeric_limits<double>::infinity(), {}};
+  auto offer = [&](const Vec<double>& n) {
+    double half_width = dot(abs(n), pair.half_a) +
+                        dot(abs(transposed_times(pair.rotation, n)), pair.half_b);
+    double along = dot(n, pair.offset_a), gap = std::fabs(along) - half_width;
+    if (gap > best.gap) best = {gap, along >= 0.0 ? n : -n};
+  };
+  for (int k = 0; k < 3; ++k) offer({k == 0 ? 1.0 : 0.0, k == 1 ? 1.0 : 0.0, k == 2 ? 1.0 : 0.0});
+  for (int k = 0; k < 3; ++k) offer(column(pair.rotation, k));
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) {
+      int y = (i + 1) % 3, z = (i + 2) % 3;
+      Vec<double> n{};
+      n[y] = -pair.rotation[z][j];
+      n[z] = pair.rotation[y][j];
+      double length = std::sqrt(dot(n, n));
+      if (length >= parallel) offer((1.0 / length) * n);
+    }
+  return best;
+}
+
+// Go on where `press` has left a pair with less than half of the minimum depth. Where a corner
+// touches a corner or an edge, several axes have gap zero: B is moved along each in turn. Returns
+// whether B was moved.
+inline bool press_on(Pair<double>& pair) {
+  double floor = depth_floor * pair.size;
+  bool moved = false;
+  for (int i = 0; i < most_presses; ++i) {
+    Gap worst = largest_gap(pair);
+    if (!(worst.gap > -0.5 * floor)) break;
+    move_against(pair, floor + worst.gap, worst.direction);
+    moved = true;
+  }
+  return moved;
+}
+
+// Whether `press_on` has work to do, for all lanes at once. The widths of edge axes are those of
+// the vectors as rounded, as in the separating-axis test.
+template <class T>
+inline Mask<T> has_too_little_depth(const Pair<T>& pair) {
+  SeparatingAxis<T> unused;
+  T gap = face_gap(pair.offset_a[0], pair.half_a[0], pair.half_b, row(pair.rotation, 0));
+  for (int k = 1; k < 3; ++k)
+    gap = max(gap, face_gap(pair.offset_a[k], pair.half_a[k], pair.half_b, row(pair.rotation, k)));
+  for (int k = 0; k < 3; ++k)
+    gap = max(gap,
+              face_gap(pair.offset_b[k], pair.half_b[k], pair.half_a, column(pair.rotation, k)));
+  BestAxis<T> best{gap, T{}, gap};
+  offer_edge_axes(pair, FirstFrame<T>(pair), best, unused.doubtful);
+  return best.largest_gap > -0.5 * depth_floor * pair.size;
+}
+
+}  // namespace box_contact

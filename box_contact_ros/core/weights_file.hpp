@@ -1,0 +1,100 @@
+// The network of model `mlp` from a safetensors file.
+//
+// The file begins with 8 bytes, the little-endian length of a JSON header. The header gives dtype,
+// shape and place of each tensor, and the tensors follow. The reader finds four tensors by name and
+// knows no more of JSON. It needs a little-endian machine and ignores the model card's checksum.
+#pragma once
+
+#include <cctype>
+#include <cstdlib>
+#include <fstream>
+#include <initializer_list>
+#include <iterator>
+#include <stdexcept>
+#include <string>
+
+#include "mlp.hpp"
+
+namespace box_contact {
+
+class WeightsFile {
+ public:
+  // Throws std::runtime_error with path and cause, as `network` does.
+  explicit WeightsFile(const std::string& path) : path_(path) {
+    std::ifstream file(path, std::ios::binary);
+    if (!file) refuse("cannot be opened");
+    std::string bytes((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+    std::uint64_t length = 0;
+    if (bytes.size() >= 8) std::memcpy(&length, bytes.data(), 8);
+    if (bytes.size() < 8 || length > bytes.size() - 8) refuse("is no safetensors file");
+    for (char c : bytes.substr(8, length))
+      if (!std::isspace(static_cast<unsigned char>(c))) header_ += c;
+    data_ = bytes.substr(8 + length);
+  }
+
+  Network network() const {
+    // The model card lists no sizes: the network is for boxes of any size.
+    if (header_.find(R"(\"sizes\":[])") == std::string::npos)
+      refuse("is for boxes of some sizes only, or has no model card");
+    size_t units = number(entry("point.0.bias"), R"("shape":[)");
+    std::vector<float> bias = tensor("point.0.bias", {units});
+    std::vector<float> first = tensor("point.0.weight", {units, site_features});
+    std::vector<float> last = tensor("point.1.weight", {site_outputs, units});
+    std::vector<float> last_bias = tensor("point.1.bias", {site_outputs});
+    Network network;
+    network.units.resize(units);
+    for (size_t u = 0; u < units; ++u) {
+      Network::Unit& unit = network.units[u];
+      unit.bias = bias[u];
+      for (size_t k = 0; k < 4; ++k) {
+        unit.of_site[k] = first[site_features * u + k];
+        unit.of_faces[k] = first[site_features * u + 4 + k];
+        unit.of_axis[k] = first[site_features * u + 8 + k];
+      }
+      for (size_t k = 0; k < site_outputs; ++k) unit.to_outputs[k] = last[units * k + u];
+    }
+    for (size_t k = 0; k < site_outputs; ++k) network.output_bias[k] = last_bias[k];
+    return network;
+  }
+
+ private:
+  // What the header tells of a tensor. Quotes within the model card are escaped, so none matches.
+  std::string entry(const std::string& name) const {
+    size_t place = header_.find('"' + name + R"(":{)");
+    if (place == std::string::npos) refuse("has no tensor " + name);
+    return header_.substr(place, header_.find('}', place) - place);
+  }
+  static size_t number(const std::string& entry, const std::string& key) {
+    size_t place = entry.find(key);
+    return place == std::string::npos
+               ? 0
+               : std::strtoull(entry.c_str() + place + key.size(), nullptr, 10);
+  }
+  std::vector<float> tensor(const std::string& name, std::initializer_list<size_t> shape) const {
+    std::string told = entry(name), extents;
+    size_t count = 1;
+    for (size_t extent : shape) {
+      extents += (extents.empty() ? "" : ",") + std::to_string(extent);
+      count *= extent;
+    }
+    const std::string key = R"("data_offsets":[)";
+    size_t begin = number(told, key), end = number(told, key + std::to_string(begin) + ",");
+    if (told.find(R"("dtype":"F32")") == std::string::npos ||
+        told.find(R"("shape":[)" + extents + "]") == std::string::npos || begin > end ||
+        end > data_.size() || end - begin != count * sizeof(float))
+      refuse("has no tensor " + name + " of float32 and the shape [" + extents + "]");
+    std::vector<float> numbers(count);
+    std::memcpy(numbers.data(), data_.data() + begin, end - begin);
+    return numbers;
+  }
+  [[noreturn]] void refuse(const std::string& cause) const {
+    throw std::runtime_error("weights file " + path_ + " " + cause);
+  }
+
+  std::string path_, header_, data_;
+};
+
+// Read the weights of model `mlp`: weights/mlp.safetensors.
+inline Network read_network(const std::string& path) { return WeightsFile(path).network(); }
+
+}  // namespace box_contact
