@@ -1,18 +1,16 @@
-"""What all tests share: a fresh kernel cache, a ROS domain of their own, programs as processes.
+"""What all tests share: a ROS domain of their own, and programs as processes.
 
-The environment is set while this file is imported: before any test module imports numba or rclpy,
-which read it once, and so that every process that a test starts inherits it.
+The environment is set while this file is imported: before any test module imports rclpy, which
+reads it once, and so that every process that a test starts inherits it.
 """
 
 from __future__ import annotations
 
 import os
 import runpy
-import shutil
 import signal
 import subprocess
 import sys
-import tempfile
 import time
 import zlib
 from collections.abc import Callable, Iterator, Sequence
@@ -21,14 +19,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-
-# With xdist this file is imported by the controller first, then by every worker.
-IS_WORKER = 'PYTEST_XDIST_WORKER' in os.environ
-
-# Numba's cache does not notice edits in kernels that a kernel imports, so a run never reuses an
-# older one. One folder for the whole run: workers and subprocesses inherit it, compiling once.
-if not IS_WORKER:
-    os.environ['NUMBA_CACHE_DIR'] = tempfile.mkdtemp(prefix='box_contact_numba_')
 
 
 def _domain_id(module: str = '') -> int:
@@ -53,12 +43,6 @@ def own_domain(request: pytest.FixtureRequest) -> None:
     for the dead.
     """
     os.environ['ROS_DOMAIN_ID'] = str(_domain_id(request.module.__name__))
-
-
-def pytest_unconfigure() -> None:
-    """Remove the kernel cache of this run."""
-    if not IS_WORKER:
-        shutil.rmtree(os.environ['NUMBA_CACHE_DIR'], ignore_errors=True)
 
 
 @pytest.fixture

@@ -1,22 +1,27 @@
-"""Do the laws bite? Each mutant is one line of the package made wrong; a test has to fail for it.
+"""Do the laws bite? Each mutant is one wrong line; a test has to fail for it.
 
     python test/mutants.py [NAME ...]
 
-Every mutant is a copy of the checkout with kernels of its own, which are compiled anew: about a
-minute each, so this is no part of the suite. Prints which test killed which mutant; the exit status
-is 1 if one survived.
+Each mutant is a copy of the checkout with one line changed. If the line belongs to the core, the
+core is compiled in the copy, for the baseline instruction set only. Prints which test killed which
+mutant; the exit status is 1 if one survived.
 """
 from __future__ import annotations
 
 import argparse
+import functools
 import os
 import re
+import runpy
 import shutil
 import subprocess
 import sys
+import sysconfig
 import tempfile
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
+from unittest import mock
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -31,50 +36,124 @@ class Mutant(NamedTuple):
 
 
 FAMILIES = 'test/test_families.py'
+LAWS = 'test/test_laws.py'
+TEST_CORE = 'test/test_core.py'
+EXACT = 'test/test_exact.py'
 MUTANTS = {
     'normal flipped': Mutant(
-        'sat.py', 's = 1.0 if along >= 0.0 else -1.0', 's = -1.0 if along >= 0.0 else 1.0',
-        f'{FAMILIES} -k gates'),
+        'core/separating_axis.hpp', 'select<T>(along >= 0.0, splat<T>(1.0), splat<T>(-1.0));',
+        'select<T>(along >= 0.0, splat<T>(-1.0), splat<T>(1.0));', f'{FAMILIES} -k gates'),
     'axis dropped': Mutant(
-        'sat.py', 'max(g6, max(g7, g8))', 'max(g6, g7)', f'{FAMILIES} -k gates'),
+        'core/separating_axis.hpp', 'best.offer(select<T>(used, overlap * inverse, none)',
+        'if (i + j < 4) best.offer(select<T>(used, overlap * inverse, none)',
+        f'{FAMILIES} -k gates'),
     'cross product not normalised': Mutant(
-        'sat.py', 'inverse = 1.0 / math.sqrt(length2)', 'inverse = 1.0', f'{FAMILIES} -k gates'),
+        'core/separating_axis.hpp', 'T inverse = 1.0 / sqrt(length2);',
+        'T inverse = splat<T>(1.0);', f'{FAMILIES} -k gates'),
     "constant added to R's entries": Mutant(
-        'sat.py', 'width = ((h1 * abs(u2) + h2 * abs(u1))',
-        'width = ((h1 * (abs(u2) + 1e-6) + h2 * (abs(u1) + 1e-6))', f'{FAMILIES} -k gates'),
+        'core/separating_axis.hpp', '(frame.half[y] * abs(uz) + frame.half[z] * abs(uy))',
+        '(frame.half[y] * (abs(uz) + 1e-6) + frame.half[z] * (abs(uy) + 1e-6))',
+        f'{FAMILIES} -k gates'),
+    'largest gap taken for that of the axis': Mutant(
+        'core/separating_axis.hpp', 'largest_gap = max(largest_gap, candidate_gap);',
+        'largest_gap = gap;', f'{LAWS} -k swap'),
     'float32 too early': Mutant(
-        'pose.py', 'tx, ty, tz = bx - ax, by - ay, bz - az',
-        'tx, ty, tz = bx - ax, by - ay, np.float64(np.float32(bz - az))', f'{FAMILIES} -k gates'),
+        'core/poses.hpp', 'Vec<T> t = b.position - a.position;',
+        'Vec<T> t = b.position - a.position; t[2] = t[2] * 0x20000001p0 - '
+        '(t[2] * 0x20000001p0 - t[2]);', f'{FAMILIES} -k gates'),
     'frame of A for all edge axes': Mutant(
-        'sat.py', 'first = work[A_FIRST + i] > 0.5\n        t0', 'first = True\n        t0',
+        'core/separating_axis.hpp',
+        'inline SeparatingAxis<T> separating_axis(const Pair<T>& pair) {',
+        'inline SeparatingAxis<T> separating_axis(Pair<T> pair) { pair.a_first = T{} == T{};',
         f'{FAMILIES} -k swap'),
-    'grazing edges left as they are': Mutant(
-        'sat.py', '        if work[GRAZING + i] > 0.5:\n', '        if False:\n',
+    'near-parallel edges left as they are': Mutant(
+        'core/contact.hpp', '  if (any(doubtful)) {', '  if (false) {',
         f'{FAMILIES} -k edges_along_each_other'),
-    'frame of A for grazing pairs': Mutant(
-        'grazing.py', 'a_first = work[A_FIRST + i] > 0.5', 'a_first = True',
-        'test/test_laws.py -k swap_of_grazing'),
-    'corners pressed along one axis': Mutant(
-        'exact.py', 'press_on(work, i)\n', 'pass\n', f'{FAMILIES} -k exact_touch'),
-    'one face for every centroid': Mutant(
-        'overlap.py', 'if kept < CANCELLED:', 'if False:', f'{FAMILIES} -k thin_plates'),
-    'absolute tolerance': Mutant(
-        'overlap.py', 'move = DEPTH_FLOOR * work[SIZE + i] + work[SEPARATION + i]',
-        'move = DEPTH_FLOOR + work[SEPARATION + i]', f'{FAMILIES} -k scale'),
-    'contact plane not clipped': Mutant(
-        'overlap.py', 'count = _clip(work, one, 4, two, 2, 1.0, 0.0)',
-        'count = _clip(work, one, 4, two, 2, 1.0, 1e300)', f'{FAMILIES} -k exact_point'),
+    'frame of A for near-parallel edges': Mutant(
+        'core/contact.hpp', 'refine(lane(q.pair, i), one_a, one_b, one);',
+        'Pair<double> it = lane(q.pair, i); it.a_first = true; refine(it, one_a, one_b, one);',
+        f'{LAWS} -k swap_of_grazing'),
+    'sums of two doubles not exact': Mutant(
+        'core/near_parallel_edges.hpp', 'return {s, (a - (s - c)) + (b - c)};', 'return {s, 0.0};',
+        f'{FAMILIES} -k gates'),
+    'quaternions not scaled for 32 digits': Mutant(
+        'core/near_parallel_edges.hpp', 'q[k] = std::ldexp(q[k], -exponent);',
+        'q[k] = std::ldexp(q[k], 0);', f'{LAWS} -k any_length'),
     'quaternion taken for a unit one': Mutant(
-        'pose.py', 's = 2.0 /', 's = 2.0 + 0.0 *', 'test/test_fuzz.py -k gates_are'),
+        'core/poses.hpp', 'T s = 2.0 / (', 'T s = 2.0 + 0.0 * (',
+        'test/test_fuzz.py -k gates_are'),
+    'the first of concentric boxes is A': Mutant(
+        'core/poses.hpp', '  if (any(concentric)) {', '  if (false) {', f'{LAWS} -k concentric'),
+    'corners pressed along one axis': Mutant(
+        'core/contact.hpp', 'if (pressed) press_on(pair);', 'if (false) press_on(pair);',
+        f'{EXACT} -k in_a_point'),
+    'absolute tolerance': Mutant(
+        'core/pressing.hpp', 'max(depth_floor * pair.size + axis.separation, T{});',
+        'max(depth_floor + axis.separation, T{});', f'{FAMILIES} -k scale'),
+    'one face for every centroid': Mutant(
+        'core/overlap_clipping.hpp', '  if (kept < cancelled) {', '  if (false) {',
+        f'{FAMILIES} -k thin_plates'),
+    'contact plane not clipped': Mutant(
+        'core/overlap_clipping.hpp', 'double bounds[5] = {0.0,', 'double bounds[5] = {1e300,',
+        f'{FAMILIES} -k exact_point'),
+    'a face in the far face counts twice': Mutant(
+        'core/overlap_clipping.hpp', '    if (high > floor) sum +=', '    if (true) sum +=',
+        f'{EXACT} -k clipping'),
+    'no certificate': Mutant(
+        'core/overlap_face_sums.hpp',
+        'certificate(x_n, normal, area, length, found.volume, pair.size, depth)',
+        '(found.volume == found.volume)', f'{EXACT} -k "thin and sharing"'),
+    'faces not moved out of each other': Mutant(
+        'core/overlap_face_sums.hpp', 'Mask<T> risky = unflush(pair, depth);',
+        'Mask<T> risky = depth != depth;', f'{TEST_CORE} -k flush'),
+    'mirrored rounding trusted': Mutant(
+        'core/overlap_face_sums.hpp', 'found.certain &= risky == 0;', '',
+        f'{EXACT} -k almost_aligned'),
+    'face sums in the order of the names': Mutant(
+        'core/contact.hpp', 'CertifiedOverlap<T> overlap = overlap_by_face_sums(',
+        'pair.a_first = T{} == T{}; CertifiedOverlap<T> overlap = overlap_by_face_sums(',
+        f'{LAWS} -k roundings'),
+    'a piece of an edge of length below zero': Mutant(
+        'core/overlap_face_sums.hpp',
+        'Four<T> length = max(t - s, Four<T>{}), middle = 0.5 * (s + t) - origin[j];',
+        'Four<T> length = t - s, middle = 0.5 * (s + t) - origin[j];',
+        f'{TEST_CORE} -k certain'),
     'point left outside': Mutant(
-        'mlp.py', 'return max(0.0, room) / step if step > max(0.0, room) else 1.0',
-        'return 1.0', 'test/test_mlp.py -k garbage_for_weights'),
+        'core/mlp.hpp', 'share = min(share, select<T>(step > room, room / step, splat<T>(1.0)));',
+        'share = splat<T>(1.0);', 'test/test_mlp.py -k garbage_for_weights'),
     'smaller bounding box, always': Mutant(
-        'outline.py', '_ALIKE = 0.2', '_ALIKE = 1e-6',
-        'test/test_outline.py -k keep_their_frame'),
-    'side of a couple of faces taken as it comes': Mutant(
-        'sites.py', 'numbers[(STRENGTHS + f) * LANES + i] = abs(push)',
-        'numbers[(STRENGTHS + f) * LANES + i] = push', 'test/test_mlp.py -k box_symmetries'),
+        'core/overlap_bounds.hpp', 'clearly_smaller = 0.8;', 'clearly_smaller = 1.0 - 1e-6;',
+        'test/test_overlap_bounds.py -k keep_their_frame'),
+    'slabs not widened': Mutant(
+        'core/overlap_bounds.hpp', 'constexpr double flush = 0x1p-46;',
+        'constexpr double flush = 0.0;', 'test/test_overlap_bounds.py -k whole_patch'),
+    'side of a pair of faces taken as it comes': Mutant(
+        'core/mlp.hpp', 'F faces[4] = {cut[f], abs(push[f]),', 'F faces[4] = {cut[f], push[f],',
+        'test/test_mlp.py -k box_symmetries'),
+    'range without its depth': Mutant(
+        'core/mlp.hpp', 'excess = max(excess, -separation / (2.0 * depth_max',
+        'excess = max(excess, 0.0 * -separation / (2.0 * depth_max',
+        'test/test_mlp.py -k limits_belong'),
+    'threads overlap': Mutant(
+        'core/binding/module.cpp', 'long begin = blocks * thread / threads * lanes,',
+        'long begin = std::max(0L, blocks * thread / threads - 1) * lanes,',
+        f'{TEST_CORE} -k threads'),
+    'threads leave a block out': Mutant(
+        'core/binding/module.cpp', 'end = blocks * (thread + 1) / threads * lanes;',
+        'end = (blocks * (thread + 1) / threads - (threads > 1)) * lanes;',
+        f'{TEST_CORE} -k threads'),
+    'any refused row is named': Mutant(
+        'core/binding/module.cpp', 'if (refused_of[thread] >= 0) refused = refused_of[thread];',
+        'if (refused_of[thread] >= 0 && refused < 0) refused = refused_of[thread];',
+        f'{TEST_CORE} -k threads'),
+    'lanes that repeat the last row are counted': Mutant(
+        'core/contact.hpp', 'for (int i = count; i < width<T>; ++i) set_lane(q.touching, i, 0);',
+        '', f'{TEST_CORE} -k threads_change'),
+    'a reference to the type is kept': Mutant(
+        'core/binding/module.cpp', '  Py_DECREF(type);', '  ', f'{TEST_CORE} -k references'),
+    'the forced instruction set is ignored': Mutant(
+        'core/__init__.py', '_forced or instruction_sets()[-1]', 'instruction_sets()[-1]',
+        f'{TEST_CORE} -k forced'),
     # Guards of the nodes against faults.
     'weights taken as they are': Mutant(
         'network.py', "if tensors_digest(tensors) != card['sha256']:", 'if False:',
@@ -121,12 +200,6 @@ MUTANTS = {
     "poses looked for on the node's own topics": Mutant(
         'nodes/contact.py', 'if self._resolved(topic) in taken:', 'if False:',
         'test/test_scene_node.py -k topic_of_the_node'),
-    'a face in the far face counts twice': Mutant(
-        'overlap.py', '        if highest > floor:', '        if True:',
-        'test/test_exact.py -k concentric'),
-    'the first of concentric boxes is A': Mutant(
-        'pose.py', 'if concentric > 0:', 'if False:',
-        'test/test_laws.py -k concentric'),
     'ticks held up by one that lacks a pose': Mutant(
         'pairing.py', 'self._changed |= not stale <= self._were_stale', 'pass',
         'test/test_pairing.py -k hold_up'),
@@ -164,17 +237,41 @@ MUTANTS = {
 
 
 def copied(folder: Path) -> Path:
-    """The checkout without what is generated."""
+    """Copy the checkout, without what is generated but for the extensions."""
     copy = folder / 'checkout'
     shutil.copytree(ROOT, copy, ignore=shutil.ignore_patterns(
         '.*', '__pycache__', 'build', 'install', 'log', '*.egg-info'))
     return copy
 
 
+@functools.cache
+def baseline_extension() -> Any:
+    """What setup.py says of the core's extension for the baseline instruction set."""
+    given: dict[str, Any] = {}
+    with mock.patch('setuptools.setup', given.update):
+        runpy.run_path(str(ROOT / 'setup.py'))
+    return next(each for each in given['ext_modules'] if each.name.endswith('._baseline'))
+
+
+def build(checkout: Path) -> None:
+    """Compile the core of a copy, for the baseline instruction set, and remove all others."""
+    extension = baseline_extension()
+    folder = checkout / 'box_contact_ros' / 'core'
+    for built in folder.glob('*.so'):
+        built.unlink()
+    macros = [f'-D{name}={value}' for name, value in extension.define_macros]
+    folders = [f'-I{path}' for path in (sysconfig.get_path('include'), *extension.include_dirs)]
+    # Half as long to compile with -O1. The bits are the same.
+    subprocess.run(
+        [*os.environ.get('CXX', 'g++').split(), '-shared', '-fPIC', *macros, *folders,
+         *extension.extra_compile_args, '-O1', '-w', *extension.sources,
+         '-o', folder / f'_baseline{sysconfig.get_config_var("EXT_SUFFIX")}'],
+        cwd=checkout, check=True)
+
+
 def run(checkout: Path, tests: str) -> tuple[bool, str]:
-    """Whether tests pass, and the first that fails."""
-    env = os.environ | {'PYTHONPATH': str(checkout),
-                        'NUMBA_CACHE_DIR': str(checkout.parent / 'kernels')}
+    """Return whether tests pass, and the first that fails."""
+    env = os.environ | {'PYTHONPATH': str(checkout)}
     words = [sys.executable, '-m', 'pytest', '-x', '-q', '-p', 'no:cacheprovider',
              *re.findall(r'"[^"]*"|\S+', tests)]
     done = subprocess.run([word.strip('"') for word in words], cwd=checkout, env=env, text=True,
@@ -185,26 +282,37 @@ def run(checkout: Path, tests: str) -> tuple[bool, str]:
     return done.returncode == 0, failed.group(1) if failed else 'the end of the process'
 
 
+def killer_of(name: str) -> str | None:
+    """Make a mutant and run its tests. Return the test that failed, or None if none did."""
+    mutant = MUTANTS[name]
+    with tempfile.TemporaryDirectory() as folder:
+        checkout = copied(Path(folder))
+        file = checkout / 'box_contact_ros' / mutant.file
+        text = file.read_text()
+        if mutant.old not in text:
+            raise SystemExit(f'{name}: {mutant.file} has no {mutant.old!r}')
+        file.write_text(text.replace(mutant.old, mutant.new))
+        if file.suffix in ('.hpp', '.cpp'):
+            build(checkout)
+        passed, killer = run(checkout, mutant.tests)
+    return None if passed else killer
+
+
 def main() -> int:
     """Try the mutants named, or all."""
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('names', nargs='*', metavar='NAME', help=', '.join(MUTANTS))
-    names = parser.parse_args().names or list(MUTANTS)
+    parser.add_argument('--jobs', type=int, default=1, help='mutants at a time (default: 1)')
+    given = parser.parse_args()
+    names = given.names or list(MUTANTS)
+    baseline_extension()  # once, before there are threads
     survivors = []
-    for name in names:
-        mutant = MUTANTS[name]
-        with tempfile.TemporaryDirectory() as folder:
-            checkout = copied(Path(folder))
-            file = checkout / 'box_contact_ros' / mutant.file
-            text = file.read_text()
-            if mutant.old not in text:
-                raise SystemExit(f'{name}: {mutant.file} has no {mutant.old!r}')
-            file.write_text(text.replace(mutant.old, mutant.new))
-            passed, killer = run(checkout, mutant.tests)
-        print(f'{name:<32} {"SURVIVED" if passed else "killed by " + killer}', flush=True)
-        if passed:
-            survivors.append(name)
+    with ThreadPoolExecutor(given.jobs) as pool:
+        for name, killer in zip(names, pool.map(killer_of, names), strict=True):
+            print(f'{name:<45} {f"killed by {killer}" if killer else "SURVIVED"}', flush=True)
+            if killer is None:
+                survivors.append(name)
     print(f'{len(names) - len(survivors)} of {len(names)} killed')
     return 1 if survivors else 0
 

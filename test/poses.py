@@ -172,3 +172,43 @@ def sharing_an_axis(rng, n):
     offset[:, 2] = np.where(flush, rng.choice([-0.5, 0.5], n) * (size_a - size_b)[:, 2],
                             rng.uniform(-0.45, 0.45, n) * (size_a + size_b)[:, 2])
     return (np.tile(IDENTITY, (n, 1)), np.concatenate([offset, turn], axis=1), size_a, size_b)
+
+
+def corners_that_touch(rng, n):
+    """Boxes in any orientation, a corner of one exactly on a corner of the other, disjoint else.
+
+    A plane across a random direction separates them. Returns the pairs and the corners (n, 3).
+    """
+    size_a, size_b = np.exp(rng.uniform(-1, 1, (2, n, 3)))
+    turn_a, turn_b = unit_quaternions(rng, n), unit_quaternions(rng, n)
+    across = rng.normal(size=(n, 3))
+    minus = (-1, -1, -1, 1)
+    corner_a = 0.5 * size_a * np.sign(rotate(turn_a * minus, across))
+    corner_b = -0.5 * size_b * np.sign(rotate(turn_b * minus, across))
+    a = np.hstack([np.zeros((n, 3)), turn_a])
+    corners = rotate(turn_a, corner_a)
+    b = np.hstack([corners - rotate(turn_b, corner_b), turn_b])
+    return (a, b, size_a, size_b), corners
+
+
+def columns_that_touch(rng, n):
+    """Boxes upright on two levels, the top of one on the level of the other's bottom.
+
+    Seen from above, a corner of one is on a corner or on a side of the other, so two axes or more
+    have a gap of zero at once. Returns the pairs and the points where they touch (n, 3).
+    """
+    size_a, size_b = np.exp(rng.uniform(-1, 1, (2, n, 3)))
+    yaw = 0.5 * np.pi * rng.integers(0, 4, n) + rng.uniform(0.1, 0.5 * np.pi - 0.1, n)
+    turn = small_rotations(np.tile([0.0, 0, 1], (n, 1)), yaw)
+    across = rng.normal(size=(n, 3)) * (1, 1, 0)
+    on_side = rng.random(n) < 0.5
+    across[on_side] = rotate(turn, np.tile([1.0, 0, 0], (n, 1)))[on_side]
+    at_a = 0.5 * size_a * np.sign(across) + 0.5 * size_a * (0, 0, 1)
+    at_b = -0.5 * size_b * np.sign(rotate(turn * (-1, -1, -1, 1), across) + (0, 0, 1e-9))
+    at_b[on_side, 1] *= rng.uniform(-1, 1, int(on_side.sum()))
+    b = np.hstack([at_a - rotate(turn, at_b), turn])
+    whole = unit_quaternions(rng, n)
+    whole[rng.random(n) < 1 / 3] = IDENTITY[3:]
+    zero = np.zeros((n, 3))
+    return (moved(np.tile(IDENTITY, (n, 1)), zero, whole), moved(b, zero, whole), size_a,
+            size_b), rotate(whole, at_a)

@@ -15,7 +15,7 @@ from ros_client import Client, serving
 from sensor_msgs.msg import PointCloud2
 
 DEEP = QoSProfile(depth=1000)
-PATIENCE = 240.0  # s; kernels may have to be compiled first, by several processes at once
+PATIENCE = 240.0  # s
 
 
 def bench(program, out: Path, *arguments: str):

@@ -8,15 +8,7 @@ from poses import IDENTITY
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.pose import rotation_matrix
-from box_contact_ros.symmetry import (
-    FOLD_SIZE,
-    OFFSET,
-    TURN,
-    fold_features,
-    fold_octant,
-    folded,
-    unfold,
-)
+from box_contact_ros.symmetry import fold
 from box_contact_ros.training import dataset
 from box_contact_ros.training.dataset import (
     CONTAINER,
@@ -205,19 +197,14 @@ def test_labels_unfold(cubes: Placements) -> None:
     """Label → folded → unfolded is the label, by the maps that the solver uses."""
     sat = dataset.query(cubes)
     results = {how: dataset.fold(cubes, how) for how in (OCTANT, FEATURES)}
-    fold = np.empty(FOLD_SIZE)
-    for row in range(0, len(cubes), 97):
-        for how, result in results.items():
-            if how == OCTANT:
-                fold_octant(sat.offset[row], sat.turn[row], fold)
-            else:
-                fold_features(sat.offset[row], sat.turn[row], sat.axis[row], sat.normal[row], fold)
-            for found, label in ((result.point, cubes.point), (result.normal, cubes.normal)):
-                assert unfold(fold, *found[row]) == pytest.approx(label[row], abs=1e-15)
-                assert folded(fold, *label[row]) == pytest.approx(found[row], abs=1e-15)
-            np.testing.assert_array_equal(fold[OFFSET:OFFSET + 3], result.inputs[row, :3])
-            turn = rotation_matrix(pose_of(result.inputs[row:row + 1])[0, 3:])
-            np.testing.assert_allclose(fold[TURN:TURN + 9], turn.ravel(), atol=1e-12)
+    for how, result in results.items():
+        folds = fold(how, sat.offset_a, sat.rotation, axis=sat.axis, normal=sat.normal)
+        for found, label in ((result.point, cubes.point), (result.normal, cubes.normal)):
+            np.testing.assert_allclose(folds.unfolded(found), label, rtol=0, atol=1e-15)
+            np.testing.assert_allclose(folds.folded(label), found, rtol=0, atol=1e-15)
+        np.testing.assert_array_equal(folds.offset, result.inputs[:, :3])
+        turn = rotation_matrix(pose_of(result.inputs)[:, 3:])
+        np.testing.assert_allclose(folds.rotation, turn, atol=1e-12)
 
 
 # --- subsets --------------------------------------------------------------------------------------

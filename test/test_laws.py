@@ -64,6 +64,17 @@ def test_swap(pairs):
     assert np.all(error[deep] <= 2 * point_bound(one, size)[deep])
 
 
+@pytest.mark.parametrize('kind', ['near_parallel_pairs', 'flush_pairs', 'equal_thickness'])
+def test_swap_moves_the_point_by_roundings(kind):
+    """Faces in one plane are told apart by moving those of one box, whichever is called A."""
+    a, b, size_a, size_b = getattr(poses, kind)(np.random.default_rng(15), 20_000)
+    one, two = solve(a, b, size_a, size_b), solve(b, a, size_b, size_a)
+    rows = np.abs(one.normal + two.normal).max(axis=1) < 1e-9
+    assert rows.mean() > 0.3
+    off = np.abs(one.point - two.point).max(axis=1)
+    assert np.all(off[rows] <= 0.01 * point_bound(one, largest(size_a, size_b))[rows])
+
+
 def test_swap_of_concentric_boxes():
     """No offset says which box comes first: their sizes do, or their axes."""
     rng = np.random.default_rng(12)

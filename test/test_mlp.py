@@ -8,15 +8,23 @@ import poses
 import pytest
 
 from box_contact_ros import ContactSolver
-from box_contact_ros.block import LANES
-from box_contact_ros.mlp import ASPECT_MAX, DEPTH_MAX, RATIO_MAX
+from box_contact_ros.core import (
+    ASPECT_MAX,
+    DEPTH_FLOOR,
+    DEPTH_MAX,
+    FEATURES,
+    OUTPUTS,
+    SIZE_RATIO_MAX,
+    native,
+)
+from box_contact_ros.mlp import ACTIVATION, DESCRIPTION, UNITS_MAX
 from box_contact_ros.network import WeightsError, save_weights
-from box_contact_ros.overlap import DEPTH_FLOOR
 from box_contact_ros.posesets import SETS, Pairs, log_uniform, quaternion_multiply, turns
 from box_contact_ros.report.accuracy import LIMITS
-from box_contact_ros.sites import ACTIVATION, DESCRIPTION, INPUTS, OUTPUTS, UNITS_MAX
 
 N = 10_000
+LANES = native.lanes
+"""Rows of a batch that are solved side by side."""
 UNIT = (1.0, 1.0, 1.0)
 EXACT = ContactSolver(UNIT, UNIT, model='exact')
 
@@ -83,7 +91,7 @@ def in_range(pairs, found):
                         pairs.size_b.max(axis=1) / pairs.size_b.min(axis=1))
     ratio = largest(pairs) / edge(pairs)
     shortest = np.minimum(pairs.size_a.min(axis=1), pairs.size_b.min(axis=1))
-    return ((aspect <= ASPECT_MAX * (1 + 1e-9)) & (ratio <= RATIO_MAX * (1 + 1e-9))
+    return ((aspect <= ASPECT_MAX * (1 + 1e-9)) & (ratio <= SIZE_RATIO_MAX * (1 + 1e-9))
             & (-found.separation <= DEPTH_MAX * (1 + 1e-9) * shortest))
 
 
@@ -122,7 +130,7 @@ def test_verdict_separation_and_normal_are_those_of_exact(mlp, pairs):
 
 def garbage(rng, kind):
     """(weight, bias) of two layers that were not trained."""
-    widths = (INPUTS, 32, OUTPUTS)
+    widths = (FEATURES, 32, OUTPUTS)
     layers = []
     for number, (inputs, outputs) in enumerate(zip(widths, widths[1:])):
         weight, bias = rng.normal(size=(outputs, inputs)), rng.normal(size=outputs)
@@ -147,7 +155,7 @@ def card_of(widths: tuple[int, ...]) -> dict[str, Any]:
 
 def written(path, layers):
     """The weights file of these layers."""
-    save_weights(path, {'point': layers}, card_of((INPUTS, 32, OUTPUTS)))
+    save_weights(path, {'point': layers}, card_of((FEATURES, 32, OUTPUTS)))
     return str(path)
 
 
@@ -180,7 +188,7 @@ def test_points_of_an_aligned_stack_are_inside(mlp):
     """Two containers exactly above each other, turned anywhere.
 
     All their sides lie in pairs of one plane, and rounding put the edges of each outside the other:
-    no outline, a point 6 m off.
+    no bounds, and a point 6 m off.
     """
     rng = np.random.default_rng(8)
     n = 5000
@@ -233,7 +241,7 @@ def test_the_sets_are_inside_the_range(name):
 
 @pytest.mark.parametrize('what, size_a, size_b, depth', [
     ('aspect', (ASPECT_MAX, 1, 1), (ASPECT_MAX, 1, 1), 0.01),
-    ('ratio', (RATIO_MAX,) * 3, UNIT, 0.01),
+    ('ratio', (SIZE_RATIO_MAX,) * 3, UNIT, 0.01),
     ('depth', UNIT, UNIT, DEPTH_MAX)])
 def test_the_limits_belong_to_the_range(what, size_a, size_b, depth):
     """At the limit itself the network answers; a little beyond, `exact`. Single calls count too."""
@@ -269,7 +277,7 @@ def test_batch_equals_single_calls(mlp, pairs):
 @pytest.mark.parametrize('count', [1, 2, LANES - 1, LANES, LANES + 1, 2 * LANES + 2])
 @pytest.mark.parametrize('first', [0, 5])
 def test_a_row_does_not_know_its_neighbours(mlp, count, first):
-    """Blocks that are not full, and rows at other places of a block: the same bits."""
+    """Vectors that are not full, and rows in other lanes: the same bits."""
     pairs = Pairs(*poses.near_parallel_pairs(np.random.default_rng(6), 200))
     all_rows = solve(mlp, pairs)
     some = solve(mlp, Pairs(*(part[first:first + count] for part in pairs)))
@@ -278,12 +286,12 @@ def test_a_row_does_not_know_its_neighbours(mlp, count, first):
 
 
 def test_rows_apart_refused_or_out_of_range_do_not_disturb_neighbours(mlp):
-    """Within one block, contacts between rows of all other kinds keep their bits.
+    """Side by side, contacts between rows of all other kinds keep their bits.
 
     A refused row raises, and the next call is right again.
     """
     rng = np.random.default_rng(7)
-    pairs = SETS['random sizes'](rng, LANES)
+    pairs = SETS['random sizes'](rng, 32)
     clean = solve(mlp, pairs)
     mixed = Pairs(*(part.copy() for part in pairs))
     mixed.pose_b[1::4, :3] += 1e3                       # far apart
@@ -493,9 +501,9 @@ def test_missing_weights_name_the_model_that_needs_none(monkeypatch):
 
 
 @pytest.mark.parametrize('hidden', [(), (8, 8), (UNITS_MAX + 1,)])
-def test_layers_that_the_kernels_do_not_have_are_refused(tmp_path, hidden):
+def test_layers_that_the_core_does_not_have_are_refused(tmp_path, hidden):
     """None or two hidden layers, or too many units."""
-    widths = (INPUTS, *hidden, OUTPUTS)
+    widths = (FEATURES, *hidden, OUTPUTS)
     layers = [(np.zeros((b, a)), np.zeros(b)) for a, b in zip(widths, widths[1:])]
     path = tmp_path / 'other.safetensors'
     save_weights(path, {'point': layers}, card_of(widths))
@@ -509,7 +517,7 @@ def test_layers_that_the_kernels_do_not_have_are_refused(tmp_path, hidden):
     ({'activation': None}, "units are 'relu', not None")])
 def test_weights_with_another_meaning_are_refused(tmp_path, change, words):
     """They would be taken without complaint, and answer nonsense."""
-    widths = (INPUTS, 4, OUTPUTS)
+    widths = (FEATURES, 4, OUTPUTS)
     layers = [(np.zeros((b, a)), np.zeros(b)) for a, b in zip(widths, widths[1:])]
     path = tmp_path / 'other.safetensors'
     save_weights(path, {'point': layers}, card_of(widths))
@@ -526,7 +534,7 @@ def test_weights_of_another_model_are_refused(tmp_path):
     card = {'name': 'other', 'model': 'other', 'inputs': {}, 'outputs': [], 'sizes': [],
             'architecture': [6, 4], 'data': {}, 'seed': 0, 'commit': '', 'metrics': {}}
     save_weights(path, {'point': [(rng.normal(size=(4, 6)), rng.normal(size=4))]}, card)
-    with pytest.raises(WeightsError, match=f'{INPUTS} inputs and {OUTPUTS}'):
+    with pytest.raises(WeightsError, match=f'{FEATURES} inputs and {OUTPUTS}'):
         ContactSolver(UNIT, UNIT, model='mlp', weights=str(path))
 
 

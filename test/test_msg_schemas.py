@@ -28,9 +28,9 @@ from rclpy.qos import (
 from ros_client import Client, serving
 from sensor_msgs.msg import PointField
 
+from box_contact_ros.core import LENGTH_MAX, QUATERNION_MAX
 from box_contact_ros.nodes.contact import PARAMETERS, ContactNode
 from box_contact_ros.nodes.messages import make_cloud, make_header, read_cloud
-from box_contact_ros.pose import LENGTH_MAX, QUATERNION_MAX
 from box_contact_ros.resources import resource_path
 from box_contact_ros.scene import Answer, Pair
 

@@ -9,10 +9,10 @@ import pytest
 from safetensors.numpy import load_file, save_file
 
 from box_contact_ros import ContactSolver
+from box_contact_ros.baselines.paper import _networks
 from box_contact_ros.network import (
     CARD_FIELDS,
     WeightsError,
-    forward,
     load_weights,
     save_weights,
     tensors_digest,
@@ -88,10 +88,18 @@ def test_forward_is_the_formula(good: Path) -> None:
         if number < 2:
             value = np.tanh(value)
     np.testing.assert_allclose(predict(network, inputs), value, rtol=0, atol=1e-5)
-    activation = np.zeros((2, 6), dtype=np.float32)
-    activation[0] = inputs[0]
-    row = forward(network.packed, np.array(WIDTHS), activation)
-    np.testing.assert_allclose(activation[row, :4], value[0], rtol=0, atol=1e-5)
+    one = _networks.forward(network.packed, np.array(WIDTHS), inputs[:1].astype(np.float32))
+    np.testing.assert_allclose(one[0], value[0], rtol=0, atol=1e-5)
+
+
+@pytest.mark.parametrize('widths', [[], [6], [6, 5, 4], [6, 5, 3, 5], [6, 0, 4], [6, -5, 3, 4],
+                                    [2**62, 4, 1], [5, 6, 3, 4]])
+def test_widths_that_do_not_fit(good: Path, widths: list[int]) -> None:
+    """No number beyond the parameters is read."""
+    network = load_weights(good).networks['n']
+    with pytest.raises(ValueError, match='do not fit|wrong shape'):
+        _networks.forward(network.packed, np.array(widths, dtype=np.int64),
+                          np.zeros((1, 6), dtype=np.float32))
 
 
 @pytest.mark.parametrize('share', [0.0, 0.02, 0.5, 0.999])

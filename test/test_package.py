@@ -313,8 +313,17 @@ def test_program_names_under_colcon_and_pip(env: dict[str, str], prefix: str) ->
     )
 
 
+def test_a_build_without_a_compiler_names_it() -> None:
+    """One line at the end says what is missing, and how it is installed."""
+    done = _run('setup.py', 'build_ext', CXX='/no/such/compiler -O3')
+    assert done.returncode == 1
+    assert done.stderr.splitlines()[-1] == (
+        'error: box_contact_ros needs a C++17 compiler, and /no/such/compiler is not here '
+        '(Debian, Ubuntu: apt install g++)')
+
+
 def test_import_stays_small() -> None:
-    """The core is for everybody: no ROS, no PyTorch, no FCL, no MuJoCo comes with it."""
+    """The core is for everybody: no ROS, PyTorch, FCL, MuJoCo or Numba comes with it."""
     done = _run(
         '-c',
         'import sys, box_contact_ros\n'
@@ -322,4 +331,4 @@ def test_import_stays_small() -> None:
     )
     assert done.returncode == 0, done.stderr
     assert 'box_contact_ros' in done.stdout.split()
-    assert not {'rclpy', 'torch', 'fcl', 'mujoco', 'matplotlib'} & set(done.stdout.split())
+    assert not {'rclpy', 'torch', 'fcl', 'mujoco', 'matplotlib', 'numba'} & set(done.stdout.split())

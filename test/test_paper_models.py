@@ -9,16 +9,8 @@ from box_contact_ros import ContactSolver
 from box_contact_ros.network import WeightsError
 from box_contact_ros.pose import rotation_matrix
 from box_contact_ros.resources import resource_path
-from box_contact_ros.symmetry import (
-    EDGE_EDGE,
-    FOLD_SIZE,
-    VERTEX_FACE,
-    euler_angles,
-    fold_features,
-    fold_octant,
-    folded,
-    unfold,
-)
+from box_contact_ros.symmetry import EDGE_EDGE, FEATURES, NO_FOLD, OCTANT, VERTEX_FACE, fold
+from box_contact_ros.training import dataset
 
 EDGE = 2.0
 MODELS = {'paper': (poses.CUBE, 0.6, 12.0), 'paper-continuous': (poses.CUBE, 0.008, 0.15),
@@ -82,6 +74,38 @@ def test_contracts(name):
         one = solver(a[i], b[i])
         assert np.array_equal(one.point, found.point[i], equal_nan=True)
         assert np.array_equal(one.normal, found.normal[i], equal_nan=True)
+
+
+@pytest.mark.parametrize('name', MODELS)
+def test_point_is_in_the_middle_of_the_depth(name):
+    """|point(δ) − (point(0) − δ/2 · normal)| ≤ 1e-4 of the size, where B has moved by −δ · normal.
+
+    The networks know touching boxes only, so the depth δ changes neither the normal nor the rest.
+    """
+    solver, exact, size = make(name)
+    a, b = touching(np.array(size), n=2000, depth=1e-9)
+    deep, delta = b.copy(), 0.05
+    before = exact.batch(a, b)
+    deep[:, :3] -= delta * before.normal
+    after = exact.batch(a, deep)
+    same = np.sum(before.normal * after.normal, axis=1) > 1 - 1e-12  # no other axis has won
+    assert same.mean() > 0.9
+    first, second = solver.batch(a, b), solver.batch(a, deep)
+    error = np.linalg.norm(second.point - (first.point - 0.5 * delta * before.normal), axis=1)
+    # A fold may choose the other side when an offset or an angle is zero but for rounding.
+    assert np.quantile(error[same], 0.99) < 1e-4 * max(size)
+    assert np.quantile(np.linalg.norm(second.normal - first.normal, axis=1)[same], 0.99) < 1e-4
+
+
+@pytest.mark.parametrize('name', MODELS)
+def test_the_first_refused_row_is_named(name):
+    """And other rows do not matter."""
+    solver, _, size = make(name)
+    a, b = touching(np.array(size), n=6, depth=0.05)
+    b[2, 3:] = 0.0
+    a[4, 0] = np.nan
+    with pytest.raises(ValueError, match=r'poses_b\[2\] quaternion .* has zero length'):
+        solver.batch(a, b)
 
 
 @pytest.mark.parametrize('name', MODELS)
@@ -155,19 +179,27 @@ def rotations(n, seed=2):
     return rng, rng.normal(size=(n, 3)), rotation_matrix(poses.unit_quaternions(rng, n))
 
 
+def assert_proper(folds, offsets, turns):
+    """The offset M t and the rotation M R Nᵀ are a pair of the same boxes, with its angles."""
+    assert np.abs(np.linalg.det(folds.rotation) - 1).max() < 1e-12
+    assert np.abs(folds.angles).max() <= np.pi / 2
+    assert np.array_equal(folds.folded(offsets), folds.offset)
+    assert np.array_equal(folds.map_first @ turns @ np.swapaxes(folds.map_second, 1, 2),
+                          folds.rotation)
+    assert np.allclose(folds.unfolded(folds.folded(offsets)), offsets)
+    assert np.allclose(rotation_matrix(dataset.quaternion_from_euler(folds.angles)),
+                       folds.rotation)
+
+
 def test_fold_octant_reaches_the_domain():
-    """The fold has t' ≥ 0, R' proper with angles in [−π/2, π/2], and unfold undoes it."""
-    rng, offsets, turns = rotations(2000)
-    fold = np.zeros(FOLD_SIZE)
-    for t, r in zip(offsets, turns):
-        fold_octant(t, r.ravel(), fold)
-        turned = fold[21:30].reshape(3, 3)
-        assert np.all(fold[18:21] >= 0)
-        assert abs(np.linalg.det(turned) - 1) < 1e-12
-        assert np.abs(euler_angles(fold)).max() <= np.pi / 2
-        assert np.allclose(np.abs(fold[18:21]), np.abs(t))
-        assert np.allclose(unfold(fold, *folded(fold, *t)), t)
-        assert np.allclose(np.abs(turned), np.abs(r))
+    """The fold has t' ≥ 0, R' proper with angles in [−π/2, π/2], and unfolding undoes it."""
+    _, offsets, turns = rotations(2000)
+    folds = fold(OCTANT, offsets, turns, axis=np.zeros(2000), normal=offsets)
+    assert np.all(folds.offset >= 0)
+    assert_proper(folds, offsets, turns)
+    assert np.allclose(np.abs(folds.offset), np.abs(offsets))
+    assert np.allclose(np.abs(folds.rotation), np.abs(turns))
+    assert np.all(folds.subset == -1)
 
 
 @pytest.mark.parametrize('axis', [0, 1, 2, *range(6, 15)])
@@ -177,25 +209,52 @@ def test_fold_features_reaches_the_reference_features(axis):
     Or the edges become those of z at (+, +) and y at (−, −); angles stay within ±π/2.
     """
     rng, offsets, turns = rotations(500)
-    fold = np.zeros(FOLD_SIZE)
-    for t, r in zip(offsets, turns):
-        if axis < 3:
-            n = np.eye(3)[axis]
-        else:
-            n = np.cross(np.eye(3)[(axis - 6) // 3], r[:, (axis - 6) % 3])
-            n /= np.linalg.norm(n)
-        n = n * rng.choice([-1.0, 1.0])
-        subset = fold_features(t, r.ravel(), axis, n, fold)
-        turned = fold[21:30].reshape(3, 3)
-        normal = np.array(folded(fold, *n))
-        on_b = turned.T @ normal
-        assert abs(np.linalg.det(turned) - 1) < 1e-12
-        assert np.abs(euler_angles(fold)).max() <= np.pi / 2
-        if axis < 3:
-            assert subset == VERTEX_FACE
-            assert np.allclose(normal, (1, 0, 0))
-            assert np.all(on_b >= 0)
-        else:
-            assert subset == EDGE_EDGE
-            assert abs(normal[2]) < 1e-12 and normal[0] >= normal[1] >= -1e-12
-            assert abs(on_b[1]) < 1e-12 and on_b[0] >= on_b[2] >= -1e-12
+    if axis < 3:
+        n = np.tile(np.eye(3)[axis], (500, 1))
+    else:
+        n = np.cross(np.eye(3)[(axis - 6) // 3], turns[:, :, (axis - 6) % 3])
+        n /= np.linalg.norm(n, axis=1, keepdims=True)
+    n *= rng.choice([-1.0, 1.0], (500, 1))
+    folds = fold(FEATURES, offsets, turns, axis=np.full(500, axis), normal=n)
+    assert_proper(folds, offsets, turns)
+    normal = folds.folded(n)
+    on_b = np.einsum('nji,nj->ni', folds.rotation, normal)
+    if axis < 3:
+        assert np.all(folds.subset == VERTEX_FACE)
+        assert np.allclose(normal, (1, 0, 0))
+        assert np.all(on_b >= 0)
+    else:
+        assert np.all(folds.subset == EDGE_EDGE)
+        assert np.abs(normal[:, 2]).max() < 1e-12
+        assert np.all((normal[:, 0] >= normal[:, 1]) & (normal[:, 1] >= -1e-12))
+        assert np.abs(on_b[:, 1]).max() < 1e-12
+        assert np.all((on_b[:, 0] >= on_b[:, 2]) & (on_b[:, 2] >= -1e-12))
+
+
+@pytest.mark.parametrize('axis', [0, 1, 2])
+def test_equally_steep_edges_keep_their_order(axis):
+    """Aligned cubes: the edge along the normal comes first, the two level ones after it."""
+    n = np.eye(3)[[axis]]
+    folds = fold(FEATURES, n, np.eye(3)[None], axis=np.array([axis]), normal=n)
+    order = [axis, *(k for k in range(3) if k != axis)]
+    assert np.array_equal(np.abs(folds.map_second[0]), np.eye(3)[order])
+
+
+@pytest.mark.parametrize('axis', [-1, 3, 5, 15])
+def test_axes_without_reference_features(axis):
+    """FEATURES refuses them; other ways read no axis."""
+    _, offsets, turns = rotations(3)
+    axes = np.array([0, 6, axis])
+    with pytest.raises(ValueError, match=r'axis\[2\] is no face of the first box'):
+        fold(FEATURES, offsets, turns, axis=axes, normal=offsets)
+    untouched = fold(NO_FOLD, offsets, turns, axis=axes, normal=offsets)
+    assert np.array_equal(untouched.offset, offsets)
+    assert np.array_equal(untouched.rotation, turns)
+
+
+def test_arrays_that_do_not_fit_are_refused():
+    _, offsets, turns = rotations(3)
+    with pytest.raises(ValueError, match='rotation has the wrong shape'):
+        fold(OCTANT, offsets, turns[:2], axis=np.zeros(3), normal=offsets)
+    with pytest.raises(ValueError, match='NO_FOLD, OCTANT or FEATURES'):
+        fold(3, offsets, turns, axis=np.zeros(3), normal=offsets)

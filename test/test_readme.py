@@ -147,7 +147,8 @@ def rviz(words: list[str], **_) -> None:
 def apt(words: list[str], **_) -> None:
     """Packages that package.xml depends on."""
     manifest = ElementTree.parse(ROOT / 'package.xml')
-    assert set(words[3:]) <= {entry.text for entry in manifest.findall('exec_depend')}
+    assert set(words[3:]) <= {entry.text for kind in ('build_depend', 'exec_depend')
+                              for entry in manifest.findall(kind)}
 
 
 def launch(words: list[str], **_) -> None:

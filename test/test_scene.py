@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.checks import SHOWN
-from box_contact_ros.scene import Box, Pair, Scene, SceneSolver, _near_pairs, two_boxes
+from box_contact_ros.core import native
+from box_contact_ros.scene import Box, Pair, Scene, SceneSolver, two_boxes
 from box_contact_ros.scene_file import SceneError, parse_scene, read_scene
 from box_contact_ros.stability import families
 
@@ -92,13 +93,14 @@ def test_no_touching_pair_is_left_out():
         cases = entry.pairs
         n = len(cases.pose_a)
         where = np.empty((2 * n, 7))
-        half = np.empty((2 * n, 3))
+        size = np.empty((2 * n, 3))
         where[0::2], where[1::2] = cases.pose_a, cases.pose_b
-        half[0::2], half[1::2] = 0.5 * cases.size_a, 0.5 * cases.size_b
+        size[0::2], size[1::2] = cases.size_a, cases.size_b
         near, unknown = np.empty((2, n), dtype=np.int64)
-        count, none = _near_pairs(where, half, np.arange(2 * n), np.empty((2 * n, 3)),
-                                  np.empty((2 * n, 3)), np.ones(2 * n, dtype=bool),
-                                  np.arange(0, 2 * n, 2), np.arange(1, 2 * n, 2), near, unknown)
+        count, none = native.near_pairs(
+            where, size, np.arange(2 * n), np.empty((2 * n, 3)), np.empty((2 * n, 3)),
+            np.ones(2 * n, dtype=bool), np.arange(0, 2 * n, 2), np.arange(1, 2 * n, 2), near,
+            unknown)
         found = ContactSolver((1, 1, 1), (1, 1, 1), model='exact').batch(
             cases.pose_a, cases.pose_b, size_a=cases.size_a, size_b=cases.size_b)
         assert none == 0

@@ -16,7 +16,7 @@ import pytest
 torch = pytest.importorskip('torch')
 pytest.importorskip('matplotlib')
 
-from box_contact_ros.training import mlp, halving, search  # noqa: E402
+from box_contact_ros.training import halving, mlp, search  # noqa: E402
 from box_contact_ros.training.halving import Candidate, CheckpointError, Rung  # noqa: E402
 
 QUICK = ['--quick', '--candidates', '48', '--seed', '2', '--device', 'cpu']

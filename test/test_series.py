@@ -16,8 +16,8 @@ import pytest
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.contact import Contacts
+from box_contact_ros.core import DEPTH_FLOOR
 from box_contact_ros.network import Network, load_weights
-from box_contact_ros.overlap import DEPTH_FLOOR
 from box_contact_ros.posesets import SETS, Pairs, log_uniform, pressed, quaternion_multiply, turns
 from box_contact_ros.resources import resource_path
 from box_contact_ros.stability.choices import solve_with_choices
@@ -378,5 +378,5 @@ def test_a_batch_with_a_bad_pose_is_refused():
     """No choices of a pair that is none."""
     pairs = SETS['random cubes'](np.random.default_rng(4), 10)
     pairs.pose_b[3, 0] = np.nan
-    with pytest.raises(ValueError, match='1 of the pairs from row 0 on'):
+    with pytest.raises(ValueError, match='row 3 is refused'):
         solve_with_choices(NETWORK, pairs)

@@ -12,8 +12,6 @@ import pytest
 pytest.importorskip('fcl')
 
 from box_contact_ros import ContactSolver, soup  # noqa: E402
-from box_contact_ros.block import OK  # noqa: E402
-from box_contact_ros.contact import Contacts  # noqa: E402
 
 IDENTITY = poses.IDENTITY
 EXACT = ContactSolver(poses.CUBE, poses.CUBE, model='exact')
@@ -229,16 +227,15 @@ def test_batch_is_row_by_row_with_sizes_of_their_own():
 
 
 def test_refused_rows_are_not_answered():
-    """A bad row in a batch keeps its status and costs no other row its answer."""
+    """The first bad row of a batch is named, and the soup is not asked for any row."""
     model = soup.Soup(2)
     a = np.tile(IDENTITY, (3, 1))
     b = np.tile([0.5, 0.25, 1.9, 0, 0, 0, 1], (3, 1))
     b[1, 0] = np.nan
-    found = Contacts(np.empty(3, dtype=np.bool_), np.empty(3), np.empty((3, 3)), np.empty((3, 3)))
-    status = np.zeros(3, dtype=np.int8)
     size = np.array([poses.CUBE])
-    assert model.solve(a, b, size, size, status, found) == 1
-    assert status[1] != OK and found.colliding.tolist() == [True, False, True]
+    found, refused = model.solve(a, b, size, size)
+    assert refused == 1
+    assert found.colliding.tolist() == [True, False, True] and model.soup_misses == 0
 
 
 @pytest.mark.parametrize('name, divisions', [('soup', 8), ('soup-1', 1), ('soup-16', 16)])

@@ -1,6 +1,7 @@
 """Training of the MLP for all boxes, and for a scene's; how a solver uses the latter."""
 from __future__ import annotations
 
+import dataclasses
 import re
 from pathlib import Path
 
@@ -10,10 +11,18 @@ import pytest
 torch = pytest.importorskip('torch')
 
 from box_contact_ros import ContactSolver  # noqa: E402
-from box_contact_ros.network import WeightsError, load_weights, save_weights, unpacked  # noqa: E402
+from box_contact_ros.core import stages  # noqa: E402
+from box_contact_ros.mlp import UNITS_MAX, core_numbers  # noqa: E402
+from box_contact_ros.network import (  # noqa: E402
+    Network,
+    WeightsError,
+    load_weights,
+    save_weights,
+    unpacked,
+)
 from box_contact_ros.posesets import Pairs, containers, cubes, size_pairs, tilted  # noqa: E402
-from box_contact_ros.sites import UNITS_MAX  # noqa: E402
-from box_contact_ros.training import mlp, contacts, points, scene, train  # noqa: E402
+from box_contact_ros.training import contacts, mlp, points, scene, train  # noqa: E402
+from box_contact_ros.training.contacts import MlpSamples  # noqa: E402
 
 SCENE = """\
 boxes:
@@ -35,19 +44,19 @@ def error_of(pairs: Pairs, weights: Path) -> float:
 
 
 @pytest.fixture(scope='module')
-def data() -> contacts.Contacts:
-    return contacts.contacts(contacts.mixture, [5], 6000)
+def data() -> MlpSamples:
+    return contacts.draw_samples(contacts.mixture, [5], 6000)
 
 
 # --- the fit --------------------------------------------------------------------------------------
 
 
-def test_gradients_are_the_derivatives(data: contacts.Contacts) -> None:
+def test_gradients_are_the_derivatives(data: MlpSamples) -> None:
     """One step of Adam's first moment is a tenth of the gradient: against autograd of the loss.
 
     To the rounding of float32.
     """
-    fit = points.Fit(data, points.Settings(hidden=[(6, 5)], steps=10, batch=len(data.inputs)))
+    fit = points.Fit(data, points.Settings(hidden=[(6, 5)], steps=10, batch=len(data)))
     before = [p.clone().requires_grad_() for p in fit.parameters]
     value = fit.inputs.clone()
     for layer in range(3):
@@ -66,16 +75,23 @@ def test_gradients_are_the_derivatives(data: contacts.Contacts) -> None:
         torch.testing.assert_close(10.0 * moment, parameter.grad, rtol=1e-3, atol=1e-3 * largest)
 
 
-def test_the_activation_is_the_kernels() -> None:
-    """`points.relu` beside `sites.relu`, from −6 to 6."""
-    from box_contact_ros.sites import relu
+def test_the_network_is_the_cores() -> None:
+    """What is trained beside core/mlp.hpp, with hidden units on both sides of zero."""
+    pairs = size_pairs(np.random.default_rng(6), 1000)
+    widths = (12, 8, 3)
+    layers = points.drawn(np.random.default_rng(1), widths)
+    network = Network('point', widths, np.concatenate([part.ravel() for layer in layers
+                                                       for part in layer]))
+    core = stages(*pairs, names=('features', 'vectors', 'answer'), network=core_numbers(network))
+    (first, bias), (last, last_bias) = (map(torch.tensor, layer) for layer in layers)
+    sums = torch.tensor(core.features).reshape(-1, 12) @ first.T + bias
+    assert 0.2 < float((sums > 0.0).float().mean()) < 0.8
+    outputs = (points.relu(sums) @ last.T + last_bias)[None]
+    found = points.Fit.answers(outputs, torch.tensor(core.vectors))[0].numpy()
+    np.testing.assert_allclose(found, core.answer, atol=1e-6)
 
-    x = np.linspace(-6.0, 6.0, 2001, dtype=np.float32)
-    found = points.relu(torch.tensor(x)).numpy()
-    np.testing.assert_allclose(found, [relu(value) for value in x], atol=1e-6)
 
-
-def test_a_narrow_network_beside_a_wide_one_is_the_narrow_one(data: contacts.Contacts) -> None:
+def test_a_narrow_network_beside_a_wide_one_is_the_narrow_one(data: MlpSamples) -> None:
     """Units that only fill up the matrices stay at zero: trained alone, the network is the same."""
     start = [points.drawn(np.random.default_rng(k), (12, *hidden, 3))
              for k, hidden in enumerate([(8, 4), (12, 16)])]
@@ -93,13 +109,13 @@ def test_a_narrow_network_beside_a_wide_one_is_the_narrow_one(data: contacts.Con
     np.testing.assert_allclose(alone.point_errors(data)[0], both.point_errors(data)[0], atol=1e-5)
 
 
-def test_normalisation_is_folded_in_and_out(data: contacts.Contacts) -> None:
+def test_normalisation_is_folded_in_and_out(data: MlpSamples) -> None:
     """`folded` serves raw inputs, and `unfolded` undoes it."""
-    mean, deviation = points.normalisation(data.inputs)
+    mean, deviation = points.normalisation(data.features)
     layers = points.drawn(np.random.default_rng(0), (12, 8, 8, 3))
     weight, bias = points.folded(layers, mean, deviation)[0]
-    np.testing.assert_allclose(data.inputs @ weight.T + bias,
-                               (data.inputs - mean) / deviation @ layers[0][0].T + layers[0][1],
+    np.testing.assert_allclose(data.features @ weight.T + bias,
+                               (data.features - mean) / deviation @ layers[0][0].T + layers[0][1],
                                atol=1e-3)
     again = points.unfolded(points.folded(layers, mean, deviation), mean, deviation)
     for one, other in zip(layers, again):
@@ -107,7 +123,7 @@ def test_normalisation_is_folded_in_and_out(data: contacts.Contacts) -> None:
             np.testing.assert_allclose(a, b, rtol=1e-5, atol=1e-5)
 
 
-def test_errors_while_training_are_the_solvers(data: contacts.Contacts, tmp_path: Path) -> None:
+def test_errors_while_training_are_the_solvers(data: MlpSamples, tmp_path: Path) -> None:
     """`Fit.point_errors` beside the written file behind `ContactSolver`."""
     fit = points.Fit(data, points.Settings(hidden=[(8,)], steps=200, batch=1024))
     fit.run(200)
@@ -129,18 +145,19 @@ def test_description_does_not_depend_on_the_block(count: int) -> None:
     pairs = tilted(np.random.default_rng(1), 200)
     whole = contacts.describe(pairs)
     part = contacts.describe(Pairs(*(column[:count] for column in pairs)))
-    for one, other in zip(part, whole):
-        np.testing.assert_array_equal(one, other[:count])
+    for field in dataclasses.fields(MlpSamples):
+        np.testing.assert_array_equal(getattr(part, field.name),
+                                      getattr(whole, field.name)[:count])
 
 
-def test_hard_contacts_are_those_with_the_largest_errors(data: contacts.Contacts) -> None:
+def test_hard_contacts_are_those_with_the_largest_errors(data: MlpSamples) -> None:
     fit = points.Fit(data, points.Settings(hidden=[(8,)], steps=1, batch=1024))
     hard = mlp._hardest(fit, data, 0.02)
     errors = fit.point_errors(data)[0]
-    assert len(hard.inputs) == round(0.02 * len(data.inputs))
-    assert fit.point_errors(hard)[0].min() >= np.sort(errors)[-len(hard.inputs)] - 1e-6
-    fit.feed(mlp._joined([data, hard]))
-    assert len(fit.inputs) == len(data.inputs) + len(hard.inputs)
+    assert len(hard) == round(0.02 * len(data))
+    assert fit.point_errors(hard)[0].min() >= np.sort(errors)[-len(hard)] - 1e-6
+    fit.feed(MlpSamples.joined([data, hard]))
+    assert len(fit.inputs) == len(data) + len(hard)
     np.testing.assert_allclose(fit.point_errors(data)[0], errors, atol=1e-6)
 
 
@@ -327,11 +344,11 @@ def test_sizes_of_the_scene_are_for_the_network(expert: Path, size_a, size_b) ->
     found = some.batch(*poses(200))
     assert found.colliding.any()
     some(*(pose[0] for pose in poses(1)))
-    exact_ones = some._solver.exact_answers
+    exact_ones = some.exact_answers
     general = solver(None, size_a, size_b)
     general.batch(*poses(200))
     general(*(pose[0] for pose in poses(1)))
-    assert exact_ones == general._solver.exact_answers  # those that are too deep
+    assert exact_ones == general.exact_answers  # those that are too deep
 
 
 @pytest.mark.parametrize(('size_a', 'size_b'), [
@@ -344,10 +361,10 @@ def test_other_sizes_are_answered_exactly_and_counted(expert: Path, size_a, size
     touching = int(right.colliding.sum())
     assert touching > 10
     np.testing.assert_array_equal(found.point, right.point)
-    assert some._solver.exact_answers == touching
+    assert some.exact_answers == touching
     row = int(np.flatnonzero(right.colliding)[0])
     np.testing.assert_allclose(some(a[row], b[row]).point, right.point[row], atol=1e-12)
-    assert some._solver.exact_answers == touching + 1
+    assert some.exact_answers == touching + 1
 
 
 def test_rows_of_all_kinds_in_one_batch(expert: Path) -> None:
@@ -365,7 +382,7 @@ def test_rows_of_all_kinds_in_one_batch(expert: Path) -> None:
     for whole, one, other in zip(found, by_network, exact):
         np.testing.assert_array_equal(whole[listed], one[listed])
         np.testing.assert_array_equal(whole[~listed], other[~listed])
-    assert some._solver.exact_answers >= exact.colliding[~listed].sum() > 0
+    assert some.exact_answers >= exact.colliding[~listed].sum() > 0
     size_b[4] = (1.0, -1.0, 1.0)
     with pytest.raises(ValueError, match=r'size_b\[4\]|size_b .*not positive'):
         some.batch(a, b, size_a=size_a, size_b=size_b)
@@ -376,10 +393,10 @@ def test_sizes_changed_in_place_are_looked_up_again(expert: Path) -> None:
     a, b = poses(1)
     some, size = solver(expert), np.array([CONTAINER])
     some.batch(a, b, size_a=size, size_b=size)
-    assert some._solver.exact_answers == 0
+    assert some.exact_answers == 0
     size[0, 2] = 2.7
     assert some.batch(a, b, size_a=size, size_b=size).colliding[0]
-    assert some._solver.exact_answers == 1
+    assert some.exact_answers == 1
 
 
 @pytest.mark.parametrize('sizes', [[1.0], [[[1, 1, 1]]], [[[1, 1, 1], [1, 1]]], 'all',

@@ -1,6 +1,6 @@
-"""The outline of A∩B (its bounding boxes, a point inside) against the corners of A∩B in 60 digits.
+"""The bounds of A∩B (a bounding box, a point inside) against the corners of A∩B in 60 digits.
 
-The oracle clips faces; the outline cuts edges. They share no code and no idea.
+The oracle clips faces; the core cuts edges. They share no code and no idea.
 """
 from __future__ import annotations
 
@@ -10,37 +10,13 @@ import oracle
 import poses
 import pytest
 
-from box_contact_ros.block import (
-    HALF,
-    HALF_A,
-    HALF_B,
-    HIGH_A,
-    HIGH_B,
-    IN_B,
-    INSIDE,
-    LANES,
-    LOW_A,
-    LOW_B,
-    MIDDLE,
-    NORMAL,
-    OFFSET_A,
-    OFFSET_B,
-    ROTATION,
-    SEPARATION,
-    SIZE,
-    TOUCH,
-    new_work,
-)
-from box_contact_ros.outline import outline_block
-from box_contact_ros.overlap import DEPTH_FLOOR, press
-from box_contact_ros.pose import load_block
-from box_contact_ros.sat import query_block
+from box_contact_ros.core import DEPTH_FLOOR, Stages, stages
 
 N = 64
-ALIKE = 0.2
-"""Share by which B's bounding box has to be smaller than A's to be chosen."""
+CLEARLY_SMALLER = 0.8
+"""Share of A's bounding box below which B's is chosen."""
 FLUSH = 2.0**-46
-"""By which the outline widens slabs, of the size: a point may be so far outside."""
+"""By which slabs are widened [of the size]: a point may be so far outside."""
 ROUNDING = 2.0**-48
 """Rounding of a corner's place, of the size."""
 
@@ -201,91 +177,108 @@ FAMILIES = {function.__name__: function for function in (
     identical_and_concentric, contained, corner_ties, eighth_turns, plates, small_on_large)}
 
 
-def outlines(a, b, size_a, size_b):
-    """A dict per pair that touches: what the kernels leave of it."""
-    work = new_work()
-    found = []
-    for start in range(0, len(a), LANES):
-        count = min(LANES, len(a) - start)
-        assert load_block(a, b, size_a, size_b, start, count, work) == 0
-        query_block(LANES, work)
-        touching = [i for i in range(count) if work[SEPARATION + i] <= work[TOUCH + i]]
-        for i in touching:
-            press(work, i)
-        outline_block(LANES, work)
-        for i in touching:
-            def rows(name, many, i=i):
-                return work[name + i:name + many * LANES:LANES].copy()
-
-            found.append({
-                'row': start + i, 'low_a': rows(LOW_A, 3), 'high_a': rows(HIGH_A, 3),
-                'low_b': rows(LOW_B, 3), 'high_b': rows(HIGH_B, 3), 'in_b': work[IN_B + i] > 0.5,
-                'middle': rows(MIDDLE, 3), 'half': rows(HALF, 3), 'inside': rows(INSIDE, 3),
-                'offset_a': rows(OFFSET_A, 3), 'offset_b': rows(OFFSET_B, 3),
-                'rotation': rows(ROTATION, 9).reshape(3, 3), 'normal': rows(NORMAL, 3),
-                'half_a': rows(HALF_A, 3), 'half_b': rows(HALF_B, 3), 'size': work[SIZE + i],
-                'separation': work[SEPARATION + i]})
-    return found
+def bounds_of(a, b, size_a, size_b):
+    """Return the stages of the pairs that touch, and the numbers of their rows."""
+    found = stages(a, b, size_a, size_b, names=(
+        'colliding', 'separation', 'normal', 'size', 'rotation', 'pressed_offset_a',
+        'pressed_offset_b', 'frame_b', 'bounds_middle', 'bounds_half', 'inside', 'other_axes',
+        'other_offset', 'other_half'))
+    rows = np.flatnonzero(found.colliding)
+    return Stages(*(values[rows] if len(values) else values for values in found)), rows
 
 
-def bound(outline):
+def accuracy(found, row):
     """Accuracy of the bounding box [m]: max(1e-9, 3e-14·size/depth)·size.
 
     A wedge of tilt θ is longer by FLUSH·size/θ where its slabs are wider by FLUSH·size, and its
     depth is θ·length.
     """
-    depth = max(-outline['separation'], DEPTH_FLOOR * outline['size'])
-    return max(1e-9, 3e-14 * outline['size'] / depth) * outline['size']
+    size = found.size[row]
+    depth = max(-found.separation[row], DEPTH_FLOOR * size)
+    return max(1e-9, 3e-14 * size / depth) * size
 
 
+def extremes(box, corners):
+    """Return the least and largest coordinates (3,) of points in a box's frame."""
+    local = np.array([[float(oracle.dot(e, oracle.add(p, box.centre, -1))) for e in box.axes]
+                      for p in corners])
+    return local.min(axis=0), local.max(axis=0)
+
+
+def swapped(a, b, size_a, size_b):
+    return b, a, size_b, size_a
+
+
+@pytest.mark.parametrize('order', [lambda *pair: pair, swapped], ids=['A B', 'B A'])
 @pytest.mark.parametrize('family', FAMILIES)
-def test_bounding_boxes_are_those_of_the_corners(family):
-    """In A's and in B's frame, to max(1e-9, 3e-14·size/depth) of the size."""
-    a, b, size_a, size_b = FAMILIES[family](np.random.default_rng(2027))
-    found = outlines(a, b, size_a, size_b)
-    assert len(found) > len(a) / 4
-    for outline in found:
-        row = outline['row']
+def test_bounding_boxes_are_those_of_the_corners(family, order):
+    """To max(1e-9, 3e-14·size/depth) of the size, in the frame that is chosen.
+
+    A's is chosen, unless B's has less than CLEARLY_SMALLER of its volume. So swapping A and B
+    brings in the frames that were not chosen, but for those of clearly larger volume.
+    """
+    a, b, size_a, size_b = order(*FAMILIES[family](np.random.default_rng(2027)))
+    found, rows = bounds_of(a, b, size_a, size_b)
+    assert len(rows) > len(a) / 4
+    for k, row in enumerate(rows):
         where = f'{family}[{row}]: {a[row].tolist()}, {b[row].tolist()}, ' \
                 f'{size_a[row].tolist()}, {size_b[row].tolist()}'
         box_a, box_b = oracle.make_box(a[row], size_a[row]), oracle.make_box(b[row], size_b[row])
-        # Pressed in along the very normal that the kernel took.
-        n = [mp.mpf(float(v)) for v in outline['normal']]
-        axis = tuple(sum(box_a.axes[k][c] * n[k] for k in range(3)) for c in range(3))
-        box_b = oracle.pressed(box_a, box_b, axis, -mp.mpf(float(outline['separation'])),
-                               mp.mpf(10)**-9 * mp.mpf(float(outline['size'])))
+        # Pressed in along the very normal that the core took.
+        n = [mp.mpf(float(v)) for v in found.normal[k]]
+        axis = tuple(sum(box_a.axes[j][c] * n[j] for j in range(3)) for c in range(3))
+        box_b = oracle.pressed(box_a, box_b, axis, -mp.mpf(float(found.separation[k])),
+                               mp.mpf(10)**-9 * mp.mpf(float(found.size[k])))
         corners = {p for face in oracle.overlap_faces(box_a, box_b) for p in face}
         assert corners, where
-        for box, low, high in ((box_a, 'low_a', 'high_a'), (box_b, 'low_b', 'high_b')):
-            local = np.array([[float(oracle.dot(e, oracle.add(p, box.centre, -1)))
-                               for e in box.axes] for p in corners])
-            assert np.abs(local.min(axis=0) - outline[low]).max() <= bound(outline), where
-            assert np.abs(local.max(axis=0) - outline[high]).max() <= bound(outline), where
+        both = [extremes(box, corners) for box in (box_a, box_b)]
+        low, high = both[int(found.frame_b[k])]
+        for mine, its in ((low, found.bounds_middle[k] - found.bounds_half[k]),
+                          (high, found.bounds_middle[k] + found.bounds_half[k])):
+            assert np.abs(mine - its).max() <= accuracy(found, k), where
+        volume_a, volume_b = (np.prod(above - below) for below, above in both)
+        if family == 'random_family' and abs(volume_b / volume_a - CLEARLY_SMALLER) > 1e-6:
+            assert found.frame_b[k] == (volume_b < CLEARLY_SMALLER * volume_a), where
+    if family == 'random_family':
+        assert 0.2 < found.frame_b.mean() < 0.8
 
 
 @pytest.mark.parametrize('family', FAMILIES)
 def test_the_point_inside_is_in_both_boxes(family):
-    """In its own frame within the bounding box, and in the other box to 2^-46 of the size."""
+    """In its own frame within the bounding box, and in each box to 2^-46 of the size."""
+    pairs = FAMILIES[family](np.random.default_rng(2028))
+    found, rows = bounds_of(*pairs)
+    frame_b = found.frame_b[:, None]
+    turned = np.einsum('nij,nj->ni', found.rotation, found.inside) + found.pressed_offset_a
+    back = np.einsum('nji,nj->ni', found.rotation, found.inside) - found.pressed_offset_b
+    in_a = np.where(frame_b, turned, found.inside)
+    in_b = np.where(frame_b, found.inside, back)
+    slack = ((FLUSH + 4 * ROUNDING) * found.size)[:, None]
+    assert np.all(np.abs(in_a) <= 0.5 * pairs[2][rows] + slack)
+    assert np.all(np.abs(in_b) <= 0.5 * pairs[3][rows] + slack)
+    assert np.all(np.abs(found.inside - found.bounds_middle) <= found.bounds_half + slack)
+
+
+@pytest.mark.parametrize('family', FAMILIES)
+def test_the_other_box_is_where_it_is(family):
+    """Its axes, its half extents and its place in the bounds' frame are those of the poses."""
     a, b, size_a, size_b = FAMILIES[family](np.random.default_rng(2028))
-    for o in outlines(a, b, size_a, size_b):
-        point = o['inside']
-        turn, shift = o['rotation'], o['offset_a']
-        in_a = turn @ point + shift if o['in_b'] else point
-        in_b = point if o['in_b'] else turn.T @ point - o['offset_b']
-        slack = (FLUSH + 4 * ROUNDING) * o['size']
-        assert np.all(np.abs(in_a) <= o['half_a'] + slack), (family, o['row'])
-        assert np.all(np.abs(in_b) <= o['half_b'] + slack), (family, o['row'])
-
-
-def test_the_clearly_smaller_bounding_box_is_chosen():
-    """By volume: A's, unless B's is smaller by ALIKE; both choices occur."""
-    found = outlines(*poses.random_pairs(np.random.default_rng(5), 4 * N))
-    assert 0.2 < np.mean([o['in_b'] for o in found]) < 0.8
-    for o in found:
-        volume_a = np.prod(o['high_a'] - o['low_a'])
-        volume_b = np.prod(o['high_b'] - o['low_b'])
-        if abs(volume_b / volume_a - (1.0 - ALIKE)) > 1e-9:
-            assert o['in_b'] == (volume_b < (1.0 - ALIKE) * volume_a)
+    found, rows = bounds_of(a, b, size_a, size_b)
+    axes = np.where(found.frame_b[:, None, None], found.rotation,
+                    np.swapaxes(found.rotation, 1, 2))
+    assert np.array_equal(found.other_axes, axes)
+    other = np.where(found.frame_b[:, None], size_a[rows], size_b[rows])
+    assert np.array_equal(found.other_half, 0.5 * other)
+    rounding = (64 * ROUNDING * found.size)[:, None]
+    centre = np.where(found.frame_b[:, None], -found.pressed_offset_b, found.pressed_offset_a)
+    offset = np.einsum('nij,nj->ni', axes, found.bounds_middle - centre)
+    assert np.all(np.abs(found.other_offset - offset) <= rounding)
+    # The same pair in the frame of A and in that of B.
+    there = np.einsum('nji,nj->ni', found.rotation, found.pressed_offset_a)
+    assert np.all(np.abs(there - found.pressed_offset_b) <= rounding)
+    pressed = np.maximum(0.0, DEPTH_FLOOR * found.size + found.separation)[:, None]
+    offset = stages(a[rows], b[rows], size_a[rows], size_b[rows], names=('offset_a',)).offset_a
+    assert np.all(np.abs(offset - pressed * found.normal - found.pressed_offset_a) <= rounding)
 
 
 def test_boxes_that_lie_on_each_other_keep_their_frame():
@@ -297,7 +290,8 @@ def test_boxes_that_lie_on_each_other_keep_their_frame():
     turns = poses.small_rotations(axes, rng.uniform(0, 0.01, n))
     a, b, size_a, size_b = sheared(rng, n, poses.CONTAINER, poses.CONTAINER, turns,
                                    np.full(n, 5e-3))
-    assert not any(o['in_b'] for o in outlines(a, b, size_a, size_b))
+    found, rows = bounds_of(a, b, size_a, size_b)
+    assert len(rows) == n and not found.frame_b.any()
 
 
 def test_an_aligned_stack_has_its_whole_patch():
@@ -312,8 +306,7 @@ def test_an_aligned_stack_has_its_whole_patch():
     turns = np.tile(poses.IDENTITY[3:], (n, 1))
     pairs = sheared(rng, n, poses.CONTAINER, poses.CONTAINER, turns, np.full(n, 1e-3))
     half = np.array([poses.CONTAINER[0] / 2, poses.CONTAINER[1] / 2, 0.5e-3])
-    found = outlines(*pairs)
-    assert len(found) == n
-    for o in found:
-        assert o['half'] == pytest.approx(half, abs=1e-12)
-        assert np.abs(o['inside'] - o['middle']).max() < 1e-9
+    found, rows = bounds_of(*pairs)
+    assert len(rows) == n
+    assert np.abs(found.bounds_half - half).max() <= 1e-12
+    assert np.abs(found.inside - found.bounds_middle).max() < 1e-9

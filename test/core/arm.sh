@@ -1,0 +1,38 @@
+#!/usr/bin/env bash
+# Compile the C++ test for aarch64, run it under qemu, and compare its answers with those of this
+# machine: the same bits of verdict, separation and normal.
+#
+# usage: arm.sh [PYTHON]     (a Python with NumPy; default: .venv/bin/python)
+# Needed: g++, and on Debian and Ubuntu `apt install g++-aarch64-linux-gnu qemu-user`.
+set -euo pipefail
+
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
+python=${1:-$root/.venv/bin/python}
+for program in g++ aarch64-linux-gnu-g++ qemu-aarch64 "$python"; do
+    command -v "$program" >/dev/null || {
+        echo "error: $program is not installed (apt install g++-aarch64-linux-gnu qemu-user)" >&2
+        exit 1
+    }
+done
+
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+mkdir "$work/include"
+ln -s "$root/box_contact_ros/core" "$work/include/box_contact"
+PYTHONPATH=$root/test "$python" -c 'import pathlib, sys, test_core_cpp
+test_core_cpp.write_families(pathlib.Path(sys.argv[1]))' "$work/families.txt"
+
+flags=(-std=c++17 -O2 -Wall -Wextra -Werror -ffp-contract=off -fno-tree-slp-vectorize
+    "-I$work/include" "$root/test/core/contact_test.cpp")
+g++ -Wno-psabi "${flags[@]}" -o "$work/here" &
+here=$!
+aarch64-linux-gnu-g++ "${flags[@]}" -o "$work/arm"
+wait "$here"
+
+data=("$work/families.txt" "$root/weights/mlp.safetensors")
+echo "$(uname -m):"
+"$work/here" "${data[@]}" "$work/here.answers"
+echo 'aarch64:'
+qemu-aarch64 -L /usr/aarch64-linux-gnu "$work/arm" "${data[@]}" "$work/arm.answers"
+cmp "$work/here.answers" "$work/arm.answers"
+echo "the same bits of verdict, separation and normal in $(wc -l <"$work/arm.answers") pairs"

@@ -1,0 +1,74 @@
+"""The report `accuracy`: contact classes by the definition, and points that had to be moved in."""
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import poses
+import pytest
+
+from box_contact_ros.network import load_weights, save_weights, unpacked
+from box_contact_ros.posesets import CUBE, SETS, Pairs
+from box_contact_ros.report import accuracy
+from box_contact_ros.report.accuracy import CLASSES
+from box_contact_ros.resources import resource_path
+
+SHIPPED = resource_path('weights', 'mlp.safetensors')
+
+
+def on_a_cube(turn: np.ndarray, depth: float = 1e-3) -> Pairs:
+    """A cube, turned, that comes down on the middle of another's top face."""
+    corners = poses.rotate(turn[None], np.array(list(np.ndindex(2, 2, 2))) - 0.5)
+    height = 0.5 * CUBE[2] - CUBE[2] * corners[:, 2].min() - depth
+    b = np.concatenate([[0.1, 0.2, height], turn])
+    size = np.array([CUBE])
+    return Pairs(np.array([[0.0, 0, 0, 0, 0, 0, 1]]), b[None], size, size)
+
+
+def turned(axis: tuple[float, float, float], angle: float) -> np.ndarray:
+    unit = np.array(axis) / np.linalg.norm(axis)
+    return np.append(np.sin(0.5 * angle) * unit, np.cos(0.5 * angle))
+
+
+@pytest.mark.parametrize(('turn', 'expected'), [
+    (turned((1, 1, 0), 0.7), 'vertex-face'), (turned((1, 0, 0), 0.5), 'edge-face'),
+    (turned((0, 0, 1), 0.4), 'face-face'), (turned((1, 0, 0), 1e-5), 'face-face')])
+def test_features_that_meet_a_face(turn: np.ndarray, expected: str) -> None:
+    """Swapped, too: the reference face is then one of B's."""
+    pairs = on_a_cube(turn)
+    swapped = Pairs(pairs.pose_b, pairs.pose_a, pairs.size_b, pairs.size_a)
+    for one in (pairs, swapped):
+        classes, winners = accuracy.classify(one)
+        assert CLASSES[classes[0]] == expected
+        assert winners[0] == 0
+
+
+def test_crossing_edges() -> None:
+    """Two cubes, each on an edge, at right angles to each other."""
+    lower, upper = turned((1, 0, 0), np.pi / 4), turned((0, 1, 0), np.pi / 4)
+    size = np.array([CUBE])
+    height = 2.0 * np.sqrt(0.5) * CUBE[2] - 1e-3
+    pairs = Pairs(np.concatenate([[0, 0, 0], lower])[None],
+                  np.concatenate([[0.1, 0.2, height], upper])[None], size, size)
+    classes, winners = accuracy.classify(pairs)
+    assert CLASSES[classes[0]] == 'edge-edge' and winners[0] == 1
+
+
+@pytest.mark.parametrize('name', SETS)
+def test_points_that_were_moved_in(name: str, tmp_path: Path) -> None:
+    """None of the shipped network's; many of one whose weights are ten times as large."""
+    pairs = SETS[name](np.random.default_rng(4), 2000)
+    assert accuracy.share_corrected(pairs, SHIPPED) < 0.001
+    weights = load_weights(SHIPPED)
+    rough = [(10.0 * weight, 10.0 * bias)
+             for weight, bias in unpacked(weights.networks['point'])]
+    save_weights(tmp_path / 'rough.safetensors', {'point': rough}, weights.card)
+    assert accuracy.share_corrected(pairs, tmp_path / 'rough.safetensors') > 0.05
+
+
+def test_quick_run(tmp_path: Path) -> None:
+    assert accuracy.main(['--quick', '--pairs', '2000', '--out', str(tmp_path)]) == 0
+    assert 'All limits hold.' in (tmp_path / 'accuracy.md').read_text('utf-8')
+    assert (tmp_path / 'accuracy.png').stat().st_size > 10_000
+    head, *rows = (tmp_path / 'accuracy.csv').read_text('utf-8').splitlines()
+    assert head.startswith('model,set,part') and {row.split(',')[1] for row in rows} == set(SETS)

@@ -1,0 +1,578 @@
+"""The native core gives the same bits in every instruction set, thread, call and kind of array."""
+from __future__ import annotations
+
+import gc
+import os
+import pickle
+import platform
+import re
+import shutil
+import subprocess
+import sys
+import tracemalloc
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import poses
+import pytest
+
+import box_contact_ros
+from box_contact_ros import Contact, ContactSolver
+from box_contact_ros.contact import Contacts
+from box_contact_ros.core import FORCE, instruction_sets, native, stages
+from box_contact_ros.mlp import core_numbers, load_mlp
+from box_contact_ros.posesets import SETS, Pairs
+from box_contact_ros.stability import fuzz
+
+HERE = Path(__file__).resolve().parent
+PACKAGE = Path(box_contact_ros.__file__).parent
+MODELS = ('exact', 'mlp')
+SETS_HERE = instruction_sets()
+OTHER_SETS = [name for name in SETS_HERE
+              if name != native.__name__.rpartition('.')[2].removeprefix('_')]
+POINT_ROUNDING = 1e-6
+"""Difference between instruction sets of the MLP's point [of the smaller box's longest edge]."""
+
+every_model = pytest.mark.parametrize('model', MODELS)
+
+
+def joined(*parts: tuple[np.ndarray, ...]) -> Pairs:
+    return Pairs(*(np.concatenate(columns) for columns in zip(*parts)))
+
+
+def fuzzed(n: int, seed: int) -> Pairs:
+    """Draw n pairs of each class of the fuzz."""
+    return joined(*(fuzz.draw(name, np.random.default_rng([seed, number]), n)
+                    for number, name in enumerate(fuzz.CLASSES)))
+
+
+def in_sets(n: int) -> Pairs:
+    """Draw about n pairs of each pose set."""
+    return joined(*(make(np.random.default_rng(41), n) for make in SETS.values()))
+
+
+def solve(solver: ContactSolver, pairs: Pairs, threads: int = 1) -> Contacts:
+    return solver.batch(pairs.pose_a, pairs.pose_b, size_a=pairs.size_a, size_b=pairs.size_b,
+                        threads=threads)
+
+
+def a_solver(model: str) -> ContactSolver:
+    return ContactSolver((1, 1, 1), (1, 1, 1), model=model)
+
+
+def assert_same_bits(one: tuple, other: tuple, where: object = None) -> None:
+    for name, mine, theirs in zip(Contact._fields, one, other, strict=True):
+        assert np.array_equal(mine, theirs, equal_nan=True), (name, where)
+
+
+def forced(name: str) -> dict[str, str]:
+    return os.environ | {FORCE: name}
+
+
+def started(name: str, *words: str | Path, cwd: Path = HERE) -> subprocess.Popen[str]:
+    """Start Python with an instruction set."""
+    return subprocess.Popen([sys.executable, *map(str, words)], env=forced(name), cwd=cwd,
+                            text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+
+
+# --- instruction sets -----------------------------------------------------------------------------
+
+ANSWERS = """
+import sys
+import numpy as np
+from box_contact_ros import ContactSolver
+from box_contact_ros.core import native
+pairs = np.load(sys.argv[1])
+columns = [pairs[name] for name in ('pose_a', 'pose_b', 'size_a', 'size_b')]
+found = {'instruction_set': native.instruction_set, 'lanes': native.lanes}
+for model in ('exact', 'mlp'):
+    solver = ContactSolver((1, 1, 1), (1, 1, 1), model=model)
+    many = solver.batch(*columns[:2], size_a=columns[2], size_b=columns[3])
+    found |= {f'{model} {name}': value for name, value in many._asdict().items()}
+for row in range(0, len(columns[0]), 40):
+    a, b, size_a, size_b = (column[row] for column in columns)
+    one = ContactSolver(size_a, size_b, model='exact')(a, b)
+    for name, value in one._asdict().items():
+        assert np.array_equal(value, found[f'exact {name}'][row], equal_nan=True), (row, name)
+np.savez(sys.argv[2], **found)
+"""
+
+
+def test_every_instruction_set_gives_the_same_bits(tmp_path: Path) -> None:
+    """Verdict, separation and normal; 60,000 pairs of the fuzz, the pose sets, flush boxes.
+
+    So has the point of `exact`. The network of `mlp` rounds its sums as the machine can.
+    """
+    if len(SETS_HERE) == 1:
+        pytest.skip('this machine has one instruction set only')
+    pairs = joined(fuzzed(60_000 // len(fuzz.CLASSES), 1), in_sets(1000), *(
+        make(np.random.default_rng(2), 2000) for make in (
+            poses.flush_pairs, poses.equal_thickness, poses.sharing_an_axis, poses.cards)))
+    np.savez(tmp_path / 'pairs.npz', **pairs._asdict())
+    running = {name: started(name, '-c', ANSWERS, tmp_path / 'pairs.npz', tmp_path / f'{name}.npz')
+               for name in SETS_HERE}
+    found = {}
+    for name, process in running.items():
+        output, _ = process.communicate(timeout=120)
+        assert process.returncode == 0, output
+        found[name] = dict(np.load(tmp_path / f'{name}.npz'))
+    assert len({str(one.pop('instruction_set')) for one in found.values()}) == len(SETS_HERE)
+    assert len({int(one.pop('lanes')) for one in found.values()}) > 1
+    wanted = found.pop(SETS_HERE[0])
+    edge = np.minimum(pairs.size_a.max(axis=1), pairs.size_b.max(axis=1))
+    touching = wanted['exact colliding']
+    assert 0.3 < touching.mean() < 0.9
+    for name, answers in found.items():
+        for field, value in answers.items():
+            if field != 'mlp point':
+                assert np.array_equal(value, wanted[field], equal_nan=True), (name, field)
+        # Far from the origin, a point is as good as the coordinates.
+        near = touching & (np.abs(pairs.pose_a[:, :3]).max(axis=1) < 100.0 * edge)
+        off = np.linalg.norm(answers['mlp point'] - wanted['mlp point'], axis=1) / edge
+        assert near.sum() > 10_000
+        assert off[near].max() <= POINT_ROUNDING, name
+
+
+@pytest.mark.parametrize('name', SETS_HERE)
+def test_a_forced_instruction_set_is_used(name: str) -> None:
+    code = 'from box_contact_ros.core import native; print(native.__name__)'
+    process = started(name, '-c', code)
+    assert process.communicate(timeout=60)[0].strip() == f'box_contact_ros.core._{name}'
+
+
+@pytest.mark.parametrize('value', ['avx', 'AVX2', 'none', 'baseline ', '../x', '_baseline'])
+def test_an_unknown_instruction_set_is_refused(value: str) -> None:
+    """The message names the variable, the value and the choice."""
+    process = started(value, '-c', 'import box_contact_ros')
+    output, _ = process.communicate(timeout=60)
+    assert process.returncode == 1
+    assert output.strip().endswith(
+        f'ImportError: {FORCE} is {value!r}, which is not one of: {", ".join(SETS_HERE)}')
+
+
+LESS = """
+import importlib.util, sys
+name = 'box_contact_ros.core._baseline'
+spec = importlib.util.spec_from_file_location(name, sys.argv[1])
+module = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(module)
+module.supported = lambda: ('baseline',)
+sys.modules[name] = module
+import box_contact_ros.core as core
+print(core.instruction_sets(), core.native.__name__)
+"""
+
+
+@pytest.mark.parametrize('value', ['', 'avx2', 'avx512'])
+def test_a_machine_with_less_takes_less(value: str) -> None:
+    """An instruction set that was built, but that this machine cannot run, is refused."""
+    (baseline,) = (PACKAGE / 'core').glob('_baseline.*.so')
+    process = started(value, '-c', LESS, baseline)
+    output, _ = process.communicate(timeout=60)
+    if value:
+        assert f'{FORCE} is {value!r}, which is not one of: baseline' in output
+    else:
+        assert output.strip() == "('baseline',) box_contact_ros.core._baseline"
+
+
+FUSED = re.compile(r'\bvfn?m(?:add|sub|addsub|subadd)(?:132|213|231)(?:pd|sd)\b')
+"""A fused multiply-add of doubles, as objdump names it."""
+
+
+def disassembled(file: Path) -> str:
+    tool = shutil.which('objdump')
+    if platform.machine() not in ('x86_64', 'AMD64'):
+        pytest.skip('the names of fused multiply-adds are known here for x86-64 only')
+    if not tool:
+        pytest.skip('objdump is not installed (Debian, Ubuntu: apt install binutils)')
+    return subprocess.run([tool, '-d', '--no-show-raw-insn', file], capture_output=True, text=True,
+                          check=True).stdout
+
+
+@pytest.mark.parametrize('file', sorted(PACKAGE.rglob('*.so')), ids=lambda path: path.name)
+def test_no_fused_multiply_add_of_doubles(file: Path) -> None:
+    """A fused one rounds once instead of twice, so bits would depend on the instruction set."""
+    text = disassembled(file)
+    assert text.count('\n') > 1000
+    found = FUSED.findall(text)
+    assert not found, f'{len(found)} in {file.name}: {sorted(set(found))}'
+
+
+def test_a_fused_multiply_add_would_be_found(tmp_path: Path) -> None:
+    """The test above fails for what a compiler makes of a · b + c without our flags."""
+    compiler = shutil.which(os.environ.get('CXX', 'g++').split()[0])
+    if not compiler:
+        pytest.skip('no C++ compiler is installed')
+    source, file = tmp_path / 'one.cpp', tmp_path / 'one.o'
+    source.write_text('double f(double a, double b, double c) { return a * b + c; }\n')
+    for flags, found in (([], True), (['-ffp-contract=off'], False)):
+        subprocess.run([compiler, '-O3', '-march=x86-64-v3', *flags, '-c', source, '-o', file],
+                       check=True)
+        assert bool(FUSED.search(disassembled(file))) is found
+    assert not FUSED.search('vfmadd231ps %zmm0,%zmm1,%zmm2  vfmsub213ss  vfnmadd132ps')
+
+
+LAWS = {'test_laws.py': 'not parts',
+        'test_families.py': 'not truth and not the_file and not reach_what',
+        'test_exact.py': 'not oracle and not thin_overlaps'}
+"""Tests that every instruction set runs, and which of them: those that take no oracle."""
+
+
+@pytest.mark.parametrize('name', OTHER_SETS)
+def test_laws_hold_for_every_instruction_set(name: str) -> None:
+    """Those that this process does not run: laws, hard poses and closed forms, once more."""
+    words = ('-m', 'pytest', '-x', '-q', '-p', 'no:cacheprovider')
+    running = [started(name, *words, file, '-k', which) for file, which in LAWS.items()]
+    for process in running:
+        output, _ = process.communicate(timeout=280)
+        assert process.returncode == 0, output
+
+
+# --- threads --------------------------------------------------------------------------------------
+
+MIXED = joined(fuzzed(700, 3), *(make(np.random.default_rng(4), 700) for make in (
+    poses.flush_pairs, poses.sharing_an_axis, poses.ridges)))
+"""6,300 pairs of which some are clipped, and some are outside the range of the MLP."""
+MIXED = Pairs(*(part[np.random.default_rng(5).permutation(len(part))] for part in MIXED))
+
+
+def first_rows(pairs: Pairs, count: int) -> Pairs:
+    return Pairs(*(part[:count] for part in pairs))
+
+
+@every_model
+@pytest.mark.parametrize('count', [0, 1, 511, 512, 1023, 1024, 1025, 5000])
+def test_threads_change_no_bit_and_no_count(model: str, count: int) -> None:
+    pairs = first_rows(MIXED, count)
+    network = core_numbers(load_mlp().networks['point']) if model == 'mlp' else None
+    answers, counts = [], []
+    for threads in (1, 2, 3, 7):
+        solver = native.PairSolver(model, (1.0, 1.0, 1.0), (1.0, 1.0, 1.0), network)
+        *found, refused = solver.solve(*pairs, threads)
+        assert refused == -1
+        answers.append(found)
+        counts.append((solver.clipped, solver.answered_exactly))
+        assert_same_bits(tuple(found), solve(a_solver(model), pairs, threads), threads)
+    for threads, found in zip((2, 3, 7), answers[1:]):
+        assert_same_bits(answers[0], found, threads)
+    assert len(set(counts)) == 1
+    alone = stages(*pairs, names=('colliding', 'certain', 'in_range'))
+    other_way = alone.certain if model == 'exact' else alone.in_range
+    assert counts[0][model == 'mlp'] == (alone.colliding & ~other_way).sum()
+    assert counts[0][model == 'exact'] == 0
+    if count == 5000:
+        assert counts[0][model == 'mlp'] > 100
+
+
+@every_model
+@pytest.mark.parametrize('bad', [(0,), (4999,), (40, 3000), (600, 601), (2500, 4999), (1300, 3700)])
+def test_threads_name_the_first_row_that_is_refused(model: str, bad: tuple[int, ...]) -> None:
+    pairs = Pairs(*(part.copy() for part in first_rows(MIXED, 5000)))
+    pairs.pose_b[list(bad), 3:] = 0.0
+    said = []
+    for threads in (1, 2, 3, 7):
+        solver = a_solver(model)
+        with pytest.raises(ValueError) as refusal:
+            solve(solver, pairs, threads)
+        said.append(str(refusal.value))
+        assert solver.exact_answers == 0  # nothing was answered
+    assert len(set(said)) == 1
+    assert said[0].startswith(f'poses_b[{bad[0]}] quaternion ')
+
+
+@every_model
+@pytest.mark.parametrize('threads', [0, -1, True, 1.0, 2.5, '2', None, [2], np.nan])
+def test_threads_that_are_none_are_refused(model: str, threads: object) -> None:
+    with pytest.raises(ValueError, match='^threads must be '):
+        solve(a_solver(model), first_rows(MIXED, 3), threads)
+
+
+def test_more_threads_than_rows() -> None:
+    """Whatever whole number it is."""
+    pairs = first_rows(MIXED, 2000)
+    solver = a_solver('exact')
+    for threads in (2001, 2**31, 2**70, np.uint8(200)):
+        assert_same_bits(solve(solver, pairs, threads), solve(solver, pairs))
+
+
+@every_model
+def test_one_solver_in_many_threads(model: str) -> None:
+    """Single calls and batches, of threads of their own, at once: the answers of one thread."""
+    solver = a_solver(model)
+    pairs = first_rows(MIXED, 2000)
+    unit = np.ones((2000, 3))
+    wanted, singles = solve(solver, pairs), solve(solver, Pairs(*pairs[:2], unit, unit))
+    before = solver.exact_answers
+    solve(solver, pairs)
+    a_batch = solver.exact_answers - before
+    single_counts = a_solver(model)
+    for row in range(2000):
+        single_counts(pairs.pose_a[row], pairs.pose_b[row])
+    before = solver.exact_answers
+
+    def work(number: int) -> None:
+        for turn in range(4):
+            if (number + turn) % 2:
+                assert_same_bits(solve(solver, pairs, 1 + number % 3), wanted)
+            else:
+                for row in range(2000):
+                    one = solver(pairs.pose_a[row], pairs.pose_b[row])
+                    assert_same_bits(one, tuple(field[row] for field in singles), row)
+
+    with ThreadPoolExecutor(8) as pool:
+        list(pool.map(work, range(8)))
+    # Each thread made two batches, and twice all single calls.
+    assert solver.exact_answers - before == 16 * (a_batch + single_counts.exact_answers)
+
+
+# --- one call and many ----------------------------------------------------------------------------
+
+
+@pytest.fixture(scope='module')
+def single_solvers() -> dict[str, Callable[..., native.PairSolver]]:
+    """What makes the solver of one pair, without reading the weights anew for each."""
+    return {'exact': partial(native.PairSolver, 'exact'),
+            'mlp': partial(native.PairSolver, 'mlp',
+                           network=core_numbers(load_mlp().networks['point']))}
+
+
+@every_model
+def test_a_batch_is_its_single_calls(model: str, single_solvers: dict) -> None:
+    """Bit for bit, points too: all pose sets, and 20,000 pairs of the fuzz."""
+    pairs = joined(in_sets(500), fuzzed(20_000 // len(fuzz.CLASSES), 7))
+    many = solve(a_solver(model), pairs)
+    make = single_solvers[model]
+    rows = [make(size_a=tuple(size_a), size_b=tuple(size_b))(a, b)
+            for a, b, size_a, size_b in zip(*pairs)]
+    assert_same_bits(many, tuple(np.array(column) for column in zip(*rows)))
+    assert isinstance(rows[0], Contact) and type(rows[0].colliding) is bool
+    assert many.colliding.sum() > 10_000
+
+
+class Marked(np.ndarray):
+    """A subclass of arrays."""
+
+
+def read_only(array: np.ndarray) -> np.ndarray:
+    array = array.copy()
+    array.flags.writeable = False
+    return array
+
+
+KINDS: dict[str, Callable[[np.ndarray], object]] = {
+    'list': np.ndarray.tolist, 'float32': lambda v: v.astype(np.float32), 'read-only': read_only,
+    'strided': lambda v: np.repeat(v, 2, axis=-1)[..., ::2], 'Fortran': np.asfortranarray,
+    'backwards': lambda v: v[..., ::-1].copy()[..., ::-1], 'big-endian': lambda v: v.astype('>f8'),
+    'subclass': lambda v: v.view(Marked), 'longdouble': lambda v: v.astype(np.longdouble)}
+
+
+@every_model
+@pytest.mark.parametrize('kind', KINDS)
+def test_kinds_of_arrays_have_the_same_bits(model: str, kind: str) -> None:
+    """Single calls and batches take poses and sizes of any kind; numbers are float32's here."""
+    pairs = Pairs(*(part[:300].astype(np.float32).astype(float) for part in MIXED))
+    size_a, size_b = pairs.size_a[0], pairs.size_b[0]
+    turned = Pairs(*map(KINDS[kind], pairs))
+    wanted = solve(a_solver(model), pairs)
+    found = solve(a_solver(model), turned)
+    assert_same_bits(found, wanted)
+    assert all(type(field) is np.ndarray for field in found)
+    plain = ContactSolver(size_a, size_b, model=model)
+    other = ContactSolver(KINDS[kind](size_a), KINDS[kind](size_b), model=model)
+    for a, b in zip(pairs.pose_a, pairs.pose_b):
+        one = other(KINDS[kind](a), KINDS[kind](b))
+        assert_same_bits(one, plain(a, b))
+        assert type(one) is Contact and type(one.normal) is type(one.point) is np.ndarray
+
+
+# --- the object -----------------------------------------------------------------------------------
+
+ABOVE = np.array([0.1, 0.05, 1.9, 0.02, 0.01, 0.0, 1.0])
+
+
+@every_model
+def test_a_solver_is_pickled(model: str) -> None:
+    """With its sizes, its model and the name of its weights; counts begin anew."""
+    solver = ContactSolver((1, 2, 30), poses.CUBE, model=model)
+    above = ABOVE + (0, 0, 14, 0, 0, 0, 0)
+    solver(poses.IDENTITY, above)
+    for protocol in range(2, pickle.HIGHEST_PROTOCOL + 1):
+        other = pickle.loads(pickle.dumps(solver, protocol))
+        assert other.exact_answers == 0
+        assert_same_bits(other(poses.IDENTITY, above), solver(poses.IDENTITY, above))
+        assert_same_bits(solve(other, first_rows(MIXED, 9)), solve(solver, first_rows(MIXED, 9)))
+
+
+def test_a_solver_is_made_anew() -> None:
+    """A second __init__ leaves nothing of the first; one that fails leaves all of it."""
+    solver = ContactSolver((1, 2, 30), poses.CUBE, model='mlp')
+    solver(poses.IDENTITY, ABOVE + (0, 0, 14, 0, 0, 0, 0))
+    assert solver.exact_answers == 1
+    for model in ('exact', 'mlp', 'fcl', 'mlp', 'exact'):
+        solver.__init__((2, 2, 2), poses.CUBE, model=model)
+        assert solver.exact_answers == 0
+        fresh = ContactSolver((2, 2, 2), poses.CUBE, model=model)
+        assert_same_bits(solver(poses.IDENTITY, ABOVE), fresh(poses.IDENTITY, ABOVE))
+        assert_same_bits(solve(solver, first_rows(MIXED, 9)), solve(fresh, first_rows(MIXED, 9)))
+    wanted = solver(poses.IDENTITY, ABOVE)
+    with pytest.raises(ValueError):
+        solver.__init__((2, 2, 0), poses.CUBE)
+    with pytest.raises((TypeError, ValueError)):
+        native.PairSolver.__init__(solver, 'mlp', (1.0, 1.0, 1.0), (1.0, 1.0, 1.0))
+    with pytest.raises((TypeError, ValueError)):
+        native.PairSolver.__init__(solver, 'exact', (1.0, 1.0), (1.0, 1.0, 1.0))
+    assert_same_bits(solver(poses.IDENTITY, ABOVE), wanted)
+
+
+def test_a_solver_that_was_not_made_answers_nothing() -> None:
+    """Python lets a subclass forget __init__: an exception, not a crash."""
+    raw = native.PairSolver.__new__(native.PairSolver)
+    with pytest.raises(AttributeError, match='converted'):
+        raw(poses.IDENTITY, ABOVE)
+    with pytest.raises(TypeError):
+        raw.solve(*(part[:1] for part in MIXED), 1)
+    assert (raw.clipped, raw.answered_exactly) == (0, 0)
+
+
+class Counting(ContactSolver):
+    """Counts the poses that are no plain arrays."""
+
+    calls = 0
+
+    def converted(self, pose_a: object, pose_b: object) -> Contact:
+        self.calls += 1
+        return super().converted(pose_a, pose_b)
+
+
+@every_model
+def test_a_subclass_of_a_solver(model: str) -> None:
+    solver = Counting(poses.CUBE, poses.CUBE, model=model)
+    wanted = ContactSolver(poses.CUBE, poses.CUBE, model=model)(poses.IDENTITY, ABOVE)
+    assert_same_bits(solver(poses.IDENTITY, ABOVE), wanted)
+    assert solver.calls == 0  # C++ answered
+    assert_same_bits(solver(list(poses.IDENTITY), pose_b=ABOVE), wanted)
+    assert solver.calls == 1
+    with pytest.raises(ValueError, match='^pose_b quaternion'):
+        solver(poses.IDENTITY, np.zeros(7))
+    assert solver.calls == 2
+    for words in ((), (ABOVE,), (ABOVE, ABOVE, ABOVE)):
+        with pytest.raises(TypeError):
+            solver(*words)
+
+
+def memory() -> int:
+    """Return the resident memory of this process [bytes]."""
+    return int(Path('/proc/self/statm').read_text().split()[1]) * os.sysconf('SC_PAGE_SIZE')
+
+
+def everything_once(solver: ContactSolver, pairs: Pairs) -> None:
+    """Use each way into the core, refusals too."""
+    solver(poses.IDENTITY, ABOVE)
+    solver(poses.IDENTITY, ABOVE + (0, 0, 99, 0, 0, 0, 0))
+    solver(list(poses.IDENTITY), ABOVE)
+    solve(solver, pairs, 2)
+    stages(*pairs, names=('normal', 'certain', 'features'))
+    for bad in (np.zeros(7), np.zeros(6), None):
+        with pytest.raises(ValueError):
+            solver(poses.IDENTITY, bad)
+    with pytest.raises(ValueError):
+        solve(solver, pairs._replace(pose_b=0.0 * pairs.pose_b), 2)
+    with pytest.raises(ValueError):
+        stages(pairs.pose_a, 0.0 * pairs.pose_b, pairs.size_a, pairs.size_b, names=('normal',))
+    with pytest.raises(ValueError):
+        native.stages(*pairs[:3], pairs.size_b[:2], None, ('normal',))
+    with pytest.raises(TypeError):
+        native.stages(*pairs, None)
+    native.PairSolver(None, (1.0, 1.0, 1.0), (1.0, 1.0, 1.0))
+
+
+@pytest.fixture
+def traced() -> Iterator[None]:
+    tracemalloc.start()
+    yield
+    tracemalloc.stop()
+
+
+@every_model
+def test_references_and_memory_stay(model: str, traced: None) -> None:
+    """Hundreds of rounds leave neither a reference nor memory behind."""
+    solver = ContactSolver(poses.CUBE, poses.CUBE, model=model)
+    pairs = first_rows(MIXED, 40)
+    rounds = 300
+    watched = [solver, ContactSolver, native.PairSolver, Contact, poses.IDENTITY, ABOVE, *pairs,
+               solver.model, Exception, np.ndarray]
+    for _ in range(50):
+        everything_once(solver, pairs)
+    gc.collect()
+    references = [sys.getrefcount(each) for each in watched]
+    allocated = tracemalloc.get_traced_memory()[0]
+    for _ in range(rounds):
+        everything_once(solver, pairs)
+    gc.collect()
+    assert [sys.getrefcount(each) for each in watched] == references
+    # An array or a tuple that were kept each round would be more.
+    assert tracemalloc.get_traced_memory()[0] - allocated < 50 * rounds
+
+
+def test_networks_are_freed() -> None:
+    """Each solver has its own numbers, outside of what Python counts."""
+    numbers = np.zeros(3 + 16 * 20_000, dtype=np.float32)  # 1.3 MB
+
+    def make() -> native.PairSolver:
+        return native.PairSolver('mlp', (1.0, 1.0, 1.0), (1.0, 1.0, 1.0), numbers)
+
+    solver = make()
+    before = memory()
+    for _ in range(200):
+        make()
+        solver.__init__('mlp', (1.0, 1.0, 1.0), (1.0, 1.0, 1.0), numbers)
+    assert memory() - before < 20 * numbers.nbytes
+
+
+# --- face sums ------------------------------------------------------------------------------------
+
+
+def share_certain(pairs: Pairs) -> float:
+    found = stages(*pairs, names=('colliding', 'certain'))
+    assert found.colliding.mean() > 0.4
+    return found.certain[found.colliding].mean()
+
+
+@pytest.mark.parametrize('name', SETS)
+def test_the_certificate_holds_of_usual_poses(name: str) -> None:
+    """An exact point that had to be clipped costs several times as much."""
+    least = 0.99 if name == 'touching' else 0.999
+    assert share_certain(SETS[name](np.random.default_rng(51), 5000)) >= least
+
+
+def flush_stacks(kind: str, n: int = 4000) -> Pairs:
+    """Draw boxes whose faces lie in common planes, in any orientation and place."""
+    rng = np.random.default_rng(52)
+    size_a = np.exp(rng.uniform(-1, 1, (n, 3)))
+    size_b, shift = size_a.copy(), np.zeros((n, 3))
+    turn = np.tile(poses.IDENTITY[3:], (n, 1))
+    if kind in ('aligned', 'half overhanging', 'quarter turns'):
+        shift[:, 2] = size_a[:, 2] * (1.0 - 10.0**rng.uniform(-6, -1, n))
+    if kind == 'half overhanging':
+        shift[:, 0] = 0.5 * size_a[:, 0] * rng.choice([-1, 1], n)
+    if kind == 'quarter turns':
+        size_a[:, 1] = size_a[:, 0]
+        size_b = size_a.copy()
+        turn = poses.small_rotations(np.tile([0.0, 0, 1], (n, 1)),
+                                     0.5 * np.pi * rng.integers(0, 4, n))
+    if kind == 'nested':
+        size_b = size_a * rng.uniform(0.1, 0.9, (n, 1))
+        shift = 0.5 * rng.integers(-1, 2, (n, 3)) * (size_a - size_b)
+    whole, place = poses.unit_quaternions(rng, n), rng.uniform(-5, 5, (n, 3))
+    return Pairs(poses.moved(np.tile(poses.IDENTITY, (n, 1)), place, whole),
+                 poses.moved(np.hstack([shift, turn]), place, whole), size_a, size_b)
+
+
+@pytest.mark.parametrize('kind', ['aligned', 'half overhanging', 'quarter turns', 'identical',
+                                  'nested'])
+def test_flush_boxes_are_certain(kind: str) -> None:
+    """Faces in one plane are told apart once, so none of these has to be clipped."""
+    assert share_certain(flush_stacks(kind)) == 1.0

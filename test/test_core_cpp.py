@@ -1,0 +1,234 @@
+"""The C++ core by itself: its test, a short fuzz and the example, compiled and run.
+
+The test runs for every instruction set of the machine, by g++ and by clang++, and with sanitizers.
+All of them have to give the same bits of verdict, separation and normal.
+"""
+from __future__ import annotations
+
+import os
+import platform
+import shutil
+import subprocess
+from collections.abc import Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+SOURCES = ROOT / 'test' / 'core'
+EXAMPLE = ROOT / 'docs' / 'examples' / 'cpp'
+WEIGHTS = ROOT / 'weights' / 'mlp.safetensors'
+FLAGS = ['-std=c++17', '-Wall', '-Wextra', '-Werror', '-Wno-psabi', '-ffp-contract=off',
+         '-fno-tree-slp-vectorize']
+SANITIZE = ['-O1', '-g1', '-fsanitize=address,undefined,float-cast-overflow',
+            '-fno-sanitize-recover=all', '-fno-sanitize=null,object-size,vptr,alignment']
+"""Left out are checks that take half of the compile time: the address sanitizer repeats most."""
+FUZZ_ROUNDS = 8000
+"""About four seconds with sanitizers, 40,000 pairs."""
+PATIENCE = 280.0
+"""For a compiler or a program [s]."""
+LEVELS = {'baseline': (['-O1'], ()),
+          'avx2': (['-O2', '-march=x86-64-v3'], ('avx2', 'fma', 'bmi2', 'movbe')),
+          'avx512': (['-O2', '-march=x86-64-v4'],
+                     ('avx512f', 'avx512bw', 'avx512cd', 'avx512dq', 'avx512vl'))}
+"""Flags of the compiler for an instruction set, and those of /proc/cpuinfo that it needs.
+
+Only the last two can fuse products, and only from -O2 on.
+"""
+
+FLAGS_PROGRAM = """
+#include <cstdio>
+#include "box_contact/box_contact.hpp"
+
+int main() {
+  try {
+    box_contact::Solver({1, 1, 1}, {1, 1, 1});
+  } catch (const std::logic_error& error) {
+    std::puts(error.what());
+  }
+}
+"""
+
+
+def missing_flags(level: str) -> list[str]:
+    """Return the flags of /proc/cpuinfo that an instruction set needs and this machine lacks."""
+    needed = LEVELS[level][1]
+    if needed and platform.machine() not in ('x86_64', 'AMD64'):
+        return list(needed)
+    info = Path('/proc/cpuinfo')
+    have = set(info.read_text().split()) if needed and info.is_file() else set()
+    return [flag for flag in needed if flag not in have]
+
+
+def compiler(name: str) -> str:
+    """Return the path of a compiler, or skip."""
+    path = shutil.which(name)
+    if not path:
+        pytest.skip(f'{name} is not installed')
+    return path
+
+
+@pytest.fixture(scope='module')
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder laid out as an installation: include/box_contact; and the hard poses."""
+    folder = tmp_path_factory.mktemp('core')
+    (folder / 'include').mkdir()
+    shutil.copytree(ROOT / 'box_contact_ros' / 'core', folder / 'include' / 'box_contact',
+                    ignore=shutil.ignore_patterns('*.so', '__pycache__'))
+    write_families(folder / 'families.txt')
+    return folder
+
+
+def write_families(path: Path) -> None:
+    """Write the stored families as text: a line a pair, doubles as hexadecimal numbers."""
+    stored, = (ROOT / 'box_contact_ros').glob('*/families.npz')
+    lines = []
+    with np.load(stored) as arrays:
+        for name in sorted({key.split('.')[0] for key in arrays.files}):
+            columns = [arrays[f'{name}.{part}'] for part in
+                       ('pose_a', 'pose_b', 'size_a', 'size_b', 'gap', 'centroid')]
+            for row in np.hstack([part.reshape(len(part), -1) for part in columns]):
+                lines.append(' '.join([name, *(float(value).hex() for value in row)]))
+    path.write_text('\n'.join(lines) + '\n')
+
+
+class Builds:
+    """Programs that compilers make in the background, as many at a time as there are cores."""
+
+    def __init__(self, folder: Path):
+        self.folder = folder
+        self.pool = ThreadPoolExecutor(os.cpu_count())
+        self.futures: dict[str, Future] = {}
+
+    def start(self, name: str, *command: object, **environment: str) -> None:
+        """Run the command that makes the program `name`."""
+        self.futures[name] = self.pool.submit(
+            subprocess.run, [str(part) for part in command], env={**os.environ, **environment},
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=PATIENCE)
+
+    def compile(self, name: str, program: str, source: Path, *flags: str) -> None:
+        """Compile one source file, if the compiler is installed."""
+        if shutil.which(program):
+            self.start(name, program, *flags, f'-I{self.folder / "include"}', source, '-o',
+                       self.folder / name)
+
+    def program(self, name: str) -> Path:
+        """Return the program, once it is made."""
+        done = self.futures[name].result()
+        assert done.returncode == 0, done.stdout[-4000:]
+        return self.folder / name
+
+
+@pytest.fixture(scope='module')
+def builds(folder: Path) -> Iterator[Builds]:
+    """Return all builds, started; the slowest first."""
+    builds = Builds(folder)
+    test, fuzz = SOURCES / 'contact_test.cpp', SOURCES / 'fuzz.cpp'
+    builds.compile('sanitized-test', 'g++', test, *FLAGS, *SANITIZE)
+    builds.compile('sanitized-fuzz', 'g++', fuzz, *FLAGS, *SANITIZE)
+    for level, (flags, _) in LEVELS.items():
+        if not missing_flags(level):
+            builds.compile(f'test-{level}', 'g++', test, *FLAGS, *flags)
+    builds.compile('test-clang', 'clang++', test, *FLAGS, '-O1')
+    start_example(builds)
+    flags_source = folder / 'flags.cpp'
+    flags_source.write_text(FLAGS_PROGRAM)
+    for name, flag in (('flags-fused', '-ffp-contract=fast'), ('flags-off', '-ffp-contract=off')):
+        builds.compile(name, 'g++', flags_source, '-std=c++17', '-O2', '-march=x86-64-v3',
+                       '-Wno-psabi', flag)
+    yield builds
+    builds.pool.shutdown(cancel_futures=True)
+
+
+def start_example(builds: Builds) -> None:
+    """Build the example by its CMakeLists.txt, or where CMake is missing by the compiler."""
+    if shutil.which('cmake') and shutil.which('g++'):
+        folder = builds.folder / 'example'
+        configure = (f'cmake -S "{EXAMPLE}" -B "{folder}" -DCMAKE_CXX_FLAGS_RELEASE=-O0 '
+                     '-DCMAKE_CXX_FLAGS="-Wall -Wextra -Werror"')
+        builds.start('example/first_contact', 'sh', '-c',
+                     f'{configure} && cmake --build "{folder}"', CXX='g++',
+                     AMENT_PREFIX_PATH=str(builds.folder))
+    else:
+        (builds.folder / 'example').mkdir()
+        builds.compile('example/first_contact', 'g++', EXAMPLE / 'first_contact.cpp', *FLAGS, '-O0')
+
+
+def run(program: Path, *arguments: object) -> str:
+    """Run a program; return what it printed."""
+    done = subprocess.run([str(program), *map(str, arguments)], stdout=subprocess.PIPE,
+                          stderr=subprocess.STDOUT, text=True, timeout=PATIENCE)
+    assert done.returncode == 0, done.stdout[-4000:]
+    return done.stdout
+
+
+def run_test(builds: Builds, folder: Path, name: str) -> None:
+    """Run a build of contact_test; its answers have to be those of the first build that ran."""
+    program = builds.program(name)
+    answers = folder / f'{name}.answers'
+    assert ' 0 failures' in run(program, folder / 'families.txt', WEIGHTS, answers)
+    first = folder / 'first.answers'
+    if not first.exists():
+        shutil.copy(answers, first)
+    one, other = first.read_text().splitlines(), answers.read_text().splitlines()
+    assert len(one) == len(other) > 20_000
+    different = [row for row, pair in enumerate(zip(one, other)) if pair[0] != pair[1]]
+    assert not different, f'{name}: rows {different[:10]} of {len(different)}'
+
+
+@pytest.mark.parametrize('level', LEVELS)
+def test_by_gcc(builds, folder, level):
+    """Hard poses, laws and refusals; the same bits for each instruction set."""
+    compiler('g++')
+    if missing_flags(level):
+        pytest.skip(f'this machine has no {", ".join(missing_flags(level))}')
+    run_test(builds, folder, f'test-{level}')
+
+
+def test_by_clang(builds, folder):
+    """The same bits by another compiler."""
+    compiler('clang++')
+    run_test(builds, folder, 'test-clang')
+
+
+def test_with_sanitizers(builds, folder):
+    """No access out of bounds, no undefined behaviour; the same bits."""
+    compiler('g++')
+    run_test(builds, folder, 'sanitized-test')
+
+
+def test_fuzz_with_sanitizers(builds):
+    """Adversarial poses and random networks."""
+    compiler('g++')
+    assert ' 0 failures' in run(builds.program('sanitized-fuzz'), FUZZ_ROUNDS)
+
+
+def test_example(builds):
+    """From an installation that AMENT_PREFIX_PATH names, as in a colcon workspace."""
+    compiler('g++')
+    assert run(builds.program('example/first_contact')).splitlines() == [
+        'height 2.600 m: no contact, gap 0.009 m',
+        'height 2.590 m: contact, depth 0.001 m, normal (0.000, 0.000, 1.000), '
+        'point (0.142, 0.044, 1.295) m',
+        'batch: 1 0, first refused row -1',
+        'refused: pose_b quaternion (0, 0, 0, 0) has no length within 1e-100 to 1e100']
+
+
+def test_fast_math_is_refused(folder):
+    """The header does not compile."""
+    command = [compiler('g++'), '-std=c++17', '-ffast-math', '-fsyntax-only', '-x', 'c++',
+               str(folder / 'include' / 'box_contact' / 'box_contact.hpp')]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE)
+    assert done.returncode != 0
+    assert 'compile without -ffast-math' in done.stderr
+
+
+def test_fused_products_are_refused(builds):
+    """The solver does not start."""
+    compiler('g++')
+    if missing_flags('avx2'):
+        pytest.skip(f'this machine has no {", ".join(missing_flags("avx2"))}')
+    assert 'compile with -ffp-contract=off' in run(builds.program('flags-fused'))
+    assert run(builds.program('flags-off')) == ''

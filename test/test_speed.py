@@ -1,0 +1,89 @@
+"""The report `speed`: its flush stacks are flush, its limits break, and a quick run writes all."""
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from box_contact_ros import ContactSolver
+from box_contact_ros.core import instruction_sets, stages
+from box_contact_ros.report import generation, processor, speed, versions
+from box_contact_ros.report.speed import UNIT, Timing
+
+
+def test_flush_stacks_are_aligned_and_flush() -> None:
+    """Right angles to rounding; of the sides, those along y in one plane; the depth is small."""
+    pairs = speed.flush_stacks(np.random.default_rng(1), 2000)
+    found = stages(*pairs, names=('rotation', 'offset_a'))
+    np.testing.assert_allclose(np.abs(found.rotation), np.broadcast_to(np.eye(3), (2000, 3, 3)),
+                               atol=1e-15)
+    assert np.abs(found.offset_a[:, 1]).max() < 1e-14
+    assert 0.3 < np.mean(np.abs(found.offset_a[:, 0]) < 1e-14) < 0.7
+    contacts = ContactSolver((1, 1, 1), (1, 1, 1), model='exact').batch(
+        pairs.pose_a, pairs.pose_b, size_a=pairs.size_a, size_b=pairs.size_b)
+    depth = -contacts.separation / pairs.size_a[:, 2]
+    assert contacts.colliding.all()
+    assert 0.99e-5 < depth.min() < 2e-5 and 0.008 < depth.max() < 1.1e-2
+
+
+def run_of(exact: float, batches: list[float], unit: float | None = 1000.0) -> list[Timing]:
+    """Timings of one instruction set [ns]."""
+    common = {'instruction_set': 'AVX2'}
+    found = [Timing(name='exact', kind='single', rounds=[exact], **common)]
+    if unit is not None:
+        found.append(Timing(name=UNIT, kind='single', rounds=[unit], **common))
+    return found + [Timing(name=f'exact: set {k}', kind='batch', rounds=[value], **common)
+                    for k, value in enumerate(batches)]
+
+
+@pytest.mark.parametrize(('timings', 'best', 'expected'), [
+    (run_of(350.0, [100.0, 110.0, 120.0]), True, [True, True, True]),
+    (run_of(370.0, [100.0, 110.0, 120.0]), True, [False, True, True]),
+    (run_of(370.0, [100.0, 110.0, 120.0]), False, [True, True]),
+    (run_of(350.0, [115.0, 120.0, 126.0]), True, [True, False, True]),
+    (run_of(350.0, [70.0, 80.0, 100.0]), True, [True, True, False]),
+    (run_of(350.0, [100.0, 110.0, 120.0], unit=None), True, [False, False, True]),
+])
+def test_limits_break(timings: list[Timing], best: bool, expected: list[bool]) -> None:
+    """Single call, slowest batch, slowest by median; without the unit nothing by it holds."""
+    assert [claim.holds for claim in speed.claims_of(timings, best)] == expected
+
+
+def test_limits_of_threads_and_starts_break() -> None:
+    def timings(gain: float) -> list[Timing]:
+        return [Timing(name=f'{model}: set', kind=kind, instruction_set='AVX2', rounds=[value])
+                for model in speed.MODELS for kind, value in (('batch', gain),
+                                                              ('two threads', 1.0))]
+
+    assert [claim.holds for claim in speed.thread_claims(timings(1.81))] == [True, True]
+    assert [claim.holds for claim in speed.thread_claims(timings(1.79))] == [False, True]
+    assert speed.start_claim([0.1, 0.14, 9.0]).holds
+    assert not speed.start_claim([0.1, 0.16, 0.2]).holds
+
+
+def test_quick_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Rows of every instruction set; the page names all figures, whether or not they hold."""
+    assert speed.main(['--quick', '--out', str(tmp_path)]) in (0, 1)
+    with (tmp_path / 'speed.csv').open(encoding='utf-8') as file:
+        rows = list(csv.DictReader(file))
+    by_set = {row['instruction_set'] for row in rows if row['kind'] == 'single'}
+    assert len(by_set) == len(instruction_sets())
+    for label in by_set:
+        names = {row['name'] for row in rows if row['instruction_set'] == label}
+        assert names >= {f'{model}: {name}' for model in speed.MODELS for name in speed.BATCH_SETS}
+    assert all(float(row['ns']) > 0.0 for row in rows)
+    assert {row['processor'] for row in rows} == {processor()}
+    assert 'new process' in {row['kind'] for row in rows}
+    text = (tmp_path / 'speed.md').read_text('utf-8')
+    assert versions(speed.PACKAGES) in text and 'aligned flush stacks' in text
+    assert 'nan' not in text and text in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(('vendor', 'family', 'model', 'expected'), [
+    ('AuthenticAMD', 25, 17, 'Zen 4'), ('AuthenticAMD', 25, 1, 'Zen 3'),
+    ('AuthenticAMD', 26, 2, 'Zen 5'), ('GenuineIntel', 6, 143, 'Sapphire Rapids'),
+    ('GenuineIntel', 6, 1, None), ('unknown', 25, 17, None)])
+def test_generations(vendor: str, family: int, model: int, expected: str | None) -> None:
+    assert generation(vendor, family, model) == expected
