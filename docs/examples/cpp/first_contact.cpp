@@ -1,0 +1,44 @@
+// Lower a container on another one, and print the contact.
+#include <cstdio>
+#include <stdexcept>
+
+#include "box_contact/box_contact.hpp"
+
+int main() {
+  // Two 40 ft containers: full extents along x, y, z [m].
+  const box_contact::Solver::Size container{12.192, 2.438, 2.591};
+  const box_contact::Solver solver(container, container);
+
+  // A stands at the origin. B comes down on it, turned by 2 · asin(0.02) about the vertical axis.
+  const box_contact::Solver::Pose a{{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 1.0}};
+  box_contact::Solver::Pose b{{0.5, 0.1, 2.6}, {0.0, 0.0, 0.02, 0.9998}};
+  for (double height : {2.6, 2.59}) {
+    b.position[2] = height;
+    const box_contact::Contact contact = solver(a, b);
+    if (!contact.colliding) {
+      std::printf("height %.3f m: no contact, gap %.3f m\n", height, contact.separation);
+      continue;
+    }
+    std::printf(
+        "height %.3f m: contact, depth %.3f m, normal (%.3f, %.3f, %.3f), "
+        "point (%.3f, %.3f, %.3f) m\n",
+        height, -contact.separation, contact.normal[0], contact.normal[1], contact.normal[2],
+        contact.point[0], contact.point[1], contact.point[2]);
+  }
+
+  // Rows of poses, x y z qx qy qz qw, are solved some at a time, into your arrays.
+  const double poses_a[2][7] = {{0, 0, 0, 0, 0, 0, 1}, {0, 0, 0, 0, 0, 0, 1}};
+  const double poses_b[2][7] = {{0, 0, 2.59, 0, 0, 0, 1}, {0, 2.5, 0, 0, 0, 0, 1}};
+  bool colliding[2];
+  double separation[2], normal[6], point[6];
+  const long refused =
+      solver.batch(poses_a[0], poses_b[0], 2, {colliding, separation, normal, point});
+  std::printf("batch: %d %d, first refused row %ld\n", colliding[0], colliding[1], refused);
+
+  try {
+    b.quaternion[2] = b.quaternion[3] = 0.0;
+    solver(a, b);
+  } catch (const std::invalid_argument& error) {
+    std::printf("refused: %s\n", error.what());
+  }
+}
