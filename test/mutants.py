@@ -135,16 +135,15 @@ MUTANTS = {
         'excess = max(excess, 0.0 * -separation / (2.0 * depth_max',
         'test/test_mlp.py -k limits_belong'),
     'threads overlap': Mutant(
-        'core/binding/module.cpp', 'long begin = blocks * thread / threads * lanes,',
-        'long begin = std::max(0L, blocks * thread / threads - 1) * lanes,',
+        'core/binding/module.cpp', 'long begin = chunk * rows_per_chunk,',
+        'long begin = std::max(0L, chunk * rows_per_chunk - lanes),',
         f'{TEST_CORE} -k threads'),
     'threads leave a block out': Mutant(
-        'core/binding/module.cpp', 'end = blocks * (thread + 1) / threads * lanes;',
-        'end = (blocks * (thread + 1) / threads - (threads > 1)) * lanes;',
+        'core/binding/module.cpp', 'for (long chunk = next++; chunk < chunks;',
+        'for (long chunk = next++; chunk < chunks - (threads > 1);',
         f'{TEST_CORE} -k threads'),
     'any refused row is named': Mutant(
-        'core/binding/module.cpp', 'if (refused_of[thread] >= 0) refused = refused_of[thread];',
-        'if (refused_of[thread] >= 0 && refused < 0) refused = refused_of[thread];',
+        'core/binding/module.cpp', 'std::min(refused_of[thread], refused);', 'refused;',
         f'{TEST_CORE} -k threads'),
     'lanes that repeat the last row are counted': Mutant(
         'core/contact.hpp', 'for (int i = count; i < width<T>; ++i) set_lane(q.touching, i, 0);',

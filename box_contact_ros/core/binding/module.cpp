@@ -5,6 +5,7 @@
 // which is told the row.
 #include "arrays.hpp"  // first, as Python.h wants
 
+#include <algorithm>
 #include <atomic>
 #include <cstddef>
 #include <memory>
@@ -37,8 +38,9 @@ constexpr const char* instruction_set = "baseline";
 #endif
 using Block = Lanes<double, lanes>;
 
-// A thread is worth starting for this many rows.
-constexpr long rows_per_thread = 512;
+// Rows that a thread takes at a time: some 100 µs of work, and whole blocks.
+constexpr long rows_per_chunk = 512;
+static_assert(rows_per_chunk % (2 * lanes) == 0, "rows share vectors as in one thread");
 
 PyTypeObject* contact_type = nullptr;  // the NamedTuple that `use_contact_type` was given
 PyObject* name_converted = nullptr;    // of the method for poses that are no plain arrays
@@ -183,38 +185,35 @@ void solver_dealloc(PyObject* self) {
   Py_DECREF(type);  // an object of a heap type keeps its type alive
 }
 
-// Solve all rows, in as many threads as are asked for and worth it. Rows are independent, so no bit
-// depends on their number. Returns the first row that is refused, or −1.
+// Solve all rows, in as many threads as are asked for and worth it. Each takes the next chunk until
+// none is left: a thread that starts late costs little. Rows are independent, so no bit depends on
+// the number of threads. Returns the first row that is refused, or −1.
 template <class M>
 long solve_in_threads(const M& model, const PairArrays& pairs, const Results& results, long threads,
                       Counts& counts) {
-  long count = pairs.count;
-  threads = std::max(1L, std::min(threads, count / rows_per_thread));
+  long chunks = (pairs.count + rows_per_chunk - 1) / rows_per_chunk;
+  threads = std::max(1L, std::min(threads, chunks));
   std::vector<Counts> counts_of(threads);
-  std::vector<long> refused_of(threads, -1);
+  std::vector<long> refused_of(threads, pairs.count);
+  std::atomic<long> next{0};
   auto work = [&](long thread) {
-    // Whole blocks, so that rows share vectors as in one thread.
-    long blocks = (count + lanes - 1) / lanes;
-    long begin = blocks * thread / threads * lanes, end = blocks * (thread + 1) / threads * lanes;
-    refused_of[thread] = solve_rows<Block>(model, pairs.rows, begin, std::min(end, count), results,
-                                           counts_of[thread]);
+    for (long chunk = next++; chunk < chunks; chunk = next++) {
+      long begin = chunk * rows_per_chunk, end = std::min(begin + rows_per_chunk, long(pairs.count));
+      long refused = solve_rows<Block>(model, pairs.rows, begin, end, results, counts_of[thread]);
+      if (refused >= 0) refused_of[thread] = std::min(refused_of[thread], refused);
+    }
   };
   std::vector<std::thread> others;
-  long started = 1;
   try {
-    for (; started < threads; ++started) others.emplace_back(work, started);
+    for (long thread = 1; thread < threads; ++thread) others.emplace_back(work, thread);
   } catch (const std::system_error&) {
-    // No more threads are to be had: the rows that are left are solved here.
+    // No more threads are to be had: those that run take all chunks.
   }
   work(0);
-  for (; started < threads; ++started) work(started);
   for (std::thread& other : others) other.join();
-  long refused = -1;
-  for (long thread = threads - 1; thread >= 0; --thread) {
-    counts += counts_of[thread];
-    if (refused_of[thread] >= 0) refused = refused_of[thread];
-  }
-  return refused;
+  for (const Counts& part : counts_of) counts += part;
+  long refused = *std::min_element(refused_of.begin(), refused_of.end());
+  return refused < pairs.count ? refused : -1;
 }
 
 PyObject* solver_solve(PyObject* self, PyObject* const* args, Py_ssize_t count) {
