@@ -22,8 +22,11 @@ FEATURE_NAMES = (
     'slant · cut of all faces along this axis', '|push of all faces| along it',
     'larger slant · cut of all faces along another', '|push of all faces| along all axes')
 """Features at a site: four of its own, four that all sites of its faces have, four of its axis."""
-DESCRIPTION = 'cuts of the unit cube, at nine sites'
-"""What features and outputs mean; weights made for another meaning are refused."""
+DESCRIPTION = 'cuts of the bounds by the slab, at nine sites'
+"""What the features of shipped weights mean; see core/overlap_bounds.hpp."""
+BOUNDS = {DESCRIPTION: 'slab', 'cuts of the unit cube, at nine sites': 'edges'}
+"""Method of the bounds by the description in a card; weights made for another one are refused."""
+_NATIVE = {'slab': 'mlp', 'edges': 'mlp-edges'}  # names that the core has for the models
 ACTIVATION = 'relu'
 """Activation of the hidden units; weights made for another one are refused."""
 UNITS_MAX = 64
@@ -55,14 +58,15 @@ class Mlp:
     def __init__(self, size_a: np.ndarray, size_b: np.ndarray, weights: str | None = None) -> None:
         self.weights = load_mlp(weights)
         numbers = core_numbers(self.weights.networks['point'])
-        self._pairs = native.PairSolver('mlp', (1.0, 1.0, 1.0), (1.0, 1.0, 1.0), numbers)
+        name = _NATIVE[bounds_of(self.weights)]
+        self._pairs = native.PairSolver(name, (1.0, 1.0, 1.0), (1.0, 1.0, 1.0), numbers)
         self._exact = Exact()
         self._answered_exactly = 0
         self._listed = _listed_sizes(self.weights)
         self._looked_up = (b'', np.zeros(1, dtype=np.bool_))
         # Single calls have no test of the sizes, so one for boxes that are not listed ends here.
         listed = self._in_card(size_a, size_b).all()
-        self.single = ('mlp', numbers) if listed else (None, None)
+        self.single = (name, numbers) if listed else (None, None)
 
     @property
     def exact_answers(self) -> int:
@@ -130,12 +134,17 @@ def load_mlp(weights: str | None = None) -> Weights:
     if len(network.widths) != 3 or network.widths[1] > UNITS_MAX:
         raise WeightsError(f"weights file {path}: network 'point' must have one hidden layer, "
                            f'of at most {UNITS_MAX} units')
-    if found.card['inputs'].get('description') != DESCRIPTION:
+    if found.card['inputs'].get('description') not in BOUNDS:
         raise WeightsError(f'weights file {path} is for other inputs than this version has')
     if found.card.get('activation') != ACTIVATION:
         raise WeightsError(f"weights file {path}: this version's units are {ACTIVATION!r}, not "
                            f"{found.card.get('activation')!r}")
     return found
+
+
+def bounds_of(weights: Weights) -> str:
+    """Return the method of the bounds that the weights were made for: 'slab' or 'edges'."""
+    return BOUNDS[weights.card['inputs']['description']]
 
 
 def _listed_sizes(weights: Weights) -> np.ndarray | None:

@@ -119,8 +119,7 @@ MUTANTS = {
         'Four<T> length = t - s, middle = 0.5 * (s + t) - origin[j];',
         f'{TEST_CORE} -k certain'),
     'point left outside': Mutant(
-        'core/mlp.hpp', 'share = min(share, select<T>(step > room, room / step, splat<T>(1.0)));',
-        'share = splat<T>(1.0);', 'test/test_mlp.py -k garbage_for_weights'),
+        'core/mlp.hpp', ' & placed.inside;', ';', 'test/test_mlp.py -k garbage_for_weights'),
     'smaller bounding box, always': Mutant(
         'core/overlap_bounds.hpp', 'clearly_smaller = 0.8;', 'clearly_smaller = 1.0 - 1e-6;',
         'test/test_overlap_bounds.py -k keep_their_frame'),
@@ -146,8 +145,8 @@ MUTANTS = {
         'core/binding/module.cpp', 'std::min(refused_of[thread], refused);', 'refused;',
         f'{TEST_CORE} -k threads'),
     'lanes that repeat the last row are counted': Mutant(
-        'core/contact.hpp', 'for (int i = count; i < width<T>; ++i) set_lane(q.touching, i, 0);',
-        '', f'{TEST_CORE} -k threads_change'),
+        'core/contact.hpp', 'set_lane(queries[g].touching, int(i), 0);', ';',
+        f'{TEST_CORE} -k threads_change'),
     'a reference to the type is kept': Mutant(
         'core/binding/module.cpp', '  Py_DECREF(type);', '  ', f'{TEST_CORE} -k references'),
     'the forced instruction set is ignored': Mutant(

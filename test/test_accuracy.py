@@ -56,14 +56,14 @@ def test_crossing_edges() -> None:
 
 @pytest.mark.parametrize('name', SETS)
 def test_points_that_were_moved_in(name: str, tmp_path: Path) -> None:
-    """None of the shipped network's; many of one whose weights are ten times as large."""
+    """None of the shipped network's; many of one whose weights are thirty times as large."""
     pairs = SETS[name](np.random.default_rng(4), 2000)
     assert accuracy.share_corrected(pairs, SHIPPED) < 0.001
     weights = load_weights(SHIPPED)
-    rough = [(10.0 * weight, 10.0 * bias)
+    rough = [(30.0 * weight, 30.0 * bias)
              for weight, bias in unpacked(weights.networks['point'])]
     save_weights(tmp_path / 'rough.safetensors', {'point': rough}, weights.card)
-    assert accuracy.share_corrected(pairs, tmp_path / 'rough.safetensors') > 0.05
+    assert accuracy.share_corrected(pairs, tmp_path / 'rough.safetensors') > 0.02
 
 
 def test_quick_run(tmp_path: Path) -> None:

@@ -483,9 +483,9 @@ def everything_once(solver: ContactSolver, pairs: Pairs) -> None:
     with pytest.raises(ValueError):
         stages(pairs.pose_a, 0.0 * pairs.pose_b, pairs.size_a, pairs.size_b, names=('normal',))
     with pytest.raises(ValueError):
-        native.stages(*pairs[:3], pairs.size_b[:2], None, ('normal',))
+        native.stages(*pairs[:3], pairs.size_b[:2], None, ('normal',), False)
     with pytest.raises(TypeError):
-        native.stages(*pairs, None)
+        native.stages(*pairs, None, ('normal',))
     native.PairSolver(None, (1.0, 1.0, 1.0), (1.0, 1.0, 1.0))
 
 

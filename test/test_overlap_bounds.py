@@ -11,6 +11,7 @@ import poses
 import pytest
 
 from box_contact_ros.core import DEPTH_FLOOR, Stages, stages
+from box_contact_ros.core.stages import BOUNDS
 
 N = 64
 CLEARLY_SMALLER = 0.8
@@ -177,12 +178,12 @@ FAMILIES = {function.__name__: function for function in (
     identical_and_concentric, contained, corner_ties, eighth_turns, plates, small_on_large)}
 
 
-def bounds_of(a, b, size_a, size_b):
+def bounds_of(a, b, size_a, size_b, method='edges'):
     """Return the stages of the pairs that touch, and the numbers of their rows."""
     found = stages(a, b, size_a, size_b, names=(
         'colliding', 'separation', 'normal', 'size', 'rotation', 'pressed_offset_a',
-        'pressed_offset_b', 'frame_b', 'bounds_middle', 'bounds_half', 'inside', 'other_axes',
-        'other_offset', 'other_half'))
+        'pressed_offset_b', 'frame_b', 'bounds_middle', 'bounds_half', 'other_axes',
+        'other_offset', 'other_half'), bounds=method)
     rows = np.flatnonzero(found.colliding)
     return Stages(*(values[rows] if len(values) else values for values in found)), rows
 
@@ -244,19 +245,21 @@ def test_bounding_boxes_are_those_of_the_corners(family, order):
 
 
 @pytest.mark.parametrize('family', FAMILIES)
-def test_the_point_inside_is_in_both_boxes(family):
-    """In its own frame within the bounding box, and in each box to 2^-46 of the size."""
-    pairs = FAMILIES[family](np.random.default_rng(2028))
-    found, rows = bounds_of(*pairs)
-    frame_b = found.frame_b[:, None]
-    turned = np.einsum('nij,nj->ni', found.rotation, found.inside) + found.pressed_offset_a
-    back = np.einsum('nji,nj->ni', found.rotation, found.inside) - found.pressed_offset_b
-    in_a = np.where(frame_b, turned, found.inside)
-    in_b = np.where(frame_b, found.inside, back)
-    slack = ((FLUSH + 4 * ROUNDING) * found.size)[:, None]
-    assert np.all(np.abs(in_a) <= 0.5 * pairs[2][rows] + slack)
-    assert np.all(np.abs(in_b) <= 0.5 * pairs[3][rows] + slack)
-    assert np.all(np.abs(found.inside - found.bounds_middle) <= found.bounds_half + slack)
+def test_bounds_by_the_slab_hold_the_overlap(family):
+    """They hold those of the edges, in the frame that both chose, and lie in the frame's box."""
+    pairs = FAMILIES[family](np.random.default_rng(2029))
+    edges, rows = bounds_of(*pairs)
+    slab, _ = bounds_of(*pairs, method='slab')
+    slack = (4 * FLUSH * slab.size)[:, None]
+    own = 0.5 * np.where(slab.frame_b[:, None], pairs[3][rows], pairs[2][rows])
+    assert np.all(np.abs(slab.bounds_middle) + slab.bounds_half <= own + slack)
+    same = slab.frame_b == edges.frame_b
+    assert same.mean() > 0.5
+    tolerance = np.array([[accuracy(edges, k)] for k in range(len(rows))])
+    for sign in (-1.0, 1.0):
+        beyond = sign * (edges.bounds_middle - slab.bounds_middle) + (
+            edges.bounds_half - slab.bounds_half)
+        assert np.all((beyond <= tolerance)[same])
 
 
 @pytest.mark.parametrize('family', FAMILIES)
@@ -281,7 +284,8 @@ def test_the_other_box_is_where_it_is(family):
     assert np.all(np.abs(offset - pressed * found.normal - found.pressed_offset_a) <= rounding)
 
 
-def test_boxes_that_lie_on_each_other_keep_their_frame():
+@pytest.mark.parametrize('method', BOUNDS)
+def test_boxes_that_lie_on_each_other_keep_their_frame(method):
     """A container rocks on another: its frame does not change, or the point would jump."""
     rng = np.random.default_rng(6)
     n = 2000
@@ -290,11 +294,12 @@ def test_boxes_that_lie_on_each_other_keep_their_frame():
     turns = poses.small_rotations(axes, rng.uniform(0, 0.01, n))
     a, b, size_a, size_b = sheared(rng, n, poses.CONTAINER, poses.CONTAINER, turns,
                                    np.full(n, 5e-3))
-    found, rows = bounds_of(a, b, size_a, size_b)
+    found, rows = bounds_of(a, b, size_a, size_b, method=method)
     assert len(rows) == n and not found.frame_b.any()
 
 
-def test_an_aligned_stack_has_its_whole_patch():
+@pytest.mark.parametrize('method', BOUNDS)
+def test_an_aligned_stack_has_its_whole_patch(method):
     """Containers exactly one on the other, turned anywhere.
 
     Every side of one lies in a side's plane of the other, and rounding alone says whose edges are
@@ -306,7 +311,6 @@ def test_an_aligned_stack_has_its_whole_patch():
     turns = np.tile(poses.IDENTITY[3:], (n, 1))
     pairs = sheared(rng, n, poses.CONTAINER, poses.CONTAINER, turns, np.full(n, 1e-3))
     half = np.array([poses.CONTAINER[0] / 2, poses.CONTAINER[1] / 2, 0.5e-3])
-    found, rows = bounds_of(*pairs)
+    found, rows = bounds_of(*pairs, method=method)
     assert len(rows) == n
     assert np.abs(found.bounds_half - half).max() <= 1e-12
-    assert np.abs(found.inside - found.bounds_middle).max() < 1e-9

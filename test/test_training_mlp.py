@@ -133,10 +133,10 @@ def test_errors_while_training_are_the_solvers(data: MlpSamples, tmp_path: Path)
     pairs = size_pairs(np.random.default_rng(3), 500)
     trained = fit.point_errors(contacts.describe(pairs))[0]
     solved = mlp.point_errors(pairs, path)
-    # The solver also shortens answers that would leave the other box, which seldom harms.
+    # The solver also moves answers into the other box, which seldom harms.
     assert np.mean(np.abs(trained - solved) < 1e-4) > 0.3
     assert np.mean(solved <= trained + 1e-4) > 0.95
-    assert solved.mean() <= trained.mean()
+    assert solved.mean() <= trained.mean() * (1.0 + 1e-5)  # float32
 
 
 @pytest.mark.parametrize('count', [1, 63, 65, 129])

@@ -84,12 +84,13 @@ template <class T>
 // The same pair with the box that comes first in the order of the data as A.
 template <class T>
 [[gnu::always_inline]] inline Pair<T> first_as_a(const Pair<T>& pair) {
+  Mask<T> a_first = pair.a_first;
   Pair<T> ordered = pair;
-  ordered.half_a = select(pair.a_first, pair.half_a, pair.half_b);
-  ordered.half_b = select(pair.a_first, pair.half_b, pair.half_a);
-  ordered.offset_a = select(pair.a_first, pair.offset_a, -pair.offset_b);
-  ordered.offset_b = select(pair.a_first, pair.offset_b, -pair.offset_a);
-  ordered.rotation = select(pair.a_first, pair.rotation, transpose(pair.rotation));
+  ordered.half_a = select(a_first, pair.half_a, pair.half_b);
+  ordered.half_b = select(a_first, pair.half_b, pair.half_a);
+  ordered.offset_a = select(a_first, pair.offset_a, -pair.offset_b);
+  ordered.offset_b = select(a_first, pair.offset_b, -pair.offset_a);
+  ordered.rotation = select(a_first, pair.rotation, transpose(pair.rotation));
   return ordered;
 }
 
@@ -101,6 +102,16 @@ inline Overlap clipped_overlap(Pair<double> pair, int face, bool pressed) {
 
 // Model `exact`: the centroid of A∩B by face sums, or by clipping where these are not certain.
 struct ExactModel {
+  // How many queries of T it takes at once.
+  template <class T>
+  static constexpr int group = 1;
+
+  template <class T>
+  [[gnu::always_inline]] void points(const Query<T> (&queries)[1], Vec<T> (&found)[1],
+                                     Counts& counts) const {
+    found[0] = points(queries[0], counts);
+  }
+
   // Contact points in A's frame [m], for the pairs that touch.
   template <class T>
   [[gnu::always_inline]] Vec<T> points(const Query<T>& q, Counts& counts) const {
@@ -170,30 +181,50 @@ template <class T>
   return query(pose_a, pose_b, half_a, half_b);
 }
 
+// Write `count` solved rows from `first` on. Returns the first that is refused, or −1.
+template <class T>
+[[gnu::always_inline]] inline long write_rows(const Query<T>& q, const Vec<T>& points, long first,
+                                              long count, const Results& results) {
+  T nothing = splat<T>(std::numeric_limits<double>::quiet_NaN());
+  Vec<T> none{nothing, nothing, nothing};
+  Vec<T> normal = select(q.touching, direction_in_common_frame(q.pair, q.axis.normal), none);
+  Vec<T> point = select(q.touching, point_in_common_frame(q.pair, points), none);
+  long refused = -1;
+  for (int i = 0; i < count && i < width<T>; ++i) {
+    long row = first + i;
+    results.colliding[row] = lane(q.touching, i) != 0;
+    results.separation[row] = lane(q.axis.separation, i);
+    for (int k = 0; k < 3; ++k) results.normal[3 * row + k] = lane(normal[k], i);
+    for (int k = 0; k < 3; ++k) results.point[3 * row + k] = lane(point[k], i);
+    if (!lane(q.pair.valid, i) && refused < 0) refused = row;
+  }
+  return refused;
+}
+
 // Solve rows `begin` to `end`. Returns the first row whose poses or sizes are refused, or −1; what
 // is written to such a row has no meaning.
 template <class T, class Model>
 long solve_rows(const Model& model, const Rows& rows, long begin, long end, const Results& results,
                 Counts& counts) {
+  constexpr int group = Model::template group<T>;
   long refused = -1;
-  for (long first = begin; first < end; first += width<T>) {
-    Query<T> q = query_rows<T>(rows, first, end);
-    int count = int(std::min<long>(width<T>, end - first));
-    T separation = q.axis.separation;
-    Vec<T> normal = direction_in_common_frame(q.pair, q.axis.normal), point;
-    // Lanes that repeat the last row are not counted.
-    for (int i = count; i < width<T>; ++i) set_lane(q.touching, i, 0);
-    if (any(q.touching)) point = point_in_common_frame(q.pair, model.points(q, counts));
-    T nothing = splat<T>(std::numeric_limits<double>::quiet_NaN());
-    normal = select(q.touching, normal, Vec<T>{nothing, nothing, nothing});
-    point = select(q.touching, point, Vec<T>{nothing, nothing, nothing});
-    for (int i = 0; i < count; ++i) {
-      long row = first + i;
-      results.colliding[row] = lane(q.touching, i) != 0;
-      results.separation[row] = lane(separation, i);
-      for (int k = 0; k < 3; ++k) results.normal[3 * row + k] = lane(normal[k], i);
-      for (int k = 0; k < 3; ++k) results.point[3 * row + k] = lane(point[k], i);
-      if (!lane(q.pair.valid, i) && refused < 0) refused = row;
+  for (long first = begin; first < end; first += group * width<T>) {
+    Query<T> queries[group];
+    Vec<T> points[group]{};
+    bool touching = false;
+    for (int g = 0; g < group; ++g) {
+      long start = first + g * width<T>;
+      queries[g] = query_rows<T>(rows, std::min(start, end - 1), end);
+      // Lanes that repeat the last row are not counted.
+      for (long i = std::max(0L, end - start); i < width<T>; ++i)
+        set_lane(queries[g].touching, int(i), 0);
+      touching |= any(queries[g].touching);
+    }
+    if (touching) model.points(queries, points, counts);
+    for (int g = 0; g < group; ++g) {
+      long start = first + g * width<T>;
+      long row = write_rows(queries[g], points[g], start, end - start, results);
+      if (refused < 0) refused = row;
     }
   }
   return refused;
@@ -207,13 +238,16 @@ template <class Model>
                                              Counts& counts) {
   Pose<double> a{{pose_a[0], pose_a[1], pose_a[2]}, {pose_a[3], pose_a[4], pose_a[5], pose_a[6]}};
   Pose<double> b{{pose_b[0], pose_b[1], pose_b[2]}, {pose_b[3], pose_b[4], pose_b[5], pose_b[6]}};
-  Query<double> q = query(a, b, half_a, half_b);
+  Query<double> queries[1] = {query(a, b, half_a, half_b)};
+  const Query<double>& q = queries[0];
   if (!q.pair.valid) return false;
   contact.colliding = q.touching;
   contact.separation = q.axis.separation;
   if (q.touching) {
+    Vec<double> points[1];
+    model.points(queries, points, counts);
     contact.normal = direction_in_common_frame(q.pair, q.axis.normal);
-    contact.point = point_in_common_frame(q.pair, model.points(q, counts));
+    contact.point = point_in_common_frame(q.pair, points[0]);
   } else {
     double nothing = std::numeric_limits<double>::quiet_NaN();
     contact.normal = contact.point = {nothing, nothing, nothing};

@@ -1,11 +1,14 @@
-// The bounding box of the overlap A∩B in the frame of one of the boxes, and a point inside.
+// Bounds of the overlap A∩B: a box about it in the frame of one of the boxes.
 //
-// Every corner of A∩B lies on an edge of A or of B. So the 24 edges, each cut off where it leaves
-// the other box, give the exact bounding box of the overlap in either box's frame, and the mean of
-// the pieces, weighted by their lengths, is a point of A∩B near its centroid.
+// There are two methods. Both look for bounds in either box's frame, and choose A's, or B's where it
+// is clearly smaller. The smaller one follows the overlap's own direction, and
+// the network's errors are two to seven times smaller in it.
 //
-// Of the two bounding boxes A's is chosen, or B's if it is clearly smaller. The smaller one follows
-// the overlap's own direction, and the network's errors are two to seven times smaller in it.
+// - `bounds_by_slab` cuts the boxes by SAT's slab, then each by the other by interval arithmetic.
+//   It costs a fifth of the other method. Its bounds are exact for the median overlap, and half as
+//   large again for one in a hundred.
+// - `bounds_by_edges` cuts the 24 edges of both boxes. Every corner of A∩B lies on one of them, so
+//   the bounds are exact.
 #pragma once
 
 #include <limits>
@@ -25,14 +28,14 @@ constexpr double clearly_smaller = 0.8;
 // Least half extent of a bounding box [m], so that one can divide by it.
 constexpr double thinnest = 1e-290;
 
-// The chosen bounding box. "Its frame" is that of box B where `in_b`, else of A, from that box's
-// centre. The "other box" is the one whose faces cut the bounding box.
+// The chosen bounds. "Their frame" is that of box B where `in_b`, else of A, from that box's centre.
+// The "other box" is the one whose faces cut the bounds.
 template <class T>
 struct OverlapBounds {
   Mask<T> in_b;
-  Vec<T> middle, half;  // its frame [m]
-  Vec<T> inside;        // a point of A∩B, its frame [m]
-  Mat<T> other_axes;    // the other box's axes as rows, its frame
+  Vec<T> middle, half;  // their frame [m]
+  Vec<T> own_half;      // half extents of the box whose frame it is [m]
+  Mat<T> other_axes;    // the other box's axes as rows, their frame
   Vec<T> other_offset;  // from the other box's centre to `middle`, along the other box's axes [m]
   Vec<T> other_half;    // the other box's half extents [m]
 };
@@ -43,10 +46,38 @@ template <class T>
 struct Interval {
   Four<T> low, high;
 };
+// A box about the overlap in one of the boxes' frames, from that box's centre [m].
 template <class T>
-struct BoundingBox {
-  Vec<T> low, high;
+struct FrameBox {
+  Vec<T> middle, half;
 };
+
+template <class T>
+[[gnu::always_inline]] inline FrameBox<T> choose(Mask<T> mask, const FrameBox<T>& a,
+                                                 const FrameBox<T>& b) {
+  return {select(mask, a.middle, b.middle), select(mask, a.half, b.half)};
+}
+template <class T>
+[[gnu::always_inline]] inline T volume(const FrameBox<T>& box) {
+  return box.half[0] * box.half[1] * box.half[2];
+}
+
+// The bounds in the frame of B where `in_b`, else of A.
+template <class T>
+[[gnu::always_inline]] inline OverlapBounds<T> chosen(const Pair<T>& pair, Mask<T> in_b,
+                                                      const FrameBox<T>& box) {
+  OverlapBounds<T> found;
+  found.in_b = in_b;
+  found.middle = box.middle;
+  found.half = box.half;
+  found.own_half = select(in_b, pair.half_b, pair.half_a);
+  found.other_half = select(in_b, pair.half_a, pair.half_b);
+  found.other_axes = select(in_b, pair.rotation, transpose(pair.rotation));
+  // The other box's centre along its own axes: B's is at offset_b, A's, seen from B, at −offset_a.
+  Vec<T> centre = select(in_b, -pair.offset_a, pair.offset_b);
+  found.other_offset = found.other_axes * box.middle - centre;
+  return found;
+}
 
 template <class T>
 [[gnu::always_inline]] inline T smallest_of(const Four<T>& x) {
@@ -93,26 +124,86 @@ template <class T>
 }
 
 template <class T>
-[[gnu::always_inline]] inline BoundingBox<T> joined(const Interval<T> (&intervals)[3]) {
-  BoundingBox<T> box;
+[[gnu::always_inline]] inline FrameBox<T> joined(const Interval<T> (&intervals)[3]) {
+  FrameBox<T> box;
   for (int k = 0; k < 3; ++k) {
-    box.low[k] = smallest_of<T>(intervals[k].low);
-    box.high[k] = -smallest_of<T>(-intervals[k].high);
+    T low = smallest_of<T>(intervals[k].low), high = -smallest_of<T>(-intervals[k].high);
+    box.middle[k] = 0.5 * (low + high);
+    box.half[k] = max(0.5 * (high - low), splat<T>(thinnest));
   }
   return box;
 }
 
+// The part of a box that lies within `depth` of its extreme plane along `direction`, bounded.
 template <class T>
-[[gnu::always_inline]] inline T volume(const BoundingBox<T>& box) {
-  Vec<T> extent = box.high - box.low;
-  return extent[0] * extent[1] * extent[2];
+[[gnu::always_inline]] inline FrameBox<T> part_in_slab(const Vec<T>& half, const Vec<T>& direction,
+                                                       T depth) {
+  FrameBox<T> part;
+  for (int k = 0; k < 3; ++k) {
+    part.half[k] = min(half[k], (0.5 * depth) / abs(direction[k]));
+    T middle = half[k] - part.half[k];
+    part.middle[k] = select<T>(direction[k] >= 0.0, middle, -middle);
+  }
+  return part;
+}
+
+// Box Y seen from box X: Y's axes as rows in X's frame, their reciprocals, and X's centre from Y's
+// along Y's axes.
+template <class T>
+struct Facing {
+  Mat<T> axes, inverse;
+  Vec<T> offset;
+};
+
+// Cut X's box by Y's: along each axis of X, each pair of Y's faces leaves an interval at most.
+template <class T>
+[[gnu::always_inline]] inline FrameBox<T> tighten(const FrameBox<T>& x, const FrameBox<T>& y,
+                                                  const Facing<T>& y_from_x, T slack) {
+  Vec<T> at = y_from_x.axes * x.middle + y_from_x.offset - y.middle, reach;
+  for (int k = 0; k < 3; ++k) reach[k] = (y.half[k] + slack) + dot(abs(row(y_from_x.axes, k)), x.half);
+  FrameBox<T> cut;
+  for (int i = 0; i < 3; ++i) {
+    T high = 2.0 * x.half[i], low = high;  // from the opposite end of X's interval
+    for (int k = 0; k < 3; ++k) {
+      T by = y_from_x.inverse[k][i], far = reach[k] * abs(by), middle = at[k] * by;
+      high = min(high, far - middle);
+      low = min(low, far + middle);
+    }
+    cut.middle[i] = x.middle[i] + 0.5 * (high - low);
+    cut.half[i] = max(0.5 * (high + low) - x.half[i], splat<T>(thinnest));
+  }
+  return cut;
 }
 
 }  // namespace bounds
 
-// The bounds of a pair that has been pressed in; of pairs that do not overlap, without meaning.
+// Bounds by SAT's slab, of a pair that has been pressed in to `depth` [m].
+//
+// The overlap lies in the slab between the boxes' extreme planes along SAT's winning axis, as thick
+// as the depth. `normal`: that axis as a unit vector from A to B, in A's frame.
 template <class T>
-[[gnu::always_inline]] inline OverlapBounds<T> overlap_bounds(const Pair<T>& pair) {
+[[gnu::always_inline]] inline OverlapBounds<T> bounds_by_slab(const Pair<T>& pair,
+                                                              const Vec<T>& normal, T depth) {
+  using namespace bounds;
+  const Mat<T>& r = pair.rotation;
+  Mat<T> inverse = reciprocals(r);
+  T slack = flush * pair.size;
+  FrameBox<T> a = part_in_slab(pair.half_a, normal, depth);
+  FrameBox<T> b = part_in_slab(pair.half_b, -transposed_times(r, normal), depth);
+  Facing<T> b_to_a{transpose(r), transpose(inverse), -pair.offset_b};
+  Facing<T> a_to_b{r, inverse, pair.offset_a};
+  FrameBox<T> cut_a = tighten(a, b, b_to_a, slack), cut_b = tighten(b, a, a_to_b, slack);
+  Mask<T> in_b = volume(cut_b) < clearly_smaller * volume(cut_a);
+  Facing<T> facing{select(in_b, a_to_b.axes, b_to_a.axes),
+                   select(in_b, a_to_b.inverse, b_to_a.inverse),
+                   select(in_b, a_to_b.offset, b_to_a.offset)};
+  return chosen(pair, in_b,
+                tighten(choose(in_b, cut_b, cut_a), choose(in_b, cut_a, cut_b), facing, slack));
+}
+
+// Bounds by the 24 edges, of a pair that has been pressed in; of pairs apart, without meaning.
+template <class T>
+inline OverlapBounds<T> bounds_by_edges(const Pair<T>& pair) {
   using namespace bounds;
   const Mat<T>& r = pair.rotation;
   Mat<T> inverse = reciprocals(r), back = transpose(r);
@@ -121,42 +212,14 @@ template <class T>
   for (int k = 0; k < 3; ++k) wide_a[k] = pair.half_a[k] + slack, wide_b[k] = pair.half_b[k] + slack;
   EdgePieces<T> edges_a = cut_edges(back, transpose(inverse), a_in_b, pair.half_a, wide_b, {});
   EdgePieces<T> edges_b = cut_edges(r, inverse, pair.offset_a, pair.half_b, wide_a, {});
-
   Four<T> far = Four<T>{} + std::numeric_limits<double>::max();
   Interval<T> in_a[3], in_b[3];
   for (int k = 0; k < 3; ++k) in_a[k] = in_b[k] = {far, -far};
   widen_by_edges(edges_a, back, a_in_b, pair.half_a, in_a, in_b);
   widen_by_edges(edges_b, r, pair.offset_a, pair.half_b, in_b, in_a);
-  BoundingBox<T> box_a = joined(in_a), box_b = joined(in_b);
-
-  OverlapBounds<T> found;
-  found.in_b = volume(box_b) < clearly_smaller * volume(box_a);
-  T scale = 1.0 / (edges_a.length + edges_b.length);
-  Vec<T> inside_a = scale * (edges_a.mean + (r * edges_b.mean + edges_b.length * pair.offset_a));
-  Vec<T> inside_b =
-      scale * (edges_b.mean + (transposed_times(r, edges_a.mean) + edges_a.length * a_in_b));
-  Vec<T> low = select(found.in_b, box_b.low, box_a.low);
-  Vec<T> high = select(found.in_b, box_b.high, box_a.high);
-  Vec<T> inside = select(found.in_b, inside_b, inside_a);
-  for (int k = 0; k < 3; ++k) {
-    found.middle[k] = 0.5 * (low[k] + high[k]);
-    found.half[k] = max(0.5 * (high[k] - low[k]), splat<T>(thinnest));
-    found.inside[k] = min(high[k], max(low[k], inside[k]));
-  }
-  found.other_axes = select(found.in_b, r, back);
-  found.other_half = select(found.in_b, pair.half_a, pair.half_b);
-  // The other box's centre along its own axes: B's is at offset_b, A's, seen from B, at −offset_a.
-  Vec<T> centre = select(found.in_b, -pair.offset_a, pair.offset_b);
-  found.other_offset = found.other_axes * found.middle - centre;
-  return found;
-}
-
-// Bring a point from the bounds' frame to A's.
-template <class T>
-[[gnu::always_inline]] inline Vec<T> point_in_frame_a(const Pair<T>& pair,
-                                                      const OverlapBounds<T>& bounds,
-                                                      const Vec<T>& point) {
-  return select(bounds.in_b, pair.offset_a + pair.rotation * point, point);
+  FrameBox<T> box_a = joined(in_a), box_b = joined(in_b);
+  Mask<T> in_second = volume(box_b) < clearly_smaller * volume(box_a);
+  return chosen(pair, in_second, choose(in_second, box_b, box_a));
 }
 
 }  // namespace box_contact

@@ -9,6 +9,8 @@ from numpy.typing import ArrayLike
 
 from . import native
 
+BOUNDS = ('slab', 'edges')
+"""Methods of the overlap's bounds."""
 _UNASKED = np.empty(0)
 
 
@@ -55,11 +57,9 @@ class Stages(NamedTuple):
     in_range: np.ndarray = _UNASKED
     """(n,) bool: the MLP may be asked; else the exact answer is given."""
     bounds_middle: np.ndarray = _UNASKED
-    """(n, 3) middle of the overlap's bounding box, bounds' frame."""
+    """(n, 3) middle of the overlap's bounds, their frame."""
     bounds_half: np.ndarray = _UNASKED
     """(n, 3) its half extents."""
-    inside: np.ndarray = _UNASKED
-    """(n, 3) a point of the overlap, bounds' frame."""
     other_axes: np.ndarray = _UNASKED
     """(n, 3, 3) the other box's axes as rows, bounds' frame."""
     other_offset: np.ndarray = _UNASKED
@@ -75,24 +75,28 @@ class Stages(NamedTuple):
 
 
 def stages(poses_a: ArrayLike, poses_b: ArrayLike, size_a: ArrayLike, size_b: ArrayLike, *,
-           names: Sequence[str], network: np.ndarray | None = None) -> Stages:
+           names: Sequence[str], network: np.ndarray | None = None,
+           bounds: str = 'slab') -> Stages:
     """Compute what the stages of n pairs give, one pair after the other.
 
     poses_a, poses_b: (n, 7) `x y z qx qy qz qw` in a common frame [m].
     size_a, size_b: (n, 3), or (1, 3) for all pairs, full extents [m].
     names: fields of `Stages` that are wanted.
-    network: numbers of an MLP (`network.packed_for_core`), for `answer`.
+    network: numbers of an MLP (`mlp.core_numbers`), for `answer`.
+    bounds: the method of the overlap's bounds, 'slab' or 'edges'; see overlap_bounds.hpp.
 
     Raises ValueError for unknown names, and for rows that are no poses or sizes.
     """
     unknown = [name for name in names if name not in Stages._fields]
     if unknown:
         raise ValueError(f'names {unknown} are not fields of Stages')
+    if bounds not in BOUNDS:
+        raise ValueError(f'bounds {bounds!r} is not one of: {", ".join(BOUNDS)}')
     if 'answer' in names and network is None:
         raise ValueError("'answer' needs a network")
     a, b, one, other = (np.asarray(values, dtype=np.float64)
                         for values in (poses_a, poses_b, size_a, size_b))
-    arrays, refused = native.stages(a, b, one, other, network, tuple(names))
+    arrays, refused = native.stages(a, b, one, other, network, tuple(names), bounds == 'edges')
     if refused >= 0:
         raise ValueError(f'row {refused} is refused: its poses or sizes are not valid')
     return Stages(**arrays)

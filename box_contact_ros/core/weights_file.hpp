@@ -36,6 +36,10 @@ class WeightsFile {
     // The model card lists no sizes: the network is for boxes of any size.
     if (header_.find(R"(\"sizes\":[])") == std::string::npos)
       refuse("is for boxes of some sizes only, or has no model card");
+    // White space has gone from the header, from texts too.
+    if (header_.find(R"(\"description\":\"cutsoftheboundsbytheslab,atninesites\")") ==
+        std::string::npos)
+      refuse("is for another description of the overlap");
     size_t units = number(entry("point.0.bias"), R"("shape":[)");
     std::vector<float> bias = tensor("point.0.bias", {units});
     std::vector<float> first = tensor("point.0.weight", {units, site_features});

@@ -30,7 +30,7 @@ import numpy as np
 from ..arguments import seed_number
 from ..contact import Contacts
 from ..core import CENTROID_REACH, DEPTH_FLOOR, Stages, native, stages
-from ..mlp import core_numbers
+from ..mlp import bounds_of, core_numbers
 from ..network import WeightsError, load_weights
 from ..pose import rotation_matrix
 from ..posesets import SETS, Pairs
@@ -51,12 +51,12 @@ class Limit(NamedTuple):
 
 
 LIMITS = {
-    'random cubes': Limit(0.3, 2.5, 8.0),
-    'touching': Limit(0.1, 1.0, 5.0),
-    'random sizes': Limit(0.3, 2.5, 10.0),
-    'stacks': Limit(0.8, 3.0, 8.0),
-    'tilted stacks': Limit(0.8, 3.0, 8.0),
-    'containers': Limit(0.6, 3.5, 8.0),
+    'random cubes': Limit(0.08, 1.0, 4.0),
+    'touching': Limit(0.001, 0.01, 0.1),
+    'random sizes': Limit(0.015, 0.2, 4.0),
+    'stacks': Limit(0.35, 1.3, 4.5),
+    'tilted stacks': Limit(0.35, 1.3, 4.5),
+    'containers': Limit(0.06, 0.5, 2.5),
 }
 """What model `mlp` has to keep, by set."""
 MAE_LIMIT = 0.005
@@ -113,9 +113,10 @@ def share_corrected(pairs: Pairs, weights: Path | str) -> float:
 
     The network's points are in the bounding box, so it is the other box that a point can leave.
     """
+    file = load_weights(weights)
     found = stages(*pairs, names=('answer', 'bounds_half', 'other_axes', 'other_offset',
                                   'other_half', 'size'),
-                   network=core_numbers(load_weights(weights).networks['point']))
+                   network=core_numbers(file.networks['point']), bounds=bounds_of(file))
     from_middle = found.bounds_half * np.clip(found.answer, -CENTROID_REACH, CENTROID_REACH)
     from_other = found.other_offset + np.einsum('nfq,nq->nf', found.other_axes, from_middle)
     beyond = np.abs(from_other) - found.other_half > OUTSIDE * found.size[:, None]

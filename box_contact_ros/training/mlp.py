@@ -24,9 +24,9 @@ from ..solver import ContactSolver
 from .contacts import MlpSamples, SizePair, draw_samples, mixture, scene_mixture
 from .points import Fit, Settings, normalisation, unfolded
 
-HIDDEN = (32,)
+HIDDEN = (12,)
 """Hidden units: what fits the time that a batch has for the network (docs/search.md)."""
-PAIRS, STEPS, BATCH, RATE = 1_500_000, 80_000, 4096, 2e-2
+PAIRS, STEPS, BATCH, RATE = 1_500_000, 60_000, 4096, 2e-2
 HARD_ROUNDS, HARD_POOL, HARD_PART, HARD_SHARE = (0.4, 0.55, 0.7, 0.85), 2_000_000, 0.01, 0.2
 """After each of these parts of the steps, a pool of fresh pairs is searched for the hardest part,
 and from then on all that were found so far make up that share of what is learned from."""

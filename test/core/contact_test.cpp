@@ -317,9 +317,9 @@ void check_rows(const char* model, const Network* network, const Pairs& pairs,
 // Verdict, separation and normal alone, which compile in a second for every width.
 struct NoPoint {
   template <class T>
-  box_contact::Vec<T> points(box_contact::Query<T>&, Counts&) const {
-    return {};
-  }
+  [[maybe_unused]] static constexpr int group = 1;
+  template <class T>
+  void points(const box_contact::Query<T> (&)[1], box_contact::Vec<T> (&)[1], Counts&) const {}
 };
 template <class T>
 [[maybe_unused]] void check_width(const char* width, const Pairs& pairs, const Answers& found) {

@@ -96,7 +96,7 @@ bool read_network(PyObject* object, std::unique_ptr<Network>& network) {
 
 // --- PairSolver ---------------------------------------------------------------------------------
 
-enum class Model { none, exact, mlp };
+enum class Model { none, exact, mlp, mlp_by_edges };
 
 struct PairSolver {
   PyObject_HEAD
@@ -105,6 +105,19 @@ struct PairSolver {
   Network* network;
   std::atomic<long> clipped, exact;
 };
+
+// Call `run` with the solver's model, which is not `none`.
+template <class Run>
+auto with_model(const PairSolver& solver, Run run) {
+  switch (solver.model) {
+    case Model::mlp:
+      return run(MlpModel{*solver.network});
+    case Model::mlp_by_edges:
+      return run(MlpModelBy<Network::Bounds::edges>{*solver.network});
+    default:
+      return run(ExactModel{});
+  }
+}
 
 PairSolver* solver_of(PyObject* object) { return reinterpret_cast<PairSolver*>(object); }
 
@@ -140,11 +153,9 @@ PyObject* solver_call(PyObject* self, PyObject* args, PyObject* keywords) {
     if (a && b) {
       Contact contact;
       Counts counts;
-      bool solved = solver->model == Model::exact
-                        ? solve_one(ExactModel{}, a, b, solver->half_a, solver->half_b, contact,
-                                    counts)
-                        : solve_one(MlpModel{*solver->network}, a, b, solver->half_a,
-                                    solver->half_b, contact, counts);
+      bool solved = with_model(*solver, [&](const auto& model) {
+        return solve_one(model, a, b, solver->half_a, solver->half_b, contact, counts);
+      });
       if (counts.clipped) solver->clipped += counts.clipped;
       if (counts.exact) solver->exact += counts.exact;
       if (solved) return new_contact(contact);
@@ -165,12 +176,17 @@ int solver_init(PyObject* self, PyObject* args, PyObject* keywords) {
   std::unique_ptr<Network> network;
   if (!read_network(weights, network)) return -1;
   std::string name = model ? model : "";
-  if ((!name.empty() && name != "exact" && name != "mlp") || (name == "mlp") != bool(network)) {
-    PyErr_SetString(PyExc_ValueError, "model is 'exact', 'mlp' with a network, or None");
+  Model chosen = name == "exact"       ? Model::exact
+                 : name == "mlp"       ? Model::mlp
+                 : name == "mlp-edges" ? Model::mlp_by_edges
+                                       : Model::none;
+  bool known = name.empty() || chosen != Model::none;
+  if (!known || bool(network) != (chosen == Model::mlp || chosen == Model::mlp_by_edges)) {
+    fail(PyExc_ValueError, "model is 'exact', 'mlp' or 'mlp-edges' with a network, or None");
     return -1;
   }
   auto* solver = solver_of(self);
-  solver->model = name == "exact" ? Model::exact : name == "mlp" ? Model::mlp : Model::none;
+  solver->model = chosen;
   for (int k = 0; k < 3; ++k) solver->half_a[k] = 0.5 * a[k], solver->half_b[k] = 0.5 * b[k];
   delete solver->network;
   solver->network = network.release();
@@ -233,9 +249,9 @@ PyObject* solver_solve(PyObject* self, PyObject* const* args, Py_ssize_t count) 
   Counts counts;
   long refused;
   Py_BEGIN_ALLOW_THREADS;
-  refused = solver->model == Model::exact
-                ? solve_in_threads(ExactModel{}, pairs, results, threads, counts)
-                : solve_in_threads(MlpModel{*solver->network}, pairs, results, threads, counts);
+  refused = with_model(*solver, [&](const auto& model) {
+    return solve_in_threads(model, pairs, results, threads, counts);
+  });
   Py_END_ALLOW_THREADS;
   if (refused < 0) solver->clipped += counts.clipped, solver->exact += counts.exact;
   return Py_BuildValue("(NNNNl)", colliding.object.release(), separation.object.release(),
@@ -287,12 +303,14 @@ PyObject* use_contact_type(PyObject*, PyObject* type) {
 }
 
 PyObject* stages(PyObject*, PyObject* const* args, Py_ssize_t count) {
-  if (count != 6 || !PySequence_Check(args[5])) {
-    return fail(PyExc_TypeError, "stages(poses_a, poses_b, sizes_a, sizes_b, network, names)");
+  if (count != 7 || !PySequence_Check(args[5])) {
+    return fail(PyExc_TypeError,
+                "stages(poses_a, poses_b, sizes_a, sizes_b, network, names, by_edges)");
   }
   PairArrays pairs;
   std::unique_ptr<Network> network;
-  if (!read_pairs(args, pairs) || !read_network(args[4], network)) return nullptr;
+  int by_edges = PyObject_IsTrue(args[6]);
+  if (by_edges < 0 || !read_pairs(args, pairs) || !read_network(args[4], network)) return nullptr;
   Owned found(PyDict_New());
   if (!found) return nullptr;
   StageArrays arrays;
@@ -316,8 +334,13 @@ PyObject* stages(PyObject*, PyObject* const* args, Py_ssize_t count) {
   if (!filled) return nullptr;
   long refused = -1;
   Py_BEGIN_ALLOW_THREADS;
-  for (long row = 0; row < pairs.count && refused < 0; ++row)
-    if (!fill_stages(pairs.rows, row, network.get(), arrays)) refused = row;
+  for (long row = 0; row < pairs.count && refused < 0; ++row) {
+    bool filled_row = by_edges ? fill_stages<Network::Bounds::edges>(pairs.rows, row, network.get(),
+                                                                     arrays)
+                               : fill_stages<Network::Bounds::slab>(pairs.rows, row, network.get(),
+                                                                    arrays);
+    if (!filled_row) refused = row;
+  }
   Py_END_ALLOW_THREADS;
   return Py_BuildValue("(Nl)", found.release(), refused);
 }

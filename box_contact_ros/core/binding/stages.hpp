@@ -11,7 +11,7 @@ struct StageArrays {
   int64_t *axis{}, *face{};
   double *separation{}, *touch{}, *size{}, *normal{}, *rotation{}, *offset_a{}, *offset_b{};
   double *pressed_offset_a{}, *pressed_offset_b{}, *centroid{}, *clipped_centroid{};
-  double *bounds_middle{}, *bounds_half{}, *inside{};
+  double *bounds_middle{}, *bounds_half{};
   double *other_axes{}, *other_offset{}, *other_half{}, *answer{};
   float *features{}, *vectors{};
 
@@ -37,7 +37,6 @@ struct StageArrays {
     visit("clipped_centroid", clipped_centroid, {3});
     visit("bounds_middle", bounds_middle, {3});
     visit("bounds_half", bounds_half, {3});
-    visit("inside", inside, {3});
     visit("other_axes", other_axes, {3, 3});
     visit("other_offset", other_offset, {3});
     visit("other_half", other_half, {3});
@@ -84,8 +83,8 @@ inline void put_features(const StageArrays& arrays, long row, const CutCube<doub
 }
 
 // Fill one row. Returns false if its poses or sizes are refused. `network` may be nullptr.
-inline bool fill_stages(const Rows& rows, long row, const Network* network,
-                        const StageArrays& arrays) {
+template <Network::Bounds method>
+bool fill_stages(const Rows& rows, long row, const Network* network, const StageArrays& arrays) {
   Query<double> q = query_rows<double>(rows, row, row + 1);
   if (!q.pair.valid) return false;
   put(arrays.colliding, row, q.touching);
@@ -110,17 +109,21 @@ inline bool fill_stages(const Rows& rows, long row, const Network* network,
         clipped_overlap(pressed, int(q.axis.face), was_pressed).centroid);
   put(arrays.pressed_offset_a, row, pressed.offset_a);
   put(arrays.pressed_offset_b, row, pressed.offset_b);
-  OverlapBounds<double> bounds = overlap_bounds(pressed);
+  OverlapBounds<double> bounds = MlpModelBy<method>::bounds_of(pressed, q.axis);
   put(arrays.frame_b, row, bounds.in_b);
   put(arrays.in_range, row, in_range(pressed, q.axis.separation, bounds));
   put(arrays.bounds_middle, row, bounds.middle);
   put(arrays.bounds_half, row, bounds.half);
-  put(arrays.inside, row, bounds.inside);
   put(arrays.other_axes, row, bounds.other_axes);
   put(arrays.other_offset, row, bounds.other_offset);
   put(arrays.other_half, row, bounds.other_half);
   CutCube<double> cube = cut_cube(bounds, q.pair.size);
-  if (network) put(arrays.answer, row, ask(*network, cube));
+  if (network && arrays.answer) {
+    CutCube<double> cubes[1] = {cube};
+    Vec<double> answers[1];
+    ask(*network, cubes, answers);
+    put(arrays.answer, row, answers[0]);
+  }
   if (arrays.features || arrays.vectors) put_features(arrays, row, cube);
   return true;
 }
