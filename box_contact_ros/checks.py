@@ -46,7 +46,7 @@ def pose_fault(pose: Sequence[float] | np.ndarray) -> str | None:
     text = f'quaternion (x={qx:g}, y={qy:g}, z={qz:g}, w={qw:g})'
     if not all(math.isfinite(value) for value in (qx, qy, qz, qw)):
         return f'{text} is not finite'
-    norm2 = (qx * qx + qy * qy) + (qz * qz + qw * qw)  # to the bit as the kernels have it
+    norm2 = (qx * qx + qy * qy) + (qz * qz + qw * qw)  # to the bit as the core has it
     if norm2 < QUATERNION_MIN * QUATERNION_MIN:
         return f'{text} has zero length'
     if norm2 > QUATERNION_MAX * QUATERNION_MAX:

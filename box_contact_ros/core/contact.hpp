@@ -29,7 +29,7 @@ struct Contact {
 // How many contacts took another way than most.
 struct Counts {
   long clipped = 0;  // by model `exact`: clipped, because the certificate did not hold
-  long exact = 0;    // by model `mlp`: answered by `exact`, because outside the trained range
+  long exact = 0;    // by model `mlp`: answered by `exact`: outside the trained range, or a box
 
   Counts& operator+=(const Counts& other) {
     clipped += other.clipped;

@@ -49,7 +49,7 @@ constexpr double place_tolerance = 0x1p-46;
 
 constexpr int site_count = 9, site_features = 12, site_outputs = 3;
 
-// The cut cube in float32, for lanes F; `slant[f]` is the normal of the pair of faces f.
+// The cut cube, for lanes F of either precision; `slant[f]` is the normal of the pair of faces f.
 template <class F>
 struct CutCube {
   Mat<F> slant;
@@ -83,7 +83,7 @@ template <class T>
   return select<T>(x >= 0.0, length, -length);
 }
 
-// The cut cube in float64. Faces are as wide as `overlap_bounds` took them: one in a plane with the
+// The cut cube in float64. Faces are as wide as the bounds took them: one in a plane with the
 // cube's face cuts nothing.
 template <class T>
 [[gnu::always_inline]] inline CutCube<T> cut_cube(const OverlapBounds<T>& bounds, T size) {

@@ -71,15 +71,9 @@ inline bool press_on(Pair<double>& pair) {
 // the vectors as rounded, as in the separating-axis test.
 template <class T>
 inline Mask<T> has_too_little_depth(const Pair<T>& pair) {
-  SeparatingAxis<T> unused;
-  T gap = face_gap(pair.offset_a[0], pair.half_a[0], pair.half_b, row(pair.rotation, 0));
-  for (int k = 1; k < 3; ++k)
-    gap = max(gap, face_gap(pair.offset_a[k], pair.half_a[k], pair.half_b, row(pair.rotation, k)));
-  for (int k = 0; k < 3; ++k)
-    gap = max(gap,
-              face_gap(pair.offset_b[k], pair.half_b[k], pair.half_a, column(pair.rotation, k)));
-  BestAxis<T> best{gap, T{}, gap};
-  offer_edge_axes(pair, FirstFrame<T>(pair), best, unused.doubtful);
+  BestAxis<T> best = best_face_axis(pair);
+  Mask<T> unused;
+  offer_edge_axes(pair, FirstFrame<T>(pair), best, unused);
   return best.largest_gap > -0.5 * depth_floor * pair.size;
 }
 

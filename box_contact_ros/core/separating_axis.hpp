@@ -164,8 +164,9 @@ template <class T>
   return select(edges, n, side * face);
 }
 
+// The best of the six face axes.
 template <class T>
-[[gnu::always_inline]] inline SeparatingAxis<T> separating_axis(const Pair<T>& pair) {
+[[gnu::always_inline]] inline BestAxis<T> best_face_axis(const Pair<T>& pair) {
   T tolerance = tie * pair.size;
   T gap = face_gap(pair.offset_a[0], pair.half_a[0], pair.half_b, row(pair.rotation, 0));
   BestAxis<T> best{gap, T{}, gap};
@@ -175,6 +176,12 @@ template <class T>
   for (int k = 0; k < 3; ++k)
     best.offer(face_gap(pair.offset_b[k], pair.half_b[k], pair.half_a, column(pair.rotation, k)),
                splat<T>(3 + k), tolerance);
+  return best;
+}
+
+template <class T>
+[[gnu::always_inline]] inline SeparatingAxis<T> separating_axis(const Pair<T>& pair) {
+  BestAxis<T> best = best_face_axis(pair);
   SeparatingAxis<T> found;
   found.face = best.axis;
   FirstFrame<T> frame(pair);
