@@ -5,8 +5,8 @@ import argparse
 import tempfile
 from pathlib import Path
 
-from .checks import shown
-from .solver import check_model
+from .solver.checks import shown
+from .solver.contact_solver import check_model
 
 
 def model_name(text: str) -> str:

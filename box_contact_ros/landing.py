@@ -24,11 +24,11 @@ from typing import Any
 
 import numpy as np
 
-from .contact import Contact
 from .contact_force import GRAVITY, ContactLaw, HeldWrench, Touch
 from .crane import LANDING_OVERLAP, Crane, CraneScenario
-from .pose import rotation_matrix
-from .solver import ContactSolver
+from .solver.contact import Contact
+from .solver.contact_solver import ContactSolver
+from .solver.pose import rotation_matrix
 
 __all__ = ['LandingCase', 'LandingRecord', 'LandingResult', 'cases', 'land', 'landing_scenario',
            'scenario_of', 'touch_of']

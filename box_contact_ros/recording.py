@@ -25,7 +25,7 @@ from rosbags.rosbag2 import (
 )
 from rosbags.typesys import Stores, get_typestore
 
-from .checks import as_size, shown
+from .solver.checks import as_size, shown
 from .streams import Size, Stream
 
 BAG_VERSION: Final = 9

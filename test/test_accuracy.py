@@ -7,11 +7,11 @@ import numpy as np
 import poses
 import pytest
 
-from box_contact_ros.network import load_weights, save_weights, unpacked
 from box_contact_ros.posesets import CUBE, SETS, Pairs
 from box_contact_ros.report import accuracy
 from box_contact_ros.report.accuracy import CLASSES
 from box_contact_ros.resources import resource_path
+from box_contact_ros.solver.weights_file import load_weights, save_weights, unpacked
 
 SHIPPED = resource_path('weights', 'mlp.safetensors')
 

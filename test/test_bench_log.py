@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from box_contact_ros import ContactSolver
-from box_contact_ros.contact import Contacts
 from box_contact_ros.nodes.bench_log import (
     COLUMNS,
     ECHO_MESSAGES,
@@ -18,6 +17,7 @@ from box_contact_ros.nodes.bench_log import (
     latency_table,
     write_csv,
 )
+from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.streams import STREAMS, by_sizes, make_stream
 
 MS = 1_000_000  # ns

@@ -21,10 +21,10 @@ import pytest
 
 import box_contact_ros
 from box_contact_ros import Contact, ContactSolver
-from box_contact_ros.contact import Contacts
 from box_contact_ros.core import FORCE, instruction_sets, native, stages
-from box_contact_ros.mlp import core_numbers, load_mlp
 from box_contact_ros.posesets import SETS, Pairs
+from box_contact_ros.solver.contact import Contacts
+from box_contact_ros.solver.mlp import core_numbers, load_mlp
 from box_contact_ros.stability import fuzz
 
 HERE = Path(__file__).resolve().parent

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from box_contact_ros.pose import rotation_matrix
 from box_contact_ros.posesets import SETS, Pairs
 from box_contact_ros.report import frontier
 from box_contact_ros.report.peers import Contestant, Ours, installed
-from box_contact_ros.solver import ContactSolver
+from box_contact_ros.solver.contact_solver import ContactSolver
+from box_contact_ros.solver.pose import rotation_matrix
 
 ROOT = Path(__file__).resolve().parents[1]
 PEERS, MISSING = installed()

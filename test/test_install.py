@@ -125,7 +125,7 @@ def test_data_files_are_there_and_load(installed: Installation) -> None:
     found = installed.ask("""
 import json, sys
 import box_contact_ros
-from box_contact_ros.network import load_weights
+from box_contact_ros.solver.weights_file import load_weights
 from box_contact_ros.resources import resource_path
 files = {}
 for folder in sys.argv[1:]:

@@ -16,7 +16,7 @@ from box_contact_ros.nodes import crane as crane_node  # noqa: E402
 from box_contact_ros.nodes import crane_feedback  # noqa: E402
 from box_contact_ros.nodes.landing_flights import answering_node, fly_over_dds  # noqa: E402
 from box_contact_ros.nodes.runtime import make_executor  # noqa: E402
-from box_contact_ros.solver import ContactSolver  # noqa: E402
+from box_contact_ros.solver.contact_solver import ContactSolver  # noqa: E402
 
 EXACT = ('--ros-args', '-p', 'model:=exact')
 HARD = {'rope_angle': 3.0, 'rope_heading': 100.0, 'pitch': 2.0, 'roll': -2.0, 'yaw': 1.0,

@@ -15,7 +15,6 @@ from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import Marker, MarkerArray
 
 from box_contact_ros import ContactSolver
-from box_contact_ros.contact import Contact
 from box_contact_ros.nodes.contact import ContactNode
 from box_contact_ros.nodes.markers import (
     PARAMETERS,
@@ -27,6 +26,7 @@ from box_contact_ros.nodes.messages import CLOUD_ROW, make_cloud, make_header
 from box_contact_ros.pairing import StampedPose
 from box_contact_ros.resources import resource_path
 from box_contact_ros.scene import Answer, Pair
+from box_contact_ros.solver.contact import Contact
 
 SLAB, CUBE = (2.0, 4.0, 1.0), (2.0, 2.0, 2.0)
 HEADER = make_header(1_500_000_000, 'yard')

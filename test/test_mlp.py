@@ -17,10 +17,10 @@ from box_contact_ros.core import (
     SIZE_RATIO_MAX,
     native,
 )
-from box_contact_ros.mlp import ACTIVATION, DESCRIPTION, UNITS_MAX
-from box_contact_ros.network import WeightsError, save_weights
 from box_contact_ros.posesets import SETS, Pairs, log_uniform, quaternion_multiply, turns
 from box_contact_ros.report.accuracy import LIMITS
+from box_contact_ros.solver.mlp import ACTIVATION, DESCRIPTION, UNITS_MAX
+from box_contact_ros.solver.weights_file import WeightsError, save_weights
 
 N = 10_000
 LANES = native.lanes
@@ -495,7 +495,7 @@ def test_missing_weights_name_the_model_that_needs_none(monkeypatch):
     def nowhere(*parts):
         raise FileNotFoundError(parts)
 
-    monkeypatch.setattr('box_contact_ros.mlp.resource_path', nowhere)
+    monkeypatch.setattr('box_contact_ros.solver.mlp.resource_path', nowhere)
     with pytest.raises(WeightsError, match="'exact'"):
         ContactSolver(UNIT, UNIT, model='mlp')
 

@@ -10,15 +10,15 @@ from safetensors.numpy import load_file, save_file
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.baselines.paper import _networks
-from box_contact_ros.network import (
+from box_contact_ros.report import paper
+from box_contact_ros.resources import resource_path
+from box_contact_ros.solver.weights_file import (
     CARD_FIELDS,
     WeightsError,
     load_weights,
     save_weights,
     tensors_digest,
 )
-from box_contact_ros.report import paper
-from box_contact_ros.resources import resource_path
 from box_contact_ros.training import dataset
 from box_contact_ros.training.errors import (
     errors_of,

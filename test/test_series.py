@@ -15,11 +15,11 @@ import poses
 import pytest
 
 from box_contact_ros import ContactSolver
-from box_contact_ros.contact import Contacts
 from box_contact_ros.core import DEPTH_FLOOR
-from box_contact_ros.network import Network, load_weights
 from box_contact_ros.posesets import SETS, Pairs, log_uniform, pressed, quaternion_multiply, turns
 from box_contact_ros.resources import resource_path
+from box_contact_ros.solver.contact import Contacts
+from box_contact_ros.solver.weights_file import Network, load_weights
 from box_contact_ros.stability.choices import solve_with_choices
 
 UNIT = (1.0, 1.0, 1.0)

@@ -14,9 +14,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from box_contact_ros import Contact, ContactSolver
-from box_contact_ros.checks import pose_fault
-from box_contact_ros.pose import quaternion_from_matrix, quaternion_multiply, rotation_matrix
-from box_contact_ros.solver import MODELS
+from box_contact_ros.solver.checks import pose_fault
+from box_contact_ros.solver.contact_solver import MODELS
+from box_contact_ros.solver.pose import quaternion_from_matrix, quaternion_multiply, rotation_matrix
 
 SOLVER = ContactSolver(poses.CUBE, poses.CUBE, model='exact')
 ABOVE = [0.5, 0.25, 1.875, 0, 0, 0, 1]

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from box_contact_ros.contact import Contacts
-from box_contact_ros.solver import ContactSolver
+from box_contact_ros.solver.contact import Contacts
+from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.stability import families, report
 
 ROOT = Path(__file__).resolve().parents[1]

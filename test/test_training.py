@@ -9,7 +9,7 @@ import pytest
 
 torch = pytest.importorskip('torch')
 
-from box_contact_ros.network import load_weights  # noqa: E402
+from box_contact_ros.solver.weights_file import load_weights  # noqa: E402
 from box_contact_ros.training import dataset, train  # noqa: E402
 from box_contact_ros.training.errors import errors_of, figures, predict  # noqa: E402
 from box_contact_ros.training.fit import (  # noqa: E402

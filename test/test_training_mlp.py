@@ -12,15 +12,15 @@ torch = pytest.importorskip('torch')
 
 from box_contact_ros import ContactSolver  # noqa: E402
 from box_contact_ros.core import stages  # noqa: E402
-from box_contact_ros.mlp import UNITS_MAX, core_numbers  # noqa: E402
-from box_contact_ros.network import (  # noqa: E402
+from box_contact_ros.posesets import Pairs, containers, cubes, size_pairs, tilted  # noqa: E402
+from box_contact_ros.solver.mlp import UNITS_MAX, core_numbers  # noqa: E402
+from box_contact_ros.solver.weights_file import (  # noqa: E402
     Network,
     WeightsError,
     load_weights,
     save_weights,
     unpacked,
 )
-from box_contact_ros.posesets import Pairs, containers, cubes, size_pairs, tilted  # noqa: E402
 from box_contact_ros.training import contacts, mlp, points, scene, train  # noqa: E402
 from box_contact_ros.training.contacts import MlpSamples  # noqa: E402
 

@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import PointCloud2
 
-from box_contact_ros.contact import Contact
 from box_contact_ros.nodes.messages import Refused, TypedMessages, make_header, read_cloud
 from box_contact_ros.nodes.wire import KEPT_FRAMES, RawMessages
 from box_contact_ros.scene import Answer, Pair
+from box_contact_ros.solver.contact import Contact
 
 STAMPS = st.integers(-2**31 * 10**9, 2**31 * 10**9 - 1)
 FRAMES = st.text(st.characters(exclude_characters='\0\N{REPLACEMENT CHARACTER}',

@@ -23,8 +23,8 @@ from rclpy.utilities import remove_ros_args
 from tqdm import tqdm
 
 from ..arguments import make_folder
-from ..contact import Contacts
-from ..solver import MODELS, MOST_SOUP_DIVISIONS, SOUP_DIVISIONS, ContactSolver
+from ..solver.contact import Contacts
+from ..solver.contact_solver import MODELS, MOST_SOUP_DIVISIONS, SOUP_DIVISIONS, ContactSolver
 from ..streams import STREAMS, Stream, by_sizes, make_stream
 from .bench_drive import Subject, about_the_machine, open_bench
 from .bench_log import (

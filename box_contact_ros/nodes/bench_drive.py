@@ -32,7 +32,7 @@ from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header
 from tqdm import tqdm
 
-from ..contact import Contacts
+from ..solver.contact import Contacts
 from ..streams import Stream
 from .bench_log import NodeLog
 from .children import Stop, asked_to_end, end, on_this_host

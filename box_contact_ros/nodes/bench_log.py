@@ -25,7 +25,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogFormatter
 
-from ..contact import Contacts
+from ..solver.contact import Contacts
 from .figures import angles, percentile
 
 CONTACT_MESSAGES = ('cloud', 'point', 'normal')

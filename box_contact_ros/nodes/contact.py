@@ -33,11 +33,11 @@ from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import PointCloud2
 
-from ..checks import shown
 from ..pairing import NEVER, PAIRINGS, RESETS, StampedPose, Tick
 from ..scene import Pair, Scene, SceneSolver, two_boxes
 from ..scene_file import read_scene
-from ..solver import MODEL_NAMES, NETWORKS, check_model
+from ..solver.checks import shown
+from ..solver.contact_solver import MODEL_NAMES, NETWORKS, check_model
 from .diagnostics import DIAGNOSTICS_SECONDS, UNMATCHED_SECONDS, Diagnostics
 from .messages import Refused, TypedMessages
 from .parameters import (

@@ -27,7 +27,7 @@ from sensor_msgs.msg import PointCloud2
 
 from ..crane import Crane
 from ..landing import LandingResult
-from ..solver import ContactSolver
+from ..solver.contact_solver import ContactSolver
 from .crane_feedback import CraneFeedback
 from .crane_log import CraneLog, LiveReport
 from .crane_parameters import PARAMETERS, scenario_from

@@ -13,10 +13,10 @@ from geometry_msgs.msg import PointStamped, PoseStamped, Vector3Stamped
 from sensor_msgs.msg import PointCloud2, PointField
 from std_msgs.msg import Header
 
-from ..checks import pose_fault, shown
-from ..contact import Contact
 from ..pairing import StampedPose
 from ..scene import Answer
+from ..solver.checks import pose_fault, shown
+from ..solver.contact import Contact
 
 NANOSECONDS = 1_000_000_000
 

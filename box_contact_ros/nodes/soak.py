@@ -26,8 +26,8 @@ import numpy as np
 from rclpy.utilities import remove_ros_args
 
 from ..arguments import make_folder
-from ..contact import Contacts
-from ..solver import MODELS, ContactSolver
+from ..solver.contact import Contacts
+from ..solver.contact_solver import MODELS, ContactSolver
 from ..streams import Stream, make_stream
 from .bench_drive import Bench, Subject, about_the_machine, open_bench
 from .bench_log import (

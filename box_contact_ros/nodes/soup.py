@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..scene import Scene, SceneSolver
-from ..solver import MOST_SOUP_DIVISIONS, SOUP_DIVISIONS
+from ..solver.contact_solver import MOST_SOUP_DIVISIONS, SOUP_DIVISIONS
 from .contact import PARAMETERS as CONTACT_PARAMETERS
 from .contact import ContactNode
 from .parameters import Setting, answer_help, whole_number

@@ -15,10 +15,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..contact import Contact
 from ..pairing import PAIRINGS, StampedPose
 from ..scene import two_boxes
-from ..solver import ContactSolver
+from ..solver.contact import Contact
+from ..solver.contact_solver import ContactSolver
 from .appearance import STALE
 from .figures import percentile
 from .messages import NANOSECONDS

@@ -13,10 +13,10 @@ from typing import NamedTuple
 import numpy as np
 from rclpy.serialization import serialize_message
 
-from ..contact import Contact
 from ..core import LENGTH_MAX, QUATERNION_MAX, QUATERNION_MIN
 from ..pairing import StampedPose
 from ..scene import Answer
+from ..solver.contact import Contact
 from .messages import (
     CLOUD_ROW,
     NANOSECONDS,

@@ -28,14 +28,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..arguments import seed_number
-from ..contact import Contacts
 from ..core import CENTROID_REACH, DEPTH_FLOOR, Stages, native, stages
-from ..mlp import bounds_of, core_numbers
-from ..network import WeightsError, load_weights
-from ..pose import rotation_matrix
 from ..posesets import SETS, Pairs
 from ..resources import resource_path
-from ..solver import MODELS, ContactSolver
+from ..solver.contact import Contacts
+from ..solver.contact_solver import MODELS, ContactSolver
+from ..solver.mlp import bounds_of, core_numbers
+from ..solver.pose import rotation_matrix
+from ..solver.weights_file import WeightsError, load_weights
 from ..training import dataset
 from ..training.errors import errors_of, figures, wrapped
 from . import add_out, processor, results_folder, versions

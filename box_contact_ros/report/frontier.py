@@ -27,10 +27,10 @@ import numpy as np
 
 from ..arguments import seed_number
 from ..core import native
-from ..network import load_weights
 from ..posesets import CONTAINER, SETS, Generator, Pairs, any_pose, log_uniform, pressed, stacked
 from ..resources import resource_path
-from ..solver import ContactSolver
+from ..solver.contact_solver import ContactSolver
+from ..solver.weights_file import load_weights
 from . import add_out, processor, results_folder, versions
 from .accuracy import CLASSES, classify, markdown
 from .paper_soup import PAPER as PAPER_SOUP

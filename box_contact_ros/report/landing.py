@@ -36,7 +36,7 @@ from ..landing import (
     land,
     scenario_of,
 )
-from ..solver import MODELS, ContactSolver
+from ..solver.contact_solver import MODELS, ContactSolver
 from . import add_out, results_folder
 
 matplotlib.use('Agg')

@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from ..arguments import make_room
-from ..network import Weights, WeightsError, load_weights
 from ..resources import resource_path
+from ..solver.weights_file import Weights, WeightsError, load_weights
 from ..training import dataset
 from ..training.dataset import SETS, Patterns
 from ..training.errors import PARTS, errors_of, figures, figures_by_part, predict

@@ -28,9 +28,9 @@ import numpy as np
 from tqdm import tqdm
 
 from .. import soup
-from ..contact import Contacts
 from ..posesets import CUBE, stacks
-from ..solver import ContactSolver
+from ..solver.contact import Contacts
+from ..solver.contact_solver import ContactSolver
 from ..training.dataset import quaternion_from_euler
 
 PAPER = {8: (1.10, 11233, 11.52), 10: (1.47, 14323, 15.47), 12: (1.85, 17911, 19.2),

@@ -23,9 +23,9 @@ import numpy as np
 
 from ..arguments import make_folder
 from ..core import FORCE, instruction_sets, native
-from ..pose import quaternion_multiply
 from ..posesets import CONTAINER, CUBE, SETS, Pairs, log_uniform, turns
-from ..solver import ContactSolver
+from ..solver.contact_solver import ContactSolver
+from ..solver.pose import quaternion_multiply
 from . import processor, versions
 
 CALLS, BATCH, ROUNDS = 2_000, 20_000, 40

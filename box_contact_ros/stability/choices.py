@@ -11,11 +11,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..contact import Contacts
 from ..core import native, stages
-from ..mlp import core_numbers
-from ..network import Network
 from ..posesets import Pairs
+from ..solver.contact import Contacts
+from ..solver.mlp import core_numbers
+from ..solver.weights_file import Network
 
 _UNIT = (1.0, 1.0, 1.0)
 

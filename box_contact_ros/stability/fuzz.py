@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 
 from ..arguments import make_room, model_name, seed_number
-from ..solver import ContactSolver
+from ..solver.contact_solver import ContactSolver
 from .judge import GATES, exact_gap, judge
 
 PAIRS, QUICK_PAIRS = 10_000_000, 60_000

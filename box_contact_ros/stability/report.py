@@ -20,7 +20,7 @@ import numpy as np
 
 from ..arguments import make_folder, model_name
 from ..posesets import Pairs
-from ..solver import MODELS, ContactSolver
+from ..solver.contact_solver import MODELS, ContactSolver
 from .families import FAMILIES, Cases, load
 from .fuzz import TOUCH_ULPS
 from .judge import COORDINATE_ULPS, NOT_FINITE, NOT_UNIT, OUTSIDE, TOLERANCE, judge

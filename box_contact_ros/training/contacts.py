@@ -7,7 +7,6 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from ..core import stages
-from ..pose import quaternion_multiply, rotation_matrix
 from ..posesets import (
     CONTAINER,
     Pairs,
@@ -19,6 +18,7 @@ from ..posesets import (
     stacked,
     turns,
 )
+from ..solver.pose import quaternion_multiply, rotation_matrix
 
 SizePair = tuple[tuple[float, float, float], tuple[float, float, float]]
 """Full extents of two boxes [m]."""

@@ -31,7 +31,7 @@ from typing import Any
 import numpy as np
 
 from ..core import Stages, stages
-from ..pose import quaternion_multiply, rotation_matrix
+from ..solver.pose import quaternion_multiply, rotation_matrix
 from ..symmetry import EDGE_EDGE, FEATURES, NO_FOLD, OCTANT, VERTEX_FACE
 from ..symmetry import fold as fold_pairs
 

@@ -2,7 +2,7 @@
 
 The general network learns from `contacts.mixture` and serves any two boxes. A scene's network
 starts from the general one and goes on with the scene's own pairs of sizes only. The solver then
-asks it for these sizes alone, and answers others exactly (box_contact_ros/mlp.py).
+asks it for these sizes alone, and answers others exactly (box_contact_ros/solver/mlp.py).
 """
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ import numpy as np
 import torch
 
 from ..core import ASPECT_MAX, DEPTH_MAX, FEATURES, OUTPUTS, SIZE_RATIO_MAX
-from ..mlp import ACTIVATION, DESCRIPTION, FEATURE_NAMES
-from ..network import load_weights, save_weights, unpacked
 from ..posesets import SETS, Pairs
 from ..resources import resource_path
-from ..solver import ContactSolver
+from ..solver.contact_solver import ContactSolver
+from ..solver.mlp import ACTIVATION, DESCRIPTION, FEATURE_NAMES
+from ..solver.weights_file import load_weights, save_weights, unpacked
 from .contacts import MlpSamples, SizePair, draw_samples, mixture, scene_mixture
 from .points import Fit, Settings, normalisation, unfolded
 

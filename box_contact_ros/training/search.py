@@ -24,15 +24,10 @@ import torch
 
 from ..arguments import make_folder, seed_number
 from ..core import FEATURES, OUTPUTS, SITES, native
-from ..mlp import UNITS_MAX, core_numbers
-from ..network import (
-    Network,
-    WeightsError,
-    load_weights,
-    unpacked,
-)
 from ..report import processor
 from ..resources import resource_path
+from ..solver.mlp import UNITS_MAX, core_numbers
+from ..solver.weights_file import Network, WeightsError, load_weights, unpacked
 from . import dataset, mlp, train
 from .contacts import MlpSamples, draw_samples, mixture
 from .fit import Settings as PaperSettings

@@ -17,10 +17,10 @@ from typing import Any
 import torch
 
 from ..arguments import make_folder, seed_number
-from ..mlp import UNITS_MAX
-from ..network import load_weights, save_weights
 from ..resources import resource_path
 from ..scene_file import SceneError
+from ..solver.mlp import UNITS_MAX
+from ..solver.weights_file import load_weights, save_weights
 from . import dataset, mlp
 from .errors import errors_of, figures_by_part
 from .fit import Settings, fit
@@ -181,9 +181,9 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument('--epochs', type=int, help="passes through the training set, of the "
                         "paper's (default: 300 to 1000, by job)")
     parser.add_argument('--hidden', type=int, metavar='UNITS', help='of the MLP: units of '
-                        f'its hidden layer (default: {mlp.HIDDEN[0]}), named in the file')
+                        f'its hidden layer (default: {mlp_recipe.HIDDEN[0]}), named in the file')
     parser.add_argument('--steps', type=int, help='of the MLP (default: '
-                        f'{mlp.STEPS:,}; a third of them make errors a tenth larger)')
+                        f'{mlp_recipe.STEPS:,}; a third of them make errors a tenth larger)')
     parser.add_argument('--out', type=Path, help='folder to write to (default: weights/)')
     parser.add_argument('--fold', action=argparse.BooleanOptionalAction, help='for paper and '
                         'containers: data folded into the domain in which the solver asks, or as '
@@ -222,7 +222,7 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
             parser.error(str(error))
         outside = [pair for pair in options.sizes if not mlp.in_range(pair)]
         for pair in outside:
-            print(f'left out, as the MLP always answers them exactly: {mlp.text(pair)}')
+            print(f'left out, as the MLP always answers them exactly: {mlp_recipe.text(pair)}')
             options.sizes.remove(pair)
         if not options.sizes:
             parser.error(f'{options.scene}: no pair of sizes is within the range of the mlp')
@@ -240,7 +240,7 @@ def main(args: Sequence[str] | None = None) -> int:
     if options.scene:
         path = options.out / f'mlp-{options.scene.stem}.safetensors'
         card = mlp.train_scene(path, options.sizes, **common)
-        print(f'{path}, {card["training"]["minutes"]} min\n{mlp.table(card)}\n'
+        print(f'{path}, {card["training"]["minutes"]} min\n{mlp_recipe.table(card)}\n'
               f'use it: ros2 run box_contact_ros contact_node --ros-args -p model:=mlp '
               f'-p weights:={path.resolve()}')
         return 0
@@ -250,7 +250,7 @@ def main(args: Sequence[str] | None = None) -> int:
             path = options.out / f'{MLP}{units}.safetensors'
             hidden = (options.hidden,) if options.hidden else mlp.HIDDEN
             card = mlp.train(path, hidden=hidden, steps=options.steps, **common)
-            print(f'{path}, {card["training"]["minutes"]} min\n{mlp.table(card)}')
+            print(f'{path}, {card["training"]["minutes"]} min\n{mlp_recipe.table(card)}')
             continue
         job = JOBS[name]
         starts, epochs = job.settings.networks, job.settings.epochs

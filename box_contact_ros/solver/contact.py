@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .core import native
+from ..core import native
 
 
 class Contact(NamedTuple):

@@ -3,8 +3,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..core import native
 from .contact import Contacts
-from .core import native
 
 
 class Exact:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .core import LENGTH_MAX, LENGTH_MIN, QUATERNION_MAX, QUATERNION_MIN
+from ..core import LENGTH_MAX, LENGTH_MIN, QUATERNION_MAX, QUATERNION_MIN
 
 SHOWN = 200
 """Characters of a refused value that an error shows."""

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..core import FEATURES, OUTPUTS, native
+from ..resources import resource_path
 from .contact import Contacts
-from .core import FEATURES, OUTPUTS, native
 from .exact import Exact
-from .network import Network, Weights, WeightsError, load_weights, unpacked
-from .resources import resource_path
+from .weights_file import Network, Weights, WeightsError, load_weights, unpacked
 
 FEATURE_NAMES = (
     'slant · cut', '|slant · push|', 'slant · push of these faces · of the others',

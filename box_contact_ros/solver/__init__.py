@@ -1,0 +1,1 @@
+"""The Python face of the core: solvers, their results, their models and weights."""
