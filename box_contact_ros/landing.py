@@ -24,8 +24,8 @@ from typing import Any
 
 import numpy as np
 
-from .contact_force import GRAVITY, ContactLaw, HeldWrench, Touch
 from .crane import LANDING_OVERLAP, Crane, CraneScenario
+from .scene.contact_law import GRAVITY, ContactLaw, HeldWrench, Touch
 from .solver.contact import Contact
 from .solver.contact_solver import ContactSolver
 from .solver.pose import rotation_matrix

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import posesets
-from .posesets import CONTAINER, CUBE, Generator, Pairs
+from .scene import pose_sets
+from .scene.pose_sets import CONTAINER, CUBE, Generator, Pairs
 
 Size = tuple[float, float, float]
 
@@ -52,7 +52,7 @@ class Stream:
 def coplanar(rng: np.random.Generator, n: int) -> Pairs:
     """Cubes of edge 2 stacked with exactly coplanar faces, zero depth, any yaw, anywhere on it."""
     offset = COPLANAR_OFFSET * rng.uniform(-2.0, 2.0, (n, 2))
-    turn = posesets.turns(np.array([0.0, 0.0, 1.0]), rng.uniform(-np.pi, np.pi, n))
+    turn = pose_sets.turns(np.array([0.0, 0.0, 1.0]), rng.uniform(-np.pi, np.pi, n))
     a = np.tile([0.0, 0, 0, 0, 0, 0, 1], (n, 1))
     b = np.concatenate([offset, np.full((n, 1), 2.0), turn], axis=1)
     sizes = np.tile(CUBE, (n, 1))
@@ -62,7 +62,7 @@ def coplanar(rng: np.random.Generator, n: int) -> Pairs:
 def separated(rng: np.random.Generator, n: int) -> Pairs:
     """Cubes of edge 2 in any pose, apart by a SAT gap of 1 mm to 1 m."""
     sizes = np.tile(CUBE, (n, 1))
-    return posesets.any_pose(rng, sizes, sizes, -posesets.log_uniform(rng, *GAPS, n))
+    return pose_sets.any_pose(rng, sizes, sizes, -pose_sets.log_uniform(rng, *GAPS, n))
 
 
 def crane_run(rng: np.random.Generator, n: int) -> Pairs:
@@ -101,15 +101,15 @@ def _of_set(draw: Generator) -> Generator:
 
 
 STREAMS: dict[str, Source] = {
-    'random': Source(_of_set(posesets.SETS['random cubes']), CUBE,
+    'random': Source(_of_set(pose_sets.SETS['random cubes']), CUBE,
                      'cubes in any pose, 0.1 to 10 % deep'),
-    'touching': Source(_of_set(posesets.SETS['touching']), CUBE,
+    'touching': Source(_of_set(pose_sets.SETS['touching']), CUBE,
                        'cubes in any pose that just touch'),
-    'near-parallel': Source(_of_set(posesets.SETS['stacks']), CUBE,
+    'near-parallel': Source(_of_set(pose_sets.SETS['stacks']), CUBE,
                             'stacked cubes, tilt 1e-6 to 1e-3 rad, 1 mm deep'),
     'coplanar': Source(coplanar, CUBE, 'stacked cubes, faces exactly coplanar'),
     'separated': Source(_of_set(separated), CUBE, 'cubes in any pose, 1 mm to 1 m apart'),
-    'containers': Source(_of_set(posesets.SETS['containers']), CONTAINER,
+    'containers': Source(_of_set(pose_sets.SETS['containers']), CONTAINER,
                          '40 ft containers with sway, 0.1 to 10 % deep'),
     'crane': Source(crane_run, CONTAINER, 'a recorded run of the crane'),
 }

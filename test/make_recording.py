@@ -25,7 +25,7 @@ from box_contact_ros.nodes.messages import (
     make_point,
 )
 from box_contact_ros.recording import TOPICS, Recorder
-from box_contact_ros.scene import Answer, two_boxes
+from box_contact_ros.scene.scene_solver import Answer, two_boxes
 
 FOLDER = Path(__file__).resolve().parents[1] / 'recordings' / 'crane_landing'
 CASE = LandingCase(rope_angle=1.25, rope_heading=35.0, tilt=1.5, tilt_heading=120.0, overhang=0.3,

@@ -19,8 +19,8 @@ from sensor_msgs.msg import PointCloud2
 
 from box_contact_ros.nodes.messages import make_header, read_cloud
 from box_contact_ros.nodes.runtime import make_executor
-from box_contact_ros.scene import SceneSolver
-from box_contact_ros.scene_file import read_scene
+from box_contact_ros.scene.scene_file import read_scene
+from box_contact_ros.scene.scene_solver import SceneSolver
 
 PERIOD = 0.005
 PATIENCE = 60.0

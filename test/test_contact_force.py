@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from box_contact_ros.contact_force import (
+from box_contact_ros.scene.contact_law import (
     GRAVITY,
     STATIC_PENETRATION,
     ContactLaw,

@@ -22,7 +22,7 @@ import pytest
 import box_contact_ros
 from box_contact_ros import Contact, ContactSolver
 from box_contact_ros.core import FORCE, instruction_sets, native, stages
-from box_contact_ros.posesets import SETS, Pairs
+from box_contact_ros.scene.pose_sets import SETS, Pairs
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.mlp import core_numbers, load_mlp
 from box_contact_ros.stability import fuzz

@@ -8,7 +8,7 @@ import poses
 import pytest
 
 from box_contact_ros import ContactSolver
-from box_contact_ros.posesets import Pairs
+from box_contact_ros.scene.pose_sets import Pairs
 from box_contact_ros.stability import families, judge, report
 
 CASES = families.load()

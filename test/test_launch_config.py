@@ -19,8 +19,8 @@ import yaml
 
 from box_contact_ros.nodes.contact import PARAMETERS
 from box_contact_ros.programs import PROGRAMS
-from box_contact_ros.scene import Scene
-from box_contact_ros.scene_file import read_scene
+from box_contact_ros.scene.scene_file import read_scene
+from box_contact_ros.scene.scene_solver import Scene
 
 ROOT = Path(__file__).resolve().parents[1]
 

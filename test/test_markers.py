@@ -23,9 +23,9 @@ from box_contact_ros.nodes.markers import (
     contact_markers,
 )
 from box_contact_ros.nodes.messages import CLOUD_ROW, make_cloud, make_header
-from box_contact_ros.pairing import StampedPose
 from box_contact_ros.resources import resource_path
-from box_contact_ros.scene import Answer, Pair
+from box_contact_ros.scene.pairing import StampedPose
+from box_contact_ros.scene.scene_solver import Answer, Pair
 from box_contact_ros.solver.contact import Contact
 
 SLAB, CUBE = (2.0, 4.0, 1.0), (2.0, 2.0, 2.0)

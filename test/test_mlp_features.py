@@ -16,8 +16,8 @@ from box_contact_ros.core import (
     native,
     stages,
 )
-from box_contact_ros.posesets import SETS, Pairs
 from box_contact_ros.resources import resource_path
+from box_contact_ros.scene.pose_sets import SETS, Pairs
 from box_contact_ros.solver.mlp import FEATURE_NAMES, UNITS_MAX, core_numbers
 from box_contact_ros.solver.weights_file import Network, load_weights, unpacked
 

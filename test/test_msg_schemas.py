@@ -32,7 +32,7 @@ from box_contact_ros.core import LENGTH_MAX, QUATERNION_MAX
 from box_contact_ros.nodes.contact import PARAMETERS, ContactNode
 from box_contact_ros.nodes.messages import make_cloud, make_header, read_cloud
 from box_contact_ros.resources import resource_path
-from box_contact_ros.scene import Answer, Pair
+from box_contact_ros.scene.scene_solver import Answer, Pair
 
 ROOT = Path(__file__).resolve().parents[1]
 FOLDER = resource_path('msg_schemas')

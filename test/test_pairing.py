@@ -6,7 +6,7 @@ import random
 import numpy as np
 import pytest
 
-from box_contact_ros.pairing import (
+from box_contact_ros.scene.pairing import (
     NO_PARTNER,
     OLD,
     REMEMBERED_STAMPS,
@@ -19,7 +19,7 @@ from box_contact_ros.pairing import (
     StampedPose,
     StampPairing,
 )
-from box_contact_ros.scene import Box, Pair, Scene, two_boxes
+from box_contact_ros.scene.scene_solver import Box, Pair, Scene, two_boxes
 
 TWO = two_boxes((2, 2, 2), (2, 2, 2))
 MS = 1_000_000  # ns

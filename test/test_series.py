@@ -16,8 +16,15 @@ import pytest
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.core import DEPTH_FLOOR
-from box_contact_ros.posesets import SETS, Pairs, log_uniform, pressed, quaternion_multiply, turns
 from box_contact_ros.resources import resource_path
+from box_contact_ros.scene.pose_sets import (
+    SETS,
+    Pairs,
+    log_uniform,
+    pressed,
+    quaternion_multiply,
+    turns,
+)
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.weights_file import Network, load_weights
 from box_contact_ros.stability.choices import solve_with_choices

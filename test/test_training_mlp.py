@@ -12,7 +12,7 @@ torch = pytest.importorskip('torch')
 
 from box_contact_ros import ContactSolver  # noqa: E402
 from box_contact_ros.core import stages  # noqa: E402
-from box_contact_ros.posesets import Pairs, containers, cubes, size_pairs, tilted  # noqa: E402
+from box_contact_ros.scene.pose_sets import Pairs, containers, cubes, size_pairs, tilted  # noqa: E402
 from box_contact_ros.solver.mlp import UNITS_MAX, core_numbers  # noqa: E402
 from box_contact_ros.solver.weights_file import (  # noqa: E402
     Network,

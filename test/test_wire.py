@@ -15,7 +15,7 @@ from sensor_msgs.msg import PointCloud2
 
 from box_contact_ros.nodes.messages import Refused, TypedMessages, make_header, read_cloud
 from box_contact_ros.nodes.wire import KEPT_FRAMES, RawMessages
-from box_contact_ros.scene import Answer, Pair
+from box_contact_ros.scene.scene_solver import Answer, Pair
 from box_contact_ros.solver.contact import Contact
 
 STAMPS = st.integers(-2**31 * 10**9, 2**31 * 10**9 - 1)

@@ -33,9 +33,9 @@ from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import PointCloud2
 
-from ..pairing import NEVER, PAIRINGS, RESETS, StampedPose, Tick
-from ..scene import Pair, Scene, SceneSolver, two_boxes
-from ..scene_file import read_scene
+from ..scene.pairing import NEVER, PAIRINGS, RESETS, StampedPose, Tick
+from ..scene.scene_file import read_scene
+from ..scene.scene_solver import Pair, Scene, SceneSolver, two_boxes
 from ..solver.checks import shown
 from ..solver.contact_solver import MODEL_NAMES, NETWORKS, check_model
 from .diagnostics import DIAGNOSTICS_SECONDS, UNMATCHED_SECONDS, Diagnostics

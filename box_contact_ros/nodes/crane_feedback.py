@@ -17,9 +17,9 @@ from collections import deque
 
 import numpy as np
 
-from ..contact_force import ContactLaw, HeldWrench, Touch
 from ..crane import Crane, CraneScenario
 from ..landing import LandingRecord
+from ..scene.contact_law import ContactLaw, HeldWrench, Touch
 
 ANSWER_SHARE = 0.8
 """Share of a tick for which its answer is awaited in real time; the rest is for simulating it."""

@@ -22,7 +22,7 @@ from rclpy.context import Context
 from rclpy.node import Node
 from std_msgs.msg import Header
 
-from ..pairing import WAITING_TICKS
+from ..scene.pairing import WAITING_TICKS
 from .messages import NANOSECONDS
 from .runtime import CONTACT_QOS, POSE_QOS, run_node
 

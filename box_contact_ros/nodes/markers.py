@@ -21,7 +21,7 @@ from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
-from ..pairing import StampedPose
+from ..scene.pairing import StampedPose
 from .appearance import BOX_A, BOX_B, BOX_OPACITY, CONTACT, STALE, Colour, proportions
 from .contact import CONTAINER
 from .messages import (

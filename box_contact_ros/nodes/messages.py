@@ -13,8 +13,8 @@ from geometry_msgs.msg import PointStamped, PoseStamped, Vector3Stamped
 from sensor_msgs.msg import PointCloud2, PointField
 from std_msgs.msg import Header
 
-from ..pairing import StampedPose
-from ..scene import Answer
+from ..scene.pairing import StampedPose
+from ..scene.scene_solver import Answer
 from ..solver.checks import pose_fault, shown
 from ..solver.contact import Contact
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..scene import Scene, SceneSolver
+from ..scene.scene_solver import Scene, SceneSolver
 from ..solver.contact_solver import MOST_SOUP_DIVISIONS, SOUP_DIVISIONS
 from .contact import PARAMETERS as CONTACT_PARAMETERS
 from .contact import ContactNode

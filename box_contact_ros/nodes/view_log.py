@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..pairing import PAIRINGS, StampedPose
-from ..scene import two_boxes
+from ..scene.pairing import PAIRINGS, StampedPose
+from ..scene.scene_solver import two_boxes
 from ..solver.contact import Contact
 from ..solver.contact_solver import ContactSolver
 from .appearance import STALE

@@ -14,8 +14,8 @@ import numpy as np
 from rclpy.serialization import serialize_message
 
 from ..core import LENGTH_MAX, QUATERNION_MAX, QUATERNION_MIN
-from ..pairing import StampedPose
-from ..scene import Answer
+from ..scene.pairing import StampedPose
+from ..scene.scene_solver import Answer
 from ..solver.contact import Contact
 from .messages import (
     CLOUD_ROW,

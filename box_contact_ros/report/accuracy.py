@@ -29,8 +29,8 @@ import numpy as np
 
 from ..arguments import seed_number
 from ..core import CENTROID_REACH, DEPTH_FLOOR, Stages, native, stages
-from ..posesets import SETS, Pairs
 from ..resources import resource_path
+from ..scene.pose_sets import SETS, Pairs
 from ..solver.contact import Contacts
 from ..solver.contact_solver import MODELS, ContactSolver
 from ..solver.mlp import bounds_of, core_numbers

@@ -27,8 +27,17 @@ import numpy as np
 
 from ..arguments import seed_number
 from ..core import native
-from ..posesets import CONTAINER, SETS, Generator, Pairs, any_pose, log_uniform, pressed, stacked
 from ..resources import resource_path
+from ..scene.pose_sets import (
+    CONTAINER,
+    SETS,
+    Generator,
+    Pairs,
+    any_pose,
+    log_uniform,
+    pressed,
+    stacked,
+)
 from ..solver.contact_solver import ContactSolver
 from ..solver.weights_file import load_weights
 from . import add_out, processor, results_folder, versions

@@ -25,7 +25,6 @@ import numpy as np
 from tqdm import tqdm
 
 from ..arguments import seed_number
-from ..contact_force import GRAVITY
 from ..landing import (
     SETTLING,
     WINDOW,
@@ -36,6 +35,7 @@ from ..landing import (
     land,
     scenario_of,
 )
+from ..scene.contact_law import GRAVITY
 from ..solver.contact_solver import MODELS, ContactSolver
 from . import add_out, results_folder
 

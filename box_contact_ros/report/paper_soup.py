@@ -28,7 +28,7 @@ import numpy as np
 from tqdm import tqdm
 
 from .. import soup
-from ..posesets import CUBE, stacks
+from ..scene.pose_sets import CUBE, stacks
 from ..solver.contact import Contacts
 from ..solver.contact_solver import ContactSolver
 from ..training.dataset import quaternion_from_euler

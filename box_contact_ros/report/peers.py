@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from ..posesets import Pairs
+from ..scene.pose_sets import Pairs
 from ..solver.contact_solver import ContactSolver
 from ..solver.pose import rotation_matrix
 

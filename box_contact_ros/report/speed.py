@@ -23,7 +23,7 @@ import numpy as np
 
 from ..arguments import make_folder
 from ..core import FORCE, instruction_sets, native
-from ..posesets import CONTAINER, CUBE, SETS, Pairs, log_uniform, turns
+from ..scene.pose_sets import CONTAINER, CUBE, SETS, Pairs, log_uniform, turns
 from ..solver.contact_solver import ContactSolver
 from ..solver.pose import quaternion_multiply
 from . import processor, versions

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import native, stages
-from ..posesets import Pairs
+from ..scene.pose_sets import Pairs
 from ..solver.contact import Contacts
 from ..solver.mlp import core_numbers
 from ..solver.weights_file import Network

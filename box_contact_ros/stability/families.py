@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..posesets import Pairs
+from ..scene.pose_sets import Pairs
 
 FILE = Path(__file__).with_name('families.npz')
 CUBE = (2.0, 2.0, 2.0)

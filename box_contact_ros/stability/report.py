@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from ..arguments import make_folder, model_name
-from ..posesets import Pairs
+from ..scene.pose_sets import Pairs
 from ..solver.contact_solver import MODELS, ContactSolver
 from .families import FAMILIES, Cases, load
 from .fuzz import TOUCH_ULPS

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from ..core import stages
-from ..posesets import (
+from ..scene.pose_sets import (
     CONTAINER,
     Pairs,
     any_pose,

@@ -16,8 +16,8 @@ import numpy as np
 import torch
 
 from ..core import ASPECT_MAX, DEPTH_MAX, FEATURES, OUTPUTS, SIZE_RATIO_MAX
-from ..posesets import SETS, Pairs
 from ..resources import resource_path
+from ..scene.pose_sets import SETS, Pairs
 from ..solver.contact_solver import ContactSolver
 from ..solver.mlp import ACTIVATION, DESCRIPTION, FEATURE_NAMES
 from ..solver.weights_file import load_weights, save_weights, unpacked

@@ -3,7 +3,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ..scene_file import read_scene
+from ..scene.scene_file import read_scene
 from .contacts import SizePair
 
 

@@ -18,7 +18,7 @@ import torch
 
 from ..arguments import make_folder, seed_number
 from ..resources import resource_path
-from ..scene_file import SceneError
+from ..scene.scene_file import SceneError
 from ..solver.mlp import UNITS_MAX
 from ..solver.weights_file import load_weights, save_weights
 from . import dataset, mlp

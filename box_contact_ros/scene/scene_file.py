@@ -14,9 +14,9 @@ from typing import Any
 
 import yaml
 
-from .resources import resource_path
-from .scene import Box, Pair, Scene, faults
-from .solver.checks import shown
+from ..resources import resource_path
+from ..solver.checks import shown
+from .scene_solver import Box, Pair, Scene, faults
 
 LARGEST_FILE = 16 * 2**20
 """Bytes that are read at most; some 100,000 pairs."""

@@ -13,10 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .core import native
-from .solver.checks import as_floats, pose_fault, shown, size_fault
-from .solver.contact import Contact
-from .solver.contact_solver import ContactSolver
+from ..core import native
+from ..solver.checks import as_floats, pose_fault, shown, size_fault
+from ..solver.contact import Contact
+from ..solver.contact_solver import ContactSolver
 
 LARGEST_ID = 2**32 - 1
 """Ids of pairs are uint32 in the cloud."""

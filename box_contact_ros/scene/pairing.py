@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .scene import Scene
+from .scene_solver import Scene
 
 WAITING_TICKS = 128
 """So many of the newest ticks wait for poses: 128 ms at 1 kHz, far more than the executor or the
