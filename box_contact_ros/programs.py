@@ -39,7 +39,7 @@ class Program:
 
 PROGRAMS = {
     'contact_node': Program(
-        'box_contact_ros.nodes.contact:main',
+        'box_contact_ros.node.contact_node:main',
         'the ROS 2 node: two box poses in, contact point and normal out',
         ('ros',),
     ),
@@ -49,7 +49,7 @@ PROGRAMS = {
         ('ros', 'sim'),
     ),
     'soup_node': Program(
-        'box_contact_ros.nodes.soup:main',
+        'box_contact_ros.node.soup_node:main',
         'the same node on a polygon soup, under soup/: what the source paper compares with',
         ('ros', 'soup'),
     ),

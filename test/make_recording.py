@@ -17,7 +17,7 @@ from rclpy.serialization import serialize_message
 from box_contact_ros import ContactSolver
 from box_contact_ros.crane import Crane
 from box_contact_ros.landing import LandingCase, land, scenario_of
-from box_contact_ros.nodes.messages import (
+from box_contact_ros.node.messages import (
     NANOSECONDS,
     make_cloud,
     make_header,

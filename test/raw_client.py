@@ -9,7 +9,7 @@ from geometry_msgs.msg import PoseStamped
 from rclpy.qos import QoSProfile
 from ros_client import Client
 
-from box_contact_ros.nodes.messages import read_cloud
+from box_contact_ros.node.messages import read_cloud
 
 ORIGIN = poses.IDENTITY
 TOUCHING = np.array([0.5, 0.25, 1.875, 0, 0, 0, 1])  # 0.125 m deep

@@ -16,8 +16,8 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import PointCloud2
 
-from box_contact_ros.nodes.messages import NANOSECONDS, make_header
-from box_contact_ros.nodes.runtime import make_executor
+from box_contact_ros.node.messages import NANOSECONDS, make_header
+from box_contact_ros.node.runtime import make_executor
 
 MATCH_SECONDS = 60.0
 """Discovery takes a fraction of a second; on a busy machine, in a process that has had hundreds of

@@ -14,8 +14,8 @@ from rclpy.parameter import Parameter
 from ros_client import Client, serving
 
 from box_contact_ros import ContactSolver
-from box_contact_ros.nodes.contact import PARAMETERS, ContactNode
-from box_contact_ros.nodes.messages import read_cloud
+from box_contact_ros.node.contact_node import PARAMETERS, ContactNode
+from box_contact_ros.node.messages import read_cloud
 
 ORIGIN = poses.IDENTITY
 TOUCHING = np.array([0.5, 0.25, 1.875, 0, 0, 0, 1])

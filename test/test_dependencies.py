@@ -53,7 +53,7 @@ SceneSolver(read_scene('config/scenes/yard_bay.yaml'))
 NODE = """
 import rclpy
 from rclpy.parameter import Parameter
-from box_contact_ros.nodes.contact import ContactNode
+from box_contact_ros.node.contact_node import ContactNode
 context = rclpy.Context()
 rclpy.init(context=context)
 ContactNode(context, parameter_overrides=[

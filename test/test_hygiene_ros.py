@@ -18,7 +18,7 @@ from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 
 from box_contact_ros import ContactSolver
-from box_contact_ros.nodes.messages import read_cloud
+from box_contact_ros.node.messages import read_cloud
 
 
 @pytest.fixture

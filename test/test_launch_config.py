@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 import yaml
 
-from box_contact_ros.nodes.contact import PARAMETERS
+from box_contact_ros.node.contact_node import PARAMETERS
 from box_contact_ros.programs import PROGRAMS
 from box_contact_ros.scene.scene_file import read_scene
 from box_contact_ros.scene.scene_solver import Scene

@@ -29,8 +29,8 @@ from ros_client import Client, serving
 from sensor_msgs.msg import PointField
 
 from box_contact_ros.core import LENGTH_MAX, QUATERNION_MAX
-from box_contact_ros.nodes.contact import PARAMETERS, ContactNode
-from box_contact_ros.nodes.messages import make_cloud, make_header, read_cloud
+from box_contact_ros.node.contact_node import PARAMETERS, ContactNode
+from box_contact_ros.node.messages import make_cloud, make_header, read_cloud
 from box_contact_ros.resources import resource_path
 from box_contact_ros.scene.scene_solver import Answer, Pair
 

@@ -21,7 +21,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from box_contact_ros.nodes.contact import PARAMETERS
+from box_contact_ros.node.contact_node import PARAMETERS
 from box_contact_ros.programs import PROGRAMS
 from box_contact_ros.resources import resource_path
 

@@ -20,9 +20,9 @@ from rclpy.qos import QoSProfile
 from ros_client import Client, serving, stamp_of
 
 from box_contact_ros import ContactSolver
-from box_contact_ros.nodes.contact import ContactNode
-from box_contact_ros.nodes.messages import make_header, read_cloud
-from box_contact_ros.nodes.runtime import RCLError
+from box_contact_ros.node.contact_node import ContactNode
+from box_contact_ros.node.messages import make_header, read_cloud
+from box_contact_ros.node.runtime import RCLError
 
 MS = 1_000_000  # ns
 SCENE = """\

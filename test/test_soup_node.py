@@ -17,10 +17,10 @@ from sensor_msgs.msg import PointCloud2
 pytest.importorskip('fcl')
 
 from box_contact_ros import ContactSolver  # noqa: E402
-from box_contact_ros.nodes.contact import PARAMETERS as CONTACT_PARAMETERS  # noqa: E402
-from box_contact_ros.nodes.contact import ContactNode  # noqa: E402
-from box_contact_ros.nodes.messages import read_cloud  # noqa: E402
-from box_contact_ros.nodes.soup import PARAMETERS, SoupNode  # noqa: E402
+from box_contact_ros.node.contact_node import PARAMETERS as CONTACT_PARAMETERS  # noqa: E402
+from box_contact_ros.node.contact_node import ContactNode  # noqa: E402
+from box_contact_ros.node.messages import read_cloud  # noqa: E402
+from box_contact_ros.node.soup_node import PARAMETERS, SoupNode  # noqa: E402
 from box_contact_ros.resources import resource_path  # noqa: E402
 
 ORIGIN = poses.IDENTITY

@@ -24,9 +24,9 @@ from browser import chromium, open_page  # noqa: E402
 from PIL import Image  # noqa: E402
 
 from box_contact_ros import ContactSolver  # noqa: E402
+from box_contact_ros.node.contact_node import ContactNode  # noqa: E402
+from box_contact_ros.node.messages import CLOUD_ROW, NANOSECONDS  # noqa: E402
 from box_contact_ros.nodes.appearance import BOX_A, BOX_B, STALE  # noqa: E402
-from box_contact_ros.nodes.contact import ContactNode  # noqa: E402
-from box_contact_ros.nodes.messages import CLOUD_ROW, NANOSECONDS  # noqa: E402
 from box_contact_ros.nodes.view_log import LOST_AFTER, ViewLog  # noqa: E402
 from box_contact_ros.nodes.view_node import ViewNode  # noqa: E402
 from box_contact_ros.nodes.view_page import _edges, _turn_from_z, read_out  # noqa: E402

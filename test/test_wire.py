@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import PointCloud2
 
-from box_contact_ros.nodes.messages import Refused, TypedMessages, make_header, read_cloud
-from box_contact_ros.nodes.wire import KEPT_FRAMES, RawMessages
+from box_contact_ros.node.message_bytes import KEPT_FRAMES, RawMessages
+from box_contact_ros.node.messages import Refused, TypedMessages, make_header, read_cloud
 from box_contact_ros.scene.scene_solver import Answer, Pair
 from box_contact_ros.solver.contact import Contact
 

@@ -23,6 +23,8 @@ from rclpy.utilities import remove_ros_args
 from tqdm import tqdm
 
 from ..arguments import make_folder
+from ..node.contact_node import PARAMETERS
+from ..node.runtime import REFUSALS
 from ..solver.contact import Contacts
 from ..solver.contact_solver import MODELS, MOST_SOUP_DIVISIONS, SOUP_DIVISIONS, ContactSolver
 from ..streams import STREAMS, Stream, by_sizes, make_stream
@@ -38,8 +40,6 @@ from .bench_log import (
     write_csv,
 )
 from .children import DOMAINS
-from .contact import PARAMETERS
-from .runtime import REFUSALS
 
 NODES = ('contact', 'soup', 'echo')
 SECONDS, LONGEST = 60.0, 3600.0  # of sending, in all: the default, and what is accepted

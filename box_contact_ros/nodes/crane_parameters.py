@@ -6,7 +6,7 @@ from typing import Any
 
 from ..crane import LANDING_OVERLAP, CraneScenario
 from ..landing import LANDING_DURATION
-from .parameters import Setting, flag, number, numbers, size, text, whole_number
+from ..node.parameters import Setting, flag, number, numbers, size, text, whole_number
 
 STANDARD = CraneScenario()
 PARAMETERS = {

@@ -22,9 +22,9 @@ from rclpy.context import Context
 from rclpy.node import Node
 from std_msgs.msg import Header
 
+from ..node.messages import NANOSECONDS
+from ..node.runtime import CONTACT_QOS, POSE_QOS, run_node
 from ..scene.pairing import WAITING_TICKS
-from .messages import NANOSECONDS
-from .runtime import CONTACT_QOS, POSE_QOS, run_node
 
 STAMP_AT = 4
 """CDR: four bytes of encapsulation, the second of them 1 for little endian, then the stamp."""

@@ -17,10 +17,10 @@ from rclpy.parameter import Parameter
 
 from ..crane import CraneScenario
 from ..landing import LandingResult
+from ..node.runtime import make_executor
 from .children import DOMAINS, end, on_this_host, start
 from .crane import CraneNode, receive_while
 from .crane_parameters import PARAMETERS, SCENARIO
-from .runtime import make_executor
 
 PATIENCE = 30.0
 """For the node to answer [s]."""

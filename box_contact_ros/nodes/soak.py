@@ -26,6 +26,8 @@ import numpy as np
 from rclpy.utilities import remove_ros_args
 
 from ..arguments import make_folder
+from ..node.contact_node import PARAMETERS
+from ..node.runtime import REFUSALS
 from ..solver.contact import Contacts
 from ..solver.contact_solver import MODELS, ContactSolver
 from ..streams import Stream, make_stream
@@ -40,8 +42,6 @@ from .bench_log import (
     write_csv,
 )
 from .children import DOMAINS
-from .contact import PARAMETERS
-from .runtime import REFUSALS
 
 BLOCK_SECONDS = 10.0
 ECHO_SHARE = 0.25

@@ -28,9 +28,9 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
 from ..crane import CONTAINER_40FT
+from ..node.contact_node import PARAMETERS
+from ..node.runtime import REFUSALS, make_executor
 from .children import DOMAINS, Stop, asked_to_end, end, on_this_host, start
-from .contact import PARAMETERS
-from .runtime import REFUSALS, make_executor
 from .view_node import ViewNode
 from .view_page import Landing, Page
 

@@ -39,20 +39,10 @@ from ..scene.scene_solver import Pair, Scene, SceneSolver, two_boxes
 from ..solver.checks import shown
 from ..solver.contact_solver import MODEL_NAMES, NETWORKS, check_model
 from .diagnostics import DIAGNOSTICS_SECONDS, UNMATCHED_SECONDS, Diagnostics
+from .message_bytes import RawMessages
 from .messages import Refused, TypedMessages
-from .parameters import (
-    Setting,
-    answer_help,
-    checked,
-    declare,
-    flag,
-    number,
-    one_of,
-    size,
-    text,
-)
+from .parameters import Setting, answer_help, checked, declare, flag, number, one_of, size, text
 from .runtime import CONTACT_QOS, LOG_SECONDS, POSE_QOS, RCLError, run_node
-from .wire import RawMessages
 
 SERIALIZATIONS = {'raw': RawMessages, 'typed': TypedMessages}
 """Values of the node parameter `serialization`."""

@@ -11,8 +11,8 @@ from typing import Any
 
 from ..scene.scene_solver import Scene, SceneSolver
 from ..solver.contact_solver import MOST_SOUP_DIVISIONS, SOUP_DIVISIONS
-from .contact import PARAMETERS as CONTACT_PARAMETERS
-from .contact import ContactNode
+from .contact_node import PARAMETERS as CONTACT_PARAMETERS
+from .contact_node import ContactNode
 from .parameters import Setting, answer_help, whole_number
 from .runtime import run_node
 

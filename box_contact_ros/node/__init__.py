@@ -1,0 +1,1 @@
+"""All rclpy of the product: the contact node and the parts that it is wired from."""
