@@ -42,7 +42,7 @@ help:
 	echo 'The set-up looks for Python 3.11 or 3.12; another place: make demo PYTHON=/path/to/python3.12'
 
 demo: .venv/.installed-demo
-	@exec $(VENV_PYTHON) -m box_contact_ros.demo $(ARGS)
+	@exec $(VENV_PYTHON) -m box_contact_ros.apps.demo $(ARGS)
 
 view: .venv/.installed-view
 	@exec $(VENV_PYTHON) -m box_contact_ros view $(ARGS)

@@ -44,7 +44,7 @@ PROGRAMS = {
         ('ros',),
     ),
     'crane': Program(
-        'box_contact_ros.nodes.crane:main',
+        'box_contact_ros.apps.crane.crane_node:main',
         'a MuJoCo crane that lowers one container onto another and publishes both poses',
         ('ros', 'sim'),
     ),
@@ -54,27 +54,27 @@ PROGRAMS = {
         ('ros', 'soup'),
     ),
     'view': Program(
-        'box_contact_ros.nodes.view:main',
+        'box_contact_ros.apps.viewer.view:main',
         'a page in the browser: the crane, the boxes, the contact and its figures, live',
         ('ros', 'sim', 'view'),
     ),
     'markers': Program(
-        'box_contact_ros.nodes.markers:main',
+        'box_contact_ros.apps.viewer.markers:main',
         'draw boxes and contacts as markers for RViz',
         ('ros',),
     ),
     'bench': Program(
-        'box_contact_ros.nodes.bench:main',
+        'box_contact_ros.apps.bench.bench:main',
         'drive contact, soup and echo node with streams of poses: latency, losses, errors',
         ('ros', 'sim', 'soup', 'report'),
     ),
     'record': Program(
-        'box_contact_ros.nodes.record:main',
+        'box_contact_ros.apps.recording.record:main',
         'write poses and contacts of running nodes to a bag (MCAP) for Foxglove and ros2 bag',
         ('ros', 'bag'),
     ),
     'soak': Program(
-        'box_contact_ros.nodes.soak:main',
+        'box_contact_ros.apps.bench.soak:main',
         'ten minutes at 1 kHz: losses, mispairs, memory, latency beside echo nodes',
         ('ros', 'sim', 'report'),
     ),

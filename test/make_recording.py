@@ -15,8 +15,9 @@ from geometry_msgs.msg import PoseStamped
 from rclpy.serialization import serialize_message
 
 from box_contact_ros import ContactSolver
-from box_contact_ros.crane import Crane
-from box_contact_ros.landing import LandingCase, land, scenario_of
+from box_contact_ros.apps.crane.landing import LandingCase, land, scenario_of
+from box_contact_ros.apps.crane.mujoco_crane import Crane
+from box_contact_ros.apps.recording.bag_file import TOPICS, Recorder
 from box_contact_ros.node.messages import (
     NANOSECONDS,
     make_cloud,
@@ -24,7 +25,6 @@ from box_contact_ros.node.messages import (
     make_normal,
     make_point,
 )
-from box_contact_ros.recording import TOPICS, Recorder
 from box_contact_ros.scene.scene_solver import Answer, two_boxes
 
 FOLDER = Path(__file__).resolve().parents[1] / 'recordings' / 'crane_landing'

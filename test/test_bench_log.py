@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from box_contact_ros import ContactSolver
-from box_contact_ros.nodes.bench_log import (
+from box_contact_ros.apps.bench.bench_log import (
     COLUMNS,
     ECHO_MESSAGES,
     NodeLog,
@@ -17,8 +17,8 @@ from box_contact_ros.nodes.bench_log import (
     latency_table,
     write_csv,
 )
+from box_contact_ros.apps.bench.pose_streams import STREAMS, by_sizes, make_stream
 from box_contact_ros.solver.contact import Contacts
-from box_contact_ros.streams import STREAMS, by_sizes, make_stream
 
 MS = 1_000_000  # ns
 START = 1_700_000_000_000_000_000  # ns: stamps as large as real ones

@@ -10,11 +10,11 @@ import time
 
 import pytest
 
-from box_contact_ros.nodes import children
+from box_contact_ros.apps import processes
 
 STORM = """
 import os, signal, threading, time
-from box_contact_ros.nodes.children import asked_to_end
+from box_contact_ros.apps.processes import asked_to_end
 
 end = time.monotonic() + 2.0
 
@@ -45,7 +45,7 @@ def test_signals_at_any_moment_do_not_hang():
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_ends_the_wait_and_says_the_status(number):
     before = signal.getsignal(number)
-    with children.asked_to_end() as stop:
+    with processes.asked_to_end() as stop:
         assert not stop.is_set() and stop.status == 0 and not stop.wait(0.0)
         threading.Timer(0.1, os.kill, (os.getpid(), number)).start()
         began = time.monotonic()
@@ -56,7 +56,7 @@ def test_a_signal_ends_the_wait_and_says_the_status(number):
 
 
 def test_a_child_that_does_not_listen_is_killed(monkeypatch):
-    monkeypatch.setattr(children, 'END_PATIENCE', 0.2)
+    monkeypatch.setattr(processes, 'END_PATIENCE', 0.2)
     child = subprocess.Popen(
         [sys.executable, '-c', 'import signal, time\n'
                                'signal.signal(signal.SIGTERM, signal.SIG_IGN)\n'
@@ -64,6 +64,6 @@ def test_a_child_that_does_not_listen_is_killed(monkeypatch):
                                'time.sleep(100)'],
         stdout=subprocess.PIPE, start_new_session=True)
     assert child.stdout.readline() == b'here\n'
-    children.end([child])
+    processes.end([child])
     assert child.returncode == -signal.SIGKILL
     child.stdout.close()

@@ -10,7 +10,7 @@ import pytest
 
 pytest.importorskip('mujoco')
 
-from box_contact_ros.crane import (  # noqa: E402
+from box_contact_ros.apps.crane.mujoco_crane import (
     CONTAINER_40FT,
     GRAVITY,
     MAX_HOIST_SPEED,

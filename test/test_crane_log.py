@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from box_contact_ros.nodes.crane_log import CraneLog, LiveReport, live_line
+from box_contact_ros.apps.crane.crane_log import CraneLog, LiveReport, live_line
 
 MS = 1_000_000  # ns
 START = 1_700_000_000_000_000_000  # ns: stamps as large as real ones

@@ -10,8 +10,7 @@ import pytest
 pytest.importorskip('mujoco')
 
 from box_contact_ros import ContactSolver  # noqa: E402
-from box_contact_ros.crane import GRAVITY, Crane  # noqa: E402
-from box_contact_ros.landing import (  # noqa: E402
+from box_contact_ros.apps.crane.landing import (
     SETTLING,
     WINDOW,
     LandingRecord,
@@ -21,6 +20,7 @@ from box_contact_ros.landing import (  # noqa: E402
     landing_scenario,
     scenario_of,
 )
+from box_contact_ros.apps.crane.mujoco_crane import GRAVITY, Crane  # noqa: E402
 
 CASES = list(cases())
 HANGING_OVER = 17

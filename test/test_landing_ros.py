@@ -11,11 +11,11 @@ import rclpy  # noqa: E402
 from rclpy.context import Context  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 
-from box_contact_ros.landing import LANDING_DURATION, cases, land, scenario_of  # noqa: E402
+from box_contact_ros.apps.crane import crane_feedback  # noqa: E402
+from box_contact_ros.apps.crane import crane_node as crane_node  # noqa: E402
+from box_contact_ros.apps.crane.landing import LANDING_DURATION, cases, land, scenario_of  # noqa: E402
+from box_contact_ros.apps.crane.landing_flights import answering_node, fly_over_dds  # noqa: E402
 from box_contact_ros.node.runtime import make_executor  # noqa: E402
-from box_contact_ros.nodes import crane as crane_node  # noqa: E402
-from box_contact_ros.nodes import crane_feedback  # noqa: E402
-from box_contact_ros.nodes.landing_flights import answering_node, fly_over_dds  # noqa: E402
 from box_contact_ros.solver.contact_solver import ContactSolver  # noqa: E402
 
 EXACT = ('--ros-args', '-p', 'model:=exact')

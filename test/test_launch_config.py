@@ -60,7 +60,7 @@ def crane_launch(monkeypatch: pytest.MonkeyPatch) -> tuple[dict[str, Any], dict[
 def table_of(program: str) -> dict[str, Any]:
     """The parameters of a program."""
     if program == 'crane':
-        return importlib.import_module('box_contact_ros.nodes.crane_parameters').PARAMETERS
+        return importlib.import_module('box_contact_ros.apps.crane.crane_parameters').PARAMETERS
     return importlib.import_module(PROGRAMS[program].target.partition(':')[0]).PARAMETERS
 
 

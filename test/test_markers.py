@@ -15,14 +15,9 @@ from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import Marker, MarkerArray
 
 from box_contact_ros import ContactSolver
+from box_contact_ros.apps.viewer.markers import PARAMETERS, MarkersNode, box_marker, contact_markers
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import CLOUD_ROW, make_cloud, make_header
-from box_contact_ros.nodes.markers import (
-    PARAMETERS,
-    MarkersNode,
-    box_marker,
-    contact_markers,
-)
 from box_contact_ros.resources import resource_path
 from box_contact_ros.scene.pairing import StampedPose
 from box_contact_ros.scene.scene_solver import Answer, Pair

@@ -74,7 +74,7 @@ def make(words: list[str], **_) -> None:
     assert done.returncode == 0, done.stderr
     if words[1] == 'demo' and len(words) > 2:  # what ARGS hands on
         arguments = shlex.split(words[2].partition('=')[2])
-        assert all(word in run(sys.executable, '-m', 'box_contact_ros.demo', '--help')
+        assert all(word in run(sys.executable, '-m', 'box_contact_ros.apps.demo', '--help')
                    for word in arguments if word.startswith('--'))
 
 

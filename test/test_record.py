@@ -23,15 +23,15 @@ from rclpy.serialization import serialize_message  # noqa: E402
 from test_bench import bench, rows_of  # noqa: E402
 
 from box_contact_ros import ContactSolver  # noqa: E402
-from box_contact_ros.node.messages import make_header, read_cloud  # noqa: E402
-from box_contact_ros.nodes.record import RecordNode  # noqa: E402
-from box_contact_ros.recording import (  # noqa: E402
+from box_contact_ros.apps.recording.bag_file import (
     TOPICS,
     Recorder,
     RecordingError,
     read_replay,
     type_of,
 )
+from box_contact_ros.apps.recording.record import RecordNode  # noqa: E402
+from box_contact_ros.node.messages import make_header, read_cloud  # noqa: E402
 from box_contact_ros.report.accuracy import LIMITS  # noqa: E402
 from box_contact_ros.resources import resource_path  # noqa: E402
 

@@ -110,8 +110,8 @@ LANDED = {f'landed, case {number}': number for number in (0, 5, 17, 31)}
 def crane_series(name: str) -> Series:
     """The poses of one run of the crane."""
     pytest.importorskip('mujoco')
-    from box_contact_ros.crane import Crane, CraneScenario
-    from box_contact_ros.landing import cases, land, scenario_of
+    from box_contact_ros.apps.crane.landing import cases, land, scenario_of
+    from box_contact_ros.apps.crane.mujoco_crane import Crane, CraneScenario
 
     if name in LOWERED:
         crane = Crane(CraneScenario.drawn(LOWERED[name]), CRANE_RATE)

@@ -10,9 +10,9 @@ import pytest
 pytest.importorskip('mujoco')
 
 from box_contact_ros import ContactSolver  # noqa: E402
-from box_contact_ros.nodes.bench_log import NodeLog  # noqa: E402
-from box_contact_ros.nodes.soak import mispairs, without_contact  # noqa: E402
-from box_contact_ros.streams import make_stream  # noqa: E402
+from box_contact_ros.apps.bench.bench_log import NodeLog  # noqa: E402
+from box_contact_ros.apps.bench.pose_streams import make_stream  # noqa: E402
+from box_contact_ros.apps.bench.soak import mispairs, without_contact  # noqa: E402
 
 MS = 1_000_000  # ns
 

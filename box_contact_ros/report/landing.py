@@ -24,8 +24,7 @@ import matplotlib
 import numpy as np
 from tqdm import tqdm
 
-from ..arguments import seed_number
-from ..landing import (
+from ..apps.crane.landing import (
     SETTLING,
     WINDOW,
     LandingCase,
@@ -35,6 +34,7 @@ from ..landing import (
     land,
     scenario_of,
 )
+from ..arguments import seed_number
 from ..scene.contact_law import GRAVITY
 from ..solver.contact_solver import MODELS, ContactSolver
 from . import add_out, results_folder
@@ -123,7 +123,7 @@ def table(results: Sequence[tuple[Job, LandingResult]]) -> str:
 
 def over_dds(jobs: Sequence[Job]) -> Iterator[tuple[Job, LandingResult]]:
     """Run the landings one by one, their contacts from a contact node; in lockstep."""
-    from ..nodes.landing_flights import answering_node, fly_over_dds  # only here: needs ROS
+    from ..apps.crane.landing_flights import answering_node, fly_over_dds  # only here: needs ROS
 
     for model, group in groupby(jobs, key=lambda job: job.model):
         with answering_node(model, scenario_of(jobs[0].case)) as domain:

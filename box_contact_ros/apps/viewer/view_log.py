@@ -15,13 +15,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..node.messages import NANOSECONDS
-from ..scene.pairing import PAIRINGS, StampedPose
-from ..scene.scene_solver import two_boxes
-from ..solver.contact import Contact
-from ..solver.contact_solver import ContactSolver
-from .appearance import STALE
-from .figures import percentile
+from ...node.messages import NANOSECONDS
+from ...scene.pairing import PAIRINGS, StampedPose
+from ...scene.scene_solver import two_boxes
+from ...solver.contact import Contact
+from ...solver.contact_solver import ContactSolver
+from ..percentiles import percentile
+from .style import STALE
 
 WINDOW = 2.0
 """Figures are those of the answers to the poses of the last so many seconds."""

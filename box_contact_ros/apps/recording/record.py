@@ -20,9 +20,9 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.utilities import remove_ros_args
 from sensor_msgs.msg import PointCloud2
 
-from ..node.runtime import REFUSALS, run_node
-from ..recording import NANOSECONDS, POSE, TOPICS, TYPES, Recorder, RecordingError, type_of
-from ..solver.checks import as_size
+from ...node.runtime import REFUSALS, run_node
+from ...solver.checks import as_size
+from .bag_file import NANOSECONDS, POSE, TOPICS, TYPES, Recorder, RecordingError, type_of
 
 MESSAGES = dict(zip(TYPES.values(), (PoseStamped, PointStamped, Vector3Stamped, PointCloud2)))
 DEPTH = 1000

@@ -7,7 +7,8 @@ are in. Messages stay the bytes they come as; no faster answer can be given from
 It is served as the contact node is, or, with --bare, as any node on this executor: without
 `runtime.let_callbacks_finish`.
 
-`python -m box_contact_ros.nodes.echo [--bare]`; for bench and soak, not a program of its own.
+`python -m box_contact_ros.apps.bench.echo_node [--bare]`; for bench and soak, not a program of its
+own.
 """
 from __future__ import annotations
 
@@ -22,9 +23,9 @@ from rclpy.context import Context
 from rclpy.node import Node
 from std_msgs.msg import Header
 
-from ..node.messages import NANOSECONDS
-from ..node.runtime import CONTACT_QOS, POSE_QOS, run_node
-from ..scene.pairing import WAITING_TICKS
+from ...node.messages import NANOSECONDS
+from ...node.runtime import CONTACT_QOS, POSE_QOS, run_node
+from ...scene.pairing import WAITING_TICKS
 
 STAMP_AT = 4
 """CDR: four bytes of encapsulation, the second of them 1 for little endian, then the stamp."""

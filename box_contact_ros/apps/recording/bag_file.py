@@ -25,8 +25,8 @@ from rosbags.rosbag2 import (
 )
 from rosbags.typesys import Stores, get_typestore
 
-from .solver.checks import as_size, shown
-from .streams import Size, Stream
+from ...solver.checks import as_size, shown
+from ..bench.pose_streams import Size, Stream
 
 BAG_VERSION: Final = 9
 """Of rosbag2's metadata: what Jazzy writes and reads."""

@@ -25,8 +25,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogFormatter
 
-from ..solver.contact import Contacts
-from .figures import angles, percentile
+from ...solver.contact import Contacts
+from ..percentiles import angles, percentile
 
 CONTACT_MESSAGES = ('cloud', 'point', 'normal')
 """Kinds of message that a contact node answers with."""

@@ -22,12 +22,12 @@ import numpy as np
 from rclpy.utilities import remove_ros_args
 from tqdm import tqdm
 
-from ..arguments import make_folder
-from ..node.contact_node import PARAMETERS
-from ..node.runtime import REFUSALS
-from ..solver.contact import Contacts
-from ..solver.contact_solver import MODELS, MOST_SOUP_DIVISIONS, SOUP_DIVISIONS, ContactSolver
-from ..streams import STREAMS, Stream, by_sizes, make_stream
+from ...arguments import make_folder
+from ...node.contact_node import PARAMETERS
+from ...node.runtime import REFUSALS
+from ...solver.contact import Contacts
+from ...solver.contact_solver import MODELS, MOST_SOUP_DIVISIONS, SOUP_DIVISIONS, ContactSolver
+from ..processes import DOMAINS
 from .bench_drive import Subject, about_the_machine, open_bench
 from .bench_log import (
     CONTACT_MESSAGES,
@@ -39,7 +39,7 @@ from .bench_log import (
     latency_table,
     write_csv,
 )
-from .children import DOMAINS
+from .pose_streams import STREAMS, Stream, by_sizes, make_stream
 
 NODES = ('contact', 'soup', 'echo')
 SECONDS, LONGEST = 60.0, 3600.0  # of sending, in all: the default, and what is accepted
@@ -153,7 +153,7 @@ def _subjects(options: argparse.Namespace) -> list[Subject]:
             'soup', program('soup_node', f'divisions:={options.divisions}'),
             NodeLog('soup', f'soup-{options.divisions}', CONTACT_MESSAGES), prefix='soup/'),
         'echo': lambda: Subject(
-            'echo', ['-m', 'box_contact_ros.nodes.echo', '--ros-args'],
+            'echo', ['-m', 'box_contact_ros.apps.bench.echo_node', '--ros-args'],
             NodeLog('echo', '', ECHO_MESSAGES), has_sizes=False),
     }
     subjects = [made[name]() for name in options.nodes]
@@ -167,7 +167,7 @@ def _streams(options: argparse.Namespace) -> list[Stream]:
     shares = max(1, len(options.streams)) * (1 if options.side_by_side else len(options.nodes))
     count = options.duration and max(2, round(options.rate * options.duration / shares))
     if options.replay:
-        from ..recording import read_replay  # only here: rosbags is an extra
+        from ..recording.bag_file import read_replay  # only here: rosbags is an extra
 
         replay = read_replay(options.replay, options.topic_a, options.topic_b,
                              size_a=options.size_a, size_b=options.size_b)

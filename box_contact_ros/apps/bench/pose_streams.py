@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .scene import pose_sets
-from .scene.pose_sets import CONTAINER, CUBE, Generator, Pairs
+from ...scene import pose_sets
+from ...scene.pose_sets import CONTAINER, CUBE, Generator, Pairs
 
 Size = tuple[float, float, float]
 
@@ -70,7 +70,7 @@ def crane_run(rng: np.random.Generator, n: int) -> Pairs:
 
     The motion takes 18 s; it is played faster or slower if n poses take another time to send.
     """
-    from .crane import Crane, CraneScenario  # only here: MuJoCo is an extra
+    from ..crane.mujoco_crane import Crane, CraneScenario  # only here: MuJoCo is an extra
 
     scenario = CraneScenario.drawn(int(rng.integers(1, 2**31)))
     crane = Crane(scenario, n / scenario.duration)

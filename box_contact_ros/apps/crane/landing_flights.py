@@ -15,12 +15,12 @@ import rclpy
 from rclpy.context import Context
 from rclpy.parameter import Parameter
 
-from ..crane import CraneScenario
-from ..landing import LandingResult
-from ..node.runtime import make_executor
-from .children import DOMAINS, end, on_this_host, start
-from .crane import CraneNode, receive_while
+from ...node.runtime import make_executor
+from ..processes import DOMAINS, end, on_this_host, start
+from .crane_node import CraneNode, receive_while
 from .crane_parameters import PARAMETERS, SCENARIO
+from .landing import LandingResult
+from .mujoco_crane import CraneScenario
 
 PATIENCE = 30.0
 """For the node to answer [s]."""

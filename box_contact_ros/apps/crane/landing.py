@@ -24,11 +24,11 @@ from typing import Any
 
 import numpy as np
 
-from .crane import LANDING_OVERLAP, Crane, CraneScenario
-from .scene.contact_law import GRAVITY, ContactLaw, HeldWrench, Touch
-from .solver.contact import Contact
-from .solver.contact_solver import ContactSolver
-from .solver.pose import rotation_matrix
+from ...scene.contact_law import GRAVITY, ContactLaw, HeldWrench, Touch
+from ...solver.contact import Contact
+from ...solver.contact_solver import ContactSolver
+from ...solver.pose import rotation_matrix
+from .mujoco_crane import LANDING_OVERLAP, Crane, CraneScenario
 
 __all__ = ['LandingCase', 'LandingRecord', 'LandingResult', 'cases', 'land', 'landing_scenario',
            'scenario_of', 'touch_of']

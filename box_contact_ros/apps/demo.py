@@ -1,7 +1,7 @@
 """The demonstration: a contact node and a crane, two processes that talk over DDS.
 
-`python -m box_contact_ros.demo` starts both, shows the crane's live contacts and its summary, and
-ends both again, within a minute. The contacts push the load, one point per tick, and the crane says
+`python -m box_contact_ros.apps.demo` starts both, shows the crane's live contacts and its summary,
+and ends both again, within a minute. The contacts push the load, one point per tick, and the crane says
 whether it came to rest on the stack; with `--open-loop` they are only recorded. Both run in a ROS
 domain of their own on this host, so that nothing else hears them; the environment variable
 `BOX_CONTACT_DEMO_DOMAIN` chooses another one. The exit status is the crane's: 0 only if contacts
@@ -21,9 +21,9 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from .crane import CONTAINER_40FT, CraneScenario
-from .landing import LANDING_DURATION
-from .nodes.children import DOMAINS, END_PATIENCE, Stop, asked_to_end, end, on_this_host, start
+from .crane.landing import LANDING_DURATION
+from .crane.mujoco_crane import CONTAINER_40FT, CraneScenario
+from .processes import DOMAINS, END_PATIENCE, Stop, asked_to_end, end, on_this_host, start
 
 DOMAIN_VARIABLE = 'BOX_CONTACT_DEMO_DOMAIN'
 
@@ -91,7 +91,7 @@ def main(args: Sequence[str] | None = None) -> int:
 
 def _options(args: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
-        prog='python -m box_contact_ros.demo',
+        prog='python -m box_contact_ros.apps.demo',
         description='A contact node and a crane simulator, live in this terminal for less than a '
                     'minute.',
         epilog=f'{DOMAIN_VARIABLE}=N in the environment chooses the ROS domain, '

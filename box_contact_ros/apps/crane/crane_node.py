@@ -25,15 +25,15 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import PointCloud2
 
-from ..crane import Crane
-from ..landing import LandingResult
-from ..node.messages import NANOSECONDS, read_cloud
-from ..node.parameters import answer_help, declare
-from ..node.runtime import REFUSALS, make_executor, uninterrupted
-from ..solver.contact_solver import ContactSolver
+from ...node.messages import NANOSECONDS, read_cloud
+from ...node.parameters import answer_help, declare
+from ...node.runtime import REFUSALS, make_executor, uninterrupted
+from ...solver.contact_solver import ContactSolver
 from .crane_feedback import CraneFeedback
 from .crane_log import CraneLog, LiveReport
 from .crane_parameters import PARAMETERS, scenario_from
+from .landing import LandingResult
+from .mujoco_crane import Crane
 
 OFFER_PERIOD = 0.1  # s between the pairs that only ask whether anyone answers
 DRAIN = 1.0  # s of patience for the last answers

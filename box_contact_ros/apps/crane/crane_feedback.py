@@ -17,9 +17,9 @@ from collections import deque
 
 import numpy as np
 
-from ..crane import Crane, CraneScenario
-from ..landing import LandingRecord
-from ..scene.contact_law import ContactLaw, HeldWrench, Touch
+from ...scene.contact_law import ContactLaw, HeldWrench, Touch
+from .landing import LandingRecord
+from .mujoco_crane import Crane, CraneScenario
 
 ANSWER_SHARE = 0.8
 """Share of a tick for which its answer is awaited in real time; the rest is for simulating it."""

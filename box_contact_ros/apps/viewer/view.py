@@ -27,10 +27,10 @@ from rclpy.context import Context
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
-from ..crane import CONTAINER_40FT
-from ..node.contact_node import PARAMETERS
-from ..node.runtime import REFUSALS, make_executor
-from .children import DOMAINS, Stop, asked_to_end, end, on_this_host, start
+from ...node.contact_node import PARAMETERS
+from ...node.runtime import REFUSALS, make_executor
+from ..crane.mujoco_crane import CONTAINER_40FT
+from ..processes import DOMAINS, Stop, asked_to_end, end, on_this_host, start
 from .view_node import ViewNode
 from .view_page import Landing, Page
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from ..crane import LANDING_OVERLAP, CraneScenario
-from ..landing import LANDING_DURATION
-from ..node.parameters import Setting, flag, number, numbers, size, text, whole_number
+from ...node.parameters import Setting, flag, number, numbers, size, text, whole_number
+from .landing import LANDING_DURATION
+from .mujoco_crane import LANDING_OVERLAP, CraneScenario
 
 STANDARD = CraneScenario()
 PARAMETERS = {

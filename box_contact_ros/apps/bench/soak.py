@@ -25,12 +25,12 @@ from typing import Any
 import numpy as np
 from rclpy.utilities import remove_ros_args
 
-from ..arguments import make_folder
-from ..node.contact_node import PARAMETERS
-from ..node.runtime import REFUSALS
-from ..solver.contact import Contacts
-from ..solver.contact_solver import MODELS, ContactSolver
-from ..streams import Stream, make_stream
+from ...arguments import make_folder
+from ...node.contact_node import PARAMETERS
+from ...node.runtime import REFUSALS
+from ...solver.contact import Contacts
+from ...solver.contact_solver import MODELS, ContactSolver
+from ..processes import DOMAINS
 from .bench_drive import Bench, Subject, about_the_machine, open_bench
 from .bench_log import (
     CONTACT_MESSAGES,
@@ -41,7 +41,7 @@ from .bench_log import (
     markdown,
     write_csv,
 )
-from .children import DOMAINS
+from .pose_streams import Stream, make_stream
 
 BLOCK_SECONDS = 10.0
 ECHO_SHARE = 0.25
@@ -135,7 +135,7 @@ def _contact(options: argparse.Namespace) -> Subject:
 
 
 def _echo(name: str, prefix: str, *options: str) -> Subject:
-    return Subject(name, ['-m', 'box_contact_ros.nodes.echo', *options, '--ros-args',
+    return Subject(name, ['-m', 'box_contact_ros.apps.bench.echo_node', *options, '--ros-args',
                           '-r', f'echo:={prefix}echo'],
                    NodeLog(name, '', ECHO_MESSAGES), prefix, poses=f'for_{prefix}', has_sizes=False)
 

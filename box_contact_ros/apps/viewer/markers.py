@@ -21,8 +21,8 @@ from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
-from ..node.contact_node import CONTAINER
-from ..node.messages import (
+from ...node.contact_node import CONTAINER
+from ...node.messages import (
     NANOSECONDS,
     OTHER_SCENE,
     Refused,
@@ -31,10 +31,10 @@ from ..node.messages import (
     make_header,
     read_cloud,
 )
-from ..node.parameters import Setting, answer_help, checked, declare, number, size
-from ..node.runtime import CONTACT_QOS, LOG_SECONDS, POSE_QOS, run_node
-from ..scene.pairing import StampedPose
-from .appearance import BOX_A, BOX_B, BOX_OPACITY, CONTACT, STALE, Colour, proportions
+from ...node.parameters import Setting, answer_help, checked, declare, number, size
+from ...node.runtime import CONTACT_QOS, LOG_SECONDS, POSE_QOS, run_node
+from ...scene.pairing import StampedPose
+from .style import BOX_A, BOX_B, BOX_OPACITY, CONTACT, STALE, Colour, proportions
 
 PARAMETERS = {
     'size_a': Setting(CONTAINER, 'full extents of box A, three numbers > 0 [m]', size),

@@ -14,7 +14,7 @@ from rclpy.parameter_client import AsyncParameterClient
 from rclpy.task import Future
 from sensor_msgs.msg import PointCloud2
 
-from ..node.messages import (
+from ...node.messages import (
     NANOSECONDS,
     OTHER_SCENE,
     Refused,
@@ -22,7 +22,7 @@ from ..node.messages import (
     is_of_two_boxes,
     read_cloud,
 )
-from ..node.runtime import LOG_SECONDS, POSE_QOS
+from ...node.runtime import LOG_SECONDS, POSE_QOS
 from .view_log import ViewLog
 
 ASK_PERIOD = 0.5

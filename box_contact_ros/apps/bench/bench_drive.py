@@ -32,13 +32,13 @@ from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header
 from tqdm import tqdm
 
-from ..node.messages import NANOSECONDS, make_header, read_cloud
-from ..node.runtime import let_callbacks_finish, make_executor, spin_for
-from ..solver.contact import Contacts
-from ..streams import Stream
+from ...node.messages import NANOSECONDS, make_header, read_cloud
+from ...node.runtime import let_callbacks_finish, make_executor, spin_for
+from ...solver.contact import Contacts
+from ..processes import Stop, asked_to_end, end, on_this_host
 from .bench_log import NodeLog
-from .children import Stop, asked_to_end, end, on_this_host
-from .echo import raw_stamp
+from .echo_node import raw_stamp
+from .pose_streams import Stream
 
 # Bounds on everything that waits, so that a bench always ends.
 START_LIMIT = 30.0  # s until a node answers

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .figures import angles, percentile
+from ..percentiles import angles, percentile
 
 __all__ = ['CraneLog', 'CraneSummary', 'LIVE_HEADER', 'LiveReport', 'live_line']
 

@@ -1,0 +1,1 @@
+"""Clients of the node, and the demo."""

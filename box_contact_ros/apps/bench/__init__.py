@@ -1,0 +1,1 @@
+"""Load for running nodes, and what is measured under it."""

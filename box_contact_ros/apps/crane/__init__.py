@@ -1,0 +1,1 @@
+"""The crane: its simulation, its landing, and its node."""

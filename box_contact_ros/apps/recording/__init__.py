@@ -1,0 +1,1 @@
+"""Recordings of running nodes, as bags."""

@@ -1,0 +1,1 @@
+"""What shows a scene: the page in the browser, and markers for RViz."""
