@@ -6,10 +6,17 @@ import poses
 import pytest
 
 from box_contact_ros import ContactSolver
+from box_contact_ros.baselines.paper.symmetry import (
+    EDGE_EDGE,
+    FEATURES,
+    NO_FOLD,
+    OCTANT,
+    VERTEX_FACE,
+    fold,
+)
 from box_contact_ros.resources import resource_path
 from box_contact_ros.solver.pose import rotation_matrix
 from box_contact_ros.solver.weights_file import WeightsError
-from box_contact_ros.symmetry import EDGE_EDGE, FEATURES, NO_FOLD, OCTANT, VERTEX_FACE, fold
 from box_contact_ros.training import dataset
 
 EDGE = 2.0

@@ -15,7 +15,8 @@ pytest.importorskip('matplotlib')
 
 from tqdm import tqdm  # noqa: E402
 
-from box_contact_ros import ContactSolver, soup  # noqa: E402
+from box_contact_ros import ContactSolver  # noqa: E402
+from box_contact_ros.baselines import soup  # noqa: E402
 from box_contact_ros.report import paper, paper_soup  # noqa: E402
 from box_contact_ros.training import dataset  # noqa: E402
 

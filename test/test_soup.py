@@ -11,7 +11,8 @@ import pytest
 
 pytest.importorskip('fcl')
 
-from box_contact_ros import ContactSolver, soup  # noqa: E402
+from box_contact_ros import ContactSolver  # noqa: E402
+from box_contact_ros.baselines import soup
 
 IDENTITY = poses.IDENTITY
 EXACT = ContactSolver(poses.CUBE, poses.CUBE, model='exact')

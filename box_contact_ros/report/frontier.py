@@ -26,6 +26,7 @@ from typing import Any
 import numpy as np
 
 from ..arguments import seed_number
+from ..baselines.engines import Contestant, Ours, installed
 from ..core import native
 from ..resources import resource_path
 from ..scene.pose_sets import (
@@ -44,7 +45,6 @@ from . import add_out, processor, results_folder, versions
 from .accuracy import CLASSES, classify, markdown
 from .paper_soup import PAPER as PAPER_SOUP
 from .paper_soup import PAPER_NETWORK
-from .peers import Contestant, Ours, installed
 
 SOUPS = (8, 10, 12, 14, 16, 18, 20, 22)
 """Divisions of an edge: those of the paper's Table 3."""

@@ -27,7 +27,7 @@ import fcl
 import numpy as np
 from tqdm import tqdm
 
-from .. import soup
+from ..baselines import soup
 from ..scene.pose_sets import CUBE, stacks
 from ..solver.contact import Contacts
 from ..solver.contact_solver import ContactSolver

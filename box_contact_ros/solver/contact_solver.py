@@ -9,8 +9,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..baselines.paper.paper_models import Paper, PaperContinuous
 from ..core import native
-from ..paper import Paper, PaperContinuous
 from .checks import as_floats, as_size, pose_fault, shown, size_fault
 from .contact import Contact, Contacts
 from .exact import Exact
@@ -88,12 +88,12 @@ def make_model(name: str, size_a: np.ndarray, size_b: np.ndarray, weights: str |
     if name == 'paper-continuous':
         return PaperContinuous(size_a, size_b, weights)
     if name == 'fcl':
-        from ..fcl_box import FclBox  # only here: python-fcl is an extra
+        from ..baselines.fcl_box import FclBox  # only here: python-fcl is an extra
 
         return FclBox()
     divisions = soup_divisions(name)
     if divisions:
-        from ..soup import Soup  # likewise
+        from ..baselines.soup import Soup  # likewise
 
         return Soup(divisions)
     raise NotImplementedError(name)

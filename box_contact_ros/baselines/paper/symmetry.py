@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .baselines.paper import _networks
-from .baselines.paper._networks import EDGE_EDGE, FEATURES, NO_FOLD, OCTANT, VERTEX_FACE
+from . import _networks
+from ._networks import EDGE_EDGE, FEATURES, NO_FOLD, OCTANT, VERTEX_FACE
 
 __all__ = ['EDGE_EDGE', 'FEATURES', 'Folds', 'NO_FOLD', 'OCTANT', 'VERTEX_FACE', 'fold']
 

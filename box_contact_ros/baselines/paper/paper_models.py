@@ -11,12 +11,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from .baselines.paper import _networks
-from .baselines.paper._networks import FEATURES, INPUTS, OCTANT, OUTPUTS
-from .resources import resource_path
-from .solver.checks import as_size
-from .solver.contact import Contacts
-from .solver.weights_file import Network, Weights, WeightsError, load_weights
+from ...resources import resource_path
+from ...solver.checks import as_size
+from ...solver.contact import Contacts
+from ...solver.weights_file import Network, Weights, WeightsError, load_weights
+from . import _networks
+from ._networks import FEATURES, INPUTS, OCTANT, OUTPUTS
 
 SAME_SIZE = 1e-9
 """Relative difference of extents up to which a size is the one that the weights were made for."""
