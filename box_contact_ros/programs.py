@@ -84,7 +84,7 @@ PROGRAMS = {
         ('train',),
     ),
     'search': Program(
-        'box_contact_ros.training.search:main',
+        'box_contact_ros.training.experiments.search:main',
         'train thousands of networks at once to find the size and settings that they should have',
         ('train', 'report'),
     ),

@@ -19,8 +19,8 @@ from box_contact_ros.solver.weights_file import (
     save_weights,
     tensors_digest,
 )
-from box_contact_ros.training import dataset
-from box_contact_ros.training.errors import (
+from box_contact_ros.training.paper_recipe import dataset
+from box_contact_ros.training.paper_recipe.errors import (
     errors_of,
     figures,
     figures_by_part,

@@ -17,7 +17,7 @@ from box_contact_ros.baselines.paper.symmetry import (
 from box_contact_ros.resources import resource_path
 from box_contact_ros.solver.pose import rotation_matrix
 from box_contact_ros.solver.weights_file import WeightsError
-from box_contact_ros.training import dataset
+from box_contact_ros.training.paper_recipe import dataset
 
 EDGE = 2.0
 MODELS = {'paper': (poses.CUBE, 0.6, 12.0), 'paper-continuous': (poses.CUBE, 0.008, 0.15),

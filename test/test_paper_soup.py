@@ -18,7 +18,7 @@ from tqdm import tqdm  # noqa: E402
 from box_contact_ros import ContactSolver  # noqa: E402
 from box_contact_ros.baselines import soup  # noqa: E402
 from box_contact_ros.report import paper, paper_soup  # noqa: E402
-from box_contact_ros.training import dataset  # noqa: E402
+from box_contact_ros.training.paper_recipe import dataset  # noqa: E402
 
 EXACT = ContactSolver(poses.CUBE, poses.CUBE, model='exact')
 

@@ -16,8 +16,9 @@ import pytest
 torch = pytest.importorskip('torch')
 pytest.importorskip('matplotlib')
 
-from box_contact_ros.training import halving, mlp, search  # noqa: E402
-from box_contact_ros.training.halving import Candidate, CheckpointError, Rung  # noqa: E402
+from box_contact_ros.training import mlp_recipe  # noqa: E402
+from box_contact_ros.training.experiments import search, successive_halving  # noqa: E402
+from box_contact_ros.training.experiments.successive_halving import Candidate, CheckpointError, Rung  # noqa: E402
 
 QUICK = ['--quick', '--candidates', '48', '--seed', '2', '--device', 'cpu']
 
@@ -64,14 +65,14 @@ class Toy:
 def test_the_better_part_goes_on_with_its_weights(tmp_path: Path) -> None:
     """Rate 0.3 is number 6, which diverges; 5 and 7 are next; 19, in use, is kept though worst."""
     toy = Toy()
-    done = halving.run(toy, tmp_path / 'c', progress=False)
+    done = successive_halving.run(toy, tmp_path / 'c', progress=False)
     assert [len(scores) for scores in done.scores] == [20, 8, 3]
     assert set(done.scores[1]) == {2, 3, 4, 5, 7, 8, 9, 19}
     assert set(done.scores[2]) == {5, 7, 19}
     assert float(done.networks[2][5][0][0][0, 0]) == 1 + 2 + 4
     assert len(set(toy.seeds)) == len(toy.seeds)  # no two groups see the same random numbers
     costs = [[toy.cost(one) for one in group] for group in
-             halving.in_groups(toy.candidates(), toy, 4)]
+             successive_halving.in_groups(toy.candidates(), toy, 4)]
     flat = [cost for group in costs for cost in group]
     assert flat == sorted(flat) and max(map(len, costs)) == 4
 
@@ -79,14 +80,14 @@ def test_the_better_part_goes_on_with_its_weights(tmp_path: Path) -> None:
 @pytest.mark.parametrize('stop_after', range(8))
 def test_stopped_anywhere_it_ends_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
                                            stop_after: int) -> None:
-    monkeypatch.setattr(halving, 'SAVE_EVERY', 0.0)
-    whole = halving.run(Toy(), tmp_path / 'whole', progress=False)
+    monkeypatch.setattr(successive_halving, 'SAVE_EVERY', 0.0)
+    whole = successive_halving.run(Toy(), tmp_path / 'whole', progress=False)
     path = tmp_path / 'stopped'
     first = Toy(stop_after)
     with pytest.raises(KeyboardInterrupt):
-        halving.run(first, path, progress=False)
+        successive_halving.run(first, path, progress=False)
     second = Toy()
-    resumed = halving.run(second, path, progress=False)
+    resumed = successive_halving.run(second, path, progress=False)
     assert not set(first.trained) & set(second.trained)  # nothing is done twice
     assert len(first.trained) + len(second.trained) == 20 + 8 + 3
     np.testing.assert_equal(resumed.scores, whole.scores)  # equal NaN included
@@ -94,14 +95,14 @@ def test_stopped_anywhere_it_ends_the_same(tmp_path: Path, monkeypatch: pytest.M
 
 
 def test_checkpoint_of_another_search_is_refused(tmp_path: Path) -> None:
-    halving.run(Toy(), tmp_path / 'c', progress=False)
+    successive_halving.run(Toy(), tmp_path / 'c', progress=False)
     other = Toy()
     other.seed = 6
     with pytest.raises(CheckpointError, match='with other options'):
-        halving.run(other, tmp_path / 'c', progress=False)
+        successive_halving.run(other, tmp_path / 'c', progress=False)
     (tmp_path / 'c').write_bytes(b'not a checkpoint')
     with pytest.raises(CheckpointError, match='cannot be read, remove it'):
-        halving.run(Toy(), tmp_path / 'c', progress=False)
+        successive_halving.run(Toy(), tmp_path / 'c', progress=False)
 
 
 def test_frontier() -> None:
@@ -123,7 +124,7 @@ def test_candidates_are_over_the_whole_range() -> None:
     """Hidden units 4 to 64 by fours, small ones more often; the first is what is in use."""
     found = search.MlpSearch(seed=1, count=2048, quick=False, device='cpu').candidates()
     assert len(found) == 2048
-    assert found[0].shipped and found[0].hidden == mlp.HIDDEN
+    assert found[0].shipped and found[0].hidden == mlp_recipe.HIDDEN
     units = {units for one in found for units in one.hidden}
     assert units == set(range(4, 65, 4))
     assert len({one.rate for one in found}) == 2048

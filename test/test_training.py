@@ -10,15 +10,10 @@ import pytest
 torch = pytest.importorskip('torch')
 
 from box_contact_ros.solver.weights_file import load_weights  # noqa: E402
-from box_contact_ros.training import dataset, train  # noqa: E402
-from box_contact_ros.training.errors import errors_of, figures, predict  # noqa: E402
-from box_contact_ros.training.fit import (  # noqa: E402
-    Settings,
-    fit,
-    gradients,
-    outputs_of,
-    wrapped,
-)
+from box_contact_ros.training import train  # noqa: E402
+from box_contact_ros.training.paper_recipe import dataset  # noqa: E402
+from box_contact_ros.training.paper_recipe.errors import errors_of, figures, predict  # noqa: E402
+from box_contact_ros.training.paper_recipe.fit import Settings, fit, gradients, outputs_of, wrapped  # noqa: E402
 
 SMALL = Settings((6, 9, 7, 4), networks=3, epochs=12, batch=50, rate=0.05)
 

@@ -21,8 +21,8 @@ from box_contact_ros.solver.weights_file import (  # noqa: E402
     save_weights,
     unpacked,
 )
-from box_contact_ros.training import contacts, mlp, points, scene, train  # noqa: E402
-from box_contact_ros.training.contacts import MlpSamples  # noqa: E402
+from box_contact_ros.training import mlp_fit, mlp_recipe, samples, scene_sizes, train  # noqa: E402
+from box_contact_ros.training.samples import MlpSamples  # noqa: E402
 
 SCENE = """\
 boxes:
@@ -40,12 +40,12 @@ CONTAINER, SPREADER = (12.192, 2.591, 2.438), (12.192, 2.438, 0.8)
 
 
 def error_of(pairs: Pairs, weights: Path) -> float:
-    return float(mlp.point_errors(pairs, weights).mean())
+    return float(mlp_recipe.point_errors(pairs, weights).mean())
 
 
 @pytest.fixture(scope='module')
 def data() -> MlpSamples:
-    return contacts.draw_samples(contacts.mixture, [5], 6000)
+    return samples.draw_samples(samples.mixture, [5], 6000)
 
 
 # --- the fit --------------------------------------------------------------------------------------
@@ -56,7 +56,7 @@ def test_gradients_are_the_derivatives(data: MlpSamples) -> None:
 
     To the rounding of float32.
     """
-    fit = points.Fit(data, points.Settings(hidden=[(6, 5)], steps=10, batch=len(data)))
+    fit = mlp_fit.Fit(data, mlp_fit.Settings(hidden=[(6, 5)], steps=10, batch=len(data)))
     before = [p.clone().requires_grad_() for p in fit.parameters]
     value = fit.inputs.clone()
     for layer in range(3):
@@ -66,8 +66,8 @@ def test_gradients_are_the_derivatives(data: MlpSamples) -> None:
                           for q in range(3)], dim=1)  # sites are 3 f + q
     error = answer - fit.offsets
     squared = (error.square() * fit.squared_scale).sum(dim=-1)
-    loss = (error.square().mean() + points.POINT_WEIGHT * squared.mean()
-            + points.TAIL_WEIGHT * squared.square().mean())
+    loss = (error.square().mean() + mlp_fit.POINT_WEIGHT * squared.mean()
+            + mlp_fit.TAIL_WEIGHT * squared.square().mean())
     loss.backward()
     assert fit.run(1)[0] == pytest.approx(loss.item(), rel=1e-4)
     for moment, parameter in zip(fit._first, before):
@@ -79,25 +79,25 @@ def test_the_network_is_the_cores() -> None:
     """What is trained beside core/mlp.hpp, with hidden units on both sides of zero."""
     pairs = size_pairs(np.random.default_rng(6), 1000)
     widths = (12, 8, 3)
-    layers = points.drawn(np.random.default_rng(1), widths)
+    layers = mlp_fit.drawn(np.random.default_rng(1), widths)
     network = Network('point', widths, np.concatenate([part.ravel() for layer in layers
                                                        for part in layer]))
     core = stages(*pairs, names=('features', 'vectors', 'answer'), network=core_numbers(network))
     (first, bias), (last, last_bias) = (map(torch.tensor, layer) for layer in layers)
     sums = torch.tensor(core.features).reshape(-1, 12) @ first.T + bias
     assert 0.2 < float((sums > 0.0).float().mean()) < 0.8
-    outputs = (points.relu(sums) @ last.T + last_bias)[None]
-    found = points.Fit.answers(outputs, torch.tensor(core.vectors))[0].numpy()
+    outputs = (mlp_fit.relu(sums) @ last.T + last_bias)[None]
+    found = mlp_fit.Fit.answers(outputs, torch.tensor(core.vectors))[0].numpy()
     np.testing.assert_allclose(found, core.answer, atol=1e-6)
 
 
 def test_a_narrow_network_beside_a_wide_one_is_the_narrow_one(data: MlpSamples) -> None:
     """Units that only fill up the matrices stay at zero: trained alone, the network is the same."""
-    start = [points.drawn(np.random.default_rng(k), (12, *hidden, 3))
+    start = [mlp_fit.drawn(np.random.default_rng(k), (12, *hidden, 3))
              for k, hidden in enumerate([(8, 4), (12, 16)])]
     common = {'steps': 30, 'batch': 512, 'rate': 3e-3}
-    alone = points.Fit(data, points.Settings(hidden=[(8, 4)], **common), start=start[:1])
-    both = points.Fit(data, points.Settings(hidden=[(8, 4), (12, 16)], **common), start=start)
+    alone = mlp_fit.Fit(data, mlp_fit.Settings(hidden=[(8, 4)], **common), start=start[:1])
+    both = mlp_fit.Fit(data, mlp_fit.Settings(hidden=[(8, 4), (12, 16)], **common), start=start)
     alone.run(30)
     both.run(30)
     assert both.parameters[1].shape[1:] == (12, 16)
@@ -111,13 +111,13 @@ def test_a_narrow_network_beside_a_wide_one_is_the_narrow_one(data: MlpSamples) 
 
 def test_normalisation_is_folded_in_and_out(data: MlpSamples) -> None:
     """`folded` serves raw inputs, and `unfolded` undoes it."""
-    mean, deviation = points.normalisation(data.features)
-    layers = points.drawn(np.random.default_rng(0), (12, 8, 8, 3))
-    weight, bias = points.folded(layers, mean, deviation)[0]
+    mean, deviation = mlp_fit.normalisation(data.features)
+    layers = mlp_fit.drawn(np.random.default_rng(0), (12, 8, 8, 3))
+    weight, bias = mlp_fit.folded(layers, mean, deviation)[0]
     np.testing.assert_allclose(data.features @ weight.T + bias,
                                (data.features - mean) / deviation @ layers[0][0].T + layers[0][1],
                                atol=1e-3)
-    again = points.unfolded(points.folded(layers, mean, deviation), mean, deviation)
+    again = mlp_fit.unfolded(mlp_fit.folded(layers, mean, deviation), mean, deviation)
     for one, other in zip(layers, again):
         for a, b in zip(one, other):
             np.testing.assert_allclose(a, b, rtol=1e-5, atol=1e-5)
@@ -125,14 +125,14 @@ def test_normalisation_is_folded_in_and_out(data: MlpSamples) -> None:
 
 def test_errors_while_training_are_the_solvers(data: MlpSamples, tmp_path: Path) -> None:
     """`Fit.point_errors` beside the written file behind `ContactSolver`."""
-    fit = points.Fit(data, points.Settings(hidden=[(8,)], steps=200, batch=1024))
+    fit = mlp_fit.Fit(data, mlp_fit.Settings(hidden=[(8,)], steps=200, batch=1024))
     fit.run(200)
     path = tmp_path / 'mlp.safetensors'
-    card = mlp._card(path, (8,), 0, 'none', [], fit, {})
+    card = mlp_recipe._card(path, (8,), 0, 'none', [], fit, {})
     save_weights(path, {'point': fit.export(0)}, card)
     pairs = size_pairs(np.random.default_rng(3), 500)
-    trained = fit.point_errors(contacts.describe(pairs))[0]
-    solved = mlp.point_errors(pairs, path)
+    trained = fit.point_errors(samples.describe(pairs))[0]
+    solved = mlp_recipe.point_errors(pairs, path)
     # The solver also moves answers into the other box, which seldom harms.
     assert np.mean(np.abs(trained - solved) < 1e-4) > 0.3
     assert np.mean(solved <= trained + 1e-4) > 0.95
@@ -143,16 +143,16 @@ def test_errors_while_training_are_the_solvers(data: MlpSamples, tmp_path: Path)
 def test_description_does_not_depend_on_the_block(count: int) -> None:
     """Also where a block has one pair: some were described as nothing, one in two million NaN."""
     pairs = tilted(np.random.default_rng(1), 200)
-    whole = contacts.describe(pairs)
-    part = contacts.describe(Pairs(*(column[:count] for column in pairs)))
+    whole = samples.describe(pairs)
+    part = samples.describe(Pairs(*(column[:count] for column in pairs)))
     for field in dataclasses.fields(MlpSamples):
         np.testing.assert_array_equal(getattr(part, field.name),
                                       getattr(whole, field.name)[:count])
 
 
 def test_hard_contacts_are_those_with_the_largest_errors(data: MlpSamples) -> None:
-    fit = points.Fit(data, points.Settings(hidden=[(8,)], steps=1, batch=1024))
-    hard = mlp._hardest(fit, data, 0.02)
+    fit = mlp_fit.Fit(data, mlp_fit.Settings(hidden=[(8,)], steps=1, batch=1024))
+    hard = mlp_recipe._hardest(fit, data, 0.02)
     errors = fit.point_errors(data)[0]
     assert len(hard) == round(0.02 * len(data))
     assert fit.point_errors(hard)[0].min() >= np.sort(errors)[-len(hard)] - 1e-6
@@ -175,7 +175,7 @@ def test_quick_training(quick: Path, tmp_path: Path) -> None:
     """Its error is a fraction of the middle's, which a network of zeros answers with."""
     card = load_weights(quick).card
     assert (card['seed'], card['model'], card['sizes']) == (3, 'mlp', [])
-    assert card['architecture'] == [12, *mlp.HIDDEN, 3]
+    assert card['architecture'] == [12, *mlp_recipe.HIDDEN, 3]
     pairs = cubes(np.random.default_rng(8), 2000)
     nothing = tmp_path / 'nothing.safetensors'
     save_weights(nothing, {'point': [(np.zeros((b, a)), np.zeros(b)) for a, b in (
@@ -226,7 +226,7 @@ def test_refused_arguments(arguments: list[str], message: str, tmp_path: Path,
     (containers, 0.6, 3.5, 8.0)])
 def test_shipped_weights_keep_their_limits(make, mean: float, p99: float, worst: float) -> None:
     """In % of the smaller box's longest edge, on poses of another seed than the card's."""
-    errors = 100.0 * mlp.point_errors(make(np.random.default_rng(77), 10_000), None)
+    errors = 100.0 * mlp_recipe.point_errors(make(np.random.default_rng(77), 10_000), None)
     assert errors.mean() < mean
     assert np.quantile(errors, 0.99) < p99
     assert errors.max() < worst
@@ -245,14 +245,14 @@ def test_the_example_in_the_docs(tmp_path: Path) -> None:
     """docs/training.md: three pairs of sizes, all within the range."""
     page = (Path(__file__).parents[1] / 'docs' / 'training.md').read_text('utf-8')
     text = re.search(r'^```yaml\n(.*?)^```$', page, re.MULTILINE | re.DOTALL).group(1)
-    sizes = scene.size_pairs(write(tmp_path, text))
-    assert len(sizes) == 3 and all(map(mlp.in_range, sizes))
+    sizes = scene_sizes.size_pairs(write(tmp_path, text))
+    assert len(sizes) == 3 and all(map(mlp_recipe.in_range, sizes))
 
 
 def test_distinct_pairs_of_sizes(tmp_path: Path) -> None:
     """Swapped boxes and other names for the axes are the same; boxes in no pair do not count."""
     path = write(tmp_path, SCENE + '# end\n')
-    assert scene.size_pairs(path) == [(CONTAINER, CONTAINER), (CONTAINER, SPREADER)]
+    assert scene_sizes.size_pairs(path) == [(CONTAINER, CONTAINER), (CONTAINER, SPREADER)]
 
 
 @pytest.mark.parametrize(('before', 'after', 'message'), [
@@ -318,7 +318,7 @@ def test_scene_says_what_it_saves_and_how_to_use_it(
 def test_scene_card(expert: Path) -> None:
     card = load_weights(expert).card
     assert card['sizes'] == [[list(CONTAINER)] * 2, [list(CONTAINER), list(SPREADER)]]
-    assert card['architecture'] == load_weights(mlp.resource_path(
+    assert card['architecture'] == load_weights(mlp_recipe.resource_path(
         'weights', 'mlp.safetensors')).card['architecture']
 
 

@@ -36,8 +36,8 @@ from ..solver.contact_solver import MODELS, ContactSolver
 from ..solver.mlp import bounds_of, core_numbers
 from ..solver.pose import rotation_matrix
 from ..solver.weights_file import WeightsError, load_weights
-from ..training import dataset
-from ..training.errors import errors_of, figures, wrapped
+from ..training.paper_recipe import dataset
+from ..training.paper_recipe.errors import errors_of, figures, wrapped
 from . import add_out, processor, results_folder, versions
 from .paper import PAPER
 

@@ -18,9 +18,9 @@ import numpy as np
 from ..arguments import make_room
 from ..resources import resource_path
 from ..solver.weights_file import Weights, WeightsError, load_weights
-from ..training import dataset
-from ..training.dataset import SETS, Patterns
-from ..training.errors import PARTS, errors_of, figures, figures_by_part, predict
+from ..training.paper_recipe import dataset
+from ..training.paper_recipe.dataset import SETS, Patterns
+from ..training.paper_recipe.errors import PARTS, errors_of, figures, figures_by_part, predict
 from . import processor
 
 PAPER = {

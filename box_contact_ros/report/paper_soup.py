@@ -31,7 +31,7 @@ from ..baselines import soup
 from ..scene.pose_sets import CUBE, stacks
 from ..solver.contact import Contacts
 from ..solver.contact_solver import ContactSolver
-from ..training.dataset import quaternion_from_euler
+from ..training.paper_recipe.dataset import quaternion_from_euler
 
 PAPER = {8: (1.10, 11233, 11.52), 10: (1.47, 14323, 15.47), 12: (1.85, 17911, 19.2),
          14: (1.94, 21789, 23.13), 16: (2.13, 24667, 24.63), 18: (2.31, 26517, 28.0),

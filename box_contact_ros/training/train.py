@@ -21,11 +21,12 @@ from ..resources import resource_path
 from ..scene.scene_file import SceneError
 from ..solver.mlp import UNITS_MAX
 from ..solver.weights_file import load_weights, save_weights
-from . import dataset, mlp
-from .errors import errors_of, figures_by_part
-from .fit import Settings, fit
-from .points import device_of
-from .scene import size_pairs
+from . import mlp_recipe
+from .mlp_fit import device_of
+from .paper_recipe import dataset
+from .paper_recipe.errors import errors_of, figures_by_part
+from .paper_recipe.fit import Settings, fit
+from .scene_sizes import size_pairs
 
 
 @dataclasses.dataclass(frozen=True)
@@ -220,7 +221,7 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
             options.sizes = size_pairs(options.scene)
         except SceneError as error:
             parser.error(str(error))
-        outside = [pair for pair in options.sizes if not mlp.in_range(pair)]
+        outside = [pair for pair in options.sizes if not mlp_recipe.in_range(pair)]
         for pair in outside:
             print(f'left out, as the MLP always answers them exactly: {mlp_recipe.text(pair)}')
             options.sizes.remove(pair)
@@ -239,7 +240,7 @@ def main(args: Sequence[str] | None = None) -> int:
               'device': options.device}
     if options.scene:
         path = options.out / f'mlp-{options.scene.stem}.safetensors'
-        card = mlp.train_scene(path, options.sizes, **common)
+        card = mlp_recipe.train_scene(path, options.sizes, **common)
         print(f'{path}, {card["training"]["minutes"]} min\n{mlp_recipe.table(card)}\n'
               f'use it: ros2 run box_contact_ros contact_node --ros-args -p model:=mlp '
               f'-p weights:={path.resolve()}')
@@ -248,8 +249,8 @@ def main(args: Sequence[str] | None = None) -> int:
         if name == MLP:
             units = f'-{options.hidden}' if options.hidden else ''
             path = options.out / f'{MLP}{units}.safetensors'
-            hidden = (options.hidden,) if options.hidden else mlp.HIDDEN
-            card = mlp.train(path, hidden=hidden, steps=options.steps, **common)
+            hidden = (options.hidden,) if options.hidden else mlp_recipe.HIDDEN
+            card = mlp_recipe.train(path, hidden=hidden, steps=options.steps, **common)
             print(f'{path}, {card["training"]["minutes"]} min\n{mlp_recipe.table(card)}')
             continue
         job = JOBS[name]

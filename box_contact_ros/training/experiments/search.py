@@ -22,27 +22,14 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from ..arguments import make_folder, seed_number
-from ..core import FEATURES, OUTPUTS, SITES, native
-from ..report import processor
-from ..resources import resource_path
-from ..solver.mlp import UNITS_MAX, core_numbers
-from ..solver.weights_file import Network, WeightsError, load_weights, unpacked
-from . import dataset, mlp, train
-from .contacts import MlpSamples, draw_samples, mixture
-from .fit import Settings as PaperSettings
-from .fit import fit, outputs_of, wrapped
-from .halving import (
-    Candidate,
-    CheckpointError,
-    Progress,
-    Rung,
-    Scores,
-    Search,
-    ranking,
-    run,
-)
-from .points import (
+from ...arguments import make_folder, seed_number
+from ...core import FEATURES, OUTPUTS, SITES, native
+from ...report import processor
+from ...resources import resource_path
+from ...solver.mlp import UNITS_MAX, core_numbers
+from ...solver.weights_file import Network, WeightsError, load_weights, unpacked
+from .. import mlp_recipe, train
+from ..mlp_fit import (
     Fit,
     Layers,
     Settings,
@@ -52,6 +39,20 @@ from .points import (
     normalisation,
     unbatched,
     unfolded,
+)
+from ..paper_recipe import dataset
+from ..paper_recipe.fit import Settings as PaperSettings
+from ..paper_recipe.fit import fit, outputs_of, wrapped
+from ..samples import MlpSamples, draw_samples, mixture
+from .successive_halving import (
+    Candidate,
+    CheckpointError,
+    Progress,
+    Rung,
+    Scores,
+    Search,
+    ranking,
+    run,
 )
 
 UNITS = np.arange(4, UNITS_MAX + 1, 4)
@@ -114,7 +115,7 @@ class MlpSearch:
 
     def candidates(self) -> list[Candidate]:
         """Units uniform in their logarithm, so that half of the candidates are small."""
-        found = [Candidate(0, mlp.HIDDEN, mlp.RATE, shipped=True)]
+        found = [Candidate(0, mlp_recipe.HIDDEN, mlp_recipe.RATE, shipped=True)]
         for number in range(1, self.rungs[0].candidates):
             rng = np.random.default_rng([self.seed, _CANDIDATES, number])
             units = log_uniform(rng, UNITS[0], UNITS[-1])
@@ -379,7 +380,7 @@ steps of {UNITS[1] - UNITS[0]}, and learning rates of 0.001 to 0.1 were trained 
 halving: all of them a little, then the best of every class of cost longer. Error: point error
 against `exact` on {len(search.data[1]):,} contacts of the training mixture, in % of the
 smaller box's longest edge, after the last rung. These trainings are short (`train` takes
-{mlp.STEPS:,} steps of {mlp.BATCH:,} contacts): what counts is how sizes compare.
+{mlp_recipe.STEPS:,} steps of {mlp_recipe.BATCH:,} contacts): what counts is how sizes compare.
 
 {_rungs(search, 'steps')}
 

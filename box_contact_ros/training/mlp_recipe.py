@@ -21,8 +21,8 @@ from ..scene.pose_sets import SETS, Pairs
 from ..solver.contact_solver import ContactSolver
 from ..solver.mlp import ACTIVATION, DESCRIPTION, FEATURE_NAMES
 from ..solver.weights_file import load_weights, save_weights, unpacked
-from .contacts import MlpSamples, SizePair, draw_samples, mixture, scene_mixture
-from .points import Fit, Settings, normalisation, unfolded
+from .mlp_fit import Fit, Settings, normalisation, unfolded
+from .samples import MlpSamples, SizePair, draw_samples, mixture, scene_mixture
 
 HIDDEN = (12,)
 """Hidden units: what fits the time that a batch has for the network (docs/search.md)."""

@@ -24,7 +24,7 @@ import numpy as np
 from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save
 
-from .points import Layers
+from ..mlp_fit import Layers
 
 SAVE_EVERY = 10.0
 """Least time between two checkpoints [s]."""

@@ -6,8 +6,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..baselines.paper import _networks
-from ..solver.weights_file import Network
+from ...baselines.paper import _networks
+from ...solver.weights_file import Network
 
 PARTS = {'all': slice(0, 4), 'point': slice(0, 2), 'normal': slice(2, 4)}
 """Outputs that are reported together."""

@@ -20,7 +20,7 @@ import numpy as np
 import torch
 
 from ..core import FEATURES, OUTPUTS
-from .contacts import MlpSamples
+from .samples import MlpSamples
 
 POINT_WEIGHT, TAIL_WEIGHT = 10.0, 3e3
 """Weights of the squared point error, and of its square, beside the squared offset error. Ten makes

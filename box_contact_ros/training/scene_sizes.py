@@ -4,7 +4,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..scene.scene_file import read_scene
-from .contacts import SizePair
+from .samples import SizePair
 
 
 def size_pairs(path: Path) -> list[SizePair]:

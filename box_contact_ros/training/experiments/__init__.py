@@ -1,0 +1,1 @@
+"""Experiments: which network to train at all."""

@@ -1,0 +1,1 @@
+"""The recipe of the source paper: its data sets, its networks, their errors."""
