@@ -99,12 +99,12 @@ PROGRAMS = {
         ('report',),
     ),
     'fuzz': Program(
-        'box_contact_ros.stability.fuzz:main',
+        'box_contact_ros.verification.fuzz:main',
         'millions of random pairs, judged by an independent test; gates at zero',
         ('report', 'fuzz'),
     ),
     'stability': Program(
-        'box_contact_ros.stability.report:main',
+        'box_contact_ros.reports.stability:main',
         'what each model makes of families of hard poses',
         ('report', 'soup'),
     ),

@@ -1,8 +1,9 @@
-"""Write box_contact_ros/stability/families.npz: the hard poses, with their truth in 60 digits.
+"""Write box_contact_ros/stability/hard_poses.npz: the hard poses, with their truth in 60 digits.
 
     python test/make_families.py
 
-Once written, the file is what tests and reports read (see `box_contact_ros.stability.families`).
+Once written, the file is what tests and reports read
+(see `box_contact_ros.verification.hard_poses`).
 """
 from __future__ import annotations
 
@@ -11,7 +12,7 @@ import numpy as np
 import oracle
 from tqdm import tqdm
 
-from box_contact_ros.stability import families
+from box_contact_ros.verification import hard_poses
 
 FLOOR = mp.mpf(10)**-9
 """Depth, of the size, below which the point is that of boxes pressed in: no truth for it here."""
@@ -33,15 +34,15 @@ def truth(a, b, size_a, size_b):
 def main():
     """Generate all families and judge every case."""
     arrays = {}
-    for name in tqdm(families.FAMILIES, unit='family'):
-        pairs = families.generate(name)
+    for name in tqdm(hard_poses.FAMILIES, unit='family'):
+        pairs = hard_poses.generate(name)
         found = [truth(*row) for row in zip(*pairs)]
         arrays |= {f'{name}.{part}': values for part, values in pairs._asdict().items()}
         arrays[f'{name}.gap'] = np.array([gap for gap, _ in found])
         arrays[f'{name}.centroid'] = np.array([centroid for _, centroid in found], dtype=float)
-    np.savez_compressed(families.FILE, **arrays)
+    np.savez_compressed(hard_poses.FILE, **arrays)
     total = sum(len(values) for key, values in arrays.items() if key.endswith('.gap'))
-    print(f'{families.FILE}: {total} cases, {families.FILE.stat().st_size / 1e6:.2f} MB')
+    print(f'{hard_poses.FILE}: {total} cases, {hard_poses.FILE.stat().st_size / 1e6:.2f} MB')
 
 
 if __name__ == '__main__':

@@ -25,7 +25,7 @@ from box_contact_ros.core import FORCE, instruction_sets, native, stages
 from box_contact_ros.scene.pose_sets import SETS, Pairs
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.mlp import core_numbers, load_mlp
-from box_contact_ros.stability import fuzz
+from box_contact_ros.verification import fuzz
 
 HERE = Path(__file__).resolve().parent
 PACKAGE = Path(box_contact_ros.__file__).parent

@@ -8,10 +8,11 @@ import poses
 import pytest
 
 from box_contact_ros import ContactSolver
+from box_contact_ros.reports import stability
 from box_contact_ros.scene.pose_sets import Pairs
-from box_contact_ros.stability import families, judge, report
+from box_contact_ros.verification import hard_poses, judge
 
-CASES = families.load()
+CASES = hard_poses.load()
 MODELS = ('exact', 'mlp')
 EPS = np.finfo(float).eps
 STATED = 4.0
@@ -34,11 +35,11 @@ def size_of(pairs):
 def test_the_file_holds_what_the_generators_draw():
     """Up to another machine's sines. More cases, and the file was not written anew."""
     for name, cases in CASES.items():
-        for stored, drawn in zip(cases.pairs, families.generate(name)):
+        for stored, drawn in zip(cases.pairs, hard_poses.generate(name)):
             np.testing.assert_allclose(stored, drawn, rtol=1e-12, atol=1e-12, err_msg=name)
 
 
-@pytest.mark.parametrize('name', families.FAMILIES)
+@pytest.mark.parametrize('name', hard_poses.FAMILIES)
 def test_truth_is_the_oracles(name):
     """Of every 40th case, from the stored doubles."""
     cases = CASES[name]
@@ -77,24 +78,24 @@ def test_families_reach_what_they_are_for():
 
 
 @pytest.mark.parametrize('model', MODELS)
-@pytest.mark.parametrize('name', families.FAMILIES)
+@pytest.mark.parametrize('name', hard_poses.FAMILIES)
 def test_gates(name, model):
     """No wrong verdict, no wrong normal, every point in both boxes, nothing that is not finite.
 
     Depth to 1e-12 of the size (or the coordinates' rounding).
     """
-    row = report.examine(model, name, CASES[name])
+    row = stability.examine(model, name, CASES[name])
     assert (row.verdicts, row.normals, row.outside, row.not_finite) == (0, 0, 0, 0)
     pairs = CASES[name].pairs
     found = solve(model, pairs)
     off = np.abs(found.separation - CASES[name].gap)
-    assert (off <= report.tolerance(pairs))[found.colliding].all()
+    assert (off <= stability.tolerance(pairs))[found.colliding].all()
     assert np.isfinite(found.separation).all()
     assert np.isnan(found.point[~found.colliding]).all()
     assert np.isnan(found.normal[~found.colliding]).all()
 
 
-@pytest.mark.parametrize('name', families.FAMILIES)
+@pytest.mark.parametrize('name', hard_poses.FAMILIES)
 def test_exact_point(name):
     """To max(1e-9, 1e-14·size/depth) of the size, and the coordinates' rounding."""
     cases = CASES[name]
@@ -106,15 +107,15 @@ def test_exact_point(name):
     assert (off <= bound)[known].all()
 
 
-@pytest.mark.parametrize('name', families.FAMILIES)
+@pytest.mark.parametrize('name', hard_poses.FAMILIES)
 def test_mlp_point(name):
     """To the stated error."""
-    row = report.examine('mlp', name, CASES[name])
+    row = stability.examine('mlp', name, CASES[name])
     assert row.point_worst <= STATED
 
 
 @pytest.mark.parametrize('model', MODELS)
-@pytest.mark.parametrize('name', families.FAMILIES)
+@pytest.mark.parametrize('name', hard_poses.FAMILIES)
 def test_a_batch_is_its_single_calls(name, model):
     """Bit for bit, and the same again, in any order."""
     pairs = CASES[name].pairs
@@ -147,7 +148,7 @@ def test_swap(everything, model):
     np.testing.assert_array_equal(one.colliding, two.colliding)
     np.testing.assert_array_equal(one.separation, two.separation)
     along = judge.judge(*everything, (one.colliding, one.separation, -two.normal, one.point)).along
-    allowed = 2 * report.tolerance(everything)
+    allowed = 2 * stability.tolerance(everything)
     assert (np.abs(along - one.separation) <= allowed)[one.colliding].all()
 
 
@@ -188,7 +189,7 @@ def test_reflection(everything, model):
     two = solve(model, everything._replace(pose_a=mirrored(everything.pose_a),
                                            pose_b=mirrored(everything.pose_b)))
     np.testing.assert_array_equal(one.colliding, two.colliding)
-    allowed = report.tolerance(everything)
+    allowed = stability.tolerance(everything)
     assert (np.abs(one.separation - two.separation) <= allowed).all()
 
 
@@ -204,7 +205,7 @@ def test_free_after_moving_by_the_depth(everything, model):
     depth = -one.separation[:, None]
     reach = np.abs(np.hstack([everything.pose_a[:, :3], everything.pose_b[:, :3]])).max(axis=1)
     m = np.maximum(1e-9 * depth[:, 0], 8 * np.spacing(np.maximum(reach, size_of(everything))))
-    m = (m + 2 * report.tolerance(everything))[:, None]
+    m = (m + 2 * stability.tolerance(everything))[:, None]
 
     def moved(by):
         pose_b = everything.pose_b.copy()
@@ -229,7 +230,7 @@ def test_depth_is_lipschitz(everything):
         pose_b = everything.pose_b.copy()
         pose_b[:, :3] += step
         two = solve('exact', everything._replace(pose_b=pose_b))
-        allowed = scale * size + 2 * report.tolerance(everything)
+        allowed = scale * size + 2 * stability.tolerance(everything)
         assert (np.abs(two.separation - one.separation) <= allowed).all()
 
 
@@ -238,7 +239,7 @@ def test_boxes_that_grow_are_no_less_deep(everything, model):
     """Growing a box never lowers the depth."""
     one = solve(model, everything)
     two = solve(model, everything._replace(size_b=1.01 * everything.size_b))
-    assert (two.separation <= one.separation + 2 * report.tolerance(everything)).all()
+    assert (two.separation <= one.separation + 2 * stability.tolerance(everything)).all()
     assert two.colliding[one.colliding].all()
 
 

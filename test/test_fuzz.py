@@ -9,7 +9,7 @@ import oracle
 import pytest
 
 from box_contact_ros import ContactSolver
-from box_contact_ros.stability import fuzz, judge
+from box_contact_ros.verification import fuzz, judge
 
 SEED = 20260
 

@@ -9,7 +9,7 @@ import poses
 import pytest
 
 from box_contact_ros import ContactSolver
-from box_contact_ros.stability import fuzz
+from box_contact_ros.verification import fuzz
 
 N = 2000
 SOLVER = ContactSolver((1, 1, 1), (1, 1, 1), model='exact')

@@ -17,7 +17,7 @@ from box_contact_ros.core import native
 from box_contact_ros.scene.scene_file import SceneError, parse_scene, read_scene
 from box_contact_ros.scene.scene_solver import Box, Pair, Scene, SceneSolver, two_boxes
 from box_contact_ros.solver.checks import SHOWN
-from box_contact_ros.stability import families
+from box_contact_ros.verification import hard_poses
 
 IDENTITY = (0, 0, 0, 0, 0, 0, 1)
 
@@ -89,7 +89,7 @@ def test_a_tick_is_every_pair_alone(model, origin):
 def test_no_touching_pair_is_left_out():
     """All stored hard poses, exact touch included: what touches by SAT is near."""
     touching = 0
-    for entry in families.load().values():
+    for entry in hard_poses.load().values():
         cases = entry.pairs
         n = len(cases.pose_a)
         where = np.empty((2 * n, 7))

@@ -7,15 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from box_contact_ros.reports import stability
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
-from box_contact_ros.stability import families, report
+from box_contact_ros.verification import hard_poses
 
 ROOT = Path(__file__).resolve().parents[1]
-CASES = families.load()
+CASES = hard_poses.load()
 
 
-def planted(monkeypatch: pytest.MonkeyPatch, fault: str) -> report.Row:
+def planted(monkeypatch: pytest.MonkeyPatch, fault: str) -> stability.Row:
     """The row of a solver that is wrong in one way for its first contact of a family."""
     class Faulty(ContactSolver):
         def batch(self, *poses, **sizes):
@@ -33,15 +34,15 @@ def planted(monkeypatch: pytest.MonkeyPatch, fault: str) -> report.Row:
                 found.separation[row] *= 1.001
             return found
 
-    monkeypatch.setattr(report, 'ContactSolver', Faulty)
-    return report.examine('exact', 'c1_depths', CASES['c1_depths'])
+    monkeypatch.setattr(stability, 'ContactSolver', Faulty)
+    return stability.examine('exact', 'c1_depths', CASES['c1_depths'])
 
 
 @pytest.mark.parametrize('fault', ['verdicts', 'normals', 'outside', 'not_finite'])
 def test_planted_faults_are_counted(monkeypatch: pytest.MonkeyPatch, fault: str) -> None:
     row = planted(monkeypatch, fault)
     assert getattr(row, fault) == 1
-    assert report.gates([row]) == [f'exact, c1_depths: 1 {fault}']
+    assert stability.gates([row]) == [f'exact, c1_depths: 1 {fault}']
 
 
 def test_a_planted_depth_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -50,15 +51,15 @@ def test_a_planted_depth_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_a_model_that_ends_its_process_is_a_row() -> None:
     """As python-fcl's signed distance does, which aborts; here, one that cannot even start."""
-    row = report.examine_apart('no such model', 'c1_depths', CASES['c1_depths'])
+    row = stability.examine_apart('no such model', 'c1_depths', CASES['c1_depths'])
     assert row.failure == 'ended with status 1'
-    assert 'ended with status 1' in report.table([row])
+    assert 'ended with status 1' in stability.table([row])
 
 
 def test_the_program(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip('fcl')
     arguments = ['--models', 'exact', 'fcl', '--families', 'a4_ridges', 'd5_edge_against_face']
-    assert report.main([*arguments, '--out', str(tmp_path)]) == 0
+    assert stability.main([*arguments, '--out', str(tmp_path)]) == 0
     with (tmp_path / 'stability.csv').open() as file:
         rows = list(csv.DictReader(file))
     assert [(row['model'], row['family']) for row in rows] == [
@@ -74,7 +75,7 @@ def test_the_committed_report_is_complete() -> None:
     with (ROOT / 'docs' / 'stability.csv').open() as file:
         rows = list(csv.DictReader(file))
     for model in ('exact', 'mlp', 'fcl', 'soup-8'):
-        assert [row['family'] for row in rows if row['model'] == model] == list(families.FAMILIES)
-    assert not report.gates([report.Row(row['model'], row['family'], int(row['cases']), **{
+        assert [row['family'] for row in rows if row['model'] == model] == list(hard_poses.FAMILIES)
+    assert not stability.gates([stability.Row(row['model'], row['family'], int(row['cases']), **{
         name: int(row[name]) for name in ('verdicts', 'normals', 'outside', 'not_finite')})
         for row in rows])

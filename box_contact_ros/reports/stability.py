@@ -21,9 +21,9 @@ import numpy as np
 from ..arguments import make_folder, model_name
 from ..scene.pose_sets import Pairs
 from ..solver.contact_solver import MODELS, ContactSolver
-from .families import FAMILIES, Cases, load
-from .fuzz import TOUCH_ULPS
-from .judge import COORDINATE_ULPS, NOT_FINITE, NOT_UNIT, OUTSIDE, TOLERANCE, judge
+from ..verification.fuzz import TOUCH_ULPS
+from ..verification.hard_poses import FAMILIES, Cases, load
+from ..verification.judge import COORDINATE_ULPS, NOT_FINITE, NOT_UNIT, OUTSIDE, TOLERANCE, judge
 
 REPORTED = ('exact', 'mlp', 'fcl', 'soup-8')
 """Models in docs/stability.md."""
@@ -215,8 +215,8 @@ def page(rows: Sequence[Row], command: str) -> str:
 Made by `{command}`. {"BROKEN: " + "; ".join(broken) + "." if broken else
 "Of `exact` and `mlp`, every verdict and normal is right, and every point in both boxes."}
 
-Families of poses that break collision tests (`box_contact_ros/stability/families.py` says what each
-is), every case also turned, swapped, renamed or scaled; stored as doubles, the truth in 60 digits.
+Families of poses that break collision tests (`box_contact_ros/verification/hard_poses.py` says what
+each is), every case also turned, swapped, renamed or scaled; stored as doubles, the truth in 60 digits.
 *Wrong verdict*: where the gap or depth is more than 16 units in the last place of the largest
 coordinate. *Wrong normal*: not the direction of least depth, to 1e-12 of the size, or not unit.
 *Depth error*: of the size; far from the origin (`f_far`) a unit in the coordinates' last place is

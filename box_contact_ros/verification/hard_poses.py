@@ -2,7 +2,7 @@
 
 Each family is a generator of pairs in a plain frame; `variants` then turns them, swaps the boxes,
 renames their axes and scales them. What tests and reports use is not drawn anew but read from
-`families.npz`, doubles and all: at 1e-12 the rounding of the recipe is part of the case, and
+`hard_poses.npz`, doubles and all: at 1e-12 the rounding of the recipe is part of the case, and
 another machine's sine may round differently. `test/make_families.py` wrote that file, with the true
 gap and centroid in 60 digits.
 """
@@ -16,7 +16,7 @@ import numpy as np
 
 from ..scene.pose_sets import Pairs
 
-FILE = Path(__file__).with_name('families.npz')
+FILE = Path(__file__).with_name('hard_poses.npz')
 CUBE = (2.0, 2.0, 2.0)
 FORTY, TWENTY, HIGH_CUBE = (12.192, 2.438, 2.591), (6.058, 2.438, 2.591), (12.192, 2.438, 2.896)
 X, Y, Z = np.eye(3)

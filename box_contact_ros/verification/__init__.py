@@ -1,0 +1,1 @@
+"""Is it right: hard poses, an independent judge, fuzzing."""
