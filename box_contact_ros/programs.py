@@ -89,12 +89,12 @@ PROGRAMS = {
         ('train', 'report'),
     ),
     'accuracy': Program(
-        'box_contact_ros.report.accuracy:main',
+        'box_contact_ros.reports.accuracy:main',
         'point error of a model against the exact one, per set of poses and contact class',
         ('report',),
     ),
     'frontier': Program(
-        'box_contact_ros.report.frontier:main',
+        'box_contact_ros.reports.frontier:main',
         'speed against error of every model and of the engines beside them, as table and picture',
         ('report',),
     ),
@@ -109,7 +109,7 @@ PROGRAMS = {
         ('report', 'soup'),
     ),
     'paper': Program(
-        'box_contact_ros.report.paper:main',
+        'box_contact_ros.reports.paper_tables:main',
         "redo the source paper's tables, its figures beside ours",
         ('report',),
     ),

@@ -7,8 +7,8 @@ import numpy as np
 import poses
 import pytest
 
-from box_contact_ros.report import accuracy
-from box_contact_ros.report.accuracy import CLASSES
+from box_contact_ros.reports import accuracy
+from box_contact_ros.reports.accuracy import CLASSES
 from box_contact_ros.resources import resource_path
 from box_contact_ros.scene.pose_sets import CUBE, SETS, Pairs
 from box_contact_ros.solver.weights_file import load_weights, save_weights, unpacked

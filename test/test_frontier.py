@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from box_contact_ros.baselines.engines import Contestant, Ours, installed
-from box_contact_ros.report import frontier
+from box_contact_ros.reports import frontier
 from box_contact_ros.scene.pose_sets import SETS, Pairs
 from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.solver.pose import rotation_matrix

@@ -17,7 +17,7 @@ from box_contact_ros.core import (
     SIZE_RATIO_MAX,
     native,
 )
-from box_contact_ros.report.accuracy import LIMITS
+from box_contact_ros.reports.accuracy import LIMITS
 from box_contact_ros.scene.pose_sets import SETS, Pairs, log_uniform, quaternion_multiply, turns
 from box_contact_ros.solver.mlp import ACTIVATION, DESCRIPTION, UNITS_MAX
 from box_contact_ros.solver.weights_file import WeightsError, save_weights

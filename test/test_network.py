@@ -10,7 +10,7 @@ from safetensors.numpy import load_file, save_file
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.baselines.paper import _networks
-from box_contact_ros.report import paper
+from box_contact_ros.reports import paper_tables
 from box_contact_ros.resources import resource_path
 from box_contact_ros.solver.weights_file import (
     CARD_FIELDS,
@@ -282,7 +282,7 @@ def test_tables_in_the_docs_are_the_shipped_weights(tmp_path: Path) -> None:
     Figures may differ by their rounding. (The other tables hold times: see test_paper_soup.)
     """
     docs = Path(__file__).parents[1] / 'docs' / 'paper_tables.md'
-    assert paper.main(['--table', '1', '--table', '2',
+    assert paper_tables.main(['--table', '1', '--table', '2',
                        '--out', str(tmp_path / 'new' / 'page.md')]) == 0
     old, new = cells(docs.read_text()), cells((tmp_path / 'new' / 'page.md').read_text())
     assert len(old) > len(new) > 100
@@ -296,9 +296,9 @@ def test_tables_in_the_docs_are_the_shipped_weights(tmp_path: Path) -> None:
 def test_paper_program(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
                        tmp_path: Path) -> None:
     """Quick: the paper's figures, a tenth of the patterns, said so. Without weights: one line."""
-    assert paper.main(['--quick', '--table', '1', '--table', '2']) == 0
+    assert paper_tables.main(['--quick', '--table', '1', '--table', '2']) == 0
     page = capsys.readouterr().out
     assert '0.5624' in page and '0.4523' in page and '7,500' in page and 'every 10th' in page
-    monkeypatch.setattr(paper, 'resource_path', lambda *parts: tmp_path.joinpath(*parts))
-    assert paper.main([]) == 1
+    monkeypatch.setattr(paper_tables, 'resource_path', lambda *parts: tmp_path.joinpath(*parts))
+    assert paper_tables.main([]) == 1
     assert 'does not exist' in capsys.readouterr().err

@@ -17,7 +17,7 @@ from tqdm import tqdm  # noqa: E402
 
 from box_contact_ros import ContactSolver  # noqa: E402
 from box_contact_ros.baselines import soup  # noqa: E402
-from box_contact_ros.report import paper, paper_soup  # noqa: E402
+from box_contact_ros.reports import paper_soup_tables, paper_tables  # noqa: E402
 from box_contact_ros.training.paper_recipe import dataset  # noqa: E402
 
 EXACT = ContactSolver(poses.CUBE, poses.CUBE, model='exact')
@@ -28,15 +28,16 @@ def small(monkeypatch):
     """Two N of the tables and one beside them, on 150 patterns."""
     sets = {'contact': dataset.paper(5, counts=(10, 10, 150)),
             'vertex_face': dataset.paper(5, counts=(10, 10, 150))}
-    monkeypatch.setattr(paper, '_sets_of', lambda _: sets)
-    monkeypatch.setattr(paper_soup, 'PAPER', {n: paper_soup.PAPER[n] for n in (8, 10)})
-    monkeypatch.setattr(paper_soup, 'ALSO', (2, 32))
+    monkeypatch.setattr(paper_tables, '_sets_of', lambda _: sets)
+    few = {n: paper_soup_tables.PAPER[n] for n in (8, 10)}
+    monkeypatch.setattr(paper_soup_tables, 'PAPER', few)
+    monkeypatch.setattr(paper_soup_tables, 'ALSO', (2, 32))
     return sets['contact']['external'].inputs
 
 
 def test_coplanar_faces_lie_in_one_plane():
     """Exact touch to the last bit, all in contact; one in ten exactly on top."""
-    a, b = paper_soup.coplanar(np.random.default_rng(1), 200)
+    a, b = paper_soup_tables.coplanar(np.random.default_rng(1), 200)
     found = EXACT.batch(a, b)
     assert found.colliding.all() and (found.separation == 0.0).all()
     assert (found.normal == [0, 0, 1]).all()
@@ -45,16 +46,16 @@ def test_coplanar_faces_lie_in_one_plane():
 
 
 def test_near_parallel_cubes_are_a_millimetre_deep():
-    a, b = paper_soup.near_parallel(np.random.default_rng(1), 200)
+    a, b = paper_soup_tables.near_parallel(np.random.default_rng(1), 200)
     assert len(a) == len(b) == 200
     assert EXACT.batch(a, b).separation == pytest.approx(-1e-3 * np.ones(200), abs=1e-12)
 
 
 def test_touching_poses_are_the_patterns(small):
     """They touch to within rounding, and pressed they are as deep as was asked for."""
-    given = paper_soup.touching(small)
+    given = paper_soup_tables.touching(small)
     assert np.abs(EXACT.batch(*given).separation).max() < 1e-14
-    pressed = paper_soup.pressed(given, 1e-3)
+    pressed = paper_soup_tables.pressed(given, 1e-3)
     assert len(pressed[0]) > 100
     assert EXACT.batch(*pressed).separation == pytest.approx(-1e-3, abs=1e-12)
 
@@ -66,7 +67,7 @@ def test_the_search_alone_finds_every_pair():
     """
     a, b = np.array([[0, 0, 0, 0.3, -0.2, 0.1, 1], [0.5, 0.25, 1.5, 0.1, 0.2, 0.3, 1]])
     pair = soup.Soup(8).place(a, b, poses.CUBE, poses.CUBE)
-    pairs = paper_soup.pair_count(soup.collide(*pair))
+    pairs = paper_soup_tables.pair_count(soup.collide(*pair))
     result = fcl.CollisionResult()
     fcl.collide(*pair, fcl.CollisionRequest(num_max_contacts=1, enable_contact=True,
                                             enable_cost=True, num_max_cost_sources=10_000), result)
@@ -76,7 +77,7 @@ def test_the_search_alone_finds_every_pair():
 
 def test_undisturbed_gives_back_what_it_took():
     cores = os.sched_getaffinity(0)
-    with pytest.raises(RuntimeError, match='planted'), paper_soup.undisturbed():
+    with pytest.raises(RuntimeError, match='planted'), paper_soup_tables.undisturbed():
         assert len(os.sched_getaffinity(0)) == 1 and not gc.isenabled()
         raise RuntimeError('planted')
     assert os.sched_getaffinity(0) == cores and gc.isenabled()
@@ -85,25 +86,25 @@ def test_undisturbed_gives_back_what_it_took():
 def test_crossing_is_on_log_log_paper():
     """Error 1/N reaches 1/6 at 6; below from the first on; never."""
     errors = {n: 1 / n for n in (1, 4, 16)}
-    assert paper_soup.crossing(errors, 1 / 6) == pytest.approx(6.0)
-    assert paper_soup.crossing(errors, 1.5) == 0.0
-    assert paper_soup.crossing(errors, 0.01) == math.inf
-    assert paper_soup.in_words(0.0) == 'below N = 1'
-    assert paper_soup.in_words(17.6) == 'N ≈ 18'
-    assert paper_soup.in_words(math.inf) == 'beyond N = 64'
+    assert paper_soup_tables.crossing(errors, 1 / 6) == pytest.approx(6.0)
+    assert paper_soup_tables.crossing(errors, 1.5) == 0.0
+    assert paper_soup_tables.crossing(errors, 0.01) == math.inf
+    assert paper_soup_tables.in_words(0.0) == 'below N = 1'
+    assert paper_soup_tables.in_words(17.6) == 'N ≈ 18'
+    assert paper_soup_tables.in_words(math.inf) == 'beyond N = 64'
 
 
 def test_planted_errors_show(small, monkeypatch):
     """A point shifted by 10 mm, a normal turned round, contacts withheld: each is seen."""
-    given = paper_soup.pressed(paper_soup.touching(small[:40]), 1e-3)
+    given = paper_soup_tables.pressed(paper_soup_tables.touching(small[:40]), 1e-3)
     truth = EXACT.batch(*given)
     answer = soup.point_and_normal
 
     def judged(planted):
         monkeypatch.setattr(soup, 'point_and_normal', planted)
-        cell = paper_soup.Cell('touching', 8)
+        cell = paper_soup_tables.Cell('touching', 8)
         with tqdm(disable=True) as bar:
-            paper_soup.judge_cell(cell, given, truth, bar)
+            paper_soup_tables.judge_cell(cell, given, truth, bar)
         return cell
 
     def planted(change):
@@ -131,7 +132,7 @@ def test_all_is_written(small, tmp_path, capsys):
     out = tmp_path / 'new' / 'page.md'
     arguments = [word for number in (3, 4) for word in ('--table', str(number))]
     arguments += [word for number in (9, 10) for word in ('--figure', str(number))]
-    assert paper.main(['--quick', *arguments, '--out', str(out)]) == 0
+    assert paper_tables.main(['--quick', *arguments, '--out', str(out)]) == 0
     assert sorted(path.name for path in out.parent.iterdir()) == [
         'page.md', 'paper_figure_10.png', 'paper_figure_9.png', 'paper_soup.csv']
     page = out.read_text('utf-8')
@@ -142,7 +143,7 @@ def test_all_is_written(small, tmp_path, capsys):
         rows = list(csv.DictReader(file))
     timed = [row for row in rows if row['step_mean_ms']]
     assert {(int(row['divisions']), row['regime']) for row in timed} == {
-        (n, regime) for n in (8, 10) for regime in paper_soup.REGIMES}
+        (n, regime) for n in (8, 10) for regime in paper_soup_tables.REGIMES}
     for row in timed:
         assert int(row['triangles']) == 12 * int(row['divisions'])**2
         assert 0 < float(row['step_p50_ms']) <= float(row['step_max_ms'])
@@ -157,12 +158,12 @@ def test_all_is_written(small, tmp_path, capsys):
 def test_one_figure_alone(small, tmp_path, monkeypatch, capsys):
     """Without --out, the picture that was asked for goes to the current folder."""
     monkeypatch.chdir(tmp_path)
-    assert paper.main(['--figure', '9']) == 0
+    assert paper_tables.main(['--figure', '9']) == 0
     assert [path.name for path in tmp_path.iterdir()] == ['paper_figure_9.png']
     assert 'paper_figure_9.png' in capsys.readouterr().out
 
 
 def test_no_such_table(capsys):
     with pytest.raises(SystemExit):
-        paper.main(['--table', '5'])
+        paper_tables.main(['--table', '5'])
     assert '--table' in capsys.readouterr().err

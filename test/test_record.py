@@ -32,7 +32,7 @@ from box_contact_ros.apps.recording.bag_file import (
 )
 from box_contact_ros.apps.recording.record import RecordNode  # noqa: E402
 from box_contact_ros.node.messages import make_header, read_cloud  # noqa: E402
-from box_contact_ros.report.accuracy import LIMITS  # noqa: E402
+from box_contact_ros.reports.accuracy import LIMITS  # noqa: E402
 from box_contact_ros.resources import resource_path  # noqa: E402
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -9,8 +9,9 @@ import pytest
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.core import instruction_sets, stages
-from box_contact_ros.report import generation, processor, speed, versions
-from box_contact_ros.report.speed import UNIT, Timing
+from box_contact_ros.report import generation, processor, versions
+from box_contact_ros.reports import speed
+from box_contact_ros.reports.speed import UNIT, Timing
 
 
 def test_flush_stacks_are_aligned_and_flush() -> None:

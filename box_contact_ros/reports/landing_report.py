@@ -1,7 +1,7 @@
 """Landings by model: whether the container comes to rest on one contact point per tick.
 
-`python -m box_contact_ros.report.landing` runs a grid of landings (rope angle, tilt, overhang; yaw
-and headings drawn) for every model, rate and latency, the constants of the contact law being the
+`python -m box_contact_ros.reports.landing_report` runs a grid of landings (rope angle, tilt, overhang;
+yaw and headings drawn) for every model, rate and latency, the constants of the contact law being the
 same for all models, and writes landing.csv (a row per landing), landing.md (a row per model, rate
 and latency) and landing.png (one landing, the models side by side). With --dds the contacts come
 from a contact node in another process, in lockstep, and landing_dds.csv and .md are written.
@@ -35,9 +35,9 @@ from ..apps.crane.landing import (
     scenario_of,
 )
 from ..arguments import seed_number
+from ..report import add_out, results_folder
 from ..scene.contact_law import GRAVITY
 from ..solver.contact_solver import MODELS, ContactSolver
-from . import add_out, results_folder
 
 matplotlib.use('Agg')
 from matplotlib import pyplot as plt  # noqa: E402
@@ -207,7 +207,7 @@ def draw(path: Path, models: Sequence[str], job: Job) -> None:
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the sweep and write its three files; 0 whatever the models do."""
-    parser = argparse.ArgumentParser(prog='python -m box_contact_ros.report.landing',
+    parser = argparse.ArgumentParser(prog='python -m box_contact_ros.reports.landing_report',
                                      description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('--models', nargs='+', default=['exact', 'fcl'], choices=list(MODELS),
@@ -234,7 +234,7 @@ def main(args: Sequence[str] | None = None) -> int:
     name = _stem(options.dds)
     write_csv(options.out / f'{name}.csv', results)
     given = sys.argv[1:] if args is None else args
-    command = ' '.join(['python -m box_contact_ros.report.landing', *given])
+    command = ' '.join(['python -m box_contact_ros.reports.landing_report', *given])
     (options.out / f'{name}.md').write_text(page(results, command, dds=options.dds))
     if not options.dds:
         shown = list(cases(seed=options.seed))[SHOWN]

@@ -16,12 +16,12 @@ from pathlib import Path
 import numpy as np
 
 from ..arguments import make_room
+from ..report import processor
 from ..resources import resource_path
 from ..solver.weights_file import Weights, WeightsError, load_weights
 from ..training.paper_recipe import dataset
 from ..training.paper_recipe.dataset import SETS, Patterns
 from ..training.paper_recipe.errors import PARTS, errors_of, figures, figures_by_part, predict
-from . import processor
 
 PAPER = {
     1: {'ME': (0.0332, 0.0259, -0.0005), 'MAE': (0.4161, 0.4383, 0.5624),
@@ -246,21 +246,21 @@ def report(tables: Collection[int], drawn: Collection[int], *, quick: bool = Fal
             draw_figure_9(folder / 'paper_figure_9.png')
         sections.append(section_figure_9('paper_figure_9.png'))
     if {3, 4} & set(tables) or 10 in drawn:
-        from . import paper_soup  # only here: python-fcl is an extra
+        from . import paper_soup_tables  # only here: python-fcl is an extra
 
         jumps = _shipped('paper')
-        result = paper_soup.measure(_external(jumps, 'contact').inputs, quick=quick)
+        result = paper_soup_tables.measure(_external(jumps, 'contact').inputs, quick=quick)
         if folder:
-            paper_soup.write_csv(result, folder / 'paper_soup.csv', processor())
+            paper_soup_tables.write_csv(result, folder / 'paper_soup.csv', processor())
         if 3 in tables:
-            sections.append(paper_soup.section_3(result))
+            sections.append(paper_soup_tables.section_3(result))
         if 4 in tables:
-            sections.append(paper_soup.section_4(result))
+            sections.append(paper_soup_tables.section_4(result))
         if 10 in drawn:
             if folder:
-                paper_soup.draw_figure_10(result, folder / 'paper_figure_10.png')
-            sections.append(paper_soup.section_figure_10(result, 'paper_figure_10.png'))
-        sections.append(paper_soup.section_errors(result))
+                paper_soup_tables.draw_figure_10(result, folder / 'paper_figure_10.png')
+            sections.append(paper_soup_tables.section_figure_10(result, 'paper_figure_10.png'))
+        sections.append(paper_soup_tables.section_errors(result))
     return filled('\n'.join(sections))
 
 

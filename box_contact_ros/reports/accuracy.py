@@ -29,6 +29,7 @@ import numpy as np
 
 from ..arguments import seed_number
 from ..core import CENTROID_REACH, DEPTH_FLOOR, Stages, native, stages
+from ..report import add_out, processor, results_folder, versions
 from ..resources import resource_path
 from ..scene.pose_sets import SETS, Pairs
 from ..solver.contact import Contacts
@@ -38,8 +39,7 @@ from ..solver.pose import rotation_matrix
 from ..solver.weights_file import WeightsError, load_weights
 from ..training.paper_recipe import dataset
 from ..training.paper_recipe.errors import errors_of, figures, wrapped
-from . import add_out, processor, results_folder, versions
-from .paper import PAPER
+from .paper_tables import PAPER
 
 
 class Limit(NamedTuple):

@@ -28,6 +28,7 @@ import numpy as np
 from ..arguments import seed_number
 from ..baselines.engines import Contestant, Ours, installed
 from ..core import native
+from ..report import add_out, processor, results_folder, versions
 from ..resources import resource_path
 from ..scene.pose_sets import (
     CONTAINER,
@@ -41,10 +42,9 @@ from ..scene.pose_sets import (
 )
 from ..solver.contact_solver import ContactSolver
 from ..solver.weights_file import load_weights
-from . import add_out, processor, results_folder, versions
 from .accuracy import CLASSES, classify, markdown
-from .paper_soup import PAPER as PAPER_SOUP
-from .paper_soup import PAPER_NETWORK
+from .paper_soup_tables import PAPER as PAPER_SOUP
+from .paper_soup_tables import PAPER_NETWORK
 
 SOUPS = (8, 10, 12, 14, 16, 18, 20, 22)
 """Divisions of an edge: those of the paper's Table 3."""

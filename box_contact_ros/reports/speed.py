@@ -1,6 +1,6 @@
 """Speed of the models and of the engines that a user would otherwise call.
 
-`python -m box_contact_ros.report.speed --out docs` prints the tables and writes speed.md and
+`python -m box_contact_ros.reports.speed --out docs` prints the tables and writes speed.md and
 speed.csv. Every instruction set of the machine is measured in a subprocess of its own, on one
 pinned core. The contestants take turns, so a disturbance hits all of them: the claims are ratios.
 Two threads and the start of a new process follow. The exit status is 1 if a limit is broken.
@@ -23,10 +23,10 @@ import numpy as np
 
 from ..arguments import make_folder
 from ..core import FORCE, instruction_sets, native
+from ..report import processor, versions
 from ..scene.pose_sets import CONTAINER, CUBE, SETS, Pairs, log_uniform, turns
 from ..solver.contact_solver import ContactSolver
 from ..solver.pose import quaternion_multiply
-from . import processor, versions
 
 CALLS, BATCH, ROUNDS = 2_000, 20_000, 40
 """Single calls of a round, pairs of a batch, rounds."""
@@ -377,7 +377,7 @@ def write_csv(path: Path, timings: Sequence[Timing], starts: Sequence[float]) ->
 def main(args: Sequence[str] | None = None) -> int:
     """Measure, print, write; 1 if a limit is broken."""
     parser = argparse.ArgumentParser(
-        prog='python -m box_contact_ros.report.speed', description=__doc__,
+        prog='python -m box_contact_ros.reports.speed', description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('--out', type=Path, help='folder for speed.md and speed.csv')
     parser.add_argument('--quick', action='store_true', help='few rounds, to try it out')
@@ -401,7 +401,7 @@ def main(args: Sequence[str] | None = None) -> int:
     starts = measure_starts(QUICK_STARTS if options.quick else STARTS)
     claims.append(start_claim(starts))
     given = sys.argv[1:] if args is None else args
-    text = page(runs, claims, ' '.join(['python -m box_contact_ros.report.speed', *given]),
+    text = page(runs, claims, ' '.join(['python -m box_contact_ros.reports.speed', *given]),
                 options.quick)
     print(text)
     if options.out:
