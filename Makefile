@@ -26,7 +26,7 @@ export PYTHONUNBUFFERED := 1
 
 VENV_PYTHON := .venv/bin/python
 # What the installation is made from: a change of one of these installs again.
-INSTALL_INPUTS := setup.py setup.cfg pyproject.toml constraints.txt box_contact_ros/programs.py \
+INSTALL_INPUTS := setup.py setup.cfg pyproject.toml constraints.txt box_contact_ros/cli.py \
     $(shell find box_contact_ros -name '*.[ch]pp')
 
 help:

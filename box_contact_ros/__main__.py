@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
-from box_contact_ros.programs import reader_is_gone, run, usage
+from .cli import reader_is_gone, run, usage
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -6,8 +6,8 @@ import importlib
 
 import pytest
 
-from box_contact_ros import arguments
-from box_contact_ros.programs import PROGRAMS
+from box_contact_ros.cli import PROGRAMS
+from box_contact_ros.solver import arguments
 
 FOLDERS = ('accuracy', 'bench', 'frontier', 'search mlp', 'soak', 'speed', 'stability',
            'train')
@@ -15,7 +15,7 @@ FILES = ('fuzz', 'paper')
 
 
 def main_of(name):
-    target = PROGRAMS[name].target if name in PROGRAMS else f'box_contact_ros.report.{name}:main'
+    target = PROGRAMS[name].target if name in PROGRAMS else f'box_contact_ros.output.{name}:main'
     module, _, function = target.partition(':')
     return getattr(importlib.import_module(module), function)
 

@@ -18,8 +18,8 @@ from pathlib import Path
 
 import pytest
 
+from box_contact_ros.cli import PROGRAMS
 from box_contact_ros.core import instruction_sets
-from box_contact_ros.programs import PROGRAMS
 
 ROOT = Path(__file__).resolve().parents[1]
 NAME = 'box_contact_ros'

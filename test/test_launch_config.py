@@ -17,8 +17,8 @@ import numpy as np
 import pytest
 import yaml
 
+from box_contact_ros.cli import PROGRAMS
 from box_contact_ros.node.contact_node import PARAMETERS
-from box_contact_ros.programs import PROGRAMS
 from box_contact_ros.scene.scene_file import read_scene
 from box_contact_ros.scene.scene_solver import Scene
 

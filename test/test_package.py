@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from box_contact_ros import __main__ as command_line
-from box_contact_ros import programs, resources
+from box_contact_ros import cli, resources
 from box_contact_ros.resources import resource_path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -118,18 +118,18 @@ def _run(*command: str, **env: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-@pytest.mark.parametrize('name', programs.PROGRAMS)
+@pytest.mark.parametrize('name', cli.PROGRAMS)
 def test_program_table_is_complete(name: str) -> None:
     """Every program has a module that gets installed, a description and known extras."""
-    program = programs.PROGRAMS[name]
+    program = cli.PROGRAMS[name]
     module, _, function = program.target.partition(':')
     assert function == 'main'
     path = ROOT.joinpath(*module.split('.')).with_suffix('.py')
     assert path.is_file()
     assert path.with_name('__init__.py').is_file()  # find_packages leaves out a folder without it
     assert program.description and '\n' not in program.description
-    assert set(program.extras) <= set(programs.MODULES_OF_EXTRA)
-    assert callable(getattr(programs.start, name))
+    assert set(program.extras) <= set(cli.MODULES_OF_EXTRA)
+    assert callable(getattr(cli.start, name))
 
 
 @pytest.mark.parametrize('arguments', [(), ('--help',), ('-h',)])
@@ -137,7 +137,7 @@ def test_help_lists_the_programs(arguments: tuple[str, ...]) -> None:
     """Asking for help is not an error, and neither is typing nothing."""
     done = _run('-m', 'box_contact_ros', *arguments)
     assert (done.returncode, done.stderr) == (0, '')
-    for name, program in programs.PROGRAMS.items():
+    for name, program in cli.PROGRAMS.items():
         assert name in done.stdout and program.description in done.stdout
 
 
@@ -162,7 +162,7 @@ def probe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     )
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setitem(
-        programs.PROGRAMS, 'probe', programs.Program('probe_program:main', 'a test', ())
+        cli.PROGRAMS, 'probe', cli.Program('probe_program:main', 'a test', ())
     )
     monkeypatch.setattr(sys, 'argv', list(sys.argv))  # programs.run sets it
 
@@ -178,7 +178,7 @@ def test_arguments_reach_main_unchanged(
     assert command_line.main(['probe', *arguments]) == len(arguments)
     assert json.loads(capfd.readouterr().out) == arguments
     monkeypatch.setattr(sys, 'argv', ['/usr/bin/box_contact_probe', *arguments])
-    assert programs._from_command_line('probe') == len(arguments)
+    assert cli._from_command_line('probe') == len(arguments)
     assert json.loads(capfd.readouterr().out) == arguments
 
 
@@ -212,16 +212,16 @@ def test_missing_extra_is_one_line_that_names_it(
     monkeypatch.setattr(sys, 'argv', list(sys.argv))
     fake = type(sys)('fake')
     fake.main = main
-    monkeypatch.setattr(programs.importlib, 'import_module', lambda _: fake)
-    monkeypatch.setattr(programs.importlib.util, 'find_spec', lambda _: None)
-    assert programs.run(name, []) == 1
+    monkeypatch.setattr(cli.importlib, 'import_module', lambda _: fake)
+    monkeypatch.setattr(cli.importlib.util, 'find_spec', lambda _: None)
+    assert cli.run(name, []) == 1
     message = capsys.readouterr().err
     assert message.count('\n') == 1
     assert f"pip install -c constraints.txt '.[{extras}]'" in message
     assert ('apt install ros-jazzy-ros-base' in message) == module.startswith('rclpy')
     # Where there is a ROS, perhaps apt's, its wheels are not recommended.
-    monkeypatch.setattr(programs.importlib.util, 'find_spec', lambda _: object())
-    programs.run(name, [])
+    monkeypatch.setattr(cli.importlib.util, 'find_spec', lambda _: object())
+    cli.run(name, [])
     assert f"'.[{extras.removeprefix('ros,')}]'" in capsys.readouterr().err
 
 
@@ -230,10 +230,10 @@ def test_missing_module_of_our_own_keeps_its_traceback(
 ) -> None:
     """No extra would help: hiding where it happened would only hide the fault."""
     monkeypatch.setitem(
-        programs.PROGRAMS, 'probe', programs.Program('box_contact_ros.no_such:main', 'a test', ())
+        cli.PROGRAMS, 'probe', cli.Program('box_contact_ros.no_such:main', 'a test', ())
     )
     with pytest.raises(ModuleNotFoundError, match='no_such'):
-        programs.run('probe', [])
+        cli.run('probe', [])
 
 
 def test_program_fixture_ends_the_whole_group(program) -> None:
@@ -303,9 +303,9 @@ def test_program_names_under_colcon_and_pip(env: dict[str, str], prefix: str) ->
     )
     assert done.returncode == 0, done.stderr
     scripts, develop, install = json.loads(done.stdout)
-    assert scripts == programs.entry_points(prefix)
+    assert scripts == cli.entry_points(prefix)
     assert [script.partition(' = ')[0] for script in scripts] == [
-        prefix + name for name in programs.PROGRAMS
+        prefix + name for name in cli.PROGRAMS
     ]
     folder = '$base/lib/box_contact_ros'
     assert [entry and entry[1] for entry in (develop, install)] == (

@@ -21,8 +21,8 @@ from pathlib import Path
 import pytest
 import yaml
 
+from box_contact_ros.cli import PROGRAMS
 from box_contact_ros.node.contact_node import PARAMETERS
-from box_contact_ros.programs import PROGRAMS
 from box_contact_ros.resources import resource_path
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -9,7 +9,7 @@ import pytest
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.core import instruction_sets, stages
-from box_contact_ros.report import generation, processor, versions
+from box_contact_ros.output import generation, processor, versions
 from box_contact_ros.reports import speed
 from box_contact_ros.reports.speed import UNIT, Timing
 

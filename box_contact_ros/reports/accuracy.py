@@ -27,11 +27,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arguments import seed_number
 from ..core import CENTROID_REACH, DEPTH_FLOOR, Stages, native, stages
-from ..report import add_out, processor, results_folder, versions
+from ..output import add_out, processor, results_folder, versions
 from ..resources import resource_path
 from ..scene.pose_sets import SETS, Pairs
+from ..solver.arguments import seed_number
 from ..solver.contact import Contacts
 from ..solver.contact_solver import MODELS, ContactSolver
 from ..solver.mlp import bounds_of, core_numbers

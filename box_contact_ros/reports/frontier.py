@@ -25,10 +25,9 @@ from typing import Any
 
 import numpy as np
 
-from ..arguments import seed_number
 from ..baselines.engines import Contestant, Ours, installed
 from ..core import native
-from ..report import add_out, processor, results_folder, versions
+from ..output import add_out, processor, results_folder, versions
 from ..resources import resource_path
 from ..scene.pose_sets import (
     CONTAINER,
@@ -40,6 +39,7 @@ from ..scene.pose_sets import (
     pressed,
     stacked,
 )
+from ..solver.arguments import seed_number
 from ..solver.contact_solver import ContactSolver
 from ..solver.weights_file import load_weights
 from .accuracy import CLASSES, classify, markdown

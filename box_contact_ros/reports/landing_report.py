@@ -34,9 +34,9 @@ from ..apps.crane.landing import (
     land,
     scenario_of,
 )
-from ..arguments import seed_number
-from ..report import add_out, results_folder
+from ..output import add_out, results_folder
 from ..scene.contact_law import GRAVITY
+from ..solver.arguments import seed_number
 from ..solver.contact_solver import MODELS, ContactSolver
 
 matplotlib.use('Agg')

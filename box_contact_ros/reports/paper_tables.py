@@ -15,9 +15,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ..arguments import make_room
-from ..report import processor
+from ..output import processor
 from ..resources import resource_path
+from ..solver.arguments import make_room
 from ..solver.weights_file import Weights, WeightsError, load_weights
 from ..training.paper_recipe import dataset
 from ..training.paper_recipe.dataset import SETS, Patterns

@@ -21,10 +21,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ..arguments import make_folder
 from ..core import FORCE, instruction_sets, native
-from ..report import processor, versions
+from ..output import processor, versions
 from ..scene.pose_sets import CONTAINER, CUBE, SETS, Pairs, log_uniform, turns
+from ..solver.arguments import make_folder
 from ..solver.contact_solver import ContactSolver
 from ..solver.pose import quaternion_multiply
 

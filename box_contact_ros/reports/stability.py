@@ -18,8 +18,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..arguments import make_folder, model_name
 from ..scene.pose_sets import Pairs
+from ..solver.arguments import make_folder, model_name
 from ..solver.contact_solver import MODELS, ContactSolver
 from ..verification.fuzz import TOUCH_ULPS
 from ..verification.hard_poses import FAMILIES, Cases, load

@@ -16,9 +16,9 @@ from typing import Any
 
 import torch
 
-from ..arguments import make_folder, seed_number
 from ..resources import resource_path
 from ..scene.scene_file import SceneError
+from ..solver.arguments import make_folder, seed_number
 from ..solver.mlp import UNITS_MAX
 from ..solver.weights_file import load_weights, save_weights
 from . import mlp_recipe

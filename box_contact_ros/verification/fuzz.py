@@ -21,7 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..arguments import make_room, model_name, seed_number
+from ..solver.arguments import make_room, model_name, seed_number
 from ..solver.contact_solver import ContactSolver
 from .judge import GATES, exact_gap, judge
 

@@ -22,9 +22,9 @@ import numpy as np
 from rclpy.utilities import remove_ros_args
 from tqdm import tqdm
 
-from ...arguments import make_folder
 from ...node.contact_node import PARAMETERS
 from ...node.runtime import REFUSALS
+from ...solver.arguments import make_folder
 from ...solver.contact import Contacts
 from ...solver.contact_solver import MODELS, MOST_SOUP_DIVISIONS, SOUP_DIVISIONS, ContactSolver
 from ..processes import DOMAINS

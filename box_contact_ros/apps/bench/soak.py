@@ -25,9 +25,9 @@ from typing import Any
 import numpy as np
 from rclpy.utilities import remove_ros_args
 
-from ...arguments import make_folder
 from ...node.contact_node import PARAMETERS
 from ...node.runtime import REFUSALS
+from ...solver.arguments import make_folder
 from ...solver.contact import Contacts
 from ...solver.contact_solver import MODELS, ContactSolver
 from ..processes import DOMAINS

@@ -22,10 +22,10 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from ...arguments import make_folder, seed_number
 from ...core import FEATURES, OUTPUTS, SITES, native
-from ...report import processor
+from ...output import processor
 from ...resources import resource_path
+from ...solver.arguments import make_folder, seed_number
 from ...solver.mlp import UNITS_MAX, core_numbers
 from ...solver.weights_file import Network, WeightsError, load_weights, unpacked
 from .. import mlp_recipe, train

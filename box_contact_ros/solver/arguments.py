@@ -5,8 +5,8 @@ import argparse
 import tempfile
 from pathlib import Path
 
-from .solver.checks import shown
-from .solver.contact_solver import check_model
+from .checks import shown
+from .contact_solver import check_model
 
 
 def model_name(text: str) -> str:

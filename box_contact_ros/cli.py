@@ -230,7 +230,7 @@ def usage() -> str:
 
 def entry_points(prefix: str = '') -> list[str]:
     """Return the console scripts as setup.py wants them, each name with `prefix` before it."""
-    return [f'{prefix}{name} = box_contact_ros.programs:start.{name}' for name in PROGRAMS]
+    return [f'{prefix}{name} = box_contact_ros.cli:start.{name}' for name in PROGRAMS]
 
 
 def _from_command_line(name: str) -> int:

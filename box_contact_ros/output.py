@@ -7,7 +7,7 @@ import sys
 from importlib import metadata
 from pathlib import Path
 
-from ..arguments import make_folder
+from .solver.arguments import make_folder
 
 
 def add_out(parser: argparse.ArgumentParser, files: str) -> None:
