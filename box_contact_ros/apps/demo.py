@@ -1,8 +1,8 @@
 """The demonstration: a contact node and a crane, two processes that talk over DDS.
 
 `python -m box_contact_ros.apps.demo` starts both, shows the crane's live contacts and its summary,
-and ends both again, within a minute. The contacts push the load, one point per tick, and the crane says
-whether it came to rest on the stack; with `--open-loop` they are only recorded. Both run in a ROS
+and ends both again, within a minute. The contacts push the load, one point per tick, and the
+crane says whether it came to rest on the stack; with `--open-loop` they are only recorded. Both run in a ROS
 domain of their own on this host, so that nothing else hears them; the environment variable
 `BOX_CONTACT_DEMO_DOMAIN` chooses another one. The exit status is the crane's: 0 only if contacts
 came through, nothing was lost, and, closed loop, the load came to rest.

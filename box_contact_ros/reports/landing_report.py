@@ -1,8 +1,8 @@
 """Landings by model: whether the container comes to rest on one contact point per tick.
 
-`python -m box_contact_ros.reports.landing_report` runs a grid of landings (rope angle, tilt, overhang;
-yaw and headings drawn) for every model, rate and latency, the constants of the contact law being the
-same for all models, and writes landing.csv (a row per landing), landing.md (a row per model, rate
+`python -m box_contact_ros.reports.landing_report` runs a grid of landings (rope angle, tilt,
+overhang; yaw and headings drawn) for every model, rate and latency, the constants of the contact
+law being the same for all models, and writes landing.csv (a row per landing), landing.md (a row per model, rate
 and latency) and landing.png (one landing, the models side by side). With --dds the contacts come
 from a contact node in another process, in lockstep, and landing_dds.csv and .md are written.
 """

@@ -216,7 +216,8 @@ Made by `{command}`. {"BROKEN: " + "; ".join(broken) + "." if broken else
 "Of `exact` and `mlp`, every verdict and normal is right, and every point in both boxes."}
 
 Families of poses that break collision tests (`box_contact_ros/verification/hard_poses.py` says what
-each is), every case also turned, swapped, renamed or scaled; stored as doubles, the truth in 60 digits.
+each is), every case also turned, swapped, renamed or scaled; stored as doubles, the truth in 60
+digits.
 *Wrong verdict*: where the gap or depth is more than 16 units in the last place of the largest
 coordinate. *Wrong normal*: not the direction of least depth, to 1e-12 of the size, or not unit.
 *Depth error*: of the size; far from the origin (`f_far`) a unit in the coordinates' last place is
