@@ -61,12 +61,12 @@ test-arm: .venv/.installed-test
 lint: .venv/.installed-test
 	@$(VENV_PYTHON) -m ruff check . $(ARGS)
 	$(VENV_PYTHON) -m mypy
-	exec $(VENV_PYTHON) -m pytest test/test_ament.py
+	exec $(VENV_PYTHON) -m pytest test/package/test_ament.py
 
 # Lines of the core's Python side, the solver and scenes, that their own tests run.
 coverage: .venv/.installed-test
 	@$(VENV_PYTHON) -m coverage run -m pytest \
-	    $(addprefix test/test_,solver.py paper_models.py pairing.py scene.py contact_force.py network.py package.py mlp.py hygiene.py) $(ARGS)
+	    test/solver test/scene test/baselines/test_paper_models.py test/package/test_package.py $(ARGS)
 	$(VENV_PYTHON) -m coverage report
 
 clean:

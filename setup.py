@@ -26,7 +26,7 @@ if platform.machine() in ('x86_64', 'AMD64'):
                          'avx512': ['-march=x86-64-v4', '-mprefer-vector-width=512']}
 
 # Not imported from the package: its __init__.py needs what is only about to be installed.
-programs = runpy.run_path(str(Path(__file__).with_name(NAME) / 'programs.py'))
+cli = runpy.run_path(str(Path(__file__).with_name(NAME) / 'cli.py'))
 
 # colcon (like bloom's Debian packages) runs `setup.py install|develop` and wants programs in
 # lib/box_contact_ros, each under its bare name for `ros2 run`: setup.cfg says where. pip and other
@@ -118,7 +118,7 @@ setup(
     package_data={NAME: ['py.typed', '**/*.pyi', 'verification/*.npz']},
     ext_modules=extensions(),
     data_files=data_files(),
-    entry_points={'console_scripts': programs['entry_points']('box_contact_' if BY_PIP else '')},
+    entry_points={'console_scripts': cli['entry_points']('box_contact_' if BY_PIP else '')},
     cmdclass={'build_ext': BuildCore},
     distclass=PipDistribution if BY_PIP else Distribution,
     zip_safe=False,

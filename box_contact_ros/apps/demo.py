@@ -2,10 +2,10 @@
 
 `python -m box_contact_ros.apps.demo` starts both, shows the crane's live contacts and its summary,
 and ends both again, within a minute. The contacts push the load, one point per tick, and the
-crane says whether it came to rest on the stack; with `--open-loop` they are only recorded. Both run in a ROS
-domain of their own on this host, so that nothing else hears them; the environment variable
-`BOX_CONTACT_DEMO_DOMAIN` chooses another one. The exit status is the crane's: 0 only if contacts
-came through, nothing was lost, and, closed loop, the load came to rest.
+crane says whether it came to rest on the stack; with `--open-loop` they are only recorded. Both
+run in a ROS domain of their own on this host, so that nothing else hears them; the environment
+variable `BOX_CONTACT_DEMO_DOMAIN` chooses another one. The exit status is the crane's: 0 only
+if contacts came through, nothing was lost, and, closed loop, the load came to rest.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Program `accuracy`: how far a model's contact point is from the exact one, per set and class.
 
-Every set of `posesets` is drawn anew from `--seed`; model `exact` gives the truth. Written are
+Every set of `pose_sets` is drawn anew from `--seed`; model `exact` gives the truth. Written are
 accuracy.csv (a row per model, set and part of the set), accuracy.md and accuracy.png. The exit
 status is 1 if `mlp` breaks one of the limits in `LIMITS`, its separations or normals are not
 those of `exact`, a point lies outside a box, or a pair was handed to `exact`.

@@ -2,9 +2,10 @@
 
 `python -m box_contact_ros.reports.landing_report` runs a grid of landings (rope angle, tilt,
 overhang; yaw and headings drawn) for every model, rate and latency, the constants of the contact
-law being the same for all models, and writes landing.csv (a row per landing), landing.md (a row per model, rate
-and latency) and landing.png (one landing, the models side by side). With --dds the contacts come
-from a contact node in another process, in lockstep, and landing_dds.csv and .md are written.
+law being the same for all models, and writes landing.csv (a row per landing), landing.md
+(a row per model, rate and latency) and landing.png (one landing, the models side by
+side). With --dds the contacts come from a contact node in another process,
+in lockstep, and landing_dds.csv and .md are written.
 """
 from __future__ import annotations
 
@@ -159,7 +160,7 @@ Made by `{command}`.
 {DDS_START if dds else ''}
 {count} landings a row: ropes 0.5 to 3° off the plumb line, box tilted by 0.5 to 3°, centres 0 to
 0.6 m apart at the first touch, yaw to 1°, every direction drawn. 20 t, 40 ft, no damping but that
-of contact and ropes; the same law and constants for every model (`contact_force`), one point,
+of contact and ropes; the same law and constants for every model (`contact_law`), one point,
 normal and depth per tick. At rest means, from {SETTLING:g} s after the first touch on, for
 {WINDOW:g} s: no corner faster than 10 mm/s (20 at 200 Hz), ropes slack, contact force within 1 % of
 the weight at every tick, tilt < 0.5°; and always depth < 1 % of the height, gap after the first

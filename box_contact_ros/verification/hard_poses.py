@@ -3,8 +3,8 @@
 Each family is a generator of pairs in a plain frame; `variants` then turns them, swaps the boxes,
 renames their axes and scales them. What tests and reports use is not drawn anew but read from
 `hard_poses.npz`, doubles and all: at 1e-12 the rounding of the recipe is part of the case, and
-another machine's sine may round differently. `test/make_families.py` wrote that file, with the true
-gap and centroid in 60 digits.
+another machine's sine may round differently. `test/helpers/make_hard_poses.py` wrote that
+file, with the true gap and centroid in 60 digits.
 """
 from __future__ import annotations
 

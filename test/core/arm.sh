@@ -19,7 +19,7 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 mkdir "$work/include"
 ln -s "$root/box_contact_ros/core" "$work/include/box_contact"
-PYTHONPATH=$root/test "$python" -c 'import pathlib, sys, test_core_cpp
+PYTHONPATH=$root/test/core:$root/test/helpers "$python" -c 'import pathlib, sys, test_core_cpp
 test_core_cpp.write_families(pathlib.Path(sys.argv[1]))' "$work/families.txt"
 
 flags=(-std=c++17 -O2 -Wall -Wextra -Werror -ffp-contract=off -fno-tree-slp-vectorize

@@ -91,7 +91,7 @@ class Source:
 
 
 def _of_set(draw: Generator) -> Generator:
-    """A set of `posesets`, filled up to exactly n pairs."""
+    """A set of `pose_sets`, filled up to exactly n pairs."""
     def filled(rng: np.random.Generator, n: int) -> Pairs:
         parts: list[Pairs] = []
         while (missing := n - sum(len(part.pose_a) for part in parts)) > 0:

@@ -1,7 +1,7 @@
 """The closed loop of the crane client: contacts that come back become the wrench on the load.
 
 Plain Python, no ROS. One thread asks and simulates (`ask`, `step`), another hands the answers in
-(`answer`). The law, and what is held when nothing comes, are those of `contact_force`.
+(`answer`). The law, and what is held when nothing comes, are those of `contact_law`.
 
 In real time a tick is simulated at its end, not at its beginning: first its poses are published,
 then the answer is awaited for most of the tick, and the contact acts from the time at which it

@@ -1,6 +1,6 @@
 """A container set down by one contact point per tick, and whether it came to rest. No ROS.
 
-`land` runs one landing of `crane.Crane` under `contact_force.ContactLaw`; the contacts come from
+`land` runs one landing of `mujoco_crane.Crane` under `contact_law.ContactLaw`; the contacts come from
 any function of the two poses. What happened is kept tick by tick in a `LandingRecord`, whoever ran
 it, and `LandingRecord.judge` measures it against the criteria below.
 
@@ -11,7 +11,7 @@ depth is less than `DEPTH_LIMIT` of the load's height, and after the first touch
 than `GAP_LIMIT`. Depth, gap and first touch are those of the exact solver on the recorded poses,
 whatever model gave the contacts.
 
-Conventions: those of `pose`, `contact_force` and `crane`; SI units; angles of cases in degrees.
+Conventions: those of `pose`, `contact_law` and `mujoco_crane`; SI units; angles of cases in degrees.
 """
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.verification import hard_poses
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 CASES = hard_poses.load()
 
 

@@ -14,7 +14,7 @@ from box_contact_ros.scene.pose_sets import SETS, Pairs
 from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.solver.pose import rotation_matrix
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 PEERS, MISSING = installed()
 
 

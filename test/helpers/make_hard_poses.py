@@ -1,6 +1,6 @@
-"""Write box_contact_ros/stability/hard_poses.npz: the hard poses, with their truth in 60 digits.
+"""Write box_contact_ros/verification/hard_poses.npz: the hard poses, with their truth in 60 digits.
 
-    python test/make_families.py
+    python test/helpers/make_hard_poses.py
 
 Once written, the file is what tests and reports read
 (see `box_contact_ros.verification.hard_poses`).

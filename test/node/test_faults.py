@@ -2,7 +2,8 @@
 
 The node runs as a process of its own. Killed and restarted nodes and clients are in
 test_contact_node.py, weights and requests that cannot be read in test_hygiene_ros.py, scenes that
-are replaced by garbage in test_scene_node.py. `test/mutants.py` has a node without each guard.
+are replaced by garbage in test_scene_node.py. `test/verification/mutants.py` has a node without
+each guard.
 """
 from __future__ import annotations
 

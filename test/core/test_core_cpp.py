@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 SOURCES = ROOT / 'test' / 'core'
 EXAMPLE = ROOT / 'docs' / 'examples' / 'cpp'
 WEIGHTS = ROOT / 'weights' / 'mlp.safetensors'

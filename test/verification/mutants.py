@@ -1,6 +1,6 @@
 """Do the laws bite? Each mutant is one wrong line; a test has to fail for it.
 
-    python test/mutants.py [NAME ...]
+    python test/verification/mutants.py [NAME ...]
 
 Each mutant is a copy of the checkout with one line changed. If the line belongs to the core, the
 core is compiled in the copy, for the baseline instruction set only. Prints which test killed which
@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 from unittest import mock
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 
 
 class Mutant(NamedTuple):
@@ -35,10 +35,13 @@ class Mutant(NamedTuple):
     tests: str
 
 
-FAMILIES = 'test/test_families.py'
-LAWS = 'test/test_laws.py'
-TEST_CORE = 'test/test_core.py'
-EXACT = 'test/test_exact.py'
+FAMILIES = 'test/verification/test_hard_poses.py'
+LAWS = 'test/core/test_laws.py'
+NODE = 'node/contact_node.py'
+TEST_PAIRING = 'test/scene/test_pairing.py'
+TEST_SCENE_NODE = 'test/node/test_scene_node.py'
+TEST_CORE = 'test/core/test_core.py'
+EXACT = 'test/core/test_exact.py'
 MUTANTS = {
     'normal flipped': Mutant(
         'core/separating_axis.hpp', 'select<T>(along >= 0.0, splat<T>(1.0), splat<T>(-1.0));',
@@ -81,7 +84,7 @@ MUTANTS = {
         'q[k] = std::ldexp(q[k], 0);', f'{LAWS} -k any_length'),
     'quaternion taken for a unit one': Mutant(
         'core/poses.hpp', 'T s = 2.0 / (', 'T s = 2.0 + 0.0 * (',
-        'test/test_fuzz.py -k gates_are'),
+        'test/verification/test_fuzz.py -k gates_are'),
     'the first of concentric boxes is A': Mutant(
         'core/poses.hpp', '  if (any(concentric)) {', '  if (false) {', f'{LAWS} -k concentric'),
     'corners pressed along one axis': Mutant(
@@ -119,20 +122,20 @@ MUTANTS = {
         'Four<T> length = t - s, middle = 0.5 * (s + t) - origin[j];',
         f'{TEST_CORE} -k certain'),
     'point left outside': Mutant(
-        'core/mlp.hpp', ' & placed.inside;', ';', 'test/test_mlp.py -k garbage_for_weights'),
+        'core/mlp.hpp', ' & placed.inside;', ';', 'test/solver/test_mlp.py -k garbage_for_weights'),
     'smaller bounding box, always': Mutant(
         'core/overlap_bounds.hpp', 'clearly_smaller = 0.8;', 'clearly_smaller = 1.0 - 1e-6;',
-        'test/test_overlap_bounds.py -k keep_their_frame'),
+        'test/core/test_overlap_bounds.py -k keep_their_frame'),
     'slabs not widened': Mutant(
         'core/overlap_bounds.hpp', 'constexpr double flush = 0x1p-46;',
-        'constexpr double flush = 0.0;', 'test/test_overlap_bounds.py -k whole_patch'),
+        'constexpr double flush = 0.0;', 'test/core/test_overlap_bounds.py -k whole_patch'),
     'side of a pair of faces taken as it comes': Mutant(
         'core/mlp.hpp', 'F faces[4] = {cut[f], abs(push[f]),', 'F faces[4] = {cut[f], push[f],',
-        'test/test_mlp.py -k box_symmetries'),
+        'test/solver/test_mlp.py -k box_symmetries'),
     'range without its depth': Mutant(
         'core/mlp.hpp', 'excess = max(excess, -separation / (2.0 * depth_max',
         'excess = max(excess, 0.0 * -separation / (2.0 * depth_max',
-        'test/test_mlp.py -k limits_belong'),
+        'test/solver/test_mlp.py -k limits_belong'),
     'threads overlap': Mutant(
         'core/binding/module.cpp', 'long begin = chunk * rows_per_chunk,',
         'long begin = std::max(0L, chunk * rows_per_chunk - lanes),',
@@ -154,83 +157,85 @@ MUTANTS = {
         f'{TEST_CORE} -k forced'),
     # Guards of the nodes against faults.
     'weights taken as they are': Mutant(
-        'network.py', "if tensors_digest(tensors) != card['sha256']:", 'if False:',
-        'test/test_network.py -k edited_byte'),
+        'solver/weights_file.py', "if tensors_digest(tensors) != card['sha256']:", 'if False:',
+        'test/solver/test_weights_file.py -k edited_byte'),
     'an error ends the callback': Mutant(
-        'nodes/contact.py', 'except Exception as error:', 'except KeyError as error:',
-        'test/test_contact_node.py -k error_inside'),
+        NODE, 'except Exception as error:', 'except KeyError as error:',
+        'test/node/test_contact_node.py -k error_inside'),
     'length of a message not checked': Mutant(
-        'nodes/wire.py', 'if len(data) != at + _POSE.size:', 'if False:',
-        'test/test_wire.py -k other_bytes'),
+        'node/message_bytes.py', 'if len(data) != at + _POSE.size:', 'if False:',
+        'test/node/test_message_bytes.py -k other_bytes'),
     'numbers of a pose not checked': Mutant(
-        'nodes/wire.py', 'and _LEAST < hypot(qx, qy, qz, qw) < _MOST):', '):',
-        'test/test_faults.py -k half_of_the_poses'),
+        'node/message_bytes.py', 'and _LEAST < hypot(qx, qy, qz, qw) < _MOST):', '):',
+        'test/node/test_faults.py -k half_of_the_poses'),
     'frames not compared': Mutant(
-        'nodes/contact.py', 'elif pose.frame_id != frame_id:', 'elif False:',
-        'test/test_contact_node.py -k frames_must'),
+        NODE, 'elif pose.frame_id != frame_id:', 'elif False:',
+        'test/node/test_contact_node.py -k frames_must'),
     'a stamp answered again': Mutant(
-        'pairing.py', 'if stamp in taken:', 'if False:',
-        'test/test_scene_node.py -k repeated_and_late'),
+        'scene/pairing.py', 'if stamp in taken:', 'if False:',
+        f'{TEST_SCENE_NODE} -k repeated_and_late'),
     'time that goes back is late': Mutant(
-        'pairing.py', 'if stamp < self._newest.get(box, NEVER) - RESET:', 'if False:',
-        'test/test_pairing.py -k set_back'),
+        'scene/pairing.py', 'if stamp < self._newest.get(box, NEVER) - RESET:', 'if False:',
+        f'{TEST_PAIRING} -k set_back'),
     'a clock that jumps is not heard': Mutant(
-        'nodes/contact.py', 'self.counts[RESETS] += 1\n            self._pairing.reset()',
-        'pass', 'test/test_faults.py -k clock'),
+        NODE, 'self.counts[RESETS] += 1\n            self._pairing.reset()',
+        'pass', 'test/node/test_faults.py -k clock'),
     'a pose of any age': Mutant(
-        'pairing.py', 'return newest is None or 0 < self.max_age < abs(now - newest)',
-        'return newest is None', 'test/test_scene_node.py -k different_rates'),
+        'scene/pairing.py', 'return newest is None or 0 < self.max_age < abs(now - newest)',
+        'return newest is None', f'{TEST_SCENE_NODE} -k different_rates'),
     'a silent box is waited for': Mutant(
-        'pairing.py', 'return 0 < self.max_age < now - self._missing_since.get(box, now)',
-        'return False', 'test/test_scene_node.py -k stale_box'),
+        'scene/pairing.py', 'return 0 < self.max_age < now - self._missing_since.get(box, now)',
+        'return False', f'{TEST_SCENE_NODE} -k stale_box'),
     'ticks wait without bound': Mutant(
-        'pairing.py', 'poses.number + WAITING_TICKS < self._begun', 'False',
-        'test/test_pairing.py -k dropped'),
+        'scene/pairing.py', 'poses.number + WAITING_TICKS < self._begun', 'False',
+        f'{TEST_PAIRING} -k dropped'),
     'ticks that were answered do not count': Mutant(
-        'pairing.py', 'poses.number + WAITING_TICKS < self._begun',
-        'len(waiting) > WAITING_TICKS and not over', 'test/test_pairing.py -k further_behind'),
+        'scene/pairing.py', 'poses.number + WAITING_TICKS < self._begun',
+        'len(waiting) > WAITING_TICKS and not over', f'{TEST_PAIRING} -k further_behind'),
     'a box that joins opens old ticks': Mutant(
-        'pairing.py', 'return stamp <= self._joined[box] + self.tolerance or any(', 'return any(',
-        'test/test_pairing.py -k joins'),
+        'scene/pairing.py', 'return stamp <= self._joined[box] + self.tolerance or any(',
+        'return any(',
+        f'{TEST_PAIRING} -k joins'),
     'a scene that fails half way stays': Mutant(
-        'nodes/contact.py', 'self._take_over(old, old_settings)', 'pass',
-        'test/test_scene_node.py -k half_way'),
+        NODE, 'self._take_over(old, old_settings)', 'pass',
+        f'{TEST_SCENE_NODE} -k half_way'),
     "poses looked for on the node's own topics": Mutant(
-        'nodes/contact.py', 'if self._resolved(topic) in taken:', 'if False:',
-        'test/test_scene_node.py -k topic_of_the_node'),
+        NODE, 'if self._resolved(topic) in taken:', 'if False:',
+        f'{TEST_SCENE_NODE} -k topic_of_the_node'),
     'ticks held up by one that lacks a pose': Mutant(
-        'pairing.py', 'self._changed |= not stale <= self._were_stale', 'pass',
-        'test/test_pairing.py -k hold_up'),
+        'scene/pairing.py', 'self._changed |= not stale <= self._were_stale', 'pass',
+        f'{TEST_PAIRING} -k hold_up'),
     'a tick answered again': Mutant(
-        'pairing.py', 'if self._is_too_late(box, stamp):', 'if False:',
-        'test/test_pairing.py -k answered_again'),
+        'scene/pairing.py', 'if self._is_too_late(box, stamp):', 'if False:',
+        f'{TEST_PAIRING} -k answered_again'),
     'a change forgets what waits': Mutant(
-        'nodes/contact.py', "if running and settings['pairing'] == old['pairing']:", 'if False:',
-        'test/test_scene_node.py -k come_and_go'),
+        NODE, "if running and settings['pairing'] == old['pairing']:", 'if False:',
+        f'{TEST_SCENE_NODE} -k come_and_go'),
     'a bad scene goes through': Mutant(
-        'nodes/contact.py', 'return SetParametersResult(successful=False, reason=_reason(error))',
-        'return SetParametersResult(successful=True)', 'test/test_scene_node.py -k bad_scene'),
+        NODE, 'return SetParametersResult(successful=False, reason=_reason(error))',
+        'return SetParametersResult(successful=True)', f'{TEST_SCENE_NODE} -k bad_scene'),
     'nesting without limit': Mutant(
-        'scene_file.py', 'if depth > DEEPEST:', 'if False:', 'test/test_scene.py -k refusal_names'),
+        'scene/scene_file.py', 'if depth > DEEPEST:', 'if False:',
+        'test/scene/test_scene.py -k refusal_names'),
     'answers kept for whoever does not read': Mutant(
-        'nodes/runtime.py', 'CONTACT_QOS = QoSProfile(depth=10,',
-        'CONTACT_QOS = QoSProfile(history=2,', 'test/test_faults.py -k never_reads'),
+        'node/runtime.py', 'CONTACT_QOS = QoSProfile(depth=10,',
+        'CONTACT_QOS = QoSProfile(history=2,', 'test/node/test_faults.py -k never_reads'),
     'events of poses served': Mutant(
-        'nodes/contact.py', 'self._keep_events(subscription)',
-        'self._events_of[subscription] = []', 'test/test_faults.py -k deadlines'),
+        NODE, 'self._keep_events(subscription)',
+        'self._events_of[subscription] = []', 'test/node/test_faults.py -k deadlines'),
     'events of contacts served': Mutant(
-        'nodes/contact.py', 'self._keep_events(self._contacts)',
-        'self._events_of[self._contacts] = []', 'test/test_faults.py -k topics_go'),
+        NODE, 'self._keep_events(self._contacts)',
+        'self._events_of[self._contacts] = []', 'test/node/test_faults.py -k topics_go'),
     "events of pairs' contacts served": Mutant(
-        'nodes/contact.py', 'PublisherEventCallbacks(use_default_callbacks=False)',
-        'PublisherEventCallbacks()', 'test/test_faults.py -k topics_go'),
+        NODE, 'PublisherEventCallbacks(use_default_callbacks=False)',
+        'PublisherEventCallbacks()', 'test/node/test_faults.py -k topics_go'),
     'publishers gone by what is left': Mutant(
-        'nodes/contact.py', 'event.total_count_change - event.current_count_change',
-        'max(0, -event.current_count_change)', 'test/test_scene_node.py -k come_and_go_between'),
+        NODE, 'event.total_count_change - event.current_count_change',
+        'max(0, -event.current_count_change)', f'{TEST_SCENE_NODE} -k come_and_go_between'),
     'room in shared memory not asked for': Mutant(
-        'programs.py', 'room < LEAST_ROOM', 'False', 'test/test_faults.py -k memory_is_full'),
+        'cli.py', 'room < LEAST_ROOM', 'False', 'test/node/test_faults.py -k memory_is_full'),
     'little shared memory used': Mutant(
-        'programs.py', 'room < USUAL_ROOM', 'False', 'test/test_faults.py -k almost_full'),
+        'cli.py', 'room < USUAL_ROOM', 'False', 'test/node/test_faults.py -k almost_full'),
 }
 
 

@@ -1,4 +1,4 @@
-"""Make recordings/crane_landing: `python test/make_recording.py`.
+"""Make recordings/crane_landing: `python test/helpers/make_recording.py`.
 
 A 40 ft container is set down on another one in closed loop, one contact per tick at 200 Hz; from
 half a second before the first touch to three and a half after it. No ROS graph: the messages are
@@ -27,7 +27,7 @@ from box_contact_ros.node.messages import (
 )
 from box_contact_ros.scene.scene_solver import Answer, two_boxes
 
-FOLDER = Path(__file__).resolve().parents[1] / 'recordings' / 'crane_landing'
+FOLDER = Path(__file__).resolve().parents[2] / 'recordings' / 'crane_landing'
 CASE = LandingCase(rope_angle=1.25, rope_heading=35.0, tilt=1.5, tilt_heading=120.0, overhang=0.3,
                    overhang_heading=-60.0, yaw=0.6)
 MODEL, RATE = 'mlp', 200.0

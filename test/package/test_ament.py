@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 SOURCES = [str(ROOT / name) for name in ('box_contact_ros', 'launch', 'setup.py', 'test')]
 
 LINE_LENGTH = '100'  # ament's default is 99

@@ -243,7 +243,7 @@ def write(folder: Path, text: str) -> Path:
 
 def test_the_example_in_the_docs(tmp_path: Path) -> None:
     """docs/training.md: three pairs of sizes, all within the range."""
-    page = (Path(__file__).parents[1] / 'docs' / 'training.md').read_text('utf-8')
+    page = (Path(__file__).parents[2] / 'docs' / 'training.md').read_text('utf-8')
     text = re.search(r'^```yaml\n(.*?)^```$', page, re.MULTILINE | re.DOTALL).group(1)
     sizes = scene_sizes.size_pairs(write(tmp_path, text))
     assert len(sizes) == 3 and all(map(mlp_recipe.in_range, sizes))

@@ -21,7 +21,7 @@ import pytest
 from box_contact_ros.cli import PROGRAMS
 from box_contact_ros.core import instruction_sets
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 NAME = 'box_contact_ros'
 DATA = ('weights', 'msg_schemas', 'launch', 'config')
 # Also those that are about to be added.

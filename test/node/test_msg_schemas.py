@@ -34,7 +34,7 @@ from box_contact_ros.node.messages import make_cloud, make_header, read_cloud
 from box_contact_ros.resources import resource_path
 from box_contact_ros.scene.scene_solver import Answer, Pair
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 FOLDER = resource_path('msg_schemas')
 DOCUMENT = yaml.safe_load((FOLDER / 'asyncapi.yaml').read_text(encoding='utf-8'))
 SCHEMAS = {path.name: json.loads(path.read_text('utf-8')) for path in sorted(FOLDER.glob('*.json'))}
@@ -187,7 +187,7 @@ def parse(tmp_path_factory):
                        timeout=90, check=True)
     except subprocess.SubprocessError as error:
         pytest.skip(f'npm could not fetch {PARSER}: {error}')
-    script = shutil.copy(ROOT / 'test' / 'asyncapi_parser.mjs', place)
+    script = shutil.copy(ROOT / 'test' / 'helpers' / 'asyncapi_parser.mjs', place)
 
     def parse(folder: Path) -> dict[str, list[str]]:
         ran = subprocess.run(['node', script, folder / 'asyncapi.yaml'], capture_output=True,

@@ -22,7 +22,7 @@ from box_contact_ros.node.contact_node import PARAMETERS
 from box_contact_ros.scene.scene_file import read_scene
 from box_contact_ros.scene.scene_solver import Scene
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 
 # --- launch ---------------------------------------------------------------------------------------
 

@@ -71,7 +71,7 @@ def test_installed_without_extras(names, program, setup_arguments, tmp_path):
     script = RUN.format(needed=needed, program=program)
     done = subprocess.run([sys.executable, '-c', script], cwd=tmp_path, capture_output=True,
                           text=True, env={**os.environ, 'PYTHONPATH': str(Path(
-                              __file__).resolve().parents[1])}, timeout=300)
+                              __file__).resolve().parents[2])}, timeout=300)
     assert done.returncode == 0, done.stderr
 
 

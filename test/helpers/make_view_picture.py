@@ -1,6 +1,6 @@
 """Take docs/view.png: the page of `view`, in a headless Chromium, while the load settles.
 
-Run as `python test/make_view_picture.py [--out FILE]`.
+Run as `python test/helpers/make_view_picture.py [--out FILE]`.
 """
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pathlib import Path
 
 from browser import open_page
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 SEED = 3
 """A landing that touches with a corner, and rocks."""
 

@@ -329,5 +329,5 @@ def test_any_text_is_a_scene_or_refused(text):
 
 def test_shipped_scenes_are_good():
     """config/scenes: each can be computed."""
-    for path in (Path(__file__).parents[1] / 'config' / 'scenes').glob('*.yaml'):
+    for path in (Path(__file__).parents[2] / 'config' / 'scenes').glob('*.yaml'):
         SceneSolver(read_scene(str(path)), model='exact')

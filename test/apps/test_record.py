@@ -35,7 +35,7 @@ from box_contact_ros.node.messages import make_header, read_cloud  # noqa: E402
 from box_contact_ros.reports.accuracy import LIMITS  # noqa: E402
 from box_contact_ros.resources import resource_path  # noqa: E402
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 SHIPPED = resource_path('recordings', 'crane_landing')
 CONTAINER = (12.192, 2.438, 2.591)
 STACK = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)

@@ -15,7 +15,7 @@ from box_contact_ros import __main__ as command_line
 from box_contact_ros import cli, resources
 from box_contact_ros.resources import resource_path
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 
 
 def _touch(path: Path) -> Path:

@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+HELPERS = Path(__file__).resolve().parents[1] / 'helpers'
 CUBES = ('-p', 'size_a:=[2.0, 2.0, 2.0]', '-p', 'size_b:=[2.0, 2.0, 2.0]')
 SUBNET = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET'}
 
@@ -89,7 +90,7 @@ def far_hosts(unjoined):
         return
     ip('-n', names[0], 'link', 'delete', ends[0])
     carrier = subprocess.Popen(
-        [sys.executable, Path(__file__).with_name('cable.py'), *ends, str(LOSS), str(DELAY)],
+        [sys.executable, HELPERS / 'cable.py', *ends, str(LOSS), str(DELAY)],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:
         if carrier.stdout.readline() != 'ready\n':
@@ -166,7 +167,7 @@ def test_a_yard_shared_by_two_hosts(program, hosts, tmp_path):
     whole.write_text(json.dumps({'boxes': boxes, 'pairs': pairs}))
     for node in nodes:
         node.wait_for_output('ready', 120)
-    script = Path(__file__).with_name('shared_scene.py')
+    script = HELPERS / 'shared_scene.py'
     played = subprocess.run([*here, sys.executable, script, whole, '2', '600'],
                             env=os.environ | SUBNET, capture_output=True, text=True, timeout=180)
     print(played.stdout)
