@@ -3,7 +3,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..contact import Contact
+from ..solver.contact import Contact
 
 LENGTH_MIN: float
 LENGTH_MAX: float

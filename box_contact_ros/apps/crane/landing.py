@@ -1,8 +1,8 @@
 """A container set down by one contact point per tick, and whether it came to rest. No ROS.
 
-`land` runs one landing of `mujoco_crane.Crane` under `contact_law.ContactLaw`; the contacts come from
-any function of the two poses. What happened is kept tick by tick in a `LandingRecord`, whoever ran
-it, and `LandingRecord.judge` measures it against the criteria below.
+`land` runs one landing of `mujoco_crane.Crane` under `contact_law.ContactLaw`; the contacts
+come from any function of the two poses. What happened is kept tick by tick in
+a `LandingRecord`, whoever ran it, and `LandingRecord.judge` measures it against the criteria below.
 
 The criteria, from `SETTLING` s after the first touch on, for `WINDOW` s: no corner of the load
 moves faster than `corner_speed_limit`, all ropes are slack, the contact force is within
@@ -11,7 +11,8 @@ depth is less than `DEPTH_LIMIT` of the load's height, and after the first touch
 than `GAP_LIMIT`. Depth, gap and first touch are those of the exact solver on the recorded poses,
 whatever model gave the contacts.
 
-Conventions: those of `pose`, `contact_law` and `mujoco_crane`; SI units; angles of cases in degrees.
+Conventions: those of `pose`, `contact_law` and `mujoco_crane`; SI units; angles of cases
+in degrees.
 """
 from __future__ import annotations
 
