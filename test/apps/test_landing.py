@@ -9,7 +9,7 @@ import pytest
 
 pytest.importorskip('mujoco')
 
-from box_contact_ros import ContactSolver  # noqa: E402
+from box_contact_ros import ContactSolver
 from box_contact_ros.apps.crane.landing import (
     SETTLING,
     WINDOW,
@@ -20,7 +20,7 @@ from box_contact_ros.apps.crane.landing import (
     landing_scenario,
     scenario_of,
 )
-from box_contact_ros.apps.crane.mujoco_crane import GRAVITY, Crane  # noqa: E402
+from box_contact_ros.apps.crane.mujoco_crane import GRAVITY, Crane
 
 CASES = list(cases())
 HANGING_OVER = 17

@@ -7,16 +7,15 @@ import pytest
 
 pytest.importorskip('mujoco')
 
-import rclpy  # noqa: E402
-from rclpy.context import Context  # noqa: E402
-from rclpy.parameter import Parameter  # noqa: E402
+import rclpy
+from rclpy.context import Context
+from rclpy.parameter import Parameter
 
-from box_contact_ros.apps.crane import crane_feedback  # noqa: E402
-from box_contact_ros.apps.crane import crane_node as crane_node  # noqa: E402
-from box_contact_ros.apps.crane.landing import LANDING_DURATION, cases, land, scenario_of  # noqa: E402
-from box_contact_ros.apps.crane.landing_flights import answering_node, fly_over_dds  # noqa: E402
-from box_contact_ros.node.runtime import make_executor  # noqa: E402
-from box_contact_ros.solver.contact_solver import ContactSolver  # noqa: E402
+from box_contact_ros.apps.crane import crane_feedback, crane_node
+from box_contact_ros.apps.crane.landing import LANDING_DURATION, cases, land, scenario_of
+from box_contact_ros.apps.crane.landing_flights import answering_node, fly_over_dds
+from box_contact_ros.node.runtime import make_executor
+from box_contact_ros.solver.contact_solver import ContactSolver
 
 EXACT = ('--ros-args', '-p', 'model:=exact')
 HARD = {'rope_angle': 3.0, 'rope_heading': 100.0, 'pitch': 2.0, 'roll': -2.0, 'yaw': 1.0,

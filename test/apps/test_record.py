@@ -14,15 +14,15 @@ from ros_client import Client, stamp_of
 
 pytest.importorskip('rosbags')
 
-from geometry_msgs.msg import PoseStamped  # noqa: E402
-from make_recording import make  # noqa: E402
-from mcap.reader import make_reader  # noqa: E402
-from mcap_ros2.decoder import DecoderFactory  # noqa: E402
-from rclpy.context import Context  # noqa: E402
-from rclpy.serialization import serialize_message  # noqa: E402
-from test_bench import bench, rows_of  # noqa: E402
+from geometry_msgs.msg import PoseStamped
+from make_recording import make
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+from rclpy.context import Context
+from rclpy.serialization import serialize_message
+from test_bench import bench, rows_of
 
-from box_contact_ros import ContactSolver  # noqa: E402
+from box_contact_ros import ContactSolver
 from box_contact_ros.apps.recording.bag_file import (
     TOPICS,
     Recorder,
@@ -30,10 +30,10 @@ from box_contact_ros.apps.recording.bag_file import (
     read_replay,
     type_of,
 )
-from box_contact_ros.apps.recording.record import RecordNode  # noqa: E402
-from box_contact_ros.node.messages import make_header, read_cloud  # noqa: E402
-from box_contact_ros.reports.accuracy import LIMITS  # noqa: E402
-from box_contact_ros.resources import resource_path  # noqa: E402
+from box_contact_ros.apps.recording.record import RecordNode
+from box_contact_ros.node.messages import make_header, read_cloud
+from box_contact_ros.reports.accuracy import LIMITS
+from box_contact_ros.resources import resource_path
 
 ROOT = Path(__file__).resolve().parents[2]
 SHIPPED = resource_path('recordings', 'crane_landing')

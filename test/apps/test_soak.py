@@ -9,10 +9,10 @@ import pytest
 
 pytest.importorskip('mujoco')
 
-from box_contact_ros import ContactSolver  # noqa: E402
-from box_contact_ros.apps.bench.bench_log import NodeLog  # noqa: E402
-from box_contact_ros.apps.bench.pose_streams import make_stream  # noqa: E402
-from box_contact_ros.apps.bench.soak import mispairs, without_contact  # noqa: E402
+from box_contact_ros import ContactSolver
+from box_contact_ros.apps.bench.bench_log import NodeLog
+from box_contact_ros.apps.bench.pose_streams import make_stream
+from box_contact_ros.apps.bench.soak import mispairs, without_contact
 
 MS = 1_000_000  # ns
 

@@ -20,16 +20,16 @@ from ros_client import MATCH_SECONDS, Client, serving
 pytest.importorskip('viser')
 pytest.importorskip('mujoco')
 
-from browser import chromium, open_page  # noqa: E402
-from PIL import Image  # noqa: E402
+from browser import chromium, open_page
+from PIL import Image
 
-from box_contact_ros import ContactSolver  # noqa: E402
-from box_contact_ros.apps.viewer.style import BOX_A, BOX_B, STALE  # noqa: E402
-from box_contact_ros.apps.viewer.view_log import LOST_AFTER, ViewLog  # noqa: E402
-from box_contact_ros.apps.viewer.view_node import ViewNode  # noqa: E402
-from box_contact_ros.apps.viewer.view_page import _edges, _turn_from_z, read_out  # noqa: E402
-from box_contact_ros.node.contact_node import ContactNode  # noqa: E402
-from box_contact_ros.node.messages import CLOUD_ROW, NANOSECONDS  # noqa: E402
+from box_contact_ros import ContactSolver
+from box_contact_ros.apps.viewer.style import BOX_A, BOX_B, STALE
+from box_contact_ros.apps.viewer.view_log import LOST_AFTER, ViewLog
+from box_contact_ros.apps.viewer.view_node import ViewNode
+from box_contact_ros.apps.viewer.view_page import _edges, _turn_from_z, read_out
+from box_contact_ros.node.contact_node import ContactNode
+from box_contact_ros.node.messages import CLOUD_ROW, NANOSECONDS
 
 ORIGIN = poses.IDENTITY
 TOUCHING = np.array([0.5, 0.25, 1.875, 0, 0, 0, 1])

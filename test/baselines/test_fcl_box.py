@@ -10,7 +10,7 @@ import pytest
 
 pytest.importorskip('fcl')
 
-from box_contact_ros import ContactSolver  # noqa: E402
+from box_contact_ros import ContactSolver
 
 CUBES = ContactSolver(poses.CUBE, poses.CUBE, model='fcl')
 IDENTITY = poses.IDENTITY

@@ -11,7 +11,7 @@ import pytest
 
 pytest.importorskip('fcl')
 
-from box_contact_ros import ContactSolver  # noqa: E402
+from box_contact_ros import ContactSolver
 from box_contact_ros.baselines import soup
 
 IDENTITY = poses.IDENTITY

@@ -16,12 +16,12 @@ from sensor_msgs.msg import PointCloud2
 
 pytest.importorskip('fcl')
 
-from box_contact_ros import ContactSolver  # noqa: E402
-from box_contact_ros.node.contact_node import PARAMETERS as CONTACT_PARAMETERS  # noqa: E402
-from box_contact_ros.node.contact_node import ContactNode  # noqa: E402
-from box_contact_ros.node.messages import read_cloud  # noqa: E402
-from box_contact_ros.node.soup_node import PARAMETERS, SoupNode  # noqa: E402
-from box_contact_ros.resources import resource_path  # noqa: E402
+from box_contact_ros import ContactSolver
+from box_contact_ros.node.contact_node import PARAMETERS as CONTACT_PARAMETERS
+from box_contact_ros.node.contact_node import ContactNode
+from box_contact_ros.node.messages import read_cloud
+from box_contact_ros.node.soup_node import PARAMETERS, SoupNode
+from box_contact_ros.resources import resource_path
 
 ORIGIN = poses.IDENTITY
 TOUCHING = np.array([0.5, 0.25, 1.875, 0.1, 0.2, 0, 1])

@@ -8,7 +8,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 SOURCES = [str(ROOT / name) for name in ('box_contact_ros', 'launch', 'setup.py', 'test')]
 
-LINE_LENGTH = '100'  # ament's default is 99
+CONFIG = str(Path(__file__).with_name('flake8.ini'))
 NOT_FOLLOWED = ['D213', 'D401']
 """Rules of ament's pep257 that the package does not follow. PEP 257 itself lets a summary stand on
 the first line or on the second (D213), and what a function gives is often said shorter by naming
@@ -17,7 +17,7 @@ it than by an imperative (D401)."""
 
 def test_flake8() -> None:
     linter = pytest.importorskip('ament_flake8.main')
-    status, errors = linter.main_with_errors(argv=['--linelength', LINE_LENGTH, *SOURCES])
+    status, errors = linter.main_with_errors(argv=['--config', CONFIG, *SOURCES])
     assert status == 0, '\n'.join(errors)
 
 

@@ -13,12 +13,12 @@ import pytest
 fcl = pytest.importorskip('fcl')
 pytest.importorskip('matplotlib')
 
-from tqdm import tqdm  # noqa: E402
+from tqdm import tqdm
 
-from box_contact_ros import ContactSolver  # noqa: E402
-from box_contact_ros.baselines import soup  # noqa: E402
-from box_contact_ros.reports import paper_soup_tables, paper_tables  # noqa: E402
-from box_contact_ros.training.paper_recipe import dataset  # noqa: E402
+from box_contact_ros import ContactSolver
+from box_contact_ros.baselines import soup
+from box_contact_ros.reports import paper_soup_tables, paper_tables
+from box_contact_ros.training.paper_recipe import dataset
 
 EXACT = ContactSolver(poses.CUBE, poses.CUBE, model='exact')
 

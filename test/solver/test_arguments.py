@@ -15,7 +15,7 @@ FILES = ('fuzz', 'paper')
 
 
 def main_of(name):
-    target = PROGRAMS[name].target if name in PROGRAMS else f'box_contact_ros.output.{name}:main'
+    target = PROGRAMS[name].target if name in PROGRAMS else f'box_contact_ros.reports.{name}:main'
     module, _, function = target.partition(':')
     return getattr(importlib.import_module(module), function)
 

@@ -283,7 +283,7 @@ def test_tables_in_the_docs_are_the_shipped_weights(tmp_path: Path) -> None:
     """
     docs = Path(__file__).parents[2] / 'docs' / 'paper_tables.md'
     assert paper_tables.main(['--table', '1', '--table', '2',
-                       '--out', str(tmp_path / 'new' / 'page.md')]) == 0
+                              '--out', str(tmp_path / 'new' / 'page.md')]) == 0
     old, new = cells(docs.read_text()), cells((tmp_path / 'new' / 'page.md').read_text())
     assert len(old) > len(new) > 100
     for before, after in zip(old, new):

@@ -16,9 +16,9 @@ import pytest
 torch = pytest.importorskip('torch')
 pytest.importorskip('matplotlib')
 
-from box_contact_ros.training import mlp_recipe  # noqa: E402
-from box_contact_ros.training.experiments import search, successive_halving  # noqa: E402
-from box_contact_ros.training.experiments.successive_halving import Candidate, CheckpointError, Rung  # noqa: E402
+from box_contact_ros.training import mlp_recipe
+from box_contact_ros.training.experiments import search, successive_halving
+from box_contact_ros.training.experiments.successive_halving import Candidate, CheckpointError, Rung
 
 QUICK = ['--quick', '--candidates', '48', '--seed', '2', '--device', 'cpu']
 
@@ -157,8 +157,8 @@ def test_killed_and_started_again_it_ends_the_same(tmp_path: Path, what: str, na
     # A checkpoint after every group.
     process = subprocess.Popen(
         [sys.executable, '-c', 'import sys\n'
-         'from box_contact_ros.training import halving, search\n'
-         'halving.SAVE_EVERY = 0.0\n'
+         'from box_contact_ros.training.experiments import search, successive_halving\n'
+         'successive_halving.SAVE_EVERY = 0.0\n'
          'sys.exit(search.main(sys.argv[1:]))', what, *QUICK, '--out', str(killed)],
         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     deadline = time.monotonic() + 150

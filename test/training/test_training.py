@@ -9,11 +9,11 @@ import pytest
 
 torch = pytest.importorskip('torch')
 
-from box_contact_ros.solver.weights_file import load_weights  # noqa: E402
-from box_contact_ros.training import train  # noqa: E402
-from box_contact_ros.training.paper_recipe import dataset  # noqa: E402
-from box_contact_ros.training.paper_recipe.errors import errors_of, figures, predict  # noqa: E402
-from box_contact_ros.training.paper_recipe.fit import Settings, fit, gradients, outputs_of, wrapped  # noqa: E402
+from box_contact_ros.solver.weights_file import load_weights
+from box_contact_ros.training import train
+from box_contact_ros.training.paper_recipe import dataset
+from box_contact_ros.training.paper_recipe.errors import errors_of, figures, predict
+from box_contact_ros.training.paper_recipe.fit import Settings, fit, gradients, outputs_of, wrapped
 
 SMALL = Settings((6, 9, 7, 4), networks=3, epochs=12, batch=50, rate=0.05)
 

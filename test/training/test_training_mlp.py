@@ -10,19 +10,19 @@ import pytest
 
 torch = pytest.importorskip('torch')
 
-from box_contact_ros import ContactSolver  # noqa: E402
-from box_contact_ros.core import stages  # noqa: E402
-from box_contact_ros.scene.pose_sets import Pairs, containers, cubes, size_pairs, tilted  # noqa: E402
-from box_contact_ros.solver.mlp import UNITS_MAX, core_numbers  # noqa: E402
-from box_contact_ros.solver.weights_file import (  # noqa: E402
+from box_contact_ros import ContactSolver
+from box_contact_ros.core import stages
+from box_contact_ros.scene.pose_sets import Pairs, containers, cubes, size_pairs, tilted
+from box_contact_ros.solver.mlp import UNITS_MAX, core_numbers
+from box_contact_ros.solver.weights_file import (
     Network,
     WeightsError,
     load_weights,
     save_weights,
     unpacked,
 )
-from box_contact_ros.training import mlp_fit, mlp_recipe, samples, scene_sizes, train  # noqa: E402
-from box_contact_ros.training.samples import MlpSamples  # noqa: E402
+from box_contact_ros.training import mlp_fit, mlp_recipe, samples, scene_sizes, train
+from box_contact_ros.training.samples import MlpSamples
 
 SCENE = """\
 boxes:
