@@ -14,9 +14,9 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from ..scene.pose import rotation_matrix
 from ..scene.pose_sets import Pairs
 from ..solver.contact_solver import ContactSolver
-from ..solver.pose import rotation_matrix
 
 MOST_CONTACTS = 16
 """Contacts asked for; two boxes have at most eight."""

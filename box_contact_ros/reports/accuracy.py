@@ -30,12 +30,12 @@ import numpy as np
 from ..core import CENTROID_REACH, DEPTH_FLOOR, Stages, native, stages
 from ..output import add_out, processor, results_folder, versions
 from ..resources import resource_path
+from ..scene.pose import rotation_matrix
 from ..scene.pose_sets import SETS, Pairs
 from ..solver.arguments import seed_number
 from ..solver.contact import Contacts
 from ..solver.contact_solver import MODELS, ContactSolver
 from ..solver.mlp import bounds_of, core_numbers
-from ..solver.pose import rotation_matrix
 from ..solver.weights_file import WeightsError, load_weights
 from ..training.paper_recipe import dataset
 from ..training.paper_recipe.errors import errors_of, figures, wrapped

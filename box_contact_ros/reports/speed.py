@@ -23,10 +23,10 @@ import numpy as np
 
 from ..core import FORCE, instruction_sets, native
 from ..output import processor, versions
+from ..scene.pose import quaternion_multiply
 from ..scene.pose_sets import CONTAINER, CUBE, SETS, Pairs, log_uniform, turns
 from ..solver.arguments import make_folder
 from ..solver.contact_solver import ContactSolver
-from ..solver.pose import quaternion_multiply
 
 CALLS, BATCH, ROUNDS = 2_000, 20_000, 40
 """Single calls of a round, pairs of a batch, rounds."""

@@ -31,7 +31,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..solver.pose import rotation_matrix
+from .pose import rotation_matrix
 
 __all__ = ['ContactLaw', 'HeldWrench', 'Touch', 'effective_mass']
 

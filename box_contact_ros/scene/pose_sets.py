@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..solver.contact_solver import ContactSolver
-from ..solver.pose import quaternion_multiply, rotation_matrix
+from .pose import quaternion_multiply, rotation_matrix
 
 CUBE = (2.0, 2.0, 2.0)
 CONTAINER = (12.192, 2.438, 2.591)

@@ -1,4 +1,4 @@
-"""ContactSolver: SAT first, then the contact point by the chosen model. Conventions: `pose`."""
+"""ContactSolver: SAT first, then the contact point by the chosen model."""
 from __future__ import annotations
 
 import os

@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from ..core import stages
+from ..scene.pose import quaternion_multiply, rotation_matrix
 from ..scene.pose_sets import (
     CONTAINER,
     Pairs,
@@ -18,7 +19,6 @@ from ..scene.pose_sets import (
     stacked,
     turns,
 )
-from ..solver.pose import quaternion_multiply, rotation_matrix
 
 SizePair = tuple[tuple[float, float, float], tuple[float, float, float]]
 """Full extents of two boxes [m]."""

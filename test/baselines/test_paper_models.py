@@ -15,7 +15,7 @@ from box_contact_ros.baselines.paper.symmetry import (
     fold,
 )
 from box_contact_ros.resources import resource_path
-from box_contact_ros.solver.pose import rotation_matrix
+from box_contact_ros.scene.pose import rotation_matrix
 from box_contact_ros.solver.weights_file import WeightsError
 from box_contact_ros.training.paper_recipe import dataset
 

@@ -10,9 +10,9 @@ import pytest
 
 from box_contact_ros.baselines.engines import Contestant, Ours, installed
 from box_contact_ros.reports import frontier
+from box_contact_ros.scene.pose import rotation_matrix
 from box_contact_ros.scene.pose_sets import SETS, Pairs
 from box_contact_ros.solver.contact_solver import ContactSolver
-from box_contact_ros.solver.pose import rotation_matrix
 
 ROOT = Path(__file__).resolve().parents[2]
 PEERS, MISSING = installed()

@@ -14,7 +14,7 @@ from box_contact_ros.scene.contact_law import (
     Touch,
     effective_mass,
 )
-from box_contact_ros.solver.pose import rotation_matrix
+from box_contact_ros.scene.pose import rotation_matrix
 
 CONTAINER = (12.192, 2.438, 2.591)
 MASS = 20_000.0

@@ -16,7 +16,6 @@ from hypothesis import strategies as st
 from box_contact_ros import Contact, ContactSolver
 from box_contact_ros.solver.checks import pose_fault
 from box_contact_ros.solver.contact_solver import MODELS
-from box_contact_ros.solver.pose import quaternion_from_matrix, quaternion_multiply, rotation_matrix
 
 SOLVER = ContactSolver(poses.CUBE, poses.CUBE, model='exact')
 ABOVE = [0.5, 0.25, 1.875, 0, 0, 0, 1]
@@ -181,17 +180,6 @@ def test_any_fourteen_doubles(pose_a, pose_b):
     if contact.colliding:
         assert np.isfinite(contact.point).all()
         assert abs(np.linalg.norm(contact.normal) - 1) < 1e-12
-
-
-@settings(max_examples=200, deadline=None)
-@given(st.lists(st.floats(-1, 1), min_size=4, max_size=4).filter(lambda q: np.hypot(*q[:2]) > 0.1))
-def test_quaternion_helpers(values):
-    """Matrix and back, and the product, agree with each other."""
-    q = np.array(values) / np.linalg.norm(values)
-    again = quaternion_from_matrix(rotation_matrix(q))
-    assert min(np.abs(again - q).max(), np.abs(again + q).max()) < 1e-14
-    assert np.allclose(rotation_matrix(quaternion_multiply(q, again)),
-                       rotation_matrix(q) @ rotation_matrix(again), atol=1e-14)
 
 
 def test_importing_is_light():

@@ -8,7 +8,7 @@ from poses import IDENTITY
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.baselines.paper.symmetry import fold
-from box_contact_ros.solver.pose import rotation_matrix
+from box_contact_ros.scene.pose import rotation_matrix
 from box_contact_ros.training.paper_recipe import dataset
 from box_contact_ros.training.paper_recipe.dataset import (
     CONTAINER,

@@ -26,9 +26,9 @@ from typing import Any
 import numpy as np
 
 from ...scene.contact_law import GRAVITY, ContactLaw, HeldWrench, Touch
+from ...scene.pose import rotation_matrix
 from ...solver.contact import Contact
 from ...solver.contact_solver import ContactSolver
-from ...solver.pose import rotation_matrix
 from .mujoco_crane import LANDING_OVERLAP, Crane, CraneScenario
 
 __all__ = ['LandingCase', 'LandingRecord', 'LandingResult', 'cases', 'land', 'landing_scenario',

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 import viser
 
-from ...solver.pose import rotation_matrix
+from ...scene.pose import rotation_matrix
 from .style import BOX_A, BOX_B, BOX_OPACITY, CONTACT, EXACT, proportions
 from .view_log import Figures, Scene
 

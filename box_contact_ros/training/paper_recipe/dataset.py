@@ -33,7 +33,7 @@ import numpy as np
 from ...baselines.paper.symmetry import EDGE_EDGE, FEATURES, NO_FOLD, OCTANT, VERTEX_FACE
 from ...baselines.paper.symmetry import fold as fold_pairs
 from ...core import Stages, stages
-from ...solver.pose import quaternion_multiply, rotation_matrix
+from ...scene.pose import quaternion_multiply, rotation_matrix
 
 CUBE = (2.0, 2.0, 2.0)
 """The paper's boxes: cubes with edges of length 2."""
