@@ -18,7 +18,7 @@ import fcl
 import numpy as np
 
 from ..solver.contact import Contacts
-from ..solver.exact import Exact
+from ..solver.models import Exact
 
 MOST_CONTACTS = 16
 """FCL's box-box makes at most eight contacts (two rectangles cut each other in an octagon)."""

@@ -31,7 +31,7 @@ import fcl
 import numpy as np
 
 from ..solver.contact import Contacts
-from ..solver.exact import Exact
+from ..solver.models import Exact
 
 FIRST_CONTACTS = 1 << 16
 """Contacts asked for at first: two cubes exactly on top of each other make 27,400 with N = 22."""

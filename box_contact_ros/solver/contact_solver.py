@@ -13,8 +13,8 @@ from ..baselines.paper.paper_models import Paper, PaperContinuous
 from ..core import native
 from .checks import as_floats, as_size, pose_fault, shown, size_fault
 from .contact import Contact, Contacts
-from .exact import Exact
 from .mlp import Mlp
+from .models import Exact
 
 MODELS = {
     'mlp': 'SAT, and a network for the point; any sizes; constant cost; the default',

@@ -11,7 +11,7 @@ import numpy as np
 from ..core import FEATURES, OUTPUTS, native
 from ..resources import resource_path
 from .contact import Contacts
-from .exact import Exact
+from .models import Exact
 from .weights_file import Network, Weights, WeightsError, load_weights, unpacked
 
 FEATURE_NAMES = (
