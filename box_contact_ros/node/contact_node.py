@@ -37,7 +37,7 @@ from ..scene.pairing import NEVER, PAIRINGS, RESETS, StampedPose, Tick
 from ..scene.scene_file import read_scene
 from ..scene.scene_solver import Pair, Scene, SceneSolver, two_boxes
 from ..solver.checks import shown
-from ..solver.contact_solver import MODEL_NAMES, NETWORKS, check_model
+from ..solver.models import find_model, model_names
 from .diagnostics import DIAGNOSTICS_SECONDS, UNMATCHED_SECONDS, Diagnostics
 from .message_bytes import RawMessages
 from .messages import Refused, TypedMessages
@@ -50,7 +50,8 @@ SERIALIZATIONS = {'raw': RawMessages, 'typed': TypedMessages}
 
 def model(name: str, value: Any) -> str:
     """One of the models."""
-    return check_model(name, text(name, value))
+    find_model(name, text(name, value))
+    return str(value)
 
 
 CHANGES = ('total_count_change', 'current_count_change', 'not_alive_count_change')
@@ -66,8 +67,7 @@ PARAMETERS = {
     'size_b': Setting(CONTAINER, 'full extents of box B, three numbers > 0 [m]', size),
     'scene': Setting('', 'scene file (or the scene itself, as text) with boxes and pairs; replaces '
                          'size_a and size_b; set again, it is read again', text),
-    'model': Setting('mlp', f'how the contact point is found: {MODEL_NAMES}',
-                     model),
+    'model': Setting('mlp', f'how the contact point is found: {model_names()}', model),
     'weights': Setting('', 'weights file to use in place of the shipped one', text),
     'pairing': Setting('stamp', 'stamp: answer once, when poses of equal stamp are in; latest: '
                                 "answer every pose with the other boxes' last", one_of(PAIRINGS)),
@@ -230,7 +230,8 @@ class ContactNode(LifecycleNode):
         pairs = len(scene.pairs)
         topics = [subscription.topic_name for subscription in self._subscriptions_of.values()
                   ] or ['nowhere, as the node is not active']
-        if self._settings.get('weights') and self._solver.model not in NETWORKS:
+        entry, _ = find_model('model', self._solver.model)
+        if self._settings.get('weights') and not entry.reads_weights:
             self.get_logger().warning(f'model {self._solver.model!r} uses no weights: '
                                       f'{shown(self._settings["weights"])} is ignored')
         elif self._solver.model == 'mlp' and self._solver.sizes_answered_exactly:

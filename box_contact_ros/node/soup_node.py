@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..scene.scene_solver import Scene, SceneSolver
-from ..solver.contact_solver import MOST_SOUP_DIVISIONS, SOUP_DIVISIONS
+from ..solver.models import MOST_SOUP_DIVISIONS, SOUP_DIVISIONS
 from .contact_node import PARAMETERS as CONTACT_PARAMETERS
 from .contact_node import ContactNode
 from .parameters import Setting, answer_help, whole_number

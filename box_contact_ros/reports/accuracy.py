@@ -34,8 +34,9 @@ from ..scene.pose import rotation_matrix
 from ..scene.pose_sets import SETS, Pairs
 from ..solver.arguments import seed_number
 from ..solver.contact import Contacts
-from ..solver.contact_solver import MODELS, ContactSolver
+from ..solver.contact_solver import ContactSolver
 from ..solver.mlp import bounds_of, core_numbers
+from ..solver.models import MODELS
 from ..solver.weights_file import WeightsError, load_weights
 from ..training.paper_recipe import dataset
 from ..training.paper_recipe.errors import errors_of, figures, wrapped

@@ -38,7 +38,8 @@ from ..apps.crane.landing import (
 from ..output import add_out, results_folder
 from ..scene.contact_law import GRAVITY
 from ..solver.arguments import seed_number
-from ..solver.contact_solver import MODELS, ContactSolver
+from ..solver.contact_solver import ContactSolver
+from ..solver.models import MODELS
 
 matplotlib.use('Agg')
 from matplotlib import pyplot as plt  # noqa: E402

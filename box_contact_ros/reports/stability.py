@@ -20,7 +20,8 @@ import numpy as np
 
 from ..scene.pose_sets import Pairs
 from ..solver.arguments import make_folder, model_name
-from ..solver.contact_solver import MODELS, ContactSolver
+from ..solver.contact_solver import ContactSolver
+from ..solver.models import MODELS
 from ..verification.fuzz import TOUCH_ULPS
 from ..verification.hard_poses import FAMILIES, Cases, load
 from ..verification.judge import COORDINATE_ULPS, NOT_FINITE, NOT_UNIT, OUTSIDE, TOLERANCE, judge

@@ -6,15 +6,16 @@ import tempfile
 from pathlib import Path
 
 from .checks import shown
-from .contact_solver import check_model
+from .models import find_model
 
 
 def model_name(text: str) -> str:
-    """The name of a model, as a program's argument."""
+    """Return the name of a model, as a program's argument."""
     try:
-        return check_model('model', text)
+        find_model('model', text)
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from error
+    return text
 
 
 def seed_number(text: str) -> int:

@@ -1,102 +1,17 @@
 """ContactSolver: SAT first, then the contact point by the chosen model."""
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from functools import partial
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..baselines.paper.paper_models import Paper, PaperContinuous
 from ..core import native
 from .checks import as_floats, as_size, pose_fault, shown, size_fault
 from .contact import Contact, Contacts
-from .mlp import Mlp
-from .models import Exact
-
-MODELS = {
-    'mlp': 'SAT, and a network for the point; any sizes; constant cost; the default',
-    'exact': 'SAT and the exact centroid of the overlap; any sizes; the reference',
-    'paper': "the paper's network 6-20-18-4; two equal cubes, or the crane's containers",
-    'paper-continuous': "the paper's networks 6-20-17-4 on subsets without jumps; two equal cubes",
-    'fcl': "FCL's box-box, its deepest contact; any sizes; needs python-fcl; a baseline",
-    'soup': 'polygon soup on FCL, 8 divisions an edge, or N: soup-N; needs python-fcl; a baseline',
-}
-"""Models by name, with a line about each."""
-MODEL_NAMES = ', '.join([*MODELS, 'soup-N'])
-"""For those who choose."""
-NETWORKS = ('mlp', 'paper', 'paper-continuous')
-"""Models that read weights."""
-
-SOUP_DIVISIONS, MOST_SOUP_DIVISIONS = 8, 64
-"""Divisions of an edge in model `soup`, and the most that are accepted (49,152 triangles a box)."""
-
-
-class Model(Protocol):
-    """A model behind `ContactSolver`.
-
-    It may have `single`, the native model of single calls with its network, and `exact_answers`,
-    the contacts that it handed to `exact`.
-    """
-
-    def solve(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
-              threads: int = 1) -> tuple[Contacts, int]:
-        """Return the contacts of poses (n, 7) and full extents (n or 1, 3).
-
-        The number of the first row that is refused comes with them, or −1.
-        """
-
-
-def soup_divisions(name: str) -> int | None:
-    """N of a model name `soup` or `soup-N`, None for any other; ValueError for a bad N."""
-    if name == 'soup':
-        return SOUP_DIVISIONS
-    if not name.startswith('soup-'):
-        return None
-    text = name.removeprefix('soup-')
-    # Not any length: int() refuses thousands of digits in words of its own.
-    if (text.isascii() and text.isdecimal() and len(text) < 10
-            and 1 <= int(text) <= MOST_SOUP_DIVISIONS):
-        return int(text)
-    raise ValueError(f'model {shown(name)}: the divisions N of soup-N must be a whole number from '
-                     f'1 to {MOST_SOUP_DIVISIONS}')
-
-
-def check_model(where: str, name: object) -> str:
-    """The name of a model; ValueError, which begins with `where`, for what is none."""
-    if isinstance(name, str) and (name in MODELS or soup_divisions(name)):
-        return name
-    raise ValueError(f'{where} {shown(name)} is not one of: {MODEL_NAMES}')
-
-
-def make_model(name: str, size_a: np.ndarray, size_b: np.ndarray, weights: str | None) -> Model:
-    """The model of that name for boxes of full extents (1, 3); `weights` names a file or is None.
-
-    Raises ValueError for a name, sizes or weights that do not fit.
-    """
-    check_model('model', name)
-    if weights is not None and not isinstance(weights, (str, os.PathLike)):
-        raise ValueError(f'weights must be the path of a file, not {shown(weights)}')
-    if name == 'mlp':
-        return Mlp(size_a, size_b, weights)
-    if name == 'exact':
-        return Exact()
-    if name == 'paper':
-        return Paper(size_a, size_b, weights)
-    if name == 'paper-continuous':
-        return PaperContinuous(size_a, size_b, weights)
-    if name == 'fcl':
-        from ..baselines.fcl_box import FclBox  # only here: python-fcl is an extra
-
-        return FclBox()
-    divisions = soup_divisions(name)
-    if divisions:
-        from ..baselines.soup import Soup  # likewise
-
-        return Soup(divisions)
-    raise NotImplementedError(name)
+from .models import build_model
 
 
 class ContactSolver(native.PairSolver):
@@ -112,7 +27,8 @@ class ContactSolver(native.PairSolver):
     `ValueError`, with the field and the value, for anything that is not a size or a pose. A solver
     may be called from several threads.
 
-    model: one of `MODELS`, or soup-N; weights: a file to use instead of the shipped weights.
+    model: a name of the registry, `models.MODELS`.
+    weights: a file to use instead of the shipped weights.
     """
 
     def __init__(self, size_a: ArrayLike, size_b: ArrayLike, *, model: str = 'mlp',
@@ -121,7 +37,7 @@ class ContactSolver(native.PairSolver):
         self._size_b = as_size(size_b, 'size_b')
         self.model = model
         self._weights = weights
-        self._solver = make_model(model, self._size_a, self._size_b, weights)
+        self._solver = build_model(model, self._size_a, self._size_b, weights)
         single, network = getattr(self._solver, 'single', (None, None))
         # Single calls are made by the base class, in C++; it calls `converted` for the rest.
         super().__init__(single, tuple(self._size_a[0]), tuple(self._size_b[0]), network)

@@ -1,14 +1,39 @@
-"""Model `exact`: SAT and the exact centroid of the overlap, in float64. The reference."""
+"""The registry of models: what each is called, what it is for, and how it is built.
+
+A new model is a module with its class and an entry of `MODELS`. Solver, node, programs and tests
+read the table. The README's table of models is tested against it.
+"""
 from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any, Protocol
 
 import numpy as np
 
 from ..core import native
+from .checks import shown
 from .contact import Contacts
 
 
+class Model(Protocol):
+    """A model behind `ContactSolver`.
+
+    It may have `single`, the core's name of the model that answers single calls and its network,
+    and `exact_answers`, the contacts that it handed to `exact`.
+    """
+
+    def solve(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
+              threads: int = 1) -> tuple[Contacts, int]:
+        """Return the contacts of poses (n, 7) and full extents (n or 1, 3).
+
+        The number of the first row that is refused comes with them, or −1.
+        """
+
+
 class Exact:
-    """The exact model, for any sizes; see core/contact.hpp."""
+    """Model `exact`: the centroid of the overlap in float64; see core/contact.hpp."""
 
     single = 'exact', None
     """The native model of single calls, and its network."""
@@ -26,3 +51,131 @@ class Exact:
         """Return contacts for poses (n, 7), sizes (n or 1, 3), and the first refused row or −1."""
         *found, refused = self._pairs.solve(a, b, size_a, size_b, threads)
         return Contacts(*found), refused
+
+
+@dataclass(frozen=True, kw_only=True)
+class Family:
+    """Models of one entry that differ in a whole number N: `name` has the default, or `name-N`."""
+
+    argument: str
+    """The builder's name for N."""
+    default: int
+    most: int
+    """N is 1 to this."""
+
+    def parse(self, name: str, text: str) -> int:
+        """Return the N that `text` gives for the model `name`; raises ValueError for a bad one."""
+        # int() refuses thousands of digits in words of its own.
+        if (text.isascii() and text.isdecimal() and len(text) < 10
+                and 1 <= int(text) <= self.most):
+            return int(text)
+        raise ValueError(f'model {shown(f"{name}-{text}")}: the {self.argument} N of {name}-N must '
+                         f'be a whole number from 1 to {self.most}')
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModelEntry:
+    """One model, or one family of them."""
+
+    name: str
+    line: str
+    """How it finds the point, in a line."""
+    builder: str
+    """'module:function' that returns the `Model`; its module is imported when one is built."""
+    takes: tuple[str, ...] = ()
+    """The builder's keyword arguments: of size_a, size_b (1, 3), weights, and the family's."""
+    boxes: str = 'any'
+    """The boxes that it answers."""
+    extra: str = ''
+    """Extra of setup.py that brings its library."""
+    native_single: bool = False
+    """Whether single calls are answered in C++, without a conversion in Python."""
+    native_batch: bool = False
+    """Whether the rows of a batch are answered in C++."""
+    family: Family | None = None
+
+    @property
+    def reads_weights(self) -> bool:
+        """Whether the model reads a weights file."""
+        return 'weights' in self.takes
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names under which users ask for it."""
+        return (self.name, f'{self.name}-N') if self.family else (self.name,)
+
+    def options(self, name: str) -> dict[str, int] | None:
+        """Return what a name says to the builder, or None for the name of another model.
+
+        Raises ValueError for a bad number of a family.
+        """
+        if name == self.name:
+            return {self.family.argument: self.family.default} if self.family else {}
+        text = name.removeprefix(f'{self.name}-')
+        if self.family is None or text == name:
+            return None
+        return {self.family.argument: self.family.parse(self.name, text)}
+
+
+SOUP_DIVISIONS, MOST_SOUP_DIVISIONS = 8, 64
+"""Divisions of an edge in model `soup`, and the most that are accepted (49,152 triangles a box)."""
+_NEEDS = ('size_a', 'size_b', 'weights')
+_ENTRIES = (
+    ModelEntry(
+        name='mlp', line='SAT, and a network for the point; constant cost; the default',
+        builder='box_contact_ros.solver.mlp:Mlp', takes=_NEEDS,
+        native_single=True, native_batch=True),
+    ModelEntry(
+        name='exact', line='SAT and the exact centroid of the overlap; the reference',
+        builder='box_contact_ros.solver.models:Exact', native_single=True, native_batch=True),
+    ModelEntry(
+        name='paper', line="the paper's network 6-20-18-4",
+        builder='box_contact_ros.baselines.paper.paper_models:Paper', takes=_NEEDS,
+        boxes='two equal cubes, or two 40 ft containers', native_batch=True),
+    ModelEntry(
+        name='paper-continuous', line="the paper's networks 6-20-17-4 on subsets without jumps",
+        builder='box_contact_ros.baselines.paper.paper_models:PaperContinuous', takes=_NEEDS,
+        boxes='two equal cubes', native_batch=True),
+    ModelEntry(
+        name='fcl', line="FCL's box-box, its deepest contact; a baseline",
+        builder='box_contact_ros.baselines.fcl_box:FclBox', extra='soup'),
+    ModelEntry(
+        name='soup', line='polygon soup on FCL, N divisions an edge; a baseline',
+        builder='box_contact_ros.baselines.soup:Soup', takes=('divisions',), extra='soup',
+        family=Family(argument='divisions', default=SOUP_DIVISIONS, most=MOST_SOUP_DIVISIONS)),
+)
+MODELS = {entry.name: entry for entry in _ENTRIES}
+"""The models by name, in the order in which they are listed to users."""
+
+
+def model_names() -> str:
+    """Return the names of all models for help texts, separated by commas."""
+    return ', '.join(name for entry in MODELS.values() for name in entry.names)
+
+
+def find_model(where: str, name: object) -> tuple[ModelEntry, dict[str, int]]:
+    """Return the entry of a model's name, and what the name says to the builder.
+
+    Raises ValueError, which begins with `where`, for a name that no entry has.
+    """
+    for entry in MODELS.values() if isinstance(name, str) else ():
+        options = entry.options(str(name))
+        if options is not None:
+            return entry, options
+    raise ValueError(f'{where} {shown(name)} is not one of: {model_names()}')
+
+
+def build_model(name: str, size_a: np.ndarray, size_b: np.ndarray, weights: str | None) -> Model:
+    """Return the model of that name for boxes of full extents (1, 3) [m].
+
+    weights: the path of a file, or None for the shipped one.
+    Raises ValueError for a name, sizes or weights that do not fit.
+    """
+    entry, options = find_model('model', name)
+    if weights is not None and not isinstance(weights, (str, os.PathLike)):
+        raise ValueError(f'weights must be the path of a file, not {shown(weights)}')
+    given: dict[str, Any] = {'size_a': size_a, 'size_b': size_b, 'weights': weights, **options}
+    module, _, function = entry.builder.partition(':')
+    build = getattr(import_module(module), function)
+    model: Model = build(**{argument: given[argument] for argument in entry.takes})
+    return model

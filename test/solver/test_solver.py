@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from box_contact_ros import Contact, ContactSolver
 from box_contact_ros.solver.checks import pose_fault
-from box_contact_ros.solver.contact_solver import MODELS
+from box_contact_ros.solver.models import MODELS
 
 SOLVER = ContactSolver(poses.CUBE, poses.CUBE, model='exact')
 ABOVE = [0.5, 0.25, 1.875, 0, 0, 0, 1]

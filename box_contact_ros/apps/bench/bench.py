@@ -26,7 +26,8 @@ from ...node.contact_node import PARAMETERS
 from ...node.runtime import REFUSALS
 from ...solver.arguments import make_folder
 from ...solver.contact import Contacts
-from ...solver.contact_solver import MODELS, MOST_SOUP_DIVISIONS, SOUP_DIVISIONS, ContactSolver
+from ...solver.contact_solver import ContactSolver
+from ...solver.models import MOST_SOUP_DIVISIONS, SOUP_DIVISIONS, model_names
 from ..processes import DOMAINS
 from .bench_drive import Subject, about_the_machine, open_bench
 from .bench_log import (
@@ -97,7 +98,7 @@ def _options(args: Sequence[str]) -> argparse.Namespace:
     parser.add_argument('--nodes', nargs='+', choices=NODES, default=list(NODES), metavar='NODE',
                         help=f'which of: {", ".join(NODES)} (default: all)')
     parser.add_argument('--model', default=PARAMETERS['model'].default, metavar='NAME',
-                        help=f'of the contact node: {", ".join(MODELS)} (default: %(default)s)')
+                        help=f'of the contact node: {model_names()} (default: %(default)s)')
     parser.add_argument('--divisions', type=int, default=SOUP_DIVISIONS, metavar='N',
                         help='of an edge in the polygon soup (default: %(default)s)')
     parser.add_argument('--seed', type=int, default=1, metavar='N',

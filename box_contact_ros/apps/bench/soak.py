@@ -29,7 +29,8 @@ from ...node.contact_node import PARAMETERS
 from ...node.runtime import REFUSALS
 from ...solver.arguments import make_folder
 from ...solver.contact import Contacts
-from ...solver.contact_solver import MODELS, ContactSolver
+from ...solver.contact_solver import ContactSolver
+from ...solver.models import MODELS
 from ..processes import DOMAINS
 from .bench_drive import Bench, Subject, about_the_machine, open_bench
 from .bench_log import (

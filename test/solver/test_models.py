@@ -1,0 +1,102 @@
+"""The registry of models: one entry makes a model, and what is listed elsewhere is what it has."""
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import poses
+import pytest
+import yaml
+
+import box_contact_ros
+from box_contact_ros import MODELS, ContactSolver
+from box_contact_ros.solver.arguments import model_name
+from box_contact_ros.solver.models import Exact, Family, ModelEntry, find_model, model_names
+
+ROOT = Path(__file__).resolve().parents[2]
+HIGHER = np.array([0.5, 0.25, 1.875, 0, 0, 0, 1])
+
+
+class Lifted(Exact):
+    """The exact point, moved up by N mm: a model of this test's own."""
+
+    single = None, None  # what is inherited would answer single calls in C++
+
+    def __init__(self, millimetres):
+        super().__init__()
+        self.lift = 1e-3 * millimetres
+
+    def solve(self, a, b, size_a, size_b, threads=1):
+        found, refused = super().solve(a, b, size_a, size_b, threads)
+        found.point[found.colliding, 2] += self.lift
+        return found, refused
+
+
+@pytest.fixture
+def lifted(monkeypatch):
+    """The model above as an entry, which is all that it takes."""
+    monkeypatch.setitem(sys.modules, 'of_a_test', SimpleNamespace(Lifted=Lifted))
+    monkeypatch.setitem(MODELS, 'lifted', ModelEntry(
+        name='lifted', line='the exact point, lifted', builder='of_a_test:Lifted',
+        takes=('millimetres',), family=Family(argument='millimetres', default=1, most=9)))
+
+
+@pytest.mark.parametrize('name, lift', [('lifted', 1e-3), ('lifted-7', 7e-3)])
+def test_a_model_is_added_by_an_entry(lifted, name, lift):
+    """Single calls and batches answer with it, for any threads."""
+    exact, solver = (ContactSolver(poses.CUBE, poses.CUBE, model=model)
+                     for model in ('exact', name))
+    want = exact(poses.IDENTITY, HIGHER).point + (0, 0, lift)
+    assert solver(poses.IDENTITY, HIGHER).point == pytest.approx(want, abs=1e-15)
+    many = solver.batch([poses.IDENTITY] * 3, [HIGHER] * 3, threads=2)
+    assert many.point == pytest.approx(np.tile(want, (3, 1)), abs=1e-15)
+    assert model_name(name) == name
+
+
+def test_an_added_model_is_named_where_another_is_refused(lifted):
+    with pytest.raises(ValueError, match="model 'lifte' is not one of: .*, lifted, lifted-N$"):
+        ContactSolver(poses.CUBE, poses.CUBE, model='lifte')
+    with pytest.raises(ValueError, match='millimetres N of lifted-N must be a whole .* 1 to 9'):
+        ContactSolver(poses.CUBE, poses.CUBE, model='lifted-10')
+
+
+@pytest.mark.parametrize('name', MODELS)
+def test_entries_say_what_their_models_do(name):
+    """Single calls are native where the entry says so; weights are read where it says so."""
+    if MODELS[name].extra:
+        pytest.importorskip('fcl')
+    made = ContactSolver(poses.CUBE, poses.CUBE, model=name)._solver
+    assert MODELS[name].name == name and find_model('model', name)[0] is MODELS[name]
+    assert (getattr(made, 'single', (None, None))[0] is not None) == MODELS[name].native_single
+    assert hasattr(made, 'weights') == MODELS[name].reads_weights
+
+
+def test_the_readme_has_a_row_for_every_entry():
+    """Names, boxes and extra."""
+    table = (ROOT / 'README.md').read_text('utf-8').partition('\n| Model | Boxes |')[2]
+    rows = [line.strip('| ').split(' | ')
+            for line in table.partition('\n\n')[0].splitlines()[2:]]
+    assert [re.findall('`(.*?)`', names) for names, _, _ in rows] == [
+        list(entry.names) for entry in MODELS.values()]
+    for (_, boxes, point), entry in zip(rows, MODELS.values(), strict=True):
+        assert boxes == entry.boxes
+        assert re.findall('extra `(.*)`', point) == ([entry.extra] if entry.extra else [])
+
+
+def test_the_parameter_file_lists_every_name():
+    text = (ROOT / 'config' / 'contact_node.yaml').read_text('utf-8')
+    assert f'found: {model_names()}.' in text
+    assert find_model('model', yaml.safe_load(text)['/**']['ros__parameters']['model'])
+
+
+def test_the_solver_imports_no_baseline():
+    """Builders are imported when they are asked for."""
+    code = ('import sys, box_contact_ros.solver.arguments; '
+            'print([name for name in sys.modules if "baselines" in name])')
+    done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True,
+                          cwd=Path(box_contact_ros.__file__).parents[1])
+    assert done.stdout == '[]\n', done.stderr
