@@ -1,9 +1,9 @@
 # What every extension of the core offers; see binding/module.cpp.
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
-
-from ..solver.contact import Contact
+from numpy.typing import ArrayLike
 
 LENGTH_MIN: float
 LENGTH_MAX: float
@@ -23,7 +23,7 @@ compiler: str
 class PairSolver:
     def __init__(self, model: str | None, size_a: tuple[float, float, float],
                  size_b: tuple[float, float, float], network: np.ndarray | None = None) -> None: ...
-    def __call__(self, pose_a: object, pose_b: object) -> Contact: ...
+    def __call__(self, pose_a: ArrayLike, pose_b: ArrayLike) -> Any: ...
     def solve(self, poses_a: np.ndarray, poses_b: np.ndarray, sizes_a: np.ndarray,
               sizes_b: np.ndarray, threads: int, /,
               ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, int]: ...

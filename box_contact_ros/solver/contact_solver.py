@@ -3,7 +3,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -41,6 +41,9 @@ class ContactSolver(native.PairSolver):
         single, network = getattr(self._solver, 'single', (None, None))
         # Single calls are made by the base class, in C++; it calls `converted` for the rest.
         super().__init__(single, tuple(self._size_a[0]), tuple(self._size_b[0]), network)
+
+    if TYPE_CHECKING:  # the core, which does it, knows no type of ours
+        def __call__(self, pose_a: ArrayLike, pose_b: ArrayLike) -> Contact: ...
 
     def __reduce__(self) -> tuple[Callable[..., ContactSolver], tuple[Any, ...]]:
         """Pickle the arguments."""
