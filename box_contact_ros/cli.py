@@ -132,7 +132,7 @@ MODULES_OF_EXTRA = {
     'bag': ('rosbags',),
     'soup': ('fcl',),
     'view': ('viser',),
-    'train': ('torch', 'tqdm'),
+    'train': ('safetensors', 'torch', 'tqdm'),
     'report': ('matplotlib', 'tqdm'),
     'peers': ('coal', 'pybullet'),
     'fuzz': ('mpmath',),

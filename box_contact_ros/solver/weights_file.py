@@ -1,27 +1,32 @@
-"""Multilayer perceptrons: the file format of their weights.
+"""Weights files: the perceptrons of a model and its card, in the format safetensors.
 
-A weights file is `safetensors`: tensors `<network>.<layer>.weight` (outputs × inputs) and
-`<network>.<layer>.bias`, float32, layers counted from 0; hidden units are rectified, in the
-paper's networks tanh; the output is linear. Inputs and outputs are in SI units: any scaling is
-folded into the weights. The metadata entry `card` is the model card, a JSON object: name, model,
-architecture, inputs and outputs with their ranges, sizes it was trained for, data recipe and seed,
-commit, metrics, and the `sha256` of the tensors.
+A file begins with 8 bytes, the little-endian length of a JSON header. The header gives dtype, shape
+and place of each tensor, and the tensors follow without gaps. Reading it needs no library; the
+extra `train` brings the one that writes.
+
+Tensors are float32: `<network>.<layer>.weight` (outputs × inputs) and `<network>.<layer>.bias`.
+Layers are counted from 0. Hidden units are rectified, in the paper's networks tanh, and the output
+is linear. Inputs and outputs are in SI units: any scaling is folded into the weights.
+The metadata entry `card` is the model card, a JSON object with `CARD_FIELDS`.
 """
 from __future__ import annotations
 
 import hashlib
 import json
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from safetensors import SafetensorError, safe_open
-from safetensors.numpy import save
 
 CARD_FIELDS = ('name', 'model', 'architecture', 'inputs', 'outputs', 'sizes', 'data', 'seed',
                'commit', 'metrics', 'sha256')
-"""Entries that every model card has."""
+"""Entries that every model card has: `inputs` with their ranges, `sizes` it was trained for, the
+`sha256` of the tensors."""
+
+FILE_LIMIT = 2**24
+"""Bytes of the largest file that is read, header and tensors: a thousand times what is shipped."""
 
 WEIGHT_LIMIT = 1e4
 """Largest weight a loader believes: trained weights stay below 1e2, a flipped exponent bit does
@@ -53,7 +58,7 @@ class WeightsError(ValueError):
 
 
 def tensors_digest(tensors: dict[str, np.ndarray]) -> str:
-    """SHA-256 over names, shapes and bytes of the tensors, in the order of their names."""
+    """Return the SHA-256 over names, shapes and bytes of tensors, in the order of their names."""
     digest = hashlib.sha256()
     for name in sorted(tensors):
         array = np.ascontiguousarray(tensors[name], dtype='<f4')
@@ -65,6 +70,8 @@ def tensors_digest(tensors: dict[str, np.ndarray]) -> str:
 def save_weights(path: Path, networks: dict[str, list[tuple[np.ndarray, np.ndarray]]],
                  card: dict[str, Any]) -> None:
     """Write networks, each a list of (weight, bias) per layer, and their model card."""
+    from safetensors.numpy import save  # only here: it is an extra
+
     tensors = {}
     for name, layers in networks.items():
         for number, (weight, bias) in enumerate(layers):
@@ -79,47 +86,77 @@ def save_weights(path: Path, networks: dict[str, list[tuple[np.ndarray, np.ndarr
     path.write_bytes(save(tensors, metadata={'card': json.dumps(card, ensure_ascii=False)}))
 
 
+def read_tensors(data: bytes) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+    """Return the tensors and the metadata of a safetensors file's bytes.
+
+    Raises ValueError, TypeError or LookupError for bytes that are none, and for other numbers than
+    float32.
+    """
+    start = 8 + int.from_bytes(data[:8], 'little')
+    header = json.loads(data[8:start].decode('utf-8'))
+    metadata = header.pop('__metadata__', {})
+    tensors, place = {}, start
+    for name, entry in sorted(header.items(), key=lambda item: item[1]['data_offsets']):
+        shape, (begin, end) = entry['shape'], entry['data_offsets']
+        if entry['dtype'] != 'F32':
+            raise ValueError(f'{name} is {entry["dtype"]}, not F32')
+        if start + begin != place or end - begin != 4 * math.prod(shape):
+            raise ValueError(f'{name} has no place of its own')
+        # NumPy refuses shapes and places that are not whole numbers within the data.
+        tensors[name] = np.ndarray(shape, '<f4', data, place).astype(np.float32)
+        place = start + end
+    if place != len(data):
+        raise ValueError('it does not end with the last tensor')
+    return tensors, metadata
+
+
 def load_weights(path: Path | str) -> Weights:
     """Read and check a weights file; raises `WeightsError` that says what is wrong with it."""
     path = Path(path)
     try:
-        if path.exists() and not path.is_file():
-            raise OSError('it is no regular file')  # opening a FIFO would wait for its writer
-        with safe_open(path, framework='numpy') as file:
-            metadata = file.metadata() or {}
-            tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
+        return _checked(path, *read_tensors(_read(path)))
     except FileNotFoundError as error:
         raise WeightsError(f'weights file {path} does not exist') from error
-    except (SafetensorError, OSError, ValueError, TypeError, AttributeError) as error:
-        # The last two are what number types that NumPy lacks (bfloat16, float8) end in.
+    except WeightsError:
+        raise
+    except (OSError, ValueError, TypeError, LookupError, AttributeError, RecursionError) as error:
         raise WeightsError(f'weights file {path} cannot be read: {error}') from error
+
+
+def _read(path: Path) -> bytes:
+    if path.exists() and not path.is_file():
+        raise OSError('it is no regular file')  # opening a FIFO would wait for its writer
+    with path.open('rb') as file:
+        data = file.read(FILE_LIMIT + 1)
+    if len(data) > FILE_LIMIT:
+        raise ValueError(f'it is larger than {FILE_LIMIT} bytes')
+    return data
+
+
+def _checked(path: Path, tensors: dict[str, np.ndarray], metadata: dict[str, Any]) -> Weights:
+    """Return the weights of a file, or raise `WeightsError`."""
     try:
         card = json.loads(metadata['card'])
-        if not isinstance(card, dict):
-            raise TypeError('the card is no JSON object')
-        missing = [field for field in CARD_FIELDS if field not in card]
-    except (KeyError, TypeError, ValueError, RecursionError) as error:
+        missing = [field for field in CARD_FIELDS if field not in card.keys()]
+    except (LookupError, TypeError, ValueError, AttributeError, RecursionError) as error:
         raise WeightsError(f'weights file {path} has no readable model card') from error
     if missing:
         raise WeightsError(f'weights file {path}: the model card lacks {", ".join(missing)}')
     if not isinstance(card['inputs'], dict):
         raise WeightsError(f'weights file {path}: inputs of the model card is no object')
     for name, array in tensors.items():
-        if array.dtype != np.float32:
-            raise WeightsError(f'weights file {path}: {name} is {array.dtype}, not float32')
-        if not np.all(np.isfinite(array)) or np.any(np.abs(array) > WEIGHT_LIMIT):
+        if not np.all(np.abs(array) <= WEIGHT_LIMIT):  # nor is NaN
             raise WeightsError(
                 f'weights file {path}: {name} holds values that are not finite or beyond '
                 f'±{WEIGHT_LIMIT:g}')
     if tensors_digest(tensors) != card['sha256']:
         raise WeightsError(f'weights file {path}: checksum differs from its model card')
-    networks = {}
-    for name in sorted({key.split('.')[0] for key in tensors}):
-        networks[name] = _pack(name, tensors, path)
-        if list(networks[name].widths) != card['architecture']:
-            raise WeightsError(
-                f'weights file {path}: {name} is {networks[name].widths}, the model card says '
-                f'{card["architecture"]}')
+    networks = {name: _pack(name, tensors, path)
+                for name in sorted({key.split('.')[0] for key in tensors})}
+    for name, network in networks.items():
+        if list(network.widths) != card['architecture']:
+            raise WeightsError(f'weights file {path}: {name} is {network.widths}, the model card '
+                               f'says {card["architecture"]}')
     if not networks:
         raise WeightsError(f'weights file {path} holds no network')
     return Weights(path, networks, card)
@@ -144,7 +181,7 @@ def _pack(name: str, tensors: dict[str, np.ndarray], path: Path) -> Network:
 
 
 def unpacked(network: Network) -> list[tuple[np.ndarray, np.ndarray]]:
-    """(weight (outputs, inputs), bias (outputs,)) of every layer."""
+    """Return (weight (outputs, inputs), bias (outputs,)) of every layer."""
     layers, place = [], 0
     for inputs, outputs in zip(network.widths, network.widths[1:]):
         end = place + inputs * outputs

@@ -2,11 +2,14 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from safetensors.numpy import load_file, save_file
+from safetensors import SafetensorError, safe_open
+from safetensors.numpy import load, load_file, save_file
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.baselines.paper import _networks
@@ -14,8 +17,10 @@ from box_contact_ros.reports import paper_tables
 from box_contact_ros.resources import resource_path
 from box_contact_ros.solver.weights_file import (
     CARD_FIELDS,
+    FILE_LIMIT,
     WeightsError,
     load_weights,
+    read_tensors,
     save_weights,
     tensors_digest,
 )
@@ -138,7 +143,7 @@ def test_values_no_training_gives(tmp_path: Path, value: float) -> None:
     ({'n.1.weight': None, 'n.1.bias': None}, 'belong to no layer'),
     ({'n.4.bias': np.zeros(4, dtype=np.float32)}, 'belong to no layer'),
     ({'odd': np.zeros(0, dtype=np.float32)}, 'belong to no layer'),
-    ({'n.0.bias': np.zeros(5)}, 'is float64, not float32'),
+    ({'n.0.bias': np.zeros(5)}, 'is F64, not F32'),
 ])
 def test_shapes_that_are_no_network(tmp_path: Path, change: dict, message: str) -> None:
     content = {**tensors(), **change}
@@ -189,7 +194,7 @@ def test_incomplete_card(tmp_path: Path) -> None:
 
 
 def test_number_types_that_numpy_lacks(good: Path) -> None:
-    """bfloat16 in the header ends in a TypeError within safetensors."""
+    """Such as bfloat16."""
     content = good.read_bytes()
     end = 8 + int.from_bytes(content[:8], 'little')
     header = json.loads(content[8:end])
@@ -198,6 +203,99 @@ def test_number_types_that_numpy_lacks(good: Path) -> None:
     good.write_bytes(len(text).to_bytes(8, 'little') + text + content[end:])
     with pytest.raises(WeightsError, match='cannot be read'):
         load_weights(good)
+
+
+# --- the reader beside the library ----------------------------------------------------------------
+
+
+@pytest.mark.parametrize('path', sorted(resource_path('weights').iterdir()), ids=lambda p: p.stem)
+def test_the_reader_reads_what_the_library_reads(path: Path) -> None:
+    """Every shipped file: names, shapes, bits and metadata."""
+    found, metadata = read_tensors(path.read_bytes())
+    want = load_file(path)
+    assert set(found) == set(want)
+    for name, array in want.items():
+        assert found[name].dtype == array.dtype and found[name].shape == array.shape
+        assert found[name].tobytes() == array.tobytes()
+    with safe_open(path, framework='numpy') as file:
+        assert metadata == file.metadata()
+
+
+def with_header(content: bytes, change: Callable[[dict[str, Any]], object] | str) -> bytes:
+    """A file whose header is changed, or is this text."""
+    end = 8 + int.from_bytes(content[:8], 'little')
+    if isinstance(change, str):
+        text = change.encode()
+    else:
+        header = json.loads(content[8:end])
+        change(header)
+        text = json.dumps(header).encode()
+    return len(text).to_bytes(8, 'little') + text + content[end:]
+
+
+BAD_HEADERS = {
+    'no JSON': '{"n.0.bias"', 'no object': '[1, 2]', 'a number': '3', 'nothing': '',
+    'nested deeply': '[' * 100_000,
+    'no field': lambda header: header['n.0.bias'].pop('shape'),
+    'no entry': lambda header: header.update({'n.0.bias': 4}),
+    'overlap': lambda header: header['n.0.bias'].update(data_offsets=[4, 24]),
+    'a hole': lambda header: header.pop('n.0.bias'),
+    'reversed': lambda header: header['n.0.bias'].update(data_offsets=[20, 0]),
+    'negative': lambda header: header['n.0.bias'].update(data_offsets=[-20, 0]),
+    'negative shape': lambda header: header['n.0.bias'].update(shape=[-5]),
+    'two negative ones': lambda header: header['n.0.weight'].update(shape=[-5, -6]),
+    'fractions': lambda header: header['n.0.bias'].update(shape=[5.0]),
+    'truth': lambda header: header['n.0.bias'].update(shape=[5, True]),
+    'beyond 64 bits': lambda header: header['n.0.bias'].update(shape=[0, 2**70]),
+    'another size': lambda header: header['n.0.bias'].update(shape=[6]),
+    'three offsets': lambda header: header['n.0.bias'].update(data_offsets=[0, 20, 40]),
+    'another kind': lambda header: header['n.0.bias'].update(dtype='F64'),
+    'beyond the end': lambda header: header.update(
+        {'z': {'dtype': 'F32', 'shape': [1], 'data_offsets': [276, 280]}}),
+}
+
+
+@pytest.mark.parametrize('change', BAD_HEADERS.values(), ids=BAD_HEADERS)
+def test_bad_headers(good: Path, change: Callable[[dict[str, Any]], object] | str) -> None:
+    """The library refuses them, too."""
+    good.write_bytes(with_header(good.read_bytes(), change))
+    with pytest.raises(WeightsError, match='cannot be read'):
+        load_weights(good)
+    with pytest.raises(SafetensorError):
+        load_file(good)
+
+
+@pytest.mark.parametrize('tail', [b'x', b'four'])
+def test_nothing_stands_after_the_tensors(good: Path, tail: bytes) -> None:
+    good.write_bytes(good.read_bytes() + tail)
+    with pytest.raises(WeightsError, match='does not end with the last tensor'):
+        load_weights(good)
+
+
+def test_a_file_of_any_size_is_not_read(good: Path) -> None:
+    """Sparse, so that the test is quick."""
+    with good.open('ab') as file:
+        file.truncate(FILE_LIMIT + 1)
+    with pytest.raises(WeightsError, match='larger than'):
+        load_weights(good)
+
+
+def test_every_edited_byte_of_the_header(good: Path) -> None:
+    """What is still read is what the library reads."""
+    content = good.read_bytes()
+    read = 0
+    for place in range(8 + int.from_bytes(content[:8], 'little')):
+        edited = bytearray(content)
+        edited[place] ^= 1 << place % 7
+        try:
+            found, _ = read_tensors(bytes(edited))
+        except (ValueError, TypeError, LookupError, AttributeError):
+            continue
+        want = load(bytes(edited))
+        assert {name: array.tobytes() for name, array in found.items()} == {
+            name: array.tobytes() for name, array in want.items()}
+        read += 1
+    assert read > 100  # a letter of the card or of a name
 
 
 def test_no_file(tmp_path: Path) -> None:
