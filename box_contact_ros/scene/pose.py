@@ -30,26 +30,3 @@ def quaternion_multiply(p: np.ndarray, q: np.ndarray) -> np.ndarray:
                      pw * qy - px * qz + py * qw + pz * qx,
                      pw * qz + px * qy - py * qx + pz * qw,
                      pw * qw - px * qx - py * qy - pz * qz], axis=-1)
-
-
-def quaternion_from_matrix(matrix: np.ndarray) -> np.ndarray:
-    """Return unit quaternions (..., 4) xyzw of rotation matrices (..., 3, 3).
-
-    The largest component is positive. Of the four classical formulas the best conditioned is taken
-    (Shepperd 1978).
-    """
-    m = np.asarray(matrix, dtype=np.float64)
-    diagonal = np.stack([m[..., 0, 0], m[..., 1, 1], m[..., 2, 2]], axis=-1)
-    trace = diagonal.sum(axis=-1, keepdims=True)
-    # 4 q qᵀ, whose row of the largest diagonal entry is that component times 4 q.
-    outer = np.empty((*m.shape[:-2], 4, 4))
-    for i in range(3):
-        for j in range(3):
-            outer[..., i, j] = m[..., i, j] + m[..., j, i]
-        outer[..., i, i] = 1.0 + 2.0 * diagonal[..., i] - trace[..., 0]
-        j, k = (i + 1) % 3, (i + 2) % 3
-        outer[..., i, 3] = outer[..., 3, i] = m[..., k, j] - m[..., j, k]
-    outer[..., 3, 3] = 1.0 + trace[..., 0]
-    best = np.argmax(np.diagonal(outer, axis1=-2, axis2=-1), axis=-1)
-    row = np.take_along_axis(outer, best[..., None, None], axis=-2)[..., 0, :]
-    return row / np.linalg.norm(row, axis=-1, keepdims=True)

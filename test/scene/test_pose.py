@@ -2,18 +2,27 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from box_contact_ros.scene.pose import quaternion_from_matrix, quaternion_multiply, rotation_matrix
+from box_contact_ros.scene.pose import quaternion_multiply, rotation_matrix
+
+quaternions = st.lists(st.floats(-1, 1), min_size=4, max_size=4).filter(
+    lambda q: np.hypot(*q[:2]) > 0.1).map(np.array)
 
 
 @settings(max_examples=200, deadline=None)
-@given(st.lists(st.floats(-1, 1), min_size=4, max_size=4).filter(lambda q: np.hypot(*q[:2]) > 0.1))
-def test_quaternion_helpers(values):
-    """Matrix and back, and the product, agree with each other."""
-    q = np.array(values) / np.linalg.norm(values)
-    again = quaternion_from_matrix(rotation_matrix(q))
-    assert min(np.abs(again - q).max(), np.abs(again + q).max()) < 1e-14
-    assert np.allclose(rotation_matrix(quaternion_multiply(q, again)),
-                       rotation_matrix(q) @ rotation_matrix(again), atol=1e-14)
+@given(quaternions, quaternions)
+def test_products(p, q):
+    """A product of quaternions is the product of their rotation matrices, of any length."""
+    matrix = rotation_matrix(q)
+    assert np.allclose(matrix @ matrix.T, np.eye(3), atol=1e-14)
+    assert np.linalg.det(matrix) == pytest.approx(1.0)
+    assert np.allclose(rotation_matrix(quaternion_multiply(p, q)), rotation_matrix(p) @ matrix,
+                       atol=1e-14)
+
+
+def test_a_quarter_about_z_turns_x_to_y():
+    assert rotation_matrix([0, 0, 1, 1]) @ (1, 0, 0) == pytest.approx([0, 1, 0])
+    assert np.array_equal(rotation_matrix([0, 0, -1, -1]), rotation_matrix([0, 0, 1, 1]))
