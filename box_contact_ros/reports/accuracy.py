@@ -32,7 +32,7 @@ from ..output import add_out, processor, results_folder, versions
 from ..resources import resource_path
 from ..scene.pose import rotation_matrix
 from ..scene.pose_sets import SETS, Pairs
-from ..solver.arguments import seed_number
+from ..solver.arguments import check_ranges, seed_number
 from ..solver.contact import Contacts
 from ..solver.contact_solver import ContactSolver
 from ..solver.mlp import bounds_of, core_numbers
@@ -450,8 +450,7 @@ def main(args: Sequence[str] | None = None) -> int:
                         help='of the sets, default: %(default)s')
     add_out(parser, 'accuracy.md, accuracy.csv, accuracy.png')
     options = parser.parse_args(args)
-    if options.pairs < 1:
-        parser.error('--pairs must be at least 1')
+    check_ranges(parser, options, pairs=(1, None))
     options.out = results_folder(parser, options)
     count = min(options.pairs, QUICK_PAIRS) if options.quick else options.pairs
     try:

@@ -1,7 +1,8 @@
-"""Arguments that several programs have in common."""
+"""Arguments of programs, and how they are refused: models, seeds, numbers, output folders."""
 from __future__ import annotations
 
 import argparse
+import math
 import tempfile
 from pathlib import Path
 
@@ -19,10 +20,23 @@ def model_name(text: str) -> str:
 
 
 def seed_number(text: str) -> int:
-    """A seed of random numbers, as a program's argument: a whole number from 0."""
+    """Return a seed of random numbers, as a program's argument: a whole number from 0."""
     if not text.isascii() or not text.isdecimal() or len(text) > 18:
         raise argparse.ArgumentTypeError(f'{shown(text)} is no whole number from 0')
     return int(text)
+
+
+def check_ranges(parser: argparse.ArgumentParser, options: argparse.Namespace,
+                 **ranges: tuple[float, float | None]) -> None:
+    """Refuse numbers outside their ranges (low, high or None); options that are None are not set.
+
+    parser: reports the refusal and ends the program.
+    """
+    for name, (low, high) in ranges.items():
+        value = getattr(options, name)
+        if value is not None and not low <= value <= (math.inf if high is None else high):
+            limits = f'be at least {low}' if high is None else f'lie in {low} to {high}'
+            parser.error(f'--{name} must {limits}, got {value}')
 
 
 def make_folder(parser: argparse.ArgumentParser, folder: Path) -> Path:

@@ -21,7 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..solver.arguments import make_room, model_name, seed_number
+from ..solver.arguments import check_ranges, make_room, model_name, seed_number
 from ..solver.contact_solver import ContactSolver
 from .judge import GATES, exact_gap, judge
 
@@ -377,9 +377,7 @@ def main(args: Sequence[str] | None = None) -> int:
     parser.add_argument('--workers', type=int, default=os.cpu_count() or 1, help='processes')
     parser.add_argument('--out', type=Path, metavar='FILE', help='CSV with the tallies')
     options = parser.parse_args(args)
-    for name in ('pairs', 'workers'):
-        if getattr(options, name) < 1:
-            parser.error(f'--{name} must be at least 1')
+    check_ranges(parser, options, pairs=(1, None), workers=(1, None))
     if options.out:
         make_room(parser, options.out)
     began = time.monotonic()

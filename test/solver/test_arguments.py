@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import importlib
 
 import pytest
@@ -47,3 +48,16 @@ def test_folders_are_made(tmp_path):
     assert not list((tmp_path / 'a' / 'b').iterdir())
     assert arguments.make_room(parser, tmp_path / 'c' / 'file').parent.is_dir()
     assert not list((tmp_path / 'c').iterdir())
+
+
+@pytest.mark.parametrize('value, limits, words', [
+    (0, (1, None), '--count must be at least 1, got 0'),
+    (9, (1, 8.5), '--count must lie in 1 to 8.5, got 9'),
+    (float('nan'), (1, None), 'at least 1'),
+    (1, (1, 1), None), (None, (1, 1), None)])
+def test_ranges(value, limits, words, capsys):
+    """The limits are within; an option that was not given is not refused."""
+    parser = argparse.ArgumentParser()
+    with pytest.raises(SystemExit) if words else contextlib.nullcontext():
+        arguments.check_ranges(parser, argparse.Namespace(count=value), count=limits)
+    assert (words or '') in capsys.readouterr().err

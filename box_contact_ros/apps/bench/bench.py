@@ -24,7 +24,7 @@ from tqdm import tqdm
 
 from ...node.contact_node import PARAMETERS
 from ...node.runtime import REFUSALS
-from ...solver.arguments import make_folder
+from ...solver.arguments import check_ranges, make_folder
 from ...solver.contact import Contacts
 from ...solver.contact_solver import ContactSolver
 from ...solver.models import MOST_SOUP_DIVISIONS, SOUP_DIVISIONS, model_names
@@ -123,11 +123,8 @@ def _options(args: Sequence[str]) -> argparse.Namespace:
             parser.error('--size-a and --size-b are of a --replay: streams have their sizes')
         if options.duration is None:
             options.duration = SECONDS
-    for name, low, high in (('rate', 1.0, 4000.0), ('duration', 0.1, LONGEST),
-                            ('divisions', 1, MOST_SOUP_DIVISIONS), ('seed', 0, 2**32)):
-        value = getattr(options, name)
-        if value is not None and not low <= value <= high:
-            parser.error(f'--{name} must lie in {low:g} to {high:g}, got {value}')
+    check_ranges(parser, options, rate=(1, 4000), duration=(0.1, LONGEST),
+                 divisions=(1, MOST_SOUP_DIVISIONS), seed=(0, 2**32), domain=(0, DOMAINS[-1]))
     options.streams = [name for name in STREAMS if name in options.streams and not options.replay]
     options.nodes = [name for name in NODES if name in options.nodes]
     if options.quick:
@@ -135,8 +132,6 @@ def _options(args: Sequence[str]) -> argparse.Namespace:
         options.duration = min(options.duration or quick, quick)
     if options.domain is None:
         options.domain = random.choice(DOMAINS)
-    if not 0 <= options.domain <= DOMAINS[-1]:
-        parser.error(f'--domain must lie in 0 to {DOMAINS[-1]}, got {options.domain}')
     make_folder(parser, options.out)
     return options
 

@@ -27,7 +27,7 @@ from rclpy.utilities import remove_ros_args
 
 from ...node.contact_node import PARAMETERS
 from ...node.runtime import REFUSALS
-from ...solver.arguments import make_folder
+from ...solver.arguments import check_ranges, make_folder
 from ...solver.contact import Contacts
 from ...solver.contact_solver import ContactSolver
 from ...solver.models import MODELS
@@ -157,10 +157,8 @@ def _options(args: Sequence[str]) -> argparse.Namespace:
     parser.add_argument('--domain', type=int, default=random.choice(DOMAINS), metavar='ID',
                         help=f'ROS domain, 0 to {DOMAINS[-1]} (default: drawn at random)')
     options = parser.parse_args(list(args))
-    for name, low, high in (('minutes', 0.02, 24 * 60), ('rate', 1.0, 4000.0),
-                            ('domain', 0, DOMAINS[-1])):
-        if not low <= getattr(options, name) <= high:
-            parser.error(f'--{name} must lie in {low:g} to {high:g}, got {getattr(options, name)}')
+    check_ranges(parser, options, minutes=(0.02, 24 * 60), rate=(1, 4000),
+                 domain=(0, DOMAINS[-1]))
     make_folder(parser, options.out)
     options.seconds = 2.0 if options.quick else 60.0 * options.minutes
     return options

@@ -29,6 +29,7 @@ from rclpy.utilities import remove_ros_args
 
 from ...node.contact_node import PARAMETERS
 from ...node.runtime import REFUSALS, make_executor
+from ...solver.arguments import check_ranges
 from ..crane.mujoco_crane import CONTAINER_40FT
 from ..processes import DOMAINS, Stop, asked_to_end, end, on_this_host, start
 from .view_node import ViewNode
@@ -237,11 +238,8 @@ def _options(args: Sequence[str]) -> argparse.Namespace:
         PARAMETERS['model'].check('--model', options.model)
     except ValueError as error:
         parser.error(str(error))
-    for name, low, high in (('rate', 20, 1000), ('seed', 0, 2**31), ('port', 1, 65535)):
-        if not low <= getattr(options, name) <= high:
-            parser.error(f'--{name} must lie in {low} to {high}, got {getattr(options, name)}')
+    check_ranges(parser, options, rate=(20, 1000), seed=(0, 2**31), port=(1, 65535),
+                 domain=(0, DOMAINS[-1]))
     if options.domain is None and not options.attach:
         options.domain = random.choice(DOMAINS)
-    if options.domain is not None and not 0 <= options.domain <= DOMAINS[-1]:
-        parser.error(f'--domain must lie in 0 to {DOMAINS[-1]}, got {options.domain}')
     return options
