@@ -1,18 +1,17 @@
 """The programs of this package, and the one way in which all of them are started.
 
-A program can be started in three ways, which behave alike because all three end in `run`:
+A program starts in three ways, which all end in `run`:
 
 - `ros2 run box_contact_ros PROGRAM`   an entry point in lib/box_contact_ros (built with colcon)
 - `box_contact_PROGRAM`                an entry point in bin/ (installed with pip)
 - `python -m box_contact_ros PROGRAM`
 
-`PROGRAMS` is the only list of them. setup.py loads this file by its path, at a time when nothing
-but the standard library can be relied on, so import nothing else at the top of it.
+`PROGRAMS` is the only list of them. setup.py loads this file by its path before anything is
+installed: its top imports the standard library alone.
 
-A program is a function `main(args=None) -> int` that returns the exit status. `args` is what
-stands after the program's name, in the manner of `sys.argv[1:]` (without the name), unchanged:
-`rclpy.init(args=args)` finds `--ros-args ...` in it, and `rclpy.utilities.remove_ros_args(args)`
-gives what is left for argparse.
+A program is a function `main(args=None) -> int` that returns the exit status. `args` are the words
+after the program's name, unchanged. `rclpy.init(args=args)` finds `--ros-args ...` in them, and
+`rclpy.utilities.remove_ros_args(args)` leaves the rest for argparse.
 """
 
 from __future__ import annotations
@@ -37,97 +36,48 @@ class Program:
     extras: tuple[str, ...]
 
 
+def _program(module: str, extras: str, description: str) -> Program:
+    return Program(f'box_contact_ros.{module}:main', description, tuple(extras.split()))
+
+
 PROGRAMS = {
-    'contact_node': Program(
-        'box_contact_ros.node.contact_node:main',
-        'the ROS 2 node: two box poses in, contact point and normal out',
-        ('ros',),
-    ),
-    'crane': Program(
-        'box_contact_ros.apps.crane.crane_node:main',
-        'a MuJoCo crane that lowers one container onto another and publishes both poses',
-        ('ros', 'sim'),
-    ),
-    'soup_node': Program(
-        'box_contact_ros.node.soup_node:main',
-        'the same node on a polygon soup, under soup/: what the source paper compares with',
-        ('ros', 'soup'),
-    ),
-    'view': Program(
-        'box_contact_ros.apps.viewer.view:main',
-        'a page in the browser: the crane, the boxes, the contact and its figures, live',
-        ('ros', 'sim', 'view'),
-    ),
-    'markers': Program(
-        'box_contact_ros.apps.viewer.markers:main',
-        'draw boxes and contacts as markers for RViz',
-        ('ros',),
-    ),
-    'bench': Program(
-        'box_contact_ros.apps.bench.bench:main',
-        'drive contact, soup and echo node with streams of poses: latency, losses, errors',
-        ('ros', 'sim', 'soup', 'report'),
-    ),
-    'record': Program(
-        'box_contact_ros.apps.recording.record:main',
-        'write poses and contacts of running nodes to a bag (MCAP) for Foxglove and ros2 bag',
-        ('ros', 'bag'),
-    ),
-    'soak': Program(
-        'box_contact_ros.apps.bench.soak:main',
-        'ten minutes at 1 kHz: losses, mispairs, memory, latency beside echo nodes',
-        ('ros', 'sim', 'report'),
-    ),
-    'train': Program(
-        'box_contact_ros.training.train:main',
-        'make the data sets, fit the networks, write weights/',
-        ('train',),
-    ),
-    'search': Program(
-        'box_contact_ros.training.experiments.search:main',
-        'train thousands of networks at once to find the size and settings that they should have',
-        ('train', 'report'),
-    ),
-    'accuracy': Program(
-        'box_contact_ros.reports.accuracy:main',
-        'point error of a model against the exact one, per set of poses and contact class',
-        ('report',),
-    ),
-    'frontier': Program(
-        'box_contact_ros.reports.frontier:main',
-        'speed against error of every model and of the engines beside them, as table and picture',
-        ('report',),
-    ),
-    'fuzz': Program(
-        'box_contact_ros.verification.fuzz:main',
-        'millions of random pairs, judged by an independent test; gates at zero',
-        ('report', 'fuzz'),
-    ),
-    'stability': Program(
-        'box_contact_ros.reports.stability:main',
-        'what each model makes of families of hard poses',
-        ('report', 'soup'),
-    ),
-    'paper': Program(
-        'box_contact_ros.reports.paper_tables:main',
-        "redo the source paper's tables, its figures beside ours",
-        ('report',),
-    ),
+    'contact_node': _program('node.contact_node', 'ros',
+        'the ROS 2 node: two box poses in, contact point and normal out'),
+    'crane': _program('apps.crane.crane_node', 'ros sim',
+        'a MuJoCo crane that lowers one container onto another and publishes both poses'),
+    'soup_node': _program('node.soup_node', 'ros soup',
+        'the same node on a polygon soup, under soup/: what the source paper compares with'),
+    'view': _program('apps.viewer.view', 'ros sim view',
+        'a page in the browser: the crane, the boxes, the contact and its figures, live'),
+    'markers': _program('apps.viewer.markers', 'ros',
+        'draw boxes and contacts as markers for RViz'),
+    'bench': _program('apps.bench.bench', 'ros sim soup report',
+        'drive contact, soup and echo node with streams of poses: latency, losses, errors'),
+    'record': _program('apps.recording.record', 'ros bag',
+        'write poses and contacts of running nodes to a bag (MCAP) for Foxglove and ros2 bag'),
+    'soak': _program('apps.bench.soak', 'ros sim report',
+        'ten minutes at 1 kHz: losses, mispairs, memory, latency beside echo nodes'),
+    'train': _program('training.train', 'train',
+        'make the data sets, fit the networks, write weights/'),
+    'search': _program('training.experiments.search', 'train report',
+        'train thousands of networks at once to find the size and settings that they should have'),
+    'accuracy': _program('reports.accuracy', 'report',
+        'point error of a model against the exact one, per set of poses and contact class'),
+    'frontier': _program('reports.frontier', 'report',
+        'speed against error of every model and of the engines beside them, as table and picture'),
+    'fuzz': _program('verification.fuzz', 'report fuzz',
+        'millions of random pairs, judged by an independent test; gates at zero'),
+    'stability': _program('reports.stability', 'report soup',
+        'what each model makes of families of hard poses'),
+    'paper': _program('reports.paper_tables', 'report',
+        "redo the source paper's tables, its figures beside ours"),
 }
 
 # What each extra brings, by top-level module. A module that is missing and not listed here is a
 # fault of the package, not of the user's installation, and keeps its traceback.
 MODULES_OF_EXTRA = {
-    'ros': (
-        'rclpy',
-        'builtin_interfaces',
-        'diagnostic_msgs',
-        'geometry_msgs',
-        'rcl_interfaces',
-        'sensor_msgs',
-        'std_msgs',
-        'visualization_msgs',
-    ),
+    'ros': ('rclpy', 'builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs', 'rcl_interfaces',
+            'sensor_msgs', 'std_msgs', 'visualization_msgs'),
     'sim': ('mujoco', 'rich'),
     'bag': ('rosbags',),
     'soup': ('fcl',),
@@ -142,8 +92,8 @@ MODULES_OF_EXTRA = {
 def run(name: str, args: Sequence[str]) -> int:
     """Start program `name` with the arguments after its name; return its exit status.
 
-    A module that is missing because an extra was not installed is answered with one line on stderr
-    and status 1; a name that is no program with one line and status 2, as argparse does.
+    A module of an extra that is not installed gives one line on stderr and status 1. An unknown
+    name gives one line and status 2, as argparse does.
     """
     if name not in PROGRAMS:
         print(_unknown(name), file=sys.stderr)
@@ -174,27 +124,22 @@ def run(name: str, args: Sequence[str]) -> int:
 
 
 def reader_is_gone() -> int:
-    """The status of a program whose output nobody reads to the end, such as `| head`.
-
-    What is left of it goes nowhere.
-    """
+    """Return the status of a program whose output has no reader left, as in `| head`."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return 141  # what a shell reports for a program ended by SIGPIPE
 
 
 SHARED_MEMORY = '/dev/shm'
 LEAST_ROOM = 64 * 2**10
-"""Bytes: ROS 2's libraries write some pages of shared memory as they are loaded (for tracing), and
-where there are none they are killed by SIGBUS."""
+"""Bytes: ROS 2's libraries write pages of shared memory as they load, or die by SIGBUS."""
 USUAL_ROOM = 4 * 2**20
-"""Bytes: Fast DDS allocates 0.7 MB as a process joins, or is killed in the same way. What it has,
-it keeps: shared memory that fills up later does no harm."""
+"""Bytes: Fast DDS allocates 0.7 MB as a process joins, or dies in the same way."""
 TRANSPORTS = 'FASTDDS_BUILTIN_TRANSPORTS'
 """Environment variable of Fast DDS."""
 
 
 def _shared_memory_has_room() -> bool:
-    """Whether ROS 2 can start; where there is little room, Fast DDS is told to do without."""
+    """Return whether ROS 2 can start; where there is little room, Fast DDS goes without."""
     try:
         disk = os.statvfs(SHARED_MEMORY)
     except (AttributeError, OSError):  # another system
@@ -237,8 +182,8 @@ def _from_command_line(name: str) -> int:
     return run(name, sys.argv[1:])
 
 
-# What the console scripts call. A generated script can pass no arguments, so there is a callable
-# per program; the name does not come from sys.argv[0], which a link or a copy would change.
+# What the console scripts call, a callable for each program: a generated script passes no arguments,
+# and a link or a copy changes sys.argv[0].
 start = SimpleNamespace(
     **{name: functools.partial(_from_command_line, name) for name in PROGRAMS}
 )
