@@ -16,7 +16,7 @@ import yaml
 
 from ..resources import resource_path
 from ..solver.checks import shown
-from .scene_solver import Box, Pair, Scene, faults
+from .scene_solver import Box, Pair, Place, Scene, dotted, faults
 
 LARGEST_FILE = 16 * 2**20
 """Bytes that are read at most; some 100,000 pairs."""
@@ -30,7 +30,6 @@ class _Loader(getattr(yaml, 'CSafeLoader', yaml.SafeLoader)):  # type: ignore[mi
 
 _Loader.add_implicit_resolver('tag:yaml.org,2002:float',
                               re.compile(r'[-+]?\d+(\.\d*)?[eE][-+]?\d+$'), list('-+0123456789'))
-Place = tuple[Any, ...]
 
 
 class SceneError(ValueError):
@@ -79,7 +78,7 @@ def parse_scene(text: str, name: str = 'scene') -> Scene:
 
     def refusal(path: Place, reason: str) -> SceneError:
         line = next((lines[path[:n]] for n in range(len(path), -1, -1) if path[:n] in lines), 1)
-        return SceneError(f'{name}:{line}: {_dotted(path)}{": " if path else ""}{reason}')
+        return SceneError(f'{name}:{line}: {dotted(path)}{": " if path else ""}{reason}')
 
     try:
         text.encode('utf-8')
@@ -105,7 +104,7 @@ def parse_scene(text: str, name: str = 'scene') -> Scene:
     pairs = tuple(Pair(int(pair['id']), pair['name'], pair['a'], pair['b'])
                   for pair in data['pairs'])
     for place, reason in faults(boxes, pairs):
-        raise refusal(_path(place), reason)
+        raise refusal(place, reason)
     return Scene(boxes, pairs, data.get('frame_id', ''))
 
 
@@ -186,19 +185,3 @@ def _words(error: Any) -> str:
     if error.validator in ('required', 'additionalProperties'):
         return str(error.message)
     return f'{value}: {error.message}' if value not in error.message else str(error.message)
-
-
-def _dotted(path: Place) -> str:
-    text = ''.join(f'[{part}]' if isinstance(part, int) else f'.{part}' for part in path)
-    return text.removeprefix('.')
-
-
-def _path(place: str) -> Place:
-    """`boxes.load.size` or `pairs[3].a` as a path."""
-    parts: list[Any] = []
-    for part in place.split('.'):
-        head, _, rest = part.partition('[')
-        parts.append(head)
-        if rest:
-            parts.append(int(rest.rstrip(']')))
-    return tuple(parts)

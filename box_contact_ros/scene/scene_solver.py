@@ -59,7 +59,7 @@ class Scene:
 
     def __post_init__(self) -> None:
         for place, reason in faults(self.boxes, self.pairs):
-            raise ValueError(f'{place}: {reason}')
+            raise ValueError(f'{dotted(place)}: {reason}')
 
     @cached_property
     def moving(self) -> tuple[str, ...]:
@@ -76,36 +76,46 @@ def two_boxes(size_a: Sequence[float], size_b: Sequence[float]) -> Scene:
     return Scene(boxes, (Pair(0, '', 'box_a', 'box_b'),))
 
 
-def faults(boxes: Mapping[str, Box], pairs: Sequence[Pair]) -> Iterator[tuple[str, str]]:
-    """What is wrong with a scene, as (place, reason): `boxes.load.size` or `pairs[3].a`."""
+Place = tuple[str | int, ...]
+"""A value of a scene: ('boxes', 'load', 'size') or ('pairs', 3, 'a')."""
+
+
+def dotted(place: Place) -> str:
+    """Return a place in words: `boxes.load.size` or `pairs[3].a`."""
+    text = ''.join(f'[{part}]' if isinstance(part, int) else f'.{part}' for part in place)
+    return text.removeprefix('.')
+
+
+def faults(boxes: Mapping[str, Box], pairs: Sequence[Pair]) -> Iterator[tuple[Place, str]]:
+    """Yield the place and the reason of everything that is wrong with a scene."""
     for name, box in boxes.items():
         fault = size_fault(box.size)
         if fault:
-            yield f'boxes.{name}.size', fault
+            yield ('boxes', name, 'size'), fault
         fault = pose_fault(box.pose) if box.pose else None
         if fault:
-            yield f'boxes.{name}.pose', fault
+            yield ('boxes', name, 'pose'), fault
     if not pairs:
-        yield 'pairs', 'a scene needs at least one pair'
-    # Number of the first pair with an id, a name, a couple of boxes.
+        yield ('pairs',), 'a scene needs at least one pair'
+    # Number of the first pair with an id, a name, two boxes.
     seen: dict[tuple[str, object], int] = {}
     for number, pair in enumerate(pairs):
-        place = f'pairs[{number}]'
+        place = ('pairs', number)
         if not 0 <= pair.id <= LARGEST_ID:
-            yield f'{place}.id', f'{pair.id} is outside 0 to {LARGEST_ID}'
+            yield (*place, 'id'), f'{pair.id} is outside 0 to {LARGEST_ID}'
         unknown = [side for side in ('a', 'b') if getattr(pair, side) not in boxes]
         for side in unknown:
-            yield f'{place}.{side}', f'{shown(getattr(pair, side))} is none of the boxes'
+            yield (*place, side), f'{shown(getattr(pair, side))} is none of the boxes'
         if pair.a == pair.b:
-            yield f'{place}.b', f'{shown(pair.b)} is the same box as a'
+            yield (*place, 'b'), f'{shown(pair.b)} is the same box as a'
         elif not unknown and boxes[pair.a].pose and boxes[pair.b].pose:
             yield place, f'{shown(pair.a)} and {shown(pair.b)} are both fixed'
         for what, value in (('id', pair.id), ('name', pair.name),
                             ('pair of boxes', frozenset((pair.a, pair.b)))):
             first = seen.setdefault((what, value), number)
             if first != number:
-                yield f'{place}.{what}' if what != 'pair of boxes' else place, (
-                    f'the same {what} as pairs[{first}]')
+                yield (place if what == 'pair of boxes' else (*place, what),
+                       f'the same {what} as pairs[{first}]')
 
 
 class Answer(NamedTuple):
