@@ -182,7 +182,7 @@ def _from_command_line(name: str) -> int:
     return run(name, sys.argv[1:])
 
 
-# What the console scripts call, a callable for each program: a generated script passes no arguments,
+# What the console scripts call, one for each program: a generated script passes no arguments,
 # and a link or a copy changes sys.argv[0].
 start = SimpleNamespace(
     **{name: functools.partial(_from_command_line, name) for name in PROGRAMS}
