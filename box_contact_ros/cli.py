@@ -41,35 +41,50 @@ def _program(module: str, extras: str, description: str) -> Program:
 
 
 PROGRAMS = {
-    'contact_node': _program('node.contact_node', 'ros',
+    'contact_node': _program(
+        'node.contact_node', 'ros',
         'the ROS 2 node: two box poses in, contact point and normal out'),
-    'crane': _program('apps.crane.crane_node', 'ros sim',
+    'crane': _program(
+        'apps.crane.crane_node', 'ros sim',
         'a MuJoCo crane that lowers one container onto another and publishes both poses'),
-    'soup_node': _program('node.soup_node', 'ros soup',
+    'soup_node': _program(
+        'node.soup_node', 'ros soup',
         'the same node on a polygon soup, under soup/: what the source paper compares with'),
-    'view': _program('apps.viewer.view', 'ros sim view',
+    'view': _program(
+        'apps.viewer.view', 'ros sim view',
         'a page in the browser: the crane, the boxes, the contact and its figures, live'),
-    'markers': _program('apps.viewer.markers', 'ros',
+    'markers': _program(
+        'apps.viewer.markers', 'ros',
         'draw boxes and contacts as markers for RViz'),
-    'bench': _program('apps.bench.bench', 'ros sim soup report',
+    'bench': _program(
+        'apps.bench.bench', 'ros sim soup report',
         'drive contact, soup and echo node with streams of poses: latency, losses, errors'),
-    'record': _program('apps.recording.record', 'ros bag',
+    'record': _program(
+        'apps.recording.record', 'ros bag',
         'write poses and contacts of running nodes to a bag (MCAP) for Foxglove and ros2 bag'),
-    'soak': _program('apps.bench.soak', 'ros sim report',
+    'soak': _program(
+        'apps.bench.soak', 'ros sim report',
         'ten minutes at 1 kHz: losses, mispairs, memory, latency beside echo nodes'),
-    'train': _program('training.train', 'train',
+    'train': _program(
+        'training.train', 'train',
         'make the data sets, fit the networks, write weights/'),
-    'search': _program('training.experiments.search', 'train report',
+    'search': _program(
+        'training.experiments.search', 'train report',
         'train thousands of networks at once to find the size and settings that they should have'),
-    'accuracy': _program('reports.accuracy', 'report',
+    'accuracy': _program(
+        'reports.accuracy', 'report',
         'point error of a model against the exact one, per set of poses and contact class'),
-    'frontier': _program('reports.frontier', 'report',
+    'frontier': _program(
+        'reports.frontier', 'report',
         'speed against error of every model and of the engines beside them, as table and picture'),
-    'fuzz': _program('verification.fuzz', 'report fuzz',
+    'fuzz': _program(
+        'verification.fuzz', 'report fuzz',
         'millions of random pairs, judged by an independent test; gates at zero'),
-    'stability': _program('reports.stability', 'report soup',
+    'stability': _program(
+        'reports.stability', 'report soup',
         'what each model makes of families of hard poses'),
-    'paper': _program('reports.paper_tables', 'report',
+    'paper': _program(
+        'reports.paper_tables', 'report',
         "redo the source paper's tables, its figures beside ours"),
 }
 
