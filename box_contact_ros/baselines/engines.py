@@ -22,8 +22,8 @@ MOST_CONTACTS = 16
 """Contacts asked for; two boxes have at most eight."""
 
 
-class Answer(NamedTuple):
-    """What a contestant says of a pair: normal (3,) from A to B and point (3,), None if apart."""
+class EngineAnswer(NamedTuple):
+    """What a contestant answers: normal (3,) from A to B and point (3,), None if apart."""
 
     touching: bool
     normal: np.ndarray | None
@@ -42,7 +42,7 @@ class Contestant(Protocol):
     def ask(self, *arguments: Any) -> Any:
         """What is timed."""
 
-    def read(self, result: Any) -> Answer:
+    def read(self, result: Any) -> EngineAnswer:
         """The answer, read before `ask` is called again."""
 
 
@@ -65,10 +65,10 @@ class Ours:
     def ask(self, solver: ContactSolver, a: np.ndarray, b: np.ndarray) -> Any:
         return solver(a, b)
 
-    def read(self, result: Any) -> Answer:
+    def read(self, result: Any) -> EngineAnswer:
         if not result.colliding:
-            return Answer(False, None, None)
-        return Answer(True, result.normal, result.point)
+            return EngineAnswer(False, None, None)
+        return EngineAnswer(True, result.normal, result.point)
 
 
 class MujocoDistance:
@@ -99,13 +99,13 @@ class MujocoDistance:
         self._matrix(turn_b, quat_b)
         return self._distance(model, data, 0, 1, 1.0, self._ends)
 
-    def read(self, result: Any) -> Answer:
+    def read(self, result: Any) -> EngineAnswer:
         if result > 0.0:
-            return Answer(False, None, None)
+            return EngineAnswer(False, None, None)
         start, end = self._ends[:3], self._ends[3:]
         step = start - end
         length = np.linalg.norm(step)
-        return Answer(True, step / length if length else None, 0.5 * (start + end))
+        return EngineAnswer(True, step / length if length else None, 0.5 * (start + end))
 
 
 class MujocoCollision:
@@ -133,7 +133,7 @@ class MujocoCollision:
         self._collide(model, data)
         return data
 
-    def read(self, result: Any) -> Answer:
+    def read(self, result: Any) -> EngineAnswer:
         contacts = result.contact
         return self._choose(np.array(contacts.pos), np.array(contacts.frame)[:, :3],
                             -np.array(contacts.dist))
@@ -166,7 +166,7 @@ class Fcl:
         fcl.collide(one, two, self._request, result)
         return result
 
-    def read(self, result: Any) -> Answer:
+    def read(self, result: Any) -> EngineAnswer:
         contacts = result.contacts
         return self._choose(np.array([c.pos for c in contacts]),
                             np.array([c.normal for c in contacts]),
@@ -204,11 +204,11 @@ class Coal:
         self._coal.collide(one, at_one, two, at_two, self._request, self._result)
         return self._result
 
-    def read(self, result: Any) -> Answer:
+    def read(self, result: Any) -> EngineAnswer:
         if not result.numContacts():
-            return Answer(False, None, None)
+            return EngineAnswer(False, None, None)
         contact = result.getContact(0)
-        return Answer(True, np.array(contact.normal), np.array(contact.pos))
+        return EngineAnswer(True, np.array(contact.normal), np.array(contact.pos))
 
 
 class Bullet:
@@ -243,27 +243,27 @@ class Bullet:
         bullet.resetBasePositionAndOrientation(two, b, turn_b, physicsClientId=client)
         return bullet.getClosestPoints(one, two, 0.0, physicsClientId=client)
 
-    def read(self, result: Any) -> Answer:
+    def read(self, result: Any) -> EngineAnswer:
         # 5, 6: the points on A and B; 7: the normal on B, towards A; 8: the distance.
         return self._choose(np.array([0.5 * (np.array(c[5]) + np.array(c[6])) for c in result]),
                             np.array([-np.array(c[7]) for c in result]),
                             np.array([-c[8] for c in result]))
 
 
-def _deepest(points: np.ndarray, normals: np.ndarray, depths: np.ndarray) -> Answer:
+def _deepest(points: np.ndarray, normals: np.ndarray, depths: np.ndarray) -> EngineAnswer:
     if not len(points):
-        return Answer(False, None, None)
+        return EngineAnswer(False, None, None)
     first = int(np.argmax(depths))
-    return Answer(True, normals[first], points[first])
+    return EngineAnswer(True, normals[first], points[first])
 
 
-def _mean(points: np.ndarray, normals: np.ndarray, depths: np.ndarray) -> Answer:
+def _mean(points: np.ndarray, normals: np.ndarray, depths: np.ndarray) -> EngineAnswer:
     if not len(points):
-        return Answer(False, None, None)
-    return Answer(True, normals[int(np.argmax(depths))], points.mean(axis=0))
+        return EngineAnswer(False, None, None)
+    return EngineAnswer(True, normals[int(np.argmax(depths))], points.mean(axis=0))
 
 
-CHOICES: dict[str, Callable[[np.ndarray, np.ndarray, np.ndarray], Answer]] = {
+CHOICES: dict[str, Callable[[np.ndarray, np.ndarray, np.ndarray], EngineAnswer]] = {
     'deepest': _deepest, 'mean': _mean}
 """One point of several (n, 3), with their normals (n, 3) and depths (n,)."""
 
