@@ -11,18 +11,17 @@ v_n = −v·n, positive while the boxes part:
     3. Torsion        μ·F_n·r about n against the spin ω·n       proportional to it below v_s / r
     4. Rocking        −2c·(W²/12)·ω_roll, −2c·(L²/12)·ω_pitch    in the load's own axes
 
-1 and 2 act at the ONE point, which is why the point has to be the middle of the contact region. 3
-and 4 are what a patch does and a point cannot: of 36 landings at 200 Hz none comes to rest without
-4, and three without 3, because the yaw never stops. 4 is the damping of c spread evenly over the
-load's whole bottom, twice: c·∫x²dA / A = c·L²/12; it is meant for a load that stands upright. Both
-act only while the boxes touch.
+1 and 2 act at the ONE point, so the point has to be the middle of the contact region. 3 and 4 are
+what a patch does and a point cannot. 4 is the damping of c spread evenly over the load's bottom,
+twice: c·∫x²dA / A = c·L²/12, for a load that stands upright. Both act only while the boxes touch.
+docs/decisions/contact-law.md has what was measured for each constant.
 
-A wrench is computed from a contact and from the state of the load at the time the contact was
-asked for, and is then held: between ticks, and over ticks whose answer was lost (`HeldWrench`).
+A wrench belongs to the time at which its contact was asked for. `HeldWrench` holds it between
+ticks, and over ticks whose answer was lost.
 
-Conventions: those of `pose`; SI units; a wrench is (6,): force [N], then torque about the load's
-centre of mass [N m], both in the common frame, as is a velocity (6,): linear [m/s], angular
-[rad/s].
+Conventions: those of `pose`; SI units. A wrench (6,) is a force [N], then a torque about the load's
+centre of mass [N m]. A velocity (6,) is linear [m/s], then angular [rad/s]. Both are in the common
+frame.
 """
 from __future__ import annotations
 
@@ -40,35 +39,26 @@ GRAVITY = 9.81
 
 STATIC_PENETRATION = 5e-3
 """Depth at which k carries the weight [m]: k = m·g / 5 mm, 3.9e7 N/m for 20 t; 0.2 % of a
-container's height. Touching down at 0.3 m/s adds as much again. Less depth makes k exceed its limit
-at higher rates; with four times as much, touch-downs pass the permitted 1 % of the height."""
+container's height. Touching down at 0.3 m/s adds as much again."""
 
 DAMPING_RATIO = 0.5
-"""c = 2·0.5·√(k·m), 8.9e5 N s/m for 20 t: half of critical for the heaving load. With much less a
-touch-down bounces; 1 would exceed the limit below at 1 kHz as well."""
+"""c = 2·0.5·√(k·m), 8.9e5 N s/m for 20 t: half of critical for the heaving load."""
 
 STIFFNESS_LIMIT = 0.125
-"""k ≤ 0.125·m_eff/Δt² [1]. A wrench held over Δt acts Δt/2 late on average, which feeds the energy
-k·Δt/2·v² a second into every oscillation, and latency feeds more: c has to take out more than that.
-For one mass on one spring 0.25 would do. The load is more: F_n grows with the depth of its deepest
-corner and acts at the centroid, a stiffness that is not symmetric, and where the load overhangs so
-far that the patch is about to lift off on one side, such a system flutters at the rates at which
-the limit binds. Measured at 200 Hz over 36 landings: with 0.25, 32 come to rest without latency and
-15 with 2 ms; with 0.125, all, up to 4 ms. The price is a static penetration of 10 mm at 200 Hz."""
+"""k ≤ 0.125·m_eff/Δt² [1]. A wrench that is held over Δt acts Δt/2 late on average. That feeds the
+energy k·Δt/2·v² a second into every oscillation, and latency feeds more; c has to take it out.
+The price is a static penetration of 10 mm at 200 Hz."""
 
 DAMPING_LIMIT = 0.35
-"""Every damper ≤ 0.35·inertia/Δt [1]: c by m_eff, the rocking dampers by I_roll and I_pitch. It is
-the share of the speed that a held damper takes away per tick: at 1 it would stop the corner within
-one, and with a tick of latency oscillate by itself; the rest is for latency."""
+"""Every damper ≤ 0.35·inertia/Δt [1]: c by m_eff, the rocking dampers by I_roll and I_pitch. A held
+damper takes this share of the speed away per tick; the rest of the 1 is for latency."""
 
 FRICTION = 0.5
 """Coulomb's μ [1], steel on steel, dry."""
 
 SLIP_SPEED = 0.1
-"""v_s [m/s]: friction grows in proportion to the slip up to here. Without it, the sign of the slip
-would switch the whole of μ·F_n from tick to tick at rest. With it, a load at rest on a slope s
-creeps at v_s·s/μ: 0.9 mm/s at 0.25°. μ·m·g / v_s acts as a damper of 9.8e5 N s/m on 20 t, a time
-constant of 20 ms: four ticks at 200 Hz. Ten times less would be unstable there."""
+"""v_s [m/s]: friction grows in proportion to the slip up to here, so that its sign does not switch
+from tick to tick at rest. The price: a load at rest on a slope s creeps at v_s·s/μ."""
 
 
 def effective_mass(mass: float, size: tuple[float, float, float]) -> float:
