@@ -1,9 +1,8 @@
 """Named sets of posed pairs of boxes: what accuracy, speed and training are measured and made on.
 
-A set is a function (rng, n) -> Pairs with about n pairs (a few draws that miss are left out). All
-poses are of boxes that overlap by a depth that is drawn, not left to chance: a pair that overlaps
-deeply is drawn first, then B is moved out along SAT's normal, which changes the depth by just as
-much and keeps the axis.
+A set is a function (rng, n) -> Pairs with about n pairs: a few draws miss and are left out. The
+depth of the overlap is drawn, too. A pair that overlaps deeply is drawn first. Then B moves out
+along SAT's normal, which changes the depth by just as much and keeps the axis.
 """
 from __future__ import annotations
 
@@ -19,6 +18,7 @@ from .pose import quaternion_multiply, rotation_matrix
 CUBE = (2.0, 2.0, 2.0)
 CONTAINER = (12.192, 2.438, 2.591)
 """ISO 40 ft [m]."""
+Z = (0.0, 0.0, 1.0)
 
 
 class Pairs(NamedTuple):
@@ -76,30 +76,39 @@ def any_pose(rng: np.random.Generator, size_a: np.ndarray, size_b: np.ndarray,
     return pressed(Pairs(a, b, size_a, size_b), depth)
 
 
+def _level(heading: np.ndarray) -> np.ndarray:
+    """Return the level unit vectors (n, 3) of headings (n,) [rad]."""
+    return np.stack([np.cos(heading), np.sin(heading), np.zeros(len(heading))], axis=1)
+
+
+def _onto(place: np.ndarray, turn: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
+          depth: np.ndarray) -> Pairs:
+    """Return pairs with A at the origin and B at places (n, 3), orientations (n, 4), to `depth`."""
+    a = np.tile([0.0, 0, 0, 0, 0, 0, 1], (len(place), 1))
+    return pressed(Pairs(a, np.concatenate([place, turn], axis=1), size_a, size_b), depth)
+
+
 def stacked(rng: np.random.Generator, size: tuple[float, float, float], tilt: np.ndarray,
             yaw: np.ndarray, depth: np.ndarray, *, spread: float = 0.98,
             about: np.ndarray | None = None) -> Pairs:
-    """One box on another of the same size, tilted about a random level axis, turned by yaw.
+    """Draw one box on another of the same size, tilted about a random level axis, turned by yaw.
 
     Both angles are in [rad]; the box is off the other's middle by up to `spread` of the size.
-
-    about: the tilt's axis is within that angle (n,) [rad] of ±x, in place of anywhere.
+    about: the tilt's axis is within that angle (n,) [rad] of ±x, instead of anywhere.
     """
     n = len(tilt)
     sizes = np.tile(np.array(size), (n, 1))
     heading = rng.uniform(-np.pi, np.pi, n) if about is None else (
         rng.choice([0.0, np.pi], n) + rng.choice([-1.0, 1.0], n) * about)
-    level = np.stack([np.cos(heading), np.sin(heading), np.zeros(n)], axis=1)
-    turn = quaternion_multiply(turns(level, tilt), turns((0.0, 0.0, 1.0), yaw))
+    turn = quaternion_multiply(turns(_level(heading), tilt), turns(Z, yaw))
     place = np.concatenate([spread * rng.uniform(-1, 1, (n, 2)) * sizes[:, :2],
                             0.98 * sizes[:, 2:]], axis=1)
-    a = np.tile([0.0, 0, 0, 0, 0, 0, 1], (n, 1))
-    return pressed(Pairs(a, np.concatenate([place, turn], axis=1), sizes, sizes), depth)
+    return _onto(place, turn, sizes, sizes, depth)
 
 
 def laid(rng: np.random.Generator, size_a: np.ndarray, size_b: np.ndarray, tilt: np.ndarray,
          depth: np.ndarray) -> Pairs:
-    """B anywhere on A, tilted about a random level axis [rad], turned by any yaw.
+    """Draw B anywhere on A, tilted about a random level axis [rad], turned by any yaw.
 
     Any axis of either box is up; sizes (n, 3).
     """
@@ -107,10 +116,8 @@ def laid(rng: np.random.Generator, size_a: np.ndarray, size_b: np.ndarray, tilt:
     orders = np.array([[0, 1, 2], [1, 2, 0], [2, 0, 1]])
     size_a = np.take_along_axis(size_a, orders[rng.integers(0, 3, n)], axis=1)
     size_b = np.take_along_axis(size_b, orders[rng.integers(0, 3, n)], axis=1)
-    heading = rng.uniform(-np.pi, np.pi, n)
-    level = np.stack([np.cos(heading), np.sin(heading), np.zeros(n)], axis=1)
-    yaw = rng.uniform(-np.pi, np.pi, n)
-    turn = quaternion_multiply(turns(level, tilt), turns((0.0, 0.0, 1.0), yaw))
+    heading, yaw = (rng.uniform(-np.pi, np.pi, n) for _ in range(2))
+    turn = quaternion_multiply(turns(_level(heading), tilt), turns(Z, yaw))
     # A random place of A's top meets a random place of B's bottom.
     at_b = 0.49 * rng.uniform(-2, 2, (n, 2)) * size_b[:, :2]
     across = np.stack([np.cos(yaw) * at_b[:, 0] - np.sin(yaw) * at_b[:, 1],
@@ -118,8 +125,7 @@ def laid(rng: np.random.Generator, size_a: np.ndarray, size_b: np.ndarray, tilt:
     place = np.concatenate([0.49 * rng.uniform(-2, 2, (n, 2)) * size_a[:, :2] - across,
                             0.5 * (size_a + size_b)[:, 2:]], axis=1)
     place[:, 2] -= 0.01 * np.minimum(size_a[:, 2], size_b[:, 2])
-    a = np.tile([0.0, 0, 0, 0, 0, 0, 1], (n, 1))
-    return pressed(Pairs(a, np.concatenate([place, turn], axis=1), size_a, size_b), depth)
+    return _onto(place, turn, size_a, size_b, depth)
 
 
 def cubes(rng: np.random.Generator, n: int) -> Pairs:
@@ -151,10 +157,9 @@ def containers(rng: np.random.Generator, n: int) -> Pairs:
     sizes = np.tile(CONTAINER, (n, 1))
     roll, pitch, yaw = np.radians(rng.uniform(-5, 5, (3, n)))
     turn = quaternion_multiply(quaternion_multiply(
-        turns((0.0, 0.0, 1.0), yaw), turns((0.0, 1.0, 0.0), pitch)), turns((1.0, 0.0, 0.0), roll))
-    a = np.tile([0.0, 0, 0, 0, 0, 0, 1], (n, 1))
-    b = np.concatenate([0.95 * rng.uniform(-1, 1, (n, 3)) * sizes, turn], axis=1)
-    return pressed(Pairs(a, b, sizes, sizes), 2.438 * log_uniform(rng, 1e-3, 0.1, n))
+        turns(Z, yaw), turns((0.0, 1.0, 0.0), pitch)), turns((1.0, 0.0, 0.0), roll))
+    place = 0.95 * rng.uniform(-1, 1, (n, 3)) * sizes
+    return _onto(place, turn, sizes, sizes, 2.438 * log_uniform(rng, 1e-3, 0.1, n))
 
 
 def random_sizes(rng: np.random.Generator, n: int, aspect: float = 20.0, ratio: float = 20.0,
