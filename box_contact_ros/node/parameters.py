@@ -7,15 +7,17 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any
 
-from rcl_interfaces.msg import ParameterDescriptor
+from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 
 from ..solver.checks import shown, size_fault
+from .rclpy_workarounds import parameter_overrides
 
 Check = Callable[[str, Any], Any]
 """From a parameter's name and value to the value as the node uses it; ValueError if it is wrong."""
@@ -118,7 +120,7 @@ def _say_unknown(node: Node, settings: Mapping[str, Setting]) -> None:
 
     They are not refused, since a file of parameters may be meant for several nodes.
     """
-    for name in getattr(node, '_parameter_overrides', {}):  # rclpy has no public name for them
+    for name in parameter_overrides(node):
         # Those of topics are declared with the topics.
         if not node.has_parameter(name) and not name.startswith('qos_overrides.'):
             near = ' or '.join(get_close_matches(name, settings))
@@ -129,6 +131,37 @@ def _say_unknown(node: Node, settings: Mapping[str, Setting]) -> None:
 def checked(settings: Mapping[str, Setting], values: Mapping[str, Any]) -> dict[str, Any]:
     """All values as the node uses them; ValueError for the first that is wrong."""
     return {name: setting.check(name, values[name]) for name, setting in settings.items()}
+
+
+class CheckedParameters:
+    """The parameters of a running node: changed together if all are good, else not at all."""
+
+    def __init__(self, node: Node, settings: Mapping[str, Setting],
+                 apply: Callable[[dict[str, Any], Collection[str]], None]) -> None:
+        """Declare and check the parameters; raise ValueError for a bad one.
+
+        apply: Called before a change with all new values and the names that were set; what it
+        raises refuses the change.
+        """
+        self._settings, self._apply = settings, apply
+        self.values = declare(node, settings)
+        node.add_on_set_parameters_callback(self._on_set)
+
+    def _on_set(self, parameters: list[Parameter]) -> SetParametersResult:
+        changes = {p.name: p.value for p in parameters if p.name in self._settings}
+        try:
+            values = checked(self._settings, {**self.values, **changes})
+            self._apply(values, changes)
+        except Exception as error:  # the client would wait for ever
+            return SetParametersResult(successful=False, reason=reason_of(error))
+        self.values = values
+        return SetParametersResult(successful=True)
+
+
+def reason_of(error: Exception) -> str:
+    """Return what an error says; with its type, unless it is a refusal or a missing library."""
+    known = isinstance(error, (ValueError, ImportError))
+    return str(error) if known else f'{type(error).__name__}: {error}'
 
 
 def answer_help(program: str, doc: str | None, settings: Mapping[str, Setting],

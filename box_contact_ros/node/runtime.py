@@ -3,7 +3,6 @@ from __future__ import annotations
 
 import atexit
 import contextlib
-import ctypes
 import os
 import signal
 import sys
@@ -14,18 +13,18 @@ from typing import Any
 import rclpy
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
-from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
+
+from .rclpy_workarounds import RCLError, keep_for_ever
 
 try:
     from rclpy.experimental.events_executor import EventsExecutor
 except ImportError:  # rclpy before 7.1.4
     EventsExecutor = None
 
-RCLError = rclpy_implementation.RCLError
 REFUSALS = (ValueError, rclpy.exceptions.ParameterException, RCLError)
 """What a node raises on parameters or arguments that it cannot start with."""
 POSE_QOS = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -105,9 +104,7 @@ def spin(node: Node, *, undisturbed: bool = True) -> None:
         pass
     finally:
         executor.shutdown()
-        # EventsExecutor aborts the process if it is destroyed while it still has something of a
-        # node, as after a signal in the instant in which it takes the node over: it never is.
-        ctypes.pythonapi.Py_IncRef(ctypes.py_object(executor))
+        keep_for_ever(executor)
 
 
 @contextlib.contextmanager

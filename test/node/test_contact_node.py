@@ -112,11 +112,11 @@ def test_an_error_inside_does_not_end_the_node(node, client, monkeypatch):
     def broken(*_):
         raise RuntimeError('planted')
 
-    solver = node._solver
-    node._solver = broken
+    solver = node._evaluator.solver
+    node._evaluator.solver = broken
     stamp = client.send(ORIGIN, TOUCHING)
     client.spin(lambda: node.counts['refused: internal error'] > 0, 5.0)
-    node._solver = solver
+    node._evaluator.solver = solver
     client.ask(ORIGIN, TOUCHING)
     assert node.counts['refused: internal error'] == 1
     assert stamp not in client.clouds

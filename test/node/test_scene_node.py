@@ -22,7 +22,7 @@ from ros_client import Client, serving, stamp_of
 from box_contact_ros import ContactSolver
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import make_header, read_cloud
-from box_contact_ros.node.runtime import RCLError
+from box_contact_ros.node.rclpy_workarounds import RCLError
 
 MS = 1_000_000  # ns
 SCENE = """\
@@ -289,7 +289,7 @@ def test_publishers_that_come_and_go_between_two_looks_are_counted(node):
     """Events are looked at once a second: what went is what came less what is more than before."""
     for came, more, gone in ((1, 1, 0), (1, 0, 1), (0, -1, 1), (3, -2, 5)):
         before = node.counts['publishers gone']
-        node._on_matched('lorry')(SimpleNamespace(
+        node._topics.events.on_matched('lorry')(SimpleNamespace(
             total_count_change=came, current_count_change=more, current_count=1))
         assert node.counts['publishers gone'] == before + gone
 

@@ -37,7 +37,8 @@ class Mutant(NamedTuple):
 
 FAMILIES = 'test/verification/test_hard_poses.py'
 LAWS = 'test/core/test_laws.py'
-NODE = 'node/contact_node.py'
+EVALUATOR = 'node/evaluator.py'
+TOPICS = 'node/scene_topics.py'
 TEST_PAIRING = 'test/scene/test_pairing.py'
 TEST_SCENE_NODE = 'test/node/test_scene_node.py'
 TEST_CORE = 'test/core/test_core.py'
@@ -160,7 +161,7 @@ MUTANTS = {
         'solver/weights_file.py', "if tensors_digest(tensors) != card['sha256']:", 'if False:',
         'test/solver/test_weights_file.py -k edited_byte'),
     'an error ends the callback': Mutant(
-        NODE, 'except Exception as error:', 'except KeyError as error:',
+        EVALUATOR, 'except Exception as error:', 'except KeyError as error:',
         'test/node/test_contact_node.py -k error_inside'),
     'length of a message not checked': Mutant(
         'node/message_bytes.py', 'if len(data) != at + _POSE.size:', 'if False:',
@@ -169,7 +170,7 @@ MUTANTS = {
         'node/message_bytes.py', 'and _LEAST < hypot(qx, qy, qz, qw) < _MOST):', '):',
         'test/node/test_faults.py -k half_of_the_poses'),
     'frames not compared': Mutant(
-        NODE, 'elif pose.frame_id != frame_id:', 'elif False:',
+        EVALUATOR, 'elif pose.frame_id != frame_id:', 'elif False:',
         'test/node/test_contact_node.py -k frames_must'),
     'a stamp answered again': Mutant(
         'scene/pairing.py', 'if stamp in taken:', 'if False:',
@@ -178,7 +179,7 @@ MUTANTS = {
         'scene/pairing.py', 'if stamp < self._newest.get(box, NEVER) - RESET:', 'if False:',
         f'{TEST_PAIRING} -k set_back'),
     'a clock that jumps is not heard': Mutant(
-        NODE, 'self.counts[RESETS] += 1\n            self._pairing.reset()',
+        EVALUATOR, 'self.counts[RESETS] += 1\n        self._pairing.reset()',
         'pass', 'test/node/test_faults.py -k clock'),
     'a pose of any age': Mutant(
         'scene/pairing.py', 'return newest is None or 0 < self.max_age < abs(now - newest)',
@@ -197,10 +198,10 @@ MUTANTS = {
         'return any(',
         f'{TEST_PAIRING} -k joins'),
     'a scene that fails half way stays': Mutant(
-        NODE, 'self._take_over(old, old_settings)', 'pass',
+        TOPICS, 'self._change(*old)', 'pass',
         f'{TEST_SCENE_NODE} -k half_way'),
     "poses looked for on the node's own topics": Mutant(
-        NODE, 'if self._resolved(topic) in taken:', 'if False:',
+        TOPICS, 'if self._resolved(topic) in taken:', 'if False:',
         f'{TEST_SCENE_NODE} -k topic_of_the_node'),
     'ticks held up by one that lacks a pose': Mutant(
         'scene/pairing.py', 'self._changed |= not stale <= self._were_stale', 'pass',
@@ -209,10 +210,11 @@ MUTANTS = {
         'scene/pairing.py', 'if self._is_too_late(box, stamp):', 'if False:',
         f'{TEST_PAIRING} -k answered_again'),
     'a change forgets what waits': Mutant(
-        NODE, "if running and settings['pairing'] == old['pairing']:", 'if False:',
+        EVALUATOR, "if settings['pairing'] == old.get('pairing'):", 'if False:',
         f'{TEST_SCENE_NODE} -k come_and_go'),
     'a bad scene goes through': Mutant(
-        NODE, 'return SetParametersResult(successful=False, reason=_reason(error))',
+        'node/parameters.py',
+        'return SetParametersResult(successful=False, reason=reason_of(error))',
         'return SetParametersResult(successful=True)', f'{TEST_SCENE_NODE} -k bad_scene'),
     'nesting without limit': Mutant(
         'scene/scene_file.py', 'if depth > DEEPEST:', 'if False:',
@@ -221,16 +223,15 @@ MUTANTS = {
         'node/runtime.py', 'CONTACT_QOS = QoSProfile(depth=10,',
         'CONTACT_QOS = QoSProfile(history=2,', 'test/node/test_faults.py -k never_reads'),
     'events of poses served': Mutant(
-        NODE, 'self._keep_events(subscription)',
-        'self._events_of[subscription] = []', 'test/node/test_faults.py -k deadlines'),
+        TOPICS, 'self.events.watch(subscription)', 'pass', 'test/node/test_faults.py -k deadlines'),
     'events of contacts served': Mutant(
-        NODE, 'self._keep_events(self._contacts)',
-        'self._events_of[self._contacts] = []', 'test/node/test_faults.py -k topics_go'),
+        TOPICS, 'self.events.watch(self.contacts)', 'pass',
+        'test/node/test_faults.py -k topics_go'),
     "events of pairs' contacts served": Mutant(
-        NODE, 'PublisherEventCallbacks(use_default_callbacks=False)',
+        TOPICS, 'PublisherEventCallbacks(use_default_callbacks=False)',
         'PublisherEventCallbacks()', 'test/node/test_faults.py -k topics_go'),
     'publishers gone by what is left': Mutant(
-        NODE, 'event.total_count_change - event.current_count_change',
+        'node/qos_events.py', 'event.total_count_change - event.current_count_change',
         'max(0, -event.current_count_change)', f'{TEST_SCENE_NODE} -k come_and_go_between'),
     'room in shared memory not asked for': Mutant(
         'cli.py', 'room < LEAST_ROOM', 'False', 'test/node/test_faults.py -k memory_is_full'),

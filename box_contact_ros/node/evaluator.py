@@ -1,0 +1,148 @@
+"""Evaluation of ticks: poses are read, paired, handed to the solver; contacts are published."""
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from ..scene.pairing import NEVER, PAIRINGS, RESETS, Pairing, StampedPose, Tick
+from ..scene.scene_solver import SceneSolver
+from ..solver.checks import shown
+from .diagnostics import UNMATCHED_SECONDS, Diagnostics
+from .message_bytes import RawMessages
+from .messages import Refused, TypedMessages
+from .runtime import LOG_SECONDS
+from .scene_topics import SceneTopics
+
+SERIALIZATIONS: dict[str, type[RawMessages] | type[TypedMessages]] = {
+    'raw': RawMessages, 'typed': TypedMessages}
+"""Values of the node parameter `serialization`."""
+NANOSECONDS_A_SECOND = 1e9
+OUTSIDE = 'outside the trained range'
+
+
+class Evaluator:
+    """Answers ticks of poses; every pose that is refused is counted and logged, never answered."""
+
+    _pairing: Pairing
+    _messages: RawMessages | TypedMessages
+
+    def __init__(self, solver: SceneSolver, settings: Mapping[str, Any], *, topics: SceneTopics,
+                 counts: Counter[str], diagnostics: Diagnostics, logger: Any) -> None:
+        """Begin without poses; `settings` are the checked parameters."""
+        self._topics, self._diagnostics, self._logger = topics, diagnostics, logger
+        self.counts = counts
+        self._settings: Mapping[str, Any] = {}
+        self.solver = solver
+        self.set_solver(solver, settings)
+
+    def set_solver(self, solver: SceneSolver, settings: Mapping[str, Any]) -> None:
+        """Replace the solver and its scene; poses that wait stay unless the pairing changes."""
+        old = self._settings
+        if old:
+            self.close()
+        tolerance, max_age = (round(NANOSECONDS_A_SECOND * settings[name])
+                              for name in ('tolerance', 'max_age'))
+        if settings['pairing'] == old.get('pairing'):
+            self._pairing.set_scene(solver.scene)
+            self._pairing.tolerance, self._pairing.max_age = tolerance, max_age
+        else:
+            self._pairing = PAIRINGS[settings['pairing']](
+                solver.scene, tolerance=tolerance, max_age=max_age, counts=self.counts)
+        if settings['serialization'] != old.get('serialization'):
+            self._messages = SERIALIZATIONS[settings['serialization']]()
+        self.solver, self._settings = solver, settings
+
+    def close(self) -> None:
+        """Keep the count of a solver that goes."""
+        self.counts[OUTSIDE] += self.solver.exact_answers
+
+    def reset(self) -> None:
+        """Forget all poses."""
+        self._pairing.reset()
+
+    def clock_jumped(self) -> None:
+        """Forget all poses, as the clock has jumped back or was changed, and count that."""
+        self.counts[RESETS] += 1
+        self._pairing.reset()
+
+    def pose_callback(self, box: str, topic: str) -> Callable[[Any], None]:
+        """Return the callback for the poses of a box; it raises nothing, whatever happens."""
+        def callback(message: Any) -> None:
+            self.counts['poses'] += 1
+            try:
+                ticks = self._pairing.add(box, self._messages.read_pose(message))
+            except Exception as error:
+                self._refuse(error, topic)
+                return
+            for tick in ticks:
+                try:
+                    self._answer(tick)
+                except Exception as error:  # one tick that is refused keeps back no other
+                    self._refuse(error, topic)
+        return callback
+
+    def report(self) -> None:
+        """Publish the diagnostics; warn of poses that come and cannot be answered."""
+        counts = +self.counts
+        counts[OUTSIDE] += self.solver.exact_answers
+        unanswered = self._diagnostics.publish(
+            counts, len(self.solver.scene.pairs), self._pairing.stale())
+        if unanswered > UNMATCHED_SECONDS:
+            self._logger.warning(
+                f'poses arrive, but none could be answered for {UNMATCHED_SECONDS:g} s (pairing '
+                f'{self._settings["pairing"]!r}: do the stamps of all boxes agree?)',
+                throttle_duration_sec=LOG_SECONDS)
+
+    def _answer(self, tick: Tick) -> None:
+        stamp, frame_id = self._header_of(tick)
+        started = time.perf_counter_ns()
+        answer = self.solver([pose and pose.numbers for pose in tick])
+        took = time.perf_counter_ns() - started
+        messages = self._messages
+        messages.begin(stamp, frame_id)
+        for pair, contact in answer.touching:
+            publishers = self._topics.publishers.get(pair.id)
+            if publishers is not None:
+                publishers.point.publish(messages.point(contact))
+                publishers.normal.publish(messages.normal(contact))
+        self._topics.contacts.publish(messages.cloud(answer))
+        # What nobody waits for comes last.
+        stale = len(answer.stale)
+        self._diagnostics.computed(took, evaluated=stale < len(self.solver.scene.pairs))
+        counts = self.counts
+        counts['contacts'] += len(answer.touching)
+        counts['evaluations'] += 1
+        counts['stale pairs'] += stale
+
+    def _header_of(self, tick: Tick) -> tuple[int, str]:
+        """Return the newest stamp [ns] of a tick and its frame; raise Refused if frames differ."""
+        stamp, frame_id = NEVER, self.solver.scene.frame_id or None
+        for pose in tick:
+            if pose is not None:
+                if frame_id is None:
+                    frame_id = pose.frame_id
+                elif pose.frame_id != frame_id:
+                    raise Refused('frame_id differs', self._frames(tick, pose))
+                if pose.stamp > stamp:
+                    stamp = pose.stamp
+        return stamp, frame_id or ''
+
+    def _frames(self, tick: Tick, odd: StampedPose) -> str:
+        """Describe the frame of a tick, by the scene or the first box, and that of a pose."""
+        scene = self.solver.scene
+        known = [(box, pose) for box, pose in zip(scene.moving, tick) if pose is not None]
+        one, frame = ('the scene', scene.frame_id) if scene.frame_id else (
+            known[0][0], known[0][1].frame_id)
+        box = next(box for box, pose in known if pose is odd)
+        return f'{one} is in frame {shown(frame)}, {box} in {shown(odd.frame_id)}'
+
+    def _refuse(self, error: Exception, topic: str) -> None:
+        """Count and log what was refused."""
+        if isinstance(error, Refused):
+            reason, text = error.reason, f'{topic}: {error}'
+        else:
+            reason, text = 'internal error', f'{type(error).__name__}: {error}'
+        self.counts[f'refused: {reason}'] += 1
+        self._logger.warning(f'{text}; refused', throttle_duration_sec=LOG_SECONDS)

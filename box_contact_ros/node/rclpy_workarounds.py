@@ -1,0 +1,73 @@
+"""Workarounds for rclpy: every use of its private attributes, and of its objects' memory.
+
+All were seen with rclpy 7.1 (Jazzy). Each names the symptom, and the test that guards it.
+"""
+from __future__ import annotations
+
+import ctypes
+from typing import Any
+
+from rclpy.event_handler import EventHandler
+from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.node import Node
+from rclpy.subscription import Subscription
+
+RCLError = rclpy_implementation.RCLError
+"""Symptom: what the middleware refuses raises a type without a public name.
+Test: test_scene_node.py::test_a_scene_that_fails_half_way_is_taken_back."""
+CHANGES = ('total_count_change', 'current_count_change', 'not_alive_count_change')
+"""What events count since they were last taken; each kind has some of these."""
+
+
+def parameter_overrides(node: Node) -> list[str]:
+    """Return the names of the parameters that were given at the start.
+
+    Symptom: rclpy silently ignores names that are never declared, and has no public list of them.
+    Test: test_hygiene_ros.py::test_a_parameter_that_there_is_not.
+    """
+    return list(getattr(node, '_parameter_overrides', {}))
+
+
+def withhold_events(node: Node, entity: Any) -> list[EventHandler]:
+    """Take the QoS events of a topic from all executors; return their handlers.
+
+    Symptom: an event waits in EventsExecutor's queue while its publisher or subscription is
+    destroyed. The process ends with SIGSEGV: the event is released without Python's lock.
+    Tests: test_faults.py::test_scenes_change_while_deadlines_are_missed, …::test_topics_go_while….
+    """
+    handlers = list(entity.event_handlers)
+    entity.event_handlers.clear()
+    for handler in handlers:
+        node.remove_waitable(handler)
+    return handlers
+
+
+def serve_event(handler: EventHandler) -> None:
+    """Call the callback of a withheld handler, if its event has something new.
+
+    Symptom: only an executor may take an event, after it has set a private flag.
+    Test: test_scene_node.py::test_deadlines_and_lost_publishers_are_reported.
+    """
+    handler._ready_to_take_data = True
+    event = handler.take_data()
+    if event is not None and any(getattr(event, change, 0) for change in CHANGES):
+        handler.callback(event)
+
+
+def silence(subscription: Subscription) -> None:
+    """Drop the messages that an executor has taken for a subscription that is about to go.
+
+    Symptom: the callback runs after destroy_subscription, with poses of a box that is gone.
+    Test: test_faults.py::test_topics_go_while_others_ask_for_what_they_do_not_offer.
+    """
+    subscription.callback = lambda _: None
+
+
+def keep_for_ever(executor: Any) -> None:
+    """Keep an executor from being destroyed, even as the interpreter ends.
+
+    Symptom: EventsExecutor aborts the process if it is destroyed while it has something of a node.
+    A signal during add_node brings that about.
+    Test: test_contact_node.py::test_ends_cleanly; the symptom is rare.
+    """
+    ctypes.pythonapi.Py_IncRef(ctypes.py_object(executor))

@@ -1,0 +1,191 @@
+"""Topics of a scene: pose subscriptions of its moving boxes, contact publishers of its pairs."""
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Collection, Mapping
+from functools import partial
+from typing import Any, NamedTuple
+
+from geometry_msgs.msg import PointStamped, PoseStamped, Vector3Stamped
+from rclpy.duration import Duration
+from rclpy.event_handler import PublisherEventCallbacks, UnsupportedEventTypeError
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import QoSProfile
+from rclpy.subscription import Subscription
+from sensor_msgs.msg import PointCloud2
+
+from ..scene.scene_solver import Pair, Scene
+from ..solver.checks import shown
+from .qos_events import QosEvents
+from .rclpy_workarounds import RCLError, silence
+from .runtime import CONTACT_QOS, POSE_QOS
+
+TOPICS_OF_EVERY_NODE = ('/diagnostics', '/parameter_events', '/rosout', '/clock')
+"""Topics of other types than poses."""
+
+
+class PoseSource(NamedTuple):
+    """How the poses of a box are subscribed to."""
+
+    topic: str
+    raw: bool
+    """Whether the callback gets the bytes of messages."""
+    deadline: float
+    """Longest time [s] between poses that publishers must offer; 0: none."""
+
+
+class PairPublishers(NamedTuple):
+    """The publishers of a pair's own topics."""
+
+    pair: Pair
+    point: Publisher
+    normal: Publisher
+
+
+class SceneTopics:
+    """Creates and destroys a node's topics, so that they are those of the current scene."""
+
+    contacts: Publisher
+    """The cloud of all pairs, there from the first `set_scene` to `close`."""
+
+    def __init__(self, node: Node, prefix: str, counts: Counter[str]) -> None:
+        """Begin without topics; `prefix` stands before the names of contact topics."""
+        self._node, self._prefix = node, prefix
+        self.events = QosEvents(node, counts)
+        self.publishers: dict[int, PairPublishers] = {}  # by pair's id
+        self._subscriptions: dict[str, tuple[PoseSource, Subscription]] = {}  # by box
+        self._callback_of: Callable[[str, str], Callable[[Any], None]] | None = None
+        self._is_open = False
+        self._wanted: tuple[Mapping[str, PoseSource], Collection[Pair]] = {}, ()
+        self._pair_of_id: dict[int, Pair] = {}
+
+    def check(self, scene: Scene, *, pair_topics: bool) -> None:
+        """Raise ValueError for a scene that reuses an id, or whose names can be no topics here.
+
+        A pose topic may not be one of the node's own topics, which have other types.
+        """
+        for pair in scene.pairs:
+            before = self._pair_of_id.get(pair.id, pair)
+            if pair.name and pair != before:
+                raise ValueError(f'scene: id {pair.id} of pair {pair.name} was given to '
+                                 f'{before.name} ({before.a}, {before.b}) before: ids are never '
+                                 f'used again while a node runs (start it anew)')
+        own = [f'{self._prefix}contacts', '~/transition_event', *TOPICS_OF_EVERY_NODE]
+        if pair_topics:
+            own += [f'{self._topic_of(pair)}/{kind}' for pair in scene.pairs
+                    for kind in ('point', 'normal')]
+        taken = {self._resolved(topic) for topic in own}
+        for box in scene.moving:
+            topic = scene.boxes[box].pose_topic
+            if self._resolved(topic) in taken:
+                raise ValueError(f'scene: pose_topic {shown(topic)} of box {box} is a topic of '
+                                 'this node that carries no poses')
+
+    def set_scene(self, scene: Scene, *, pair_topics: bool, raw: bool, deadline: float) -> None:
+        """Replace the topics by those of a scene; on RCLError bring the old ones back."""
+        old, was_open = self._wanted, self._is_open
+        sources = {box: PoseSource(scene.boxes[box].pose_topic, raw, deadline)
+                   for box in scene.moving}
+        try:
+            self._change(sources, scene.pairs if pair_topics else ())
+        except RCLError:
+            if was_open:
+                self._change(*old)
+            else:
+                self.close()
+            raise
+        self._pair_of_id |= {pair.id: pair for pair in scene.pairs if pair.name}
+
+    def activate(self, callback_of: Callable[[str, str], Callable[[Any], None]]) -> None:
+        """Subscribe to all poses, with the callback for a box and its topic; or raise RCLError."""
+        self._callback_of = callback_of
+        try:
+            self._change(*self._wanted)
+        except RCLError:
+            self.deactivate()
+            raise
+
+    def deactivate(self) -> None:
+        """Subscribe to no poses."""
+        self._callback_of = None
+        self._unsubscribe(list(self._subscriptions))
+
+    def close(self) -> None:
+        """Destroy all publishers."""
+        self._unpublish(list(self.publishers))
+        if self._is_open:
+            self.events.unwatch(self.contacts)
+            self._node.destroy_publisher(self.contacts)
+        self._is_open, self._wanted = False, ({}, ())
+
+    def pose_topics(self) -> list[str]:
+        """Return the full names of the topics that are subscribed to."""
+        return [subscription.topic_name for _, subscription in self._subscriptions.values()]
+
+    def _topic_of(self, pair: Pair) -> str:
+        return f'{self._prefix}{pair.name}{"/" if pair.name else ""}contact'
+
+    def _resolved(self, topic: str) -> str:
+        """Return a topic's full name, or raise ValueError if it can have none."""
+        try:
+            return self._node.resolve_topic_name(topic)
+        except RCLError as error:
+            reason = str(error).partition(', at ')[0]
+            raise ValueError(f'scene: {shown(topic)}: {reason}') from error
+
+    def _change(self, sources: Mapping[str, PoseSource], pairs: Collection[Pair]) -> None:
+        """Keep the topics that stay, destroy the others, create what is new."""
+        self._wanted = sources, pairs
+        self._unsubscribe([box for box, (source, _) in self._subscriptions.items()
+                           if sources.get(box) != source])
+        if not self._is_open:
+            self.contacts = self._node.create_publisher(
+                PointCloud2, f'{self._prefix}contacts', CONTACT_QOS)
+            self.events.watch(self.contacts)
+            self._is_open = True
+        kept = set(pairs)
+        self._unpublish([key for key, entry in self.publishers.items() if entry.pair not in kept])
+        for pair in pairs:
+            if pair.id not in self.publishers:
+                self.publishers[pair.id] = self._publish(pair)
+        for box, source in sources.items():
+            if self._callback_of is not None and box not in self._subscriptions:
+                subscription = self._subscribe(box, source, self._callback_of(box, source.topic))
+                self._subscriptions[box] = source, subscription
+                self.events.watch(subscription)
+
+    def _publish(self, pair: Pair) -> PairPublishers:
+        def publisher(kind: type, topic: str) -> Publisher:
+            # No events: too many to serve. A subscriber of another QoS is told by its own node.
+            return self._node.create_publisher(
+                kind, f'{self._topic_of(pair)}/{topic}', CONTACT_QOS,
+                event_callbacks=PublisherEventCallbacks(use_default_callbacks=False))
+        return PairPublishers(pair, publisher(PointStamped, 'point'),
+                              publisher(Vector3Stamped, 'normal'))
+
+    def _unpublish(self, ids: Collection[int]) -> None:
+        for key in ids:
+            _, point, normal = self.publishers.pop(key)
+            self._node.destroy_publisher(point)
+            self._node.destroy_publisher(normal)
+
+    def _subscribe(self, box: str, source: PoseSource, callback: Callable[[Any], None],
+                   ) -> Subscription:
+        qos = QoSProfile(depth=POSE_QOS.depth, reliability=POSE_QOS.reliability)
+        if source.deadline:
+            qos.deadline = Duration(seconds=source.deadline)
+        create = partial(self._node.create_subscription, PoseStamped, source.topic, callback, qos,
+                         raw=source.raw)
+        try:
+            return create(event_callbacks=self.events.callbacks(
+                box, deadline=bool(source.deadline)))
+        except UnsupportedEventTypeError:  # depends on the middleware
+            return create()
+
+    def _unsubscribe(self, boxes: Collection[str]) -> None:
+        for box in boxes:
+            _, subscription = self._subscriptions.pop(box)
+            silence(subscription)
+            self.events.unwatch(subscription)
+            self._node.destroy_subscription(subscription)
