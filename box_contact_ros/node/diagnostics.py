@@ -1,4 +1,4 @@
-"""What a contact node says of itself once a second on /diagnostics."""
+"""What a contact node reports once a second on /diagnostics."""
 from __future__ import annotations
 
 import time
@@ -39,8 +39,8 @@ class Diagnostics:
     def publish(self, counts: Counter[str], pairs: int, stale: Sequence[str]) -> float:
         """Publish `counts` and what happened since the last time.
 
-        Returns for how long [s] poses have been coming in without one that could be answered, or 0
-        if some were refused since the last time: for these the reason has been said.
+        Return for how long [s] poses have come without an answer. If some were refused since the
+        last time, return 0: their reason has been logged.
         """
         new = Counter(counts)
         new.subtract(self._reported)

@@ -11,14 +11,13 @@ from ..scene.scene_solver import SceneSolver
 from ..solver.checks import shown
 from .diagnostics import UNMATCHED_SECONDS, Diagnostics
 from .message_bytes import RawMessages
-from .messages import Refused, TypedMessages
+from .messages import NANOSECONDS, Refused, TypedMessages
 from .runtime import LOG_SECONDS
 from .scene_topics import SceneTopics
 
 SERIALIZATIONS: dict[str, type[RawMessages] | type[TypedMessages]] = {
     'raw': RawMessages, 'typed': TypedMessages}
 """Values of the node parameter `serialization`."""
-NANOSECONDS_A_SECOND = 1e9
 OUTSIDE = 'outside the trained range'
 
 
@@ -42,7 +41,7 @@ class Evaluator:
         old = self._settings
         if old:
             self.close()
-        tolerance, max_age = (round(NANOSECONDS_A_SECOND * settings[name])
+        tolerance, max_age = (round(NANOSECONDS * settings[name])
                               for name in ('tolerance', 'max_age'))
         if settings['pairing'] == old.get('pairing'):
             self._pairing.set_scene(solver.scene)

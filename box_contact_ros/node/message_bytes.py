@@ -1,8 +1,8 @@
 """Messages as the bytes that are sent (CDR), without message objects: `RawMessages`.
 
-A pose has a strict layout, and any bytes that do not are refused. Answers are patched together from
-what rclpy itself serialises once for each frame_id, so nothing here knows the layout of a cloud's
-constant parts.
+A pose has a strict layout. All other bytes are refused. Answers are put together from what rclpy
+serialises once for each frame_id: nothing here knows the layout of a cloud's constant parts.
+Bytes are kept because they halve the latency: docs/decisions/contact-node.md.
 """
 from __future__ import annotations
 
@@ -50,8 +50,8 @@ _new_tuple = tuple.__new__  # a named tuple's own constructor is Python code
 _NOTHING = Contact(False, 0.0, np.zeros(3), np.zeros(3))
 
 
-class _Answers(NamedTuple):
-    """What the answers in a frame have in common, between the bytes that change."""
+class _FrameBytes(NamedTuple):
+    """What all messages of a frame have in common, between the bytes that change."""
 
     head: bytes
     point: bytes
@@ -61,12 +61,12 @@ class _Answers(NamedTuple):
 
 
 def numbers_at(length: int) -> int:
-    """Where the seven numbers are, behind a frame_id of so many bytes: doubles are aligned to 8."""
+    """Return where the seven numbers are, behind a frame_id of so many bytes; aligned to 8."""
     return ENCAPSULATION + -(-(FRAME_AT - ENCAPSULATION + length) // 8) * 8
 
 
 def parse_pose(data: bytes) -> tuple[tuple[float, ...], str, int, int]:
-    """Numbers, frame_id, seconds and nanoseconds of a serialised PoseStamped; raises Refused."""
+    """Return numbers, frame_id, seconds and nanoseconds of a PoseStamped, or raise Refused."""
     if len(data) < FRAME_AT or data[0] != 0 or data[1] > 1:
         raise Refused('not a PoseStamped', f'{len(data)} bytes that are no plain CDR message')
     order = '<' if data[1] else '>'
@@ -86,7 +86,7 @@ def parse_pose(data: bytes) -> tuple[tuple[float, ...], str, int, int]:
 
 
 class RawMessages:
-    """The fast way. A reader for all boxes: its shortcut knows the frame of the last pose."""
+    """Reads poses of all boxes, and makes answers. A shortcut knows the frame of the last pose."""
 
     raw = True
     """Whether subscriptions hand over bytes."""
@@ -95,10 +95,10 @@ class RawMessages:
         self._frame: bytes | None = None
         self._frame_id = ''
         self._unpack = struct.Struct(_LAYOUT.format(0, 0)).unpack
-        self._answers: dict[str, _Answers] = {}
+        self._bytes_of: dict[str, _FrameBytes] = {}
 
     def read_pose(self, data: bytes) -> StampedPose:
-        """The pose of a serialised message; raises Refused."""
+        """Return the pose of a serialised message, or raise Refused."""
         try:
             order, sec, nanosec, frame, x, y, z, qx, qy, qz, qw = self._unpack(data)
         except struct.error:  # another length
@@ -125,25 +125,25 @@ class RawMessages:
         return pose
 
     def begin(self, stamp: int, frame_id: str) -> None:
-        """What follows carries this stamp [ns] and frame."""
-        answers = self._answers.get(frame_id)
-        if answers is None:
-            if len(self._answers) >= KEPT_FRAMES:
-                self._answers.clear()
-            answers = self._answers[frame_id] = _in_frame(frame_id)
-        self._in_frame = answers
-        self._stamp = answers.head + _STAMP.pack(*divmod(stamp, NANOSECONDS))
+        """Set stamp [ns] and frame of the messages that follow."""
+        frame = self._bytes_of.get(frame_id)
+        if frame is None:
+            if len(self._bytes_of) >= KEPT_FRAMES:
+                self._bytes_of.clear()
+            frame = self._bytes_of[frame_id] = _in_frame(frame_id)
+        self._in_frame = frame
+        self._stamp = frame.head + _STAMP.pack(*divmod(stamp, NANOSECONDS))
 
     def point(self, contact: Contact) -> bytes:
-        """`contact/point`."""
+        """Make `contact/point`."""
         return self._stamp + self._in_frame.point + contact.point.tobytes()
 
     def normal(self, contact: Contact) -> bytes:
-        """`contact/normal`."""
+        """Make `contact/normal`."""
         return self._stamp + self._in_frame.normal + contact.normal.tobytes()
 
     def cloud(self, answer: Answer) -> bytes:
-        """`contacts`."""
+        """Make `contacts`."""
         rows = b''.join([c.point.tobytes() + c.normal.tobytes() + _ROW_END.pack(-c.separation, p.id)
                          for p, c in answer.touching])
         if answer.stale:
@@ -155,7 +155,7 @@ class RawMessages:
                          _SIZES.pack(size, size), rows, b'\0' if answer.stale else b'\1'))
 
 
-def _in_frame(frame_id: str) -> _Answers:
+def _in_frame(frame_id: str) -> _FrameBytes:
     header = make_header(0, frame_id)
     point = bytes(serialize_message(make_point(header, _NOTHING)))
     normal = bytes(serialize_message(make_normal(header, _NOTHING)))
@@ -166,5 +166,5 @@ def _in_frame(frame_id: str) -> _Answers:
     frame_end = FRAME_AT + len(frame_id.encode()) + 1
     width_at = -(-frame_end // 4) * 4 + 4  # height, width: aligned to 4, as the encapsulation is
     # A cloud without rows ends with row_step, the number of bytes of data, and is_dense.
-    return _Answers(point[:ENCAPSULATION], point[body:-24], normal[body:-24],
+    return _FrameBytes(point[:ENCAPSULATION], point[body:-24], normal[body:-24],
                     cloud[body:width_at], cloud[width_at + 4:-9])

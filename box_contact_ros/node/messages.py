@@ -1,7 +1,7 @@
 """Between messages and numbers: poses in; point, normal and the contacts cloud out.
 
-`TypedMessages` is the plain way, through rclpy's message objects; `wire.RawMessages` does the same
-with bytes, faster. Both answer alike, which a test compares.
+`TypedMessages` uses rclpy's message objects. `message_bytes.RawMessages` does the same with bytes,
+faster. Tests compare the two.
 """
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import PointStamped, PoseStamped, Vector3Stamped
+from geometry_msgs.msg import Point, PointStamped, PoseStamped, Vector3, Vector3Stamped
 from sensor_msgs.msg import PointCloud2, PointField
 from std_msgs.msg import Header
 
@@ -20,15 +20,16 @@ from ..solver.contact import Contact
 
 NANOSECONDS = 1_000_000_000
 
-CLOUD_ROW = np.dtype([(name, '<f8') for name in (
-    'x', 'y', 'z', 'normal_x', 'normal_y', 'normal_z', 'depth')] + [('pair', '<u4')])
-"""One row of the `contacts` cloud: a pair in contact, or, all NaN but for its id, one that could
-not be evaluated. float64, because float32 loses half a metre in UTM coordinates; depth [m] is
+_ROW = [*((name, '<f8') for name in (
+    'x', 'y', 'z', 'normal_x', 'normal_y', 'normal_z', 'depth')), ('pair', '<u4')]
+CLOUD_ROW = np.dtype(_ROW)
+"""One row of the `contacts` cloud: a pair in contact. Of a pair that could not be evaluated all is
+NaN but its id. float64, because float32 loses half a metre in UTM coordinates. Depth [m] is
 −separation."""
 _FIELDS = [
-    PointField(name=name, offset=CLOUD_ROW.fields[name][1], count=1,
+    PointField(name=name, offset=8 * place, count=1,
                datatype=PointField.UINT32 if name == 'pair' else PointField.FLOAT64)
-    for name in CLOUD_ROW.names]
+    for place, (name, _) in enumerate(_ROW)]
 _NUMBERS = {PointField.UINT32: 'u4', PointField.FLOAT32: 'f4', PointField.FLOAT64: 'f8'}
 _NAN = (float('nan'),) * 7
 
@@ -42,7 +43,7 @@ class Refused(ValueError):
 
 
 def checked_pose(numbers: Sequence[float], frame_id: str, sec: int, nanosec: int) -> StampedPose:
-    """A pose that can be answered; raises Refused for any other."""
+    """Return a pose that can be answered, or raise Refused."""
     if nanosec >= NANOSECONDS:
         raise Refused('bad header', f'stamp has {nanosec} nanoseconds, a second or more')
     if '\N{REPLACEMENT CHARACTER}' in frame_id:  # rclpy's word for bytes it cannot decode
@@ -54,32 +55,25 @@ def checked_pose(numbers: Sequence[float], frame_id: str, sec: int, nanosec: int
 
 
 def make_header(stamp: int, frame_id: str) -> Header:
-    """Header of a stamp [ns]."""
+    """Make the header of a stamp [ns]."""
     return Header(stamp=Time(sec=stamp // NANOSECONDS, nanosec=stamp % NANOSECONDS),
                   frame_id=frame_id)
 
 
 def make_point(header: Header, contact: Contact) -> PointStamped:
-    """`contact/point`; values are made float: messages do not check them."""
-    message = PointStamped(header=header)
-    point = message.point
-    point.x, point.y, point.z = (float(value) for value in contact.point)
-    return message
+    """Make `contact/point`; values are made float, as messages do not check them."""
+    x, y, z = map(float, contact.point)
+    return PointStamped(header=header, point=Point(x=x, y=y, z=z))
 
 
 def make_normal(header: Header, contact: Contact) -> Vector3Stamped:
-    """`contact/normal`."""
-    message = Vector3Stamped(header=header)
-    vector = message.vector
-    vector.x, vector.y, vector.z = (float(value) for value in contact.normal)
-    return message
+    """Make `contact/normal`."""
+    x, y, z = map(float, contact.normal)
+    return Vector3Stamped(header=header, vector=Vector3(x=x, y=y, z=z))
 
 
 def make_cloud(header: Header, answer: Answer) -> PointCloud2:
-    """`contacts`: a row for each pair in contact, a row of NaN for each that is stale.
-
-    No row says 'no contact'.
-    """
+    """Make `contacts`: a row for each pair in contact, a row of NaN for each stale pair."""
     rows = [(*c.point, *c.normal, -c.separation, pair.id) for pair, c in answer.touching]
     rows += [(*_NAN, pair.id) for pair in answer.stale]
     return PointCloud2(header=header, height=1, width=len(rows), fields=_FIELDS,
@@ -119,23 +113,23 @@ class TypedMessages:
     """Whether subscriptions hand over bytes."""
 
     def read_pose(self, message: PoseStamped) -> StampedPose:
-        """The pose of a message; raises Refused."""
+        """Return the pose of a message, or raise Refused."""
         p, q, header = message.pose.position, message.pose.orientation, message.header
         return checked_pose((p.x, p.y, p.z, q.x, q.y, q.z, q.w), header.frame_id,
                             header.stamp.sec, header.stamp.nanosec)
 
     def begin(self, stamp: int, frame_id: str) -> None:
-        """What follows carries this stamp [ns] and frame."""
+        """Set stamp [ns] and frame of the messages that follow."""
         self._header = make_header(stamp, frame_id)
 
     def point(self, contact: Contact) -> PointStamped:
-        """`contact/point`."""
+        """Make `contact/point`."""
         return make_point(self._header, contact)
 
     def normal(self, contact: Contact) -> Vector3Stamped:
-        """`contact/normal`."""
+        """Make `contact/normal`."""
         return make_normal(self._header, contact)
 
     def cloud(self, answer: Answer) -> PointCloud2:
-        """`contacts`."""
+        """Make `contacts`."""
         return make_cloud(self._header, answer)

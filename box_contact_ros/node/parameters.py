@@ -39,7 +39,7 @@ def _is_number(value: Any) -> bool:
 
 
 def number(low: float, high: float) -> Check:
-    """A number within [low, high]; integers are as good as floats."""
+    """Check for a number within [low, high]; integers are as good as floats."""
     def check(name: str, value: Any) -> float:
         if not _is_number(value):
             raise ValueError(f'{name} must be a number, not {shown(value)}')
@@ -50,7 +50,7 @@ def number(low: float, high: float) -> Check:
 
 
 def whole_number(low: int, high: int) -> Check:
-    """A whole number within [low, high]."""
+    """Check for a whole number within [low, high]."""
     def check(name: str, value: Any) -> int:
         if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
             raise ValueError(f'{name} must be a whole number from {low} to {high}, '
@@ -60,7 +60,7 @@ def whole_number(low: int, high: int) -> Check:
 
 
 def numbers(count: int) -> Check:
-    """So many finite numbers."""
+    """Check for so many finite numbers."""
     def check(name: str, value: Any) -> tuple[float, ...]:
         found = value if isinstance(value, Sequence) else ()
         if len(found) != count or not all(map(_is_number, found)) or not all(
@@ -71,8 +71,8 @@ def numbers(count: int) -> Check:
 
 
 def size(name: str, value: Any) -> tuple[float, ...]:
-    """Three full extents [m]."""
-    extents = numbers(3)(name, value)
+    """Check three full extents [m]."""
+    extents: tuple[float, ...] = numbers(3)(name, value)
     fault = size_fault(extents)
     if fault:
         raise ValueError(f'{name} {fault}')
@@ -80,23 +80,24 @@ def size(name: str, value: Any) -> tuple[float, ...]:
 
 
 def text(name: str, value: Any) -> str:
-    """Any string."""
+    """Check for a string."""
     if not isinstance(value, str):
         raise ValueError(f'{name} must be a string, not {shown(value)}')
     return value
 
 
 def one_of(choices: Iterable[str]) -> Check:
-    """One of some strings."""
+    """Check for one of some strings."""
     def check(name: str, value: Any) -> str:
-        if text(name, value) not in choices:
+        choice = text(name, value)
+        if choice not in choices:
             raise ValueError(f'{name} {shown(value)} is not one of: {", ".join(choices)}')
-        return value
+        return choice
     return check
 
 
 def flag(name: str, value: Any) -> bool:
-    """Either true or false."""
+    """Check for true or false."""
     if not isinstance(value, bool):
         raise ValueError(f'{name} must be true or false, not {shown(value)}')
     return value
@@ -116,10 +117,7 @@ def declare(node: Node, settings: Mapping[str, Setting], *, fixed: bool = False,
 
 
 def _say_unknown(node: Node, settings: Mapping[str, Setting]) -> None:
-    """Warn of values given at the start for names that nobody has declared; rclpy ignores them.
-
-    They are not refused, since a file of parameters may be meant for several nodes.
-    """
+    """Warn of names without a parameter; a file of parameters may be meant for several nodes."""
     for name in parameter_overrides(node):
         # Those of topics are declared with the topics.
         if not node.has_parameter(name) and not name.startswith('qos_overrides.'):
@@ -129,7 +127,7 @@ def _say_unknown(node: Node, settings: Mapping[str, Setting]) -> None:
 
 
 def checked(settings: Mapping[str, Setting], values: Mapping[str, Any]) -> dict[str, Any]:
-    """All values as the node uses them; ValueError for the first that is wrong."""
+    """Return all values as the node uses them, or raise ValueError for the first bad one."""
     return {name: setting.check(name, values[name]) for name, setting in settings.items()}
 
 
@@ -138,11 +136,7 @@ class CheckedParameters:
 
     def __init__(self, node: Node, settings: Mapping[str, Setting],
                  apply: Callable[[dict[str, Any], Collection[str]], None]) -> None:
-        """Declare and check the parameters; raise ValueError for a bad one.
-
-        apply: Called before a change with all new values and the names that were set; what it
-        raises refuses the change.
-        """
+        """Declare and check; `apply` gets new values and the names that were set, or refuses."""
         self._settings, self._apply = settings, apply
         self.values = declare(node, settings)
         node.add_on_set_parameters_callback(self._on_set)
@@ -181,7 +175,7 @@ def answer_help(program: str, doc: str | None, settings: Mapping[str, Setting],
 
 
 def _outside_ros_args(args: Sequence[str]) -> Iterator[str]:
-    """What is not between `--ros-args` and `--`; rclpy's own function fails on a bad value."""
+    """Yield what is not between `--ros-args` and `--`; rclpy's function fails on a bad value."""
     inside = False
     for arg in args:
         if arg == '--ros-args' or (inside and arg == '--'):

@@ -20,10 +20,9 @@ from rclpy.task import Future
 
 from .rclpy_workarounds import RCLError, keep_for_ever
 
-try:
+EventsExecutor: Any = None
+with contextlib.suppress(ImportError):  # rclpy before 7.1.4
     from rclpy.experimental.events_executor import EventsExecutor
-except ImportError:  # rclpy before 7.1.4
-    EventsExecutor = None
 
 REFUSALS = (ValueError, rclpy.exceptions.ParameterException, RCLError)
 """What a node raises on parameters or arguments that it cannot start with."""
@@ -40,10 +39,7 @@ LOG_SECONDS = 1.0
 
 
 def make_executor(context: Context) -> Any:
-    """The executor that loses nothing at 1 kHz where rclpy has it, else the default one.
-
-    A wait-set executor may deliver pose i + 1 of one box before pose i of the other.
-    """
+    """Return the executor that loses nothing at 1 kHz where rclpy has it, else the default one."""
     if EventsExecutor is None:
         return SingleThreadedExecutor(context=context)
     return EventsExecutor(context=context)
@@ -52,8 +48,8 @@ def make_executor(context: Context) -> Any:
 def spin_for(executor: Any, seconds: float) -> None:
     """Serve callbacks for so long, or until the executor's context is shut down.
 
-    Unlike `spin_once` this stays in the executor from one callback to the next, which takes some
-    5 µs less for a tick of two poses. An exception out of a callback comes out of here.
+    It stays in the executor from one callback to the next: 5 µs less than `spin_once` for a tick of
+    two poses. An exception of a callback is raised here.
     """
     # A new one each time: the executor leaves a callback with it.
     executor.spin_until_future_complete(Future(), seconds)
@@ -62,10 +58,8 @@ def spin_for(executor: Any, seconds: float) -> None:
 def let_callbacks_finish() -> None:
     """Keep this process's other threads from interrupting the one that calls this (Linux).
 
-    Every reliable publish wakes two or three threads of the middleware (timers, acknowledgements),
-    which the scheduler then runs at once if they share a core: measured, that made publishing point
-    and normal take 55 µs in place of some 20. As batch threads they wait until this one is idle,
-    which it is for most of a millisecond.
+    Every reliable publish wakes two or three threads of the middleware. As batch threads they wait
+    until this one is idle: docs/performance.md.
     """
     try:
         mine = threading.get_native_id()
@@ -80,8 +74,7 @@ def let_callbacks_finish() -> None:
 def spin(node: Node, *, undisturbed: bool = True) -> None:
     """Serve a node until its context is shut down (SIGINT, SIGTERM, or `context.shutdown()`).
 
-    An exception out of a callback is said, and ends nothing. `undisturbed`: see
-    `let_callbacks_finish`.
+    An exception of a callback is logged and ends nothing. `undisturbed`: `let_callbacks_finish`.
     """
     executor = make_executor(node.context)
     try:
@@ -109,10 +102,10 @@ def spin(node: Node, *, undisturbed: bool = True) -> None:
 
 @contextlib.contextmanager
 def uninterrupted() -> Iterator[None]:
-    """Ignore SIGINT, so that who presses Ctrl-C twice gets the clean end that is under way.
+    """Ignore SIGINT, so that a second Ctrl-C does not break the clean end that is under way.
 
-    rclpy takes its handlers back after the first. Another one while the node leaves the network,
-    or while the interpreter ends, 130 ms in all, would kill the process.
+    rclpy takes its handlers back after the first. Another one within the next 130 ms, until the
+    interpreter has ended, would kill the process.
     """
     if threading.current_thread() is not threading.main_thread():  # only that one may
         yield
@@ -127,12 +120,12 @@ def uninterrupted() -> Iterator[None]:
 
 def run_node(make_node: Callable[[Context], Node], args: Sequence[str] | None, *,
              undisturbed: bool = True) -> int:
-    """Start a node and `spin`: 0 after a clean end, 1 (with one line) if it refuses to start."""
+    """Start a node and `spin`; return 0 after a clean end, 1 (and print why) if it cannot start."""
     context = Context()
     node, joined = None, False
     try:
         # Handlers have to be asked for where the context is not the default one.
-        rclpy.init(args=args, context=context,
+        rclpy.init(args=None if args is None else list(args), context=context,
                    signal_handler_options=SignalHandlerOptions.ALL)
         joined = True
         node = make_node(context)

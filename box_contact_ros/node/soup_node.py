@@ -1,8 +1,8 @@
 """The soup node: the contact node's work done by a polygon soup, the source paper's rival.
 
-Subscribes box_a/pose and box_b/pose like the contact node, and publishes the same messages under
-soup/contact/point, soup/contact/normal and soup/contacts, so that both run side by side on one
-input; and /diagnostics.
+Subscribes box_a/pose and box_b/pose like the contact node. Publishes the same messages under
+soup/contact/point, soup/contact/normal and soup/contacts, and /diagnostics. Both nodes can run side
+by side on one input.
 """
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class SoupNode(ContactNode):
 
     @staticmethod
     def make_solver(settings: Mapping[str, Any], scene: Scene) -> SceneSolver:
-        """A soup of so many divisions."""
+        """Return the solver for a soup of so many divisions."""
         return SceneSolver(scene, model=f'soup-{settings["divisions"]}')
 
 

@@ -1,7 +1,37 @@
-"""Which poses belong together: streams of stamped poses of several boxes, joined to ticks.
+"""Pairing: joins the streams of stamped poses of several boxes to ticks.
 
-Time is what the stamps say. No clock is asked, so a recording, a simulation that is paused and one
-that runs at ten times real time are treated alike.
+Time is what the stamps say. No clock is asked. A recording, a paused simulation and a simulation at
+ten times real time are treated alike.
+
+A tick of policy `stamp` holds the poses of one stamp. Each stamp is answered once.
+```
+tick     event                                     next      effect
+-------  ----------------------------------------  --------  ---------------------------------
+none     first pose of a stamp                     waiting
+none     pose of a stamp answered without its box  none      TOO_LATE
+waiting  pose of the last awaited box              answered  a tick
+waiting  pose nearer than the one of its box       waiting   NO_PARTNER for the earlier one
+waiting  no awaited box is left, or                answered  a tick, None for a missing box
+         WAITING_TICKS newer ticks have begun      dropped   NO_PARTNER, if no pair is whole
+waiting  one of its boxes leaves the scene         waiting   its pose is dropped, not counted
+waiting  time is set back                          dropped   NO_PARTNER for each pose
+```
+A tick awaits the boxes that are current or missing. Before the first answer it awaits all boxes.
+```
+box      event                                     next      effect
+-------  ----------------------------------------  --------  ---------------------------------
+unseen   pose                                      current
+current  a tick begins after its newest stamp      missing
+missing  max_age passes after that tick            stale     waiting ticks are looked over
+missing  all boxes pause longer than max_age       current
+missing  pose of a new stamp                       current
+stale    pose of a new stamp                       current
+any      pose of a stamp that was taken            same      REPEATED
+any      stamp older than all remembered ones      same      OLD
+any      stamp RESET before its newest             unseen    RESETS, for all boxes
+```
+Policy `latest` makes a tick of every pose that is not OLD. A box is stale by its newest stamp.
+Why no library does this: docs/decisions/contact-node.md.
 """
 from __future__ import annotations
 

@@ -128,7 +128,7 @@ def test_memory_for_frames_is_bounded():
     messages = RawMessages()
     for number in range(10 * KEPT_FRAMES):
         messages.begin(number, f'frame {number}')
-    assert len(messages._answers) <= KEPT_FRAMES
+    assert len(messages._bytes_of) <= KEPT_FRAMES
 
 
 @pytest.mark.parametrize('order', ['<', '>'])
