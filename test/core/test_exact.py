@@ -5,11 +5,11 @@ in sides, and plates of one thickness.
 """
 from __future__ import annotations
 
-import mpmath as mp
 import numpy as np
 import oracle
 import poses
 import pytest
+from gmpy2 import mpfr
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.core import DEPTH_FLOOR, stages
@@ -69,7 +69,7 @@ def check(family, chunk, a, b, size_a, size_b):
                 and (sign == 1 or abs(oracle.dot(offset, axis)) <= 1e-12 * size)]
         assert min(np.abs(axis - found.normal[i]).max() for axis in best) < 1e-9, where
         assert abs(np.linalg.norm(found.normal[i]) - 1) < 1e-14, where
-        axis = tuple(mp.mpf(float(v)) for v in found.normal[i])
+        axis = tuple(mpfr(float(v)) for v in found.normal[i])
         point = oracle.as_array(oracle.contact_point(box_a, box_b, axis, -separation, size))
         depth = max(-float(separation), 1e-9 * size)
         bound = max(1e-9, 1e-14 * size / depth) * size

@@ -4,11 +4,11 @@ The oracle clips faces; the core cuts edges. They share no code and no idea.
 """
 from __future__ import annotations
 
-import mpmath as mp
 import numpy as np
 import oracle
 import poses
 import pytest
+from gmpy2 import mpfr
 
 from box_contact_ros.core import DEPTH_FLOOR, Stages, stages
 from box_contact_ros.core.stages import BOUNDS
@@ -226,10 +226,10 @@ def test_bounding_boxes_are_those_of_the_corners(family, order):
                 f'{size_a[row].tolist()}, {size_b[row].tolist()}'
         box_a, box_b = oracle.make_box(a[row], size_a[row]), oracle.make_box(b[row], size_b[row])
         # Pressed in along the very normal that the core took.
-        n = [mp.mpf(float(v)) for v in found.normal[k]]
+        n = [mpfr(float(v)) for v in found.normal[k]]
         axis = tuple(sum(box_a.axes[j][c] * n[j] for j in range(3)) for c in range(3))
-        box_b = oracle.pressed(box_a, box_b, axis, -mp.mpf(float(found.separation[k])),
-                               mp.mpf(10)**-9 * mp.mpf(float(found.size[k])))
+        box_b = oracle.pressed(box_a, box_b, axis, -mpfr(float(found.separation[k])),
+                               mpfr(10)**-9 * mpfr(float(found.size[k])))
         corners = {p for face in oracle.overlap_faces(box_a, box_b) for p in face}
         assert corners, where
         both = [extremes(box, corners) for box in (box_a, box_b)]

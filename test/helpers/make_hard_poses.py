@@ -7,14 +7,14 @@ Once written, the file is what tests and reports read
 """
 from __future__ import annotations
 
-import mpmath as mp
 import numpy as np
 import oracle
+from gmpy2 import mpfr
 from tqdm import tqdm
 
 from box_contact_ros.verification import hard_poses
 
-FLOOR = mp.mpf(10)**-9
+FLOOR = mpfr(10)**-9
 """Depth, of the size, below which the point is that of boxes pressed in: no truth for it here."""
 
 
@@ -22,7 +22,7 @@ def truth(a, b, size_a, size_b):
     """Largest gap, and the overlap's centroid from A's position, of one pair."""
     box_a, box_b = oracle.make_box(a, size_a), oracle.make_box(b, size_b)
     gap = oracle.separation(box_a, box_b)
-    size = mp.mpf(float(max(*size_a, *size_b)))
+    size = mpfr(float(max(*size_a, *size_b)))
     centroid = None
     if gap < -FLOOR * size:
         centroid = oracle.overlap(box_a, box_b)[1]

@@ -1,6 +1,6 @@
 """Slow, obvious truth for two boxes, in 60-digit arithmetic. Shares no code with the package.
 
-Inputs are the very doubles a solver gets; everything after them is mpmath: quaternions are
+Inputs are the very doubles a solver gets; everything after them is MPFR: quaternions are
 normalised to 60 digits, the 15 axes are tested as the textbook writes them, and the overlap's
 volume and centroid come from its faces: each face of either box, clipped by the other box's six
 half-spaces, is one side of a pyramid whose apex lies inside.
@@ -9,12 +9,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import mpmath as mp
 import numpy as np
+from gmpy2 import get_context, mpfr, sqrt
 
-mp.mp.dps = 60
-ZERO, ONE = mp.mpf(0), mp.mpf(1)
-SAME = mp.mpf(10)**-40
+BITS = 203
+"""60 digits, as mpmath counts them: the stored truth was made with so many bits."""
+get_context().precision = BITS
+ZERO, ONE = mpfr(0), mpfr(1)
+SAME = mpfr(10)**-40
 """Lengths below this are zero: 20 digits above the rounding of 60-digit arithmetic, and 20 below
 anything that doubles can express between boxes of everyday sizes."""
 
@@ -56,13 +58,14 @@ class Box:
 
 
 def make_box(pose, size):
-    x, y, z, qx, qy, qz, qw = (mp.mpf(float(v)) for v in pose)
+    assert get_context().precision == BITS  # a thread's own: another one rounds to 53
+    x, y, z, qx, qy, qz, qw = (mpfr(float(v)) for v in pose)
     n2 = qx * qx + qy * qy + qz * qz + qw * qw
     s = 2 / n2
     axes = ((1 - s * (qy * qy + qz * qz), s * (qx * qy + qw * qz), s * (qx * qz - qw * qy)),
             (s * (qx * qy - qw * qz), 1 - s * (qx * qx + qz * qz), s * (qy * qz + qw * qx)),
             (s * (qx * qz + qw * qy), s * (qy * qz - qw * qx), 1 - s * (qx * qx + qy * qy)))
-    return Box((x, y, z), axes, tuple(mp.mpf(float(v)) / 2 for v in size))
+    return Box((x, y, z), axes, tuple(mpfr(float(v)) / 2 for v in size))
 
 
 def axis_gaps(a, b):
@@ -71,7 +74,7 @@ def axis_gaps(a, b):
     found = []
     candidates = list(a.axes) + list(b.axes) + [cross(u, v) for u in a.axes for v in b.axes]
     for number, axis in enumerate(candidates):
-        length = mp.sqrt(dot(axis, axis))
+        length = sqrt(dot(axis, axis))
         if length < SAME:
             continue
         axis = scaled(axis, 1 / length)
@@ -152,7 +155,7 @@ def pressed(a, b, axis, depth, floor):
 
 def contact_point(a, b, axis, depth, size):
     """The package's definition of the point: centroid of A∩B, pressed in to 1e-9 of the size."""
-    return overlap(a, pressed(a, b, axis, depth, mp.mpf(10)**-9 * mp.mpf(float(size))))[1]
+    return overlap(a, pressed(a, b, axis, depth, mpfr(10)**-9 * mpfr(float(size))))[1]
 
 
 def as_array(vector):

@@ -3,10 +3,10 @@ from __future__ import annotations
 
 import csv
 
-import mpmath as mp
 import numpy as np
 import oracle
 import pytest
+from gmpy2 import mpfr
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.verification import fuzz, judge
@@ -49,7 +49,7 @@ def test_the_judges_gap_is_the_oracles(name):
         exact = oracle.separation(oracle.make_box(a, size_a), oracle.make_box(b, size_b))
         assert judge.exact_gap(a, b, size_a, size_b) == float(exact)
         if found[0][row] and not verdict.doubtful[row]:
-            off = abs(mp.mpf(float(found[1][row])) - exact) / verdict.tolerance[row]
+            off = abs(mpfr(float(found[1][row])) - exact) / verdict.tolerance[row]
             assert off <= 2.0
 
 
