@@ -42,6 +42,14 @@ class Series(NamedTuple):
 
     pairs: Pairs
     motions: int
+    answers: dict[str, Contacts]
+    """By model, those that were asked for."""
+
+    def solve(self, model: str) -> Contacts:
+        """Return a model's answers in all frames."""
+        if model not in self.answers:
+            self.answers[model] = solve(model, self.pairs)
+        return self.answers[model]
 
 
 def solve(model: str, pairs: Pairs) -> Contacts:
@@ -106,7 +114,6 @@ LANDED = {f'landed, case {number}': number for number in (0, 5, 17, 31)}
 """Closed loop by number of `landing.cases`: among them the hardest, see test_landing.py."""
 
 
-@cache
 def crane_series(name: str) -> Series:
     """The poses of one run of the crane."""
     pytest.importorskip('mujoco')
@@ -126,7 +133,7 @@ def crane_series(name: str) -> Series:
                     rate_hz=CRANE_RATE, latency=0.002).poses
     n = len(load)
     return Series(Pairs(np.tile(crane.stack_pose, (n, 1)), np.array(load),
-                        np.tile(scenario.stack_size, (n, 1)), np.tile(scenario.size, (n, 1))), 1)
+                        np.tile(scenario.stack_size, (n, 1)), np.tile(scenario.size, (n, 1))), 1, {})
 
 
 APPROACHES, FRAMES = 150, 401
@@ -134,7 +141,6 @@ TURN = 0.5
 """Largest angle [rad] by which a box turns in an approach."""
 
 
-@cache
 def approaches(name: str, turning: bool) -> Series:
     """Family I: B comes down on a slanted line, rests for an instant, and goes off sideways.
 
@@ -163,7 +169,7 @@ def approaches(name: str, turning: bool) -> Series:
     if turning:
         b[:, 3:] = quaternion_multiply(turns(repeated(axis), repeated(angle) * time), b[:, 3:])
         b[:, 3:] *= rng.choice([-1.0, 1.0], (len(b), 1))
-    return Series(Pairs(repeated(met.pose_a), b, repeated(met.size_a), repeated(met.size_b)), n)
+    return Series(Pairs(repeated(met.pose_a), b, repeated(met.size_a), repeated(met.size_b)), n, {})
 
 
 SERIES = {name: (crane_series, name) for name in (*LOWERED, *LANDED)}
@@ -171,8 +177,9 @@ SERIES |= {f'{name}, {"turning" if turning else "fixed"}': (approaches, name, tu
            for name in SETS for turning in (False, True)}
 
 
-@pytest.fixture(params=SERIES)
+@pytest.fixture(scope='module', params=SERIES)
 def series(request: pytest.FixtureRequest) -> tuple[str, Series]:
+    """Name and frames: all tests of a series run one after the other, and share its answers."""
     make, *arguments = SERIES[request.param]
     return request.param, make(*arguments)
 
@@ -187,8 +194,9 @@ def test_one_contact_interval_per_approach(series):
     of contact in common. While they turn, `mlp` begins as many contacts as `exact` does, in
     the same frames.
     """
-    name, (pairs, motions) = series
-    exact, mlp = solve('exact', pairs), solve('mlp', pairs)
+    name, motion = series
+    pairs, motions, _ = motion
+    exact, mlp = motion.solve('exact'), motion.solve('mlp')
     assert np.array_equal(mlp.colliding, exact.colliding)
     begun = contact_intervals(exact, motions)
     print(f'{name}: {exact.colliding.sum()} of {len(pairs.pose_a)} frames in contact, '
@@ -200,7 +208,7 @@ def test_one_contact_interval_per_approach(series):
 
 def test_chatter_is_counted():
     """The test above would see a contact that breaks off for one frame."""
-    pairs, motions = approaches('containers', False)
+    pairs, motions, _ = approaches('containers', False)
     exact = solve('exact', pairs)
     exact.colliding[np.flatnonzero(exact.colliding)[1]] = False
     assert sorted(contact_intervals(exact, motions))[-2:] == [1, 2]
@@ -208,13 +216,13 @@ def test_chatter_is_counted():
 
 def test_frames_know_no_history(series):
     """In random order, and with −q for q: the same bits."""
-    _, (pairs, _) = series
+    _, motion = series
     rng = np.random.default_rng(2)
-    order = rng.permutation(len(pairs.pose_a))
-    other = Pairs(*(part[order] for part in pairs))
+    order = rng.permutation(len(motion.pairs.pose_a))
+    other = Pairs(*(part[order] for part in motion.pairs))
     other.pose_b[:, 3:] *= rng.choice([-1.0, 1.0], (len(order), 1))
     for model in ('exact', 'mlp'):
-        for one, two in zip(solve(model, pairs), solve(model, other)):
+        for one, two in zip(motion.solve(model), solve(model, other)):
             assert np.array_equal(one[order], two, equal_nan=True)
 
 
@@ -223,9 +231,10 @@ def test_the_point_keeps_to_its_slope(series):
 
     Of `mlp` between frames in which the network is asked the same way.
     """
-    name, (pairs, motions) = series
+    name, motion = series
+    pairs, motions, _ = motion
     one, other = frames(pairs, motions)
-    exact = slopes(one, other, *frames(solve('exact', pairs), motions))
+    exact = slopes(one, other, *frames(motion.solve('exact'), motions))
     found, choices = solve_with_choices(NETWORK, pairs)
     before, after = frames(choices, motions)
     same = before.equal(after)
@@ -245,8 +254,8 @@ def beyond_exact(model: str, series: Series) -> tuple[float, float]:
     The bound is the exact point's step plus 1 % of the boxes' shortest edge; the worst is what a
     step has beyond the exact point's, by the smaller box's longest edge.
     """
-    pairs, motions = series
-    excess = steps(solve(model, pairs), motions) - steps(solve('exact', pairs), motions)
+    pairs, motions, _ = series
+    excess = steps(series.solve(model), motions) - steps(series.solve('exact'), motions)
     first, _ = frames(pairs, motions)
     shortest = np.minimum(first.size_a.min(axis=1), first.size_b.min(axis=1))
     longest = np.minimum(first.size_a.max(axis=1), first.size_b.max(axis=1))
@@ -278,10 +287,10 @@ def test_the_deepest_point_jumps_by_the_box(series):
     """
     pytest.importorskip('fcl')
     name, motion = series
-    share, worst = beyond_exact('fcl', motion)
-    print(f'{name}: {100 * share:.2f} % of the steps, worst {100 * worst:.2f} % of the edge')
     if 'fixed' in name:
         return  # boxes that do not turn: the deepest corner mostly stays
+    share, worst = beyond_exact('fcl', motion)
+    print(f'{name}: {100 * share:.2f} % of the steps, worst {100 * worst:.2f} % of the edge')
     assert worst > 0.15
     assert worst > 5.0 * beyond_exact('mlp', motion)[1]
 
