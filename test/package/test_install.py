@@ -2,6 +2,7 @@
 
 Each is made once, from a copy of the tracked files, in a temporary folder, without the network.
 Of a plain one the sources are deleted before it is looked at: nothing may reach back to them.
+All are built by one compiler, which does not optimise and compiles the same text once.
 """
 from __future__ import annotations
 
@@ -12,7 +13,7 @@ import subprocess
 import sys
 import sysconfig
 import venv
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -32,6 +33,35 @@ CLEAN = {name: value for name, value in os.environ.items()
          if not name.startswith(('PYTHONPATH', 'AMENT', 'COLCON', 'CMAKE_PREFIX'))}
 
 pytestmark = pytest.mark.skipif(not TRACKED, reason='not a git checkout: what would be copied?')
+
+COMPILER = f"""#!{sys.executable}
+import hashlib, os, pathlib, shlex, shutil, subprocess, sys
+
+compiler, words = shlex.split({os.environ.get('CXX', 'g++')!r}), sys.argv[1:]
+if '-c' not in words:
+    os.execvp(compiler[0], compiler + words)
+at = words.index('-o')
+output = words[at + 1]
+del words[at:at + 2]
+text = subprocess.run([*compiler, *words, '-E', '-P'], stdout=subprocess.PIPE, check=True).stdout
+flags = [word for word in words if not word.startswith('-I') and not word.endswith('.cpp')]
+found = pathlib.Path(__file__).with_name(hashlib.sha256(repr(flags).encode() + text).hexdigest())
+if not found.exists():
+    subprocess.run([*compiler, *words, '-O0', '-o', found], check=True)
+shutil.copy(found, output)
+"""
+"""As the compiler: an object is made once for the same flags and the same preprocessed text."""
+
+
+@pytest.fixture(scope='module', autouse=True)
+def one_compiler(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Build all installations with one memory of objects."""
+    compiler = tmp_path_factory.mktemp('compiler') / 'c++'
+    compiler.write_text(COMPILER)
+    compiler.chmod(0o755)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(CLEAN, 'CXX', str(compiler))
+        yield
 
 
 def run(*words: str | Path, cwd: Path, timeout: float = 180.0) -> str:
