@@ -16,6 +16,7 @@ import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -65,6 +66,12 @@ def run(*words: str, timeout: float = 120.0, **env: str) -> str:
     return done.stdout
 
 
+@cache
+def help_of(*program: str) -> str:
+    """Return what `python -m ... --help` prints."""
+    return run(sys.executable, '-m', *program, '--help')
+
+
 def make(words: list[str], **_) -> None:
     """The targets exist: a dry run plans them."""
     env = {name: value for name, value in os.environ.items()
@@ -74,7 +81,7 @@ def make(words: list[str], **_) -> None:
     assert done.returncode == 0, done.stderr
     if words[1] == 'demo' and len(words) > 2:  # what ARGS hands on
         arguments = shlex.split(words[2].partition('=')[2])
-        assert all(word in run(sys.executable, '-m', 'box_contact_ros.apps.demo', '--help')
+        assert all(word in help_of('box_contact_ros.apps.demo')
                    for word in arguments if word.startswith('--'))
 
 
@@ -100,7 +107,7 @@ def start(words: list[str], program, **_) -> None:
         crane = program(name, *arguments, '-p', 'duration:=2.0', '-p', 'rate:=100')
         assert crane.wait(120) == 0, crane.output
     else:
-        known = run(sys.executable, '-m', 'box_contact_ros', name, '--help')
+        known = help_of('box_contact_ros', name)
         for word in arguments:
             if word.startswith('--'):
                 assert word in known
