@@ -24,7 +24,7 @@ endif
 
 PY := .venv/bin/python
 # A worker for each processor. Tests of a file stay together, and the longest files come first.
-PYTEST := $(PY) -m pytest -n auto --dist loadgroup --no-loadscope-reorder --durations 10
+PYTEST := $(PY) -m pytest -n auto --dist loadfile --no-loadscope-reorder --durations 10
 LINT := echo ruff; $(PY) -m ruff check .; echo mypy; $(PY) -m mypy
 
 help:

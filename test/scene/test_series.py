@@ -132,8 +132,8 @@ def crane_series(name: str) -> Series:
         load = land(scenario, ContactSolver(scenario.size, scenario.stack_size, model='mlp'),
                     rate_hz=CRANE_RATE, latency=0.002).poses
     n = len(load)
-    return Series(Pairs(np.tile(crane.stack_pose, (n, 1)), np.array(load),
-                        np.tile(scenario.stack_size, (n, 1)), np.tile(scenario.size, (n, 1))), 1, {})
+    return Series(Pairs(np.tile(crane.stack_pose, (n, 1)), np.array(load), np.tile(
+        scenario.stack_size, (n, 1)), np.tile(scenario.size, (n, 1))), 1, {})
 
 
 APPROACHES, FRAMES = 150, 401
