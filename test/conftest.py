@@ -15,18 +15,39 @@ import time
 import zlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+CHAINS = (
+    ('test_faults.py', 'test_contact_node.py', 'test_two_hosts.py', 'test_soak.py',
+     'test_markers.py', 'test_processes.py'),
+    ('test_bench.py', 'test_scene_node.py', 'test_landing_ros.py', 'test_hygiene_ros.py',
+     'test_msg_schemas.py', 'test_view.py', 'test_record.py', 'test_soup_node.py'))
+"""Files whose programs lose messages or time where they have to wait for a processor. They mostly
+wait for each other. The files of a chain run one after the other, and go before all others."""
+LONGEST_FIRST = (
+    'test_core_cpp.py', 'test_install.py', 'test_series.py', 'test_core.py', 'test_exact.py',
+    'test_landing.py', 'test_search.py', 'test_training_mlp.py', 'test_crane.py',
+    'test_readme.py', 'test_ament.py', 'test_frontier.py', 'test_training.py')
+"""Of the others, those that take more than five seconds. Begun late, one leaves workers idle."""
+NICE = 10
+"""Niceness of the others: a share of a tenth where a program of a chain wants the processor."""
 
-def _domain_id(module: str = '') -> int:
-    # Two runs at once must not hear each other, nor two workers of a run. 1 to 101: 0 is where
-    # everybody's real nodes are, and above 101 ports collide with the ephemeral ones of Linux.
+_modules = count()
+
+
+def _domain_id() -> int:
+    # Two runs at once must not hear each other, nor two workers of a run, nor two modules. 1 to
+    # 101: 0 is where everybody's real nodes are, and above 101 ports collide with the ephemeral
+    # ones of Linux.
     run = os.environ.get('PYTEST_XDIST_TESTRUNUID', str(os.getpid()))
     worker = int(os.environ.get('PYTEST_XDIST_WORKER', 'gw0').removeprefix('gw'))
-    return 1 + (zlib.crc32(run.encode()) + worker + zlib.crc32(module.encode())) % 101
+    workers = int(os.environ.get('PYTEST_XDIST_WORKER_COUNT', '1'))
+    number = (zlib.crc32(run.encode()) + next(_modules)) % max(1, 101 // workers)
+    return 1 + (number * workers + worker) % 101
 
 
 os.environ['ROS_DOMAIN_ID'] = str(_domain_id())
@@ -35,30 +56,43 @@ os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'
 
 
-LONGEST_FIRST = (
-    'test_core_cpp.py', 'test_faults.py', 'test_contact_node.py', 'test_scene_node.py',
-    'test_bench.py', 'test_landing_ros.py', 'test_msg_schemas.py', 'test_install.py',
-    'test_two_hosts.py', 'test_core.py', 'test_series.py', 'test_exact.py', 'test_hygiene_ros.py',
-    'test_training_mlp.py', 'test_search.py', 'test_record.py', 'test_view.py', 'test_landing.py',
-    'test_crane.py', 'test_soup_node.py', 'test_readme.py', 'test_frontier.py', 'test_soak.py',
-    'test_markers.py', 'test_training.py', 'test_ament.py')
-"""Files that take more than ten seconds. Begun late, one would leave the other workers idle."""
-
-
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put the longest files first."""
-    rank = {name: number for number, name in enumerate(LONGEST_FIRST)}
+    """Put the chains first, then the longest files."""
+    rank = {name: number for number, name in enumerate((*chain(*CHAINS), *LONGEST_FIRST))}
     items.sort(key=lambda item: rank.get(item.path.name, len(rank)))
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers() -> int:
+    """Run one worker more than there are processors, as chains mostly wait; more than nine idle."""
+    return min(os.cpu_count() or 1, 8) + 1
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """Keep the tests of a chain, or of another file, on one worker, in the order of the items."""
+    from xdist.scheduler import LoadScopeScheduling
+
+    class ByChainOrFile(LoadScopeScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            file = nodeid.partition('::')[0]
+            chains = [str(files) for files in CHAINS if Path(file).name in files]
+            return chains[0] if chains else file
+
+    config.option.loadscopereorder = False
+    return ByChainOrFile(config, log)
 
 
 @pytest.fixture(scope='module', autouse=True)
 def own_domain(request: pytest.FixtureRequest) -> None:
-    """A ROS domain for each module.
+    """Give each module a ROS domain, and a module of no chain the lower priority.
 
     Processes that were killed leave shared memory of theirs behind, in which later ones may wait
     for the dead.
     """
-    os.environ['ROS_DOMAIN_ID'] = str(_domain_id(request.module.__name__))
+    os.environ['ROS_DOMAIN_ID'] = str(_domain_id())
+    if 'PYTEST_XDIST_WORKER' in os.environ and request.path.name not in chain(*CHAINS):
+        os.nice(max(0, NICE - os.nice(0)))
 
 
 @pytest.fixture

@@ -221,6 +221,7 @@ LAWS = {'core/test_laws.py': 'not parts',
 """Tests that every instruction set runs, and which of them: those that take no oracle."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('name', OTHER_SETS)
 def test_laws_hold_for_every_instruction_set(name: str) -> None:
     """Those that this process does not run: laws, hard poses and closed forms, once more."""

@@ -16,6 +16,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).resolve().parents[2]
 SOURCES = ROOT / 'test' / 'core'
 EXAMPLE = ROOT / 'docs' / 'examples' / 'cpp'

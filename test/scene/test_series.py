@@ -172,12 +172,13 @@ def approaches(name: str, turning: bool) -> Series:
     return Series(Pairs(repeated(met.pose_a), b, repeated(met.size_a), repeated(met.size_b)), n, {})
 
 
-SERIES = {name: (crane_series, name) for name in (*LOWERED, *LANDED)}
-SERIES |= {f'{name}, {"turning" if turning else "fixed"}': (approaches, name, turning)
-           for name in SETS for turning in (False, True)}
+CRANES = {name: (crane_series, name) for name in (*LOWERED, *LANDED)}
+SERIES = CRANES | {f'{name}, {"turning" if turning else "fixed"}': (approaches, name, turning)
+                   for name in SETS for turning in (False, True)}
 
 
-@pytest.fixture(scope='module', params=SERIES)
+@pytest.fixture(scope='module', params=[
+    pytest.param(name, marks=[pytest.mark.slow] if name in CRANES else []) for name in SERIES])
 def series(request: pytest.FixtureRequest) -> tuple[str, Series]:
     """Name and frames: all tests of a series run one after the other, and share its answers."""
     make, *arguments = SERIES[request.param]
