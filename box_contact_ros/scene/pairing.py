@@ -35,7 +35,10 @@ Why no library does this: docs/decisions/contact-node.md.
 """
 from __future__ import annotations
 
-from collections import Counter, OrderedDict, deque
+from abc import ABC, abstractmethod
+from collections import Counter, deque
+from collections.abc import Container
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -43,13 +46,12 @@ import numpy as np
 from .scene_solver import Scene
 
 WAITING_TICKS = 128
-"""So many of the newest ticks wait for poses: 128 ms at 1 kHz, far more than the executor or the
-transport ever lets two streams drift apart, and a bound on memory."""
+"""Ticks that may wait: 128 ms at 1 kHz. Executor and transport never let two streams drift apart as
+far, and memory stays bounded."""
 REMEMBERED_STAMPS = 1024
 """Stamps per box that are known to have been taken, so that none is answered twice."""
 RESET = 1_000_000_000
-"""A pose whose stamp lies this far [ns] before an earlier one of its box has not been late: time
-has been set back, as by a simulation that starts again."""
+"""Time has been set back if a stamp lies this far [ns] before an earlier one of its box."""
 NO_PARTNER = 'dropped: no partner'
 TOO_LATE = 'dropped: tick answered before'
 NEVER = -2**63
@@ -73,173 +75,164 @@ Tick = list['StampedPose | None']
 """A pose of each of `scene.moving`, None for a box that has none recent enough."""
 
 
-class _Poses(dict[str, StampedPose]):
-    """What a tick has so far, by box."""
+def _remembered() -> deque[int]:
+    return deque(maxlen=REMEMBERED_STAMPS)
 
-    __slots__ = ('number',)
+
+@dataclass(slots=True)
+class BoxState:
+    """What is known of one moving box; all stamps in ns."""
+
+    newest: int = NEVER
+    """Its latest stamp; NEVER: unseen."""
+    missing_since: int | None = None
+    """Stamp of the first tick that lacks a pose of this box; None: current."""
+    joined: int = NEVER
+    """Newest tick that was answered before the box was in the scene."""
+    taken: deque[int] = field(default_factory=_remembered)
+    """Stamps of its poses that were taken."""
+    missed: deque[int] = field(default_factory=_remembered)
+    """Ticks that were answered without the box."""
+    last: StampedPose | None = None
+    """Its last pose, for policy `latest`."""
+
+
+@dataclass(slots=True)
+class WaitingTick:
+    """Poses of one stamp, by box, that wait for those of other boxes."""
 
     number: int
     """How many ticks began before."""
+    poses: dict[str, StampedPose] = field(default_factory=dict)
 
 
-class _Pairing:
-    """What both policies share: the newest stamp of each box, staleness, and time going back."""
+class Pairing(ABC):
+    """What both policies share: the state of each box, and time that is set back."""
 
-    def __init__(self, scene: Scene, *, tolerance: int = 0, max_age: int = 0) -> None:
+    def __init__(self, scene: Scene, *, tolerance: int = 0, max_age: int = 0,
+                 counts: Counter[str] | None = None) -> None:
         """Begin without poses.
 
-        tolerance: stamps this far apart [ns] still belong together (policy `stamp`);
-        max_age: a pose further than this [ns] from the tick is not used, 0: any is.
+        tolerance: Stamps this far apart [ns] still belong together (policy `stamp`).
+        max_age: A pose further than this [ns] from the tick is not used; 0: any is.
+        counts: Refused and dropped poses are counted here; a new Counter by default.
         """
         self.tolerance, self.max_age = tolerance, max_age
-        self.counts: Counter[str] = Counter()
-        self._newest: dict[str, int] = {}  # stamp, by box
-        self._now = NEVER                  # of all boxes
+        self.counts: Counter[str] = Counter() if counts is None else counts
+        self._now = NEVER  # newest stamp of all boxes
+        self._boxes: dict[str, BoxState] = {}
         self.set_scene(scene)
 
     def set_scene(self, scene: Scene) -> None:
-        """Go over to another scene; what is known of boxes that stay, stays."""
-        self.boxes = scene.moving
-        moving = set(scene.moving)
-        self._partners = [tuple({pair.a, pair.b} & moving) for pair in scene.pairs]
-        self._newest = {box: stamp for box, stamp in self._newest.items() if box in moving}
+        """Replace the scene; boxes that stay keep their state and their poses."""
+        self._boxes = {box: self._boxes.get(box) or BoxState() for box in scene.moving}
+        self._partners = [tuple({pair.a, pair.b} & self._boxes.keys()) for pair in scene.pairs]
 
     def reset(self) -> None:
         """Forget all poses and stamps, as when time is set back."""
-        self._newest.clear()
+        self._boxes = {box: BoxState() for box in self._boxes}
         self._now = NEVER
 
+    @abstractmethod
+    def add(self, box: str, pose: StampedPose) -> list[Tick]:
+        """Take a pose; return the ticks that can be answered now, in their order."""
+
     def stale(self) -> list[str]:
-        """Boxes without a pose that is recent enough, by the newest stamp of all."""
-        if self._now == NEVER:
-            return []
-        return [box for box in self.boxes if self._is_stale(box, self._now)]
+        """Return the boxes without a recent pose, by the newest stamp of all."""
+        return [] if self._now == NEVER else [
+            box for box, state in self._boxes.items() if self._is_stale(state, self._now)]
 
-    def _is_stale(self, box: str, now: int) -> bool:
-        raise NotImplementedError
+    @abstractmethod
+    def _is_stale(self, state: BoxState, now: int) -> bool:
+        """Return whether a box has no pose that is recent enough."""
 
-    def _look_back(self, box: str, stamp: int) -> None:
-        if stamp < self._newest.get(box, NEVER) - RESET:
+    def _state_at(self, box: str, stamp: int) -> BoxState:
+        """Return the state of a box, after a reset if its stamp shows that time was set back."""
+        state = self._boxes[box]
+        if stamp < state.newest - RESET:
             self.counts[RESETS] += 1
             self.reset()
+            return self._boxes[box]
+        return state
 
-    def _evaluable(self, poses: dict[str, StampedPose]) -> bool:
-        return any(all(box in poses for box in partners) for partners in self._partners)
+    def _is_evaluable(self, present: Container[str]) -> bool:
+        """Return whether some pair has a pose of each of its moving boxes."""
+        return any(all(box in present for box in boxes) for boxes in self._partners)
 
 
-class StampPairing(_Pairing):
-    """A tick is complete when every box has given a pose of its stamp, in whatever order they come.
+class StampPairing(Pairing):
+    """Policy `stamp`: a tick is complete when every box has given a pose of its stamp.
 
-    Each stamp is answered once: a pose that comes when its tick was answered without it is dropped.
-
-    The pairing does not wait for a box that is stale, nor, once a tick has been answered, for one
-    that was never seen. A tick that stays incomplete is given up when WAITING_TICKS newer ones
-    have begun, or when what it lacks is stale: if it has a pair of which all poses are there, it is
-    answered late and without the others, else dropped.
+    Poses may come in any order. The module's docstring has the table of states and events.
     """
 
-    def __init__(self, scene: Scene, *, tolerance: int = 0, max_age: int = 0) -> None:
-        self._waiting: OrderedDict[int, _Poses] = OrderedDict()
-        self._begun = 0  # ticks so far
-        self._taken: dict[str, deque[int]] = {}
-        self._missing_since: dict[str, int] = {}  # stamp of the first tick that a box lacks
-        self._went_without: dict[str, deque[int]] = {}  # ticks answered without a box, by stamp
-        self._newest_answered = NEVER
-        self._joined: dict[str, int] = {}  # newest tick that was answered before a box was there
-        self._newest_closed = NEVER        # of all of these
-        self._answered = False
+    def __init__(self, scene: Scene, *, tolerance: int = 0, max_age: int = 0,
+                 counts: Counter[str] | None = None) -> None:
+        """Begin without poses, as Pairing does."""
+        self._waiting: dict[int, WaitingTick] = {}  # by stamp, as they began
+        self._begun = 0                 # ticks so far
+        self._newest_answered = NEVER   # tick
+        self._newest_closed = NEVER     # tick that was answered without a box of the scene
+        self._has_answered = False
         self._were_stale: set[str] = set()
-        self._changed = False  # a tick may wait for nothing any more: time to look all of them over
-        super().__init__(scene, tolerance=tolerance, max_age=max_age)
+        self._awaits_less = False       # time to look all waiting ticks over
+        super().__init__(scene, tolerance=tolerance, max_age=max_age, counts=counts)
 
     def set_scene(self, scene: Scene) -> None:
-        """Go over to another scene; poses of boxes that stay go on waiting."""
+        """Replace the scene; poses of boxes that stay go on waiting."""
+        before = self._boxes.keys()
         super().set_scene(scene)
-        for key, poses in list(self._waiting.items()):
-            for gone in poses.keys() - set(self.boxes):
-                del poses[gone]
-            if not poses:
+        for box in self._boxes.keys() - before:
+            self._boxes[box].joined = self._newest_closed = self._newest_answered
+        for key, tick in list(self._waiting.items()):
+            tick.poses = {box: pose for box, pose in tick.poses.items() if box in self._boxes}
+            if not tick.poses:
                 del self._waiting[key]
-        self._missing_since = {box: stamp for box, stamp in self._missing_since.items()
-                               if box in self.boxes}
-        self._taken, self._went_without = (
-            {box: kept.get(box, deque(maxlen=REMEMBERED_STAMPS)) for box in self.boxes}
-            for kept in (self._taken, self._went_without))
-        self._joined = {box: self._joined.get(box, self._newest_answered) for box in self.boxes}
-        self._newest_closed = max(self._newest_closed, *self._joined.values())
-        self._changed = True
+        self._awaits_less = True
 
     def reset(self) -> None:
-        """Forget all poses and stamps."""
+        """Forget all poses and stamps; poses that wait are dropped and counted."""
         super().reset()
-        self.counts[NO_PARTNER] += sum(map(len, self._waiting.values()))
+        self.counts[NO_PARTNER] += sum(len(tick.poses) for tick in self._waiting.values())
         self._waiting.clear()
-        self._missing_since.clear()
-        self._answered = False
+        self._has_answered = False
         self._newest_answered = self._newest_closed = NEVER
-        self._joined = dict.fromkeys(self.boxes, NEVER)
-        for stamps in (*self._taken.values(), *self._went_without.values()):
-            stamps.clear()
 
     def add(self, box: str, pose: StampedPose) -> list[Tick]:
-        """Take a pose; the tick that it completes, after those that are not waited for any more."""
-        stamp, taken = pose.stamp, self._taken[box]
-        newest = self._newest
-        if stamp <= newest.get(box, NEVER) and self._refuses(box, stamp):
+        """Take a pose; return its tick if complete, after those that need wait no longer."""
+        stamp = pose.stamp
+        state = self._state_at(box, stamp)
+        if stamp > state.newest:
+            state.newest = stamp
+        elif self._refuses(state, stamp):
             return []
-        if stamp > newest.get(box, NEVER):
-            newest[box] = stamp
-        taken.append(stamp)
-        self._missing_since.pop(box, None)
+        state.taken.append(stamp)
+        state.missing_since = None
         if stamp > self._now:
             self._advance(stamp)
         waiting = self._waiting
-        key = self._slot(box, stamp) if self.tolerance else stamp
-        poses = waiting.get(key)
-        if poses is None:
-            if self._is_too_late(box, stamp):
+        key = self._nearest_tick(box, stamp) if self.tolerance else stamp
+        tick = waiting.get(key)
+        if tick is None:
+            if self._is_too_late(state, stamp):
                 self.counts[TOO_LATE] += 1
                 return []
-            poses = waiting[key] = _Poses()
-            poses.number = self._begun
+            tick = waiting[key] = WaitingTick(self._begun)
             self._begun += 1
             self._note_missing(stamp)
-        if box in poses:  # with a tolerance: an earlier pose that was near the stamp of this one
+        if box in tick.poses:  # with a tolerance: an earlier pose near the stamp of this one
             self.counts[NO_PARTNER] += 1
-        poses[box] = pose
+        tick.poses[box] = pose
         ticks = self._give_up(key) if len(waiting) > 1 else []
-        if len(poses) == len(self.boxes) or not self._is_awaiting(poses):
+        if len(tick.poses) == len(self._boxes) or not self._is_awaiting(tick):
             ticks.append(self._answer(key))
-            if not self._answered:
-                self._answered = self._changed = True
+            if not self._has_answered:
+                self._has_answered = self._awaits_less = True
         return ticks
 
-    def _answer(self, key: int) -> Tick:
-        """A waiting tick, which waits no more."""
-        poses = self._waiting.pop(key)
-        if key > self._newest_answered:
-            self._newest_answered = key
-        if len(poses) < len(self.boxes):
-            self._newest_closed = max(self._newest_closed, key)
-            for box in self.boxes:
-                if box not in poses:
-                    self._went_without[box].append(key)
-        return [poses.get(box) for box in self.boxes]
-
-    def _is_too_late(self, box: str, stamp: int) -> bool:
-        """Whether the tick of a pose was answered without its box, or before that had joined."""
-        if stamp > self._newest_closed + self.tolerance:
-            return False
-        return stamp <= self._joined[box] + self.tolerance or any(
-            abs(key - stamp) <= self.tolerance for key in self._went_without[box])
-
-    def _refuses(self, box: str, stamp: int) -> bool:
-        """Whether a stamp has been taken before, or is too old to tell.
-
-        It is not later than the last of its box.
-        """
-        self._look_back(box, stamp)
-        taken = self._taken[box]
+    def _refuses(self, state: BoxState, stamp: int) -> bool:
+        """Refuse and count a stamp that was taken before, or is too old to tell."""
+        taken = state.taken
         if len(taken) == REMEMBERED_STAMPS and stamp < taken[0]:
             self.counts[OLD] += 1
             return True
@@ -248,109 +241,112 @@ class StampPairing(_Pairing):
             return True
         return False
 
-    def _slot(self, box: str, stamp: int) -> int:
-        """Stamp of the tick that a pose belongs to: its own, or the nearest within tolerance."""
-        if stamp in self._waiting:
-            return stamp
-        near = [key for key, poses in self._waiting.items()
-                if box not in poses and abs(key - stamp) <= self.tolerance]
-        return min(near, key=lambda key: abs(key - stamp), default=stamp)
-
     def _advance(self, stamp: int) -> None:
+        """Take a stamp that is newer than all before as the time, and look who is stale."""
         if 0 < self.max_age < stamp - self._now:
-            # Time has leapt, as after a pause of all boxes. This one is the first, and the others
-            # are not stale for that.
-            self._missing_since.clear()
+            # All boxes have paused: this pose is the first, and the others are not stale for that.
+            for state in self._boxes.values():
+                state.missing_since = None
         self._now = stamp
-        stale = {box for box in self._missing_since if self._is_stale(box, stamp)}
-        self._changed |= not stale <= self._were_stale
+        stale = {box for box, state in self._boxes.items() if self._is_stale(state, stamp)}
+        self._awaits_less |= not stale <= self._were_stale
         self._were_stale = stale
 
-    def _note_missing(self, stamp: int) -> None:
-        """A tick has begun: boxes that have given no pose as late as this lack one.
+    def _nearest_tick(self, box: str, stamp: int) -> int:
+        """Return the stamp of the waiting tick that a pose belongs to: its own, else the nearest.
 
-        Once a tick is enough. A box that gives an older pose in the middle of one, and then no
-        more, is missing from the next one on.
+        A tick further than the tolerance, or that has a pose of the box, is not meant.
         """
-        newest, missing = self._newest, self._missing_since
-        for box in self.boxes:
-            if stamp > newest.get(box, NEVER) and box not in missing:
-                missing[box] = stamp
+        if stamp in self._waiting:
+            return stamp
+        near = [key for key, tick in self._waiting.items()
+                if box not in tick.poses and abs(key - stamp) <= self.tolerance]
+        return min(near, key=lambda key: abs(key - stamp), default=stamp)
 
-    def _is_stale(self, box: str, now: int) -> bool:
-        return 0 < self.max_age < now - self._missing_since.get(box, now)
+    def _is_too_late(self, state: BoxState, stamp: int) -> bool:
+        """Return whether a tick was answered without the box, or before the box had joined."""
+        if stamp > self._newest_closed + self.tolerance:
+            return False
+        return stamp <= state.joined + self.tolerance or any(
+            abs(key - stamp) <= self.tolerance for key in state.missed)
 
-    def _is_awaiting(self, poses: dict[str, StampedPose]) -> bool:
-        """Whether a tick with these poses waits for another box."""
-        for box in self.boxes:
-            if (box not in poses and (box in self._newest or not self._answered)
-                    and not self._is_stale(box, self._now)):
+    def _note_missing(self, stamp: int) -> None:
+        """Note which boxes have given no pose as late as a tick that begins.
+
+        A box that is older in the middle of a tick, and then silent, is missing from the next one.
+        """
+        for state in self._boxes.values():
+            if stamp > state.newest and state.missing_since is None:
+                state.missing_since = stamp
+
+    def _is_stale(self, state: BoxState, now: int) -> bool:
+        since = state.missing_since
+        return since is not None and 0 < self.max_age < now - since
+
+    def _is_awaiting(self, tick: WaitingTick) -> bool:
+        """Return whether a tick waits for a box that is neither stale nor unseen."""
+        for box, state in self._boxes.items():
+            if (box not in tick.poses and (state.newest != NEVER or not self._has_answered)
+                    and not self._is_stale(state, self._now)):
                 return True
         return False
 
-    def _give_up(self, key: int) -> list[Tick]:
-        """The ticks other than that of `key` that have waited enough.
-
-        Those of which no pair can be evaluated are dropped.
-        """
-        waiting, over = self._waiting, []
-        for stamp, poses in waiting.items():  # as they began
-            if poses.number + WAITING_TICKS < self._begun or (
-                    self._changed and not self._is_awaiting(poses)):
-                over.append(stamp)
-            elif not self._changed:
+    def _give_up(self, newest: int) -> list[Tick]:
+        """Return the ticks but `newest` that await nothing; drop those without a whole pair."""
+        over = []
+        for key, tick in self._waiting.items():  # as they began
+            if tick.number + WAITING_TICKS < self._begun or (
+                    self._awaits_less and not self._is_awaiting(tick)):
+                over.append(key)
+            elif not self._awaits_less:
                 break
-        self._changed = False
+        self._awaits_less = False
         ticks = []
-        for stamp in over:
-            if stamp == key:
+        for key in over:
+            if key == newest:
                 continue
-            if self._evaluable(waiting[stamp]):
-                ticks.append(self._answer(stamp))
+            if self._is_evaluable(self._waiting[key].poses):
+                ticks.append(self._answer(key))
             else:
-                self.counts[NO_PARTNER] += len(waiting.pop(stamp))
+                self.counts[NO_PARTNER] += len(self._waiting.pop(key).poses)
         return ticks
 
+    def _answer(self, key: int) -> Tick:
+        """Remove a tick from those that wait, and return its poses."""
+        poses = self._waiting.pop(key).poses
+        self._newest_answered = max(self._newest_answered, key)
+        if len(poses) < len(self._boxes):
+            self._newest_closed = max(self._newest_closed, key)
+            for box, state in self._boxes.items():
+                if box not in poses:
+                    state.missed.append(key)
+        return [poses.get(box) for box in self._boxes]
 
-class LatestPairing(_Pairing):
-    """Every pose that arrives makes a tick, with the last pose of each other box.
 
-    A pose older than the last one of its box is refused; one of the same stamp is not, as there are
+class LatestPairing(Pairing):
+    """Policy `latest`: every pose that arrives makes a tick, with the last pose of each other box.
+
+    A pose older than the last one of its box is refused. One of the same stamp is used: there are
     publishers that do not stamp.
     """
 
-    def __init__(self, scene: Scene, *, tolerance: int = 0, max_age: int = 0) -> None:
-        self._last: dict[str, StampedPose] = {}
-        super().__init__(scene, tolerance=tolerance, max_age=max_age)
-
-    def set_scene(self, scene: Scene) -> None:
-        """Go over to another scene; the last poses of boxes that stay are kept."""
-        super().set_scene(scene)
-        self._last = {box: pose for box, pose in self._last.items() if box in self.boxes}
-
-    def reset(self) -> None:
-        """Forget all poses."""
-        super().reset()
-        self._last.clear()
-
     def add(self, box: str, pose: StampedPose) -> list[Tick]:
-        """Take a pose; the tick that it makes, once both boxes of a pair have been seen."""
-        self._look_back(box, pose.stamp)
-        if pose.stamp < self._newest.get(box, pose.stamp):
+        """Take a pose; return the tick that it makes, once both boxes of a pair have been seen."""
+        stamp = pose.stamp
+        state = self._state_at(box, stamp)
+        if stamp < state.newest:
             self.counts[OLD] += 1
             return []
-        self._newest[box] = pose.stamp
-        self._now = max(self._now, pose.stamp)
-        self._last[box] = pose
-        if not self._evaluable(self._last):
+        state.newest, state.last = stamp, pose
+        self._now = max(self._now, stamp)
+        if not self._is_evaluable({box for box, state in self._boxes.items() if state.last}):
             return []
-        return [[None if self._is_stale(other, pose.stamp) else self._last.get(other)
-                 for other in self.boxes]]
+        return [[None if self._is_stale(other, stamp) else other.last
+                 for other in self._boxes.values()]]
 
-    def _is_stale(self, box: str, now: int) -> bool:
-        newest = self._newest.get(box)
-        return newest is None or 0 < self.max_age < abs(now - newest)
+    def _is_stale(self, state: BoxState, now: int) -> bool:
+        return state.last is None or 0 < self.max_age < abs(now - state.newest)
 
 
-PAIRINGS = {'stamp': StampPairing, 'latest': LatestPairing}
+PAIRINGS: dict[str, type[Pairing]] = {'stamp': StampPairing, 'latest': LatestPairing}
 """Values of the node parameter `pairing`."""

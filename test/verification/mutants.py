@@ -176,25 +176,25 @@ MUTANTS = {
         'scene/pairing.py', 'if stamp in taken:', 'if False:',
         f'{TEST_SCENE_NODE} -k repeated_and_late'),
     'time that goes back is late': Mutant(
-        'scene/pairing.py', 'if stamp < self._newest.get(box, NEVER) - RESET:', 'if False:',
+        'scene/pairing.py', 'if stamp < state.newest - RESET:', 'if False:',
         f'{TEST_PAIRING} -k set_back'),
     'a clock that jumps is not heard': Mutant(
         EVALUATOR, 'self.counts[RESETS] += 1\n        self._pairing.reset()',
         'pass', 'test/node/test_faults.py -k clock'),
     'a pose of any age': Mutant(
-        'scene/pairing.py', 'return newest is None or 0 < self.max_age < abs(now - newest)',
-        'return newest is None', f'{TEST_SCENE_NODE} -k different_rates'),
+        'scene/pairing.py', 'state.last is None or 0 < self.max_age < abs(now - state.newest)',
+        'state.last is None', f'{TEST_SCENE_NODE} -k different_rates'),
     'a silent box is waited for': Mutant(
-        'scene/pairing.py', 'return 0 < self.max_age < now - self._missing_since.get(box, now)',
+        'scene/pairing.py', 'return since is not None and 0 < self.max_age < now - since',
         'return False', f'{TEST_SCENE_NODE} -k stale_box'),
     'ticks wait without bound': Mutant(
-        'scene/pairing.py', 'poses.number + WAITING_TICKS < self._begun', 'False',
+        'scene/pairing.py', 'tick.number + WAITING_TICKS < self._begun', 'False',
         f'{TEST_PAIRING} -k dropped'),
     'ticks that were answered do not count': Mutant(
-        'scene/pairing.py', 'poses.number + WAITING_TICKS < self._begun',
-        'len(waiting) > WAITING_TICKS and not over', f'{TEST_PAIRING} -k further_behind'),
+        'scene/pairing.py', 'tick.number + WAITING_TICKS < self._begun',
+        'len(self._waiting) > WAITING_TICKS and not over', f'{TEST_PAIRING} -k further_behind'),
     'a box that joins opens old ticks': Mutant(
-        'scene/pairing.py', 'return stamp <= self._joined[box] + self.tolerance or any(',
+        'scene/pairing.py', 'return stamp <= state.joined + self.tolerance or any(',
         'return any(',
         f'{TEST_PAIRING} -k joins'),
     'a scene that fails half way stays': Mutant(
@@ -204,10 +204,10 @@ MUTANTS = {
         TOPICS, 'if self._resolved(topic) in taken:', 'if False:',
         f'{TEST_SCENE_NODE} -k topic_of_the_node'),
     'ticks held up by one that lacks a pose': Mutant(
-        'scene/pairing.py', 'self._changed |= not stale <= self._were_stale', 'pass',
+        'scene/pairing.py', 'self._awaits_less |= not stale <= self._were_stale', 'pass',
         f'{TEST_PAIRING} -k hold_up'),
     'a tick answered again': Mutant(
-        'scene/pairing.py', 'if self._is_too_late(box, stamp):', 'if False:',
+        'scene/pairing.py', 'if self._is_too_late(state, stamp):', 'if False:',
         f'{TEST_PAIRING} -k answered_again'),
     'a change forgets what waits': Mutant(
         EVALUATOR, "if settings['pairing'] == old.get('pairing'):", 'if False:',
