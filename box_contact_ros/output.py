@@ -1,13 +1,42 @@
-"""Programs that print or draw what the project claims, from the shipped weights."""
+"""What every report is written with: folders, tables, CSV files, percentiles, the machine."""
 from __future__ import annotations
 
 import argparse
+import csv
+import math
 import platform
 import sys
+import tempfile
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
 
-from .solver.arguments import make_folder
+import numpy as np
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+# --- where results go -----------------------------------------------------------------------------
+
+
+def make_folder(parser: argparse.ArgumentParser, folder: Path) -> Path:
+    """Create the folder of `--out`, or refuse, before the work, one that cannot be written to."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=folder).close()
+    except OSError as error:
+        parser.error(f'cannot write to {folder} ({error.strerror}): name another place with --out')
+    return folder
+
+
+def make_room(parser: argparse.ArgumentParser, path: Path) -> Path:
+    """Create the folder of a file that `--out` names, as `make_folder`."""
+    if path.is_dir():
+        parser.error(f'--out {path} is a folder: name a file')
+    make_folder(parser, path.parent)
+    return path
 
 
 def add_out(parser: argparse.ArgumentParser, files: str) -> None:
@@ -17,11 +46,89 @@ def add_out(parser: argparse.ArgumentParser, files: str) -> None:
 
 
 def results_folder(parser: argparse.ArgumentParser, options: argparse.Namespace) -> Path:
-    """Where results are written: a quick run never replaces those of a full one unasked."""
+    """Return the folder of results; a quick run replaces a full run's only where `--out` says."""
     return make_folder(parser, options.out or Path('quick-results' if options.quick else 'docs'))
 
 
-# --- what a figure was measured on ----------------------------------------------------------------
+def command_line(program: str, args: Sequence[str] | None) -> str:
+    """Return the command that a page names; `args` as `main` received them."""
+    given = sys.argv[1:] if args is None else args
+    return ' '.join(['python -m', program, *given])
+
+
+# --- tables, files, pictures ----------------------------------------------------------------------
+
+
+def markdown_table(head: Sequence[str], rows: Iterable[Sequence[object]], *, words: int = 1,
+                   padded: bool = False) -> str:
+    """Return a Markdown table; the first `words` columns are set to the left, the others right.
+
+    padded: columns are filled with blanks, so that the source reads as a table too.
+    """
+    lines = [[str(cell) for cell in line] for line in (head, *rows)]
+    if not padded:
+        rule = ['---' if column < words else '---:' for column in range(len(head))]
+    else:
+        widths = [max(3, *map(len, column)) for column in zip(*lines)]
+        rule = ['-' * width if column < words else '-' * (width - 1) + ':'
+                for column, width in enumerate(widths)]
+        lines = [[cell.ljust(width) if column < words else cell.rjust(width)
+                  for column, (cell, width) in enumerate(zip(line, widths))] for line in lines]
+    return '\n'.join('| ' + ' | '.join(line) + ' |' for line in (lines[0], rule, *lines[1:]))
+
+
+def write_csv(path: Path, rows: Iterable[Mapping[str, object]], *, digits: int = 6) -> None:
+    """Write rows by column name; the columns are those of all rows, in the order of appearance.
+
+    A float has `digits` significant digits. A missing value, None and NaN are empty cells.
+    """
+    listed = list(rows)
+    columns = list(dict.fromkeys(name for row in listed for name in row))
+    with path.open('w', newline='', encoding='utf-8') as file:
+        writer = csv.writer(file, lineterminator='\n')
+        writer.writerow(columns)
+        writer.writerows([_cell(row.get(name), digits) for name in columns] for row in listed)
+
+
+def _cell(value: object, digits: int) -> object:
+    if isinstance(value, float):
+        return '' if math.isnan(value) else f'{value:.{digits}g}'
+    return value  # the writer leaves a None empty
+
+
+def subplots(rows: int, columns: int, size: tuple[float, float], **shared: Any,
+             ) -> tuple[Figure, np.ndarray]:
+    """Return a figure of a size [inch], and its axes (rows, columns); no display is needed."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=size, layout='constrained', dpi=110)
+    return figure, figure.subplots(rows, columns, squeeze=False, **shared)
+
+
+# --- figures --------------------------------------------------------------------------------------
+
+
+def percentiles(values: Sequence[float] | np.ndarray, *percents: float) -> tuple[float, ...]:
+    """Return percentiles of values (n,), 0 being the least and 100 the largest; NaN of none."""
+    if not len(values):
+        return (math.nan,) * len(percents)
+    return tuple(float(value) for value in np.percentile(values, percents))
+
+
+def number(value: float, digits: int = 3) -> str:
+    """Return a value with so many digits, never in powers of ten; NaN is a dash."""
+    if math.isnan(value):
+        return '–'
+    if value == 0.0:
+        return '0'
+    if value < 10.0 ** -digits:
+        return f'<{10.0 ** -digits:g}'
+    if value >= 1e3:
+        return f'{value:,.0f}'
+    return f'{value:.{max(0, digits - 1 - math.floor(math.log10(value)))}f}'
+
+
+# --- the machine ----------------------------------------------------------------------------------
 
 _AMD = ((23, 0x00, 0x2f, 'Zen'), (23, 0x30, 0xff, 'Zen 2'), (25, 0x00, 0x0f, 'Zen 3'),
         (25, 0x10, 0x1f, 'Zen 4'), (25, 0x20, 0x5f, 'Zen 3'), (25, 0x60, 0x7f, 'Zen 4'),
@@ -34,22 +141,36 @@ _GENERATIONS = {'AuthenticAMD': _AMD, 'GenuineIntel': _INTEL}
 """By vendor: CPU family, first and last model, generation."""
 
 
-def _cpu_fields(path: Path = Path('/proc/cpuinfo')) -> dict[str, str]:
-    """Return the fields of the first processor, none on another system than Linux."""
-    try:
-        text = path.read_text().split('\n\n')[0]
-    except OSError:
-        return {}
-    pairs = (line.partition(':') for line in text.splitlines())
-    return {name.strip(): value.strip() for name, _, value in pairs}
+class Core(Protocol):
+    """What the machine's description asks the native core: `box_contact_ros.core.native`."""
+
+    instruction_set: str
+    compiler: str
 
 
-def generation(vendor: str, family: int, model: int) -> str | None:
-    """Return the name of a processor's generation, or None where it is not known here."""
-    for known, first, last, name in _GENERATIONS.get(vendor, ()):
-        if family == known and first <= model <= last:
-            return name
-    return None
+@dataclass(frozen=True, kw_only=True)
+class Machine:
+    """What a figure was measured on; `dataclasses.asdict` gives the columns of a CSV file."""
+
+    processor: str
+    """Name, microarchitecture, CPU family and model."""
+    instruction_set: str
+    compiler: str
+    versions: str
+    """Versions of Python and of packages."""
+
+    def __str__(self) -> str:
+        return ', '.join(filter(None, (self.processor, self.instruction_set, self.compiler,
+                                       self.versions)))
+
+
+def machine(core: Core | None = None, packages: Sequence[str] = ('numpy',)) -> Machine:
+    """Return this machine's description; without `core`, what does not run the native core."""
+    compiler = core.compiler if core else ''
+    return Machine(
+        processor=processor(), instruction_set=core.instruction_set if core else '',
+        compiler=f'GCC {compiler}' if compiler[:1].isdigit() else compiler,
+        versions=versions(packages))
 
 
 def processor() -> str:
@@ -64,7 +185,25 @@ def processor() -> str:
     return f'{name} ({known + ", " if known else ""}family {family}, model {model})'
 
 
-def versions(packages: tuple[str, ...] = ('numpy',)) -> str:
+def generation(vendor: str, family: int, model: int) -> str | None:
+    """Return the name of a processor's generation, or None where it is not known here."""
+    for known, first, last, name in _GENERATIONS.get(vendor, ()):
+        if family == known and first <= model <= last:
+            return name
+    return None
+
+
+def _cpu_fields(path: Path = Path('/proc/cpuinfo')) -> dict[str, str]:
+    """Return the fields of the first processor, none on another system than Linux."""
+    try:
+        text = path.read_text().split('\n\n')[0]
+    except OSError:
+        return {}
+    pairs = (line.partition(':') for line in text.splitlines())
+    return {name.strip(): value.strip() for name, _, value in pairs}
+
+
+def versions(packages: Sequence[str] = ('numpy',)) -> str:
     """Return the versions of Python and of packages that are installed."""
     found = [f'Python {platform.python_version()}']
     for package in packages:

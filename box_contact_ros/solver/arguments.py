@@ -3,11 +3,12 @@ from __future__ import annotations
 
 import argparse
 import math
-import tempfile
-from pathlib import Path
 
+from ..output import make_folder, make_room
 from .checks import shown
 from .models import find_model
+
+__all__ = ['check_ranges', 'make_folder', 'make_room', 'model_name', 'seed_number']
 
 
 def model_name(text: str) -> str:
@@ -37,21 +38,3 @@ def check_ranges(parser: argparse.ArgumentParser, options: argparse.Namespace,
         if value is not None and not low <= value <= (math.inf if high is None else high):
             limits = f'be at least {low}' if high is None else f'lie in {low} to {high}'
             parser.error(f'--{name} must {limits}, got {value}')
-
-
-def make_folder(parser: argparse.ArgumentParser, folder: Path) -> Path:
-    """Create the folder of `--out`, or refuse, before the work, one that cannot be written to."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        tempfile.TemporaryFile(dir=folder).close()
-    except OSError as error:
-        parser.error(f'cannot write to {folder} ({error.strerror}): name another place with --out')
-    return folder
-
-
-def make_room(parser: argparse.ArgumentParser, path: Path) -> Path:
-    """Create the folder of a file that `--out` names, as `make_folder`."""
-    if path.is_dir():
-        parser.error(f'--out {path} is a folder: name a file')
-    make_folder(parser, path.parent)
-    return path

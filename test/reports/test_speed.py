@@ -9,7 +9,7 @@ import pytest
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.core import instruction_sets, stages
-from box_contact_ros.output import generation, processor, versions
+from box_contact_ros.output import processor, versions
 from box_contact_ros.reports import speed
 from box_contact_ros.reports.speed import UNIT, Timing
 
@@ -80,11 +80,3 @@ def test_quick_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     text = (tmp_path / 'speed.md').read_text('utf-8')
     assert versions(speed.PACKAGES) in text and 'aligned flush stacks' in text
     assert 'nan' not in text and text in capsys.readouterr().out
-
-
-@pytest.mark.parametrize(('vendor', 'family', 'model', 'expected'), [
-    ('AuthenticAMD', 25, 17, 'Zen 4'), ('AuthenticAMD', 25, 1, 'Zen 3'),
-    ('AuthenticAMD', 26, 2, 'Zen 5'), ('GenuineIntel', 6, 143, 'Sapphire Rapids'),
-    ('GenuineIntel', 6, 1, None), ('unknown', 25, 17, None)])
-def test_generations(vendor: str, family: int, model: int, expected: str | None) -> None:
-    assert generation(vendor, family, model) == expected

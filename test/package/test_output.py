@@ -1,0 +1,64 @@
+"""The output module: tables, CSV files, percentiles, and the machine's description."""
+from __future__ import annotations
+
+import csv
+import math
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from box_contact_ros import output
+from box_contact_ros.core import native
+
+
+def test_a_table_has_its_words_to_the_left() -> None:
+    rows = [['a', 1], ['bcd', 22.5]]
+    assert output.markdown_table(['', 'x'], rows) == (
+        '|  | x |\n| --- | ---: |\n| a | 1 |\n| bcd | 22.5 |')
+    assert output.markdown_table(['', 'x', 'y'], [], words=2).endswith('| --- | --- | ---: |')
+
+
+def test_a_padded_table_has_lines_of_one_length() -> None:
+    lines = output.markdown_table(['name', 'x'], [['a', 1], ['bcdef', 22.5]], padded=True)
+    assert lines.splitlines() == ['| name  |    x |', '| ----- | ---: |', '| a     |    1 |',
+                                  '| bcdef | 22.5 |']
+
+
+def test_a_csv_file_has_the_columns_of_all_rows(tmp_path: Path) -> None:
+    output.write_csv(tmp_path / 'x.csv', [
+        {'name': 'a, b', 'value': 1 / 3, 'count': 7}, {'name': 'c', 'value': math.nan, 'no': None},
+        {'name': 'd', 'value': np.float64(1e-9), 'count': '0.10'}], digits=4)
+    with (tmp_path / 'x.csv').open(encoding='utf-8') as file:
+        head, *rows = csv.reader(file)
+    assert head == ['name', 'value', 'count', 'no']
+    assert rows == [['a, b', '0.3333', '7', ''], ['c', '', '', ''], ['d', '1e-09', '0.10', '']]
+
+
+def test_percentiles() -> None:
+    assert output.percentiles(np.arange(101.0), 0, 50, 99, 100) == (0.0, 50.0, 99.0, 100.0)
+    assert output.percentiles([3.0], 50) == (3.0,)
+    assert all(map(math.isnan, output.percentiles(np.array([]), 50, 99)))
+
+
+def test_numbers_are_readable() -> None:
+    values = (math.nan, 0.0, 1e-9, 0.0123, 1.2345, 98.76, 1234.5)
+    assert [output.number(value) for value in values] == [
+        '–', '0', '<0.001', '0.0123', '1.23', '98.8', '1,234']
+
+
+def test_a_machine_names_all_that_a_time_depends_on() -> None:
+    found = output.machine(native, ('numpy', 'no-such-package'))
+    assert found.instruction_set == native.instruction_set
+    assert native.compiler in found.compiler and f'numpy {np.__version__}' in found.versions
+    assert all(value and value in str(found) for value in asdict(found).values())
+    assert str(output.machine()) == f'{output.processor()}, {output.versions()}'
+
+
+@pytest.mark.parametrize(('vendor', 'family', 'model', 'expected'), [
+    ('AuthenticAMD', 25, 17, 'Zen 4'), ('AuthenticAMD', 25, 1, 'Zen 3'),
+    ('AuthenticAMD', 26, 2, 'Zen 5'), ('GenuineIntel', 6, 143, 'Sapphire Rapids'),
+    ('GenuineIntel', 6, 1, None), ('unknown', 25, 17, None)])
+def test_generations(vendor: str, family: int, model: int, expected: str | None) -> None:
+    assert output.generation(vendor, family, model) == expected
