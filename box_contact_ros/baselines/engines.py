@@ -1,21 +1,24 @@
 """What answers for a pair of boxes: this package's models and the engines that users would take.
 
-All behind one interface, `Contestant`, so that `frontier` measures all alike: from two poses, in
-the form that the engine takes them, to a result that Python can read. Making shapes and models is
-preparation and not measured; setting both poses is.
+All are an `Engine`, so reports ask and time them alike: from two poses, in the engine's own form,
+to a result that Python can read. Making shapes and models is preparation and is not timed. Setting
+both poses is timed.
 
-An engine that answers with several points is entered with the two ways in which users make one of
-them: the deepest, and the mean. Normals are turned to point from A to B, the convention here.
+An engine that returns several points is entered with the two ways in which users make one of them:
+the deepest, and the mean. All normals point from A to B.
 """
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import Any, NamedTuple, Protocol
+from dataclasses import dataclass
+from functools import cache, partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..scene.pose import rotation_matrix
 from ..scene.pose_sets import Pairs
+from ..solver.contact import Contacts
 from ..solver.contact_solver import ContactSolver
 
 MOST_CONTACTS = 16
@@ -23,286 +26,116 @@ MOST_CONTACTS = 16
 
 
 class EngineAnswer(NamedTuple):
-    """What a contestant answers: normal (3,) from A to B and point (3,), None if apart."""
+    """What an engine answers for a pair: normal (3,) from A to B and point (3,), None if apart."""
 
     touching: bool
     normal: np.ndarray | None
     point: np.ndarray | None
 
 
-class Contestant(Protocol):
+APART = EngineAnswer(False, None, None)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Engine:
     """One way to answer."""
 
     name: str
-    """As the report shows it."""
-
-    def prepare(self, pairs: Pairs) -> list[tuple[Any, ...]]:
-        """Arguments of `ask` for every pair. ValueError: not for boxes of these sizes."""
-
-    def ask(self, *arguments: Any) -> Any:
-        """What is timed."""
-
-    def read(self, result: Any) -> EngineAnswer:
-        """The answer, read before `ask` is called again."""
+    """As reports show it."""
+    prepare: Callable[[Pairs], list[Callable[[], Any]]]
+    """Return a call for each pair, to be timed. ValueError: not for boxes of these sizes."""
+    read: Callable[[Any], EngineAnswer]
+    """Return the answer in what a call returned; to be read before the next call."""
+    prepare_batch: Callable[..., Callable[[], Contacts]] | None = None
+    """Return a call that answers for all pairs at once; takes pairs and `threads`."""
 
 
-class Ours:
-    """A model of this package."""
-
-    def __init__(self, model: str, name: str | None = None, weights: str | None = None) -> None:
-        self.name = name or model
-        self.model = model
-        self.weights = weights
-
-    def solver(self, size_a: np.ndarray, size_b: np.ndarray) -> ContactSolver:
-        """The solver for full extents (3,)."""
-        return ContactSolver(size_a, size_b, model=self.model, weights=self.weights)
-
-    def prepare(self, pairs: Pairs) -> list[tuple[Any, ...]]:
-        solver = _per_sizes(self.solver)
-        return [(solver(p, q), a, b) for a, b, p, q in _rows(pairs)]
-
-    def ask(self, solver: ContactSolver, a: np.ndarray, b: np.ndarray) -> Any:
-        return solver(a, b)
-
-    def read(self, result: Any) -> EngineAnswer:
-        if not result.colliding:
-            return EngineAnswer(False, None, None)
-        return EngineAnswer(True, result.normal, result.point)
+# --- this package's models ------------------------------------------------------------------------
 
 
-class MujocoDistance:
-    """MuJoCo's `mj_geomDistance`: signed distance and the two nearest points; their middle."""
+def ours(model: str, name: str | None = None, weights: str | None = None) -> Engine:
+    """Return a model of this package, which reports show as `name`."""
+    def solver(p: np.ndarray, q: np.ndarray) -> ContactSolver:
+        return ContactSolver(p, q, model=model, weights=weights)
 
-    name = 'MuJoCo mj_geomDistance'
+    def prepare(pairs: Pairs) -> list[Callable[[], Any]]:
+        solvers = _per_sizes(solver)
+        return [partial(solvers(p, q), a, b) for a, b, p, q in _rows(pairs)]
 
-    def __init__(self) -> None:
-        import mujoco
+    def prepare_batch(pairs: Pairs, threads: int = 1) -> Callable[[], Contacts]:
+        a, b, size_a, size_b = pairs
+        return partial(solver(size_a[0], size_b[0]).batch, a, b, size_a=size_a, size_b=size_b,
+                       threads=threads)
 
-        self._distance, self._matrix = mujoco.mj_geomDistance, mujoco.mju_quat2Mat
-        self._ends = np.zeros(6)
+    def read(contact: Any) -> EngineAnswer:
+        return EngineAnswer(True, contact.normal, contact.point) if contact.colliding else APART
 
-    def prepare(self, pairs: Pairs) -> list[tuple[Any, ...]]:
-        models = _per_sizes(_mujoco_model)
-        found = []
-        for a, b, p, q in _rows(pairs):
-            model, data = models(p, q)
-            found.append((model, data, *data.geom_xpos, *data.geom_xmat,
-                          a[:3], b[:3], np.roll(a[3:], 1), np.roll(b[3:], 1)))
-        return found
+    return Engine(name=name or model, prepare=prepare, read=read, prepare_batch=prepare_batch)
 
-    def ask(self, model: Any, data: Any, place_a: Any, place_b: Any, turn_a: Any, turn_b: Any,
-            a: np.ndarray, b: np.ndarray, quat_a: np.ndarray, quat_b: np.ndarray) -> Any:
+
+# --- MuJoCo ---------------------------------------------------------------------------------------
+
+
+def mujoco_distance() -> Engine:
+    """Return MuJoCo's `mj_geomDistance`: signed distance and two nearest points; their middle."""
+    import mujoco
+
+    ends = np.zeros(6)
+    distance, matrix = mujoco.mj_geomDistance, mujoco.mju_quat2Mat
+
+    def ask(model: Any, data: Any, place_a: Any, place_b: Any, turn_a: Any, turn_b: Any,
+            a: np.ndarray, b: np.ndarray, quat_a: np.ndarray, quat_b: np.ndarray) -> float:
         place_a[:] = a
         place_b[:] = b
-        self._matrix(turn_a, quat_a)
-        self._matrix(turn_b, quat_b)
-        return self._distance(model, data, 0, 1, 1.0, self._ends)
+        matrix(turn_a, quat_a)
+        matrix(turn_b, quat_b)
+        return distance(model, data, 0, 1, 1.0, ends)
 
-    def read(self, result: Any) -> EngineAnswer:
+    def prepare(pairs: Pairs) -> list[Callable[[], Any]]:
+        models = _per_sizes(_mujoco_model)
+        return [partial(ask, model, data, *data.geom_xpos, *data.geom_xmat, *_wxyz(a, b))
+                for a, b, p, q in _rows(pairs) for model, data in [models(p, q)]]
+
+    def read(result: float) -> EngineAnswer:
         if result > 0.0:
-            return EngineAnswer(False, None, None)
-        start, end = self._ends[:3], self._ends[3:]
+            return APART
+        start, end = ends[:3], ends[3:]
         step = start - end
         length = np.linalg.norm(step)
         return EngineAnswer(True, step / length if length else None, 0.5 * (start + end))
 
+    return Engine(name='MuJoCo mj_geomDistance', prepare=prepare, read=read)
 
-class MujocoCollision:
-    """MuJoCo's `mj_collision`, after `mj_kinematics`: up to eight contacts."""
 
-    def __init__(self, choose: str) -> None:
-        import mujoco
+def mujoco_collision(choice: str) -> Engine:
+    """Return MuJoCo's `mj_collision`, after `mj_kinematics`: up to eight contacts."""
+    import mujoco
 
-        self.name = f'MuJoCo mj_collision, {choose}'
-        self._choose = CHOICES[choose]
-        self._kinematics, self._collide = mujoco.mj_kinematics, mujoco.mj_collision
+    kinematics, collide = mujoco.mj_kinematics, mujoco.mj_collision
 
-    def prepare(self, pairs: Pairs) -> list[tuple[Any, ...]]:
-        models = _per_sizes(_mujoco_model)
-        found = []
-        for a, b, p, q in _rows(pairs):
-            model, data = models(p, q)
-            found.append((model, data, data.qpos, np.concatenate(
-                [a[:3], np.roll(a[3:], 1), b[:3], np.roll(b[3:], 1)])))
-        return found
-
-    def ask(self, model: Any, data: Any, places: np.ndarray, poses: np.ndarray) -> Any:
+    def ask(model: Any, data: Any, places: np.ndarray, poses: np.ndarray) -> Any:
         places[:] = poses
-        self._kinematics(model, data)
-        self._collide(model, data)
+        kinematics(model, data)
+        collide(model, data)
         return data
 
-    def read(self, result: Any) -> EngineAnswer:
-        contacts = result.contact
-        return self._choose(np.array(contacts.pos), np.array(contacts.frame)[:, :3],
-                            -np.array(contacts.dist))
+    def prepare(pairs: Pairs) -> list[Callable[[], Any]]:
+        models = _per_sizes(_mujoco_model)
+        calls = []
+        for a, b, p, q in _rows(pairs):
+            model, data = models(p, q)
+            place_a, place_b, quat_a, quat_b = _wxyz(a, b)
+            calls.append(partial(ask, model, data, data.qpos, np.concatenate(
+                [place_a, quat_a, place_b, quat_b])))
+        return calls
 
+    def read(data: Any) -> EngineAnswer:
+        contacts = data.contact
+        # A frame's first row is the normal, from the geom of lower number to the other.
+        return CHOICES[choice](np.array(contacts.pos), np.array(contacts.frame)[:, :3],
+                               -np.array(contacts.dist))
 
-class Fcl:
-    """python-fcl's `collide` of two boxes."""
-
-    def __init__(self, choose: str) -> None:
-        import fcl
-
-        self.name = f'python-fcl collide, {choose}'
-        self._choose = CHOICES[choose]
-        self._fcl = fcl
-        self._request = fcl.CollisionRequest(num_max_contacts=MOST_CONTACTS, enable_contact=True)
-
-    def prepare(self, pairs: Pairs) -> list[tuple[Any, ...]]:
-        fcl = self._fcl
-        boxes = _per_sizes(lambda p, q: (fcl.CollisionObject(fcl.Box(*p)),
-                                         fcl.CollisionObject(fcl.Box(*q))))
-        return [(*boxes(p, q), a[:3], b[:3], np.roll(a[3:], 1), np.roll(b[3:], 1))
-                for a, b, p, q in _rows(pairs)]
-
-    def ask(self, one: Any, two: Any, a: np.ndarray, b: np.ndarray, quat_a: np.ndarray,
-            quat_b: np.ndarray) -> Any:
-        fcl = self._fcl
-        one.setTransform(fcl.Transform(quat_a, a))
-        two.setTransform(fcl.Transform(quat_b, b))
-        result = fcl.CollisionResult()
-        fcl.collide(one, two, self._request, result)
-        return result
-
-    def read(self, result: Any) -> EngineAnswer:
-        contacts = result.contacts
-        return self._choose(np.array([c.pos for c in contacts]),
-                            np.array([c.normal for c in contacts]),
-                            np.array([c.penetration_depth for c in contacts]))
-
-
-class Coal:
-    """Coal's `collide`: the deepest point."""
-
-    name = 'Coal collide'
-
-    def __init__(self) -> None:
-        import coal
-
-        self._coal = coal
-        self._request = coal.CollisionRequest()
-        self._request.enable_contact = True
-        self._request.num_max_contacts = MOST_CONTACTS
-        self._result = coal.CollisionResult()
-
-    def prepare(self, pairs: Pairs) -> list[tuple[Any, ...]]:
-        coal = self._coal
-        boxes = _per_sizes(lambda p, q: (coal.Box(*p), coal.Box(*q), coal.Transform3s(),
-                                         coal.Transform3s()))
-        return [(*boxes(p, q), a[:3], b[:3], rotation_matrix(a[3:]), rotation_matrix(b[3:]))
-                for a, b, p, q in _rows(pairs)]
-
-    def ask(self, one: Any, two: Any, at_one: Any, at_two: Any, a: np.ndarray, b: np.ndarray,
-            turn_a: np.ndarray, turn_b: np.ndarray) -> Any:
-        at_one.setTranslation(a)
-        at_one.setRotation(turn_a)
-        at_two.setTranslation(b)
-        at_two.setRotation(turn_b)
-        self._result.clear()
-        self._coal.collide(one, at_one, two, at_two, self._request, self._result)
-        return self._result
-
-    def read(self, result: Any) -> EngineAnswer:
-        if not result.numContacts():
-            return EngineAnswer(False, None, None)
-        contact = result.getContact(0)
-        return EngineAnswer(True, np.array(contact.normal), np.array(contact.pos))
-
-
-class Bullet:
-    """PyBullet's `getClosestPoints` at distance 0."""
-
-    def __init__(self, choose: str) -> None:
-        import pybullet
-
-        self.name = f'PyBullet getClosestPoints, {choose}'
-        self._choose = CHOICES[choose]
-        self._bullet = pybullet
-        self._client = pybullet.connect(pybullet.DIRECT)
-
-    def prepare(self, pairs: Pairs) -> list[tuple[Any, ...]]:
-        bullet, client = self._bullet, self._client
-        # Bodies stay in the world and slow its broad phase down: only those of these pairs.
-        bullet.resetSimulation(physicsClientId=client)
-
-        def bodies(p: np.ndarray, q: np.ndarray) -> tuple[int, int]:
-            return tuple(bullet.createMultiBody(
-                1.0, bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=list(0.5 * size),
-                                                 physicsClientId=client),
-                physicsClientId=client) for size in (p, q))
-
-        made = _per_sizes(bodies)
-        return [(*made(p, q), tuple(a[:3]), tuple(b[:3]), tuple(a[3:]), tuple(b[3:]))
-                for a, b, p, q in _rows(pairs)]
-
-    def ask(self, one: int, two: int, a: Any, b: Any, turn_a: Any, turn_b: Any) -> Any:
-        bullet, client = self._bullet, self._client
-        bullet.resetBasePositionAndOrientation(one, a, turn_a, physicsClientId=client)
-        bullet.resetBasePositionAndOrientation(two, b, turn_b, physicsClientId=client)
-        return bullet.getClosestPoints(one, two, 0.0, physicsClientId=client)
-
-    def read(self, result: Any) -> EngineAnswer:
-        # 5, 6: the points on A and B; 7: the normal on B, towards A; 8: the distance.
-        return self._choose(np.array([0.5 * (np.array(c[5]) + np.array(c[6])) for c in result]),
-                            np.array([-np.array(c[7]) for c in result]),
-                            np.array([-c[8] for c in result]))
-
-
-def _deepest(points: np.ndarray, normals: np.ndarray, depths: np.ndarray) -> EngineAnswer:
-    if not len(points):
-        return EngineAnswer(False, None, None)
-    first = int(np.argmax(depths))
-    return EngineAnswer(True, normals[first], points[first])
-
-
-def _mean(points: np.ndarray, normals: np.ndarray, depths: np.ndarray) -> EngineAnswer:
-    if not len(points):
-        return EngineAnswer(False, None, None)
-    return EngineAnswer(True, normals[int(np.argmax(depths))], points.mean(axis=0))
-
-
-CHOICES: dict[str, Callable[[np.ndarray, np.ndarray, np.ndarray], EngineAnswer]] = {
-    'deepest': _deepest, 'mean': _mean}
-"""One point of several (n, 3), with their normals (n, 3) and depths (n,)."""
-
-PEERS: dict[str, tuple[str, list[Callable[[], Contestant]]]] = {
-    'mujoco': ('sim', [MujocoDistance, lambda: MujocoCollision('deepest'),
-                       lambda: MujocoCollision('mean')]),
-    'fcl': ('soup', [lambda: Fcl('deepest'), lambda: Fcl('mean')]),
-    'coal': ('peers', [Coal]),
-    'pybullet': ('peers', [lambda: Bullet('deepest'), lambda: Bullet('mean')]),
-}
-"""By module: the extra of this package that brings it, and its contestants."""
-
-
-def installed() -> tuple[list[Contestant], list[str]]:
-    """The peers that can be imported, and a line about each that cannot."""
-    found, missing = [], []
-    for module, (extra, makers) in PEERS.items():
-        try:
-            found += [make() for make in makers]
-        except ImportError:
-            missing.append(f"{module} is not installed (extra '{extra}')")
-    return found, missing
-
-
-def _rows(pairs: Pairs) -> Iterator[tuple[np.ndarray, ...]]:
-    """Contiguous rows: pose_a, pose_b, size_a, size_b."""
-    return zip(*(np.ascontiguousarray(part) for part in pairs))
-
-
-def _per_sizes(make: Callable[[np.ndarray, np.ndarray], Any]) -> Callable[..., Any]:
-    """`make`, called once for every pair of sizes."""
-    made: dict[bytes, Any] = {}
-
-    def cached(p: np.ndarray, q: np.ndarray) -> Any:
-        key = p.tobytes() + q.tobytes()
-        if key not in made:
-            made[key] = make(p, q)
-        return made[key]
-    return cached
+    return Engine(name=f'MuJoCo mj_collision, {choice}', prepare=prepare, read=read)
 
 
 def _mujoco_model(p: np.ndarray, q: np.ndarray) -> tuple[Any, Any]:
@@ -315,3 +148,155 @@ def _mujoco_model(p: np.ndarray, q: np.ndarray) -> tuple[Any, Any]:
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     return model, data
+
+
+# --- FCL, Coal, Bullet ----------------------------------------------------------------------------
+
+
+def fcl_collision(choice: str) -> Engine:
+    """Return python-fcl's `collide` of two boxes."""
+    import fcl
+
+    request = fcl.CollisionRequest(num_max_contacts=MOST_CONTACTS, enable_contact=True)
+
+    def ask(one: Any, two: Any, a: np.ndarray, b: np.ndarray, quat_a: np.ndarray,
+            quat_b: np.ndarray) -> Any:
+        one.setTransform(fcl.Transform(quat_a, a))
+        two.setTransform(fcl.Transform(quat_b, b))
+        result = fcl.CollisionResult()
+        fcl.collide(one, two, request, result)
+        return result
+
+    def prepare(pairs: Pairs) -> list[Callable[[], Any]]:
+        boxes = _per_sizes(lambda p, q: (fcl.CollisionObject(fcl.Box(*p)),
+                                         fcl.CollisionObject(fcl.Box(*q))))
+        return [partial(ask, *boxes(p, q), *_wxyz(a, b)) for a, b, p, q in _rows(pairs)]
+
+    def read(result: Any) -> EngineAnswer:
+        contacts = result.contacts
+        return CHOICES[choice](np.array([c.pos for c in contacts]),
+                               np.array([c.normal for c in contacts]),
+                               np.array([c.penetration_depth for c in contacts]))
+
+    return Engine(name=f'python-fcl collide, {choice}', prepare=prepare, read=read)
+
+
+def coal_collision() -> Engine:
+    """Return Coal's `collide`: the deepest point."""
+    import coal
+
+    request, result = coal.CollisionRequest(), coal.CollisionResult()
+    request.enable_contact = True
+    request.num_max_contacts = MOST_CONTACTS
+
+    def ask(one: Any, two: Any, at_one: Any, at_two: Any, a: np.ndarray, b: np.ndarray,
+            matrix_a: np.ndarray, matrix_b: np.ndarray) -> Any:
+        at_one.setTranslation(a)
+        at_one.setRotation(matrix_a)
+        at_two.setTranslation(b)
+        at_two.setRotation(matrix_b)
+        result.clear()
+        coal.collide(one, at_one, two, at_two, request, result)
+        return result
+
+    def prepare(pairs: Pairs) -> list[Callable[[], Any]]:
+        boxes = _per_sizes(lambda p, q: (coal.Box(*p), coal.Box(*q), coal.Transform3s(),
+                                         coal.Transform3s()))
+        return [partial(ask, *boxes(p, q), a[:3], b[:3], rotation_matrix(a[3:]),
+                        rotation_matrix(b[3:])) for a, b, p, q in _rows(pairs)]
+
+    def read(_: Any) -> EngineAnswer:
+        if not result.numContacts():
+            return APART
+        contact = result.getContact(0)
+        return EngineAnswer(True, np.array(contact.normal), np.array(contact.pos))
+
+    return Engine(name='Coal collide', prepare=prepare, read=read)
+
+
+def bullet_points(choice: str) -> Engine:
+    """Return PyBullet's `getClosestPoints` at distance 0."""
+    import pybullet as bullet
+
+    client = bullet.connect(bullet.DIRECT)
+    place = partial(bullet.resetBasePositionAndOrientation, physicsClientId=client)
+
+    def bodies(p: np.ndarray, q: np.ndarray) -> list[int]:
+        shapes = [bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=list(0.5 * size),
+                                              physicsClientId=client) for size in (p, q)]
+        return [bullet.createMultiBody(1.0, shape, physicsClientId=client) for shape in shapes]
+
+    def ask(one: int, two: int, a: Any, b: Any, quat_a: Any, quat_b: Any) -> Any:
+        place(one, a, quat_a)
+        place(two, b, quat_b)
+        return bullet.getClosestPoints(one, two, 0.0, physicsClientId=client)
+
+    def prepare(pairs: Pairs) -> list[Callable[[], Any]]:
+        # Bodies stay in the world and slow its broad phase down: only those of these pairs.
+        bullet.resetSimulation(physicsClientId=client)
+        made = _per_sizes(bodies)
+        return [partial(ask, *made(p, q), *(tuple(part) for part in (a[:3], b[:3], a[3:], b[3:])))
+                for a, b, p, q in _rows(pairs)]
+
+    def read(contacts: Any) -> EngineAnswer:
+        # 5, 6: the points on A and B; 7: the normal on B, towards A; 8: the distance.
+        return CHOICES[choice](np.array([0.5 * (np.array(c[5]) + np.array(c[6]))
+                                         for c in contacts]),
+                               np.array([-np.array(c[7]) for c in contacts]),
+                               np.array([-c[8] for c in contacts]))
+
+    return Engine(name=f'PyBullet getClosestPoints, {choice}', prepare=prepare, read=read)
+
+
+# --- all of them ----------------------------------------------------------------------------------
+
+
+def _deepest(points: np.ndarray, normals: np.ndarray, depths: np.ndarray) -> EngineAnswer:
+    if not len(points):
+        return APART
+    first = int(np.argmax(depths))
+    return EngineAnswer(True, normals[first], points[first])
+
+
+def _mean(points: np.ndarray, normals: np.ndarray, depths: np.ndarray) -> EngineAnswer:
+    deepest = _deepest(points, normals, depths)
+    return deepest._replace(point=points.mean(axis=0)) if deepest.touching else APART
+
+
+CHOICES = {'deepest': _deepest, 'mean': _mean}
+"""One point of several (n, 3), with their normals (n, 3) and depths (n,)."""
+
+RIVALS: dict[str, tuple[str, list[Callable[[], Engine]]]] = {
+    'mujoco': ('sim', [mujoco_distance, *(partial(mujoco_collision, one) for one in CHOICES)]),
+    'fcl': ('soup', [partial(fcl_collision, one) for one in CHOICES]),
+    'coal': ('peers', [coal_collision]),
+    'pybullet': ('peers', [partial(bullet_points, one) for one in CHOICES]),
+}
+"""By module: the extra of this package that brings it, and its engines."""
+
+
+def installed() -> tuple[list[Engine], list[str]]:
+    """Return the rivals that can be imported, and a line about each that cannot."""
+    found, missing = [], []
+    for module, (extra, makers) in RIVALS.items():
+        try:
+            found += [make() for make in makers]
+        except ImportError:
+            missing.append(f"{module} is not installed (extra '{extra}')")
+    return found, missing
+
+
+def _rows(pairs: Pairs) -> Iterator[tuple[np.ndarray, ...]]:
+    """Yield contiguous rows: pose_a, pose_b, size_a, size_b."""
+    return zip(*(np.ascontiguousarray(part) for part in pairs))
+
+
+def _wxyz(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Return places (3,) of both poses, then their quaternions (4,) wxyz."""
+    return a[:3], b[:3], np.roll(a[3:], 1), np.roll(b[3:], 1)
+
+
+def _per_sizes(make: Callable[[np.ndarray, np.ndarray], Any]) -> Callable[..., Any]:
+    """Return `make`, called once for each pair of sizes."""
+    cached = cache(lambda p, q: make(np.array(p), np.array(q)))
+    return lambda p, q: cached(tuple(p), tuple(q))

@@ -16,19 +16,18 @@ about half the winners are edge pairs although the contact is a patch.
 from __future__ import annotations
 
 import argparse
-import csv
 import math
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from .. import output
 from ..core import CENTROID_REACH, DEPTH_FLOOR, Stages, native, stages
-from ..output import add_out, processor, results_folder, versions
 from ..resources import resource_path
 from ..scene.pose import rotation_matrix
 from ..scene.pose_sets import SETS, Pairs
@@ -39,7 +38,7 @@ from ..solver.mlp import bounds_of, core_numbers
 from ..solver.models import MODELS
 from ..solver.weights_file import WeightsError, load_weights
 from ..training.paper_recipe import dataset
-from ..training.paper_recipe.errors import errors_of, figures, wrapped
+from ..training.paper_recipe.errors import errors_of, figures, figures_by_part, wrapped
 from .paper_tables import PAPER
 
 
@@ -136,8 +135,8 @@ def outside(pairs: Pairs, found: Contacts) -> float:
     return float(np.max((farthest / size - pressed)[found.colliding], initial=0.0))
 
 
-@dataclass
-class Result:
+@dataclass(frozen=True, kw_only=True)
+class AccuracyRow:
     """One model on one set."""
 
     model: str
@@ -158,21 +157,37 @@ class Result:
     """Largest, of the size."""
     outside: float
     """Farthest point outside a box, of the size."""
-    corrected_share: float = math.nan
-    broken: list[str] = field(default_factory=list)
-    """Limits that do not hold, in words."""
+    corrected_share: float
+    """Share of points that the network had put outside a box; NaN for another model."""
 
     def parts(self) -> dict[str, np.ndarray]:
-        """Errors of all pairs, per class and per winner; parts that have none are left out."""
+        """Return errors of all pairs, per class and per winner; empty parts are left out."""
         found = {'all': self.errors}
         found |= {name: self.errors[self.classes == k] for k, name in enumerate(CLASSES)}
         found |= {name: self.errors[self.winners == k] for k, name in enumerate(WINNERS)}
         return {name: errors for name, errors in found.items() if len(errors)}
 
+    def broken(self) -> list[str]:
+        """Return the limits of `mlp` that do not hold, in words."""
+        if self.model != 'mlp':
+            return []
+        found, limit = statistics(self.errors), LIMITS[self.set]
+        checks = {f'{name} {value:.3f} > {most:g} %': value <= most
+                  for name, value, most in zip(limit._fields, found, limit)}
+        checks |= {
+            f'{self.verdict_errors} verdicts differ': self.verdict_errors == 0,
+            'normals differ': self.normal_difference == 0.0,
+            'separations differ': self.separation_difference == 0.0,
+            'points outside': self.outside <= OUTSIDE,
+            'exact answers': self.exact_share == 0.0,
+        }
+        # Comparisons with NaN are false, so a NaN breaks its limit.
+        return [f'{self.model}, {self.set}: {text}' for text, holds in checks.items() if not holds]
+
 
 def measure(model: str, name: str, pairs: Pairs, truth: Contacts, weights: str | None = None,
-            ) -> Result | None:
-    """A model on a set, or None where the model is not for its sizes."""
+            ) -> AccuracyRow | None:
+    """Measure a model on a set; None where the model is not for its sizes."""
     cube = tuple(pairs.size_a[0])
     try:
         solver = ContactSolver(cube, cube, model=model, weights=weights)
@@ -187,40 +202,42 @@ def measure(model: str, name: str, pairs: Pairs, truth: Contacts, weights: str |
     edge = np.minimum(touching.size_a.max(axis=1), touching.size_b.max(axis=1))
     size = np.maximum(pairs.size_a.max(axis=1), pairs.size_b.max(axis=1))
     apart = np.linalg.norm(found.point[both] - truth.point[both], axis=1)
-    result = Result(
-        model, name, 100.0 * apart / edge, classes, winners, len(both),
-        solver.exact_answers / max(1, int(found.colliding.sum())),
-        int((found.colliding != truth.colliding).sum()),
-        float(np.abs(found.normal[both] - truth.normal[both]).max(initial=0.0)),
-        float((np.abs(found.separation - truth.separation) / size).max(initial=0.0)),
-        outside(pairs, found))
-    if model == 'mlp':
-        result.corrected_share = share_corrected(
-            touching, weights or resource_path('weights', 'mlp.safetensors'))
-        result.broken = _broken(result)
-    return result
+    return AccuracyRow(
+        model=model, set=name, errors=100.0 * apart / edge, classes=classes, winners=winners,
+        pairs=len(both), exact_share=solver.exact_answers / max(1, int(found.colliding.sum())),
+        verdict_errors=int((found.colliding != truth.colliding).sum()),
+        normal_difference=float(np.abs(found.normal[both] - truth.normal[both]).max(initial=0.0)),
+        separation_difference=float(
+            (np.abs(found.separation - truth.separation) / size).max(initial=0.0)),
+        outside=outside(pairs, found),
+        corrected_share=math.nan if model != 'mlp' else share_corrected(
+            touching, weights or resource_path('weights', 'mlp.safetensors')))
 
 
-def _broken(result: Result) -> list[str]:
-    mean, p99, worst = statistics(result.errors)
-    limit = LIMITS[result.set]
-    checks = {
-        f'mean {mean:.3f} > {limit.mean:g} %': mean <= limit.mean,
-        f'p99 {p99:.3f} > {limit.p99:g} %': p99 <= limit.p99,
-        f'worst {worst:.3f} > {limit.worst:g} %': worst <= limit.worst,
-        f'{result.verdict_errors} verdicts differ': result.verdict_errors == 0,
-        'normals differ': result.normal_difference == 0.0,
-        'separations differ': result.separation_difference == 0.0,
-        'points outside': result.outside <= OUTSIDE,
-        'exact answers': result.exact_share == 0.0,
-    }
-    # Comparisons with NaN are false, so a NaN breaks its limit.
-    return [f'{result.model}, {result.set}: {text}' for text, holds in checks.items() if not holds]
+def measure_all(models: Sequence[str], count: int, seed: int, weights: str | None,
+                ) -> list[AccuracyRow]:
+    """Measure models on `count` pairs of every set, model by model."""
+    from tqdm import tqdm
+
+    rows = []
+    with tqdm(total=len(SETS) * len(models), desc='accuracy', unit='set') as bar:
+        for number, (name, make) in enumerate(SETS.items()):
+            # A few draws miss, up to 3 in 100.
+            drawn = make(np.random.default_rng([seed, number]), count + count // 20 + 10)
+            pairs = Pairs(*(part[:count] for part in drawn))
+            truth = ContactSolver((1, 1, 1), (1, 1, 1), model='exact').batch(
+                pairs.pose_a, pairs.pose_b, size_a=pairs.size_a, size_b=pairs.size_b)
+            for model in models:
+                bar.set_postfix_str(f'{model}, {name}')
+                rows.append(measure(model, name, pairs, truth,
+                                    weights if model == 'mlp' else None))
+                bar.update()
+    return sorted(filter(None, rows), key=lambda row: models.index(row.model))
 
 
 def statistics(errors: np.ndarray) -> tuple[float, float, float]:
-    """Mean, 99th percentile, worst."""
-    return float(errors.mean()), float(np.quantile(errors, 0.99)), float(errors.max())
+    """Return mean, 99th percentile, worst."""
+    return (float(errors.mean()), *output.percentiles(errors, 99, 100))
 
 
 # --- the paper's figures --------------------------------------------------------------------------
@@ -228,7 +245,7 @@ def statistics(errors: np.ndarray) -> tuple[float, float, float]:
 
 def paper_errors(models: Sequence[str], weights: str | None = None, step: int = 1,
                  ) -> tuple[dict[str, np.ndarray], int]:
-    """Wrapped errors (n, 4) [rad] on the paper's external set, per model, and n as drawn.
+    """Return wrapped errors (n, 4) [rad] on the paper's external set, per model, and n as drawn.
 
     Azimuth and elevation of the impact point, seen from the first box's centre, and of the normal.
     The set is that of the weights of model `paper`; `paper` is its network alone, asked as the
@@ -257,96 +274,92 @@ def paper_errors(models: Sequence[str], weights: str | None = None, step: int = 
 
 
 def paper_table(errors: dict[str, np.ndarray], drawn: int) -> str:
-    """ME, MAE and RMSE beside Tables 1 and 2."""
-    rows = [['', *PAPER[1], 'point MAE', 'normal MAE', 'patterns']]
-    for number, title in ((1, 'with'), (2, 'without')):
-        rows.append([f"paper's Table {number}, {title} discontinuities",
-                     *[f'{PAPER[number][name][2]:.4f}' for name in PAPER[number]], '', '', ''])
+    """Return ME, MAE and RMSE beside Tables 1 and 2."""
+    rows = [[f"paper's Table {number}, {title} discontinuities",
+             *[f'{PAPER[number][name][2]:.4f}' for name in PAPER[number]], '', '', '']
+            for number, title in ((1, 'with'), (2, 'without'))]
     for model, wrong in errors.items():
-        overall, halves = figures(wrong), [figures(wrong[:, part]) for part in
-                                           (slice(0, 2), slice(2, 4))]
+        overall, point, normal = (part for part in figures_by_part(wrong).values())
         label = 'our network of Table 1' if model == 'paper' else f'`{model}`'
         rows.append([label, *[f'{overall[name] + 0.0:.3g}' for name in PAPER[1]],
-                     *[f'{half["MAE"]:.3g}' for half in halves], f'{len(wrong):,} of {drawn:,}'])
-    return markdown(rows)
+                     f'{point["MAE"]:.3g}', f'{normal["MAE"]:.3g}', f'{len(wrong):,} of {drawn:,}'])
+    return output.markdown_table(['', *PAPER[1], 'point MAE', 'normal MAE', 'patterns'], rows)
+
+
+def paper_broken(errors: dict[str, np.ndarray], drawn: int) -> list[str]:
+    """Return what `mlp` breaks of its limits on the paper's external set."""
+    if 'mlp' not in errors:
+        return []
+    mae, missed = figures(errors['mlp'])['MAE'], drawn - len(errors['mlp'])
+    checks = {f'MAE {mae:.4f} > {MAE_LIMIT:g} rad': mae <= MAE_LIMIT,
+              f'{missed} contacts missed': missed == 0}
+    return [f"mlp, the paper's external set: {text}" for text, holds in checks.items() if not holds]
 
 
 # --- the report -----------------------------------------------------------------------------------
 
 
-def markdown(rows: Sequence[Sequence[str]]) -> str:
-    """Rows as a Markdown table, the first one its head; figures to the right."""
-    lines = [rows[0], ['---', *['---:'] * (len(rows[0]) - 1)], *rows[1:]]
-    return '\n'.join('| ' + ' | '.join(line) + ' |' for line in lines)
-
-
-def _three(errors: np.ndarray | None) -> str:
-    return '–' if errors is None else '/'.join(
-        f'{value:.{digits}f}' for value, digits in zip(statistics(errors), (3, 2, 1)))
-
-
-def table(results: Sequence[Result]) -> str:
-    """Errors of whole sets beside the limits."""
-    rows = [['model, set', 'pairs', 'mean', 'p99', 'worst', 'limits', 'answered by exact',
-             'verdicts wrong', 'normal off', 'separation off', 'corrected', 'outside']]
-    for r in results:
-        limit = '/'.join(f'{value:g}' for value in LIMITS[r.set]) if r.model == 'mlp' else ''
+def table(rows: Sequence[AccuracyRow]) -> str:
+    """Return the errors of whole sets beside the limits."""
+    lines = []
+    for r in rows:
         mean, p99, worst = statistics(r.errors)
-        corrected = '' if math.isnan(r.corrected_share) else f'{100.0 * r.corrected_share:.2g} %'
-        rows.append([
+        lines.append([
             f'{r.model}, {r.set}', f'{r.pairs:,}', f'{mean:.3f}', f'{p99:.2f}', f'{worst:.2f}',
-            limit, f'{100.0 * r.exact_share:.3g} %', str(r.verdict_errors),
-            f'{r.normal_difference:.2g}', f'{r.separation_difference:.2g}', corrected,
+            '/'.join(f'{value:g}' for value in LIMITS[r.set]) if r.model == 'mlp' else '',
+            f'{100.0 * r.exact_share:.3g} %', r.verdict_errors,
+            f'{r.normal_difference:.2g}', f'{r.separation_difference:.2g}',
+            '' if math.isnan(r.corrected_share) else f'{100.0 * r.corrected_share:.2g} %',
             f'{r.outside:.1g}'])
-    return markdown(rows)
+    return output.markdown_table(
+        ['model, set', 'pairs', 'mean', 'p99', 'worst', 'limits', 'answered by exact',
+         'verdicts wrong', 'normal off', 'separation off', 'corrected', 'outside'], lines)
 
 
-def class_table(results: Sequence[Result]) -> str:
-    """mean/p99/worst per class and winner, with the share of the pairs."""
+def class_table(rows: Sequence[AccuracyRow]) -> str:
+    """Return mean/p99/worst per class and winner, with the share of the pairs."""
+    def cell(row: AccuracyRow, name: str) -> str:
+        errors = row.parts().get(name)
+        if errors is None:
+            return '–'
+        mean, p99, worst = statistics(errors)
+        share = 100.0 * len(errors) / len(row.errors)
+        return f'{mean:.3f}/{p99:.2f}/{worst:.1f} ({share:.0f} %)'
+
     names = (*CLASSES, *WINNERS)
-    rows = [['model, set', *names]]
-    for r in results:
-        parts = r.parts()
-        rows.append([f'{r.model}, {r.set}', *[
-            f'{_three(parts[name])} ({100.0 * len(parts[name]) / len(r.errors):.0f} %)'
-            if name in parts else '–' for name in names]])
-    return markdown(rows)
+    return output.markdown_table(['model, set', *names], [
+        [f'{row.model}, {row.set}', *(cell(row, name) for name in names)] for row in rows])
 
 
-def write_csv(path: Path, results: Sequence[Result]) -> None:
-    """A row per model, set and part: errors in %, differences of the size.
+def csv_rows(rows: Sequence[AccuracyRow]) -> list[dict[str, object]]:
+    """Return a row per model, set and part: errors in %, differences of the size.
 
     The row of a whole set ends with what is known of the set only.
     """
-    with path.open('w', newline='') as file:
-        writer = csv.writer(file, lineterminator='\n')
-        writer.writerow(['model', 'set', 'part', 'pairs', 'mean', 'p50', 'p99', 'worst',
-                         'limit_mean', 'limit_p99', 'limit_worst', 'exact_share', 'verdict_errors',
-                         'normal_difference', 'separation_difference', 'corrected_share',
-                         'outside'])
-        for r in results:
-            for part, errors in r.parts().items():
-                mean, p99, worst = statistics(errors)
-                more = [''] * 9
-                if part == 'all':
-                    limits = LIMITS[r.set] if r.model == 'mlp' else [''] * 3
-                    corrected = '' if math.isnan(r.corrected_share) else f'{r.corrected_share:.5g}'
-                    more = [*limits, f'{r.exact_share:.5g}', r.verdict_errors,
-                            f'{r.normal_difference:.3g}', f'{r.separation_difference:.3g}',
-                            corrected, f'{r.outside:.3g}']
-                writer.writerow([r.model, r.set, part, len(errors), f'{mean:.5g}',
-                                 f'{np.median(errors):.5g}', f'{p99:.5g}', f'{worst:.5g}', *more])
+    found: list[dict[str, object]] = []
+    for row in rows:
+        limits = LIMITS[row.set] if row.model == 'mlp' else (None,) * 3
+        for part, errors in row.parts().items():
+            mean, p99, worst = statistics(errors)
+            found.append({'model': row.model, 'set': row.set, 'part': part, 'pairs': len(errors),
+                          'mean': mean, 'p50': float(np.median(errors)), 'p99': p99,
+                          'worst': worst})
+            if part == 'all':
+                found[-1] |= dict(zip(('limit_mean', 'limit_p99', 'limit_worst'), limits))
+                found[-1] |= {name: getattr(row, name) for name in (
+                    'exact_share', 'verdict_errors', 'normal_difference', 'separation_difference',
+                    'corrected_share', 'outside')}
+    return found
 
 
-def page(results: Sequence[Result], errors: dict[str, np.ndarray], drawn: int, command: str,
+def page(rows: Sequence[AccuracyRow], errors: dict[str, np.ndarray], drawn: int, command: str,
          seed: int, broken: Sequence[str]) -> str:
-    """The Markdown page."""
-    verdict = ('All limits hold.' if not broken else
-               'BROKEN: ' + '; '.join(broken) + '.')
+    """Return the Markdown page."""
+    verdict = f'BROKEN: {"; ".join(broken)}.' if broken else 'All limits hold.'
     return f"""# Point error against the exact centroid
 
-Made by `{command}` on {processor()},
-{native.instruction_set}; {versions()}; seed {seed}. {verdict}
+Made by `{command}` on
+{output.machine(native)}; seed {seed}. {verdict}
 
 Errors are distances between a model's contact point and that of model `exact`, in % of the longest
 edge of the smaller box. `answered by exact`: pairs outside the network's range. Verdicts, normals
@@ -355,7 +368,7 @@ and separations are compared with `exact`: they are SAT's in both, so nothing ma
 farthest that an answer is outside a box, as a fraction of the size, beside what boxes that only
 touch are pressed in by (1e-9).
 
-{table(results)}
+{table(rows)}
 
 ![Distribution of the errors](accuracy.png)
 
@@ -367,7 +380,7 @@ many corners of one box have gone through the plane of the other's best face: on
 (edge-face), more (face-face). `face axis` and `edge axis` are SAT's winners: in stacks many winners
 are pairs of edges although faces meet.
 
-{class_table(results)}
+{class_table(rows)}
 
 ## The paper's figures
 
@@ -383,49 +396,21 @@ of what overlaps. Its figures are the difference between the two definitions, an
 """
 
 
-def _curve(axis: Any, errors: np.ndarray, **style: Any) -> None:
-    """Share of pairs with a larger error; what is too small to be drawn stands at the left."""
-    if len(errors):
-        axis.loglog(np.sort(np.maximum(errors, SHOWN[0] / 10)),
-                    1.0 - np.arange(len(errors)) / len(errors), **style)
-
-
-def draw(path: Path, results: Sequence[Result]) -> None:
-    """Share of pairs with a larger error, per set, logarithmic; limits marked."""
-    import matplotlib
-
-    matplotlib.use('Agg')
-    from matplotlib import pyplot as plt
-
-    names = list(dict.fromkeys(r.set for r in results))
-    models = list(dict.fromkeys(r.model for r in results))
-    figure, axes = plt.subplots(2, 3, figsize=(12.5, 7.0), sharex=True, sharey=True,
-                                constrained_layout=True)
-    for axis, name in zip(axes.flat, names):
-        for r in results:
-            if r.set != name:
-                continue
-            colour = 'C0' if r.model == 'mlp' else f'C{5 + models.index(r.model) % 5}'
-            _curve(axis, r.errors, linewidth=1.6, color=colour, label=r.model)
-            if r.model != 'mlp':
-                continue
-            for k, part in enumerate(CLASSES):
-                _curve(axis, r.errors[r.classes == k], linewidth=0.8, linestyle='--',
-                       color=f'C{1 + k}', label=part)
-            if r.errors.max() < SHOWN[0]:
-                axis.text(0.03, 0.5, f'{r.model}: all below {r.errors.max():.1g} %', fontsize=9,
-                          transform=axis.transAxes)
+def draw(path: Path, rows: Sequence[AccuracyRow]) -> None:
+    """Draw the share of pairs with a larger error, per set, logarithmic; limits marked."""
+    figure, axes = output.subplots(2, 3, (12.5, 7.0), sharex=True, sharey=True)
+    lowest = 1.0 / max(len(row.errors) for row in rows)
+    for axis, name in zip(axes.flat, dict.fromkeys(row.set for row in rows)):
+        axis.set(title=name, xlim=SHOWN, ylim=(0.7 * lowest, 1.3))
+        axis.grid(color='0.9', linewidth=0.5)
+        for k, row in enumerate(row for row in rows if row.set == name):
+            _draw_row(axis, row, f'C{5 + k % 5}')
         limit = LIMITS[name]
-        lowest = 1.0 / max(len(r.errors) for r in results)
         for value, height, label in ((limit.p99, 0.01, 'p99'), (limit.worst, lowest, 'worst')):
             axis.plot([value], [height], marker='v', color='black', markersize=6)
             axis.annotate(label, (value, height), xytext=(5, 4), textcoords='offset points',
                           fontsize=8)
         axis.axvline(limit.mean, color='black', linewidth=0.7, linestyle=':')
-        axis.set_title(name, fontsize=10)
-        axis.set_xlim(*SHOWN)
-        axis.set_ylim(0.7 * lowest, 1.3)
-        axis.grid(color='0.9', linewidth=0.5)
         axis.legend(fontsize=7, loc='lower left')
     for axis in axes[-1]:
         axis.set_xlabel("point error [% of the smaller box's longest edge]")
@@ -433,8 +418,28 @@ def draw(path: Path, results: Sequence[Result]) -> None:
         axis.set_ylabel('share of pairs with a larger error')
     figure.suptitle('Point error against exact; dashed: mlp per class; '
                     '▼ its limits, dotted: of its mean')
-    figure.savefig(path, dpi=110)
-    plt.close(figure)
+    figure.savefig(path)
+
+
+def _draw_row(axis: Any, row: AccuracyRow, colour: str) -> None:
+    """Draw a model's errors; of `mlp` per class too."""
+    _curve(axis, row.errors, linewidth=1.6, color='C0' if row.model == 'mlp' else colour,
+           label=row.model)
+    if row.model != 'mlp':
+        return
+    for k, part in enumerate(CLASSES):
+        _curve(axis, row.errors[row.classes == k], linewidth=0.8, linestyle='--',
+               color=f'C{1 + k}', label=part)
+    if row.errors.max() < SHOWN[0]:
+        axis.text(0.03, 0.5, f'{row.model}: all below {row.errors.max():.1g} %', fontsize=9,
+                  transform=axis.transAxes)
+
+
+def _curve(axis: Any, errors: np.ndarray, **style: Any) -> None:
+    """Draw the share of pairs with a larger error; what is too small stands at the left."""
+    if len(errors):
+        axis.loglog(np.sort(np.maximum(errors, SHOWN[0] / 10)),
+                    1.0 - np.arange(len(errors)) / len(errors), **style)
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -448,58 +453,28 @@ def main(args: Sequence[str] | None = None) -> int:
     parser.add_argument('--quick', action='store_true', help=f'{QUICK_PAIRS} pairs a set')
     parser.add_argument('--seed', type=seed_number, default=2,
                         help='of the sets, default: %(default)s')
-    add_out(parser, 'accuracy.md, accuracy.csv, accuracy.png')
+    output.add_out(parser, 'accuracy.md, accuracy.csv, accuracy.png')
     options = parser.parse_args(args)
     check_ranges(parser, options, pairs=(1, None))
-    options.out = results_folder(parser, options)
+    folder = output.results_folder(parser, options)
     count = min(options.pairs, QUICK_PAIRS) if options.quick else options.pairs
     try:
-        results = _measure_all(options.model, count, options.seed, options.weights)
+        rows = measure_all(options.model, count, options.seed, options.weights)
         errors, drawn = paper_errors(['exact', *(m for m in options.model if m == 'mlp')],
                                      options.weights, 10 if options.quick else 1)
     except WeightsError as error:
         print(f'accuracy: {error}', file=sys.stderr)
         return 1
-    broken = [text for result in results for text in result.broken]
-    if 'mlp' in errors:
-        mae = figures(errors['mlp'])['MAE']
-        if not mae <= MAE_LIMIT:
-            broken.append(f"mlp, the paper's external set: MAE {mae:.4f} > {MAE_LIMIT:g} rad")
-        if len(errors['mlp']) != drawn:
-            broken.append(f"mlp, the paper's external set: "
-                          f'{drawn - len(errors["mlp"])} contacts missed')
-    given = sys.argv[1:] if args is None else args
-    write_csv(options.out / 'accuracy.csv', results)
-    command = ' '.join(['python -m box_contact_ros accuracy', *given])
-    (options.out / 'accuracy.md').write_text(
-        page(results, errors, drawn, command, options.seed, broken), encoding='utf-8')
-    draw(options.out / 'accuracy.png', results)
-    print(table(results), class_table(results), paper_table(errors, drawn), sep='\n\n')
+    broken = [text for row in rows for text in row.broken()] + paper_broken(errors, drawn)
+    output.write_csv(folder / 'accuracy.csv', csv_rows(rows), digits=5)
+    command = output.command_line('box_contact_ros accuracy', args)
+    (folder / 'accuracy.md').write_text(
+        page(rows, errors, drawn, command, options.seed, broken), encoding='utf-8')
+    draw(folder / 'accuracy.png', rows)
+    print(table(rows), class_table(rows), paper_table(errors, drawn), sep='\n\n')
     for text in broken:
         print(f'accuracy: limit broken: {text}', file=sys.stderr)
     return 1 if broken else 0
-
-
-def _measure_all(models: Sequence[str], count: int, seed: int, weights: str | None,
-                 ) -> list[Result]:
-    from tqdm import tqdm
-
-    results = []
-    with tqdm(total=len(SETS) * len(models), desc='accuracy', unit='set') as bar:
-        for number, (name, make) in enumerate(SETS.items()):
-            # A few draws miss, up to 3 in 100.
-            drawn = make(np.random.default_rng([seed, number]), count + count // 20 + 10)
-            pairs = Pairs(*(part[:count] for part in drawn))
-            truth = ContactSolver((1, 1, 1), (1, 1, 1), model='exact').batch(
-                pairs.pose_a, pairs.pose_b, size_a=pairs.size_a, size_b=pairs.size_b)
-            for model in models:
-                bar.set_postfix_str(f'{model}, {name}')
-                result = measure(model, name, pairs, truth,
-                                 weights if model == 'mlp' else None)
-                if result is not None:
-                    results.append(result)
-                bar.update()
-    return sorted(results, key=lambda r: models.index(r.model))
 
 
 if __name__ == '__main__':

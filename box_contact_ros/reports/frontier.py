@@ -1,33 +1,33 @@
-"""Speed against error: every model and the engines beside them, on the same sets of poses.
+"""Program `frontier`: speed against error of every model and of the engines beside them.
 
-`python -m box_contact_ros frontier` writes docs/frontier.csv, .md and .png. One run, one pinned
-core, garbage collection off, each contestant warmed up and timed call by call, the contestants in
-turn on every set. Times are read as ratios within the run; the machine is named.
+`python -m box_contact_ros frontier` writes frontier.csv, .md and .png. One run, one pinned core,
+garbage collection off. Each contestant is warmed up and timed call by call, the contestants in turn
+on every set. Times are read as ratios within the run; the machine is named.
 
 Errors are against the exact model: the point's in % of the smaller box's longest edge, per contact
 class (`accuracy`), the normal's in degrees, and verdicts that differ: contacts missed, contacts
-invented. Where an engine gives several points, see `peers`.
+invented. Engines that return several points: see `engines`.
+
+`--speed` writes the speed gates instead, speed.md and speed.csv: see `speed`.
 """
 from __future__ import annotations
 
 import argparse
-import csv
-import gc
 import math
-import os
 import sys
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 from inspect import getdoc
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..baselines.engines import Contestant, Ours, installed
+from .. import output
+from ..baselines.engines import Engine, installed, ours
 from ..core import native
-from ..output import add_out, processor, results_folder, versions
+from ..output import markdown_table, number, percentiles
 from ..resources import resource_path
 from ..scene.pose_sets import (
     CONTAINER,
@@ -42,29 +42,39 @@ from ..scene.pose_sets import (
 from ..solver.arguments import seed_number
 from ..solver.contact_solver import ContactSolver
 from ..solver.weights_file import load_weights
-from .accuracy import CLASSES, classify, markdown
+from .accuracy import CLASSES, classify
 from .paper_soup_tables import PAPER as PAPER_SOUP
 from .paper_soup_tables import PAPER_NETWORK
+from .speed import pinned, take_turns, usable_cores, write_speed
 
 SOUPS = (8, 10, 12, 14, 16, 18, 20, 22)
 """Divisions of an edge: those of the paper's Table 3."""
-BATCH_PAIRS, QUICK_BATCH_PAIRS = 20_000, 1_000
-"""Pairs on which models with batches are judged and timed."""
-SINGLE_PAIRS, QUICK_SINGLE_PAIRS = 1_000, 40
-"""Pairs on which the others are judged, and on which all are timed call by call."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plan:
+    """How much is judged and timed."""
+
+    batch_pairs: int
+    """Pairs on which models with batches are judged and timed."""
+    single_pairs: int
+    """Pairs on which the others are judged, and on which all are timed call by call."""
+    seconds: float
+    """Time that a contestant has to be asked on a set, once for answers and once for timing."""
+    rounds: int
+    soups: Sequence[int]
+
+
+FULL = Plan(batch_pairs=20_000, single_pairs=1_000, seconds=1.0, rounds=5, soups=SOUPS)
+QUICK = Plan(batch_pairs=1_000, single_pairs=40, seconds=0.05, rounds=2, soups=SOUPS[:1])
 FEW_PAIRS = 16
 """Pairs of sizes in the timing of a set that has others in every row: each needs a solver."""
-SECONDS, QUICK_SECONDS = 1.0, 0.05
-"""Time that a contestant has to be asked on a set, once for answers and once for timing."""
-ROUNDS, QUICK_ROUNDS = 5, 2
-"""Rounds in which the contestants are timed in turn, so that a slow moment hits all of them."""
 LEAST_PAIRS = 10
 """Pairs judged and timed whatever they take."""
 BATCHES = 3
 """Batches timed in a round."""
 BATCH_MODELS = ('exact', 'mlp', 'paper', 'paper-continuous')
 """Models whose batch is more than a loop."""
-DEGREES = 180.0 / math.pi
 IN_SHORT = ('exact', 'mlp', 'paper', 'fcl', 'soup-8', 'soup-22', 'MuJoCo mj_geomDistance',
             'MuJoCo mj_collision, mean', 'python-fcl collide, deepest', 'Coal collide',
             'PyBullet getClosestPoints, mean')
@@ -82,7 +92,7 @@ SMALLEST_ERROR = 1e-2
 
 
 def apart(rng: np.random.Generator, n: int) -> Pairs:
-    """Boxes 1e-6 to 0.1 m apart: half containers almost stacked, half cubes in any pose."""
+    """Draw boxes 1e-6 to 0.1 m apart: half containers almost stacked, half cubes in any pose."""
     half = n // 2
     size = np.tile((2.0, 2.0, 2.0), (half, 1))
     cubes = any_pose(rng, size, size, np.full(half, 0.01))
@@ -97,245 +107,218 @@ def apart(rng: np.random.Generator, n: int) -> Pairs:
 ALL_SETS: dict[str, Generator] = {**SETS, 'just apart': apart}
 
 
-@dataclass
-class Cell:
-    """One contestant on one set. Times [ns], errors [%], normals [deg]; NaN: not measured."""
+@dataclass(frozen=True, kw_only=True)
+class Errors:
+    """Answers on a set against the exact ones."""
+
+    points: dict[str, tuple[int, float, float, float]]
+    """By class, or 'all': contacts, and the point error's median, p99, worst [%]."""
+    normal: tuple[float, float]
+    """p99 and worst of the normal's error [deg]; NaN: none was judged."""
+    missed: int
+    invented: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class FrontierRow:
+    """One contestant on one set. NaN: not measured."""
 
     name: str
     set: str
     judged: int
     calls: int
-    single: tuple[float, float, float]
-    """p50, p99, max of a call."""
+    single: tuple[float, ...]
+    """p50, p99, max of a call [ns]."""
     batch: float
-    """p50 of a pair in a batch."""
-    points: dict[str, tuple[int, float, float, float]]
-    """By class, or 'all': contacts, and the point error's median, p99, worst."""
-    normal: tuple[float, float]
-    """p99 and worst."""
-    missed: int
-    invented: int
+    """p50 of a pair in a batch [ns]."""
+    errors: Errors
 
 
 # --- measuring ------------------------------------------------------------------------------------
 
 
-def contestants(quick: bool = False) -> tuple[list[Contestant], list[str]]:
-    """All that can be measured here, and a line about each that cannot."""
-    found: list[Contestant] = [Ours('exact'), Ours('mlp')]
+def contestants(soups: Sequence[int] = SOUPS) -> tuple[list[Engine], list[str]]:
+    """Return all that can be measured here, and a line about each that cannot."""
     sizes = {}
     for path in resource_path('weights').glob('mlp-*.safetensors'):
         card = load_weights(path).card
         if not card['sizes']:  # those of a scene are for its boxes alone
             sizes[tuple(card['architecture'][1:-1])] = str(path)
-    found += [Ours('mlp', f'mlp {"-".join(map(str, units))}', path)
+    found = [ours('exact'), ours('mlp')]
+    found += [ours('mlp', f'mlp {"-".join(map(str, units))}', path)
               for units, path in sorted(sizes.items())]
-    found += [Ours('paper'), Ours('paper-continuous')]
-    peers, missing = installed()
-    try:
-        import fcl  # noqa: F401
-        found.append(Ours('fcl'))
-        found += [Ours(f'soup-{n}') for n in (SOUPS[:1] if quick else SOUPS)]
-    except ImportError:
-        pass  # `installed` says so
-    return [*found, *peers], missing
+    found += [ours('paper'), ours('paper-continuous')]
+    rivals, missing = installed()
+    if not any(line.startswith('fcl ') for line in missing):
+        found += [ours('fcl'), *(ours(f'soup-{n}') for n in soups)]
+    return [*found, *rivals], missing
 
 
-class Subject:
+class Trial:
     """A contestant on a set: its answers, judged, and its times, gathered in rounds."""
 
-    def __init__(self, contestant: Contestant, name: str, pairs: Pairs, quick: bool) -> None:
+    def __init__(self, engine: Engine, name: str, pairs: Pairs, plan: Plan) -> None:
         """Ask and judge. ValueError: not for boxes of these sizes."""
-        self._contestant, self._name = contestant, name
-        self._seconds = (QUICK_SECONDS if quick else SECONDS) / (QUICK_ROUNDS if quick else ROUNDS)
-        self._pairs = pairs
-        few = QUICK_SINGLE_PAIRS if quick else SINGLE_PAIRS
-        self._batched = isinstance(contestant, Ours) and contestant.model in BATCH_MODELS
-        if self._batched:
-            self._solver = contestant.solver(pairs.size_a[0], pairs.size_b[0])
-            answers = self._batch()
+        self._name, self._set = engine.name, name
+        self._seconds = plan.seconds / plan.rounds
+        self._pairs = len(pairs.pose_a)
+        self._ask_all = None
+        if engine.prepare_batch and engine.name.split()[0] in BATCH_MODELS:
+            self._ask_all = engine.prepare_batch(pairs)
+            found = self._ask_all()
+            answers = found.colliding, found.normal, found.point
         else:
-            answers = _answers(contestant, _head(pairs, few), QUICK_SECONDS if quick else SECONDS)
+            answers = _answers(engine, _head(pairs, plan.single_pairs), plan.seconds)
         self._judged = len(answers[0])
-        self._cell = judge(_head(pairs, self._judged), *answers)
+        self._errors = judge(_head(pairs, self._judged), *answers)
         one_size = all((sizes == sizes[0]).all() for sizes in (pairs.size_a, pairs.size_b))
-        self._prepared = contestant.prepare(_head(pairs, few if one_size else FEW_PAIRS))
+        self._calls = engine.prepare(_head(pairs, plan.single_pairs if one_size else FEW_PAIRS))
         self._singles: list[int] = []
         self._batches: list[float] = []
 
-    def _batch(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        a, b, size_a, size_b = self._pairs
-        found = self._solver.batch(a, b, size_a=size_a, size_b=size_b)
-        return found.colliding, found.normal, found.point
-
     def time(self) -> None:
-        """One round; garbage collection is off."""
-        ask, clock, times = self._contestant.ask, time.perf_counter_ns, self._singles
-        for arguments in self._prepared[:LEAST_PAIRS]:
-            ask(*arguments)
+        """Time one round: single calls for the time there is, then batches."""
+        clock, times = time.perf_counter_ns, self._singles
+        for call in self._calls[:LEAST_PAIRS]:
+            call()
         until = clock() + int(1e9 * self._seconds)
         least = len(times) + LEAST_PAIRS
         while clock() < until:
-            for arguments in self._prepared:
+            for call in self._calls:
                 began = clock()
-                ask(*arguments)
+                call()
                 ended = clock()
                 times.append(ended - began)
                 if ended > until and len(times) >= least:
                     break
-        for _ in range(BATCHES if self._batched else 0):
+        for _ in range(BATCHES if self._ask_all else 0):
             began = clock()
-            self._batch()
-            self._batches.append((clock() - began) / len(self._pairs.pose_a))
+            self._ask_all()
+            self._batches.append((clock() - began) / self._pairs)
 
-    def cell(self) -> Cell:
-        """What was found."""
-        p50, p99, most = np.quantile(self._singles, (0.5, 0.99, 1.0))
-        batch = float(np.median(self._batches)) if self._batches else math.nan
-        return Cell(self._contestant.name, self._name, self._judged, len(self._singles),
-                    (float(p50), float(p99), float(most)), batch, *self._cell)
+    def row(self) -> FrontierRow:
+        """Return what was found."""
+        return FrontierRow(
+            name=self._name, set=self._set, judged=self._judged, calls=len(self._singles),
+            single=percentiles(self._singles, 50, 99, 100),
+            batch=percentiles(self._batches, 50)[0], errors=self._errors)
 
 
-def judge(pairs: Pairs, colliding: np.ndarray, normals: np.ndarray, points: np.ndarray,
-          ) -> tuple[dict[str, tuple[int, float, float, float]], tuple[float, float], int, int]:
-    """Answers (n,), (n, 3), (n, 3) against the exact ones: the last four fields of a `Cell`."""
+def judge(pairs: Pairs, colliding: np.ndarray, normals: np.ndarray, points: np.ndarray) -> Errors:
+    """Compare answers (n,), (n, 3), (n, 3) with the exact ones."""
     truth = ContactSolver((1, 1, 1), (1, 1, 1), model='exact').batch(
         pairs.pose_a, pairs.pose_b, size_a=pairs.size_a, size_b=pairs.size_b)
     both = colliding & truth.colliding
     found: dict[str, tuple[int, float, float, float]] = {}
-    normal = (math.nan, math.nan)
     if both.any():
         touching = Pairs(*(part[both] for part in pairs))
         edge = np.minimum(touching.size_a.max(axis=1), touching.size_b.max(axis=1))
         errors = 100.0 * np.linalg.norm(points[both] - truth.point[both], axis=1) / edge
         classes = classify(touching)[0]
-        for label, part in (('all', errors), *((c, errors[classes == k])
-                                               for k, c in enumerate(CLASSES))):
-            if len(part):
-                p50, p99, worst = np.quantile(part, (0.5, 0.99, 1.0))
-                found[label] = (len(part), float(p50), float(p99), float(worst))
+        parts = {'all': errors, **{c: errors[classes == k] for k, c in enumerate(CLASSES)}}
+        found = {label: (len(part), *percentiles(part, 50, 99, 100))
+                 for label, part in parts.items() if len(part)}
     size = np.maximum(pairs.size_a.max(axis=1), pairs.size_b.max(axis=1))
     clear = np.abs(truth.separation) > VERDICT * size
-    if (both & clear).any():
-        one, other = normals[both & clear], truth.normal[both & clear]
-        # By the chord: the cosine of a small angle is 1 to the last digit.
-        angles = 2.0 * DEGREES * np.arcsin(np.clip(
-            0.5 * np.linalg.norm(one - other, axis=1), 0.0, 1.0))
-        normal = (float(np.quantile(angles, 0.99)), float(angles.max()))
-    return (found, normal, int((truth.colliding & ~colliding & clear).sum()),
-            int((colliding & ~truth.colliding & clear).sum()))
+    # By the chord: the cosine of a small angle is 1 to the last digit.
+    chords = np.linalg.norm((normals - truth.normal)[both & clear], axis=1)
+    angles = np.degrees(2.0 * np.arcsin(np.clip(0.5 * chords, 0.0, 1.0)))
+    return Errors(points=found, normal=percentiles(angles, 99, 100),
+                  missed=int((truth.colliding & ~colliding & clear).sum()),
+                  invented=int((colliding & ~truth.colliding & clear).sum()))
 
 
 def _head(pairs: Pairs, count: int) -> Pairs:
     return Pairs(*(part[:count] for part in pairs))
 
 
-def _answers(contestant: Contestant, pairs: Pairs, seconds: float) -> tuple[np.ndarray, ...]:
-    """Answers (n,), (n, 3), (n, 3) of as many pairs as there is time to ask."""
-    colliding, normals, points = [], [], []
+def _answers(engine: Engine, pairs: Pairs, seconds: float) -> tuple[np.ndarray, ...]:
+    """Return answers (n,), (n, 3), (n, 3) of as many pairs as there is time to ask."""
     nothing = np.full(3, math.nan)
-    prepared = contestant.prepare(pairs)
+    answers = []
     began = time.monotonic()
-    for arguments in prepared:
-        answer = contestant.read(contestant.ask(*arguments))
-        colliding.append(answer.touching)
-        normals.append(nothing if answer.normal is None else answer.normal)
-        points.append(nothing if answer.point is None else answer.point)
-        if time.monotonic() - began > seconds and len(points) >= LEAST_PAIRS:
+    for call in engine.prepare(pairs):
+        answers.append(engine.read(call()))
+        if time.monotonic() - began > seconds and len(answers) >= LEAST_PAIRS:
             break
-    return np.array(colliding), np.array(normals), np.array(points)
+    touching, normals, points = zip(*answers)
+    return np.array(touching), *(np.array([nothing if one is None else one for one in column])
+                                 for column in (normals, points))
 
 
-def measure_all(found: Sequence[Contestant], *, seed: int = 3, quick: bool = False) -> list[Cell]:
-    """All cells, set by set, the contestants in turn."""
+def measure_all(found: Sequence[Engine], *, seed: int = 3, plan: Plan = FULL) -> list[FrontierRow]:
+    """Return all rows, set by set, the contestants in turn."""
     from tqdm import tqdm
 
-    count, rounds = (QUICK_BATCH_PAIRS, QUICK_ROUNDS) if quick else (BATCH_PAIRS, ROUNDS)
-    cells = []
-    with tqdm(total=len(ALL_SETS) * len(found) * (1 + rounds), desc='frontier', unit='step') as bar:
-        for number, (name, make) in enumerate(ALL_SETS.items()):
-            drawn = make(np.random.default_rng([seed, number]), count + count // 10 + 20)
+    count, rows = plan.batch_pairs, []
+    with tqdm(total=len(ALL_SETS) * len(found) * (1 + plan.rounds), desc='frontier',
+              unit='step') as bar:
+        for place, (name, make) in enumerate(ALL_SETS.items()):
+            drawn = make(np.random.default_rng([seed, place]), count + count // 10 + 20)
             pairs = Pairs(*(np.ascontiguousarray(part[:count]) for part in drawn))
-            subjects = []
-            for contestant in found:
-                bar.set_postfix_str(f'{name}, {contestant.name}')
+            trials = []
+            for engine in found:
+                bar.set_postfix_str(f'{name}, {engine.name}')
                 try:
-                    subjects.append(Subject(contestant, name, pairs, quick))
+                    trials.append(Trial(engine, name, pairs, plan))
                 except ValueError:
-                    if not (isinstance(contestant, Ours) and contestant.model.startswith('paper')):
+                    if not engine.name.startswith('paper'):
                         raise
-                    bar.update(rounds)  # two equal boxes of few sizes
+                    bar.update(plan.rounds)  # two equal boxes of few sizes
                 bar.update()
-            gc.collect()
-            gc.disable()
-            try:
-                for _ in range(rounds):
-                    for subject in subjects:
-                        subject.time()
-                        bar.update()
-            finally:
-                gc.enable()
-            cells += [subject.cell() for subject in subjects]
-    return cells
+            take_turns([trial.time for trial in trials], plan.rounds, bar.update)
+            rows += [trial.row() for trial in trials]
+    return rows
 
 
 # --- the report -----------------------------------------------------------------------------------
 
 
-def _number(value: float, digits: int = 3) -> str:
-    """A figure with so many digits, never in powers of ten."""
-    if math.isnan(value):
-        return '–'
-    if value == 0.0:
-        return '0'
-    if value < 10.0 ** -digits:
-        return f'<{10.0 ** -digits:g}'
-    return f'{value:.{max(0, digits - 1 - math.floor(math.log10(value)))}f}' if value < 1e3 else (
-        f'{value:,.0f}')
+def _errors(values: Sequence[float]) -> str:
+    return '/'.join(map(number, values))
 
 
-def in_short(cells: Sequence[Cell]) -> str:
-    """The table for the README: containers and stacks, what a crane has all day."""
-    by = {(cell.name, cell.set): cell for cell in cells}
-    rows = [['', 'single call, p50 / p99 [µs]', 'batch [ns a pair]',
-             'point error p99, containers [%]', 'stacks [%]', 'normal, worst [°]',
-             'missed', 'invented']]
+def in_short(rows: Sequence[FrontierRow]) -> str:
+    """Return the table for the README: containers and stacks, what a crane has all day."""
+    by = {(row.name, row.set): row for row in rows}
+    lines = []
     for name in IN_SHORT:
-        cell = by.get((name, 'containers'))
-        if cell is None:
+        row, stack = by.get((name, 'containers')), by.get((name, 'stacks'))
+        if row is None:
             continue
-        stack, mine = by.get((name, 'stacks')), [c for c in cells if c.name == name]
-        worst = [c.normal[1] for c in mine if not math.isnan(c.normal[1])]
-        rows.append([
+        mine = [one for one in rows if one.name == name]
+        worst = [one.errors.normal[1] for one in mine if not math.isnan(one.errors.normal[1])]
+        lines.append([
             f'`{name}`' if ' ' not in name else name,
-            f'{_number(cell.single[0] / 1e3)} / {_number(cell.single[1] / 1e3)}',
-            _number(cell.batch),
-            *[_number(c.points['all'][2]) if c and c.points else '–' for c in (cell, stack)],
-            _number(max(worst)) if worst else '–',
-            f'{sum(c.missed for c in mine)} of {sum(c.judged for c in mine):,}',
-            str(sum(c.invented for c in mine))])
-    return markdown(rows)
+            f'{number(row.single[0] / 1e3)} / {number(row.single[1] / 1e3)}', number(row.batch),
+            *[number(one.errors.points['all'][2]) if one and one.errors.points else '–'
+              for one in (row, stack)],
+            number(max(worst, default=math.nan)),
+            f'{sum(one.errors.missed for one in mine)} of {sum(one.judged for one in mine):,}',
+            sum(one.errors.invented for one in mine)])
+    return markdown_table(
+        ['', 'single call, p50 / p99 [µs]', 'batch [ns a pair]', 'point error p99, containers [%]',
+         'stacks [%]', 'normal, worst [°]', 'missed', 'invented'], lines)
 
 
-def set_table(cells: Sequence[Cell], name: str) -> str:
-    """All contestants on one set."""
-    rows = [['', 'call p50 [µs]', 'p99', 'max', 'batch [ns]', 'judged',
-             *[f'{label}: p50/p99/worst' for label in ('all', *CLASSES)],
-             'normal p99/worst [°]', 'missed', 'invented']]
-    for cell in cells:
-        if cell.set == name:
-            rows.append([
-                cell.name, *[_number(value / 1e3) for value in cell.single], _number(cell.batch),
-                f'{cell.judged:,}',
-                *['/'.join(_number(v) for v in cell.points[label][1:]) if label in cell.points
-                  else '–' for label in ('all', *CLASSES)],
-                '/'.join(_number(v) for v in cell.normal), str(cell.missed), str(cell.invented)])
-    return markdown(rows)
+def set_table(rows: Sequence[FrontierRow], name: str) -> str:
+    """Return all contestants on one set."""
+    labels = ('all', *CLASSES)
+    return markdown_table(
+        ['', 'call p50 [µs]', 'p99', 'max', 'batch [ns]', 'judged',
+         *[f'{label}: p50/p99/worst' for label in labels], 'normal p99/worst [°]', 'missed',
+         'invented'],
+        [[row.name, *[number(value / 1e3) for value in row.single], number(row.batch),
+          f'{row.judged:,}',
+          *[_errors(row.errors.points[label][1:]) if label in row.errors.points else '–'
+            for label in labels],
+          _errors(row.errors.normal), row.errors.missed, row.errors.invented]
+         for row in rows if row.set == name])
 
 
-def honesty(cells: Sequence[Cell]) -> str:
-    """Where the network loses and what it is for, with this run's figures."""
-    by = {(cell.name, cell.set): cell for cell in cells}
+def honesty(rows: Sequence[FrontierRow]) -> str:
+    """Return where the network loses and what it is for, with this run's figures."""
+    by = {(row.name, row.set): row for row in rows}
     exact, net = (by[name, 'containers'] for name in ('exact', 'mlp'))
     medians = {name: [by[name, s].batch for s in SETS] for name in ('exact', 'mlp')}
     spread = {name: max(values) / min(values) for name, values in medians.items()}
@@ -345,29 +328,28 @@ def honesty(cells: Sequence[Cell]) -> str:
         'Python most of either is the call itself.',
         f'- **What it is for is batches and a constant cost.** A pair in a batch takes '
         f'{net.batch / exact.batch:.2f} of the time of `exact` on containers, '
-        f'{by["mlp", "stacks"].batch / by["exact", "stacks"].batch:.2f} on stacks; from the '
-        f'cheapest set to the dearest its cost grows by a factor of {spread["mlp"]:.2f}, '
-        f'that of `exact` by {spread["exact"]:.2f}.',
-        '- **What neither shares with the engines is the centroid.** The error of an engine is '
-        'mostly not a fault: it gives a deepest point or the corners of a patch, which is another '
-        'question answered. It is the distance that a user who needs one point for the whole patch '
-        'is off by.']
+        f'{by["mlp", "stacks"].batch / by["exact", "stacks"].batch:.2f} on stacks. From the '
+        f'cheapest set to the dearest its cost grows by a factor of {spread["mlp"]:.2f}, the cost '
+        f'of `exact` by {spread["exact"]:.2f}.',
+        '- **Only these two return the centroid.** The error of an engine is mostly not a fault: '
+        'an engine returns a deepest point or the corners of a patch, and so answers another '
+        'question. A user who needs one point for the whole patch is off by this distance.']
     paper = by.get(('paper', 'random cubes'))
-    if paper and paper.points:
+    if paper and paper.errors.points:
         lines.append(
             f"- **The paper's own network is not a contact model.** Its median point error is "
-            f'{paper.points["all"][1]:.0f} % of the edge on random cubes, because a smooth network '
-            'answers with something between both sides of a jump; its time is as constant as the '
+            f'{paper.errors.points["all"][1]:.0f} % of the edge on random cubes. A smooth network '
+            "answers with something between both sides of a jump. Its time is as constant as the "
             "mlp's.")
     return '\n'.join(lines)
 
 
-def page(cells: Sequence[Cell], missing: Sequence[str], command: str) -> str:
-    """The Markdown page."""
+def page(rows: Sequence[FrontierRow], missing: Sequence[str], command: str) -> str:
+    """Return the Markdown page."""
     skipped = ''.join(f'\n\nLeft out: {line}.' for line in missing)
     return f"""# Speed against error
 
-Made by `{command}` on one core of {processor()}, {native.instruction_set}; {versions()}.
+Made by `{command}` on one core of {output.machine(native)}.
 Times are from two poses to a result in Python; a call's includes the two readings of the clock
 (about 0.05 µs). Ratios within this run are what to trust.{skipped}
 
@@ -377,43 +359,42 @@ Times are from two poses to a result in Python; a call's includes the two readin
 
 Times are those on containers with sway; normals and verdicts are over all sets.
 
-{in_short(cells)}
+{in_short(rows)}
 
-{honesty(cells)}
+{honesty(rows)}
 
 ## All sets
 
 Point errors in % of the smaller box's longest edge, as median/p99/worst, per contact class
 ([accuracy](accuracy.md)). *Missed*: contacts of `exact` that were not reported; *invented*: the
-reverse; these and normals only where the gap or depth is more than {VERDICT:g} of the size, as at
-exact touch either verdict is right, and many normals. *Judged*: pairs asked; models with batches
-are asked for more. Random sizes are timed on {FEW_PAIRS} pairs of sizes. Engines that give several
-points are entered twice: their deepest, and the mean. `mlp N` are networks of N hidden units,
-trained for 60,000 steps.
+reverse. These and normals count only where the gap or depth is more than {VERDICT:g} of the size:
+at exact touch either verdict is right, and many normals. *Judged*: pairs asked; models with batches
+are asked for more. Random sizes are timed on {FEW_PAIRS} pairs of sizes. Engines that return
+several points are entered twice: their deepest, and the mean. `mlp N` are networks of N hidden
+units, trained for 60,000 steps.
 
 """ + '\n\n'.join(f'### {name.capitalize()}\n\n{getdoc(ALL_SETS[name])}\n\n'
-                  f'{set_table(cells, name)}' for name in ALL_SETS) + '\n'
+                  f'{set_table(rows, name)}' for name in ALL_SETS) + '\n'
 
 
-def write_csv(path: Path, cells: Sequence[Cell]) -> None:
-    """A row per cell and contact class; times in ns, errors in %, normals in degrees."""
-    with path.open('w', newline='') as file:
-        writer = csv.writer(file, lineterminator='\n')
-        writer.writerow(['contestant', 'set', 'class', 'contacts', 'point_p50', 'point_p99',
-                         'point_worst', 'call_p50', 'call_p99', 'call_max', 'calls', 'batch_p50',
-                         'judged', 'normal_p99', 'normal_worst', 'missed', 'invented',
-                         'processor'])
-        for cell in cells:
-            shared = [*(f'{v:.0f}' for v in cell.single), cell.calls, f'{cell.batch:.1f}',
-                      cell.judged, *(f'{v:.4g}' for v in cell.normal), cell.missed, cell.invented,
-                      processor()]
-            for label, (count, *errors) in (cell.points or {'all': (0, *[math.nan] * 3)}).items():
-                writer.writerow([cell.name, cell.set, label, count,
-                                 *(f'{v:.4g}' for v in errors), *shared])
+def csv_rows(rows: Sequence[FrontierRow]) -> list[dict[str, object]]:
+    """Return a row per contestant, set and class; times in ns, errors in %, normals in degrees."""
+    here, found = output.machine(native), []
+    for row in rows:
+        errors = row.errors
+        for label, (count, *point) in (errors.points or {'all': (0, *[math.nan] * 3)}).items():
+            found.append({
+                'contestant': row.name, 'set': row.set, 'class': label, 'contacts': count,
+                **dict(zip(('point_p50', 'point_p99', 'point_worst'), point)),
+                **dict(zip(('call_p50', 'call_p99', 'call_max'), map(round, row.single))),
+                'calls': row.calls, 'batch_p50': row.batch, 'judged': row.judged,
+                'normal_p99': errors.normal[0], 'normal_worst': errors.normal[1],
+                'missed': errors.missed, 'invented': errors.invented, **asdict(here)})
+    return found
 
 
 def pareto(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Those (time, error) than which none is both faster and better, by time."""
+    """Return those (time, error) than which none is both faster and better, by time."""
     found: list[tuple[float, float]] = []
     for when, error in sorted(points):
         if not found or error < found[-1][1]:
@@ -435,38 +416,16 @@ def _group(name: str) -> str:
     return name if name in STYLES else name.split('-')[0].split(' ')[0]
 
 
-def draw(path: Path, cells: Sequence[Cell]) -> None:
-    """Point error (p99) over time, log-log: single calls filled, batches hollow; frontiers."""
-    import matplotlib
-
-    matplotlib.use('Agg')
-    from matplotlib import pyplot as plt
-
-    figure, axes = plt.subplots(1, len(SHOWN_SETS), figsize=(15.0, 6.4), sharey=True,
-                                constrained_layout=True)
+def draw(path: Path, rows: Sequence[FrontierRow]) -> None:
+    """Draw point error (p99) over time: single calls filled, batches hollow; frontiers."""
+    figure, axes = output.subplots(1, len(SHOWN_SETS), (15.0, 6.4), sharey=True)
     shown: dict[str, Any] = {}
-    for axis, name in zip(axes, SHOWN_SETS):
-        singles, batches = [], []
-        for cell in cells:
-            if cell.set != name or not cell.points:
-                continue
-            error = max(cell.points['all'][2], SMALLEST_ERROR)
-            colour, marker = STYLES[_group(cell.name)]
-            one = (cell.single[0] / 1e3, error)
-            singles.append(one)
-            shown[_group(cell.name)], = axis.plot(*one, marker, color=colour, markersize=6,
-                                                  linestyle='none')
-            _label(axis, cell.name, one)
-            if not math.isnan(cell.batch):
-                many = (cell.batch / 1e3, error)
-                batches.append(many)
-                axis.plot(*many, marker, color=colour, markersize=6, fillstyle='none')
-                axis.plot([many[0], one[0]], [error, error], color=colour, linewidth=0.5)
-        for points, style in ((singles, '-'), (batches, '--')):
-            line = pareto(points)
-            if line:
-                axis.step([x for x, _ in line], [y for _, y in line], style, where='post',
-                          color='0.4', linewidth=1.0, zorder=0)
+    for axis, name in zip(axes.flat, SHOWN_SETS):
+        # Before anything is plotted: empty axes cannot be made logarithmic any more.
+        axis.set(xscale='log', yscale='log', title=name,
+                 xlabel='time [µs]; filled: single call from Python, hollow: a pair in a batch')
+        axis.grid(color='0.9', linewidth=0.5)
+        shown |= _draw_set(axis, [row for row in rows if row.set == name and row.errors.points])
         if name == 'random cubes':
             shown["the paper's network, 2003"], = axis.plot(
                 1e3 * PAPER_NETWORK, PAPER_ERROR, '*', color='black', markersize=11,
@@ -474,67 +433,69 @@ def draw(path: Path, cells: Sequence[Cell]) -> None:
             times = [1e3 * PAPER_SOUP[n][0] for n in (min(PAPER_SOUP), max(PAPER_SOUP))]
             shown["the paper's soup, N = 8 to 22, no error given"], = axis.plot(
                 times, [SMALLEST_ERROR] * 2, '-', color='black', linewidth=3)
-        axis.set_xscale('log')
-        axis.set_yscale('log')
-        axis.set_title(name)
-        axis.set_xlabel('time [µs]; filled: single call from Python, hollow: a pair in a batch')
-        axis.grid(color='0.9', linewidth=0.5)
-    axes[0].set_ylabel("point error, p99 [% of the smaller box's longest edge]")
-    axes[0].set_ylim(SMALLEST_ERROR / 1.5, 150.0)
+    axes[0, 0].set(ylabel="point error, p99 [% of the smaller box's longest edge]",
+                   ylim=(SMALLEST_ERROR / 1.5, 150.0))
     figure.legend(shown.values(), [f'{name} (no error: the reference)' if name == 'exact' else name
                                    for name in shown], loc='outside lower center', ncols=4,
                   fontsize=8)
     figure.suptitle('Speed against error; lines: the frontiers of single calls (solid) and of '
                     'batches (dashed)')
-    figure.savefig(path, dpi=110)
-    plt.close(figure)
+    figure.savefig(path)
 
 
-def _label(axis: Any, text: str, at: tuple[float, float]) -> None:
-    """Networks by their size, soups by their divisions at both ends."""
-    if text in (f'soup-{SOUPS[0]}', f'soup-{SOUPS[-1]}') or text.startswith('mlp '):
-        axis.annotate(text.replace('mlp ', '').replace('soup-', 'N = '), at, xytext=(5, 3),
-                      textcoords='offset points', fontsize=7)
+def _draw_set(axis: Any, rows: Sequence[FrontierRow]) -> dict[str, Any]:
+    """Draw the contestants on one set; returns a handle for each group of the legend."""
+    shown, singles, batches = {}, [], []
+    for row in rows:
+        error = max(row.errors.points['all'][2], SMALLEST_ERROR)
+        colour, marker = STYLES[_group(row.name)]
+        single, batch = row.single[0] / 1e3, row.batch / 1e3
+        singles.append((single, error))
+        shown[_group(row.name)], = axis.plot(single, error, marker, color=colour, markersize=6,
+                                             linestyle='none')
+        # Networks by their size, soups by their divisions at both ends.
+        if row.name in (f'soup-{SOUPS[0]}', f'soup-{SOUPS[-1]}') or row.name.startswith('mlp '):
+            axis.annotate(row.name.replace('mlp ', '').replace('soup-', 'N = '), (single, error),
+                          xytext=(5, 3), textcoords='offset points', fontsize=7)
+        if not math.isnan(batch):
+            batches.append((batch, error))
+            axis.plot(batch, error, marker, color=colour, markersize=6, fillstyle='none')
+            axis.plot([batch, single], [error, error], color=colour, linewidth=0.5)
+    for points, style in ((singles, '-'), (batches, '--')):
+        if line := pareto(points):
+            axis.step(*zip(*line), style, where='post', color='0.4', linewidth=1.0, zorder=0)
+    return shown
 
 
 def main(args: Sequence[str] | None = None) -> int:
-    """Measure, print, write."""
+    """Measure, print, write; with `--speed`, 1 if a limit is broken."""
     parser = argparse.ArgumentParser(prog='frontier', description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    add_out(parser, 'frontier.md, .csv, .png')
+    output.add_out(parser, 'frontier.md, .csv, .png')
+    parser.add_argument('--speed', action='store_true',
+                        help='the speed gates instead: speed.md, .csv')
     parser.add_argument('--quick', action='store_true', help='few pairs, to try it out')
     parser.add_argument('--seed', type=seed_number, default=3,
                         help='of the sets (default: %(default)s)')
-    parser.add_argument('--core', type=int, help='core to run on (default: the last one)')
+    cores = usable_cores()
+    parser.add_argument('--core', type=int, default=cores[-1], choices=cores, metavar='N',
+                        help='core to run on (default: the last one)')
     options = parser.parse_args(args)
-    options.out = results_folder(parser, options)
-    restore = _pinned(options.core, parser.error)
-    try:
-        found, missing = contestants(options.quick)
+    folder = output.results_folder(parser, options)
+    command = output.command_line('box_contact_ros frontier', args)
+    if options.speed:
+        return write_speed(folder, command, core=options.core, quick=options.quick)
+    plan = QUICK if options.quick else FULL
+    with pinned({options.core}):
+        found, missing = contestants(plan.soups)
         for line in missing:
             print(f'frontier: left out: {line}', file=sys.stderr)
-        cells = measure_all(found, seed=options.seed, quick=options.quick)
-    finally:
-        restore()
-    given = sys.argv[1:] if args is None else args
-    write_csv(options.out / 'frontier.csv', cells)
-    (options.out / 'frontier.md').write_text(
-        page(cells, missing, ' '.join(['python -m box_contact_ros frontier', *given])),
-        encoding='utf-8')
-    draw(options.out / 'frontier.png', cells)
-    print(in_short(cells), honesty(cells), sep='\n\n')
+        rows = measure_all(found, seed=options.seed, plan=plan)
+    output.write_csv(folder / 'frontier.csv', csv_rows(rows), digits=4)
+    (folder / 'frontier.md').write_text(page(rows, missing, command), encoding='utf-8')
+    draw(folder / 'frontier.png', rows)
+    print(in_short(rows), honesty(rows), sep='\n\n')
     return 0
-
-
-def _pinned(core: int | None, error: Callable[[str], Any]) -> Callable[[], None]:
-    """Run on one core; returns what undoes it."""
-    if not hasattr(os, 'sched_setaffinity'):
-        return lambda: None
-    before = os.sched_getaffinity(0)
-    if core is not None and core not in before:
-        error(f'--core {core} is not one of {sorted(before)}')
-    os.sched_setaffinity(0, {max(before) if core is None else core})
-    return lambda: os.sched_setaffinity(0, before)
 
 
 if __name__ == '__main__':

@@ -1,40 +1,32 @@
-"""Speed of the models and of the engines that a user would otherwise call.
+"""How contestants are timed, and the speed gates: limits on ratios of times.
 
-`python -m box_contact_ros.reports.speed --out docs` prints the tables and writes speed.md and
-speed.csv. Every instruction set of the machine is measured in a subprocess of its own, on one
-pinned core. The contestants take turns, so a disturbance hits all of them: the claims are ratios.
-Two threads and the start of a new process follow. The exit status is 1 if a limit is broken.
+`python -m box_contact_ros frontier --speed` writes speed.md and speed.csv. Each instruction set of
+the machine is measured in a subprocess of its own, on one pinned core. The contestants take turns,
+so a disturbance hits all of them: the claims are ratios. Two threads and the start of a new process
+follow. The exit status is 1 if a limit is broken.
 """
 from __future__ import annotations
 
-import argparse
-import csv
 import gc
 import json
 import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
+from ..baselines.engines import Engine, fcl_collision, mujoco_distance, ours
 from ..core import FORCE, instruction_sets, native
-from ..output import processor, versions
+from ..output import machine, markdown_table, percentiles, write_csv
 from ..scene.pose import quaternion_multiply
 from ..scene.pose_sets import CONTAINER, CUBE, SETS, Pairs, log_uniform, turns
-from ..solver.arguments import make_folder
-from ..solver.contact_solver import ContactSolver
 
-CALLS, BATCH, ROUNDS = 2_000, 20_000, 40
-"""Single calls of a round, pairs of a batch, rounds."""
-THREAD_BATCH = 100_000
-"""Pairs of the batches that threads share: at 20,000, waking a second core takes a tenth."""
-QUICK_CALLS, QUICK_BATCH, QUICK_ROUNDS = 200, 1_000, 3
-STARTS, QUICK_STARTS = 20, 2
-"""New processes that are timed."""
 MODELS = ('exact', 'mlp')
 UNIT = 'MuJoCo mj_geomDistance'
 """The contestant whose median single call is the unit of all ratios."""
@@ -60,42 +52,64 @@ print(ContactSolver(cube, cube)((0, 0, 0, 0, 0, 0, 1), (0, 0, 1.9, 0, 0, 0, 1)),
 
 
 @dataclass(frozen=True, kw_only=True)
-class Timing:
-    """Times of one contestant [ns for each call or pair], over the rounds."""
+class Effort:
+    """How much is timed."""
 
-    name: str
-    kind: str
-    """'single' or 'batch'; 'two threads' for a batch that two threads share."""
-    instruction_set: str
-    rounds: list[float]
-
-    def quantile(self, q: float) -> float:
-        """Return a quantile over the rounds."""
-        return float(np.quantile(self.rounds, q))
-
-    @property
-    def median(self) -> float:
-        """The median over the rounds."""
-        return self.quantile(0.5)
+    calls: int
+    """Single calls of a round."""
+    batch: int
+    """Pairs of a batch."""
+    shared_batch: int
+    """Pairs of a batch that threads share: at 20,000, waking a second core takes a tenth."""
+    rounds: int
+    starts: int
+    """New processes."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Contestant:
-    """What is timed."""
+FULL = Effort(calls=2_000, batch=20_000, shared_batch=100_000, rounds=40, starts=20)
+QUICK = Effort(calls=200, batch=1_000, shared_batch=1_000, rounds=3, starts=2)
 
-    name: str
-    kind: str
-    count: int
-    """Calls or pairs of a run."""
-    run: Callable[[], object]
+# --- the timing that all reports share ------------------------------------------------------------
 
 
-@dataclass(frozen=True, kw_only=True)
-class Claim:
-    """A figure and its limit."""
+@contextmanager
+def pinned(cores: Collection[int]) -> Iterator[None]:
+    """Run on these cores only, where the system can do so."""
+    if not hasattr(os, 'sched_setaffinity'):
+        yield
+        return
+    before = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, cores)
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, before)
 
-    text: str
-    holds: bool
+
+@contextmanager
+def no_garbage_collection() -> Iterator[None]:
+    """Collect the garbage now, and none until the end."""
+    gc.collect()
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.enable()
+
+
+def usable_cores() -> list[int]:
+    """Return the cores that this process may use; reports measure on the last one."""
+    return sorted(os.sched_getaffinity(0)) if hasattr(os, 'sched_getaffinity') else [0]
+
+
+def take_turns(runs: Sequence[Callable[[], object]], rounds: int,
+               after_each: Callable[[], object] = lambda: None) -> None:
+    """Call all in turn, `rounds` times, so that a slow moment hits all of them."""
+    with no_garbage_collection():
+        for _ in range(rounds):
+            for run in runs:
+                run()
+                after_each()
 
 
 # --- contestants ----------------------------------------------------------------------------------
@@ -125,6 +139,33 @@ BATCH_SETS = {**SETS, 'aligned flush stacks': flush_stacks}
 """Sets of poses that batches are timed on."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class Timing:
+    """Times of one contestant [ns for each call or pair], over the rounds."""
+
+    name: str
+    kind: str
+    """'single' or 'batch'; 'two threads' for a batch that two threads share."""
+    instruction_set: str
+    rounds: list[float]
+
+    @property
+    def median(self) -> float:
+        """The median over the rounds."""
+        return percentiles(self.rounds, 50)[0]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stint:
+    """What is timed as a whole, once a round."""
+
+    name: str
+    kind: str
+    count: int
+    """Calls or pairs of a run."""
+    run: Callable[[], object]
+
+
 def _drawn(name: str, count: int) -> Pairs:
     """Draw exactly `count` pairs of a set; a few draws miss."""
     rng = np.random.default_rng([1, list(BATCH_SETS).index(name)])
@@ -132,128 +173,77 @@ def _drawn(name: str, count: int) -> Pairs:
     return Pairs(*(np.ascontiguousarray(part[:count]) for part in drawn))
 
 
-def single_calls(pairs: Pairs) -> list[Contestant]:
+def single_calls(count: int) -> list[Stint]:
     """Return the contestants for equal cubes, from two poses to a result in Python."""
-    poses = list(zip(pairs.pose_a.copy(), pairs.pose_b.copy()))
-    split = [(a[:3].copy(), b[:3].copy(), np.roll(a[3:], 1), np.roll(b[3:], 1)) for a, b in poses]
-    found: dict[str, Callable[[], None]] = {model: _ours(model, poses) for model in MODELS}
-    for name, make, extra in ((UNIT, _mujoco, 'sim'), ('python-fcl collide', _fcl, 'soup')):
+    engines = [ours(model) for model in MODELS]
+    for make in (mujoco_distance, partial(fcl_collision, 'deepest')):
         try:
-            found[name] = make(split)
-        except ImportError:
-            print(f'{name} is not installed: left out (extra {extra!r})', file=sys.stderr)
-    return [Contestant(name=name, kind='single', count=len(poses), run=run)
-            for name, run in found.items()]
+            engines.append(make())
+        except ImportError as error:
+            print(f'{error.name} is not installed: left out', file=sys.stderr)
+
+    def stint(engine: Engine) -> Stint:
+        calls = engine.prepare(pairs)
+
+        def run() -> None:
+            for call in calls:
+                call()
+        return Stint(name=engine.name, kind='single', count=count, run=run)
+
+    pairs = _drawn('random cubes', count)
+    return [stint(engine) for engine in engines]
 
 
-def _ours(model: str, poses: list[tuple[np.ndarray, np.ndarray]]) -> Callable[[], None]:
-    solver = ContactSolver(CUBE, CUBE, model=model)
-
-    def run() -> None:
-        for a, b in poses:
-            solver(a, b)
-    return run
-
-
-def _mujoco(split: list[tuple[np.ndarray, ...]]) -> Callable[[], None]:
-    import mujoco
-    half = ' '.join(str(extent / 2) for extent in CUBE)
-    body = f'<body><freejoint/><geom type="box" size="{half}"/></body>'
-    model = mujoco.MjModel.from_xml_string(f'<mujoco><worldbody>{body}{body}</worldbody></mujoco>')
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    place_a, place_b = data.geom_xpos
-    turn_a, turn_b = data.geom_xmat
-    ends = np.zeros(6)
-    distance, matrix = mujoco.mj_geomDistance, mujoco.mju_quat2Mat
-
-    def run() -> None:
-        for a, b, quat_a, quat_b in split:
-            place_a[:] = a
-            place_b[:] = b
-            matrix(turn_a, quat_a)
-            matrix(turn_b, quat_b)
-            distance(model, data, 0, 1, 1.0, ends)
-    return run
-
-
-def _fcl(split: list[tuple[np.ndarray, ...]]) -> Callable[[], None]:
-    import fcl
-    one, two = fcl.CollisionObject(fcl.Box(*CUBE)), fcl.CollisionObject(fcl.Box(*CUBE))
-    request = fcl.CollisionRequest(num_max_contacts=1, enable_contact=True)
-
-    def run() -> None:
-        for a, b, quat_a, quat_b in split:
-            one.setTransform(fcl.Transform(quat_a, a))
-            two.setTransform(fcl.Transform(quat_b, b))
-            fcl.collide(one, two, request, fcl.CollisionResult())
-    return run
-
-
-def batch(model: str, name: str, count: int, threads: int = 1) -> Contestant:
+def batch(model: str, name: str, count: int, threads: int = 1) -> Stint:
     """Return the contestant for a batch of a model on a set, every row its own sizes."""
-    solver = ContactSolver(CUBE, CUBE, model=model)
-    a, b, size_a, size_b = _drawn(name, count)
-    return Contestant(
-        name=f'{model}: {name}', kind='two threads' if threads == 2 else 'batch', count=count,
-        run=lambda: solver.batch(a, b, size_a=size_a, size_b=size_b, threads=threads))
+    prepare = ours(model).prepare_batch
+    assert prepare is not None
+    return Stint(name=f'{model}: {name}', kind='two threads' if threads == 2 else 'batch',
+                 count=count, run=prepare(_drawn(name, count), threads=threads))
 
 
 # --- measuring ------------------------------------------------------------------------------------
 
 
-def timed(contestants: Sequence[Contestant], rounds: int) -> list[Timing]:
-    """Time all contestants in turn, `rounds` times, after a warm-up; garbage collection is off."""
-    times: list[list[float]] = [[] for _ in contestants]
-    for one in contestants:
+def timed(stints: Sequence[Stint], rounds: int) -> list[Timing]:
+    """Time all in turn, `rounds` times, after a warm-up."""
+    times: list[list[float]] = [[] for _ in stints]
+
+    def clocked(one: Stint, found: list[float]) -> Callable[[], None]:
+        def run() -> None:
+            began = time.perf_counter_ns()
+            one.run()
+            found.append((time.perf_counter_ns() - began) / one.count)
+        return run
+
+    for one in stints:
         one.run()
-    gc.collect()
-    gc.disable()
-    try:
-        for _ in range(rounds):
-            for one, found in zip(contestants, times):
-                began = time.perf_counter_ns()
-                one.run()
-                found.append((time.perf_counter_ns() - began) / one.count)
-    finally:
-        gc.enable()
+    take_turns([clocked(one, found) for one, found in zip(stints, times)], rounds)
     return [Timing(name=one.name, kind=one.kind, instruction_set=native.instruction_set,
-                   rounds=found) for one, found in zip(contestants, times)]
+                   rounds=found) for one, found in zip(stints, times)]
 
 
-def measure_here(core: int, quick: bool) -> list[Timing]:
-    """Measure single calls and batches in this process, on one core."""
-    os.sched_setaffinity(0, {core})
-    calls, pairs = (QUICK_CALLS, QUICK_BATCH) if quick else (CALLS, BATCH)
-    contestants = single_calls(_drawn('random cubes', calls))
-    contestants += [batch(model, name, pairs) for model in MODELS for name in BATCH_SETS]
-    return timed(contestants, QUICK_ROUNDS if quick else ROUNDS)
+def print_timings(core: int, effort: Effort) -> None:
+    """Print times of single calls and batches on one core as JSON, for `measure_with`."""
+    with pinned({core}):
+        stints = single_calls(effort.calls)
+        stints += [batch(model, name, effort.batch) for model in MODELS for name in BATCH_SETS]
+        print(json.dumps([asdict(one) for one in timed(stints, effort.rounds)]))
 
 
-def print_timings(core: int, quick: bool) -> None:
-    """Print what `measure_here` finds as JSON, for `measure_with`."""
-    print(json.dumps([asdict(one) for one in measure_here(core, quick)]))
-
-
-def measure_with(instruction_set: str, core: int, quick: bool) -> list[Timing]:
+def measure_with(instruction_set: str, core: int, effort: Effort) -> list[Timing]:
     """Measure in a subprocess that is made to use an instruction set."""
-    assert __spec__ is not None  # its name is this module's, also where __name__ is __main__
-    code = f'from {__spec__.name} import print_timings; print_timings({core}, {quick})'
+    code = f'from {__name__} import Effort, print_timings; print_timings({core}, {effort})'
     done = subprocess.run([sys.executable, '-c', code], stdout=subprocess.PIPE, text=True,
                           check=True, env={**os.environ, FORCE: instruction_set})
     return [Timing(**fields) for fields in json.loads(done.stdout)]
 
 
-def measure_threads(cores: Sequence[int], quick: bool) -> list[Timing]:
+def measure_threads(cores: Sequence[int], effort: Effort) -> list[Timing]:
     """Measure batches with one thread and with two, on these cores."""
-    before = os.sched_getaffinity(0)
-    os.sched_setaffinity(0, set(cores))
-    try:
-        count = QUICK_BATCH if quick else THREAD_BATCH
-        return timed([batch(model, 'random cubes', count, threads) for model in MODELS
-                      for threads in (1, 2)], QUICK_ROUNDS if quick else ROUNDS)
-    finally:
-        os.sched_setaffinity(0, before)
+    with pinned(cores):
+        return timed([batch(model, 'random cubes', effort.shared_batch, threads)
+                      for model in MODELS for threads in (1, 2)], effort.rounds)
 
 
 def measure_starts(count: int) -> list[float]:
@@ -271,18 +261,20 @@ def measure_starts(count: int) -> list[float]:
     return times[1:]
 
 
-# --- the report -----------------------------------------------------------------------------------
+# --- the gates ------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, kw_only=True)
+class Claim:
+    """A figure and its limit."""
+
+    text: str
+    holds: bool
 
 
 def unit_of(timings: Sequence[Timing]) -> float:
     """Return the median single call of UNIT [ns], NaN where MuJoCo is not installed."""
     return next((one.median for one in timings if one.name == UNIT), float('nan'))
-
-
-def _exact_batches(timings: Sequence[Timing]) -> dict[str, float]:
-    """Return the median times of batches of `exact` by set [ns a pair]."""
-    return {one.name.partition(': ')[2]: one.median for one in timings
-            if one.kind == 'batch' and one.name.startswith('exact: ')}
 
 
 def claims_of(timings: Sequence[Timing], best: bool) -> list[Claim]:
@@ -294,7 +286,8 @@ def claims_of(timings: Sequence[Timing], best: bool) -> list[Claim]:
         claims.append(_at_most(f'{name}: a single call of `exact` takes {{:.3f}} of {UNIT}',
                                single / unit, SINGLE_LIMIT))
     if name in BATCH_LIMITS:
-        batches = _exact_batches(timings)
+        batches = {one.name.partition(': ')[2]: one.median for one in timings
+                   if one.kind == 'batch' and one.name.startswith('exact: ')}
         slowest = max(batches, key=lambda one: batches[one])
         claims.append(_at_most(
             f'{name}: a pair in a batch of `exact` takes {{:.3f}} of {UNIT} on {slowest}, the '
@@ -330,30 +323,32 @@ def start_claim(seconds: Sequence[float]) -> Claim:
                     f'{len(seconds)} starts without ROS', float(np.median(seconds)), START_LIMIT)
 
 
+# --- the report -----------------------------------------------------------------------------------
+
+
 def table(timings: Sequence[Timing]) -> str:
     """Return the times of one instruction set as Markdown."""
     unit = unit_of(timings)
-    lines = ['| | | min [ns] | p50 [ns] | p99 [ns] | p50 by mj_geomDistance |',
-             '| --- | --- | ---: | ---: | ---: | ---: |']
-    lines += [f'| {one.name} | {one.kind} | {one.quantile(0):.0f} | {one.median:.0f} | '
-              f'{one.quantile(0.99):.0f} | {one.median / unit:.3f} |' for one in timings]
-    return '\n'.join(lines)
+    return markdown_table(
+        ['', '', 'min [ns]', 'p50 [ns]', 'p99 [ns]', 'p50 by mj_geomDistance'],
+        [[one.name, one.kind, *(f'{value:.0f}' for value in percentiles(one.rounds, 0, 50, 99)),
+          f'{one.median / unit:.3f}'] for one in timings], words=2)
 
 
 def page(runs: Sequence[Sequence[Timing]], claims: Sequence[Claim], command: str,
-         quick: bool) -> str:
+         effort: Effort) -> str:
     """Return the Markdown page."""
-    rounds, calls, pairs = ((QUICK_ROUNDS, QUICK_CALLS, QUICK_BATCH) if quick else
-                            (ROUNDS, CALLS, BATCH))
+    here = machine(native, PACKAGES)
     listed = '\n'.join(f'- {"" if claim.holds else "BROKEN: "}{claim.text}' for claim in claims)
     tables = '\n\n'.join(f'## {run[0].instruction_set}\n\n{table(run)}' for run in runs)
     return f"""# Speed
 
-Made by `{command}` on one core of {processor()}; {versions(PACKAGES)}.
+Made by `{command}` on one core of {here.processor}; {here.compiler}; {here.versions}.
 
 Every time is from poses to a result in Python; that of MuJoCo and FCL includes the update of both
-poses. Each instruction set has a process of its own. In it the contestants take turns, {rounds}
-rounds. Quantiles are over rounds of {calls:,} calls, or of one batch of {pairs:,} pairs.
+poses. Each instruction set has a process of its own. In it the contestants take turns,
+{effort.rounds} rounds. Percentiles are over rounds of {effort.calls:,} calls, or of one batch of
+{effort.batch:,} pairs.
 
 {listed}
 
@@ -361,58 +356,36 @@ rounds. Quantiles are over rounds of {calls:,} calls, or of one batch of {pairs:
 """
 
 
-def write_csv(path: Path, timings: Sequence[Timing], starts: Sequence[float]) -> None:
-    """Write a row for each contestant and round; the times of starts are in ns too."""
-    machine = [processor(), versions(PACKAGES)]
-    with path.open('w', newline='', encoding='utf-8') as file:
-        writer = csv.writer(file, lineterminator='\n')
-        writer.writerow(['name', 'kind', 'instruction_set', 'round', 'ns', 'processor', 'versions'])
-        writer.writerows([one.name, one.kind, one.instruction_set, number, f'{value:.1f}', *machine]
-                         for one in timings for number, value in enumerate(one.rounds))
-        writer.writerows(['first contact', 'new process', native.instruction_set, number,
-                          f'{1e9 * seconds:.0f}', *machine]
-                         for number, seconds in enumerate(starts))
+def write_timings(path: Path, timings: Sequence[Timing]) -> None:
+    """Write a row for each contestant and round [ns]."""
+    here = machine(native, PACKAGES)
+    about = {'processor': here.processor, 'compiler': here.compiler, 'versions': here.versions}
+    write_csv(path, [{'name': one.name, 'kind': one.kind, 'instruction_set': one.instruction_set,
+                      'round': number, 'ns': f'{value:.1f}', **about}
+                     for one in timings for number, value in enumerate(one.rounds)])
 
 
-def main(args: Sequence[str] | None = None) -> int:
-    """Measure, print, write; 1 if a limit is broken."""
-    parser = argparse.ArgumentParser(
-        prog='python -m box_contact_ros.reports.speed', description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--out', type=Path, help='folder for speed.md and speed.csv')
-    parser.add_argument('--quick', action='store_true', help='few rounds, to try it out')
-    parser.add_argument('--core', type=int, help='core to run on (default: the last one)')
-    options = parser.parse_args(args)
-    if options.out:
-        make_folder(parser, options.out)
-    cores = sorted(os.sched_getaffinity(0))
-    core = cores[-1] if options.core is None else options.core
-    if core not in cores:
-        parser.error(f'--core {core} is not one of {cores}')
-    names = instruction_sets()
-    runs = [measure_with(name, core, options.quick) for name in reversed(names)]
+def write_speed(folder: Path, command: str, *, core: int, quick: bool) -> int:
+    """Measure, print, write speed.md and speed.csv; 1 if a limit is broken."""
+    effort, cores = QUICK if quick else FULL, usable_cores()
+    runs = [measure_with(name, core, effort) for name in reversed(instruction_sets())]
     claims = [claim for number, run in enumerate(runs) for claim in claims_of(run, number == 0)]
     threads = []
     if len(cores) > 1:
-        threads = measure_threads(cores[-2:], options.quick)
+        threads = measure_threads(cores[-2:], effort)
         claims += thread_claims(threads)
     else:
         print('two threads are left out: there is one core', file=sys.stderr)
-    starts = measure_starts(QUICK_STARTS if options.quick else STARTS)
+    starts = measure_starts(effort.starts)
     claims.append(start_claim(starts))
-    given = sys.argv[1:] if args is None else args
-    text = page(runs, claims, ' '.join(['python -m box_contact_ros.reports.speed', *given]),
-                options.quick)
+    text = page(runs, claims, command, effort)
     print(text)
-    if options.out:
-        (options.out / 'speed.md').write_text(text, encoding='utf-8')
-        write_csv(options.out / 'speed.csv', [one for run in (*runs, threads) for one in run],
-                  starts)
+    (folder / 'speed.md').write_text(text, encoding='utf-8')
+    write_timings(folder / 'speed.csv', [
+        *(one for run in (*runs, threads) for one in run),
+        Timing(name='first contact', kind='new process', instruction_set=native.instruction_set,
+               rounds=[1e9 * seconds for seconds in starts])])
     broken = [claim for claim in claims if not claim.holds]
     for claim in broken:
-        print(f'speed: limit broken: {claim.text}', file=sys.stderr)
+        print(f'frontier: limit broken: {claim.text}', file=sys.stderr)
     return 1 if broken else 0
-
-
-if __name__ == '__main__':
-    sys.exit(main())

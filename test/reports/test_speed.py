@@ -1,4 +1,4 @@
-"""The report `speed`: its flush stacks are flush, its limits break, and a quick run writes all."""
+"""The speed gates: flush stacks are flush, limits break, and a quick run writes all."""
 from __future__ import annotations
 
 import csv
@@ -10,7 +10,7 @@ import pytest
 from box_contact_ros import ContactSolver
 from box_contact_ros.core import instruction_sets, stages
 from box_contact_ros.output import processor, versions
-from box_contact_ros.reports import speed
+from box_contact_ros.reports import frontier, speed
 from box_contact_ros.reports.speed import UNIT, Timing
 
 
@@ -66,7 +66,7 @@ def test_limits_of_threads_and_starts_break() -> None:
 
 def test_quick_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Rows of every instruction set; the page names all figures, whether or not they hold."""
-    assert speed.main(['--quick', '--out', str(tmp_path)]) in (0, 1)
+    assert frontier.main(['--speed', '--quick', '--out', str(tmp_path)]) in (0, 1)
     with (tmp_path / 'speed.csv').open(encoding='utf-8') as file:
         rows = list(csv.DictReader(file))
     by_set = {row['instruction_set'] for row in rows if row['kind'] == 'single'}
