@@ -9,6 +9,7 @@ the deepest, and the mean. All normals point from A to B.
 """
 from __future__ import annotations
 
+import multiprocessing
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache, partial
@@ -284,6 +285,30 @@ def installed() -> tuple[list[Engine], list[str]]:
         except ImportError:
             missing.append(f"{module} is not installed (extra '{extra}')")
     return found, missing
+
+
+def in_subprocess(work: Callable[..., Any], *arguments: Any, patience: float) -> Any:
+    """Return what `work` returns in a subprocess. RuntimeError: what ended the subprocess."""
+    context = multiprocessing.get_context('spawn')
+    receiving, sending = context.Pipe(duplex=False)
+    process = context.Process(target=_answer_to, args=(sending, work, *arguments))
+    process.start()
+    sending.close()
+    try:
+        if receiving.poll(patience):
+            return receiving.recv()
+        raise RuntimeError(f'no answer in {patience:g} s')
+    except EOFError:
+        process.join()
+        raise RuntimeError(f'ended by signal {-process.exitcode}' if process.exitcode < 0 else
+                           f'ended with status {process.exitcode}') from None
+    finally:
+        process.kill()
+        process.join()
+
+
+def _answer_to(pipe: Any, work: Callable[..., Any], *arguments: Any) -> None:
+    pipe.send(work(*arguments))
 
 
 def _rows(pairs: Pairs) -> Iterator[tuple[np.ndarray, ...]]:

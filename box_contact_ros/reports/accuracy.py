@@ -125,7 +125,7 @@ def share_corrected(pairs: Pairs, weights: Path | str) -> float:
 
 def outside(pairs: Pairs, found: Contacts) -> float:
     """Return the largest distance of a point from a box, of the size, beyond the pressing."""
-    size = np.maximum(pairs.size_a.max(axis=1), pairs.size_b.max(axis=1))
+    size = pairs.size
     farthest = np.full(len(size), -np.inf)
     for pose, extents in ((pairs.pose_a, pairs.size_a), (pairs.pose_b, pairs.size_b)):
         local = np.einsum('nji,nj->ni', rotation_matrix(pose[:, 3:]), found.point - pose[:, :3])
@@ -191,24 +191,23 @@ def measure(model: str, name: str, pairs: Pairs, truth: Contacts, weights: str |
     cube = tuple(pairs.size_a[0])
     try:
         solver = ContactSolver(cube, cube, model=model, weights=weights)
-        found = solver.batch(pairs.pose_a, pairs.pose_b, size_a=pairs.size_a, size_b=pairs.size_b)
+        found = pairs.contacts(solver)
     except ValueError:
         if model == 'mlp':
             raise
         return None  # the paper's models are for two equal boxes of few sizes
     both = truth.colliding & found.colliding
-    touching = Pairs(*(part[both] for part in pairs))
+    touching = pairs.rows(both)
     classes, winners = classify(touching)
-    edge = np.minimum(touching.size_a.max(axis=1), touching.size_b.max(axis=1))
-    size = np.maximum(pairs.size_a.max(axis=1), pairs.size_b.max(axis=1))
     apart = np.linalg.norm(found.point[both] - truth.point[both], axis=1)
     return AccuracyRow(
-        model=model, set=name, errors=100.0 * apart / edge, classes=classes, winners=winners,
-        pairs=len(both), exact_share=solver.exact_answers / max(1, int(found.colliding.sum())),
+        model=model, set=name, errors=100.0 * apart / touching.edge, classes=classes,
+        winners=winners, pairs=len(both),
+        exact_share=solver.exact_answers / max(1, int(found.colliding.sum())),
         verdict_errors=int((found.colliding != truth.colliding).sum()),
         normal_difference=float(np.abs(found.normal[both] - truth.normal[both]).max(initial=0.0)),
         separation_difference=float(
-            (np.abs(found.separation - truth.separation) / size).max(initial=0.0)),
+            (np.abs(found.separation - truth.separation) / pairs.size).max(initial=0.0)),
         outside=outside(pairs, found),
         corrected_share=math.nan if model != 'mlp' else share_corrected(
             touching, weights or resource_path('weights', 'mlp.safetensors')))
@@ -223,10 +222,9 @@ def measure_all(models: Sequence[str], count: int, seed: int, weights: str | Non
     with tqdm(total=len(SETS) * len(models), desc='accuracy', unit='set') as bar:
         for number, (name, make) in enumerate(SETS.items()):
             # A few draws miss, up to 3 in 100.
-            drawn = make(np.random.default_rng([seed, number]), count + count // 20 + 10)
-            pairs = Pairs(*(part[:count] for part in drawn))
-            truth = ContactSolver((1, 1, 1), (1, 1, 1), model='exact').batch(
-                pairs.pose_a, pairs.pose_b, size_a=pairs.size_a, size_b=pairs.size_b)
+            pairs = make(np.random.default_rng([seed, number]),
+                         count + count // 20 + 10).rows(slice(count))
+            truth = pairs.contacts()
             for model in models:
                 bar.set_postfix_str(f'{model}, {name}')
                 rows.append(measure(model, name, pairs, truth,

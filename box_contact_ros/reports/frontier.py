@@ -40,7 +40,6 @@ from ..scene.pose_sets import (
     stacked,
 )
 from ..solver.arguments import seed_number
-from ..solver.contact_solver import ContactSolver
 from ..solver.weights_file import load_weights
 from .accuracy import CLASSES, classify
 from .paper_soup_tables import PAPER as PAPER_SOUP
@@ -168,11 +167,12 @@ class Trial:
             found = self._ask_all()
             answers = found.colliding, found.normal, found.point
         else:
-            answers = _answers(engine, _head(pairs, plan.single_pairs), plan.seconds)
+            answers = _answers(engine, pairs.rows(slice(plan.single_pairs)), plan.seconds)
         self._judged = len(answers[0])
-        self._errors = judge(_head(pairs, self._judged), *answers)
+        self._errors = judge(pairs.rows(slice(self._judged)), *answers)
         one_size = all((sizes == sizes[0]).all() for sizes in (pairs.size_a, pairs.size_b))
-        self._calls = engine.prepare(_head(pairs, plan.single_pairs if one_size else FEW_PAIRS))
+        timed = pairs.rows(slice(plan.single_pairs if one_size else FEW_PAIRS))
+        self._calls = engine.prepare(timed)
         self._singles: list[int] = []
         self._batches: list[float] = []
 
@@ -206,30 +206,23 @@ class Trial:
 
 def judge(pairs: Pairs, colliding: np.ndarray, normals: np.ndarray, points: np.ndarray) -> Errors:
     """Compare answers (n,), (n, 3), (n, 3) with the exact ones."""
-    truth = ContactSolver((1, 1, 1), (1, 1, 1), model='exact').batch(
-        pairs.pose_a, pairs.pose_b, size_a=pairs.size_a, size_b=pairs.size_b)
+    truth = pairs.contacts()
     both = colliding & truth.colliding
     found: dict[str, tuple[int, float, float, float]] = {}
     if both.any():
-        touching = Pairs(*(part[both] for part in pairs))
-        edge = np.minimum(touching.size_a.max(axis=1), touching.size_b.max(axis=1))
-        errors = 100.0 * np.linalg.norm(points[both] - truth.point[both], axis=1) / edge
+        touching = pairs.rows(both)
+        errors = 100.0 * np.linalg.norm(points[both] - truth.point[both], axis=1) / touching.edge
         classes = classify(touching)[0]
         parts = {'all': errors, **{c: errors[classes == k] for k, c in enumerate(CLASSES)}}
         found = {label: (len(part), *percentiles(part, 50, 99, 100))
                  for label, part in parts.items() if len(part)}
-    size = np.maximum(pairs.size_a.max(axis=1), pairs.size_b.max(axis=1))
-    clear = np.abs(truth.separation) > VERDICT * size
+    clear = np.abs(truth.separation) > VERDICT * pairs.size
     # By the chord: the cosine of a small angle is 1 to the last digit.
     chords = np.linalg.norm((normals - truth.normal)[both & clear], axis=1)
     angles = np.degrees(2.0 * np.arcsin(np.clip(0.5 * chords, 0.0, 1.0)))
     return Errors(points=found, normal=percentiles(angles, 99, 100),
                   missed=int((truth.colliding & ~colliding & clear).sum()),
                   invented=int((colliding & ~truth.colliding & clear).sum()))
-
-
-def _head(pairs: Pairs, count: int) -> Pairs:
-    return Pairs(*(part[:count] for part in pairs))
 
 
 def _answers(engine: Engine, pairs: Pairs, seconds: float) -> tuple[np.ndarray, ...]:
@@ -254,8 +247,8 @@ def measure_all(found: Sequence[Engine], *, seed: int = 3, plan: Plan = FULL) ->
     with tqdm(total=len(ALL_SETS) * len(found) * (1 + plan.rounds), desc='frontier',
               unit='step') as bar:
         for place, (name, make) in enumerate(ALL_SETS.items()):
-            drawn = make(np.random.default_rng([seed, place]), count + count // 10 + 20)
-            pairs = Pairs(*(np.ascontiguousarray(part[:count]) for part in drawn))
+            pairs = make(np.random.default_rng([seed, place]),
+                         count + count // 10 + 20).rows(slice(count))
             trials = []
             for engine in found:
                 bar.set_postfix_str(f'{name}, {engine.name}')

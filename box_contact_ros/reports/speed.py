@@ -169,8 +169,7 @@ class Stint:
 def _drawn(name: str, count: int) -> Pairs:
     """Draw exactly `count` pairs of a set; a few draws miss."""
     rng = np.random.default_rng([1, list(BATCH_SETS).index(name)])
-    drawn = BATCH_SETS[name](rng, count + count // 20 + 20)
-    return Pairs(*(np.ascontiguousarray(part[:count]) for part in drawn))
+    return BATCH_SETS[name](rng, count + count // 20 + 20).rows(slice(count))
 
 
 def single_calls(count: int) -> list[Stint]:

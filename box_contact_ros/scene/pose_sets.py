@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..solver.contact import Contacts
 from ..solver.contact_solver import ContactSolver
 from .pose import quaternion_multiply, rotation_matrix
 
@@ -28,6 +29,25 @@ class Pairs(NamedTuple):
     pose_b: np.ndarray
     size_a: np.ndarray
     size_b: np.ndarray
+
+    @property
+    def size(self) -> np.ndarray:
+        """The largest extents (n,) of both boxes [m]: the unit of depths."""
+        return np.maximum(self.size_a.max(axis=1), self.size_b.max(axis=1))
+
+    @property
+    def edge(self) -> np.ndarray:
+        """The longest edges (n,) of the smaller boxes [m]: the unit of point errors."""
+        return np.minimum(self.size_a.max(axis=1), self.size_b.max(axis=1))
+
+    def rows(self, chosen: np.ndarray | slice) -> Pairs:
+        """Return some of the pairs, in contiguous arrays."""
+        return Pairs(*(np.ascontiguousarray(part[chosen]) for part in self))
+
+    def contacts(self, solver: ContactSolver | None = None) -> Contacts:
+        """Return the contacts by a solver, without one the exact ones."""
+        solver = solver or ContactSolver((1, 1, 1), (1, 1, 1), model='exact')
+        return solver.batch(self.pose_a, self.pose_b, size_a=self.size_a, size_b=self.size_b)
 
 
 Generator = Callable[[np.random.Generator, int], Pairs]
@@ -56,8 +76,7 @@ def log_uniform(rng: np.random.Generator, low: float, high: float, n: int | tupl
 def pressed(pairs: Pairs, depth: np.ndarray) -> Pairs:
     """The pairs that overlap, with B moved along SAT's normal to `depth` (n,) [m]."""
     a, b, size_a, size_b = pairs
-    found = ContactSolver((1, 1, 1), (1, 1, 1), model='exact').batch(
-        a, b, size_a=size_a, size_b=size_b)
+    found = pairs.contacts()
     rows = found.colliding
     moved = b[rows].copy()
     moved[:, :3] += (-found.separation - depth)[rows, None] * found.normal[rows]

@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parents[2]
 CASES = hard_poses.load()
 
 
-def planted(monkeypatch: pytest.MonkeyPatch, fault: str) -> stability.Row:
+def planted(monkeypatch: pytest.MonkeyPatch, fault: str) -> stability.StabilityRow:
     """The row of a solver that is wrong in one way for its first contact of a family."""
     class Faulty(ContactSolver):
         def batch(self, *poses, **sizes):
@@ -76,6 +76,6 @@ def test_the_committed_report_is_complete() -> None:
         rows = list(csv.DictReader(file))
     for model in ('exact', 'mlp', 'fcl', 'soup-8'):
         assert [row['family'] for row in rows if row['model'] == model] == list(hard_poses.FAMILIES)
-    assert not stability.gates([stability.Row(row['model'], row['family'], int(row['cases']), **{
-        name: int(row[name]) for name in ('verdicts', 'normals', 'outside', 'not_finite')})
-        for row in rows])
+    assert not stability.gates([stability.StabilityRow(
+        row['model'], row['family'], int(row['cases']),
+        **{name: int(row[name]) for name in stability.COUNTS}) for row in rows])
