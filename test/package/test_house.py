@@ -1,0 +1,313 @@
+"""The house of the package: order of imports, names, sizes of folders and functions.
+
+DESIGN's list of folders is `FOLDERS`: a folder imports only folders that stand above it.
+"""
+from __future__ import annotations
+
+import ast
+import subprocess
+from collections import defaultdict
+from collections.abc import Iterator
+from itertools import chain
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+NAME = 'box_contact_ros'
+
+FOLDERS = ('core', 'solver', 'scene', 'node', 'apps', 'baselines', 'training', 'verification',
+           'reports')
+EVERYBODYS = ('output', 'resources')
+"""Root modules that every folder may import, and that import none of the folders."""
+ROOT_MODULES = ('__init__', '__main__', 'cli', *EVERYBODYS)
+ROOT_ENTRIES = {*FOLDERS, *(f'{name}.py' for name in ROOT_MODULES), 'py.typed'}
+ENTRIES_MAX = 8
+ENTRIES_MAX_OF = {'node': 12, 'core/*.hpp': 12}
+"""Larger limits. The core's headers are counted apart from the core's other entries."""
+FUNCTION_LINES_MAX = 60
+
+
+class House:
+    """The files of a package: what git would commit, or what the folder holds."""
+
+    def __init__(self, package: Path):
+        self.package = package
+        self.files = listed(package)
+        self.trees = {file: ast.parse(file.read_text('utf-8')) for file in self.files
+                      if file.suffix in ('.py', '.pyi')}
+
+    def name(self, file: Path) -> str:
+        """Return a file's path below the package."""
+        return file.relative_to(self.package).as_posix()
+
+    def definitions(self, *kinds: type[ast.AST]) -> Iterator[tuple[Path, ast.AST]]:
+        """Yield file and node of every definition at any depth, except in stubs of modules."""
+        for file, tree in self.trees.items():
+            if file.suffix == '.py' or file.with_suffix('.py') not in self.trees:
+                for node in ast.walk(tree):
+                    if isinstance(node, kinds):
+                        yield file, node
+
+
+def listed(package: Path) -> list[Path]:
+    """Return the files of a checkout that git does not ignore, else all but what was built."""
+    command = ['git', 'ls-files', '-z', '--cached', '--others', '--exclude-standard']
+    try:
+        names = subprocess.run(command, cwd=package, capture_output=True, text=True).stdout
+    except FileNotFoundError:  # no git
+        names = ''
+    files = [package / name for name in names.split('\0') if name] or [
+        path for path in package.rglob('*')
+        if path.suffix != '.so' and '__pycache__' not in path.parts]
+    return sorted(path for path in files if path.is_file())
+
+
+# --- the order of imports -------------------------------------------------------------------------
+
+
+def imported(house: House, file: Path) -> Iterator[tuple[int, str]]:
+    """Yield line and dotted path below the package of all that a file imports from the package."""
+    here = (NAME, *file.relative_to(house.package).parent.parts)
+    for node in ast.walk(house.trees[file]):
+        names = []
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            above = '.'.join(here[:len(here) + 1 - node.level]) if node.level else ''
+            module = '.'.join(filter(None, (above, node.module)))
+            names = [f'{module}.{alias.name}' for alias in node.names]
+        for name in names:
+            first, _, rest = name.partition('.')
+            if first == NAME and rest:
+                yield node.lineno, rest
+
+
+def part_of(path: str, exported: dict[str, str]) -> str:
+    """Return the folder or root module that an imported path leads to.
+
+    `exported` has the folders of the names that the root itself exports.
+    """
+    first = path.partition('.')[0]
+    return exported.get(first, first)
+
+
+def import_faults(house: House) -> Iterator[str]:
+    """Yield imports against the order of the folders."""
+    init = house.package / '__init__.py'
+    exported = {}
+    if init in house.trees:
+        exported = {path.rpartition('.')[2]: path.partition('.')[0]
+                    for _, path in imported(house, init)}
+    for file in house.trees:
+        own = house.name(file).partition('/')[0]
+        for line, path in imported(house, file):
+            part = part_of(path, exported)
+            if not may_import(own, part):
+                yield f'{house.name(file)}:{line} imports {path}'
+
+
+def may_import(own: str, part: str) -> bool:
+    """Return whether a folder, or a root module `NAME.py`, may import a folder or root module."""
+    if own in FOLDERS:
+        return part in EVERYBODYS or part in FOLDERS[:FOLDERS.index(own) + 1]
+    if own == '__init__.py':
+        return part in EVERYBODYS or part in ('solver', 'scene')
+    if own.removesuffix('.py') in EVERYBODYS:
+        return part in EVERYBODYS
+    return part in ROOT_MODULES
+
+
+# --- names ----------------------------------------------------------------------------------------
+
+
+def twice(places: Iterator[tuple[str, str]]) -> Iterator[str]:
+    """Yield the names that stand in several places."""
+    found = defaultdict(list)
+    for name, place in places:
+        found[name].append(place)
+    for name, where in sorted(found.items()):
+        if len(where) > 1:
+            yield f'{name}: {", ".join(where)}'
+
+
+def basename_faults(house: House) -> Iterator[str]:
+    """Yield basenames that several modules share; a stub belongs to its module."""
+    modules = {file.with_suffix('') for file in house.trees if file.stem != '__init__'}
+    headers = [file for file in house.files if file.suffix in ('.hpp', '.cpp')]
+    yield from twice((file.name, house.name(file)) for file in chain(sorted(modules), headers))
+
+
+def class_faults(house: House) -> Iterator[str]:
+    """Yield names that several classes share."""
+    yield from twice((node.name, f'{house.name(file)}:{node.lineno}')
+                     for file, node in house.definitions(ast.ClassDef))
+
+
+# --- sizes ----------------------------------------------------------------------------------------
+
+
+def entry_faults(house: House) -> Iterator[str]:
+    """Yield folders with too many entries, and what does not belong into the root."""
+    entries = defaultdict(set)
+    for file in house.files:
+        parts = file.relative_to(house.package).parts
+        for depth, part in enumerate(parts):
+            folder = '/'.join(parts[:depth])
+            headers = '/*.hpp' if folder == 'core' and part.endswith('.hpp') else ''
+            entries[folder + headers].add(part)
+    root = entries.pop('')
+    for verb, names in (('has', root - ROOT_ENTRIES), ('lacks', ROOT_ENTRIES - root)):
+        if names:
+            yield f'the root {verb} {", ".join(sorted(names))}'
+    for folder, names in sorted(entries.items()):
+        most = ENTRIES_MAX_OF.get(folder, ENTRIES_MAX)
+        if len(names) > most:
+            yield f'{folder} has {len(names)} entries, and may have {most}'
+
+
+def function_faults(house: House) -> Iterator[str]:
+    """Yield functions that are too long."""
+    for file, node in house.definitions(ast.FunctionDef, ast.AsyncFunctionDef):
+        lines = node.end_lineno - node.lineno + 1
+        if lines > FUNCTION_LINES_MAX:
+            yield f'{house.name(file)}:{node.lineno} {node.name} has {lines} lines'
+
+
+RULES = {
+    f'A folder imports only folders above it: {", ".join(FOLDERS)}.': import_faults,
+    'No two modules share a basename.': basename_faults,
+    f'A folder has at most {ENTRIES_MAX} entries (headers of the core, node: 12).': entry_faults,
+    'No two classes share a name.': class_faults,
+    f'A function has at most {FUNCTION_LINES_MAX} lines.': function_faults,
+}
+
+
+def report(house: House) -> str:
+    """Return all faults under the rules that they break; empty without a fault."""
+    lines = []
+    for rule, faults in RULES.items():
+        if found := list(faults(house)):
+            lines += ['', f'{rule} Against it: {len(found)}', *(f'  {fault}' for fault in found)]
+    return '\n'.join(lines)
+
+
+def test_the_package_keeps_its_house() -> None:
+    """All faults are reported at once."""
+    house = House(ROOT / NAME)
+    assert len(house.trees) > 50
+    if faults := report(house):
+        pytest.fail(faults, pytrace=False)
+
+
+# --- planted faults are found ---------------------------------------------------------------------
+
+
+@pytest.fixture
+def sound(tmp_path: Path) -> dict[str, str]:
+    """Return the files of a package without a fault."""
+    folders = {f'{folder}/__init__.py': '' for folder in FOLDERS}
+    modules = {f'{name}.py': '' for name in ROOT_MODULES}
+    return folders | modules | {
+        '__init__.py': 'from .solver.ask import ask\n',
+        '__main__.py': f'from {NAME} import cli\n',
+        'py.typed': '',
+        'core/stages.py': 'import numpy\nfrom ..resources import resource_path\n',
+        'core/_native.pyi': 'class Pair: ...\n',
+        'core/_native.so': 'built',
+        'core/__pycache__/stages.pyc': 'built',
+        'solver/ask.py': f'from ..core import stages\nfrom {NAME}.output import table\n',
+        'solver/ask.pyi': 'class Stub: ...\n',
+        'reports/speed.py': f'from {NAME} import ask\nimport {NAME}.apps\n',
+    }
+
+
+def planted(folder: Path, files: dict[str, str]) -> House:
+    for name, text in files.items():
+        path = folder / NAME / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    return House(folder / NAME)
+
+
+def test_a_sound_package_has_no_fault(tmp_path: Path, sound: dict[str, str]) -> None:
+    assert report(planted(tmp_path, sound)) == ''
+
+
+@pytest.mark.parametrize('git', [False, True])
+def test_what_is_ignored_is_not_counted(tmp_path: Path, sound: dict[str, str], git: bool) -> None:
+    """Built files count neither in a checkout, new files included, nor elsewhere."""
+    if git:
+        subprocess.run(['git', 'init', '-q', tmp_path], check=True)
+        (tmp_path / '.gitignore').write_text('*.so\n__pycache__/\n')
+    built = {f'scene/{number}.so': '' for number in range(9)}
+    assert report(planted(tmp_path, sound | built)) == ''
+    assert 'scene has 9 entries' in report(planted(
+        tmp_path, sound | {f'scene/{number}.txt': '' for number in range(8)}))
+
+
+IMPORTS = [
+    ('core/stages.py', 'from ..solver.ask import ask', 'solver.ask.ask'),
+    ('core/stages.py', 'from ..solver import ask', 'solver.ask'),
+    ('core/_native.pyi', f'from {NAME}.apps import demo', 'apps.demo'),
+    ('scene/one.py', f'import {NAME}.node', 'node'),
+    ('scene/one.py', 'def f():\n    from .. import reports', 'reports'),
+    ('scene/deep/one.py', 'from ...node import one', 'node.one'),
+    ('core/stages.py', f'from {NAME} import ask', 'ask'),
+    ('training/one.py', 'from ..cli import PROGRAMS', 'cli.PROGRAMS'),
+    ('__init__.py', 'from .node import one', 'node.one'),
+    ('output.py', 'from .solver import ask', 'solver.ask'),
+    ('resources.py', 'from .cli import PROGRAMS', 'cli.PROGRAMS'),
+    ('cli.py', 'import sys\nif sys:\n    from .core import stages', 'core.stages'),
+    ('__main__.py', f'from {NAME}.apps.demo import main', 'apps.demo.main'),
+]
+
+
+@pytest.mark.parametrize('file, text, path', IMPORTS)
+def test_an_import_against_the_order_is_found(tmp_path: Path, sound: dict[str, str], file: str,
+                                              text: str, path: str) -> None:
+    house = planted(tmp_path, sound | {file: f'{sound.get(file, "")}{text}\n'})
+    fault, = import_faults(house)
+    assert fault.startswith(f'{file}:') and fault.endswith(f' imports {path}')
+    assert fault in report(house)
+
+
+OTHERS = [
+    (basename_faults, {'node/ask.py': ''}, 'ask: node/ask, solver/ask'),
+    (basename_faults, {'apps/_native.pyi': ''}, '_native: apps/_native, core/_native'),
+    (basename_faults, {'core/a.hpp': '', 'core/b/a.hpp': ''}, 'a.hpp: core/a.hpp, core/b/a.hpp'),
+    (class_faults, {'node/a.py': '\nclass One: ...', 'apps/b.py': 'def f():\n  class One: ...'},
+     'One: apps/b.py:2, node/a.py:2'),
+    (class_faults, {'node/a.py': 'class Pair: ...'}, 'Pair: core/_native.pyi:1, node/a.py:1'),
+    (entry_faults, {f'apps/a/{n}.py': '' for n in range(9)},
+     'apps/a has 9 entries, and may have 8'),
+    (entry_faults, {f'node/{n}.py': '' for n in range(12)},
+     'node has 13 entries, and may have 12'),
+    (entry_faults, {f'core/{n}.hpp': '' for n in range(13)},
+     'core/*.hpp has 13 entries, and may have 12'),
+    (entry_faults, {'tools.py': '', 'more/one.py': ''}, 'the root has more, tools.py'),
+    (function_faults, {'scene/a.py': 'def f():' + '\n  1' * 60}, 'scene/a.py:1 f has 61 lines'),
+    (function_faults, {'scene/a.py': 'class A:\n  async def f():' + '\n    1' * 60},
+     'scene/a.py:2 f has 61 lines'),
+]
+
+
+@pytest.mark.parametrize('rule, files, fault', OTHERS)
+def test_another_fault_is_found(tmp_path: Path, sound: dict[str, str], rule: object,
+                                files: dict[str, str], fault: str) -> None:
+    house = planted(tmp_path, sound | files)
+    assert list(rule(house)) == [fault]
+    assert fault in report(house)
+
+
+def test_a_missing_folder_is_found(tmp_path: Path, sound: dict[str, str]) -> None:
+    del sound['apps/__init__.py']
+    assert list(entry_faults(planted(tmp_path, sound))) == ['the root lacks apps']
+
+
+def test_as_much_as_may_be(tmp_path: Path, sound: dict[str, str]) -> None:
+    """Limits themselves are no faults."""
+    limits = {f'scene/{n}.txt': '' for n in range(7)} | {f'node/{n}.txt': '' for n in range(11)}
+    limits |= {f'core/{n}.hpp': '' for n in range(12)}
+    limits['apps/a.py'] = 'def f():' + '\n  1' * 59
+    assert report(planted(tmp_path, sound | limits)) == ''
