@@ -300,8 +300,9 @@ def in_subprocess(work: Callable[..., Any], *arguments: Any, patience: float) ->
         raise RuntimeError(f'no answer in {patience:g} s')
     except EOFError:
         process.join()
-        raise RuntimeError(f'ended by signal {-process.exitcode}' if process.exitcode < 0 else
-                           f'ended with status {process.exitcode}') from None
+        status = process.exitcode or 0
+        raise RuntimeError(f'ended by signal {-status}' if status < 0 else
+                           f'ended with status {status}') from None
     finally:
         process.kill()
         process.join()
