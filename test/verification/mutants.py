@@ -225,8 +225,7 @@ MUTANTS = {
     'events of poses served': Mutant(
         TOPICS, 'self.events.watch(subscription)', 'pass', 'test/node/test_faults.py -k deadlines'),
     'events of contacts served': Mutant(
-        TOPICS, 'self.events.watch(self.contacts)', 'pass',
-        'test/node/test_faults.py -k topics_go'),
+        TOPICS, 'self.events.watch(self.contacts)', 'pass', f'{TEST_SCENE_NODE} -k no_executor'),
     "events of pairs' contacts served": Mutant(
         TOPICS, 'PublisherEventCallbacks(use_default_callbacks=False)',
         'PublisherEventCallbacks()', 'test/node/test_faults.py -k topics_go'),
