@@ -7,7 +7,7 @@ A program starts in three ways, which all end in `run`:
 - `python -m box_contact_ros PROGRAM`
 
 `PROGRAMS` is the only list of them. setup.py loads this file by its path before anything is
-installed: its top imports the standard library alone.
+installed. Its top imports the standard library alone.
 
 A program is a function `main(args=None) -> int` that returns the exit status. `args` are the words
 after the program's name, unchanged. `rclpy.init(args=args)` finds `--ros-args ...` in them, and

@@ -1,14 +1,11 @@
 """Model `fcl`: FCL's own box-box primitive, and of its contacts the deepest, as engines give it.
 
-A baseline: where two faces meet, FCL returns up to four corners of the patch with a depth each, and
-whoever wants one point takes the deepest. That corner changes with the smallest tilt, so the point
-jumps across the patch.
+Where two faces meet, FCL returns up to four corners of the patch with a depth each. The deepest
+changes with the smallest tilt, so the point jumps across the patch.
 
-The checks of sizes and poses, the verdict, and the separation of boxes apart are SAT's, as in every
-model here; FCL gives point, normal and depth of those in contact. Within the rounding of an exact
-touch it may find no contact: the exact answer stands there. FCL's signed distance is never asked
-for. FCL's normal of (o1, o2) points from o1 to o2, from A to B; a test holds it to that in both
-orders.
+FCL gives point, normal and depth of boxes in contact; everything else is SAT's. Within the rounding
+of an exact touch FCL may find no contact, and the exact answer stands. FCL's normal of (o1, o2)
+points from o1 to o2, from A to B; a test checks that in both orders.
 """
 from __future__ import annotations
 

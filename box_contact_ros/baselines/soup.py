@@ -1,25 +1,20 @@
 """Model `soup`: polygon soup, the method that the source paper compares itself with (section 5).
 
-Each face is split in N × N rectangles of two triangles, 12 N² triangles a box. (The paper's column
-"triangles/face" holds just these numbers: they are per cube.) FCL, in place of the paper's RAPID,
-finds all pairs of triangles that meet, with a bounding volume tree per box. What the paper leaves
-to "an additional algorithm" is done here as follows:
+Each face is split in N × N rectangles of two triangles: 12 N² triangles a box, the paper's column
+"triangles/face". FCL stands for the paper's RAPID and finds all pairs of triangles that meet, with
+a bounding volume tree per box. The rest replaces the paper's "additional algorithm":
 
-- Contacts. For two triangles that meet, FCL gives the one or two corners of either that lie deepest
-  behind the other's plane, and a normal: the outward normal of A's triangle, or the reverse of the
-  outward normal of B's, whichever plane is less deeply crossed. The triangles are wound so that
-  their normals leave the box; so FCL's normal points from A to B.
-- Point: the mean of the contacts' positions, each weighted by the smaller of its two triangles'
-  areas [m²], the most in which the two can meet. (The area in which they do meet is not known, and
-  is zero where they cross.) On a cube all triangles are alike, and the mean is a plain one.
+- Contacts. FCL gives the one or two deepest corners of two triangles that meet, and a normal. The
+  normal is the outward one of A's triangle, or the reverse of B's, of the less deeply crossed.
+- Point: the mean of the contacts' positions. A weight is the smaller area of the two triangles
+  [m²], the most in which they can meet.
 - Normal: the mean of the contacts' normals with the same weights, made unit.
-- Separation and verdict: SAT's, as in every model here. The largest depth of the contacts is no
-  substitute: it is measured to the far corners of triangles, and is off by their size, not by a
-  part of the overlap (`docs/paper_tables.md` has figures).
+- Separation and verdict: SAT's. FCL's depths are those of the triangles' far corners and are off
+  by a triangle's size: `docs/paper_tables.md` has figures.
 
-Triangles are surfaces, so there are contacts in the sense of SAT without a pair of triangles: a box
-inside another, and some exact touches, within rounding. There, and where the normals cancel, the
-answer is SAT's normal and the exact point; `Soup.soup_misses` counts them.
+Some contacts have no pair of triangles: a box inside another, and some exact touches. There, and
+where the normals cancel, SAT's normal and the exact point are the answer. `Soup.soup_misses` counts
+them.
 """
 from __future__ import annotations
 
@@ -39,8 +34,8 @@ MORE_CONTACTS = 16
 """Factor by which more are asked for when so many have been found."""
 
 CANCELLED = 1e-9
-"""Length of the mean normal up to which it has cancelled and has no direction: a mean of 1e6 unit
-vectors is rounded by 1e-10 at worst, and opposite faces that cancel leave no more than that."""
+"""Length of a mean normal up to which it has cancelled: a mean of 1e6 unit vectors is rounded by
+1e-10 at worst."""
 
 
 class Mesh(NamedTuple):

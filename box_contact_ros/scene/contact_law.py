@@ -11,9 +11,9 @@ v_n = −v·n, positive while the boxes part:
     3. Torsion        μ·F_n·r about n against the spin ω·n       proportional to it below v_s / r
     4. Rocking        −2c·(W²/12)·ω_roll, −2c·(L²/12)·ω_pitch    in the load's own axes
 
-1 and 2 act at the ONE point, so the point has to be the middle of the contact region. 3 and 4 are
-what a patch does and a point cannot. 4 is the damping of c spread evenly over the load's bottom,
-twice: c·∫x²dA / A = c·L²/12, for a load that stands upright. Both act only while the boxes touch.
+Lines 1 and 2 act at the ONE point, so the point has to be the middle of the contact region. The
+others are what a patch does and a point cannot, and act only while the boxes touch. Rocking is the
+damping c spread evenly over an upright load's bottom, twice: c·∫x²dA / A = c·L²/12.
 docs/decisions/contact-law.md has what was measured for each constant.
 
 A wrench belongs to the time at which its contact was asked for. `HeldWrench` holds it between
@@ -57,16 +57,16 @@ FRICTION = 0.5
 """Coulomb's μ [1], steel on steel, dry."""
 
 SLIP_SPEED = 0.1
-"""v_s [m/s]: friction grows in proportion to the slip up to here, so that its sign does not switch
-from tick to tick at rest. The price: a load at rest on a slope s creeps at v_s·s/μ."""
+"""v_s [m/s]: friction grows in proportion to the slip up to here, or its sign would switch at rest.
+The price: a load at rest on a slope s creeps at v_s·s/μ."""
 
 
 def effective_mass(mass: float, size: tuple[float, float, float]) -> float:
     """Mass [kg] that a vertical push at a bottom corner of a box of full extents `size` [m] feels.
 
-    1 / m_eff = 1 / m + (L/2)² / I_pitch + (W/2)² / I_roll with I = m (extent² + H²) / 12, that is
-    m_eff = 0.19 m for a 40-ft container and m / 4 for a cube. The corner is the lightest place, so
-    what is stable there is stable everywhere.
+    1 / m_eff = 1 / m + (L/2)² / I_pitch + (W/2)² / I_roll, I = m (extent² + H²) / 12: 0.19 m for a
+    40-ft container, m / 4 for a cube. What is stable at the corner, the lightest place, is stable
+    everywhere.
     """
     length, width, height = size
     pitch = 3.0 * length**2 / (length**2 + height**2)
@@ -87,28 +87,22 @@ class Touch:
 class ContactLaw:
     """The law's constants for one load at one rate; make them with `for_load`.
 
-    stiffness        k [N/m]
-    damping          c [N s/m]
-    friction         μ [1]
-    slip_speed       v_s [m/s]
-    torsion_radius   r [m]: radius of gyration of the footprint, 3.6 m for a 40-ft container
-    rocking          dampers on roll and on pitch [N m s]
+    The torsion radius is the footprint's radius of gyration, 3.6 m for a 40-ft container.
     """
 
-    stiffness: float
-    damping: float
-    friction: float = FRICTION
-    slip_speed: float = SLIP_SPEED
-    torsion_radius: float
-    rocking: tuple[float, float]
+    stiffness: float  # k [N/m]
+    damping: float  # c [N s/m]
+    friction: float = FRICTION  # μ [1]
+    slip_speed: float = SLIP_SPEED  # v_s [m/s]
+    torsion_radius: float  # r [m]
+    rocking: tuple[float, float]  # dampers on roll and on pitch [N m s]
 
     @classmethod
     def for_load(cls, mass: float, size: tuple[float, float, float], rate_hz: float) -> ContactLaw:
         """Constants for a load of `mass` [kg] and `size` [m] that asks `rate_hz` times a second.
 
-        `size` is its full extents. The constants are scaled with the mass, and down where the rate
-        demands it (40 ft, 20 t: at 200 Hz k to 1.9e7 N/m, c to 2.7e5 N s/m, the pitch damper to
-        83 %; at 1 kHz nothing).
+        `size` is its full extents. The constants grow with the mass and shrink where the rate
+        demands it: for 40 ft, 20 t, 200 Hz to k = 1.9e7 N/m, c = 2.7e5 N s/m.
         """
         length, width, height = size
         corner = effective_mass(mass, size)
@@ -158,8 +152,7 @@ nanosecond is far below every physics step."""
 class HeldWrench:
     """The wrench that acts: that of the newest answer that is due, until the next one is.
 
-    Zeros before the first. A tick without an answer changes nothing: zero force on a lost tick
-    would let the load fall for that tick, and it would never rest.
+    Zeros before the first. A tick without an answer changes nothing.
     """
 
     def __init__(self) -> None:

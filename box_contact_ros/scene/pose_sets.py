@@ -112,8 +112,8 @@ def stacked(rng: np.random.Generator, size: tuple[float, float, float], tilt: np
             about: np.ndarray | None = None) -> Pairs:
     """Draw one box on another of the same size, tilted about a random level axis, turned by yaw.
 
-    Both angles are in [rad]; the box is off the other's middle by up to `spread` of the size.
-    about: the tilt's axis is within that angle (n,) [rad] of ±x, instead of anywhere.
+    Both angles are in [rad]. The box is off the other's middle by up to `spread` of the size.
+    about: keeps the tilt's axis within that angle (n,) [rad] of ±x.
     """
     n = len(tilt)
     sizes = np.tile(np.array(size), (n, 1))

@@ -64,7 +64,7 @@ def read_scene(source: str | os.PathLike[str]) -> Scene:
 
 
 def scene_path(source: str) -> Path:
-    """The path of a scene file: as it is, or, where there is none, one of the package's own."""
+    """Return the path of a scene file, one of the package's own where the path leads nowhere."""
     path = Path(source)
     if not path.is_absolute() and not path.exists():
         with suppress(FileNotFoundError):

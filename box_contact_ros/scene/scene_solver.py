@@ -1,8 +1,7 @@
 """A scene: boxes, fixed or moving, the pairs of them that matter, and what one tick computes.
 
-Nothing outside the listed pairs is looked at. Of the listed ones, a cheap conservative test leaves
-those whose bounding boxes, along the axes of the common frame, come near each other; all of these
-go through the solver as one batch.
+Nothing outside the listed pairs is looked at. A cheap conservative test leaves the pairs whose
+axis-aligned bounding boxes come near each other. These go through the solver as one batch.
 """
 from __future__ import annotations
 
@@ -200,7 +199,7 @@ class SceneSolver:
         return [poses[place] if fixed is None else fixed for place, fixed in self._sides]
 
     def __call__(self, poses: Sequence[np.ndarray | None]) -> Answer:
-        """One tick. poses: (7,) of each box of `scene.moving`, None where there is none.
+        """Return the answer to one tick: a pose (7,) or None for each box of `scene.moving`.
 
         Raises ValueError for numbers that are no pose, and for more or fewer poses than that.
         """

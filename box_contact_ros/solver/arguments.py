@@ -29,10 +29,7 @@ def seed_number(text: str) -> int:
 
 def check_ranges(parser: argparse.ArgumentParser, options: argparse.Namespace,
                  **ranges: tuple[float, float | None]) -> None:
-    """Refuse numbers outside their ranges (low, high or None); options that are None are not set.
-
-    parser: reports the refusal and ends the program.
-    """
+    """Refuse options outside their ranges (low, high or None: no limit); None is not checked."""
     for name, (low, high) in ranges.items():
         value = getattr(options, name)
         if value is not None and not low <= value <= (math.inf if high is None else high):

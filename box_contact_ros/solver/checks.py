@@ -1,7 +1,6 @@
 """What is accepted as a pose and as a size, and the words in which the rest is refused.
 
-The same limits as in the core (core/poses.hpp), for the places where a person or a message
-can bring in anything: every refusal names the field and the value.
+The limits are those of the core (core/poses.hpp). Every refusal names the field and the value.
 """
 from __future__ import annotations
 
@@ -25,7 +24,7 @@ _REPR.maxstring = _REPR.maxother = SHOWN
 
 
 def shown(value: Any) -> str:
-    """`repr`, cut short: an error is to be read, whatever came in (a megabyte, a maze of YAML)."""
+    """Return `repr`, cut short for an error that a person reads."""
     try:
         text = _REPR.repr(value).replace('\n', ' ')
     except ValueError:  # integers of more than 4,300 digits have no repr
@@ -34,9 +33,9 @@ def shown(value: Any) -> str:
 
 
 def pose_fault(pose: Sequence[float] | np.ndarray) -> str | None:
-    """Why 7 numbers `x y z qx qy qz qw` are not a pose, or None.
+    """Return why 7 numbers `x y z qx qy qz qw` are not a pose, or None.
 
-    A quaternion off unit length is none of the reasons: it is normalised.
+    A quaternion may have any length within the limits.
     """
     x, y, z, qx, qy, qz, qw = (float(value) for value in pose)
     if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(z)):
@@ -55,7 +54,7 @@ def pose_fault(pose: Sequence[float] | np.ndarray) -> str | None:
 
 
 def size_fault(size: Sequence[float] | np.ndarray) -> str | None:
-    """Why three full extents [m] are not a size, or None."""
+    """Return why three full extents [m] are not a size, or None."""
     extents = [float(value) for value in size]
     text = '(' + ', '.join(f'{value:g}' for value in extents) + ')'
     if not all(math.isfinite(value) for value in extents):
@@ -69,9 +68,9 @@ def size_fault(size: Sequence[float] | np.ndarray) -> str | None:
 
 def as_floats(value: ArrayLike, name: str, shapes: str, *accepted: tuple[int | None, ...],
               ) -> np.ndarray:
-    """`value` as a float64 array of one of the `accepted` shapes (None: any length).
+    """Return `value` as a contiguous float64 array of an `accepted` shape (None: any length).
 
-    It is contiguous. `shapes` is how the accepted shapes are called in the error.
+    shapes: what the error calls the accepted shapes.
     """
     try:
         array = np.asarray(value)
@@ -99,7 +98,7 @@ def _holds_numbers(array: np.ndarray) -> bool:
 
 
 def as_size(size: ArrayLike, name: str) -> np.ndarray:
-    """Three full extents (3,) [m], checked, as (1, 3)."""
+    """Return three full extents (3,) [m], checked, as (1, 3)."""
     array = as_floats(size, name, 'three full extents', (3,))
     fault = size_fault(array)
     if fault:

@@ -32,15 +32,14 @@ ACTIVATION = 'relu'
 UNITS_MAX = 64
 """Most hidden units: as far as the search for their number goes."""
 SAME_EXTENT = 1e-6
-"""Relative difference up to which an extent is one that the network was trained for: sizes may
-have been through float32 or a text file, and the point moves by as little."""
+"""Relative difference up to which an extent is a trained one: sizes may come through float32."""
 
 
 def core_numbers(network: Network) -> np.ndarray:
     """Return a network as the core reads it: float32 (3 + 16 · units,).
 
-    The biases of the outputs come first. Each unit follows with its bias, its weights for the
-    features of the faces, of the axis and of the site, and its weights to the outputs.
+    The biases of the outputs come first. For each unit follow its bias, its weights for features of
+    faces, axis and site, and its weights to the outputs.
     """
     (first, bias), (last, last_bias) = unpacked(network)
     units = np.concatenate([bias[:, None], first[:, 4:8], first[:, 8:12], first[:, :4], last.T],

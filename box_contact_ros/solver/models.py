@@ -20,8 +20,8 @@ from .contact import Contacts
 class Model(Protocol):
     """A model behind `ContactSolver`.
 
-    It may have `single`, the core's name of the model that answers single calls and its network,
-    and `exact_answers`, the contacts that it handed to `exact`.
+    It may have `single`, the core's model of single calls with its network. It may have
+    `exact_answers`, the contacts that it handed to `exact`.
     """
 
     def solve(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,

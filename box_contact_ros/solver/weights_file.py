@@ -87,10 +87,9 @@ def save_weights(path: Path, networks: dict[str, list[tuple[np.ndarray, np.ndarr
 
 
 def read_tensors(data: bytes) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-    """Return the tensors and the metadata of a safetensors file's bytes.
+    """Return the tensors and the metadata of a safetensors file.
 
-    Raises ValueError, TypeError or LookupError for bytes that are none, and for other numbers than
-    float32.
+    Raises ValueError, TypeError or LookupError for a damaged file and for other types than float32.
     """
     start = 8 + int.from_bytes(data[:8], 'little')
     header = json.loads(data[8:start].decode('utf-8'))
