@@ -10,6 +10,7 @@ points from o1 to o2, from A to B; a test checks that in both orders.
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 
 import fcl
 import numpy as np
@@ -21,38 +22,68 @@ MOST_CONTACTS = 16
 """FCL's box-box makes at most eight contacts (two rectangles cut each other in an octagon)."""
 
 
-class FclBox:
-    """FCL's box-box collide, deepest contact; any sizes."""
+class FclModel:
+    """A model that asks FCL about the pairs in contact; `exact` answers where FCL does not.
 
-    def __init__(self) -> None:
+    make: returns FCL's object of a box of full extents (x, y, z) [m].
+    """
+
+    def __init__(self, make: Callable[[tuple[float, ...]], fcl.CollisionObject]) -> None:
         self._exact = Exact()
-        self._request = fcl.CollisionRequest(num_max_contacts=MOST_CONTACTS, enable_contact=True)
+        # A scene has few sizes. Each solver keeps objects of its own, one for A and one for B,
+        # because placing moves them.
+        self._object = functools.lru_cache(maxsize=64)(lambda size, box: make(size))
+
+    def place(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
+              ) -> tuple[fcl.CollisionObject, fcl.CollisionObject]:
+        """Return objects of full extents (3,) at poses (7,), about A's centre; until the next call.
+
+        Directions are the common frame's. B − A is formed in float64 here, so that FCL adds no
+        rounding far from the origin.
+        """
+        first, second = self._object(tuple(size_a), 0), self._object(tuple(size_b), 1)
+        for placed, position, quaternion in ((first, np.zeros(3), a[3:]),
+                                             (second, b[:3] - a[:3], b[3:])):
+            x, y, z, w = quaternion / np.linalg.norm(quaternion)
+            placed.setTransform(fcl.Transform(np.array([w, x, y, z]), position))
+        return first, second
 
     def solve(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
               threads: int = 1) -> tuple[Contacts, int]:
         """Return contacts for poses (n, 7), sizes (n or 1, 3), and the first refused row or −1."""
         found, refused = self._exact.solve(a, b, size_a, size_b, threads)
         for row in np.flatnonzero(found.colliding) if refused < 0 else ():
-            # B − A is formed in float64 here, so that FCL adds no rounding far from the origin.
-            first = _place(size_a[row % len(size_a)], np.zeros(3), a[row, 3:])
-            second = _place(size_b[row % len(size_b)], b[row, :3] - a[row, :3], b[row, 3:])
-            result = fcl.CollisionResult()
-            fcl.collide(first, second, self._request, result)
-            if not result.contacts:
-                continue
-            deepest = max(result.contacts, key=lambda contact: contact.penetration_depth)
-            found.separation[row] = -deepest.penetration_depth
-            found.normal[row] = deepest.normal
-            found.point[row] = a[row, :3] + deepest.pos
+            sizes = size_a[row % len(size_a)], size_b[row % len(size_b)]
+            answer = self.ask(*self.place(a[row], b[row], *sizes), *sizes)
+            if answer is not None:
+                point, found.normal[row], depth = answer
+                found.point[row] = a[row, :3] + point
+                if depth is not None:
+                    found.separation[row] = -depth
         return found, refused
 
+    def ask(self, first: fcl.CollisionObject, second: fcl.CollisionObject, size_a: np.ndarray,
+            size_b: np.ndarray) -> tuple[np.ndarray, np.ndarray, float | None] | None:
+        """Return point (3,) from A's centre, normal (3,), and the depth or None for SAT's.
 
-def _place(size: np.ndarray, position: np.ndarray, quaternion: np.ndarray) -> fcl.CollisionObject:
-    """A box of full extents (3,) [m] at a position (3,) [m], quaternion (4,) xyzw of any length."""
-    x, y, z, w = quaternion / np.linalg.norm(quaternion)
-    return fcl.CollisionObject(_box(*size), fcl.Transform(np.array([w, x, y, z]), position))
+        None: FCL has no answer.
+        """
+        raise NotImplementedError
 
 
-@functools.lru_cache(maxsize=64)  # a scene has few sizes
-def _box(length: float, width: float, height: float) -> fcl.Box:
-    return fcl.Box(length, width, height)
+class FclBox(FclModel):
+    """FCL's box-box collide, deepest contact; any sizes."""
+
+    def __init__(self) -> None:
+        super().__init__(lambda size: fcl.CollisionObject(fcl.Box(*size)))
+        self._request = fcl.CollisionRequest(num_max_contacts=MOST_CONTACTS, enable_contact=True)
+
+    def ask(self, first: fcl.CollisionObject, second: fcl.CollisionObject, size_a: np.ndarray,
+            size_b: np.ndarray) -> tuple[np.ndarray, np.ndarray, float | None] | None:
+        """Return the deepest of FCL's contacts, with its depth."""
+        result = fcl.CollisionResult()
+        fcl.collide(first, second, self._request, result)
+        if not result.contacts:
+            return None
+        deepest = max(result.contacts, key=lambda contact: contact.penetration_depth)
+        return deepest.pos, deepest.normal, deepest.penetration_depth

@@ -13,8 +13,8 @@ a bounding volume tree per box. The rest replaces the paper's "additional algori
   by a triangle's size: `docs/paper_tables.md` has figures.
 
 Some contacts have no pair of triangles: a box inside another, and some exact touches. There, and
-where the normals cancel, SAT's normal and the exact point are the answer. `Soup.soup_misses` counts
-them.
+where the normals cancel, SAT's normal and the exact point are the answer. `Soup.exact_answers`
+counts them.
 """
 from __future__ import annotations
 
@@ -25,8 +25,7 @@ from typing import NamedTuple
 import fcl
 import numpy as np
 
-from ..solver.contact import Contacts
-from ..solver.models import Exact
+from .fcl_box import FclModel
 
 FIRST_CONTACTS = 1 << 16
 """Contacts asked for at first: two cubes exactly on top of each other make 27,400 with N = 22."""
@@ -87,12 +86,6 @@ def _mesh(size: tuple[float, float, float], divisions: int) -> Mesh:
     return Mesh(model, 0.5 * np.linalg.norm(across, axis=1))
 
 
-def _move(soup: fcl.CollisionObject, position: np.ndarray, quaternion: np.ndarray) -> None:
-    """To a position (3,) [m], quaternion (4,) xyzw of any length but zero."""
-    x, y, z, w = quaternion / np.linalg.norm(quaternion)
-    soup.setTransform(fcl.Transform(np.array([w, x, y, z]), position))
-
-
 def collide(first: fcl.CollisionObject, second: fcl.CollisionObject) -> list[fcl.Contact]:
     """All contacts of two soups.
 
@@ -126,57 +119,27 @@ def point_and_normal(contacts: Sequence[fcl.Contact], areas_a: np.ndarray, areas
     return None if length <= CANCELLED else (point, normal / length)
 
 
-class Soup:
+class Soup(FclModel):
     """Polygon soup of N divisions per edge, for any sizes.
 
-    soup_misses: pairs in contact so far that the soup could not answer, and `exact` did.
+    exact_answers: pairs in contact so far that the soup could not answer, and `exact` did.
     """
 
     def __init__(self, divisions: int) -> None:
+        super().__init__(lambda size: fcl.CollisionObject(mesh(size, divisions).model))
         self.divisions = divisions
-        self.soup_misses = 0
-        self._exact = Exact()
-
-        def new_object(size: tuple[float, ...], box: int) -> fcl.CollisionObject:
-            return fcl.CollisionObject(mesh(size, divisions).model)
-
-        # Making one passes over all vertices, so they are kept, and moved: for each solver its own,
-        # for A and for B.
-        self._object = functools.lru_cache(maxsize=64)(new_object)
+        self.exact_answers = 0
 
     def __reduce__(self) -> tuple[type[Soup], tuple[int]]:
         """Pickled without what is kept, which FCL cannot write: for pools of processes."""
         return Soup, (self.divisions,)
 
-    @property
-    def exact_answers(self) -> int:
-        """`soup_misses`, under the name that all models have for it."""
-        return self.soup_misses
-
-    def place(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
-              ) -> tuple[fcl.CollisionObject, fcl.CollisionObject]:
-        """Soups of full extents (3,) at poses (7,), about A's centre; until the next call.
-
-        Directions are the common frame's. B − A is formed in float64 here, so that FCL adds no
-        rounding far from the origin.
-        """
-        first, second = self._object(tuple(size_a), 0), self._object(tuple(size_b), 1)
-        _move(first, np.zeros(3), a[3:])
-        _move(second, b[:3] - a[:3], b[3:])
-        return first, second
-
-    def solve(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
-              threads: int = 1) -> tuple[Contacts, int]:
-        """Return contacts for poses (n, 7), sizes (n or 1, 3), and the first refused row or −1."""
-        found, refused = self._exact.solve(a, b, size_a, size_b, threads)
-        for row in np.flatnonzero(found.colliding) if refused < 0 else ():
-            sizes = size_a[row % len(size_a)], size_b[row % len(size_b)]
-            contacts = collide(*self.place(a[row], b[row], *sizes))
-            answer = point_and_normal(
-                contacts, *(mesh(size, self.divisions).areas for size in sizes))
-            if answer is None:
-                self.soup_misses += 1
-                continue
-            found.point[row] = a[row, :3] + answer[0]
-            found.normal[row] = answer[1]
-        return found, refused
+    def ask(self, first: fcl.CollisionObject, second: fcl.CollisionObject, size_a: np.ndarray,
+            size_b: np.ndarray) -> tuple[np.ndarray, np.ndarray, float | None] | None:
+        """Return the weighted mean of the contacts; the depth is SAT's."""
+        answer = point_and_normal(collide(first, second), *(
+            mesh(size, self.divisions).areas for size in (size_a, size_b)))
+        if answer is None:
+            self.exact_answers += 1
+            return None
+        return (*answer, None)

@@ -236,7 +236,7 @@ def test_refused_rows_are_not_answered():
     size = np.array([poses.CUBE])
     found, refused = model.solve(a, b, size, size)
     assert refused == 1
-    assert found.colliding.tolist() == [True, False, True] and model.soup_misses == 0
+    assert found.colliding.tolist() == [True, False, True] and model.exact_answers == 0
 
 
 @pytest.mark.parametrize('name, divisions', [('soup', 8), ('soup-1', 1), ('soup-16', 16)])
