@@ -18,9 +18,10 @@ from box_contact_ros.core import (
     native,
 )
 from box_contact_ros.reports.accuracy import LIMITS
+from box_contact_ros.resources import resource_path
 from box_contact_ros.scene.pose_sets import SETS, Pairs, log_uniform, quaternion_multiply, turns
 from box_contact_ros.solver.mlp import ACTIVATION, DESCRIPTION, UNITS_MAX
-from box_contact_ros.solver.weights_file import WeightsError, save_weights
+from box_contact_ros.solver.weights_file import WeightsError, load_weights, save_weights, unpacked
 
 N = 10_000
 LANES = native.lanes
@@ -536,6 +537,40 @@ def test_weights_of_another_model_are_refused(tmp_path):
     save_weights(path, {'point': [(rng.normal(size=(4, 6)), rng.normal(size=4))]}, card)
     with pytest.raises(WeightsError, match=f'{FEATURES} inputs and {OUTPUTS}'):
         ContactSolver(UNIT, UNIT, model='mlp', weights=str(path))
+
+
+def listing(path, sizes):
+    """A copy of the shipped network whose card lists pairs of sizes."""
+    shipped = load_weights(resource_path('weights', 'mlp.safetensors'))
+    save_weights(path, {'point': unpacked(shipped.networks['point'])},
+                 shipped.card | {'sizes': sizes})
+    return str(path)
+
+
+def test_sizes_that_the_card_lists_are_for_the_network(mlp, tmp_path):
+    """In one batch, too, in either order of the boxes and of the axes; the rest is exact."""
+    weights = listing(tmp_path / 'some', [[poses.CUBE, poses.CONTAINER]])
+    some = ContactSolver(poses.CONTAINER[::-1], poses.CUBE, model='mlp', weights=weights)
+    pairs = SETS['random cubes'](np.random.default_rng(8), 60)
+    sizes_b = np.tile(poses.CUBE, (len(pairs.pose_b), 1))
+    sizes_b[::2] = poses.CONTAINER
+    a, b = pairs.pose_a, pairs.pose_b
+    found, network, exact = (one.batch(a, b, size_a=poses.CUBE, size_b=sizes_b)
+                             for one in (some, mlp, EXACT))
+    assert np.array_equal(found.point[::2], network.point[::2], equal_nan=True)
+    assert np.array_equal(found.point[1::2], exact.point[1::2], equal_nan=True)
+    assert some.exact_answers >= np.count_nonzero(exact.colliding[1::2]) > 0
+    one = ContactSolver(poses.CUBE, poses.CUBE, model='mlp', weights=weights)
+    assert np.array_equal(one(a[0], b[0]).point, EXACT.batch(
+        a[:1], b[:1], size_a=poses.CUBE, size_b=poses.CUBE).point[0])
+    with pytest.raises(ValueError, match='zero length'):
+        one.batch(np.zeros((1, 7)), b[:1])
+
+
+@pytest.mark.parametrize('sizes', [5, 'abc', [[2, 2]], [poses.CUBE], [[poses.CUBE, (1, -1, 1)]]])
+def test_sizes_in_a_card_that_are_none(tmp_path, sizes):
+    with pytest.raises(WeightsError, match='no pairs of three extents'):
+        ContactSolver(UNIT, UNIT, model='mlp', weights=listing(tmp_path / 'bad', sizes))
 
 
 def test_depths_in_the_sets_are_what_they_say():

@@ -1,6 +1,7 @@
 """The registry of models: one entry makes a model, and what is listed elsewhere is what it has."""
 from __future__ import annotations
 
+import argparse
 import re
 import subprocess
 import sys
@@ -14,7 +15,7 @@ import yaml
 
 import box_contact_ros
 from box_contact_ros import MODELS, ContactSolver
-from box_contact_ros.solver.arguments import model_name
+from box_contact_ros.solver.arguments import model_name, seed_number
 from box_contact_ros.solver.models import Exact, Family, ModelEntry, find_model, model_names
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -55,6 +56,15 @@ def test_a_model_is_added_by_an_entry(lifted, name, lift):
     many = solver.batch([poses.IDENTITY] * 3, [HIGHER] * 3, threads=2)
     assert many.point == pytest.approx(np.tile(want, (3, 1)), abs=1e-15)
     assert model_name(name) == name
+
+
+def test_programs_take_names_and_seeds():
+    with pytest.raises(argparse.ArgumentTypeError, match="'exakt' is not one of"):
+        model_name('exakt')
+    assert seed_number('7') == 7
+    for text in ('-1', '1.5', '²', '9' * 19):
+        with pytest.raises(argparse.ArgumentTypeError, match='no whole number from 0'):
+            seed_number(text)
 
 
 def test_an_added_model_is_named_where_another_is_refused(lifted):
