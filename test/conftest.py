@@ -1,7 +1,7 @@
 """What all tests share: a ROS domain of their own, and programs as processes.
 
-The environment is set while this file is imported: before any test module imports rclpy, which
-reads it once, and so that every process that a test starts inherits it.
+This file sets the environment while it is imported: rclpy reads the environment once, when the
+first test module imports it. Every process that a test starts inherits it.
 """
 
 from __future__ import annotations
@@ -40,9 +40,8 @@ _modules = count()
 
 
 def _domain_id() -> int:
-    # Two runs at once must not hear each other, nor two workers of a run, nor two modules. 1 to
-    # 101: 0 is where everybody's real nodes are, and above 101 ports collide with the ephemeral
-    # ones of Linux.
+    # Two runs at once must not hear each other, nor two workers of a run, nor two modules.
+    # From 1, as everybody's real nodes are in 0; to 101, as ports of more are Linux's ephemeral.
     run = os.environ.get('PYTEST_XDIST_TESTRUNUID', str(os.getpid()))
     worker = int(os.environ.get('PYTEST_XDIST_WORKER', 'gw0').removeprefix('gw'))
     workers = int(os.environ.get('PYTEST_XDIST_WORKER_COUNT', '1'))
