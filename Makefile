@@ -6,7 +6,7 @@ SHELL := bash
 .ONESHELL:
 .NOTPARALLEL:
 .DEFAULT_GOAL := help
-.PHONY: help demo view test check test-arm lint coverage clean
+.PHONY: help demo view test check test-arm coverage clean
 
 # Arguments for the program behind the target: make test ARGS='-k sat -x'
 ARGS ?=
@@ -31,9 +31,8 @@ help:
 	@echo 'make demo     the crane, the contact node, and contacts live in this terminal'
 	echo 'make view     the same in the browser, with models to switch and runs to repeat'
 	echo 'make test     ruff, mypy and all tests'
-	echo 'make check    ruff, mypy, and tests of core, solver and scene: a minute'
+	echo 'make check    all linters, and the quick tests of core, solver and scene: a minute'
 	echo 'make test-arm the C++ test on an emulated 64-bit ARM'
-	echo "make lint     ruff, mypy and ament's linters only"
 	echo 'make coverage share of the core that its own tests run'
 	echo 'make clean    remove .venv and everything that was generated'
 	echo
@@ -56,16 +55,12 @@ test:
 check:
 	@.ci/setup test
 	$(LINT)
-	exec $(PYTEST) test/core test/solver test/scene -m 'not slow' $(ARGS)
+	exec $(PYTEST) -m 'not slow' test/core test/solver test/scene \
+	    test/package/test_house.py test/package/test_ament.py $(ARGS)
 
 test-arm:
 	@.ci/setup test
 	exec bash test/core/arm.sh $(PY)
-
-lint:
-	@.ci/setup test
-	$(LINT)
-	exec $(PY) -m pytest test/package/test_ament.py $(ARGS)
 
 # Lines of the core's Python side, the solver and scenes, that their own tests run.
 coverage:
