@@ -17,6 +17,7 @@ import numpy as np
 
 from .. import output
 from ..baselines.engines import in_subprocess
+from ..core import native
 from ..scene.pose import quaternion_multiply
 from ..scene.pose_sets import Pairs
 from ..solver.arguments import model_name
@@ -174,7 +175,8 @@ def page(rows: Sequence[StabilityRow], command: str) -> str:
     models = list(dict.fromkeys(row.model for row in rows))
     parts = [f"""# Numerical stability
 
-Made by `{command}`. {"BROKEN: " + "; ".join(broken) + "." if broken else
+Made by `{command}` on {output.machine(native)}.
+{"BROKEN: " + "; ".join(broken) + "." if broken else
 "Of `exact` and `mlp`, every verdict and normal is right, and every point in both boxes."}
 
 Families of poses that break collision tests: `box_contact_ros/verification/hard_poses.py` describes

@@ -1,4 +1,4 @@
-"""Fuzz: millions of random pairs, judged by code that shares nothing with the solver's.
+"""Program `fuzz`: millions of random pairs, judged by code that shares nothing with the solver.
 
 `python -m box_contact_ros fuzz` draws pairs of boxes by class of size, in poses of the kinds that
 break collision tests, and asks each model for all of them. Every gate stands at zero: contacts
@@ -9,20 +9,25 @@ pose, ready to be pasted into a test; the exit status is then 1.
 from __future__ import annotations
 
 import argparse
-import csv
 import os
-import platform
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import nullcontext
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 
-from ..solver.arguments import check_ranges, make_room, model_name, seed_number
+from ..core import native
+from ..output import machine, make_room, write_csv
+from ..scene.pose import quaternion_multiply, rotation_matrix
+from ..scene.pose_sets import CONTAINER, Pairs, log_uniform, turns, unit_quaternions
+from ..solver.arguments import check_ranges, model_name, seed_number
 from ..solver.contact_solver import ContactSolver
+from .hard_poses import HIGH_CUBE, TWENTY, right_angles
 from .judge import GATES, exact_gap, judge
 
 PAIRS, QUICK_PAIRS = 10_000_000, 60_000
@@ -41,59 +46,50 @@ Sizes = Callable[[np.random.Generator, int], tuple[np.ndarray, np.ndarray]]
 # --- what is drawn --------------------------------------------------------------------------------
 
 
-def _log_uniform(rng: np.random.Generator, low: float, high: float, n: int | tuple[int, ...],
-                 ) -> np.ndarray:
-    return np.exp(rng.uniform(np.log(low), np.log(high), n))
-
-
 def _cube(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray]:
-    """Equal cubes, 1 cm to 10 m."""
-    size = np.repeat(_log_uniform(rng, 0.01, 10.0, n)[:, None], 3, axis=1)
+    """Draw equal cubes, 1 cm to 10 m."""
+    size = np.repeat(log_uniform(rng, 0.01, 10.0, n)[:, None], 3, axis=1)
     return size, size.copy()
 
 
 def _container(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray]:
-    """ISO containers: 20 and 40 ft, standard and high cube."""
-    kinds = np.array([[6.058, 2.438, 2.591], [12.192, 2.438, 2.591], [6.058, 2.438, 2.896],
-                      [12.192, 2.438, 2.896]])
+    """Draw ISO containers: 20 and 40 ft, standard and high cube."""
+    kinds = np.array([TWENTY, CONTAINER, (6.058, 2.438, 2.896), HIGH_CUBE])
     return kinds[rng.integers(0, 4, n)], kinds[rng.integers(0, 4, n)]
 
 
 def _slab(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray]:
-    """Two wide extents, one of a tenth to a hundredth; the other box is anything."""
-    flat = np.stack([_log_uniform(rng, 1, 3, n), _log_uniform(rng, 1, 3, n),
-                     _log_uniform(rng, 0.01, 0.1, n)], axis=1)
-    return _shuffled(rng, flat), np.exp(rng.uniform(-1.5, 1.0, (n, 3)))
+    """Draw boxes with two wide extents, one of a tenth to a hundredth; the other is anything."""
+    flat = np.stack([log_uniform(rng, 1, 3, n), log_uniform(rng, 1, 3, n),
+                     log_uniform(rng, 0.01, 0.1, n)], axis=1)
+    return rng.permuted(flat, axis=1), np.exp(rng.uniform(-1.5, 1.0, (n, 3)))
 
 
 def _needle(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray]:
-    """One long extent, two of a twentieth to a thousandth; both boxes."""
+    """Draw boxes with one long extent and two of a twentieth to a thousandth; both boxes."""
     sizes = []
     for _ in range(2):
-        thin = _log_uniform(rng, 1e-3, 0.05, (n, 2))
-        sizes.append(_shuffled(rng, np.column_stack([_log_uniform(rng, 0.5, 2, n), thin])))
+        thin = log_uniform(rng, 1e-3, 0.05, (n, 2))
+        sizes.append(rng.permuted(np.column_stack([log_uniform(rng, 0.5, 2, n), thin]), axis=1))
     return sizes[0], sizes[1]
 
 
 def _card(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray]:
-    """Sheets 0.35 mm and thicker, to 1:10,000; both boxes."""
+    """Draw sheets 0.35 mm and thicker, to 1:10,000; both boxes."""
     sizes = []
     for _ in range(2):
-        wide = _log_uniform(rng, 0.05, 3.5, (n, 2))
-        sizes.append(_shuffled(rng, np.column_stack([wide, _log_uniform(rng, 3.5e-4, 2e-3, n)])))
+        wide = log_uniform(rng, 0.05, 3.5, (n, 2))
+        sizes.append(rng.permuted(np.column_stack([wide, log_uniform(rng, 3.5e-4, 2e-3, n)]),
+                                  axis=1))
     return sizes[0], sizes[1]
 
 
 def _small_on_large(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray]:
-    """Ratios of 100 to 1,000,000."""
+    """Draw boxes of size ratios of 100 to 1,000,000."""
     small = np.exp(rng.uniform(-1, 1, (n, 3)))
-    large = np.exp(rng.uniform(-1, 1, (n, 3))) * _log_uniform(rng, 1e2, 1e6, n)[:, None]
+    large = np.exp(rng.uniform(-1, 1, (n, 3))) * log_uniform(rng, 1e2, 1e6, n)[:, None]
     turned = rng.random(n) < 0.5
     return np.where(turned[:, None], large, small), np.where(turned[:, None], small, large)
-
-
-def _shuffled(rng: np.random.Generator, sizes: np.ndarray) -> np.ndarray:
-    return rng.permuted(sizes, axis=1)
 
 
 CLASSES: dict[str, Sizes] = {'cube': _cube, 'container': _container, 'slab': _slab,
@@ -101,27 +97,51 @@ CLASSES: dict[str, Sizes] = {'cube': _cube, 'container': _container, 'slab': _sl
 """Size classes by name."""
 
 
-def draw(name: str, rng: np.random.Generator, n: int) -> tuple[np.ndarray, ...]:
-    """Pairs of a class, n of them: pose_a, pose_b (n, 7), size_a, size_b (n, 3).
+def draw(name: str, rng: np.random.Generator, n: int) -> Pairs:
+    """Draw n pairs of a class.
 
     Orientations: a third anything; a third one of the 24 right-angled ones, tilted by 0 or 1e-16 to
-    0.1 rad; a third with one edge direction in common. Places: a third anywhere near; the others
-    with features of both boxes (corner, middle of an edge or a face) brought together to a gap or
-    overlap of 1e-13 to 0.3 of the size, along one of the fifteen axes or anywhere, and mostly a
-    smaller one across; one in a hundred to 0 or 1e-16 to 1e-13: those take 60 digits to judge. Half
-    of the pairs are then moved rigidly, a fifth of those far from the origin.
+    0.1 rad; a third with one edge direction in common. A third of the places is anywhere near; the
+    others are `_brought_together`. Half of the pairs are then moved rigidly, a fifth of those far
+    from the origin.
     """
     size_a, size_b = CLASSES[name](rng, n)
-    size = np.maximum(size_a, size_b).max(axis=1)
-    turn = _quaternions(rng, n)
+    turn = unit_quaternions(rng, n)
     kind = rng.integers(0, 3, n)
-    right = _RIGHT_ANGLES[rng.integers(0, 24, n)]
-    tilt = _log_uniform(rng, 1e-16, 0.1, n) * (rng.random(n) < 0.9)
-    tilted = _product(_turns(_axes(rng, n), tilt), right)
-    shared = _product(right, _turns(np.eye(3)[rng.integers(0, 3, n)], rng.uniform(-4, 4, n)))
+    right = np.array(right_angles())[rng.integers(0, 24, n)]
+    tilt = log_uniform(rng, 1e-16, 0.1, n) * (rng.random(n) < 0.9)
+    tilted = quaternion_multiply(turns(_axes(rng, n), tilt), right)
+    shared = quaternion_multiply(
+        right, turns(np.eye(3)[rng.integers(0, 3, n)], rng.uniform(-4, 4, n)))
     turn = np.where((kind == 1)[:, None], tilted, np.where((kind == 2)[:, None], shared, turn))
+    place = _brought_together(rng, rotation_matrix(turn), size_a, size_b)
+    anywhere = rng.random(n) < 1.0 / 3.0
+    reach = 0.5 * (size_a + np.abs(rotation_matrix(turn) * size_b[:, None]).sum(axis=2))
+    place = np.where(anywhere[:, None], reach * rng.uniform(-1.05, 1.05, (n, 3)), place)
 
-    axes = _matrices(turn)
+    moved = rng.random(n) < 0.5
+    rigid = np.where(moved[:, None], unit_quaternions(rng, n), [0.0, 0.0, 0.0, 1.0])
+    far = np.where(rng.random(n) < 0.2, log_uniform(rng, 1e2, 1e7, n), 10.0) * moved
+    shift = rng.uniform(-1, 1, (n, 3)) * far[:, None]
+    a = np.concatenate([shift, rigid], axis=1)
+    b = np.concatenate([np.einsum('nij,nj->ni', rotation_matrix(rigid), place) + shift,
+                        quaternion_multiply(rigid, turn)], axis=1)
+    # Quaternions as programs send them: either sign, and a length off by rounding or by drift.
+    for pose in (a, b):
+        pose[:, 3:] *= (rng.choice([-1.0, 1.0], n) * (1.0 + rng.choice(
+            [0.0, 0.0, 1e-15, 1e-7, 1e-3], n)))[:, None]
+    return Pairs(a, b, size_a, size_b)
+
+
+def _brought_together(rng: np.random.Generator, axes: np.ndarray, size_a: np.ndarray,
+                      size_b: np.ndarray) -> np.ndarray:
+    """Draw places (n, 3) of B, turned by axes (n, 3, 3), where features of both boxes meet.
+
+    Corners, middles of edges or faces meet up to a gap or overlap of 1e-13 to 0.3 of the size,
+    along one of the fifteen axes or anywhere. Most have a smaller step across too. One in a hundred
+    has a gap of 0 or 1e-16 to 1e-13 instead, which takes 60 digits to judge.
+    """
+    n = len(axes)
     at_a = 0.5 * rng.integers(-1, 2, (n, 3)) * size_a
     at_b = np.einsum('nij,nj->ni', axes, 0.5 * rng.integers(-1, 2, (n, 3)) * size_b)
     # Along: an axis of A, of B, a cross product, or anything.
@@ -134,78 +154,20 @@ def draw(name: str, rng: np.random.Generator, n: int) -> tuple[np.ndarray, ...]:
     length = np.linalg.norm(crossed, axis=1)
     rows = (which == 2) & (length > 1e-3)
     along[rows] = crossed[rows] / length[rows, None]
+    size = np.maximum(size_a, size_b).max(axis=1)
     least = np.minimum(size_a.min(axis=1), size_b.min(axis=1))
     close = rng.random(n) < 0.01
-    step = np.where(close, _log_uniform(rng, 1e-16, 1e-13, n) * (rng.random(n) < 0.5),
-                    _log_uniform(rng, 1e-13, 0.3, n)) * rng.choice([-1.0, 1.0], n)
+    step = np.where(close, log_uniform(rng, 1e-16, 1e-13, n) * (rng.random(n) < 0.5),
+                    log_uniform(rng, 1e-13, 0.3, n)) * rng.choice([-1.0, 1.0], n)
     place = at_a - at_b + along * (step * np.where(rng.random(n) < 0.5, size, least))[:, None]
     # A step within a plane of contact leaves it as it is: mostly another one comes across.
-    across = _log_uniform(rng, 1e-12, 1e-2, n) * (rng.random(n) < 0.9) * ~close
-    place += _axes(rng, n) * (across * least)[:, None]
-    anywhere = rng.random(n) < 1.0 / 3.0
-    reach = 0.5 * (size_a + np.abs(np.einsum('nij,nj->nij', axes, size_b)).sum(axis=2))
-    place = np.where(anywhere[:, None], reach * rng.uniform(-1.05, 1.05, (n, 3)), place)
-
-    a = np.concatenate([np.zeros((n, 3)), np.tile([0.0, 0, 0, 1], (n, 1))], axis=1)
-    b = np.concatenate([place, turn], axis=1)
-    moved = rng.random(n) < 0.5
-    rigid = np.where(moved[:, None], _quaternions(rng, n), a[:, 3:])
-    far = np.where(rng.random(n) < 0.2, _log_uniform(rng, 1e2, 1e7, n), 10.0) * moved
-    shift = rng.uniform(-1, 1, (n, 3)) * far[:, None]
-    frame = _matrices(rigid)
-    a = np.concatenate([shift, rigid], axis=1)
-    b = np.concatenate([np.einsum('nij,nj->ni', frame, b[:, :3]) + shift, _product(rigid, turn)],
-                       axis=1)
-    # Quaternions as programs send them: either sign, and a length off by rounding or by drift.
-    for pose in (a, b):
-        pose[:, 3:] *= (rng.choice([-1.0, 1.0], n) * (1.0 + rng.choice(
-            [0.0, 0.0, 1e-15, 1e-7, 1e-3], n)))[:, None]
-    return a, b, size_a, size_b
+    across = log_uniform(rng, 1e-12, 1e-2, n) * (rng.random(n) < 0.9) * ~close
+    return place + _axes(rng, n) * (across * least)[:, None]
 
 
 def _axes(rng: np.random.Generator, n: int) -> np.ndarray:
     axes = rng.normal(size=(n, 3))
     return axes / np.linalg.norm(axes, axis=1, keepdims=True)
-
-
-def _quaternions(rng: np.random.Generator, n: int) -> np.ndarray:
-    q = rng.normal(size=(n, 4))
-    return q / np.linalg.norm(q, axis=1, keepdims=True)
-
-
-def _turns(axes: np.ndarray, angles: np.ndarray) -> np.ndarray:
-    return np.concatenate([axes * np.sin(0.5 * angles)[:, None], np.cos(0.5 * angles)[:, None]],
-                          axis=1)
-
-
-def _product(p: np.ndarray, q: np.ndarray) -> np.ndarray:
-    u, w, v, s = p[:, :3], p[:, 3:], q[:, :3], q[:, 3:]
-    return np.concatenate([w * v + s * u + np.cross(u, v),
-                           w * s - np.sum(u * v, axis=1, keepdims=True)], axis=1)
-
-
-def _matrices(q: np.ndarray) -> np.ndarray:
-    x, y, z, w = q.T
-    return np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w),
-                     2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w),
-                     2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-                    axis=1).reshape(-1, 3, 3)
-
-
-def _right_angles() -> np.ndarray:
-    """The 24 orientations that map axes on axes, as quaternions."""
-    half = np.sqrt(0.5)
-    quarter = np.concatenate([half * np.eye(3), np.full((3, 1), half)], axis=1)
-    found = [np.array([0.0, 0.0, 0.0, 1.0])]
-    for q in found:  # grows while it is gone through
-        for turn in quarter:
-            new = _product(q[None], turn[None])[0]
-            if all(min(np.abs(new - old).max(), np.abs(new + old).max()) > 1e-6 for old in found):
-                found.append(new)
-    return np.array(found)
-
-
-_RIGHT_ANGLES = _right_angles()
 
 
 # --- the judgement --------------------------------------------------------------------------------
@@ -250,32 +212,24 @@ class Tally:
                 f'{self.worst_depth:.2g} of its tolerance  {wrong or "no fault"}')
 
 
-def examine(pairs: tuple[np.ndarray, ...], name: str, solvers: dict[str, ContactSolver],
-            ) -> list[Tally]:
-    """Ask each model for pairs (pose_a, pose_b, size_a, size_b), and judge its answers."""
-    a, b, size_a, size_b = pairs
-    gaps: dict[int, float] = {}
-
-    def gap(row: int) -> float:
-        """In 60 digits, and once for all models."""
-        if row not in gaps:
-            gaps[row] = exact_gap(a[row], b[row], size_a[row], size_b[row])
-        return gaps[row]
-
+def examine(pairs: Pairs, name: str, solvers: dict[str, ContactSolver]) -> list[Tally]:
+    """Ask each model for the pairs of a class, and judge the answers."""
+    gap = cache(lambda row: exact_gap(*(part[row] for part in pairs)))  # once for all models
+    touch = TOUCH_ULPS * last_place(pairs)
     tallies = []
     for model, solver in solvers.items():
-        tally = Tally(name, model, pairs=len(a))
+        tally = Tally(name, model, pairs=len(pairs.pose_a))
         tallies.append(tally)
         before = solver.exact_answers
         try:
-            found = solver.batch(a, b, size_a=size_a, size_b=size_b)
+            found = pairs.contacts(solver)
         except Exception as error:
             tally.faults['exception'] += 1
             tally.poses.append(f'# {model}, exception: {error!r}')
             continue
-        verdict = judge(a, b, size_a, size_b, found)
+        verdict = judge(*pairs, found)
         for row in np.flatnonzero(verdict.doubtful):
-            verdict.settle(row, gap(row), found, touch=TOUCH_ULPS * _last_place(pairs, row))
+            verdict.settle(row, gap(row), found, touch=touch[row])
         faults = verdict.faults
         tally.contacts = int(found.colliding.sum())
         tally.near_touch = int(verdict.doubtful.sum())
@@ -289,41 +243,36 @@ def examine(pairs: tuple[np.ndarray, ...], name: str, solvers: dict[str, Contact
     return tallies
 
 
-def _last_place(pairs: tuple[np.ndarray, ...], row: int) -> float:
-    """A unit in the last place of the largest coordinate or size."""
-    a, b, size_a, size_b = (part[row] for part in pairs)
-    return float(np.spacing(max(np.abs(a[:3]).max(), np.abs(b[:3]).max(), size_a.max(),
-                                size_b.max())))
+def last_place(pairs: Pairs) -> np.ndarray:
+    """Return a unit in the last place (n,) of the largest coordinate or size [m]."""
+    parts = [np.abs(pairs.pose_a[:, :3]), np.abs(pairs.pose_b[:, :3]), pairs.size_a, pairs.size_b]
+    return np.spacing(np.hstack(parts).max(axis=1))
 
 
 def _pasted(words: str, model: str, pair: Sequence[np.ndarray]) -> str:
-    """A pair as Python, every digit."""
+    """Return a pair as Python, every digit."""
     values = [', '.join(map(repr, part.tolist())) for part in pair]
     return (f'# {words}\nContactSolver(({values[2]}), ({values[3]}), model={model!r})(\n'
             f'    ({values[0]}),\n    ({values[1]}))')
 
 
 def _piece(job: tuple[str, int, int, int, tuple[str, ...]]) -> list[Tally]:
-    """One piece of a class, for all models. Seeded by itself, whoever runs it."""
+    """Draw and judge one piece of a class, for all models; the seed is the piece's own."""
     name, seed, number, count, models = job
     rng = np.random.default_rng([seed, list(CLASSES).index(name), number])
     return examine(draw(name, rng, count), name, {model: _solver(model) for model in models})
 
 
-_solvers: dict[str, ContactSolver] = {}
-
-
+@cache
 def _solver(model: str) -> ContactSolver:
-    """One per process: loading weights takes longer than a piece."""
-    if model not in _solvers:
-        _solvers[model] = ContactSolver((1, 1, 1), (1, 1, 1), model=model)
-    return _solvers[model]
+    """Return the process's solver: loading weights takes longer than a piece."""
+    return ContactSolver((1, 1, 1), (1, 1, 1), model=model)
 
 
 def fuzz(total: int, *, seed: int = 1, classes: Sequence[str] = tuple(CLASSES),
          models: Sequence[str] = MODELS, workers: int = 1, progress: bool = True,
          ) -> dict[tuple[str, str], Tally]:
-    """Tallies by class and model, of `total` pairs spread evenly over the classes."""
+    """Return tallies by class and model, of `total` pairs spread evenly over the classes."""
     from tqdm import tqdm
 
     jobs = []
@@ -332,9 +281,10 @@ def fuzz(total: int, *, seed: int = 1, classes: Sequence[str] = tuple(CLASSES),
         for number in range(-(-left // PIECE)):
             jobs.append((name, seed, number, min(PIECE, left - number * PIECE), tuple(models)))
     tallies = {(name, model): Tally(name, model) for name in classes for model in models}
-    with tqdm(total=sum(job[3] for job in jobs), desc='fuzz', unit='pair', unit_scale=True,
-              mininterval=1.0, disable=not progress) as bar:
-        for found in _mapped(jobs, workers):
+    with (tqdm(total=sum(job[3] for job in jobs), desc='fuzz', unit='pair', unit_scale=True,
+               mininterval=1.0, disable=not progress) as bar,
+          ProcessPoolExecutor(workers) if workers > 1 else nullcontext() as pool):
+        for found in pool.map(_piece, jobs) if pool else map(_piece, jobs):
             for tally in found:
                 tallies[tally.name, tally.model].add(tally)
             bar.set_postfix(faults=sum(t.broken for t in tallies.values()), refresh=False)
@@ -342,24 +292,11 @@ def fuzz(total: int, *, seed: int = 1, classes: Sequence[str] = tuple(CLASSES),
     return tallies
 
 
-def _mapped(jobs: Sequence[tuple], workers: int) -> Iterator[list[Tally]]:
-    if workers == 1:
-        yield from map(_piece, jobs)
-        return
-    with ProcessPoolExecutor(workers) as pool:
-        yield from pool.map(_piece, jobs)
-
-
-def write_csv(path: Path, tallies: dict[tuple[str, str], Tally]) -> None:
-    """A row per class and model."""
-    with path.open('w', newline='') as file:
-        writer = csv.writer(file, lineterminator='\n')
-        gates = list(next(iter(tallies.values())).faults)
-        writer.writerow(['class', 'model', 'pairs', 'contacts', 'near_touch', 'exact_answers',
-                         'worst_depth_by_tolerance', *gates])
-        for t in tallies.values():
-            writer.writerow([t.name, t.model, t.pairs, t.contacts, t.near_touch, t.exact_answers,
-                             f'{t.worst_depth:.3g}', *t.faults.values()])
+def csv_rows(tallies: Iterable[Tally]) -> list[dict[str, object]]:
+    """Return a row per class and model."""
+    return [{'class': t.name, 'model': t.model, 'pairs': t.pairs, 'contacts': t.contacts,
+             'near_touch': t.near_touch, 'exact_answers': t.exact_answers,
+             'worst_depth_by_tolerance': t.worst_depth, **t.faults} for t in tallies]
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -389,11 +326,11 @@ def main(args: Sequence[str] | None = None) -> int:
         for pose in tally.poses:
             print(f'\n{pose}')
     if options.out:
-        write_csv(options.out, tallies)
+        write_csv(options.out, csv_rows(tallies.values()), digits=3)
     broken = sum(tally.broken for tally in tallies.values())
     print(f'\n{"BROKEN: " + str(broken) + " faults" if broken else "all gates at zero"} after '
           f'{(time.monotonic() - began) / 60:.1f} minutes, seed {options.seed}, '
-          f'Python {platform.python_version()}')
+          f'{machine(native)}')
     return 1 if broken else 0
 
 

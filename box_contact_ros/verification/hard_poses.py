@@ -9,16 +9,18 @@ file, with the true gap and centroid in 60 digits.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from ..scene.pose_sets import Pairs
+from ..scene.pose_sets import CONTAINER as FORTY
+from ..scene.pose_sets import CUBE, Pairs, turns
+from ..solver.pose import quaternion_multiply, rotation_matrix
 
 FILE = Path(__file__).with_name('hard_poses.npz')
-CUBE = (2.0, 2.0, 2.0)
-FORTY, TWENTY, HIGH_CUBE = (12.192, 2.438, 2.591), (6.058, 2.438, 2.591), (12.192, 2.438, 2.896)
+TWENTY, HIGH_CUBE = (6.058, 2.438, 2.591), (12.192, 2.438, 2.896)
 X, Y, Z = np.eye(3)
 UPRIGHT = np.array([0.0, 0.0, 0.0, 1.0])
 
@@ -41,47 +43,43 @@ class Cases(NamedTuple):
 
 
 def turned(axis: tuple[float, ...] | np.ndarray, angle: float) -> np.ndarray:
-    """Quaternion xyzw of a rotation [rad]."""
-    axis = np.asarray(axis, dtype=np.float64)
-    return np.append(np.sin(0.5 * angle) * axis / np.linalg.norm(axis), np.cos(0.5 * angle))
+    """Return the quaternion xyzw of a rotation [rad]."""
+    return turns(axis, np.array([angle]))[0]
 
 
-def product(p: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Quaternion of p after q."""
-    u, w, v, s = p[:3], p[3], q[:3], q[3]
-    return np.append(w * v + s * u + np.cross(u, v), w * s - u @ v)
-
-
-def matrix(q: np.ndarray) -> np.ndarray:
-    """The (3, 3) rotation matrix of a unit quaternion."""
-    x, y, z, w = q
-    return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-                     [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-                     [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]])
-
-
+@cache
 def right_angles() -> list[np.ndarray]:
-    """The 24 orientations that map axes on axes."""
+    """Return the 24 orientations that map axes on axes."""
     found = [UPRIGHT]
-    for q in found:  # grows while it is gone through
+    for q in found:  # grows while the loop runs
         for axis in (X, Y, Z):
-            new = product(q, turned(axis, 0.5 * np.pi))
+            new = quaternion_multiply(q, turned(axis, 0.5 * np.pi))
             if all(min(np.abs(new - p).max(), np.abs(new + p).max()) > 1e-6 for p in found):
                 found.append(new)
     return found
 
 
+def at(place: tuple[float, ...] | np.ndarray, turn: np.ndarray = UPRIGHT,
+       size_a: tuple[float, ...] | np.ndarray = CUBE,
+       size_b: tuple[float, ...] | np.ndarray | None = None) -> Case:
+    """Return the case of A at the origin and B at a place [m]; without `size_b`, of equal boxes."""
+    size_b = size_a if size_b is None else size_b
+    return (np.append(np.zeros(3), UPRIGHT), np.append(place, turn),
+            np.array(size_a, dtype=np.float64), np.array(size_b, dtype=np.float64))
+
+
 def placed(size_a: tuple[float, ...], size_b: tuple[float, ...], turn: np.ndarray,
            along: np.ndarray, gap: float, lateral: tuple[float, ...] | np.ndarray = (0.0, 0.0, 0.0),
            turn_a: np.ndarray = UPRIGHT) -> Case:
-    """A at the origin, B beyond it along a unit direction, `gap` between their projections."""
-    a, b = np.asarray(size_a, dtype=np.float64), np.asarray(size_b, dtype=np.float64)
-    reach = 0.5 * (np.abs(along @ matrix(turn_a)) @ a + np.abs(along @ matrix(turn)) @ b)
-    return (np.append(np.zeros(3), turn_a), np.append((reach + gap) * along + lateral, turn), a, b)
+    """Return A at the origin, B beyond A along a unit direction, `gap` between projections."""
+    reach = 0.5 * sum(np.abs(along @ rotation_matrix(q)) @ np.asarray(size, dtype=np.float64)
+                      for q, size in ((turn_a, size_a), (turn, size_b)))
+    a, *rest = at((reach + gap) * along + lateral, turn, size_a, size_b)
+    return np.append(a[:3], turn_a), *rest
 
 
 def unit(vector: tuple[float, ...] | np.ndarray) -> np.ndarray:
-    """The vector, of length 1."""
+    """Return the vector, of length 1."""
     return np.asarray(vector, dtype=np.float64) / np.linalg.norm(vector)
 
 
@@ -92,11 +90,11 @@ def edge_crossing(gap: float, angle: float = 1.1, along: float = 0.0, size: floa
     B is shifted along A's ridge.
     """
     a = turned(X, 0.25 * np.pi)
-    b = product(turned(Z, angle), turned(X, 0.25 * np.pi))
+    b = quaternion_multiply(turned(Z, angle), turned(X, 0.25 * np.pi))
     return placed((length, size, size), (length, size, size), b, Z, gap, (along, 0.0, 0.0), a)
 
 
-VERTEX_DOWN = product(turned(Y, -np.arctan(np.sqrt(0.5))), turned(X, 0.25 * np.pi))
+VERTEX_DOWN = quaternion_multiply(turned(Y, -np.arctan(np.sqrt(0.5))), turned(X, 0.25 * np.pi))
 """A cube on its corner: its body diagonal is vertical."""
 EDGE_DOWN = turned(X, 0.25 * np.pi)
 
@@ -152,8 +150,9 @@ def a5_right_angles(rng: np.random.Generator) -> Iterator[Case]:
     """All 24 right-angled orientations, and tilts about them."""
     for base in right_angles():
         for tilt in (0.0, 1e-15, 1e-12, 1e-9, 1e-6, 1e-3, 0.05, 0.25 * np.pi):
-            yield placed((3.0, 2.0, 1.0), (2.5, 1.5, 0.5), product(turned(rng.normal(size=3), tilt),
-                         base), (X, Y, Z)[rng.integers(3)], rng.choice([-1e-3, -1e-6, 1e-6]),
+            turn = quaternion_multiply(turned(rng.normal(size=3), tilt), base)
+            yield placed((3.0, 2.0, 1.0), (2.5, 1.5, 0.5), turn,
+                         (X, Y, Z)[rng.integers(3)], rng.choice([-1e-3, -1e-6, 1e-6]),
                          rng.uniform(-0.2, 0.2, 3))
 
 
@@ -161,7 +160,7 @@ def a6_float32_quaternions(rng: np.random.Generator) -> Iterator[Case]:
     """Orientations that have been through float32: a tilt of 1e-7 in aligned stacks."""
     for _ in range(30):
         turn = unit(rng.normal(size=4))
-        a, b, size_a, size_b = placed(FORTY, FORTY, turn, matrix(turn)[:, 2],
+        a, b, size_a, size_b = placed(FORTY, FORTY, turn, rotation_matrix(turn)[:, 2],
                                       rng.choice([-1e-2, -1e-4, 1e-4]), turn_a=turn)
         b[3:] = turn.astype(np.float32)
         yield a, b, size_a, size_b
@@ -169,12 +168,10 @@ def a6_float32_quaternions(rng: np.random.Generator) -> Iterator[Case]:
 
 def b1_exact_touch(rng: np.random.Generator) -> Iterator[Case]:
     """Touch with dyadic numbers: face, edge and corner on each other, nothing rounded."""
-    size = np.array(CUBE)
     for place in ((2, 0, 0), (2, 1, 0.5), (2, 2, 0), (2, 2, 1), (2, 2, 2), (2, -2, 2), (0, 2, -2),
                   (2, 0, 2)):
         for turn in (UPRIGHT, np.array([0.5, 0.5, 0.5, 0.5]), np.array([1.0, 0, 0, 0])):
-            yield (np.append(np.zeros(3), UPRIGHT), np.append(np.array(place, float), turn), size,
-                   size)
+            yield at(place, turn)
     yield from feature_pairs(0.0)
 
 
@@ -200,7 +197,7 @@ def b4_one_axis(rng: np.random.Generator) -> Iterator[Case]:
         while wanted:
             turn = unit(rng.normal(size=4))
             size_a, size_b = np.exp(rng.uniform(-1, 1, (2, 3)))
-            r = matrix(turn)
+            r = rotation_matrix(turn)
             axes = [*np.eye(3), *r.T, *(np.cross(e, f) for e in np.eye(3) for f in r.T)]
             axes = [axis / np.linalg.norm(axis) for axis in axes]
             n = axes[number]
@@ -234,8 +231,7 @@ def b7_corner_gaps(rng: np.random.Generator) -> Iterator[Case]:
     for gap in (1e-9, 1e-6, 1e-3, 0.1):
         for place in ((1, 1, 1), (1, 1, 0), (1, -1, 0.3)):
             step = np.array(place) * np.where(np.abs(place) == 1, 2.0 + gap, 1.0)
-            yield (np.append(np.zeros(3), UPRIGHT), np.append(step, UPRIGHT), np.array(CUBE),
-                   np.array(CUBE))
+            yield at(step)
 
 
 def c1_depths(rng: np.random.Generator) -> Iterator[Case]:
@@ -258,24 +254,21 @@ def c3_contained(rng: np.random.Generator) -> Iterator[Case]:
             for turn in (UPRIGHT, unit(rng.normal(size=4))):
                 size = np.array((2.0, 1.5, 1.2)) / ratio
                 place = share * 0.5 * (np.array(CUBE) - np.linalg.norm(size)) * (0.3, 0.7, 1.0)
-                yield (np.append(np.zeros(3), UPRIGHT), np.append(place, turn), np.array(CUBE),
-                       size)
+                yield at(place, turn, CUBE, size)
 
 
 def c4_concentric(rng: np.random.Generator) -> Iterator[Case]:
     """Centres at one place: the normal's sign is free."""
     for size in (CUBE, (1.0, 1.0, 1.0), (3.0, 1.0, 0.5)):
         for turn in (UPRIGHT, turned(Z, 0.25 * np.pi), unit(rng.normal(size=4))):
-            yield (np.append(np.zeros(3), UPRIGHT), np.append(np.zeros(3), turn), np.array(CUBE),
-                   np.array(size))
+            yield at(np.zeros(3), turn, CUBE, size)
 
 
 def c5_identical(rng: np.random.Generator) -> Iterator[Case]:
     """The same box twice, its axes renamed."""
     for turn in right_angles():
-        size = np.array((3.0, 2.0, 1.0))
-        renamed = np.abs(matrix(turn).T.round()) @ size
-        yield np.append(np.zeros(3), UPRIGHT), np.append(np.zeros(3), turn), size, renamed
+        size = (3.0, 2.0, 1.0)
+        yield at(np.zeros(3), turn, size, np.abs(rotation_matrix(turn).T.round()) @ size)
 
 
 def c6_bars_through(rng: np.random.Generator) -> Iterator[Case]:
@@ -289,16 +282,14 @@ def d1_two_axes(rng: np.random.Generator) -> Iterator[Case]:
     """Two axes with equal depth, and nearly."""
     for nudge in (0.0, 1e-15, -1e-15, 1e-12, -1e-12, 1e-9, -1e-9, 1e-6, -1e-6):
         for t in (1.999, 1.9, 1.0):
-            yield (np.append(np.zeros(3), UPRIGHT), np.append((t + 2 * nudge, t, 0.1), UPRIGHT),
-                   np.array(CUBE), np.array(CUBE))
+            yield at((t + 2 * nudge, t, 0.1))
 
 
 def d2_three_axes(rng: np.random.Generator) -> Iterator[Case]:
     """Three."""
     for nudge in (0.0, 1e-15, 1e-12, 1e-9, 1e-6):
         for t in (1.999, 1.9, 1.0):
-            yield (np.append(np.zeros(3), UPRIGHT), np.append((t + nudge, t, t - nudge), UPRIGHT),
-                   np.array(CUBE), np.array(CUBE))
+            yield at((t + nudge, t, t - nudge))
 
 
 def d3_eighth_turns(rng: np.random.Generator) -> Iterator[Case]:
@@ -312,7 +303,7 @@ def d3_eighth_turns(rng: np.random.Generator) -> Iterator[Case]:
 
 def d4_diagonals(rng: np.random.Generator) -> Iterator[Case]:
     """A body diagonal upright, and the common mistake of 45° twice."""
-    for turn in (VERTEX_DOWN, product(turned(Y, 0.25 * np.pi), turned(X, 0.25 * np.pi))):
+    for turn in (VERTEX_DOWN, quaternion_multiply(turned(Y, 0.25 * np.pi), EDGE_DOWN)):
         for gap in (-0.1, -1e-3, -1e-9, 1e-9, 1e-3):
             yield placed(CUBE, CUBE, turn, Z, gap, (0.2, 0.1, 0.0))
 
@@ -387,9 +378,7 @@ def h3_between_stacks(rng: np.random.Generator) -> Iterator[Case]:
     for gap in (0.02, 0.05, 0.15):
         for degrees in (0.1, 0.5, 1.0, 2.0, 5.0):
             for axis in (X, Z, (1, 0.3, 1)):
-                turn = turned(axis, np.radians(degrees))
-                yield (np.append(np.zeros(3), UPRIGHT),
-                       np.append((0.3, 2.438 + gap, 1.2), turn), np.array(FORTY), np.array(FORTY))
+                yield at((0.3, 2.438 + gap, 1.2), turned(axis, np.radians(degrees)), FORTY)
 
 
 def h6_spreader(rng: np.random.Generator) -> Iterator[Case]:
@@ -398,17 +387,16 @@ def h6_spreader(rng: np.random.Generator) -> Iterator[Case]:
         for gap in (-0.01, -1e-4, 1e-4):
             turn = turned((1, 0.2, 0.1), np.radians(degrees))
             yield placed(FORTY, (12.0, 2.4, 0.3), turn, Z, gap, (0.05, 0.02, 0.0))
-            yield placed(FORTY, (30.0, 0.6, 0.9), product(turned(Z, 0.5 * np.pi), turn), Z, gap)
+            yield placed(FORTY, (30.0, 0.6, 0.9),
+                         quaternion_multiply(turned(Z, 0.5 * np.pi), turn), Z, gap)
 
 
 def h7_bay(rng: np.random.Generator) -> Iterator[Case]:
     """Neighbours of a bay that touch at shared planes."""
     for step in ((0, 1, 0), (0, 0, 1), (1, 0, 0), (0, 1, 1), (0, 2, 0), (1, 1, 0)):
-        place = np.array(step) * FORTY
-        yield (np.append(np.zeros(3), UPRIGHT), np.append(place, UPRIGHT), np.array(FORTY),
-               np.array(FORTY))
-        yield (np.append(np.full(3, 100.3), UPRIGHT), np.append(place + 100.3, UPRIGHT),
-               np.array(FORTY), np.array(FORTY))
+        case = at(np.array(step) * FORTY, UPRIGHT, FORTY)
+        yield case
+        yield moved(case, np.full(3, 100.3), UPRIGHT)
 
 
 FAMILIES: dict[str, Family] = {function.__name__: function for function in (
@@ -427,35 +415,33 @@ own."""
 
 
 def scaled(case: Case, by: float) -> Case:
-    """All lengths times a factor."""
-    a, b, size_a, size_b = (part.copy() for part in case)
-    a[:3] *= by
-    b[:3] *= by
-    return a, b, size_a * by, size_b * by
+    """Return the case with all lengths times a factor."""
+    a, b = (np.append(pose[:3] * by, pose[3:]) for pose in case[:2])
+    return a, b, case[2] * by, case[3] * by
 
 
 def moved(case: Case, shift: np.ndarray, turn: np.ndarray) -> Case:
-    """Both boxes turned about the origin, then shifted."""
-    poses = [np.append(matrix(turn) @ pose[:3] + shift, product(turn, pose[3:]))
-             for pose in case[:2]]
-    return poses[0], poses[1], case[2], case[3]
+    """Return the case with both boxes turned about the origin, then shifted."""
+    a, b = (np.append(rotation_matrix(turn) @ pose[:3] + shift,
+                      quaternion_multiply(turn, pose[3:])) for pose in case[:2])
+    return a, b, case[2], case[3]
 
 
 def renamed(case: Case, box: int, turn: np.ndarray) -> Case:
-    """A box's axes called by other names, its extents along: the same body."""
+    """Return the case with a box's axes called by other names: the same body."""
     parts = list(case)
-    parts[box] = np.append(case[box][:3], product(case[box][3:], turn))
-    parts[2 + box] = np.abs(matrix(turn).T.round()) @ case[2 + box]
+    parts[box] = np.append(case[box][:3], quaternion_multiply(case[box][3:], turn))
+    parts[2 + box] = np.abs(rotation_matrix(turn).T.round()) @ case[2 + box]
     return parts[0], parts[1], parts[2], parts[3]
 
 
 def swapped(case: Case) -> Case:
-    """B for A."""
+    """Return the case with B for A."""
     return case[1], case[0], case[3], case[2]
 
 
 def variants(case: Case, rng: np.random.Generator) -> Iterator[Case]:
-    """The case as it is, and once turned, swapped, renamed or scaled, or several of it."""
+    """Yield the case as it is, and once turned, swapped, renamed or scaled, or several of it."""
     yield case
     other = case
     if rng.random() < 0.6:
@@ -472,14 +458,14 @@ def variants(case: Case, rng: np.random.Generator) -> Iterator[Case]:
 
 
 def generate(name: str, seed: int = 2026) -> Pairs:
-    """The pairs of a family, each with a variant."""
+    """Return the pairs of a family, each with a variant."""
     rng = np.random.default_rng([seed, list(FAMILIES).index(name)])
     cases = [variant for case in FAMILIES[name](rng) for variant in variants(case, rng)]
     return Pairs(*(np.array(column, dtype=np.float64) for column in zip(*cases)))
 
 
 def load(path: Path = FILE) -> dict[str, Cases]:
-    """The families as stored."""
+    """Return the families as stored."""
     with np.load(path) as file:
         return {name: Cases(Pairs(*(file[f'{name}.{part}'] for part in Pairs._fields)),
                             file[f'{name}.gap'], file[f'{name}.centroid']) for name in FAMILIES}

@@ -9,6 +9,7 @@ import pytest
 from gmpy2 import mpfr
 
 from box_contact_ros import ContactSolver
+from box_contact_ros.output import write_csv
 from box_contact_ros.verification import fuzz, judge
 
 SEED = 20260
@@ -32,7 +33,7 @@ def test_gates_are_at_zero(tmp_path):
         assert tally.contacts > tally.pairs / 3
         assert 0 < tally.near_touch < 0.05 * tally.pairs
         assert tally.worst_depth <= 1.0
-    fuzz.write_csv(tmp_path / 'fuzz.csv', tallies)
+    write_csv(tmp_path / 'fuzz.csv', fuzz.csv_rows(tallies.values()))
     with (tmp_path / 'fuzz.csv').open() as file:
         rows = list(csv.DictReader(file))
     assert [(row['class'], row['model']) for row in rows] == list(tallies)
@@ -58,7 +59,7 @@ def settled(pairs, found):
     verdict = judge.judge(*pairs, found)
     for row in np.flatnonzero(verdict.doubtful):
         gap = judge.exact_gap(*(part[row] for part in pairs))
-        verdict.settle(row, gap, found, touch=fuzz.TOUCH_ULPS * fuzz._last_place(pairs, row))
+        verdict.settle(row, gap, found, touch=fuzz.TOUCH_ULPS * fuzz.last_place(pairs)[row])
     return [{text for bit, text in judge.GATES.items() if faults & bit}
             for faults in verdict.faults]
 
