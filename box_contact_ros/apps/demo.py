@@ -1,9 +1,10 @@
 """The demonstration: a contact node and a crane, two processes that talk over DDS.
 
 `python -m box_contact_ros.apps.demo` starts both, shows the crane's live contacts and its summary,
-and ends both again, within a minute. The contacts push the load, one point per tick, and the
-crane says whether it came to rest on the stack; with `--open-loop` they are only recorded. Both
-run in a ROS domain of their own on this host, so that nothing else hears them; the environment
+and ends both again, within a minute. The contacts push the load, one point per tick. The crane
+reports whether the load came to rest on the stack. With `--open-loop` contacts are only recorded.
+
+Both run in a ROS domain of their own on this host, so that nothing else hears them. The environment
 variable `BOX_CONTACT_DEMO_DOMAIN` chooses another one. The exit status is the crane's: 0 only
 if contacts came through, nothing was lost, and, closed loop, the load came to rest.
 """
@@ -21,9 +22,12 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
+from ..scene.pose_sets import CONTAINER
+from ..solver.arguments import within
+from . import processes
 from .crane.landing import LANDING_DURATION
-from .crane.mujoco_crane import CONTAINER_40FT, CraneScenario
-from .processes import DOMAINS, END_PATIENCE, Stop, asked_to_end, end, on_this_host, start
+from .crane.mujoco_crane import CraneScenario
+from .processes import DOMAINS, END_PATIENCE, Stop, asked_to_end, on_this_host, printed, program
 
 DOMAIN_VARIABLE = 'BOX_CONTACT_DEMO_DOMAIN'
 
@@ -44,7 +48,7 @@ Next:
 
 
 def _python() -> str:
-    """This Python as it is called from here: that of `make demo` is no other program's."""
+    """Return this Python as it is called from here: `make demo` uses its own."""
     with contextlib.suppress(ValueError):
         return str(Path(sys.executable).relative_to(Path.cwd()))
     return sys.executable
@@ -54,13 +58,10 @@ def main(args: Sequence[str] | None = None) -> int:
     """Run the demonstration and return the crane's exit status."""
     options = _options(args)
     env = os.environ | on_this_host(options.domain)
-    sizes = [f'{name}:=[{",".join(map(str, CONTAINER_40FT))}]' for name in ('size_a', 'size_b')]
-    model = [f'model:={options.model}'] if options.model else []
-    crane = [
-        f'duration:={options.duration}', f'rate:={options.rate}', 'report:=true',
-        f'wait:={TIME_LIMIT - OVERHEAD - options.duration}',
-        f'closed_loop:={str(options.closed_loop).lower()}',
-    ]
+    sizes = {'size_a': CONTAINER, 'size_b': CONTAINER}
+    node = program('contact_node', **sizes, **({'model': options.model} if options.model else {}))
+    crane = program('crane', **sizes, duration=options.duration, rate=options.rate, report=True,
+                    wait=TIME_LIMIT - OVERHEAD - options.duration, closed_loop=options.closed_loop)
     what = ('sets one container down on another' if options.closed_loop
             else 'lowers one container onto another and lifts it')
     how = 'its contacts hold the load up' if options.closed_loop else 'nothing is done with it'
@@ -68,22 +69,20 @@ def main(args: Sequence[str] | None = None) -> int:
           f'{options.rate:g} Hz.\nA contact node answers; {how}. Both are ROS 2 processes of their '
           f'own, in domain {options.domain} on this host.', flush=True)
     deadline = time.monotonic() + TIME_LIMIT
-    processes: list[subprocess.Popen[bytes]] = []
+    started: list[subprocess.Popen[bytes]] = []
     with tempfile.TemporaryFile() as node_output:
         with asked_to_end() as stop:
             try:
-                processes.append(start('contact_node', sizes + model, env, node_output))
-                processes.append(start('crane', sizes + crane, env, None))
-                status = _watch(processes[0], processes[1], deadline, stop)
+                for command, output in ((node, node_output), (crane, None)):
+                    started.append(processes.start(command, output, env))
+                status = _watch(started[0], started[1], deadline, stop)
             finally:
-                end(processes)
+                processes.end(started)
         if stop.is_set():
             return stop.status
         if status:
-            node_output.seek(0)
-            text = node_output.read().decode(errors='replace').rstrip()
             print(f'demo: failed with status {status}; what contact_node printed:\n'
-                  f'{text or "(nothing)"}', file=sys.stderr)
+                  f'{printed(node_output) or "(nothing)"}', file=sys.stderr)
             return status
     print(NEXT.format(python=_python()))
     return 0
@@ -104,7 +103,7 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
                         help='only record the contacts')
     parser.add_argument('--model', help="the node's model of the contact point (default: closed "
                                         f"loop {LANDING_MODEL}, open loop the node's own)")
-    parser.add_argument('--rate', type=float, default=200.0, metavar='HZ',
+    parser.add_argument('--rate', type=within(1.0, 2000.0), default=200.0, metavar='HZ',
                         help='pairs of poses a second (default: %(default)g)')
     open_loop = CraneScenario().duration
     parser.add_argument('--duration', type=float, metavar='S',
@@ -119,8 +118,6 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
     least = LANDING_LEAST if options.closed_loop else 1.0
     if not least <= options.duration <= 40.0:
         parser.error(f'--duration must lie in {least:g} to 40 s, got {options.duration:g}')
-    if not 1.0 <= options.rate <= 2000.0:
-        parser.error(f'--rate must lie in 1 to 2000 Hz, got {options.rate:g}')
     domain = os.environ.get(DOMAIN_VARIABLE, str(random.choice(DOMAINS)))
     if not domain.isdecimal() or int(domain) > DOMAINS[-1]:
         parser.error(f'{DOMAIN_VARIABLE} must be a number from 0 to {DOMAINS[-1]}, got {domain!r}')
@@ -132,7 +129,7 @@ def _watch(node: subprocess.Popen[bytes], crane: subprocess.Popen[bytes],
            deadline: float, stop: Stop) -> int:
     """Wait for the crane's exit status.
 
-    An early end of the node, the time limit, or being asked to end is a 1.
+    An early end of the node, the time limit, or a signal to this process is a 1.
     """
     while (status := crane.poll()) is None:
         if node.poll() is not None:

@@ -1,39 +1,70 @@
-"""Programs of this package as child processes, in a ROS domain of their own on this host.
+"""Programs of this package as subprocesses, in a ROS domain of their own on this host.
 
-Knows nothing of rclpy: the demonstration starts and ends both its processes from outside.
+Imports no rclpy: the demonstration starts and ends both its processes from outside.
 """
 from __future__ import annotations
 
+import argparse
 import contextlib
 import os
+import random
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import IO, Any
 
+from ..solver.arguments import within
+
 DOMAINS = range(1, 102)
-"""To draw from: 0 is everybody's; beyond 101, ports run into those that Linux hands out."""
+"""Domains to draw from: 0 is everybody's; beyond 101, ports run into those that Linux assigns."""
 END_PATIENCE = 3.0
 """Time [s] between asking a process group to end and killing it."""
 LOOK_PERIOD = 0.05
 """Time [s] after which a signal is noticed, at most."""
 
 
+def add_domain(parser: argparse.ArgumentParser, note: str = '') -> None:
+    """Add `--domain`, drawn at random where it is not given; the help text ends with `note`."""
+    parser.add_argument('--domain', type=within(0, DOMAINS[-1]), default=random.choice(DOMAINS),
+                        metavar='ID',
+                        help=f'ROS domain, 0 to {DOMAINS[-1]} (default: drawn at random{note})')
+
+
 def on_this_host(domain: int) -> dict[str, str]:
-    """Environment of processes that only processes of this host hear, and only in this domain."""
+    """Return the environment of processes that only this host hears, and only in this domain."""
     return {'ROS_DOMAIN_ID': str(domain), 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
 
 
-def start(program: str, parameters: Sequence[str], env: dict[str, str],
-          output: IO[bytes] | int | None) -> subprocess.Popen[bytes]:
-    """Start a program of this package in a process group of its own; `output` None passes it on."""
-    command = [sys.executable, '-m', 'box_contact_ros', program, '--ros-args']
-    for parameter in parameters:
-        command += ['-p', parameter]
-    return subprocess.Popen(command, env=env, stdin=subprocess.DEVNULL, stdout=output,
-                            stderr=subprocess.STDOUT if output else None, start_new_session=True)
+def parameters(**values: object) -> list[str]:
+    """Return the words `-p NAME:=VALUE` that set ROS parameters."""
+    return [word for name, value in values.items() for word in ('-p', f'{name}:={_yaml(value)}')]
+
+
+def _yaml(value: object) -> str:
+    if isinstance(value, (tuple, list)):
+        return f'[{",".join(map(str, value))}]'
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def program(name: str, **values: object) -> list[str]:
+    """Return Python's arguments for a program of this package with ROS parameters."""
+    return ['-m', 'box_contact_ros', name, '--ros-args', *parameters(**values)]
+
+
+def start(arguments: Sequence[str], output: IO[bytes] | int | None = subprocess.DEVNULL,
+          env: Mapping[str, str] | None = None) -> subprocess.Popen[bytes]:
+    """Start Python in a process group of its own; `output` None passes its output on."""
+    return subprocess.Popen([sys.executable, *arguments], env=env, stdin=subprocess.DEVNULL,
+                            stdout=output, stderr=subprocess.STDOUT if output else None,
+                            start_new_session=True)
+
+
+def printed(output: IO[bytes]) -> str:
+    """Return what a process wrote to its file."""
+    output.seek(0)
+    return output.read().decode(errors='replace').rstrip()
 
 
 def end(processes: Sequence[subprocess.Popen[bytes]]) -> None:
@@ -44,7 +75,7 @@ def end(processes: Sequence[subprocess.Popen[bytes]]) -> None:
     for process in processes:
         with contextlib.suppress(subprocess.TimeoutExpired):
             process.wait(max(0.0, deadline - time.monotonic()))
-        # Also where the first process is gone: children of its own may be left in the group.
+        # Also where the first process is gone: its own subprocesses may be left in the group.
         _signal_group(process, signal.SIGKILL)
         process.wait()
 
@@ -55,21 +86,20 @@ def _signal_group(process: subprocess.Popen[bytes], number: signal.Signals) -> N
 
 
 class Stop:
-    """Set when this process was asked to end, by `signals`; the first of them says how.
+    """Set when this process was asked to end, by `signals`; the first of them is the reason.
 
-    No `threading.Event`: a signal's handler runs in the main thread, perhaps while that holds the
-    event's lock, and would wait for itself.
+    A `threading.Event` would deadlock: the handler may run while the main thread holds its lock.
     """
 
     def __init__(self) -> None:
         self.signals: list[int] = []
 
     def is_set(self) -> bool:
-        """Whether a signal came."""
+        """Return whether a signal came."""
         return bool(self.signals)
 
     def wait(self, seconds: float) -> bool:
-        """Sleep so long, or until a signal came; whether one did."""
+        """Sleep this long, or until a signal came; return whether one did."""
         end = time.monotonic() + seconds
         while not self.signals and (left := end - time.monotonic()) > 0.0:
             time.sleep(min(left, LOOK_PERIOD))  # which goes on after a handler has run
@@ -85,7 +115,7 @@ class Stop:
 def asked_to_end() -> Iterator[Stop]:
     """Turn SIGINT, SIGTERM and SIGHUP into a flag.
 
-    An exception might fall between a child's start and its being written down, and leave it alone.
+    An exception could fall between a subprocess's start and its entry in a list, and orphan it.
     """
     stop = Stop()
 

@@ -31,7 +31,7 @@ from ..core import CENTROID_REACH, DEPTH_FLOOR, Stages, native, stages
 from ..resources import resource_path
 from ..scene.pose import rotation_matrix
 from ..scene.pose_sets import SETS, Pairs
-from ..solver.arguments import check_ranges, seed_number
+from ..solver.arguments import seed_number, within
 from ..solver.contact import Contacts
 from ..solver.contact_solver import ContactSolver
 from ..solver.mlp import bounds_of, core_numbers
@@ -447,13 +447,12 @@ def main(args: Sequence[str] | None = None) -> int:
     parser.add_argument('--model', nargs='+', default=['mlp'], choices=list(MODELS),
                         metavar='MODEL', help=f'of {", ".join(MODELS)}; default: mlp')
     parser.add_argument('--weights', help='weights file of MLP, default: the shipped one')
-    parser.add_argument('--pairs', type=int, default=PAIRS, help='a set, default: %(default)s')
+    parser.add_argument('--pairs', type=within(1), default=PAIRS, help='a set, default: %(default)s')
     parser.add_argument('--quick', action='store_true', help=f'{QUICK_PAIRS} pairs a set')
     parser.add_argument('--seed', type=seed_number, default=2,
                         help='of the sets, default: %(default)s')
     output.add_out(parser, 'accuracy.md, accuracy.csv, accuracy.png')
     options = parser.parse_args(args)
-    check_ranges(parser, options, pairs=(1, None))
     folder = output.results_folder(parser, options)
     count = min(options.pairs, QUICK_PAIRS) if options.quick else options.pairs
     try:

@@ -25,7 +25,7 @@ from ..core import native
 from ..output import machine, make_room, write_csv
 from ..scene.pose import quaternion_multiply, rotation_matrix
 from ..scene.pose_sets import CONTAINER, Pairs, log_uniform, turns, unit_quaternions
-from ..solver.arguments import check_ranges, model_name, seed_number
+from ..solver.arguments import model_name, seed_number, within
 from ..solver.contact_solver import ContactSolver
 from .hard_poses import HIGH_CUBE, TWENTY, right_angles
 from .judge import GATES, exact_gap, judge
@@ -303,7 +303,7 @@ def main(args: Sequence[str] | None = None) -> int:
     """Fuzz, print a line per class and model; 1 if a gate is broken."""
     parser = argparse.ArgumentParser(prog='fuzz', description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--pairs', type=int, default=PAIRS, help='in all (default: %(default)s)')
+    parser.add_argument('--pairs', type=within(1), default=PAIRS, help='in all (default: %(default)s)')
     parser.add_argument('--quick', action='store_true', help=f'{QUICK_PAIRS:,} pairs')
     parser.add_argument('--seed', type=seed_number, default=1, help='default: %(default)s')
     parser.add_argument('--classes', nargs='+', choices=list(CLASSES), default=list(CLASSES),
@@ -311,10 +311,9 @@ def main(args: Sequence[str] | None = None) -> int:
     parser.add_argument('--models', nargs='+', type=model_name, default=list(MODELS),
                         metavar='MODEL',
                         help='default: %(default)s')
-    parser.add_argument('--workers', type=int, default=os.cpu_count() or 1, help='processes')
+    parser.add_argument('--workers', type=within(1), default=os.cpu_count() or 1, help='processes')
     parser.add_argument('--out', type=Path, metavar='FILE', help='CSV with the tallies')
     options = parser.parse_args(args)
-    check_ranges(parser, options, pairs=(1, None), workers=(1, None))
     if options.out:
         make_room(parser, options.out)
     began = time.monotonic()

@@ -149,10 +149,10 @@ def test_called_off(program, tmp_path):
 
 
 @pytest.mark.parametrize('arguments, words', [
-    ('--rate 0', '--rate must lie in 1 to 4000'),
-    ('--model exakt', "--model 'exakt' is not one of"),
+    ('--rate 0', 'argument --rate: must lie in 1 to 4000'),
+    ('--model exakt', "argument --model: model 'exakt' is not one of"),
     ('--streams randon', 'invalid choice'),
-    ('--divisions 0', '--divisions must lie in'),
+    ('--divisions 0', 'argument --divisions: must lie in'),
 ])
 def test_bad_options(program, arguments, words):
     running = program('bench', *arguments.split())

@@ -10,15 +10,11 @@ import pytest
 
 pytest.importorskip('mujoco')
 
-from box_contact_ros.apps.crane.mujoco_crane import (
-    CONTAINER_40FT,
-    GRAVITY,
-    MAX_HOIST_SPEED,
-    Crane,
-    CraneScenario,
-)
+from box_contact_ros.apps.crane.mujoco_crane import MAX_HOIST_SPEED, Crane, CraneScenario
+from box_contact_ros.scene.contact_law import GRAVITY
+from box_contact_ros.scene.pose_sets import CONTAINER
 
-LENGTH, WIDTH, HEIGHT = CONTAINER_40FT
+LENGTH, WIDTH, HEIGHT = CONTAINER
 
 # Hangs still and level over the stack: what a test varies stands out.
 STILL = {
@@ -40,7 +36,7 @@ def rotation(pose: np.ndarray) -> np.ndarray:
 def bottom_corners(pose: np.ndarray) -> np.ndarray:
     """World positions (4, 3) of the load's bottom corners, m."""
     signs = np.array(list(product((1, -1), (1, -1), (-1,))))
-    return pose[:3] + (signs * np.array(CONTAINER_40FT) / 2) @ rotation(pose).T
+    return pose[:3] + (signs * np.array(CONTAINER) / 2) @ rotation(pose).T
 
 
 def run(crane: Crane) -> np.ndarray:

@@ -20,7 +20,8 @@ from box_contact_ros.apps.crane.landing import (
     landing_scenario,
     scenario_of,
 )
-from box_contact_ros.apps.crane.mujoco_crane import GRAVITY, Crane
+from box_contact_ros.apps.crane.mujoco_crane import Crane
+from box_contact_ros.scene.contact_law import GRAVITY
 
 CASES = list(cases())
 HANGING_OVER = 17

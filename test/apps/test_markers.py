@@ -17,15 +17,16 @@ from visualization_msgs.msg import Marker, MarkerArray
 from box_contact_ros import ContactSolver
 from box_contact_ros.apps.viewer.markers import PARAMETERS, MarkersNode, box_marker, contact_markers
 from box_contact_ros.node.contact_node import ContactNode
-from box_contact_ros.node.messages import CLOUD_ROW, make_cloud, make_header
+from box_contact_ros.node.messages import make_cloud, make_header
 from box_contact_ros.resources import resource_path
+from box_contact_ros.scene.contact_law import Touch
 from box_contact_ros.scene.pairing import StampedPose
 from box_contact_ros.scene.scene_solver import Answer, Pair
 from box_contact_ros.solver.contact import Contact
 
 SLAB, CUBE = (2.0, 4.0, 1.0), (2.0, 2.0, 2.0)
 HEADER = make_header(1_500_000_000, 'yard')
-ROW = np.array([(1.0, 2.0, 3.0, 0.0, 0.6, 0.8, 0.0125, 0)], CLOUD_ROW)[0]
+TOUCH = Touch(np.array([1.0, 2.0, 3.0]), np.array([0.0, 0.6, 0.8]), 0.0125)
 TOUCHING = np.array([0.5, 0.25, 1.875, 0, 0, 0, 1])
 APART = np.array([0.5, 0.25, 2.5, 0, 0, 0, 1])
 
@@ -49,7 +50,7 @@ def test_a_box_is_a_cube_of_its_full_extents_at_its_pose():
 
 def test_a_contact_is_point_normal_and_depth():
     """The sphere is at the point; the arrow goes from it, along the normal; the depth is in mm."""
-    point, normal, depth = contact_markers(HEADER, ROW, SLAB, CUBE)
+    point, normal, depth = contact_markers(HEADER, TOUCH, SLAB, CUBE)
     assert [m.type for m in (point, normal, depth)] == [
         Marker.SPHERE, Marker.ARROW, Marker.TEXT_VIEW_FACING]
     assert all(m.action == Marker.ADD and m.header == HEADER and m.color.a == 1.0
@@ -66,7 +67,7 @@ def test_a_contact_is_point_normal_and_depth():
 
 def test_without_contact_the_same_markers_are_deleted():
     """A marker is known by namespace and id, so those of both must be the same."""
-    drawn, deleted = (contact_markers(HEADER, row, SLAB, CUBE) for row in (ROW, None))
+    drawn, deleted = (contact_markers(HEADER, touch, SLAB, CUBE) for touch in (TOUCH, None))
     assert [(m.ns, m.id) for m in deleted] == [(m.ns, m.id) for m in drawn]
     assert len({(m.ns, m.id) for m in drawn}) == 3
     assert all(m.action == Marker.DELETE for m in deleted)
@@ -78,7 +79,7 @@ def test_the_rviz_config_names_topics_and_namespaces_that_exist():
                 for display in config['Visualization Manager']['Displays']}
     pose = StampedPose(poses.IDENTITY, 'yard', 0)
     markers = [box_marker(0, pose, CUBE), box_marker(1, pose, CUBE),
-               *contact_markers(HEADER, ROW, CUBE, CUBE)]
+               *contact_markers(HEADER, TOUCH, CUBE, CUBE)]
     assert set(displays['MarkerArray']['Namespaces']) == {marker.ns for marker in markers}
     assert displays['MarkerArray']['Topic']['Value'] == 'markers'
     assert displays['PointStamped']['Topic']['Value'] == 'contact/point'

@@ -27,7 +27,7 @@ from box_contact_ros import ContactSolver
 from box_contact_ros.apps.viewer.style import BOX_A, BOX_B, STALE
 from box_contact_ros.apps.viewer.view_log import LOST_AFTER, ViewLog
 from box_contact_ros.apps.viewer.view_node import ViewNode
-from box_contact_ros.apps.viewer.view_page import _edges, _turn_from_z, read_out
+from box_contact_ros.apps.viewer.view_page import _edges, _quaternion_from_z, read_out
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import CLOUD_ROW, NANOSECONDS
 
@@ -68,11 +68,11 @@ def test_an_answer_belongs_to_the_poses_of_its_stamp(log, cloud_at):
     news.insert(cloud_at, lambda: log.cloud(START, rows(), START + 3 * MS))
     for one in news:
         one()
-    scene, figures = log.scene(), log.figures(START + 4 * MS)
-    assert np.array_equal(scene.poses, (ORIGIN, TOUCHING))
-    assert np.array_equal(scene.answer.point, EXACT.point)
-    assert np.array_equal(scene.answer.normal, EXACT.normal)
-    assert scene.answer.depth == -EXACT.separation == -scene.exact.separation
+    seen, figures = log.snapshot(), log.figures(START + 4 * MS)
+    assert np.array_equal(seen.poses, (ORIGIN, TOUCHING))
+    assert np.array_equal(seen.answer.touch.point, EXACT.point)
+    assert np.array_equal(seen.answer.touch.normal, EXACT.normal)
+    assert seen.answer.touch.depth == -EXACT.separation == -seen.exact.separation
     assert figures.latency_median == pytest.approx(3e-3)
     assert (figures.answered, figures.lost) == (1, 0)
 
@@ -103,8 +103,8 @@ def test_no_contact_has_no_point_and_no_error(log, cloud):
     """No row, or a row of NaN for what could not be evaluated."""
     send(log, START, APART)
     log.cloud(START, cloud, START + MS)
-    scene, figures = log.scene(), log.figures(START)
-    assert scene.answer.point is None and scene.exact.separation == pytest.approx(0.5)
+    seen, figures = log.snapshot(), log.figures(START)
+    assert seen.answer.touch is None and seen.exact.separation == pytest.approx(0.5)
     assert math.isnan(figures.point_error_median) and figures.answered == 1
 
 
@@ -140,17 +140,17 @@ def test_boxes_move_on_when_nobody_answers(log):
     send(log, START)
     log.cloud(START, rows(), START + MS)
     send(log, START + STALE, APART)
-    assert np.array_equal(log.scene().poses[1], TOUCHING)
+    assert np.array_equal(log.snapshot().poses[1], TOUCHING)
     send(log, START + STALE + 1, APART)
-    scene = log.scene()
-    assert np.array_equal(scene.poses[1], APART) and scene.answer is None
+    seen = log.snapshot()
+    assert np.array_equal(seen.poses[1], APART) and seen.answer is None
 
 
 def test_a_run_starts_anew(log):
     send(log, START)
     log.cloud(START, rows(), START + MS)
     log.start_anew()
-    assert log.scene() is None and log.figures(START).answered == 0
+    assert log.snapshot() is None and log.figures(START).answered == 0
 
 
 def test_latest_pairing_answers_with_the_newer_stamp():
@@ -159,7 +159,7 @@ def test_latest_pairing_answers_with_the_newer_stamp():
     log.pose(1, START, TOUCHING)
     log.pose(0, START + 10 * MS, ORIGIN)
     log.cloud(START + 10 * MS, rows(), START + 11 * MS)
-    assert np.array_equal(log.scene().answer.point, EXACT.point)
+    assert np.array_equal(log.snapshot().answer.touch.point, EXACT.point)
 
 
 # --- what is shown --------------------------------------------------------------------------------
@@ -173,7 +173,7 @@ def test_read_out_says_lengths_in_mm_and_shares_of_the_edge(log):
     """3 mm of an edge of 2 m are 0.15 %."""
     send(log, START)
     log.cloud(START, rows(0.003), START + 2 * MS)
-    text = read_out(log.scene(), log.figures(START + 3 * MS), 'soup')
+    text = read_out(log.snapshot(), log.figures(START + 3 * MS), 'soup')
     assert shown(text, 'verdict') == 'contact'
     assert shown(text, 'separation') == '-125.00 mm'
     assert shown(text, 'error') == '3.0 mm = 0.15 %'
@@ -186,10 +186,10 @@ def test_read_out_without_contact_answer_or_poses(log):
     """No figure is made up."""
     assert shown(read_out(None, None, ''), 'verdict') == 'waiting for poses'
     send(log, START, APART)
-    text = read_out(log.scene(), log.figures(START), 'exact')
+    text = read_out(log.snapshot(), log.figures(START), 'exact')
     assert (shown(text, 'verdict'), shown(text, 'error')) == ('no answer', '–')
     log.cloud(START, NO_ROWS, START)
-    text = read_out(log.scene(), log.figures(START), 'exact')
+    text = read_out(log.snapshot(), log.figures(START), 'exact')
     assert (shown(text, 'verdict'), shown(text, 'error')) == ('no contact', '–')
 
 
@@ -197,7 +197,7 @@ def test_read_out_without_contact_answer_or_poses(log):
     (0, 0, 1), (0, 0, -1), (1, 0, 0), (0, -1, 0), (0.36, 0.48, -0.8), (1e-12, 0, -1)])
 def test_the_arrow_is_turned_along_the_normal(direction):
     """Turned by a unit quaternion (w, v), z is v·(2 v_z) + z·(w² − v·v) + 2 w v × z."""
-    w, *v = _turn_from_z(np.array(direction, float))
+    w, *v = _quaternion_from_z(np.array(direction, float))
     v, z = np.array(v), np.array([0.0, 0.0, 1.0])
     assert w * w + v @ v == pytest.approx(1.0)
     turned = 2 * v * v[2] + z * (w * w - v @ v) + 2 * w * np.cross(v, z)
@@ -247,18 +247,18 @@ def test_it_hears_poses_and_answers(view, client):
     """And measures a latency; a pose of NaN, which the contact node refuses, is no pair."""
     client.offer_until_answered(ORIGIN, APART)
     assert client.spin(lambda: view.log is not None, 60.0)
-    deadline = time.monotonic() + MATCH_SECONDS
-    while not (view.log.scene() and view.log.scene().answer):  # the view has to have matched too
+    deadline = time.monotonic() + MATCH_SECONDS  # the view has to have matched too
+    while not (view.log.snapshot() and view.log.snapshot().answer):
         assert time.monotonic() < deadline, 'nothing heard'
         client.ask(ORIGIN, TOUCHING)
     stamp = client.ask(ORIGIN, TOUCHING)
-    assert client.spin(lambda: view.log.scene().answer.stamp == stamp, 10.0)
-    scene = view.log.scene()
-    assert scene.answer.point == pytest.approx(scene.exact.point)
-    assert 0.0 < scene.answer.latency < 5.0
+    assert client.spin(lambda: view.log.snapshot().answer.stamp == stamp, 10.0)
+    seen = view.log.snapshot()
+    assert seen.answer.touch.point == pytest.approx(seen.exact.point)
+    assert 0.0 < seen.answer.latency < 5.0
     client.send(ORIGIN, (math.nan, 0, 0, 0, 0, 0, 1))
     client.ask(ORIGIN, APART)
-    assert client.spin(lambda: view.log.scene().answer.point is None, 10.0)
+    assert client.spin(lambda: view.log.snapshot().answer.touch is None, 10.0)
 
 
 def test_it_switches_the_model_of_the_running_node(view, client, contact_node):
@@ -285,7 +285,7 @@ def test_another_size_is_another_log(view, client, contact_node):
     assert client.spin(lambda: view.log is not old, 10.0)
     view.log.pose(0, START, ORIGIN)
     view.log.pose(1, START, TOUCHING)
-    assert view.log.scene().exact.separation == pytest.approx(1.875 - 2.5)
+    assert view.log.snapshot().exact.separation == pytest.approx(1.875 - 2.5)
     contact_node.set_parameters([Parameter('size_b', value=[2.0, 2.0, 2.5])])  # as others expect
     assert client.spin(lambda: list(view.settings['size_b']) == [2.0, 2.0, 2.5], 10.0)
 

@@ -2,7 +2,7 @@
 
 Contact node, soup node and an echo node run as processes of their own, in a ROS domain of their
 own on this host. Each stream goes to one of them after the other, so that they do not compete for
-cores. Every answer is paired by stamp with what was sent, and held against the exact contact. The
+cores. Every answer is paired by stamp with what was sent, and compared with the exact contact. The
 streams for cubes come first; for the containers the nodes are restarted, with the other sizes.
 With --replay the stream is a recording's pairs of poses of equal stamp, sent at --rate. Prints two
 tables and writes bench.csv, bench.md and bench.png.
@@ -13,9 +13,8 @@ the contact node lost nothing and gave no wrong verdict and no answer twice.
 from __future__ import annotations
 
 import argparse
-import random
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -24,23 +23,30 @@ from tqdm import tqdm
 
 from ...node.contact_node import PARAMETERS
 from ...node.runtime import REFUSALS
-from ...solver.arguments import check_ranges, make_folder
+from ...output import make_folder, percentiles
+from ...solver.arguments import model_name, within
 from ...solver.contact import Contacts
 from ...solver.contact_solver import ContactSolver
 from ...solver.models import MOST_SOUP_DIVISIONS, SOUP_DIVISIONS, model_names
-from ..processes import DOMAINS
-from .bench_drive import Subject, about_the_machine, open_bench
-from .bench_log import (
-    CONTACT_MESSAGES,
-    ECHO_MESSAGES,
-    NodeLog,
-    StreamResult,
+from ..answer_log import StreamResult
+from ..processes import add_domain
+from .bench_drive import (
+    Bench,
+    MeasuredNode,
+    about_the_machine,
+    echo_node,
+    open_bench,
+    solver_node,
+)
+from .bench_report import (
+    all_latencies,
+    bullets,
     draw,
     error_table,
     latency_table,
-    write_csv,
+    write_results,
 )
-from .pose_streams import STREAMS, Stream, by_sizes, make_stream
+from .pose_streams import STREAMS, Replay, Stream, by_sizes, make_stream
 
 NODES = ('contact', 'soup', 'echo')
 SECONDS, LONGEST = 60.0, 3600.0  # of sending, in all: the default, and what is accepted
@@ -55,19 +61,23 @@ def main(args: Sequence[str] | None = None) -> int:
     except REFUSALS as error:
         print(f'error: {error}', file=sys.stderr)
         return 1
-    subjects = _subjects(options)
+    nodes = _nodes(options)
     try:
-        with open_bench(subjects, args, rate=options.rate, domain=options.domain) as bench:
+        with open_bench(nodes, args, rate=options.rate, domain=options.domain) as bench:
             streams = _streams(options)
-            groups = by_sizes(streams)
-            truths = {stream.name: _truth(stream) for group in groups for stream in group}
+            truths = {stream.name: _truth(stream) for stream in streams}
             about = _about(options, streams, bench.node_cores)
             print('\n'.join(f'{name}: {value}' for name, value in about.items()), flush=True)
-            bench.run(groups, truths)
+
+            def play(stream: Stream) -> None:
+                for turn in bench.turns():
+                    bench.play(stream, truths[stream.name], turn)
+
+            bench.run(by_sizes(streams), play)
     except REFUSALS as error:
         print(f'error: {error}', file=sys.stderr)
         return 1
-    passed = _report(options, subjects, bench.notes, about, interrupted=bench.stop.is_set())
+    passed = _report(options, bench, about)
     return bench.stop.status or (0 if passed else 1)
 
 
@@ -77,11 +87,47 @@ def _options(args: Sequence[str]) -> argparse.Namespace:
         epilog='streams:\n' + '\n'.join(
             f'  {name:<14} {source.description}' for name, source in STREAMS.items())
         + '\n\nWhat follows --ros-args is for the bench itself, not for the nodes.')
-    parser.add_argument('--rate', type=float, default=200.0, metavar='HZ',
+    parser.add_argument('--rate', type=within(1.0, 4000.0), default=200.0, metavar='HZ',
                         help='pairs of poses sent per second (default: %(default)g)')
-    parser.add_argument('--duration', type=float, metavar='S',
+    parser.add_argument('--duration', type=within(0.1, LONGEST), metavar='S',
                         help='time in which poses are sent, split evenly over streams and nodes '
                              f'(default: {SECONDS:g}; of a replay, all of it)')
+    _add_source(parser)
+    parser.add_argument('--nodes', nargs='+', choices=NODES, default=list(NODES), metavar='NODE',
+                        help=f'which of: {", ".join(NODES)} (default: all)')
+    parser.add_argument('--model', type=model_name, default=PARAMETERS['model'].default,
+                        metavar='NAME',
+                        help=f'of the contact node: {model_names()} (default: %(default)s)')
+    parser.add_argument('--divisions', type=within(1, MOST_SOUP_DIVISIONS), default=SOUP_DIVISIONS,
+                        metavar='N', help='of an edge in the polygon soup (default: %(default)s)')
+    parser.add_argument('--seed', type=within(0, 2**32), default=1, metavar='N',
+                        help='of the streams (default: %(default)s)')
+    parser.add_argument('--side-by-side', action='store_true',
+                        help='one input for all nodes at the same time, as they would run beside a '
+                             'simulator; they then compete for cores, and the floor with them '
+                             '(default: each stream goes to one node after the other)')
+    parser.add_argument('--out', type=Path, default=Path('bench-results'), metavar='FOLDER',
+                        help='for bench.csv, bench.md, bench.png (default: %(default)s/)')
+    parser.add_argument('--quick', action='store_true',
+                        help=f'{QUICK_SECONDS:g} s per stream, to see that it works')
+    add_domain(parser)
+    options = parser.parse_args(list(args))
+    if options.replay is None:
+        if options.size_a or options.size_b:
+            parser.error('--size-a and --size-b are of a --replay: streams have their sizes')
+        if options.duration is None:
+            options.duration = SECONDS
+    options.streams = [name for name in STREAMS if name in options.streams and not options.replay]
+    options.nodes = [name for name in NODES if name in options.nodes]
+    if options.quick:
+        quick = QUICK_SECONDS * max(1, len(options.streams))
+        options.duration = min(options.duration or quick, quick)
+    make_folder(parser, options.out)
+    return options
+
+
+def _add_source(parser: argparse.ArgumentParser) -> None:
+    """Add the options of what is sent: streams, or a recording."""
     source = parser.add_mutually_exclusive_group()
     source.add_argument('--streams', nargs='+', choices=STREAMS, default=list(STREAMS),
                         metavar='NAME', help='which of the streams below (default: all)')
@@ -95,68 +141,19 @@ def _options(args: Sequence[str]) -> argparse.Namespace:
         parser.add_argument(f'--size-{box}', type=float, nargs=3, metavar=('X', 'Y', 'Z'),
                             help=f'of the replay: full extents of box {box.upper()} [m] '
                                  '(default: as the recording says)')
-    parser.add_argument('--nodes', nargs='+', choices=NODES, default=list(NODES), metavar='NODE',
-                        help=f'which of: {", ".join(NODES)} (default: all)')
-    parser.add_argument('--model', default=PARAMETERS['model'].default, metavar='NAME',
-                        help=f'of the contact node: {model_names()} (default: %(default)s)')
-    parser.add_argument('--divisions', type=int, default=SOUP_DIVISIONS, metavar='N',
-                        help='of an edge in the polygon soup (default: %(default)s)')
-    parser.add_argument('--seed', type=int, default=1, metavar='N',
-                        help='of the streams (default: %(default)s)')
-    parser.add_argument('--side-by-side', action='store_true',
-                        help='one input for all nodes at the same time, as they would run beside a '
-                             'simulator; they then compete for cores, and the floor with them '
-                             '(default: each stream goes to one node after the other)')
-    parser.add_argument('--out', type=Path, default=Path('bench-results'), metavar='FOLDER',
-                        help='for bench.csv, bench.md, bench.png (default: %(default)s/)')
-    parser.add_argument('--quick', action='store_true',
-                        help=f'{QUICK_SECONDS:g} s per stream, to see that it works')
-    parser.add_argument('--domain', type=int, default=None, metavar='ID',
-                        help=f'ROS domain, 0 to {DOMAINS[-1]} (default: drawn at random)')
-    options = parser.parse_args(list(args))
-    try:
-        PARAMETERS['model'].check('--model', options.model)
-    except ValueError as error:
-        parser.error(str(error))
-    if options.replay is None:
-        if options.size_a or options.size_b:
-            parser.error('--size-a and --size-b are of a --replay: streams have their sizes')
-        if options.duration is None:
-            options.duration = SECONDS
-    check_ranges(parser, options, rate=(1, 4000), duration=(0.1, LONGEST),
-                 divisions=(1, MOST_SOUP_DIVISIONS), seed=(0, 2**32), domain=(0, DOMAINS[-1]))
-    options.streams = [name for name in STREAMS if name in options.streams and not options.replay]
-    options.nodes = [name for name in NODES if name in options.nodes]
-    if options.quick:
-        quick = QUICK_SECONDS * max(1, len(options.streams))
-        options.duration = min(options.duration or quick, quick)
-    if options.domain is None:
-        options.domain = random.choice(DOMAINS)
-    make_folder(parser, options.out)
-    return options
 
 
-def _subjects(options: argparse.Namespace) -> list[Subject]:
-    def program(name: str, *parameters: str) -> list[str]:
-        words = [word for parameter in parameters for word in ('-p', parameter)]
-        return ['-m', 'box_contact_ros', name, '--ros-args', *words]
-
-    made = {
-        'contact': lambda: Subject(
-            'contact', program('contact_node', f'model:={options.model}'),
-            NodeLog('contact', options.model, CONTACT_MESSAGES)),
-        'soup': lambda: Subject(
-            'soup', program('soup_node', f'divisions:={options.divisions}'),
-            NodeLog('soup', f'soup-{options.divisions}', CONTACT_MESSAGES), prefix='soup/'),
-        'echo': lambda: Subject(
-            'echo', ['-m', 'box_contact_ros.apps.bench.echo_node', '--ros-args'],
-            NodeLog('echo', '', ECHO_MESSAGES), has_sizes=False),
+def _nodes(options: argparse.Namespace) -> list[MeasuredNode]:
+    """Return the nodes that were asked for; side by side, they listen to the same topics."""
+    poses = {name: '' if options.side_by_side else f'for_{name}/' for name in NODES}
+    nodes = {
+        'contact': solver_node('contact', options.model, poses=poses['contact'],
+                               model=options.model),
+        'soup': solver_node('soup', f'soup-{options.divisions}', poses=poses['soup'],
+                            prefix='soup/', divisions=options.divisions),
+        'echo': echo_node('echo', poses=poses['echo']),
     }
-    subjects = [made[name]() for name in options.nodes]
-    if not options.side_by_side:
-        for subject in subjects:
-            subject.poses = f'for_{subject.name}/'
-    return subjects
+    return [nodes[name] for name in options.nodes]
 
 
 def _streams(options: argparse.Namespace) -> list[Stream]:
@@ -179,36 +176,26 @@ def _truth(stream: Stream) -> Contacts:
 
 def _about(options: argparse.Namespace, streams: list[Stream], node_cores: set[int],
            ) -> dict[str, str]:
-    """Where and how it ran; in the output and in every row of the CSV."""
+    """Return where and how it ran, for the output and every row of the CSV."""
+    replay = [stream.described for stream in streams if isinstance(stream, Replay)]
     return about_the_machine(node_cores) | {
         'nodes run': 'side by side' if options.side_by_side else 'in turn',
         'set rate [Hz]': f'{options.rate:g}',
         'seed': str(options.seed),
-    } | ({'replay': f'{options.replay}: {streams[0].described}'} if options.replay else {})
+    } | ({'replay': f'{options.replay}: {replay[0]}'} if replay else {})
 
 
-def _report(options: argparse.Namespace, subjects: list[Subject], notes: list[str],
-            about: dict[str, str], *, interrupted: bool) -> bool:
-    """Print and write the results; whether the bench passed."""
+def _report(options: argparse.Namespace, bench: Bench, about: Mapping[str, str]) -> bool:
+    """Print and write the results; return whether the bench passed."""
     # A replay has a name that is not in the list, and is the only stream.
     order = {name: number for number, name in enumerate(STREAMS)}
-    results = sorted((result for subject in subjects for result in subject.log.results()),
+    results = sorted((result for node in bench.nodes for result in node.log.results()),
                      key=lambda r: (order.get(r.stream, 0), options.nodes.index(r.node)))
-    if interrupted and not results:
+    if bench.stop.is_set() and not results:
         print('\ninterrupted before the first stream had been answered: no results')
         return False
-    lines = list(notes)
-    if interrupted:
-        lines.append('interrupted: figures are of the streams that ended before')
-    for name in [subject.name for subject in subjects]:
-        lines.append(f'{name}: {_sum(name, results)}')
-    adds_up = all(r.adds_up for r in results) and all(s.log.adds_up for s in subjects)
-    lines.append('sent = answered + lost: ' + ('yes' if adds_up else 'NO'))
-    late = [r for r in results if r.lateness_max > 0.0]
-    if late:
-        p99, most = (1e3 * max(getattr(r, f'lateness_{name}') for r in late)
-                     for name in ('p99', 'max'))
-        lines.append(f'the bench itself was late by p99 {p99:.3f} ms, at most {most:.3f} ms')
+    adds_up = all(r.adds_up for r in results) and all(node.log.adds_up for node in bench.nodes)
+    lines = _findings(bench, results, adds_up=adds_up)
     text = ('latency [ms], from the stamp of the poses to the answer\n\n'
             f'{latency_table(results)}\n\n'
             'error against the exact contact: point [mm], normal [deg]\n\n'
@@ -216,24 +203,37 @@ def _report(options: argparse.Namespace, subjects: list[Subject], notes: list[st
     print(f'\n{text}')
     print('\n'.join(lines), flush=True)
     if results:
-        write_csv(options.out / 'bench.csv', results, about)
-        where = '\n'.join(f'- {name}: {value}' for name, value in about.items())
-        found = '\n'.join(f'- {line}' for line in lines)
-        (options.out / 'bench.md').write_text(f'# Bench\n\n{where}\n\n{text}\n{found}\n', 'utf-8')
+        write_results(options.out / 'bench.csv', results, about)
+        (options.out / 'bench.md').write_text(
+            f'# Bench\n\n{bullets(about)}\n\n{text}\n{bullets(lines)}\n', 'utf-8')
         draw(options.out / 'bench.png', results,
              f'{options.rate:g} Hz, nodes {about["nodes run"]}, {about["machine"]}')
         print(f'results: {options.out}/bench.csv, bench.md, bench.png', flush=True)
     faulty = any(r.faults for r in results if r.node == 'contact')
-    return bool(results) and adds_up and not notes and not faulty and not interrupted
+    return bool(results) and adds_up and not bench.notes and not faulty and not bench.stop.is_set()
 
 
-def _sum(name: str, results: list[StreamResult]) -> str:
+def _findings(bench: Bench, results: Sequence[StreamResult], *, adds_up: bool) -> list[str]:
+    """Return what stands below the tables: faults, sums by node, and how late the bench was."""
+    lines = list(bench.notes)
+    if bench.stop.is_set():
+        lines.append('interrupted: figures are of the streams that ended before')
+    lines += [f'{node.name}: {_sum(node.name, results)}' for node in bench.nodes]
+    lines.append('sent = answered + lost: ' + ('yes' if adds_up else 'NO'))
+    late = [1e3 * np.array(percentiles(r.lateness, 99, 100)) for r in results]
+    if late and np.max(late) > 0.0:
+        p99, most = np.max(late, axis=0)
+        lines.append(f'the bench itself was late by p99 {p99:.3f} ms, at most {most:.3f} ms')
+    return lines
+
+
+def _sum(name: str, results: Sequence[StreamResult]) -> str:
     mine = [r for r in results if r.node == name]
     sent, answered = sum(r.sent for r in mine), sum(r.answered for r in mine)
     faults = [f'{r.stream}: {", ".join(r.faults)}' for r in mine if r.faults]
     text = f'sent {sent}, answered {answered}, lost {sum(r.lost for r in mine)}'
-    latencies = np.concatenate([r.latencies for r in mine] or [np.zeros(0)])
+    latencies = all_latencies(results, name)
     if latencies.size:
-        p50, p99 = np.percentile(1e3 * latencies, (50.0, 99.0))
+        p50, p99 = percentiles(latencies, 50, 99)
         text += f', p50 {p50:.3f} ms, p99 {p99:.3f} ms'
     return f'{text} ({"; ".join(faults)})' if faults else text

@@ -11,32 +11,39 @@ import os
 import platform
 import struct
 import subprocess
-import sys
 import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import IO, Any
 
-import rclpy
+import numpy as np
 from geometry_msgs.msg import PointStamped, PoseStamped, Vector3Stamped
 from rclpy.context import Context
 from rclpy.node import Node
-from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message, serialize_message
-from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header
 from tqdm import tqdm
 
 from ...node.messages import NANOSECONDS, make_header, read_cloud
-from ...node.runtime import let_callbacks_finish, make_executor, spin_for
+from ...node.runtime import let_callbacks_finish, spin_for
+from ...output import processor
 from ...solver.contact import Contacts
-from ..processes import Stop, asked_to_end, end, on_this_host
-from .bench_log import NodeLog
+from ..answer_log import CONTACT_MESSAGES, ECHO_MESSAGES, AnswerLog, first_row
+from ..processes import (
+    Stop,
+    asked_to_end,
+    end,
+    on_this_host,
+    parameters,
+    printed,
+    program,
+    start,
+)
+from ..ros_client import DEEP_RELIABLE, joined, pose_message
 from .echo_node import raw_stamp
 from .pose_streams import Stream
 
@@ -48,8 +55,6 @@ DRAIN_SILENCE = 1.0  # s without an answer: what is still out is lost
 DRAIN_LIMIT = 15.0  # s for the last answers of a node that has fallen behind
 SLICE = 0.05  # s between looks at whether the bench was called off
 
-# Deep: what the DDS layer delivers while Python is busy must not push out the rest.
-DEEP = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
 MESSAGES = {
     'cloud': (PointCloud2, 'contacts'),
     'point': (PointStamped, 'contact/point'),
@@ -57,61 +62,84 @@ MESSAGES = {
     'echo': (Header, 'echo'),
 }
 """Type and topic of each kind of answer; the soup's topics stand under soup/."""
-CLOUD_COLUMNS = ('x', 'y', 'z', 'normal_x', 'normal_y', 'normal_z', 'depth')
 
 
 @dataclass
-class Subject:
-    """A node that is measured: how it is started, what it answers, what it answered."""
+class MeasuredNode:
+    """A node that is measured: how it is started, what it answered, its process while it runs."""
 
-    name: str
+    log: AnswerLog
     command: list[str]
-    """Arguments of Python; the sizes are added."""
-    log: NodeLog
-    prefix: str = ''
-    """Of the topics it answers on."""
+    """Arguments of Python; the sizes and the pose topics are added."""
     poses: str = ''
     """Prefix of the pose topics that it listens to."""
-    has_sizes: bool = True
+    prefix: str = ''
+    """Of the topics it answers on."""
     failed: bool = False
     """Did not answer, or ended; for the group of streams that is under way."""
+    process: subprocess.Popen[bytes] | None = None
+    output: IO[bytes] | None = None
+
+    @property
+    def name(self) -> str:
+        """What tables call the node."""
+        return self.log.node
+
+    def start(self, stream: Stream, cores: set[int]) -> None:
+        """Start the process on some cores, for the boxes of a stream."""
+        sizes = {'size_a': stream.size_a, 'size_b': stream.size_b}
+        remaps = [word for box in ('box_a', 'box_b') for word in (
+            '-r', f'{box}/pose:={self.poses}{box}/pose') if self.poses]
+        has_sizes = self.log.kinds != ECHO_MESSAGES
+        self.failed, self.output = False, tempfile.TemporaryFile()
+        self.process = start([*self.command, *(parameters(**sizes) if has_sizes else []), *remaps],
+                             self.output)
+        # It has inherited this process's core; now, before it has threads, it gets its own.
+        with contextlib.suppress(ProcessLookupError):
+            os.sched_setaffinity(self.process.pid, cores)
+
+    def ended(self) -> int | None:
+        """Return the exit status of the process, None while it runs."""
+        return self.process.poll() if self.process else None
 
 
-@dataclass(frozen=True)
-class Running:
-    """The process of a node, and the file that holds what it prints."""
-
-    subject: Subject
-    process: subprocess.Popen[bytes]
-    output: IO[bytes]
+def solver_node(name: str, model: str, /, *, poses: str, prefix: str = '',
+                **values: object) -> MeasuredNode:
+    """Return a contact or soup node that is not started yet; `values` are its parameters."""
+    return MeasuredNode(AnswerLog(name, model, CONTACT_MESSAGES),
+                        program(f'{name}_node', **values), poses, prefix)
 
 
-@dataclass
-class Clock:
-    """Time [ns] that starts as the system's and then only runs: nobody sets it meanwhile."""
+def echo_node(name: str, *, poses: str, prefix: str = '', bare: bool = False) -> MeasuredNode:
+    """Return an echo node that is not started yet."""
+    return MeasuredNode(AnswerLog(name, '', ECHO_MESSAGES), [
+        '-m', 'box_contact_ros.apps.bench.echo_node', *(['--bare'] if bare else []), '--ros-args',
+        '-r', f'echo:={prefix}echo'], poses, prefix)
 
-    start: int = field(default_factory=lambda: time.time_ns() - time.perf_counter_ns())
 
-    def now(self) -> int:
-        return self.start + time.perf_counter_ns()
+def monotonic_clock() -> Callable[[], int]:
+    """Return a clock [ns] that starts at the system's time and is never set back."""
+    start = time.time_ns() - time.perf_counter_ns()
+    return lambda: start + time.perf_counter_ns()
 
 
 class BenchNode(Node):
     """Publishes poses that were serialised before, keeps the bytes of what comes back."""
 
-    def __init__(self, context: Context, subjects: Sequence[Subject], clock: Clock) -> None:
+    def __init__(self, context: Context, nodes: Sequence[MeasuredNode],
+                 clock: Callable[[], int]) -> None:
         super().__init__('bench', context=context)
         self.arrivals: list[tuple[int, int, str, bytes]] = []
-        """(received [ns], number of the subject, kind, message)."""
+        """(received [ns], number of the node, kind, message)."""
         self._publishers_ab = {
-            poses: [self.create_publisher(PoseStamped, f'{poses}{box}/pose', DEEP)
+            poses: [self.create_publisher(PoseStamped, f'{poses}{box}/pose', DEEP_RELIABLE)
                     for box in ('box_a', 'box_b')]
-            for poses in dict.fromkeys(subject.poses for subject in subjects)}
-        for number, subject in enumerate(subjects):
-            for kind in subject.log.kinds:
+            for poses in dict.fromkeys(node.poses for node in nodes)}
+        for number, node in enumerate(nodes):
+            for kind in node.log.kinds:
                 message, topic = MESSAGES[kind]
-                self.create_subscription(message, subject.prefix + topic,
-                                         self._keep(number, kind, clock.now), DEEP, raw=True)
+                self.create_subscription(message, node.prefix + topic,
+                                         self._keep(number, kind, clock), DEEP_RELIABLE, raw=True)
 
     def _keep(self, number: int, kind: str, now: Callable[[], int]) -> Callable[[bytes], None]:
         arrivals = self.arrivals
@@ -121,142 +149,126 @@ class BenchNode(Node):
         return callback
 
     def senders(self, poses: str) -> list[Callable[[bytes], None]]:
-        """What sends a serialised pose of box A, and of box B, under that prefix."""
+        """Return what sends a serialised pose of box A, and of box B, under that prefix."""
         return [publisher.publish for publisher in self._publishers_ab[poses]]
 
 
 class Bench:
     """One run: starts the nodes group by group, plays the streams, keeps the logs."""
 
-    def __init__(self, node: BenchNode, subjects: list[Subject], *, rate: float, clock: Clock,
-                 stop: Stop, node_cores: set[int]) -> None:
+    def __init__(self, nodes: Sequence[MeasuredNode], client: BenchNode, executor: Any, *,
+                 clock: Callable[[], int], rate: float, node_cores: set[int], stop: Stop) -> None:
         """rate: pairs a second [Hz]; stop: set to call all off; node_cores: of the nodes."""
-        self.node, self.subjects, self.rate, self.clock = node, subjects, rate, clock
-        self.stop, self.node_cores = stop, node_cores
+        self.nodes, self.client, self.executor, self.clock = nodes, client, executor, clock
+        self.rate, self.node_cores, self.stop = rate, node_cores, stop
         self.notes: list[str] = []
         """What went wrong with the nodes as such."""
-        self.executor = make_executor(node.context)
-        self.executor.add_node(node)
-        let_callbacks_finish()
-        self._running: list[Running] = []
+        self.on_answer: Callable[[], None] = lambda: None
+        """Called after messages were handed to the logs."""
         self._last = 0
 
-    def run(self, groups: list[list[Stream]], truths: dict[str, Contacts], *, play: bool = True,
-            ) -> None:
-        """Play all streams; what was done when `stop` is set stays in the logs.
+    def run(self, groups: list[list[Stream]], play: Callable[[Stream], None]) -> None:
+        """Start the nodes for each group of streams; when they answer, `play` each stream of it.
 
-        play: otherwise the nodes are only started, until they answer.
+        What was done when `stop` is set stays in the logs.
         """
         for streams in groups:
             if self.stop.is_set():
                 return
             try:
-                self._start(streams[0])
+                for node in self.nodes:
+                    node.start(streams[0], self.node_cores)
                 self._await_answers(streams[0])
-                for stream in streams if play else ():
-                    for turn in self._turns():
-                        self._play(stream, truths[stream.name], turn)
+                for stream in streams:
+                    play(stream)
             finally:
-                self._end()
+                self.end()
 
-    def _turns(self) -> list[list[Subject]]:
-        """Who is sent a stream at the same time: all that listen to the same topics."""
-        turns: dict[str, list[Subject]] = {}
-        for subject in self.subjects:
-            if not subject.failed:
-                turns.setdefault(subject.poses, []).append(subject)
+    def turns(self) -> list[list[MeasuredNode]]:
+        """Return which nodes are sent a stream together: all that listen to the same topics."""
+        turns: dict[str, list[MeasuredNode]] = {}
+        for node in self.nodes:
+            if not node.failed:
+                turns.setdefault(node.poses, []).append(node)
         return list(turns.values())
 
     # --- processes -------------------------------------------------------------------------------
 
-    def _start(self, stream: Stream) -> None:
-        sizes = [word for name in ('size_a', 'size_b') for word in (
-            '-p', f'{name}:=[{",".join(map(str, getattr(stream, name)))}]')]
-        for subject in self.subjects:
-            remaps = [word for box in ('box_a', 'box_b') for word in (
-                '-r', f'{box}/pose:={subject.poses}{box}/pose') if subject.poses]
-            subject.failed, output = False, tempfile.TemporaryFile()
-            process = subprocess.Popen(
-                [sys.executable, *subject.command, *(sizes if subject.has_sizes else []), *remaps],
-                stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT,
-                start_new_session=True)
-            self._running.append(Running(subject, process, output))
-            # It has inherited this process's core; now, before it has threads, it gets its own.
-            with contextlib.suppress(ProcessLookupError):
-                os.sched_setaffinity(process.pid, self.node_cores)
-
     def _await_answers(self, stream: Stream) -> None:
         """Offer pairs until every node has answered one, then some at the rate, to warm up."""
-        answered_before = {s.name: len(s.log.offers_answered) for s in self.subjects}
-        waiting = list(self._running)
+        answered_before = {node.name: len(node.log.offers_answered) for node in self.nodes}
+        waiting = list(self.nodes)
         deadline = time.monotonic() + START_LIMIT
         offers = _serialised(stream, [0] * WARM_UP)
         with _bar(len(waiting), f'start {_lengths(stream)}', 'node') as bar:
             while waiting and not self.stop.is_set():
-                for running in list(waiting):
-                    subject, process = running.subject, running.process
-                    if len(subject.log.offers_answered) > answered_before[subject.name]:
-                        waiting.remove(running)
+                for node in list(waiting):
+                    if len(node.log.offers_answered) > answered_before[node.name]:
+                        waiting.remove(node)
                         bar.update()
-                    elif process.poll() is not None:
-                        self._fail(running, f'ended with status {process.returncode}')
-                        waiting.remove(running)
+                    elif node.ended() is not None:
+                        self._fail(node, f'ended with status {node.ended()}')
+                        waiting.remove(node)
                     elif time.monotonic() > deadline:
-                        self._fail(running, f'did not answer within {START_LIMIT:g} s')
-                        waiting.remove(running)
-                for turn in self._turns():
+                        self._fail(node, f'did not answer within {START_LIMIT:g} s')
+                        waiting.remove(node)
+                for turn in self.turns():
                     self._offer(turn, offers[:1])
                 self._spin(time.monotonic() + OFFER_PERIOD)
                 self._decode()
-        for turn in self._turns():
+        for turn in self.turns():
             last = self._offer(turn, offers)
             # A soup may still be busy with them for seconds.
             self._drain(partial(_unanswered, turn, last))
 
-    def _fail(self, running: Running, why: str) -> None:
-        running.subject.failed = True
-        running.output.seek(0)
-        printed = running.output.read().decode(errors='replace').strip().splitlines()
-        last = f': {printed[-1]}' if printed else ''
-        self.notes.append(f'{running.subject.name} {why}{last}')
+    def _fail(self, node: MeasuredNode, why: str) -> None:
+        node.failed = True
+        *_, last = ['', *(printed(node.output).splitlines() if node.output else [])]
+        self.notes.append(f'{node.name} {why}{": " if last else ""}{last}')
 
-    def _end(self) -> None:
-        """End the processes."""
-        for running in self._running:
-            if running.process.poll() is not None and not running.subject.failed:
-                self._fail(running, f'ended early with status {running.process.returncode}')
-        end([running.process for running in self._running])
-        for running in self._running:
-            running.output.close()
-        self._running = []
+    def end(self) -> None:
+        """End the processes that still run."""
+        for node in self.nodes:
+            if node.ended() is not None and not node.failed:
+                self._fail(node, f'ended early with status {node.ended()}')
+        end([node.process for node in self.nodes if node.process])
+        for node in self.nodes:
+            if node.output:
+                node.output.close()
+            node.process = node.output = None
 
     # --- sending and receiving -------------------------------------------------------------------
 
-    def _play(self, stream: Stream, truth: Contacts, turn: list[Subject]) -> None:
+    def play(self, stream: Stream, truth: Contacts | None, turn: list[MeasuredNode]) -> None:
         """Send a stream to the nodes of one turn, and wait for their last answers."""
         if self.stop.is_set():
             return
-        for subject in turn:
-            subject.log.open(stream.name, truth)
+        for node in turn:
+            node.log.open(stream.name, len(stream), truth)
         pairs = _serialised(stream, range(len(stream)))
         sent: list[tuple[int, float]] = []
-        sender = threading.Thread(target=self._send, args=(turn[0].poses, pairs, sent))
-        who = ' '.join(subject.name for subject in turn)
+        who = ' '.join(node.name for node in turn)
         with _bar(len(pairs), f'{stream.name} ({who})', 'pair') as bar, _no_collection():
-            sender.start()
-            while sender.is_alive():
-                self._spin(time.monotonic() + SLICE)
-                bar.update(len(sent) - bar.n)
-            bar.update(len(sent) - bar.n)
+            self._send_and_receive(turn, pairs, sent, lambda: bar.update(len(sent) - bar.n))
         for stamp, lateness in sent:
-            for subject in turn:
-                subject.log.sent(stamp, lateness)
-        self._drain(lambda: sum(subject.log.outstanding for subject in turn))
+            for node in turn:
+                node.log.sent(stamp, lateness)
+        self._drain(lambda: sum(node.log.outstanding for node in turn))
+
+    def _send_and_receive(self, turn: list[MeasuredNode], pairs: list[Any],
+                          sent: list[tuple[int, float]],
+                          show: Callable[[], object] = lambda: None) -> None:
+        """Send pairs in a thread, receive meanwhile, and `show` how far it is."""
+        sender = threading.Thread(target=self._send, args=(turn[0].poses, pairs, sent))
+        sender.start()
+        while sender.is_alive():
+            self._spin(time.monotonic() + SLICE)
+            show()
 
     def _send(self, poses: str, pairs: list[tuple[tuple[bytes, bytes], ...]],
               sent: list[tuple[int, float]]) -> None:
         """Send pairs at the rate; the schedule is absolute, so lateness is not handed on."""
-        publish_a, publish_b = self.node.senders(poses)
+        publish_a, publish_b = self.client.senders(poses)
         period, stopped = 1.0 / self.rate, self.stop.is_set
         start = time.perf_counter() + SLICE
         for row, ((head, tail_a), (_, tail_b)) in enumerate(pairs):
@@ -271,21 +283,18 @@ class Bench:
             publish_b(middle + tail_b)
             sent.append((stamp, max(0.0, -left)))
 
-    def _offer(self, turn: list[Subject], pairs: list[Any]) -> set[int]:
-        """Send pairs that count in no figure; their stamps [ns]."""
+    def _offer(self, turn: list[MeasuredNode], pairs: list[Any]) -> set[int]:
+        """Send pairs that count in no figure; return their stamps [ns]."""
         sent: list[tuple[int, float]] = []
-        sender = threading.Thread(target=self._send, args=(turn[0].poses, pairs, sent))
-        sender.start()
-        while sender.is_alive():
-            self._spin(time.monotonic() + SLICE)
+        self._send_and_receive(turn, pairs, sent)
         stamps = {stamp for stamp, _ in sent}
-        for subject in turn:
-            subject.log.offers |= stamps
+        for node in turn:
+            node.log.offers |= stamps
         return stamps
 
     def _stamp(self) -> int:
-        """The time [ns], later than any before: stamps are names here."""
-        self._last = max(self.clock.now(), self._last + 1)
+        """Return the time [ns], later than any before: stamps are names here."""
+        self._last = max(self.clock(), self._last + 1)
         return self._last
 
     def _spin(self, until: float) -> None:
@@ -309,28 +318,24 @@ class Bench:
         self._decode()
 
     def _decode(self) -> int:
-        """Hand what has arrived to the logs; how many messages it was."""
-        arrivals = self.node.arrivals
+        """Hand what has arrived to the logs; return how many messages it was."""
+        arrivals = self.client.arrivals
         count = len(arrivals)
         for received, number, kind, data in arrivals:
-            values: Sequence[float] = ()
+            values: Sequence[float] | np.ndarray = ()
             if kind != 'echo':
                 message = deserialize_message(data, MESSAGES[kind][0])
                 values = _values(kind, message)
-            self.subjects[number].log.answer(kind, raw_stamp(data), received, values)
+            self.nodes[number].log.answer(kind, raw_stamp(data), received, values)
         arrivals.clear()
+        self.on_answer()
         return count
-
-    def close(self) -> None:
-        """End everything that still runs."""
-        self._end()
-        self.executor.shutdown()
 
 
 @contextlib.contextmanager
-def open_bench(subjects: list[Subject], args: Sequence[str], *, rate: float, domain: int,
-               kind: type[Bench] = Bench) -> Iterator[Bench]:
-    """A bench of its own ROS domain and cores. Afterwards all is as it was, and no node is left.
+def open_bench(nodes: Sequence[MeasuredNode], args: Sequence[str], *, rate: float, domain: int,
+               ) -> Iterator[Bench]:
+    """Give a bench of its own ROS domain and cores. Afterwards all is as it was, no node is left.
 
     args: what follows the program's name, for rclpy. SIGINT, SIGTERM and SIGHUP set `bench.stop`,
     so that the nodes are ended and the results kept.
@@ -339,68 +344,52 @@ def open_bench(subjects: list[Subject], args: Sequence[str], *, rate: float, dom
     os.environ |= on_this_host(domain)
     cores = os.sched_getaffinity(0)
     own = {max(cores)} if len(cores) > 1 else cores
-    context, node, bench = Context(), None, None
+    clock = monotonic_clock()
     with asked_to_end() as stop:
         try:
             os.sched_setaffinity(0, own)  # before rclpy starts its threads, which inherit it
-            rclpy.init(args=list(args), context=context,
-                       signal_handler_options=SignalHandlerOptions.NO)
-            clock = Clock()
-            node = BenchNode(context, subjects, clock)
-            bench = kind(node, subjects, rate=rate, clock=clock, stop=stop,
-                         node_cores=cores - own or cores)
-            yield bench
+            with joined(partial(BenchNode, nodes=nodes, clock=clock), args) as (client, executor):
+                let_callbacks_finish()
+                bench = Bench(nodes, client, executor, clock=clock, rate=rate, stop=stop,
+                              node_cores=cores - own or cores)
+                try:
+                    yield bench
+                finally:
+                    bench.end()
         finally:
-            if bench is not None:
-                bench.close()
-            if node is not None:
-                node.destroy_node()
-            context.try_shutdown()
             os.sched_setaffinity(0, cores)
 
 
 def about_the_machine(node_cores: set[int]) -> dict[str, str]:
-    """Where a bench runs; called in one."""
+    """Return where a bench runs; called in one."""
     def listed(cores: set[int]) -> str:
         return ' '.join(map(str, sorted(cores)))
 
-    return {'machine': f'{platform.node()}: {_processor()}, {os.cpu_count()} cores',
+    return {'machine': f'{platform.node()}: {processor()}, {os.cpu_count()} cores',
             'cores': f'bench on {listed(os.sched_getaffinity(0))}, nodes on {listed(node_cores)}',
             'load at start': f'{os.getloadavg()[0]:.2f}',
             'python': platform.python_version()}
 
 
-def _processor() -> str:
-    with contextlib.suppress(OSError):
-        for line in Path('/proc/cpuinfo').read_text().splitlines():
-            if line.startswith('model name'):
-                return line.partition(':')[2].strip()
-    return platform.machine()
+def _unanswered(turn: list[MeasuredNode], offers: set[int]) -> int:
+    """Return how many answers to these offers (stamps) have not come."""
+    return sum(len(offers - node.log.offers_answered) for node in turn)
 
 
-def _unanswered(turn: list[Subject], offers: set[int]) -> int:
-    """How many answers to these offers (stamps) have not come."""
-    return sum(len(offers - subject.log.offers_answered) for subject in turn)
-
-
-def _values(kind: str, message: Any) -> Sequence[float]:
+def _values(kind: str, message: Any) -> Sequence[float] | np.ndarray:
     if kind == 'cloud':
-        rows = read_cloud(message)  # of pair 0, the only one
-        return [float(rows[0][name]) for name in CLOUD_COLUMNS] if len(rows) else ()
+        return first_row(read_cloud(message))  # of pair 0, the only one
     vector = message.point if kind == 'point' else message.vector
     return vector.x, vector.y, vector.z
 
 
 def _serialised(stream: Stream, rows: Sequence[int]) -> list[tuple[tuple[bytes, bytes], ...]]:
-    """The pairs of some rows, each message cut in two: the stamp goes between."""
+    """Return the pairs of some rows, each message cut in two: the stamp goes between."""
     pairs = []
     for row in rows:
         pair = []
         for values in (stream.pose_a[row], stream.pose_b[row]):
-            message = PoseStamped(header=make_header(0, 'world'))
-            p, q = message.pose.position, message.pose.orientation
-            p.x, p.y, p.z, q.x, q.y, q.z, q.w = map(float, values)
-            data = serialize_message(message)
+            data = serialize_message(pose_message(make_header(0, 'world'), values))
             # Little endian whatever the machine's order, since the stamp is packed so.
             if data[1] != 1:
                 raise NotImplementedError('messages are serialised big endian here')
@@ -411,7 +400,7 @@ def _serialised(stream: Stream, rows: Sequence[int]) -> list[tuple[tuple[bytes, 
 
 @contextlib.contextmanager
 def _no_collection() -> Iterator[None]:
-    """A full collection takes milliseconds, which would be taken for a node's."""
+    """Collect no garbage meanwhile: it takes milliseconds, which would count as a node's."""
     gc.collect()
     gc.freeze()
     gc.disable()

@@ -4,6 +4,7 @@ All poses of a stream are made before it is played, so that playing one costs no
 """
 from __future__ import annotations
 
+import dataclasses
 import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -47,6 +48,28 @@ class Stream:
     def sizes(self) -> tuple[Size, Size]:
         """Full extents of both boxes [m]: what the nodes have to be started with."""
         return self.size_a, self.size_b
+
+
+@dataclass(frozen=True)
+class Replay(Stream):
+    """The pairs of poses of equal stamp of a recording, in the order of their stamps."""
+
+    stamps: np.ndarray
+    """(n,) as recorded [ns]."""
+
+    @property
+    def described(self) -> str:
+        """How much it is, and over what time it was recorded, in words."""
+        seconds = (int(self.stamps[-1]) - int(self.stamps[0])) * 1e-9
+        return f'{len(self)} pairs of poses, recorded in {seconds:.2f} s'
+
+    def thinned(self, count: int | None) -> Replay:
+        """Return `count` pairs spread over the whole; all if there are fewer, or for None."""
+        if count is None or count >= len(self):
+            return self
+        rows = np.linspace(0, len(self) - 1, count).round().astype(int)
+        return dataclasses.replace(self, pose_a=self.pose_a[rows], pose_b=self.pose_b[rows],
+                                   stamps=self.stamps[rows])
 
 
 def coplanar(rng: np.random.Generator, n: int) -> Pairs:

@@ -3,9 +3,9 @@
 There are two, which compute nothing: a bare one, and one served as the contact node is, with the
 middleware's threads kept from interrupting it. All run as processes of their own, in a ROS domain
 of their own on this host. Blocks of a few seconds go to the one and then to the others, so that
-what disturbs the machine disturbs all. Every answer is held against what the same model says of the
-same two poses: an answer that was put together from poses of two ticks is found. Prints a table,
-and writes soak.csv and soak.md.
+what disturbs the machine disturbs all. Every answer is compared with the
+same model's for the same two poses, which detects answers that mix poses of two ticks. Prints a
+table, and writes soak.csv and soak.md.
 
 The exit status is 0 only if nothing was lost, mispaired, answered twice or wrong, and the contact
 node's memory grew by less than 1 MB after its first block.
@@ -15,33 +15,32 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import math
-import random
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from rclpy.utilities import remove_ros_args
 
 from ...node.contact_node import PARAMETERS
 from ...node.runtime import REFUSALS
-from ...solver.arguments import check_ranges, make_folder
+from ...output import make_folder, markdown_table, percentiles
+from ...solver.arguments import model_name, within
 from ...solver.contact import Contacts
 from ...solver.contact_solver import ContactSolver
-from ...solver.models import MODELS
-from ..processes import DOMAINS
-from .bench_drive import Bench, Subject, about_the_machine, open_bench
-from .bench_log import (
-    CONTACT_MESSAGES,
-    ECHO_MESSAGES,
-    NodeLog,
-    StreamLog,
-    StreamResult,
-    markdown,
-    write_csv,
+from ...solver.models import model_names
+from ..answer_log import AnswerLog, StreamLog, StreamResult
+from ..processes import add_domain
+from .bench_drive import (
+    Bench,
+    MeasuredNode,
+    about_the_machine,
+    echo_node,
+    open_bench,
+    solver_node,
 )
+from .bench_report import bullets, write_results
 from .pose_streams import Stream, make_stream
 
 BLOCK_SECONDS = 10.0
@@ -60,38 +59,6 @@ STREAMS = ('containers', 'crane')
 """Played in turn: unrelated poses, and a motion. For boxes of one size, so that nobody restarts."""
 
 
-class SoakBench(Bench):
-    """A bench that sends some nodes less, and looks at their memory after every block."""
-
-    def __init__(self, *arguments: Any, **options: Any) -> None:
-        super().__init__(*arguments, **options)
-        self.memory: list[float] = []
-        """Of the contact node after each block [MB]."""
-        self.first_answer = math.nan
-        """Seconds from the start of the node to its first answer, to a tenth."""
-
-    def _play(self, stream: Stream, truth: Contacts, turn: list[Subject]) -> None:
-        if turn[0].name != 'contact':
-            rows = slice(0, round(ECHO_SHARE * len(stream)))
-            stream = dataclasses.replace(
-                stream, pose_a=stream.pose_a[rows], pose_b=stream.pose_b[rows])
-            truth = Contacts(*(column[rows] for column in truth))
-        super()._play(stream, truth, turn)
-        for running in self._running:
-            if running.subject is turn[0] and turn[0].name == 'contact':
-                self.memory.append(resident(running.process.pid))
-
-    def _start(self, stream: Stream) -> None:
-        self._started = time.monotonic()
-        super()._start(stream)
-
-    def _decode(self) -> int:
-        count = super()._decode()
-        if math.isnan(self.first_answer) and self.subjects[0].log.offers_answered:
-            self.first_answer = time.monotonic() - self._started
-        return count
-
-
 def resident(pid: int) -> float:
     """Resident memory of a process [MB], NaN where it is not told."""
     try:
@@ -107,65 +74,91 @@ def main(args: Sequence[str] | None = None) -> int:
     """Run the soak; 0 only if all was right."""
     args = list(args or ())
     options = _options(remove_ros_args(args))
-    subjects = [_contact(options), _echo('bare echo', 'bare/', '--bare'), _echo('echo', 'served/')]
+    nodes = [_contact(options),
+             echo_node('bare echo', poses='for_bare/', prefix='bare/', bare=True),
+             echo_node('echo', poses='for_served/', prefix='served/')]
     try:
         blocks, truths = _blocks(options)
-        # Once by itself, so that no other node starts on the same core.
-        with open_bench([_contact(options)], args, rate=options.rate, domain=options.domain,
-                        kind=SoakBench) as first:
-            first.run([blocks[:1]], truths, play=False)
-        if first.stop.is_set():
-            return first.stop.status
-        with open_bench(subjects, args, rate=options.rate, domain=options.domain,
-                        kind=SoakBench) as bench:
+        first_answer, status = _time_start(options, args, blocks[0])
+        if status:
+            return status
+        with open_bench(nodes, args, rate=options.rate, domain=options.domain) as bench:
             about = about_the_machine(bench.node_cores) | {
                 'set rate [Hz]': f'{options.rate:g}', 'model': options.model}
             print('\n'.join(f'{name}: {value}' for name, value in about.items()), flush=True)
-            bench.run([blocks], truths)
+            memory = _play(bench, blocks, truths)
     except REFUSALS as error:
         print(f'error: {error}', file=sys.stderr)
         return 1
-    passed = _report(options, subjects, bench, first.first_answer, about)
+    passed = _report(options, bench, memory, first_answer, about)
     return bench.stop.status or (0 if passed else 1)
 
 
-def _contact(options: argparse.Namespace) -> Subject:
-    return Subject('contact', ['-m', 'box_contact_ros', 'contact_node', '--ros-args',
-                               '-p', f'model:={options.model}'],
-                   NodeLog('contact', options.model, CONTACT_MESSAGES), poses='for_contact/')
+def _time_start(options: argparse.Namespace, args: Sequence[str], stream: Stream,
+                ) -> tuple[float, int]:
+    """Start a contact node by itself, so that no other one starts on the same core.
+
+    Return the seconds to its first answer, and the exit status if a signal came.
+    """
+    node, first = _contact(options), math.nan
+    with open_bench([node], args, rate=options.rate, domain=options.domain) as bench:
+        started = time.monotonic()
+
+        def look() -> None:
+            nonlocal first
+            if math.isnan(first) and node.log.offers_answered:
+                first = time.monotonic() - started
+
+        bench.on_answer = look
+        bench.run([[stream]], lambda _: None)
+    return first, bench.stop.status
 
 
-def _echo(name: str, prefix: str, *options: str) -> Subject:
-    return Subject(name, ['-m', 'box_contact_ros.apps.bench.echo_node', *options, '--ros-args',
-                          '-r', f'echo:={prefix}echo'],
-                   NodeLog(name, '', ECHO_MESSAGES), prefix, poses=f'for_{prefix}', has_sizes=False)
+def _play(bench: Bench, blocks: list[Stream], truths: Mapping[str, Contacts]) -> list[float]:
+    """Play blocks, shorter ones to the echo nodes; return the memory after each [MB]."""
+    memory = []
+
+    def play(block: Stream) -> None:
+        for turn in bench.turns():
+            if turn[0].name == 'contact':
+                bench.play(block, truths[block.name], turn)
+                if turn[0].process:
+                    memory.append(resident(turn[0].process.pid))
+            else:
+                rows = slice(0, round(ECHO_SHARE * len(block)))
+                bench.play(dataclasses.replace(
+                    block, pose_a=block.pose_a[rows], pose_b=block.pose_b[rows]), None, turn)
+
+    bench.run([blocks], play)
+    return memory
+
+
+def _contact(options: argparse.Namespace) -> MeasuredNode:
+    return solver_node('contact', options.model, poses='for_contact/', model=options.model)
 
 
 def _options(args: Sequence[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog='soak', description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--minutes', type=float, default=10.0, metavar='MIN',
+    parser.add_argument('--minutes', type=within(0.02, 24 * 60.0), default=10.0, metavar='MIN',
                         help='of poses to the contact node; each echo node takes a quarter as long '
                              'beside (default: %(default)g)')
-    parser.add_argument('--rate', type=float, default=1000.0, metavar='HZ',
+    parser.add_argument('--rate', type=within(1.0, 4000.0), default=1000.0, metavar='HZ',
                         help='pairs of poses sent per second (default: %(default)g)')
-    parser.add_argument('--model', default=PARAMETERS['model'].default, choices=MODELS,
-                        metavar='NAME', help=f'one of: {", ".join(MODELS)} (default: %(default)s)')
+    parser.add_argument('--model', type=model_name, default=PARAMETERS['model'].default,
+                        metavar='NAME', help=f'one of: {model_names()} (default: %(default)s)')
     parser.add_argument('--out', type=Path, default=Path('soak-results'), metavar='FOLDER',
                         help='for soak.csv and soak.md (default: %(default)s/)')
     parser.add_argument('--quick', action='store_true', help='two blocks of a second')
-    parser.add_argument('--domain', type=int, default=random.choice(DOMAINS), metavar='ID',
-                        help=f'ROS domain, 0 to {DOMAINS[-1]} (default: drawn at random)')
+    add_domain(parser)
     options = parser.parse_args(list(args))
-    check_ranges(parser, options, minutes=(0.02, 24 * 60), rate=(1, 4000),
-                 domain=(0, DOMAINS[-1]))
     make_folder(parser, options.out)
     options.seconds = 2.0 if options.quick else 60.0 * options.minutes
     return options
 
 
 def _blocks(options: argparse.Namespace) -> tuple[list[Stream], dict[str, Contacts]]:
-    """The blocks in the order they are played, and what the model answers to each."""
+    """Return the blocks in the order they are played, and what the model answers to each."""
     count = max(2, round(options.seconds / BLOCK_SECONDS))
     rows = round(options.rate * options.seconds / count)
     streams = [make_stream(name, rows) for name in STREAMS]
@@ -180,90 +173,89 @@ def _blocks(options: argparse.Namespace) -> tuple[list[Stream], dict[str, Contac
     return blocks, truths
 
 
-def _report(options: argparse.Namespace, subjects: list[Subject], bench: SoakBench,
-            first_answer: float, about: dict[str, str]) -> bool:
-    """Print and write what was found; whether all was right."""
-    results = {subject.name: subject.log.results() for subject in subjects}
-    contact, bare, echo = (results[name] for name in ('contact', 'bare echo', 'echo'))
-    if not (contact and bare and echo):
+def _report(options: argparse.Namespace, bench: Bench, memory: Sequence[float],
+            first_answer: float, about: Mapping[str, str]) -> bool:
+    """Print and write what was found; return whether all was right."""
+    contact, bare, echo = results = [node.log.results() for node in bench.nodes]
+    log = bench.nodes[0].log
+    if not all(results):
         print('\n'.join(['nothing was sent', *bench.notes]))
         return False
-    growth = float(max(bench.memory) - bench.memory[0]) if bench.memory else float('nan')
-    mispaired = sum(mispairs(subjects[0].log))
+    growth = float(max(memory) - memory[0]) if memory else math.nan
     counts = {'lost': sum(r.lost for r in contact),
-              'mispaired or wrong': mispaired + sum(r.wrong_verdicts for r in contact),
+              'mispaired or wrong': sum(mispairs(log)) + sum(r.wrong_verdicts for r in contact),
               'answered twice, or to no pose': sum(r.duplicates + r.strangers for r in contact),
               'contradictions between cloud, point and normal': sum(
                   r.contradictions for r in contact)}
-    mine, plain, floor = (1e3 * np.concatenate([r.latencies for r in of])
-                          for of in (contact, bare, echo))
-    clouds = 1e3 * np.concatenate([without_contact(log) for log in subjects[0].log.streams])
-    table = [['latency [ms]', 'contact node', 'of it, no contact: one message',
-              'echo, served alike', 'contact / echo', 'aim', 'bare echo', 'contact / bare echo']]
-    for name, percent, aim in (('p50', 50, P50_LIMIT), ('p99', 99, P99_LIMIT), ('p99.9', 99.9, 0),
-                               ('worst', 100, 0)):
-        one, other, lone, echoed = (float(np.percentile(of, percent)) if of.size else math.nan
-                                    for of in (mine, clouds, plain, floor))
-        table.append([name, f'{one:.3f}', f'{other:.3f}', f'{echoed:.3f}', f'{one / echoed:.2f}',
-                      f'{aim:g}' if aim else '', f'{lone:.3f}', f'{one / lone:.2f}'])
+    table = _latency_table(log, contact, bare, echo)
     lines = [f'sent: {sum(r.sent for r in contact)} to the contact node, '
-             f'{sum(r.sent for r in echo)} to each echo node']
-    lines += [f'{name}: {value}' for name, value in counts.items()]
-    lines.append(f'memory: {bench.memory[0]:.1f} MB after the first block, grown by at most '
-                 f'{growth:.2f} MB (limit {GROWTH_LIMIT:g})')
-    lines.append(f'start of the contact node to its first answer: {first_answer:.1f} s '
-                 f'(aim {START_LIMIT:g}, from warm caches)')
+             f'{sum(r.sent for r in echo)} to each echo node',
+             *(f'{name}: {value}' for name, value in counts.items()),
+             f'memory: {memory[0] if memory else math.nan:.1f} MB after the first block, grown by '
+             f'at most {growth:.2f} MB (limit {GROWTH_LIMIT:g})',
+             f'start of the contact node to its first answer: {first_answer:.1f} s '
+             f'(aim {START_LIMIT:g}, from warm caches)']
     for name, of in (('bare echo', bare), ('echo', echo)):
         p50, p99 = _ratio_by_block(contact, of)
         lines.append(f'block by block, contact / {name} is {p50:.2f} at p50 and {p99:.2f} at p99 '
                      f'(median of {len(of)} blocks)')
-    lines.append(f'the soak itself was late by at most '
-                 f'{1e3 * max(r.lateness_max for r in contact):.1f} ms')
-    lines += bench.notes
-    text = '\n'.join(f'- {line}' for line in lines)
-    print(f'\n{markdown(table, left=1)}\n\n{text}', flush=True)
-    write_csv(options.out / 'soak.csv', [*contact, *bare, *echo],
-              {name: value for name, value in about.items() if name != 'model'})  # a column already
-    where = '\n'.join(f'- {name}: {value}' for name, value in about.items())
+    lines.append('the soak itself was late by at most '
+                 f'{1e3 * max(r.lateness.max() for r in contact):.1f} ms')
+    text = bullets([*lines, *bench.notes])
+    print(f'\n{table}\n\n{text}', flush=True)
+    write_results(options.out / 'soak.csv', sum(results, []),
+                  {name: value for name, value in about.items() if name != 'model'})
     (options.out / 'soak.md').write_text(
         '# Soak\n\nMade by `python -m box_contact_ros soak`: blocks of poses to the contact node '
         'and to two echo nodes in turn,\na bare one and one whose threads are scheduled as the '
         "contact node's are. Latencies run from the stamp of the\nposes to the later of point and "
         'normal. The aims are for the ratio to the echo node served alike. Errors in soak.csv are\n'
-        f"against the same model's answers.\n\n{where}\n\n{markdown(table, left=1)}\n\n{text}\n",
-        'utf-8')
+        f"against the same model's answers.\n\n{bullets(about)}\n\n{table}\n\n{text}\n", 'utf-8')
     print(f'results: {options.out}/soak.csv, soak.md')
-    faultless = not any(counts.values())
-    adds_up = (all(r.adds_up for r in [*contact, *bare, *echo])
-               and all(s.log.adds_up for s in subjects))
-    return faultless and adds_up and not bench.notes and not growth >= GROWTH_LIMIT
+    adds_up = (all(r.adds_up for r in sum(results, []))
+               and all(node.log.adds_up for node in bench.nodes))
+    return not any(counts.values()) and adds_up and not bench.notes and not growth >= GROWTH_LIMIT
+
+
+def _latency_table(log: AnswerLog, *results: Sequence[StreamResult]) -> str:
+    """Return latencies of the contact node as ratios to those of both echo nodes."""
+    head = ['latency [ms]', 'contact node', 'of it, no contact: one message',
+            'echo, served alike', 'contact / echo', 'aim', 'bare echo', 'contact / bare echo']
+    whole = [np.concatenate([r.latencies for r in of]) for of in results]
+    clouds = np.concatenate([without_contact(stream) for stream in log.streams])
+    columns = [1e3 * np.array(percentiles(of, 50, 99, 99.9, 100)) for of in (*whole, clouds)]
+    rows = []
+    for name, aim, one, bare, echo, cloud in zip(
+            ('p50', 'p99', 'p99.9', 'worst'), (P50_LIMIT, P99_LIMIT, 0, 0), *columns):
+        rows.append([name, f'{one:.3f}', f'{cloud:.3f}', f'{echo:.3f}', f'{one / echo:.2f}',
+                     f'{aim:g}' if aim else '', f'{bare:.3f}', f'{one / bare:.2f}'])
+    return markdown_table(head, rows, padded=True)
 
 
 def _ratio_by_block(ours: Sequence[StreamResult], theirs: Sequence[StreamResult],
                     ) -> tuple[float, float]:
-    """Medians of the ratios of p50 and of p99, of blocks that were sent one after the other."""
-    ours_theirs = [[np.percentile(r.latencies, (50, 99)) if r.answered else (np.nan, np.nan)
-                    for r in of] for of in (ours, theirs)]
-    p50, p99 = np.nanmedian([a / b for a, b in zip(*map(np.asarray, ours_theirs))], axis=0)
+    """Return medians of the ratios of p50 and p99, of blocks sent one after the other."""
+    mine, other = (np.array([percentiles(r.latencies, 50, 99) for r in of])
+                   for of in (ours, theirs))
+    rows = min(len(mine), len(other))
+    p50, p99 = np.nanmedian(mine[:rows] / other[:rows], axis=0)
     return float(p50), float(p99)
 
 
 def without_contact(stream: StreamLog) -> np.ndarray:
-    """Latencies [s] of the answers that are a cloud without rows, and nothing else."""
-    rows = len(stream.stamps)
-    received = stream.received['cloud'][:rows]
-    alone = (received > 0) & ~stream.touching[:rows] & ~stream.refused[:rows]
-    return 1e-9 * (received - np.array(stream.stamps, dtype=np.int64))[alone]
+    """Return latencies [s] of the answers that are a cloud without rows, and nothing else."""
+    return stream.latencies[~stream.contacts]
 
 
-def mispairs(log: NodeLog) -> list[int]:
-    """Answers of each stream whose point is not the model's for the two poses of that stamp."""
+def mispairs(log: AnswerLog) -> list[int]:
+    """Count the answers of each stream whose point is not the model's for that stamp's poses."""
     found = []
     for stream in log.streams:
-        rows = len(stream.stamps)
-        here = (stream.received['point'][:rows] > 0) & stream.truth.colliding[:rows]
-        apart = np.linalg.norm(stream.values['point'][:rows] - stream.truth.point[:rows], axis=1)
-        depth = np.abs(stream.values['cloud'][:rows, 6] + stream.truth.separation[:rows])
+        rows, truth = slice(0, len(stream.stamps)), stream.truth
+        assert truth is not None
+        here = (stream.received['point'][rows] > 0) & truth.colliding[rows]
+        apart = np.linalg.norm(stream.values['point'][rows] - truth.point[rows], axis=1)
+        depth = np.abs(stream.values['cloud'][rows, 6] + truth.separation[rows])
         found.append(int(np.count_nonzero(
             here & ~((apart <= SAME_POINT) & (depth <= SAME_POINT)))))
     return found

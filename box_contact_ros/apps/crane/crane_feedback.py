@@ -17,8 +17,8 @@ from collections import deque
 
 import numpy as np
 
-from ...scene.contact_law import ContactLaw, HeldWrench, Touch
-from .landing import LandingRecord
+from ...scene.contact_law import Touch
+from .landing import ClosedLoop, LoopState
 from .mujoco_crane import Crane, CraneScenario
 
 ANSWER_SHARE = 0.8
@@ -36,34 +36,27 @@ class CraneFeedback:
     def __init__(self, scenario: CraneScenario, rate_hz: float, *, latency: float,
                  lockstep: bool, stop: threading.Event) -> None:
         """No contact acts before `latency` [s] after asking; `stop` ends every waiting."""
-        self.record = LandingRecord(scenario, rate_hz)
-        self._law = ContactLaw.for_load(scenario.mass, scenario.size, rate_hz)
+        self._loop = ClosedLoop(scenario, rate_hz)
+        self.record = self._loop.record
         self._rate_hz, self._latency, self._lockstep = rate_hz, latency, lockstep
-        self._held, self._stop = HeldWrench(), stop
-        self._asked: dict[int, tuple[int, float, np.ndarray, np.ndarray]] = {}
+        self._stop = stop
+        self._asked: dict[int, LoopState] = {}
         self._arrived: deque[tuple[int, Touch | None, int]] = deque()
         self._news = threading.Condition()
         self._lost_in_a_row = 0
 
     def ask(self, stamp: int, crane: Crane) -> None:
         """Note the state whose poses are about to be published under `stamp` [ns]."""
-        tick = len(self.record.poses)
-        self.record.before(crane)
-        self._asked[stamp] = tick, crane.time, crane.load_pose, crane.load_velocity
+        self._asked[stamp] = self._loop.ask(crane)
 
-    def answer(self, stamp: int, rows: np.ndarray, received: int) -> None:
-        """Take the rows of a `contacts` cloud, received at `received` [ns] of the stamps' clock.
+    def answer(self, stamp: int, values: np.ndarray, received: int) -> None:
+        """Take the first row of a `contacts` cloud, received at `received` [ns] of the same clock.
 
         No row is no contact; a row of NaN could not be evaluated, which is no answer.
         """
-        touch = None
-        if len(rows):
-            row = rows[0]
-            touch = Touch(np.array([row['x'], row['y'], row['z']]),
-                          np.array([row['normal_x'], row['normal_y'], row['normal_z']]),
-                          float(row['depth']))
-            if not np.isfinite([*touch.point, *touch.normal, touch.depth]).all():
-                return
+        if np.isnan(values).any():
+            return
+        touch = Touch(values[:3], values[3:6], float(values[6])) if len(values) else None
         with self._news:
             self._arrived.append((stamp, touch, received))
             self._news.notify()
@@ -86,11 +79,10 @@ class CraneFeedback:
         if self._lockstep and self._lost_in_a_row >= LOCKSTEP_LOST_MOST:
             raise TimeoutError(f'no answer to {LOCKSTEP_LOST_MOST} pairs in a row, each awaited '
                                f'for {LOCKSTEP_PATIENCE:g} s')
-        crane.step_under(self._held.at)
-        self.record.after(crane, self._held.current)
+        self._loop.step(crane)
 
     def _apply(self) -> bool:
-        """Turn what has arrived into wrenches; returns whether there was anything."""
+        """Turn what has arrived into wrenches; return whether there was anything."""
         arrived = False
         while self._arrived:
             stamp, touch, received = self._arrived.popleft()
@@ -98,10 +90,7 @@ class CraneFeedback:
             if state is None:  # an offer's answer, or one that came twice
                 continue
             arrived = True
-            tick, asked, pose, velocity = state
             # Answers take as long in simulated time as they really took, unless time waits.
             took = 0.0 if self._lockstep else (received - stamp) * 1e-9
-            self.record.answered(tick, touch)
-            self._held.answer(self._law.wrench(touch, pose, velocity), asked=asked,
-                              due=asked + max(self._latency, took))
+            self._loop.answer(state, touch, latency=max(self._latency, took))
         return arrived

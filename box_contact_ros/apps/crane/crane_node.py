@@ -16,21 +16,21 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
-import rclpy
 from geometry_msgs.msg import PointStamped, PoseStamped, Vector3Stamped
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
-from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import PointCloud2
 
-from ...node.messages import NANOSECONDS, read_cloud
+from ...node.messages import make_header, read_cloud
 from ...node.parameters import answer_help, declare
-from ...node.runtime import REFUSALS, make_executor, uninterrupted
+from ...node.runtime import REFUSALS
 from ...solver.contact_solver import ContactSolver
+from ..answer_log import first_row
+from ..ros_client import DEEP_RELIABLE, joined, pose_message, stamp_of
 from .crane_feedback import CraneFeedback
-from .crane_log import CraneLog, LiveReport
+from .crane_log import CraneLog, CraneSummary, LiveReport
 from .crane_parameters import PARAMETERS, scenario_from
 from .landing import LandingResult
 from .mujoco_crane import Crane
@@ -49,7 +49,8 @@ class CraneNode(Node):
         self.rate, self.wait = values['rate'], values['wait']
         self.report, self.frame_id = values['report'], values['frame_id']
         self.scenario = scenario_from(values)
-        self.log = CraneLog()
+        self.ticks = round(self.scenario.duration * self.rate)
+        self.log = CraneLog(self.ticks)
         self.stop = threading.Event()
         self.in_real_time = not (values['closed_loop'] and values['lockstep'])
         self.feedback = CraneFeedback(
@@ -57,22 +58,16 @@ class CraneNode(Node):
             stop=self.stop) if values['closed_loop'] else None
         self.solver = ContactSolver(self.scenario.size, self.scenario.stack_size, model='exact')
 
-        # Deep queues: what the DDS layer delivers while Python is busy must not push out the rest.
-        reliable = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
-        self._publishers_ab = [
-            self.create_publisher(PoseStamped, f'{box}/pose', reliable) for box in
-            ('box_a', 'box_b')
-        ]
+        self._publishers_ab = [self.create_publisher(PoseStamped, f'{box}/pose', DEEP_RELIABLE)
+                               for box in ('box_a', 'box_b')]
         self._answers = [
-            self.create_subscription(kind, topic, callback, reliable) for kind, topic, callback in (
-                (PointStamped, 'contact/point', self._on_point),
-                (Vector3Stamped, 'contact/normal', self._on_normal),
-                (PointCloud2, 'contacts', self._on_cloud),
-            )
-        ]
+            self.create_subscription(kind, topic, callback, DEEP_RELIABLE)
+            for kind, topic, callback in ((PointStamped, 'contact/point', self._on_point),
+                                          (Vector3Stamped, 'contact/normal', self._on_normal),
+                                          (PointCloud2, 'contacts', self._on_cloud))]
 
     def unmatched(self) -> list[str]:
-        """Topics that have no counterpart yet."""
+        """Return the topics that have no counterpart yet."""
         return [p.topic_name for p in self._publishers_ab if not p.get_subscription_count()] + [
             s.topic_name for s in self._answers if not s.get_publisher_count()]
 
@@ -82,7 +77,7 @@ class CraneNode(Node):
         Matched endpoints alone do not say that the other side has matched too, or spins already.
         """
         crane, deadline = Crane(self.scenario, self.rate), time.monotonic() + self.wait
-        while not self.log.offer_answered and not self.stop.is_set():
+        while not self.log.offers_answered and not self.stop.is_set():
             if time.monotonic() > deadline:
                 unmatched = ', '.join(self.unmatched())
                 what = f'nobody at the other end of {unmatched}' if unmatched else 'no answer'
@@ -97,7 +92,7 @@ class CraneNode(Node):
         gc.collect()
         gc.freeze()  # a full collection would hold up the poses for milliseconds
         start = time.perf_counter()
-        for tick in range(round(self.scenario.duration * self.rate)):
+        for tick in range(self.ticks):
             # The schedule is absolute: lateness of one tick is not handed on to the next.
             early = start + tick / self.rate - time.perf_counter() if self.in_real_time else 0.0
             if self.stop.wait(max(0.0, early)):
@@ -108,52 +103,51 @@ class CraneNode(Node):
             else:
                 self.feedback.step(stamp, crane)
         deadline = time.monotonic() + DRAIN
-        while not self.log.complete() and time.monotonic() < deadline:
+        while self.log.outstanding and time.monotonic() < deadline:
             if self.stop.wait(0.02):
                 return
 
+    def summary(self) -> CraneSummary | None:
+        """Return how good the answers were, None if nothing was sent."""
+        return self.log.summary(self.solver, min(max(self.scenario.size),
+                                                 max(self.scenario.stack_size)))
+
     def landing(self) -> LandingResult | None:
-        """How the landing went, None in an open loop."""
+        """Return how the landing went, None in an open loop."""
         return self.feedback.record.judge() if self.feedback else None
 
     def _publish(self, crane: Crane, *, offer: bool = False) -> int:
         """Publish both poses under one stamp [ns], the node's clock now; note them beforehand."""
-        stamp = self.get_clock().now()
+        stamp = self._now()
         poses = crane.load_pose, crane.stack_pose
         if offer:
-            self.log.offered(stamp.nanoseconds)
+            self.log.offers.add(stamp)
         else:
-            self.log.sent(stamp.nanoseconds, *poses)
+            self.log.sent_poses(stamp, *poses)
             if self.feedback:
-                self.feedback.ask(stamp.nanoseconds, crane)
-        for publisher, values in zip(self._publishers_ab, poses, strict=True):
-            message = PoseStamped()
-            message.header.frame_id = self.frame_id
-            message.header.stamp = stamp.to_msg()
-            x, y, z, qx, qy, qz, qw = map(float, values)
-            position, orientation = message.pose.position, message.pose.orientation
-            position.x, position.y, position.z = x, y, z
-            orientation.x, orientation.y, orientation.z, orientation.w = qx, qy, qz, qw
-            publisher.publish(message)
-        return stamp.nanoseconds
+                self.feedback.ask(stamp, crane)
+        header = make_header(stamp, self.frame_id)
+        for publisher, pose in zip(self._publishers_ab, poses):
+            publisher.publish(pose_message(header, pose))
+        return stamp
+
+    def _now(self) -> int:
+        return int(self.get_clock().now().nanoseconds)
 
     def _on_point(self, message: PointStamped) -> None:
         point = (message.point.x, message.point.y, message.point.z)
-        self.log.point(_stamp(message), point, self.get_clock().now().nanoseconds)
+        self.log.answer('point', stamp_of(message.header), self._now(), point)
 
     def _on_normal(self, message: Vector3Stamped) -> None:
         normal = (message.vector.x, message.vector.y, message.vector.z)
-        self.log.normal(_stamp(message), normal, self.get_clock().now().nanoseconds)
+        self.log.answer('normal', stamp_of(message.header), self._now(), normal)
 
     def _on_cloud(self, message: PointCloud2) -> None:
-        received, rows = self.get_clock().now().nanoseconds, read_cloud(message)
+        received, stamp = self._now(), stamp_of(message.header)
+        values = first_row(read_cloud(message))
         if self.feedback:  # before the log: here somebody waits
-            self.feedback.answer(_stamp(message), rows, received)
-        self.log.cloud(_stamp(message), rows['depth'])
-
-
-def _stamp(message: Any) -> int:
-    return message.header.stamp.sec * NANOSECONDS + message.header.stamp.nanosec
+            self.feedback.answer(stamp, values, received)
+        self.log.answer('cloud', stamp, received, values)
 
 
 def receive_while(node: CraneNode, executor: Any, work: Callable[[], None]) -> None:
@@ -174,42 +168,33 @@ def receive_while(node: CraneNode, executor: Any, work: Callable[[], None]) -> N
     future.result()
 
 
+def fly(node: CraneNode, executor: Any) -> None:
+    """Run the whole motion, as soon as somebody answers."""
+    receive_while(node, executor, node.await_answers)
+    receive_while(node, executor, node.lower)
+
+
 def main(args: Sequence[str] | None = None) -> int:
     """Run the crane once; 0 only if contacts came through, none was lost, and the load rests."""
     answer_help('crane', __doc__, PARAMETERS, args)
-    context, started, node, executor, signalled = Context(), False, None, None, 0
+    node, signalled = None, 0
     try:
         # Handlers have to be asked for where the context is not the default one.
-        rclpy.init(args=args, context=context, signal_handler_options=SignalHandlerOptions.ALL)
-        started = True
-        node = CraneNode(context)
-        executor = make_executor(context)
-        executor.add_node(node)
-        receive_while(node, executor, node.await_answers)
-        receive_while(node, executor, node.lower)
+        with joined(CraneNode, args, signals=SignalHandlerOptions.ALL) as (node, executor):
+            fly(node, executor)
     except KeyboardInterrupt:
         signalled = 130  # 128 + SIGINT, as shells report it
-    except Exception as error:
-        if started and not context.ok():
-            signalled = 143  # 128 + SIGTERM, which shuts the context down under whatever runs
-        elif isinstance(error, (*REFUSALS, TimeoutError)):
-            print(f'error: {error}', file=sys.stderr)
-            return 1
-        else:
-            raise
-    finally:
-        with uninterrupted():
-            if executor is not None:
-                executor.shutdown()
-            if node is not None:
-                node.destroy_node()
-            context.try_shutdown()
-    if node is None or not node.log.exchanges:
+    except ExternalShutdownException:
+        signalled = 143  # 128 + SIGTERM, which shuts the context down under whatever runs
+    except (*REFUSALS, TimeoutError) as error:
+        print(f'error: {error}', file=sys.stderr)
+        return 1
+    summary, landing = (node.summary(), node.landing()) if node else (None, None)
+    if node is None or summary is None:
         return signalled
-    edge = min(max(node.scenario.size), max(node.scenario.stack_size))
-    summary, landing = node.log.summary(node.solver, edge), node.landing()
-    print(f'crane: {"interrupted" if signalled else "done"} after {summary.sent / node.rate:g} s '
-          f'of motion at {node.rate:g} Hz\n{summary}', flush=True)
+    print(f'crane: {"interrupted" if signalled else "done"} after '
+          f'{summary.result.sent / node.rate:g} s of motion at {node.rate:g} Hz\n{summary}',
+          flush=True)
     if landing:
         print(landing, flush=True)
     passed = summary.passed and (landing is None or landing.at_rest)

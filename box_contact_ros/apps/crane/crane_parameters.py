@@ -6,13 +6,13 @@ from typing import Any
 
 from ...node.parameters import Setting, flag, number, numbers, size, text, whole_number
 from .landing import LANDING_DURATION
-from .mujoco_crane import LANDING_OVERLAP, CraneScenario
+from .mujoco_crane import LANDING_OVERLAP, LIMITS, CraneScenario
 
 STANDARD = CraneScenario()
 PARAMETERS = {
     'rate': Setting(200.0, 'pairs of poses published per second [Hz]', number(1, 2000)),
     'duration': Setting(STANDARD.duration, f'length of the motion [s]; left at its default, a '
-                        f'closed loop takes {LANDING_DURATION:g}', number(0.1, 86_400)),
+                        f'closed loop takes {LANDING_DURATION:g}', number(*LIMITS['duration'])),
     'wait': Setting(10.0, 'patience for a contact node to answer [s]', number(0, 600)),
     'frame_id': Setting('world', 'frame of the published poses', text),
     'report': Setting(False, 'print live lines while in contact', flag),
@@ -28,19 +28,20 @@ PARAMETERS = {
     'offset': Setting(STANDARD.offset, 'x, y of the trolley from the centre of the stack [m]',
                       numbers(2)),
     'rope_angle': Setting(STANDARD.rope_angle, 'ropes from the plumb line at the start [deg]',
-                          number(0, 20)),
+                          number(*LIMITS['rope_angle'])),
     'rope_heading': Setting(STANDARD.rope_heading, 'whereto, counter-clockwise from x [deg]',
-                            number(-360, 360)),
+                            number(*LIMITS['rope_heading'])),
     'pitch': Setting(STANDARD.pitch, 'tilt of the load about y at the start [deg]',
-                     number(-10, 10)),
-    'roll': Setting(STANDARD.roll, 'tilt of the load about x at the start [deg]', number(-10, 10)),
+                     number(*LIMITS['pitch'])),
+    'roll': Setting(STANDARD.roll, 'tilt of the load about x at the start [deg]',
+                    number(*LIMITS['roll'])),
     'yaw': Setting(STANDARD.yaw, 'turn of the load about the plumb line at the start [deg]',
-                   number(-20, 20)),
+                   number(*LIMITS['yaw'])),
     'lowering_speed': Setting(STANDARD.lowering_speed, 'top speed of the hoist [m/s]',
                               number(0, 0.8)),
     'overlap': Setting(STANDARD.overlap, 'depth to which the load is lowered into the stack [m]; '
                        f'left at its default, a closed loop pays the ropes out by '
-                       f'{LANDING_OVERLAP:g} beyond the load at rest', number(-1000, 1)),
+                       f'{LANDING_OVERLAP:g} beyond the load at rest', number(*LIMITS['overlap'])),
 }
 SCENARIO = {name: {'size_a': 'size', 'size_b': 'stack_size'}.get(name, name) for name in (
     'duration', 'size_a', 'size_b', 'offset', 'rope_angle', 'rope_heading', 'pitch', 'roll', 'yaw',

@@ -21,18 +21,17 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import product
-from typing import Any
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from ...output import percentiles
 from ...scene.contact_law import GRAVITY, ContactLaw, HeldWrench, Touch
 from ...scene.pose import rotation_matrix
 from ...solver.contact import Contact
 from ...solver.contact_solver import ContactSolver
+from .crane_log import table
 from .mujoco_crane import LANDING_OVERLAP, Crane, CraneScenario
-
-__all__ = ['LandingCase', 'LandingRecord', 'LandingResult', 'cases', 'land', 'landing_scenario',
-           'scenario_of', 'touch_of']
 
 SETTLING, WINDOW = 10.0, 5.0
 """The load has to be at rest from `SETTLING` s after the first touch on, for `WINDOW` s."""
@@ -205,7 +204,7 @@ class LandingResult:
                                     f'{1e3 * self.exact_point_step:.2g}), while settling '
                                     f'{1e3 * self.point_step_ever:.2g} mm (exact: '
                                     f'{1e3 * self.exact_point_step_ever:.2g})'))
-        return '\n'.join(f'  {name + " ":.<24} {value}' for name, value in rows)
+        return table(rows)
 
 
 @dataclass
@@ -221,10 +220,10 @@ class LandingRecord:
     points: dict[int, np.ndarray] = field(default_factory=dict)
     """Contact points (3,) by the tick they were asked for; none where there was no contact."""
 
-    def before(self, crane: Crane) -> None:
+    def before(self, state: LoopState) -> None:
         """Note the state in which a tick begins."""
-        self.poses.append(crane.load_pose)
-        self.velocities.append(crane.load_velocity)
+        self.poses.append(state.pose)
+        self.velocities.append(state.velocity)
 
     def answered(self, tick: int, touch: Touch | None) -> None:
         """Note the answer to a tick's poses."""
@@ -304,27 +303,64 @@ class LandingRecord:
         return LandingResult(**figures)
 
 
+class ForceLaw(Protocol):
+    """From one contact to the force and the torque on the load."""
+
+    def wrench(self, touch: Touch | None, pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+        """Return the wrench (6,) on the load at `pose` (7,) with `velocity` (6,)."""
+
+
+class LoopState(NamedTuple):
+    """The state of the load for which a contact is asked."""
+
+    tick: int
+    time: float
+    pose: np.ndarray
+    velocity: np.ndarray
+
+
+class ClosedLoop:
+    """A crane under the wrench of a law, recorded tick by tick, wherever contacts come from."""
+
+    def __init__(self, scenario: CraneScenario, rate_hz: float,
+                 law: ForceLaw | None = None) -> None:
+        """Take the standard law for this load and rate where `law` is None."""
+        self.record = LandingRecord(scenario, rate_hz)
+        self._law = law or ContactLaw.for_load(scenario.mass, scenario.size, rate_hz)
+        self._held = HeldWrench()
+
+    def ask(self, crane: Crane) -> LoopState:
+        """Begin a tick; return the state whose contact is asked for."""
+        state = LoopState(len(self.record.poses), crane.time, crane.load_pose, crane.load_velocity)
+        self.record.before(state)
+        return state
+
+    def answer(self, state: LoopState, touch: Touch | None, *, latency: float) -> None:
+        """Take the contact of a state; it acts `latency` [s] after it was asked for."""
+        self.record.answered(state.tick, touch)
+        self._held.answer(self._law.wrench(touch, state.pose, state.velocity), asked=state.time,
+                          due=state.time + latency)
+
+    def step(self, crane: Crane) -> None:
+        """End the tick: advance the crane under the wrench that is due."""
+        crane.step_under(self._held.at)
+        self.record.after(crane, self._held.current)
+
+
 def land(scenario: CraneScenario, source: ContactSource, *, rate_hz: float = 200.0,
-         latency: float = 0.0) -> LandingRecord:
+         latency: float = 0.0, law: ForceLaw | None = None) -> LandingRecord:
     """Run one landing with contacts from `source`, which act `latency` s after they were asked for.
 
     The source may be a ContactSolver; where it gives None, the last wrench is held.
     """
-    crane = Crane(scenario, rate_hz)
-    stack = crane.stack_pose
-    law = ContactLaw.for_load(scenario.mass, scenario.size, rate_hz)
-    held, record = HeldWrench(), LandingRecord(scenario, rate_hz)
-    for tick in range(round(scenario.duration * rate_hz)):
-        asked, pose, velocity = crane.time, crane.load_pose, crane.load_velocity
-        record.before(crane)
-        contact = source(pose, stack)
+    crane, loop = Crane(scenario, rate_hz), ClosedLoop(scenario, rate_hz, law)
+    for _ in range(round(scenario.duration * rate_hz)):
+        state = loop.ask(crane)
+        contact = source(state.pose, crane.stack_pose)
         if contact is not None:
-            touch = touch_of(contact)
-            record.answered(tick, touch)
-            held.answer(law.wrench(touch, pose, velocity), asked=asked, due=asked + latency)
-        crane.step_under(held.at)
-        record.after(crane, held.current)
-    return record
+            loop.answer(state, touch_of(contact), latency=latency)
+        loop.step(crane)
+    return loop.record
 
 
 def _steps(points: np.ndarray) -> np.ndarray:
@@ -335,4 +371,4 @@ def _steps(points: np.ndarray) -> np.ndarray:
 
 
 def _largest(values: np.ndarray) -> float:
-    return float(np.nanmax(values)) if np.isfinite(values).any() else math.nan
+    return percentiles(values[~np.isnan(values)], 100)[0]

@@ -31,13 +31,8 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
-__all__ = ['CONTAINER_40FT', 'Crane', 'CraneScenario']
-
-CONTAINER_40FT = (12.192, 2.438, 2.591)
-"""Length, width and height of a 40-ft container, in metres."""
-
-GRAVITY = 9.81
-"""Gravitational acceleration, m/s^2."""
+from ...scene.contact_law import GRAVITY
+from ...scene.pose_sets import CONTAINER
 
 PHYSICS_STEP = 5e-4
 """Longest physics step, s. A tick of publication is cut into equal steps no longer than this."""
@@ -69,8 +64,13 @@ LANDING_OVERLAP = 0.8
 load tilted by 3 degrees hangs 0.4 m unevenly in its ropes, and the trolley may stand a metre aside:
 half of this already leaves all four ropes slack in the default geometry."""
 
+LIMITS = {'mass': (1.0, 1e6), 'rope_length': (1.0, 200.0), 'rope_spread': (0.0, 1.0),
+          'rope_angle': (0.0, 20.0), 'rope_heading': (-360.0, 360.0), 'pitch': (-10.0, 10.0),
+          'roll': (-10.0, 10.0), 'yaw': (-20.0, 20.0), 'lowering_speed': (0.0, MAX_HOIST_SPEED),
+          'overlap': (-1e3, 1.0), 'duration': (0.1, 86_400.0)}
+"""Least and largest value of the numbers of a `CraneScenario`."""
+
 _CORNERS = np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]], dtype=float)
-_ROPES = range(len(_CORNERS))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,15 +87,15 @@ class CraneScenario:
     rope_angle       -- the load is released at rest with its ropes this far from the plumb line
     rope_heading     -- direction it is pulled aside to, counter-clockwise from x
     pitch, roll      -- tilt at the start, about y and about x, held by unequal ropes
-    yaw              -- turn about the plumb line at the start
+    yaw              -- rotation about the plumb line at the start
     lowering_speed   -- top speed of the hoist, m/s; lifting uses it as well
     overlap          -- depth to which the load, at rest and level, is lowered into the stack
     duration         -- of the whole programme, s
     land             -- lower until the ropes are slack (give an `overlap` for it), never lift
     """
 
-    size: tuple[float, float, float] = CONTAINER_40FT
-    stack_size: tuple[float, float, float] = CONTAINER_40FT
+    size: tuple[float, float, float] = CONTAINER
+    stack_size: tuple[float, float, float] = CONTAINER
     mass: float = 20_000.0
     drop_position: tuple[float, float] = (0.0, 0.0)
     offset: tuple[float, float] = (0.25, -0.15)
@@ -120,19 +120,7 @@ class CraneScenario:
             if length == 3 and min(values) <= 0.0:
                 raise ValueError(f'{field} must be positive, got {values}')
             object.__setattr__(self, field, values)
-        for field, low, high in (
-            ('mass', 1.0, 1e6),
-            ('rope_length', 1.0, 200.0),
-            ('rope_spread', 0.0, 1.0),
-            ('rope_angle', 0.0, 20.0),
-            ('rope_heading', -360.0, 360.0),
-            ('pitch', -10.0, 10.0),
-            ('roll', -10.0, 10.0),
-            ('yaw', -20.0, 20.0),
-            ('lowering_speed', 0.0, MAX_HOIST_SPEED),
-            ('overlap', -1e3, 1.0),
-            ('duration', 0.1, 86_400.0),
-        ):
+        for field, (low, high) in LIMITS.items():
             value = float(getattr(self, field))
             if not low <= value <= high:
                 raise ValueError(f'{field} must lie in [{low}, {high}], got {value}')
@@ -203,7 +191,7 @@ class Crane:
         self._substeps = math.ceil(1.0 / (rate_hz * PHYSICS_STEP))
         self._rate_hz = float(rate_hz)
         self._ticks = 0
-        self._model = mujoco.MjModel.from_xml_string(_mjcf(scenario))
+        self._model = _build(scenario)
         self._model.opt.timestep = 1.0 / (rate_hz * self._substeps)
         self._data = mujoco.MjData(self._model)
         self._load = self._model.body('load').id
@@ -286,17 +274,17 @@ class Crane:
             [scenario.rope_angle, scenario.rope_heading, scenario.pitch, scenario.roll,
              scenario.yaw]
         )
-        tilt = _turn('z', yaw) @ _turn('y', pitch) @ _turn('x', roll)
+        tilt = _rotation('z', yaw) @ _rotation('y', pitch) @ _rotation('x', roll)
 
         level = trolley - [0.0, 0.0, drop] - half_height
         self._put(level, tilt)
         lengths = self._data.ten_length.copy()
-        self._put(level, _turn('z', yaw))
+        self._put(level, _rotation('z', yaw))
         trims = lengths - self._data.ten_length
 
-        # In the frame where x is the heading, the sway is a turn about -y.
-        sway = _turn('z', heading) @ _turn('y', -(1.0 - scenario.rope_spread) * angle)
-        sway = sway @ _turn('z', -heading)
+        # In the frame where x is the heading, the sway is a rotation about -y.
+        sway = _rotation('z', heading) @ _rotation('y', -(1.0 - scenario.rope_spread) * angle)
+        sway = sway @ _rotation('z', -heading)
         aside = drop * np.array(
             [math.sin(angle) * math.cos(heading), math.sin(angle) * math.sin(heading),
              -math.cos(angle)]
@@ -331,8 +319,8 @@ def _ramp(share: float) -> float:
     return share - math.sin(2.0 * math.pi * share) / (2.0 * math.pi)
 
 
-def _turn(axis: str, angle: float) -> np.ndarray:
-    """Rotation matrix (3, 3) about a coordinate axis by `angle` in rad."""
+def _rotation(axis: str, angle: float) -> np.ndarray:
+    """Return the rotation matrix (3, 3) about a coordinate axis by `angle` in rad."""
     first, second = {'x': (1, 2), 'y': (2, 0), 'z': (0, 1)}[axis]
     rotation = np.eye(3)
     rotation[first, first] = rotation[second, second] = math.cos(angle)
@@ -345,54 +333,32 @@ def _pose(position: np.ndarray, quaternion_wxyz: np.ndarray) -> np.ndarray:
     return np.concatenate([position, quaternion_wxyz[1:], quaternion_wxyz[:1]])
 
 
-def _text(*numbers: float) -> str:
-    """Numbers for an MJCF attribute, in full precision."""
-    return ' '.join(repr(float(number)) for number in numbers)
-
-
-def _mjcf(scenario: CraneScenario) -> str:
+def _build(scenario: CraneScenario) -> mujoco.MjModel:
     """Return the scenario as a MuJoCo model: static trolley and stack, free load, four ropes."""
     half, stack_half = np.array(scenario.size) / 2.0, np.array(scenario.stack_size) / 2.0
     stack_centre = np.array([*scenario.drop_position, stack_half[2]])
     lowest_top = 2.0 * stack_half[2] - scenario.overlap + 2.0 * half[2]
-    trolley = np.array([*(stack_centre[:2] + scenario.offset), lowest_top + scenario.rope_length])
-    holds = scenario.rope_spread * _CORNERS * half[:2]
-    corners = _CORNERS * half[:2]
-    newline = '\n'
-    trolley_sites = newline.join(
-        f'      <site name="hold_{i}" pos="{_text(*holds[i], 0.0)}"/>' for i in _ROPES
-    )
-    load_sites = newline.join(
-        f'      <site name="corner_{i}" pos="{_text(*corners[i], half[2])}"/>' for i in _ROPES
-    )
-    # The range's upper end is set by the hoist before every physics step.
-    tendons = newline.join(
-        f'    <spatial name="rope_{i}" limited="true" range="0 {_text(scenario.rope_length)}" '
-        f'solreflimit="{_text(-ROPE_STIFFNESS, -ROPE_DAMPING)}" '
-        f'solimplimit="{_text(ROPE_IMPEDANCE, ROPE_IMPEDANCE, 1.0)}">'
-        f'<site site="hold_{i}"/><site site="corner_{i}"/></spatial>' for i in _ROPES
-    )
-    return f"""
-<mujoco model="crane">
-  <option gravity="0 0 {_text(-GRAVITY)}" integrator="implicitfast"/>
-  <default>
-    <geom type="box" contype="0" conaffinity="0"/>
-  </default>
-  <worldbody>
-    <body name="trolley" pos="{_text(*trolley)}">
-{trolley_sites}
-    </body>
-    <body name="stack" pos="{_text(*stack_centre)}">
-      <geom size="{_text(*stack_half)}"/>
-    </body>
-    <body name="load" pos="{_text(*trolley[:2], lowest_top)}">
-      <freejoint/>
-      <geom size="{_text(*half)}" mass="{_text(scenario.mass)}"/>
-{load_sites}
-    </body>
-  </worldbody>
-  <tendon>
-{tendons}
-  </tendon>
-</mujoco>
-"""
+    above = stack_centre[:2] + scenario.offset
+
+    spec = mujoco.MjSpec()
+    spec.option.gravity = 0.0, 0.0, -GRAVITY
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    trolley, stack, load = (spec.worldbody.add_body(name=name, pos=place) for name, place in (
+        ('trolley', [*above, lowest_top + scenario.rope_length]), ('stack', stack_centre),
+        ('load', [*above, lowest_top])))
+    load.add_freejoint()
+    for body, extents, mass in ((stack, stack_half, 0.0), (load, half, scenario.mass)):
+        body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=extents, mass=mass, contype=0,
+                      conaffinity=0)
+    for i, corner in enumerate(_CORNERS * half[:2]):
+        trolley.add_site(name=f'hold_{i}', pos=[*(scenario.rope_spread * corner), 0.0])
+        load.add_site(name=f'corner_{i}', pos=[*corner, half[2]])
+        # The range's upper end is set by the hoist before every physics step.
+        rope = spec.add_tendon(
+            name=f'rope_{i}', limited=mujoco.mjtLimited.mjLIMITED_TRUE,
+            range=[0.0, scenario.rope_length],
+            solref_limit=[-ROPE_STIFFNESS, -ROPE_DAMPING],
+            solimp_limit=[ROPE_IMPEDANCE, ROPE_IMPEDANCE, 1.0, 0.5, 2.0])
+        rope.wrap_site(f'hold_{i}')
+        rope.wrap_site(f'corner_{i}')
+    return spec.compile()

@@ -10,7 +10,6 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -26,7 +25,7 @@ from rosbags.rosbag2 import (
 from rosbags.typesys import Stores, get_typestore
 
 from ...solver.checks import as_size, shown
-from ..bench.pose_streams import Size, Stream
+from ..bench.pose_streams import Replay, Size
 
 BAG_VERSION: Final = 9
 """Of rosbag2's metadata: what Jazzy writes and reads."""
@@ -91,28 +90,6 @@ class Recorder:
     def close(self) -> None:
         """Write what is still in memory, index and metadata."""
         self._writer.close()
-
-
-@dataclass(frozen=True)
-class Replay(Stream):
-    """The pairs of poses of equal stamp of a recording, in the order of their stamps."""
-
-    stamps: np.ndarray
-    """(n,) as recorded [ns]."""
-
-    @property
-    def described(self) -> str:
-        """How much it is, and over what time it was recorded."""
-        seconds = (int(self.stamps[-1]) - int(self.stamps[0])) / NANOSECONDS
-        return f'{len(self)} pairs of poses, recorded in {seconds:.2f} s'
-
-    def thinned(self, count: int | None) -> Replay:
-        """`count` pairs spread over the whole; all if there are fewer, or for None."""
-        if count is None or count >= len(self):
-            return self
-        rows = np.linspace(0, len(self) - 1, count).round().astype(int)
-        return Replay(self.name, self.size_a, self.size_b, self.pose_a[rows], self.pose_b[rows],
-                      self.stamps[rows])
 
 
 def read_replay(path: Path, topic_a: str = TOPICS[0], topic_b: str = TOPICS[1], *,

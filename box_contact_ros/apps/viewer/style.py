@@ -4,6 +4,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
+import numpy as np
+
 Colour = tuple[int, int, int]
 """Red, green, blue, 0 to 255."""
 
@@ -26,7 +28,12 @@ class Proportions(NamedTuple):
 
 
 def proportions(size_a: Sequence[float], size_b: Sequence[float]) -> Proportions:
-    """Of the contact between boxes of these full extents [m]: to be seen beside the smaller one."""
+    """Return those of a contact between boxes of these full extents [m]: seen on the smaller."""
     edge = min(max(size_a), max(size_b))
     return Proportions(point_radius=0.015 * edge, normal_length=0.15 * edge,
                        text_height=0.04 * edge)
+
+
+def unit_pose(pose: np.ndarray) -> np.ndarray:
+    """Return a pose (7,) whose quaternion has unit length, which drawing needs."""
+    return np.concatenate([pose[:3], pose[3:] / np.linalg.norm(pose[3:])])

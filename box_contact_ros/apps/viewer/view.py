@@ -8,6 +8,7 @@ ends with Ctrl-C, and what it has started with it.
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import os
 import queue
 import random
@@ -20,20 +21,19 @@ import time
 import webbrowser
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import IO
+from functools import partial
 
-import rclpy
-from rclpy.context import Context
-from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
 from ...node.contact_node import PARAMETERS
-from ...node.runtime import REFUSALS, make_executor
-from ...solver.arguments import check_ranges
-from ..crane.mujoco_crane import CONTAINER_40FT
-from ..processes import DOMAINS, Stop, asked_to_end, end, on_this_host, start
+from ...node.runtime import REFUSALS
+from ...scene.pose_sets import CONTAINER
+from ...solver.arguments import model_name, within
+from .. import processes
+from ..processes import DOMAINS, Stop, asked_to_end, on_this_host, printed, program
+from ..ros_client import joined
 from .view_node import ViewNode
-from .view_page import Landing, Page
+from .view_page import CraneRun, Page
 
 FRAME_PERIOD = 1 / 30
 PAUSE = 1.5
@@ -45,114 +45,98 @@ WAIT = 60.0
 class Simulation:
     """A contact node, and a crane that is started again whenever it has ended."""
 
-    def __init__(self, model: str, landing: Landing) -> None:
-        self._sizes = [f'{name}:=[{",".join(map(str, CONTAINER_40FT))}]'
-                       for name in ('size_a', 'size_b')]
-        self.landing = landing
+    def __init__(self, model: str, run: CraneRun) -> None:
+        self._sizes = {'size_a': CONTAINER, 'size_b': CONTAINER}
+        self.run = run
         self.last_run: tuple[bool, str] | None = None
         """Whether the last run that ended by itself passed, and the crane's report of it."""
         self._node_output, self._crane_output = (tempfile.TemporaryFile() for _ in range(2))
-        self._crane: subprocess.Popen | None = None
+        self._crane: subprocess.Popen[bytes] | None = None
         self._next_at = 0.0
-        self._node = start('contact_node', [f'model:={model}', *self._sizes],
-                           dict(os.environ), self._node_output)
+        self._node = processes.start(program('contact_node', model=model, **self._sizes),
+                                     self._node_output)
 
     def step(self) -> bool:
-        """Start a crane if it is time; whether one was. RuntimeError if the node has ended."""
+        """Start a crane if it is time; return whether one was. RuntimeError if the node ended."""
         if self._node.poll() is not None:
             raise RuntimeError(f'contact_node ended, status {self._node.returncode}; it printed:\n'
-                               f'{_text(self._node_output)}')
+                               f'{printed(self._node_output)}')
         now = time.monotonic()
         if self._crane is not None and self._crane.poll() is not None:
-            self.last_run = self._crane.returncode == 0, _text(self._crane_output)
+            self.last_run = self._crane.returncode == 0, printed(self._crane_output)
             self._crane = None
             self._next_at = now + PAUSE
-            self.landing = Landing(self.landing.seed + 1, self.landing.rate,
-                                   self.landing.closed_loop)
+            self.run = dataclasses.replace(self.run, seed=self.run.seed + 1)
         if self._crane is not None or now < self._next_at:
             return False
         self._start_crane()
         return True
 
-    def land(self, landing: Landing) -> None:
+    def land(self, run: CraneRun) -> None:
         """End what is under way; `step` then starts this."""
         if self._crane is not None:
-            end([self._crane])
+            processes.end([self._crane])
             self._crane = None
-        self.landing, self._next_at = landing, 0.0
+        self.run, self._next_at = run, 0.0
 
     def _start_crane(self) -> None:
         self._crane_output.seek(0)
         self._crane_output.truncate()
-        self._crane = start('crane', [
-            *self._sizes, f'seed:={self.landing.seed}', f'rate:={self.landing.rate}',
-            f'closed_loop:={str(self.landing.closed_loop).lower()}', f'wait:={WAIT}',
-        ], dict(os.environ), self._crane_output)
+        self._crane = processes.start(
+            program('crane', wait=WAIT, **self._sizes, **dataclasses.asdict(self.run)),
+            self._crane_output)
 
     def close(self) -> None:
         """End everything."""
-        end([process for process in (self._crane, self._node) if process is not None])
+        processes.end([process for process in (self._crane, self._node) if process is not None])
         self._node_output.close()
         self._crane_output.close()
 
 
-def _text(file: IO[bytes]) -> str:
-    file.seek(0)
-    return file.read().decode(errors='replace').rstrip()
-
-
 @contextmanager
 def listening(target: str, args: Sequence[str]) -> Iterator[ViewNode]:
-    """A ViewNode that is served by a thread."""
-    context = Context()
-    # No handlers of rclpy's: what a signal ends first is for `main` to say.
-    rclpy.init(args=list(args), context=context, signal_handler_options=SignalHandlerOptions.NO)
-    node = ViewNode(context, target)
-    executor = make_executor(context)
-    executor.add_node(node)
-    stop = threading.Event()
+    """Give a ViewNode that is served by a thread; `target` is the contact node's name."""
+    with joined(partial(ViewNode, target=target), args) as (node, executor):
+        stop = threading.Event()
 
-    def serve() -> None:
-        while not stop.is_set():
-            try:
-                executor.spin_once(timeout_sec=0.1)
-            except Exception as error:  # one bad message does not end the view
-                node.get_logger().error(f'{type(error).__name__}: {error}',
-                                        throttle_duration_sec=1.0)
+        def serve() -> None:
+            while not stop.is_set():
+                try:
+                    executor.spin_once(timeout_sec=0.1)
+                except Exception as error:  # one bad message does not end the view
+                    node.get_logger().error(f'{type(error).__name__}: {error}',
+                                            throttle_duration_sec=1.0)
 
-    thread = threading.Thread(target=serve, name='ROS')
-    thread.start()
-    try:
-        yield node
-    finally:
-        stop.set()
-        thread.join()
-        executor.shutdown()
-        node.destroy_node()
-        context.try_shutdown()
+        thread = threading.Thread(target=serve, name='ROS')
+        thread.start()
+        try:
+            yield node
+        finally:
+            stop.set()
+            thread.join()
 
 
 def watch(node: ViewNode, page: Page, simulation: Simulation | None,
           wishes: queue.SimpleQueue[Callable[[], None]], stop: Stop) -> None:
-    """Draw, and do what is wished for, until `stop` is set."""
+    """Draw, and do what the page's users wish for, until `stop` is set."""
     frame_end = 0.0
     while not stop.wait(max(0.0, frame_end - time.monotonic())):
         frame_end = time.monotonic() + FRAME_PERIOD
         while not wishes.empty():
             wishes.get()()
         if simulation is not None and simulation.step():
-            page.show_landing(simulation.landing)
+            page.show_run(simulation.run)
             if simulation.last_run is not None:
                 page.show_last_run(*simulation.last_run)
             if node.log is not None:
                 node.log.start_anew()
-        log, scene, figures = node.log, None, None
+        log, snapshot, figures = node.log, None, None
         if log is not None:
             page.set_sizes(node.settings['size_a'], node.settings['size_b'])
-            scene = log.scene()
-            page.draw(scene)
+            snapshot = log.snapshot()
+            page.draw(snapshot)
             figures = log.figures(node.get_clock().now().nanoseconds)
-        page.show(scene, figures, model=node.settings.get('model', ''), wish=node.wish,
+        page.show(snapshot, figures, model=node.settings.get('model', ''), wish=node.wish,
                   refusal=node.refusal, connected=node.connected)
 
 
@@ -176,15 +160,20 @@ def main(args: Sequence[str] | None = None) -> int:
 def serve(options: argparse.Namespace, args: Sequence[str], stop: Stop) -> None:
     """Serve the page until `stop` is set; RuntimeError if the contact node ends."""
     wishes: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
-    landing = Landing(options.seed, options.rate, not options.open_loop)
+    run = None if options.attach else CraneRun(options.seed, options.rate, not options.open_loop)
     page = simulation = None
+
+    def land(wish: CraneRun) -> None:
+        if simulation is not None:
+            simulation.land(wish)
+
     try:
         with listening(options.node, args) as node:
-            if not options.attach:
-                simulation = Simulation(options.model, landing)
-            page = Page(options.host, options.port, landing=None if options.attach else landing,
-                        on_model=lambda name: wishes.put(lambda: node.set_model(name)),
-                        on_land=lambda wish: wishes.put(lambda: simulation.land(wish)))
+            if run is not None:
+                simulation = Simulation(options.model, run)
+            page = Page(options.host, options.port, run=run,
+                        on_model=lambda name: wishes.put(partial(node.set_model, name)),
+                        on_land=lambda wish: wishes.put(partial(land, wish)))
             where = ('' if options.domain is None else
                      f' (ROS_DOMAIN_ID={options.domain} for ros2 and RViz)')
             print(f'view: {page.url}{where}; Ctrl-C ends it', flush=True)
@@ -211,21 +200,20 @@ def _options(args: Sequence[str]) -> argparse.Namespace:
     parser.add_argument('--host', default='127.0.0.1',
                         help='address to serve at; whoever reaches it can change the model '
                              '(default: %(default)s)')
-    parser.add_argument('--port', type=int, default=8080,
+    parser.add_argument('--port', type=within(1, 65535), default=8080,
                         help='to serve at, or the next that is free (default: %(default)s)')
     parser.add_argument('--no-browser', action='store_true', help='do not open a browser')
     parser.add_argument('--attach', action='store_true',
                         help='start nothing: listen to nodes that run already')
     parser.add_argument('--node', default='contact_node', metavar='NAME',
                         help='of the contact node (default: %(default)s)')
-    parser.add_argument('--domain', type=int, metavar='ID',
-                        help=f'ROS domain, 0 to {DOMAINS[-1]} (default: drawn at random; with '
-                             '--attach, ROS_DOMAIN_ID)')
-    parser.add_argument('--model', default=PARAMETERS['model'].default, metavar='NAME',
-                        help='the contact node starts with (default: %(default)s)')
-    parser.add_argument('--seed', type=int, default=0, metavar='N',
+    processes.add_domain(parser, '; with --attach, ROS_DOMAIN_ID')
+    parser.set_defaults(domain=None)
+    parser.add_argument('--model', type=model_name, default=PARAMETERS['model'].default,
+                        metavar='NAME', help='the contact node starts with (default: %(default)s)')
+    parser.add_argument('--seed', type=within(0, 2**31), default=0, metavar='N',
                         help='of the first landing (default: %(default)s)')
-    parser.add_argument('--rate', type=float, default=200.0, metavar='HZ',
+    parser.add_argument('--rate', type=within(20.0, 1000.0), default=200.0, metavar='HZ',
                         help='pairs of poses a second (default: %(default)g)')
     parser.add_argument('--open-loop', action='store_true',
                         help='contacts are shown, but do not carry the load')
@@ -234,12 +222,6 @@ def _options(args: Sequence[str]) -> argparse.Namespace:
         if options.attach and getattr(options, name) != parser.get_default(name):
             parser.error(f'--{name.replace("_", "-")} is for what the view starts itself, and '
                          '--attach starts nothing')
-    try:
-        PARAMETERS['model'].check('--model', options.model)
-    except ValueError as error:
-        parser.error(str(error))
-    check_ranges(parser, options, rate=(20, 1000), seed=(0, 2**31), port=(1, 65535),
-                 domain=(0, DOMAINS[-1]))
     if options.domain is None and not options.attach:
         options.domain = random.choice(DOMAINS)
     return options

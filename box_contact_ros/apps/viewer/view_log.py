@@ -6,7 +6,6 @@ missed must not count as a loss. Stamps are nanoseconds; lengths metres, latenci
 """
 from __future__ import annotations
 
-import math
 import threading
 from collections import OrderedDict, deque
 from collections.abc import Sequence
@@ -16,11 +15,13 @@ from typing import NamedTuple
 import numpy as np
 
 from ...node.messages import NANOSECONDS
+from ...output import percentiles
+from ...scene.contact_law import Touch
 from ...scene.pairing import PAIRINGS, StampedPose
 from ...scene.scene_solver import two_boxes
 from ...solver.contact import Contact
 from ...solver.contact_solver import ContactSolver
-from ..percentiles import percentile
+from ..answer_log import touch_in
 from .style import STALE
 
 WINDOW = 2.0
@@ -34,35 +35,33 @@ Poses = tuple[np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True)
-class Answer:
+class AnsweredPair:
     """A pair of poses (7,) and the contact that the node answered with."""
 
     stamp: int
     received: int
     poses: Poses
-    point: np.ndarray | None
-    """(3,); None for no contact, and so are normal and depth."""
-    normal: np.ndarray | None
-    depth: float | None
+    touch: Touch | None
+    """None for no contact."""
 
     @property
     def latency(self) -> float:
-        """From the poses' stamp to the cloud."""
+        """Time from the poses' stamp to the cloud."""
         return (self.received - self.stamp) * 1e-9
 
 
-class Scene(NamedTuple):
+class Snapshot(NamedTuple):
     """What is drawn: poses (7,), the answer to them, the exact contact beside it."""
 
     poses: Poses
-    answer: Answer | None
+    answer: AnsweredPair | None
     """None if nobody answers."""
     exact: Contact
 
 
 @dataclass(frozen=True, kw_only=True)
-class Figures:
-    """Of the answers to the poses of the last `WINDOW`; NaN where there is nothing to measure."""
+class ViewFigures:
+    """Figures of the answers to the poses of the last `WINDOW`; NaN where there are none."""
 
     latency_median: float
     latency_p99: float
@@ -95,7 +94,7 @@ class ViewLog:
             self._pairing = self._new_pairing(self._scene)
             self._pairs: OrderedDict[int, Poses] = OrderedDict()  # not answered yet
             self._clouds: OrderedDict[int, tuple[np.ndarray, int]] = OrderedDict()  # no pair yet
-            self._answers: deque[Answer] = deque(maxlen=KEPT)
+            self._answers: deque[AnsweredPair] = deque(maxlen=KEPT)
             self._newest: tuple[int, Poses] | None = None
             self._answered = self._lost = 0
 
@@ -131,14 +130,9 @@ class ViewLog:
                 self._answer(stamp, poses, rows, received)
 
     def _answer(self, stamp: int, poses: Poses, rows: np.ndarray, received: int) -> None:
-        contact: tuple = (None, None, None)
-        if len(rows) and math.isfinite(rows[0]['depth']):
-            x, y, z, nx, ny, nz, depth = (float(rows[0][name]) for name in (
-                'x', 'y', 'z', 'normal_x', 'normal_y', 'normal_z', 'depth'))
-            contact = np.array([x, y, z]), np.array([nx, ny, nz]), depth
         if not self._answered:
             self._first = stamp
-        self._answers.append(Answer(stamp, received, poses, *contact))
+        self._answers.append(AnsweredPair(stamp, received, poses, touch_in(rows)))
         self._answered += 1
 
     def _give_up(self, now: int) -> None:
@@ -152,8 +146,8 @@ class ViewLog:
         while self._answers and now - self._answers[0].stamp > WINDOW * NANOSECONDS:
             self._answers.popleft()
 
-    def scene(self) -> Scene | None:
-        """The last answer with its poses; the last poses if nobody answers; None before them."""
+    def snapshot(self) -> Snapshot | None:
+        """Return the last answer with its poses, or the last poses if nobody answers."""
         with self._lock:
             if self._newest is None:
                 return None
@@ -163,27 +157,27 @@ class ViewLog:
             answer = None
         if answer is not None:
             poses = answer.poses
-        return Scene(poses, answer, self._exact(*poses))
+        return Snapshot(poses, answer, self._exact(*poses))
 
-    def figures(self, now: int) -> Figures:
-        """As things stand at this time [ns], of the clock of `cloud`."""
+    def figures(self, now: int) -> ViewFigures:
+        """Return the figures as things stand at this time [ns], of the clock of `cloud`."""
         with self._lock:
             answers, answered, lost = list(self._answers), self._answered, self._lost
         latencies = np.array([answer.latency for answer in answers])
         errors = self._point_errors(answers)
-        return Figures(
-            latency_median=percentile(latencies, 50.0), latency_p99=percentile(latencies, 99.0),
-            point_error_median=percentile(errors, 50.0),
-            point_error_p99=percentile(errors, 99.0), edge=self._edge,
+        median, p99 = percentiles(latencies, 50, 99)
+        error_median, error_p99 = percentiles(errors, 50, 99)
+        return ViewFigures(
+            latency_median=median, latency_p99=p99, point_error_median=error_median,
+            point_error_p99=error_p99, edge=self._edge,
             rate=sum(now - answer.received < NANOSECONDS for answer in answers),
             answered=answered, lost=lost)
 
-    def _point_errors(self, answers: Sequence[Answer]) -> np.ndarray:
-        """Distances (n,) of the points from the exact ones, where both say contact."""
-        touching = [answer for answer in answers if answer.point is not None]
+    def _point_errors(self, answers: Sequence[AnsweredPair]) -> np.ndarray:
+        """Return distances (n,) of points from the exact ones, where both report a contact."""
+        touching = [(*answer.poses, answer.touch.point) for answer in answers if answer.touch]
         if not touching:
             return np.zeros(0)
-        exact = self._exact.batch(*(np.array([answer.poses[box] for answer in touching])
-                                    for box in (0, 1)))
-        errors = np.linalg.norm(np.array([a.point for a in touching]) - exact.point, axis=1)
-        return errors[exact.colliding]
+        poses_a, poses_b, points = map(np.array, zip(*touching))
+        exact = self._exact.batch(poses_a, poses_b)
+        return np.linalg.norm(points - exact.point, axis=1)[exact.colliding]

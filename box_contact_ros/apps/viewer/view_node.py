@@ -1,28 +1,21 @@
 """The view's ears, and its hand on the contact node: subscriptions, and the parameter `model`."""
 from __future__ import annotations
 
-import contextlib
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
-from geometry_msgs.msg import PoseStamped
+import numpy as np
 from rclpy.context import Context
-from rclpy.node import Node
 from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.task import Future
-from sensor_msgs.msg import PointCloud2
+from std_msgs.msg import Header
 
-from ...node.messages import (
-    NANOSECONDS,
-    OTHER_SCENE,
-    Refused,
-    TypedMessages,
-    is_of_two_boxes,
-    read_cloud,
-)
-from ...node.runtime import LOG_SECONDS, POSE_QOS
+from ...node.runtime import POSE_QOS
+from ...scene.pairing import StampedPose
+from ..ros_client import stamp_of
+from .listener import Listener
 from .view_log import ViewLog
 
 ASK_PERIOD = 0.5
@@ -32,12 +25,11 @@ ANSWER_PATIENCE = 3.0
 ASKED = ('size_a', 'size_b', 'pairing', 'model')
 
 
-class ViewNode(Node):
+class ViewNode(Listener):
     """Writes what it hears to `log`, which there is once the contact node has named its sizes."""
 
     def __init__(self, context: Context, target: str, **options: Any) -> None:
         """`target` is the name of the contact node."""
-        super().__init__('view', context=context, **options)
         self.log: ViewLog | None = None
         self.settings: Mapping[str, Any] = {}
         """The contact node's parameters, those of ASKED."""
@@ -47,11 +39,9 @@ class ViewNode(Node):
         """Why the last model that was asked for was refused."""
         self._answered = 0.0
         self._question: Future | None = None
+        # Contacts best effort: the view must never hold up the contact node.
+        super().__init__('view', context, POSE_QOS, **options)
         self._target = AsyncParameterClient(self, target)
-        for box, topic in enumerate(('box_a/pose', 'box_b/pose')):
-            self.create_subscription(PoseStamped, topic, self._pose_callback(box), POSE_QOS)
-        # Best effort: the view must never hold up the contact node.
-        self.create_subscription(PointCloud2, 'contacts', self._on_cloud, POSE_QOS)
         self.create_timer(ASK_PERIOD, self._ask)
 
     @property
@@ -88,22 +78,12 @@ class ViewNode(Node):
                                    for name in ('size_a', 'size_b', 'pairing')):
             self.log = ViewLog(settings['size_a'], settings['size_b'], settings['pairing'])
 
-    def _pose_callback(self, box: int) -> Callable[[PoseStamped], None]:
-        read = TypedMessages().read_pose
+    def on_pose(self, box: int, pose: StampedPose) -> None:
+        """Write a pose to the log."""
+        if self.log is not None:
+            self.log.pose(box, pose.stamp, pose.numbers)
 
-        def callback(message: PoseStamped) -> None:
-            if self.log is None:
-                return
-            with contextlib.suppress(Refused):  # by the contact node too, which says so
-                pose = read(message)
-                self.log.pose(box, pose.stamp, pose.numbers)
-        return callback
-
-    def _on_cloud(self, message: PointCloud2) -> None:
-        received = self.get_clock().now().nanoseconds
-        stamp = message.header.stamp
-        rows = read_cloud(message)
-        if not is_of_two_boxes(rows):
-            self.get_logger().warning(OTHER_SCENE, throttle_duration_sec=LOG_SECONDS)
-        elif self.log is not None:
-            self.log.cloud(stamp.sec * NANOSECONDS + stamp.nanosec, rows, received)
+    def on_cloud(self, header: Header, rows: np.ndarray) -> None:
+        """Write a cloud to the log, with the time."""
+        if self.log is not None:
+            self.log.cloud(stamp_of(header), rows, self.get_clock().now().nanoseconds)

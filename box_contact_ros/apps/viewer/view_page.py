@@ -20,8 +20,8 @@ import numpy as np
 import viser
 
 from ...scene.pose import rotation_matrix
-from .style import BOX_A, BOX_B, BOX_OPACITY, CONTACT, EXACT, proportions
-from .view_log import Figures, Scene
+from .style import BOX_A, BOX_B, BOX_OPACITY, CONTACT, EXACT, proportions, unit_pose
+from .view_log import Snapshot, ViewFigures
 
 MODELS = ('mlp', 'exact', 'soup', 'paper')
 CHART_LEAST, CHART_MOST = ({'pad': 0.1, 'soft': value, 'mode': 1} for value in (-20.0, 20.0))
@@ -35,7 +35,7 @@ GROUND, LINES = (236, 238, 241), (206, 211, 217)
 
 
 @dataclass(frozen=True)
-class Landing:
+class CraneRun:
     """What the crane is asked for."""
 
     seed: int
@@ -46,9 +46,9 @@ class Landing:
 class Page:
     """Wishes of whoever looks at it go to `on_model` and `on_land`, in threads of viser's."""
 
-    def __init__(self, host: str, port: int, *, landing: Landing | None,
-                 on_model: Callable[[str], None], on_land: Callable[[Landing], None]) -> None:
-        """Serve at a port, or the next that is free; `landing` None: no crane to be asked."""
+    def __init__(self, host: str, port: int, *, run: CraneRun | None,
+                 on_model: Callable[[str], None], on_land: Callable[[CraneRun], None]) -> None:
+        """Serve at a port, or the next that is free; `run` None: no crane to be asked."""
         # viser would wait for ever for a server that cannot start.
         with socket.create_server((host, 0), family=socket.getaddrinfo(host, 0)[0][0]):
             pass
@@ -62,7 +62,7 @@ class Page:
                                    control_width='large')
         server.gui.main_panel.dock_right()
         server.gui.main_panel.set_width(PANEL_WIDTH)
-        self._sizes: tuple = ()
+        self._sizes: tuple[Sequence[float], ...] = ()
         self._origin: np.ndarray | None = None
         server.on_client_connect(self._aim)
         self._set_stage()
@@ -79,8 +79,8 @@ class Page:
         self._model = server.gui.add_button_group('model', MODELS)
         self._model.on_click(lambda event: on_model(event.target.value))
         self._status = server.gui.add_html('')
-        if landing is not None:
-            self._add_crane(landing, on_land)
+        if run is not None:
+            self._add_crane(run, on_land)
 
     def _set_stage(self) -> None:
         scene = self._server.scene
@@ -98,26 +98,28 @@ class Page:
         for name, colour in (('load', BOX_A), ('stack', BOX_B)):
             self._boxes.append(scene.add_box(f'/{name}', colour, opacity=BOX_OPACITY,
                                              visible=False))
-            dark = tuple(round(0.5 * value) for value in colour)
+            dark = np.array(colour) // 2
             self._edges.append(scene.add_line_segments(
-                f'/{name}/edges', np.zeros((12, 2, 3)), dark, line_width=2.0))
+                f'/{name}/edges', np.zeros((12, 2, 3)), dark, thickness=2.0,
+                thickness_units='screen'))
         self._point = scene.add_icosphere('/contact/point', 1.0, CONTACT, visible=False)
         # A cross, so that it is seen through the sphere, which is often at the same place.
         self._exact = scene.add_line_segments('/contact/exact', np.zeros((3, 2, 3)), EXACT,
-                                              line_width=3.0, visible=False)
+                                              thickness=3.0, thickness_units='screen',
+                                              visible=False)
         self._normal = scene.add_arrows('/contact/normal', np.array([[[0, 0, 0], [0, 0, 1.0]]]),
                                         CONTACT, visible=False)
 
-    def _add_crane(self, landing: Landing, on_land: Callable[[Landing], None]) -> None:
+    def _add_crane(self, run: CraneRun, on_land: Callable[[CraneRun], None]) -> None:
         gui = self._server.gui
         with gui.add_folder('crane'):
-            seed = gui.add_number('seed', landing.seed, min=0, max=2**31, step=1,
+            seed = gui.add_number('seed', run.seed, min=0, max=2**31, step=1,
                                   hint='0: the standard scenario; others are drawn at random')
-            rate = gui.add_slider('rate [Hz]', 20, 1000, 10, landing.rate)
-            closed_loop = gui.add_checkbox('closed loop', landing.closed_loop,
+            rate = gui.add_slider('rate [Hz]', 20, 1000, 10, run.rate)
+            closed_loop = gui.add_checkbox('closed loop', run.closed_loop,
                                            hint='the contact carries the load')
             gui.add_button('land again').on_click(lambda _: on_land(
-                Landing(int(seed.value), float(rate.value), closed_loop.value)))
+                CraneRun(int(seed.value), float(rate.value), closed_loop.value)))
             self._seed = seed
             self._verdict = gui.add_html('')
             self._report = gui.add_folder('its report', expand_by_default=False, visible=False)
@@ -125,46 +127,46 @@ class Page:
                 self._last_run = gui.add_html('')
 
     def set_sizes(self, size_a: Sequence[float], size_b: Sequence[float]) -> None:
-        """Full extents [m]; where the scene is drawn about is found anew."""
+        """Take the boxes' full extents [m]; the origin of the drawing is found anew."""
         if (tuple(size_a), tuple(size_b)) == self._sizes:
             return
         self._sizes, self._origin = (tuple(size_a), tuple(size_b)), None
         look = proportions(size_a, size_b)
         for box, edges, size in zip(self._boxes, self._edges, self._sizes):
-            box.dimensions = size
+            box.dimensions = size[0], size[1], size[2]
             edges.points = _edges(size)
         self._point.radius = look.point_radius
-        self._exact.points = 2.5 * look.point_radius * np.stack([-np.eye(3), np.eye(3)], axis=1)
+        cross = 2.5 * look.point_radius * np.stack([-np.eye(3), np.eye(3)], axis=1)
+        self._exact.points = cross.astype(np.float32)
         self._normal.points = np.array([[[0.0, 0.0, 0.0], [0.0, 0.0, look.normal_length]]])
         self._normal.shaft_radius = 0.45 * look.point_radius
         self._normal.head_radius = 1.1 * look.point_radius
         self._normal.head_length = 2.6 * look.point_radius
 
-    def draw(self, scene: Scene | None) -> None:
+    def draw(self, snapshot: Snapshot | None) -> None:
         """Show poses and contact."""
-        if scene is None or not self._sizes:
+        if snapshot is None or not self._sizes:
             return
         if self._origin is None:
-            self._look_at(scene)
+            self._origin = snapshot.poses[1][:3].copy()
+            self._look_at(snapshot.poses[1])
         with self._server.atomic():
-            for box, pose in zip(self._boxes, scene.poses):
+            for box, pose in zip(self._boxes, map(unit_pose, snapshot.poses)):
                 box.position = pose[:3] - self._origin
-                box.wxyz = np.roll(pose[3:] / np.linalg.norm(pose[3:]), 1)
+                box.wxyz = np.roll(pose[3:], 1)
                 box.visible = True
-            answer = scene.answer
-            touching = answer is not None and answer.point is not None
-            if touching:
-                self._point.position = self._normal.position = answer.point - self._origin
-                self._normal.wxyz = _turn_from_z(answer.normal)
-            self._point.visible = self._normal.visible = touching
-            if scene.exact.colliding:
-                self._exact.position = scene.exact.point - self._origin
-            self._exact.visible = touching and scene.exact.colliding
+            touch, exact = snapshot.answer and snapshot.answer.touch, snapshot.exact
+            if touch:
+                self._point.position = self._normal.position = touch.point - self._origin
+                self._normal.wxyz = _quaternion_from_z(touch.normal)
+            self._point.visible = self._normal.visible = touch is not None
+            if exact.colliding:
+                self._exact.position = exact.point - self._origin
+            self._exact.visible = touch is not None and exact.colliding
 
-    def _look_at(self, scene: Scene) -> None:
-        """Put the origin, the ground and the camera where the boxes are."""
-        size_b, pose_b = np.array(self._sizes[1]), scene.poses[1]
-        self._origin = pose_b[:3].copy()
+    def _look_at(self, pose_b: np.ndarray) -> None:
+        """Put the ground and the camera where the boxes are."""
+        size_b = np.array(self._sizes[1])
         down = 0.5 * float(np.abs(rotation_matrix(pose_b[3:])[2]) @ size_b)
         self._ground.position = (0.0, 0.0, -down)
         self._ground.visible = True
@@ -184,16 +186,16 @@ class Page:
         client.camera.position = self._server.initial_camera.position
         client.camera.look_at = self._server.initial_camera.look_at
 
-    def show(self, scene: Scene | None, figures: Figures | None, *, model: str, wish: str,
+    def show(self, snapshot: Snapshot | None, figures: ViewFigures | None, *, model: str, wish: str,
              refusal: str, connected: bool) -> None:
         """Show the figures, if it is time for new ones."""
         now = time.monotonic()
         if now < self._next_read_out:
             return
         self._next_read_out = now + READ_OUT_PERIOD
-        self._read_out.content = read_out(scene, figures, model)
-        if scene is not None:
-            self._history.append((now, 1e3 * scene.exact.separation))
+        self._read_out.content = read_out(snapshot, figures, model)
+        if snapshot is not None:
+            self._history.append((now, 1e3 * snapshot.exact.separation))
             while now - self._history[0][0] > HISTORY:
                 self._history.popleft()
             times, separations = np.array(self._history).T
@@ -209,12 +211,12 @@ class Page:
             text, bad = f'refused: {refusal}', True
         self._status.content = _line('model-status', text, bad=bad)
 
-    def show_landing(self, landing: Landing) -> None:
-        """Which run is under way."""
-        self._seed.value = landing.seed
+    def show_run(self, run: CraneRun) -> None:
+        """Show which run is under way."""
+        self._seed.value = run.seed
 
     def show_last_run(self, passed: bool, text: str) -> None:
-        """Whether the crane's last run passed, and its report."""
+        """Show whether the crane's last run passed, and its report."""
         self._verdict.content = _line('last-run', f'last run: {"passed" if passed else "FAILED"}',
                                       bad=not passed)
         self._report.visible = True
@@ -228,23 +230,19 @@ class Page:
             self._server.stop()
 
 
-def read_out(scene: Scene | None, figures: Figures | None, model: str) -> str:
-    """The figures as an HTML table; each value has its name as id."""
-    answer = scene.answer if scene else None
-    error = math.nan
-    if answer is not None and answer.point is not None and scene.exact.colliding:
-        error = float(np.linalg.norm(answer.point - scene.exact.point))
-    if scene is None or figures is None:
-        verdict = 'waiting for poses'
-    elif answer is None:
-        verdict = 'no answer'
+def read_out(snapshot: Snapshot | None, figures: ViewFigures | None, model: str) -> str:
+    """Return the figures as an HTML table; each value has its name as id."""
+    if snapshot is None or figures is None:
+        rows = [('verdict', 'verdict', 'waiting for poses')]
     else:
-        verdict = 'no contact' if answer.point is None else 'contact'
-    rows = [('verdict', 'verdict', verdict)]
-    if scene is not None and figures is not None:
-        edge = figures.edge
-        rows += [
-            ('separation', 'separation', f'{_text(1e3 * scene.exact.separation, "+.2f")} mm'),
+        answer, exact, edge = snapshot.answer, snapshot.exact, figures.edge
+        verdict, error = 'no answer' if answer is None else 'no contact', math.nan
+        if answer is not None and answer.touch is not None:
+            verdict = 'contact'
+            error = float(np.linalg.norm(answer.touch.point - exact.point))  # NaN without an exact
+        rows = [
+            ('verdict', 'verdict', verdict),
+            ('separation', 'separation', f'{_text(1e3 * exact.separation, "+.2f")} mm'),
             ('error', f'point error of {model}', _share(error, edge)),
             ('error-p99', '&emsp;p99', _share(figures.point_error_p99, edge)),
             ('latency', 'latency, median', f'{_text(1e3 * figures.latency_median, ".2f")} ms'),
@@ -269,22 +267,22 @@ def _text(value: float, form: str) -> str:
 
 
 def _share(length: float, edge: float) -> str:
-    """A length [m] in mm and as a share of an edge."""
+    """Return a length [m] in mm and as a share of an edge."""
     if math.isnan(length):
         return '–'
     return f'{1e3 * length:.1f} mm = {100.0 * length / edge:.2f} %'
 
 
-def _turn_from_z(direction: np.ndarray) -> np.ndarray:
-    """The least turn that brings z to a unit vector, as w x y z."""
+def _quaternion_from_z(direction: np.ndarray) -> np.ndarray:
+    """Return the smallest rotation that brings z to a unit vector, as w x y z."""
     x, y, z = direction
-    turn = np.array([1.0 + z, -y, x, 0.0])
-    length = np.linalg.norm(turn)
-    return turn / length if length > 0.0 else np.array([0.0, 1.0, 0.0, 0.0])  # z to -z: about x
+    quaternion = np.array([1.0 + z, -y, x, 0.0])
+    length = np.linalg.norm(quaternion)  # 0 for -z: then about x
+    return quaternion / length if length > 0.0 else np.array([0.0, 1.0, 0.0, 0.0])
 
 
 def _edges(size: Sequence[float]) -> np.ndarray:
-    """The 12 edges of a box about the origin: (12, 2, 3)."""
+    """Return the 12 edges of a box about the origin: (12, 2, 3)."""
     corners = 0.5 * np.array(size) * np.array(
         [[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
     return np.array([[corners[i], corners[i | bit]]

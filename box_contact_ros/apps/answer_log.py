@@ -1,0 +1,279 @@
+"""What a client sent to one node, what the node answered, and how good it was. No ROS.
+
+An `AnswerLog` matches messages to poses by their stamp. Its results compare them with the exact
+contacts. Stamps and times of receipt are nanoseconds of one clock; positions are metres in the
+poses' common frame. What counts:
+
+- answered: the cloud came, and, if it reports a contact, point and normal came too. Every pair that
+  was sent is either answered or lost. A loss has one of three reasons, found independently:
+  no cloud (lost evaluation), a cloud without its point or normal (lost contact), a cloud that says
+  that the pair could not be evaluated.
+- latency: from the stamp, taken just before the poses are published, to the receipt of the later of
+  point and normal, or of the cloud where that says that there is no contact.
+- the echo node answers with one message; it has latencies, but no verdicts and no errors.
+"""
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..output import percentiles
+from ..scene.contact_law import Touch
+from ..solver.contact import Contacts
+
+CONTACT_MESSAGES = ('cloud', 'point', 'normal')
+"""Kinds of message that a contact node answers with."""
+ECHO_MESSAGES = ('echo',)
+WIDTHS = {'cloud': 7, 'point': 3, 'normal': 3, 'echo': 0}
+"""Numbers kept of each: see `first_row` for the cloud's."""
+CLOUD_COLUMNS = ('x', 'y', 'z', 'normal_x', 'normal_y', 'normal_z', 'depth')
+
+
+def first_row(rows: np.ndarray) -> np.ndarray:
+    """Return the numbers of CLOUD_COLUMNS (7,) of a cloud's first row, none (0,) without rows."""
+    return np.array([float(rows[0][name]) for name in CLOUD_COLUMNS] if len(rows) else [])
+
+
+def touch_in(rows: np.ndarray) -> Touch | None:
+    """Return the contact in a cloud's first row; None without one, or if it was not evaluated."""
+    values = first_row(rows)
+    if not len(values) or np.isnan(values).any():
+        return None
+    return Touch(values[:3], values[3:6], float(values[6]))
+
+
+def angles(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Return angles (n,) [deg] between rows of vectors (n, 3); arccos would lose small angles."""
+    sines = np.linalg.norm(np.cross(first, second), axis=1)
+    return np.degrees(np.arctan2(sines, np.sum(first * second, axis=1)))
+
+
+class StreamLog:
+    """One stream as it was sent to one node, and what came back to each row of it."""
+
+    def __init__(self, name: str, rows: int, kinds: Sequence[str]) -> None:
+        """Make room for `rows` pairs, each answered by a message of each of `kinds`."""
+        self.name = name
+        self.truth: Contacts | None = None
+        """The exact contacts of the rows; what it takes for results, but for an echo."""
+        self.stamps: list[int] = []
+        self.lateness: list[float] = []
+        """How late each pair was sent, compared with the schedule [s]."""
+        self.received = {kind: np.zeros(rows, dtype=np.int64) for kind in kinds}
+        """Time of the first message [ns], 0 for none."""
+        self.values = {kind: np.full((rows, WIDTHS[kind]), math.nan) for kind in kinds}
+        self.touching = np.zeros(rows, dtype=bool)
+        self.refused = np.zeros(rows, dtype=bool)
+        self.duplicates = self.strangers = 0
+
+    @property
+    def evaluated(self) -> np.ndarray:
+        """Which pairs have their first message (cloud or echo), (sent,)."""
+        return next(iter(self.received.values()))[:len(self.stamps)] > 0
+
+    @property
+    def answered(self) -> np.ndarray:
+        """Which pairs have all that they can have, (sent,)."""
+        rows = slice(0, len(self.stamps))
+        alone = ~self.touching[rows]
+        came = [times[rows] > 0 for times in list(self.received.values())[1:]]
+        whole: np.ndarray = np.all(came, axis=0) if came else alone
+        return self.evaluated & ~self.refused[rows] & (alone | whole)
+
+    @property
+    def contacts(self) -> np.ndarray:
+        """Which of the answers report a contact, (answered,)."""
+        return self.touching[:len(self.stamps)][self.answered]
+
+    @property
+    def latencies(self) -> np.ndarray:
+        """From the stamp to the end of each answer [s], (answered,)."""
+        rows = slice(0, len(self.stamps))
+        first, *more = (times[rows] for times in self.received.values())
+        finished = np.where(self.touching[rows], np.max(more, axis=0), first) if more else first
+        return (finished - np.array(self.stamps, dtype=np.int64))[self.answered] * 1e-9
+
+
+class AnswerLog:
+    """Everything that was sent to one node and came from it. Two threads may use it.
+
+    One thread calls `open` and `sent`, another one `answer`.
+    """
+
+    def __init__(self, node: str, model: str, kinds: Sequence[str] = CONTACT_MESSAGES) -> None:
+        self.node, self.model, self.kinds = node, model, kinds
+        self.streams: list[StreamLog] = []
+        self.offers: set[int] = set()
+        """Stamps [ns] of pairs that find out whether anyone answers; they count in no figure."""
+        self.offers_answered: set[int] = set()
+        self.newest_contact = 0
+        """Stamp [ns] of the newest contact of which all messages are in; 0 for none."""
+        self.messages = self.matched = self.offer_messages = 0
+        self._rows: dict[int, tuple[StreamLog, int]] = {}
+
+    def open(self, name: str, rows: int, truth: Contacts | None = None) -> StreamLog:
+        """Begin a stream; `sent` fills it row by row."""
+        self.streams.append(StreamLog(name, rows, self.kinds))
+        self.streams[-1].truth = truth
+        return self.streams[-1]
+
+    def sent(self, stamp: int, lateness: float = 0.0) -> None:
+        """Note that the stream's next row goes out under `stamp` [ns], `lateness` [s] too late."""
+        log = self.streams[-1]
+        if stamp in self._rows or stamp in self.offers:
+            raise ValueError(f'stamp {stamp} was sent twice')
+        self._rows[stamp] = log, len(log.stamps)
+        log.stamps.append(stamp)
+        log.lateness.append(lateness)
+
+    def find(self, stamp: int) -> tuple[StreamLog, int] | None:
+        """Return the stream and the row that were sent under a stamp [ns]."""
+        return self._rows.get(stamp)
+
+    def answer(self, kind: str, stamp: int, received: int,
+               values: Sequence[float] | np.ndarray = ()) -> None:
+        """Note a message received at `received` [ns]; values: see WIDTHS, none for no contact.
+
+        An answer may come late, when another stream is under way: the stamp says where it belongs.
+        """
+        self.messages += 1
+        if stamp in self.offers:
+            self.offer_messages += 1
+            self.offers_answered.add(stamp)
+            return
+        found = self.find(stamp)
+        if found is None:
+            if self.streams:
+                self.streams[-1].strangers += 1
+            return
+        log, row = found
+        if log.received[kind][row]:
+            log.duplicates += 1
+            return
+        self.matched += 1
+        if len(values):
+            log.values[kind][row] = values
+        if kind == 'cloud':
+            log.refused[row] = bool(np.isnan(values).any())
+            log.touching[row] = len(values) > 0 and not log.refused[row]
+        log.received[kind][row] = received
+        if log.touching[row] and all(log.received[kind][row] for kind in self.kinds):
+            self.newest_contact = max(self.newest_contact, stamp)
+
+    @property
+    def outstanding(self) -> int:
+        """Pairs of the stream under way that may still be answered."""
+        log = self.streams[-1]
+        rows = slice(0, len(log.stamps))
+        return int(np.count_nonzero(~(log.answered | log.refused[rows])))
+
+    @property
+    def adds_up(self) -> bool:
+        """Whether each message is a first answer, a duplicate, a stranger or an offer's."""
+        others = sum(log.duplicates + log.strangers for log in self.streams)
+        return self.messages == self.matched + others + self.offer_messages
+
+    def results(self) -> list[StreamResult]:
+        """Return the figures of each stream of which anything was sent, in order."""
+        return [_result(self, log) for log in self.streams if log.stamps]
+
+
+@dataclass(frozen=True, kw_only=True)
+class StreamResult:
+    """Figures of one node and one stream."""
+
+    node: str
+    stream: str
+    model: str
+    sent: int
+    answered: int
+    lost: int
+    lost_evaluations: int
+    lost_contacts: int
+    not_evaluated: int
+    duplicates: int
+    strangers: int
+    wrong_verdicts: int
+    contradictions: int
+    """Answers whose cloud, point and normal disagree with each other."""
+    contacts: int
+    rate: float
+    """Pairs a second as they were really sent [Hz]."""
+    latencies: np.ndarray = field(repr=False)
+    """(answered,) [s]."""
+    point_errors: np.ndarray = field(repr=False)
+    """(n,) [m], where node and exact solver both report a contact."""
+    normal_errors: np.ndarray = field(repr=False)
+    """(n,) [deg], of the same."""
+    lateness: np.ndarray = field(repr=False)
+    """How far the client itself fell behind its schedule (sent,) [s]."""
+
+    @property
+    def adds_up(self) -> bool:
+        """Whether what was sent is what was answered and what was lost, reason by reason."""
+        reasons = self.lost_evaluations + self.lost_contacts + self.not_evaluated
+        return self.sent == self.answered + self.lost and self.lost == reasons
+
+    @property
+    def faults(self) -> list[str]:
+        """What went wrong, in words; slow or inaccurate is not wrong."""
+        counted = {'lost': self.lost, 'duplicates': self.duplicates,
+                   'answers to no pose': self.strangers, 'wrong verdicts': self.wrong_verdicts,
+                   'contradictions': self.contradictions}
+        faults = [f'{count} {name}' for name, count in counted.items() if count]
+        return faults if self.adds_up else [*faults, 'the counts do not add up']
+
+    @property
+    def latency(self) -> dict[str, float]:
+        """Figures of the latencies [s] in the words of `ros2 topic delay`; NaN without any."""
+        values = self.latencies
+        mean, std = (values.mean(), values.std()) if values.size else (math.nan, math.nan)
+        least, most, p50, p99, p999 = percentiles(values, 0, 100, 50, 99, 99.9)
+        return {'mean': float(mean), 'min': least, 'max': most, 'std': float(std), 'p50': p50,
+                'p99': p99, 'p999': p999}
+
+    @property
+    def point_error(self) -> dict[str, float]:
+        """Median, p99 and largest of the point errors [m]; NaN without any."""
+        return _error(self.point_errors)
+
+    @property
+    def normal_error(self) -> dict[str, float]:
+        """The same of the normal errors [deg]."""
+        return _error(self.normal_errors)
+
+
+def _error(values: np.ndarray) -> dict[str, float]:
+    return dict(zip(('median', 'p99', 'max'), percentiles(values, 50, 99, 100)))
+
+
+def _result(node: AnswerLog, log: StreamLog) -> StreamResult:
+    sent = len(log.stamps)
+    evaluated, answered = log.evaluated, log.answered
+    touching, refused = log.touching[:sent], log.refused[:sent]
+    wrong = contradictory = measured = np.zeros(sent, dtype=bool)
+    point_errors = normal_errors = np.zeros(0)
+    if log.truth is not None and node.kinds != ECHO_MESSAGES:
+        cloud, point, normal = (log.values[kind][:sent] for kind in CONTACT_MESSAGES)
+        real = log.truth.colliding[:sent]
+        wrong = evaluated & ~refused & (touching != real)
+        either = (log.received['point'][:sent] > 0) | (log.received['normal'][:sent] > 0)
+        apart = np.any(np.concatenate([point, normal], axis=1) != cloud[:, :6], axis=1)
+        contradictory = evaluated & ~touching & either | answered & touching & apart
+        measured = answered & touching & real
+        point_errors = np.linalg.norm(point[measured] - log.truth.point[:sent][measured], axis=1)
+        normal_errors = angles(normal[measured], log.truth.normal[:sent][measured])
+    lost = {'lost': ~answered, 'lost_evaluations': ~evaluated, 'not_evaluated': refused,
+            'lost_contacts': evaluated & ~refused & ~answered}
+    counts = lost | {'answered': answered, 'contacts': answered & touching,
+                     'wrong_verdicts': wrong, 'contradictions': contradictory}
+    span = (log.stamps[-1] - log.stamps[0]) * 1e-9
+    return StreamResult(
+        node=node.node, stream=log.name, model=node.model, sent=sent, duplicates=log.duplicates,
+        strangers=log.strangers, rate=(sent - 1) / span if span else math.nan,
+        latencies=log.latencies, point_errors=point_errors, normal_errors=normal_errors,
+        lateness=np.array(log.lateness),
+        **{name: int(np.count_nonzero(rows)) for name, rows in counts.items()})

@@ -1,0 +1,74 @@
+"""What clients of the contact node need of rclpy: a node that is served, messages as numbers."""
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any, TypeVar
+
+import numpy as np
+import rclpy
+from geometry_msgs.msg import PoseStamped
+from rclpy.context import Context
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
+from std_msgs.msg import Header
+
+from ..node.messages import NANOSECONDS
+from ..node.runtime import make_executor, uninterrupted
+
+NodeKind = TypeVar('NodeKind', bound=Node)
+
+# Deep: what the DDS layer delivers while Python is busy must not push out the rest.
+DEEP_RELIABLE, DEEP_BEST_EFFORT = (QoSProfile(depth=1000, reliability=reliability) for reliability
+                                   in (ReliabilityPolicy.RELIABLE, ReliabilityPolicy.BEST_EFFORT))
+
+
+@contextmanager
+def joined(make_node: Callable[[Context], NodeKind], args: Sequence[str] | None = None, *,
+           domain: int | None = None, signals: SignalHandlerOptions = SignalHandlerOptions.NO,
+           ) -> Iterator[tuple[NodeKind, Any]]:
+    """Give a node and its executor in a context of their own; end all three afterwards.
+
+    signals: which handlers of rclpy's are installed; none where the caller has its own. After a
+    signal, whatever was under way fails; that is raised as ExternalShutdownException.
+    """
+    context = Context()
+    rclpy.init(args=None if args is None else list(args), context=context, domain_id=domain,
+               signal_handler_options=signals)
+    node = executor = None
+    try:
+        node = make_node(context)
+        executor = make_executor(context)
+        executor.add_node(node)
+        yield node, executor
+    except Exception as error:
+        if context.ok():
+            raise
+        raise ExternalShutdownException from error
+    finally:
+        with uninterrupted():
+            if executor is not None:
+                executor.shutdown()
+            if node is not None:
+                node.destroy_node()
+            context.try_shutdown()
+
+
+def stamp_of(header: Header) -> int:
+    """Return a header's stamp [ns]."""
+    return int(header.stamp.sec) * NANOSECONDS + int(header.stamp.nanosec)
+
+
+def pose_message(header: Header, pose: np.ndarray) -> PoseStamped:
+    """Return the message of a pose `x y z qx qy qz qw`."""
+    message = PoseStamped(header=header)
+    set_pose(message.pose, pose)
+    return message
+
+
+def set_pose(pose: Any, numbers: np.ndarray) -> None:
+    """Write a pose `x y z qx qy qz qw` into a geometry_msgs/Pose."""
+    p, q = pose.position, pose.orientation
+    p.x, p.y, p.z, q.x, q.y, q.z, q.w = map(float, numbers)
