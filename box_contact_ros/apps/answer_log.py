@@ -2,15 +2,17 @@
 
 An `AnswerLog` matches messages to poses by their stamp. Its results compare them with the exact
 contacts. Stamps and times of receipt are nanoseconds of one clock; positions are metres in the
-poses' common frame. What counts:
+poses' common frame.
 
-- answered: the cloud came, and, if it reports a contact, point and normal came too. Every pair that
-  was sent is either answered or lost. A loss has one of three reasons, found independently:
-  no cloud (lost evaluation), a cloud without its point or normal (lost contact), a cloud that says
-  that the pair could not be evaluated.
-- latency: from the stamp, taken just before the poses are published, to the receipt of the later of
-  point and normal, or of the cloud where that says that there is no contact.
-- the echo node answers with one message; it has latencies, but no verdicts and no errors.
+A pair is answered when the cloud came, and, if it reports a contact, point and normal came too.
+Every other pair is lost, for one of three reasons that are found independently: no cloud (lost
+evaluation); a cloud without its point or normal (lost contact); a cloud that reports that the pair
+could not be evaluated.
+
+The latency runs from the stamp, taken just before the poses are published, to the last message of
+a contact (point or normal), or to the cloud that reports no contact.
+
+The echo node answers with one message; it has latencies, but no verdicts and no errors.
 """
 from __future__ import annotations
 
@@ -110,7 +112,7 @@ class AnswerLog:
         """Stamps [ns] of pairs that find out whether anyone answers; they count in no figure."""
         self.offers_answered: set[int] = set()
         self.newest_contact = 0
-        """Stamp [ns] of the newest contact of which all messages are in; 0 for none."""
+        """Stamp [ns] of the newest contact that is complete; 0 without any."""
         self.messages = self.matched = self.offer_messages = 0
         self._rows: dict[int, tuple[StreamLog, int]] = {}
 
@@ -177,7 +179,7 @@ class AnswerLog:
         return self.messages == self.matched + others + self.offer_messages
 
     def results(self) -> list[StreamResult]:
-        """Return the figures of each stream of which anything was sent, in order."""
+        """Return the figures of each stream that was begun to be sent, in order."""
         return [_result(self, log) for log in self.streams if log.stamps]
 
 

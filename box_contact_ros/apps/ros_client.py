@@ -20,9 +20,8 @@ from ..node.runtime import make_executor, uninterrupted
 
 NodeKind = TypeVar('NodeKind', bound=Node)
 
-# Deep: what the DDS layer delivers while Python is busy must not push out the rest.
-DEEP_RELIABLE, DEEP_BEST_EFFORT = (QoSProfile(depth=1000, reliability=reliability) for reliability
-                                   in (ReliabilityPolicy.RELIABLE, ReliabilityPolicy.BEST_EFFORT))
+DEEP_RELIABLE = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
+"""What the DDS layer delivers while Python is busy must not push out the rest."""
 
 
 @contextmanager

@@ -7,8 +7,8 @@ streams for cubes come first; for the containers the nodes are restarted, with t
 With --replay the stream is a recording's pairs of poses of equal stamp, sent at --rate. Prints two
 tables and writes bench.csv, bench.md and bench.png.
 
-The exit status is 0 only if every node answered, the counts add up (sent = answered + lost), and
-the contact node lost nothing and gave no wrong verdict and no answer twice.
+The exit status is 0 only if every node answered and the counts add up (sent = answered + lost).
+The contact node must lose nothing, and give no wrong verdict and no answer twice.
 """
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """What runs the bench: starts the nodes, sends the streams, receives the answers.
 
-One thread sends, on an absolute schedule, poses that were serialised before; the executor receives
+One thread sends, on an absolute schedule, poses that were serialised before. The executor receives
 in the main thread and only keeps the bytes, with the time. Everything else is done between streams.
 """
 from __future__ import annotations

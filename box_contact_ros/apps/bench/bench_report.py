@@ -81,7 +81,7 @@ def all_latencies(results: Iterable[StreamResult], node: str) -> np.ndarray:
 
 
 def draw(path: Path, results: Sequence[StreamResult], title: str) -> None:
-    """Draw latency distributions, latencies by stream, and errors beside latencies."""
+    """Draw latency distributions, latencies by stream, and errors over latencies."""
     figure, axes = subplots(1, 3, (16.0, 5.6))
     nodes = list(dict.fromkeys(result.node for result in results))
     colors = {node: COLORS.get(node, f'C{i}') for i, node in enumerate(nodes)}

@@ -1,7 +1,7 @@
 """The echo node: answers every pair of poses with its stamp, and computes nothing.
 
 It is the floor of the bench: what transport and executor alone cost. It subscribes box_a/pose and
-box_b/pose as the contact node does, and answers on echo (std_msgs/Header) once poses of equal stamp
+box_b/pose as the contact node does. It answers on echo (std_msgs/Header) once poses of equal stamp
 are in. Messages stay the bytes they come as; no faster answer can be given from Python.
 
 It is served as the contact node is, or, with --bare, as any node on this executor: without
@@ -34,13 +34,13 @@ EMPTY_FRAME = struct.pack('<I', 1) + b'\0'
 
 
 def raw_stamp(data: bytes) -> int:
-    """Stamp [ns] of a serialised message that begins with a header."""
+    """Return the stamp [ns] of a serialised message that begins with a header."""
     sec, nanosec = struct.unpack_from('<iI' if data[1] else '>iI', data, STAMP_AT)
     return sec * NANOSECONDS + nanosec
 
 
 def raw_header(stamp: int) -> bytes:
-    """A serialised Header of a stamp [ns] and no frame."""
+    """Return a serialised Header of a stamp [ns] and no frame."""
     return b'\0\1\0\0' + struct.pack('<iI', *divmod(stamp, NANOSECONDS)) + EMPTY_FRAME
 
 

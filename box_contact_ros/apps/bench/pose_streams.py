@@ -20,9 +20,8 @@ EXTRA_DRAWS = 16
 """Pairs drawn beyond those that are still needed: a few draws of a set miss and are left out."""
 COPLANAR_OFFSET = 0.8
 """Largest offset of stacked cubes along x and along y, as a share of the edge. Up to 0.85 the two
-faces overlap whatever the yaw: seen along a side of the turned face, at an angle t to x, the
-centres are 2·0.85·(cos t + sin t) apart, which is less than the (cos t + sin t) + 1 that the two
-half-widths of cubes of edge 2 add up to."""
+faces of edge 2 overlap whatever the yaw t: 2·0.85·(cos t + sin t) < (cos t + sin t) + 1, the sum
+of their half-widths along a side of the rotated face."""
 GAPS = (1e-3, 1.0)
 """Least and largest SAT gap of the pairs that are apart [m]."""
 
@@ -73,23 +72,23 @@ class Replay(Stream):
 
 
 def coplanar(rng: np.random.Generator, n: int) -> Pairs:
-    """Cubes of edge 2 stacked with exactly coplanar faces, zero depth, any yaw, anywhere on it."""
+    """Draw cubes of edge 2 stacked with exactly coplanar faces, zero depth, any yaw and place."""
     offset = COPLANAR_OFFSET * rng.uniform(-2.0, 2.0, (n, 2))
-    turn = pose_sets.turns(np.array([0.0, 0.0, 1.0]), rng.uniform(-np.pi, np.pi, n))
+    quaternions = pose_sets.turns(np.array([0.0, 0.0, 1.0]), rng.uniform(-np.pi, np.pi, n))
     a = np.tile([0.0, 0, 0, 0, 0, 0, 1], (n, 1))
-    b = np.concatenate([offset, np.full((n, 1), 2.0), turn], axis=1)
+    b = np.concatenate([offset, np.full((n, 1), 2.0), quaternions], axis=1)
     sizes = np.tile(CUBE, (n, 1))
     return Pairs(a, b, sizes, sizes)
 
 
 def separated(rng: np.random.Generator, n: int) -> Pairs:
-    """Cubes of edge 2 in any pose, apart by a SAT gap of 1 mm to 1 m."""
+    """Draw cubes of edge 2 in any pose, apart by a SAT gap of 1 mm to 1 m."""
     sizes = np.tile(CUBE, (n, 1))
     return pose_sets.any_pose(rng, sizes, sizes, -pose_sets.log_uniform(rng, *GAPS, n))
 
 
 def crane_run(rng: np.random.Generator, n: int) -> Pairs:
-    """A crane lowers a container onto another and lifts it: the whole motion, in n poses.
+    """Lower a container onto another by a crane and lift it: the whole motion, in n poses.
 
     The motion takes 18 s; it is played faster or slower if n poses take another time to send.
     """
@@ -105,7 +104,7 @@ def crane_run(rng: np.random.Generator, n: int) -> Pairs:
 
 
 @dataclass(frozen=True)
-class Source:
+class StreamSource:
     """Where a stream comes from: how it is drawn, the size of both boxes [m], what it is."""
 
     draw: Callable[[np.random.Generator, int], Pairs]
@@ -114,7 +113,7 @@ class Source:
 
 
 def _of_set(draw: Generator) -> Generator:
-    """A set of `pose_sets`, filled up to exactly n pairs."""
+    """Return a set of `pose_sets`, filled up to exactly n pairs."""
     def filled(rng: np.random.Generator, n: int) -> Pairs:
         parts: list[Pairs] = []
         while (missing := n - sum(len(part.pose_a) for part in parts)) > 0:
@@ -123,24 +122,23 @@ def _of_set(draw: Generator) -> Generator:
     return filled
 
 
-STREAMS: dict[str, Source] = {
-    'random': Source(_of_set(pose_sets.SETS['random cubes']), CUBE,
-                     'cubes in any pose, 0.1 to 10 % deep'),
-    'touching': Source(_of_set(pose_sets.SETS['touching']), CUBE,
-                       'cubes in any pose that just touch'),
-    'near-parallel': Source(_of_set(pose_sets.SETS['stacks']), CUBE,
-                            'stacked cubes, tilt 1e-6 to 1e-3 rad, 1 mm deep'),
-    'coplanar': Source(coplanar, CUBE, 'stacked cubes, faces exactly coplanar'),
-    'separated': Source(_of_set(separated), CUBE, 'cubes in any pose, 1 mm to 1 m apart'),
-    'containers': Source(_of_set(pose_sets.SETS['containers']), CONTAINER,
-                         '40 ft containers with sway, 0.1 to 10 % deep'),
-    'crane': Source(crane_run, CONTAINER, 'a recorded run of the crane'),
-}
+STREAMS: dict[str, StreamSource] = {name: StreamSource(*source) for name, source in {
+    'random': (_of_set(pose_sets.SETS['random cubes']), CUBE,
+               'cubes in any pose, 0.1 to 10 % deep'),
+    'touching': (_of_set(pose_sets.SETS['touching']), CUBE, 'cubes in any pose that just touch'),
+    'near-parallel': (_of_set(pose_sets.SETS['stacks']), CUBE,
+                      'stacked cubes, tilt 1e-6 to 1e-3 rad, 1 mm deep'),
+    'coplanar': (coplanar, CUBE, 'stacked cubes, faces exactly coplanar'),
+    'separated': (_of_set(separated), CUBE, 'cubes in any pose, 1 mm to 1 m apart'),
+    'containers': (_of_set(pose_sets.SETS['containers']), CONTAINER,
+                   '40 ft containers with sway, 0.1 to 10 % deep'),
+    'crane': (crane_run, CONTAINER, 'a recorded run of the crane'),
+}.items()}
 """The streams by name; neighbours are for boxes of the same sizes."""
 
 
 def make_stream(name: str, count: int, seed: int = 1) -> Stream:
-    """`count` pairs of the stream of that name; the same for the same seed, whatever else is made.
+    """Return `count` pairs of a named stream; the same for the same seed.
 
     Raises ValueError for a name that is not one of STREAMS or a count below 1.
     """
@@ -155,7 +153,7 @@ def make_stream(name: str, count: int, seed: int = 1) -> Stream:
 
 
 def by_sizes(streams: Sequence[Stream]) -> list[list[Stream]]:
-    """Streams for boxes of the same sizes together, in the order in which they first come."""
+    """Group streams for boxes of the same sizes, in the order in which they first come."""
     groups: dict[tuple[Size, Size], list[Stream]] = {}
     for stream in streams:
         groups.setdefault(stream.sizes, []).append(stream)

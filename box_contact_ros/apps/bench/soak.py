@@ -7,8 +7,8 @@ what disturbs the machine disturbs all. Every answer is compared with the
 same model's for the same two poses, which detects answers that mix poses of two ticks. Prints a
 table, and writes soak.csv and soak.md.
 
-The exit status is 0 only if nothing was lost, mispaired, answered twice or wrong, and the contact
-node's memory grew by less than 1 MB after its first block.
+The exit status is 0 only if nothing was lost, mispaired, answered twice or wrong. The contact
+node's memory must grow by less than 1 MB after its first block.
 """
 from __future__ import annotations
 

@@ -1,13 +1,13 @@
 """The closed loop of the crane client: contacts that come back become the wrench on the load.
 
 Plain Python, no ROS. One thread asks and simulates (`ask`, `step`), another hands the answers in
-(`answer`). The law, and what is held when nothing comes, are those of `contact_law`.
+(`answer`). The loop itself is `landing.ClosedLoop`.
 
-In real time a tick is simulated at its end, not at its beginning: first its poses are published,
-then the answer is awaited for most of the tick, and the contact acts from the time at which it
-really came. Simulated at its beginning, a tick would give every contact a latency of a tick, which
-at 200 Hz is more than the loop bears. In lockstep the simulation waits for every answer, and the
-contact acts `latency` after it was asked for, exactly.
+In real time a tick is simulated at its end. First its poses are published, then the answer is
+awaited for most of the tick, and the contact acts from the time at which it really came. Simulated
+at its beginning, a tick would delay every contact by a tick: at 200 Hz, more than the loop bears.
+In lockstep the simulation waits for every answer. The contact acts exactly `latency` after its
+poses were published.
 """
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from .landing import ClosedLoop, LoopState
 from .mujoco_crane import Crane, CraneScenario
 
 ANSWER_SHARE = 0.8
-"""Share of a tick for which its answer is awaited in real time; the rest is for simulating it."""
+"""Share of a tick that waits for its answer in real time; the rest is for simulating it."""
 LOCKSTEP_PATIENCE = 1.0
 """Time [s] after which lockstep takes an answer for lost, and goes on with the wrench it has."""
 LOCKSTEP_LOST_MOST = 5

@@ -50,7 +50,7 @@ SCENARIO = {name: {'size_a': 'size', 'size_b': 'stack_size'}.get(name, name) for
 
 
 def scenario_from(values: Mapping[str, Any]) -> CraneScenario:
-    """The scenario of checked parameters.
+    """Return the scenario of checked parameters.
 
     What is left at its default may be drawn by the seed, or be what a landing needs.
     """

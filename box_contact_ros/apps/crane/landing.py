@@ -1,18 +1,17 @@
 """A container set down by one contact point per tick, and whether it came to rest. No ROS.
 
-`land` runs one landing of `mujoco_crane.Crane` under `contact_law.ContactLaw`; the contacts
-come from any function of the two poses. What happened is kept tick by tick in
-a `LandingRecord`, whoever ran it, and `LandingRecord.judge` measures it against the criteria below.
+A `ClosedLoop` steps a crane under a `ForceLaw`, wherever the contacts come from, and records what
+happened; `land` closes it with any function of the two poses. `LandingRecord.judge` measures the
+record against these criteria, from `SETTLING` s after the first touch on, for `WINDOW` s:
 
-The criteria, from `SETTLING` s after the first touch on, for `WINDOW` s: no corner of the load
-moves faster than `corner_speed_limit`, all ropes are slack, the contact force is within
-`FORCE_LIMIT` of the weight at every tick, the load is tilted by less than `TILT_LIMIT`. Always: the
-depth is less than `DEPTH_LIMIT` of the load's height, and after the first touch no gap opens wider
-than `GAP_LIMIT`. Depth, gap and first touch are those of the exact solver on the recorded poses,
-whatever model gave the contacts.
+- No corner of the load moves faster than `corner_speed_limit`. All ropes are slack.
+- The contact force is within `FORCE_LIMIT` of the weight at every tick.
+- The load is tilted by less than `TILT_LIMIT`.
+- Always: the depth is less than `DEPTH_LIMIT` of the load's height.
+- After the first touch, no gap opens wider than `GAP_LIMIT`.
 
-Conventions: those of `pose`, `contact_law` and `mujoco_crane`; SI units; angles of cases
-in degrees.
+Depth, gap and first touch are those of the exact solver on the recorded poses, whatever model gave
+the contacts. Conventions: those of `pose`, `contact_law` and `mujoco_crane`.
 """
 from __future__ import annotations
 
@@ -56,41 +55,40 @@ ContactSource = Callable[[np.ndarray, np.ndarray], Contact | None]
 
 
 def touch_of(contact: Contact) -> Touch | None:
-    """The part of a contact that the law needs; None where the boxes are apart."""
+    """Return the part of a contact that a law needs; None where the boxes are apart."""
     if not contact.colliding:
         return None
     return Touch(contact.point, contact.normal, max(0.0, -contact.separation))
 
 
 def landing_scenario(**fields: Any) -> CraneScenario:
-    """A scenario that sets the load down and leaves it; `fields` are those of CraneScenario."""
+    """Return a scenario that sets the load down; `fields` are those of CraneScenario."""
     fields = {'land': True, 'overlap': LANDING_OVERLAP, 'duration': LANDING_DURATION} | fields
     return CraneScenario(**fields)
 
 
 @dataclass(frozen=True, kw_only=True)
 class LandingCase:
-    """What is varied from landing to landing. Angles in degrees, lengths in m.
-
-    rope_angle, rope_heading -- the ropes at the start, from the plumb line, and whereto
-    tilt, tilt_heading       -- of the load at the start, and the share of pitch (cos), roll (sin)
-    overhang, overhang_heading -- lateral distance of the two centres at the first touch, whereto
-    yaw                      -- of the load at the start
-    """
+    """What is varied from landing to landing. Angles in degrees, lengths in m."""
 
     rope_angle: float
+    """Of the ropes at the start, from the plumb line."""
     rope_heading: float
     tilt: float
+    """Of the load at the start."""
     tilt_heading: float
+    """The share of pitch (its cosine) and roll (its sine)."""
     overhang: float
+    """Lateral distance of the two centres at the first touch."""
     overhang_heading: float
     yaw: float
+    """Of the load at the start."""
 
 
 def cases(*, rope_angles: Sequence[float] = (0.5, 1.25, 2.0, 3.0),
           tilts: Sequence[float] = (0.5, 1.5, 3.0), overhangs: Sequence[float] = (0.0, 0.3, 0.6),
           seed: int = 1) -> Iterator[LandingCase]:
-    """Every combination of rope angle, tilt and overhang; headings and yaw (to 1°) are drawn."""
+    """Yield each combination of rope angle, tilt and overhang; draw headings and yaw (to 1°)."""
     random = np.random.default_rng(seed)
     for rope_angle, tilt, overhang in product(rope_angles, tilts, overhangs):
         rope, tilted, hanging = random.uniform(-180.0, 180.0, 3)
@@ -104,10 +102,10 @@ AIMING_RATE = 100.0
 
 
 def scenario_of(case: LandingCase) -> CraneScenario:
-    """The scenario of a case: the trolley stands where the load sways to its overhang.
+    """Return the scenario of a case: the trolley stands where the load sways to its overhang.
 
     Moving the trolley moves the whole motion before the touch, so the trolley is shifted by what
-    was missed, twice: the first shift may change which corner touches, and so when.
+    was missed. It is shifted twice: the first shift may change which corner touches.
     """
     tilt, heading = case.tilt, math.radians(case.tilt_heading)
     hanging = math.radians(case.overhang_heading)
@@ -129,38 +127,35 @@ def scenario_of(case: LandingCase) -> CraneScenario:
 
 @dataclass(frozen=True, kw_only=True)
 class LandingResult:
-    """Figures of one landing. SI units, angles in rad; NaN where nothing was measured.
-
-    touched            time of the first touch [s], NaN for never
-    overhang           lateral distance of the two centres then [m]
-    settled            time from the first touch until corners stay within the limit [s], NaN: never
-    corner_speed       of the fastest corner in the window [m/s]
-    corner_speed_limit its limit [m/s]
-    rope_tension       of the tautest rope in the window [N]
-    force_error        |mean contact force − weight| / weight over the window, and `force_worst`
-                       the same of the worst tick
-    tilt               largest in the window [rad]
-    depth              largest ever, as a share of the load's height
-    gap                largest after the first touch [m]
-    point_step         largest |Δpoint| between neighbouring ticks in the window [m], and
-                       `exact_point_step` that of the exact point on the same poses
-    point_step_ever, exact_point_step_ever  the same over the whole contact
-    """
+    """Figures of one landing. SI units, angles in rad; NaN where nothing was measured."""
 
     touched: float = math.nan
+    """Time of the first touch [s], NaN for never."""
     overhang: float = math.nan
+    """Lateral distance of the two centres then [m]."""
     settled: float = math.nan
+    """Time from the first touch until corners stay within the limit [s], NaN for never."""
     corner_speed: float = math.nan
+    """Of the fastest corner in the window [m/s]."""
     corner_speed_limit: float = CORNER_SPEED_LIMIT
     rope_tension: float = math.nan
+    """Of the tautest rope in the window [N]."""
     force_error: float = math.nan
+    """|mean contact force − weight| / weight over the window."""
     force_worst: float = math.nan
+    """The same of the window's worst tick."""
     tilt: float = math.nan
+    """Largest in the window [rad]."""
     depth: float = math.nan
+    """Largest ever, as a share of the load's height."""
     gap: float = math.nan
+    """Largest after the first touch [m]."""
     point_step: float = math.nan
+    """Largest |Δpoint| between neighbouring ticks in the window [m]."""
     exact_point_step: float = math.nan
+    """The same of the exact point on the same poses."""
     point_step_ever: float = math.nan
+    """Largest |Δpoint| over the whole contact [m]."""
     exact_point_step_ever: float = math.nan
 
     @property
@@ -181,7 +176,7 @@ class LandingResult:
         return all(self.verdicts.values())
 
     def __str__(self) -> str:
-        """A few lines for people: every figure with its limit."""
+        """Return a few lines for people: every figure with its limit."""
         if math.isnan(self.corner_speed):
             return ('  landing ................ not judged: it takes a touch and '
                     f'{SETTLING + WINDOW:g} s after it')
@@ -209,7 +204,7 @@ class LandingResult:
 
 @dataclass
 class LandingRecord:
-    """A landing tick by tick: the state before each tick, and the wrench at its end."""
+    """A landing tick by tick: the state before each tick, rope tensions and force at its end."""
 
     scenario: CraneScenario
     rate_hz: float
@@ -220,23 +215,8 @@ class LandingRecord:
     points: dict[int, np.ndarray] = field(default_factory=dict)
     """Contact points (3,) by the tick they were asked for; none where there was no contact."""
 
-    def before(self, state: LoopState) -> None:
-        """Note the state in which a tick begins."""
-        self.poses.append(state.pose)
-        self.velocities.append(state.velocity)
-
-    def answered(self, tick: int, touch: Touch | None) -> None:
-        """Note the answer to a tick's poses."""
-        if touch is not None:
-            self.points[tick] = np.array(touch.point)
-
-    def after(self, crane: Crane, wrench: np.ndarray) -> None:
-        """Note how a tick ended: the ropes' tensions and the wrench (6,) that acts."""
-        self.tensions.append(crane.rope_tensions)
-        self.forces.append(wrench[:3].copy())
-
     def corner_speeds(self) -> np.ndarray:
-        """Speed [m/s] of the fastest of the load's eight corners, per tick (n,)."""
+        """Return the speed [m/s] of the fastest of the load's eight corners, per tick (n,)."""
         signs = np.array(list(product((-0.5, 0.5), repeat=3)))
         poses, velocities = np.array(self.poses), np.array(self.velocities)
         arms = np.einsum('nij,kj->nki', rotation_matrix(poses[:, 3:]),
@@ -245,16 +225,16 @@ class LandingRecord:
         return np.linalg.norm(speeds, axis=2).max(axis=1)
 
     def tilts(self) -> np.ndarray:
-        """Angle [rad] between the load's vertical and the world's, per tick (n,)."""
+        """Return the angle [rad] between the load's vertical and the world's, per tick (n,)."""
         up = rotation_matrix(np.array(self.poses)[:, 3:])[:, :, 2]
         return np.arctan2(np.hypot(up[:, 0], up[:, 1]), up[:, 2])
 
     def vertical_forces(self) -> np.ndarray:
-        """Vertical part [N] of the contact force, per tick (n,)."""
+        """Return the vertical part [N] of the contact force, per tick (n,)."""
         return np.array(self.forces)[:, 2]
 
     def point_path(self) -> np.ndarray:
-        """Contact points (n, 3) [m], NaN where there was no contact or no answer."""
+        """Return contact points (n, 3) [m], NaN where there was no contact or no answer."""
         path = np.full((len(self.poses), 3), math.nan)
         for tick, point in self.points.items():
             path[tick] = point
@@ -311,7 +291,7 @@ class ForceLaw(Protocol):
 
 
 class LoopState(NamedTuple):
-    """The state of the load for which a contact is asked."""
+    """The load's state when its contact is asked for."""
 
     tick: int
     time: float
@@ -332,19 +312,22 @@ class ClosedLoop:
     def ask(self, crane: Crane) -> LoopState:
         """Begin a tick; return the state whose contact is asked for."""
         state = LoopState(len(self.record.poses), crane.time, crane.load_pose, crane.load_velocity)
-        self.record.before(state)
+        self.record.poses.append(state.pose)
+        self.record.velocities.append(state.velocity)
         return state
 
     def answer(self, state: LoopState, touch: Touch | None, *, latency: float) -> None:
         """Take the contact of a state; it acts `latency` [s] after it was asked for."""
-        self.record.answered(state.tick, touch)
+        if touch is not None:
+            self.record.points[state.tick] = np.array(touch.point)
         self._held.answer(self._law.wrench(touch, state.pose, state.velocity), asked=state.time,
                           due=state.time + latency)
 
     def step(self, crane: Crane) -> None:
         """End the tick: advance the crane under the wrench that is due."""
-        crane.step_under(self._held.at)
-        self.record.after(crane, self._held.current)
+        crane.step(self._held.at)
+        self.record.tensions.append(crane.rope_tensions)
+        self.record.forces.append(self._held.current[:3].copy())
 
 
 def land(scenario: CraneScenario, source: ContactSource, *, rate_hz: float = 200.0,
@@ -364,7 +347,7 @@ def land(scenario: CraneScenario, source: ContactSource, *, rate_hz: float = 200
 
 
 def _steps(points: np.ndarray) -> np.ndarray:
-    """|Δpoint| [m] to the row before (n,), NaN where one of the two is missing."""
+    """Return |Δpoint| [m] to the row before (n,), NaN where one of the two is missing."""
     steps = np.full(len(points), math.nan)
     steps[1:] = np.linalg.norm(np.diff(points, axis=0), axis=1)
     return steps

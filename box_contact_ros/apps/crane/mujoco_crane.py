@@ -1,23 +1,21 @@
 """A crane that sets a container onto a stack: the simulator side, MuJoCo only, no ROS.
 
 A trolley stands still high above the stack. Four ropes run from it to the four top corners of the
-load. Ropes pull and never push: each is a spatial tendon with an upper length limit, and the hoist
-works by moving that limit. Nothing else holds or damps the load, so it sways, and because the ropes
-converge towards the trolley it pitches and rolls as it sways. The stack is static. MuJoCo's own
-contact is switched off: without a wrench from outside, the load sinks a few centimetres into the
-stack, which is what a contact query has to see.
+load. Ropes pull and never push: each is a spatial tendon, and the hoist moves its upper length
+limit. Nothing else holds or damps the load, so it sways. The ropes converge towards the trolley,
+so the load pitches and rolls as it sways. The stack is static. MuJoCo's own contact is switched
+off. Without a wrench from outside, the load sinks a few centimetres into the stack.
 
-The programme of the hoist, as shares of the scenario's duration (`HOIST_SHARES`): hang, lower,
-stay (meanwhile the start tilt is trimmed out rope by rope, as a spreader's trim does), lift, hang.
-The programme is tied to the duration, so a short run meets the same contacts as a long one; what
-varies with the duration is the height the load comes from.
+The hoist's programme is given as shares of the scenario's duration (`HOIST_SHARES`): hang, lower,
+stay, lift, hang. While it stays, the start tilt is trimmed out rope by rope, as a spreader does.
+A short run therefore meets the same contacts as a long one; the load comes from another height.
 
 With `land` the hoist has another programme (`LANDING_SHARES`): hang, lower until the ropes are
 slack, and stay so; the ropes keep their start trim. It needs the wrench of a contact, without which
 the load hangs in the stack in the end.
 
-Conventions: SI units; world frame with z up and the ground at z = 0; a pose is the seven numbers
-`x y z qx qy qz qw` of the body's centre; angles given to `CraneScenario` are degrees.
+Conventions: SI units; world frame with z up and the ground at z = 0. A pose is the seven numbers
+`x y z qx qy qz qw` of the body's centre. Angles given to `CraneScenario` are degrees.
 """
 
 from __future__ import annotations
@@ -29,7 +27,6 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ...scene.contact_law import GRAVITY
 from ...scene.pose_sets import CONTAINER
@@ -41,9 +38,8 @@ ROPE_STIFFNESS, ROPE_DAMPING, ROPE_IMPEDANCE = 1600.0, 3.0, 0.75
 """A rope's stretch as MuJoCo's limit spring, per unit of mass: 1/s^2, 1/s, 1.
 
 Heave on the ropes rings at some 40 rad/s, far above sway, and dies out within a second; the load
-stretches them by about 2 mm. The damping is small for a reason: the solver damps the whole rate of
-a rope, the hoist's own speed included, so a hoist faster than `MAX_HOIST_SPEED` would leave the
-rope taut and slack by turns, in jerks of several times the weight.
+stretches them by about 2 mm. The damping is small, because the solver damps the hoist's own speed
+too. A hoist faster than `MAX_HOIST_SPEED` would jerk the rope with several times the weight.
 """
 
 MAX_HOIST_SPEED = (1.0 - ROPE_IMPEDANCE) * GRAVITY / ROPE_DAMPING
@@ -53,16 +49,16 @@ HOIST_SHARES = {'hang': 0.05, 'lower': 0.30, 'stay': 0.45, 'lift': 0.15}
 """Phases of the hoist as shares of the duration, in order; the rest of the time the load hangs."""
 
 TRIM_SHARES = (0.40, 0.70)
-"""Shares of the duration between which the start tilt is trimmed out: it begins after the first
-touch, so that the load touches with a corner or an edge and ends on a face."""
+"""Shares of the duration between which the start tilt is trimmed out. It begins after the first
+touch: the load touches with a corner or an edge, and ends on a face."""
 
 LANDING_SHARES = {'hang': 0.05, 'lower': 0.45}
 """Phases of the hoist of a landing as shares of the duration, in order; then it stays down."""
 
 LANDING_OVERLAP = 0.8
-"""Overlap for a landing, m: how far the ropes are paid out beyond a load at rest on the stack. A
-load tilted by 3 degrees hangs 0.4 m unevenly in its ropes, and the trolley may stand a metre aside:
-half of this already leaves all four ropes slack in the default geometry."""
+"""Overlap for a landing, m: how far the ropes are paid out beyond a load at rest on the stack. Half
+of it already leaves all four ropes slack, with a load tilted by 3 degrees (0.4 m unevenly in its
+ropes) and a trolley a metre aside."""
 
 LIMITS = {'mass': (1.0, 1e6), 'rope_length': (1.0, 200.0), 'rope_spread': (0.0, 1.0),
           'rope_angle': (0.0, 20.0), 'rope_heading': (-360.0, 360.0), 'pitch': (-10.0, 10.0),
@@ -77,21 +73,22 @@ _CORNERS = np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]], dtype=float)
 class CraneScenario:
     """What hangs where, and how it is lowered. Lengths in m, angles in degrees, world frame.
 
-    size, stack_size -- full extents (length x, width y, height z) of the load and of the stack
-    mass             -- of the load, kg, spread evenly over its box
-    drop_position    -- x, y of the stack's centre; the stack stands on the ground, not turned
-    offset           -- x, y of the trolley from the stack's centre: the lateral error of the drop
-    rope_length      -- height of the trolley over the load's top once the load is down
-    rope_spread      -- spacing of the ropes at the trolley by their spacing at the load: 1 makes
-                        them parallel (the load sways level), 0 lets them meet in one point
-    rope_angle       -- the load is released at rest with its ropes this far from the plumb line
-    rope_heading     -- direction it is pulled aside to, counter-clockwise from x
-    pitch, roll      -- tilt at the start, about y and about x, held by unequal ropes
-    yaw              -- rotation about the plumb line at the start
-    lowering_speed   -- top speed of the hoist, m/s; lifting uses it as well
-    overlap          -- depth to which the load, at rest and level, is lowered into the stack
-    duration         -- of the whole programme, s
-    land             -- lower until the ropes are slack (give an `overlap` for it), never lift
+    | field | meaning |
+    |---|---|
+    | size, stack_size | full extents (length x, width y, height z) of load and stack |
+    | mass | of the load, kg, spread evenly over its box |
+    | drop_position | x, y of the stack's centre; the stack stands on the ground, not rotated |
+    | offset | x, y of the trolley from the stack's centre: the lateral error of the drop |
+    | rope_length | height of the trolley over the load's top once the load is down |
+    | rope_spread | spacing of the ropes at the trolley by that at the load; 0: one point |
+    | rope_angle | the load is released at rest with its ropes this far from the plumb line |
+    | rope_heading | direction it is pulled aside to, counter-clockwise from x |
+    | pitch, roll | tilt at the start, about y and about x, held by unequal ropes |
+    | yaw | rotation about the plumb line at the start |
+    | lowering_speed | top speed of the hoist, m/s; lifting uses it as well |
+    | overlap | depth to which the load, at rest and level, is lowered into the stack |
+    | duration | of the whole programme, s |
+    | land | lower until the ropes are slack (give an `overlap` for it), never lift |
     """
 
     size: tuple[float, float, float] = CONTAINER
@@ -153,7 +150,7 @@ class CraneScenario:
 
     @property
     def lowering_distance(self) -> float:
-        """How far the hoist lowers the load, m; half the top speed is its mean speed."""
+        """How far the hoist lowers the load, m; its mean speed is half the top speed."""
         shares = LANDING_SHARES if self.land else HOIST_SHARES
         return 0.5 * self.lowering_speed * shares['lower'] * self.duration
 
@@ -163,7 +160,7 @@ class CraneScenario:
         return 0.5 * self.lowering_speed * HOIST_SHARES['lift'] * self.duration
 
     def hoist_height(self, time: float) -> float:
-        """Height of the load, level and at rest, over its lowest place, in m at `time` in s."""
+        """Return the height [m] of the load, level and at rest, over its lowest place."""
         if self.land:
             hang, lower = (share * self.duration for share in LANDING_SHARES.values())
             return self.lowering_distance * (1.0 - _ramp((time - hang) / lower))
@@ -173,7 +170,7 @@ class CraneScenario:
         return self.lowering_distance * (1.0 - down) + self.lifting_distance * up
 
     def trim(self, time: float) -> float:
-        """Share of the start tilt that the ropes still hold at `time` in s, 1 down to 0."""
+        """Return the share of the start tilt that the ropes still hold, 1 down to 0."""
         if self.land:
             return 1.0  # trimmed out by the landing itself, once the ropes are slack
         start, end = (share * self.duration for share in TRIM_SHARES)
@@ -234,27 +231,15 @@ class Crane:
         tensions[self._data.efc_id[rows]] = self._data.efc_force[rows]
         return tensions
 
-    def step(self, force: ArrayLike | None = None,
-             torque: ArrayLike | None = None) -> None:
-        """Advance one tick with a wrench held over it.
+    def step(self, wrench: Callable[[float], np.ndarray] | None = None) -> None:
+        """Advance one tick, under a wrench that may change from one physics step to the next.
 
-        force  -- N, world frame, acting at the load's centre of mass: (3,), None for none
-        torque -- N m, world frame, about the load's centre of mass: (3,), None for none
-        """
-        wrench = np.zeros(6)
-        wrench[:3] = 0.0 if force is None else force
-        wrench[3:] = 0.0 if torque is None else torque
-        self.step_under(lambda _: wrench)
-
-    def step_under(self, wrench: Callable[[float], np.ndarray]) -> None:
-        """Advance one tick under a wrench that may change from one physics step to the next.
-
-        wrench -- from a simulated time in s, the start of a physics step, to the force in N and the
-                  torque in N m (6,) over that step, world frame, at the load's centre of mass
+        wrench: from the simulated time [s] at which a physics step starts to force [N] and torque
+        [N m] over it (6,), world frame, at the load's centre of mass. None for no wrench.
         """
         for substep in range(1, self._substeps + 1):
             start = (self._ticks + (substep - 1) / self._substeps) / self._rate_hz
-            self._data.xfrc_applied[self._load] = wrench(start)
+            self._data.xfrc_applied[self._load] = wrench(start) if wrench else 0.0
             time = (self._ticks + substep / self._substeps) / self._rate_hz
             self._set_ropes(self.scenario.hoist_height(time), self.scenario.trim(time))
             mujoco.mj_step(self._model, self._data)
@@ -314,7 +299,7 @@ class Crane:
 
 
 def _ramp(share: float) -> float:
-    """Rise from 0 to 1 over share 0 to 1, starting and ending with no speed and no jerk of it."""
+    """Rise from 0 to 1 over share 0 to 1, with no speed and no jerk at either end."""
     share = min(max(share, 0.0), 1.0)
     return share - math.sin(2.0 * math.pi * share) / (2.0 * math.pi)
 
@@ -329,7 +314,7 @@ def _rotation(axis: str, angle: float) -> np.ndarray:
 
 
 def _pose(position: np.ndarray, quaternion_wxyz: np.ndarray) -> np.ndarray:
-    """Turn MuJoCo's position and w x y z quaternion into x y z qx qy qz qw: the only place."""
+    """Return a pose of MuJoCo's position and w x y z quaternion."""
     return np.concatenate([position, quaternion_wxyz[1:], quaternion_wxyz[:1]])
 
 

@@ -47,7 +47,7 @@ class RecordingError(ValueError):
 
 
 def type_of(topic: str) -> str:
-    """The message type of a topic, from its name; RecordingError for a name that tells nothing."""
+    """Return the message type of a topic, from its name; RecordingError if it tells nothing."""
     for end, kind in TYPES.items():
         if topic == end or topic.endswith(f'/{end}'):
             return kind
@@ -61,7 +61,7 @@ class Recorder:
     def __init__(self, folder: Path, topics: Sequence[str], about: Mapping[str, Any]) -> None:
         """Begin a recording in a folder that does not exist yet.
 
-        topics: absolute names. about: what is kept beside the messages, as JSON: `size_a`, `size_b`
+        topics: absolute names. about: what is kept with the messages, as JSON: `size_a`, `size_b`
         (full extents [m]), `model`. Raises RecordingError.
         """
         types = get_typestore(Stores.ROS2_JAZZY)
@@ -94,7 +94,7 @@ class Recorder:
 
 def read_replay(path: Path, topic_a: str = TOPICS[0], topic_b: str = TOPICS[1], *,
                 size_a: Size | None = None, size_b: Size | None = None) -> Replay:
-    """The pairs of poses in a bag: a folder, or an .mcap file alone.
+    """Return the pairs of poses in a bag: a folder, or an .mcap file alone.
 
     Sizes that are not given are those that the recording says. Raises RecordingError for what is no
     bag, lacks a topic, has no pairs, or says no sizes where none are given.
@@ -124,7 +124,7 @@ def read_replay(path: Path, topic_a: str = TOPICS[0], topic_b: str = TOPICS[1], 
 
 
 def _poses(reader: Reader, path: Path, topic: str) -> dict[int, tuple[float, ...]]:
-    """Poses `x y z qx qy qz qw` on a topic by stamp [ns]."""
+    """Return poses `x y z qx qy qz qw` on a topic by stamp [ns]."""
     found = [c for c in reader.connections if c.topic.lstrip('/') == topic.lstrip('/')]
     if not found:
         raise RecordingError(f'{path} has no topic {shown(topic)}; it has: '

@@ -16,17 +16,15 @@ from typing import Any
 from geometry_msgs.msg import PointStamped, PoseStamped, Vector3Stamped
 from rclpy.context import Context
 from rclpy.node import Node
-from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.utilities import remove_ros_args
 from sensor_msgs.msg import PointCloud2
 
-from ...node.runtime import REFUSALS, run_node
+from ...node.runtime import POSE_QOS, REFUSALS, run_node
 from ...solver.checks import as_size
+from ..ros_client import DEEP_RELIABLE
 from .bag_file import NANOSECONDS, POSE, TOPICS, TYPES, Recorder, RecordingError, type_of
 
 MESSAGES = dict(zip(TYPES.values(), (PoseStamped, PointStamped, Vector3Stamped, PointCloud2)))
-DEPTH = 1000
-"""What the DDS layer delivers while a chunk is compressed must not push out the rest."""
 PROGRESS_SECONDS = 1.0
 
 
@@ -42,10 +40,8 @@ class RecordNode(Node):
         for name, topic in resolved.items():
             kind = type_of(name)
             # Poses as the contact node takes them, from whatever publisher; contacts without loss.
-            reliability = (ReliabilityPolicy.BEST_EFFORT if kind == POSE
-                           else ReliabilityPolicy.RELIABLE)
             self.create_subscription(MESSAGES[kind], topic, self._keep(name),
-                                     QoSProfile(depth=DEPTH, reliability=reliability), raw=True)
+                                     POSE_QOS if kind == POSE else DEEP_RELIABLE, raw=True)
         if sys.stderr.isatty():
             self.create_timer(PROGRESS_SECONDS, self._show_progress)
         print(f'recording to {folder}: {", ".join(resolved)}', flush=True)
@@ -72,7 +68,7 @@ class RecordNode(Node):
         return (last - first) / NANOSECONDS
 
     def destroy_node(self) -> None:
-        """Complete the bag, and say what is in it; RecordingError if it cannot be completed."""
+        """Complete the bag, and print what is in it; RecordingError if it cannot be completed."""
         super().destroy_node()
         try:
             if self._fault is not None:

@@ -1,6 +1,6 @@
 """Markers for RViz: both boxes, and while they touch the contact point, the normal, the depth.
 
-Subscribes box_a/pose, box_b/pose and contacts, which a contact node answers with; publishes markers
+Subscribes box_a/pose, box_b/pose and the contact node's contacts. Publishes markers
 (visualization_msgs/MarkerArray), at most `rate` times a second and only what is new. RViz with
 config/contact.rviz shows them.
 """
@@ -63,7 +63,7 @@ def contact_markers(header: Header, touch: Touch | None, size_a: Sequence[float]
     normal.points = [_set(Point(), end) for end in (touch.point, touch.point + arrow)]
     # Of an arrow with two points: diameter of the shaft, diameter and length of the head.
     _set(normal.scale, np.array([0.8, 1.8, 3.0]) * look.point_radius)
-    # Beside the arrow's tail, where neither point nor arrow is.
+    # At the arrow's tail, where neither point nor arrow is.
     _set(depth.pose.position, touch.point - 0.5 * arrow)
     depth.scale.z = look.text_height
     depth.text = f'depth {1e3 * touch.depth:.2f} mm'

@@ -1,7 +1,7 @@
 """A page in the browser: the crane, both boxes, the contact and its figures, live.
 
-It starts a contact node and, again and again, a crane, in a ROS domain of their own; or, with
---attach, listens to a contact node and a simulator that run already. On the page the contact node
+It starts a contact node and, again and again, a crane, in a ROS domain of their own. With --attach
+it listens to a contact node and a simulator that run already. On the page the contact node
 is switched from model to model while it runs, and the crane lands again with other settings. It
 ends with Ctrl-C, and what it has started with it.
 """
@@ -39,7 +39,7 @@ FRAME_PERIOD = 1 / 30
 PAUSE = 1.5
 """Time [s] between the end of a run and the next, to see how it ended."""
 WAIT = 60.0
-"""How long the crane waits for the contact node that starts beside it [s]."""
+"""How long the crane waits for the contact node, which starts at the same time [s]."""
 
 
 class Simulation:

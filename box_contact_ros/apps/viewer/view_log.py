@@ -1,8 +1,8 @@
 """What the view hears, and the figures it shows of it; works without a ROS graph.
 
 Poses are paired as the contact node pairs them; a cloud belongs to the pair with its stamp. The
-view listens in from outside, so both may come in any order, and a pose that only the view has
-missed must not count as a loss. Stamps are nanoseconds; lengths metres, latencies seconds.
+view listens in from outside, so both may come in any order. A pose that only the view has missed
+must not count as a loss. Stamps are nanoseconds; lengths metres, latencies seconds.
 """
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class AnsweredPair:
 
 
 class Snapshot(NamedTuple):
-    """What is drawn: poses (7,), the answer to them, the exact contact beside it."""
+    """What is drawn: poses (7,), the answer to them, and their exact contact."""
 
     poses: Poses
     answer: AnsweredPair | None
@@ -99,7 +99,7 @@ class ViewLog:
             self._answered = self._lost = 0
 
     def pose(self, box: int, stamp: int, numbers: np.ndarray) -> None:
-        """A pose of box 0 (A) or 1 (B), as numbers (7,)."""
+        """Take a pose of box 0 (A) or 1 (B), as numbers (7,)."""
         with self._lock:
             for tick in self._pairing.add(self._scene.moving[box],
                                           StampedPose(numbers, '', stamp)):
@@ -118,7 +118,7 @@ class ViewLog:
         self._give_up(stamp)
 
     def cloud(self, stamp: int, rows: np.ndarray, received: int) -> None:
-        """The rows (messages.CLOUD_ROW) of a `contacts` cloud, received at this time [ns].
+        """Take the rows (messages.CLOUD_ROW) of a `contacts` cloud, received at this time [ns].
 
         A row of NaN says that the pair could not be evaluated, which is an answer without contact.
         """

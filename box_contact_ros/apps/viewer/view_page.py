@@ -1,7 +1,7 @@
 """The page: scene, read-outs and controls, served by viser. No ROS.
 
-The scene is drawn about the place where box B was first seen, because browsers draw in float32,
-which in map coordinates would be half a metre coarse.
+The origin of the drawing is the place where box B was first seen. Browsers draw in float32, which
+is half a metre coarse in map coordinates.
 """
 from __future__ import annotations
 
