@@ -69,7 +69,11 @@ class Simulation:
             self.run = dataclasses.replace(self.run, seed=self.run.seed + 1)
         if self._crane is not None or now < self._next_at:
             return False
-        self._start_crane()
+        self._crane_output.seek(0)
+        self._crane_output.truncate()
+        self._crane = processes.start(
+            program('crane', wait=WAIT, **self._sizes, **dataclasses.asdict(self.run)),
+            self._crane_output)
         return True
 
     def land(self, run: CraneRun) -> None:
@@ -78,13 +82,6 @@ class Simulation:
             processes.end([self._crane])
             self._crane = None
         self.run, self._next_at = run, 0.0
-
-    def _start_crane(self) -> None:
-        self._crane_output.seek(0)
-        self._crane_output.truncate()
-        self._crane = processes.start(
-            program('crane', wait=WAIT, **self._sizes, **dataclasses.asdict(self.run)),
-            self._crane_output)
 
     def close(self) -> None:
         """End everything."""
