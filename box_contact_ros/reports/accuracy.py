@@ -447,7 +447,8 @@ def main(args: Sequence[str] | None = None) -> int:
     parser.add_argument('--model', nargs='+', default=['mlp'], choices=list(MODELS),
                         metavar='MODEL', help=f'of {", ".join(MODELS)}; default: mlp')
     parser.add_argument('--weights', help='weights file of MLP, default: the shipped one')
-    parser.add_argument('--pairs', type=within(1), default=PAIRS, help='a set, default: %(default)s')
+    parser.add_argument('--pairs', type=within(1), default=PAIRS,
+                        help='a set, default: %(default)s')
     parser.add_argument('--quick', action='store_true', help=f'{QUICK_PAIRS} pairs a set')
     parser.add_argument('--seed', type=seed_number, default=2,
                         help='of the sets, default: %(default)s')

@@ -303,7 +303,8 @@ def main(args: Sequence[str] | None = None) -> int:
     """Fuzz, print a line per class and model; 1 if a gate is broken."""
     parser = argparse.ArgumentParser(prog='fuzz', description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--pairs', type=within(1), default=PAIRS, help='in all (default: %(default)s)')
+    parser.add_argument('--pairs', type=within(1), default=PAIRS,
+                        help='in all (default: %(default)s)')
     parser.add_argument('--quick', action='store_true', help=f'{QUICK_PAIRS:,} pairs')
     parser.add_argument('--seed', type=seed_number, default=1, help='default: %(default)s')
     parser.add_argument('--classes', nargs='+', choices=list(CLASSES), default=list(CLASSES),

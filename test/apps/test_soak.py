@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip('mujoco')
 
 from box_contact_ros import ContactSolver
-from box_contact_ros.apps.answer_log import AnswerLog
+from box_contact_ros.apps.bench.answer_log import AnswerLog
 from box_contact_ros.apps.bench.pose_streams import make_stream
 from box_contact_ros.apps.bench.soak import mispairs, without_contact
 

@@ -28,8 +28,8 @@ from ...solver.arguments import model_name, within
 from ...solver.contact import Contacts
 from ...solver.contact_solver import ContactSolver
 from ...solver.models import MOST_SOUP_DIVISIONS, SOUP_DIVISIONS, model_names
-from ..answer_log import StreamResult
 from ..processes import add_domain
+from .answer_log import StreamResult
 from .bench_drive import Bench, MeasuredNode, about_the_machine, echo_node, open_bench, solver_node
 from .bench_report import all_latencies, bullets, draw, error_table, latency_table, write_results
 from .pose_streams import STREAMS, Replay, Stream, by_sizes, make_stream

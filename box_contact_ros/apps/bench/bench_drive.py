@@ -32,9 +32,9 @@ from ...node.messages import NANOSECONDS, make_header, read_cloud
 from ...node.runtime import let_callbacks_finish, spin_for
 from ...output import processor
 from ...solver.contact import Contacts
-from ..answer_log import CONTACT_MESSAGES, ECHO_MESSAGES, AnswerLog, first_row
 from ..processes import Stop, asked_to_end, end, on_this_host, parameters, printed, program, start
 from ..ros_client import DEEP_RELIABLE, joined, pose_message
+from .answer_log import CONTACT_MESSAGES, ECHO_MESSAGES, AnswerLog, first_row
 from .echo_node import raw_stamp
 from .pose_streams import Stream
 

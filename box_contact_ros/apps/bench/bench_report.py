@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import LogFormatter
 
 from ...output import markdown_table, percentiles, subplots, write_csv
-from ..answer_log import StreamResult
+from .answer_log import StreamResult
 
 LEAST_DRAWN = 1e-9
 """Point errors [mm] are drawn as no less: a logarithmic axis has no zero."""

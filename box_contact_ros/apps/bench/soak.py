@@ -30,8 +30,8 @@ from ...solver.arguments import model_name, within
 from ...solver.contact import Contacts
 from ...solver.contact_solver import ContactSolver
 from ...solver.models import model_names
-from ..answer_log import AnswerLog, StreamLog, StreamResult
 from ..processes import add_domain
+from .answer_log import AnswerLog, StreamLog, StreamResult
 from .bench_drive import Bench, MeasuredNode, about_the_machine, echo_node, open_bench, solver_node
 from .bench_report import bullets, write_results
 from .pose_streams import Stream, make_stream

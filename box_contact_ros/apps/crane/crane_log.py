@@ -10,7 +10,7 @@ import numpy as np
 
 from ...output import percentiles
 from ...solver.contact import Contacts
-from ..answer_log import AnswerLog, StreamResult
+from ..bench.answer_log import AnswerLog, StreamResult
 
 LIVE_PERIOD = 0.2  # s between live lines
 

@@ -27,7 +27,7 @@ from ...node.messages import make_header, read_cloud
 from ...node.parameters import answer_help, declare
 from ...node.runtime import REFUSALS
 from ...solver.contact_solver import ContactSolver
-from ..answer_log import first_row
+from ..bench.answer_log import first_row
 from ..ros_client import DEEP_RELIABLE, joined, pose_message, stamp_of
 from .crane_feedback import CraneFeedback
 from .crane_log import CraneLog, CraneSummary, LiveReport

@@ -23,7 +23,7 @@ from ...node.runtime import CONTACT_QOS, run_node
 from ...scene.contact_law import Touch
 from ...scene.pairing import StampedPose
 from ...scene.pose_sets import CONTAINER
-from ..answer_log import touch_in
+from ..bench.answer_log import touch_in
 from ..ros_client import set_pose, stamp_of
 from .listener import Listener
 from .style import BOX_A, BOX_B, BOX_OPACITY, CONTACT, STALE, Colour, proportions, unit_pose

@@ -21,7 +21,7 @@ from ...scene.pairing import PAIRINGS, StampedPose
 from ...scene.scene_solver import two_boxes
 from ...solver.contact import Contact
 from ...solver.contact_solver import ContactSolver
-from ..answer_log import touch_in
+from ..bench.answer_log import touch_in
 from .style import STALE
 
 WINDOW = 2.0

@@ -22,9 +22,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..output import percentiles
-from ..scene.contact_law import Touch
-from ..solver.contact import Contacts
+from ...output import percentiles
+from ...scene.contact_law import Touch
+from ...solver.contact import Contacts
 
 CONTACT_MESSAGES = ('cloud', 'point', 'normal')
 """Kinds of message that a contact node answers with."""
