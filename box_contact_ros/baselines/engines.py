@@ -122,7 +122,7 @@ def mujoco_collision(choice: str) -> Engine:
 
     def prepare(pairs: Pairs) -> list[Callable[[], Any]]:
         models = _per_sizes(_mujoco_model)
-        calls = []
+        calls: list[Callable[[], Any]] = []
         for a, b, p, q in _rows(pairs):
             model, data = models(p, q)
             place_a, place_b, quat_a, quat_b = _wxyz(a, b)
@@ -203,7 +203,7 @@ def coal_collision() -> Engine:
     def prepare(pairs: Pairs) -> list[Callable[[], Any]]:
         boxes = _per_sizes(lambda p, q: (coal.Box(*p), coal.Box(*q), coal.Transform3s(),
                                          coal.Transform3s()))
-        return [partial(ask, *boxes(p, q), a[:3], b[:3], rotation_matrix(a[3:]),
+        return [partial(partial(ask, *boxes(p, q)), a[:3], b[:3], rotation_matrix(a[3:]),
                         rotation_matrix(b[3:])) for a, b, p, q in _rows(pairs)]
 
     def read(_: Any) -> EngineAnswer:

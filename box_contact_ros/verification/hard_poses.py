@@ -15,9 +15,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..scene.pose import quaternion_multiply, rotation_matrix
 from ..scene.pose_sets import CONTAINER as FORTY
 from ..scene.pose_sets import CUBE, Pairs, turns
-from ..solver.pose import quaternion_multiply, rotation_matrix
 
 FILE = Path(__file__).with_name('hard_poses.npz')
 TWENTY, HIGH_CUBE = (6.058, 2.438, 2.591), (12.192, 2.438, 2.896)
