@@ -10,7 +10,7 @@ import pytest
 from box_contact_ros.cli import PROGRAMS
 from box_contact_ros.solver import arguments
 
-FOLDERS = ('accuracy', 'bench', 'frontier', 'search mlp', 'soak', 'speed', 'stability',
+FOLDERS = ('accuracy', 'bench', 'frontier', 'search mlp', 'soak', 'stability',
            'train')
 FILES = ('fuzz', 'paper')
 
