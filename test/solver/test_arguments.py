@@ -2,7 +2,6 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
 import importlib
 
 import pytest
@@ -50,16 +49,18 @@ def test_folders_are_made(tmp_path):
     assert not list((tmp_path / 'c').iterdir())
 
 
-@pytest.mark.parametrize('value, limits, words', [
-    ('0', (1,), 'must be at least 1, got 0'),
-    ('9', (1.0, 8.5), 'must lie in 1 to 8.5, got 9'),
-    ('nan', (1.0,), 'at least 1'),
-    ('1.5', (1,), 'invalid'),
-    ('1', (1, 1), None)])
-def test_ranges(value, limits, words, capsys):
-    """The limits are within the range; a whole limit asks for whole numbers."""
+@pytest.mark.parametrize('low, high, text, wanted', [
+    (1.0, 4.0, '4', 4.0), (0, 9, '9', 9), (1.0, 4.0, '4.1', None), (0, 9, '-1', None),
+    (1.0, 4.0, 'nan', None), (0, 9, '1.5', None),
+    (1, None, '7', 7), (1, None, '0', None)])
+def test_numbers_within(low, high, text, wanted, capsys):
+    """Both ends are accepted; what is outside, or not whole where it must be, is refused."""
     parser = argparse.ArgumentParser()
-    parser.add_argument('--count', type=arguments.within(*limits))
-    with pytest.raises(SystemExit) if words else contextlib.nullcontext():
-        parser.parse_args(['--count', value])
-    assert (words or '') in capsys.readouterr().err
+    parser.add_argument('--rate', type=arguments.within(low, high))
+    if wanted is not None:
+        found = parser.parse_args(['--rate', text]).rate
+        assert found == wanted and type(found) is type(wanted)
+        return
+    with pytest.raises(SystemExit):
+        parser.parse_args(['--rate', text])
+    assert 'argument --rate: ' in capsys.readouterr().err
