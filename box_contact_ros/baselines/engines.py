@@ -1,8 +1,8 @@
 """What answers for a pair of boxes: this package's models and the engines that users would take.
 
-All are an `Engine`, so reports ask and time them alike: from two poses, in the engine's own form,
-to a result that Python can read. Making shapes and models is preparation and is not timed. Setting
-both poses is timed.
+All are an `Engine`, so reports ask and time them alike. A call goes from two poses, in the engine's
+own form, to a result that Python can read. Making shapes and models is preparation and is not
+timed. Setting both poses is timed.
 
 An engine that returns several points is entered with the two ways in which users make one of them:
 the deepest, and the mean. All normals point from A to B.

@@ -167,4 +167,4 @@ def _in_frame(frame_id: str) -> _FrameBytes:
     width_at = -(-frame_end // 4) * 4 + 4  # height, width: aligned to 4, as the encapsulation is
     # A cloud without rows ends with row_step, the number of bytes of data, and is_dense.
     return _FrameBytes(point[:ENCAPSULATION], point[body:-24], normal[body:-24],
-                    cloud[body:width_at], cloud[width_at + 4:-9])
+                       cloud[body:width_at], cloud[width_at + 4:-9])

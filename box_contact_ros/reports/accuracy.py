@@ -2,10 +2,10 @@
 
 Every set of `pose_sets` is drawn anew from `--seed`; model `exact` gives the truth. Written are
 accuracy.csv (a row per model, set and part of the set), accuracy.md and accuracy.png. The exit
-status is 1 if `mlp` breaks one of the limits in `LIMITS`, its separations or normals are not
-those of `exact`, a point lies outside a box, or a pair was handed to `exact`.
+status is 1 if `mlp` breaks one of the limits in `LIMITS`, or differs from `exact` in a separation
+or normal. A point outside a box, or a pair that `exact` answered, breaks them too.
 
-Classes. The features that meet are told from the pose, not from which SAT axis wins: in stacks
+Classes. The features that meet are told from the pose, not from the SAT axis that wins. In stacks
 about half the winners are edge pairs although the contact is a patch.
 
 - edge-edge: the winner is a pair of edges, and its axis is farther than FACE_LIKE from the normals
@@ -62,10 +62,10 @@ LIMITS = {
 MAE_LIMIT = 0.005
 """Mean absolute error [rad] of `mlp` on the paper's external set."""
 OUTSIDE = 2.0**-44
-"""How far outside a box a point may be, of the size (5.7e-14), beside what B is pressed in."""
+"""How far outside a box a point may be, of the size (5.7e-14), on top of the minimum depth."""
 
 OPENED = 5e-12
-"""By how much boxes of the paper's set may be apart [of the size]: near a pitch of ±90° the angles
+"""By how much boxes of the paper's set may be apart [of the size]. Near a pitch of ±90° the angles
 keep a pose to 12 digits only. Still far below the 1e-9 that B is pressed in."""
 
 PAIRS, QUICK_PAIRS = 100_000, 5_000
@@ -131,7 +131,7 @@ def outside(pairs: Pairs, found: Contacts) -> float:
         local = np.einsum('nji,nj->ni', rotation_matrix(pose[:, 3:]), found.point - pose[:, :3])
         farthest = np.maximum(farthest, (np.abs(local) - 0.5 * extents).max(axis=1))
     pressed = np.maximum(0.0, DEPTH_FLOOR + found.separation / size)
-    # A point inside is no distance outside; NaN, which a pair apart has, is none either.
+    # A point inside is no distance outside; pairs apart have NaN.
     return float(np.max((farthest / size - pressed)[found.colliding], initial=0.0))
 
 
@@ -272,7 +272,7 @@ def paper_errors(models: Sequence[str], weights: str | None = None, step: int = 
 
 
 def paper_table(errors: dict[str, np.ndarray], drawn: int) -> str:
-    """Return ME, MAE and RMSE beside Tables 1 and 2."""
+    """Return ME, MAE and RMSE, and those of Tables 1 and 2."""
     rows = [[f"paper's Table {number}, {title} discontinuities",
              *[f'{PAPER[number][name][2]:.4f}' for name in PAPER[number]], '', '', '']
             for number, title in ((1, 'with'), (2, 'without'))]
@@ -298,7 +298,7 @@ def paper_broken(errors: dict[str, np.ndarray], drawn: int) -> list[str]:
 
 
 def table(rows: Sequence[AccuracyRow]) -> str:
-    """Return the errors of whole sets beside the limits."""
+    """Return the errors of whole sets, and their limits."""
     lines = []
     for r in rows:
         mean, p99, worst = statistics(r.errors)

@@ -1,12 +1,12 @@
-"""Program `frontier`: speed against error of every model and of the engines beside them.
+"""Program `frontier`: speed against error of every model and of other engines.
 
 `python -m box_contact_ros frontier` writes frontier.csv, .md and .png. One run, one pinned core,
 garbage collection off. Each contestant is warmed up and timed call by call, the contestants in turn
 on every set. Times are read as ratios within the run; the machine is named.
 
-Errors are against the exact model: the point's in % of the smaller box's longest edge, per contact
-class (`accuracy`), the normal's in degrees, and verdicts that differ: contacts missed, contacts
-invented. Engines that return several points: see `engines`.
+Errors are against the exact model. Those of points are in % of the smaller box's longest edge, per
+contact class (`accuracy`); those of normals in degrees. Verdicts that differ are contacts missed
+and contacts invented. Engines that return several points: see `engines`.
 
 `--speed` writes the speed gates instead, speed.md and speed.csv: see `speed`.
 """
@@ -29,6 +29,7 @@ from ..baselines.engines import Engine, installed, ours
 from ..core import native
 from ..output import markdown_table, number, percentiles
 from ..resources import resource_path
+from ..scene.pose import degrees_between
 from ..scene.pose_sets import (
     CONTAINER,
     SETS,
@@ -81,10 +82,10 @@ IN_SHORT = ('exact', 'mlp', 'paper', 'fcl', 'soup-8', 'soup-22', 'MuJoCo mj_geom
 SHOWN_SETS = ('random cubes', 'containers', 'stacks')
 """Sets in the picture."""
 PAPER_ERROR = 34.0
-"""The paper's MAE of 0.5624 rad in % of an edge: seen from 1.2 m, the mean distance of a touching
-cube's surface, it is a point error of 0.67 m, a third of the edge of 2 m."""
+"""The paper's MAE of 0.5624 rad in % of an edge. Seen from 1.2 m, the mean distance of a touching
+cube's surface, the MAE is a point error of 0.67 m, a third of the edge of 2 m."""
 VERDICT = 1e-9
-"""Gap or depth, of the size, from which on verdicts and normals are judged: at exact touch both
+"""Least gap or depth, of the size, at which verdicts and normals are judged. At exact touch both
 verdicts are right, and a normal may be any that keeps the boxes apart."""
 SMALLEST_ERROR = 1e-2
 """Errors below this [%] are drawn here: those of `exact` are zero, being the reference."""
@@ -107,7 +108,7 @@ ALL_SETS: dict[str, Generator] = {**SETS, 'just apart': apart}
 
 
 @dataclass(frozen=True, kw_only=True)
-class Errors:
+class EngineErrors:
     """Answers on a set against the exact ones."""
 
     points: dict[str, tuple[int, float, float, float]]
@@ -130,7 +131,7 @@ class FrontierRow:
     """p50, p99, max of a call [ns]."""
     batch: float
     """p50 of a pair in a batch [ns]."""
-    errors: Errors
+    errors: EngineErrors
 
 
 # --- measuring ------------------------------------------------------------------------------------
@@ -204,7 +205,8 @@ class Trial:
             batch=percentiles(self._batches, 50)[0], errors=self._errors)
 
 
-def judge(pairs: Pairs, colliding: np.ndarray, normals: np.ndarray, points: np.ndarray) -> Errors:
+def judge(pairs: Pairs, colliding: np.ndarray, normals: np.ndarray, points: np.ndarray,
+          ) -> EngineErrors:
     """Compare answers (n,), (n, 3), (n, 3) with the exact ones."""
     truth = pairs.contacts()
     both = colliding & truth.colliding
@@ -217,10 +219,8 @@ def judge(pairs: Pairs, colliding: np.ndarray, normals: np.ndarray, points: np.n
         found = {label: (len(part), *percentiles(part, 50, 99, 100))
                  for label, part in parts.items() if len(part)}
     clear = np.abs(truth.separation) > VERDICT * pairs.size
-    # By the chord: the cosine of a small angle is 1 to the last digit.
-    chords = np.linalg.norm((normals - truth.normal)[both & clear], axis=1)
-    angles = np.degrees(2.0 * np.arcsin(np.clip(0.5 * chords, 0.0, 1.0)))
-    return Errors(points=found, normal=percentiles(angles, 99, 100),
+    angles = degrees_between(normals[both & clear], truth.normal[both & clear])
+    return EngineErrors(points=found, normal=percentiles(angles, 99, 100),
                   missed=int((truth.colliding & ~colliding & clear).sum()),
                   invented=int((colliding & ~truth.colliding & clear).sum()))
 

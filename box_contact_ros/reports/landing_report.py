@@ -1,30 +1,27 @@
 """Landings by model: whether the container comes to rest on one contact point per tick.
 
-`python -m box_contact_ros.reports.landing_report` runs a grid of landings (rope angle, tilt,
-overhang; yaw and headings drawn) for every model, rate and latency, the constants of the contact
-law being the same for all models, and writes landing.csv (a row per landing), landing.md
-(a row per model, rate and latency) and landing.png (one landing, the models side by
-side). With --dds the contacts come from a contact node in another process,
-in lockstep, and landing_dds.csv and .md are written.
+`python -m box_contact_ros.reports.landing_report` runs a grid of landings for every model, rate and
+latency: rope angle, tilt, overhang; yaw and headings are drawn. The constants of the contact law
+are the same for all models. Written are landing.csv (a row per landing), landing.md (a row per
+model, rate and latency) and landing.png (one landing for each model). With --dds the
+contacts come from a contact node in another process, in lockstep, and landing_dds.csv and .md are
+written.
 """
 from __future__ import annotations
 
 import argparse
-import csv
-import dataclasses
 import math
 import os
-import sys
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from itertools import groupby
 from pathlib import Path
 
-import matplotlib
 import numpy as np
 from tqdm import tqdm
 
+from .. import output
 from ..apps.crane.landing import (
     SETTLING,
     WINDOW,
@@ -35,14 +32,11 @@ from ..apps.crane.landing import (
     land,
     scenario_of,
 )
-from ..output import add_out, results_folder
+from ..core import native
 from ..scene.contact_law import GRAVITY
 from ..solver.arguments import seed_number
 from ..solver.contact_solver import ContactSolver
 from ..solver.models import MODELS
-
-matplotlib.use('Agg')
-from matplotlib import pyplot as plt  # noqa: E402
 
 QUICK = 7
 """`--quick` runs every seventh case: prime to the grid's sides, so all values are met."""
@@ -51,8 +45,8 @@ SHOWN = 17
 
 
 @dataclass(frozen=True)
-class Job:
-    """One landing to run: which of the cases, with what."""
+class LandingRun:
+    """One landing to run: the number of the case, with what."""
 
     model: str
     rate_hz: float
@@ -61,77 +55,83 @@ class Job:
     case: LandingCase
 
 
-def run(job: Job) -> tuple[Job, LandingResult]:
+Landed = tuple[LandingRun, LandingResult]
+
+
+def run(landing: LandingRun) -> Landed:
     """Run and judge one landing."""
-    return job, fly(job).judge()
+    return landing, fly(landing).judge()
 
 
-def fly(job: Job) -> LandingRecord:
+def fly(landing: LandingRun) -> LandingRecord:
     """Run one landing."""
-    scenario = scenario_of(job.case)
-    solver = ContactSolver(scenario.size, scenario.stack_size, model=job.model)
-    return land(scenario, solver, rate_hz=job.rate_hz, latency=job.latency)
+    scenario = scenario_of(landing.case)
+    solver = ContactSolver(scenario.size, scenario.stack_size, model=landing.model)
+    return land(scenario, solver, rate_hz=landing.rate_hz, latency=landing.latency)
 
 
-def jobs_of(models: Sequence[str], rates: Sequence[float], latencies: Sequence[float], *,
-            seed: int = 1, step: int = 1) -> list[Job]:
-    """All landings of a sweep; `step` takes every so-manieth case."""
-    return [Job(model, rate, latency, number, case)
+def landings_of(models: Sequence[str], rates: Sequence[float], latencies: Sequence[float], *,
+                seed: int = 1, step: int = 1) -> list[LandingRun]:
+    """Return the landings of a sweep: every `step`-th case."""
+    return [LandingRun(model, rate, latency, number, case)
             for model in models for rate in rates for latency in latencies
             for number, case in list(enumerate(cases(seed=seed)))[::step]]
 
 
-def write_csv(path: Path, results: Sequence[tuple[Job, LandingResult]]) -> None:
-    """A row per landing: what was run, whether it rests, every figure.
+def csv_row(landing: LandingRun, result: LandingResult) -> dict[str, object]:
+    """Return what was run, whether it rests, and every figure.
 
     SI units; angles of cases in degrees, their columns begin with case_.
     """
-    with path.open('w', newline='') as file:
-        writer = csv.writer(file, lineterminator='\n')
-        case_fields = [f'case_{field.name}' for field in dataclasses.fields(LandingCase)]
-        figures = [field.name for field in dataclasses.fields(LandingResult)]
-        writer.writerow(['model', 'rate_hz', 'latency', 'case', *case_fields, 'at_rest', *figures])
-        for job, result in results:
-            case = dataclasses.astuple(job.case)
-            writer.writerow([
-                job.model, f'{job.rate_hz:g}', f'{job.latency:g}', job.number,
-                *[f'{value:.6g}' for value in case], int(result.at_rest),
-                *[f'{value:.6g}' for value in dataclasses.astuple(result)]])
+    return {'model': landing.model, 'rate_hz': landing.rate_hz, 'latency': landing.latency,
+            'case': landing.number,
+            **{f'case_{name}': value for name, value in asdict(landing.case).items()},
+            'at_rest': int(result.at_rest), **asdict(result)}
 
 
-def table(results: Sequence[tuple[Job, LandingResult]]) -> str:
-    """A Markdown row per model, rate and latency: how many rest, and the worst of each figure."""
+SHOWN_WORST = {
+    'settled [s]': ('settled', 1.0), 'corner [mm/s]': ('corner_speed', 1e3),
+    'force [%]': ('force_worst', 100.0), 'tilt [°]': ('tilt', 180.0 / math.pi),
+    'depth [%]': ('depth', 100.0), 'gap [mm]': ('gap', 1e3),
+    'point step, window [mm]': ('point_step', 1e3),
+    'point step, ever [mm]': ('point_step_ever', 1e3)}
+"""By column: a figure of `LandingResult`, whose worst value the table shows, and its factor."""
+
+
+def table(results: Sequence[Landed]) -> str:
+    """Return a row per model, rate and latency: how many rest, and the worst of each figure."""
+    def worst(group: Sequence[LandingResult], name: str, factor: float) -> str:
+        values = [getattr(result, name) for result in group]
+        # What was never reached has no worst; the word is clearer than a NaN.
+        return 'never' if any(map(math.isnan, values)) else f'{factor * max(values):.2g}'
+
     groups: dict[tuple[str, float, float], list[LandingResult]] = {}
-    for job, result in results:
-        groups.setdefault((job.model, job.rate_hz, job.latency), []).append(result)
-    head = ['model', 'rate [Hz]', 'latency [ms]', 'at rest', 'settled [s]',
-            'corner [mm/s]', 'force [%]', 'tilt [°]', 'depth [%]', 'gap [mm]',
-            'point step, window [mm]', 'exact', 'point step, ever [mm]', 'exact']
-    lines = [head, ['---'] + ['---:'] * (len(head) - 1)]
+    for landing, result in results:
+        key = (landing.model, landing.rate_hz, landing.latency)
+        groups.setdefault(key, []).append(result)
+    head, rows = ['model', 'rate [Hz]', 'latency [ms]', 'at rest'], []
+    for title, (name, _) in SHOWN_WORST.items():
+        head += [title, 'exact'] if name.startswith('point') else [title]
     for (model, rate, latency), group in groups.items():
-        def worst(name: str, factor: float = 1.0, group: list[LandingResult] = group) -> str:
-            values = [getattr(result, name) for result in group]
-            # What was never reached has no worst; the word is clearer than a NaN.
-            return 'never' if any(map(math.isnan, values)) else f'{factor * max(values):.2g}'
-        lines.append([
-            model, f'{rate:g}', f'{1e3 * latency:g}',
-            f'{sum(result.at_rest for result in group)} of {len(group)}', worst('settled'),
-            worst('corner_speed', 1e3), worst('force_worst', 100.0),
-            worst('tilt', 180.0 / math.pi), worst('depth', 100.0), worst('gap', 1e3),
-            worst('point_step', 1e3), worst('exact_point_step', 1e3),
-            worst('point_step_ever', 1e3), worst('exact_point_step_ever', 1e3)])
-    return '\n'.join('| ' + ' | '.join(line) + ' |' for line in lines)
+        row = [model, f'{rate:g}', f'{1e3 * latency:g}',
+               f'{sum(result.at_rest for result in group)} of {len(group)}']
+        for name, factor in SHOWN_WORST.values():
+            row.append(worst(group, name, factor))
+            if name.startswith('point'):
+                row.append(worst(group, f'exact_{name}', factor))
+        rows.append(row)
+    return output.markdown_table(head, rows)
 
 
-def over_dds(jobs: Sequence[Job]) -> Iterator[tuple[Job, LandingResult]]:
-    """Run the landings one by one, their contacts from a contact node; in lockstep."""
+def over_dds(landings: Sequence[LandingRun]) -> Iterator[Landed]:
+    """Run landings one by one, their contacts from a contact node; in lockstep."""
     from ..apps.crane.landing_flights import answering_node, fly_over_dds  # only here: needs ROS
 
-    for model, group in groupby(jobs, key=lambda job: job.model):
-        with answering_node(model, scenario_of(jobs[0].case)) as domain:
-            for job in group:
-                yield job, fly_over_dds(domain, scenario_of(job.case), rate_hz=job.rate_hz,
-                                        latency=job.latency)
+    for model, group in groupby(landings, key=lambda one: one.model):
+        with answering_node(model, scenario_of(landings[0].case)) as domain:
+            for one in group:
+                yield one, fly_over_dds(domain, scenario_of(one.case), rate_hz=one.rate_hz,
+                                        latency=one.latency)
 
 
 OFFLINE_END = """
@@ -140,45 +140,42 @@ OFFLINE_END = """
 The same with the contacts from a contact node over DDS: [landing_dds.md](landing_dds.md).
 """
 DDS_START = """
-The contacts of these landings come from a contact node in another process, over DDS, and act so
-much later than their poses were published; the simulation waits for every answer (lockstep), so
-that a busy machine changes nothing. None was lost. What is measured, and the same without ROS:
+The contacts of these landings come from a contact node in another process, over DDS. They act that
+much later than their poses were published. The simulation waits for every answer (lockstep), so
+that a busy machine changes nothing. No answer was lost. The same without ROS:
 [landing.md](landing.md).
 """
 
 
-def _stem(dds: bool) -> str:
-    """Name of the files, without its ending."""
-    return 'landing_dds' if dds else 'landing'
-
-
-def page(results: Sequence[tuple[Job, LandingResult]], command: str, *, dds: bool = False) -> str:
-    """The Markdown page."""
-    count = len({job.number for job, _ in results})
+def page(results: Sequence[Landed], command: str, *, dds: bool = False) -> str:
+    """Return the Markdown page."""
+    count = len({landing.number for landing, _ in results})
     return f"""# A container lands on one contact point per tick{', over DDS' if dds else ''}
 
-Made by `{command}`.
+Made by `{command}` on {output.machine(native)}.
 {DDS_START if dds else ''}
 {count} landings a row: ropes 0.5 to 3° off the plumb line, box tilted by 0.5 to 3°, centres 0 to
 0.6 m apart at the first touch, yaw to 1°, every direction drawn. 20 t, 40 ft, no damping but that
 of contact and ropes; the same law and constants for every model (`contact_law`), one point,
-normal and depth per tick. At rest means, from {SETTLING:g} s after the first touch on, for
-{WINDOW:g} s: no corner faster than 10 mm/s (20 at 200 Hz), ropes slack, contact force within 1 % of
-the weight at every tick, tilt < 0.5°; and always depth < 1 % of the height, gap after the first
-touch < 20 mm. Figures are the worst of the row's landings. A point step is |Δpoint| between
-neighbouring ticks, in the window or over the whole contact; beside it, the exact point's on the
-same poses. Every landing is a row of {_stem(dds)}.csv.
+normal and depth per tick.
+
+At rest means, from {SETTLING:g} s after the first touch on, for {WINDOW:g} s: no corner faster than
+10 mm/s (20 at 200 Hz), ropes slack, contact force within 1 % of the weight at every tick, tilt
+below 0.5°; and always depth below 1 % of the height, gap after the first touch below 20 mm.
+
+Figures are the worst of the row's landings. A point step is |Δpoint| between neighbouring ticks, in
+the window or over the whole contact. The column on its right has the exact point's step on the same
+poses. Every landing is a row of {'landing_dds' if dds else 'landing'}.csv.
 
 {table(results)}
 {'' if dds else OFFLINE_END}"""
 
 
-def draw(path: Path, models: Sequence[str], job: Job) -> None:
-    """One landing, a column per model: corner speed, force, tilt, and the point's path."""
-    figure, axes = plt.subplots(4, len(models), figsize=(4.6 * len(models), 10.5), sharey='row',
-                                squeeze=False, constrained_layout=True)
+def draw(path: Path, models: Sequence[str], landing: LandingRun) -> None:
+    """Draw one landing, a column per model: corner speed, force, tilt, and the point's path."""
+    figure, axes = output.subplots(4, len(models), (4.6 * len(models), 10.5), sharey='row')
     for column, model in zip(axes.T, models):
-        record = fly(dataclasses.replace(job, model=model))
+        record = fly(replace(landing, model=model))
         result = record.judge()
         points = record.point_path() - np.array([0.0, 0.0, record.scenario.stack_size[2]])
         time = np.arange(len(record.poses)) / record.rate_hz - result.touched
@@ -202,9 +199,8 @@ def draw(path: Path, models: Sequence[str], job: Job) -> None:
     for axis, label in zip(axes[:, 0], ('fastest corner [mm/s]', 'contact force / weight',
                                         'tilt [°]', 'contact point y [m]')):
         axis.set_ylabel(label)
-    figure.suptitle(f'One landing at {job.rate_hz:g} Hz, the same constants; grey: judged')
-    figure.savefig(path, dpi=110)
-    plt.close(figure)
+    figure.suptitle(f'One landing at {landing.rate_hz:g} Hz, the same constants; grey: judged')
+    figure.savefig(path)
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -223,28 +219,27 @@ def main(args: Sequence[str] | None = None) -> int:
     parser.add_argument('--seed', type=seed_number, default=1, help='of yaws and headings')
     parser.add_argument('--quick', action='store_true', help=f'every {QUICK}th landing only')
     parser.add_argument('--workers', type=int, default=os.cpu_count(), help='processes')
-    add_out(parser, 'landing.csv, landing.md, landing.png')
+    output.add_out(parser, 'landing.csv, landing.md, landing.png')
     options = parser.parse_args(args)
-    options.out = results_folder(parser, options)
-    jobs = jobs_of(options.models, options.rates, options.latency, seed=options.seed,
-                   step=QUICK if options.quick else 1)
+    folder = output.results_folder(parser, options)
+    landings = landings_of(options.models, options.rates, options.latency, seed=options.seed,
+                           step=QUICK if options.quick else 1)
+    progress = {'total': len(landings), 'desc': 'landings', 'unit': ''}
     if options.dds:
-        results = list(tqdm(over_dds(jobs), total=len(jobs), desc='landings', unit=''))
+        results = list(tqdm(over_dds(landings), **progress))
     else:
         with ProcessPoolExecutor(options.workers) as pool:
-            results = list(tqdm(pool.map(run, jobs), total=len(jobs), desc='landings', unit=''))
-    name = _stem(options.dds)
-    write_csv(options.out / f'{name}.csv', results)
-    given = sys.argv[1:] if args is None else args
-    command = ' '.join(['python -m box_contact_ros.reports.landing_report', *given])
-    (options.out / f'{name}.md').write_text(page(results, command, dds=options.dds))
-    if not options.dds:
+            results = list(tqdm(pool.map(run, landings), **progress))
         shown = list(cases(seed=options.seed))[SHOWN]
-        draw(options.out / 'landing.png', options.models,
-             Job(options.models[0], options.rates[0], options.latency[0], SHOWN, shown))
+        draw(folder / 'landing.png', options.models,
+             LandingRun(options.models[0], options.rates[0], options.latency[0], SHOWN, shown))
+    name = 'landing_dds' if options.dds else 'landing'
+    output.write_csv(folder / f'{name}.csv', [csv_row(*one) for one in results])
+    command = output.command_line('box_contact_ros.reports.landing_report', args)
+    (folder / f'{name}.md').write_text(page(results, command, dds=options.dds), encoding='utf-8')
     print(table(results))
     return 0
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    raise SystemExit(main())

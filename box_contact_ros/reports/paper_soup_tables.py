@@ -3,35 +3,37 @@
 Times are CPU times of one thread on one pinned core, after a warm-up, with garbage collection off.
 Like the paper's gprof, they leave out what other programs take meanwhile. Three of them:
 
-- the step: `fcl.collide` as python-fcl has it, from two placed soups to a list of all contacts;
-  what the paper times. Making Python objects of the contacts is part of it;
+- the step: `fcl.collide` as python-fcl has it, from two placed soups to a list of all contacts; the
+  paper times this. Making Python objects of the contacts is part of it;
 - FCL alone: the same search, asked for one contact and for costs. FCL stops at the first contact
-  only where no costs are asked for, so it tests all it tests in the step, and hands over next to
-  nothing. It is what compiled code would see;
-- the answer: a call of model `soup`, pose to point and normal, with SAT and the exact point (which
-  stands in where the soup finds nothing).
+  only where no costs are asked for. So it tests all that the step tests, and returns next to
+  nothing: what compiled code would see.
+
+- the answer: a call of model `soup`, pose to point and normal, with SAT. Where the soup finds
+  nothing, the exact point stands in.
 """
 from __future__ import annotations
 
-import csv
-import gc
 import math
-import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import fcl
 import numpy as np
 from tqdm import tqdm
 
+from .. import output
 from ..baselines import soup
+from ..core import native
+from ..scene.pose import degrees_between
 from ..scene.pose_sets import CUBE, stacks
 from ..solver.contact import Contacts
 from ..solver.contact_solver import ContactSolver
 from ..training.paper_recipe.dataset import quaternion_from_euler
+from .speed import no_garbage_collection, pinned, usable_cores
 
 PAPER = {8: (1.10, 11233, 11.52), 10: (1.47, 14323, 15.47), 12: (1.85, 17911, 19.2),
          14: (1.94, 21789, 23.13), 16: (2.13, 24667, 24.63), 18: (2.31, 26517, 28.0),
@@ -43,7 +45,7 @@ ALSO = (1, 2, 4, 32, 64)
 """Divisions at which only the accuracy is measured, on touching boxes."""
 
 OVERLAP = 1e-3
-"""Depth [m] of touching and near-parallel cubes of edge 2 where the accuracy is measured: at exact
+"""Depth [m] of touching and near-parallel cubes of edge 2 where the accuracy is measured. At exact
 touch the soup finds nothing in a part of the patterns."""
 SEED = 20
 WARM_UP = 30      # patterns before any that counts
@@ -71,30 +73,33 @@ Poses = tuple[np.ndarray, np.ndarray]
 """Poses (n, 7) of A and of B, two cubes of edge 2."""
 
 
-@dataclass
-class Cell:
-    """Soup of N divisions on one regime; times in ms."""
+@dataclass(frozen=True, kw_only=True)
+class SoupTimes:
+    """Soup of N divisions, timed on a regime [ms]."""
 
-    regime: str
-    divisions: int
-    steps: np.ndarray = field(default_factory=lambda: np.empty(0))
-    pairs: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    steps: np.ndarray
+    alone: np.ndarray
+    answers: np.ndarray
+    pairs: np.ndarray
     """Pairs of triangles that meet, per pattern."""
-    alone: list[float] = field(default_factory=list)
-    answers: list[float] = field(default_factory=list)
-    worst: int = 0
-    """The pattern with the most pairs."""
-    worst_step: float = math.nan
-    worst_alone: float = math.nan
-    touching: int = 0
-    """Patterns that touch, by SAT, of those timed."""
-    misses: int = 0
+    worst_step: float
+    """Step of the pattern with the most pairs."""
+    worst_alone: float
+    touching: int
+    """Patterns that touch, by SAT."""
+    misses: int
     """Of these, those in which no two triangles meet."""
-    point: np.ndarray = field(default_factory=lambda: np.empty(0))
-    """Error of the point [m] per pattern judged and answered by the soup."""
-    normal: np.ndarray = field(default_factory=lambda: np.empty(0))
-    """Error of the normal [deg]."""
-    depth: np.ndarray = field(default_factory=lambda: np.empty(0))
+
+
+@dataclass(frozen=True, kw_only=True)
+class SoupErrors:
+    """Soup of N divisions, judged on a regime; a row per pattern that the soup answered."""
+
+    point: np.ndarray
+    """[m]."""
+    normal: np.ndarray
+    """[deg]."""
+    depth: np.ndarray
     """Deepest contact minus the true depth [m]."""
 
 
@@ -110,34 +115,39 @@ class Rival:
     """Mean time of a call."""
 
 
-@dataclass(frozen=True)
-class Result:
-    """All that is measured."""
+@dataclass(frozen=True, kw_only=True)
+class SoupResult:
+    """All that is measured; cells are by regime and N."""
 
-    cells: Mapping[tuple[str, int], Cell]
+    times: Mapping[tuple[str, int], SoupTimes]
+    errors: Mapping[tuple[str, int], SoupErrors]
     rivals: Mapping[str, Rival]
     exact: float
     """Mean time of a call of model `exact` [ms]."""
     counts: Mapping[str, Counts]
+
+    def ends(self, regime: str) -> tuple[SoupTimes, SoupTimes]:
+        """Return the times of the least N of Table 3, and of the largest."""
+        return self.times[regime, min(PAPER)], self.times[regime, max(PAPER)]
 
 
 # --- the patterns ---------------------------------------------------------------------------------
 
 
 def touching(inputs: np.ndarray) -> Poses:
-    """The paper's patterns (n, 6), offset [m] and roll, pitch, yaw [rad], as poses."""
+    """Return the paper's patterns (n, 6), offset [m] and roll, pitch, yaw [rad], as poses."""
     b = np.concatenate([inputs[:, :3], quaternion_from_euler(inputs[:, 3:])], axis=1)
     return _origin(len(b)), b
 
 
 def near_parallel(rng: np.random.Generator, n: int) -> Poses:
-    """One cube on the other, tilted by 1e-6–1e-3 rad, 1 mm deep, any yaw, anywhere on it."""
+    """Draw one cube on the other, tilted by 1e-6–1e-3 rad, 1 mm deep, any yaw, anywhere on it."""
     pairs = stacks(rng, 2 * n)  # a few are placed beside the cube and left out
     return pairs.pose_a[:n], pairs.pose_b[:n]
 
 
 def coplanar(rng: np.random.Generator, n: int) -> Poses:
-    """One cube on the other, faces in one plane to the last bit.
+    """Draw one cube on the other, faces in one plane to the last bit.
 
     One in ten stands exactly on top; the others anywhere on it, half of them with their sides
     parallel, half under any yaw.
@@ -165,7 +175,7 @@ def _cubes(model: str) -> ContactSolver:
 
 
 def pressed(poses: Poses, depth: float) -> Poses:
-    """The pairs that touch, B moved along SAT's normal until they are `depth` [m] deep."""
+    """Return the pairs that touch, B moved along SAT's normal until they are `depth` [m] deep."""
     a, b = poses
     found = _cubes('exact').batch(a, b)
     rows = found.colliding
@@ -177,82 +187,61 @@ def pressed(poses: Poses, depth: float) -> Poses:
 # --- time -----------------------------------------------------------------------------------------
 
 
-@contextmanager
-def undisturbed() -> Iterator[None]:
-    """One core, the last one that this process may use; no garbage collection."""
-    pinnable = hasattr(os, 'sched_setaffinity')
-    cores = os.sched_getaffinity(0) if pinnable else set()
-    if pinnable:
-        os.sched_setaffinity(0, {max(cores)})
-    gc.collect()
-    gc.disable()
-    try:
-        yield
-    finally:
-        gc.enable()
-        if pinnable:
-            os.sched_setaffinity(0, cores)
-
-
 def search(first: fcl.CollisionObject, second: fcl.CollisionObject) -> None:
-    """The search of FCL for all pairs, of which one is handed over: see the module's docstring."""
+    """Search for all pairs; FCL returns one of them: see the module's docstring."""
     fcl.collide(first, second, fcl.CollisionRequest(num_max_contacts=1, enable_contact=True,
                                                     enable_cost=True), fcl.CollisionResult())
 
 
 def milliseconds(work: Callable[..., object], *arguments: object) -> float:
-    """CPU time of one call [ms]."""
+    """Return the CPU time of one call [ms]."""
     started = time.thread_time_ns()
     work(*arguments)
     return 1e-6 * (time.thread_time_ns() - started)
 
 
 def pair_count(contacts: Sequence[fcl.Contact]) -> int:
-    """Pairs of triangles that meet; FCL gives one contact or two for each."""
+    """Return how many pairs of triangles meet; FCL gives one contact or two for each."""
     return len({(contact.b1, contact.b2) for contact in contacts})
 
 
-def time_cell(cell: Cell, poses: Poses, thin: int, bar: tqdm) -> None:
-    """Fill in times and numbers of pairs of triangles."""
+def time_soup(divisions: int, poses: Poses, thin: int, bar: tqdm) -> SoupTimes:
+    """Time the soup of N divisions, and count its pairs of triangles."""
     a, b = poses
-    boxes = soup.Soup(cell.divisions)
-    solver = _cubes(f'soup-{cell.divisions}')
-    count = len(a)
-    cell.steps, cell.pairs = np.empty(count), np.empty(count, dtype=np.int64)
-    for row in range(min(WARM_UP, count)):
+    boxes, solver = soup.Soup(divisions), _cubes(f'soup-{divisions}')
+    steps, pairs = np.empty(len(a)), np.empty(len(a), dtype=np.int64)
+    alone, answers = [], []
+    for row in range(min(WARM_UP, len(a))):
         pair = boxes.place(a[row], b[row], CUBE, CUBE)
         soup.collide(*pair), search(*pair), solver(a[row], b[row])
-    for row in range(count):
+    for row in range(len(a)):
         pair = boxes.place(a[row], b[row], CUBE, CUBE)
         started = time.thread_time_ns()
         contacts = soup.collide(*pair)
-        cell.steps[row] = 1e-6 * (time.thread_time_ns() - started)
-        cell.pairs[row] = pair_count(contacts)
+        steps[row] = 1e-6 * (time.thread_time_ns() - started)
+        pairs[row] = pair_count(contacts)
         if row % thin == 0:
-            cell.alone.append(milliseconds(search, *pair))
-            cell.answers.append(milliseconds(solver, a[row], b[row]))
+            alone.append(milliseconds(search, *pair))
+            answers.append(milliseconds(solver, a[row], b[row]))
         if row % 100 == 0:
-            bar.update(min(100, count - row))
+            bar.update(min(100, len(a) - row))
     found = _cubes('exact').batch(a, b).colliding
-    cell.touching, cell.misses = int(found.sum()), int((found & (cell.pairs == 0)).sum())
-    cell.worst = int(np.argmax(cell.pairs))
-    pair = boxes.place(a[cell.worst], b[cell.worst], CUBE, CUBE)
-    cell.worst_step = float(np.median([milliseconds(soup.collide, *pair) for _ in range(REPEATS)]))
-    cell.worst_alone = float(np.median([milliseconds(search, *pair) for _ in range(REPEATS)]))
+    most = int(np.argmax(pairs))
+    pair = boxes.place(a[most], b[most], CUBE, CUBE)
+    worst_step, worst_alone = (
+        float(np.median([milliseconds(work, *pair) for _ in range(REPEATS)]))
+        for work in (soup.collide, search))
+    return SoupTimes(steps=steps, pairs=pairs, alone=np.array(alone), answers=np.array(answers),
+                     worst_step=worst_step, worst_alone=worst_alone, touching=int(found.sum()),
+                     misses=int((found & (pairs == 0)).sum()))
 
 
 # --- accuracy -------------------------------------------------------------------------------------
 
 
-def degrees_between(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Angles (n,) [deg] between unit vectors (n, 3)."""
-    cross = np.linalg.norm(np.cross(one, other), axis=1)
-    return np.degrees(np.arctan2(cross, np.sum(one * other, axis=1)))
-
-
-def judge_cell(cell: Cell, poses: Poses, exact: Contacts, bar: tqdm) -> None:
-    """Fill in the errors against `exact`; patterns without an answer of the soup are left out."""
-    boxes, areas = soup.Soup(cell.divisions), soup.mesh(CUBE, cell.divisions).areas
+def judge_soup(divisions: int, poses: Poses, exact: Contacts) -> SoupErrors:
+    """Compare with `exact`; patterns without an answer of the soup are left out."""
+    boxes, areas = soup.Soup(divisions), soup.mesh(CUBE, divisions).areas
     rows, points, normals, depths = [], [], [], []
     for row, (a, b) in enumerate(zip(*poses)):
         contacts = soup.collide(*boxes.place(a, b, CUBE, CUBE))
@@ -262,14 +251,14 @@ def judge_cell(cell: Cell, poses: Poses, exact: Contacts, bar: tqdm) -> None:
             points.append(a[:3] + answer[0])
             normals.append(answer[1])
             depths.append(max(contact.penetration_depth for contact in contacts))
-    bar.update(len(poses[0]))
-    cell.point = np.linalg.norm(np.reshape(points, (-1, 3)) - exact.point[rows], axis=1)
-    cell.normal = degrees_between(np.reshape(normals, (-1, 3)), exact.normal[rows])
-    cell.depth = np.array(depths) + exact.separation[rows]
+    return SoupErrors(
+        point=np.linalg.norm(np.reshape(points, (-1, 3)) - exact.point[rows], axis=1),
+        normal=degrees_between(np.reshape(normals, (-1, 3)), exact.normal[rows]),
+        depth=np.array(depths) + exact.separation[rows])
 
 
 def time_calls(solver: ContactSolver, poses: Poses) -> float:
-    """Mean time of a call [ms]; they are too short for a clock each."""
+    """Return the mean time of a call [ms]; calls are too short for a clock each."""
     def calls() -> None:
         for a, b in zip(*poses):
             solver(a, b)
@@ -279,7 +268,7 @@ def time_calls(solver: ContactSolver, poses: Poses) -> float:
 
 
 def judge_rival(model: str, poses: Poses, exact: Contacts) -> Rival:
-    """A network's errors and its time."""
+    """Return a network's errors and its time."""
     solver = _cubes(model)
     found = solver.batch(*poses)
     return Rival(float(np.linalg.norm(found.point - exact.point, axis=1).mean()),
@@ -288,9 +277,10 @@ def judge_rival(model: str, poses: Poses, exact: Contacts) -> Rival:
 
 
 def crossing(errors: Mapping[int, float], level: float) -> float:
-    """The N at which the error falls to `level`, straight on log-log paper between those measured.
+    """Return the N at which the error falls to `level`.
 
-    It is 0 if the error is below from the first on, infinite if it never is.
+    The line between those measured is straight on log-log paper. The N is 0 if the error is below
+    from the first on, infinite if it never is.
     """
     divisions = sorted(errors)
     if errors[divisions[0]] <= level:
@@ -305,7 +295,7 @@ def crossing(errors: Mapping[int, float], level: float) -> float:
 # --- all of it ------------------------------------------------------------------------------------
 
 
-def measure(inputs: np.ndarray, *, quick: bool = False) -> Result:
+def measure(inputs: np.ndarray, *, quick: bool = False) -> SoupResult:
     """Time and judge every N on every regime; inputs: the paper's external set (n, 6)."""
     counts = QUICK if quick else FULL
     rng = np.random.default_rng(SEED)
@@ -318,115 +308,112 @@ def measure(inputs: np.ndarray, *, quick: bool = False) -> Result:
     some = tuple(p[:2 * counts['touching'].judged] for p in poses['touching'])
     judged['touching'] = tuple(p[:counts['touching'].judged] for p in pressed(some, OVERLAP))
     truth = {name: _cubes('exact').batch(*given) for name, given in judged.items()}
-    cells = {}
+    times, errors = {}, {}
     work = len(PAPER) * sum(c.timed + c.judged for c in counts.values())
     work += len(ALSO) * counts['touching'].judged
-    with undisturbed(), tqdm(total=work, unit='pattern', disable=None) as bar:
+    with (pinned({usable_cores()[-1]}), no_garbage_collection(),
+          tqdm(total=work, unit='pattern', disable=None) as bar):
         for divisions in sorted([*PAPER, *ALSO]):
             for regime in REGIMES if divisions in PAPER else ['touching']:
                 bar.set_description(f'soup, N = {divisions}, {regime}')
-                cell = cells[regime, divisions] = Cell(regime, divisions)
                 if divisions in PAPER:
-                    time_cell(cell, poses[regime], counts[regime].thin, bar)
-                judge_cell(cell, judged[regime], truth[regime], bar)
+                    times[regime, divisions] = time_soup(divisions, poses[regime],
+                                                         counts[regime].thin, bar)
+                errors[regime, divisions] = judge_soup(divisions, judged[regime], truth[regime])
+                bar.update(len(judged[regime][0]))
         rivals = {model: judge_rival(model, judged['touching'], truth['touching'])
                   for model in ('paper', 'paper-continuous')}
         exact = time_calls(_cubes('exact'), judged['touching'])
-    return Result(cells, rivals, exact, counts)
+    return SoupResult(times=times, errors=errors, rivals=rivals, exact=exact, counts=counts)
 
 
 # --- what is written ------------------------------------------------------------------------------
-
-
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    return '\n'.join('| ' + ' | '.join(line) + ' |' for line in (
-        head, ['---:'] * len(head), *rows))
 
 
 def _ms(value: float) -> str:
     return f'{value:.3f}' if value < 0.1 else f'{value:.2f}'
 
 
-def table_3(result: Result) -> str:
-    """Mean times by N and regime, the paper's first."""
-    head = ['N', 'triangles a cube', 'paper: touching']
-    for regime in REGIMES:
-        head += [f'{regime}: step', 'FCL alone', 'answer']
-    rows = []
-    for divisions, (paper, _, _) in PAPER.items():
-        row = [str(divisions), f'{12 * divisions**2:,}', f'{paper:.2f}']
-        for regime in REGIMES:
-            cell = result.cells[regime, divisions]
-            row += [_ms(float(np.mean(times))) for times in (cell.steps, cell.alone, cell.answers)]
-        rows.append(row)
-    return _table(head, rows)
+def _by_regime(head: Sequence[str], titles: Sequence[str], paper: Callable[[int], list[str]],
+               ours: Callable[[SoupTimes], list[str]], result: SoupResult) -> str:
+    """Return a table with a row per N: the paper's figures, then ours for each regime."""
+    columns = [f'{regime}: {titles[0]}' if k == 0 else title
+               for regime in REGIMES for k, title in enumerate(titles)]
+    return output.markdown_table(['N', *head, *columns], [
+        [divisions, *paper(divisions),
+         *(cell for regime in REGIMES for cell in ours(result.times[regime, divisions]))]
+        for divisions in PAPER], words=0)
 
 
-def table_4(result: Result) -> str:
-    """The largest number of pairs, and the times of that pattern, by N and regime."""
-    head = ['N', 'paper: tests', 'paper: ms']
-    for regime in REGIMES:
-        head += [f'{regime}: pairs', 'step, ms', 'FCL alone, ms']
-    rows = []
-    for divisions, (_, tests, paper) in PAPER.items():
-        row = [str(divisions), f'{tests:,}', f'{paper:.2f}']
-        for regime in REGIMES:
-            cell = result.cells[regime, divisions]
-            row += [f'{cell.pairs[cell.worst]:,}', _ms(cell.worst_step), _ms(cell.worst_alone)]
-        rows.append(row)
-    return _table(head, rows)
+def table_3(result: SoupResult) -> str:
+    """Return mean times by N and regime, the paper's first."""
+    return _by_regime(
+        ['triangles a cube', 'paper: touching'], ['step', 'FCL alone', 'answer'],
+        lambda n: [f'{12 * n**2:,}', f'{PAPER[n][0]:.2f}'],
+        lambda cell: [_ms(float(t.mean())) for t in (cell.steps, cell.alone, cell.answers)],
+        result)
 
 
-def table_of_errors(result: Result) -> str:
-    """Errors by N and regime, then the networks'."""
+def table_4(result: SoupResult) -> str:
+    """Return the largest number of pairs, and the times of that pattern, by N and regime."""
+    return _by_regime(
+        ['paper: tests', 'paper: ms'], ['pairs', 'step, ms', 'FCL alone, ms'],
+        lambda n: [f'{PAPER[n][1]:,}', f'{PAPER[n][2]:.2f}'],
+        lambda cell: [f'{cell.pairs.max():,}', _ms(cell.worst_step), _ms(cell.worst_alone)],
+        result)
+
+
+def table_of_errors(result: SoupResult) -> str:
+    """Return errors by N and regime, then the networks'."""
     head = ['N', 'misses at exact touch']
     for regime in REGIMES:
         head += [f'{regime}: point, mean', 'max', 'normal, mean']
     head += ['depth, touching', 'depth, near-parallel']
     rows = []
-    for divisions in sorted({divisions for _, divisions in result.cells}):
-        cell = result.cells['touching', divisions]
-        misses = f'{100 * cell.misses / cell.touching:.0f} %' if cell.touching else ''
-        row = [str(divisions), misses]
-        for regime in REGIMES:
-            other = result.cells.get((regime, divisions))
-            row += ['', '', ''] if other is None else [
-                f'{1e3 * other.point.mean():.1f}', f'{1e3 * other.point.max():.0f}',
-                f'{other.normal.mean():.1f}']
-        for regime in ('touching', 'near-parallel'):
-            other = result.cells.get((regime, divisions))
-            row.append('' if other is None else f'{1e3 * other.depth.mean():.0f}')
+    for divisions in sorted({divisions for _, divisions in result.errors}):
+        times = result.times.get(('touching', divisions))
+        row = [str(divisions), f'{100 * times.misses / times.touching:.0f} %' if times else '']
+        cells = {regime: result.errors.get((regime, divisions)) for regime in REGIMES}
+        for cell in cells.values():
+            row += [f'{1e3 * cell.point.mean():.1f}', f'{1e3 * cell.point.max():.0f}',
+                    f'{cell.normal.mean():.1f}'] if cell else ['', '', '']
+        row += [f'{1e3 * cell.depth.mean():.0f}' if (cell := cells[regime]) else ''
+                for regime in ('touching', 'near-parallel')]
         rows.append(row)
     for name, rival in result.rivals.items():
         rows.append([f'`{name}`', '', f'{1e3 * rival.point:.1f}', '', f'{rival.normal:.1f}',
                      *[''] * (len(head) - 5)])
-    return _table(head, rows)
+    return output.markdown_table(head, rows, words=0)
 
 
-def equal_at(result: Result) -> dict[str, float]:
-    """By network: the N at which the soup's mean point error equals its."""
-    errors = {divisions: float(cell.point.mean())
-              for (regime, divisions), cell in result.cells.items() if regime == 'touching'}
+def _touching_errors(result: SoupResult) -> dict[int, float]:
+    """Return the mean point error on touching cubes [m], by N."""
+    return {n: float(cell.point.mean()) for (regime, n), cell in sorted(result.errors.items())
+            if regime == 'touching'}
+
+
+def equal_at(result: SoupResult) -> dict[str, float]:
+    """Return, by network, the N at which the soup's mean point error equals its."""
+    errors = _touching_errors(result)
     return {name: crossing(errors, rival.point) for name, rival in result.rivals.items()}
 
 
 def in_words(divisions: float) -> str:
-    """A `crossing`."""
+    """Return a `crossing` in words."""
     if divisions == 0.0:
         return f'below N = {min(ALSO)}'
     return f'N ≈ {divisions:.0f}' if math.isfinite(divisions) else f'beyond N = {max(ALSO)}'
 
 
-def section_3(result: Result) -> str:
-    """Table 3 with its notes."""
+def section_3(result: SoupResult) -> str:
+    """Return Table 3 with its notes."""
     counts = result.counts
     thin = ', '.join(f'{math.ceil(count.timed / count.thin):,} {name}'
                      for name, count in counts.items())
-    first, last = (result.cells['coplanar', n] for n in (min(PAPER), max(PAPER)))
-    share = 100 * (1 - np.mean(last.alone) / np.mean(last.steps[::counts['coplanar'].thin]))
+    first, last = result.ends('coplanar')
+    share = 100 * (1 - last.alone.mean() / last.steps[::counts['coplanar'].thin].mean())
     network = result.rivals['paper'].milliseconds
-    slower = [np.mean(result.cells['touching', n].steps) / network
-              for n in (min(PAPER), max(PAPER))]
+    slower = [cell.steps.mean() / network for cell in result.ends('touching')]
     return f"""## Table 3: polygon soup, mean time
 
 ms, on two cubes of edge 2. *Touching*: {counts['touching'].timed:,} patterns of the external set
@@ -438,30 +425,29 @@ bit, one in ten exactly on top, the others anywhere, half with parallel sides, h
 
 - *Step* is what the paper times: two placed soups in, all contacts out, here as python-fcl's list.
   *FCL alone* is the same search without the list, as compiled code would see it ({share:.0f} % of
-  the coplanar step at N = {last.divisions} is the making of Python objects). *Answer* is a call of
+  the coplanar step at N = {max(PAPER)} is the making of Python objects). *Answer* is a call of
   model `soup`, with SAT, point and normal. The last two are timed on {thin} patterns.
 - A call of model `paper`, network, SAT and Python included, takes {1e3 * network:.1f} µs in the
   same run, on any pattern: the step takes {slower[0]:.0f} times that at N = {min(PAPER)} and
   {slower[1]:.0f} times at N = {max(PAPER)} on touching cubes, and
-  {np.mean(first.steps) / network:,.0f} to {np.mean(last.steps) / network:,.0f} times on coplanar
+  {first.steps.mean() / network:,.0f} to {last.steps.mean() / network:,.0f} times on coplanar
   ones. The paper has 2 to 6 on the first.
 - A call of model `exact` takes {1e3 * result.exact:.1f} µs: it is the soup that is slow, not exact
   geometry, and against that the paper's network wins nothing.
 """
 
 
-def section_4(result: Result) -> str:
-    """Table 4 with its notes."""
-    low, high = min(PAPER), max(PAPER)
-
+def section_4(result: SoupResult) -> str:
+    """Return Table 4 with its notes."""
     def growth(regime: str) -> float:
-        return (result.cells[regime, high].worst_step / result.cells[regime, low].worst_step)
+        first, last = result.ends(regime)
+        return last.worst_step / first.worst_step
 
     def most(regime: str) -> str:
-        return ' to '.join(f'{result.cells[regime, n].pairs.max():,}' for n in (low, high))
+        return ' to '.join(f'{cell.pairs.max():,}' for cell in result.ends(regime))
 
-    few = max(result.cells['touching', n].pairs.max() for n in PAPER)
-
+    low, high = min(PAPER), max(PAPER)
+    few = max(result.times['touching', n].pairs.max() for n in PAPER)
     return f"""## Table 4: polygon soup, the pattern with the most pairs
 
 Of the same patterns: the most pairs of triangles that meet, and that pattern's times (median of
@@ -482,9 +468,10 @@ Of the same patterns: the most pairs of triangles that meet, and that pattern's 
 """
 
 
-def section_errors(result: Result) -> str:
-    """The soup's errors, and what differs from the paper."""
+def section_errors(result: SoupResult) -> str:
+    """Return the soup's errors, and what differs from the paper."""
     counts = result.counts
+    along = 1e3 * result.errors['near-parallel', max(PAPER)].point.mean()
     return f"""## What the soup answers
 
 Errors against `exact`: point in mm (of cubes of 2,000 mm), normal in degrees, depth in mm.
@@ -501,8 +488,7 @@ Errors against `exact`: point in mm (of cubes of 2,000 mm), normal in degrees, d
   triangles, so it shrinks with them and not with the overlap: useless at 1 mm. Model `soup` takes
   separation and verdict from the axis test.
 - On near-parallel cubes the triangles that meet lie along the outline of the patch, not in it, so
-  the point stays {1e3 * result.cells['near-parallel', max(PAPER)].point.mean():.0f} mm off, however
-  small they are.
+  the point stays {along:.0f} mm off, however small they are.
 - On touching cubes the normal hardly gets better with N: what counts is how many of the triangles
   that meet are the face's, and how many the sides'.
 
@@ -517,8 +503,8 @@ Errors against `exact`: point in mm (of cubes of 2,000 mm), normal in degrees, d
 """
 
 
-def section_figure_10(result: Result, picture: str) -> str:
-    """Figure 10's caption."""
+def section_figure_10(result: SoupResult, picture: str) -> str:
+    """Return Figure 10's caption."""
     equal = equal_at(result)
     words = '; '.join(f"`{name}`'s ({1e3 * result.rivals[name].point:.0f} mm) at {in_words(n)}"
                       for name, n in equal.items())
@@ -533,40 +519,20 @@ measure of accuracy.
 """
 
 
-def draw_figure_10(result: Result, path: Path) -> None:
-    """Times and errors against N, as a PNG."""
-    import matplotlib
-
-    matplotlib.use('Agg')
-    from matplotlib import pyplot as plt
-
-    divisions = list(PAPER)
-    figure, (left, right) = plt.subplots(1, 2, figsize=(11.0, 4.8), layout='constrained')
-    for regime, colour in zip(REGIMES, ('tab:blue', 'tab:green', 'tab:red')):
-        cells = [result.cells[regime, n] for n in divisions]
-        left.plot(divisions, [cell.steps.mean() for cell in cells], '-o', color=colour,
-                  markersize=3.5, label=f'{regime}, mean')
-        left.plot(divisions, [cell.worst_step for cell in cells], ':s', color=colour,
-                  markersize=3.5, label=f'{regime}, most pairs')
-    left.axhline(result.rivals['paper'].milliseconds, color='black', label='call of model paper')
-    for column, style, label in ((0, '-', 'mean'), (2, ':', 'maximum')):
-        left.plot(divisions, [PAPER[n][column] for n in divisions], style, color='0.6',
-                  label=f"the paper's soup, {label}")
-    left.axhline(PAPER_NETWORK, color='0.6', linestyle='--', label="the paper's network")
-    left.set(yscale='log', xlabel='divisions N of an edge', ylabel='time [ms]', xticks=divisions)
-    # Room for the legend beside the curves.
-    left.legend(fontsize=7.5, loc='upper center', bbox_to_anchor=(0.5, -0.14), ncols=3)
-
-    errors = sorted((n, 1e3 * cell.point.mean())
-                    for (regime, n), cell in result.cells.items() if regime == 'touching')
-    right.plot(*zip(*errors), '-o', color='tab:blue', markersize=3.5, label='soup, touching')
+def draw_figure_10(result: SoupResult, path: Path) -> None:
+    """Draw times and errors against N."""
+    figure, ((left, right),) = output.subplots(1, 2, (11.0, 4.8))
+    _draw_times(left, result)
+    ticks = [1, 2, 4, 8, 16, 32, 64]
+    errors = _touching_errors(result)
+    right.plot(list(errors), [1e3 * error for error in errors.values()], '-o', color='tab:blue',
+               markersize=3.5, label='soup, touching')
     for (name, n), colour in zip(equal_at(result).items(), ('tab:orange', 'tab:purple')):
         right.axhline(1e3 * result.rivals[name].point, color=colour, label=f'{name}: {in_words(n)}')
         if 0.0 < n < math.inf:
             right.axvline(n, color=colour, linestyle='--')
-            if min(divisions) <= n <= max(divisions):
+            if min(PAPER) <= n <= max(PAPER):
                 left.axvline(n, color=colour, linestyle='--')
-    ticks = [1, 2, 4, 8, 16, 32, 64]
     right.set(xscale='log', yscale='log', xlabel='divisions N of an edge',
               ylabel='mean point error [mm]')
     right.set_xticks(ticks, [str(tick) for tick in ticks])
@@ -575,39 +541,50 @@ def draw_figure_10(result: Result, path: Path) -> None:
     for axes in (left, right):
         axes.grid(color='0.9', which='both', linewidth=0.6)
         axes.set_axisbelow(True)
-    figure.savefig(path, dpi=130)
-    plt.close(figure)
+    figure.savefig(path)
 
 
-def write_csv(result: Result, path: Path, machine: str) -> None:
-    """A row per model, N and regime."""
-    fcl_version = getattr(fcl, '__version__', 'unknown')
+def _draw_times(axes: Any, result: SoupResult) -> None:
+    divisions = list(PAPER)
+    for regime, colour in zip(REGIMES, ('tab:blue', 'tab:green', 'tab:red')):
+        cells = [result.times[regime, n] for n in divisions]
+        axes.plot(divisions, [cell.steps.mean() for cell in cells], '-o', color=colour,
+                  markersize=3.5, label=f'{regime}, mean')
+        axes.plot(divisions, [cell.worst_step for cell in cells], ':s', color=colour,
+                  markersize=3.5, label=f'{regime}, most pairs')
+    axes.axhline(result.rivals['paper'].milliseconds, color='black', label='call of model paper')
+    for column, style, label in ((0, '-', 'mean'), (2, ':', 'maximum')):
+        axes.plot(divisions, [PAPER[n][column] for n in divisions], style, color='0.6',
+                  label=f"the paper's soup, {label}")
+    axes.axhline(PAPER_NETWORK, color='0.6', linestyle='--', label="the paper's network")
+    axes.set(yscale='log', xlabel='divisions N of an edge', ylabel='time [ms]', xticks=divisions)
+    # Room for the legend below the curves.
+    axes.legend(fontsize=7.5, loc='upper center', bbox_to_anchor=(0.5, -0.14), ncols=3)
 
-    def mean(values: Sequence[float] | np.ndarray, factor: float = 1.0) -> str:
-        return f'{factor * np.mean(values):.6g}' if len(values) else ''
 
-    columns = ('model', 'divisions', 'triangles', 'regime', 'patterns', 'touching', 'misses',
-               'step_mean_ms', 'step_p50_ms', 'step_p99_ms', 'step_max_ms', 'alone_patterns',
-               'alone_mean_ms', 'answer_mean_ms', 'most_pairs', 'most_pairs_step_ms',
-               'most_pairs_alone_ms', 'judged', 'point_error_mean_m', 'point_error_max_m',
-               'normal_error_mean_deg', 'depth_error_mean_m', 'machine', 'fcl')
-    rows = []
-    for (regime, divisions), cell in result.cells.items():
-        quantiles = np.quantile(cell.steps, (0.5, 0.99, 1.0)) if len(cell.steps) else ()
-        timed = bool(len(cell.steps))
-        rows.append(dict(zip(columns, [
-            'soup', divisions, 12 * divisions**2, regime, len(cell.steps),
-            cell.touching if timed else '', cell.misses if timed else '', mean(cell.steps),
-            *([f'{q:.6g}' for q in quantiles] or ['', '', '']), len(cell.alone), mean(cell.alone),
-            mean(cell.answers), *([int(cell.pairs.max()), f'{cell.worst_step:.6g}',
-                                   f'{cell.worst_alone:.6g}'] if timed else ['', '', '']),
-            len(cell.point), mean(cell.point), f'{cell.point.max():.6g}', mean(cell.normal),
-            mean(cell.depth), machine, fcl_version])))
+def csv_rows(result: SoupResult) -> Iterator[dict[str, object]]:
+    """Yield a row per model, N and regime."""
+    here = asdict(output.machine(native, ('numpy', 'python-fcl')))
+
+    def mean(values: np.ndarray) -> float:
+        return float(values.mean())
+
+    for (regime, divisions), errors in result.errors.items():
+        row: dict[str, object] = {'model': 'soup', 'divisions': divisions,
+                                  'triangles': 12 * divisions**2, 'regime': regime}
+        columns = ('patterns', 'touching', 'misses', 'step_mean_ms', 'step_p50_ms', 'step_p99_ms',
+                   'step_max_ms', 'alone_patterns', 'alone_mean_ms', 'answer_mean_ms',
+                   'most_pairs', 'most_pairs_step_ms', 'most_pairs_alone_ms')
+        times = result.times.get((regime, divisions))
+        row |= dict(zip(columns, [
+            len(times.steps), times.touching, times.misses, mean(times.steps),
+            *output.percentiles(times.steps, 50, 99, 100), len(times.alone), mean(times.alone),
+            mean(times.answers), int(times.pairs.max()), times.worst_step, times.worst_alone,
+        ] if times else [None] * len(columns)))
+        yield row | {'judged': len(errors.point), 'point_error_mean_m': mean(errors.point),
+                     'point_error_max_m': float(errors.point.max()),
+                     'normal_error_mean_deg': mean(errors.normal),
+                     'depth_error_mean_m': mean(errors.depth), **here}
     for name, rival in result.rivals.items():
-        rows.append({'model': name, 'regime': 'touching', 'answer_mean_ms':
-                     f'{rival.milliseconds:.6g}', 'point_error_mean_m': f'{rival.point:.6g}',
-                     'normal_error_mean_deg': f'{rival.normal:.6g}', 'machine': machine})
-    with path.open('w', newline='', encoding='utf-8') as file:
-        writer = csv.DictWriter(file, columns, restval='', lineterminator='\n')
-        writer.writeheader()
-        writer.writerows(rows)
+        yield {'model': name, 'regime': 'touching', 'answer_mean_ms': rival.milliseconds,
+               'point_error_mean_m': rival.point, 'normal_error_mean_deg': rival.normal, **here}

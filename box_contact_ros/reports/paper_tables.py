@@ -1,8 +1,8 @@
 """Program `paper`: the source paper's Tables 1 to 4 and Figures 9 and 10, redone, as Markdown.
 
-Tables 1 and 2, Figure 9: the data sets are made again from the seed in each model card, and the
-shipped weights are run on them by the code that the solver uses. Nothing is copied from the
-cards, and PyTorch is not used. Tables 3 and 4, Figure 10: see `paper_soup`; they need python-fcl.
+Tables 1 and 2, Figure 9: the data sets are made again from the seed in each model card. The code
+that the solver uses runs the shipped weights on them. Nothing is copied from the cards, and PyTorch
+is not used. Tables 3 and 4, Figure 10: see `paper_soup_tables`; they need python-fcl.
 """
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ..output import processor
+from .. import output
+from ..core import native
 from ..resources import resource_path
-from ..solver.arguments import make_room
 from ..solver.weights_file import Weights, WeightsError, load_weights
 from ..training.paper_recipe import dataset
 from ..training.paper_recipe.dataset import SETS, Patterns
@@ -64,14 +64,14 @@ Errors = dict[str, np.ndarray]
 
 
 def evaluate(weights: Weights, step: int = 1) -> dict[str, Errors]:
-    """Errors of every network of a file on the sets of its card, every `step`-th pattern."""
+    """Return errors of a file's networks on the sets of its card, every `step`-th pattern."""
     return {network: _errors(weights, network, sets, step)
             for network, sets in _sets_of(weights.path).items()}
 
 
 @functools.lru_cache(maxsize=4)  # some tables and figures share them; they take seconds to make
 def _sets_of(weights: Path) -> dict[str, dict[str, Patterns]]:
-    """The sets of a file's card, by network."""
+    """Return the sets of a file's card, by network."""
     return dataset.of_card(load_weights(weights).card)
 
 
@@ -84,19 +84,13 @@ def _errors(weights: Weights, network: str, sets: Mapping[str, Patterns], step: 
             for name, p in sets.items()}
 
 
-def _rows(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = [head, ['---', *['---:'] * (len(head) - 1)], *rows]
-    return '\n'.join('| ' + ' | '.join(line) + ' |' for line in lines)
-
-
 def _number(value: float) -> str:
-    """Four decimals, zero without a sign."""
+    """Return a value with four decimals, zero without a sign."""
     return f'{round(value, 4) + 0.0:.4f}'
 
 
 def beside_paper(number: int, columns: Mapping[str, Errors]) -> str:
-    """One of the paper's tables: its figures and ours, per set."""
-    head = ['', *[f'{name}, {who}' for name in SETS for who in ('paper', *columns)]]
+    """Return one of the paper's tables: its figures and ours, per set."""
     rows = []
     for figure, theirs in PAPER[number].items():
         row = [figure]
@@ -104,21 +98,21 @@ def beside_paper(number: int, columns: Mapping[str, Errors]) -> str:
             row += [_number(their), *[_number(figures(errors[name])[figure])
                                       for errors in columns.values()]]
         rows.append(row)
-    return _rows(head, rows)
+    return output.markdown_table(
+        ['', *[f'{name}, {who}' for name in SETS for who in ('paper', *columns)]], rows)
 
 
 def by_part(columns: Mapping[str, Errors]) -> str:
-    """Our figures on all sets, for all outputs, the point's and the normal's."""
+    """Return our figures on all sets, for all outputs, the point's and the normal's."""
     rows = []
     for title, errors in columns.items():
         for name in SETS:
-            parts = figures_by_part(errors[name])
+            parts = figures_by_part(errors[name]).values()
             rows.append([title, name, f'{len(errors[name]):,}',
-                         *[_number(parts[part][figure]) for part in PARTS
-                           for figure in ('ME', 'MAE', 'RMSE')]])
-    head = ['', 'set', 'patterns', *[f'{figure}, {part}' for part in PARTS
-                                     for figure in ('ME', 'MAE', 'RMSE')]]
-    return _rows(head, rows)
+                         *[_number(value) for part in parts for value in part.values()]])
+    return output.markdown_table(
+        ['', 'set', 'patterns', *[f'{figure}, {part}' for part in PARTS for figure in PAPER[1]]],
+        rows)
 
 
 def _external(weights: Weights, network: str) -> Patterns:
@@ -126,7 +120,7 @@ def _external(weights: Weights, network: str) -> Patterns:
 
 
 def filled(page: str) -> str:
-    """The page with its paragraphs and list items filled anew, numbers of any length in them."""
+    """Return the page with its paragraphs and list items filled anew."""
     lines: list[str] = []
     for line in page.splitlines():
         text = line.strip()
@@ -141,18 +135,19 @@ def filled(page: str) -> str:
 
 
 def intro(quick: bool) -> str:
-    """Head of the page."""
+    """Return the head of the page."""
     note = f' Quick run: every {QUICK}th pattern only, and fewer for the soup.' if quick else ''
     return f"""# The paper's tables and figures, redone
 
-Made by `python -m box_contact_ros paper --out docs/paper_tables.md` on {processor()}, from the
-shipped weights and the seeds in their model cards.{note} Each table and figure can be made by
-itself: `--table 3`, `--figure 9`. Numbers under "paper" are the paper's.
+Made by `python -m box_contact_ros paper --out docs/paper_tables.md` on
+{output.machine(native)}, from the shipped weights and the seeds in their model cards.{note}
+Each table and figure can be made by itself: `--table 3`, `--figure 9`. Numbers under "paper" are
+the paper's.
 """
 
 
 def sections_1_and_2(tables: Collection[int], step: int) -> list[str]:
-    """Tables 1 and 2, those of them that are asked for, and their notes."""
+    """Return Tables 1 and 2, those of them that were chosen, and their notes."""
     sections, detail, folding = [], {}, _FOLDED_DATA
     if 1 in tables:
         jumps = _shipped('paper')
@@ -198,7 +193,7 @@ Ours is over both subsets taken together; each has as many patterns as the paper
 
 
 def section_figure_9(picture: str) -> str:
-    """Figure 9's caption."""
+    """Return Figure 9's caption."""
     return f"""## Figure 9: desired and modelled first output
 
 ![A line with dots that scatter about it; a line with dots on it]({picture})
@@ -211,15 +206,10 @@ is desired (line); dots: what the network says. Left, one network on data with d
 
 
 def draw_figure_9(path: Path) -> None:
-    """The first output, desired and modelled, as a PNG."""
-    import matplotlib
-
-    matplotlib.use('Agg')
-    from matplotlib import pyplot as plt
-
-    picture, panels = plt.subplots(1, 2, figsize=(11.0, 4.2), layout='constrained', sharex=True)
-    for axes, (name, network) in zip(panels, (('paper', 'contact'),
-                                              ('paper-continuous', 'vertex_face'))):
+    """Draw the first output, desired and modelled."""
+    picture, panels = output.subplots(1, 2, (11.0, 4.2), sharex=True)
+    for axes, (name, network) in zip(panels.flat, (('paper', 'contact'),
+                                                   ('paper-continuous', 'vertex_face'))):
         weights = _shipped(name)
         patterns = _external(weights, network)
         wanted = patterns.outputs[:SHOWN, 0]
@@ -231,13 +221,12 @@ def draw_figure_9(path: Path) -> None:
                  xlabel='pattern of the external set, sorted', ylabel='azimuth of the point [rad]')
         axes.grid(color='0.9', linewidth=0.6)
         axes.legend()
-    picture.savefig(path, dpi=130)
-    plt.close(picture)
+    picture.savefig(path)
 
 
 def report(tables: Collection[int], drawn: Collection[int], *, quick: bool = False,
            folder: Path | None = None) -> str:
-    """The page with some of the tables and figures; pictures and CSV go to `folder`, if any."""
+    """Return the page with some of the tables and figures; files go to `folder`, if any."""
     sections = [intro(quick)]
     if {1, 2} & set(tables):
         sections += sections_1_and_2(tables, QUICK if quick else 1)
@@ -251,7 +240,7 @@ def report(tables: Collection[int], drawn: Collection[int], *, quick: bool = Fal
         jumps = _shipped('paper')
         result = paper_soup_tables.measure(_external(jumps, 'contact').inputs, quick=quick)
         if folder:
-            paper_soup_tables.write_csv(result, folder / 'paper_soup.csv', processor())
+            output.write_csv(folder / 'paper_soup.csv', paper_soup_tables.csv_rows(result))
         if 3 in tables:
             sections.append(paper_soup_tables.section_3(result))
         if 4 in tables:
@@ -265,7 +254,7 @@ def report(tables: Collection[int], drawn: Collection[int], *, quick: bool = Fal
 
 
 def main(args: Sequence[str] | None = None) -> int:
-    """Print the page, or write it to a file, with pictures beside it."""
+    """Print the page, or write it to a file, with pictures in the same folder."""
     parser = argparse.ArgumentParser(
         description="The source paper's Tables 1 to 4 and Figures 9 and 10 beside ours, as "
         'Markdown. All of them, unless some are chosen.')
@@ -284,7 +273,7 @@ def main(args: Sequence[str] | None = None) -> int:
     drawn = options.figure or (() if chosen else FIGURES)
     folder = Path() if options.figure else None
     if options.out is not None:
-        folder = make_room(parser, options.out).parent
+        folder = output.make_room(parser, options.out).parent
     try:
         page = report(tables, drawn, quick=options.quick, folder=folder)
     except (WeightsError, FileNotFoundError) as error:

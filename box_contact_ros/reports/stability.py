@@ -1,9 +1,10 @@
 """Program `stability`: what each model makes of the families of hard poses.
 
 `python -m box_contact_ros stability` asks every model for every stored case (`hard_poses`) and
-writes stability.md and .csv: wrong verdicts, wrong normals, the worst error of depth and point, and
-how far the point moves when a pose is nudged. The truth is stored, in 60 digits. Models that build
-on FCL run in a subprocess, family by family: an abort is a finding, not an end.
+writes stability.md and .csv. The tables have wrong verdicts, wrong normals, the worst error of
+depth and point, and how far the point moves when a pose is nudged. The truth is stored, in 60
+digits. Models that build on FCL run in a subprocess, family by family: an abort is a finding, not
+an end.
 """
 from __future__ import annotations
 
@@ -40,7 +41,7 @@ NUDGES = 3
 
 
 COUNTS = ('verdicts', 'normals', 'outside', 'not_finite')
-"""Faults, of which `exact` and `mlp` have none."""
+"""Faults; `exact` and `mlp` must have none."""
 WORST = ('depth', 'point_p99', 'point_worst', 'ratio', 'exact_ratio')
 
 

@@ -30,3 +30,9 @@ def quaternion_multiply(p: np.ndarray, q: np.ndarray) -> np.ndarray:
                      pw * qy - px * qz + py * qw + pz * qx,
                      pw * qz + px * qy - py * qx + pz * qw,
                      pw * qw - px * qx - py * qy - pz * qz], axis=-1)
+
+
+def degrees_between(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Return the angles (n,) [deg] between vectors (n, 3); by atan2, as acos loses small angles."""
+    sines = np.linalg.norm(np.cross(one, other), axis=1)
+    return np.degrees(np.arctan2(sines, np.sum(one * other, axis=1)))

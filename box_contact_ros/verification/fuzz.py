@@ -1,7 +1,7 @@
 """Program `fuzz`: millions of random pairs, judged by code that shares nothing with the solver.
 
 `python -m box_contact_ros fuzz` draws pairs of boxes by class of size, in poses of the kinds that
-break collision tests, and asks each model for all of them. Every gate stands at zero: contacts
+break collision tests. Each model answers all of them. Every gate stands at zero: contacts
 missed or invented, depths wrong, an axis that is not the shallowest, a point outside, NaN, an
 exception. What is too near exact touch for float64 is judged in 60 digits. A broken gate prints the
 pose, ready to be pasted into a test; the exit status is then 1.
@@ -35,8 +35,8 @@ PIECE = 50_000
 """Pairs that are drawn and judged at a time."""
 MODELS = ('exact', 'mlp')
 TOUCH_ULPS = 8.0
-"""A gap of up to so many units in the last place of the largest coordinate or size is a touch:
-the package's convention, which the judge has to know."""
+"""Largest gap that is a touch, in units in the last place of the largest coordinate or size. The
+judge has to know this convention of the package."""
 SHOWN = 3
 """Faults of a class and model that are printed."""
 
@@ -137,9 +137,9 @@ def _brought_together(rng: np.random.Generator, axes: np.ndarray, size_a: np.nda
                       size_b: np.ndarray) -> np.ndarray:
     """Draw places (n, 3) of B, turned by axes (n, 3, 3), where features of both boxes meet.
 
-    Corners, middles of edges or faces meet up to a gap or overlap of 1e-13 to 0.3 of the size,
-    along one of the fifteen axes or anywhere. Most have a smaller step across too. One in a hundred
-    has a gap of 0 or 1e-16 to 1e-13 instead, which takes 60 digits to judge.
+    Corners, middles of edges or faces meet up to a gap or overlap of 1e-13 to 0.3 of the size. The
+    gap is along one of the fifteen axes or anywhere. Most have a smaller step across too. One in a
+    hundred has a gap of 0 or 1e-16 to 1e-13 instead, which takes 60 digits to judge.
     """
     n = len(axes)
     at_a = 0.5 * rng.integers(-1, 2, (n, 3)) * size_a

@@ -1,9 +1,9 @@
 """Families of hard poses, by what makes them hard: parallel, touching, deep, tied, thin, far.
 
 Each family is a generator of pairs in a plain frame; `variants` then turns them, swaps the boxes,
-renames their axes and scales them. What tests and reports use is not drawn anew but read from
-`hard_poses.npz`, doubles and all: at 1e-12 the rounding of the recipe is part of the case, and
-another machine's sine may round differently. `test/helpers/make_hard_poses.py` wrote that
+renames their axes and scales them. Tests and reports do not draw them anew: they read
+`hard_poses.npz`. At 1e-12 the rounding of the recipe is part of the case, and another machine's
+sine may round differently. `test/helpers/make_hard_poses.py` wrote that
 file, with the true gap and centroid in 60 digits.
 """
 from __future__ import annotations
@@ -85,7 +85,7 @@ def unit(vector: tuple[float, ...] | np.ndarray) -> np.ndarray:
 
 def edge_crossing(gap: float, angle: float = 1.1, along: float = 0.0, size: float = 2.0,
                   length: float = 2.0) -> Case:
-    """Two bars on edge, A's ridge up along x, B's ridge down, crossing at an angle.
+    """Return two bars on edge, A's ridge up along x, B's ridge down, crossing at an angle.
 
     B is shifted along A's ridge.
     """
@@ -100,7 +100,7 @@ EDGE_DOWN = turned(X, 0.25 * np.pi)
 
 
 def feature_pairs(gap: float) -> list[Case]:
-    """The four ways in which two convex bodies touch, `gap` apart."""
+    """Return the four ways in which two convex bodies touch, `gap` apart."""
     return [placed(CUBE, CUBE, UPRIGHT, Z, gap, (0.3, 0.2, 0.0)),
             placed(CUBE, CUBE, EDGE_DOWN, Z, gap, (0.1, 0.3, 0.0)),
             placed(CUBE, CUBE, VERTEX_DOWN, Z, gap, (0.2, -0.1, 0.0)),
@@ -115,7 +115,7 @@ TILTS = (0.0, 1e-16, 1e-15, 1e-14, 1e-12, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e
 
 
 def a1_tilted_faces(rng: np.random.Generator) -> Iterator[Case]:
-    """Face on face, tilted about generic and in-face axes, overlapping."""
+    """Yield face on face, tilted about generic and in-face axes, overlapping."""
     for tilt in TILTS:
         for axis in AXES:
             for overlap in (1e-9, 1e-5, 1e-2):
@@ -124,7 +124,7 @@ def a1_tilted_faces(rng: np.random.Generator) -> Iterator[Case]:
 
 
 def a2_tilted_gaps(rng: np.random.Generator) -> Iterator[Case]:
-    """The same with a gap: what a constant added to |R| turns into contacts."""
+    """Yield a1 with a gap: what a constant added to |R| turns into contacts."""
     for tilt in TILTS[::2]:
         for gap in (1e-12, 1e-9, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3):
             yield placed(FORTY, FORTY, turned(AXES[rng.integers(5)], tilt), Z, gap,
@@ -132,7 +132,7 @@ def a2_tilted_gaps(rng: np.random.Generator) -> Iterator[Case]:
 
 
 def a3_parallel_edges(rng: np.random.Generator) -> Iterator[Case]:
-    """An edge direction in common to the last bit, faces at an angle."""
+    """Yield an edge direction in common to the last bit, faces at an angle."""
     for angle in np.radians(np.arange(5.0, 90.0, 10.0)):
         for offset in (0.0, 0.3, 0.9, 1.0, 1.1):
             yield placed(FORTY, FORTY, turned(X, angle), Z, -10.0**rng.uniform(-6, -1),
@@ -140,14 +140,14 @@ def a3_parallel_edges(rng: np.random.Generator) -> Iterator[Case]:
 
 
 def a4_ridges(rng: np.random.Generator) -> Iterator[Case]:
-    """Bars turned by 45°, ridge on ridge, crossing at small angles."""
+    """Yield bars turned by 45°, ridge on ridge, crossing at small angles."""
     for crossing in (0.0, 1e-7, 1e-5, 1e-3, 3e-3, 0.02, 0.05, 0.1, 0.2, 0.5):
         for overlap in (0.001, 0.01, 0.05):
             yield edge_crossing(-overlap, crossing, size=1.0, length=15.0)
 
 
 def a5_right_angles(rng: np.random.Generator) -> Iterator[Case]:
-    """All 24 right-angled orientations, and tilts about them."""
+    """Yield all 24 right-angled orientations, and tilts about them."""
     for base in right_angles():
         for tilt in (0.0, 1e-15, 1e-12, 1e-9, 1e-6, 1e-3, 0.05, 0.25 * np.pi):
             turn = quaternion_multiply(turned(rng.normal(size=3), tilt), base)
@@ -157,7 +157,7 @@ def a5_right_angles(rng: np.random.Generator) -> Iterator[Case]:
 
 
 def a6_float32_quaternions(rng: np.random.Generator) -> Iterator[Case]:
-    """Orientations that have been through float32: a tilt of 1e-7 in aligned stacks."""
+    """Yield orientations that have been through float32: a tilt of 1e-7 in aligned stacks."""
     for _ in range(30):
         turn = unit(rng.normal(size=4))
         a, b, size_a, size_b = placed(FORTY, FORTY, turn, rotation_matrix(turn)[:, 2],
@@ -167,7 +167,7 @@ def a6_float32_quaternions(rng: np.random.Generator) -> Iterator[Case]:
 
 
 def b1_exact_touch(rng: np.random.Generator) -> Iterator[Case]:
-    """Touch with dyadic numbers: face, edge and corner on each other, nothing rounded."""
+    """Yield exact touch in dyadic numbers: face, edge and corner on each other, nothing rounded."""
     for place in ((2, 0, 0), (2, 1, 0.5), (2, 2, 0), (2, 2, 1), (2, 2, 2), (2, -2, 2), (0, 2, -2),
                   (2, 0, 2)):
         for turn in (UPRIGHT, np.array([0.5, 0.5, 0.5, 0.5]), np.array([1.0, 0, 0, 0])):
@@ -176,7 +176,7 @@ def b1_exact_touch(rng: np.random.Generator) -> Iterator[Case]:
 
 
 def b2_shared_lines(rng: np.random.Generator) -> Iterator[Case]:
-    """Boxes on one floor that share a line of their sides, or a corner, but no area."""
+    """Yield boxes on one floor that share a line of their sides, or a corner, but no area."""
     for offset in (-1.0, -0.5, 0.0, 0.5, 1.0):
         for gap in (0.0, 1e-15, -1e-15, 1e-9, -1e-9):
             yield placed(FORTY, FORTY, UPRIGHT, Y, gap, (offset * 12.192, 0.0, 0.0))
@@ -184,14 +184,14 @@ def b2_shared_lines(rng: np.random.Generator) -> Iterator[Case]:
 
 
 def b3_ladder(rng: np.random.Generator) -> Iterator[Case]:
-    """Gaps and overlaps from 1e-15 of the size on, on each pair of features."""
+    """Yield gaps and overlaps from 1e-15 of the size on, on each pair of features."""
     rungs = 10.0**np.array([-15, -12, -9, -8, -7, -6, -5, -4, -3, -2, -1])
     for step in (*-2.0 * rungs[::-1], *2.0 * rungs, 1.0, 1e2, 1e4, 1e8):
         yield from feature_pairs(float(step))
 
 
 def b4_one_axis(rng: np.random.Generator) -> Iterator[Case]:
-    """Poses that one axis alone separates, for each of the fifteen, and the twins that overlap."""
+    """Yield poses that one of the fifteen axes alone separates, and twins that overlap."""
     for number in range(15):
         wanted = 2
         while wanted:
@@ -213,21 +213,21 @@ def b4_one_axis(rng: np.random.Generator) -> Iterator[Case]:
 
 
 def b5_beyond_an_end(rng: np.random.Generator) -> Iterator[Case]:
-    """Two edges whose lines cross beyond an edge's end."""
+    """Yield two edges whose lines cross beyond an edge's end."""
     for share in np.linspace(0.95, 1.05, 21):
         for gap in (-1e-3, 1e-3):
             yield edge_crossing(gap, 0.5 * np.pi, along=share, length=2.0)
 
 
 def b6_spin(rng: np.random.Generator) -> Iterator[Case]:
-    """A gap of 1 cm, B turning about the normal, or tumbling."""
+    """Yield a gap of 1 cm, B turning about the normal, or tumbling."""
     for degrees in range(0, 360, 15):
         yield placed(FORTY, FORTY, turned(Z, np.radians(degrees)), Z, 0.01, (0.5, 0.3, 0.0))
         yield placed(CUBE, CUBE, turned((1, 2, 3), np.radians(degrees)), Z, 0.01, (0.3, 0.1, 0.0))
 
 
 def b7_corner_gaps(rng: np.random.Generator) -> Iterator[Case]:
-    """Corners and edges apart in a direction that is no axis: the gap is less than the distance."""
+    """Yield corners and edges apart along no axis: the gap is less than the distance."""
     for gap in (1e-9, 1e-6, 1e-3, 0.1):
         for place in ((1, 1, 1), (1, 1, 0), (1, -1, 0.3)):
             step = np.array(place) * np.where(np.abs(place) == 1, 2.0 + gap, 1.0)
@@ -235,20 +235,20 @@ def b7_corner_gaps(rng: np.random.Generator) -> Iterator[Case]:
 
 
 def c1_depths(rng: np.random.Generator) -> Iterator[Case]:
-    """Overlaps of 1 to 99 % of the extent, on each pair of features."""
+    """Yield overlaps of 1 to 99 % of the extent, on each pair of features."""
     for share in (0.01, 0.1, 0.3, 0.49, 0.51, 0.7, 0.9, 0.99):
         yield from feature_pairs(-2.0 * share)
 
 
 def c2_half_through(rng: np.random.Generator) -> Iterator[Case]:
-    """A small box crosses the middle of a slab, where the normal turns round."""
+    """Yield a small box across the middle of a slab, where the normal turns round."""
     for share in (0.4, 0.499, 0.4999999, 0.5, 0.5000001, 0.501, 0.6):
         for turn in (UPRIGHT, turned((1, 2, 3), 0.4)):
             yield placed((5.0, 4.0, 1.0), (0.2, 0.15, 0.1), turn, Z, -share, (0.2, 0.1, 0.0))
 
 
 def c3_contained(rng: np.random.Generator) -> Iterator[Case]:
-    """A box inside another, off its middle."""
+    """Yield a box inside another, off its middle."""
     for ratio in (2.0, 10.0, 100.0):
         for share in (0.01, 0.3, 0.9):
             for turn in (UPRIGHT, unit(rng.normal(size=4))):
@@ -258,42 +258,42 @@ def c3_contained(rng: np.random.Generator) -> Iterator[Case]:
 
 
 def c4_concentric(rng: np.random.Generator) -> Iterator[Case]:
-    """Centres at one place: the normal's sign is free."""
+    """Yield centres at one place: the normal's sign is free."""
     for size in (CUBE, (1.0, 1.0, 1.0), (3.0, 1.0, 0.5)):
         for turn in (UPRIGHT, turned(Z, 0.25 * np.pi), unit(rng.normal(size=4))):
             yield at(np.zeros(3), turn, CUBE, size)
 
 
 def c5_identical(rng: np.random.Generator) -> Iterator[Case]:
-    """The same box twice, its axes renamed."""
+    """Yield the same box twice, its axes renamed."""
     for turn in right_angles():
         size = (3.0, 2.0, 1.0)
         yield at(np.zeros(3), turn, size, np.abs(rotation_matrix(turn).T.round()) @ size)
 
 
 def c6_bars_through(rng: np.random.Generator) -> Iterator[Case]:
-    """A thin bar goes through a wide box."""
+    """Yield a thin bar through a wide box."""
     for _ in range(15):
         yield placed((4.0, 3.0, 1.0), (10.0, 0.1, 0.15), unit(rng.normal(size=4)), Z, -1.0,
                      rng.uniform(-0.5, 0.5, 3))
 
 
 def d1_two_axes(rng: np.random.Generator) -> Iterator[Case]:
-    """Two axes with equal depth, and nearly."""
+    """Yield two axes with equal depth, and nearly."""
     for nudge in (0.0, 1e-15, -1e-15, 1e-12, -1e-12, 1e-9, -1e-9, 1e-6, -1e-6):
         for t in (1.999, 1.9, 1.0):
             yield at((t + 2 * nudge, t, 0.1))
 
 
 def d2_three_axes(rng: np.random.Generator) -> Iterator[Case]:
-    """Three."""
+    """Yield three axes with equal depth, and nearly."""
     for nudge in (0.0, 1e-15, 1e-12, 1e-9, 1e-6):
         for t in (1.999, 1.9, 1.0):
             yield at((t + nudge, t, t - nudge))
 
 
 def d3_eighth_turns(rng: np.random.Generator) -> Iterator[Case]:
-    """45°: an edge on a face, an edge on an edge, and the octagon between two squares."""
+    """Yield turns of 45°: edge on face, edge on edge, the octagon between two squares."""
     for nudge in (0.0, 1e-12, -1e-12, 1e-9, 1e-6, 1e-3, -1e-3):
         angle = 0.25 * np.pi + nudge
         yield placed(CUBE, CUBE, turned(X, angle), Z, -0.01, (0.2, 0.1, 0.0))
@@ -302,14 +302,14 @@ def d3_eighth_turns(rng: np.random.Generator) -> Iterator[Case]:
 
 
 def d4_diagonals(rng: np.random.Generator) -> Iterator[Case]:
-    """A body diagonal upright, and the common mistake of 45° twice."""
+    """Yield a body diagonal upright, and the common mistake of 45° twice."""
     for turn in (VERTEX_DOWN, quaternion_multiply(turned(Y, 0.25 * np.pi), EDGE_DOWN)):
         for gap in (-0.1, -1e-3, -1e-9, 1e-9, 1e-3):
             yield placed(CUBE, CUBE, turn, Z, gap, (0.2, 0.1, 0.0))
 
 
 def d5_edge_against_face(rng: np.random.Generator) -> Iterator[Case]:
-    """A shallow crossing of edges, a face axis within a few per cent of it.
+    """Yield a shallow crossing of edges, a face axis within a few per cent of it.
 
     Libraries with a preference for faces answer it with the face.
     """
@@ -319,7 +319,7 @@ def d5_edge_against_face(rng: np.random.Generator) -> Iterator[Case]:
 
 
 def e1_thin(rng: np.random.Generator) -> Iterator[Case]:
-    """Plates, rods, cards: 1:10 to 1:10,000, stacked and leaning."""
+    """Yield plates, rods, cards: 1:10 to 1:10,000, stacked and leaning."""
     for aspect in (10.0, 100.0, 1e3, 1e4):
         for size in ((3.5, 2.0, 3.5 / aspect), (3.5, 3.5 / aspect, 3.5 / aspect)):
             for turn in (UPRIGHT, turned(X, 1e-6), turned((1, 1, 0), 0.3),
@@ -329,7 +329,7 @@ def e1_thin(rng: np.random.Generator) -> Iterator[Case]:
 
 
 def e2_small_on_large(rng: np.random.Generator) -> Iterator[Case]:
-    """Ratios of 100 to 1,000,000."""
+    """Yield size ratios of 100 to 1,000,000."""
     for ratio in (1e2, 1e4, 1e6):
         for turn in (UPRIGHT, turned(X, 1e-7), unit(rng.normal(size=4))):
             for place in ((0.0, 0.0), (0.31, -0.47)):
@@ -338,14 +338,14 @@ def e2_small_on_large(rng: np.random.Generator) -> Iterator[Case]:
 
 
 def e3_scales(rng: np.random.Generator) -> Iterator[Case]:
-    """One shape at 1e-6 to 1e6 m."""
+    """Yield one shape at 1e-6 to 1e6 m."""
     for scale in (1e-6, 1e-3, 1.0, 1e3, 1e6):
         for case in feature_pairs(-2e-3):
             yield scaled(case, scale)
 
 
 def e4_shallow_in_big(rng: np.random.Generator) -> Iterator[Case]:
-    """Overlaps at float32's rounding of a large pair, and far below."""
+    """Yield overlaps at float32's rounding of a large pair, and far below."""
     for overlap in (7e-8, 1e-12):
         for turn in (UPRIGHT, turned((1, 2, 3), 1e-7), turned((1, 2, 0), 0.01),
                      unit(rng.normal(size=4))):
@@ -353,7 +353,7 @@ def e4_shallow_in_big(rng: np.random.Generator) -> Iterator[Case]:
 
 
 def f_far(rng: np.random.Generator) -> Iterator[Case]:
-    """Far from the origin, UTM coordinates among them, turned about the far place."""
+    """Yield pairs far from the origin, in UTM coordinates too, turned about the far place."""
     for far in ((1e3, 0, 0), (1e4, -1e4, 10), (1e5, 1e5, 0), (5e5, 5.8e6, 20), (1e7, -1e7, 1e7)):
         for turn in (UPRIGHT, unit(rng.normal(size=4))):
             for gap in (-0.1, -5e-3, -1e-6, 1e-6, 5e-3):
@@ -362,7 +362,7 @@ def f_far(rng: np.random.Generator) -> Iterator[Case]:
 
 
 def h1_stacks(rng: np.random.Generator) -> Iterator[Case]:
-    """40 on 40, 20 on 20, two 20s on a 40, at the gaps that yards have; twist-lock offsets."""
+    """Yield 40 on 40, 20 on 20, two 20s on a 40, at the gaps of yards; twist-lock offsets."""
     for gap in (-5e-3, -1e-3, -1e-4, 0.0, 1e-4, 1e-3, 5e-3, 0.025):
         for below, above, shift in ((FORTY, FORTY, 0.0), (TWENTY, TWENTY, 0.0),
                                     (FORTY, TWENTY, 3.067), (FORTY, TWENTY, -3.067),
@@ -374,7 +374,7 @@ def h1_stacks(rng: np.random.Generator) -> Iterator[Case]:
 
 
 def h3_between_stacks(rng: np.random.Generator) -> Iterator[Case]:
-    """Lowered into a slot: side gaps of 20 to 150 mm, swaying until they close."""
+    """Yield a box lowered into a slot: side gaps of 20 to 150 mm, swaying until they close."""
     for gap in (0.02, 0.05, 0.15):
         for degrees in (0.1, 0.5, 1.0, 2.0, 5.0):
             for axis in (X, Z, (1, 0.3, 1)):
@@ -382,7 +382,7 @@ def h3_between_stacks(rng: np.random.Generator) -> Iterator[Case]:
 
 
 def h6_spreader(rng: np.random.Generator) -> Iterator[Case]:
-    """A thin spreader on a container, a trolley beam across it."""
+    """Yield a thin spreader on a container, a trolley beam across it."""
     for degrees in (0.0, 1e-5, 0.1, 1.0, 5.0):
         for gap in (-0.01, -1e-4, 1e-4):
             turn = turned((1, 0.2, 0.1), np.radians(degrees))
@@ -392,7 +392,7 @@ def h6_spreader(rng: np.random.Generator) -> Iterator[Case]:
 
 
 def h7_bay(rng: np.random.Generator) -> Iterator[Case]:
-    """Neighbours of a bay that touch at shared planes."""
+    """Yield neighbours of a bay that touch at shared planes."""
     for step in ((0, 1, 0), (0, 0, 1), (1, 0, 0), (0, 1, 1), (0, 2, 0), (1, 1, 0)):
         case = at(np.array(step) * FORTY, UPRIGHT, FORTY)
         yield case

@@ -5,8 +5,8 @@ rounding of a threshold, and whatever looks wrong, is settled by `exact_gap`, wh
 60 digits. So a gate that is reported broken is broken.
 
 Any direction gives a valid bound, whatever rounding did to it: the gap between the projections of
-the sixteen corners on it. Boxes are apart if it is positive in one of them, and the depth is the
-least overlap over all directions; the separating-axis theorem says that the fifteen suffice. What
+the sixteen corners on it. Boxes are apart if the gap is positive in one direction. The depth is the
+least overlap over all directions. The separating-axis theorem proves that the fifteen suffice. What
 rounding may cost `judge` is the best direction, where edges are almost parallel.
 """
 from __future__ import annotations
@@ -22,8 +22,8 @@ COORDINATE_ULPS = 8.0
 DOUBT = 1e-14
 """Gap, of the size, up to which its sign is not known in float64."""
 PRESSED = 3e-9
-"""Contacts shallower than a third of this, of the size, have the point of boxes pressed in: by so
-much at corners, along three axes."""
+"""How far a corner moves, of the size, when boxes are pressed in along three axes. Contacts
+shallower than a third of this have the point of boxes pressed in."""
 INSIDE = 2.0**-43
 """How far outside a box a point may be, of the size and the coordinates: roundings."""
 TINY = 1e-140
