@@ -221,8 +221,8 @@ def judge(pairs: Pairs, colliding: np.ndarray, normals: np.ndarray, points: np.n
     clear = np.abs(truth.separation) > VERDICT * pairs.size
     angles = degrees_between(normals[both & clear], truth.normal[both & clear])
     return EngineErrors(points=found, normal=percentiles(angles, 99, 100),
-                  missed=int((truth.colliding & ~colliding & clear).sum()),
-                  invented=int((colliding & ~truth.colliding & clear).sum()))
+                        missed=int((truth.colliding & ~colliding & clear).sum()),
+                        invented=int((colliding & ~truth.colliding & clear).sum()))
 
 
 def _answers(engine: Engine, pairs: Pairs, seconds: float) -> tuple[np.ndarray, ...]:
