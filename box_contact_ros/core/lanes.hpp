@@ -64,13 +64,44 @@ template <class T>
   return mask ? if_true : if_false;
 }
 
-// Of two equal numbers, or with a NaN in `a` or `b`, min and max return b.
+// Of two equal numbers, or with a NaN in `a` or `b`, min and max return b. The instructions are named
+// because g++ takes two for the comparison of a vector with a constant.
 template <class T>
 [[gnu::always_inline]] inline T min(T a, T b) {
+#if defined(__AVX512F__)
+  if constexpr (std::is_same_v<T, Lanes<double, 8>>)
+    return (T)_mm512_maskz_min_pd(0xff, (__m512d)a, (__m512d)b);
+  if constexpr (std::is_same_v<T, Lanes<float, 16>>)
+    return (T)_mm512_maskz_min_ps(0xffff, (__m512)a, (__m512)b);
+#endif
+#if defined(__AVX__)
+  if constexpr (std::is_same_v<T, Lanes<double, 4>>)
+    return (T)_mm256_min_pd((__m256d)a, (__m256d)b);
+  if constexpr (std::is_same_v<T, Lanes<float, 8>>) return (T)_mm256_min_ps((__m256)a, (__m256)b);
+#endif
+#if defined(__SSE2__)
+  if constexpr (std::is_same_v<T, Lanes<double, 2>>) return (T)_mm_min_pd((__m128d)a, (__m128d)b);
+  if constexpr (std::is_same_v<T, Lanes<float, 4>>) return (T)_mm_min_ps((__m128)a, (__m128)b);
+#endif
   return a < b ? a : b;
 }
 template <class T>
 [[gnu::always_inline]] inline T max(T a, T b) {
+#if defined(__AVX512F__)
+  if constexpr (std::is_same_v<T, Lanes<double, 8>>)
+    return (T)_mm512_maskz_max_pd(0xff, (__m512d)a, (__m512d)b);
+  if constexpr (std::is_same_v<T, Lanes<float, 16>>)
+    return (T)_mm512_maskz_max_ps(0xffff, (__m512)a, (__m512)b);
+#endif
+#if defined(__AVX__)
+  if constexpr (std::is_same_v<T, Lanes<double, 4>>)
+    return (T)_mm256_max_pd((__m256d)a, (__m256d)b);
+  if constexpr (std::is_same_v<T, Lanes<float, 8>>) return (T)_mm256_max_ps((__m256)a, (__m256)b);
+#endif
+#if defined(__SSE2__)
+  if constexpr (std::is_same_v<T, Lanes<double, 2>>) return (T)_mm_max_pd((__m128d)a, (__m128d)b);
+  if constexpr (std::is_same_v<T, Lanes<float, 4>>) return (T)_mm_max_ps((__m128)a, (__m128)b);
+#endif
   return a > b ? a : b;
 }
 
