@@ -12,20 +12,20 @@ namespace box_contact {
 // 0 · ∞, and three of them multiplied must not underflow.
 constexpr double least_entry = 1e-90;
 
-// Reciprocals of the entries of R. Three need one division.
+// Reciprocals of the entries of R, given by its columns. Three need one division.
+template <class T>
+[[gnu::always_inline]] inline Columns<T> reciprocals(const Columns<T>& r) {
+  auto away_from_zero = [](auto entry) {
+    return select(abs(entry) > least_entry, entry, splat<decltype(entry)>(least_entry));
+  };
+  Columns<T> x;
+  for (int j = 0; j < 3; ++j) x[j] = each(away_from_zero, r[j]);
+  Triple<T> product = uniform(splat<T>(1.0)) / (x[0] * (x[1] * x[2]));
+  return {{product * (x[1] * x[2]), product * (x[0] * x[2]), product * (x[0] * x[1])}};
+}
 template <class T>
 [[gnu::always_inline]] inline Mat<T> reciprocals(const Mat<T>& r) {
-  Mat<T> inverse;
-  for (int i = 0; i < 3; ++i) {
-    T x[3];
-    for (int j = 0; j < 3; ++j)
-      x[j] = select<T>(abs(r[i][j]) > least_entry, r[i][j], splat<T>(least_entry));
-    T product = 1.0 / (x[0] * (x[1] * x[2]));
-    inverse[i][0] = product * (x[1] * x[2]);
-    inverse[i][1] = product * (x[0] * x[2]);
-    inverse[i][2] = product * (x[0] * x[1]);
-  }
-  return inverse;
+  return matrix(reciprocals(columns(r)));
 }
 
 // Most algorithms here do the same for the four signs (σ, τ) of two axes: one after the other for W

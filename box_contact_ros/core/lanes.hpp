@@ -191,6 +191,27 @@ template <class T>
 [[gnu::always_inline]] inline Vec<T> operator*(T factor, const Vec<T>& a) {
   return {factor * a[0], factor * a[1], factor * a[2]};
 }
+template <class T, class = std::enable_if_t<!is_scalar<T>>>
+[[gnu::always_inline]] inline Vec<T> operator*(Number<T> factor, const Vec<T>& a) {
+  return splat<T>(factor) * a;
+}
+// By components, and with the same number for each.
+template <class T>
+[[gnu::always_inline]] inline Vec<T> operator*(const Vec<T>& a, const Vec<T>& b) {
+  return {a[0] * b[0], a[1] * b[1], a[2] * b[2]};
+}
+template <class T>
+[[gnu::always_inline]] inline Vec<T> operator/(const Vec<T>& a, const Vec<T>& b) {
+  return {a[0] / b[0], a[1] / b[1], a[2] / b[2]};
+}
+template <class T>
+[[gnu::always_inline]] inline Vec<T> operator+(const Vec<T>& a, T b) {
+  return {a[0] + b, a[1] + b, a[2] + b};
+}
+template <class T>
+[[gnu::always_inline]] inline Vec<T> operator-(T a, const Vec<T>& b) {
+  return {a - b[0], a - b[1], a - b[2]};
+}
 template <class T>
 [[gnu::always_inline]] inline T dot(const Vec<T>& a, const Vec<T>& b) {
   return (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2];
@@ -200,18 +221,20 @@ template <class T>
   return {abs(a[0]), abs(a[1]), abs(a[2])};
 }
 template <class T>
+[[gnu::always_inline]] inline Vec<T> min(const Vec<T>& a, const Vec<T>& b) {
+  return {min(a[0], b[0]), min(a[1], b[1]), min(a[2], b[2])};
+}
+template <class T>
+[[gnu::always_inline]] inline Vec<T> max(const Vec<T>& a, const Vec<T>& b) {
+  return {max(a[0], b[0]), max(a[1], b[1]), max(a[2], b[2])};
+}
+template <class T>
 [[gnu::always_inline]] inline T largest(const Vec<T>& a) {
   return max(max(a[0], a[1]), a[2]);
 }
 template <class T>
 [[gnu::always_inline]] inline T smallest(const Vec<T>& a) {
   return min(min(a[0], a[1]), a[2]);
-}
-// The nearest point of the box of half extents `half` about the origin.
-template <class T>
-[[gnu::always_inline]] inline Vec<T> clamp(const Vec<T>& x, const Vec<T>& half) {
-  return {min(half[0], max(-half[0], x[0])), min(half[1], max(-half[1], x[1])),
-          min(half[2], max(-half[2], x[2]))};
 }
 template <class T>
 [[gnu::always_inline]] inline Vec<T> select(Mask<T> mask, const Vec<T>& a, const Vec<T>& b) {
@@ -270,6 +293,155 @@ template <class T>
 template <class T, class N>
 [[gnu::always_inline]] inline void set_lane(Vec<T>& a, int i, const Vec<N>& value) {
   for (int k = 0; k < 3; ++k) set_lane(a[k], i, value[k]);
+}
+
+// --- Triples ---
+//
+// A triple is three numbers that one formula treats alike: the components of a vector, or one number
+// for each pair of opposite faces. W pairs have it as a `Vec`. A single pair has it side by side in
+// one vector of the machine, where the machine has one of four such numbers. The fourth lane then
+// repeats the third, so it traps or slows down where that one does.
+//
+// Either way each number takes the same operations in the same order, and has the same bits.
+
+#if defined(__AVX__)
+constexpr int machine_bytes = 32;
+#else
+constexpr int machine_bytes = 16;
+#endif
+
+// Whether triples of T are vectors of the machine.
+template <class T>
+constexpr bool packed = is_scalar<T> && 4 * sizeof(T) <= machine_bytes;
+
+template <class T, bool = packed<T>>
+struct TripleOf {
+  using type = Vec<T>;
+};
+template <class T>
+struct TripleOf<T, true> {
+  using type = Lanes<T, 4>;
+};
+template <class T>
+using Triple = typename TripleOf<T>::type;
+
+// Functions below take a `Vec<T>`, or a vector of the machine, `Packed`.
+
+template <class T>
+[[gnu::always_inline]] inline Triple<T> triple(const Vec<T>& a) {
+  if constexpr (packed<T>) {
+    return Triple<T>{a[0], a[1], a[2], a[2]};
+  } else {
+    return a;
+  }
+}
+// The same number three times.
+template <class T>
+[[gnu::always_inline]] inline Triple<T> uniform(T x) {
+  return triple(Vec<T>{x, x, x});
+}
+template <class T>
+[[gnu::always_inline]] inline Vec<T> components(const Triple<T>& a) {
+  return {a[0], a[1], a[2]};
+}
+
+// A formula of single numbers, for each number of triples.
+template <class Formula, class T, class... More>
+[[gnu::always_inline]] inline Vec<T> each(Formula formula, const Vec<T>& a, const More&... more) {
+  return {formula(a[0], more[0]...), formula(a[1], more[1]...), formula(a[2], more[2]...)};
+}
+template <class Formula, class Packed, class... More>
+[[gnu::always_inline]] inline Packed each(Formula formula, Packed a, More... more) {
+  return formula(a, more...);
+}
+
+// Component k as a factor or a summand of triples.
+template <class T>
+[[gnu::always_inline]] inline T spread(const Vec<T>& a, int k) {
+  return a[k];
+}
+template <class Packed>
+[[gnu::always_inline]] inline Packed spread(Packed a, int k) {
+  return k == 0   ? __builtin_shufflevector(a, a, 0, 0, 0, 0)
+         : k == 1 ? __builtin_shufflevector(a, a, 1, 1, 1, 1)
+                  : __builtin_shufflevector(a, a, 2, 2, 2, 2);
+}
+
+// The sum of the components, three times.
+template <class T>
+[[gnu::always_inline]] inline Vec<T> total(const Vec<T>& a) {
+  return uniform((a[0] + a[1]) + a[2]);
+}
+template <class Packed>
+[[gnu::always_inline]] inline Packed total(Packed a) {
+  return (spread(a, 0) + spread(a, 1)) + spread(a, 2);
+}
+
+// The components y z x.
+template <class T>
+[[gnu::always_inline]] inline Vec<T> rotated(const Vec<T>& a) {
+  return {a[1], a[2], a[0]};
+}
+template <class Packed>
+[[gnu::always_inline]] inline Packed rotated(Packed a) {
+  return __builtin_shufflevector(a, a, 1, 2, 0, 0);
+}
+
+// One choice for all three numbers of a single pair, without a branch.
+template <class Packed, class = std::enable_if_t<!is_scalar<Packed> && !std::is_class_v<Packed>>>
+[[gnu::always_inline]] inline Packed select(bool mask, Packed a, Packed b) {
+  return (Mask<Packed>{} - Number<Mask<Packed>>(mask)) ? a : b;
+}
+
+// The nearest point of the box of half extents `half` about the origin.
+template <class Three>
+[[gnu::always_inline]] inline Three clamp(const Three& x, const Three& half) {
+  return min(half, max(-half, x));
+}
+
+// A 3 × 3 matrix as triples: its columns.
+template <class T>
+struct Columns {
+  Triple<T> c[3];
+
+  [[gnu::always_inline]] Triple<T>& operator[](int j) { return c[j]; }
+  [[gnu::always_inline]] const Triple<T>& operator[](int j) const { return c[j]; }
+};
+
+template <class T>
+[[gnu::always_inline]] inline Columns<T> columns(const Mat<T>& m) {
+  return {{triple(column(m, 0)), triple(column(m, 1)), triple(column(m, 2))}};
+}
+template <class T>
+[[gnu::always_inline]] inline Mat<T> matrix(const Columns<T>& m) {
+  return {{{m[0][0], m[1][0], m[2][0]}, {m[0][1], m[1][1], m[2][1]}, {m[0][2], m[1][2], m[2][2]}}};
+}
+template <class T>
+[[gnu::always_inline]] inline Columns<T> transpose(const Columns<T>& m) {
+  if constexpr (packed<T>) {
+    auto even = __builtin_shufflevector(m[0], m[1], 0, 4, 2, 6);
+    auto odd = __builtin_shufflevector(m[0], m[1], 1, 5, 3, 7);
+    auto last_even = __builtin_shufflevector(m[2], m[2], 0, 0, 2, 2);
+    auto last_odd = __builtin_shufflevector(m[2], m[2], 1, 1, 3, 3);
+    return {{__builtin_shufflevector(even, last_even, 0, 1, 4, 5),
+             __builtin_shufflevector(odd, last_odd, 0, 1, 4, 5),
+             __builtin_shufflevector(even, last_even, 2, 3, 6, 7)}};
+  } else {
+    return columns(transpose(matrix(m)));
+  }
+}
+template <class T>
+[[gnu::always_inline]] inline Columns<T> abs(const Columns<T>& m) {
+  return {{abs(m[0]), abs(m[1]), abs(m[2])}};
+}
+template <class T>
+[[gnu::always_inline]] inline Columns<T> select(Mask<T> mask, const Columns<T>& a,
+                                                const Columns<T>& b) {
+  return {{select(mask, a[0], b[0]), select(mask, a[1], b[1]), select(mask, a[2], b[2])}};
+}
+template <class T>
+[[gnu::always_inline]] inline Triple<T> operator*(const Columns<T>& m, const Triple<T>& a) {
+  return (spread(a, 0) * m[0] + spread(a, 1) * m[1]) + spread(a, 2) * m[2];
 }
 
 }  // namespace box_contact

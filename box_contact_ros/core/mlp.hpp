@@ -49,28 +49,32 @@ constexpr double place_tolerance = 0x1p-46;
 
 constexpr int site_count = 9, site_features = 12, site_outputs = 3;
 
-// The cut cube, for lanes F of either precision; `slant[f]` is the normal of the pair of faces f.
+// The cut cube, for lanes F of either precision. Rows of `slant` are the normals of the pairs of
+// faces. So its columns, like the other triples, have one number for each pair of faces f.
 template <class F>
 struct CutCube {
-  Mat<F> slant;
-  Vec<F> cut;   // how far both faces f cut into the cube, 0 (they miss it) to 2 (nothing is left)
-  Vec<F> push;  // how much further the lower face cuts than the upper one
+  Columns<F> slant;
+  Triple<F> cut;  // how far both faces f cut into the cube, 0 (they miss it) to 2 (nothing is left)
+  Triple<F> push;  // how much further the lower face cuts than the upper one
 };
 
 // Features that the sites of a pair of faces, of an axis, and one site have.
 template <class F>
 struct SiteFeatures {
-  F of_faces[3][4];     // cut, |push|, push · push of the others along it, cut of all faces
-  F of_axis[3][4];      // Σ slant · cut, |Σ slant · push|, the larger of the former along the other
-                        // axes, |Σ slant · push| summed over the axes
-  F of_site[3][3][4];   // [f][q]: |slant · cut|, |slant · push|, slant · push · that of the others,
-                        // larger slant along another axis · cut
+  // By f: cut, |push|, push · push of the others along it, cut of all faces.
+  Triple<F> of_faces[4];
+  // By q: Σ slant · cut, |Σ slant · push|, the larger of the former along the other axes,
+  // |Σ slant · push| summed over the axes.
+  Triple<F> of_axis[4];
+  // [q], by f: |slant · cut|, |slant · push|, slant · push · that of the others, larger slant along
+  // another axis · cut.
+  Triple<F> of_site[3][4];
 };
 // What the outputs of site (f, q) multiply: the push of the faces f along their normal; the push of
 // the others along these faces, times their cut; what the others' normals have of this push.
 template <class F>
 struct SiteVectors {
-  F along[3][3][site_outputs];
+  Triple<F> along[3][site_outputs];  // [q], by f
 };
 
 // Slants and pushes are shortened by this. It is far below float32's rounding of what they are added
@@ -87,52 +91,59 @@ template <class T>
 // cube's face cuts nothing.
 template <class T>
 [[gnu::always_inline]] inline CutCube<T> cut_cube(const OverlapBounds<T>& bounds, T size) {
+  Columns<T> normals;
+  for (int k = 0; k < 3; ++k) normals[k] = spread(bounds.half, k) * bounds.other_axes[k];
+  Triple<T> one = uniform(splat<T>(1.0));
+  Triple<T> inverse = one / ((abs(normals[0]) + abs(normals[1])) + abs(normals[2]));
+  auto cut_by = [&](const Triple<T>& reach) -> Triple<T> {
+    return min(one + one, max(Triple<T>{}, one - reach * inverse));
+  };
+  Triple<T> half = bounds.other_half + flush * size;
+  Triple<T> upper = cut_by(half - bounds.other_offset);
+  Triple<T> lower = cut_by(half + bounds.other_offset);
+  auto shorten = [](auto x) { return shortened(x); };
   CutCube<T> cube;
-  for (int f = 0; f < 3; ++f) {
-    T half = bounds.other_half[f] + flush * size, offset = bounds.other_offset[f];
-    Vec<T> n;
-    for (int k = 0; k < 3; ++k) n[k] = bounds.other_axes[f][k] * bounds.half[k];
-    T inverse = 1.0 / ((abs(n[0]) + abs(n[1])) + abs(n[2]));
-    T upper = min(splat<T>(2.0), max(T{}, 1.0 - (half - offset) * inverse));
-    T lower = min(splat<T>(2.0), max(T{}, 1.0 - (half + offset) * inverse));
-    for (int k = 0; k < 3; ++k) cube.slant[f][k] = shortened(n[k] * inverse);
-    cube.cut[f] = upper + lower;
-    cube.push[f] = shortened(lower - upper);
-  }
+  for (int k = 0; k < 3; ++k) cube.slant[k] = each(shorten, normals[k] * inverse);
+  cube.cut = upper + lower;
+  cube.push = each(shorten, lower - upper);
   return cube;
 }
 
 template <class F>
 [[gnu::always_inline]] inline void describe(const CutCube<F>& cube, SiteFeatures<F>& features,
                                             SiteVectors<F>& vectors) {
-  const Mat<F>& slant = cube.slant;
-  const Vec<F>&cut = cube.cut, &push = cube.push;
-  F cosine[3];  // of pairs of faces 1 2, 2 0, 0 1
-  for (int f = 0; f < 3; ++f) cosine[f] = dot(row(slant, (f + 1) % 3), row(slant, (f + 2) % 3));
-  Vec<F> shift, shifts, slanted;
+  const Columns<F>& slant = cube.slant;
+  const Triple<F>&cut = cube.cut, &push = cube.push;
+  // The numbers of the next pair of faces or axis, and of the one after it.
+  auto next = [](const Triple<F>& x) { return rotated(x); };
+  auto last = [](const Triple<F>& x) { return rotated(rotated(x)); };
+  // By f: the cosine of the two others, and their push along these faces.
+  Triple<F> cosine = (next(slant[0]) * last(slant[0]) + next(slant[1]) * last(slant[1])) +
+                     next(slant[2]) * last(slant[2]);
+  Triple<F> along = last(cosine) * next(push) + next(cosine) * last(push);
+  Triple<F> next_cut = last(cosine) * next(cut), last_cut = next(cosine) * last(cut);
+  // By q.
+  Columns<F> normals = transpose(slant);
+  Triple<F> shift = normals * push, shifts = abs(shift), slanted = abs(normals) * cut;
+
+  features.of_faces[0] = cut;
+  features.of_faces[1] = abs(push);
+  features.of_faces[2] = push * along;
+  features.of_faces[3] = total(cut);
+  features.of_axis[0] = slanted;
+  features.of_axis[1] = shifts;
+  features.of_axis[2] = max(next(slanted), last(slanted));
+  features.of_axis[3] = total(shifts);
   for (int q = 0; q < 3; ++q) {
-    shift[q] = dot(column(slant, q), push);
-    shifts[q] = abs(shift[q]);
-    slanted[q] = dot(abs(column(slant, q)), cut);
-  }
-  F whole_cut = (cut[0] + cut[1]) + cut[2], whole_shift = (shifts[0] + shifts[1]) + shifts[2];
-  for (int f = 0; f < 3; ++f) {
-    int g = (f + 1) % 3, h = (f + 2) % 3;
-    F along = cosine[h] * push[g] + cosine[g] * push[h];  // the others' push along these faces
-    F faces[4] = {cut[f], abs(push[f]), push[f] * along, whole_cut};
-    F axis[4] = {slanted[f], shifts[f], max(slanted[g], slanted[h]), whole_shift};
-    for (int k = 0; k < 4; ++k) features.of_faces[f][k] = faces[k];
-    for (int k = 0; k < 4; ++k) features.of_axis[f][k] = axis[k];
-    for (int q = 0; q < 3; ++q) {
-      F s = slant[f][q], pushed = s * push[f];
-      F larger = max(abs(slant[f][(q + 1) % 3]), abs(slant[f][(q + 2) % 3]));
-      F site[4] = {abs(s) * cut[f], abs(pushed), pushed * (shift[q] - pushed), larger * cut[f]};
-      for (int k = 0; k < 4; ++k) features.of_site[f][q][k] = site[k];
-      F passed = push[f] * (slant[g][q] * (cosine[h] * cut[g]) + slant[h][q] * (cosine[g] * cut[h]));
-      vectors.along[f][q][0] = pushed;
-      vectors.along[f][q][1] = s * (cut[f] * along);
-      vectors.along[f][q][2] = passed;
-    }
+    const Triple<F>& s = slant[q];
+    Triple<F> pushed = s * push, larger = max(abs(slant[(q + 1) % 3]), abs(slant[(q + 2) % 3]));
+    features.of_site[q][0] = abs(s) * cut;
+    features.of_site[q][1] = abs(pushed);
+    features.of_site[q][2] = pushed * (spread(shift, q) - pushed);
+    features.of_site[q][3] = larger * cut;
+    vectors.along[q][0] = pushed;
+    vectors.along[q][1] = s * (cut * along);
+    vectors.along[q][2] = push * (next(s) * next_cut + last(s) * last_cut);
   }
 }
 
@@ -166,88 +177,40 @@ template <class F>
 }
 
 template <class F>
-[[gnu::always_inline]] inline F weighted_sum(F start, const float (&weights)[4],
-                                             const F (&features)[4]) {
+[[gnu::always_inline]] inline Vec<F> multiply_add(float w, const Vec<F>& x, const Vec<F>& y) {
+  return {multiply_add(w, x[0], y[0]), multiply_add(w, x[1], y[1]), multiply_add(w, x[2], y[2])};
+}
+
+template <class Three>
+[[gnu::always_inline]] inline Three weighted_sum(Three start, const float (&weights)[4],
+                                                 const Three (&features)[4]) {
   for (int k = 0; k < 4; ++k) start = multiply_add(weights[k], features[k], start);
   return start;
 }
 
 template <class F>
-[[gnu::always_inline]] inline void add_unit(const Network::Unit& unit, F of_faces, F of_axis,
-                                            const F (&site)[4], F (&outputs)[site_outputs]) {
-  F hidden = max(weighted_sum(of_faces + of_axis, unit.of_site, site), F{});
-  for (int k = 0; k < site_outputs; ++k)
-    outputs[k] = multiply_add(unit.to_outputs[k], hidden, outputs[k]);
-}
-
-template <class F>
 struct SiteOutputs {
-  F at[3][3][site_outputs];
+  Triple<F> at[3][site_outputs];  // [q], by f
 };
 
-// The outputs at all sites of W pairs. What sites share is summed once.
+// The outputs at all sites. What sites share is summed once.
 template <class F>
 inline void forward(const Network& network, const SiteFeatures<F>& features,
                     SiteOutputs<F>& outputs) {
-  for (auto& faces : outputs.at)
-    for (auto& site : faces)
-      for (int k = 0; k < site_outputs; ++k) site[k] = splat<F>(network.output_bias[k]);
+  for (auto& axis : outputs.at)
+    for (int k = 0; k < site_outputs; ++k) axis[k] = uniform(splat<F>(network.output_bias[k]));
   for (const Network::Unit& unit : network.units) {
-    F of_faces[3], of_axis[3];
+    Triple<F> of_faces =
+        weighted_sum(uniform(splat<F>(unit.bias)), unit.of_faces, features.of_faces);
+    Triple<F> of_axis = weighted_sum(Triple<F>{}, unit.of_axis, features.of_axis);
 #pragma GCC unroll 3
-    for (int k = 0; k < 3; ++k) {
-      of_faces[k] = weighted_sum(splat<F>(unit.bias), unit.of_faces, features.of_faces[k]);
-      of_axis[k] = weighted_sum(F{}, unit.of_axis, features.of_axis[k]);
+    for (int q = 0; q < 3; ++q) {
+      Triple<F> shared = of_faces + spread(of_axis, q);
+      Triple<F> hidden = max(weighted_sum(shared, unit.of_site, features.of_site[q]), Triple<F>{});
+      for (int k = 0; k < site_outputs; ++k)
+        outputs.at[q][k] = multiply_add(unit.to_outputs[k], hidden, outputs.at[q][k]);
     }
-#pragma GCC unroll 3
-    for (int f = 0; f < 3; ++f)
-#pragma GCC unroll 3
-      for (int q = 0; q < 3; ++q)
-        add_unit(unit, of_faces[f], of_axis[q], features.of_site[f][q], outputs.at[f][q]);
   }
-}
-
-// Lanes that hold the sites of a single pair.
-#if defined(__AVX512F__)
-constexpr int site_lanes = 16;
-#elif defined(__AVX2__)
-constexpr int site_lanes = 8;
-#else
-constexpr int site_lanes = 4;
-#endif
-constexpr int site_vectors = (site_count + site_lanes - 1) / site_lanes;
-
-// The same for a single pair, with the sites f · 3 + q as lanes: the same sums in the same order.
-inline void forward(const Network& network, const SiteFeatures<float>& features,
-                    SiteOutputs<float>& outputs) {
-  using F = Lanes<float, site_lanes>;
-  constexpr int padded = site_lanes * site_vectors;
-  alignas(sizeof(F)) float numbers[3][4][padded]{};
-  for (int f = 0; f < 3; ++f)
-    for (int q = 0; q < 3; ++q)
-      for (int k = 0; k < 4; ++k) {
-        numbers[0][k][3 * f + q] = features.of_faces[f][k];
-        numbers[1][k][3 * f + q] = features.of_axis[q][k];
-        numbers[2][k][3 * f + q] = features.of_site[f][q][k];
-      }
-  F of_faces[site_vectors][4], of_axis[site_vectors][4], of_site[site_vectors][4];
-  F found[site_vectors][site_outputs];
-  for (int v = 0; v < site_vectors; ++v) {
-    for (int k = 0; k < 4; ++k) {
-      std::memcpy(&of_faces[v][k], &numbers[0][k][site_lanes * v], sizeof(F));
-      std::memcpy(&of_axis[v][k], &numbers[1][k][site_lanes * v], sizeof(F));
-      std::memcpy(&of_site[v][k], &numbers[2][k][site_lanes * v], sizeof(F));
-    }
-    for (int k = 0; k < site_outputs; ++k) found[v][k] = splat<F>(network.output_bias[k]);
-  }
-  for (const Network::Unit& unit : network.units)
-#pragma GCC unroll 3
-    for (int v = 0; v < site_vectors; ++v)
-      add_unit(unit, weighted_sum(splat<F>(unit.bias), unit.of_faces, of_faces[v]),
-               weighted_sum(F{}, unit.of_axis, of_axis[v]), of_site[v], found[v]);
-  for (int s = 0; s < site_count; ++s)
-    for (int k = 0; k < site_outputs; ++k)
-      outputs.at[s / 3][s % 3][k] = found[s / site_lanes][k][s % site_lanes];
 }
 
 // Float32 lanes for a group of float64 lanes: as wide in bytes.
@@ -255,7 +218,6 @@ template <class T>
 using Narrow =
     typename std::conditional_t<is_scalar<T>, NumberOf<float>, LanesOf<float, 2 * width<T>>>::type;
 
-[[gnu::always_inline]] inline float narrow(const double& x) { return float(x); }
 template <class T>
 [[gnu::always_inline]] inline Narrow<T> narrow(const T& low, const T& high) {
   using Half = Lanes<float, width<T>>;
@@ -265,86 +227,107 @@ template <class T>
   return joined;
 }
 template <class T>
-[[gnu::always_inline]] inline T widen(const Narrow<T>& x, int half) {
-  if constexpr (is_scalar<T>) {
-    return x;
+[[gnu::always_inline]] inline T half_of(const Narrow<T>& x, int half) {
+  using Half = Lanes<float, width<T>>;
+  Half halves[2];
+  std::memcpy(halves, &x, sizeof(x));
+  return __builtin_convertvector(halves[half], T);
+}
+
+// Triples of a group as one of float32, and back.
+template <class T>
+[[gnu::always_inline]] inline Vec<Narrow<T>> narrow(const Vec<T> (&group)[2]) {
+  return {narrow(group[0][0], group[1][0]), narrow(group[0][1], group[1][1]),
+          narrow(group[0][2], group[1][2])};
+}
+template <class T>
+[[gnu::always_inline]] inline Triple<float> narrow(const Triple<T> (&group)[1]) {
+  const Triple<T>& x = group[0];
+  if constexpr (packed<T>) {
+    return __builtin_convertvector(x, Triple<float>);
   } else {
-    using Half = Lanes<float, width<T>>;
-    Half halves[2];
-    std::memcpy(halves, &x, sizeof(x));
-    return __builtin_convertvector(halves[half], T);
+    return triple(Vec<float>{float(x[0]), float(x[1]), float(x[2])});
   }
+}
+template <class T>
+[[gnu::always_inline]] inline Triple<T> widen(const Triple<Narrow<T>>& x, int half) {
+  if constexpr (packed<T>) {
+    return __builtin_convertvector(x, Triple<T>);
+  } else if constexpr (is_scalar<T>) {
+    return {x[0], x[1], x[2]};
+  } else {
+    return {half_of<T>(x[0], half), half_of<T>(x[1], half), half_of<T>(x[2], half)};
+  }
+}
+
+template <class T, int group>
+[[gnu::always_inline]] inline CutCube<Narrow<T>> narrow(const CutCube<T> (&cubes)[group]) {
+  auto joined = [&](auto part) {
+    Triple<T> parts[group];
+    for (int g = 0; g < group; ++g) parts[g] = part(cubes[g]);
+    return narrow<T>(parts);
+  };
+  CutCube<Narrow<T>> cube;
+  for (int k = 0; k < 3; ++k)
+    cube.slant[k] = joined([&](const CutCube<T>& c) { return c.slant[k]; });
+  cube.cut = joined([](const CutCube<T>& c) { return c.cut; });
+  cube.push = joined([](const CutCube<T>& c) { return c.push; });
+  return cube;
 }
 
 // The network's answers for a group of cubes: centroids from the middles of their bounding boxes, in
 // half extents.
 template <class T, int group>
 [[gnu::always_inline]] inline void ask(const Network& network, const CutCube<T> (&cubes)[group],
-                                       Vec<T> (&answers)[group]) {
+                                       Triple<T> (&answers)[group]) {
   using F = Narrow<T>;
-  auto joined = [&](auto part) -> F {
-    if constexpr (group == 1) {
-      return narrow(part(cubes[0]));
-    } else {
-      return narrow<T>(part(cubes[0]), part(cubes[1]));
-    }
-  };
-  CutCube<F> cube;
-  for (int f = 0; f < 3; ++f) {
-    for (int k = 0; k < 3; ++k)
-      cube.slant[f][k] = joined([&](const CutCube<T>& one) { return one.slant[f][k]; });
-    cube.cut[f] = joined([&](const CutCube<T>& one) { return one.cut[f]; });
-    cube.push[f] = joined([&](const CutCube<T>& one) { return one.push[f]; });
-  }
   SiteFeatures<F> features;
   SiteVectors<F> vectors;
   SiteOutputs<F> outputs;
-  describe(cube, features, vectors);
+  describe(narrow(cubes), features, vectors);
   forward(network, features, outputs);
+  Columns<F> parts;  // [q], by f
   for (int q = 0; q < 3; ++q) {
-    F sum{};
-    for (int f = 0; f < 3; ++f) {
-      const auto&out = outputs.at[f][q], &along = vectors.along[f][q];
-      sum += (out[0] * along[0] + out[1] * along[1]) + out[2] * along[2];
-    }
-    for (int g = 0; g < group; ++g) answers[g][q] = widen<T>(sum, g);
+    const auto &out = outputs.at[q], &along = vectors.along[q];
+    parts[q] = (out[0] * along[0] + out[1] * along[1]) + out[2] * along[2];
   }
+  Columns<F> by_axis = transpose(parts);  // [f], by q
+  Triple<F> sum{};
+  for (int f = 0; f < 3; ++f) sum = sum + by_axis[f];
+  for (int g = 0; g < group; ++g) answers[g] = widen<T>(sum, g);
 }
 
 // The answer [m] from the middle of the bounding box, cut to where a centroid can be.
 template <class T>
-[[gnu::always_inline]] inline Vec<T> within_reach(const OverlapBounds<T>& bounds,
-                                                  const Vec<T>& answer) {
-  Vec<T> found;
-  for (int k = 0; k < 3; ++k)
-    found[k] = bounds.half[k] *
-               min(splat<T>(centroid_reach), max(splat<T>(-centroid_reach), answer[k]));
-  return found;
+[[gnu::always_inline]] inline Triple<T> within_reach(const OverlapBounds<T>& bounds,
+                                                     const Triple<T>& answer) {
+  return bounds.half * clamp(answer, uniform(splat<T>(centroid_reach)));
 }
 
 // A point in the bounds' frame [m], and whether it lies in both boxes.
 template <class T>
 struct Placed {
-  Vec<T> point;
+  Triple<T> point;
   Mask<T> inside;
 };
 
 // Move the network's answer into both boxes: twice to the nearest point of the other box, and back
 // to the nearest point of the box whose frame it is.
 template <class T>
-[[gnu::always_inline]] inline Placed<T> place(const OverlapBounds<T>& bounds, const Vec<T>& answer,
-                                              T size) {
-  auto in_other = [&](const Vec<T>& point) {
-    return bounds.other_offset + bounds.other_axes * (point - bounds.middle);
+[[gnu::always_inline]] inline Placed<T> place(const OverlapBounds<T>& bounds,
+                                              const Triple<T>& answer, T size) {
+  Columns<T> to_other = bounds.other_axes, from_other = transpose(to_other);
+  auto in_other = [&](const Triple<T>& point) -> Triple<T> {
+    return bounds.other_offset + to_other * (point - bounds.middle);
   };
-  Vec<T> point = clamp(bounds.middle + within_reach(bounds, answer), bounds.own_half);
+  Triple<T> point = clamp(bounds.middle + within_reach(bounds, answer), bounds.own_half);
 #pragma GCC unroll 2
   for (int round = 0; round < 2; ++round) {
-    Vec<T> at = in_other(point), back = clamp(at, bounds.other_half) - at;
-    point = clamp(point + transposed_times(bounds.other_axes, back), bounds.own_half);
+    Triple<T> at = in_other(point), back = clamp(at, bounds.other_half) - at;
+    point = clamp(point + from_other * back, bounds.own_half);
   }
   // Each comparison fails for NaN.
-  Vec<T> beyond = abs(in_other(point)) - bounds.other_half;
+  Triple<T> beyond = abs(in_other(point)) - bounds.other_half;
   Mask<T> inside = beyond[0] <= place_tolerance * size;
   inside &= beyond[1] <= place_tolerance * size;
   inside &= beyond[2] <= place_tolerance * size;
@@ -362,7 +345,7 @@ template <class T>
   T excess = max(long_a / (aspect_max * short_a), long_b / (aspect_max * short_b));
   excess = max(excess, max(long_a, long_b) / (size_ratio_max * min(long_a, long_b)));
   excess = max(excess, -separation / (2.0 * depth_max * min(short_a, short_b)));
-  return (excess <= range_slack) & (smallest(bounds.half) >= flat * pair.size);
+  return (excess <= range_slack) & (smallest(components<T>(bounds.half)) >= flat * pair.size);
 }
 
 // The model for bounds of one method.
@@ -391,11 +374,11 @@ struct MlpModelBy {
                                      Counts& counts) const {
     OverlapBounds<T> bounds[count];
     CutCube<T> cubes[count];
-    Vec<T> answers[count], pressed_offset[count];
+    Triple<T> answers[count], pressed_offset[count];
     for (int g = 0; g < count; ++g) {
       Pair<T> pair = queries[g].pair;
       press(pair, queries[g].axis);
-      pressed_offset[g] = pair.offset_a;
+      pressed_offset[g] = triple(pair.offset_a);
       bounds[g] = bounds_of(pair, queries[g].axis);
       cubes[g] = cut_cube(bounds[g], pair.size);
     }
@@ -403,8 +386,8 @@ struct MlpModelBy {
     for (int g = 0; g < count; ++g) {
       const Query<T>& q = queries[g];
       Placed<T> placed = place(bounds[g], answers[g], q.pair.size);
-      found[g] = select(bounds[g].in_b, pressed_offset[g] + q.pair.rotation * placed.point,
-                        placed.point);
+      Triple<T> from_b = pressed_offset[g] + columns(q.pair.rotation) * placed.point;
+      found[g] = components<T>(select(bounds[g].in_b, from_b, placed.point));
       Mask<T> answered = in_range(q.pair, q.axis.separation, bounds[g]) & placed.inside;
       Mask<T> fallback = (answered == 0) & q.touching;
       if (any(fallback)) {

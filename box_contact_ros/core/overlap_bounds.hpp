@@ -33,11 +33,11 @@ constexpr double thinnest = 1e-290;
 template <class T>
 struct OverlapBounds {
   Mask<T> in_b;
-  Vec<T> middle, half;  // their frame [m]
-  Vec<T> own_half;      // half extents of the box whose frame it is [m]
-  Mat<T> other_axes;    // the other box's axes as rows, their frame
-  Vec<T> other_offset;  // from the other box's centre to `middle`, along the other box's axes [m]
-  Vec<T> other_half;    // the other box's half extents [m]
+  Triple<T> middle, half;  // their frame [m]
+  Triple<T> own_half;      // half extents of the box whose frame it is [m]
+  Columns<T> other_axes;   // the other box's axes as rows, their frame
+  Triple<T> other_offset;  // from the other box's centre to `middle`, along its axes [m]
+  Triple<T> other_half;    // the other box's half extents [m]
 };
 
 namespace bounds {
@@ -49,7 +49,7 @@ struct Interval {
 // A box about the overlap in one of the boxes' frames, from that box's centre [m].
 template <class T>
 struct FrameBox {
-  Vec<T> middle, half;
+  Triple<T> middle, half;
 };
 
 template <class T>
@@ -62,20 +62,40 @@ template <class T>
   return box.half[0] * box.half[1] * box.half[2];
 }
 
-// The bounds in the frame of B where `in_b`, else of A.
+// Box Y seen from box X: Y's axes as rows in X's frame, and X's centre from Y's along Y's axes.
+template <class T>
+struct Facing {
+  Columns<T> axes;
+  Triple<T> offset;
+};
+template <class T>
+[[gnu::always_inline]] inline Facing<T> b_from_a(const Pair<T>& pair) {
+  return {columns(transpose(pair.rotation)), triple(-pair.offset_b)};
+}
+template <class T>
+[[gnu::always_inline]] inline Facing<T> a_from_b(const Pair<T>& pair) {
+  return {columns(pair.rotation), triple(pair.offset_a)};
+}
+template <class T>
+[[gnu::always_inline]] inline Facing<T> choose(Mask<T> mask, const Facing<T>& a,
+                                               const Facing<T>& b) {
+  return {select(mask, a.axes, b.axes), select(mask, a.offset, b.offset)};
+}
+
+// The bounds in the frame of B where `in_b`, else of A. `facing`: the other box from there.
 template <class T>
 [[gnu::always_inline]] inline OverlapBounds<T> chosen(const Pair<T>& pair, Mask<T> in_b,
-                                                      const FrameBox<T>& box) {
+                                                      const FrameBox<T>& box,
+                                                      const Facing<T>& facing) {
   OverlapBounds<T> found;
   found.in_b = in_b;
   found.middle = box.middle;
   found.half = box.half;
-  found.own_half = select(in_b, pair.half_b, pair.half_a);
-  found.other_half = select(in_b, pair.half_a, pair.half_b);
-  found.other_axes = select(in_b, pair.rotation, transpose(pair.rotation));
-  // The other box's centre along its own axes: B's is at offset_b, A's, seen from B, at −offset_a.
-  Vec<T> centre = select(in_b, -pair.offset_a, pair.offset_b);
-  found.other_offset = found.other_axes * box.middle - centre;
+  Triple<T> half_a = triple(pair.half_a), half_b = triple(pair.half_b);
+  found.own_half = select(in_b, half_b, half_a);
+  found.other_half = select(in_b, half_a, half_b);
+  found.other_axes = facing.axes;
+  found.other_offset = facing.axes * box.middle + facing.offset;
   return found;
 }
 
@@ -125,53 +145,43 @@ template <class T>
 
 template <class T>
 [[gnu::always_inline]] inline FrameBox<T> joined(const Interval<T> (&intervals)[3]) {
-  FrameBox<T> box;
+  Vec<T> middle, half;
   for (int k = 0; k < 3; ++k) {
     T low = smallest_of<T>(intervals[k].low), high = -smallest_of<T>(-intervals[k].high);
-    box.middle[k] = 0.5 * (low + high);
-    box.half[k] = max(0.5 * (high - low), splat<T>(thinnest));
+    middle[k] = 0.5 * (low + high);
+    half[k] = max(0.5 * (high - low), splat<T>(thinnest));
   }
-  return box;
+  return {triple(middle), triple(half)};
 }
 
 // The part of a box that lies within `depth` of its extreme plane along `direction`, bounded.
 template <class T>
-[[gnu::always_inline]] inline FrameBox<T> part_in_slab(const Vec<T>& half, const Vec<T>& direction,
-                                                       T depth) {
+[[gnu::always_inline]] inline FrameBox<T> part_in_slab(const Triple<T>& half,
+                                                       const Triple<T>& direction, T depth) {
+  auto towards = [](auto direction, auto x) { return select(direction >= 0.0, x, -x); };
   FrameBox<T> part;
-  for (int k = 0; k < 3; ++k) {
-    part.half[k] = min(half[k], (0.5 * depth) / abs(direction[k]));
-    T middle = half[k] - part.half[k];
-    part.middle[k] = select<T>(direction[k] >= 0.0, middle, -middle);
-  }
+  part.half = min(half, uniform(0.5 * depth) / abs(direction));
+  part.middle = each(towards, direction, half - part.half);
   return part;
 }
 
-// Box Y seen from box X: Y's axes as rows in X's frame, their reciprocals, and X's centre from Y's
-// along Y's axes.
-template <class T>
-struct Facing {
-  Mat<T> axes, inverse;
-  Vec<T> offset;
-};
-
 // Cut X's box by Y's: along each axis of X, each pair of Y's faces leaves an interval at most.
+// `inverse[k]`: the reciprocals of Y's axis k.
 template <class T>
 [[gnu::always_inline]] inline FrameBox<T> tighten(const FrameBox<T>& x, const FrameBox<T>& y,
-                                                  const Facing<T>& y_from_x, T slack) {
-  Vec<T> at = y_from_x.axes * x.middle + y_from_x.offset - y.middle, reach;
-  for (int k = 0; k < 3; ++k) reach[k] = (y.half[k] + slack) + dot(abs(row(y_from_x.axes, k)), x.half);
-  FrameBox<T> cut;
-  for (int i = 0; i < 3; ++i) {
-    T high = 2.0 * x.half[i], low = high;  // from the opposite end of X's interval
-    for (int k = 0; k < 3; ++k) {
-      T by = y_from_x.inverse[k][i], far = reach[k] * abs(by), middle = at[k] * by;
-      high = min(high, far - middle);
-      low = min(low, far + middle);
-    }
-    cut.middle[i] = x.middle[i] + 0.5 * (high - low);
-    cut.half[i] = max(0.5 * (high + low) - x.half[i], splat<T>(thinnest));
+                                                  const Facing<T>& y_from_x,
+                                                  const Columns<T>& inverse, T slack) {
+  Triple<T> at = y_from_x.axes * x.middle + y_from_x.offset - y.middle;
+  Triple<T> reach = (y.half + slack) + abs(y_from_x.axes) * x.half;
+  Triple<T> high = 2.0 * x.half, low = high;  // from the opposite end of X's interval
+  for (int k = 0; k < 3; ++k) {
+    Triple<T> far = spread(reach, k) * abs(inverse[k]), middle = spread(at, k) * inverse[k];
+    high = min(high, far - middle);
+    low = min(low, far + middle);
   }
+  FrameBox<T> cut;
+  cut.middle = x.middle + 0.5 * (high - low);
+  cut.half = max(0.5 * (high + low) - x.half, uniform(splat<T>(thinnest)));
   return cut;
 }
 
@@ -185,20 +195,20 @@ template <class T>
 [[gnu::always_inline]] inline OverlapBounds<T> bounds_by_slab(const Pair<T>& pair,
                                                               const Vec<T>& normal, T depth) {
   using namespace bounds;
-  const Mat<T>& r = pair.rotation;
-  Mat<T> inverse = reciprocals(r);
   T slack = flush * pair.size;
-  FrameBox<T> a = part_in_slab(pair.half_a, normal, depth);
-  FrameBox<T> b = part_in_slab(pair.half_b, -transposed_times(r, normal), depth);
-  Facing<T> b_to_a{transpose(r), transpose(inverse), -pair.offset_b};
-  Facing<T> a_to_b{r, inverse, pair.offset_a};
-  FrameBox<T> cut_a = tighten(a, b, b_to_a, slack), cut_b = tighten(b, a, a_to_b, slack);
+  Facing<T> b_to_a = b_from_a(pair), a_to_b = a_from_b(pair);
+  Columns<T> inverse = reciprocals(a_to_b.axes), inverse_b = transpose(inverse);
+  Triple<T> n = triple(normal);
+  FrameBox<T> a = part_in_slab(triple(pair.half_a), n, depth);
+  FrameBox<T> b = part_in_slab(triple(pair.half_b), -(b_to_a.axes * n), depth);
+  FrameBox<T> cut_a = tighten(a, b, b_to_a, inverse, slack);
+  FrameBox<T> cut_b = tighten(b, a, a_to_b, inverse_b, slack);
   Mask<T> in_b = volume(cut_b) < clearly_smaller * volume(cut_a);
-  Facing<T> facing{select(in_b, a_to_b.axes, b_to_a.axes),
-                   select(in_b, a_to_b.inverse, b_to_a.inverse),
-                   select(in_b, a_to_b.offset, b_to_a.offset)};
+  Facing<T> facing = choose(in_b, a_to_b, b_to_a);
   return chosen(pair, in_b,
-                tighten(choose(in_b, cut_b, cut_a), choose(in_b, cut_a, cut_b), facing, slack));
+                tighten(choose(in_b, cut_b, cut_a), choose(in_b, cut_a, cut_b), facing,
+                        select(in_b, inverse_b, inverse), slack),
+                facing);
 }
 
 // Bounds by the 24 edges, of a pair that has been pressed in; of pairs apart, without meaning.
@@ -209,7 +219,8 @@ inline OverlapBounds<T> bounds_by_edges(const Pair<T>& pair) {
   Mat<T> inverse = reciprocals(r), back = transpose(r);
   Vec<T> a_in_b = -pair.offset_b, wide_a, wide_b;
   T slack = flush * pair.size;
-  for (int k = 0; k < 3; ++k) wide_a[k] = pair.half_a[k] + slack, wide_b[k] = pair.half_b[k] + slack;
+  for (int k = 0; k < 3; ++k)
+    wide_a[k] = pair.half_a[k] + slack, wide_b[k] = pair.half_b[k] + slack;
   EdgePieces<T> edges_a = cut_edges(back, transpose(inverse), a_in_b, pair.half_a, wide_b, {});
   EdgePieces<T> edges_b = cut_edges(r, inverse, pair.offset_a, pair.half_b, wide_a, {});
   Four<T> far = Four<T>{} + std::numeric_limits<double>::max();
@@ -219,7 +230,8 @@ inline OverlapBounds<T> bounds_by_edges(const Pair<T>& pair) {
   widen_by_edges(edges_b, r, pair.offset_a, pair.half_b, in_b, in_a);
   FrameBox<T> box_a = joined(in_a), box_b = joined(in_b);
   Mask<T> in_second = volume(box_b) < clearly_smaller * volume(box_a);
-  return chosen(pair, in_second, choose(in_second, box_b, box_a));
+  return chosen(pair, in_second, choose(in_second, box_b, box_a),
+                choose(in_second, a_from_b(pair), b_from_a(pair)));
 }
 
 }  // namespace box_contact

@@ -131,7 +131,7 @@ MUTANTS = {
         'core/overlap_bounds.hpp', 'constexpr double flush = 0x1p-46;',
         'constexpr double flush = 0.0;', 'test/core/test_overlap_bounds.py -k whole_patch'),
     'side of a pair of faces taken as it comes': Mutant(
-        'core/mlp.hpp', 'F faces[4] = {cut[f], abs(push[f]),', 'F faces[4] = {cut[f], push[f],',
+        'core/mlp.hpp', 'features.of_faces[1] = abs(push);', 'features.of_faces[1] = push;',
         'test/solver/test_mlp.py -k box_symmetries'),
     'range without its depth': Mutant(
         'core/mlp.hpp', 'excess = max(excess, -separation / (2.0 * depth_max',

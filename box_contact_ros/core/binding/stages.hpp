@@ -58,27 +58,21 @@ inline void put(double* array, long row, const Mat<double>& m) {
     for (int j = 0; j < 3; ++j) array[9 * row + 3 * i + j] = m[i][j];
 }
 
-inline void put_features(const StageArrays& arrays, long row, const CutCube<double>& cube) {
-  CutCube<float> narrow_cube;
-  for (int f = 0; f < 3; ++f) {
-    for (int k = 0; k < 3; ++k) narrow_cube.slant[f][k] = float(cube.slant[f][k]);
-    narrow_cube.cut[f] = float(cube.cut[f]);
-    narrow_cube.push[f] = float(cube.push[f]);
-  }
+inline void put_features(const StageArrays& arrays, long row, const CutCube<double> (&cubes)[1]) {
   SiteFeatures<float> features;
   SiteVectors<float> vectors;
-  describe(narrow_cube, features, vectors);
+  describe(narrow(cubes), features, vectors);
   for (int f = 0; f < 3; ++f)
     for (int q = 0; q < 3; ++q) {
       long site = site_count * row + 3 * f + q;
       for (int k = 0; arrays.features && k < 4; ++k) {
         float* at = arrays.features + site_features * site + k;
-        at[0] = features.of_site[f][q][k];
-        at[4] = features.of_faces[f][k];
-        at[8] = features.of_axis[q][k];
+        at[0] = features.of_site[q][k][f];
+        at[4] = features.of_faces[k][f];
+        at[8] = features.of_axis[k][q];
       }
       for (int k = 0; arrays.vectors && k < site_outputs; ++k)
-        arrays.vectors[site_outputs * site + k] = vectors.along[f][q][k];
+        arrays.vectors[site_outputs * site + k] = vectors.along[q][k][f];
     }
 }
 
@@ -112,19 +106,18 @@ bool fill_stages(const Rows& rows, long row, const Network* network, const Stage
   OverlapBounds<double> bounds = MlpModelBy<method>::bounds_of(pressed, q.axis);
   put(arrays.frame_b, row, bounds.in_b);
   put(arrays.in_range, row, in_range(pressed, q.axis.separation, bounds));
-  put(arrays.bounds_middle, row, bounds.middle);
-  put(arrays.bounds_half, row, bounds.half);
-  put(arrays.other_axes, row, bounds.other_axes);
-  put(arrays.other_offset, row, bounds.other_offset);
-  put(arrays.other_half, row, bounds.other_half);
-  CutCube<double> cube = cut_cube(bounds, q.pair.size);
+  put(arrays.bounds_middle, row, components<double>(bounds.middle));
+  put(arrays.bounds_half, row, components<double>(bounds.half));
+  put(arrays.other_axes, row, matrix(bounds.other_axes));
+  put(arrays.other_offset, row, components<double>(bounds.other_offset));
+  put(arrays.other_half, row, components<double>(bounds.other_half));
+  CutCube<double> cubes[1] = {cut_cube(bounds, q.pair.size)};
   if (network && arrays.answer) {
-    CutCube<double> cubes[1] = {cube};
-    Vec<double> answers[1];
+    Triple<double> answers[1];
     ask(*network, cubes, answers);
-    put(arrays.answer, row, answers[0]);
+    put(arrays.answer, row, components<double>(answers[0]));
   }
-  if (arrays.features || arrays.vectors) put_features(arrays, row, cube);
+  if (arrays.features || arrays.vectors) put_features(arrays, row, cubes);
   return true;
 }
 
