@@ -3,6 +3,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -19,6 +21,7 @@ from ..scene.pose_sets import (
     stacked,
     turns,
 )
+from ..scene.scene_file import read_scene
 
 SizePair = tuple[tuple[float, float, float], tuple[float, float, float]]
 """Full extents of two boxes [m]."""
@@ -28,31 +31,39 @@ PIECE = 100_000
 
 @dataclass(frozen=True, kw_only=True)
 class MlpSamples:
-    """Features and exact answers of n contacts, each at SITES sites, counted f · 3 + q."""
+    """Features and exact answers of n contacts, each at SITES sites, counted f · 3 + q.
 
-    features: np.ndarray
-    """(n, SITES, FEATURES) float32."""
-    vectors: np.ndarray
-    """(n, SITES, OUTPUTS) float32: the factors of the outputs. The answer along q is the sum of
-    the products over all outputs and f."""
-    offsets: np.ndarray
-    """(n, 3) float32: exact centroid from the middle of the bounding box [half extents]."""
-    scale: np.ndarray
-    """(n, 3) float32: half extents [longest edge of the smaller box]."""
+    Arrays of float32, or tensors. The contacts are last, so that all operations run along them.
+    """
+
+    features: Any
+    """(SITES, FEATURES, n)."""
+    vectors: Any
+    """(SITES, OUTPUTS, n): the factors of the outputs. The answer along q is the sum of the
+    products over all outputs and f."""
+    offsets: Any
+    """(3, n): exact centroid from the middle of the bounds [half extents]."""
+    scale: Any
+    """(3, n): half extents [longest edge of the smaller box]."""
 
     def __len__(self) -> int:
         """Return n."""
-        return len(self.offsets)
+        return self.offsets.shape[-1]
 
-    def rows(self, rows: np.ndarray | slice) -> MlpSamples:
+    def each(self, change: Callable[[Any], Any]) -> MlpSamples:
+        """Return the samples with a function applied to each array."""
+        return MlpSamples(**{field.name: change(getattr(self, field.name))
+                             for field in fields(self)})
+
+    def part(self, rows: np.ndarray | slice) -> MlpSamples:
         """Return some of the samples."""
-        return MlpSamples(**{field.name: getattr(self, field.name)[rows] for field in fields(self)})
+        return self.each(lambda array: array[..., rows])
 
     @staticmethod
     def joined(parts: Sequence[MlpSamples]) -> MlpSamples:
         """Return the samples of all parts, one part after the other."""
         return MlpSamples(**{field.name: np.concatenate([getattr(part, field.name)
-                                                         for part in parts])
+                                                         for part in parts], axis=-1)
                              for field in fields(MlpSamples)})
 
 
@@ -64,15 +75,15 @@ def describe(pairs: Pairs) -> MlpSamples:
     from_b = np.einsum('nji,nj->ni', found.rotation, found.centroid - found.pressed_offset_a)
     centroid = np.where(found.frame_b[:, None], from_b, found.centroid)
     edge = np.minimum(pairs.size_a.max(axis=1), pairs.size_b.max(axis=1))[:, None]
-    offsets = (centroid - found.bounds_middle) / found.bounds_half
-    return MlpSamples(features=found.features, vectors=found.vectors,
-                      offsets=offsets.astype(np.float32),
-                      scale=(found.bounds_half / edge).astype(np.float32))
+    samples = MlpSamples(features=found.features, vectors=found.vectors,
+                         offsets=(centroid - found.bounds_middle) / found.bounds_half,
+                         scale=found.bounds_half / edge)
+    return samples.each(lambda array: np.moveaxis(array.astype(np.float32), 0, -1).copy())
 
 
-def draw_samples(make: Callable[..., Pairs], seed: Sequence[int], n: int, progress: bool = False,
-                 *rest: object) -> MlpSamples:
-    """Return the samples of about n pairs of `make(rng, n, *rest)`.
+def draw_samples(make: Callable[[np.random.Generator, int], Pairs], seed: Sequence[int], n: int,
+                 progress: bool = False) -> MlpSamples:
+    """Return the samples of about n pairs of `make(rng, n)`.
 
     Each piece of PIECE pairs has its own seed.
     """
@@ -83,7 +94,7 @@ def draw_samples(make: Callable[..., Pairs], seed: Sequence[int], n: int, progre
               disable=not progress) as bar:
         for start in range(0, n, PIECE):
             count = min(PIECE, n - start)
-            parts.append(describe(make(np.random.default_rng([*seed, start]), count, *rest)))
+            parts.append(describe(make(np.random.default_rng([*seed, start]), count)))
             bar.update(count)
     return MlpSamples.joined(parts)
 
@@ -142,6 +153,22 @@ def along_edges(rng: np.random.Generator, size_a: np.ndarray, size_b: np.ndarray
     shortest = np.minimum(size_a.min(axis=1), size_b.min(axis=1))
     return pressed(Pairs(a, np.concatenate([place, turn], axis=1), size_a, size_b),
                    shortest * log_uniform(rng, 1e-5, 0.1, n))
+
+
+def scene_sizes(path: Path) -> list[SizePair]:
+    """Return the distinct pairs of sizes in a scene file's list of pairs.
+
+    A swapped pair counts once. So do boxes that differ in which axis is called x, y or z: extents
+    are sorted, longest first. Raises SceneError for a file that is no scene.
+    """
+    scene = read_scene(path)
+    sizes = {}
+    for name, box in scene.boxes.items():
+        x, y, z = sorted(box.size, reverse=True)
+        sizes[name] = (x, y, z)
+    return list(dict.fromkeys(
+        (max(sizes[pair.a], sizes[pair.b]), min(sizes[pair.a], sizes[pair.b]))
+        for pair in scene.pairs))
 
 
 def scene_mixture(rng: np.random.Generator, n: int, sizes: Sequence[SizePair]) -> Pairs:

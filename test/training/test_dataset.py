@@ -254,7 +254,7 @@ def test_a_winning_face_of_the_second_box_is_not_data(cubes: Placements) -> None
     inverse = cubes.pose[:5, 3:] * np.array([-1.0, -1.0, -1.0, 1.0])
     swapped = Placements(CUBE, np.concatenate([seen_from_b, inverse], axis=1), cubes.point[:5],
                          cubes.normal[:5])
-    with pytest.raises(ValueError, match='face of the second box'):
+    with pytest.raises(ValueError, match='is no face of the first box'):
         dataset.fold(swapped, FEATURES)
 
 

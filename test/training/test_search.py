@@ -23,8 +23,8 @@ from box_contact_ros.training.experiments.successive_halving import Candidate, C
 QUICK = ['--quick', '--candidates', '48', '--seed', '2', '--device', 'cpu']
 
 
-class Toy:
-    """Error: |rate − 0.3| + 1 / total effort. A network is one number, the effort so far."""
+class Toy(successive_halving.Search):
+    """Error: |rate − 0.3| + 1 / effort; number 6 diverges."""
 
     name = 'toy'
     seed = 5
@@ -32,7 +32,7 @@ class Toy:
 
     def __init__(self, stop_after: int | None = None) -> None:
         self.trained: list[tuple[int, int]] = []
-        self.seeds: list[tuple[int, ...]] = []
+        self.seeds: list[int] = []
         self.stop_after = stop_after
 
     def candidates(self) -> list[Candidate]:
@@ -41,38 +41,25 @@ class Toy:
     def cost(self, candidate: Candidate) -> int:
         return candidate.hidden[0] * candidate.hidden[1]
 
-    def start(self, candidate: Candidate):
-        return [(np.zeros((1, 1), dtype=np.float32), np.zeros(1, dtype=np.float32))]
-
-    def train(self, number, group, start, seed):
+    def train(self, rung: Rung, group: Sequence[Candidate], seed: int) -> list[dict[str, float]]:
         if self.stop_after is not None and len(self.seeds) == self.stop_after:
             raise KeyboardInterrupt
-        self.seeds.append(tuple(seed))
-        networks, scores = [], []
-        for one, network in zip(group, start):
-            self.trained.append((number, one.number))
-            effort = float(network[0][0][0, 0]) + self.rungs[number].effort
-            networks.append([(np.full((1, 1), effort, dtype=np.float32),
-                              np.zeros(1, dtype=np.float32))])
-            error = abs(one.rate - 0.3) + 1.0 / effort
-            scores.append({'error': float('nan') if one.number == 6 else error})
-        return networks, scores
-
-    def keep(self, ranked: Sequence[Candidate], count: int) -> list[Candidate]:
-        return list(ranked[:count])
+        self.seeds.append(seed)
+        self.trained += [(rung.effort, one.number) for one in group]
+        return [{'error': float('nan') if one.number == 6 else
+                 abs(one.rate - 0.3) + 1.0 / rung.effort} for one in group]
 
 
-def test_the_better_part_goes_on_with_its_weights(tmp_path: Path) -> None:
+def test_the_better_part_goes_on(tmp_path: Path) -> None:
     """Rate 0.3 is number 6, which diverges; 5 and 7 are next; 19, in use, is kept though worst."""
     toy = Toy()
-    done = successive_halving.run(toy, tmp_path / 'c', progress=False)
-    assert [len(scores) for scores in done.scores] == [20, 8, 3]
-    assert set(done.scores[1]) == {2, 3, 4, 5, 7, 8, 9, 19}
-    assert set(done.scores[2]) == {5, 7, 19}
-    assert float(done.networks[2][5][0][0][0, 0]) == 1 + 2 + 4
+    done = toy.run(tmp_path / 'c')
+    assert [len(scores) for scores in done] == [20, 8, 3]
+    assert set(done[1]) == {2, 3, 4, 5, 7, 8, 9, 19}
+    assert set(done[2]) == {5, 7, 19}
     assert len(set(toy.seeds)) == len(toy.seeds)  # no two groups see the same random numbers
     costs = [[toy.cost(one) for one in group] for group in
-             successive_halving.in_groups(toy.candidates(), toy, 4)]
+             toy.groups(toy.candidates(), 4)]
     flat = [cost for group in costs for cost in group]
     assert flat == sorted(flat) and max(map(len, costs)) == 4
 
@@ -81,28 +68,28 @@ def test_the_better_part_goes_on_with_its_weights(tmp_path: Path) -> None:
 def test_stopped_anywhere_it_ends_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
                                            stop_after: int) -> None:
     monkeypatch.setattr(successive_halving, 'SAVE_EVERY', 0.0)
-    whole = successive_halving.run(Toy(), tmp_path / 'whole', progress=False)
+    whole = Toy().run(tmp_path / 'whole')
     path = tmp_path / 'stopped'
     first = Toy(stop_after)
     with pytest.raises(KeyboardInterrupt):
-        successive_halving.run(first, path, progress=False)
+        first.run(path)
     second = Toy()
-    resumed = successive_halving.run(second, path, progress=False)
+    resumed = second.run(path)
     assert not set(first.trained) & set(second.trained)  # nothing is done twice
     assert len(first.trained) + len(second.trained) == 20 + 8 + 3
-    np.testing.assert_equal(resumed.scores, whole.scores)  # equal NaN included
-    np.testing.assert_equal(resumed.networks[2], whole.networks[2])
+    np.testing.assert_equal(resumed, whole)  # equal NaN included
 
 
 def test_checkpoint_of_another_search_is_refused(tmp_path: Path) -> None:
-    successive_halving.run(Toy(), tmp_path / 'c', progress=False)
+    Toy().run(tmp_path / 'c')
     other = Toy()
     other.seed = 6
     with pytest.raises(CheckpointError, match='with other options'):
-        successive_halving.run(other, tmp_path / 'c', progress=False)
-    (tmp_path / 'c').write_bytes(b'not a checkpoint')
-    with pytest.raises(CheckpointError, match='cannot be read, remove it'):
-        successive_halving.run(Toy(), tmp_path / 'c', progress=False)
+        other.run(tmp_path / 'c')
+    for damaged in (b'not a checkpoint', b'{"scores": [{"0": {}}]', b'\xff', b'[]'):
+        (tmp_path / 'c').write_bytes(damaged)
+        with pytest.raises(CheckpointError, match='cannot be read, remove it'):
+            Toy().run(tmp_path / 'c')
 
 
 def test_frontier() -> None:
@@ -124,7 +111,7 @@ def test_candidates_are_over_the_whole_range() -> None:
     """Hidden units 4 to 64 by fours, small ones more often; the first is what is in use."""
     found = search.MlpSearch(seed=1, count=2048, quick=False, device='cpu').candidates()
     assert len(found) == 2048
-    assert found[0].shipped and found[0].hidden == mlp_recipe.HIDDEN
+    assert found[0].shipped and found[0].hidden == (mlp_recipe.HIDDEN,)
     units = {units for one in found for units in one.hidden}
     assert units == set(range(4, 65, 4))
     assert len({one.rate for one in found}) == 2048

@@ -11,11 +11,13 @@ torch = pytest.importorskip('torch')
 
 from box_contact_ros.solver.weights_file import load_weights
 from box_contact_ros.training import train
+from box_contact_ros.training.ensemble import Ensemble, Scaling
 from box_contact_ros.training.paper_recipe import dataset
-from box_contact_ros.training.paper_recipe.errors import errors_of, figures, predict
-from box_contact_ros.training.paper_recipe.fit import Settings, fit, gradients, outputs_of, wrapped
+from box_contact_ros.training.paper_recipe.errors import errors_of, figures, predict, wrapped
+from box_contact_ros.training.paper_recipe.fit import PaperSettings, fit, tensors
+from box_contact_ros.training.paper_recipe.paper_jobs import JOBS, PaperJob
 
-SMALL = Settings((6, 9, 7, 4), networks=3, epochs=12, batch=50, rate=0.05)
+SMALL = PaperSettings((6, 9, 7, 4), networks=3, epochs=12, batch=50, rate=0.05)
 
 
 @pytest.fixture(scope='module')
@@ -27,96 +29,94 @@ def run(sets: dict[str, dataset.Patterns], **changes: object):
     return fit(sets['training'], sets['cross-validation'], dataclasses.replace(SMALL, **changes))
 
 
-def test_gradients_are_the_derivatives() -> None:
-    """Against automatic differentiation, in float64, with errors that wrap."""
-    generator = torch.Generator().manual_seed(0)
-    widths, networks, patterns = (6, 5, 4, 4), 3, 11
-
-    def draw(*shape: int) -> torch.Tensor:
-        return torch.randn(shape, generator=generator, dtype=torch.float64)
-
-    weights = [draw(networks, a, b).requires_grad_() for a, b in zip(widths, widths[1:])]
-    biases = [draw(networks, 1, b).requires_grad_() for b in widths[1:]]
-    x, y = draw(patterns, 6), 3.0 * draw(patterns, 4)
-    value = x.expand(networks, -1, -1)
-    for number, (weight, bias) in enumerate(zip(weights, biases)):
-        value = value @ weight + bias
-        value = value.tanh() if number < 2 else value
-    difference = value - y
-    assert (difference.abs() > np.pi).any()
-    loss = 0.5 * wrapped(difference).square().sum(dim=2).mean(dim=1).sum()
-    loss.backward()
-    with torch.no_grad():
-        activations = outputs_of(weights, biases, x)
-        by_weight, by_bias = gradients(weights, activations, wrapped(activations[-1] - y))
-    for found, parameter in zip(by_weight + by_bias, weights + biases):
-        torch.testing.assert_close(found, parameter.grad)
+def outputs_of(networks: Ensemble, patterns: dataset.Patterns, scaling: Scaling) -> torch.Tensor:
+    x, _ = tensors(patterns, scaling, 'cpu')
+    return networks(x)
 
 
 def test_one_step_is_the_papers_formula(sets: dict[str, dataset.Patterns]) -> None:
-    """Δw = −α ∂J/∂w + μ Δw of the step before: two epochs of one batch, by hand."""
+    """Δw = −α ∂J/∂w + μ Δw of the step before: two epochs of one batch, by differences of J.
+
+    J is half the mean over the patterns of the sum of the squared errors, wrapped.
+    """
     def fitted(**changes: object):
         # All patterns in one batch. The rate falls along a cosine, to half in the second of two.
         return fit(sets['training'], sets['training'], dataclasses.replace(
             SMALL, **{'epochs': 1, 'batch': 600, 'networks': 1, 'rate': 1e-3, **changes}))
 
     rest = fitted(rate=0.0)
-    start = rest.weights[1][0].numpy()
-    x = (sets['training'].inputs - rest.mean) / rest.deviation
-    layers = outputs_of(rest.weights, rest.biases, torch.tensor(x, dtype=torch.float32))
-    right = torch.tensor(sets['training'].outputs, dtype=torch.float32)
-    gradient = gradients(rest.weights, layers, wrapped(layers[-1] - right))[0][1][0].numpy()
-    first = fitted().weights[1][0].numpy() - start
-    assert np.abs(first).max() > 1e-5
-    np.testing.assert_allclose(first, -1e-3 * gradient, atol=1e-7)
-    with_momentum = fitted(epochs=2, momentum=0.9).weights[1][0].numpy()
-    without = fitted(epochs=2, momentum=0.0).weights[1][0].numpy()
-    np.testing.assert_allclose(with_momentum - without, 0.9 * first, atol=1e-6)
+    layers = [(weight.astype(np.float64), bias) for weight, bias in rest.networks.layers(0)]
+    x = (sets['training'].inputs - rest.scaling.mean) / rest.scaling.deviation
+
+    def loss(change: float) -> float:
+        value = x
+        for number, (weight, bias) in enumerate(layers):
+            moved = weight.copy()
+            if number == 1:
+                moved[2, 3] += change
+            value = value @ moved.T + bias
+            value = np.tanh(value) if number < 2 else value
+        return 0.5 * (wrapped(value - sets['training'].outputs)**2).sum(axis=1).mean()
+
+    def weight(**changes: object) -> float:
+        return fitted(**changes).networks.layers(0)[1][0][2, 3]
+
+    gradient = (loss(1e-4) - loss(-1e-4)) / 2e-4
+    first = weight() - layers[1][0][2, 3]
+    assert abs(first) > 1e-6
+    assert first == pytest.approx(-1e-3 * gradient, rel=1e-2)
+    with_momentum, without = (weight(epochs=2, momentum=momentum) for momentum in (0.9, 0.0))
+    assert with_momentum - without == pytest.approx(0.9 * first, rel=1e-2)
 
 
 def test_networks_of_a_batch_have_their_own_settings(sets: dict[str, dataset.Patterns]) -> None:
     """Learning rate, momentum and initial range per network; a network at rest stays at rest."""
     together = run(sets, rate=[0.0, 0.05, 0.05], momentum=[0.9, 0.0, 0.9], initial=[1.0, 1.0, 0.0])
-    assert np.ptp(together.history[:, 0]) == 0.0
-    assert np.ptp(together.history[:, 1]) > 0.01
+    history = torch.stack(together.history).numpy()
+    assert np.ptp(history[:, 0]) == 0.0
+    assert np.ptp(history[:, 1]) > 0.01
     # Without any asymmetry to start from, hidden units cannot come apart: only biases learn.
-    assert float(together.weights[0][2].abs().max()) == 0.0
+    assert not together.networks.layers(2)[0][0].any()
     alone = run(sets, rate=0.05, momentum=[0.5, 0.0, 0.1])
-    np.testing.assert_allclose(alone.history[:, 1], together.history[:, 1], rtol=1e-5)
+    np.testing.assert_allclose(torch.stack(alone.history)[:, 1].numpy(), history[:, 1], rtol=1e-5)
+
+
+def test_smaller_networks_in_a_batch_stay_small(sets: dict[str, dataset.Patterns]) -> None:
+    """Units that a network does not have learn nothing."""
+    fitted = run(sets, hidden=[(9, 7), (4, 3), (9, 7)])
+    (first, _), (second, bias), (last, _) = fitted.networks.layers(1)
+    assert first[:4].all() and not first[4:].any()
+    assert not second[3:].any() and not second[:, 4:].any() and not bias[3:].any()
+    assert last[:, :3].all() and not last[:, 3:].any()
 
 
 def test_same_seed_same_weights(sets: dict[str, dataset.Patterns]) -> None:
     first, again, other = run(sets), run(sets), run(sets, seed=1)
-    for a, b, c in zip(first.weights, again.weights, other.weights):
-        assert torch.equal(a, b)
-        assert not torch.equal(a, c)
+    for (a, _), (b, _), (c, _) in zip(*(one.networks.layers(2) for one in (first, again, other))):
+        np.testing.assert_array_equal(a, b)
+        assert not np.array_equal(a, c)
 
 
 def test_best_weights_by_cross_validation_are_kept(sets: dict[str, dataset.Patterns]) -> None:
     """Of the epoch with the least error, also where training goes on to diverge."""
     fitted = run(sets, rate=[0.05, 0.8, 1e3], epochs=60)
-    assert np.all(fitted.error == np.nanmin(fitted.history, axis=0))
-    assert not fitted.history[-1, 2] <= fitted.error[2] or fitted.epoch[2] == 60
-    x = (sets['cross-validation'].inputs - fitted.mean) / fitted.deviation
-    said = outputs_of(fitted.weights, fitted.biases, torch.tensor(x, dtype=torch.float32))[-1]
-    right = torch.tensor(sets['cross-validation'].outputs, dtype=torch.float32)
-    error = wrapped(said - right).square().mean(dim=(1, 2)).sqrt().numpy()
-    np.testing.assert_allclose(error[:2], fitted.error[:2], rtol=1e-5)
+    history = torch.stack(fitted.history).numpy()
+    np.testing.assert_array_equal(fitted.error, np.nanmin(history, axis=0))
+    assert not history[-1, 2] <= fitted.error[2] or fitted.epoch[2] == 60
+    np.testing.assert_allclose(fitted.errors(sets['cross-validation'])[:2], fitted.error[:2],
+                               rtol=1e-5)
 
 
 def test_normalisation_is_folded_into_the_first_layer(sets: dict[str, dataset.Patterns],
                                                       tmp_path: Path) -> None:
     """The exported network takes metres and radians and says what the trained one says."""
     fitted = run(sets)
-    best = int(np.argmin(fitted.error))
-    x = (sets['external'].inputs - fitted.mean) / fitted.deviation
-    want = outputs_of(fitted.weights, fitted.biases,
-                      torch.tensor(x, dtype=torch.float32))[-1][best].numpy()
+    want = outputs_of(fitted.networks, sets['external'], fitted.scaling)[fitted.error.argmin()]
     value = sets['external'].inputs
     for number, (weight, bias) in enumerate(fitted.export()):
         value = value @ weight.T + bias
         value = np.tanh(value) if number < 2 else value
-    np.testing.assert_allclose(value, want, atol=1e-5)
+    np.testing.assert_allclose(value, want.detach(), atol=1e-5)
 
 
 @pytest.fixture(scope='module')
@@ -126,8 +126,8 @@ def quick(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.parametrize('job', train.JOBS.values(), ids=lambda job: job.name)
-def test_quick_training(quick: Path, job: train.Job) -> None:
+@pytest.mark.parametrize('job', JOBS.values(), ids=lambda job: job.name)
+def test_quick_training(quick: Path, job: PaperJob) -> None:
     """A file that loads, with a card whose metrics are true, better than the mean as an answer."""
     weights = load_weights(quick / f'{job.name}.safetensors')
     card = weights.card

@@ -21,8 +21,10 @@ from box_contact_ros.solver.weights_file import (
     save_weights,
     unpacked,
 )
-from box_contact_ros.training import mlp_fit, mlp_recipe, samples, scene_sizes, train
-from box_contact_ros.training.samples import MlpSamples
+from box_contact_ros.training import mlp_fit, mlp_recipe, samples, train
+from box_contact_ros.training.ensemble import Ensemble, Scaling, drawn
+from box_contact_ros.training.mlp_fit import SiteNetwork, fit, loss_of, random_batches
+from box_contact_ros.training.samples import MlpSamples, scene_sizes
 
 SCENE = """\
 boxes:
@@ -40,7 +42,7 @@ CONTAINER, SPREADER = (12.192, 2.591, 2.438), (12.192, 2.438, 0.8)
 
 
 def error_of(pairs: Pairs, weights: Path) -> float:
-    return float(mlp_recipe.point_errors(pairs, weights).mean())
+    return float(mlp_recipe.solver_errors(pairs, weights).mean())
 
 
 @pytest.fixture(scope='module')
@@ -48,95 +50,154 @@ def data() -> MlpSamples:
     return samples.draw_samples(samples.mixture, [5], 6000)
 
 
+@pytest.fixture(scope='module')
+def scaling(data: MlpSamples) -> Scaling:
+    return Scaling.of(data.features.swapaxes(1, 2))
+
+
+def network_of(units: int, seed: int = 0, hidden: tuple[int, ...] = ()) -> SiteNetwork:
+    return drawn(SiteNetwork(units), torch.Generator().manual_seed(seed), hidden=hidden)
+
+
+def trained(network, data: MlpSamples, scaling: Scaling, steps: int, rate: float = 3e-3,
+            size: int = 512) -> float:
+    """Train, always on the same batches; return the last loss."""
+    batches = random_batches(data, scaling, np.random.default_rng(1), size=size, count=steps)
+    return [loss.sum().item() for loss in fit(network, batches, steps=steps, rate=rate)][-1]
+
+
 # --- the fit --------------------------------------------------------------------------------------
 
 
-def test_gradients_are_the_derivatives(data: MlpSamples) -> None:
-    """One step of Adam's first moment is a tenth of the gradient: against autograd of the loss.
-
-    To the rounding of float32.
-    """
-    fit = mlp_fit.Fit(data, mlp_fit.Settings(hidden=[(6, 5)], steps=10, batch=len(data)))
-    before = [p.clone().requires_grad_() for p in fit.parameters]
-    value = fit.inputs.clone()
-    for layer in range(3):
-        value = value @ before[layer][0] + before[3 + layer][0, 0]
-        value = torch.nn.functional.relu(value) if layer < 2 else value
-    answer = torch.stack([(value[:, q::3] * fit.vectors[:, q::3]).sum(dim=(1, 2))
-                          for q in range(3)], dim=1)  # sites are 3 f + q
-    error = answer - fit.offsets
-    squared = (error.square() * fit.squared_scale).sum(dim=-1)
-    loss = (error.square().mean() + mlp_fit.POINT_WEIGHT * squared.mean()
-            + mlp_fit.TAIL_WEIGHT * squared.square().mean())
-    loss.backward()
-    assert fit.run(1)[0] == pytest.approx(loss.item(), rel=1e-4)
-    for moment, parameter in zip(fit._first, before):
-        largest = float(parameter.grad.abs().max())
-        torch.testing.assert_close(10.0 * moment, parameter.grad, rtol=1e-3, atol=1e-3 * largest)
+def test_loss_is_the_formula(data: MlpSamples, scaling: Scaling) -> None:
+    """All three terms of `loss_of`, by loops in float64, for a network as it starts."""
+    network = network_of(6)
+    (first, bias), (last, last_bias) = scaling.folded(network.layers())
+    some = data.part(slice(0, 50))
+    terms = np.zeros(3)
+    for k in range(50):
+        answer = np.zeros(3)
+        for site in range(9):
+            hidden = np.maximum(first @ some.features[site, :, k] + bias, 0.0)
+            answer[site % 3] += (last @ hidden + last_bias) @ some.vectors[site, :, k]
+        error = answer - some.offsets[:, k]
+        squared = ((error * some.scale[:, k])**2).sum()
+        terms += (error**2).mean() / 50, squared / 50, squared**2 / 50
+    batch = mlp_fit.tensors(some, scaling)
+    found = loss_of(network(batch.features, batch.vectors), batch).item()
+    assert found == pytest.approx(terms @ [1.0, mlp_fit.POINT_WEIGHT, mlp_fit.TAIL_WEIGHT],
+                                  rel=1e-4)
 
 
 def test_the_network_is_the_cores() -> None:
     """What is trained beside core/mlp.hpp, with hidden units on both sides of zero."""
     pairs = size_pairs(np.random.default_rng(6), 1000)
-    widths = (12, 8, 3)
-    layers = mlp_fit.drawn(np.random.default_rng(1), widths)
-    network = Network('point', widths, np.concatenate([part.ravel() for layer in layers
-                                                       for part in layer]))
+    module = network_of(8)
+    network = Network('point', (12, 8, 3), np.concatenate([part.ravel() for layer in module.layers()
+                                                           for part in layer]))
     core = stages(*pairs, names=('features', 'vectors', 'answer'), network=core_numbers(network))
-    (first, bias), (last, last_bias) = (map(torch.tensor, layer) for layer in layers)
-    sums = torch.tensor(core.features).reshape(-1, 12) @ first.T + bias
-    assert 0.2 < float((sums > 0.0).float().mean()) < 0.8
-    outputs = (mlp_fit.relu(sums) @ last.T + last_bias)[None]
-    found = mlp_fit.Fit.answers(outputs, torch.tensor(core.vectors))[0].numpy()
-    np.testing.assert_allclose(found, core.answer, atol=1e-6)
+    features, vectors = (torch.tensor(part).movedim(0, -1) for part in (core.features,
+                                                                        core.vectors))
+    with torch.no_grad():
+        active = (mlp_fit.at_sites(module.hidden, features) > 0.0).float().mean()
+        assert 0.2 < float(active) < 0.8
+        np.testing.assert_allclose(module(features, vectors).T, core.answer, atol=1e-6)
 
 
-def test_a_narrow_network_beside_a_wide_one_is_the_narrow_one(data: MlpSamples) -> None:
-    """Units that only fill up the matrices stay at zero: trained alone, the network is the same."""
-    start = [mlp_fit.drawn(np.random.default_rng(k), (12, *hidden, 3))
-             for k, hidden in enumerate([(8, 4), (12, 16)])]
-    common = {'steps': 30, 'batch': 512, 'rate': 3e-3}
-    alone = mlp_fit.Fit(data, mlp_fit.Settings(hidden=[(8, 4)], **common), start=start[:1])
-    both = mlp_fit.Fit(data, mlp_fit.Settings(hidden=[(8, 4), (12, 16)], **common), start=start)
-    alone.run(30)
-    both.run(30)
-    assert both.parameters[1].shape[1:] == (12, 16)
-    assert float(both.parameters[1][0, 8:].abs().max()) == 0.0
-    assert float(both.parameters[1][0, :, 4:].abs().max()) == 0.0
-    for one, other in zip(alone.networks()[0], both.networks()[0]):
-        for a, b in zip(one, other):
-            np.testing.assert_allclose(a, b, atol=2e-5)
-    np.testing.assert_allclose(alone.point_errors(data)[0], both.point_errors(data)[0], atol=1e-5)
+def test_adam_steps_fall_along_a_cosine(data: MlpSamples, scaling: Scaling) -> None:
+    """The first step moves each weight by the rate; the last of many moves it hardly."""
+    network = network_of(6)
+    before = [p.detach().clone() for p in network.parameters()]
+    batches = random_batches(data, scaling, np.random.default_rng(1), size=512, count=40)
+    moved = []
+    for _ in fit(network, batches, steps=40, rate=1e-3):
+        moved.append(max(float((p - q).detach().abs().max())
+                         for p, q in zip(network.parameters(), before)))
+        before = [p.detach().clone() for p in network.parameters()]
+    assert moved[0] == pytest.approx(1e-3, rel=1e-3)
+    assert max(moved[-2:]) < 2e-5
 
 
-def test_normalisation_is_folded_in_and_out(data: MlpSamples) -> None:
+def test_networks_of_an_ensemble_learn_as_if_alone(data: MlpSamples, scaling: Scaling) -> None:
+    """Each with a learning rate of its own."""
+    rates = (3e-3, 3e-2)
+    ensemble = Ensemble([network_of(8, seed) for seed in range(2)], units=rates)
+    trained(ensemble, data, scaling, 30, rate=1.0)
+    for number, rate in enumerate(rates):
+        alone = network_of(8, number)
+        trained(alone, data, scaling, 30, rate)
+        for one, other in zip(alone.layers(), ensemble.layers(number)):
+            for a, b in zip(one, other):
+                np.testing.assert_allclose(a, b, atol=0.1 * rate)  # of 30 steps
+    both = mlp_fit.point_errors(ensemble, data, scaling)
+    assert both.shape == (2, len(data))
+    np.testing.assert_allclose(both[1], mlp_fit.point_errors(alone, data, scaling), atol=1e-4)
+
+
+def test_units_that_are_not_drawn_stay_away(data: MlpSamples, scaling: Scaling) -> None:
+    """A network of four units in a wider one is a network of four units."""
+    wide, narrow = network_of(12, hidden=(4,)), network_of(4)
+    narrow.load([(wide.layers()[0][0][:4].copy(), wide.layers()[0][1][:4].copy()),
+                 (wide.layers()[1][0][:, :4].copy(), wide.layers()[1][1].copy())])
+    assert trained(wide, data, scaling, 30) == pytest.approx(trained(narrow, data, scaling, 30),
+                                                             rel=1e-3)
+    (first, bias), (last, _) = wide.layers()
+    assert not first[4:].any() and not bias[4:].any() and not last[:, 4:].any()
+    assert first[:4].all() and last[:, :4].all()
+
+
+def test_normalisation_is_folded_in_and_out(data: MlpSamples, scaling: Scaling) -> None:
     """`folded` serves raw inputs, and `unfolded` undoes it."""
-    mean, deviation = mlp_fit.normalisation(data.features)
-    layers = mlp_fit.drawn(np.random.default_rng(0), (12, 8, 8, 3))
-    weight, bias = mlp_fit.folded(layers, mean, deviation)[0]
-    np.testing.assert_allclose(data.features @ weight.T + bias,
-                               (data.features - mean) / deviation @ layers[0][0].T + layers[0][1],
-                               atol=1e-3)
-    again = mlp_fit.unfolded(mlp_fit.folded(layers, mean, deviation), mean, deviation)
-    for one, other in zip(layers, again):
+    layers = network_of(8).layers()
+    weight, bias = scaling.folded(layers)[0]
+    features = data.features.swapaxes(1, 2)
+    normalised = (features - scaling.mean) / scaling.deviation
+    np.testing.assert_allclose(features @ weight.T + bias,
+                               normalised @ layers[0][0].T + layers[0][1], atol=1e-3)
+    for one, other in zip(layers, scaling.unfolded(scaling.folded(layers))):
         for a, b in zip(one, other):
             np.testing.assert_allclose(a, b, rtol=1e-5, atol=1e-5)
 
 
-def test_errors_while_training_are_the_solvers(data: MlpSamples, tmp_path: Path) -> None:
-    """`Fit.point_errors` beside the written file behind `ContactSolver`."""
-    fit = mlp_fit.Fit(data, mlp_fit.Settings(hidden=[(8,)], steps=200, batch=1024))
-    fit.run(200)
+def test_hard_rounds_bring_what_the_network_errs_in(data: MlpSamples, scaling: Scaling) -> None:
+    """Four rounds, each after its part of the steps; a fifth of the samples are hard ones."""
+    network = network_of(4)
+    asked = []
+
+    def make(rng: np.random.Generator, n: int) -> Pairs:
+        asked.append(taken)
+        return samples.mixture(rng, n)
+
+    recipe = mlp_recipe.MlpRecipe(pairs=6000, steps=40, batch=8, rate=1e-3, pool=3000)
+    taken = 0
+    for taken, batch in enumerate(mlp_recipe.harder_batches(  # noqa: B007 (the closure reads it)
+            network, data, scaling, recipe, make, 0), start=1):
+        assert len(batch) == 8
+    assert taken == 40
+    assert asked == [16, 22, 28, 34]
+    errors = mlp_fit.point_errors(network, data, scaling)
+    hard = mlp_fit.point_errors(network, mlp_recipe.hardest(network, data, scaling), scaling)
+    assert len(hard) == round(0.01 * len(data))
+    np.testing.assert_allclose(np.sort(hard), np.sort(errors)[-len(hard):], rtol=1e-5)
+
+
+def test_errors_while_training_are_the_solvers(data: MlpSamples, scaling: Scaling,
+                                               tmp_path: Path) -> None:
+    """`point_errors` beside the written file behind `ContactSolver`."""
+    network = network_of(8)
+    trained(network, data, scaling, 200, size=1024)
     path = tmp_path / 'mlp.safetensors'
-    card = mlp_recipe._card(path, (8,), 0, 'none', [], fit, {})
-    save_weights(path, {'point': fit.export(0)}, card)
+    recipe = mlp_recipe.MlpRecipe(pairs=6000, steps=200, rate=3e-3, pool=0)
+    card = mlp_recipe.model_card(path, network, recipe, {})
+    save_weights(path, {'point': scaling.folded(network.layers())},
+                 {**card, 'seed': 0, 'commit': 'none', 'sizes': []})
     pairs = size_pairs(np.random.default_rng(3), 500)
-    trained = fit.point_errors(samples.describe(pairs))[0]
-    solved = mlp_recipe.point_errors(pairs, path)
+    said = mlp_fit.point_errors(network, samples.describe(pairs), scaling)
+    solved = mlp_recipe.solver_errors(pairs, path)
     # The solver also moves answers into the other box, which seldom harms.
-    assert np.mean(np.abs(trained - solved) < 1e-4) > 0.3
-    assert np.mean(solved <= trained + 1e-4) > 0.95
-    assert solved.mean() <= trained.mean() * (1.0 + 1e-5)  # float32
+    assert np.mean(np.abs(said - solved) < 1e-4) > 0.3
+    assert np.mean(solved <= said + 1e-4) > 0.95
+    assert solved.mean() <= said.mean() * (1.0 + 1e-5)  # float32
 
 
 @pytest.mark.parametrize('count', [1, 63, 65, 129])
@@ -147,18 +208,7 @@ def test_description_does_not_depend_on_the_block(count: int) -> None:
     part = samples.describe(Pairs(*(column[:count] for column in pairs)))
     for field in dataclasses.fields(MlpSamples):
         np.testing.assert_array_equal(getattr(part, field.name),
-                                      getattr(whole, field.name)[:count])
-
-
-def test_hard_contacts_are_those_with_the_largest_errors(data: MlpSamples) -> None:
-    fit = mlp_fit.Fit(data, mlp_fit.Settings(hidden=[(8,)], steps=1, batch=1024))
-    hard = mlp_recipe._hardest(fit, data, 0.02)
-    errors = fit.point_errors(data)[0]
-    assert len(hard) == round(0.02 * len(data))
-    assert fit.point_errors(hard)[0].min() >= np.sort(errors)[-len(hard)] - 1e-6
-    fit.feed(MlpSamples.joined([data, hard]))
-    assert len(fit.inputs) == len(data) + len(hard)
-    np.testing.assert_allclose(fit.point_errors(data)[0], errors, atol=1e-6)
+                                      getattr(whole, field.name)[..., :count])
 
 
 # --- the program ----------------------------------------------------------------------------------
@@ -175,7 +225,7 @@ def test_quick_training(quick: Path, tmp_path: Path) -> None:
     """Its error is a fraction of the middle's, which a network of zeros answers with."""
     card = load_weights(quick).card
     assert (card['seed'], card['model'], card['sizes']) == (3, 'mlp', [])
-    assert card['architecture'] == [12, *mlp_recipe.HIDDEN, 3]
+    assert card['architecture'] == [12, mlp_recipe.HIDDEN, 3]
     pairs = cubes(np.random.default_rng(8), 2000)
     nothing = tmp_path / 'nothing.safetensors'
     save_weights(nothing, {'point': [(np.zeros((b, a)), np.zeros(b)) for a, b in (
@@ -226,7 +276,7 @@ def test_refused_arguments(arguments: list[str], message: str, tmp_path: Path,
     (containers, 0.6, 3.5, 8.0)])
 def test_shipped_weights_keep_their_limits(make, mean: float, p99: float, worst: float) -> None:
     """In % of the smaller box's longest edge, on poses of another seed than the card's."""
-    errors = 100.0 * mlp_recipe.point_errors(make(np.random.default_rng(77), 10_000), None)
+    errors = 100.0 * mlp_recipe.solver_errors(make(np.random.default_rng(77), 10_000), None)
     assert errors.mean() < mean
     assert np.quantile(errors, 0.99) < p99
     assert errors.max() < worst
@@ -245,14 +295,14 @@ def test_the_example_in_the_docs(tmp_path: Path) -> None:
     """docs/training.md: three pairs of sizes, all within the range."""
     page = (Path(__file__).parents[2] / 'docs' / 'training.md').read_text('utf-8')
     text = re.search(r'^```yaml\n(.*?)^```$', page, re.MULTILINE | re.DOTALL).group(1)
-    sizes = scene_sizes.size_pairs(write(tmp_path, text))
+    sizes = scene_sizes(write(tmp_path, text))
     assert len(sizes) == 3 and all(map(mlp_recipe.in_range, sizes))
 
 
 def test_distinct_pairs_of_sizes(tmp_path: Path) -> None:
     """Swapped boxes and other names for the axes are the same; boxes in no pair do not count."""
     path = write(tmp_path, SCENE + '# end\n')
-    assert scene_sizes.size_pairs(path) == [(CONTAINER, CONTAINER), (CONTAINER, SPREADER)]
+    assert scene_sizes(path) == [(CONTAINER, CONTAINER), (CONTAINER, SPREADER)]
 
 
 @pytest.mark.parametrize(('before', 'after', 'message'), [

@@ -1,36 +1,35 @@
 """Successive halving: train thousands of networks a little, keep the best, train those longer.
 
-All candidates start in the first rung. After every rung the better part goes on, with the weights
-that it has, to a rung of more effort (Jamieson and Talwalkar 2016); in each rung the learning rate
-falls to zero, so that what is compared are finished trainings. Candidates are trained in groups of
-like cost, each group one batch of matrices.
+All candidates are in the first rung. After every rung the better part goes on to a rung of more
+effort (Jamieson and Talwalkar 2016). In each rung a network starts anew and its learning rate falls
+to zero, so finished trainings are compared. Candidates of like cost are trained as a group.
 
-The state is in one checkpoint file (`safetensors`: networks, and a JSON text with the errors), and
-holds no random numbers: candidates, weights to start from and the order of the data each have a
-stream of their own, given by the seed, the rung and the candidate or group. So a search that was
-stopped ends as if it had not been.
+The checkpoint is a JSON file with the scores so far. It holds no random numbers: every group has a
+stream of its own, given by seed, rung and group. So a search that was stopped ends as if it had
+not been.
 """
 from __future__ import annotations
 
 import json
+import math
 import os
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
-from safetensors import SafetensorError, safe_open
-from safetensors.numpy import save
-
-from ..mlp_fit import Layers
+from tqdm import tqdm
 
 SAVE_EVERY = 10.0
 """Least time between two checkpoints [s]."""
 
 Scores = dict[str, float]
 """What is known of a network after a rung; 'error' is what candidates are ranked by."""
+Rungs = list[dict[int, Scores]]
+"""For each rung, the scores by the candidates' numbers."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +42,7 @@ class Candidate:
     momentum: float = 0.0
     initial: float = 1.0
     shipped: bool = False
-    """The settings in use: it goes on to the end, to be compared with."""
+    """The settings in use: they go on to the end, to be compared with."""
 
 
 @dataclass(frozen=True)
@@ -58,138 +57,94 @@ class Rung:
     """Candidates that are trained at once."""
 
 
-class Search(Protocol):
+class CheckpointError(ValueError):
+    """A checkpoint that belongs to another search, or cannot be read."""
+
+
+class Search(ABC):
     """What is searched for."""
 
     name: str
     seed: int
     rungs: Sequence[Rung]
 
+    @abstractmethod
     def candidates(self) -> list[Candidate]:
-        """All of the first rung."""
+        """Return all of the first rung."""
 
+    @abstractmethod
     def cost(self, candidate: Candidate) -> int:
-        """Multiply-adds of its network."""
+        """Return the multiply-adds of a candidate's network."""
 
-    def start(self, candidate: Candidate) -> Layers:
-        """Its network before training."""
-
-    def train(self, number: int, group: Sequence[Candidate], start: Sequence[Layers],
-              seed: Sequence[int]) -> tuple[list[Layers], list[Scores]]:
-        """Train a group in rung `number`."""
+    @abstractmethod
+    def train(self, rung: Rung, group: Sequence[Candidate], seed: int) -> list[Scores]:
+        """Train a group."""
 
     def keep(self, ranked: Sequence[Candidate], count: int) -> list[Candidate]:
-        """Those that go on, of candidates in the order of their errors."""
+        """Return those that go on, of candidates in the order of their errors."""
+        return list(ranked[:count])
 
+    def groups(self, candidates: Sequence[Candidate], size: int) -> list[list[Candidate]]:
+        """Return groups of like cost, so that little is padded."""
+        ordered = sorted(candidates, key=lambda one: (self.cost(one), one.number))
+        return [ordered[k:k + size] for k in range(0, len(ordered), size)]
 
-class CheckpointError(ValueError):
-    """A checkpoint that belongs to another search, or cannot be read."""
-
-
-@dataclass
-class Progress:
-    """What has been done so far."""
-
-    scores: list[dict[int, Scores]]
-    """Per rung, by candidate."""
-    networks: list[dict[int, Layers]]
-    """Per rung, by candidate; of the rungs before the last but one, none."""
-
-
-def in_groups(candidates: Sequence[Candidate], search: Search, size: int) -> list[list[Candidate]]:
-    """Candidates of like cost together, so that little is padded."""
-    ordered = sorted(candidates, key=lambda one: (search.cost(one), one.number))
-    return [list(ordered[k:k + size]) for k in range(0, len(ordered), size)]
-
-
-def run(search: Search, checkpoint: Path, *, progress: bool = True) -> Progress:
-    """Go through all rungs, from where the checkpoint stands; the caller is to remove it."""
-    from tqdm import tqdm
-
-    done = _read(checkpoint, search) or Progress([{}], [{}])
-    saved = time.monotonic()
-    alive = search.candidates()
-    work = sum(rung.candidates * rung.effort * rung.batch for rung in search.rungs)
-    with tqdm(total=work, desc=search.name, mininterval=1.0, disable=not progress,
-              bar_format='{desc}: {percentage:3.0f}%|{bar}| {elapsed}<{remaining}{postfix}') as bar:
-        for number, rung in enumerate(search.rungs):
-            if number == len(done.scores):
-                done.scores.append({})
-                done.networks.append({})
-                done.networks[:-2] = [{}] * (number - 1)
-            for place, group in enumerate(in_groups(alive, search, rung.group)):
-                step = len(group) * rung.effort * rung.batch
-                bar.set_postfix(rung=f'{number + 1}/{len(search.rungs)}', refresh=False)
-                if group[0].number in done.scores[number]:
-                    bar.update(step)
-                    if progress:  # what was done before tells nothing of the speed
-                        bar.initial += step
+    def run(self, checkpoint: Path) -> Rungs:
+        """Go through all rungs, from where the checkpoint stands; the caller removes it."""
+        done = self._read(checkpoint)
+        alive = self.candidates()
+        saved = time.monotonic()
+        for number, rung in enumerate(self.rungs):
+            if number == len(done):
+                done.append({})
+            for place, group in enumerate(tqdm(
+                    self.groups(alive, rung.group), mininterval=1.0, unit='group',
+                    desc=f'{self.name}, rung {number + 1} of {len(self.rungs)}')):
+                if group[0].number in done[number]:
                     continue
-                before = ([search.start(one) for one in group] if number == 0 else
-                          [done.networks[number - 1][one.number] for one in group])
-                networks, scores = search.train(number, group, before,
-                                                [search.seed, number, place])
-                for one, network, score in zip(group, networks, scores):
-                    done.networks[number][one.number] = network
-                    done.scores[number][one.number] = score
-                bar.update(step)
+                seed = np.random.SeedSequence([self.seed, number, place]).generate_state(1)[0]
+                scores = self.train(rung, group, int(seed))
+                done[number] |= {one.number: score for one, score in zip(group, scores)}
                 if time.monotonic() - saved > SAVE_EVERY:
-                    _write(checkpoint, search, done)
+                    self._write(checkpoint, done)
                     saved = time.monotonic()
-            ranked = ranking(alive, done.scores[number])
-            if number + 1 < len(search.rungs):
-                count = search.rungs[number + 1].candidates
-                shipped = [one for one in ranked if one.shipped]
-                others = [one for one in ranked if not one.shipped]
-                alive = shipped + search.keep(others, count - len(shipped))
-    _write(checkpoint, search, done)
-    return done
+            if number + 1 < len(self.rungs):
+                shipped = [one for one in alive if one.shipped]
+                others = ranking([one for one in alive if not one.shipped], done[number])
+                alive = shipped + self.keep(others,
+                                            self.rungs[number + 1].candidates - len(shipped))
+        self._write(checkpoint, done)
+        return done
+
+    def _key(self) -> dict[str, Any]:
+        return {'search': self.name, 'seed': self.seed,
+                'rungs': [asdict(rung) for rung in self.rungs]}
+
+    def _write(self, path: Path, done: Rungs) -> None:
+        # Not over the old one: whoever is killed while writing keeps that.
+        beside = path.with_name(path.name + '.new')
+        beside.write_text(json.dumps({'key': self._key(), 'scores': done}), 'utf-8')
+        os.replace(beside, path)
+
+    def _read(self, path: Path) -> Rungs:
+        if not path.exists():
+            return []
+        try:
+            state = json.loads(path.read_text('utf-8'))
+            key, scores = state['key'], [{int(number): score for number, score in rung.items()}
+                                         for rung in state['scores']]
+        except (OSError, ValueError, LookupError, TypeError, AttributeError) as error:
+            raise CheckpointError(f'{path} cannot be read, remove it: {error}') from error
+        if key != self._key():
+            raise CheckpointError(f'{path} is of a search with other options: remove it, or give '
+                                  f'the same ones')
+        return scores
 
 
 def ranking(candidates: Sequence[Candidate], scores: Mapping[int, Scores]) -> list[Candidate]:
-    """In the order of their errors; networks that diverged come last."""
-    return sorted(candidates, key=lambda one: (not np.isfinite(scores[one.number]['error']),
-                                               scores[one.number]['error'], one.number))
+    """Return candidates in the order of their errors; networks that diverged come last."""
+    def order(one: Candidate) -> tuple[bool, float, int]:
+        error = scores[one.number]['error']
+        return not math.isfinite(error), error, one.number
 
-
-def _key(search: Search) -> dict[str, Any]:
-    return json.loads(json.dumps({
-        'search': search.name, 'seed': search.seed,
-        'rungs': [asdict(rung) for rung in search.rungs]}))
-
-
-def _write(path: Path, search: Search, done: Progress) -> None:
-    tensors = {f'{rung}.{number}.{layer}.{what}': array
-               for rung, networks in enumerate(done.networks)
-               for number, network in networks.items()
-               for layer, pair in enumerate(network)
-               for what, array in zip(('weight', 'bias'), pair)}
-    text = json.dumps({'key': _key(search), 'scores': done.scores})
-    # Not over the old one: whoever is killed while writing keeps that.
-    beside = path.with_name(path.name + '.new')
-    beside.write_bytes(save(tensors, metadata={'search': text}))
-    os.replace(beside, path)
-
-
-def _read(path: Path, search: Search) -> Progress | None:
-    if not path.exists():
-        return None
-    try:
-        with safe_open(path, framework='numpy') as file:
-            state = json.loads((file.metadata() or {})['search'])
-            found = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
-        if state['key'] != _key(search):
-            raise CheckpointError(f'{path} is of a search with other options: remove it, or '
-                                  f'give the same ones')
-    except (SafetensorError, OSError, KeyError, TypeError, json.JSONDecodeError) as error:
-        raise CheckpointError(f'{path} cannot be read, remove it: {error}') from error
-    scores = [{int(number): score for number, score in rung.items()} for rung in state['scores']]
-    networks: list[dict[int, Layers]] = [{} for _ in scores]
-    for name, array in found.items():
-        rung, number, layer, what = name.split('.')
-        layers = networks[int(rung)].setdefault(int(number), [])
-        while len(layers) <= int(layer):
-            layers.append((np.empty(0), np.empty(0)))
-        weight, bias = layers[int(layer)]
-        layers[int(layer)] = (array, bias) if what == 'weight' else (weight, array)
-    return Progress(scores, networks)
+    return sorted(candidates, key=order)

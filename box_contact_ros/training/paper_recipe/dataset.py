@@ -163,8 +163,8 @@ def _placed(rng: np.random.Generator, half: np.ndarray, point: np.ndarray, on_b:
     angles = rng.uniform(-0.5 * np.pi, 0.5 * np.pi, (len(point), 3))
     quaternion = quaternion_from_euler(angles)
     offset = point - np.einsum('nij,nj->ni', rotation_matrix(quaternion), on_b)
-    size = tuple(float(extent) for extent in 2.0 * half)
-    return Placements(size, np.concatenate([offset, quaternion], axis=1), point, normal)
+    x, y, z = (2.0 * half).tolist()
+    return Placements((x, y, z), np.concatenate([offset, quaternion], axis=1), point, normal)
 
 
 GENERATORS = (vertex_face_candidates, edge_edge_candidates)
@@ -225,14 +225,9 @@ class Folded:
 
 def fold(placements: Placements, how: int) -> Folded:
     """Bring placements into a network's domain by NO_FOLD, OCTANT or FEATURES."""
+    if how == FEATURES and len(set(placements.size)) != 1:
+        raise ValueError(f'features are folded for cubes, not for {placements.size}')
     sat = query(placements)
-    if how == FEATURES:
-        if len(set(placements.size)) != 1:
-            raise ValueError(f'features are folded for cubes, not for {placements.size}')
-        # A vertex of the first box on a face of the second: the two would have to change places.
-        # The second box's trihedron is the one whose vertices are placed, so it never happens.
-        if np.any((sat.axis >= 3) & (sat.axis < 6)):
-            raise ValueError('a face of the second box won')
     folds = fold_pairs(how, sat.offset_a, sat.rotation, axis=sat.axis, normal=sat.normal)
     point, normal = placements.point, placements.normal
     # Without a fold, zeros keep the signs that tell the azimuths π and −π apart.
@@ -256,37 +251,32 @@ def spherical(direction: np.ndarray) -> np.ndarray:
 # --- the sets -------------------------------------------------------------------------------------
 
 
-def _streams(seed: int, counts: Sequence[int], sets: Sequence[str], progress: bool,
+def _streams(seed: int, counts: Sequence[int], sets: Sequence[str],
              ) -> Iterator[tuple[str, int, np.random.Generator]]:
-    """Name, number of patterns and random stream of the sets asked for."""
-    wanted = [name for name in SETS if name in sets]
-    if progress:
-        from tqdm import tqdm
-        wanted = tqdm(wanted, desc='data sets', unit='set')
-    for name in wanted:
-        number = SETS.index(name)
-        yield name, counts[number], np.random.default_rng([seed, number])
+    """Yield name, number of patterns and random stream of the sets asked for."""
+    for number, name in enumerate(SETS):
+        if name in sets:
+            yield name, counts[number], np.random.default_rng([seed, number])
 
 
 def paper(seed: int, *, size: Sequence[float] = CUBE, counts: Sequence[int] = PAPER_COUNTS,
           folded_in: bool = True, edge_share: float = 0.5, sets: Sequence[str] = SETS,
-          progress: bool = False) -> dict[str, Patterns]:
-    """The sets with discontinuities, for two boxes of full extents `size` [m].
+          ) -> dict[str, Patterns]:
+    """Return the sets with discontinuities, for two boxes of full extents `size` [m].
 
     `folded_in`: in the domain of `symmetry.OCTANT`, as at inference; otherwise as drawn.
     `edge_share` of the patterns are edge-edge.
     """
     how = OCTANT if folded_in else NO_FOLD
     return {name: fold(mixed(rng, count, size, edge_share), how).patterns()
-            for name, count, rng in _streams(seed, counts, sets, progress)}
+            for name, count, rng in _streams(seed, counts, sets)}
 
 
 def continuous(seed: int, *, counts: Sequence[int] = CONTINUOUS_COUNTS, edge_share: float = 0.5,
-               sets: Sequence[str] = SETS, progress: bool = False,
-               ) -> dict[str, dict[str, Patterns]]:
-    """The sets of each subset without discontinuities, for two cubes of edge 2."""
+               sets: Sequence[str] = SETS) -> dict[str, dict[str, Patterns]]:
+    """Return the sets of each subset without discontinuities, for two cubes of edge 2."""
     result: dict[str, dict[str, Patterns]] = {subset: {} for subset in SUBSETS}
-    for name, count, rng in _streams(seed, counts, sets, progress):
+    for name, count, rng in _streams(seed, counts, sets):
         found: dict[str, list[Patterns]] = {subset: [] for subset in SUBSETS}
         # Only SAT tells a placement's subset. Placements are drawn until the smaller subset is
         # full; the larger one is cut to the same number.
