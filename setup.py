@@ -102,7 +102,9 @@ def data_files() -> list[tuple[str, list[str]]]:
             # is_file() also drops links that colcon --symlink-install left to deleted files.
             if path.is_file() and '__pycache__' not in path.parts:
                 files.setdefault(f'{share}/{path.parent.as_posix()}', []).append(path.as_posix())
-    files['include/box_contact'] = sorted(path.as_posix() for path in Path(CORE).glob('*.hpp'))
+    for folder in ('', 'overlap'):
+        files[f'include/box_contact/{folder}'.rstrip('/')] = sorted(
+            path.as_posix() for path in Path(CORE, folder).glob('*.hpp'))
     return list(files.items())
 
 

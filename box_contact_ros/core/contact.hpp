@@ -3,7 +3,7 @@
 // 1. `prepare`: poses and sizes become offsets and a rotation (poses.hpp).
 // 2. `separating_axis`: verdict, separation and normal (separating_axis.hpp), again with 32 digits
 //    where rounding could decide (near_parallel_edges.hpp).
-// 3. `press`: pairs at exact touch get their least depth (pressing.hpp).
+// 3. `enforce_minimum_depth`: pairs at exact touch get their least depth (minimum_depth.hpp).
 // 4. The point, by a model: `ExactModel` here, or `MlpModel` (mlp.hpp).
 //
 // All stages are templates over the lanes T, so a row of a batch has the bits of a single call.
@@ -11,19 +11,19 @@
 
 #include <algorithm>
 
+#include "minimum_depth.hpp"
 #include "near_parallel_edges.hpp"
-#include "overlap_clipping.hpp"
-#include "overlap_face_sums.hpp"
-#include "pressing.hpp"
+#include "overlap/clipping.hpp"
+#include "overlap/face_sums.hpp"
 
 namespace box_contact {
 
 // One pair: frame of the poses. Without contact, normal and point are NaN.
 struct Contact {
-  bool colliding;       // separation ≤ 8 ulp of the largest coordinate or size
-  double separation;    // [m]; negative: depth along the normal; positive: largest SAT gap
-  Vec<double> normal;   // unit vector from A to B
-  Vec<double> point;    // centroid of A∩B [m]
+  bool colliding;      // separation ≤ 8 ulp of the largest coordinate or size
+  double separation;   // [m]; negative: depth along the normal; positive: largest SAT gap
+  Vec<double> normal;  // unit vector from A to B
+  Vec<double> point;   // centroid of A∩B [m]
 };
 
 // How many contacts took another way than most.
@@ -94,9 +94,9 @@ template <class T>
   return ordered;
 }
 
-// The exact overlap of a single pair that `press` has moved.
+// The exact overlap of a single pair that `enforce_minimum_depth` has moved.
 inline Overlap clipped_overlap(Pair<double> pair, int face, bool pressed) {
-  if (pressed) press_on(pair);
+  if (pressed) enforce_on_further_axes(pair);
   return overlap_by_clipping(pair, face);
 }
 
@@ -116,20 +116,20 @@ struct ExactModel {
   template <class T>
   [[gnu::always_inline]] Vec<T> points(const Query<T>& q, Counts& counts) const {
     Pair<T> pair = q.pair;
-    Mask<T> pressed = press(pair, q.axis) & q.touching;
+    Mask<T> pressed = enforce_minimum_depth(pair, q.axis) & q.touching;
     Mask<T> fallback = pressed;
     if (any(pressed)) fallback &= has_too_little_depth(pair);
     T depth = max(-q.axis.separation, depth_floor * pair.size);
     CertifiedOverlap<T> overlap = overlap_by_face_sums(first_as_a(pair), depth);
-    Vec<T> points = select(pair.a_first, overlap.centroid,
-                           pair.offset_a + pair.rotation * overlap.centroid);
+    Vec<T> points =
+        select(pair.a_first, overlap.centroid, pair.offset_a + pair.rotation * overlap.centroid);
     fallback |= (overlap.certain == 0) & q.touching;
     if (any(fallback)) {
       for (int i = 0; i < width<T>; ++i) {
         if (!lane(fallback, i)) continue;
         ++counts.clipped;
-        Overlap clipped = clipped_overlap(lane(pair, i), int(lane(q.axis.face, i)),
-                                          lane(pressed, i) != 0);
+        Overlap clipped =
+            clipped_overlap(lane(pair, i), int(lane(q.axis.face, i)), lane(pressed, i) != 0);
         set_lane(points, i, clipped.centroid);
       }
     }
@@ -161,7 +161,7 @@ template <class T>
     for (int k = 0; k < 3; ++k) sizes[k][i] = rows.sizes_a[rows.size_step_a * row + k];
     for (int k = 0; k < 3; ++k) sizes[3 + k][i] = rows.sizes_b[rows.size_step_b * row + k];
   }
-  auto lanes_of = [](const double (&numbers)[width<T>]) {
+  auto lanes_of = [](const double(&numbers)[width<T>]) {
     T x;
     std::memcpy(&x, numbers, sizeof(T));
     return x;

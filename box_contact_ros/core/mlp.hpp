@@ -1,6 +1,6 @@
 // Model `mlp`: SAT decides and gives normal and depth; a multilayer perceptron gives the point.
 //
-// 1. `bounds_by_slab`: a box about A∩B in one of the boxes' frames (overlap_bounds.hpp).
+// 1. `bounds_by_slab`: a box about A∩B in one of the boxes' frames (overlap/bounds.hpp).
 // 2. `describe` and `forward`: where in these bounds the centroid is. Only these run in float32.
 // 3. `place`: the point is moved into both boxes.
 //
@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "contact.hpp"
-#include "overlap_bounds.hpp"
+#include "overlap/bounds.hpp"
 
 namespace box_contact {
 
@@ -377,7 +377,7 @@ struct MlpModelBy {
     Triple<T> answers[count], pressed_offset[count];
     for (int g = 0; g < count; ++g) {
       Pair<T> pair = queries[g].pair;
-      press(pair, queries[g].axis);
+      enforce_minimum_depth(pair, queries[g].axis);
       pressed_offset[g] = triple(pair.offset_a);
       bounds[g] = bounds_of(pair, queries[g].axis);
       cubes[g] = cut_cube(bounds[g], pair.size);

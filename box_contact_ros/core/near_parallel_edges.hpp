@@ -72,9 +72,9 @@ inline DoubleDouble sqrt(DoubleDouble a) {
 // bits whichever of the two is called A.
 struct PrecisePair {
   Vec<double> half, other_half;
-  DoubleDouble rotation[3][3];       // the other box's axes as columns, in the first one's frame
-  DoubleDouble offset[3];            // to the other box, in the first one's frame
-  DoubleDouble offset_in_other[3];   // the same, in the other one's frame
+  DoubleDouble rotation[3][3];      // the other box's axes as columns, in the first one's frame
+  DoubleDouble offset[3];           // to the other box, in the first one's frame
+  DoubleDouble offset_in_other[3];  // the same, in the other one's frame
 };
 
 // Scale a quaternion by a power of two: fourth powers of its components must not overflow.

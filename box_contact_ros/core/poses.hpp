@@ -26,8 +26,8 @@ constexpr double quaternion_max = 1e100;
 
 template <class T>
 struct Pose {
-  Vec<T> position;   // [m], common frame
-  T quaternion[4];   // x y z w, of any length but zero
+  Vec<T> position;  // [m], common frame
+  T quaternion[4];  // x y z w, of any length but zero
 };
 
 // A pair of boxes, ready for the separating-axis test.
@@ -85,14 +85,13 @@ Mask<T> a_first_of_concentric(const Vec<T>& half_a, const Vec<T>& half_b, const 
   T order = half_b[0] - half_a[0];
   for (int k = 1; k < 3; ++k) order = select<T>(order == 0.0, half_b[k] - half_a[k], order);
   for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j)
-      order = select<T>(order == 0.0, axes_b[i][j] - axes_a[i][j], order);
+    for (int j = 0; j < 3; ++j) order = select<T>(order == 0.0, axes_b[i][j] - axes_a[i][j], order);
   return order >= 0.0;
 }
 
 template <class T>
 [[gnu::always_inline]] inline Pair<T> prepare(const Pose<T>& a, const Pose<T>& b,
-                                               const Vec<T>& half_a, const Vec<T>& half_b) {
+                                              const Vec<T>& half_a, const Vec<T>& half_b) {
   Mat<T> axes_a = rotation_matrix(a.quaternion), axes_b = rotation_matrix(b.quaternion);
   Vec<T> t = b.position - a.position;
   Pair<T> pair;

@@ -83,7 +83,7 @@ def stages(poses_a: ArrayLike, poses_b: ArrayLike, size_a: ArrayLike, size_b: Ar
     size_a, size_b: (n, 3), or (1, 3) for all pairs, full extents [m].
     names: fields of `Stages` that are wanted.
     network: numbers of an MLP (`mlp.core_numbers`), for `answer`.
-    bounds: the method of the overlap's bounds, 'slab' or 'edges'; see overlap_bounds.hpp.
+    bounds: the method of the overlap's bounds, 'slab' or 'edges'; see overlap/bounds.hpp.
 
     Raises ValueError for unknown names, and for rows that are no poses or sizes.
     """

@@ -36,8 +36,8 @@ from ..scene.pose_sets import (
     Generator,
     Pairs,
     any_pose,
+    at_depth,
     log_uniform,
-    pressed,
     stacked,
 )
 from ..solver.arguments import seed_number
@@ -100,7 +100,7 @@ def apart(rng: np.random.Generator, n: int) -> Pairs:
                    rng.uniform(-0.1, 0.1, n - half), np.full(n - half, 0.01))
     parts = []
     for pairs in (cubes, yard):
-        parts.append(pressed(pairs, -log_uniform(rng, 1e-6, 0.1, len(pairs.pose_a))))
+        parts.append(at_depth(pairs, -log_uniform(rng, 1e-6, 0.1, len(pairs.pose_a))))
     return Pairs(*(np.concatenate(columns) for columns in zip(*parts)))
 
 
@@ -316,10 +316,9 @@ def honesty(rows: Sequence[FrontierRow]) -> str:
     medians = {name: [by[name, s].batch for s in SETS] for name in ('exact', 'mlp')}
     spread = {name: max(values) / min(values) for name, values in medians.items()}
     lines = [
-        f'- **In single calls the network loses.** `exact` takes '
-        f'{exact.single[0] / net.single[0]:.2f} of the time of `mlp`, and has no error. From '
-        'Python most of either is the call itself.',
-        f'- **What it is for is batches and a constant cost.** A pair in a batch takes '
+        f'- **The network saves time, and has an error.** A single call of `mlp` takes '
+        f'{net.single[0] / exact.single[0]:.2f} of the time of `exact`. From Python most of either '
+        f'is the call itself. A pair in a batch takes '
         f'{net.batch / exact.batch:.2f} of the time of `exact` on containers, '
         f'{by["mlp", "stacks"].batch / by["exact", "stacks"].batch:.2f} on stacks. From the '
         f'cheapest set to the dearest its cost grows by a factor of {spread["mlp"]:.2f}, the cost '

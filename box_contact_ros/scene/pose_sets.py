@@ -73,8 +73,8 @@ def log_uniform(rng: np.random.Generator, low: float, high: float, n: int | tupl
     return np.exp(rng.uniform(np.log(low), np.log(high), n))
 
 
-def pressed(pairs: Pairs, depth: np.ndarray) -> Pairs:
-    """The pairs that overlap, with B moved along SAT's normal to `depth` (n,) [m]."""
+def at_depth(pairs: Pairs, depth: np.ndarray) -> Pairs:
+    """Return the pairs that overlap, with B moved along SAT's normal to `depth` (n,) [m]."""
     a, b, size_a, size_b = pairs
     found = pairs.contacts()
     rows = found.colliding
@@ -92,7 +92,7 @@ def any_pose(rng: np.random.Generator, size_a: np.ndarray, size_b: np.ndarray,
     at_b = np.einsum('nij,nj->ni', rotation_matrix(turn_b), rng.uniform(-0.5, 0.5, (n, 3)) * size_b)
     a = np.concatenate([np.zeros((n, 3)), turn_a], axis=1)
     b = np.concatenate([at_a - at_b, turn_b], axis=1)
-    return pressed(Pairs(a, b, size_a, size_b), depth)
+    return at_depth(Pairs(a, b, size_a, size_b), depth)
 
 
 def _level(heading: np.ndarray) -> np.ndarray:
@@ -104,7 +104,7 @@ def _onto(place: np.ndarray, turn: np.ndarray, size_a: np.ndarray, size_b: np.nd
           depth: np.ndarray) -> Pairs:
     """Return pairs with A at the origin and B at places (n, 3), orientations (n, 4), to `depth`."""
     a = np.tile([0.0, 0, 0, 0, 0, 0, 1], (len(place), 1))
-    return pressed(Pairs(a, np.concatenate([place, turn], axis=1), size_a, size_b), depth)
+    return at_depth(Pairs(a, np.concatenate([place, turn], axis=1), size_a, size_b), depth)
 
 
 def stacked(rng: np.random.Generator, size: tuple[float, float, float], tilt: np.ndarray,

@@ -23,7 +23,7 @@ FEATURE_NAMES = (
     'larger slant · cut of all faces along another', '|push of all faces| along all axes')
 """Features at a site: four of its own, four that all sites of its faces have, four of its axis."""
 DESCRIPTION = 'cuts of the bounds by the slab, at nine sites'
-"""What the features of shipped weights mean; see core/overlap_bounds.hpp."""
+"""What the features of shipped weights mean; see core/overlap/bounds.hpp."""
 BOUNDS = {DESCRIPTION: 'slab', 'cuts of the unit cube, at nine sites': 'edges'}
 """Method of the bounds by the description in a card; weights made for another one are refused."""
 _NATIVE = {'slab': 'mlp', 'edges': 'mlp-edges'}  # names that the core has for the models

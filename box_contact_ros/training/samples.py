@@ -14,9 +14,9 @@ from ..scene.pose_sets import (
     CONTAINER,
     Pairs,
     any_pose,
+    at_depth,
     laid,
     log_uniform,
-    pressed,
     random_sizes,
     stacked,
     turns,
@@ -151,7 +151,7 @@ def along_edges(rng: np.random.Generator, size_a: np.ndarray, size_b: np.ndarray
              - np.einsum('nij,nj->ni', rotation_matrix(turn), at_b))
     a = np.tile([0.0, 0, 0, 0, 0, 0, 1], (n, 1))
     shortest = np.minimum(size_a.min(axis=1), size_b.min(axis=1))
-    return pressed(Pairs(a, np.concatenate([place, turn], axis=1), size_a, size_b),
+    return at_depth(Pairs(a, np.concatenate([place, turn], axis=1), size_a, size_b),
                    shortest * log_uniform(rng, 1e-5, 0.1, n))
 
 

@@ -20,8 +20,8 @@ from box_contact_ros.resources import resource_path
 from box_contact_ros.scene.pose_sets import (
     SETS,
     Pairs,
+    at_depth,
     log_uniform,
-    pressed,
     quaternion_multiply,
     turns,
 )
@@ -311,7 +311,7 @@ def small_steps(name: str) -> tuple[Pairs, Pairs]:
     rng = np.random.default_rng(9)
     pairs = SETS[name](rng, N)
     shortest = np.minimum(pairs.size_a.min(axis=1), pairs.size_b.min(axis=1))
-    pairs = pressed(pairs, shortest * log_uniform(rng, SHALLOWEST, DEEPEST, len(shortest)))
+    pairs = at_depth(pairs, shortest * log_uniform(rng, SHALLOWEST, DEEPEST, len(shortest)))
     n, size = len(pairs.pose_a), largest(pairs)
     step = np.minimum(size * log_uniform(rng, SHORTEST_STEP, LONGEST_STEP, n),
                       -0.1 * solve('exact', pairs).separation)

@@ -89,46 +89,47 @@ MUTANTS = {
     'the first of concentric boxes is A': Mutant(
         'core/poses.hpp', '  if (any(concentric)) {', '  if (false) {', f'{LAWS} -k concentric'),
     'corners pressed along one axis': Mutant(
-        'core/contact.hpp', 'if (pressed) press_on(pair);', 'if (false) press_on(pair);',
+        'core/contact.hpp', 'if (pressed) enforce_on_further_axes(pair);',
+        'if (false) enforce_on_further_axes(pair);',
         f'{EXACT} -k in_a_point'),
     'absolute tolerance': Mutant(
-        'core/pressing.hpp', 'max(depth_floor * pair.size + axis.separation, T{});',
+        'core/minimum_depth.hpp', 'max(depth_floor * pair.size + axis.separation, T{});',
         'max(depth_floor + axis.separation, T{});', f'{FAMILIES} -k scale'),
     'one face for every centroid': Mutant(
-        'core/overlap_clipping.hpp', '  if (kept < cancelled) {', '  if (false) {',
+        'core/overlap/clipping.hpp', '  if (kept < cancelled) {', '  if (false) {',
         f'{FAMILIES} -k thin_plates'),
     'contact plane not clipped': Mutant(
-        'core/overlap_clipping.hpp', 'double bounds[5] = {0.0,', 'double bounds[5] = {1e300,',
+        'core/overlap/clipping.hpp', 'double bounds[5] = {0.0,', 'double bounds[5] = {1e300,',
         f'{FAMILIES} -k exact_point'),
     'a face in the far face counts twice': Mutant(
-        'core/overlap_clipping.hpp', '    if (high > floor) sum +=', '    if (true) sum +=',
+        'core/overlap/clipping.hpp', '    if (high > floor) sum +=', '    if (true) sum +=',
         f'{EXACT} -k clipping'),
     'no certificate': Mutant(
-        'core/overlap_face_sums.hpp',
+        'core/overlap/face_sums.hpp',
         'certificate(x_n, normal, area, length, found.volume, pair.size, depth)',
         '(found.volume == found.volume)', f'{EXACT} -k "thin and sharing"'),
     'faces not moved out of each other': Mutant(
-        'core/overlap_face_sums.hpp', 'Mask<T> risky = unflush(pair, depth);',
+        'core/overlap/face_sums.hpp', 'Mask<T> risky = unflush(pair, depth);',
         'Mask<T> risky = depth != depth;', f'{TEST_CORE} -k flush'),
     'mirrored rounding trusted': Mutant(
-        'core/overlap_face_sums.hpp', 'found.certain &= risky == 0;', '',
+        'core/overlap/face_sums.hpp', 'found.certain &= risky == 0;', '',
         f'{EXACT} -k almost_aligned'),
     'face sums in the order of the names': Mutant(
         'core/contact.hpp', 'CertifiedOverlap<T> overlap = overlap_by_face_sums(',
         'pair.a_first = T{} == T{}; CertifiedOverlap<T> overlap = overlap_by_face_sums(',
         f'{LAWS} -k roundings'),
     'a piece of an edge of length below zero': Mutant(
-        'core/overlap_face_sums.hpp',
+        'core/overlap/face_sums.hpp',
         'Four<T> length = max(t - s, Four<T>{}), middle = 0.5 * (s + t) - origin[j];',
         'Four<T> length = t - s, middle = 0.5 * (s + t) - origin[j];',
         f'{TEST_CORE} -k certain'),
     'point left outside': Mutant(
         'core/mlp.hpp', ' & placed.inside;', ';', 'test/solver/test_mlp.py -k garbage_for_weights'),
     'smaller bounding box, always': Mutant(
-        'core/overlap_bounds.hpp', 'clearly_smaller = 0.8;', 'clearly_smaller = 1.0 - 1e-6;',
+        'core/overlap/bounds.hpp', 'clearly_smaller = 0.8;', 'clearly_smaller = 1.0 - 1e-6;',
         'test/core/test_overlap_bounds.py -k keep_their_frame'),
     'slabs not widened': Mutant(
-        'core/overlap_bounds.hpp', 'constexpr double flush = 0x1p-46;',
+        'core/overlap/bounds.hpp', 'constexpr double flush = 0x1p-46;',
         'constexpr double flush = 0.0;', 'test/core/test_overlap_bounds.py -k whole_patch'),
     'side of a pair of faces taken as it comes': Mutant(
         'core/mlp.hpp', 'features.of_faces[1] = abs(push);', 'features.of_faces[1] = push;',

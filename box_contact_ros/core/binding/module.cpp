@@ -3,8 +3,6 @@
 //
 // Arrays are checked here for kind and shape only. Words about refused values are made in Python,
 // which is told the row.
-#include "arrays.hpp"  // first, as Python.h wants
-
 #include <algorithm>
 #include <atomic>
 #include <cstddef>
@@ -14,6 +12,7 @@
 #include <thread>
 
 #include "../mlp.hpp"
+#include "arrays.hpp"  // first, as Python.h wants
 #include "bounding_boxes.hpp"
 #include "stages.hpp"
 
@@ -99,8 +98,7 @@ bool read_network(PyObject* object, std::unique_ptr<Network>& network) {
 enum class Model { none, exact, mlp, mlp_by_edges };
 
 struct PairSolver {
-  PyObject_HEAD
-  Model model;
+  PyObject_HEAD Model model;
   Vec<double> half_a, half_b;  // of single calls
   Network* network;
   std::atomic<long> clipped, exact;
@@ -124,8 +122,7 @@ PairSolver* solver_of(PyObject* object) { return reinterpret_cast<PairSolver*>(o
 PyObject* new_vector(const Vec<double>& v) {
   npy_intp three = 3;
   PyObject* array = PyArray_SimpleNew(1, &three, NPY_DOUBLE);
-  if (array)
-    std::memcpy(PyArray_DATA(reinterpret_cast<PyArrayObject*>(array)), v.v, sizeof(v.v));
+  if (array) std::memcpy(PyArray_DATA(reinterpret_cast<PyArrayObject*>(array)), v.v, sizeof(v.v));
   return array;
 }
 
@@ -214,7 +211,8 @@ long solve_in_threads(const M& model, const PairArrays& pairs, const Results& re
   std::atomic<long> next{0};
   auto work = [&](long thread) {
     for (long chunk = next++; chunk < chunks; chunk = next++) {
-      long begin = chunk * rows_per_chunk, end = std::min(begin + rows_per_chunk, long(pairs.count));
+      long begin = chunk * rows_per_chunk,
+           end = std::min(begin + rows_per_chunk, long(pairs.count));
       long refused = solve_rows<Block>(model, pairs.rows, begin, end, results, counts_of[thread]);
       if (refused >= 0) refused_of[thread] = std::min(refused_of[thread], refused);
     }
@@ -327,18 +325,17 @@ PyObject* stages(PyObject*, PyObject* const* args, Py_ssize_t count) {
     std::copy(shape.begin(), shape.end(), dimensions + 1);
     Array<Number> array;
     array.take(PyArray_SimpleNew(1 + int(shape.size()), dimensions, numpy_type<Number>));
-    filled = filled && array.object &&
-             PyDict_SetItem(found.get(), key.get(), array.object.get()) == 0;
+    filled =
+        filled && array.object && PyDict_SetItem(found.get(), key.get(), array.object.get()) == 0;
     if (filled) place = array.numbers;
   });
   if (!filled) return nullptr;
   long refused = -1;
   Py_BEGIN_ALLOW_THREADS;
   for (long row = 0; row < pairs.count && refused < 0; ++row) {
-    bool filled_row = by_edges ? fill_stages<Network::Bounds::edges>(pairs.rows, row, network.get(),
-                                                                     arrays)
-                               : fill_stages<Network::Bounds::slab>(pairs.rows, row, network.get(),
-                                                                    arrays);
+    bool filled_row =
+        by_edges ? fill_stages<Network::Bounds::edges>(pairs.rows, row, network.get(), arrays)
+                 : fill_stages<Network::Bounds::slab>(pairs.rows, row, network.get(), arrays);
     if (!filled_row) refused = row;
   }
   Py_END_ALLOW_THREADS;

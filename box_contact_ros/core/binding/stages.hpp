@@ -97,7 +97,7 @@ bool fill_stages(const Rows& rows, long row, const Network* network, const Stage
     put(arrays.certain, row, counts.clipped == 0);
   }
   Pair<double> pressed = q.pair;
-  bool was_pressed = press(pressed, q.axis);
+  bool was_pressed = enforce_minimum_depth(pressed, q.axis);
   if (arrays.clipped_centroid)
     put(arrays.clipped_centroid, row,
         clipped_overlap(pressed, int(q.axis.face), was_pressed).centroid);

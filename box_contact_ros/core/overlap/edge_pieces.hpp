@@ -4,7 +4,7 @@
 // a column of R, so nine reciprocals serve all edges of both boxes.
 #pragma once
 
-#include "poses.hpp"
+#include "../poses.hpp"
 
 namespace box_contact {
 

@@ -13,12 +13,13 @@ namespace box_contact {
 // Least depth [of the size]: the heights of the overlap still have seven good digits there.
 constexpr double depth_floor = 1e-9;
 
-// Most moves of `press_on`: three axes at a corner, and more because they are not at right angles.
+// Most moves of `enforce_on_further_axes`: three axes at a corner, and more because they are not at right angles.
 constexpr int most_presses = 8;
 
 // Enforce the minimum depth along the normal. Returns where B had to be moved.
 template <class T>
-[[gnu::always_inline]] inline Mask<T> press(Pair<T>& pair, const SeparatingAxis<T>& axis) {
+[[gnu::always_inline]] inline Mask<T> enforce_minimum_depth(Pair<T>& pair,
+                                                            const SeparatingAxis<T>& axis) {
   T distance = max(depth_floor * pair.size + axis.separation, T{});
   move_against(pair, distance, axis.normal);
   return distance > 0.0;
@@ -33,8 +34,8 @@ struct Gap {
 inline Gap largest_gap(const Pair<double>& pair) {
   Gap best{-std::numeric_limits<double>::infinity(), {}};
   auto offer = [&](const Vec<double>& n) {
-    double half_width = dot(abs(n), pair.half_a) +
-                        dot(abs(transposed_times(pair.rotation, n)), pair.half_b);
+    double half_width =
+        dot(abs(n), pair.half_a) + dot(abs(transposed_times(pair.rotation, n)), pair.half_b);
     double along = dot(n, pair.offset_a), gap = std::fabs(along) - half_width;
     if (gap > best.gap) best = {gap, along >= 0.0 ? n : -n};
   };
@@ -52,10 +53,10 @@ inline Gap largest_gap(const Pair<double>& pair) {
   return best;
 }
 
-// Go on where `press` has left a pair with less than half of the minimum depth. Where a corner
+// Go on where `enforce_minimum_depth` has left a pair with less than half of the minimum depth. Where a corner
 // touches a corner or an edge, several axes have gap zero: B is moved along each in turn. Returns
 // whether B was moved.
-inline bool press_on(Pair<double>& pair) {
+inline bool enforce_on_further_axes(Pair<double>& pair) {
   double floor = depth_floor * pair.size;
   bool moved = false;
   for (int i = 0; i < most_presses; ++i) {
@@ -67,7 +68,7 @@ inline bool press_on(Pair<double>& pair) {
   return moved;
 }
 
-// Whether `press_on` has work to do, for all lanes at once. The widths of edge axes are those of
+// Whether `enforce_on_further_axes` has work to do, for all lanes at once. The widths of edge axes are those of
 // the vectors as rounded, as in the separating-axis test.
 template <class T>
 inline Mask<T> has_too_little_depth(const Pair<T>& pair) {

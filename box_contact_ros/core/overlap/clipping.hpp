@@ -23,7 +23,7 @@
 #include <cmath>
 #include <utility>
 
-#include "poses.hpp"
+#include "../poses.hpp"
 
 namespace box_contact {
 
@@ -32,8 +32,8 @@ namespace box_contact {
 constexpr double cancelled = 1e-3;
 
 struct Overlap {
-  double volume = 0.0;    // [m³]
-  Vec<double> centroid{}; // A's frame [m]
+  double volume = 0.0;     // [m³]
+  Vec<double> centroid{};  // A's frame [m]
 };
 
 namespace clipping {
@@ -124,7 +124,8 @@ constexpr int face_corners[6][4] = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4},
 inline Overlap overlap_from(const Pair<double>& pair, int face, double& kept) {
   bool of_a = face < 3;
   int w = face % 3, axes[3] = {(w + 1) % 3, (w + 2) % 3, w};
-  const Vec<double>&own = of_a ? pair.half_a : pair.half_b, &other = of_a ? pair.half_b : pair.half_a;
+  const Vec<double>&own = of_a ? pair.half_a : pair.half_b,
+        &other = of_a ? pair.half_b : pair.half_a;
   Vec<double> offset = of_a ? pair.offset_a : -pair.offset_b;
   double side = offset[w] >= 0.0 ? 1.0 : -1.0;
 

@@ -21,9 +21,9 @@
 // 0.14 of `centroid_error`. What does not pass is clipped.
 #pragma once
 
+#include "../separating_axis.hpp"
+#include "clipping.hpp"
 #include "edge_pieces.hpp"
-#include "overlap_clipping.hpp"
-#include "separating_axis.hpp"
 
 namespace box_contact {
 
@@ -152,13 +152,14 @@ template <class T>
         Four<T> at_y = q * r[y][j], at_z = q * r[z][j], at_k = p * r[i][k], at_l = p * r[i][l];
         Four<T> y_by = (origin_a[y] + at_y) * along_y, z_by = (origin_a[z] + at_z) * along_z;
         Four<T> k_by = (origin_b[k] + at_k) * along_k, l_by = (origin_b[l] + at_l) * along_l;
-        Four<T> from = max(max(-y_by - slab_y, -z_by - slab_z), max(-k_by - slab_k, -l_by - slab_l));
+        Four<T> from =
+            max(max(-y_by - slab_y, -z_by - slab_z), max(-k_by - slab_k, -l_by - slab_l));
         Four<T> to = min(min(slab_y - y_by, slab_z - z_by), min(slab_k - k_by, slab_l - l_by));
         Four<T> length = sine2 * max(to - from, Four<T>{}), middle = 0.5 * (from + to);
-        faces_a.template add<Side::sigma>(i, n, tau<T>(n) * (length * q),
-                                          at_y - middle * r[z][j], at_z + middle * r[y][j]);
-        faces_b.template add<Side::tau>(j, n, sigma<T>(n) * (length * p),
-                                        at_k + middle * r[i][l], at_l - middle * r[i][k]);
+        faces_a.template add<Side::sigma>(i, n, tau<T>(n) * (length * q), at_y - middle * r[z][j],
+                                          at_z + middle * r[y][j]);
+        faces_b.template add<Side::tau>(j, n, sigma<T>(n) * (length * p), at_k + middle * r[i][l],
+                                        at_l - middle * r[i][k]);
       }
     }
   }
@@ -167,10 +168,10 @@ template <class T>
 // Over a box's six faces, in its own frame and about the origin.
 template <class T>
 struct SurfaceIntegrals {
-  Mat<T> x_n;       // ∫ x nᵀ dA; rows are components of x
-  Vec<T> first;     // Σ distance of the face · ∫ x dA
-  Vec<T> normal;    // 2 ∫ n dA
-  Vec<T> area;      // of both faces across each axis, signed sums: about their area
+  Mat<T> x_n;     // ∫ x nᵀ dA; rows are components of x
+  Vec<T> first;   // Σ distance of the face · ∫ x dA
+  Vec<T> normal;  // 2 ∫ n dA
+  Vec<T> area;    // of both faces across each axis, signed sums: about their area
 };
 
 template <class T, Side side>
@@ -203,8 +204,8 @@ template <class T, Side side>
 template <class T>
 [[gnu::always_inline]] inline Mask<T> unflush(Pair<T>& pair, T depth) {
   T rounding = place_rounding * pair.size;
-  T mirrored = mirrored_rounding * min(pair.size * (1.0 / least_centroid_error),
-                                       (1.0 / centroid_rounding) * depth);
+  T mirrored = mirrored_rounding *
+               min(pair.size * (1.0 / least_centroid_error), (1.0 / centroid_rounding) * depth);
   Mask<T> risky = depth != depth;
 #pragma GCC unroll 3
   for (int j = 0; j < 3; ++j) {
@@ -221,7 +222,8 @@ template <class T>
       T middle = pair.half_b[j] * abs(entry[j]) - pair.half_a[i];
       T shift = select<T>(entry[j] > 0.0, pair.offset_a[i], -pair.offset_a[i]);
       T beyond_plus = middle + shift, beyond_minus = middle - shift;
-      Mask<T> flush_plus = abs(beyond_plus) <= tolerance, flush_minus = abs(beyond_minus) <= tolerance;
+      Mask<T> flush_plus = abs(beyond_plus) <= tolerance,
+              flush_minus = abs(beyond_minus) <= tolerance;
       risky |= (flush_plus | flush_minus) & doubtful & (flat == 0);
       plus = select<T>(flat & flush_plus, pair.half_b[j] - (beyond_plus + tolerance), plus);
       minus = select<T>(flat & flush_minus, pair.half_b[j] - (beyond_minus + tolerance), minus);
@@ -287,12 +289,10 @@ template <class T>
   Mat<T> inverse = reciprocals(r);
   EdgePieces<T> edges_a = cut_edges(transpose(r), transpose(inverse), -pair.offset_b, pair.half_a,
                                     pair.half_b, weights_a);
-  EdgePieces<T> edges_b =
-      cut_edges(r, inverse, pair.offset_a, pair.half_b, pair.half_a, weights_b);
+  EdgePieces<T> edges_b = cut_edges(r, inverse, pair.offset_a, pair.half_b, pair.half_a, weights_b);
   // The origin is a point inside the overlap: a weighted mean of its edges.
   T scale = 1.0 / (edges_a.length + edges_b.length);
-  Vec<T> origin_a =
-      scale * (edges_a.mean + (r * edges_b.mean + edges_b.length * pair.offset_a));
+  Vec<T> origin_a = scale * (edges_a.mean + (r * edges_b.mean + edges_b.length * pair.offset_a));
   Vec<T> origin_b = transposed_times(r, origin_a) - pair.offset_b;
   FaceSums<T, Side::sigma> faces_a;
   FaceSums<T, Side::tau> faces_b;
