@@ -152,7 +152,7 @@ def along_edges(rng: np.random.Generator, size_a: np.ndarray, size_b: np.ndarray
     a = np.tile([0.0, 0, 0, 0, 0, 0, 1], (n, 1))
     shortest = np.minimum(size_a.min(axis=1), size_b.min(axis=1))
     return at_depth(Pairs(a, np.concatenate([place, turn], axis=1), size_a, size_b),
-                   shortest * log_uniform(rng, 1e-5, 0.1, n))
+                    shortest * log_uniform(rng, 1e-5, 0.1, n))
 
 
 def scene_sizes(path: Path) -> list[SizePair]:

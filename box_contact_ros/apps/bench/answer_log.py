@@ -48,7 +48,7 @@ def touch_in(rows: np.ndarray) -> Touch | None:
 
 
 def angles(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Return angles (n,) [deg] between rows of vectors (n, 3); arccos would lose small angles."""
+    """Return the degrees (n,) between rows of vectors (n, 3); arccos would lose small ones."""
     sines = np.linalg.norm(np.cross(first, second), axis=1)
     return np.degrees(np.arctan2(sines, np.sum(first * second, axis=1)))
 

@@ -287,7 +287,7 @@ class ForceLaw(Protocol):
     """From one contact to the force and the torque on the load."""
 
     def wrench(self, touch: Touch | None, pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-        """Return the wrench (6,) on the load at `pose` (7,) with `velocity` (6,)."""
+        """Return force and torque (6,) on the load at `pose` (7,) with `velocity` (6,)."""
 
 
 class LoopState(NamedTuple):

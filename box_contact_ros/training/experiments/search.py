@@ -157,6 +157,7 @@ class PaperSearch(Search):
         return [{'error': inside, 'external': beyond} for inside, beyond in zip(
             fitted.error.tolist(), fitted.errors(self.sets['external']).tolist())]
 
+
 def paper_searches(*, seed: int, count: int, quick: bool, device: str) -> list[PaperSearch]:
     """Return one for the network with discontinuities, one for each subset of that without.
 

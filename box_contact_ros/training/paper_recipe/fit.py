@@ -102,7 +102,7 @@ class Fitted:
         return self.scaling.folded(self.networks.layers(best))
 
     def errors(self, patterns: Patterns) -> Tensor:
-        """Return the root mean square errors (networks,) of the best weights [rad]."""
+        """Return the RMSE (networks,) of the best weights [rad]."""
         return rmse(self.networks, *tensors(patterns, self.scaling, self.error.device))
 
 
