@@ -79,7 +79,7 @@ def _reach(pairs: Pairs) -> np.ndarray:
 
 
 def tolerance(pairs: Pairs) -> np.ndarray:
-    """Return how far separations (n,) may be off [m]: 1e-12 of the size, or the coordinates' ulp."""
+    """Return the slack (n,) of separations [m]: 1e-12 of the size, or the coordinates' ulp."""
     return TOLERANCE * pairs.size + COORDINATE_ULPS * np.finfo(float).eps * _reach(pairs)
 
 
