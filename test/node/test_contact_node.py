@@ -272,7 +272,7 @@ def test_client_killed_and_restarted(program):
     parameters = ['--ros-args', '-p', 'size_a:=[2.0, 2.0, 2.0]', '-p', 'size_b:=[2.0, 2.0, 2.0]']
     node = program('contact_node', *arguments())
     node.wait_for_output('ready', 120)
-    first = program('crane', *parameters, '-p', 'duration:=30', '-p', 'report:=true')
+    first = program('crane', *parameters, '-p', 'duration:=12', '-p', 'report:=true')
     first.wait_for_output('contact', 60)
     time.sleep(1.0)
     first.signal(signal.SIGKILL)
