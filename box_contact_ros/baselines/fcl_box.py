@@ -15,7 +15,7 @@ from collections.abc import Callable
 import fcl
 import numpy as np
 
-from ..solver.contact import Contacts
+from ..solver.contact import Contacts, without_patch
 from ..solver.models import Exact
 
 MOST_CONTACTS = 16
@@ -51,7 +51,8 @@ class FclModel:
     def solve(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
               threads: int = 1) -> tuple[Contacts, int]:
         """Return contacts for poses (n, 7), sizes (n or 1, 3), and the first refused row or −1."""
-        found, refused = self._exact.solve(a, b, size_a, size_b, threads)
+        exact, refused = self._exact.solve(a, b, size_a, size_b, threads)
+        found = without_patch(*exact[:4])
         for row in np.flatnonzero(found.colliding) if refused < 0 else ():
             sizes = size_a[row % len(size_a)], size_b[row % len(size_b)]
             answer = self.ask(*self.place(a[row], b[row], *sizes), *sizes)

@@ -18,9 +18,14 @@
 //   point [m], common frame: the centroid of A∩B. Model `exact` errs by at most
 //       max(1e-9, 1e-14 · size / depth) · size. Model `mlp` errs by a few per cent of the smaller
 //       box, and its point is inside both boxes.
+//   volume [m³] of A∩B. Model `exact` errs by at most max(1e-9, 1e-14 · size / depth) of it. NaN from
+//       model `mlp`.
+//   covariance [m²], common frame: the second central moments of A∩B by its volume, symmetric. Model
+//       `exact` errs by at most max(1e-8, 1e-14 · size / depth) of its trace. NaN from model `mlp`.
 //
-// Without contact, `normal` and `point` are NaN. A contact shallower than 1e-9 · size has the point
-// of boxes that were pressed in to this depth.
+// Without contact, `normal`, `point` and `covariance` are NaN, and `volume` is zero. A contact
+// shallower than 1e-9 · size has the point, volume and covariance of boxes that were pressed in to
+// this depth.
 //
 // Compile with `-std=c++17 -O3 -ffp-contract=off -fno-tree-slp-vectorize`, by g++ and by clang++.
 // The third flag alone does not stop g++: its SLP pass still fuses products and sums.
@@ -101,7 +106,8 @@ class Solver {
   }
 
   // The contacts of `count` pairs, bit for bit those of single calls. Poses: rows of seven numbers
-  // `x y z qx qy qz qw`. Results: `count` rows each, normals and points of three numbers.
+  // `x y z qx qy qz qw`. Results: `count` rows each, normals and points of three numbers, covariances
+  // of nine.
   // Returns the first row that is refused, or −1. A refused row gets `colliding` false, and its
   // other fields have no meaning. All other rows are solved.
   long batch(const double* poses_a, const double* poses_b, long count,

@@ -4,7 +4,7 @@
 // 2. `separating_axis`: verdict, separation and normal (separating_axis.hpp), again with 32 digits
 //    where rounding could decide (near_parallel_edges.hpp).
 // 3. `enforce_minimum_depth`: pairs at exact touch get their least depth (minimum_depth.hpp).
-// 4. The point, by a model: `ExactModel` here, or `MlpModel` (mlp.hpp).
+// 4. The overlap, by a model: `ExactModel` here, or `MlpModel` (mlp.hpp).
 //
 // All stages are templates over the lanes T, so a row of a batch has the bits of a single call.
 #pragma once
@@ -18,12 +18,15 @@
 
 namespace box_contact {
 
-// One pair: frame of the poses. Without contact, normal and point are NaN.
+// One pair: frame of the poses. Without contact, normal, point and covariance are NaN, and the
+// volume is zero.
 struct Contact {
-  bool colliding;      // separation ≤ 8 ulp of the largest coordinate or size
-  double separation;   // [m]; negative: depth along the normal; positive: largest SAT gap
-  Vec<double> normal;  // unit vector from A to B
-  Vec<double> point;   // centroid of A∩B [m]
+  bool colliding;          // separation ≤ 8 ulp of the largest coordinate or size
+  double separation;       // [m]; negative: depth along the normal; positive: largest SAT gap
+  Vec<double> normal;      // unit vector from A to B
+  Vec<double> point;       // centroid of A∩B [m]
+  double volume;           // of A∩B [m³]; NaN from a model that gives the point alone
+  Mat<double> covariance;  // second central moments of A∩B by its volume [m²]; NaN likewise
 };
 
 // How many contacts took another way than most.
@@ -95,47 +98,87 @@ template <class T>
 }
 
 // The exact overlap of a single pair that `enforce_minimum_depth` has moved.
-inline Overlap clipped_overlap(Pair<double> pair, int face, bool pressed) {
+inline Moments<double> clipped_overlap(Pair<double> pair, int face, bool pressed) {
   if (pressed) enforce_on_further_axes(pair);
   return overlap_by_clipping(pair, face);
 }
 
-// Model `exact`: the centroid of A∩B by face sums, or by clipping where these are not certain.
+// A model has two members for lanes T:
+//
+//   Found<T>: what it finds of an overlap. `Moments<T>`, or `Vec<T>` for the centroid alone.
+//   group<T>: how many queries it takes at once.
+//
+// And `solve(queries, found, counts)` fills `found`, in A's frame, for the pairs that touch.
+
+// Model `exact`: the moments of A∩B by face sums, or by clipping where these are not certain.
 struct ExactModel {
-  // How many queries of T it takes at once.
+  template <class T>
+  using Found = Moments<T>;
   template <class T>
   static constexpr int group = 1;
 
   template <class T>
-  [[gnu::always_inline]] void points(const Query<T> (&queries)[1], Vec<T> (&found)[1],
-                                     Counts& counts) const {
-    found[0] = points(queries[0], counts);
+  [[gnu::always_inline]] void solve(const Query<T> (&queries)[1], Moments<T> (&found)[1],
+                                    Counts& counts) const {
+    found[0] = solve(queries[0], counts);
   }
 
-  // Contact points in A's frame [m], for the pairs that touch.
   template <class T>
-  [[gnu::always_inline]] Vec<T> points(const Query<T>& q, Counts& counts) const {
+  [[gnu::always_inline]] Moments<T> solve(const Query<T>& q, Counts& counts) const {
     Pair<T> pair = q.pair;
     Mask<T> pressed = enforce_minimum_depth(pair, q.axis) & q.touching;
     Mask<T> fallback = pressed;
     if (any(pressed)) fallback &= has_too_little_depth(pair);
     T depth = max(-q.axis.separation, depth_floor * pair.size);
     CertifiedOverlap<T> overlap = overlap_by_face_sums(first_as_a(pair), depth);
-    Vec<T> points =
-        select(pair.a_first, overlap.centroid, pair.offset_a + pair.rotation * overlap.centroid);
+    Moments<T> found = overlap.moments;
+    found.centroid =
+        select(pair.a_first, found.centroid, pair.offset_a + pair.rotation * found.centroid);
+    found.covariance =
+        select(pair.a_first, found.covariance, rotated(pair.rotation, found.covariance));
     fallback |= (overlap.certain == 0) & q.touching;
     if (any(fallback)) {
       for (int i = 0; i < width<T>; ++i) {
         if (!lane(fallback, i)) continue;
         ++counts.clipped;
-        Overlap clipped =
-            clipped_overlap(lane(pair, i), int(lane(q.axis.face, i)), lane(pressed, i) != 0);
-        set_lane(points, i, clipped.centroid);
+        set_lane(found, i,
+                 clipped_overlap(lane(pair, i), int(lane(q.axis.face, i)), lane(pressed, i) != 0));
       }
     }
-    return points;
+    return found;
   }
 };
+
+// The one place that decides what a contact says of moments that its model does not give: NaN.
+template <class T>
+[[gnu::always_inline]] inline Moments<T> moments(const Moments<T>& found) {
+  return found;
+}
+template <class T>
+[[gnu::always_inline]] inline Moments<T> moments(const Vec<T>& centroid) {
+  T unknown = splat<T>(std::numeric_limits<double>::quiet_NaN());
+  return {unknown, centroid, {{unknown, unknown, unknown, unknown, unknown, unknown}}};
+}
+
+// The answers for pairs, in the frame of the poses.
+template <class T>
+struct Answer {
+  Vec<T> normal;
+  Moments<T> overlap;
+};
+
+template <class T, class Found>
+[[gnu::always_inline]] inline Answer<T> answer(const Query<T>& q, const Found& found) {
+  T nothing = splat<T>(std::numeric_limits<double>::quiet_NaN());
+  Vec<T> none{nothing, nothing, nothing};
+  Moments<T> overlap = moments(found);
+  Sym<T> covariance = rotated(q.pair.axes_a, overlap.covariance);
+  return {select(q.touching, direction_in_common_frame(q.pair, q.axis.normal), none),
+          {select<T>(q.touching, overlap.volume, T{}),
+           select(q.touching, point_in_common_frame(q.pair, overlap.centroid), none),
+           select(q.touching, covariance,
+                  Sym<T>{{nothing, nothing, nothing, nothing, nothing, nothing}})}};
+}
 
 // Rows of pairs in memory. A step of 0 gives all rows the same sizes, one of 3 each row its own.
 struct Rows {
@@ -144,10 +187,12 @@ struct Rows {
   long size_step_a, size_step_b;
 };
 
-// Where results go: one row a pair, normals and points three numbers a row.
+// Where results go: one row a pair. Normals and points have three numbers a row, covariances nine.
+// `volume` and `covariance` may be nullptr.
 struct Results {
   bool* colliding;
   double *separation, *normal, *point;
+  double *volume = nullptr, *covariance = nullptr;
 };
 
 // Rows `first` to `last` side by side. Lanes beyond them repeat the last one.
@@ -182,20 +227,21 @@ template <class T>
 }
 
 // Write `count` solved rows from `first` on. Returns the first that is refused, or −1.
-template <class T>
-[[gnu::always_inline]] inline long write_rows(const Query<T>& q, const Vec<T>& points, long first,
+template <class T, class Found>
+[[gnu::always_inline]] inline long write_rows(const Query<T>& q, const Found& found, long first,
                                               long count, const Results& results) {
-  T nothing = splat<T>(std::numeric_limits<double>::quiet_NaN());
-  Vec<T> none{nothing, nothing, nothing};
-  Vec<T> normal = select(q.touching, direction_in_common_frame(q.pair, q.axis.normal), none);
-  Vec<T> point = select(q.touching, point_in_common_frame(q.pair, points), none);
+  Answer<T> rows = answer(q, found);
+  Mat<T> covariance = matrix(rows.overlap.covariance);
   long refused = -1;
   for (int i = 0; i < count && i < width<T>; ++i) {
     long row = first + i;
     results.colliding[row] = lane(q.touching, i) != 0;
     results.separation[row] = lane(q.axis.separation, i);
-    for (int k = 0; k < 3; ++k) results.normal[3 * row + k] = lane(normal[k], i);
-    for (int k = 0; k < 3; ++k) results.point[3 * row + k] = lane(point[k], i);
+    for (int k = 0; k < 3; ++k) results.normal[3 * row + k] = lane(rows.normal[k], i);
+    for (int k = 0; k < 3; ++k) results.point[3 * row + k] = lane(rows.overlap.centroid[k], i);
+    if (results.volume) results.volume[row] = lane(rows.overlap.volume, i);
+    for (int k = 0; results.covariance && k < 9; ++k)
+      results.covariance[9 * row + k] = lane(covariance[k / 3][k % 3], i);
     if (!lane(q.pair.valid, i) && refused < 0) refused = row;
   }
   return refused;
@@ -210,7 +256,7 @@ long solve_rows(const Model& model, const Rows& rows, long begin, long end, cons
   long refused = -1;
   for (long first = begin; first < end; first += group * width<T>) {
     Query<T> queries[group];
-    Vec<T> points[group]{};
+    typename Model::template Found<T> found[group]{};
     bool touching = false;
     for (int g = 0; g < group; ++g) {
       long start = first + g * width<T>;
@@ -220,10 +266,10 @@ long solve_rows(const Model& model, const Rows& rows, long begin, long end, cons
         set_lane(queries[g].touching, int(i), 0);
       touching |= any(queries[g].touching);
     }
-    if (touching) model.points(queries, points, counts);
+    if (touching) model.solve(queries, found, counts);
     for (int g = 0; g < group; ++g) {
       long start = first + g * width<T>;
-      long row = write_rows(queries[g], points[g], start, end - start, results);
+      long row = write_rows(queries[g], found[g], start, end - start, results);
       if (refused < 0) refused = row;
     }
   }
@@ -241,17 +287,12 @@ template <class Model>
   Query<double> queries[1] = {query(a, b, half_a, half_b)};
   const Query<double>& q = queries[0];
   if (!q.pair.valid) return false;
-  contact.colliding = q.touching;
-  contact.separation = q.axis.separation;
-  if (q.touching) {
-    Vec<double> points[1];
-    model.points(queries, points, counts);
-    contact.normal = direction_in_common_frame(q.pair, q.axis.normal);
-    contact.point = point_in_common_frame(q.pair, points[0]);
-  } else {
-    double nothing = std::numeric_limits<double>::quiet_NaN();
-    contact.normal = contact.point = {nothing, nothing, nothing};
-  }
+  typename Model::template Found<double> found[1]{};
+  if (q.touching) model.solve(queries, found, counts);
+  Answer<double> one = answer(q, found[0]);
+  const Moments<double>& overlap = one.overlap;
+  contact = {q.touching,       q.axis.separation, one.normal,
+             overlap.centroid, overlap.volume,    matrix(overlap.covariance)};
   return true;
 }
 

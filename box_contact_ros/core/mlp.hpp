@@ -353,6 +353,9 @@ template <Network::Bounds method>
 struct MlpModelBy {
   const Network& network;
 
+  // The network gives the centroid alone.
+  template <class T>
+  using Found = Vec<T>;
   // How many queries of T it takes at once: float32 lanes are twice as many.
   template <class T>
   static constexpr int group = is_scalar<T> ? 1 : 2;
@@ -370,8 +373,8 @@ struct MlpModelBy {
 
   // Contact points in A's frame [m], for the pairs that touch.
   template <class T, int count>
-  [[gnu::always_inline]] void points(const Query<T> (&queries)[count], Vec<T> (&found)[count],
-                                     Counts& counts) const {
+  [[gnu::always_inline]] void solve(const Query<T> (&queries)[count], Vec<T> (&found)[count],
+                                    Counts& counts) const {
     OverlapBounds<T> bounds[count];
     CutCube<T> cubes[count];
     Triple<T> answers[count], pressed_offset[count];
@@ -395,7 +398,7 @@ struct MlpModelBy {
           if (!lane(fallback, i)) continue;
           ++counts.exact;
           Counts unused;
-          set_lane(found[g], i, ExactModel{}.points(lane(q, i), unused));
+          set_lane(found[g], i, ExactModel{}.solve(lane(q, i), unused).centroid);
         }
       }
     }

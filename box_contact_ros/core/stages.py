@@ -50,8 +50,16 @@ class Stages(NamedTuple):
     """(n, 3) exact centroid of the overlap of the pressed pair."""
     clipped_centroid: np.ndarray = _UNASKED
     """(n, 3) the same by clipping, the method for pairs that are not certain."""
+    volume: np.ndarray = _UNASKED
+    """(n,) exact volume of that overlap [m³]."""
+    clipped_volume: np.ndarray = _UNASKED
+    """(n,) the same by clipping."""
+    covariance: np.ndarray = _UNASKED
+    """(n, 3, 3) its second central moments by its volume [m²], about the centroid."""
+    clipped_covariance: np.ndarray = _UNASKED
+    """(n, 3, 3) the same by clipping."""
     certain: np.ndarray = _UNASKED
-    """(n,) bool: the centroid is by face sums; else it was clipped."""
+    """(n,) bool: the exact moments are by face sums; else the overlap was clipped."""
     frame_b: np.ndarray = _UNASKED
     """(n,) bool: the bounds are in B's frame."""
     in_range: np.ndarray = _UNASKED

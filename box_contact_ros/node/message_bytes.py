@@ -47,7 +47,7 @@ _LEAST, _MOST = 2.0 * QUATERNION_MIN, 0.5 * QUATERNION_MAX
 _NAN_ROW = np.full(7, np.nan).tobytes()
 _array = np.array
 _new_tuple = tuple.__new__  # a named tuple's own constructor is Python code
-_NOTHING = Contact(False, 0.0, np.zeros(3), np.zeros(3))
+_NOTHING = Contact(False, 0.0, np.zeros(3), np.zeros(3), 0.0, np.zeros((3, 3)))
 
 
 class _FrameBytes(NamedTuple):

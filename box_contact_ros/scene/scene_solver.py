@@ -234,5 +234,6 @@ class SceneSolver:
                                        size_a=self._size[first], size_b=self._size[second])
             for row in np.flatnonzero(found.colliding):
                 touching.append((pairs[near[row]], Contact(
-                    True, float(found.separation[row]), found.normal[row], found.point[row])))
+                    True, float(found.separation[row]), found.normal[row], found.point[row],
+                    float(found.volume[row]), found.covariance[row])))
         return Answer(touching, stale, int(count))

@@ -19,6 +19,13 @@ class Contact(NamedTuple):
     """(3,) unit vector from A to B; NaN without contact."""
     point: np.ndarray
     """(3,) centroid of A∩B [m]; NaN without contact."""
+    volume: float
+    """Volume of A∩B [m³]; 0 without contact; NaN from models that give the point alone."""
+    covariance: np.ndarray
+    """(3, 3) second central moments of A∩B by its volume [m²]; NaN without contact, or as volume.
+
+    Volume and covariance are those of the overlap whose centroid is `point`, pressed in or not.
+    """
 
 
 class Contacts(NamedTuple):
@@ -32,6 +39,20 @@ class Contacts(NamedTuple):
     """(n, 3)."""
     point: np.ndarray
     """(n, 3) [m]."""
+    volume: np.ndarray
+    """(n,) [m³]."""
+    covariance: np.ndarray
+    """(n, 3, 3) [m²]."""
+
+
+def without_patch(colliding: np.ndarray, separation: np.ndarray, normal: np.ndarray,
+                  point: np.ndarray) -> Contacts:
+    """Return contacts of a model that gives the point alone: arrays with a row a pair.
+
+    Volume and covariance of those in contact are NaN, as in C++ (core/contact.hpp).
+    """
+    return Contacts(colliding, separation, normal, point, np.where(colliding, np.nan, 0.0),
+                    np.full((len(colliding), 3, 3), np.nan))
 
 
 native.use_contact_type(Contact)

@@ -69,7 +69,7 @@ class ContactSolver(native.PairSolver):
         b = as_floats(pose_b, 'pose_b', 'a pose (7,)', (7,)).reshape(1, 7)
         found = self._solve(a, b, self._size_a, self._size_b, ('pose_a', 'pose_b'))
         return Contact(bool(found.colliding[0]), float(found.separation[0]), found.normal[0],
-                       found.point[0])
+                       found.point[0], float(found.volume[0]), found.covariance[0])
 
     def batch(self, poses_a: ArrayLike, poses_b: ArrayLike, *, size_a: ArrayLike | None = None,
               size_b: ArrayLike | None = None, threads: int = 1) -> Contacts:

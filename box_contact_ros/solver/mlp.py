@@ -10,7 +10,7 @@ import numpy as np
 
 from ..core import FEATURES, OUTPUTS, native
 from ..resources import resource_path
-from .contact import Contacts
+from .contact import Contacts, without_patch
 from .models import Exact
 from .weights_file import Network, Weights, WeightsError, load_weights, unpacked
 
@@ -85,7 +85,8 @@ class Mlp:
     def _solve_partly(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
                       threads: int, listed: np.ndarray) -> tuple[Contacts, int]:
         """`solve`, by the network for rows of `listed` (n,) sizes and exactly for the others."""
-        found, refused = self._exact.solve(a, b, size_a, size_b, threads)
+        exact, refused = self._exact.solve(a, b, size_a, size_b, threads)
+        found = without_patch(*exact[:4])
         if refused >= 0:
             return found, refused
         self._answered_exactly += int(np.count_nonzero(found.colliding & ~listed))

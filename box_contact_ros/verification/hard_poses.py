@@ -4,7 +4,7 @@ Each family is a generator of pairs in a plain frame; `variants` then turns them
 renames their axes and scales them. Tests and reports do not draw them anew: they read
 `hard_poses.npz`. At 1e-12 the rounding of the recipe is part of the case, and another machine's
 sine may round differently. `test/helpers/make_hard_poses.py` wrote that
-file, with the true gap and centroid in 60 digits.
+file, with the true gap, centroid, volume and covariance in 60 digits.
 """
 from __future__ import annotations
 
@@ -37,6 +37,10 @@ class Cases(NamedTuple):
     centroid: np.ndarray
     """(n, 3) of the overlap as it is, in 60 digits, from A's position [m]; NaN if it has no
     volume or is shallower than what boxes are pressed in by."""
+    volume: np.ndarray
+    """(n,) of the same overlap, in 60 digits, rounded once [m³]; NaN where `centroid` is."""
+    covariance: np.ndarray
+    """(n, 3, 3) of the same overlap, in 60 digits, rounded once [m²]; NaN where `centroid` is."""
 
 
 # --- tools ----------------------------------------------------------------------------------------
@@ -468,4 +472,5 @@ def load(path: Path = FILE) -> dict[str, Cases]:
     """Return the families as stored."""
     with np.load(path) as file:
         return {name: Cases(Pairs(*(file[f'{name}.{part}'] for part in Pairs._fields)),
-                            file[f'{name}.gap'], file[f'{name}.centroid']) for name in FAMILIES}
+                            *(file[f'{name}.{part}'] for part in Cases._fields[1:]))
+                for name in FAMILIES}

@@ -15,7 +15,7 @@ from box_contact_ros.apps.bench.bench_report import (
     latency_table,
     write_results,
 )
-from box_contact_ros.solver.contact import Contacts
+from box_contact_ros.solver.contact import Contacts, without_patch
 
 MS = 1_000_000  # ns
 START = 1_700_000_000_000_000_000  # ns: stamps as large as real ones
@@ -28,7 +28,8 @@ def exact(rows: int = PAIRS) -> Contacts:
     touching = np.arange(rows) % 2 == 0
     nothing = np.where(touching, 0.0, np.nan)[:, None]
     points = np.stack([0.01 * np.arange(rows), np.ones(rows), np.zeros(rows)], axis=1)
-    return Contacts(touching, np.where(touching, -2e-3, 0.5), DOWN + nothing, points + nothing)
+    return without_patch(touching, np.where(touching, -2e-3, 0.5), DOWN + nothing,
+                         points + nothing)
 
 
 def stamp_of(row: int, first: int = START) -> int:

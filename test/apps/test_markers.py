@@ -172,7 +172,7 @@ def test_contacts_of_another_scene_are_not_drawn(client, node, capfd):
     offer_until_drawn(client, 2)
     publisher = client.node.create_publisher(PointCloud2, 'contacts', 10)
     assert client.spin(lambda: publisher.get_subscription_count() > 1, 10.0)  # ours, and markers'
-    contact = Contact(True, -0.1, np.array([0.0, 0.0, 1.0]), np.zeros(3))
+    contact = Contact(True, -0.1, np.array([0.0, 0.0, 1.0]), np.zeros(3), 0.0, np.zeros((3, 3)))
     for pairs in ([Pair(3, 'p', 'a', 'b')], [Pair(0, 'p', 'a', 'b'), Pair(1, 'q', 'a', 'c')]):
         publisher.publish(make_cloud(make_header(client.next_stamp(), 'map'), Answer(
             [(pair, contact) for pair in pairs], [], len(pairs))))

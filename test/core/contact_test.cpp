@@ -77,11 +77,15 @@ struct Truth {
 
 struct Answers {
   std::unique_ptr<bool[]> colliding;
-  std::vector<double> separation, normal, point;
+  std::vector<double> separation, normal, point, volume, covariance;
 
   explicit Answers(long count)
-      : colliding(new bool[count]()), separation(count), normal(3 * count), point(3 * count) {}
-  Results results() { return {colliding.get(), separation.data(), normal.data(), point.data()}; }
+      : colliding(new bool[count]()), separation(count), normal(3 * count), point(3 * count),
+        volume(count), covariance(9 * count) {}
+  Results results() {
+    return {colliding.get(), separation.data(), normal.data(),
+            point.data(),    volume.data(),     covariance.data()};
+  }
 };
 
 Answers solve(const Solver& solver, const Pairs& pairs) {
@@ -273,6 +277,14 @@ void check_laws(const char* model, const Solver& solver, const Pairs& pairs, con
                 same_bits(0x1p20 * small.point[i], found.point[i]),
             model, "scale by a power of two", row);
     }
+    check(same_bits(same.volume[row], found.volume[row]), model, "q and -q", row);
+    check(same_bits(0x1p60 * small.volume[row], found.volume[row]), model,
+          "scale by a power of two", row);
+    for (long i = 9 * row; i < 9 * row + 9; ++i) {
+      check(same_bits(same.covariance[i], found.covariance[i]), model, "q and -q", row);
+      check(same_bits(0x1p40 * small.covariance[i], found.covariance[i]), model,
+            "scale by a power of two", row);
+    }
   }
 }
 
@@ -284,6 +296,9 @@ void check_row(const char* model, const char* law, const Answers& found, long ro
     check(same_bits(one.normal[k], found.normal[3 * row + k]) &&
               same_bits(one.point[k], found.point[3 * row + k]),
           model, law, row);
+  check(same_bits(one.volume, found.volume[row]), model, law, row);
+  for (int k = 0; k < 9; ++k)
+    check(same_bits(one.covariance[k / 3][k % 3], found.covariance[9 * row + k]), model, law, row);
 }
 
 Solver::Pose pose_of(const double* p) { return {{p[0], p[1], p[2]}, {p[3], p[4], p[5], p[6]}}; }
@@ -306,10 +321,12 @@ void check_rows(const char* model, const Network* network, const Pairs& pairs,
     some.separation[count] = 7.0;
     solver.batch(&pairs.poses_a[7 * first], &pairs.poses_b[7 * first], &pairs.sizes_a[3 * first],
                  &pairs.sizes_b[3 * first], count, some.results());
-    for (long i = 0; i < count; ++i)
-      check_row(model, "a row is that of any batch", found, first + i,
-                {some.colliding[i], some.separation[i], size_of(&some.normal[3 * i]),
-                 size_of(&some.point[3 * i])});
+    for (long i = 0; i < count; ++i) {
+      Contact one{some.colliding[i],           some.separation[i], size_of(&some.normal[3 * i]),
+                  size_of(&some.point[3 * i]), some.volume[i],     {}};
+      std::memcpy(one.covariance.m, &some.covariance[9 * i], sizeof(one.covariance.m));
+      check_row(model, "a row is that of any batch", found, first + i, one);
+    }
     check(some.separation[count] == 7.0, model, "nothing is written beyond the last row", first);
   }
 }
@@ -317,9 +334,11 @@ void check_rows(const char* model, const Network* network, const Pairs& pairs,
 // Verdict, separation and normal alone, which compile in a second for every width.
 struct NoPoint {
   template <class T>
+  using Found = box_contact::Vec<T>;
+  template <class T>
   [[maybe_unused]] static constexpr int group = 1;
   template <class T>
-  void points(const box_contact::Query<T> (&)[1], box_contact::Vec<T> (&)[1], Counts&) const {}
+  void solve(const box_contact::Query<T> (&)[1], box_contact::Vec<T> (&)[1], Counts&) const {}
 };
 template <class T>
 [[maybe_unused]] void check_width(const char* width, const Pairs& pairs, const Answers& found) {

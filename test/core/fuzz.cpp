@@ -232,6 +232,7 @@ void check_contact(const char* model, const Pair& p, const Contact& found) {
     check(found.separation > 0.0 && std::isfinite(found.separation), model, "gap", p);
     for (int k = 0; k < 3; ++k)
       check(std::isnan(found.normal[k]) && std::isnan(found.point[k]), model, "apart: NaN", p);
+    check(found.volume == 0.0 && std::isnan(found.covariance[0][0]), model, "apart: no volume", p);
     return;
   }
   ++contacts;
@@ -277,11 +278,12 @@ void check_rows(const char* model, const std::vector<Pair>& rows, const Network*
   const double cube[3] = {1.0, 1.0, 1.0};
   std::vector<char> colliding(count);
   std::vector<double> separation(count), normal(3 * count), point(3 * count);
+  std::vector<double> volume(count), covariance(9 * count);
   long refused =
       make(cube, cube)
           .batch(poses_a.data(), poses_b.data(), sizes_a.data(), sizes_b.data(), long(count),
                  {reinterpret_cast<bool*>(colliding.data()), separation.data(), normal.data(),
-                  point.data()});
+                  point.data(), volume.data(), covariance.data()});
   long expected = -1;
   for (size_t row = 0; row < count; ++row) {
     const Pair& p = rows[row];
@@ -297,6 +299,9 @@ void check_rows(const char* model, const std::vector<Pair>& rows, const Network*
       for (size_t k = 0; k < 3; ++k)
         same = same && same_bits(one.normal[int(k)], normal[3 * row + k]) &&
                same_bits(one.point[int(k)], point[3 * row + k]);
+      same = same && same_bits(one.volume, volume[row]);
+      for (size_t k = 0; k < 9; ++k)
+        same = same && same_bits(one.covariance[int(k / 3)][k % 3], covariance[9 * row + k]);
       check(same, model, "a row of a batch is its single call", p);
     } catch (const std::invalid_argument&) {
       ++refusals;

@@ -353,6 +353,38 @@ def test_a_batch_is_its_single_calls(model: str, single_solvers: dict) -> None:
     assert many.colliding.sum() > 10_000
 
 
+@pytest.mark.parametrize('model', ['mlp', 'paper', 'fcl', 'soup-2'])
+def test_models_that_give_the_point_alone(model: str) -> None:
+    """Volume and covariance are NaN in contact. Without contact the volume is zero, as of all."""
+    if model in ('fcl', 'soup-2'):
+        pytest.importorskip('fcl')
+    solver = ContactSolver(poses.CUBE, poses.CUBE, model=model)
+    apart = poses.IDENTITY + (0, 0, 3, 0, 0, 0, 0)
+    many = solver.batch([poses.IDENTITY] * 2, [ABOVE, apart])
+    for row, b in enumerate((ABOVE, apart)):
+        one = solver(poses.IDENTITY, b)
+        assert one.colliding is (row == 0)
+        assert_same_bits(one, tuple(field[row] for field in many))
+        assert np.array_equal(one.volume, [np.nan, 0.0][row], equal_nan=True)
+        assert one.covariance.shape == (3, 3) and np.isnan(one.covariance).all()
+
+
+def test_kinds_and_shapes_of_a_patch() -> None:
+    """A float and a (3, 3) array of a single call, (n,) and (n, 3, 3) of a batch."""
+    solver = a_solver('exact')
+    b = poses.IDENTITY + (0.5, 0.25, 0.9, 0, 0, 0, 0)
+    one = solver(poses.IDENTITY, b)
+    assert type(one.volume) is float and one.volume == pytest.approx(0.5 * 0.75 * 0.1)
+    assert type(one.covariance) is np.ndarray and one.covariance.dtype == np.float64
+    assert one.covariance == pytest.approx(np.diag([0.25, 0.5625, 0.01]) / 12, abs=1e-15)
+    for slow in (solver(list(poses.IDENTITY), b), pickle.loads(pickle.dumps(one))):
+        assert type(slow) is Contact and type(slow.volume) is float
+        assert_same_bits(one, slow)
+    many = solver.batch([poses.IDENTITY] * 4, [b] * 4)
+    assert many.volume.shape == (4,) and many.covariance.shape == (4, 3, 3)
+    assert len(solver.batch(np.empty((0, 7)), np.empty((0, 7))).covariance) == 0
+
+
 class Marked(np.ndarray):
     """A subclass of arrays."""
 

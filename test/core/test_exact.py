@@ -29,7 +29,8 @@ SLIVERS = [3650, 16297, 79049, 85246, 85698, 105096, 105366, 110647, 158096, 158
 def test_agrees_with_the_oracle(family, chunk):
     """Verdict beyond 1e-12·size; depth and axis to 1e-12·size.
 
-    The centroid to max(1e-9, 1e-14·size/depth)·size.
+    The centroid to max(1e-9, 1e-14·size/depth)·size, the volume to as much of itself, and the
+    covariance to max(1e-8, 1e-14·size/depth) of its trace.
     """
     colliding = check(family, chunk, *FAMILIES[family](np.random.default_rng([2026, chunk]), CHUNK))
     assert 0.2 < colliding.mean() < 0.9  # both verdicts are really tested
@@ -60,6 +61,7 @@ def check(family, chunk, a, b, size_a, size_b):
             assert found.colliding[i] == (separation < 0), where
         if not found.colliding[i]:
             assert np.isnan(found.normal[i]).all() and np.isnan(found.point[i]).all(), where
+            assert found.volume[i] == 0.0 and np.isnan(found.covariance[i]).all(), where
             continue
         # The normal is one of the axes whose gap is within 1e-12·size of the largest; either way
         # along it where B's centre is neither ahead nor behind.
@@ -70,10 +72,16 @@ def check(family, chunk, a, b, size_a, size_b):
         assert min(np.abs(axis - found.normal[i]).max() for axis in best) < 1e-9, where
         assert abs(np.linalg.norm(found.normal[i]) - 1) < 1e-14, where
         axis = tuple(mpfr(float(v)) for v in found.normal[i])
-        point = oracle.as_array(oracle.contact_point(box_a, box_b, axis, -separation, size))
-        depth = max(-float(separation), 1e-9 * size)
-        bound = max(1e-9, 1e-14 * size / depth) * size
-        assert np.abs(point - found.point[i]).max() <= bound, where
+        volume, point, spread = oracle.contact_moments(box_a, box_b, axis, -separation, size)
+        rounding = 1e-14 * size / max(-float(separation), 1e-9 * size)
+        off = np.abs(oracle.as_array(point) - found.point[i]).max()
+        assert off <= max(1e-9, rounding) * size, where
+        if volume is None:
+            continue
+        assert abs(float(found.volume[i] / volume - 1)) <= max(1e-9, rounding), where
+        spread = np.array([oracle.as_array(row) for row in spread])
+        off = np.linalg.norm(spread - found.covariance[i])
+        assert off <= max(1e-8, rounding) * np.trace(spread), where
     return found.colliding
 
 
@@ -90,17 +98,77 @@ def test_clipping_concentric_boxes_gives_their_middle():
 
 @pytest.mark.parametrize('family', FAMILIES)
 def test_clipping_is_face_sums(family):
-    """Both methods give the centroid, where face sums are certain, to half the bound."""
+    """Both methods give the moments, where face sums are certain, to half the bound."""
     pairs = FAMILIES[family](np.random.default_rng(6), 20_000)
-    found = stages(*pairs, names=['colliding', 'separation', 'size', 'centroid',
-                                  'clipped_centroid', 'certain'])
+    found = stages(*pairs, names=[
+        'colliding', 'separation', 'size', 'centroid', 'clipped_centroid', 'certain', 'volume',
+        'clipped_volume', 'covariance', 'clipped_covariance'])
     rows = found.colliding & found.certain
     assert rows.sum() > 5_000
     size = found.size[rows]
     depth = np.maximum(-found.separation[rows], DEPTH_FLOOR * size)
-    bound = size * np.maximum(1e-9, 1e-14 * size / depth)
+    rounding = 1e-14 * size / depth
+    bound = np.maximum(1e-9, rounding)
     apart = np.linalg.norm((found.centroid - found.clipped_centroid)[rows], axis=1)
-    assert (apart / bound).max() < 0.5
+    assert (apart / (bound * size)).max() < 0.5
+    assert (np.abs(found.volume / found.clipped_volume - 1)[rows] / bound).max() < 0.5
+    apart = np.linalg.norm((found.covariance - found.clipped_covariance)[rows], axis=(1, 2))
+    trace = np.trace(found.clipped_covariance[rows], axis1=1, axis2=2)
+    assert (apart / trace / np.maximum(1e-8, rounding)).max() < 0.5
+
+
+def test_pieces_far_outside_the_overlap_are_found():
+    """Sides in one plane but for a tilt of 1e-9 to 1e-7 rad, over a corner: 400,000 pairs.
+
+    Where sides cross far from the overlap, rounding left pieces that moved the centroid by nothing,
+    and the covariance by six times its bound.
+    """
+    for seed in range(4):
+        pairs = poses.near_parallel_pairs(np.random.default_rng([31, seed]), 100_000)
+        found = stages(*pairs, names=['colliding', 'certain', 'separation', 'size', 'covariance',
+                                      'clipped_covariance'])
+        rows = found.colliding & found.certain
+        assert rows.sum() > 60_000
+        apart = np.linalg.norm((found.covariance - found.clipped_covariance)[rows], axis=(1, 2))
+        trace = np.trace(found.clipped_covariance[rows], axis1=1, axis2=2)
+        depth = np.maximum(-found.separation / found.size, DEPTH_FLOOR)[rows]
+        assert (apart / trace / np.maximum(1e-8, 1e-14 / depth)).max() <= 1.0
+
+
+def test_moments_of_boxes_through_each_other():
+    """A bar across a slab, and a box in a box: the overlap is a box, moved and turned."""
+    rng, n = np.random.default_rng(8), 2000
+    size_a, size_b = np.exp(rng.uniform(-1, 1, (2, n, 3)))
+    offset = rng.uniform(-0.5, 0.5, (n, 3)) * (size_a + size_b) * 0.98
+    low = np.maximum(-0.5 * size_a, offset - 0.5 * size_b)
+    high = np.minimum(0.5 * size_a, offset + 0.5 * size_b)
+    whole, place = poses.unit_quaternions(rng, n), rng.uniform(-5, 5, (n, 3))
+    a = np.tile(poses.IDENTITY, (n, 1))
+    b = np.hstack([offset, a[:, 3:]])
+    found = SOLVER.batch(poses.moved(a, place, whole), poses.moved(b, place, whole),
+                         size_a=size_a, size_b=size_b)
+    assert found.colliding.all()
+    extents = high - low
+    rounding = 1e-14 * np.maximum(size_a, size_b).max(axis=1) / extents.min(axis=1)
+    assert (np.abs(found.volume / extents.prod(axis=1) - 1) <= np.maximum(1e-9, rounding)).all()
+    axes = np.stack([poses.rotate(whole, np.tile(axis, (n, 1))) for axis in np.eye(3)], axis=2)
+    wanted = np.einsum('nik,nk,njk->nij', axes, extents**2 / 12, axes)
+    off = np.linalg.norm(found.covariance - wanted, axis=(1, 2))
+    assert (off <= np.maximum(1e-8, rounding) * (extents**2).sum(axis=1) / 12).all()
+
+
+@pytest.mark.parametrize('gap', [0.0, -1e-12, -2.591e-6])
+def test_touching_containers_have_the_pressed_volume(gap):
+    """A container on another, half overhanging: the patch, as thick as pressing or depth."""
+    length, width, height = poses.CONTAINER
+    contact = ContactSolver(poses.CONTAINER, poses.CONTAINER, model='exact')(
+        poses.IDENTITY, (6.096, 0.0, height + gap, 0, 0, 0, 1))
+    extents = np.array([length / 2, width, max(-gap, DEPTH_FLOOR * length)])
+    depth = extents[2]
+    assert contact.volume == pytest.approx(extents.prod(), rel=1e-14 * length / depth)
+    wanted = np.diag(extents**2) / 12
+    assert contact.covariance == pytest.approx(
+        wanted, abs=max(1e-8, 1e-14 * length / depth) * np.trace(wanted))
 
 
 @pytest.mark.parametrize('model', ['exact', 'mlp'])

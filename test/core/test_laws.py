@@ -9,6 +9,7 @@ import poses
 import pytest
 
 from box_contact_ros import ContactSolver
+from box_contact_ros.core import stages
 from box_contact_ros.verification import fuzz
 
 N = 2000
@@ -37,6 +38,31 @@ def point_bound(found, size):
     return np.maximum(1e-9, 1e-14 * size / depth) * size
 
 
+def share_bounds(found, size):
+    """Accuracy of volume, of itself, and of covariance, of its trace."""
+    rounding = 1e-14 * size / np.maximum(-found.separation, 1e-9 * size)
+    return np.maximum(1e-9, rounding), np.maximum(1e-8, rounding)
+
+
+def trace(covariance):
+    return np.trace(covariance, axis1=1, axis2=2)
+
+
+def turned(turn, covariance):
+    """Covariances (n, 3, 3) turned by quaternions (n, 4)."""
+    axes = np.stack([poses.rotate(turn, np.tile(axis, (len(turn), 1))) for axis in np.eye(3)],
+                    axis=2)
+    return np.einsum('nik,nkl,njl->nij', axes, covariance, axes)
+
+
+def assert_same_patch(one, two, volume, covariance, rows, size, roundings=0.0):
+    """Volume and covariance of `two` are those given, to two times the bound and the roundings."""
+    of_volume, of_covariance = (2.0 * bound + roundings for bound in share_bounds(one, size))
+    assert np.all((np.abs(two.volume - volume) <= of_volume * volume)[rows])
+    off = np.linalg.norm(two.covariance - covariance, axis=(1, 2))
+    assert np.all((off <= of_covariance * trace(covariance))[rows])
+
+
 def clear_normal(a, b, size_a, size_b, found, size):
     """Rows whose normal no tie can flip: the boxes moved a little keep it to SAME_NORMAL."""
     rows = found.colliding.copy()
@@ -62,6 +88,7 @@ def test_swap(pairs):
     deep = rows & (one.separation < -1e-8 * size)
     error = np.abs(one.point - two.point).max(axis=1)
     assert np.all(error[deep] <= 2 * point_bound(one, size)[deep])
+    assert_same_patch(one, two, one.volume, one.covariance, deep, size)
 
 
 @pytest.mark.parametrize('kind', ['near_parallel_pairs', 'flush_pairs', 'equal_thickness'])
@@ -140,11 +167,16 @@ def test_rigid_motion(pairs):
     moved = poses.rotate(turn, one.point) + shift
     bound = (rounding / -one.separation + 1e-9) * size
     assert np.all(np.abs(moved - two.point).max(axis=1)[rows] <= bound[rows])
+    assert_same_patch(one, two, one.volume, turned(turn, one.covariance), rows, size,
+                      8 * rounding / -one.separation)
 
 
 @pytest.mark.parametrize('power', [-20, 20])
 def test_scale_by_powers_of_two_is_exact(pairs, power):
-    """Everything scaled by 2^k: separation and point scale to the bit, the normal stays."""
+    """Everything scaled by 2^k: separation and point scale to the bit, the normal stays.
+
+    The volume scales by 2^3k, the covariance by 2^2k.
+    """
     a, b, size_a, size_b = pairs
     factor = 2.0**power
     scaling = np.array([factor] * 3 + [1.0] * 4)
@@ -154,6 +186,8 @@ def test_scale_by_powers_of_two_is_exact(pairs, power):
     assert np.array_equal(one.separation * factor, two.separation)
     assert np.array_equal(one.normal, two.normal, equal_nan=True)
     assert np.array_equal(one.point * factor, two.point, equal_nan=True)
+    assert np.array_equal(one.volume * factor**3, two.volume)
+    assert np.array_equal(one.covariance * factor**2, two.covariance, equal_nan=True)
 
 
 def test_box_symmetries(pairs):
@@ -169,16 +203,18 @@ def test_box_symmetries(pairs):
     turns = {'x': (half, 0, 0, half), 'y': (0, half, 0, half), 'z': (0, 0, half, half)}
     swapped = {'x': (0, 2, 1), 'y': (2, 1, 0), 'z': (1, 0, 2)}
     for first, second in itertools.product('xyz', repeat=2):
-        turned, extents = b.copy(), size_b
+        renamed, extents = b.copy(), size_b
         for axis in (first, second):
-            turned[:, 3:] = poses.multiply(turned[:, 3:], np.tile(turns[axis], (N, 1)))
+            renamed[:, 3:] = poses.multiply(renamed[:, 3:], np.tile(turns[axis], (N, 1)))
             extents = extents[:, swapped[axis]]
-        two = solve(a, turned, size_a, extents)
+        two = solve(a, renamed, size_a, extents)
         rounding = 64 * np.finfo(float).eps * np.maximum(size, 30)
         assert np.all(np.abs(one.separation - two.separation) <= rounding)
         assert np.abs(one.normal - two.normal)[rows].max() < SAME_NORMAL
         bound = (rounding / -one.separation + 1e-9) * size
         assert np.all(np.abs(one.point - two.point).max(axis=1)[rows] <= bound[rows])
+        assert_same_patch(one, two, one.volume, one.covariance, rows, size,
+                          8 * rounding / -one.separation)
 
 
 def test_separated_after_moving_by_the_depth(pairs):
@@ -270,6 +306,89 @@ def test_the_point_is_between_those_of_the_parts(kind):
     assert np.all(off <= bound[rows])
 
 
+@pytest.mark.parametrize('kind', PARTED)
+def test_moments_are_those_of_the_parts(kind):
+    """B is cut in two: volumes add, centroids weigh by them, covariances add by Steiner's rule.
+
+    100,000 pairs.
+    """
+    rng = np.random.default_rng(22)
+    a, b, size_a, size_b = PARTED[kind](rng, 100_000)
+    size = largest(size_a, size_b)
+    rows = (np.abs(a[:, :3]).max(axis=1) < 20.0 * size) & solve(a, b, size_a, size_b).colliding
+    a, b, size_a, size_b, size = (part[rows] for part in (a, b, size_a, size_b, size))
+    whole, rows = solve(a, b, size_a, size_b), np.ones(len(a), dtype=bool)
+    of_volume, of_covariance = share_bounds(whole, size)
+    volume, first, second = np.zeros(len(a)), np.zeros((len(a), 3)), np.zeros((len(a), 3, 3))
+    volume_off, trace_off = of_volume * whole.volume, of_covariance * trace(whole.covariance)
+    for part, its_size in parts_of(rng, b, size_b):
+        found = solve(a, part, size_a, its_size)
+        rows &= found.colliding & (found.separation < -1e-8 * size)  # else it has been pressed in
+        from_whole = found.point - whole.point
+        volume += found.volume
+        first += found.volume[:, None] * from_whole
+        second += found.volume[:, None, None] * (
+            found.covariance + from_whole[:, :, None] * from_whole[:, None, :])
+        its_volume, its_covariance = share_bounds(found, largest(size_a, its_size))
+        volume_off += its_volume * found.volume
+        reach = np.linalg.norm(from_whole, axis=1)
+        trace_off += found.volume / whole.volume * (
+            (its_covariance + its_volume) * (trace(found.covariance) + reach**2)
+            + 2.0 * reach * (point_bound(found, size) + point_bound(whole, size)))
+    assert rows.sum() > 5_000
+    assert np.all((np.abs(volume - whole.volume) <= volume_off)[rows])
+    centroid_off = volume_off / whole.volume * np.sqrt(trace(whole.covariance)) \
+        + 2.0 * point_bound(whole, size)
+    assert np.all((np.linalg.norm(first, axis=1) / whole.volume <= centroid_off)[rows])
+    off = np.linalg.norm(second / whole.volume[:, None, None] - whole.covariance, axis=(1, 2))
+    assert np.all((off <= trace_off + of_volume * trace(whole.covariance))[rows])
+
+
+@pytest.mark.parametrize('kind', PARTED)
+def test_covariance_is_symmetric_and_positive(kind):
+    """To rounding: no eigenvalue below −1e-8 of the trace, or its accuracy where that is less."""
+    a, b, size_a, size_b = PARTED[kind](np.random.default_rng(23), 50_000)
+    found = solve(a, b, size_a, size_b)
+    rows = found.colliding
+    covariance, bound = found.covariance[rows], share_bounds(found, largest(size_a, size_b))[1]
+    assert np.array_equal(covariance, covariance.transpose(0, 2, 1))
+    assert np.all(found.volume[rows] > 0.0)
+    least = np.linalg.eigvalsh(covariance)[:, 0]
+    assert np.all(least >= -0.1 * bound[rows] * trace(covariance))
+
+
+def test_volume_grows_with_the_depth(pairs):
+    """B pushed in along the normal of a face: the volume grows.
+
+    Before the overlap reaches the opposite face, dV = area of the face in the other box · way.
+    """
+    a, b, size_a, size_b = pairs
+    one = solve(a, b, size_a, size_b)
+    size = largest(size_a, size_b)
+    axis = stages(*pairs, names=['axis']).axis
+    thickness = np.hstack([size_a, size_b])[np.arange(N), np.minimum(axis, 5)]
+    rows = one.colliding & (axis < 6) & (-2.0 * one.separation < thickness)
+    rows &= one.separation < -1e-6 * size
+    assert rows.sum() > N / 10
+    before = one
+    for share in (0.001, 0.01, 0.1, 1.0):
+        pushed = b.copy()
+        pushed[rows, :3] += (share * one.separation[:, None] * one.normal)[rows]
+        after = solve(a, pushed, size_a, size_b)
+        slack = 2.0 * share_bounds(before, size)[0] * before.volume
+        assert np.all((after.volume >= before.volume - slack)[rows])
+        before = after
+
+
+def test_volume_grows_with_the_boxes(pairs):
+    """A larger B holds the smaller one, so the overlap grows."""
+    a, b, size_a, size_b = pairs
+    one, two = solve(a, b, size_a, size_b), solve(a, b, size_a, 1.01 * size_b)
+    rows = one.separation < -1e-8 * largest(size_a, size_b)
+    slack = 2.0 * share_bounds(one, largest(size_a, size_b))[0] * one.volume
+    assert np.all((two.volume >= one.volume - slack)[rows])
+
+
 def test_reflection(pairs):
     """The scene mirrored at x = 0: same verdict and separation, point and normal mirrored."""
     a, b, size_a, size_b = pairs
@@ -281,6 +400,9 @@ def test_reflection(pairs):
     assert np.abs(one.normal * mirror[:3] - two.normal)[rows].max() < SAME_NORMAL
     error = np.abs(one.point * mirror[:3] - two.point).max(axis=1)
     assert np.all(error[rows] <= 2 * point_bound(one, size)[rows] + 1e-12)
+    mirrored = one.covariance * np.outer(mirror[:3], mirror[:3])
+    deep = rows & (one.separation < -1e-8 * size)
+    assert_same_patch(one, two, one.volume, mirrored, deep, size)
 
 
 def test_depth_is_continuous(pairs):

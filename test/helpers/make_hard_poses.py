@@ -19,16 +19,18 @@ FLOOR = mpfr(10)**-9
 
 
 def truth(a, b, size_a, size_b):
-    """Largest gap, and the overlap's centroid from A's position, of one pair."""
+    """Largest gap, and the overlap's centroid from A's position, volume and covariance."""
     box_a, box_b = oracle.make_box(a, size_a), oracle.make_box(b, size_b)
     gap = oracle.separation(box_a, box_b)
     size = mpfr(float(max(*size_a, *size_b)))
     centroid = None
     if gap < -FLOOR * size:
-        centroid = oracle.overlap(box_a, box_b)[1]
+        volume, centroid = oracle.overlap(box_a, box_b)
     if centroid is None:
-        return float(gap), [np.nan] * 3
-    return float(gap), oracle.as_array(oracle.add(centroid, box_a.centre, -1))
+        return float(gap), np.full(3, np.nan), np.nan, np.full((3, 3), np.nan)
+    covariance = np.array([oracle.as_array(row) for row in oracle.covariance(box_a, box_b)])
+    centroid = oracle.as_array(oracle.add(centroid, box_a.centre, -1))
+    return float(gap), centroid, float(volume), covariance
 
 
 def main():
@@ -36,10 +38,10 @@ def main():
     arrays = {}
     for name in tqdm(hard_poses.FAMILIES, unit='family'):
         pairs = hard_poses.generate(name)
-        found = [truth(*row) for row in zip(*pairs)]
+        found = zip(*(truth(*row) for row in zip(*pairs)))
         arrays |= {f'{name}.{part}': values for part, values in pairs._asdict().items()}
-        arrays[f'{name}.gap'] = np.array([gap for gap, _ in found])
-        arrays[f'{name}.centroid'] = np.array([centroid for _, centroid in found], dtype=float)
+        arrays |= {f'{name}.{part}': np.array(values) for part, values in zip(
+            hard_poses.Cases._fields[1:], found, strict=True)}
     np.savez_compressed(hard_poses.FILE, **arrays)
     total = sum(len(values) for key, values in arrays.items() if key.endswith('.gap'))
     print(f'{hard_poses.FILE}: {total} cases, {hard_poses.FILE.stat().st_size / 1e6:.2f} MB')

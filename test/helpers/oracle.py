@@ -2,8 +2,8 @@
 
 Inputs are the very doubles a solver gets; everything after them is MPFR: quaternions are
 normalised to 60 digits, the 15 axes are tested as the textbook writes them, and the overlap's
-volume and centroid come from its faces: each face of either box, clipped by the other box's six
-half-spaces, is one side of a pyramid whose apex lies inside.
+moments come from its faces: each face of either box, clipped by the other box's six half-spaces, is
+one side of a pyramid whose apex lies inside. Pyramids are cut into tetrahedra.
 """
 from __future__ import annotations
 
@@ -148,14 +148,45 @@ def overlap(a, b):
     return volume, add(apex, moment, 1 / volume)
 
 
+def covariance(a, b):
+    """Second central moments of A∩B by its volume, as rows; None where there is no volume.
+
+    A tetrahedron of corners p, q, r, s from any origin has ∫ x xᵀ dV = v/20 · (p pᵀ + q qᵀ + r rᵀ +
+    s sᵀ + m mᵀ), with v its volume and m the sum of its corners. Here s is the centroid of A∩B.
+    """
+    volume, centroid = overlap(a, b)
+    if centroid is None:
+        return None
+    total = [[ZERO] * 3 for _ in range(3)]
+    for face in overlap_faces(a, b):
+        p = add(face[0], centroid, -1)
+        for i in range(1, len(face) - 1):
+            q, r = add(face[i], centroid, -1), add(face[i + 1], centroid, -1)
+            v = abs(dot(p, cross(q, r))) / 6
+            m = add(add(p, q), r)
+            for j in range(3):
+                for k in range(3):
+                    total[j][k] += v / 20 * (p[j] * p[k] + q[j] * q[k] + r[j] * r[k] + m[j] * m[k])
+    return tuple(tuple(entry / volume for entry in row) for row in total)
+
+
 def pressed(a, b, axis, depth, floor):
     """B moved against `axis` (from A to B) until the depth is `floor`, where it is less."""
     return b if depth >= floor else Box(add(b.centre, axis, depth - floor), b.axes, b.half)
 
 
-def contact_point(a, b, axis, depth, size):
-    """The package's definition of the point: centroid of A∩B, pressed in to 1e-9 of the size."""
-    return overlap(a, pressed(a, b, axis, depth, mpfr(10)**-9 * mpfr(float(size))))[1]
+def contact_moments(a, b, axis, depth, size):
+    """The package's definition: volume, centroid, covariance of A∩B, pressed in to 1e-9 · size.
+
+    Volume and covariance are None where several axes have gap zero, and pressing along the normal
+    leaves less than half of that depth: the package goes on along the others.
+    """
+    floor = mpfr(10)**-9 * mpfr(float(size))
+    moved = pressed(a, b, axis, depth, floor)
+    volume, centroid = overlap(a, moved)
+    if depth < floor and separation(a, moved) > -0.51 * floor:
+        return None, centroid, None
+    return volume, centroid, covariance(a, moved)
 
 
 def as_array(vector):

@@ -58,7 +58,7 @@ def test_poses_are_read_alike(poses):
 
 def contact(draw):
     return Contact(True, draw(BOUNDED), np.array(draw(st.tuples(*[BOUNDED] * 3))),
-                   np.array(draw(st.tuples(*[BOUNDED] * 3))))
+                   np.array(draw(st.tuples(*[BOUNDED] * 3))), 0.0, np.zeros((3, 3)))
 
 
 @given(st.data(), STAMPS, FRAMES, st.integers(0, 4), st.integers(0, 3))

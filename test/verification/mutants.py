@@ -102,12 +102,64 @@ MUTANTS = {
         'core/overlap/clipping.hpp', 'double bounds[5] = {0.0,', 'double bounds[5] = {1e300,',
         f'{FAMILIES} -k exact_point'),
     'a face in the far face counts twice': Mutant(
-        'core/overlap/clipping.hpp', '    if (high > floor) sum +=', '    if (true) sum +=',
+        'core/overlap/clipping.hpp', '    if (high > floor) visit(', '    if (true) visit(',
         f'{EXACT} -k clipping'),
     'no certificate': Mutant(
         'core/overlap/face_sums.hpp',
-        'certificate(x_n, normal, area, length, found.volume, pair.size, depth)',
-        '(found.volume == found.volume)', f'{EXACT} -k "thin and sharing"'),
+        'certificate(x_n, normal, area, length, volume, radius, farthest2 > 0.0, pair.size, depth)',
+        '(volume == volume)', f'{EXACT} -k "thin and sharing"'),
+    'pieces far outside the overlap trusted': Mutant(
+        'core/overlap/face_sums.hpp', '  found.certain &= farthest2 <= reach * reach;', '',
+        f'{EXACT} -k far_outside'),
+    'second moments from A alone': Mutant(
+        'core/overlap/face_sums.hpp', '(of_a.second + rotated(r, of_b.second))', 'of_a.second',
+        f'{EXACT} -k through_each_other'),
+    "middles for the edges' pieces": Mutant(
+        'core/overlap/face_sums.hpp', 'middle * middle + (1.0 / 12.0) * (length * length)',
+        'middle * middle', f'{LAWS} -k of_the_parts'),
+    "middles for the lines' pieces": Mutant(
+        'core/overlap/face_sums.hpp', 'T square = (1.0 / 12.0) * signed_sum_of<T>(along);',
+        'T square = 0.0 * signed_sum_of<T>(along);', f'{LAWS} -k of_the_parts'),
+    'second moments about the origin of the sums': Mutant(
+        'core/overlap/face_sums.hpp', ' - squared(from_origin);', ' + 0.0 * squared(from_origin);',
+        f'{LAWS} -k of_the_parts'),
+    'second moments not divided by the volume': Mutant(
+        'core/overlap/face_sums.hpp', '(0.2 / volume) *', '(T{} + 0.2) *',
+        f'{LAWS} -k powers_of_two'),
+    "covariance left in A's frame": Mutant(
+        'core/contact.hpp', 'rotated(q.pair.axes_a, overlap.covariance)', 'overlap.covariance',
+        f'{LAWS} -k rigid_motion'),
+    "covariance left in the first box's frame": Mutant(
+        'core/contact.hpp', 'rotated(pair.rotation, found.covariance));', 'found.covariance);',
+        f'{LAWS} -k test_swap'),
+    "clipped covariance left in the reference box's frame": Mutant(
+        'core/overlap/clipping.hpp', 'rotated(pair.rotation, covariance)}', 'covariance}',
+        f'{EXACT} -k clipping_is'),
+    'clipped squares about the plane': Mutant(
+        'core/overlap/clipping.hpp', 'Vec<double> middle = 0.5 * w - Vec<double>{',
+        'Vec<double> middle = 0.5 * w - 0.0 * Vec<double>{', f'{EXACT} -k clipping_is'),
+    'covariance of the other sign': Mutant(
+        'core/contact.hpp', 'Sym<T> covariance = rotated(',
+        'Sym<T> covariance = T{} - splat<T>(1.0) * rotated(',
+        f'{LAWS} -k positive'),
+    'covariance not symmetric': Mutant(
+        'core/overlap/moments.hpp', '{s(1, 0), s(1, 1)', '{-s(1, 0), s(1, 1)',
+        f'{LAWS} -k positive'),
+    'volume of the unpressed overlap': Mutant(
+        'core/contact.hpp', 'Mask<T> pressed = enforce_minimum_depth(pair, q.axis) & q.touching;',
+        'Pair<T> moved = pair; '
+        'Mask<T> pressed = enforce_minimum_depth(moved, q.axis) & q.touching;',
+        f'{EXACT} -k pressed_volume'),
+    'volume by its magnitude of the wrong part': Mutant(
+        'core/contact.hpp', 'select<T>(q.touching, overlap.volume, T{})',
+        'select<T>(q.touching, overlap.volume * (1.0 + 0.1 * q.axis.separation), T{})',
+        f'{LAWS} -k of_the_parts'),
+    'volume that shrinks with the depth': Mutant(
+        'core/contact.hpp', 'select<T>(q.touching, overlap.volume, T{})',
+        'select<T>(q.touching, 1.0 / overlap.volume, T{})', f'{LAWS} -k grows_with_the_depth'),
+    'patch of a model that gives none': Mutant(
+        'core/contact.hpp', 'T unknown = splat<T>(std::numeric_limits<double>::quiet_NaN());',
+        'T unknown{};', f'{TEST_CORE} -k point_alone'),
     'faces not moved out of each other': Mutant(
         'core/overlap/face_sums.hpp', 'Mask<T> risky = unflush(pair, depth);',
         'Mask<T> risky = depth != depth;', f'{TEST_CORE} -k flush'),

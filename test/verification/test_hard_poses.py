@@ -50,6 +50,9 @@ def test_truth_is_the_oracles(name):
         if np.isfinite(cases.centroid[row]).all():
             point = oracle.add(oracle.overlap(box_a, box_b)[1], box_a.centre, -1)
             np.testing.assert_allclose(oracle.as_array(point), cases.centroid[row], rtol=1e-15)
+            assert float(oracle.overlap(box_a, box_b)[0]) == cases.volume[row]
+            for line, found in zip(oracle.covariance(box_a, box_b), cases.covariance[row]):
+                np.testing.assert_allclose(found, oracle.as_array(line), rtol=1e-15)
 
 
 def test_families_reach_what_they_are_for():
@@ -105,6 +108,24 @@ def test_exact_point(name):
     reach = np.abs(cases.pairs.pose_a[:, :3]).max(axis=1)
     bound = np.maximum(1e-9, 1e-14 * size / np.maximum(-cases.gap, 1e-300)) * size + 8 * EPS * reach
     assert (off <= bound)[known].all()
+
+
+@pytest.mark.parametrize('name', hard_poses.FAMILIES)
+def test_exact_volume_and_covariance(name):
+    """To max(1e-9, 1e-14·size/depth) of itself, and max(1e-8, 1e-14·size/depth) of its trace."""
+    cases = CASES[name]
+    found, size = solve('exact', cases.pairs), size_of(cases.pairs)
+    known = found.colliding & np.isfinite(cases.volume)
+    rounding = 1e-14 * size / np.maximum(-cases.gap, 1e-300)
+    off = np.abs(found.volume - cases.volume)
+    assert (off <= np.maximum(1e-9, rounding) * cases.volume)[known].all()
+    off = np.linalg.norm(found.covariance - cases.covariance, axis=(1, 2))
+    trace = np.trace(cases.covariance, axis1=1, axis2=2)
+    assert (off <= np.maximum(1e-8, rounding) * trace)[known].all()
+    assert (found.volume[found.colliding] > 0.0).all()
+    assert np.isfinite(found.covariance[found.colliding]).all()
+    assert (found.volume[~found.colliding] == 0.0).all()
+    assert np.isnan(found.covariance[~found.colliding]).all()
 
 
 @pytest.mark.parametrize('name', hard_poses.FAMILIES)
@@ -177,6 +198,8 @@ def test_scale_by_a_power_of_two(everything, model, power):
     np.testing.assert_array_equal(k * one.separation, two.separation)
     np.testing.assert_array_equal(one.normal, two.normal)
     np.testing.assert_array_equal(k * one.point, two.point)
+    np.testing.assert_array_equal(k**3 * one.volume, two.volume)
+    np.testing.assert_array_equal(k**2 * one.covariance, two.covariance)
 
 
 @pytest.mark.parametrize('model', MODELS)

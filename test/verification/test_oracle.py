@@ -17,8 +17,12 @@ def test_axis_aligned_overlap():
     b = oracle.make_box((0.5, 0.25, 1.875, 0, 0, 0, 1), (2, 2, 2))
     assert oracle.separation(a, b) == -0.125
     volume, centroid = oracle.overlap(a, b)
-    assert abs(volume - mpfr('1.5') * mpfr('1.75') * mpfr('0.125')) < 1e-50
+    extents = [mpfr('1.5'), mpfr('1.75'), mpfr('0.125')]
+    assert abs(volume - extents[0] * extents[1] * extents[2]) < 1e-50
     assert np.allclose(oracle.as_array(centroid), (0.25, 0.125, 0.9375), atol=1e-16)
+    for j, row in enumerate(oracle.covariance(a, b)):
+        for k, entry in enumerate(row):
+            assert abs(entry - (extents[j]**2 / 12 if j == k else 0)) < 1e-50
 
 
 @pytest.mark.parametrize('offset', [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0.5, 0.5, 0.5)])
@@ -34,7 +38,8 @@ def test_shared_faces_count_once(offset):
 def test_corner_pyramid():
     """A cube standing on its corner, pressed by d into a face, cuts off a corner.
 
-    The centroid of that tetrahedron lies at d/4 from the face, its volume is d³ √3/2.
+    The centroid of that tetrahedron lies at d/4 from the face, its volume is d³ √3/2. Its variances
+    are 3/80 d² along the height and 12/80 d² across.
     """
     turn = poses.multiply(poses.small_rotations(np.array([[1.0, -1, 0]]),
                                                 np.array([np.arccos(1 / np.sqrt(3))])),
@@ -45,10 +50,12 @@ def test_corner_pyramid():
     volume, centroid = oracle.overlap(a, b)
     assert float(volume) == pytest.approx(d**3 * np.sqrt(3) / 2, rel=1e-12)
     assert oracle.as_array(centroid) == pytest.approx((0, 0, 1 - d / 4), abs=1e-12)
+    found = np.array([oracle.as_array(row) for row in oracle.covariance(a, b)])
+    assert found == pytest.approx(np.diag([12, 12, 3]) / 80 * d * d, abs=1e-14)
 
 
 def test_overlap_against_sampling():
-    """Volume and centroid of random pairs agree with 200,000 points drawn in A."""
+    """Volume, centroid and covariance of random pairs agree with 200,000 points drawn in A."""
     rng = np.random.default_rng(5)
     a, b, size_a, size_b = poses.random_pairs(rng, 12)
     hits = 0
@@ -68,6 +75,9 @@ def test_overlap_against_sampling():
             hits += 1
             error = points[inside].mean(axis=0) - oracle.as_array(centroid)
             assert np.all(np.abs(error) < 5 * points[inside].std(axis=0) / np.sqrt(inside.sum()))
+            spread = np.array([oracle.as_array(row) for row in oracle.covariance(box_a, box_b)])
+            drawn = np.cov(points[inside].T)
+            assert np.abs(drawn - spread).max() < 10 * np.trace(spread) / np.sqrt(inside.sum())
         assert (volume > 0) == (oracle.separation(box_a, box_b) < 0)
     assert hits >= 4
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from ...resources import resource_path
 from ...solver.checks import as_size
-from ...solver.contact import Contacts
+from ...solver.contact import Contacts, without_patch
 from ...solver.weights_file import Network, Weights, WeightsError, load_weights
 from . import _networks
 from ._networks import FEATURES, INPUTS, OCTANT, OUTPUTS
@@ -109,7 +109,7 @@ class Paper:
         self._check_sizes(size_a, size_b)
         *found, refused = _networks.solve(a, b, size_a, size_b, self._packed, self._widths,
                                           self._cubes, self.fold_to)
-        return Contacts(*found), refused
+        return without_patch(*found), refused
 
 
 class PaperContinuous(Paper):

@@ -119,16 +119,20 @@ auto with_model(const PairSolver& solver, Run run) {
 
 PairSolver* solver_of(PyObject* object) { return reinterpret_cast<PairSolver*>(object); }
 
-PyObject* new_vector(const Vec<double>& v) {
-  npy_intp three = 3;
-  PyObject* array = PyArray_SimpleNew(1, &three, NPY_DOUBLE);
-  if (array) std::memcpy(PyArray_DATA(reinterpret_cast<PyArrayObject*>(array)), v.v, sizeof(v.v));
+// A new array of 3, or of 3 × 3 numbers.
+PyObject* new_array(const double* numbers, int dimensions) {
+  npy_intp shape[] = {3, 3};
+  PyObject* array = PyArray_SimpleNew(dimensions, shape, NPY_DOUBLE);
+  if (array)
+    std::memcpy(PyArray_DATA(reinterpret_cast<PyArrayObject*>(array)), numbers,
+                (dimensions == 1 ? 3 : 9) * sizeof(double));
   return array;
 }
 
 PyObject* new_contact(const Contact& contact) {
   PyObject* fields[] = {PyBool_FromLong(contact.colliding), PyFloat_FromDouble(contact.separation),
-                        new_vector(contact.normal), new_vector(contact.point)};
+                        new_array(contact.normal.v, 1),     new_array(contact.point.v, 1),
+                        PyFloat_FromDouble(contact.volume), new_array(contact.covariance[0], 2)};
   constexpr Py_ssize_t count = sizeof(fields) / sizeof(fields[0]);
   PyObject* tuple = contact_type->tp_alloc(contact_type, count);
   for (Py_ssize_t k = 0; k < count; ++k) {
@@ -239,11 +243,13 @@ PyObject* solver_solve(PyObject* self, PyObject* const* args, Py_ssize_t count) 
   long threads = PyLong_AsLong(args[4]);
   if ((threads == -1 && PyErr_Occurred()) || !read_pairs(args, pairs)) return nullptr;
   Array<bool> colliding;
-  Array<double> separation, normal, point;
+  Array<double> separation, normal, point, volume, covariance;
   if (!make({pairs.count}, colliding) || !make({pairs.count}, separation) ||
-      !make({pairs.count, 3}, normal) || !make({pairs.count, 3}, point))
+      !make({pairs.count, 3}, normal) || !make({pairs.count, 3}, point) ||
+      !make({pairs.count}, volume) || !make({pairs.count, 3, 3}, covariance))
     return nullptr;
-  Results results{colliding.numbers, separation.numbers, normal.numbers, point.numbers};
+  Results results{colliding.numbers, separation.numbers, normal.numbers,
+                  point.numbers,     volume.numbers,     covariance.numbers};
   Counts counts;
   long refused;
   Py_BEGIN_ALLOW_THREADS;
@@ -252,8 +258,9 @@ PyObject* solver_solve(PyObject* self, PyObject* const* args, Py_ssize_t count) 
   });
   Py_END_ALLOW_THREADS;
   if (refused < 0) solver->clipped += counts.clipped, solver->exact += counts.exact;
-  return Py_BuildValue("(NNNNl)", colliding.object.release(), separation.object.release(),
-                       normal.object.release(), point.object.release(), refused);
+  return Py_BuildValue("(NNNNNNl)", colliding.object.release(), separation.object.release(),
+                       normal.object.release(), point.object.release(), volume.object.release(),
+                       covariance.object.release(), refused);
 }
 
 PyObject* solver_clipped(PyObject* self, void*) {
@@ -264,7 +271,8 @@ PyObject* solver_exact(PyObject* self, void*) { return PyLong_FromLong(solver_of
 PyMethodDef solver_methods[] = {
     {"solve", fastcall(solver_solve), METH_FASTCALL,
      "solve(poses_a, poses_b, sizes_a, sizes_b, threads)\n--\n\n"
-     "Return colliding, separation, normal, point, and the first refused row or -1.\n\n"
+     "Return colliding, separation, normal, point, volume, covariance, and the first refused row "
+     "or -1.\n\n"
      "poses (n, 7), sizes (n, 3) or (1, 3) full extents [m]; frame: that of the poses."},
     {nullptr, nullptr, 0, nullptr}};
 PyGetSetDef solver_attributes[] = {

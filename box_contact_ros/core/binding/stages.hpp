@@ -11,6 +11,7 @@ struct StageArrays {
   int64_t *axis{}, *face{};
   double *separation{}, *touch{}, *size{}, *normal{}, *rotation{}, *offset_a{}, *offset_b{};
   double *pressed_offset_a{}, *pressed_offset_b{}, *centroid{}, *clipped_centroid{};
+  double *volume{}, *clipped_volume{}, *covariance{}, *clipped_covariance{};
   double *bounds_middle{}, *bounds_half{};
   double *other_axes{}, *other_offset{}, *other_half{}, *answer{};
   float *features{}, *vectors{};
@@ -35,6 +36,10 @@ struct StageArrays {
     visit("pressed_offset_b", pressed_offset_b, {3});
     visit("centroid", centroid, {3});
     visit("clipped_centroid", clipped_centroid, {3});
+    visit("volume", volume, {});
+    visit("clipped_volume", clipped_volume, {});
+    visit("covariance", covariance, {3, 3});
+    visit("clipped_covariance", clipped_covariance, {3, 3});
     visit("bounds_middle", bounds_middle, {3});
     visit("bounds_half", bounds_half, {3});
     visit("other_axes", other_axes, {3, 3});
@@ -91,16 +96,22 @@ bool fill_stages(const Rows& rows, long row, const Network* network, const Stage
   put(arrays.rotation, row, q.pair.rotation);
   put(arrays.offset_a, row, q.pair.offset_a);
   put(arrays.offset_b, row, q.pair.offset_b);
-  if (arrays.centroid || arrays.certain) {
+  if (arrays.centroid || arrays.volume || arrays.covariance || arrays.certain) {
     Counts counts;
-    put(arrays.centroid, row, ExactModel{}.points(q, counts));
+    Moments<double> exact = ExactModel{}.solve(q, counts);
+    put(arrays.centroid, row, exact.centroid);
+    put(arrays.volume, row, exact.volume);
+    put(arrays.covariance, row, matrix(exact.covariance));
     put(arrays.certain, row, counts.clipped == 0);
   }
   Pair<double> pressed = q.pair;
   bool was_pressed = enforce_minimum_depth(pressed, q.axis);
-  if (arrays.clipped_centroid)
-    put(arrays.clipped_centroid, row,
-        clipped_overlap(pressed, int(q.axis.face), was_pressed).centroid);
+  if (arrays.clipped_centroid || arrays.clipped_volume || arrays.clipped_covariance) {
+    Moments<double> clipped = clipped_overlap(pressed, int(q.axis.face), was_pressed);
+    put(arrays.clipped_centroid, row, clipped.centroid);
+    put(arrays.clipped_volume, row, clipped.volume);
+    put(arrays.clipped_covariance, row, matrix(clipped.covariance));
+  }
   put(arrays.pressed_offset_a, row, pressed.offset_a);
   put(arrays.pressed_offset_b, row, pressed.offset_b);
   OverlapBounds<double> bounds = MlpModelBy<method>::bounds_of(pressed, q.axis);

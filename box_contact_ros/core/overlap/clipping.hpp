@@ -11,6 +11,8 @@
 // 3. What comes out below the reference box counts with the height −thickness. It is cut triangle by
 //    triangle, because no part of a face may count twice.
 // 4. Signed integrals of w, u w, v w and w²/2 over the polygon, triangle by triangle.
+// 5. The same polygons once more, about the centroid, for the second moments: squares of the way to
+//    the centroid from anywhere else would cancel in a small overlap.
 //
 // No face of the reference box is clipped, and every integrand vanishes on the plane w = 0. Coplanar
 // faces need no case: they contribute nothing, in exact arithmetic and in rounded.
@@ -24,6 +26,7 @@
 #include <utility>
 
 #include "../poses.hpp"
+#include "moments.hpp"
 
 namespace box_contact {
 
@@ -31,17 +34,13 @@ namespace box_contact {
 // other's edges less is left; then the other five faces are tried as the reference.
 constexpr double cancelled = 1e-3;
 
-struct Overlap {
-  double volume = 0.0;     // [m³]
-  Vec<double> centroid{};  // A's frame [m]
-};
-
 namespace clipping {
 
-struct Moments {
+// Up to the first order, about the middle of a rectangle in the contact plane.
+struct FirstMoments {
   double volume = 0.0, u = 0.0, v = 0.0, w = 0.0;
 
-  Moments& operator+=(const Moments& other) {
+  FirstMoments& operator+=(const FirstMoments& other) {
     volume += other.volume;
     u += other.u;
     v += other.v;
@@ -79,8 +78,8 @@ inline Polygon clip(const Polygon& from, int axis, double sign, double bound) {
 }
 
 // Signed ∫ (w, u w, v w, w²/2) over the polygon's projection on (u, v).
-inline Moments integrate(const Polygon& polygon) {
-  Moments sum;
+inline FirstMoments integrate(const Polygon& polygon) {
+  FirstMoments sum;
   const Vec<double>& a = polygon.corners[0];
   for (int i = 1; i + 1 < polygon.count; ++i) {
     const Vec<double>&b = polygon.corners[i], &c = polygon.corners[i + 1];
@@ -95,22 +94,57 @@ inline Moments integrate(const Polygon& polygon) {
   return sum;
 }
 
-// The same, with all that lies below w = floor lifted to there. The corners of a face are not in one
-// plane to the last bit; of such a saddle both parts have the middle, hence the triangles.
-inline Moments integrate_lifted(const Polygon& polygon, double floor) {
-  Moments sum;
+// Call visit(polygon) for parts of a polygon that lie on one side of w = floor, those below lifted to
+// there. The corners of a face are not in one plane to the last bit; of such a saddle both parts
+// have the middle, hence the triangles.
+template <class Visit>
+inline void lifted(const Polygon& polygon, double floor, Visit visit) {
   for (int i = 1; i + 1 < polygon.count; ++i) {
     Polygon triangle{3, {polygon.corners[0], polygon.corners[i], polygon.corners[i + 1]}};
     double low = std::min({triangle.corners[0][2], triangle.corners[1][2], triangle.corners[2][2]});
     double high =
         std::max({triangle.corners[0][2], triangle.corners[1][2], triangle.corners[2][2]});
     // A triangle in the plane, to the last bit, is a part below it and none above.
-    if (high > floor) sum += integrate(clip(triangle, 2, -1.0, -floor));
+    if (high > floor) visit(clip(triangle, 2, -1.0, -floor));
     if (low < floor || !(high > floor)) {
       Polygon below = clip(triangle, 2, 1.0, floor);
       for (int k = 0; k < below.count; ++k) below.corners[k][2] = floor;
-      sum += integrate(below);
+      visit(below);
     }
+  }
+}
+
+// Signed second moments, about `centre`, of the columns between the polygon and the plane w = 0. With
+// c the centre's height, a column has ∫ dw = w, ∫ (w − c) dw = w (w/2 − c), and
+// ∫ (w − c)² dw = w ((w/2 − c)² + w²/12): products of three linear functions on each triangle.
+inline Sym<double> integrate_squares(const Polygon& polygon, const Vec<double>& centre) {
+  Sym<double> sum{};
+  auto moved = [&](int i) -> Vec<double> {
+    const Vec<double>& corner = polygon.corners[i];
+    return {corner[0] - centre[0], corner[1] - centre[1], corner[2]};
+  };
+  Vec<double> a = moved(0);
+  for (int i = 1; i + 1 < polygon.count; ++i) {
+    Vec<double> b = moved(i), c = moved(i + 1);
+    double twice_area = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]);
+    // ∫ f g h over the triangle, for linear functions by their values at the corners.
+    auto integral = [&](const Vec<double>& f, const Vec<double>& g, const Vec<double>& h) {
+      Vec<double> one{1.0, 1.0, 1.0};
+      Vec<double> gh{g[0] * h[0], g[1] * h[1], g[2] * h[2]};
+      double of_f = dot(one, f), of_g = dot(one, g), of_h = dot(one, h);
+      double fg = dot(f, g), fh = dot(f, h);
+      return twice_area * (1.0 / 120.0) *
+             ((of_f * of_g * of_h + 2.0 * dot(f, gh)) +
+              (of_f * dot(one, gh) + (of_g * fh + of_h * fg)));
+    };
+    Vec<double> u{a[0], b[0], c[0]}, v{a[1], b[1], c[1]}, w{a[2], b[2], c[2]};
+    Vec<double> middle = 0.5 * w - Vec<double>{centre[2], centre[2], centre[2]};
+    sum(0, 0) += integral(w, u, u);
+    sum(1, 1) += integral(w, v, v);
+    sum(0, 1) += integral(w, u, v);
+    sum(0, 2) += integral(w, u, middle);
+    sum(1, 2) += integral(w, v, middle);
+    sum(2, 2) += integral(w, middle, middle) + integral(w, w, w) * (1.0 / 12.0);
   }
   return sum;
 }
@@ -119,9 +153,9 @@ inline Moments integrate_lifted(const Polygon& polygon, double floor) {
 constexpr int face_corners[6][4] = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4},
                                     {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
 
-// The overlap with a face axis (0–5) as the reference, and what part of the integrals' volume is
+// The overlap with a face axis (0–5) as the reference. `kept`: what part of the integrals' volume is
 // left in their sum.
-inline Overlap overlap_from(const Pair<double>& pair, int face, double& kept) {
+inline Moments<double> overlap_from(const Pair<double>& pair, int face, double& kept) {
   bool of_a = face < 3;
   int w = face % 3, axes[3] = {(w + 1) % 3, (w + 2) % 3, w};
   const Vec<double>&own = of_a ? pair.half_a : pair.half_b,
@@ -169,8 +203,11 @@ inline Overlap overlap_from(const Pair<double>& pair, int face, double& kept) {
       outside[c] |= unsigned(bound_signs[k] * corners[c][bound_axes[k]] > bounds[k]) << k;
   }
 
-  Moments sum;
+  FirstMoments sum;
   double gross = 0.0;
+  Polygon polygons[6];
+  int count = 0;
+  bool through = lowest < floor;
   for (const int* f : face_corners) {
     if (outside[f[0]] & outside[f[1]] & outside[f[2]] & outside[f[3]]) continue;
     // 2. Clip by the planes that cut the face.
@@ -179,9 +216,15 @@ inline Overlap overlap_from(const Pair<double>& pair, int face, double& kept) {
     for (int k = 0; k < 5; ++k)
       if (cut >> k & 1U) polygon = clip(polygon, bound_axes[k], bound_signs[k], bounds[k]);
     // 3. and 4. Integrate.
-    Moments part = lowest < floor ? integrate_lifted(polygon, floor) : integrate(polygon);
+    FirstMoments part;
+    if (through) {
+      lifted(polygon, floor, [&](const Polygon& lift) { part += integrate(lift); });
+    } else {
+      part = integrate(polygon);
+    }
     sum += part;
     gross += std::fabs(part.volume);
+    polygons[count++] = polygon;
   }
 
   // The sign of the volume is that of the frame's handedness, and cancels in the ratios. Boxes
@@ -200,19 +243,37 @@ inline Overlap overlap_from(const Pair<double>& pair, int face, double& kept) {
   centroid[axes[1]] = middle[1] + found[1];
   centroid[w] = side * (found[2] + half[2]);
   kept = gross > 0.0 ? std::fabs(sum.volume) / gross : 0.0;
-  return {std::fabs(sum.volume), of_a ? centroid : pair.offset_a + pair.rotation * centroid};
+
+  // 5. Second moments about the centroid.
+  Sym<double> squares{};
+  auto add = [&](const Polygon& polygon) { squares = squares + integrate_squares(polygon, found); };
+  for (int i = 0; i < count && sum.volume != 0.0; ++i) {
+    if (through) {
+      lifted(polygons[i], floor, add);
+    } else {
+      add(polygons[i]);
+    }
+  }
+  Sym<double> covariance;
+  double scale = sum.volume != 0.0 ? 1.0 / sum.volume : 0.0;
+  for (int d = 0; d < 3; ++d)
+    for (int e = d; e < 3; ++e)
+      covariance(axes[d], axes[e]) = (d < 2 && e == 2 ? side * scale : scale) * squares(d, e);
+  double volume = std::fabs(sum.volume);
+  if (of_a) return {volume, centroid, covariance};
+  return {volume, pair.offset_a + pair.rotation * centroid, rotated(pair.rotation, covariance)};
 }
 
 }  // namespace clipping
 
 // The overlap of a pair that has been pressed in. `face`: the best face axis, 0–5.
-inline Overlap overlap_by_clipping(const Pair<double>& pair, int face) {
+inline Moments<double> overlap_by_clipping(const Pair<double>& pair, int face) {
   double kept;
-  Overlap best = clipping::overlap_from(pair, face, kept);
+  Moments<double> best = clipping::overlap_from(pair, face, kept);
   if (kept < cancelled) {
     for (int other = 0; other < 6; ++other) {
       double kept_by_other;
-      Overlap candidate = clipping::overlap_from(pair, other, kept_by_other);
+      Moments<double> candidate = clipping::overlap_from(pair, other, kept_by_other);
       if (kept_by_other > kept) best = candidate, kept = kept_by_other;
     }
   }

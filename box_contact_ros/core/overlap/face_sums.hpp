@@ -29,6 +29,8 @@ namespace box_contact {
 
 // What is asked of the centroid: an error of size · max(1e-9, 1e-14 · size / depth).
 constexpr double least_centroid_error = 1e-9, centroid_rounding = 1e-14;
+// And of the covariance: max(1e-8, 1e-14 · size / depth) of its trace.
+constexpr double least_covariance_error = 1e-8;
 
 namespace face_sums {
 
@@ -55,26 +57,41 @@ constexpr double safely_inside = 1e-6;
 // Distance from a box [of the size] up to which rounding alone puts a point outside.
 constexpr double outside_by_rounding = 0x1p-48;
 
-// Shares of the accuracy that the twelve equations may be off by.
+// Squared sine below which rounding can leave a piece of the line of two faces far outside the
+// overlap, where it hardly counts in the equations, but in squares. The line is known to
+// 2⁻⁵³ · size / sine, so such pieces are within 2⁻⁵³ · size / sine² of it.
+constexpr double far_sine2 = 1e-12;
+// No point of a convex body is farther from its centroid than √15 times √trace of its covariance
+// (Kannan, Lovász and Simonovits 1995). Rounded up.
+constexpr double farthest_reach = 3.88;
+
+// Shares of the accuracy that the twelve equations may be off by. The covariance of a wedge between
+// faces that are almost parallel may be wrong by six times as much as the diagonal is.
 constexpr double off_diagonal_share = 0.03, diagonal_share = 0.3, closure_share = 0.1;
+constexpr double wedge_diagonal_share = 0.1;
 
 // Weights of the edges' pieces in the mean, so that it is not the middle of a symmetric overlap.
 constexpr EdgeWeights weights_a{0.058, 0.078, 0.043}, weights_b{0.023, 0.043, 0.013};
 
 enum class Side { sigma, tau };
 
-// Sums over the edges of the parts of a box's six faces, by the axis across the face: twice the
-// area, and three times the first moments along the two axes that follow. `side` is the sign that
-// tells a face from the opposite one. Terms of the other sign are added last, in the same order for
-// one pair and for W.
+// What is summed over the edges of a part of a face, with y and z along the two axes that follow the
+// one across it: twice the area, three times the first moments, four times the second ones.
+enum { twice_area_of, y_of, z_of, yy_of, yz_of, zz_of, sum_count };
+
+// These sums for a box's six faces, by the axis across the face. `side` is the sign that tells a
+// face from the opposite one. Terms of the other sign are added last, in the same order for one pair
+// and for W.
 template <class T, Side side>
 struct FaceSums {
-  Four<T> sums[3][3][steps<T>]{};
+  Four<T> sums[3][sum_count][steps<T>]{};
 
-  // Add a piece at step n, where the face's side is the sign `given`.
-  template <Side given>
+  // Add a piece at step n, where the face's side is the sign `given`. Second moments are added for
+  // lines only, and as if the piece were in its middle: `squares` has the rest.
+  template <Side given, int count>
   [[gnu::always_inline]] void add(int face, int n, Four<T> twice_area, Four<T> y, Four<T> z) {
-    Four<T> terms[3] = {twice_area, twice_area * y, twice_area * z};
+    Four<T> by_y = twice_area * y, by_z = twice_area * z;
+    Four<T> terms[sum_count] = {twice_area, by_y, by_z, by_y * y, by_y * z, by_z * z};
     int place = n;
     if constexpr (given != side) {  // σ and τ change places: steps or lanes 1 and 2
       if constexpr (is_scalar<T>) {
@@ -83,7 +100,7 @@ struct FaceSums {
         place = (n & 1) << 1 | n >> 1;
       }
     }
-    for (int k = 0; k < 3; ++k) sums[face][k][place] += terms[k];
+    for (int k = 0; k < count; ++k) sums[face][k][place] += terms[k];
   }
   // The total of face −, sign 0, or +, sign 1, across an axis.
   [[gnu::always_inline]] T operator()(int face, int sign, int what) const {
@@ -102,31 +119,69 @@ struct FaceSums {
   }
 };
 
-// Add the pieces of a box's own edges. `origin`: in the box's frame.
+// The sum over the four signs, of which the two with σ ≠ τ count negative.
+template <class T>
+[[gnu::always_inline]] inline T signed_sum_of(const Four<T> (&terms)[steps<T>]) {
+  if constexpr (is_scalar<T>) {
+    return (terms[0][0] + terms[0][3]) - (terms[0][1] + terms[0][2]);
+  } else {
+    return (terms[0] + terms[3]) - (terms[1] + terms[2]);
+  }
+}
+
+template <class T>
+[[gnu::always_inline]] inline T largest_of(const Four<T> (&terms)[steps<T>]) {
+  if constexpr (is_scalar<T>) {
+    return max(max(terms[0][0], terms[0][1]), max(terms[0][2], terms[0][3]));
+  } else {
+    return max(max(terms[0], terms[1]), max(terms[2], terms[3]));
+  }
+}
+
+// Add the pieces of a box's own edges. `origin`: in the box's frame. `squares` gets four times their
+// part of Σ distance of the face · ∫ x xᵀ dA, in the planes of the faces.
 template <class T, Side side>
 [[gnu::always_inline]] inline void add_edges(const EdgePieces<T>& pieces, const Vec<T>& half,
-                                             const Vec<T>& origin, FaceSums<T, side>& faces) {
+                                             const Vec<T>& origin, FaceSums<T, side>& faces,
+                                             Sym<T>& squares) {
 #pragma GCC unroll 3
   for (int j = 0; j < 3; ++j) {
     int a = (j + 1) % 3, b = (j + 2) % 3;
+    Four<T> ff[steps<T>], gg[steps<T>], fm[steps<T>], gm[steps<T>], mm[steps<T>];
 #pragma GCC unroll 4
     for (int n = 0; n < steps<T>; ++n) {
       Four<T> f = sigma<T>(n) * half[a] - origin[a], g = tau<T>(n) * half[b] - origin[b];
       Four<T> s = pieces.s[j][n], t = pieces.t[j][n];
       Four<T> length = max(t - s, Four<T>{}), middle = 0.5 * (s + t) - origin[j];
-      faces.template add<Side::sigma>(a, n, tau<T>(n) * (length * g), g, middle);
-      faces.template add<Side::tau>(b, n, sigma<T>(n) * (length * f), middle, f);
+      Four<T> by_f = length * f, by_g = length * g;
+      faces.template add<Side::sigma, yy_of>(a, n, tau<T>(n) * by_g, g, middle);
+      faces.template add<Side::tau, yy_of>(b, n, sigma<T>(n) * by_f, middle, f);
+      // In both faces it has the same weight, its length · f · g.
+      Four<T> weight = by_f * g, weight_f = weight * f, weight_g = weight * g;
+      ff[n] = weight_f * f;
+      gg[n] = weight_g * g;
+      fm[n] = weight_f * middle;
+      gm[n] = weight_g * middle;
+      mm[n] = weight * (middle * middle + (1.0 / 12.0) * (length * length));
     }
+    squares(a, a) += signed_sum_of<T>(ff);
+    squares(b, b) += signed_sum_of<T>(gg);
+    squares(a, j) += signed_sum_of<T>(fm);
+    squares(b, j) += signed_sum_of<T>(gm);
+    squares(j, j) += 2.0 * signed_sum_of<T>(mm);
   }
 }
 
 // Add the pieces of the 36 lines in which a face of A, at the sign σ of axis i, meets a face of B,
-// at τ of axis j. `origin_a`, `origin_b`: the origin in A's frame and in B's.
+// at τ of axis j. `origin_a`, `origin_b`: the origin in A's frame and in B's. `squares`, in A's frame,
+// gets what these pieces have about their own middles: length² / 12 along their direction.
+// `farthest2` gets the squared distance of the farthest piece that faces almost parallel leave.
 template <class T>
 [[gnu::always_inline]] inline void add_lines(const Pair<T>& pair, const Mat<T>& inverse,
                                              const Vec<T>& origin_a, const Vec<T>& origin_b,
                                              FaceSums<T, Side::sigma>& faces_a,
-                                             FaceSums<T, Side::tau>& faces_b) {
+                                             FaceSums<T, Side::tau>& faces_b, Sym<T>& squares,
+                                             T& farthest2) {
   const Mat<T>& r = pair.rotation;
 #pragma GCC unroll 3
   for (int i = 0; i < 3; ++i) {
@@ -136,6 +191,7 @@ template <class T>
       int k = (j + 1) % 3, l = (j + 2) % 3;
       T cosine = r[i][j], sine2 = r[y][j] * r[y][j] + r[z][j] * r[z][j];
       Mask<T> there = sine2 > least_sine2;
+      Mask<T> almost_parallel_faces = there & (sine2 < far_sine2);
       T scale = 1.0 / select<T>(there, sine2, splat<T>(1.0));
       sine2 = select<T>(there, sine2, T{});
       // Along d = a_i × b_j coordinates change by entries of R: −r_zj, r_yj in A, r_il, −r_ik in B.
@@ -143,6 +199,7 @@ template <class T>
       T along_k = inverse[i][l], along_l = -inverse[i][k];
       T slab_y = pair.half_a[y] * abs(along_y), slab_z = pair.half_a[z] * abs(along_z);
       T slab_k = pair.half_b[k] * abs(along_k), slab_l = pair.half_b[l] * abs(along_l);
+      Four<T> along[steps<T>], distance2[steps<T>];
 #pragma GCC unroll 4
       for (int n = 0; n < steps<T>; ++n) {
         Four<T> f = sigma<T>(n) * pair.half_a[i] - origin_a[i];
@@ -155,12 +212,24 @@ template <class T>
         Four<T> from =
             max(max(-y_by - slab_y, -z_by - slab_z), max(-k_by - slab_k, -l_by - slab_l));
         Four<T> to = min(min(slab_y - y_by, slab_z - z_by), min(slab_k - k_by, slab_l - l_by));
-        Four<T> length = sine2 * max(to - from, Four<T>{}), middle = 0.5 * (from + to);
-        faces_a.template add<Side::sigma>(i, n, tau<T>(n) * (length * q), at_y - middle * r[z][j],
-                                          at_z + middle * r[y][j]);
-        faces_b.template add<Side::tau>(j, n, sigma<T>(n) * (length * p), at_k + middle * r[i][l],
-                                        at_l - middle * r[i][k]);
+        Four<T> span = max(to - from, Four<T>{}), length = sine2 * span;
+        Four<T> middle = 0.5 * (from + to), by_p = length * p, by_q = length * q;
+        faces_a.template add<Side::sigma, sum_count>(
+            i, n, tau<T>(n) * by_q, at_y - middle * r[z][j], at_z + middle * r[y][j]);
+        faces_b.template add<Side::tau, sum_count>(
+            j, n, sigma<T>(n) * by_p, at_k + middle * r[i][l], at_l - middle * r[i][k]);
+        along[n] = (f * by_q + g * by_p) * (span * span);
+        distance2[n] =
+            select<Four<T>>(span > 0.0, f * f + sine2 * (q * q + middle * middle), Four<T>{});
       }
+      if (any(almost_parallel_faces))
+        farthest2 =
+            select<T>(almost_parallel_faces, max(farthest2, largest_of<T>(distance2)), farthest2);
+      T square = (1.0 / 12.0) * signed_sum_of<T>(along);
+      T by_y = square * r[y][j], by_z = square * r[z][j];
+      squares(y, y) += by_z * r[z][j];
+      squares(y, z) -= by_y * r[z][j];
+      squares(z, z) += by_y * r[y][j];
     }
   }
 }
@@ -170,32 +239,44 @@ template <class T>
 struct SurfaceIntegrals {
   Mat<T> x_n;     // ∫ x nᵀ dA; rows are components of x
   Vec<T> first;   // Σ distance of the face · ∫ x dA
+  Sym<T> second;  // Σ distance of the face · ∫ x xᵀ dA
   Vec<T> normal;  // 2 ∫ n dA
   Vec<T> area;    // of both faces across each axis, signed sums: about their area
 };
 
+// `squares`: four times the part of `second` that is not in the sums.
 template <class T, Side side>
 [[gnu::always_inline]] inline SurfaceIntegrals<T> integrate(const FaceSums<T, side>& faces,
+                                                            const Sym<T>& squares,
                                                             const Vec<T>& half,
                                                             const Vec<T>& origin) {
   SurfaceIntegrals<T> sum;
   sum.first = {};
+  Sym<T> within = squares, across{};
   for (int i = 0; i < 3; ++i) {
     int y = (i + 1) % 3, z = (i + 2) % 3;
     T low = -half[i] - origin[i], high = half[i] - origin[i];
-    T area_low = faces(i, 0, 0), area_high = faces(i, 1, 0);
+    T area_low = faces(i, 0, twice_area_of), area_high = faces(i, 1, twice_area_of);
     T x_low = low * (0.5 * area_low), x_high = high * (0.5 * area_high);
-    T y_low = faces(i, 0, 1) * (1.0 / 3.0), y_high = faces(i, 1, 1) * (1.0 / 3.0);
-    T z_low = faces(i, 0, 2) * (1.0 / 3.0), z_high = faces(i, 1, 2) * (1.0 / 3.0);
+    T y_low = faces(i, 0, y_of) * (1.0 / 3.0), y_high = faces(i, 1, y_of) * (1.0 / 3.0);
+    T z_low = faces(i, 0, z_of) * (1.0 / 3.0), z_high = faces(i, 1, z_of) * (1.0 / 3.0);
     sum.x_n[i][i] = x_high - x_low;
     sum.x_n[y][i] = y_high - y_low;
     sum.x_n[z][i] = z_high - z_low;
     sum.first[i] += high * x_high - low * x_low;
     sum.first[y] += high * y_high - low * y_low;
     sum.first[z] += high * z_high - low * z_low;
+    T low2 = low * low, high2 = high * high;
+    across(i, i) += high2 * x_high - low2 * x_low;
+    across(i, y) += high2 * y_high - low2 * y_low;
+    across(i, z) += high2 * z_high - low2 * z_low;
+    within(y, y) += high * faces(i, 1, yy_of) - low * faces(i, 0, yy_of);
+    within(y, z) += high * faces(i, 1, yz_of) - low * faces(i, 0, yz_of);
+    within(z, z) += high * faces(i, 1, zz_of) - low * faces(i, 0, zz_of);
     sum.normal[i] = area_high - area_low;
     sum.area[i] = 0.5 * abs(area_low + area_high);
   }
+  sum.second = across + splat<T>(0.25) * within;
   return sum;
 }
 
@@ -237,18 +318,25 @@ template <class T>
 }
 
 // The twelve equations, and that the overlap is no sliver. `x_n`, `normal`: over all faces, in A's
-// frame; `length`: of all edges.
+// frame; `length`: of all edges; `radius`: √trace of the covariance; `wedge`: faces that are almost
+// parallel meet.
 template <class T>
 [[gnu::always_inline]] inline Mask<T> certificate(const Mat<T>& x_n, const Vec<T>& normal,
-                                                  const Vec<T>& area, T length, T volume, T size,
-                                                  T depth) {
-  T error = size * max(splat<T>(least_centroid_error), centroid_rounding * size / depth);
+                                                  const Vec<T>& area, T length, T volume, T radius,
+                                                  Mask<T> wedge, T size, T depth) {
+  T rounding = centroid_rounding * size / depth;
+  T error = size * max(splat<T>(least_centroid_error), rounding);
+  T covariance_error = max(splat<T>(least_covariance_error), rounding);
+  T off_diagonal = off_diagonal_share * min(error, covariance_error * radius);
+  T diagonal = diagonal_share * error;
+  diagonal =
+      select<T>(wedge, min(diagonal, wedge_diagonal_share * covariance_error * size), diagonal);
   Mask<T> holds = volume > 0.0;
   holds &= area_rounding * size * (length * length * length) <= sliver_limit * error * volume;
   for (int j = 0; j < 3; ++j) {
     int k = (j + 1) % 3, l = (j + 2) % 3;
-    holds &= max(abs(x_n[k][j]), abs(x_n[l][j])) <= off_diagonal_share * error * area[j];
-    holds &= abs(x_n[j][j] - volume) * size <= diagonal_share * error * volume;
+    holds &= max(abs(x_n[k][j]), abs(x_n[l][j])) <= off_diagonal * area[j];
+    holds &= abs(x_n[j][j] - volume) * size <= diagonal * volume;
     holds &= 0.5 * abs(normal[j]) * size <= closure_share * error * area[j];
   }
   return holds;
@@ -273,8 +361,7 @@ inline Mask<T> move_inside(const Pair<T>& pair, Vec<T>& point) {
 
 template <class T>
 struct CertifiedOverlap {
-  T volume;         // [m³]
-  Vec<T> centroid;  // A's frame [m]
+  Moments<T> moments;
   Mask<T> certain;  // the certificate holds
 };
 
@@ -296,11 +383,13 @@ template <class T>
   Vec<T> origin_b = transposed_times(r, origin_a) - pair.offset_b;
   FaceSums<T, Side::sigma> faces_a;
   FaceSums<T, Side::tau> faces_b;
-  add_edges(edges_a, pair.half_a, origin_a, faces_a);
-  add_edges(edges_b, pair.half_b, origin_b, faces_b);
-  add_lines(pair, inverse, origin_a, origin_b, faces_a, faces_b);
-  SurfaceIntegrals<T> of_a = integrate(faces_a, pair.half_a, origin_a);
-  SurfaceIntegrals<T> of_b = integrate(faces_b, pair.half_b, origin_b);
+  Sym<T> squares_a{}, squares_b{};
+  add_edges(edges_a, pair.half_a, origin_a, faces_a, squares_a);
+  add_edges(edges_b, pair.half_b, origin_b, faces_b, squares_b);
+  T farthest2{};
+  add_lines(pair, inverse, origin_a, origin_b, faces_a, faces_b, squares_a, farthest2);
+  SurfaceIntegrals<T> of_a = integrate(faces_a, squares_a, pair.half_a, origin_a);
+  SurfaceIntegrals<T> of_b = integrate(faces_b, squares_b, pair.half_b, origin_b);
 
   Mat<T> turned, x_n;
   for (int i = 0; i < 3; ++i)
@@ -308,20 +397,29 @@ template <class T>
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) x_n[i][j] = of_a.x_n[i][j] + dot(row(turned, i), row(r, j));
   CertifiedOverlap<T> found;
-  found.volume = (x_n[0][0] + x_n[1][1] + x_n[2][2]) * (1.0 / 3.0);
-  found.centroid = origin_a + (0.25 / found.volume) * (of_a.first + r * of_b.first);
+  T volume = (x_n[0][0] + x_n[1][1] + x_n[2][2]) * (1.0 / 3.0);
+  Vec<T> from_origin = (0.25 / volume) * (of_a.first + r * of_b.first);
+  Vec<T> centroid = origin_a + from_origin;
+  // Little cancels: the origin is a point of the overlap.
+  Sym<T> covariance =
+      (0.2 / volume) * (of_a.second + rotated(r, of_b.second)) - squared(from_origin);
   Vec<T> area, normal = of_a.normal + r * of_b.normal;
   for (int i = 0; i < 3; ++i) area[i] = of_a.area[i] + dot(abs(row(r, i)), of_b.area);
   T length = edges_a.length + edges_b.length;
-  found.certain = certificate(x_n, normal, area, length, found.volume, pair.size, depth);
+  T radius = sqrt(max(trace(covariance), T{}));
+  T reach = farthest_reach * radius + sqrt(dot(from_origin, from_origin));
+  found.certain =
+      certificate(x_n, normal, area, length, volume, radius, farthest2 > 0.0, pair.size, depth);
+  found.certain &= farthest2 <= reach * reach;
   found.certain &= risky == 0;
   Mask<T> shallow = depth < safely_inside * pair.size;
   if (any(shallow)) {
-    Vec<T> moved = found.centroid;
+    Vec<T> moved = centroid;
     Mask<T> inside = move_inside(given, moved);
-    found.centroid = select(shallow, moved, found.centroid);
+    centroid = select(shallow, moved, centroid);
     found.certain &= inside | (shallow == 0);
   }
+  found.moments = {volume, centroid, covariance};
   return found;
 }
 

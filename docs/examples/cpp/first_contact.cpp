@@ -30,10 +30,12 @@ int main() {
   const double poses_a[2][7] = {{0, 0, 0, 0, 0, 0, 1}, {0, 0, 0, 0, 0, 0, 1}};
   const double poses_b[2][7] = {{0, 0, 2.59, 0, 0, 0, 1}, {0, 2.5, 0, 0, 0, 0, 1}};
   bool colliding[2];
-  double separation[2], normal[6], point[6];
+  double separation[2], normal[6], point[6], volume[2], covariance[18];
   const long refused =
-      solver.batch(poses_a[0], poses_b[0], 2, {colliding, separation, normal, point});
-  std::printf("batch: %d %d, first refused row %ld\n", colliding[0], colliding[1], refused);
+      solver.batch(poses_a[0], poses_b[0], 2,
+                   {colliding, separation, normal, point, volume, covariance});
+  std::printf("batch: %d %d, volumes %.3f %.3f m3, first refused row %ld\n", colliding[0],
+              colliding[1], volume[0], volume[1], refused);
 
   try {
     b.quaternion[2] = b.quaternion[3] = 0.0;
