@@ -316,10 +316,9 @@ def honesty(rows: Sequence[FrontierRow]) -> str:
     medians = {name: [by[name, s].batch for s in SETS] for name in ('exact', 'mlp')}
     spread = {name: max(values) / min(values) for name, values in medians.items()}
     lines = [
-        f'- **In single calls the network loses.** `exact` takes '
-        f'{exact.single[0] / net.single[0]:.2f} of the time of `mlp`, and has no error. From '
-        'Python most of either is the call itself.',
-        f'- **What it is for is batches and a constant cost.** A pair in a batch takes '
+        f'- **The network saves time, and has an error.** A single call of `mlp` takes '
+        f'{net.single[0] / exact.single[0]:.2f} of the time of `exact`. From Python most of either '
+        f'is the call itself. A pair in a batch takes '
         f'{net.batch / exact.batch:.2f} of the time of `exact` on containers, '
         f'{by["mlp", "stacks"].batch / by["exact", "stacks"].batch:.2f} on stacks. From the '
         f'cheapest set to the dearest its cost grows by a factor of {spread["mlp"]:.2f}, the cost '

@@ -30,7 +30,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .pose import rotation_matrix
+from .pose import cross, rotation_matrix
 
 __all__ = ['ContactLaw', 'HeldWrench', 'Touch', 'effective_mass']
 
@@ -124,7 +124,7 @@ class ContactLaw:
             return result
         normal, linear, angular = touch.normal, velocity[:3], velocity[3:]
         arm = touch.point - pose[:3]
-        at_point = linear + _cross(angular, arm)
+        at_point = linear + cross(angular, arm)
         closing = float(at_point @ normal)  # −v_n
         push = max(0.0, self.stiffness * touch.depth + self.damping * closing)
 
@@ -140,7 +140,7 @@ class ContactLaw:
         rocking = (self.rocking[0] * float(axes[:, 0] @ angular) * axes[:, 0]
                    + self.rocking[1] * float(axes[:, 1] @ angular) * axes[:, 1])
         result[:3] = force
-        result[3:] = _cross(arm, force) + torsion * normal - rocking
+        result[3:] = cross(arm, force) + torsion * normal - rocking
         return result
 
 
@@ -177,9 +177,3 @@ class HeldWrench:
         while self._due and self._due[0][0] <= time + TIME_ROUNDING:
             self.current = self._due.popleft()[1]
         return self.current
-
-
-def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Product a × b of vectors (3,); np.cross takes ten times as long on single vectors."""
-    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2],
-                     a[0] * b[1] - a[1] * b[0]])

@@ -36,3 +36,9 @@ def degrees_between(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     """Return the angles (n,) [deg] between vectors (n, 3); by atan2, as acos loses small angles."""
     sines = np.linalg.norm(np.cross(one, other), axis=1)
     return np.degrees(np.arctan2(sines, np.sum(one * other, axis=1)))
+
+
+def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return a × b of vectors (3,); np.cross takes ten times as long on single vectors."""
+    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2],
+                     a[0] * b[1] - a[1] * b[0]])

@@ -22,6 +22,7 @@ from box_contact_ros.apps.crane.landing import (
 )
 from box_contact_ros.apps.crane.mujoco_crane import Crane
 from box_contact_ros.scene.contact_law import GRAVITY
+from box_contact_ros.scene.patch_law import PatchLaw
 
 CASES = list(cases())
 HANGING_OVER = 17
@@ -59,6 +60,20 @@ def test_the_exact_point_lands_at_either_rate(rate_hz, latency):
     result = landed(HANGING_OVER, rate_hz=rate_hz, latency=latency)
     assert result.at_rest, f'\n{result}'
     assert result.point_step == result.exact_point_step < 1e-4
+
+
+@pytest.mark.parametrize(('rate_hz', 'latency'), [(200.0, 0.002), (1000.0, 0.0)])
+def test_the_patch_lands_without_a_footprint(rate_hz, latency):
+    """The elastic foundation: flat, and quieter than any law with one point (docs/decisions)."""
+    scenario = scenario_of(CASES[HANGING_OVER])
+    solver = ContactSolver(scenario.size, scenario.stack_size, model='exact')
+    law = PatchLaw.for_loop(scenario.mass, rate_hz, latency)
+    result = land(scenario, solver, rate_hz=rate_hz, latency=latency, law=law).judge()
+    assert result.at_rest, str(result)
+    assert result.corner_speed < 0.3e-3
+    assert math.degrees(result.tilt) < 0.06
+    assert result.force_worst < 1e-6
+    assert result.settled < 3.0
 
 
 @pytest.mark.parametrize('rate_hz', [200.0, 1000.0])

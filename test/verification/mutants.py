@@ -121,7 +121,7 @@ MUTANTS = {
         'core/overlap/face_sums.hpp', 'T square = (1.0 / 12.0) * signed_sum_of<T>(along);',
         'T square = 0.0 * signed_sum_of<T>(along);', f'{LAWS} -k of_the_parts'),
     'second moments about the origin of the sums': Mutant(
-        'core/overlap/face_sums.hpp', ' - squared(from_origin);', ' + 0.0 * squared(from_origin);',
+        'core/overlap/face_sums.hpp', ' - squared(from_origin);', ' + T{} * squared(from_origin);',
         f'{LAWS} -k of_the_parts'),
     'second moments not divided by the volume': Mutant(
         'core/overlap/face_sums.hpp', '(0.2 / volume) *', '(T{} + 0.2) *',

@@ -26,6 +26,7 @@ import numpy as np
 
 from ...output import percentiles
 from ...scene.contact_law import GRAVITY, ContactLaw, HeldWrench, Touch
+from ...scene.patch_law import Patch
 from ...scene.pose import rotation_matrix
 from ...solver.contact import Contact
 from ...solver.contact_solver import ContactSolver
@@ -54,11 +55,12 @@ ContactSource = Callable[[np.ndarray, np.ndarray], Contact | None]
 """From pose_a and pose_b (7,) to their contact; None stands for an answer that was lost."""
 
 
-def touch_of(contact: Contact) -> Touch | None:
+def touch_of(contact: Contact) -> Patch | None:
     """Return the part of a contact that a law needs; None where the boxes are apart."""
     if not contact.colliding:
         return None
-    return Touch(contact.point, contact.normal, max(0.0, -contact.separation))
+    depth = max(0.0, -contact.separation)
+    return Patch(contact.point, contact.normal, depth, contact.volume, contact.covariance)
 
 
 def landing_scenario(**fields: Any) -> CraneScenario:
@@ -286,8 +288,11 @@ class LandingRecord:
 class ForceLaw(Protocol):
     """From one contact to the force and the torque on the load."""
 
-    def wrench(self, touch: Touch | None, pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-        """Return force and torque (6,) on the load at `pose` (7,) with `velocity` (6,)."""
+    def wrench(self, touch: Any, pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+        """Return the wrench (6,) on the load at `pose` (7,) with `velocity` (6,).
+
+        touch: what the law needs of a contact, a `Touch` or a `Patch`; None without contact.
+        """
 
 
 class LoopState(NamedTuple):
