@@ -94,6 +94,8 @@ template <class T>
   ordered.offset_a = select(a_first, pair.offset_a, -pair.offset_b);
   ordered.offset_b = select(a_first, pair.offset_b, -pair.offset_a);
   ordered.rotation = select(a_first, pair.rotation, transpose(pair.rotation));
+  ordered.axes_a = select(a_first, pair.axes_a, pair.axes_b);
+  ordered.axes_b = select(a_first, pair.axes_b, pair.axes_a);
   return ordered;
 }
 
@@ -108,7 +110,7 @@ inline Moments<double> clipped_overlap(Pair<double> pair, int face, bool pressed
 //   Found<T>: what it finds of an overlap. `Moments<T>`, or `Vec<T>` for the centroid alone.
 //   group<T>: how many queries it takes at once.
 //
-// And `solve(queries, found, counts)` fills `found`, in A's frame, for the pairs that touch.
+// And `solve(queries, found, counts)` fills `found` for the pairs that touch, points in A's frame.
 
 // Model `exact`: the moments of A∩B by face sums, or by clipping where these are not certain.
 struct ExactModel {
@@ -134,8 +136,6 @@ struct ExactModel {
     Moments<T> found = overlap.moments;
     found.centroid =
         select(pair.a_first, found.centroid, pair.offset_a + pair.rotation * found.centroid);
-    found.covariance =
-        select(pair.a_first, found.covariance, rotated(pair.rotation, found.covariance));
     fallback |= (overlap.certain == 0) & q.touching;
     if (any(fallback)) {
       for (int i = 0; i < width<T>; ++i) {
@@ -172,11 +172,10 @@ template <class T, class Found>
   T nothing = splat<T>(std::numeric_limits<double>::quiet_NaN());
   Vec<T> none{nothing, nothing, nothing};
   Moments<T> overlap = moments(found);
-  Sym<T> covariance = rotated(q.pair.axes_a, overlap.covariance);
   return {select(q.touching, direction_in_common_frame(q.pair, q.axis.normal), none),
           {select<T>(q.touching, overlap.volume, T{}),
            select(q.touching, point_in_common_frame(q.pair, overlap.centroid), none),
-           select(q.touching, covariance,
+           select(q.touching, overlap.covariance,
                   Sym<T>{{nothing, nothing, nothing, nothing, nothing, nothing}})}};
 }
 
@@ -240,11 +239,21 @@ template <class T, class Found>
     for (int k = 0; k < 3; ++k) results.normal[3 * row + k] = lane(rows.normal[k], i);
     for (int k = 0; k < 3; ++k) results.point[3 * row + k] = lane(rows.overlap.centroid[k], i);
     if (results.volume) results.volume[row] = lane(rows.overlap.volume, i);
-    for (int k = 0; results.covariance && k < 9; ++k)
-      results.covariance[9 * row + k] = lane(covariance[k / 3][k % 3], i);
+    if (results.covariance)
+      for (int k = 0; k < 9; ++k)
+        results.covariance[9 * row + k] = lane(covariance[k / 3][k % 3], i);
     if (!lane(q.pair.valid, i) && refused < 0) refused = row;
   }
   return refused;
+}
+
+// Ask for the memory that rows will be written to, so that it is in the cache when they are solved.
+inline void fetch_rows(const Results& results, long first, long last) {
+  constexpr long line = 64 / sizeof(double);
+  for (double* place : {results.normal, results.point})
+    for (long k = 3 * first; k < 3 * last; k += line) __builtin_prefetch(place + k, 1);
+  for (long k = 9 * first; results.covariance && k < 9 * last; k += line)
+    __builtin_prefetch(results.covariance + k, 1);
 }
 
 // Solve rows `begin` to `end`. Returns the first row whose poses or sizes are refused, or −1; what
@@ -266,6 +275,7 @@ long solve_rows(const Model& model, const Rows& rows, long begin, long end, cons
         set_lane(queries[g].touching, int(i), 0);
       touching |= any(queries[g].touching);
     }
+    fetch_rows(results, first, std::min(first + group * width<T>, end));
     if (touching) model.solve(queries, found, counts);
     for (int g = 0; g < group; ++g) {
       long start = first + g * width<T>;

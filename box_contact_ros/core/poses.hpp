@@ -35,7 +35,7 @@ template <class T>
 struct Pair {
   Vec<T> half_a, half_b;      // half extents [m]
   Vec<T> origin_a;            // A's centre, common frame [m]
-  Mat<T> axes_a;              // A's axes as columns, common frame
+  Mat<T> axes_a, axes_b;      // the boxes' axes as columns, common frame
   Vec<T> offset_a, offset_b;  // B − A in A's frame, and in B's [m]
   Mat<T> rotation;            // R: B's axes as columns, in A's frame
   T size;                     // largest full extent of both boxes [m]
@@ -99,6 +99,7 @@ template <class T>
   pair.half_b = half_b;
   pair.origin_a = a.position;
   pair.axes_a = axes_a;
+  pair.axes_b = axes_b;
   pair.offset_a = transposed_times(axes_a, t);
   pair.offset_b = transposed_times(axes_b, t);
   for (int i = 0; i < 3; ++i)
@@ -144,6 +145,7 @@ template <class T>
   one.half_b = lane(pair.half_b, i);
   one.origin_a = lane(pair.origin_a, i);
   one.axes_a = lane(pair.axes_a, i);
+  one.axes_b = lane(pair.axes_b, i);
   one.offset_a = lane(pair.offset_a, i);
   one.offset_b = lane(pair.offset_b, i);
   one.rotation = lane(pair.rotation, i);

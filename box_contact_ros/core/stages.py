@@ -55,7 +55,7 @@ class Stages(NamedTuple):
     clipped_volume: np.ndarray = _UNASKED
     """(n,) the same by clipping."""
     covariance: np.ndarray = _UNASKED
-    """(n, 3, 3) its second central moments by its volume [m²], about the centroid."""
+    """(n, 3, 3) its second central moments by its volume [m²], common frame."""
     clipped_covariance: np.ndarray = _UNASKED
     """(n, 3, 3) the same by clipping."""
     certain: np.ndarray = _UNASKED

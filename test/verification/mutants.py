@@ -106,20 +106,22 @@ MUTANTS = {
         f'{EXACT} -k clipping'),
     'no certificate': Mutant(
         'core/overlap/face_sums.hpp',
-        'certificate(x_n, normal, area, length, volume, radius, farthest2 > 0.0, pair.size, depth)',
+        'certificate(x_n, normal, area, length, volume, radius, wedge, pair.size, depth)',
         '(volume == volume)', f'{EXACT} -k "thin and sharing"'),
     'pieces far outside the overlap trusted': Mutant(
-        'core/overlap/face_sums.hpp', '  found.certain &= farthest2 <= reach * reach;', '',
+        'core/overlap/face_sums.hpp', '(farthest2 <= reach * reach) | (wedge == 0);',
+        '(farthest2 == farthest2) | (wedge == 0);',
         f'{EXACT} -k far_outside'),
     'second moments from A alone': Mutant(
         'core/overlap/face_sums.hpp', '(of_a.second + rotated(r, of_b.second))', 'of_a.second',
         f'{EXACT} -k through_each_other'),
     "middles for the edges' pieces": Mutant(
-        'core/overlap/face_sums.hpp', 'middle * middle + (1.0 / 12.0) * (length * length)',
-        'middle * middle', f'{LAWS} -k of_the_parts'),
+        'core/overlap/face_sums.hpp',
+        'w_x[n] * middle + (1.0 / 12.0) * ((w[n] * length) * length);', 'w_x[n] * middle;',
+        f'{LAWS} -k of_the_parts'),
     "middles for the lines' pieces": Mutant(
-        'core/overlap/face_sums.hpp', 'T square = (1.0 / 12.0) * signed_sum_of<T>(along);',
-        'T square = 0.0 * signed_sum_of<T>(along);', f'{LAWS} -k of_the_parts'),
+        'core/overlap/face_sums.hpp', 'T square = (1.0 / 12.0) *', 'T square = 0.0 *',
+        f'{LAWS} -k of_the_parts'),
     'second moments about the origin of the sums': Mutant(
         'core/overlap/face_sums.hpp', ' - squared(from_origin);', ' + T{} * squared(from_origin);',
         f'{LAWS} -k of_the_parts'),
@@ -127,20 +129,20 @@ MUTANTS = {
         'core/overlap/face_sums.hpp', '(0.2 / volume) *', '(T{} + 0.2) *',
         f'{LAWS} -k powers_of_two'),
     "covariance left in A's frame": Mutant(
-        'core/contact.hpp', 'rotated(q.pair.axes_a, overlap.covariance)', 'overlap.covariance',
+        'core/overlap/face_sums.hpp', 'rotated(pair.axes_a, covariance)};', 'covariance};',
         f'{LAWS} -k rigid_motion'),
     "covariance left in the first box's frame": Mutant(
-        'core/contact.hpp', 'rotated(pair.rotation, found.covariance));', 'found.covariance);',
+        'core/contact.hpp', 'select(a_first, pair.axes_a, pair.axes_b);', 'pair.axes_a;',
         f'{LAWS} -k test_swap'),
     "clipped covariance left in the reference box's frame": Mutant(
-        'core/overlap/clipping.hpp', 'rotated(pair.rotation, covariance)}', 'covariance}',
+        'core/overlap/clipping.hpp', 'rotated(pair.axes_b, covariance)}', 'covariance}',
         f'{EXACT} -k clipping_is'),
     'clipped squares about the plane': Mutant(
         'core/overlap/clipping.hpp', 'Vec<double> middle = 0.5 * w - Vec<double>{',
         'Vec<double> middle = 0.5 * w - 0.0 * Vec<double>{', f'{EXACT} -k clipping_is'),
     'covariance of the other sign': Mutant(
-        'core/contact.hpp', 'Sym<T> covariance = rotated(',
-        'Sym<T> covariance = T{} - splat<T>(1.0) * rotated(',
+        'core/contact.hpp', 'select(q.touching, overlap.covariance,',
+        'select(q.touching, splat<T>(-1.0) * overlap.covariance,',
         f'{LAWS} -k positive'),
     'covariance not symmetric': Mutant(
         'core/overlap/moments.hpp', '{s(1, 0), s(1, 1)', '{-s(1, 0), s(1, 1)',

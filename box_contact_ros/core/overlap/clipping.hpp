@@ -260,8 +260,8 @@ inline Moments<double> overlap_from(const Pair<double>& pair, int face, double& 
     for (int e = d; e < 3; ++e)
       covariance(axes[d], axes[e]) = (d < 2 && e == 2 ? side * scale : scale) * squares(d, e);
   double volume = std::fabs(sum.volume);
-  if (of_a) return {volume, centroid, covariance};
-  return {volume, pair.offset_a + pair.rotation * centroid, rotated(pair.rotation, covariance)};
+  if (of_a) return {volume, centroid, rotated(pair.axes_a, covariance)};
+  return {volume, pair.offset_a + pair.rotation * centroid, rotated(pair.axes_b, covariance)};
 }
 
 }  // namespace clipping

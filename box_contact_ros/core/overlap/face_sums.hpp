@@ -75,23 +75,18 @@ constexpr EdgeWeights weights_a{0.058, 0.078, 0.043}, weights_b{0.023, 0.043, 0.
 
 enum class Side { sigma, tau };
 
-// What is summed over the edges of a part of a face, with y and z along the two axes that follow the
-// one across it: twice the area, three times the first moments, four times the second ones.
-enum { twice_area_of, y_of, z_of, yy_of, yz_of, zz_of, sum_count };
-
-// These sums for a box's six faces, by the axis across the face. `side` is the sign that tells a
-// face from the opposite one. Terms of the other sign are added last, in the same order for one pair
-// and for W.
+// Sums over the edges of the parts of a box's six faces, by the axis across the face: twice the
+// area, and three times the first moments along the two axes that follow. `side` is the sign that
+// tells a face from the opposite one. Terms of the other sign are added last, in the same order for
+// one pair and for W.
 template <class T, Side side>
 struct FaceSums {
-  Four<T> sums[3][sum_count][steps<T>]{};
+  Four<T> sums[3][3][steps<T>]{};
 
-  // Add a piece at step n, where the face's side is the sign `given`. Second moments are added for
-  // lines only, and as if the piece were in its middle: `squares` has the rest.
-  template <Side given, int count>
+  // Add a piece at step n, where the face's side is the sign `given`.
+  template <Side given>
   [[gnu::always_inline]] void add(int face, int n, Four<T> twice_area, Four<T> y, Four<T> z) {
-    Four<T> by_y = twice_area * y, by_z = twice_area * z;
-    Four<T> terms[sum_count] = {twice_area, by_y, by_z, by_y * y, by_y * z, by_z * z};
+    Four<T> terms[3] = {twice_area, twice_area * y, twice_area * z};
     int place = n;
     if constexpr (given != side) {  // σ and τ change places: steps or lanes 1 and 2
       if constexpr (is_scalar<T>) {
@@ -100,7 +95,7 @@ struct FaceSums {
         place = (n & 1) << 1 | n >> 1;
       }
     }
-    for (int k = 0; k < count; ++k) sums[face][k][place] += terms[k];
+    for (int k = 0; k < 3; ++k) sums[face][k][place] += terms[k];
   }
   // The total of face −, sign 0, or +, sign 1, across an axis.
   [[gnu::always_inline]] T operator()(int face, int sign, int what) const {
@@ -119,118 +114,226 @@ struct FaceSums {
   }
 };
 
-// The sum over the four signs, of which the two with σ ≠ τ count negative.
+// Terms of the four signs, those with σ ≠ τ negative, summed for each σ.
 template <class T>
-[[gnu::always_inline]] inline T signed_sum_of(const Four<T> (&terms)[steps<T>]) {
-  if constexpr (is_scalar<T>) {
-    return (terms[0][0] + terms[0][3]) - (terms[0][1] + terms[0][2]);
-  } else {
-    return (terms[0] + terms[3]) - (terms[1] + terms[2]);
+struct BySigma {
+  T low, high;
+
+  [[gnu::always_inline]] explicit BySigma(const Four<T> (&terms)[steps<T>]) {
+    if constexpr (is_scalar<T>) {
+      low = terms[0][0] - terms[0][2], high = terms[0][3] - terms[0][1];
+    } else {
+      low = terms[0] - terms[2], high = terms[3] - terms[1];
+    }
   }
+  [[gnu::always_inline]] T sum() const { return low + high; }
+};
+
+// Second moments need no sums for each face. An edge belongs to two faces, and counts with the weight
+//
+//   c = Σ over both of (distance of the face) · (distance of the edge, in the face).
+//
+// `squares` is Σ c ∫ x xᵀ dl over all edges. With w = c · length, a piece of an edge has
+// w · (middle · middleᵀ + length² / 12 · direction · directionᵀ) of it.
+
+// Add the pieces of a box's edges along its axis j. `origin`: in the box's frame.
+template <class T, Side side>
+[[gnu::always_inline]] inline void add_edges_along(int j, const EdgePieces<T>& pieces,
+                                                   const Vec<T>& half, const Vec<T>& origin,
+                                                   FaceSums<T, side>& faces, Sym<T>& squares) {
+  int a = (j + 1) % 3, b = (j + 2) % 3;
+  Four<T> w[steps<T>], w_g[steps<T>], w_gg[steps<T>], w_x[steps<T>], w_gx[steps<T>], w_xx[steps<T>];
+#pragma GCC unroll 4
+  for (int n = 0; n < steps<T>; ++n) {
+    Four<T> f = sigma<T>(n) * half[a] - origin[a], g = tau<T>(n) * half[b] - origin[b];
+    Four<T> s = pieces.s[j][n], t = pieces.t[j][n];
+    Four<T> length = max(t - s, Four<T>{}), middle = 0.5 * (s + t) - origin[j];
+    Four<T> by_f = length * f, by_g = length * g;
+    faces.template add<Side::sigma>(a, n, tau<T>(n) * by_g, g, middle);
+    faces.template add<Side::tau>(b, n, sigma<T>(n) * by_f, middle, f);
+    // The distance of either face is the distance in the other.
+    w[n] = by_f * (g + g);
+    w_g[n] = w[n] * g;
+    w_gg[n] = w_g[n] * g;
+    w_x[n] = w[n] * middle;
+    w_gx[n] = w_g[n] * middle;
+    w_xx[n] = w_x[n] * middle + (1.0 / 12.0) * ((w[n] * length) * length);
+  }
+  T f_low = -half[a] - origin[a], f_high = half[a] - origin[a];
+  BySigma<T> by_w(w), by_g(w_g), by_x(w_x);
+  squares(a, a) += (f_low * f_low) * by_w.low + (f_high * f_high) * by_w.high;
+  squares(a, b) += f_low * by_g.low + f_high * by_g.high;
+  squares(a, j) += f_low * by_x.low + f_high * by_x.high;
+  squares(b, b) += BySigma<T>(w_gg).sum();
+  squares(b, j) += BySigma<T>(w_gx).sum();
+  squares(j, j) += BySigma<T>(w_xx).sum();
 }
 
-template <class T>
-[[gnu::always_inline]] inline T largest_of(const Four<T> (&terms)[steps<T>]) {
-  if constexpr (is_scalar<T>) {
-    return max(max(terms[0][0], terms[0][1]), max(terms[0][2], terms[0][3]));
-  } else {
-    return max(max(terms[0], terms[1]), max(terms[2], terms[3]));
-  }
-}
-
-// Add the pieces of a box's own edges. `origin`: in the box's frame. `squares` gets four times their
-// part of Σ distance of the face · ∫ x xᵀ dA, in the planes of the faces.
 template <class T, Side side>
 [[gnu::always_inline]] inline void add_edges(const EdgePieces<T>& pieces, const Vec<T>& half,
                                              const Vec<T>& origin, FaceSums<T, side>& faces,
                                              Sym<T>& squares) {
-#pragma GCC unroll 3
-  for (int j = 0; j < 3; ++j) {
-    int a = (j + 1) % 3, b = (j + 2) % 3;
-    Four<T> ff[steps<T>], gg[steps<T>], fm[steps<T>], gm[steps<T>], mm[steps<T>];
-#pragma GCC unroll 4
-    for (int n = 0; n < steps<T>; ++n) {
-      Four<T> f = sigma<T>(n) * half[a] - origin[a], g = tau<T>(n) * half[b] - origin[b];
-      Four<T> s = pieces.s[j][n], t = pieces.t[j][n];
-      Four<T> length = max(t - s, Four<T>{}), middle = 0.5 * (s + t) - origin[j];
-      Four<T> by_f = length * f, by_g = length * g;
-      faces.template add<Side::sigma, yy_of>(a, n, tau<T>(n) * by_g, g, middle);
-      faces.template add<Side::tau, yy_of>(b, n, sigma<T>(n) * by_f, middle, f);
-      // In both faces it has the same weight, its length · f · g.
-      Four<T> weight = by_f * g, weight_f = weight * f, weight_g = weight * g;
-      ff[n] = weight_f * f;
-      gg[n] = weight_g * g;
-      fm[n] = weight_f * middle;
-      gm[n] = weight_g * middle;
-      mm[n] = weight * (middle * middle + (1.0 / 12.0) * (length * length));
-    }
-    squares(a, a) += signed_sum_of<T>(ff);
-    squares(b, b) += signed_sum_of<T>(gg);
-    squares(a, j) += signed_sum_of<T>(fm);
-    squares(b, j) += signed_sum_of<T>(gm);
-    squares(j, j) += 2.0 * signed_sum_of<T>(mm);
+  if constexpr (is_scalar<T>) {
+    add_edges_along(0, pieces, half, origin, faces, squares);
+    add_edges_along(1, pieces, half, origin, faces, squares);
+    add_edges_along(2, pieces, half, origin, faces, squares);
+  } else {
+#pragma GCC unroll 1  // unrolled, the code would not fit the first cache
+    for (int j = 0; j < 3; ++j) add_edges_along(j, pieces, half, origin, faces, squares);
   }
 }
 
-// Add the pieces of the 36 lines in which a face of A, at the sign σ of axis i, meets a face of B,
-// at τ of axis j. `origin_a`, `origin_b`: the origin in A's frame and in B's. `squares`, in A's frame,
-// gets what these pieces have about their own middles: length² / 12 along their direction.
-// `farthest2` gets the squared distance of the farthest piece that faces almost parallel leave.
+// A piece of the line in which a face of A, at the sign σ of axis i, meets a face of B, at τ of axis
+// j. Its points are p a_i + q b_j + t d from the origin, d = a_i × b_j, with t from `from` to `to`.
 template <class T>
-[[gnu::always_inline]] inline void add_lines(const Pair<T>& pair, const Mat<T>& inverse,
-                                             const Vec<T>& origin_a, const Vec<T>& origin_b,
-                                             FaceSums<T, Side::sigma>& faces_a,
-                                             FaceSums<T, Side::tau>& faces_b, Sym<T>& squares,
-                                             T& farthest2) {
+struct LinePiece {
+  Four<T> f, g;  // the origin's distances from the faces, along a_i and b_j
+  Four<T> p, q, at_y, at_z, at_k, at_l, from, to;
+};
+
+// The four lines of a pair of axes.
+template <class T>
+struct Lines {
+  const Pair<T>& pair;
+  const Vec<T>&origin_a, &origin_b;
+  int i, y, z, j, k, l;
+  T cosine, sine2, scale, sine2_or_one;
+  T along_y, along_z, along_k, along_l, slab_y, slab_z, slab_k, slab_l;
+
+  // `origin_a`, `origin_b`: the origin in A's frame and in B's.
+  [[gnu::always_inline]] Lines(const Pair<T>& pair, const Mat<T>& inverse, const Vec<T>& origin_a,
+                               const Vec<T>& origin_b, int i, int j)
+      : pair(pair),
+        origin_a(origin_a),
+        origin_b(origin_b),
+        i(i),
+        y((i + 1) % 3),
+        z((i + 2) % 3),
+        j(j),
+        k((j + 1) % 3),
+        l((j + 2) % 3) {
+    const Mat<T>& r = pair.rotation;
+    cosine = r[i][j];
+    sine2 = r[y][j] * r[y][j] + r[z][j] * r[z][j];
+    Mask<T> there = sine2 > least_sine2;
+    sine2_or_one = select<T>(there, sine2, splat<T>(1.0));
+    scale = 1.0 / sine2_or_one;
+    sine2 = select<T>(there, sine2, T{});
+    // Along d coordinates change by entries of R: −r_zj, r_yj in A, r_il, −r_ik in B.
+    along_y = -inverse[z][j], along_z = inverse[y][j];
+    along_k = inverse[i][l], along_l = -inverse[i][k];
+    slab_y = pair.half_a[y] * abs(along_y), slab_z = pair.half_a[z] * abs(along_z);
+    slab_k = pair.half_b[k] * abs(along_k), slab_l = pair.half_b[l] * abs(along_l);
+  }
+  [[gnu::always_inline]] LinePiece<T> piece(int n) const {
+    const Mat<T>& r = pair.rotation;
+    LinePiece<T> line;
+    line.f = sigma<T>(n) * pair.half_a[i] - origin_a[i];
+    line.g = tau<T>(n) * pair.half_b[j] - origin_b[j];
+    line.p = (line.f - cosine * line.g) * scale, line.q = (line.g - cosine * line.f) * scale;
+    line.at_y = line.q * r[y][j], line.at_z = line.q * r[z][j];
+    line.at_k = line.p * r[i][k], line.at_l = line.p * r[i][l];
+    Four<T> y_by = (origin_a[y] + line.at_y) * along_y, z_by = (origin_a[z] + line.at_z) * along_z;
+    Four<T> k_by = (origin_b[k] + line.at_k) * along_k, l_by = (origin_b[l] + line.at_l) * along_l;
+    line.from = -min(min(slab_y + y_by, slab_z + z_by), min(slab_k + k_by, slab_l + l_by));
+    line.to = min(min(slab_y - y_by, slab_z - z_by), min(slab_k - k_by, slab_l - l_by));
+    return line;
+  }
+};
+
+// Add the pieces of the lines in which faces of A across axis i meet faces of B. `squares` is in A's
+// frame. `least`: the least squared sine of faces that meet.
+template <class T>
+[[gnu::always_inline]] inline void add_lines_of(int i, T& least, const Pair<T>& pair,
+                                                const Mat<T>& inverse, const Vec<T>& origin_a,
+                                                const Vec<T>& origin_b,
+                                                FaceSums<T, Side::sigma>& faces_a,
+                                                FaceSums<T, Side::tau>& faces_b, Sym<T>& squares) {
   const Mat<T>& r = pair.rotation;
+  int y = (i + 1) % 3, z = (i + 2) % 3;
+  Four<T> w_all[steps<T>]{}, w_y[steps<T>]{}, w_z[steps<T>]{};
+  Four<T> w_yy[steps<T>]{}, w_yz[steps<T>]{}, w_zz[steps<T>]{};
 #pragma GCC unroll 3
-  for (int i = 0; i < 3; ++i) {
-    int y = (i + 1) % 3, z = (i + 2) % 3;
-#pragma GCC unroll 3
-    for (int j = 0; j < 3; ++j) {
-      int k = (j + 1) % 3, l = (j + 2) % 3;
-      T cosine = r[i][j], sine2 = r[y][j] * r[y][j] + r[z][j] * r[z][j];
-      Mask<T> there = sine2 > least_sine2;
-      Mask<T> almost_parallel_faces = there & (sine2 < far_sine2);
-      T scale = 1.0 / select<T>(there, sine2, splat<T>(1.0));
-      sine2 = select<T>(there, sine2, T{});
-      // Along d = a_i × b_j coordinates change by entries of R: −r_zj, r_yj in A, r_il, −r_ik in B.
-      T along_y = -inverse[z][j], along_z = inverse[y][j];
-      T along_k = inverse[i][l], along_l = -inverse[i][k];
-      T slab_y = pair.half_a[y] * abs(along_y), slab_z = pair.half_a[z] * abs(along_z);
-      T slab_k = pair.half_b[k] * abs(along_k), slab_l = pair.half_b[l] * abs(along_l);
-      Four<T> along[steps<T>], distance2[steps<T>];
+  for (int j = 0; j < 3; ++j) {
+    Lines<T> lines(pair, inverse, origin_a, origin_b, i, j);
+    least = min(least, lines.sine2_or_one);
+    int k = (j + 1) % 3, l = (j + 2) % 3;
+    Four<T> along[steps<T>];
 #pragma GCC unroll 4
-      for (int n = 0; n < steps<T>; ++n) {
-        Four<T> f = sigma<T>(n) * pair.half_a[i] - origin_a[i];
-        Four<T> g = tau<T>(n) * pair.half_b[j] - origin_b[j];
-        // The point of the line nearest to the origin: p a_i + q b_j.
-        Four<T> p = (f - cosine * g) * scale, q = (g - cosine * f) * scale;
-        Four<T> at_y = q * r[y][j], at_z = q * r[z][j], at_k = p * r[i][k], at_l = p * r[i][l];
-        Four<T> y_by = (origin_a[y] + at_y) * along_y, z_by = (origin_a[z] + at_z) * along_z;
-        Four<T> k_by = (origin_b[k] + at_k) * along_k, l_by = (origin_b[l] + at_l) * along_l;
-        Four<T> from =
-            max(max(-y_by - slab_y, -z_by - slab_z), max(-k_by - slab_k, -l_by - slab_l));
-        Four<T> to = min(min(slab_y - y_by, slab_z - z_by), min(slab_k - k_by, slab_l - l_by));
-        Four<T> span = max(to - from, Four<T>{}), length = sine2 * span;
-        Four<T> middle = 0.5 * (from + to), by_p = length * p, by_q = length * q;
-        faces_a.template add<Side::sigma, sum_count>(
-            i, n, tau<T>(n) * by_q, at_y - middle * r[z][j], at_z + middle * r[y][j]);
-        faces_b.template add<Side::tau, sum_count>(
-            j, n, sigma<T>(n) * by_p, at_k + middle * r[i][l], at_l - middle * r[i][k]);
-        along[n] = (f * by_q + g * by_p) * (span * span);
-        distance2[n] =
-            select<Four<T>>(span > 0.0, f * f + sine2 * (q * q + middle * middle), Four<T>{});
-      }
-      if (any(almost_parallel_faces))
-        farthest2 =
-            select<T>(almost_parallel_faces, max(farthest2, largest_of<T>(distance2)), farthest2);
-      T square = (1.0 / 12.0) * signed_sum_of<T>(along);
-      T by_y = square * r[y][j], by_z = square * r[z][j];
-      squares(y, y) += by_z * r[z][j];
-      squares(y, z) -= by_y * r[z][j];
-      squares(z, z) += by_y * r[y][j];
+    for (int n = 0; n < steps<T>; ++n) {
+      LinePiece<T> line = lines.piece(n);
+      Four<T> span = max(line.to - line.from, Four<T>{}), length = lines.sine2 * span;
+      Four<T> middle = 0.5 * (line.from + line.to);
+      Four<T> by_p = length * line.p, by_q = length * line.q;
+      Four<T> at_y = line.at_y - middle * r[z][j], at_z = line.at_z + middle * r[y][j];
+      faces_a.template add<Side::sigma>(i, n, tau<T>(n) * by_q, at_y, at_z);
+      faces_b.template add<Side::tau>(j, n, sigma<T>(n) * by_p, line.at_k + middle * r[i][l],
+                                      line.at_l - middle * r[i][k]);
+      Four<T> w = line.f * by_q + line.g * by_p, by_y = w * at_y, by_z = w * at_z;
+      w_all[n] += w;
+      w_y[n] += by_y;
+      w_z[n] += by_z;
+      w_yy[n] += by_y * at_y;
+      w_yz[n] += by_y * at_z;
+      w_zz[n] += by_z * at_z;
+      along[n] = w * (span * span);
     }
+    // Along d, whose coordinates are 0, −r_zj and r_yj.
+    T square = (1.0 / 12.0) * BySigma<T>(along).sum();
+    T by_y = square * r[y][j], by_z = square * r[z][j];
+    squares(y, y) += by_z * r[z][j];
+    squares(y, z) -= by_y * r[z][j];
+    squares(z, z) += by_y * r[y][j];
+  }
+  T f_low = -pair.half_a[i] - origin_a[i], f_high = pair.half_a[i] - origin_a[i];
+  BySigma<T> by_w(w_all), by_y(w_y), by_z(w_z);
+  squares(i, i) += (f_low * f_low) * by_w.low + (f_high * f_high) * by_w.high;
+  squares(i, y) += f_low * by_y.low + f_high * by_y.high;
+  squares(i, z) += f_low * by_z.low + f_high * by_z.high;
+  squares(y, y) += BySigma<T>(w_yy).sum();
+  squares(y, z) += BySigma<T>(w_yz).sum();
+  squares(z, z) += BySigma<T>(w_zz).sum();
+}
+
+template <class T>
+[[gnu::always_inline]] inline T add_lines(const Pair<T>& pair, const Mat<T>& inverse,
+                                          const Vec<T>& origin_a, const Vec<T>& origin_b,
+                                          FaceSums<T, Side::sigma>& faces_a,
+                                          FaceSums<T, Side::tau>& faces_b, Sym<T>& squares) {
+  T least = splat<T>(1.0);
+  if constexpr (is_scalar<T>) {
+    add_lines_of(0, least, pair, inverse, origin_a, origin_b, faces_a, faces_b, squares);
+    add_lines_of(1, least, pair, inverse, origin_a, origin_b, faces_a, faces_b, squares);
+    add_lines_of(2, least, pair, inverse, origin_a, origin_b, faces_a, faces_b, squares);
+  } else {
+#pragma GCC unroll 1  // unrolled, the code would not fit the first cache
+    for (int i = 0; i < 3; ++i)
+      add_lines_of(i, least, pair, inverse, origin_a, origin_b, faces_a, faces_b, squares);
+  }
+  return least;
+}
+
+// The squared distance from the origin of the farthest piece that faces almost parallel leave.
+template <class T>
+[[gnu::noinline]] T farthest_piece2(const Pair<T>& pair, const Mat<T>& inverse,
+                                    const Vec<T>& origin_a, const Vec<T>& origin_b) {
+  Four<T> farthest2{};
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) {
+      Lines<T> lines(pair, inverse, origin_a, origin_b, i, j);
+      T sine2 = lines.sine2, counts = select<T>(sine2 < far_sine2, splat<T>(1.0), T{});
+      for (int n = 0; n < steps<T>; ++n) {
+        LinePiece<T> line = lines.piece(n);
+        Four<T> middle = 0.5 * (line.from + line.to);
+        Four<T> distance2 = line.f * line.f + sine2 * (line.q * line.q + middle * middle);
+        farthest2 = max(farthest2, select<Four<T>>((line.to > line.from) & (sine2 > Four<T>{}),
+                                                   counts * distance2, Four<T>{}));
+      }
+    }
+  if constexpr (is_scalar<T>) {
+    return max(max(farthest2[0], farthest2[1]), max(farthest2[2], farthest2[3]));
+  } else {
+    return farthest2;
   }
 }
 
@@ -244,7 +347,8 @@ struct SurfaceIntegrals {
   Vec<T> area;    // of both faces across each axis, signed sums: about their area
 };
 
-// `squares`: four times the part of `second` that is not in the sums.
+// `squares` has a face's ∫ x xᵀ dA four times in the face's plane, three times where one x is across
+// it, and twice where both are.
 template <class T, Side side>
 [[gnu::always_inline]] inline SurfaceIntegrals<T> integrate(const FaceSums<T, side>& faces,
                                                             const Sym<T>& squares,
@@ -252,14 +356,14 @@ template <class T, Side side>
                                                             const Vec<T>& origin) {
   SurfaceIntegrals<T> sum;
   sum.first = {};
-  Sym<T> within = squares, across{};
+  sum.second = splat<T>(0.25) * squares;
   for (int i = 0; i < 3; ++i) {
     int y = (i + 1) % 3, z = (i + 2) % 3;
     T low = -half[i] - origin[i], high = half[i] - origin[i];
-    T area_low = faces(i, 0, twice_area_of), area_high = faces(i, 1, twice_area_of);
+    T area_low = faces(i, 0, 0), area_high = faces(i, 1, 0);
     T x_low = low * (0.5 * area_low), x_high = high * (0.5 * area_high);
-    T y_low = faces(i, 0, y_of) * (1.0 / 3.0), y_high = faces(i, 1, y_of) * (1.0 / 3.0);
-    T z_low = faces(i, 0, z_of) * (1.0 / 3.0), z_high = faces(i, 1, z_of) * (1.0 / 3.0);
+    T y_low = faces(i, 0, 1) * (1.0 / 3.0), y_high = faces(i, 1, 1) * (1.0 / 3.0);
+    T z_low = faces(i, 0, 2) * (1.0 / 3.0), z_high = faces(i, 1, 2) * (1.0 / 3.0);
     sum.x_n[i][i] = x_high - x_low;
     sum.x_n[y][i] = y_high - y_low;
     sum.x_n[z][i] = z_high - z_low;
@@ -267,16 +371,12 @@ template <class T, Side side>
     sum.first[y] += high * y_high - low * y_low;
     sum.first[z] += high * z_high - low * z_low;
     T low2 = low * low, high2 = high * high;
-    across(i, i) += high2 * x_high - low2 * x_low;
-    across(i, y) += high2 * y_high - low2 * y_low;
-    across(i, z) += high2 * z_high - low2 * z_low;
-    within(y, y) += high * faces(i, 1, yy_of) - low * faces(i, 0, yy_of);
-    within(y, z) += high * faces(i, 1, yz_of) - low * faces(i, 0, yz_of);
-    within(z, z) += high * faces(i, 1, zz_of) - low * faces(i, 0, zz_of);
+    sum.second(i, i) += 0.5 * (high2 * x_high - low2 * x_low);
+    sum.second(i, y) += 0.25 * (high2 * y_high - low2 * y_low);
+    sum.second(i, z) += 0.25 * (high2 * z_high - low2 * z_low);
     sum.normal[i] = area_high - area_low;
     sum.area[i] = 0.5 * abs(area_low + area_high);
   }
-  sum.second = across + splat<T>(0.25) * within;
   return sum;
 }
 
@@ -386,8 +486,7 @@ template <class T>
   Sym<T> squares_a{}, squares_b{};
   add_edges(edges_a, pair.half_a, origin_a, faces_a, squares_a);
   add_edges(edges_b, pair.half_b, origin_b, faces_b, squares_b);
-  T farthest2{};
-  add_lines(pair, inverse, origin_a, origin_b, faces_a, faces_b, squares_a, farthest2);
+  T least_sine2_here = add_lines(pair, inverse, origin_a, origin_b, faces_a, faces_b, squares_a);
   SurfaceIntegrals<T> of_a = integrate(faces_a, squares_a, pair.half_a, origin_a);
   SurfaceIntegrals<T> of_b = integrate(faces_b, squares_b, pair.half_b, origin_b);
 
@@ -407,10 +506,13 @@ template <class T>
   for (int i = 0; i < 3; ++i) area[i] = of_a.area[i] + dot(abs(row(r, i)), of_b.area);
   T length = edges_a.length + edges_b.length;
   T radius = sqrt(max(trace(covariance), T{}));
-  T reach = farthest_reach * radius + sqrt(dot(from_origin, from_origin));
-  found.certain =
-      certificate(x_n, normal, area, length, volume, radius, farthest2 > 0.0, pair.size, depth);
-  found.certain &= farthest2 <= reach * reach;
+  Mask<T> wedge = least_sine2_here < far_sine2;
+  found.certain = certificate(x_n, normal, area, length, volume, radius, wedge, pair.size, depth);
+  if (any(wedge)) {
+    T farthest2 = farthest_piece2(pair, inverse, origin_a, origin_b);
+    T reach = farthest_reach * radius + sqrt(dot(from_origin, from_origin));
+    found.certain &= (farthest2 <= reach * reach) | (wedge == 0);
+  }
   found.certain &= risky == 0;
   Mask<T> shallow = depth < safely_inside * pair.size;
   if (any(shallow)) {
@@ -419,7 +521,7 @@ template <class T>
     centroid = select(shallow, moved, centroid);
     found.certain &= inside | (shallow == 0);
   }
-  found.moments = {volume, centroid, covariance};
+  found.moments = {volume, centroid, rotated(pair.axes_a, covariance)};
   return found;
 }
 

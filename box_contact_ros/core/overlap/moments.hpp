@@ -69,12 +69,12 @@ template <class T, class N>
   for (int k = 0; k < 6; ++k) set_lane(a.s[k], i, value.s[k]);
 }
 
-// What a model finds of the overlap, in A's frame, from A's centre.
+// What a model finds of the overlap.
 template <class T>
 struct Moments {
   T volume;           // [m³]
-  Vec<T> centroid;    // [m]
-  Sym<T> covariance;  // second central moments by the volume [m²]
+  Vec<T> centroid;    // from A's centre, in A's frame [m]
+  Sym<T> covariance;  // second central moments by the volume, common frame [m²]
 };
 
 template <class T, class N>
