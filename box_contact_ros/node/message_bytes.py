@@ -36,7 +36,7 @@ _POSE = struct.Struct('<7d')
 _LAYOUT = '<2s2xiI{}s{}x7d'
 """Of a whole little-endian pose, by the sizes of frame_id, its length included, and of what aligns
 the numbers."""
-_ROW_END = struct.Struct('<dI')  # depth, pair
+_DEPTH_PAIR_VOLUME = struct.Struct('<dId')
 _SIZES = struct.Struct('<II')
 FRAME_AT = ENCAPSULATION + _STAMP.size + 4
 """Where frame_id's characters are: behind stamp and length."""
@@ -44,7 +44,7 @@ KEPT_FRAMES = 64
 """Frames whose layouts are kept; whoever sends more than these costs time, not memory."""
 _LEAST, _MOST = 2.0 * QUATERNION_MIN, 0.5 * QUATERNION_MAX
 """Norms of quaternions that are certainly good, whatever the rounding."""
-_NAN_ROW = np.full(7, np.nan).tobytes()
+_NAN_7 = np.full(7, np.nan).tobytes()
 _array = np.array
 _new_tuple = tuple.__new__  # a named tuple's own constructor is Python code
 _NOTHING = Contact(False, 0.0, np.zeros(3), np.zeros(3), 0.0, np.zeros((3, 3)))
@@ -144,15 +144,21 @@ class RawMessages:
 
     def cloud(self, answer: Answer) -> bytes:
         """Make `contacts`."""
-        rows = b''.join([c.point.tobytes() + c.normal.tobytes() + _ROW_END.pack(-c.separation, p.id)
-                         for p, c in answer.touching])
+        rows = b''.join([c.point.tobytes() + c.normal.tobytes()
+                         + _DEPTH_PAIR_VOLUME.pack(-c.separation, p.id, c.volume)
+                         + _upper(c.covariance.tobytes()) for p, c in answer.touching])
         if answer.stale:
-            rows += b''.join([_NAN_ROW + p.id.to_bytes(4, 'little') for p in answer.stale])
+            rows += b''.join([_NAN_7 + p.id.to_bytes(4, 'little') + _NAN_7 for p in answer.stale])
         frame = self._in_frame
         size = len(rows)
         return b''.join((self._stamp, frame.cloud_header,
                          (size // CLOUD_ROW.itemsize).to_bytes(4, 'little'), frame.cloud_fields,
                          _SIZES.pack(size, size), rows, b'\0' if answer.stale else b'\1'))
+
+
+def _upper(square: bytes) -> bytes:
+    """Return the upper triangle, row by row, of a (3, 3) array of float64."""
+    return square[:24] + square[32:48] + square[64:]
 
 
 def _in_frame(frame_id: str) -> _FrameBytes:

@@ -6,6 +6,7 @@ faster. Tests compare the two.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 from builtin_interfaces.msg import Time
@@ -20,17 +21,18 @@ from ..solver.contact import Contact
 
 NANOSECONDS = 1_000_000_000
 
-_ROW = [*((name, '<f8') for name in (
-    'x', 'y', 'z', 'normal_x', 'normal_y', 'normal_z', 'depth')), ('pair', '<u4')]
-CLOUD_ROW = np.dtype(_ROW)
+PATCH_FIELDS = ('volume', 'cov_xx', 'cov_xy', 'cov_xz', 'cov_yy', 'cov_yz', 'cov_zz')
+"""Volume [m³] and covariance [m²] of the overlap; NaN from models that give the point alone."""
+CLOUD_ROW = np.dtype([
+    *((name, '<f8') for name in ('x', 'y', 'z', 'normal_x', 'normal_y', 'normal_z', 'depth')),
+    ('pair', '<u4'), *((name, '<f8') for name in PATCH_FIELDS)])
 """One row of the `contacts` cloud: a pair in contact. Of a pair that could not be evaluated all is
 NaN but its id. float64, because float32 loses half a metre in UTM coordinates. Depth [m] is
 −separation."""
-_FIELDS = [
-    PointField(name=name, offset=8 * place, count=1,
-               datatype=PointField.UINT32 if name == 'pair' else PointField.FLOAT64)
-    for place, (name, _) in enumerate(_ROW)]
-_NUMBERS = {PointField.UINT32: 'u4', PointField.FLOAT32: 'f4', PointField.FLOAT64: 'f8'}
+_DATATYPES = {'<f8': PointField.FLOAT64, '<u4': PointField.UINT32}
+_FIELDS = [PointField(name=name, offset=entry[1], datatype=_DATATYPES[entry[0].str], count=1)
+           for name, entry in (CLOUD_ROW.fields or {}).items()]
+_UPPER = np.triu_indices(3)  # in the order of the fields cov_xx to cov_zz
 _NAN = (float('nan'),) * 7
 
 
@@ -74,8 +76,9 @@ def make_normal(header: Header, contact: Contact) -> Vector3Stamped:
 
 def make_cloud(header: Header, answer: Answer) -> PointCloud2:
     """Make `contacts`: a row for each pair in contact, a row of NaN for each stale pair."""
-    rows = [(*c.point, *c.normal, -c.separation, pair.id) for pair, c in answer.touching]
-    rows += [(*_NAN, pair.id) for pair in answer.stale]
+    rows = [(*c.point, *c.normal, -c.separation, pair.id, c.volume, *c.covariance[_UPPER])
+            for pair, c in answer.touching]
+    rows += [(*_NAN, pair.id, *_NAN) for pair in answer.stale]
     return PointCloud2(header=header, height=1, width=len(rows), fields=_FIELDS,
                        is_bigendian=False, point_step=CLOUD_ROW.itemsize,
                        row_step=CLOUD_ROW.itemsize * len(rows),
@@ -84,17 +87,48 @@ def make_cloud(header: Header, answer: Answer) -> PointCloud2:
 
 
 def read_cloud(message: PointCloud2) -> np.ndarray:
-    """Rows of a `contacts` cloud as a structured array with the fields of CLOUD_ROW.
+    """Return the rows of a `contacts` cloud as an array (n,) of CLOUD_ROW.
 
-    Whatever their order, padding and the order of their bytes: as the message says.
+    Fields are found by name, whatever their order, padding and byte order; others are ignored. A
+    cloud without any of PATCH_FIELDS, from an older recording, has NaN there. Raises Refused, with
+    the field's name, for a field that is missing or of another type.
     """
-    order = '>' if message.is_bigendian else '<'
-    layout = np.dtype({
-        'names': [field.name for field in message.fields],
-        'formats': [order + _NUMBERS[field.datatype] for field in message.fields],
-        'offsets': [field.offset for field in message.fields],
-        'itemsize': message.point_step})
-    return np.frombuffer(bytes(message.data), layout, count=message.width * message.height)
+    layout = _cloud_layout(
+        tuple([(field.name, field.offset, field.datatype, field.count)
+               for field in message.fields]), message.point_step, message.is_bigendian)
+    count = message.width * message.height
+    data = bytes(message.data)
+    if len(data) < count * message.point_step:
+        raise Refused('bad cloud', f'{count} rows of {message.point_step} bytes are more than the '
+                                   f'{len(data)} bytes of data')
+    read = np.frombuffer(data, layout, count=count)
+    if layout == CLOUD_ROW:
+        return read
+    rows = np.empty(count, dtype=CLOUD_ROW)
+    for name in CLOUD_ROW.names or ():
+        rows[name] = read[name] if name in (layout.names or ()) else np.nan
+    return rows
+
+
+@lru_cache(maxsize=16)
+def _cloud_layout(fields: tuple[tuple[str, int, int, int], ...], step: int, big: bool) -> np.dtype:
+    """Return where those of CLOUD_ROW's fields are that a cloud has, or raise Refused."""
+    found = {name: rest for name, *rest in fields}
+    names = [name for name in CLOUD_ROW.names or ()
+             if name not in PATCH_FIELDS or not found.keys().isdisjoint(PATCH_FIELDS)]
+    for name in names:
+        kind = CLOUD_ROW[name]
+        offset, datatype, count = found.get(name, (0, 0, 0))
+        if name not in found:
+            raise Refused('bad cloud', f'field {name!r} is missing')
+        if (datatype, count) != (_DATATYPES[kind.str], 1):
+            raise Refused('bad cloud', f'field {name!r} is {count} of datatype {datatype}, not 1 '
+                                       f'of {_DATATYPES[kind.str]}')
+        if offset + kind.itemsize > step:
+            raise Refused('bad cloud', f'field {name!r} ends outside its row of {step} bytes')
+    return np.dtype({
+        'names': names, 'offsets': [found[name][0] for name in names], 'itemsize': step,
+        'formats': [CLOUD_ROW[name].newbyteorder('>' if big else '<') for name in names]})
 
 
 OTHER_SCENE = ('the contacts are those of a scene with other pairs than the default one: not '

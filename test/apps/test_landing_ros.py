@@ -109,9 +109,9 @@ def test_answers_that_say_nothing_are_held_over(client, monkeypatch):
     crane, _ = client
     monkeypatch.setattr(crane_feedback, 'LOCKSTEP_PATIENCE', 0.01)
     feedback, simulated = crane.feedback, crane_node.Crane(crane.scenario, crane.rate)
-    row = np.array([0.0, 0.0, 2.6, 0.0, 0.0, -1.0, 0.005])
+    row = np.array([0.0, 0.0, 2.6, 0.0, 0.0, -1.0, 0.005, *[np.nan] * 7])  # no patch: no matter
     pushes = []
-    for stamp, values in enumerate((row, np.full(7, np.nan), row[:0]), start=1):
+    for stamp, values in enumerate((row, np.full(14, np.nan), row[:0]), start=1):
         feedback.ask(stamp, simulated)
         feedback.answer(stamp, values, stamp)
         feedback.step(stamp, simulated)

@@ -37,7 +37,7 @@ APART = np.array([0.5, 0.25, 2.5, 0, 0, 0, 1])
 CUBE = (2.0, 2.0, 2.0)
 EXACT = ContactSolver(CUBE, CUBE, model='exact')(ORIGIN, TOUCHING)
 NO_ROWS = np.zeros(0, CLOUD_ROW)
-NOT_EVALUATED = np.array([(*[math.nan] * 7, 0)], CLOUD_ROW)
+NOT_EVALUATED = np.array([(*[math.nan] * 7, 0, *[math.nan] * 7)], CLOUD_ROW)
 START = 1_000 * NANOSECONDS
 MS = 1_000_000
 
@@ -45,7 +45,8 @@ MS = 1_000_000
 def rows(shift=0.0):
     """A cloud's row: the exact contact, its point moved by `shift` [m]."""
     x, y, z = EXACT.point
-    return np.array([(x + shift, y, z, *EXACT.normal, -EXACT.separation, 0)], CLOUD_ROW)
+    return np.array([(x + shift, y, z, *EXACT.normal, -EXACT.separation, 0, EXACT.volume,
+                      *EXACT.covariance[np.triu_indices(3)])], CLOUD_ROW)
 
 
 @pytest.fixture

@@ -1,9 +1,7 @@
 """Messages as bytes: read and written as rclpy's own objects are, and nothing else is taken."""
 from __future__ import annotations
 
-import math
 import struct
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,10 +9,19 @@ from geometry_msgs.msg import PointStamped, PoseStamped, Vector3Stamped
 from hypothesis import given
 from hypothesis import strategies as st
 from rclpy.serialization import deserialize_message, serialize_message
-from sensor_msgs.msg import PointCloud2
+from sensor_msgs.msg import PointCloud2, PointField
 
+from box_contact_ros import ContactSolver
+from box_contact_ros.apps.bench.answer_log import first_row, touch_in
 from box_contact_ros.node.message_bytes import KEPT_FRAMES, RawMessages
-from box_contact_ros.node.messages import Refused, TypedMessages, make_header, read_cloud
+from box_contact_ros.node.messages import (
+    CLOUD_ROW,
+    PATCH_FIELDS,
+    Refused,
+    TypedMessages,
+    make_header,
+    read_cloud,
+)
 from box_contact_ros.scene.scene_solver import Answer, Pair
 from box_contact_ros.solver.contact import Contact
 
@@ -57,8 +64,9 @@ def test_poses_are_read_alike(poses):
 
 
 def contact(draw):
-    return Contact(True, draw(BOUNDED), np.array(draw(st.tuples(*[BOUNDED] * 3))),
-                   np.array(draw(st.tuples(*[BOUNDED] * 3))), 0.0, np.zeros((3, 3)))
+    three = st.tuples(*[BOUNDED] * 3)
+    return Contact(True, draw(BOUNDED), np.array(draw(three)), np.array(draw(three)),
+                   draw(FLOATS), np.array(draw(st.tuples(three, three, three))))
 
 
 @given(st.data(), STAMPS, FRAMES, st.integers(0, 4), st.integers(0, 3))
@@ -131,31 +139,86 @@ def test_memory_for_frames_is_bounded():
     assert len(messages._bytes_of) <= KEPT_FRAMES
 
 
+def as_message(rows, *, only=None, **changes):
+    """A cloud whose fields are those of an array, or `only` some; its own words may be changed."""
+    datatypes = {'u4': PointField.UINT32, 'f4': PointField.FLOAT32, 'f8': PointField.FLOAT64}
+    fields = [PointField(name=name, offset=offset, datatype=datatypes[kind.str[1:]], count=1)
+              for name, (kind, offset) in rows.dtype.fields.items() if name in (only or name)]
+    given = {'height': 1, 'width': len(rows), 'fields': fields, 'point_step': rows.dtype.itemsize,
+             'is_bigendian': rows.dtype['x'].str[0] == '>', 'data': rows.tobytes()}
+    return PointCloud2(**given | changes)
+
+
+def some_rows(layout=CLOUD_ROW):
+    """Two rows, each number another one; float32 would lose x."""
+    rows = np.zeros(2, dtype=layout)
+    for place, name in enumerate(CLOUD_ROW.names):
+        rows[name] = 4_000_000.123456789 + place, place
+    rows['pair'] = 7, 2**32 - 1
+    return rows
+
+
 @pytest.mark.parametrize('order', ['<', '>'])
 def test_a_cloud_is_read_by_its_field_names(order):
-    """Fields may come in any order, with padding, in either byte order; float64 stays exact."""
+    """Fields may come in any order, with padding and others between, in either byte order."""
+    names = [*reversed(CLOUD_ROW.names), 'colour']
     layout = np.dtype({
-        'names': ['pair', 'depth', 'x'], 'formats': [order + 'u4', order + 'f8', order + 'f8'],
-        'offsets': [0, 8, 24], 'itemsize': 40,
-    })
-    rows = np.zeros(2, dtype=layout)
-    rows['pair'], rows['depth'], rows['x'] = [7, 9], [0.01, math.nan], [4_000_000.123456789, 1.0]
-    cloud = SimpleNamespace(
-        is_bigendian=order == '>', point_step=40, width=2, height=1, data=rows.tobytes(),
-        fields=[SimpleNamespace(name='pair', offset=0, datatype=6),
-                SimpleNamespace(name='depth', offset=8, datatype=8),
-                SimpleNamespace(name='x', offset=24, datatype=8)],
-    )
-    read = read_cloud(cloud)
-    assert read['pair'].tolist() == [7, 9]
-    assert read['depth'][0] == 0.01 and math.isnan(read['depth'][1])
-    assert read['x'][0] == 4_000_000.123456789
+        'names': names, 'offsets': [4 + 12 * place for place in range(len(names))], 'itemsize': 200,
+        'formats': [f'{order}u4' if name in ('pair', 'colour') else f'{order}f8'
+                    for name in names]})
+    assert np.array_equal(read_cloud(as_message(some_rows(layout))), some_rows())
+
+
+def test_a_cloud_of_before_the_patch_has_none():
+    """Recordings without volume and covariance are read; what they do not say is NaN."""
+    old = np.dtype([(name, CLOUD_ROW[name]) for name in CLOUD_ROW.names
+                    if name not in PATCH_FIELDS])
+    assert old.itemsize == 60
+    rows = np.zeros(2, old)
+    rows['depth'], rows['pair'] = (0.1, 0.2), (3, 5)
+    read = read_cloud(as_message(rows))
+    assert read['depth'].tolist() == [0.1, 0.2] and read['pair'].tolist() == [3, 5]
+    assert all(np.isnan(read[name]).all() for name in PATCH_FIELDS)
+    assert np.isnan(touch_in(first_row(read)).covariance).all()
+
+
+@pytest.mark.parametrize('name', CLOUD_ROW.names)
+def test_a_wrong_field_is_refused_by_its_name(name):
+    """Missing; of another type; more than one number; outside its row."""
+    rows = some_rows()
+    others = [other for other in rows.dtype.names if other != name]
+    with pytest.raises(Refused, match=f"field '{name}' is missing"):
+        read_cloud(as_message(rows, only=others))
+    for change, words in (({'datatype': PointField.FLOAT32}, 'datatype 7'), ({'count': 2}, '2 of'),
+                          ({'offset': 113}, 'outside its row')):
+        cloud = as_message(rows)
+        field, = (field for field in cloud.fields if field.name == name)
+        for attribute, value in change.items():
+            setattr(field, attribute, value)
+        with pytest.raises(Refused, match=f"field '{name}' .*{words}"):
+            read_cloud(cloud)
+
+
+def test_a_cloud_that_is_cut_short_is_refused():
+    with pytest.raises(Refused, match='2 rows of 116 bytes are more than the 231 bytes'):
+        read_cloud(as_message(some_rows(), data=some_rows().tobytes()[:-1]))
 
 
 def test_an_empty_cloud_has_no_rows():
     """Width 0 says: evaluated, no contact."""
-    cloud = SimpleNamespace(
-        is_bigendian=False, point_step=60, width=0, height=1, data=b'',
-        fields=[SimpleNamespace(name='depth', offset=48, datatype=8)],
-    )
-    assert read_cloud(cloud)['depth'].size == 0
+    assert len(read_cloud(as_message(some_rows()[:0]))) == 0
+
+
+def test_a_row_is_the_contact_again():
+    """First row to `Patch`: every number to the bit, the covariance symmetric again."""
+    wanted = ContactSolver((2, 3, 1), (1, 2, 2), model='exact')(
+        (0, 0, 0, 0, 0, 0, 1), (0.3, 0.4, 1.2, 0.1, 0.2, 0.3, 0.9))
+    for messages in (RawMessages(), TypedMessages()):
+        messages.begin(0, 'map')
+        cloud = messages.cloud(Answer([(Pair(0, 'p', 'a', 'b'), wanted)], [], 1))
+        if messages.raw:
+            cloud = deserialize_message(cloud, PointCloud2)
+        found = touch_in(first_row(read_cloud(cloud)))
+        assert (found.depth, found.volume) == (-wanted.separation, wanted.volume)
+        for name in ('point', 'normal', 'covariance'):
+            assert np.array_equal(getattr(found, name), getattr(wanted, name))

@@ -30,7 +30,13 @@ from sensor_msgs.msg import PointField
 
 from box_contact_ros.core import LENGTH_MAX, QUATERNION_MAX
 from box_contact_ros.node.contact_node import PARAMETERS, ContactNode
-from box_contact_ros.node.messages import make_cloud, make_header, read_cloud
+from box_contact_ros.node.messages import (
+    CLOUD_ROW,
+    PATCH_FIELDS,
+    make_cloud,
+    make_header,
+    read_cloud,
+)
 from box_contact_ros.resources import resource_path
 from box_contact_ros.scene.scene_solver import Answer, Pair
 
@@ -41,6 +47,7 @@ SCHEMAS = {path.name: json.loads(path.read_text('utf-8')) for path in sorted(FOL
 OPERATIONS = DOCUMENT['operations']
 ADDRESSES = {name: channel['address'] for name, channel in DOCUMENT['channels'].items()}
 
+ROW = CLOUD_ROW.itemsize
 ORIGIN = (0, 0, 0, 0, 0, 0, 1)
 TOUCHING = (0.5, 0.25, 1.875, 0.1, 0.2, 0, 1)
 APART = (0.5, 0.25, 4, 0, 0, 0, 1)
@@ -317,7 +324,7 @@ def test_live_messages_validate(live):
         assert len(messages) > 1
     texts = {message.status[0].message for message in live['/diagnostics']}
     assert {'no poses', 'poses refused'} <= texts
-    assert {len(cloud.data) for cloud in live['contacts']} == {0, 60}
+    assert {len(cloud.data) for cloud in live['contacts']} == {0, ROW}
 
 
 def rows(cloud):
@@ -334,7 +341,7 @@ def test_live_rows_validate(live):
     for row in found:
         assert [error.message for error in check.iter_errors(row)] == []
     for cloud in live['contacts']:
-        assert len(cloud.data) == cloud.row_step == 60 * cloud.width
+        assert len(cloud.data) == cloud.row_step == ROW * cloud.width
     declared = np.dtype([(field['name'], {PointField.FLOAT64: '<f8', PointField.UINT32: '<u4'}[
         field['datatype']]) for field in schema['properties']['fields']['const']])
     assert declared.itemsize == schema['properties']['point_step']['const']
@@ -361,7 +368,9 @@ WRONG_MESSAGES = {
     'nanoseconds of a second': ('contact/point', set_in('header.stamp.nanosec', 10**9)),
     'depth as FLOAT32': ('contacts', set_in('fields.6.datatype', PointField.FLOAT32)),
     'a field of another name': ('contacts', set_in('fields.6.name', 'separation')),
-    'a padded row': ('contacts', set_in('point_step', 64)),
+    'a padded row': ('contacts', set_in('point_step', ROW + 4)),
+    'rows of before the patch': ('contacts', set_in('point_step', 60)),
+    'no covariance': ('contacts', lambda message: message.fields.pop()),
     'big-endian': ('contacts', set_in('is_bigendian', True)),
     'half a row': ('contacts', set_in('row_step', 30)),
     'pose at 1e51 m': ('box_a/pose', set_in('pose.position.x', 1e51)),
@@ -409,8 +418,12 @@ def test_wrong_rows_do_not_validate(live):
     check = validator(SCHEMAS['contacts.json'], 'row')
     row = rows(live['contacts'][-1])[0]
     assert check.is_valid(row)
-    for change in ({'normal_x': None}, {'normal_y': 1.5}, {'depth': None}, {'pair': -1},
-                   {'pair': 0.5}, {'extra': 0}):
+    assert all(isinstance(row[name], float) for name in PATCH_FIELDS)
+    assert check.is_valid(row | dict.fromkeys(PATCH_FIELDS))  # a model that gives none
+    for name in PATCH_FIELDS:  # half a patch
+        assert not check.is_valid(row | {name: None}), name
+    for change in ({'volume': -1e-9}, {'normal_x': None}, {'normal_y': 1.5}, {'depth': None},
+                   {'pair': -1}, {'pair': 0.5}, {'extra': 0}):
         assert not check.is_valid(row | change), change
 
 

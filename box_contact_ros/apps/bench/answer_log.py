@@ -23,28 +23,38 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...output import percentiles
-from ...scene.contact_law import Touch
+from ...scene.patch_law import Patch
 from ...solver.contact import Contacts
 
 CONTACT_MESSAGES = ('cloud', 'point', 'normal')
 """Kinds of message that a contact node answers with."""
 ECHO_MESSAGES = ('echo',)
 WIDTHS = {'cloud': 7, 'point': 3, 'normal': 3, 'echo': 0}
-"""Numbers kept of each: see `first_row` for the cloud's."""
-CLOUD_COLUMNS = ('x', 'y', 'z', 'normal_x', 'normal_y', 'normal_z', 'depth')
+"""Numbers kept of each, the first ones: see `first_row` for the cloud's."""
+CLOUD_COLUMNS = ('x', 'y', 'z', 'normal_x', 'normal_y', 'normal_z', 'depth', 'volume',
+                 'cov_xx', 'cov_xy', 'cov_xz', 'cov_yy', 'cov_yz', 'cov_zz')
+_COVARIANCE = [[8, 9, 10], [9, 11, 12], [10, 12, 13]]
+"""Columns of the symmetric (3, 3)."""
 
 
 def first_row(rows: np.ndarray) -> np.ndarray:
-    """Return the numbers of CLOUD_COLUMNS (7,) of a cloud's first row, none (0,) without rows."""
+    """Return the numbers of CLOUD_COLUMNS (14,) of a cloud's first row, none (0,) without rows."""
     return np.array([float(rows[0][name]) for name in CLOUD_COLUMNS] if len(rows) else [])
 
 
-def touch_in(rows: np.ndarray) -> Touch | None:
-    """Return the contact in a cloud's first row; None without one, or if it was not evaluated."""
-    values = first_row(rows)
-    if not len(values) or np.isnan(values).any():
+def is_stale(values: Sequence[float] | np.ndarray) -> bool:
+    """Whether a `first_row` says that its pair could not be evaluated."""
+    return bool(np.isnan(values[:7]).any())
+
+
+def touch_in(values: np.ndarray) -> Patch | None:
+    """Return the contact of a `first_row`; None without one, or if it could not be evaluated.
+
+    Volume and covariance are NaN from models that give the point alone.
+    """
+    if not len(values) or is_stale(values):
         return None
-    return Touch(values[:3], values[3:6], float(values[6]))
+    return Patch(values[:3], values[3:6], float(values[6]), float(values[7]), values[_COVARIANCE])
 
 
 def angles(first: np.ndarray, second: np.ndarray) -> np.ndarray:
@@ -157,9 +167,9 @@ class AnswerLog:
             return
         self.matched += 1
         if len(values):
-            log.values[kind][row] = values
+            log.values[kind][row] = values[:WIDTHS[kind]]
         if kind == 'cloud':
-            log.refused[row] = bool(np.isnan(values).any())
+            log.refused[row] = is_stale(values)
             log.touching[row] = len(values) > 0 and not log.refused[row]
         log.received[kind][row] = received
         if log.touching[row] and all(log.received[kind][row] for kind in self.kinds):

@@ -18,6 +18,7 @@ from collections import deque
 import numpy as np
 
 from ...scene.contact_law import Touch
+from ..bench.answer_log import is_stale, touch_in
 from .landing import ClosedLoop, LoopState
 from .mujoco_crane import Crane, CraneScenario
 
@@ -54,9 +55,9 @@ class CraneFeedback:
 
         No row is no contact; a row of NaN could not be evaluated, which is no answer.
         """
-        if np.isnan(values).any():
+        if is_stale(values):
             return
-        touch = Touch(values[:3], values[3:6], float(values[6])) if len(values) else None
+        touch = touch_in(values)
         with self._news:
             self._arrived.append((stamp, touch, received))
             self._news.notify()

@@ -23,7 +23,7 @@ from ...node.runtime import CONTACT_QOS, run_node
 from ...scene.contact_law import Touch
 from ...scene.pairing import StampedPose
 from ...scene.pose_sets import CONTAINER
-from ..bench.answer_log import touch_in
+from ..bench.answer_log import first_row, touch_in
 from ..ros_client import set_pose, stamp_of
 from .listener import Listener
 from .style import BOX_A, BOX_B, BOX_OPACITY, CONTACT, STALE, Colour, proportions, unit_pose
@@ -119,7 +119,7 @@ class MarkersNode(Listener):
 
     def on_cloud(self, header: Header, rows: np.ndarray) -> None:
         """Draw the contact next time."""
-        self._answer, self._changed = (header, touch_in(rows)), True
+        self._answer, self._changed = (header, touch_in(first_row(rows))), True
 
     def _publish(self) -> None:
         if self._changed:

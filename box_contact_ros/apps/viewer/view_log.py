@@ -21,7 +21,7 @@ from ...scene.pairing import PAIRINGS, StampedPose
 from ...scene.scene_solver import two_boxes
 from ...solver.contact import Contact
 from ...solver.contact_solver import ContactSolver
-from ..bench.answer_log import touch_in
+from ..bench.answer_log import first_row, touch_in
 from .style import STALE
 
 WINDOW = 2.0
@@ -132,7 +132,7 @@ class ViewLog:
     def _answer(self, stamp: int, poses: Poses, rows: np.ndarray, received: int) -> None:
         if not self._answered:
             self._first = stamp
-        self._answers.append(AnsweredPair(stamp, received, poses, touch_in(rows)))
+        self._answers.append(AnsweredPair(stamp, received, poses, touch_in(first_row(rows))))
         self._answered += 1
 
     def _give_up(self, now: int) -> None:
