@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import math
 import time
+from dataclasses import replace
 
 import numpy as np
 import poses
@@ -19,14 +20,15 @@ from box_contact_ros.apps.viewer.markers import PARAMETERS, MarkersNode, box_mar
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import make_cloud, make_header
 from box_contact_ros.resources import resource_path
-from box_contact_ros.scene.contact_law import Touch
 from box_contact_ros.scene.pairing import StampedPose
+from box_contact_ros.scene.patch_law import Patch
 from box_contact_ros.scene.scene_solver import Answer, Pair
 from box_contact_ros.solver.contact import Contact
 
 SLAB, CUBE = (2.0, 4.0, 1.0), (2.0, 2.0, 2.0)
 HEADER = make_header(1_500_000_000, 'yard')
-TOUCH = Touch(np.array([1.0, 2.0, 3.0]), np.array([0.0, 0.6, 0.8]), 0.0125)
+TOUCH = Patch(np.array([1.0, 2.0, 3.0]), np.array([0.0, 0.6, 0.8]), 0.0125, 0.05, np.eye(3) / 12)
+NO_PATCH = replace(TOUCH, volume=math.nan, covariance=np.full((3, 3), math.nan))
 TOUCHING = np.array([0.5, 0.25, 1.875, 0, 0, 0, 1])
 APART = np.array([0.5, 0.25, 2.5, 0, 0, 0, 1])
 
@@ -50,7 +52,7 @@ def test_a_box_is_a_cube_of_its_full_extents_at_its_pose():
 
 def test_a_contact_is_point_normal_and_depth():
     """The sphere is at the point; the arrow goes from it, along the normal; the depth is in mm."""
-    point, normal, depth = contact_markers(HEADER, TOUCH, SLAB, CUBE)
+    point, normal, depth, _ = contact_markers(HEADER, TOUCH, SLAB, CUBE)
     assert [m.type for m in (point, normal, depth)] == [
         Marker.SPHERE, Marker.ARROW, Marker.TEXT_VIEW_FACING]
     assert all(m.action == Marker.ADD and m.header == HEADER and m.color.a == 1.0
@@ -65,11 +67,28 @@ def test_a_contact_is_point_normal_and_depth():
     assert depth.text == 'depth 12.50 mm'
 
 
+def test_a_patch_is_an_ellipse_around_the_point():
+    """A line in the contact plane, closed; of a square of 1 m it is the circle in it."""
+    *_, patch = contact_markers(HEADER, TOUCH, SLAB, CUBE)
+    assert (patch.type, patch.action, patch.header) == (Marker.LINE_STRIP, Marker.ADD, HEADER)
+    assert xyz(patch.pose.position) == (1.0, 2.0, 3.0)
+    line = np.array([xyz(point) for point in patch.points])
+    assert line[0] == pytest.approx(line[-1], abs=1e-12)
+    assert np.abs(line @ TOUCH.normal).max() < 1e-12
+    assert np.linalg.norm(line, axis=1) == pytest.approx(0.5)
+
+
+def test_a_model_without_patch_has_its_ellipse_deleted():
+    """The point, normal and depth are drawn all the same."""
+    assert [m.action for m in contact_markers(HEADER, NO_PATCH, SLAB, CUBE)] == [
+        Marker.ADD, Marker.ADD, Marker.ADD, Marker.DELETE]
+
+
 def test_without_contact_the_same_markers_are_deleted():
     """A marker is known by namespace and id, so those of both must be the same."""
     drawn, deleted = (contact_markers(HEADER, touch, SLAB, CUBE) for touch in (TOUCH, None))
     assert [(m.ns, m.id) for m in deleted] == [(m.ns, m.id) for m in drawn]
-    assert len({(m.ns, m.id) for m in drawn}) == 3
+    assert len({(m.ns, m.id) for m in drawn}) == 4
     assert all(m.action == Marker.DELETE for m in deleted)
 
 
@@ -131,18 +150,19 @@ def offer_until_drawn(client, count):
 
 
 def drawn(client, wanted):
-    """Wait until point, normal and depth have this action in the last array."""
-    return client.spin(lambda: [actions(client.arrays[-1]).get(name)
-                                for name in ('point', 'normal', 'depth')] == [wanted] * 3, 10.0)
+    """Wait until what shows the contact has this action in the last array."""
+    names = 'point', 'normal', 'depth', 'patch'
+    return client.spin(lambda: [actions(client.arrays[-1]).get(name) for name in names] == [
+        wanted] * len(names), 10.0)
 
 
 def test_draws_what_the_contact_node_answers(client, node, contact_node):
     """In contact with its point; apart, taken away; the boxes in both cases."""
-    offer_until_drawn(client, 5)
+    offer_until_drawn(client, 6)
     stamp = client.ask(poses.IDENTITY, TOUCHING, frames=('yard', 'yard'))
     assert drawn(client, Marker.ADD)
     markers = {marker.ns: marker for marker in client.arrays[-1].markers}
-    assert set(markers) == {'box_a', 'box_b', 'point', 'normal', 'depth'}
+    assert set(markers) == {'box_a', 'box_b', 'point', 'normal', 'depth', 'patch'}
     assert {marker.header.frame_id for marker in markers.values()} == {'yard'}
     assert markers['point'].header == client.clouds[stamp].header
     wanted = ContactSolver(CUBE, CUBE, model='exact')(poses.IDENTITY, TOUCHING)
@@ -159,7 +179,7 @@ def test_nobody_answers_any_more(client, node):
     with serving(lambda context: ContactNode(context, parameter_overrides=[
             Parameter(name, value=value)
             for name, value in (SETTINGS | {'model': 'exact'}).items()])):
-        offer_until_drawn(client, 5)
+        offer_until_drawn(client, 6)
         client.ask(poses.IDENTITY, TOUCHING)
         assert drawn(client, Marker.ADD)
     client.spin(lambda: False, 0.7)
@@ -188,7 +208,7 @@ def test_no_more_often_than_asked(client, node, contact_node):
     """Poses at some 500 Hz for a second: markers at the rate, and none while nothing is new."""
     result, = node.set_parameters([Parameter('rate', value=20)])
     assert result.successful
-    offer_until_drawn(client, 5)
+    offer_until_drawn(client, 6)
     client.arrays.clear()
     started = time.monotonic()
     while time.monotonic() - started < 1.0:

@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -24,12 +25,14 @@ from browser import chromium, open_page
 from PIL import Image
 
 from box_contact_ros import ContactSolver
-from box_contact_ros.apps.viewer.style import BOX_A, BOX_B, STALE
+from box_contact_ros.apps.viewer.style import BOX_A, BOX_B, STALE, patch_ellipse
 from box_contact_ros.apps.viewer.view_log import LOST_AFTER, ViewLog
 from box_contact_ros.apps.viewer.view_node import ViewNode
 from box_contact_ros.apps.viewer.view_page import _edges, _quaternion_from_z, read_out
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import CLOUD_ROW, NANOSECONDS
+from box_contact_ros.scene.patch_law import Patch
+from box_contact_ros.scene.pose import rotation_matrix
 
 ORIGIN = poses.IDENTITY
 TOUCHING = np.array([0.5, 0.25, 1.875, 0, 0, 0, 1])
@@ -178,6 +181,8 @@ def test_read_out_says_lengths_in_mm_and_shares_of_the_edge(log):
     assert shown(text, 'verdict') == 'contact'
     assert shown(text, 'separation') == '-125.00 mm'
     assert shown(text, 'error') == '3.0 mm = 0.15 %'
+    assert shown(text, 'volume') == '0.328 m³'  # 1.5 × 1.75 × 0.125 m
+    assert shown(text, 'area') == '2.62 m²'
     assert shown(text, 'latency') == '2.00 ms'
     assert shown(text, 'lost') == '0 of 1'
     assert 'point error of soup' in text
@@ -192,6 +197,35 @@ def test_read_out_without_contact_answer_or_poses(log):
     log.cloud(START, NO_ROWS, START)
     text = read_out(log.snapshot(), log.figures(START), 'exact')
     assert (shown(text, 'verdict'), shown(text, 'error')) == ('no contact', '–')
+    assert (shown(text, 'volume'), shown(text, 'area')) == ('– m³', '– m²')
+
+
+@pytest.mark.parametrize('turn', [(0, 0, 0, 1), (0.1, -0.5, 0.3, 0.8)])
+def test_the_ellipse_of_a_rectangle(turn):
+    """A patch l × w: semi-axes l/2 and w/2 along its edges, area l·w; however the boxes lie."""
+    length, width = 1.75, 1.5
+    turned = rotation_matrix(turn)
+    contact = ContactSolver(CUBE, CUBE, model='exact')(
+        (0, 0, 0, *turn), (*turned @ [0.5, 0.25, 1.875], *turn))
+    patch = Patch(contact.point, contact.normal, 0.125, contact.volume, contact.covariance)
+    ellipse = patch_ellipse(patch)
+    longer, shorter = turned @ (0, length / 2, 0), turned @ (width / 2, 0, 0)
+    for found, wanted in zip(ellipse.semi_axes, (longer, shorter), strict=True):
+        assert found * np.sign(found @ wanted) == pytest.approx(wanted, abs=1e-12)
+    assert ellipse.area == pytest.approx(length * width)
+    line = ellipse.outline @ turned  # in the boxes' frame
+    assert np.abs(line).max(axis=0) == pytest.approx([width / 2, length / 2, 0.0], abs=1e-12)
+    assert (line[:, 0] / width)**2 + (line[:, 1] / length)**2 == pytest.approx(0.25)
+
+
+def test_the_ellipse_of_a_line_and_of_no_patch():
+    """Variances of zero, or below by rounding, have no width; NaN has no ellipse."""
+    down = np.array([0.0, 0.0, -1.0])
+    line = Patch(np.zeros(3), down, 0.0, 1e-9, np.diag([3.0, -1e-17, 1e-20]))
+    longer, shorter = patch_ellipse(line).semi_axes
+    assert np.abs(longer) == pytest.approx([3.0, 0.0, 0.0])
+    assert not shorter.any() and patch_ellipse(line).area == 0.0
+    assert patch_ellipse(replace(line, covariance=np.full((3, 3), math.nan))) is None
 
 
 @pytest.mark.parametrize('direction', [

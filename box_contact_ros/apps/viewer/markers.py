@@ -1,8 +1,8 @@
-"""Markers for RViz: both boxes, and while they touch the contact point, the normal, the depth.
+"""Markers for RViz: both boxes, and while they touch the point, normal, depth and patch.
 
 Subscribes box_a/pose, box_b/pose and the contact node's contacts. Publishes markers
 (visualization_msgs/MarkerArray), at most `rate` times a second and only what is new. RViz with
-config/contact.rviz shows them.
+config/contact.rviz shows them. The patch is an ellipse that touches the edges of a rectangle.
 """
 from __future__ import annotations
 
@@ -20,13 +20,23 @@ from visualization_msgs.msg import Marker, MarkerArray
 from ...node.messages import NANOSECONDS, make_header
 from ...node.parameters import Setting, answer_help, checked, declare, number, size
 from ...node.runtime import CONTACT_QOS, run_node
-from ...scene.contact_law import Touch
 from ...scene.pairing import StampedPose
+from ...scene.patch_law import Patch
 from ...scene.pose_sets import CONTAINER
 from ..bench.answer_log import first_row, touch_in
 from ..ros_client import set_pose, stamp_of
 from .listener import Listener
-from .style import BOX_A, BOX_B, BOX_OPACITY, CONTACT, STALE, Colour, proportions, unit_pose
+from .style import (
+    BOX_A,
+    BOX_B,
+    BOX_OPACITY,
+    CONTACT,
+    STALE,
+    Colour,
+    patch_ellipse,
+    proportions,
+    unit_pose,
+)
 
 PARAMETERS = {
     'size_a': Setting(CONTAINER, 'full extents of box A, three numbers > 0 [m]', size),
@@ -46,12 +56,15 @@ def box_marker(box: int, pose: StampedPose, extents: Sequence[float]) -> Marker:
     return marker
 
 
-def contact_markers(header: Header, touch: Touch | None, size_a: Sequence[float],
+def contact_markers(header: Header, touch: Patch | None, size_a: Sequence[float],
                     size_b: Sequence[float]) -> list[Marker]:
-    """Return point, normal (from A to B) and depth in words of a contact; None deletes them."""
-    point, normal, depth = (_marker(header, name, kind) for name, kind in (
-        ('point', Marker.SPHERE), ('normal', Marker.ARROW), ('depth', Marker.TEXT_VIEW_FACING)))
-    markers = [point, normal, depth]
+    """Return point, normal (from A to B), depth in words and patch of a contact; None deletes them.
+
+    The patch is deleted, too, where the model gives none.
+    """
+    point, normal, depth, patch = markers = [_marker(header, name, kind) for name, kind in (
+        ('point', Marker.SPHERE), ('normal', Marker.ARROW), ('depth', Marker.TEXT_VIEW_FACING),
+        ('patch', Marker.LINE_STRIP))]
     if touch is None:
         for marker in markers:
             marker.action = Marker.DELETE
@@ -70,6 +83,13 @@ def contact_markers(header: Header, touch: Touch | None, size_a: Sequence[float]
     for marker in markers:
         marker.color = _colour(CONTACT, 1.0)
     depth.color = _colour((255, 255, 255), 1.0)
+    ellipse = patch_ellipse(touch)
+    if ellipse is None:
+        patch.action = Marker.DELETE
+        return markers
+    _set(patch.pose.position, touch.point)
+    patch.scale.x = 0.5 * look.point_radius  # the line's width
+    patch.points = [_set(Point(), place) for place in ellipse.outline]
     return markers
 
 
@@ -94,7 +114,7 @@ class MarkersNode(Listener):
 
     def __init__(self, context: Context, **options: Any) -> None:
         self._poses: dict[int, StampedPose] = {}
-        self._answer: tuple[Header, Touch | None] | None = None
+        self._answer: tuple[Header, Patch | None] | None = None
         self._changed = False
         super().__init__('markers', context, CONTACT_QOS, **options)
         self._settings = declare(self, PARAMETERS)

@@ -16,8 +16,8 @@ import numpy as np
 
 from ...node.messages import NANOSECONDS
 from ...output import percentiles
-from ...scene.contact_law import Touch
 from ...scene.pairing import PAIRINGS, StampedPose
+from ...scene.patch_law import Patch
 from ...scene.scene_solver import two_boxes
 from ...solver.contact import Contact
 from ...solver.contact_solver import ContactSolver
@@ -41,7 +41,7 @@ class AnsweredPair:
     stamp: int
     received: int
     poses: Poses
-    touch: Touch | None
+    touch: Patch | None
     """None for no contact."""
 
     @property

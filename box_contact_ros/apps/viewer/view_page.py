@@ -20,7 +20,16 @@ import numpy as np
 import viser
 
 from ...scene.pose import rotation_matrix
-from .style import BOX_A, BOX_B, BOX_OPACITY, CONTACT, EXACT, proportions, unit_pose
+from .style import (
+    BOX_A,
+    BOX_B,
+    BOX_OPACITY,
+    CONTACT,
+    EXACT,
+    patch_ellipse,
+    proportions,
+    unit_pose,
+)
 from .view_log import Snapshot, ViewFigures
 
 MODELS = ('mlp', 'exact', 'soup', 'paper')
@@ -109,6 +118,9 @@ class Page:
                                               visible=False)
         self._normal = scene.add_arrows('/contact/normal', np.array([[[0, 0, 0], [0, 0, 1.0]]]),
                                         CONTACT, visible=False)
+        self._patch = scene.add_line_segments('/contact/patch', np.zeros((1, 2, 3)), CONTACT,
+                                              thickness=3.0, thickness_units='screen',
+                                              visible=False)
 
     def _add_crane(self, run: CraneRun, on_land: Callable[[CraneRun], None]) -> None:
         gui = self._server.gui
@@ -156,10 +168,17 @@ class Page:
                 box.wxyz = np.roll(pose[3:], 1)
                 box.visible = True
             touch, exact = snapshot.answer and snapshot.answer.touch, snapshot.exact
+            ellipse = None
             if touch:
-                self._point.position = self._normal.position = touch.point - self._origin
+                for drawn in (self._point, self._normal, self._patch):
+                    drawn.position = touch.point - self._origin
                 self._normal.wxyz = _quaternion_from_z(touch.normal)
+                ellipse = patch_ellipse(touch)
+            if ellipse is not None:
+                line = ellipse.outline.astype(np.float32)
+                self._patch.points = np.stack([line[:-1], line[1:]], axis=1)
             self._point.visible = self._normal.visible = touch is not None
+            self._patch.visible = ellipse is not None
             if exact.colliding:
                 self._exact.position = exact.point - self._origin
             self._exact.visible = touch is not None and exact.colliding
@@ -236,13 +255,18 @@ def read_out(snapshot: Snapshot | None, figures: ViewFigures | None, model: str)
         rows = [('verdict', 'verdict', 'waiting for poses')]
     else:
         answer, exact, edge = snapshot.answer, snapshot.exact, figures.edge
-        verdict, error = 'no answer' if answer is None else 'no contact', math.nan
+        verdict = 'no answer' if answer is None else 'no contact'
+        error = volume = area = math.nan
         if answer is not None and answer.touch is not None:
-            verdict = 'contact'
+            verdict, volume = 'contact', answer.touch.volume
             error = float(np.linalg.norm(answer.touch.point - exact.point))  # NaN without an exact
+            ellipse = patch_ellipse(answer.touch)
+            area = ellipse.area if ellipse else math.nan
         rows = [
             ('verdict', 'verdict', verdict),
             ('separation', 'separation', f'{_text(1e3 * exact.separation, "+.2f")} mm'),
+            ('volume', 'volume', f'{_text(volume, ".3g")} m³'),
+            ('area', 'area of the patch', f'{_text(area, ".3g")} m²'),
             ('error', f'point error of {model}', _share(error, edge)),
             ('error-p99', '&emsp;p99', _share(figures.point_error_p99, edge)),
             ('latency', 'latency, median', f'{_text(1e3 * figures.latency_median, ".2f")} ms'),
