@@ -6,19 +6,17 @@ config/contact.rviz shows them. The patch is an ellipse that touches the edges o
 """
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import Point
-from rcl_interfaces.msg import SetParametersResult
 from rclpy.context import Context
-from rclpy.parameter import Parameter
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
 from ...node.messages import NANOSECONDS, make_header
-from ...node.parameters import Setting, answer_help, checked, declare, number, size
+from ...node.parameters import CheckedParameters, Setting, answer_help, number, size
 from ...node.runtime import CONTACT_QOS, run_node
 from ...scene.pairing import StampedPose
 from ...scene.patch_law import Patch
@@ -117,21 +115,15 @@ class MarkersNode(Listener):
         self._answer: tuple[Header, Patch | None] | None = None
         self._changed = False
         super().__init__('markers', context, CONTACT_QOS, **options)
-        self._settings = declare(self, PARAMETERS)
-        self.add_on_set_parameters_callback(self._set_parameters)
+        self._settings = CheckedParameters(self, PARAMETERS, self._apply)
         self._markers = self.create_publisher(MarkerArray, 'markers', CONTACT_QOS)
-        self._timer = self.create_timer(1.0 / self._settings['rate'], self._publish)
-        self.get_logger().info(f'ready: at most {self._settings["rate"]:g} Hz')
+        rate = self._settings.values['rate']
+        self._timer = self.create_timer(1.0 / rate, self._publish)
+        self.get_logger().info(f'ready: at most {rate:g} Hz')
 
-    def _set_parameters(self, parameters: list[Parameter]) -> SetParametersResult:
-        changes = {p.name: p.value for p in parameters if p.name in PARAMETERS}
-        try:
-            self._settings = checked(PARAMETERS, {**self._settings, **changes})
-        except ValueError as error:
-            return SetParametersResult(successful=False, reason=str(error))
-        self._timer.timer_period_ns = round(NANOSECONDS / self._settings['rate'])
+    def _apply(self, settings: dict[str, Any], _: Collection[str]) -> None:
+        self._timer.timer_period_ns = round(NANOSECONDS / settings['rate'])
         self._changed = True
-        return SetParametersResult(successful=True)
 
     def on_pose(self, box: int, pose: StampedPose) -> None:
         """Draw the box there next time."""
@@ -147,7 +139,7 @@ class MarkersNode(Listener):
             self._markers.publish(MarkerArray(markers=self._drawn()))
 
     def _drawn(self) -> list[Marker]:
-        sizes = self._settings['size_a'], self._settings['size_b']
+        sizes = [self._settings.values[name] for name in ('size_a', 'size_b')]
         markers = [box_marker(box, self._poses[box], sizes[box]) for box in sorted(self._poses)]
         if self._answer is not None:
             header, touch = self._answer

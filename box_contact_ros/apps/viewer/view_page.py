@@ -20,6 +20,7 @@ import numpy as np
 import viser
 
 from ...scene.pose import rotation_matrix
+from ...solver.models import MODELS
 from .style import (
     BOX_A,
     BOX_B,
@@ -32,7 +33,6 @@ from .style import (
 )
 from .view_log import Snapshot, ViewFigures
 
-MODELS = ('mlp', 'exact', 'soup', 'paper')
 CHART_LEAST, CHART_MOST = ({'pad': 0.1, 'soft': value, 'mode': 1} for value in (-20.0, 20.0))
 """Of the separation [mm]: the chart shows at least this, so that it does not magnify noise."""
 READ_OUT_PERIOD = 0.2
@@ -85,7 +85,7 @@ class Page:
             scales={'x': {'time': False}, 'y': {'range': {'min': CHART_LEAST, 'max': CHART_MOST}}},
             legend={'show': False}, height=160)
         self._next_read_out = 0.0
-        self._model = server.gui.add_button_group('model', MODELS)
+        self._model = server.gui.add_button_group('model', tuple(MODELS))
         self._model.on_click(lambda event: on_model(event.target.value))
         self._status = server.gui.add_html('')
         if run is not None:
