@@ -218,13 +218,14 @@ def test_the_ellipse_of_a_rectangle(turn):
     assert (line[:, 0] / width)**2 + (line[:, 1] / length)**2 == pytest.approx(0.25)
 
 
-def test_the_ellipse_of_a_line_and_of_no_patch():
+def test_the_ellipse_of_a_line_of_a_point_and_of_no_patch():
     """Variances of zero, or below by rounding, have no width; NaN has no ellipse."""
     down = np.array([0.0, 0.0, -1.0])
     line = Patch(np.zeros(3), down, 0.0, 1e-9, np.diag([3.0, -1e-17, 1e-20]))
     longer, shorter = patch_ellipse(line).semi_axes
     assert np.abs(longer) == pytest.approx([3.0, 0.0, 0.0])
     assert not shorter.any() and patch_ellipse(line).area == 0.0
+    assert not patch_ellipse(replace(line, covariance=-1e-17 * np.eye(3))).semi_axes.any()
     assert patch_ellipse(replace(line, covariance=np.full((3, 3), math.nan))) is None
 
 

@@ -21,7 +21,7 @@ from ros_client import Client, serving, stamp_of
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.node.contact_node import ContactNode
-from box_contact_ros.node.messages import make_header, read_cloud
+from box_contact_ros.node.messages import PATCH_FIELDS, make_header, read_cloud
 from box_contact_ros.node.rclpy_workarounds import RCLError
 
 MS = 1_000_000  # ns
@@ -127,6 +127,8 @@ def test_all_pairs_in_one_cloud(client, serialization):
         wanted = cubes(np.array(LORRY), np.array([0.5, 0, 0.9, 0, 0, 0, 1]))
         assert rows[5]['depth'] == -wanted.separation
         assert [rows[5][name] for name in 'xyz'] == pytest.approx(wanted.point)
+        assert [rows[5][name] for name in PATCH_FIELDS] == [
+            wanted.volume, *wanted.covariance[np.triu_indices(3)]]
         assert rows[3]['depth'] == pytest.approx(0.1) and rows[3]['normal_z'] == 1
         assert client.spin(lambda: all(both in client.of_pair[pair]
                                        for pair in ('load_floor', 'load_lorry')), 5.0)
@@ -207,7 +209,7 @@ def test_a_stale_box_is_nan_and_never_an_old_contact(client):
         for stamp in stamps:
             rows = client.rows(stamp)
             assert set(rows) == {3, 5} and rows[3]['depth'] == pytest.approx(0.1)
-            assert all(math.isnan(rows[5][name]) for name in ('x', 'normal_x', 'depth'))
+            assert all(math.isnan(rows[5][name]) for name in ('x', 'normal_x', 'depth', 'cov_zz'))
             assert not client.clouds[stamp].is_dense
             assert stamp not in client.of_pair['load_lorry']
         client.tick(load=ON_FLOOR)

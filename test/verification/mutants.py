@@ -38,6 +38,8 @@ class Mutant(NamedTuple):
 FAMILIES = 'test/verification/test_hard_poses.py'
 LAWS = 'test/core/test_laws.py'
 EVALUATOR = 'node/evaluator.py'
+MESSAGES = 'node/messages.py'
+TEST_BYTES = 'test/node/test_message_bytes.py'
 TOPICS = 'node/scene_topics.py'
 TEST_PAIRING = 'test/scene/test_pairing.py'
 TEST_SCENE_NODE = 'test/node/test_scene_node.py'
@@ -220,7 +222,33 @@ MUTANTS = {
         'test/node/test_contact_node.py -k error_inside'),
     'length of a message not checked': Mutant(
         'node/message_bytes.py', 'if len(data) != at + _POSE.size:', 'if False:',
-        'test/node/test_message_bytes.py -k other_bytes'),
+        f'{TEST_BYTES} -k other_bytes'),
+    'the wrong triangle of the covariance sent': Mutant(
+        'node/message_bytes.py', 'square[32:48]', 'square[24:40]',
+        f'{TEST_BYTES} -k written_alike'),
+    'no matter whether a cloud has the field': Mutant(
+        MESSAGES, 'if name not in found:', 'if False:', f'{TEST_BYTES} -k wrong_field'),
+    "types of a cloud's fields not compared": Mutant(
+        MESSAGES, 'if (datatype, count) != (_DATATYPES[kind.str], 1):', 'if False:',
+        f'{TEST_BYTES} -k wrong_field'),
+    'fields outside their row read': Mutant(
+        MESSAGES, 'if offset + kind.itemsize > step:', 'if False:',
+        f'{TEST_BYTES} -k wrong_field'),
+    'bytes of a cloud not counted': Mutant(
+        MESSAGES, 'if len(data) < count * message.point_step:', 'if False:',
+        f'{TEST_BYTES} -k cut_short'),
+    'recordings of before the patch refused': Mutant(
+        MESSAGES, 'if name not in PATCH_FIELDS or not found.keys().isdisjoint(PATCH_FIELDS)]',
+        'if True]', f'{TEST_BYTES} -k before_the_patch'),
+    'a contact without patch taken for stale': Mutant(
+        'apps/bench/answer_log.py', 'np.isnan(values[:7]).any()', 'np.isnan(values).any()',
+        'test/apps/test_landing_ros.py -k say_nothing'),
+    'an ellipse of NaN': Mutant(
+        'apps/viewer/style.py', 'if not np.isfinite(patch.covariance).all():', 'if False:',
+        'test/apps/test_markers.py -k without_patch'),
+    'roots of variances below zero': Mutant(
+        'apps/viewer/style.py', 'np.maximum(variances[:0:-1], 0.0)', 'variances[:0:-1]',
+        'test/apps/test_view.py -k of_a_line'),
     'numbers of a pose not checked': Mutant(
         'node/message_bytes.py', 'and _LEAST < hypot(qx, qy, qz, qw) < _MOST):', '):',
         'test/node/test_faults.py -k half_of_the_poses'),
