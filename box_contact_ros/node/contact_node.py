@@ -218,7 +218,7 @@ class ContactNode(LifecycleNode):
         if settings.get('weights') and not entry.reads_weights:
             logger.warning(f'model {solver.model!r} uses no weights: '
                            f'{shown(settings["weights"])} is ignored')
-        elif solver.model == 'mlp' and solver.sizes_answered_exactly:
+        elif solver.sizes_answered_exactly:  # 0 for models that answer themselves
             logger.warning(f'pairs of sizes that the weights are not for: '
                            f'{solver.sizes_answered_exactly}; the exact model answers them')
         pairs, topics = len(scene.pairs), self._topics.pose_topics()
