@@ -1,0 +1,206 @@
+"""How a node starts, is served and ends; its QoS events and its options: all in this process."""
+from __future__ import annotations
+
+import os
+import signal
+from collections import Counter
+from threading import Event, Thread, get_native_id
+from types import SimpleNamespace
+
+import poses
+import pytest
+from rclpy.event_handler import UnsupportedEventTypeError
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.signals import SignalHandlerOptions
+from ros_client import Client, serving
+
+from box_contact_ros.node import contact_node, runtime, soup_node
+from box_contact_ros.node.contact_node import ContactNode
+from box_contact_ros.node.parameters import answer_help
+from box_contact_ros.node.qos_events import QosEvents
+from box_contact_ros.scene.pairing import RESETS
+
+CUBES = {'size_a': [2.0, 2.0, 2.0], 'size_b': [2.0, 2.0, 2.0], 'model': 'exact'}
+TOUCHING = (0.5, 0.25, 1.875, 0, 0, 0, 1)
+
+
+@pytest.fixture
+def run(monkeypatch):
+    """`run_node` with the test's own signal handlers, and its threads as they are."""
+    monkeypatch.setattr(runtime, 'SignalHandlerOptions',
+                        SimpleNamespace(ALL=SignalHandlerOptions.NO))
+    return lambda make_node: runtime.run_node(make_node, [], undisturbed=False)
+
+
+class Short(Node):
+    """Does something at once, then ends its context."""
+
+    def __init__(self, context, action):
+        super().__init__('short', context=context)
+        self.action = action
+        self.create_timer(0.01, self.at_once)
+
+    def at_once(self):
+        action, self.action = self.action, self.context.try_shutdown
+        action()
+
+
+def test_an_error_in_a_callback_ends_nothing(run, capfd):
+    """It is logged; the node goes on until its context ends, with status 0."""
+    def fail():
+        raise KeyError('a request')
+
+    assert run(lambda context: Short(context, fail)) == 0
+    assert "a request failed: KeyError: 'a request'" in capfd.readouterr().err
+
+
+def test_an_interrupt_is_a_clean_end(run, capfd):
+    def interrupt():
+        raise KeyboardInterrupt
+
+    assert run(lambda context: Short(context, interrupt)) == 0
+    assert run(lambda context: interrupt()) == 0
+    assert 'Traceback' not in capfd.readouterr().err
+
+
+def test_a_node_that_cannot_start_says_why(run, capsys):
+    """One line and status 1; nothing where a signal has ended the context."""
+    def refuse(context, *, gone=False):
+        if gone:
+            context.try_shutdown()
+        raise ValueError('size_a: -1 is not positive')
+
+    assert run(refuse) == 1
+    assert capsys.readouterr().err == 'error: size_a: -1 is not positive\n'
+    assert run(lambda context: refuse(context, gone=True)) == 0
+    assert not capsys.readouterr().err
+
+
+def test_other_threads_become_batch_threads(monkeypatch):
+    """All of the process but the caller's; where that is not permitted, none."""
+    changed, done = {}, Event()
+    monkeypatch.setattr(os, 'sched_setscheduler', lambda number, policy, _: changed.update(
+        {number: policy}))
+    other = Thread(target=done.wait)
+    other.start()
+    runtime.let_callbacks_finish()
+    done.set()
+    other.join()
+    assert changed[other.native_id] == os.SCHED_BATCH and get_native_id() not in changed
+
+    def forbidden(path):
+        raise PermissionError(path)
+
+    monkeypatch.setattr(os, 'listdir', forbidden)
+    runtime.let_callbacks_finish()
+
+
+def test_only_the_main_thread_ignores_interrupts(monkeypatch):
+    """Another thread may not set handlers, and leaves them alone."""
+    monkeypatch.setattr(runtime.atexit, 'register', lambda *_: None)
+    before, seen = signal.getsignal(signal.SIGINT), []
+
+    def look():
+        with runtime.uninterrupted():
+            seen.append(signal.getsignal(signal.SIGINT))
+
+    look()
+    thread = Thread(target=look)
+    thread.start()
+    thread.join()
+    assert seen == [signal.SIG_IGN, before] and signal.getsignal(signal.SIGINT) == before
+
+
+def test_rclpy_without_events_executor(monkeypatch):
+    """Older Jazzy has the default executor only; a node is answered from it all the same."""
+    monkeypatch.setattr(runtime, 'EventsExecutor', None)
+    client = Client()
+    assert isinstance(client.executor, SingleThreadedExecutor)
+    client.close()
+
+
+@pytest.mark.parametrize('program', [contact_node, soup_node])
+def test_options_outside_ros_args_are_refused(program, capsys):
+    """With status 2 and a hint; help lists all parameters with their defaults, with status 0."""
+    for arguments, status in ((['--help'], 0), (['-p', 'rate:=1'], 2),
+                              (['--ros-args', '-p', 'model:=exact', '--', '--fast'], 2)):
+        with pytest.raises(SystemExit) as ended:
+            program.main(arguments)
+        assert ended.value.code == status
+    printed = capsys.readouterr()
+    assert 'parameters stand after --ros-args' in printed.err
+    assert 'unrecognized arguments: --fast' in printed.err
+    for name in program.PARAMETERS:
+        assert f'\n  {name} ' in printed.out
+    assert '[12.192,2.438,2.591]' in printed.out and 'default: none' in printed.out
+    answer_help('contact_node', '', program.PARAMETERS, ['--ros-args', '-p', 'model:=exact'])
+
+
+@pytest.mark.parametrize('program', [contact_node, soup_node])
+def test_main_serves_its_node(program, monkeypatch):
+    """With the arguments that it was given."""
+    seen = []
+    monkeypatch.setattr(program, 'run_node', lambda *call: seen.append(call) or 0)
+    assert program.main(['--ros-args']) == 0
+    (kind, args), = seen
+    assert issubclass(kind, ContactNode) and args == ['--ros-args']
+
+
+# --- QoS events -----------------------------------------------------------------------------------
+
+
+def test_events_are_counted_and_told():
+    """Liveliness counts what is lost, not what is back; deadlines and losses count each."""
+    told: list[str] = []
+    logger = SimpleNamespace(warning=lambda text, **_: told.append(text), info=told.append)
+    counts: Counter[str] = Counter()
+    callbacks = QosEvents(SimpleNamespace(get_logger=lambda: logger), counts).callbacks(
+        'load', deadline=True)
+    for lost in (1, -1, 0):
+        callbacks.liveliness(SimpleNamespace(not_alive_count_change=lost))
+    callbacks.deadline(SimpleNamespace(total_count_change=2))
+    callbacks.message_lost(SimpleNamespace(total_count_change=3))
+    assert counts == {'liveliness lost': 1, 'deadlines missed': 2, 'lost in transport': 3}
+    assert told == ['load: a publisher of its poses shows no life',
+                    'load: no pose within the deadline']
+    assert QosEvents(SimpleNamespace(), counts).callbacks('load', deadline=False).deadline is None
+
+
+@pytest.fixture
+def client():
+    client = Client()
+    yield client
+    client.close()
+
+
+class WithoutEvents(ContactNode):
+    """On a middleware that has no such events."""
+
+    def create_subscription(self, *arguments, event_callbacks=None, **options):
+        if event_callbacks is not None:
+            raise UnsupportedEventTypeError('no events here')
+        return super().create_subscription(*arguments, **options)
+
+
+def test_a_middleware_without_events_is_answered(client):
+    """A node without them subscribes without them."""
+    with serving(lambda context: WithoutEvents(context, parameter_overrides=[
+            Parameter(name, value=value) for name, value in CUBES.items()])):
+        client.offer_until_answered(poses.IDENTITY, TOUCHING)
+
+
+def test_a_node_is_told_of_its_clock_and_of_names_that_are_none(client, capfd):
+    """A misspelt parameter is named at the start, a clock that changes is counted; then it ends."""
+    given = CUBES | {'modle': 'mlp', 'autostart': True}
+    with serving(lambda context: ContactNode(context, parameter_overrides=[
+            Parameter(name, value=value) for name, value in given.items()])) as node:
+        assert "no parameter 'modle'" in (told := capfd.readouterr().err)
+        assert 'did you mean model' in told
+        result, = node.set_parameters([Parameter('pair_topics', value='yes')])
+        assert result.reason == "pair_topics must be true or false, not 'yes'"
+        node.set_parameters([Parameter('use_sim_time', value=True)])
+        assert client.spin(lambda: node.counts[RESETS] == 1, 5.0)
+        node.trigger_shutdown()
+        assert not any('pose' in entity.topic_name for entity in node.subscriptions)
