@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from threading import Event, Thread
 from typing import Any
 
+import numpy as np
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PointStamped, PoseStamped, Vector3Stamped
@@ -18,6 +19,7 @@ from sensor_msgs.msg import PointCloud2
 
 from box_contact_ros.node.messages import NANOSECONDS, make_header
 from box_contact_ros.node.runtime import make_executor
+from box_contact_ros.solver.contact import Contact
 
 MATCH_SECONDS = 60.0
 """Discovery takes a fraction of a second; on a busy machine, in a process that has had hundreds of
@@ -26,6 +28,12 @@ participants, more than fifteen were seen. A limit against hanging, no more."""
 
 def stamp_of(message: Any) -> int:
     return message.header.stamp.sec * NANOSECONDS + message.header.stamp.nanosec
+
+
+def row_of(contact: Contact) -> tuple[float, ...]:
+    """The row of pair 0 in a `contacts` cloud that says all of a contact."""
+    return (*contact.point, *contact.normal, -contact.separation, 0, contact.volume,
+            *contact.covariance[np.triu_indices(3)])
 
 
 class Client:

@@ -11,7 +11,7 @@ import pytest
 import rclpy
 from rclpy.context import Context
 from rclpy.parameter import Parameter
-from ros_client import Client, serving
+from ros_client import Client, row_of, serving
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.node.contact_node import PARAMETERS, ContactNode
@@ -56,8 +56,7 @@ def test_answers_with_point_normal_and_cloud(node, client):
     assert (point.point.x, point.point.y, point.point.z) == tuple(wanted.point)
     assert (normal.vector.x, normal.vector.y, normal.vector.z) == tuple(wanted.normal)
     row, = read_cloud(cloud)
-    assert tuple(row) == (*wanted.point, *wanted.normal, -wanted.separation, 0, wanted.volume,
-                          *wanted.covariance[np.triu_indices(3)])
+    assert tuple(row) == row_of(wanted)
     # The cloud comes last, so a reader of it knows that point and normal are out.
     assert [topic for topic, at in client.order if at == stamp] == [
         'contact/point', 'contact/normal', 'contacts']

@@ -16,6 +16,7 @@ from geometry_msgs.msg import PoseStamped
 from raw_client import APART, GOOD, LITTLE_ENDIAN, ORIGIN, TOUCHING, RawClient, cdr
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters, SetParametersAtomically
+from ros_client import row_of
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.node.messages import read_cloud
@@ -183,7 +184,7 @@ def test_good_poses_among_bad_ones(node, client):
             rows = read_cloud(client.clouds[stamp])
             assert len(rows) == wanted.colliding == (stamp in client.points)
             for row in rows:
-                assert tuple(row) == (*wanted.point, *wanted.normal, -wanted.separation, 0)
+                assert tuple(row) == row_of(wanted)
     assert client.diagnostic('refused: bad pose') == str(2 * len(bad))
     assert 'internal error' not in node.output
 
