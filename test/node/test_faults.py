@@ -119,7 +119,7 @@ def test_100_000_messages_that_are_none(start, client):
     assert 'refused: internal error' not in counts
     for cloud in client.clouds.values():
         for row in read_cloud(cloud):
-            assert math.isnan(row['depth']) or np.isfinite(list(row)).all()
+            assert math.isnan(row['depth']) or np.isfinite(list(row)[:8]).all()  # but the patch
 
 
 @pytest.mark.parametrize('serialization', ['raw', 'typed'])
