@@ -28,7 +28,7 @@ CLOUD_ROW = np.dtype([
     ('pair', '<u4'), *((name, '<f8') for name in PATCH_FIELDS)])
 """One row of the `contacts` cloud: a pair in contact. Of a pair that could not be evaluated all is
 NaN but its id. float64, because float32 loses half a metre in UTM coordinates. Depth [m] is
-−separation."""
+−separation. New fields come last, so that older ones keep their places."""
 _DATATYPES = {'<f8': PointField.FLOAT64, '<u4': PointField.UINT32}
 _FIELDS = [PointField(name=name, offset=entry[1], datatype=_DATATYPES[entry[0].str], count=1)
            for name, entry in (CLOUD_ROW.fields or {}).items()]
