@@ -25,7 +25,7 @@ from ..solver.arguments import model_name
 from ..solver.contact_solver import ContactSolver
 from ..solver.models import MODELS
 from ..verification.fuzz import TOUCH_ULPS
-from ..verification.hard_poses import FAMILIES, Cases, load
+from ..verification.hard_poses import Cases, load
 from ..verification.judge import COORDINATE_ULPS, NOT_FINITE, NOT_UNIT, OUTSIDE, TOLERANCE, judge
 
 REPORTED = ('exact', 'mlp', 'fcl', 'soup-8')
@@ -180,9 +180,9 @@ Made by `{command}` on {output.machine(native)}.
 {"BROKEN: " + "; ".join(broken) + "." if broken else
 "Of `exact` and `mlp`, every verdict and normal is right, and every point in both boxes."}
 
-Families of poses that break collision tests: `box_contact_ros/verification/hard_poses.py` describes
-each. Every case is also turned, swapped, renamed or scaled. Poses are stored as doubles, the truth
-in 60 digits.
+Families of poses that break collision tests: `test/helpers/hard_pose_recipes.py` describes each.
+Every case is also turned, swapped, renamed or scaled. Poses are stored as doubles, the truth in 60
+digits.
 
 - *Wrong verdict*: where the gap or depth is more than 16 units in the last place of the largest
   coordinate.
@@ -205,20 +205,21 @@ def main(args: Sequence[str] | None = None) -> int:
     """Ask all, print, write; 1 if a gate is broken."""
     from tqdm import tqdm
 
+    cases = load()
     parser = argparse.ArgumentParser(prog='stability', description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('--models', nargs='+', type=model_name, default=list(REPORTED),
                         metavar='MODEL',
                         help=f'of {", ".join(MODELS)} (default: {" ".join(REPORTED)})')
-    parser.add_argument('--families', nargs='+', default=list(FAMILIES), choices=list(FAMILIES),
+    parser.add_argument('--families', nargs='+', default=list(cases), choices=list(cases),
                         metavar='FAMILY', help='default: all')
     parser.add_argument('--out', type=Path, metavar='DIR',
                         help='folder for stability.md and stability.csv (default: docs, or '
                              'quick-results with fewer models or families than that)')
     options = parser.parse_args(args)
-    whole = set(options.models) >= set(REPORTED) and set(options.families) == set(FAMILIES)
+    whole = set(options.models) >= set(REPORTED) and set(options.families) == set(cases)
     folder = output.make_folder(parser, options.out or Path('docs' if whole else 'quick-results'))
-    cases, rows = load(), []
+    rows = []
     with tqdm(total=len(options.models) * len(options.families), desc='stability',
               unit='family') as bar:
         for model in options.models:

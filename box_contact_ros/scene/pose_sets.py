@@ -7,6 +7,7 @@ along SAT's normal, which changes the depth by just as much and keeps the axis.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +20,8 @@ from .pose import quaternion_multiply, rotation_matrix
 CUBE = (2.0, 2.0, 2.0)
 CONTAINER = (12.192, 2.438, 2.591)
 """ISO 40 ft [m]."""
+TWENTY, HIGH_CUBE = (6.058, 2.438, 2.591), (12.192, 2.438, 2.896)
+"""ISO 20 ft, and 40 ft high cube [m]."""
 Z = (0.0, 0.0, 1.0)
 
 
@@ -65,6 +68,23 @@ def turns(axes: ArrayLike, angles: np.ndarray) -> np.ndarray:
     axes = axes / np.linalg.norm(axes, axis=1, keepdims=True)
     return np.concatenate([axes * np.sin(0.5 * angles)[:, None], np.cos(0.5 * angles)[:, None]],
                           axis=1)
+
+
+def turned(axis: ArrayLike, angle: float) -> np.ndarray:
+    """Return the quaternion (4,) xyzw of a rotation about an axis (3,) by an angle [rad]."""
+    return turns(axis, np.array([angle]))[0]
+
+
+@cache
+def right_angles() -> list[np.ndarray]:
+    """Return the 24 orientations that map axes on axes."""
+    found = [np.array([0.0, 0.0, 0.0, 1.0])]
+    for q in found:  # grows while the loop runs
+        for axis in np.eye(3):
+            new = quaternion_multiply(q, turned(axis, 0.5 * np.pi))
+            if all(min(np.abs(new - p).max(), np.abs(new + p).max()) > 1e-6 for p in found):
+                found.append(new)
+    return found
 
 
 def log_uniform(rng: np.random.Generator, low: float, high: float, n: int | tuple[int, ...],

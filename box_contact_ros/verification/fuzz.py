@@ -24,10 +24,18 @@ import numpy as np
 from ..core import native
 from ..output import machine, make_room, write_csv
 from ..scene.pose import quaternion_multiply, rotation_matrix
-from ..scene.pose_sets import CONTAINER, Pairs, log_uniform, turns, unit_quaternions
+from ..scene.pose_sets import (
+    CONTAINER,
+    HIGH_CUBE,
+    TWENTY,
+    Pairs,
+    log_uniform,
+    right_angles,
+    turns,
+    unit_quaternions,
+)
 from ..solver.arguments import model_name, seed_number, within
 from ..solver.contact_solver import ContactSolver
-from .hard_poses import HIGH_CUBE, TWENTY, right_angles
 from .judge import GATES, exact_gap, judge
 
 PAIRS, QUICK_PAIRS = 10_000_000, 60_000

@@ -7,6 +7,7 @@ Once written, the file is what tests and reports read
 """
 from __future__ import annotations
 
+import hard_pose_recipes as recipes
 import numpy as np
 import oracle
 from gmpy2 import mpfr
@@ -36,8 +37,8 @@ def truth(a, b, size_a, size_b):
 def main():
     """Generate all families and judge every case."""
     arrays = {}
-    for name in tqdm(hard_poses.FAMILIES, unit='family'):
-        pairs = hard_poses.generate(name)
+    for name in tqdm(recipes.FAMILIES, unit='family'):
+        pairs = recipes.generate(name)
         found = zip(*(truth(*row) for row in zip(*pairs)))
         arrays |= {f'{name}.{part}': values for part, values in pairs._asdict().items()}
         arrays |= {f'{name}.{part}': np.array(values) for part, values in zip(

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 import poses
 import pytest
+from mlp_choices import solve_with_choices
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.core import DEPTH_FLOOR
@@ -27,7 +28,6 @@ from box_contact_ros.scene.pose_sets import (
 )
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.weights_file import Network, load_weights
-from box_contact_ros.verification.mlp_choices import solve_with_choices
 
 UNIT = (1.0, 1.0, 1.0)
 NETWORK = load_weights(resource_path('weights', 'mlp.safetensors')).networks['point']

@@ -11,11 +11,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core import native, stages
-from ..scene.pose_sets import Pairs
-from ..solver.contact import Contacts
-from ..solver.mlp import core_numbers
-from ..solver.weights_file import Network
+from box_contact_ros.core import native, stages
+from box_contact_ros.scene.pose_sets import Pairs
+from box_contact_ros.solver.contact import Contacts
+from box_contact_ros.solver.mlp import core_numbers
+from box_contact_ros.solver.weights_file import Network
 
 _UNIT = (1.0, 1.0, 1.0)
 
