@@ -72,7 +72,7 @@ class Solver {
     check_size("size_b", size_b);
   }
 
-  // Model `mlp`. weights_file.hpp reads a network. Throws std::invalid_argument also for weights
+  // Model `mlp`. mlp_weights.hpp reads a network. Throws std::invalid_argument also for weights
   // that are not finite or beyond ±1e4.
   Solver(const Size& size_a, const Size& size_b, Network network) : Solver(size_a, size_b) {
     for (const Network::Unit& unit : network.units) {

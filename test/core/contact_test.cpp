@@ -20,7 +20,7 @@
 #include <vector>
 
 #include "box_contact/box_contact.hpp"
-#include "box_contact/weights_file.hpp"
+#include "box_contact/mlp_weights.hpp"
 
 namespace {
 
