@@ -20,9 +20,9 @@ from rclpy.context import Context
 from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 
-from ..scene.pairing import PAIRINGS
 from ..scene.scene_file import read_scene
 from ..scene.scene_solver import Scene, SceneSolver, two_boxes
+from ..scene.stamp_pairing import PAIRINGS
 from ..solver.checks import shown
 from ..solver.models import find_model, model_names
 from .diagnostics import DIAGNOSTICS_SECONDS, Diagnostics

@@ -6,8 +6,8 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from ..scene.pairing import NEVER, PAIRINGS, RESETS, Pairing, StampedPose, Tick
 from ..scene.scene_solver import SceneSolver
+from ..scene.stamp_pairing import NEVER, PAIRINGS, RESETS, Pairing, StampedPose, Tick
 from ..solver.checks import shown
 from .diagnostics import UNMATCHED_SECONDS, Diagnostics
 from .message_bytes import RawMessages

@@ -14,8 +14,8 @@ import numpy as np
 from rclpy.serialization import serialize_message
 
 from ..core import LENGTH_MAX, QUATERNION_MAX, QUATERNION_MIN
-from ..scene.pairing import StampedPose
 from ..scene.scene_solver import Answer
+from ..scene.stamp_pairing import StampedPose
 from ..solver.contact import Contact
 from .messages import (
     CLOUD_ROW,

@@ -14,8 +14,8 @@ from geometry_msgs.msg import Point, PointStamped, PoseStamped, Vector3, Vector3
 from sensor_msgs.msg import PointCloud2, PointField
 from std_msgs.msg import Header
 
-from ..scene.pairing import StampedPose
 from ..scene.scene_solver import Answer
+from ..scene.stamp_pairing import StampedPose
 from ..solver.checks import pose_fault, shown
 from ..solver.contact import Contact
 

@@ -41,7 +41,7 @@ EVALUATOR = 'node/evaluator.py'
 MESSAGES = 'node/messages.py'
 TEST_BYTES = 'test/node/test_message_bytes.py'
 TOPICS = 'node/scene_topics.py'
-TEST_PAIRING = 'test/scene/test_pairing.py'
+TEST_PAIRING = 'test/scene/test_stamp_pairing.py'
 TEST_SCENE_NODE = 'test/node/test_scene_node.py'
 TEST_CORE = 'test/core/test_core.py'
 EXACT = 'test/core/test_exact.py'
@@ -256,28 +256,29 @@ MUTANTS = {
         EVALUATOR, 'elif pose.frame_id != frame_id:', 'elif False:',
         'test/node/test_contact_node.py -k frames_must'),
     'a stamp answered again': Mutant(
-        'scene/pairing.py', 'if stamp in taken:', 'if False:',
+        'scene/stamp_pairing.py', 'if stamp in taken:', 'if False:',
         f'{TEST_SCENE_NODE} -k repeated_and_late'),
     'time that goes back is late': Mutant(
-        'scene/pairing.py', 'if stamp < state.newest - RESET:', 'if False:',
+        'scene/stamp_pairing.py', 'if stamp < state.newest - RESET:', 'if False:',
         f'{TEST_PAIRING} -k set_back'),
     'a clock that jumps is not heard': Mutant(
         EVALUATOR, 'self.counts[RESETS] += 1\n        self._pairing.reset()',
         'pass', 'test/node/test_faults.py -k clock'),
     'a pose of any age': Mutant(
-        'scene/pairing.py', 'state.last is None or 0 < self.max_age < abs(now - state.newest)',
+        'scene/stamp_pairing.py',
+        'state.last is None or 0 < self.max_age < abs(now - state.newest)',
         'state.last is None', f'{TEST_SCENE_NODE} -k different_rates'),
     'a silent box is waited for': Mutant(
-        'scene/pairing.py', 'return since is not None and 0 < self.max_age < now - since',
+        'scene/stamp_pairing.py', 'return since is not None and 0 < self.max_age < now - since',
         'return False', f'{TEST_SCENE_NODE} -k stale_box'),
     'ticks wait without bound': Mutant(
-        'scene/pairing.py', 'tick.number + WAITING_TICKS < self._begun', 'False',
+        'scene/stamp_pairing.py', 'tick.number + WAITING_TICKS < self._begun', 'False',
         f'{TEST_PAIRING} -k dropped'),
     'ticks that were answered do not count': Mutant(
-        'scene/pairing.py', 'tick.number + WAITING_TICKS < self._begun',
+        'scene/stamp_pairing.py', 'tick.number + WAITING_TICKS < self._begun',
         'len(self._waiting) > WAITING_TICKS and not over', f'{TEST_PAIRING} -k further_behind'),
     'a box that joins opens old ticks': Mutant(
-        'scene/pairing.py', 'return stamp <= state.joined + self.tolerance or any(',
+        'scene/stamp_pairing.py', 'return stamp <= state.joined + self.tolerance or any(',
         'return any(',
         f'{TEST_PAIRING} -k joins'),
     'a scene that fails half way stays': Mutant(
@@ -287,10 +288,10 @@ MUTANTS = {
         TOPICS, 'if self._resolved(topic) in taken:', 'if False:',
         f'{TEST_SCENE_NODE} -k topic_of_the_node'),
     'ticks held up by one that lacks a pose': Mutant(
-        'scene/pairing.py', 'self._awaits_less |= not stale <= self._were_stale', 'pass',
+        'scene/stamp_pairing.py', 'self._awaits_less |= not stale <= self._were_stale', 'pass',
         f'{TEST_PAIRING} -k hold_up'),
     'a tick answered again': Mutant(
-        'scene/pairing.py', 'if self._is_too_late(state, stamp):', 'if False:',
+        'scene/stamp_pairing.py', 'if self._is_too_late(state, stamp):', 'if False:',
         f'{TEST_PAIRING} -k answered_again'),
     'a change forgets what waits': Mutant(
         EVALUATOR, "if settings['pairing'] == old.get('pairing'):", 'if False:',

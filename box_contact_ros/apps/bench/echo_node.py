@@ -25,7 +25,7 @@ from std_msgs.msg import Header
 
 from ...node.messages import NANOSECONDS
 from ...node.runtime import CONTACT_QOS, POSE_QOS, run_node
-from ...scene.pairing import WAITING_TICKS
+from ...scene.stamp_pairing import WAITING_TICKS
 
 STAMP_AT = 4
 """CDR: four bytes of encapsulation, the second of them 1 for little endian, then the stamp."""

@@ -15,7 +15,7 @@ from std_msgs.msg import Header
 
 from ...node.messages import OTHER_SCENE, Refused, TypedMessages, is_of_two_boxes, read_cloud
 from ...node.runtime import LOG_SECONDS, POSE_QOS
-from ...scene.pairing import StampedPose
+from ...scene.stamp_pairing import StampedPose
 
 
 class Listener(Node):

@@ -16,9 +16,9 @@ import numpy as np
 
 from ...node.messages import NANOSECONDS
 from ...output import percentiles
-from ...scene.pairing import PAIRINGS, StampedPose
 from ...scene.patch_law import Patch
 from ...scene.scene_solver import two_boxes
+from ...scene.stamp_pairing import PAIRINGS, StampedPose
 from ...solver.contact import Contact
 from ...solver.contact_solver import ContactSolver
 from ..bench.answer_log import first_row, touch_in

@@ -13,7 +13,7 @@ from rclpy.task import Future
 from std_msgs.msg import Header
 
 from ...node.runtime import POSE_QOS
-from ...scene.pairing import StampedPose
+from ...scene.stamp_pairing import StampedPose
 from ..ros_client import stamp_of
 from .listener import Listener
 from .view_log import ViewLog

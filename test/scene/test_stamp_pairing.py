@@ -6,7 +6,8 @@ import random
 import numpy as np
 import pytest
 
-from box_contact_ros.scene.pairing import (
+from box_contact_ros.scene.scene_solver import Box, Pair, Scene, two_boxes
+from box_contact_ros.scene.stamp_pairing import (
     NO_PARTNER,
     OLD,
     REMEMBERED_STAMPS,
@@ -19,7 +20,6 @@ from box_contact_ros.scene.pairing import (
     StampedPose,
     StampPairing,
 )
-from box_contact_ros.scene.scene_solver import Box, Pair, Scene, two_boxes
 
 TWO = two_boxes((2, 2, 2), (2, 2, 2))
 MS = 1_000_000  # ns
