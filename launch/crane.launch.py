@@ -32,7 +32,7 @@ def parameters(*names: str, **fixed: float) -> list[dict]:
 
 
 def generate_launch_description() -> LaunchDescription:
-    """What `ros2 launch` asks for."""
+    """Return what `ros2 launch` asks for."""
     return LaunchDescription([
         *(DeclareLaunchArgument(name, default_value=default, description=description)
           for name, (_, default, description) in ARGUMENTS.items()),

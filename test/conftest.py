@@ -109,7 +109,7 @@ def step_back() -> None:
 
 @pytest.fixture
 def setup_arguments(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
-    """What setup.py hands to setuptools."""
+    """Return what setup.py hands to setuptools."""
     given: dict[str, Any] = {}
     with monkeypatch.context() as patch:
         patch.setattr('setuptools.setup', given.update)

@@ -71,7 +71,7 @@ def triangles(size: Sequence[float] | np.ndarray, divisions: int) -> np.ndarray:
 
 
 def mesh(size: Sequence[float] | np.ndarray, divisions: int) -> Mesh:
-    """The soup of a box of three full extents [m]; kept, as a scene has few sizes."""
+    """Return the soup of a box of three full extents [m]; kept, as a scene has few sizes."""
     return _mesh(tuple(float(extent) for extent in size), divisions)
 
 

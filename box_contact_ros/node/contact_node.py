@@ -159,7 +159,7 @@ class ContactNode(LifecycleNode):
 
     @property
     def _configured(self) -> Evaluator:
-        """The evaluator of a node that is configured."""
+        """Return the evaluator of a node that is configured."""
         assert self._evaluator is not None
         return self._evaluator
 

@@ -151,7 +151,7 @@ class Timing:
 
     @property
     def median(self) -> float:
-        """The median over the rounds."""
+        """Return the median over the rounds."""
         return percentiles(self.rounds, 50)[0]
 
 

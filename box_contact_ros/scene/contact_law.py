@@ -173,7 +173,7 @@ class HeldWrench:
         self._due.append((due, wrench))
 
     def at(self, time: float) -> np.ndarray:
-        """The wrench (6,) that acts at `time` [s]; times must not decrease."""
+        """Return the wrench (6,) that acts at `time` [s]; times must not decrease."""
         while self._due and self._due[0][0] <= time + TIME_ROUNDING:
             self.current = self._due.popleft()[1]
         return self.current

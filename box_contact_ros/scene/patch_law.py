@@ -96,7 +96,7 @@ class PatchLaw:
         return cls(stiffness=stiffness, damping=damping)
 
     def wrench(self, patch: Patch | None, pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-        """Return the wrench (6,) on the load at `pose` (7,) with `velocity` (6,).
+        """Return the force and torque (6,) on the load at `pose` (7,) with `velocity` (6,).
 
         Without a patch it is zero.
         """

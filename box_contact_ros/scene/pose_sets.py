@@ -35,12 +35,12 @@ class Pairs(NamedTuple):
 
     @property
     def size(self) -> np.ndarray:
-        """The largest extents (n,) of both boxes [m]: the unit of depths."""
+        """Return the largest extents (n,) of both boxes [m]: the unit of depths."""
         return np.maximum(self.size_a.max(axis=1), self.size_b.max(axis=1))
 
     @property
     def edge(self) -> np.ndarray:
-        """The longest edges (n,) of the smaller boxes [m]: the unit of point errors."""
+        """Return the longest edges (n,) of the smaller boxes [m]: the unit of point errors."""
         return np.minimum(self.size_a.max(axis=1), self.size_b.max(axis=1))
 
     def rows(self, chosen: np.ndarray | slice) -> Pairs:

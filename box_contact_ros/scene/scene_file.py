@@ -37,7 +37,7 @@ class SceneError(ValueError):
 
 
 def read_scene(source: str | os.PathLike[str]) -> Scene:
-    """The scene of a file, or of a text that begins with `{` or has more than one line.
+    """Return the scene of a file, or of a text that begins with `{` or has more than one line.
 
     A path that leads to no file from here may be one of the package's own: config/scenes/….
     Raises SceneError, whose words name file, line and field.
@@ -73,7 +73,7 @@ def scene_path(source: str) -> Path:
 
 
 def parse_scene(text: str, name: str = 'scene') -> Scene:
-    """The scene that a text describes; `name` is how errors call it."""
+    """Return the scene that a text describes; `name` is how errors call it."""
     lines: dict[Place, int] = {}
 
     def refusal(path: Place, reason: str) -> SceneError:
@@ -109,7 +109,7 @@ def parse_scene(text: str, name: str = 'scene') -> Scene:
 
 
 def _plain(text: str, lines: dict[Place, int], refusal: Any) -> Any:
-    """The data of a YAML text; the line of each of its values goes to `lines`."""
+    """Return the data of a YAML text; the line of each of its values goes to `lines`."""
     depth = 0
     for event in yaml.parse(text, Loader=_Loader):
         depth += isinstance(event, yaml.CollectionStartEvent)
@@ -156,7 +156,7 @@ def _plain(text: str, lines: dict[Place, int], refusal: Any) -> Any:
 
 
 def _first_fault(data: Any, lines: dict[Place, int]) -> tuple[Place, str] | None:
-    """The first thing, by line, in which the data differs from the schema."""
+    """Return the first thing, by line, in which the data differs from the schema."""
     from jsonschema import Draft202012Validator  # only here: it takes 0.1 s
 
     schema = json.loads(resource_path('msg_schemas', 'scene.json').read_text('utf-8'))

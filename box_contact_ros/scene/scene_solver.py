@@ -69,7 +69,7 @@ class Scene:
 
 
 def two_boxes(size_a: Sequence[float], size_b: Sequence[float]) -> Scene:
-    """The scene of one pair of moving boxes, box_a and box_b, of full extents [m]."""
+    """Return the scene of one pair of moving boxes, box_a and box_b, of full extents [m]."""
     boxes = {name: Box(name, tuple(map(float, size)), pose_topic=f'{name}/pose')
              for name, size in (('box_a', size_a), ('box_b', size_b))}
     return Scene(boxes, (Pair(0, '', 'box_a', 'box_b'),))
@@ -195,7 +195,7 @@ class SceneSolver:
         self._warm_up_answers = self._solver.exact_answers
 
     def _both(self, poses: Sequence[np.ndarray | None]) -> list[np.ndarray | None]:
-        """The two poses of the only pair."""
+        """Return the two poses of the only pair."""
         return [poses[place] if fixed is None else fixed for place, fixed in self._sides]
 
     def __call__(self, poses: Sequence[np.ndarray | None]) -> Answer:

@@ -16,7 +16,7 @@ Number = TypeVar('Number', int, float)
 
 
 def model_name(text: str) -> str:
-    """The name of a model, as a program's argument."""
+    """Return the name of a model, as a program's argument."""
     try:
         find_model('model', text)
     except ValueError as error:
@@ -25,7 +25,7 @@ def model_name(text: str) -> str:
 
 
 def seed_number(text: str) -> int:
-    """A seed of random numbers, as a program's argument: a whole number from 0."""
+    """Return a seed of random numbers, as a program's argument: a whole number from 0."""
     if not text.isascii() or not text.isdecimal() or len(text) > 18:
         raise argparse.ArgumentTypeError(f'{shown(text)} is no whole number from 0')
     return int(text)

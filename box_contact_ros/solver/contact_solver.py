@@ -43,7 +43,7 @@ class ContactSolver(native.PairSolver):
         super().__init__(single, tuple(self._size_a[0]), tuple(self._size_b[0]), network)
 
     if TYPE_CHECKING:  # the core, which does it, knows no type of ours
-        def __call__(self, pose_a: ArrayLike, pose_b: ArrayLike) -> Contact: ...
+        def __call__(self, pose_a: ArrayLike, pose_b: ArrayLike) -> Contact: ...  # noqa: D102
 
     def __reduce__(self) -> tuple[Callable[..., ContactSolver], tuple[Any, ...]]:
         """Pickle the arguments."""

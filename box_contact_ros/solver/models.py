@@ -101,7 +101,7 @@ class ModelEntry:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The names under which users ask for it."""
+        """Return the names under which users ask for it."""
         return (self.name, f'{self.name}-N') if self.family else (self.name,)
 
     def options(self, name: str) -> dict[str, int] | None:

@@ -20,7 +20,7 @@ DEPTH = 0.05  # of the lowest corner below the stack's top, in the graph [m]
 
 
 def clip(polygon: np.ndarray, direction: tuple[float, float], bound: float) -> np.ndarray:
-    """The part of a polygon (n, 2) with direction · p ≤ bound."""
+    """Return the part of a polygon (n, 2) with direction · p ≤ bound."""
     kept = []
     excess = polygon @ np.array(direction) - bound
     for i, (p, e) in enumerate(zip(polygon, excess)):
@@ -40,7 +40,7 @@ def area_centroid(polygon: np.ndarray) -> np.ndarray:
 
 
 def sketch(axes: plt.Axes, tilt: float, letter: str) -> None:
-    """A load of 4 × 1 on a stack whose top is y = 0, its lowest corner 0.35 below; tilt [rad]."""
+    """Return a load of 4 × 1, its lowest corner 0.35 below the stack's top, y = 0; tilt [rad]."""
     stack = np.array([(-2.0, -1.0), (2.0, -1.0), (2.0, 0.0), (-2.0, 0.0)])
     turn = np.array([[math.cos(tilt), -math.sin(tilt)], [math.sin(tilt), math.cos(tilt)]])
     load = np.array([(-1.9, -0.5), (1.9, -0.5), (1.9, 0.5), (-1.9, 0.5)]) @ turn.T

@@ -24,7 +24,7 @@ DOWN = np.array([0.0, 0.0, -1.0])
 
 
 def exact(rows: int = PAIRS) -> Contacts:
-    """The truth: even rows touch, each at a point of its own, 2 mm deep; odd rows are apart."""
+    """Return the truth: even rows touch at a point of their own, 2 mm deep; odd rows are apart."""
     touching = np.arange(rows) % 2 == 0
     nothing = np.where(touching, 0.0, np.nan)[:, None]
     points = np.stack([0.01 * np.arange(rows), np.ones(rows), np.zeros(rows)], axis=1)
@@ -65,7 +65,7 @@ def answer(log: AnswerLog, row: int, *, lost: tuple[str, ...] = (), delay: int =
 
 
 def played(plant=lambda row: {}, rows: int = PAIRS) -> AnswerLog:
-    """A node that answers every row; `plant` gives what is wrong with a row's answer."""
+    """Return the log of a node that answers every row; `plant` gives what is wrong in a row."""
     log = AnswerLog('contact', 'exact')
     send(log, rows=rows)
     for row in range(rows):
@@ -74,7 +74,7 @@ def played(plant=lambda row: {}, rows: int = PAIRS) -> AnswerLog:
 
 
 def only(log: AnswerLog):
-    """The one result of a log, whose counts add up."""
+    """Return the one result of a log, whose counts add up."""
     result, = log.results()
     assert log.adds_up and result.adds_up
     assert result.sent == result.answered + result.lost

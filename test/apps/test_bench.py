@@ -26,7 +26,7 @@ def bench(program, out: Path, *arguments: str):
 
 
 def rows_of(out: Path) -> dict[tuple[str, str], dict[str, str]]:
-    """The CSV by (stream, node)."""
+    """Return the CSV by (stream, node)."""
     with (out / 'bench.csv').open() as file:
         return {(row['stream'], row['node']): row for row in csv.DictReader(file)}
 

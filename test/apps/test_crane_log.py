@@ -35,7 +35,7 @@ class FloorSolver:
 
 
 def pose(tick: int) -> np.ndarray:
-    """The load at `tick`: above the floor for 50 ticks, then 1 mm deeper with every tick."""
+    """Place the load at `tick`: above the floor for 50 ticks, then 1 mm deeper with every tick."""
     return np.array([0.01 * tick, 2.0, 1e-3 * (50 - tick), 0.0, 0.0, 0.0, 1.0])
 
 

@@ -68,7 +68,7 @@ def test_a_landing_that_does_not_rest_fails(program, node):
 
 @pytest.fixture
 def client():
-    """A crane node in this process, closed loop, with what it needs to be served."""
+    """Return a crane node in this process, closed loop, with what it needs to be served."""
     context = Context()
     rclpy.init(context=context)
     values = {'closed_loop': True, 'lockstep': True} | HARD

@@ -60,13 +60,13 @@ def decoded(folder: Path) -> dict[str, dict[int, object]]:
 
 
 def numbers(message) -> list[float]:
-    """A pose as `x y z qx qy qz qw`."""
+    """Return a pose as `x y z qx qy qz qw`."""
     p, q = message.pose.position, message.pose.orientation
     return [p.x, p.y, p.z, q.x, q.y, q.z, q.w]
 
 
 def vector(message) -> list[float]:
-    """The numbers of a point or a normal."""
+    """Return the numbers of a point or a normal."""
     v = message.point if hasattr(message, 'point') else message.vector
     return [v.x, v.y, v.z]
 
@@ -260,7 +260,7 @@ def test_a_full_disk_ends_the_recording(tmp_path, monkeypatch):
 
 def written(folder: Path, stamps_a, stamps_b, topics=('/box_a/pose', '/box_b/pose'),
             **about) -> Path:
-    """A bag of poses whose x is their stamp [ns]."""
+    """Return a bag of poses whose x is their stamp [ns]."""
     recorder = Recorder(folder, topics, about)
     for topic, stamps in zip(topics, (stamps_a, stamps_b)):
         for stamp in stamps:

@@ -46,7 +46,7 @@ MS = 1_000_000
 
 
 def rows(shift=0.0):
-    """A cloud's row: the exact contact, its point moved by `shift` [m]."""
+    """Return a cloud's row: the exact contact, its point moved by `shift` [m]."""
     x, y, z = EXACT.point
     return np.array([(x + shift, y, z, *EXACT.normal, -EXACT.separation, 0, EXACT.volume,
                       *EXACT.covariance[np.triu_indices(3)])], CLOUD_ROW)
@@ -330,7 +330,7 @@ def test_another_size_is_another_log(view, client, contact_node):
 
 
 def children(pid):
-    """Processes that a process has started, in whatever group they are."""
+    """Return the processes that a process has started, in whatever group they are."""
     found = []
     for stat in Path('/proc').glob('[0-9]*/stat'):
         try:
@@ -342,7 +342,7 @@ def children(pid):
 
 
 def start_view(program, *arguments):
-    """The program, and the address of its page; in this test's domain."""
+    """Return the program, and the address of its page; in this test's domain."""
     running = program('view', '--no-browser', '--port', '8300', '--domain',
                       os.environ['ROS_DOMAIN_ID'], *arguments)
     output = running.wait_for_output('Ctrl-C', 60)

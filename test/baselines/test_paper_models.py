@@ -187,7 +187,7 @@ def rotations(n, seed=2):
 
 
 def assert_proper(folds, offsets, turns):
-    """The offset M t and the rotation M R Nᵀ are a pair of the same boxes, with its angles."""
+    """Check that offset M t and rotation M R Nᵀ are a pair of the same boxes, with its angles."""
     assert np.abs(np.linalg.det(folds.rotation) - 1).max() < 1e-12
     assert np.abs(folds.angles).max() <= np.pi / 2
     assert np.array_equal(folds.folded(offsets), folds.offset)

@@ -334,7 +334,7 @@ def test_one_solver_in_many_threads(model: str) -> None:
 
 @pytest.fixture(scope='module')
 def single_solvers() -> dict[str, Callable[..., native.PairSolver]]:
-    """What makes the solver of one pair, without reading the weights anew for each."""
+    """Return what makes the solver of one pair, without reading the weights anew for each."""
     return {'exact': partial(native.PairSolver, 'exact'),
             'mlp': partial(native.PairSolver, 'mlp',
                            network=core_numbers(load_mlp().networks['point']))}

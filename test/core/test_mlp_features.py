@@ -60,7 +60,7 @@ def pairs(request: pytest.FixtureRequest) -> Pairs:
 
 
 def cuts_of(found: Stages) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Unit normals (n, 3, 3) in the cube, and cuts of the upper and lower faces (n, 3)."""
+    """Return unit normals (n, 3, 3) in the cube, and cuts of the upper and lower faces (n, 3)."""
     normal = found.other_axes * found.bounds_half[:, None, :]
     width = np.abs(normal).sum(axis=2)
     half = found.other_half + FLUSH * found.size[:, None]

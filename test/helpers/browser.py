@@ -43,7 +43,7 @@ class Tab:
         self._number = 0
 
     def command(self, method: str, **params: Any) -> dict[str, Any]:
-        """A DevTools command and its result; events in between are passed over."""
+        """Return a DevTools command and its result; events in between are passed over."""
         self._number += 1
         self._connection.send(json.dumps({'id': self._number, 'method': method, 'params': params}))
         while True:
@@ -53,7 +53,7 @@ class Tab:
                 return message['result']
 
     def evaluate(self, expression: str) -> Any:
-        """The value of a JavaScript expression."""
+        """Return the value of a JavaScript expression."""
         answer = self.command('Runtime.evaluate', expression=expression, returnByValue=True)
         assert 'exceptionDetails' not in answer, answer['exceptionDetails']
         return answer['result'].get('value')
@@ -79,13 +79,13 @@ class Tab:
             f'.find(b => b.innerText.trim() == {label!r}); b?.click(); return !!b; }})()'), label
 
     def picture(self) -> bytes:
-        """What the page looks like, as PNG."""
+        """Return what the page looks like, as PNG."""
         return base64.b64decode(self.command('Page.captureScreenshot', format='png')['data'])
 
 
 @contextmanager
 def open_page(url: str, width: int = 1280, height: int = 720) -> Iterator[Tab]:
-    """The page in a browser of its own, which is ended in the end."""
+    """Return the page in a browser of its own, which is ended in the end."""
     with tempfile.TemporaryDirectory(prefix='box_contact_browser_',
                                      ignore_cleanup_errors=True) as profile:
         browser = subprocess.Popen(

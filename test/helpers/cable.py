@@ -21,7 +21,7 @@ LARGEST_FRAME = 65_535
 
 
 def make_tap(name: str) -> int:
-    """A new network device; what is sent to it is read from the file returned, and the reverse."""
+    """Make a network device; what is sent to it is read from the file returned, and the reverse."""
     file = os.open('/dev/net/tun', os.O_RDWR | os.O_NONBLOCK)
     fcntl.ioctl(file, TUNSETIFF, struct.pack('16sH', name.encode(), IFF_TAP | IFF_NO_PI))
     return file

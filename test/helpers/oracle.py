@@ -69,7 +69,7 @@ def make_box(pose, size):
 
 
 def axis_gaps(a, b):
-    """(number, unit axis from A to B, gap) of every axis that exists: 0–2, 3–5, 6 + 3 i + j."""
+    """Yield number, unit axis from A to B and gap of every axis: 0–2, 3–5, 6 + 3 i + j."""
     t = add(b.centre, a.centre, -1)
     found = []
     candidates = list(a.axes) + list(b.axes) + [cross(u, v) for u in a.axes for v in b.axes]
@@ -91,7 +91,7 @@ def separation(a, b):
 
 
 def _clip(polygon, axis, bound, drop_on_plane):
-    """The part of a polygon with dot(axis, p) ≤ bound; a polygon IN the plane goes or stays."""
+    """Cut a polygon to dot(axis, p) ≤ bound; a polygon IN the plane goes or stays."""
     excess = [dot(axis, p) - bound for p in polygon]
     if all(abs(e) < SAME for e in excess):
         return [] if drop_on_plane else polygon
@@ -106,7 +106,7 @@ def _clip(polygon, axis, bound, drop_on_plane):
 
 
 def overlap_faces(a, b):
-    """The faces of A∩B as polygons. Where faces of A and B lie in one plane, A's counts."""
+    """Return the faces of A∩B as polygons. Where faces of A and B lie in one plane, A's counts."""
     faces = []
     for box, other in ((a, b), (b, a)):
         for k in range(3):
@@ -176,7 +176,7 @@ def pressed(a, b, axis, depth, floor):
 
 
 def contact_moments(a, b, axis, depth, size):
-    """The package's definition: volume, centroid, covariance of A∩B, pressed in to 1e-9 · size.
+    """Return volume, centroid, covariance of A∩B, pressed in to 1e-9 · size: the definition.
 
     Volume and covariance are None where several axes have gap zero, and pressing along the normal
     leaves less than half of that depth: the package goes on along the others.

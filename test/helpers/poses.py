@@ -128,7 +128,7 @@ def equal_thickness(rng, n):
 
 
 def ridges(rng, n):
-    """A box with an edge down on another's face, turned, and cut off by the face's rim.
+    """Return a box with an edge down on another's face, turned, and cut off by the face's rim.
 
     Most are hardly inclined: of such slivers, as thin as they are deep, a millionth of their length
     and less, the oblique ends have to be right too.

@@ -18,7 +18,7 @@ LITTLE_ENDIAN = b'\0\1\0\0'
 
 
 def cdr(pose, stamp, frame=b'map\0'):
-    """A serialised PoseStamped; `stamp` is (sec, nanosec), `frame` the string with its zero."""
+    """Serialise a PoseStamped; `stamp` is (sec, nanosec), `frame` the string with its zero."""
     head = struct.pack('<iII', *stamp, len(frame)) + frame
     return LITTLE_ENDIAN + head + b'\0' * (-len(head) % 8) + struct.pack('<7d', *pose)
 
@@ -58,7 +58,7 @@ class RawClient(Client):
         return stamp
 
     def assert_answered(self):
-        """The node lives, and answers a good pair, and rightly."""
+        """Check that the node lives, and answers a good pair, and rightly."""
         row, = read_cloud(self.clouds[self.ask(ORIGIN, TOUCHING)])
         assert row['depth'] == 0.125
         assert (row['normal_x'], row['normal_y'], row['normal_z']) == (0, 0, 1)

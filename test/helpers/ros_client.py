@@ -68,7 +68,7 @@ class Client:
         return callback
 
     def next_stamp(self) -> int:
-        """A stamp [ns] later than any before."""
+        """Return a stamp [ns] later than any before."""
         self._stamp = max(self._stamp + 1, time.time_ns())
         return self._stamp
 
@@ -131,7 +131,7 @@ class Client:
             self.executor.spin_once(timeout_sec=0.0)
 
     def client_of(self, kind: Any, name: str) -> Any:
-        """A client of a service that has found its server.
+        """Return a client of a service that has found its server.
 
         Once, in the middle of the suite, one never did, while another of the same node answered:
         the client is made again then.
@@ -144,7 +144,7 @@ class Client:
         raise AssertionError(f'no service {name}')
 
     def service(self, kind: Any, name: str) -> Any:
-        """A client of a service that has answered once.
+        """Return a client of a service that has answered once.
 
         It may be ready before the way back is: an answer is lost then, and the request is made
         again.
@@ -164,7 +164,7 @@ class Client:
 
 @contextmanager
 def serving(make_node: Callable[[Context], Node]) -> Iterator[Node]:
-    """A node of the package in this process, served by a thread, with a context of its own."""
+    """Serve a node of the package in this process by a thread, with a context of its own."""
     context = Context()
     rclpy.init(context=context)
     node = make_node(context)

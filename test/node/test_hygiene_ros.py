@@ -31,7 +31,7 @@ def client():
 
 @pytest.fixture
 def node(program, client):
-    """A contact node for two cubes of edge 2, matched with the client."""
+    """Return a contact node for two cubes of edge 2, matched with the client."""
     running = program('contact_node', '--ros-args', '-p', 'size_a:=[2.0, 2.0, 2.0]',
                       '-p', 'size_b:=[2.0, 2.0, 2.0]', '-p', 'model:=exact')
     running.wait_for_output('ready', 120)
@@ -193,7 +193,7 @@ def test_good_poses_among_bad_ones(node, client):
 
 
 def call(client, kind, name, parameters, timeout=10.0):
-    """The reply of a parameter service of the node, or None."""
+    """Return the reply of a parameter service of the node, or None."""
     service = client.client_of(kind, f'/contact_node/{name}')
     future = service.call_async(kind.Request(parameters=[
         Parameter(name=key, value=value) for key, value in parameters]))

@@ -38,7 +38,7 @@ STAND_INS = {
 
 
 def noting(kind: str) -> Any:
-    """A stand-in for a class: an object of it is what it was called with."""
+    """Return a stand-in for a class: an object of it is what it was called with."""
     return lambda *args, **options: SimpleNamespace(kind=kind, args=args, **options)
 
 
@@ -58,7 +58,7 @@ def crane_launch(monkeypatch: pytest.MonkeyPatch) -> tuple[dict[str, Any], dict[
 
 
 def table_of(program: str) -> dict[str, Any]:
-    """The parameters of a program."""
+    """Return the parameters of a program."""
     if program == 'crane':
         return importlib.import_module('box_contact_ros.apps.crane.crane_parameters').PARAMETERS
     return importlib.import_module(PROGRAMS[program].target.partition(':')[0]).PARAMETERS

@@ -40,7 +40,7 @@ def message(numbers, frame_id='map', stamp=5_000_000_007):
 
 
 def outcome(read, *arguments):
-    """What a reader says: a pose to the bit, or why not."""
+    """Return what a reader says: a pose to the bit, or why not."""
     try:
         pose = read(*arguments)
     except Refused as refused:

@@ -54,7 +54,7 @@ APART = (0.5, 0.25, 4, 0, 0, 0, 1)
 
 
 def follow(reference: str, inside: Any = DOCUMENT) -> Any:
-    """What a $ref of the document (or, with `inside`, of a schema) points to."""
+    """Return what a $ref of the document (or, with `inside`, of a schema) points to."""
     file, _, pointer = reference.partition('#')
     target = SCHEMAS[file] if file else inside
     for part in pointer.split('/')[1:]:
@@ -81,7 +81,7 @@ def message_of(operation: dict[str, Any]) -> dict[str, Any]:
 
 
 def schema_at(address: str) -> dict[str, Any]:
-    """The payload schema of a topic."""
+    """Return the payload schema of a topic."""
     operation, = (operation for operation in OPERATIONS.values()
                   if follow(operation['channel']['$ref'])['address'] == address)
     return follow(message_of(operation)['payload']['schema']['$ref'])
@@ -95,7 +95,7 @@ def validator(schema: dict[str, Any], part: str = '') -> Draft202012Validator:
 
 
 def plain(value: Any) -> Any:
-    """A message as JSON would have it: octets are numbers, and what is not finite is null."""
+    """Write a message as JSON would have it: octets are numbers, what is not finite is null."""
     if hasattr(value, 'get_fields_and_field_types'):
         return {name: plain(getattr(value, name)) for name in value.get_fields_and_field_types()}
     if isinstance(value, bytes):
@@ -184,7 +184,7 @@ PARSER = '@asyncapi/parser@3.6.3'
 
 @pytest.fixture(scope='module')
 def parse(tmp_path_factory):
-    """The parser of AsyncAPI itself, from npm: takes a folder with asyncapi.yaml."""
+    """Return the parser of AsyncAPI itself, from npm: takes a folder with asyncapi.yaml."""
     place = tmp_path_factory.mktemp('npm')
     if not (shutil.which('npm') and shutil.which('node')):
         pytest.skip("AsyncAPI's own parser needs npm and node")
@@ -351,7 +351,7 @@ def test_live_rows_validate(live):
 
 
 def set_in(path: str, value: Any):
-    """A change of a message: set the attribute at a dotted path (numbers index)."""
+    """Return a change of a message: set the attribute at a dotted path (numbers index)."""
     def change(message: Any) -> Any:
         *parts, last = path.split('.')
         for part in parts:
@@ -431,7 +431,7 @@ def test_wrong_rows_do_not_validate(live):
 
 
 def declared_qos(operation: dict[str, Any]) -> QoSProfile:
-    """The profile that the document describes."""
+    """Return the profile that the document describes."""
     policies = operation['bindings']['ros2']['qosPolicies']
     assert policies['deadline'] == policies['lifespan'] == policies['leaseDuration'] == -1
     return QoSProfile(

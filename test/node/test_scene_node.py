@@ -329,7 +329,7 @@ def test_a_topic_of_the_node_is_no_pose_topic(node, client, topic):
 
 
 def refuse(name, node, monkeypatch):
-    """A topic that the middleware does not let a node subscribe to."""
+    """Return a topic that the middleware does not let a node subscribe to."""
     create = node.create_subscription
 
     def create_subscription(kind, topic, *arguments, **options):

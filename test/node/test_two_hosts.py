@@ -56,7 +56,7 @@ def join(names, ends):
 
 
 def virtual_cable(ends):
-    """A cable that loses nothing."""
+    """Return a cable that loses nothing."""
     made = ip('link', 'add', ends[0], 'type', 'veth', 'peer', 'name', ends[1])
     if made.returncode:
         pytest.skip(f'virtual cables are not permitted here: {made.stderr.strip()}')

@@ -12,10 +12,9 @@ ROOT = Path(__file__).parents[2]
 SOURCES = [str(ROOT / name) for name in ('box_contact_ros', 'launch', 'setup.py', 'test')]
 
 CONFIG = str(Path(__file__).with_name('flake8.ini'))
-NOT_FOLLOWED = ['D213', 'D401']
-"""Rules of ament's pep257 that the package does not follow. PEP 257 itself lets a summary stand on
-the first line or on the second (D213), and what a function gives is often said shorter by naming
-it than by an imperative (D401)."""
+NOT_FOLLOWED = ['D213']
+"""Rule of ament's pep257 that the package does not follow: PEP 257 itself lets a summary stand on
+the first line or on the second."""
 
 
 def run(linter: str, *words: str) -> None:

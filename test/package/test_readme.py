@@ -73,7 +73,7 @@ def help_of(*program: str) -> str:
 
 
 def make(words: list[str], **_) -> None:
-    """The targets exist: a dry run plans them."""
+    """Check that the targets exist: a dry run plans them."""
     env = {name: value for name, value in os.environ.items()
            if not name.startswith(('MAKE', 'MFLAGS'))}  # `make test` may be what runs this
     done = subprocess.run(['make', '-n', *words[1:]], cwd=ROOT, env=env, capture_output=True,
@@ -94,7 +94,7 @@ def program_and_arguments(words: list[str]) -> tuple[str, list[str]]:
 
 
 def start(words: list[str], program, **_) -> None:
-    """A node starts and says 'ready'; a crane, shortened, gets its answers.
+    """Check that a node starts and says 'ready', and that a shortened crane gets its answers.
 
     Others know the options (their work takes minutes, and other tests do a little of it).
     """
@@ -114,7 +114,7 @@ def start(words: list[str], program, **_) -> None:
 
 
 def topic(words: list[str], **_) -> None:
-    """The topic is one of the contact node's."""
+    """Check that the topic is one of the contact node's."""
     document = yaml.safe_load(resource_path('msg_schemas', 'asyncapi.yaml').read_text('utf-8'))
     addresses = {channel['address'].removeprefix('/')
                  for channel in document['channels'].values()}
@@ -146,33 +146,33 @@ def pip(words: list[str], setup_arguments, **_) -> None:
 
 
 def rviz(words: list[str], **_) -> None:
-    """The config is one that is installed."""
+    """Check that the config is one that is installed."""
     assert words[:2] == ['rviz2', '-d']
     assert resource_path(*words[-1].rpartition('box_contact_ros)/')[2].split('/')).is_file()
 
 
 def apt(words: list[str], **_) -> None:
-    """Packages that package.xml depends on."""
+    """Check that package.xml depends on the packages."""
     manifest = ElementTree.parse(ROOT / 'package.xml')
     assert set(words[3:]) <= {entry.text for kind in ('build_depend', 'exec_depend')
                               for entry in manifest.findall(kind)}
 
 
 def launch(words: list[str], **_) -> None:
-    """The file exists and declares the arguments (not run: there is no wheel of `launch`)."""
+    """Check that the file exists and declares the arguments; `launch` has no wheel to run it."""
     assert words[2] == 'box_contact_ros'
     text = (ROOT / 'launch' / words[3]).read_text('utf-8')
     assert all(f"'{word.partition(':=')[0]}'" in text for word in words[4:])
 
 
 def colcon(words: list[str], **_) -> None:
-    """Selects the package of package.xml."""
+    """Select the package of package.xml."""
     name = ElementTree.parse(ROOT / 'package.xml').findtext('name')
     assert words[2:] == ['--packages-select', name]
 
 
 def sourced(words: list[str], **_) -> None:
-    """Set-up files of ROS itself: not on this machine. Or that of the environment made before."""
+    """Read set-up files: those of ROS are not on this machine."""
     assert words[1] in ('/opt/ros/jazzy/setup.bash', 'install/setup.bash', f'{VENV}/bin/activate')
 
 
@@ -180,7 +180,7 @@ VENV = '.venv-contact'
 
 
 def venv(words: list[str], **_) -> None:
-    """A folder of its own, which git ignores."""
+    """Make a folder of its own, which git ignores."""
     assert words[3] == VENV
     assert VENV in (ROOT / '.gitignore').read_text('utf-8')
 
@@ -246,7 +246,7 @@ def test_extras_of_every_program():
 
 
 def anchors(page: Path) -> set[str]:
-    """The anchors of a page's headings, as GitHub makes them."""
+    """Return the anchors of a page's headings, as GitHub makes them."""
     text = FENCE.sub('', page.read_text('utf-8'))
     return {re.sub(r'[^\w\- ]', '', heading.lower()).replace(' ', '-')
             for heading in re.findall(r'^#+ (.+)$', text, re.MULTILINE)}

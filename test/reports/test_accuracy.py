@@ -17,7 +17,7 @@ SHIPPED = resource_path('weights', 'mlp.safetensors')
 
 
 def on_a_cube(turn: np.ndarray, depth: float = 1e-3) -> Pairs:
-    """A cube, turned, that comes down on the middle of another's top face."""
+    """Return a cube, turned, that comes down on the middle of another's top face."""
     corners = poses.rotate(turn[None], np.array(list(np.ndindex(2, 2, 2))) - 0.5)
     height = 0.5 * CUBE[2] - CUBE[2] * corners[:, 2].min() - depth
     b = np.concatenate([[0.1, 0.2, height], turn])

@@ -48,7 +48,7 @@ def test_all_take_their_turn() -> None:
 
 
 def run_of(exact: float, batches: list[float], unit: float | None = 1000.0) -> list[Timing]:
-    """Timings of one instruction set [ns]."""
+    """Return timings of one instruction set [ns]."""
     common = {'instruction_set': 'AVX2'}
     found = [Timing(name='exact', kind='single', rounds=[exact], **common)]
     if unit is not None:

@@ -23,7 +23,7 @@ def moving(*, linear=(0, 0, 0), angular=(0, 0, 0)):
 
 
 def slab(length=12.0, width=2.4, depth=1e-3, centre=(1.0, 2.0, 1.7), normal=DOWN):
-    """A rectangular patch under the load, of one thickness."""
+    """Return a rectangular patch under the load, of one thickness."""
     covariance = np.diag([length**2, width**2, depth**2]) / 12.0
     return Patch(np.array(centre), np.array(normal), depth, length * width * depth, covariance)
 
@@ -160,7 +160,7 @@ def test_a_bounce_never_gains_energy():
 @pytest.mark.parametrize('rate', [100.0, 200.0, 1000.0])
 @pytest.mark.parametrize('latency', [0.0, 0.002, 0.005])
 def test_the_constants_follow_mass_rate_and_latency(mass, rate, latency):
-    """k is m g over the least penetration, or what the delay bears; λ m g is critical damping."""
+    """Stiffness is m g over the least penetration, or what the delay bears; λ m g is critical."""
     law = PatchLaw.for_loop(mass, rate, latency)
     bears = mass * (patch_law.DELAY_LIMIT / (0.5 / rate + latency))**2
     assert law.stiffness == pytest.approx(min(mass * GRAVITY / 1e-3, bears))

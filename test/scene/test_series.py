@@ -115,7 +115,7 @@ LANDED = {f'landed, case {number}': number for number in (0, 5, 17, 31)}
 
 
 def crane_series(name: str) -> Series:
-    """The poses of one run of the crane."""
+    """Return the poses of one run of the crane."""
     pytest.importorskip('mujoco')
     from box_contact_ros.apps.crane.landing import cases, land, scenario_of
     from box_contact_ros.apps.crane.mujoco_crane import Crane, CraneScenario

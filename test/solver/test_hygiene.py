@@ -33,7 +33,7 @@ every_model = pytest.mark.parametrize('model', MODELS)
 
 
 def both_ways(model, pose_a, pose_b, size_a=poses.CUBE, size_b=poses.CUBE):
-    """The contact of a pair, seen to be the same to the bit from a single call and from a batch."""
+    """Return the contact of a pair; single call and batch agree to the bit."""
     one = ContactSolver(size_a, size_b, model=model)(pose_a, pose_b)
     many = SOLVERS[model].batch([pose_a] * 2, [pose_b] * 2, size_a=[size_a] * 2, size_b=size_b)
     for row in range(2):
@@ -45,7 +45,7 @@ def both_ways(model, pose_a, pose_b, size_a=poses.CUBE, size_b=poses.CUBE):
 
 
 def assert_sound(contact):
-    """What every answer is, whatever was asked."""
+    """Check what every answer is, whatever was asked."""
     assert type(contact.colliding) is bool and type(contact.separation) is float
     assert math.isfinite(contact.separation)
     if contact.colliding:
@@ -343,7 +343,7 @@ def test_weights_that_are_no_file(tmp_path):
 
 
 def scene_of(path, content):
-    """What `read_scene` makes of a file: a SceneError that names it, in few words, or a scene."""
+    """Check that `read_scene` makes a scene of a file, or a SceneError that names it briefly."""
     path.write_bytes(content.encode('utf-8', 'surrogatepass') if isinstance(content, str)
                      else content)
     try:

@@ -76,7 +76,7 @@ def largest(pairs):
 
 
 def edge(pairs):
-    """The smaller box's longest edge [m]: what errors are given in."""
+    """Return the smaller box's longest edge [m]: what errors are given in."""
     return np.minimum(pairs.size_a.max(axis=1), pairs.size_b.max(axis=1))
 
 
@@ -148,14 +148,14 @@ def garbage(rng, kind):
 
 
 def card_of(widths: tuple[int, ...]) -> dict[str, Any]:
-    """A model card that the MLP takes."""
+    """Return a model card that the MLP takes."""
     return {'name': 'other', 'model': 'mlp', 'inputs': {'description': DESCRIPTION},
             'activation': ACTIVATION, 'outputs': [], 'sizes': [], 'architecture': list(widths),
             'data': {}, 'seed': 0, 'commit': '', 'metrics': {}}
 
 
 def written(path, layers):
-    """The weights file of these layers."""
+    """Return the weights file of these layers."""
     save_weights(path, {'point': layers}, card_of((FEATURES, 32, OUTPUTS)))
     return str(path)
 
@@ -341,7 +341,7 @@ def test_minus_q_is_q(mlp, pairs):
 
 
 def close(one, other, pairs):
-    """The same point in every row, up to roundings of the network's float32 [% of the edge].
+    """Check that all rows have one point, up to the network's roundings [% of the edge].
 
     Measured: 1.6e-5 at worst. A rounding could choose another of the two frames only where the
     bounding boxes tie, which none of these pairs does.
@@ -540,7 +540,7 @@ def test_weights_of_another_model_are_refused(tmp_path):
 
 
 def listing(path, sizes):
-    """A copy of the shipped network whose card lists pairs of sizes."""
+    """Return a copy of the shipped network whose card lists pairs of sizes."""
     shipped = load_weights(resource_path('weights', 'mlp.safetensors'))
     save_weights(path, {'point': unpacked(shipped.networks['point'])},
                  shipped.card | {'sizes': sizes})

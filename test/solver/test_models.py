@@ -39,7 +39,7 @@ class Lifted(Exact):
 
 @pytest.fixture
 def lifted(monkeypatch):
-    """The model above as an entry, which is all that it takes."""
+    """Return the model above as an entry, which is all that it takes."""
     monkeypatch.setitem(sys.modules, 'of_a_test', SimpleNamespace(Lifted=Lifted))
     monkeypatch.setitem(MODELS, 'lifted', ModelEntry(
         name='lifted', line='the exact point, lifted', builder='of_a_test:Lifted',

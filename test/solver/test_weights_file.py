@@ -54,7 +54,7 @@ def tensors() -> dict[str, np.ndarray]:
 
 
 def write(path: Path, content: dict[str, np.ndarray], **changes: object) -> Path:
-    """A weights file whose checksum is right, whatever is in it."""
+    """Return a weights file whose checksum is right, whatever is in it."""
     text = json.dumps(card(sha256=tensors_digest(content), **changes))
     save_file(content, path, metadata={'card': text})
     return path
@@ -222,7 +222,7 @@ def test_the_reader_reads_what_the_library_reads(path: Path) -> None:
 
 
 def with_header(content: bytes, change: Callable[[dict[str, Any]], object] | str) -> bytes:
-    """A file whose header is changed, or is this text."""
+    """Return a file whose header is changed, or is this text."""
     end = 8 + int.from_bytes(content[:8], 'little')
     if isinstance(change, str):
         text = change.encode()

@@ -43,7 +43,7 @@ def cubes() -> Placements:
 
 
 def in_second_box(placements: Placements) -> np.ndarray:
-    """The impact points (n, 3) in the second box's frame."""
+    """Return the impact points (n, 3) in the second box's frame."""
     turn = rotation_matrix(placements.pose[:, 3:])
     return np.einsum('nji,nj->ni', turn, placements.point - placements.pose[:, :3])
 
@@ -144,7 +144,7 @@ def pose_of(inputs: np.ndarray) -> np.ndarray:
 
 
 def direction(angles: np.ndarray) -> np.ndarray:
-    """Unit vectors (n, 3) of azimuth and elevation (n, 2)."""
+    """Return unit vectors (n, 3) of azimuth and elevation (n, 2)."""
     azimuth, elevation = angles.T
     return np.column_stack([np.cos(elevation) * np.cos(azimuth),
                             np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])

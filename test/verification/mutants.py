@@ -333,7 +333,7 @@ def copied(folder: Path) -> Path:
 
 @functools.cache
 def baseline_extension() -> Any:
-    """What setup.py says of the core's extension for the baseline instruction set."""
+    """Return what setup.py says of the core's extension for the baseline instruction set."""
     given: dict[str, Any] = {}
     with mock.patch('setuptools.setup', given.update):
         runpy.run_path(str(ROOT / 'setup.py'))

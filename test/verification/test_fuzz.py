@@ -55,7 +55,7 @@ def test_the_judges_gap_is_the_oracles(name):
 
 
 def settled(pairs, found):
-    """The faults of a row each, by name."""
+    """Return the faults of a row each, by name."""
     verdict = judge.judge(*pairs, found)
     for row in np.flatnonzero(verdict.doubtful):
         gap = judge.exact_gap(*(part[row] for part in pairs))

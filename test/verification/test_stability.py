@@ -17,7 +17,7 @@ CASES = hard_poses.load()
 
 
 def planted(monkeypatch: pytest.MonkeyPatch, fault: str) -> stability.StabilityRow:
-    """The row of a solver that is wrong in one way for its first contact of a family."""
+    """Return the row of a solver that is wrong in one way for its first contact of a family."""
     class Faulty(ContactSolver):
         def batch(self, *poses, **sizes):
             found = Contacts(*(part.copy() for part in super().batch(*poses, **sizes)))

@@ -231,7 +231,7 @@ class StreamResult:
 
     @property
     def faults(self) -> list[str]:
-        """What went wrong, in words; slow or inaccurate is not wrong."""
+        """Return what went wrong, in words; slow or inaccurate is not wrong."""
         counted = {'lost': self.lost, 'duplicates': self.duplicates,
                    'answers to no pose': self.strangers, 'wrong verdicts': self.wrong_verdicts,
                    'contradictions': self.contradictions}
@@ -254,7 +254,7 @@ class StreamResult:
 
     @property
     def normal_error(self) -> dict[str, float]:
-        """The same of the normal errors [deg]."""
+        """Return the same of the normal errors [deg]."""
         return _error(self.normal_errors)
 
 

@@ -73,7 +73,7 @@ class MeasuredNode:
 
     @property
     def name(self) -> str:
-        """What tables call the node."""
+        """Return what tables call the node."""
         return self.log.node
 
     def start(self, stream: Stream, cores: set[int]) -> None:

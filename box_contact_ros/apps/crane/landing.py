@@ -289,7 +289,7 @@ class ForceLaw(Protocol):
     """From one contact to the force and the torque on the load."""
 
     def wrench(self, touch: Any, pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-        """Return the wrench (6,) on the load at `pose` (7,) with `velocity` (6,).
+        """Return the force and torque (6,) on the load at `pose` (7,) with `velocity` (6,).
 
         touch: what the law needs of a contact, a `Touch` or a `Patch`; None without contact.
         """

@@ -199,7 +199,7 @@ class Crane:
 
     @property
     def time(self) -> float:
-        """Simulated time since the start, s: whole ticks, so it does not drift."""
+        """Return the simulated time since the start, s: whole ticks, so it does not drift."""
         return self._ticks / self._rate_hz
 
     @property

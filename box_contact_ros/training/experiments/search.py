@@ -81,7 +81,7 @@ class MlpSearch(Search):
 
     @cached_property
     def data(self) -> tuple[MlpSamples, MlpSamples, Scaling]:
-        """What is trained on, what errors are measured on, and the scaling of both."""
+        """Return what is trained on, what errors are measured on, and the scaling of both."""
         training = draw_samples(mixture, [self.seed, _TRAINING], self.pairs)
         return (training, draw_samples(mixture, [self.seed, _CHECKING], self.checked),
                 Scaling.of(training.features.swapaxes(1, 2)))

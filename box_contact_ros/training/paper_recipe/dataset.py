@@ -116,7 +116,7 @@ def quaternion_from_euler(angles: np.ndarray) -> np.ndarray:
 
 
 def vertex_face_candidates(rng: np.random.Generator, count: int, half: np.ndarray) -> Placements:
-    """A vertex of the second trihedron on a random point of the first; most interpenetrate."""
+    """Put a vertex of the second trihedron on a random point of the first; most interpenetrate."""
     area = np.prod(half) / half
     face = rng.choice(3, count, p=area / area.sum())
     point = rng.uniform(-half, half, (count, 3))
@@ -131,7 +131,7 @@ def vertex_face_candidates(rng: np.random.Generator, count: int, half: np.ndarra
 
 
 def edge_edge_candidates(rng: np.random.Generator, count: int, half: np.ndarray) -> Placements:
-    """A random point of the second trihedron's edges on one of the first's."""
+    """Put a random point of the second trihedron's edges on one of the first's."""
     point, along_a = _edge_points(rng, count, half)
     on_b, along_b = _edge_points(rng, count, half)
     placed = _placed(rng, half, point, -on_b, np.zeros((count, 3)))
@@ -218,7 +218,7 @@ class Folded:
     """(n,) VERTEX_FACE or EDGE_EDGE after FEATURES, else −1."""
 
     def patterns(self, rows: np.ndarray | slice = slice(None)) -> Patterns:
-        """Inputs and outputs of some rows."""
+        """Return the inputs and outputs of some rows."""
         return Patterns(self.inputs[rows], np.concatenate(
             [spherical(self.point[rows]), spherical(self.normal[rows])], axis=1))
 
@@ -292,7 +292,7 @@ def continuous(seed: int, *, counts: Sequence[int] = CONTINUOUS_COUNTS, edge_sha
 
 def of_card(card: Mapping[str, Any], sets: Sequence[str] = SETS,
             ) -> dict[str, dict[str, Patterns]]:
-    """The sets a model card speaks of, made again: per network, per set."""
+    """Return the sets a model card speaks of, made again: per network, per set."""
     data = card['data']
     counts = [data['counts'][name] for name in SETS]
     options = {'counts': counts, 'edge_share': data['edge_share'], 'sets': sets}
