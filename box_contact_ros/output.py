@@ -39,12 +39,6 @@ def make_room(parser: argparse.ArgumentParser, path: Path) -> Path:
     return path
 
 
-def add_out(parser: argparse.ArgumentParser, files: str) -> None:
-    """Add `--out`, of a program that has `--quick`; `results_folder` reads it."""
-    parser.add_argument('--out', type=Path, metavar='DIR',
-                        help=f'folder for {files} (default: docs, or quick-results with --quick)')
-
-
 def results_folder(parser: argparse.ArgumentParser, options: argparse.Namespace) -> Path:
     """Return the folder of results; a quick run replaces a full run's only where `--out` says."""
     return make_folder(parser, options.out or Path('quick-results' if options.quick else 'docs'))

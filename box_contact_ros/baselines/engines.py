@@ -21,6 +21,7 @@ from ..scene.pose import rotation_matrix
 from ..scene.pose_sets import Pairs
 from ..solver.contact import Contacts
 from ..solver.contact_solver import ContactSolver
+from ..solver.models import find_model
 
 MOST_CONTACTS = 16
 """Contacts asked for; two boxes have at most eight."""
@@ -48,7 +49,9 @@ class Engine:
     read: Callable[[Any], EngineAnswer]
     """Return the answer in what a call returned; to be read before the next call."""
     prepare_batch: Callable[..., Callable[[], Contacts]] | None = None
-    """Return a call that answers for all pairs at once; takes pairs and `threads`."""
+    """Return a call that answers for all pairs at once, not in a loop; takes pairs, `threads`."""
+    any_boxes: bool = True
+    """Whether it answers for boxes of any sizes."""
 
 
 # --- this package's models ------------------------------------------------------------------------
@@ -56,6 +59,8 @@ class Engine:
 
 def ours(model: str, name: str | None = None, weights: str | None = None) -> Engine:
     """Return a model of this package, which reports show as `name`."""
+    entry, _ = find_model('model', model)
+
     def solver(p: np.ndarray, q: np.ndarray) -> ContactSolver:
         return ContactSolver(p, q, model=model, weights=weights)
 
@@ -71,7 +76,8 @@ def ours(model: str, name: str | None = None, weights: str | None = None) -> Eng
     def read(contact: Any) -> EngineAnswer:
         return EngineAnswer(True, contact.normal, contact.point) if contact.colliding else APART
 
-    return Engine(name=name or model, prepare=prepare, read=read, prepare_batch=prepare_batch)
+    return Engine(name=name or model, prepare=prepare, read=read, any_boxes=entry.any_boxes,
+                  prepare_batch=prepare_batch if entry.native_batch else None)
 
 
 # --- MuJoCo ---------------------------------------------------------------------------------------

@@ -12,11 +12,11 @@ and contacts invented. Engines that return several points: see `engines`.
 """
 from __future__ import annotations
 
-import argparse
 import math
 import sys
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from inspect import getdoc
 from pathlib import Path
@@ -40,15 +40,12 @@ from ..scene.pose_sets import (
     log_uniform,
     stacked,
 )
-from ..solver.arguments import seed_number
+from ..solver.arguments import program_parser
+from ..solver.models import MODELS
 from ..solver.weights_file import load_weights
 from .accuracy import CLASSES, classify
-from .paper_soup_tables import PAPER as PAPER_SOUP
-from .paper_soup_tables import PAPER_NETWORK
+from .paper_tables import PAPER_NETWORK, PAPER_SOUP
 from .speed import pinned, take_turns, usable_cores, write_speed
-
-SOUPS = (8, 10, 12, 14, 16, 18, 20, 22)
-"""Divisions of an edge: those of the paper's Table 3."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,19 +59,18 @@ class Plan:
     seconds: float
     """Time that a contestant has to be asked on a set, once for answers and once for timing."""
     rounds: int
-    soups: Sequence[int]
+    members: int
+    """Models of a family, at most."""
 
 
-FULL = Plan(batch_pairs=20_000, single_pairs=1_000, seconds=1.0, rounds=5, soups=SOUPS)
-QUICK = Plan(batch_pairs=1_000, single_pairs=40, seconds=0.05, rounds=2, soups=SOUPS[:1])
+FULL = Plan(batch_pairs=20_000, single_pairs=1_000, seconds=1.0, rounds=5, members=99)
+QUICK = Plan(batch_pairs=1_000, single_pairs=40, seconds=0.05, rounds=2, members=1)
 FEW_PAIRS = 16
 """Pairs of sizes in the timing of a set that has others in every row: each needs a solver."""
 LEAST_PAIRS = 10
 """Pairs judged and timed whatever they take."""
 BATCHES = 3
 """Batches timed in a round."""
-BATCH_MODELS = ('exact', 'mlp', 'paper', 'paper-continuous')
-"""Models whose batch is more than a loop."""
 IN_SHORT = ('exact', 'mlp', 'paper', 'fcl', 'soup-8', 'soup-22', 'MuJoCo mj_geomDistance',
             'MuJoCo mj_collision, mean', 'python-fcl collide, deepest', 'Coal collide',
             'PyBullet getClosestPoints, mean')
@@ -137,20 +133,21 @@ class FrontierRow:
 # --- measuring ------------------------------------------------------------------------------------
 
 
-def contestants(soups: Sequence[int] = SOUPS) -> tuple[list[Engine], list[str]]:
+def contestants(members: int = FULL.members) -> tuple[list[Engine], list[str]]:
     """Return all that can be measured here, and a line about each that cannot."""
     sizes = {}
     for path in resource_path('weights').glob('mlp-*.safetensors'):
         card = load_weights(path).card
         if not card['sizes']:  # those of a scene are for its boxes alone
             sizes[tuple(card['architecture'][1:-1])] = str(path)
-    found = [ours('exact'), ours('mlp')]
+    found = []
+    for entry in MODELS.values():
+        with suppress(ImportError):  # of an extra whose libraries `missing` names
+            entry.load()
+            found += map(ours, entry.reported_names[:members])
     found += [ours('mlp', f'mlp {"-".join(map(str, units))}', path)
               for units, path in sorted(sizes.items())]
-    found += [ours('paper'), ours('paper-continuous')]
     rivals, missing = installed()
-    if not any(line.startswith('fcl ') for line in missing):
-        found += [ours('fcl'), *(ours(f'soup-{n}') for n in soups)]
     return [*found, *rivals], missing
 
 
@@ -163,7 +160,7 @@ class Trial:
         self._seconds = plan.seconds / plan.rounds
         self._pairs = len(pairs.pose_a)
         self._ask_all = None
-        if engine.prepare_batch and engine.name.split()[0] in BATCH_MODELS:
+        if engine.prepare_batch:
             self._ask_all = engine.prepare_batch(pairs)
             found = self._ask_all()
             answers = found.colliding, found.normal, found.point
@@ -255,9 +252,9 @@ def measure_all(found: Sequence[Engine], *, seed: int = 3, plan: Plan = FULL) ->
                 try:
                     trials.append(Trial(engine, name, pairs, plan))
                 except ValueError:
-                    if not engine.name.startswith('paper'):
+                    if engine.any_boxes:
                         raise
-                    bar.update(plan.rounds)  # two equal boxes of few sizes
+                    bar.update(plan.rounds)
                 bar.update()
             take_turns([trial.time for trial in trials], plan.rounds, bar.update)
             rows += [trial.row() for trial in trials]
@@ -438,15 +435,16 @@ def draw(path: Path, rows: Sequence[FrontierRow]) -> None:
 def _draw_set(axis: Any, rows: Sequence[FrontierRow]) -> dict[str, Any]:
     """Draw the contestants on one set; returns a handle for each group of the legend."""
     shown, singles, batches = {}, [], []
+    ends = [f'soup-{n}' for n in (min(PAPER_SOUP), max(PAPER_SOUP))]
     for row in rows:
         error = max(row.errors.points['all'][2], SMALLEST_ERROR)
-        colour, marker = STYLES[_group(row.name)]
+        colour, marker = STYLES.get(_group(row.name), ('C9', 'h'))
         single, batch = row.single[0] / 1e3, row.batch / 1e3
         singles.append((single, error))
         shown[_group(row.name)], = axis.plot(single, error, marker, color=colour, markersize=6,
                                              linestyle='none')
         # Networks by their size, soups by their divisions at both ends.
-        if row.name in (f'soup-{SOUPS[0]}', f'soup-{SOUPS[-1]}') or row.name.startswith('mlp '):
+        if row.name in ends or row.name.startswith('mlp '):
             axis.annotate(row.name.replace('mlp ', '').replace('soup-', 'N = '), (single, error),
                           xytext=(5, 3), textcoords='offset points', fontsize=7)
         if not math.isnan(batch):
@@ -461,14 +459,10 @@ def _draw_set(axis: Any, rows: Sequence[FrontierRow]) -> dict[str, Any]:
 
 def main(args: Sequence[str] | None = None) -> int:
     """Measure, print, write; with `--speed`, 1 if a limit is broken."""
-    parser = argparse.ArgumentParser(prog='frontier', description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
-    output.add_out(parser, 'frontier.md, .csv, .png')
+    parser = program_parser('frontier', __doc__, quick='few pairs, to try it out', seed=3,
+                            out='frontier.md, .csv, .png')
     parser.add_argument('--speed', action='store_true',
                         help='the speed gates instead: speed.md, .csv')
-    parser.add_argument('--quick', action='store_true', help='few pairs, to try it out')
-    parser.add_argument('--seed', type=seed_number, default=3,
-                        help='of the sets (default: %(default)s)')
     cores = usable_cores()
     parser.add_argument('--core', type=int, default=cores[-1], choices=cores, metavar='N',
                         help='core to run on (default: the last one)')
@@ -479,7 +473,7 @@ def main(args: Sequence[str] | None = None) -> int:
         return write_speed(folder, command, core=options.core, quick=options.quick)
     plan = QUICK if options.quick else FULL
     with pinned({options.core}):
-        found, missing = contestants(plan.soups)
+        found, missing = contestants(plan.members)
         for line in missing:
             print(f'frontier: left out: {line}', file=sys.stderr)
         rows = measure_all(found, seed=options.seed, plan=plan)

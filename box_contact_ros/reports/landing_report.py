@@ -9,7 +9,6 @@ written.
 """
 from __future__ import annotations
 
-import argparse
 import math
 import os
 from collections.abc import Iterator, Sequence
@@ -34,9 +33,8 @@ from ..apps.crane.landing import (
 )
 from ..core import native
 from ..scene.contact_law import GRAVITY
-from ..solver.arguments import seed_number
+from ..solver.arguments import add_models, program_parser
 from ..solver.contact_solver import ContactSolver
-from ..solver.models import MODELS
 
 QUICK = 7
 """`--quick` runs every seventh case: prime to the grid's sides, so all values are met."""
@@ -205,21 +203,17 @@ def draw(path: Path, models: Sequence[str], landing: LandingRun) -> None:
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the sweep and write its three files; 0 whatever the models do."""
-    parser = argparse.ArgumentParser(prog='python -m box_contact_ros.reports.landing_report',
-                                     description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--models', nargs='+', default=['exact', 'fcl'], choices=list(MODELS),
-                        help='default: %(default)s')
+    parser = program_parser(
+        'python -m box_contact_ros.reports.landing_report', __doc__, seed=1,
+        quick=f'every {QUICK}th landing only', out='landing.csv, landing.md, landing.png')
+    add_models(parser, '--models', ['exact', 'fcl'])
     parser.add_argument('--rates', nargs='+', type=float, default=[200.0, 1000.0], metavar='HZ',
                         help='ticks a second, default: %(default)s')
     parser.add_argument('--latency', nargs='+', type=float, default=[0.0, 0.002], metavar='S',
                         help='from asking to acting [s], default: %(default)s')
     parser.add_argument('--dds', action='store_true', help='contacts from a contact node, over '
                         'DDS in lockstep; one landing at a time')
-    parser.add_argument('--seed', type=seed_number, default=1, help='of yaws and headings')
-    parser.add_argument('--quick', action='store_true', help=f'every {QUICK}th landing only')
     parser.add_argument('--workers', type=int, default=os.cpu_count(), help='processes')
-    output.add_out(parser, 'landing.csv, landing.md, landing.png')
     options = parser.parse_args(args)
     folder = output.results_folder(parser, options)
     landings = landings_of(options.models, options.rates, options.latency, seed=options.seed,

@@ -33,14 +33,10 @@ from ..scene.pose_sets import CUBE, stacks
 from ..solver.contact import Contacts
 from ..solver.contact_solver import ContactSolver
 from ..training.paper_recipe.dataset import quaternion_from_euler
+from .paper_tables import PAPER_NETWORK
+from .paper_tables import PAPER_SOUP as PAPER
 from .speed import no_garbage_collection, pinned, usable_cores
 
-PAPER = {8: (1.10, 11233, 11.52), 10: (1.47, 14323, 15.47), 12: (1.85, 17911, 19.2),
-         14: (1.94, 21789, 23.13), 16: (2.13, 24667, 24.63), 18: (2.31, 26517, 28.0),
-         20: (2.72, 30475, 32.44), 22: (2.90, 35411, 36.77)}
-"""By N: Table 3's mean time [ms]; Table 4's largest number of tests, and its time [ms]."""
-PAPER_NETWORK = 0.5
-"""The paper's time of its network [ms]."""
 ALSO = (1, 2, 4, 32, 64)
 """Divisions at which only the accuracy is measured, on touching boxes."""
 

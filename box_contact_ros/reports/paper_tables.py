@@ -30,6 +30,12 @@ PAPER = {
         'RMSE': (0.5410, 0.5748, 0.7302)},
 }
 """The paper's figures [rad], by table: training, cross-validation, external validation."""
+PAPER_SOUP = {8: (1.10, 11233, 11.52), 10: (1.47, 14323, 15.47), 12: (1.85, 17911, 19.2),
+              14: (1.94, 21789, 23.13), 16: (2.13, 24667, 24.63), 18: (2.31, 26517, 28.0),
+              20: (2.72, 30475, 32.44), 22: (2.90, 35411, 36.77)}
+"""By N: Table 3's mean time [ms]; Table 4's largest number of tests, and its time [ms]."""
+PAPER_NETWORK = 0.5
+"""The paper's time of its network [ms]."""
 
 TABLES, FIGURES = (1, 2, 3, 4), (9, 10)
 QUICK = 10

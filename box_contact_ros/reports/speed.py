@@ -26,8 +26,8 @@ from ..core import FORCE, instruction_sets, native
 from ..output import machine, markdown_table, percentiles, write_csv
 from ..scene.pose import quaternion_multiply
 from ..scene.pose_sets import CONTAINER, CUBE, SETS, Pairs, log_uniform, turns
+from ..solver.models import gated_models
 
-MODELS = ('exact', 'mlp')
 UNIT = 'MuJoCo mj_geomDistance'
 """The contestant whose median single call is the unit of all ratios."""
 PACKAGES = ('numpy', 'mujoco', 'python-fcl')
@@ -174,7 +174,7 @@ def _drawn(name: str, count: int) -> Pairs:
 
 def single_calls(count: int) -> list[Stint]:
     """Return the contestants for equal cubes, from two poses to a result in Python."""
-    engines = [ours(model) for model in MODELS]
+    engines = [ours(model) for model in gated_models()]
     for make in (mujoco_distance, partial(fcl_collision, 'deepest')):
         try:
             engines.append(make())
@@ -226,7 +226,8 @@ def print_timings(core: int, effort: Effort) -> None:
     """Print times of single calls and batches on one core as JSON, for `measure_with`."""
     with pinned({core}):
         stints = single_calls(effort.calls)
-        stints += [batch(model, name, effort.batch) for model in MODELS for name in BATCH_SETS]
+        stints += [batch(model, name, effort.batch)
+                   for model in gated_models() for name in BATCH_SETS]
         print(json.dumps([asdict(one) for one in timed(stints, effort.rounds)]))
 
 
@@ -242,7 +243,7 @@ def measure_threads(cores: Sequence[int], effort: Effort) -> list[Timing]:
     """Measure batches with one thread and with two, on these cores."""
     with pinned(cores):
         return timed([batch(model, 'random cubes', effort.shared_batch, threads)
-                      for model in MODELS for threads in (1, 2)], effort.rounds)
+                      for model in gated_models() for threads in (1, 2)], effort.rounds)
 
 
 def measure_starts(count: int) -> list[float]:
@@ -305,7 +306,7 @@ def _at_most(text: str, value: float, limit: float) -> Claim:
 def thread_claims(timings: Sequence[Timing]) -> list[Claim]:
     """Return the claims about two threads; only that of `exact` has a limit."""
     claims = []
-    for model in MODELS:
+    for model in gated_models():
         one, two = (next(t.median for t in timings if t.kind == kind and t.name.startswith(model))
                     for kind in ('batch', 'two threads'))
         limit = THREADS_LIMIT if model == 'exact' else None

@@ -8,7 +8,6 @@ an end.
 """
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -21,19 +20,15 @@ from ..baselines.engines import in_subprocess
 from ..core import native
 from ..scene.pose import quaternion_multiply
 from ..scene.pose_sets import Pairs
-from ..solver.arguments import model_name
+from ..solver.arguments import add_models, program_parser
 from ..solver.contact_solver import ContactSolver
-from ..solver.models import MODELS
+from ..solver.models import MODELS, find_model, gated_models
 from ..verification.fuzz import TOUCH_ULPS
 from ..verification.hard_poses import Cases, load
 from ..verification.judge import COORDINATE_ULPS, NOT_FINITE, NOT_UNIT, OUTSIDE, TOLERANCE, judge
 
-REPORTED = ('exact', 'mlp', 'fcl', 'soup-8')
-"""Models in docs/stability.md."""
-APART = ('fcl', 'soup')
-"""Models (before a dash) that run in a subprocess of their own."""
 PATIENCE = 300.0
-"""For such a subprocess and a family [s]."""
+"""For a family in a subprocess [s]."""
 NUDGE = 1e-7
 """By how much poses are moved, of the size, and turned [rad], for the ratio of Δpoint to Δpose."""
 NUDGES = 3
@@ -41,7 +36,7 @@ NUDGES = 3
 
 
 COUNTS = ('verdicts', 'normals', 'outside', 'not_finite')
-"""Faults; `exact` and `mlp` must have none."""
+"""Faults; models that are gated must have none."""
 WORST = ('depth', 'point_p99', 'point_worst', 'ratio', 'exact_ratio')
 
 
@@ -165,9 +160,9 @@ def table(rows: Sequence[StabilityRow]) -> str:
 
 
 def gates(rows: Sequence[StabilityRow]) -> list[str]:
-    """Return what is broken of what `exact` and `mlp` promise."""
+    """Return what is broken of what gated models promise."""
     return [f'{row.model}, {row.family}: {getattr(row, name)} {name}' for row in rows
-            if row.model in ('exact', 'mlp') for name in COUNTS if getattr(row, name)]
+            if row.model in gated_models() for name in COUNTS if getattr(row, name)]
 
 
 def page(rows: Sequence[StabilityRow], command: str) -> str:
@@ -206,24 +201,22 @@ def main(args: Sequence[str] | None = None) -> int:
     from tqdm import tqdm
 
     cases = load()
-    parser = argparse.ArgumentParser(prog='stability', description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--models', nargs='+', type=model_name, default=list(REPORTED),
-                        metavar='MODEL',
-                        help=f'of {", ".join(MODELS)} (default: {" ".join(REPORTED)})')
+    parser = program_parser('stability', __doc__)
+    reported = [entry.full_name for entry in MODELS.values() if entry.any_boxes]
+    add_models(parser, '--models', reported)
     parser.add_argument('--families', nargs='+', default=list(cases), choices=list(cases),
                         metavar='FAMILY', help='default: all')
     parser.add_argument('--out', type=Path, metavar='DIR',
                         help='folder for stability.md and stability.csv (default: docs, or '
                              'quick-results with fewer models or families than that)')
     options = parser.parse_args(args)
-    whole = set(options.models) >= set(REPORTED) and set(options.families) == set(cases)
+    whole = set(options.models) >= set(reported) and set(options.families) == set(cases)
     folder = output.make_folder(parser, options.out or Path('docs' if whole else 'quick-results'))
     rows = []
     with tqdm(total=len(options.models) * len(options.families), desc='stability',
               unit='family') as bar:
         for model in options.models:
-            apart = model.split('-')[0] in APART
+            apart = find_model('model', model)[0].extra  # another's library may abort
             for name in options.families:
                 bar.set_postfix_str(f'{model}, {name}')
                 rows.append((examine_apart if apart else examine)(model, name, cases[name]))

@@ -3,16 +3,42 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Callable
-from typing import TypeVar
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, TypeVar
 
-from ..output import make_folder, make_room
 from .checks import shown
-from .models import find_model
-
-__all__ = ['make_folder', 'make_room', 'model_name', 'seed_number', 'within']
+from .models import find_model, model_names
 
 Number = TypeVar('Number', int, float)
+
+
+def program_parser(program: str, doc: str | None, *, quick: str = '', seed: int | None = None,
+                   out: str = '', **options: Any) -> argparse.ArgumentParser:
+    """Return the parser of a program, whose help begins with `doc`.
+
+    quick: help of `--quick`; seed: default of `--seed`; out: the files that go to the folder of
+    `--out`, which `output.results_folder` reads. The program has those of them that are given.
+    """
+    parser = argparse.ArgumentParser(
+        prog=program, description=doc, formatter_class=argparse.RawDescriptionHelpFormatter,
+        **options)
+    if quick:
+        parser.add_argument('--quick', action='store_true', help=quick)
+    if seed is not None:
+        parser.add_argument('--seed', type=seed_number, default=seed,
+                            help='of what is drawn at random (default: %(default)s)')
+    if out:
+        parser.add_argument('--out', type=Path, metavar='DIR', help=f'folder for {out} (default: '
+                            'docs, or quick-results with --quick)')
+    return parser
+
+
+def add_models(parser: argparse.ArgumentParser, flag: str, default: str | Sequence[str]) -> None:
+    """Add an option of one model, or of several where the default is a list."""
+    parser.add_argument(flag, nargs=None if isinstance(default, str) else '+', type=model_name,
+                        default=default, metavar='MODEL',
+                        help=f'of {model_names()} (default: %(default)s)')
 
 
 def model_name(text: str) -> str:

@@ -6,6 +6,7 @@ read the table. The README's table of models is tested against it.
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
 from typing import Any, Protocol
@@ -62,6 +63,8 @@ class Family:
     default: int
     most: int
     """N is 1 to this."""
+    reported: tuple[int, ...]
+    """The N that reports show."""
 
     def parse(self, name: str, text: str) -> int:
         """Return the N that `text` gives for the model `name`; raises ValueError for a bad one."""
@@ -92,7 +95,14 @@ class ModelEntry:
     """Whether single calls are answered in C++, without a conversion in Python."""
     native_batch: bool = False
     """Whether the rows of a batch are answered in C++."""
+    gated: bool = False
+    """Whether fuzz, stability and the speed report hold it to their limits."""
     family: Family | None = None
+
+    @property
+    def any_boxes(self) -> bool:
+        """Whether the model answers for boxes of any sizes."""
+        return self.boxes == 'any'
 
     @property
     def reads_weights(self) -> bool:
@@ -103,6 +113,23 @@ class ModelEntry:
     def names(self) -> tuple[str, ...]:
         """Return the names under which users ask for it."""
         return (self.name, f'{self.name}-N') if self.family else (self.name,)
+
+    @property
+    def full_name(self) -> str:
+        """Return the name that says all: with the default N, for a family."""
+        return f'{self.name}-{self.family.default}' if self.family else self.name
+
+    @property
+    def reported_names(self) -> tuple[str, ...]:
+        """Return the full names of the models that reports show."""
+        return tuple(f'{self.name}-{n}' for n in self.family.reported) if self.family else (
+            self.name,)
+
+    def load(self) -> Callable[..., Model]:
+        """Return the builder; ImportError where its extra is not installed."""
+        module, _, function = self.builder.partition(':')
+        build: Callable[..., Model] = getattr(import_module(module), function)
+        return build
 
     def options(self, name: str) -> dict[str, int] | None:
         """Return what a name says to the builder, or None for the name of another model.
@@ -124,10 +151,11 @@ _ENTRIES = (
     ModelEntry(
         name='mlp', line='SAT, and a network for the point; constant cost; the default',
         builder='box_contact_ros.solver.mlp:Mlp', takes=_NEEDS,
-        native_single=True, native_batch=True),
+        native_single=True, native_batch=True, gated=True),
     ModelEntry(
         name='exact', line='SAT and the exact centroid of the overlap; the reference',
-        builder='box_contact_ros.solver.models:Exact', native_single=True, native_batch=True),
+        builder='box_contact_ros.solver.models:Exact',
+        native_single=True, native_batch=True, gated=True),
     ModelEntry(
         name='paper', line="the paper's network 6-20-18-4",
         builder='box_contact_ros.baselines.paper.paper_models:Paper', takes=_NEEDS,
@@ -142,7 +170,8 @@ _ENTRIES = (
     ModelEntry(
         name='soup', line='polygon soup on FCL, N divisions an edge; a baseline',
         builder='box_contact_ros.baselines.soup:Soup', takes=('divisions',), extra='soup',
-        family=Family(argument='divisions', default=SOUP_DIVISIONS, most=MOST_SOUP_DIVISIONS)),
+        family=Family(argument='divisions', default=SOUP_DIVISIONS, most=MOST_SOUP_DIVISIONS,
+                      reported=(8, 10, 12, 14, 16, 18, 20, 22))),  # of the paper's Table 3
 )
 MODELS = {entry.name: entry for entry in _ENTRIES}
 """The models by name, in the order in which they are listed to users."""
@@ -151,6 +180,11 @@ MODELS = {entry.name: entry for entry in _ENTRIES}
 def model_names() -> str:
     """Return the names of all models for help texts, separated by commas."""
     return ', '.join(name for entry in MODELS.values() for name in entry.names)
+
+
+def gated_models() -> list[str]:
+    """Return the full names of the models that reports hold to limits."""
+    return [entry.full_name for entry in MODELS.values() if entry.gated]
 
 
 def find_model(where: str, name: object) -> tuple[ModelEntry, dict[str, int]]:
@@ -175,7 +209,4 @@ def build_model(name: str, size_a: np.ndarray, size_b: np.ndarray, weights: str 
     if weights is not None and not isinstance(weights, (str, os.PathLike)):
         raise ValueError(f'weights must be the path of a file, not {shown(weights)}')
     given: dict[str, Any] = {'size_a': size_a, 'size_b': size_b, 'weights': weights, **options}
-    module, _, function = entry.builder.partition(':')
-    build = getattr(import_module(module), function)
-    model: Model = build(**{argument: given[argument] for argument in entry.takes})
-    return model
+    return entry.load()(**{argument: given[argument] for argument in entry.takes})

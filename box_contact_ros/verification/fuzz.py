@@ -8,7 +8,6 @@ pose, ready to be pasted into a test; the exit status is then 1.
 """
 from __future__ import annotations
 
-import argparse
 import os
 import sys
 import time
@@ -34,14 +33,14 @@ from ..scene.pose_sets import (
     turns,
     unit_quaternions,
 )
-from ..solver.arguments import model_name, seed_number, within
+from ..solver.arguments import add_models, program_parser, within
 from ..solver.contact_solver import ContactSolver
+from ..solver.models import gated_models
 from .judge import GATES, exact_gap, judge
 
 PAIRS, QUICK_PAIRS = 10_000_000, 60_000
 PIECE = 50_000
 """Pairs that are drawn and judged at a time."""
-MODELS = ('exact', 'mlp')
 TOUCH_ULPS = 8.0
 """Largest gap that is a touch, in units in the last place of the largest coordinate or size. The
 judge has to know this convention of the package."""
@@ -278,12 +277,12 @@ def _solver(model: str) -> ContactSolver:
 
 
 def fuzz(total: int, *, seed: int = 1, classes: Sequence[str] = tuple(CLASSES),
-         models: Sequence[str] = MODELS, workers: int = 1, progress: bool = True,
+         models: Sequence[str] | None = None, workers: int = 1, progress: bool = True,
          ) -> dict[tuple[str, str], Tally]:
     """Return tallies by class and model, of `total` pairs spread evenly over the classes."""
     from tqdm import tqdm
 
-    jobs = []
+    models, jobs = models or gated_models(), []
     for name in classes:
         left = -(-total // len(classes))
         for number in range(-(-left // PIECE)):
@@ -309,17 +308,12 @@ def csv_rows(tallies: Iterable[Tally]) -> list[dict[str, object]]:
 
 def main(args: Sequence[str] | None = None) -> int:
     """Fuzz, print a line per class and model; 1 if a gate is broken."""
-    parser = argparse.ArgumentParser(prog='fuzz', description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = program_parser('fuzz', __doc__, quick=f'{QUICK_PAIRS:,} pairs', seed=1)
     parser.add_argument('--pairs', type=within(1), default=PAIRS,
                         help='in all (default: %(default)s)')
-    parser.add_argument('--quick', action='store_true', help=f'{QUICK_PAIRS:,} pairs')
-    parser.add_argument('--seed', type=seed_number, default=1, help='default: %(default)s')
     parser.add_argument('--classes', nargs='+', choices=list(CLASSES), default=list(CLASSES),
                         metavar='CLASS', help=f'of {", ".join(CLASSES)} (default: all)')
-    parser.add_argument('--models', nargs='+', type=model_name, default=list(MODELS),
-                        metavar='MODEL',
-                        help='default: %(default)s')
+    add_models(parser, '--models', gated_models())
     parser.add_argument('--workers', type=within(1), default=os.cpu_count() or 1, help='processes')
     parser.add_argument('--out', type=Path, metavar='FILE', help='CSV with the tallies')
     options = parser.parse_args(args)

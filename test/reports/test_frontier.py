@@ -13,6 +13,7 @@ from box_contact_ros.reports import frontier
 from box_contact_ros.scene.pose import rotation_matrix
 from box_contact_ros.scene.pose_sets import SETS, Pairs
 from box_contact_ros.solver.contact_solver import ContactSolver
+from box_contact_ros.solver.models import MODELS
 
 ROOT = Path(__file__).resolve().parents[2]
 RIVALS, MISSING = installed()
@@ -175,4 +176,4 @@ def test_the_committed_report_has_all_of_them() -> None:
     with (ROOT / 'docs' / 'frontier.csv').open() as file:
         names = {row['contestant'] for row in csv.DictReader(file)}
     assert {*frontier.IN_SHORT, 'mlp 8', 'mlp 64', 'paper-continuous',
-            *(f'soup-{n}' for n in frontier.SOUPS)} <= names
+            *MODELS['soup'].reported_names} <= names

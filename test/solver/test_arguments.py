@@ -6,6 +6,7 @@ import importlib
 
 import pytest
 
+from box_contact_ros import output
 from box_contact_ros.cli import PROGRAMS
 from box_contact_ros.solver import arguments
 
@@ -43,9 +44,9 @@ def test_a_folder_in_the_place_of_the_file_is_refused_before_the_work(name, tmp_
 
 def test_folders_are_made(tmp_path):
     parser = argparse.ArgumentParser()
-    assert arguments.make_folder(parser, tmp_path / 'a' / 'b').is_dir()
+    assert output.make_folder(parser, tmp_path / 'a' / 'b').is_dir()
     assert not list((tmp_path / 'a' / 'b').iterdir())
-    assert arguments.make_room(parser, tmp_path / 'c' / 'file').parent.is_dir()
+    assert output.make_room(parser, tmp_path / 'c' / 'file').parent.is_dir()
     assert not list((tmp_path / 'c').iterdir())
 
 

@@ -43,7 +43,8 @@ def lifted(monkeypatch):
     monkeypatch.setitem(sys.modules, 'of_a_test', SimpleNamespace(Lifted=Lifted))
     monkeypatch.setitem(MODELS, 'lifted', ModelEntry(
         name='lifted', line='the exact point, lifted', builder='of_a_test:Lifted',
-        takes=('millimetres',), family=Family(argument='millimetres', default=1, most=9)))
+        takes=('millimetres',), native_batch=True, gated=True,
+        family=Family(argument='millimetres', default=1, most=9, reported=(1, 7))))
 
 
 @pytest.mark.parametrize('name, lift', [('lifted', 1e-3), ('lifted-7', 7e-3)])
@@ -110,3 +111,28 @@ def test_the_solver_imports_no_baseline():
     done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True,
                           cwd=Path(box_contact_ros.__file__).parents[1])
     assert done.stdout == '[]\n', done.stderr
+
+
+@pytest.mark.slow
+def test_an_added_model_is_in_reports_and_programs(lifted, tmp_path, capsys):
+    """None of them has a list of its own."""
+    from box_contact_ros.reports import frontier, speed, stability
+    from box_contact_ros.verification import fuzz
+
+    assert {'lifted-1', 'lifted-7'} <= {engine.name for engine in frontier.contestants()[0]}
+    assert 'lifted-1' in [stint.name for stint in speed.single_calls(10)]
+    assert fuzz.main(['--pairs', '6', '--workers', '1']) in (0, 1)
+    assert '\ncube            lifted-1' in capsys.readouterr().out
+    assert stability.main(['--families', 'a4_ridges', '--out', str(tmp_path)]) in (0, 1)
+    assert '## `lifted-1`' in (tmp_path / 'stability.md').read_text('utf-8')
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('module', [
+    'reports.accuracy', 'reports.landing_report', 'reports.stability', 'verification.fuzz',
+    'apps.bench.bench', 'apps.bench.soak'])
+def test_programs_accept_an_added_model(lifted, module, capsys):
+    main = pytest.importorskip(f'box_contact_ros.{module}').main
+    with pytest.raises(SystemExit, match='0'):
+        main(['--help'])
+    assert 'lifted, lifted-N' in ' '.join(capsys.readouterr().out.split())

@@ -24,10 +24,10 @@ from tqdm import tqdm
 from ...node.contact_node import PARAMETERS
 from ...node.runtime import REFUSALS
 from ...output import make_folder, percentiles
-from ...solver.arguments import model_name, within
+from ...solver.arguments import add_models, program_parser, within
 from ...solver.contact import Contacts
 from ...solver.contact_solver import ContactSolver
-from ...solver.models import MOST_SOUP_DIVISIONS, SOUP_DIVISIONS, model_names
+from ...solver.models import MOST_SOUP_DIVISIONS, SOUP_DIVISIONS
 from ..processes import add_domain
 from .answer_log import StreamResult
 from .bench_drive import Bench, MeasuredNode, about_the_machine, echo_node, open_bench, solver_node
@@ -68,8 +68,8 @@ def main(args: Sequence[str] | None = None) -> int:
 
 
 def _options(args: Sequence[str]) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(
-        prog='bench', description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter,
+    parser = program_parser(
+        'bench', __doc__, seed=1, quick=f'{QUICK_SECONDS:g} s per stream, to see that it works',
         epilog='streams:\n' + '\n'.join(
             f'  {name:<14} {source.description}' for name, source in STREAMS.items())
         + '\n\nWhat follows --ros-args is for the bench itself, not for the nodes.')
@@ -81,21 +81,15 @@ def _options(args: Sequence[str]) -> argparse.Namespace:
     _add_source(parser)
     parser.add_argument('--nodes', nargs='+', choices=NODES, default=list(NODES), metavar='NODE',
                         help=f'which of: {", ".join(NODES)} (default: all)')
-    parser.add_argument('--model', type=model_name, default=PARAMETERS['model'].default,
-                        metavar='NAME',
-                        help=f'of the contact node: {model_names()} (default: %(default)s)')
+    add_models(parser, '--model', PARAMETERS['model'].default)
     parser.add_argument('--divisions', type=within(1, MOST_SOUP_DIVISIONS), default=SOUP_DIVISIONS,
                         metavar='N', help='of an edge in the polygon soup (default: %(default)s)')
-    parser.add_argument('--seed', type=within(0, 2**32), default=1, metavar='N',
-                        help='of the streams (default: %(default)s)')
     parser.add_argument('--side-by-side', action='store_true',
                         help='one input for all nodes at the same time, as they would run beside a '
                              'simulator; they then compete for cores, and the floor with them '
                              '(default: each stream goes to one node after the other)')
     parser.add_argument('--out', type=Path, default=Path('bench-results'), metavar='FOLDER',
                         help='for bench.csv, bench.md, bench.png (default: %(default)s/)')
-    parser.add_argument('--quick', action='store_true',
-                        help=f'{QUICK_SECONDS:g} s per stream, to see that it works')
     add_domain(parser)
     options = parser.parse_args(list(args))
     if options.replay is None:

@@ -26,10 +26,9 @@ from rclpy.utilities import remove_ros_args
 from ...node.contact_node import PARAMETERS
 from ...node.runtime import REFUSALS
 from ...output import make_folder, markdown_table, percentiles
-from ...solver.arguments import model_name, within
+from ...solver.arguments import add_models, program_parser, within
 from ...solver.contact import Contacts
 from ...solver.contact_solver import ContactSolver
-from ...solver.models import model_names
 from ..processes import add_domain
 from .answer_log import AnswerLog, StreamLog, StreamResult
 from .bench_drive import Bench, MeasuredNode, about_the_machine, echo_node, open_bench, solver_node
@@ -131,18 +130,15 @@ def _contact(options: argparse.Namespace) -> MeasuredNode:
 
 
 def _options(args: Sequence[str]) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(prog='soak', description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = program_parser('soak', __doc__, quick='two blocks of a second')
     parser.add_argument('--minutes', type=within(0.02, 24 * 60.0), default=10.0, metavar='MIN',
                         help='of poses to the contact node; each echo node takes a quarter as long '
                              'beside (default: %(default)g)')
     parser.add_argument('--rate', type=within(1.0, 4000.0), default=1000.0, metavar='HZ',
                         help='pairs of poses sent per second (default: %(default)g)')
-    parser.add_argument('--model', type=model_name, default=PARAMETERS['model'].default,
-                        metavar='NAME', help=f'one of: {model_names()} (default: %(default)s)')
+    add_models(parser, '--model', PARAMETERS['model'].default)
     parser.add_argument('--out', type=Path, default=Path('soak-results'), metavar='FOLDER',
                         help='for soak.csv and soak.md (default: %(default)s/)')
-    parser.add_argument('--quick', action='store_true', help='two blocks of a second')
     add_domain(parser)
     options = parser.parse_args(list(args))
     make_folder(parser, options.out)
