@@ -149,8 +149,7 @@ LEAST_ROOM = 64 * 2**10
 """Bytes: ROS 2's libraries write pages of shared memory as they load, or die by SIGBUS."""
 USUAL_ROOM = 4 * 2**20
 """Bytes: Fast DDS allocates 0.7 MB as a process joins, or dies in the same way."""
-TRANSPORTS = 'FASTDDS_BUILTIN_TRANSPORTS'
-"""Environment variable of Fast DDS."""
+TRANSPORTS = 'FASTDDS_BUILTIN_TRANSPORTS'  # environment variable of Fast DDS
 
 
 def _shared_memory_has_room() -> bool:

@@ -146,12 +146,10 @@ class Core(Protocol):
 class Machine:
     """What a figure was measured on; `dataclasses.asdict` gives the columns of a CSV file."""
 
-    processor: str
-    """Name, microarchitecture, CPU family and model."""
+    processor: str  # name, microarchitecture, CPU family and model
     instruction_set: str
     compiler: str
-    versions: str
-    """Versions of Python and of packages."""
+    versions: str  # versions of Python and of packages
 
     def __str__(self) -> str:
         return ', '.join(filter(None, (self.processor, self.instruction_set, self.compiler,

@@ -19,10 +19,8 @@ from ..solver.arguments import within
 
 DOMAINS = range(1, 102)
 """Domains to draw from: 0 is everybody's; beyond 101, ports run into those that Linux assigns."""
-END_PATIENCE = 3.0
-"""Time [s] between asking a process group to end and killing it."""
-LOOK_PERIOD = 0.05
-"""Time [s] after which a signal is noticed, at most."""
+END_PATIENCE = 3.0  # time [s] between asking a process group to end and killing it
+LOOK_PERIOD = 0.05  # time [s] after which a signal is noticed, at most
 
 
 def add_domain(parser: argparse.ArgumentParser, note: str = '') -> None:

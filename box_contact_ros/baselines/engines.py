@@ -23,8 +23,7 @@ from ..solver.contact import Contacts
 from ..solver.contact_solver import ContactSolver
 from ..solver.models import find_model
 
-MOST_CONTACTS = 16
-"""Contacts asked for; two boxes have at most eight."""
+MOST_CONTACTS = 16  # contacts asked for; two boxes have at most eight
 
 
 class EngineAnswer(NamedTuple):
@@ -42,16 +41,14 @@ APART = EngineAnswer(False, None, None)
 class Engine:
     """One way to answer."""
 
-    name: str
-    """As reports show it."""
+    name: str  # as reports show it
     prepare: Callable[[Pairs], list[Callable[[], Any]]]
     """Return a call for each pair, to be timed. ValueError: not for boxes of these sizes."""
     read: Callable[[Any], EngineAnswer]
     """Return the answer in what a call returned; to be read before the next call."""
     prepare_batch: Callable[..., Callable[[], Contacts]] | None = None
     """Return a call that answers for all pairs at once, not in a loop; takes pairs, `threads`."""
-    any_boxes: bool = True
-    """Whether it answers for boxes of any sizes."""
+    any_boxes: bool = True  # whether it answers for boxes of any sizes
 
 
 # --- this package's models ------------------------------------------------------------------------

@@ -29,8 +29,7 @@ from .fcl_box import FclModel
 
 FIRST_CONTACTS = 1 << 16
 """Contacts asked for at first: two cubes exactly on top of each other make 27,400 with N = 22."""
-MORE_CONTACTS = 16
-"""Factor by which more are asked for when so many have been found."""
+MORE_CONTACTS = 16  # factor by which more are asked for when so many have been found
 
 CANCELLED = 1e-9
 """Length of a mean normal up to which it has cancelled: a mean of 1e6 unit vectors is rounded by
@@ -40,10 +39,8 @@ CANCELLED = 1e-9
 class Mesh(NamedTuple):
     """A box as polygon soup."""
 
-    model: fcl.BVHModel
-    """Triangles and tree, in the box's own frame."""
-    areas: np.ndarray
-    """(12 N²,) of the triangles, in FCL's numbering [m²]."""
+    model: fcl.BVHModel  # triangles and tree, in the box's own frame
+    areas: np.ndarray  # (12 N²,) of the triangles, in FCL's numbering [m²]
 
 
 def triangles(size: Sequence[float] | np.ndarray, divisions: int) -> np.ndarray:

@@ -9,8 +9,7 @@ from numpy.typing import ArrayLike
 
 from . import native
 
-BOUNDS = ('slab', 'edges')
-"""Methods of the overlap's bounds."""
+BOUNDS = ('slab', 'edges')  # methods of the overlap's bounds
 _UNASKED = np.empty(0)
 
 
@@ -22,58 +21,38 @@ class Stages(NamedTuple):
     A, from that box's centre; the other box is the one whose faces cut the bounding box.
     """
 
-    colliding: np.ndarray = _UNASKED
-    """(n,) bool."""
-    separation: np.ndarray = _UNASKED
-    """(n,) largest gap of the separating-axis test."""
+    colliding: np.ndarray = _UNASKED  # (n,) bool
+    separation: np.ndarray = _UNASKED  # (n,) largest gap of the separating-axis test
     axis: np.ndarray = _UNASKED
     """(n,) int64 winning axis: 0–2 faces of A, 3–5 of B, 6 + 3 i + j for edges a_i × b_j."""
-    face: np.ndarray = _UNASKED
-    """(n,) int64 best face axis, 0–5, whatever wins."""
-    normal: np.ndarray = _UNASKED
-    """(n, 3) unit vector along the winning axis, from A to B."""
-    touch: np.ndarray = _UNASKED
-    """(n,) separation up to which the boxes touch."""
-    size: np.ndarray = _UNASKED
-    """(n,) largest full extent of both boxes."""
-    rotation: np.ndarray = _UNASKED
-    """(n, 3, 3) B's axes as columns."""
-    offset_a: np.ndarray = _UNASKED
-    """(n, 3) B − A."""
-    offset_b: np.ndarray = _UNASKED
-    """(n, 3) B − A in B's frame."""
-    pressed_offset_a: np.ndarray = _UNASKED
-    """(n, 3) B − A of the pressed pair."""
-    pressed_offset_b: np.ndarray = _UNASKED
-    """(n, 3) the same in B's frame."""
-    centroid: np.ndarray = _UNASKED
-    """(n, 3) exact centroid of the overlap of the pressed pair."""
+    face: np.ndarray = _UNASKED  # (n,) int64 best face axis, 0–5, whatever wins
+    normal: np.ndarray = _UNASKED  # (n, 3) unit vector along the winning axis, from A to B
+    touch: np.ndarray = _UNASKED  # (n,) separation up to which the boxes touch
+    size: np.ndarray = _UNASKED  # (n,) largest full extent of both boxes
+    rotation: np.ndarray = _UNASKED  # (n, 3, 3) B's axes as columns
+    offset_a: np.ndarray = _UNASKED  # (n, 3) B − A
+    offset_b: np.ndarray = _UNASKED  # (n, 3) B − A in B's frame
+    pressed_offset_a: np.ndarray = _UNASKED  # (n, 3) B − A of the pressed pair
+    pressed_offset_b: np.ndarray = _UNASKED  # (n, 3) the same in B's frame
+    centroid: np.ndarray = _UNASKED  # (n, 3) exact centroid of the overlap of the pressed pair
     clipped_centroid: np.ndarray = _UNASKED
     """(n, 3) the same by clipping, the method for pairs that are not certain."""
-    volume: np.ndarray = _UNASKED
-    """(n,) exact volume of that overlap [m³]."""
-    clipped_volume: np.ndarray = _UNASKED
-    """(n,) the same by clipping."""
+    volume: np.ndarray = _UNASKED  # (n,) exact volume of that overlap [m³]
+    clipped_volume: np.ndarray = _UNASKED  # (n,) the same by clipping
     covariance: np.ndarray = _UNASKED
     """(n, 3, 3) its second central moments by its volume [m²], common frame."""
-    clipped_covariance: np.ndarray = _UNASKED
-    """(n, 3, 3) the same by clipping."""
+    clipped_covariance: np.ndarray = _UNASKED  # (n, 3, 3) the same by clipping
     certain: np.ndarray = _UNASKED
     """(n,) bool: the exact moments are by face sums; else the overlap was clipped."""
-    frame_b: np.ndarray = _UNASKED
-    """(n,) bool: the bounds are in B's frame."""
+    frame_b: np.ndarray = _UNASKED  # (n,) bool: the bounds are in B's frame
     in_range: np.ndarray = _UNASKED
     """(n,) bool: the MLP may be asked; else the exact answer is given."""
-    bounds_middle: np.ndarray = _UNASKED
-    """(n, 3) middle of the overlap's bounds, their frame."""
-    bounds_half: np.ndarray = _UNASKED
-    """(n, 3) its half extents."""
-    other_axes: np.ndarray = _UNASKED
-    """(n, 3, 3) the other box's axes as rows, bounds' frame."""
+    bounds_middle: np.ndarray = _UNASKED  # (n, 3) middle of the overlap's bounds, their frame
+    bounds_half: np.ndarray = _UNASKED  # (n, 3) its half extents
+    other_axes: np.ndarray = _UNASKED  # (n, 3, 3) the other box's axes as rows, bounds' frame
     other_offset: np.ndarray = _UNASKED
     """(n, 3) from the other box's centre to `bounds_middle`, along the other box's axes."""
-    other_half: np.ndarray = _UNASKED
-    """(n, 3) half extents of the other box."""
+    other_half: np.ndarray = _UNASKED  # (n, 3) half extents of the other box
     features: np.ndarray = _UNASKED
     """(n, 9, 12) float32 features of the sites f · 3 + q: four of the site, of its faces, axis."""
     vectors: np.ndarray = _UNASKED

@@ -58,8 +58,7 @@ LIMITS = {
     'containers': Limit(0.06, 0.5, 2.5),
 }
 """What model `mlp` has to keep, by set."""
-MAE_LIMIT = 0.005
-"""Mean absolute error [rad] of `mlp` on the paper's external set."""
+MAE_LIMIT = 0.005  # mean absolute error [rad] of `mlp` on the paper's external set
 OUTSIDE = 2.0**-44
 """How far outside a box a point may be, of the size (5.7e-14), on top of the minimum depth."""
 
@@ -70,8 +69,7 @@ keep a pose to 12 digits only. Still far below the 1e-9 that B is pressed in."""
 PAIRS, QUICK_PAIRS = 100_000, 5_000
 CLASSES = ('vertex-face', 'edge-edge', 'edge-face', 'face-face')
 WINNERS = ('face axis', 'edge axis')
-SHOWN = (1e-4, 100.0)
-"""Errors that are drawn [%]."""
+SHOWN = (1e-4, 100.0)  # errors that are drawn [%]
 FACE_LIKE = math.cos(math.radians(6.0))
 """Cosine of the angle to a face's normal up to which an edge pair's axis stands for the face."""
 
@@ -142,20 +140,14 @@ class AccuracyRow:
     set: str
     errors: np.ndarray
     """(n,) point errors of pairs that touch by both, % of the smaller box's longest edge."""
-    classes: np.ndarray
-    """(n,) index into CLASSES."""
-    winners: np.ndarray
-    """(n,) index into WINNERS."""
+    classes: np.ndarray  # (n,) index into CLASSES
+    winners: np.ndarray  # (n,) index into WINNERS
     pairs: int
-    exact_share: float
-    """Share of contacts answered by `exact`."""
+    exact_share: float  # share of contacts answered by `exact`
     verdict_errors: int
-    normal_difference: float
-    """Largest difference of a component."""
-    separation_difference: float
-    """Largest, of the size."""
-    outside: float
-    """Farthest point outside a box, of the size."""
+    normal_difference: float  # largest difference of a component
+    separation_difference: float  # largest, of the size
+    outside: float  # farthest point outside a box, of the size
     corrected_share: float
     """Share of points that the network had put outside a box; NaN for another model."""
 

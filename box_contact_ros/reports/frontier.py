@@ -52,31 +52,26 @@ from .speed import pinned, take_turns, usable_cores, write_speed
 class Plan:
     """How much is judged and timed."""
 
-    batch_pairs: int
-    """Pairs on which models with batches are judged and timed."""
+    batch_pairs: int  # pairs on which models with batches are judged and timed
     single_pairs: int
     """Pairs on which the others are judged, and on which all are timed call by call."""
     seconds: float
     """Time that a contestant has to be asked on a set, once for answers and once for timing."""
     rounds: int
-    members: int
-    """Models of a family, at most."""
+    members: int  # models of a family, at most
 
 
 FULL = Plan(batch_pairs=20_000, single_pairs=1_000, seconds=1.0, rounds=5, members=99)
 QUICK = Plan(batch_pairs=1_000, single_pairs=40, seconds=0.05, rounds=2, members=1)
 FEW_PAIRS = 16
 """Pairs of sizes in the timing of a set that has others in every row: each needs a solver."""
-LEAST_PAIRS = 10
-"""Pairs judged and timed whatever they take."""
-BATCHES = 3
-"""Batches timed in a round."""
+LEAST_PAIRS = 10  # pairs judged and timed whatever they take
+BATCHES = 3  # batches timed in a round
 IN_SHORT = ('exact', 'mlp', 'paper', 'fcl', 'soup-8', 'soup-22', 'MuJoCo mj_geomDistance',
             'MuJoCo mj_collision, mean', 'python-fcl collide, deepest', 'Coal collide',
             'PyBullet getClosestPoints, mean')
 """Rows of the table in the README."""
-SHOWN_SETS = ('random cubes', 'containers', 'stacks')
-"""Sets in the picture."""
+SHOWN_SETS = ('random cubes', 'containers', 'stacks')  # sets in the picture
 PAPER_ERROR = 34.0
 """The paper's MAE of 0.5624 rad in % of an edge. Seen from 1.2 m, the mean distance of a touching
 cube's surface, the MAE is a point error of 0.67 m, a third of the edge of 2 m."""
@@ -109,8 +104,7 @@ class EngineErrors:
 
     points: dict[str, tuple[int, float, float, float]]
     """By class, or 'all': contacts, and the point error's median, p99, worst [%]."""
-    normal: tuple[float, float]
-    """p99 and worst of the normal's error [deg]; NaN: none was judged."""
+    normal: tuple[float, float]  # p99 and worst of the normal's error [deg]; NaN: none was judged
     missed: int
     invented: int
 
@@ -123,10 +117,8 @@ class FrontierRow:
     set: str
     judged: int
     calls: int
-    single: tuple[float, ...]
-    """p50, p99, max of a call [ns]."""
-    batch: float
-    """p50 of a pair in a batch [ns]."""
+    single: tuple[float, ...]  # p50, p99, max of a call [ns]
+    batch: float  # p50 of a pair in a batch [ns]
     errors: EngineErrors
 
 

@@ -36,10 +36,8 @@ from ..scene.contact_law import GRAVITY
 from ..solver.arguments import add_models, program_parser
 from ..solver.contact_solver import ContactSolver
 
-QUICK = 7
-"""`--quick` runs every seventh case: prime to the grid's sides, so all values are met."""
-SHOWN = 17
-"""The case that is drawn: sway of 1.25°, tilt of 3°, 0.6 m of overhang."""
+QUICK = 7  # `--quick` runs every seventh case: prime to the grid's sides, so all values are met
+SHOWN = 17  # the case that is drawn: sway of 1.25°, tilt of 3°, 0.6 m of overhang
 
 
 @dataclass(frozen=True)

@@ -37,8 +37,7 @@ from .paper_tables import PAPER_NETWORK
 from .paper_tables import PAPER_SOUP as PAPER
 from .speed import no_garbage_collection, pinned, usable_cores
 
-ALSO = (1, 2, 4, 32, 64)
-"""Divisions at which only the accuracy is measured, on touching boxes."""
+ALSO = (1, 2, 4, 32, 64)  # divisions at which only the accuracy is measured, on touching boxes
 
 OVERLAP = 1e-3
 """Depth [m] of touching and near-parallel cubes of edge 2 where the accuracy is measured. At exact
@@ -53,10 +52,8 @@ class Counts:
     """How many patterns of a regime are looked at."""
 
     timed: int
-    thin: int
-    """Every so many of them are timed for FCL alone and for the answer."""
-    judged: int
-    """Of how many the accuracy is measured."""
+    thin: int  # every so many of them are timed for FCL alone and for the answer
+    judged: int  # of how many the accuracy is measured
 
 
 FULL = {'touching': Counts(75_000, 25, 1000), 'near-parallel': Counts(1000, 1, 1000),
@@ -65,8 +62,7 @@ QUICK = {'touching': Counts(100, 10, 20), 'near-parallel': Counts(20, 1, 20),
          'coplanar': Counts(10, 2, 10)}
 REGIMES = tuple(FULL)
 
-Poses = tuple[np.ndarray, np.ndarray]
-"""Poses (n, 7) of A and of B, two cubes of edge 2."""
+Poses = tuple[np.ndarray, np.ndarray]  # poses (n, 7) of A and of B, two cubes of edge 2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,39 +72,29 @@ class SoupTimes:
     steps: np.ndarray
     alone: np.ndarray
     answers: np.ndarray
-    pairs: np.ndarray
-    """Pairs of triangles that meet, per pattern."""
-    worst_step: float
-    """Step of the pattern with the most pairs."""
+    pairs: np.ndarray  # pairs of triangles that meet, per pattern
+    worst_step: float  # step of the pattern with the most pairs
     worst_alone: float
-    touching: int
-    """Patterns that touch, by SAT."""
-    misses: int
-    """Of these, those in which no two triangles meet."""
+    touching: int  # patterns that touch, by SAT
+    misses: int  # of these, those in which no two triangles meet
 
 
 @dataclass(frozen=True, kw_only=True)
 class SoupErrors:
     """Soup of N divisions, judged on a regime; a row per pattern that the soup answered."""
 
-    point: np.ndarray
-    """[m]."""
-    normal: np.ndarray
-    """[deg]."""
-    depth: np.ndarray
-    """Deepest contact minus the true depth [m]."""
+    point: np.ndarray  # [m]
+    normal: np.ndarray  # [deg]
+    depth: np.ndarray  # deepest contact minus the true depth [m]
 
 
 @dataclass(frozen=True)
 class Rival:
     """A network, on the touching patterns that the soup's accuracy is measured on."""
 
-    point: float
-    """Mean error of the point [m]."""
-    normal: float
-    """Mean error of the normal [deg]."""
-    milliseconds: float
-    """Mean time of a call."""
+    point: float  # mean error of the point [m]
+    normal: float  # mean error of the normal [deg]
+    milliseconds: float  # mean time of a call
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -118,8 +104,7 @@ class SoupResult:
     times: Mapping[tuple[str, int], SoupTimes]
     errors: Mapping[tuple[str, int], SoupErrors]
     rivals: Mapping[str, Rival]
-    exact: float
-    """Mean time of a call of model `exact` [ms]."""
+    exact: float  # mean time of a call of model `exact` [ms]
     counts: Mapping[str, Counts]
 
     def ends(self, regime: str) -> tuple[SoupTimes, SoupTimes]:

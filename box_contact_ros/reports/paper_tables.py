@@ -34,14 +34,11 @@ PAPER_SOUP = {8: (1.10, 11233, 11.52), 10: (1.47, 14323, 15.47), 12: (1.85, 1791
               14: (1.94, 21789, 23.13), 16: (2.13, 24667, 24.63), 18: (2.31, 26517, 28.0),
               20: (2.72, 30475, 32.44), 22: (2.90, 35411, 36.77)}
 """By N: Table 3's mean time [ms]; Table 4's largest number of tests, and its time [ms]."""
-PAPER_NETWORK = 0.5
-"""The paper's time of its network [ms]."""
+PAPER_NETWORK = 0.5  # the paper's time of its network [ms]
 
 TABLES, FIGURES = (1, 2, 3, 4), (9, 10)
-QUICK = 10
-"""`--quick` looks at every tenth pattern."""
-SHOWN = 150
-"""Patterns in Figure 9."""
+QUICK = 10  # `--quick` looks at every tenth pattern
+SHOWN = 150  # patterns in Figure 9
 
 _DIFFERENCES = """\
 ## What differs from the paper, Tables 1 and 2
@@ -65,8 +62,7 @@ _FOLDED_DATA = """\
 - `paper`: on data brought by the boxes' symmetries to t ≥ 0 and angles in [−π/2, π/2], as the
   solver asks it; the paper's were not."""
 
-Errors = dict[str, np.ndarray]
-"""Wrapped errors (n, 4) [rad] by set."""
+Errors = dict[str, np.ndarray]  # wrapped errors (n, 4) [rad] by set
 
 
 def evaluate(weights: Weights, step: int = 1) -> dict[str, Errors]:

@@ -28,20 +28,16 @@ from ..scene.pose import quaternion_multiply
 from ..scene.pose_sets import CONTAINER, CUBE, SETS, Pairs, log_uniform, turns
 from ..solver.models import gated_models
 
-UNIT = 'MuJoCo mj_geomDistance'
-"""The contestant whose median single call is the unit of all ratios."""
+UNIT = 'MuJoCo mj_geomDistance'  # the contestant whose median single call is the unit of all ratios
 PACKAGES = ('numpy', 'mujoco', 'python-fcl')
 
-SINGLE_LIMIT = 0.36
-"""Single call of `exact` with the best instruction set [calls of UNIT]."""
+SINGLE_LIMIT = 0.36  # single call of `exact` with the best instruction set [calls of UNIT]
 BATCH_LIMITS = {'AVX-512': 0.088, 'AVX2': 0.125}
 """Pair of `exact` in a batch, on every set of poses, by instruction set [calls of UNIT]."""
 SPREAD_LIMIT = 1.20
 """Slowest set of poses by the median set, batch of `exact`, for the instruction sets above."""
-THREADS_LIMIT = 1.8
-"""Least gain of two threads on two cores, batch of `exact`."""
-START_LIMIT = 0.15
-"""From the start of a process to its first contact, without ROS [s]."""
+THREADS_LIMIT = 1.8  # least gain of two threads on two cores, batch of `exact`
+START_LIMIT = 0.15  # from the start of a process to its first contact, without ROS [s]
 
 FIRST_CONTACT = """\
 from box_contact_ros import ContactSolver
@@ -55,15 +51,12 @@ print(ContactSolver(cube, cube)((0, 0, 0, 0, 0, 0, 1), (0, 0, 1.9, 0, 0, 0, 1)),
 class Effort:
     """How much is timed."""
 
-    calls: int
-    """Single calls of a round."""
-    batch: int
-    """Pairs of a batch."""
+    calls: int  # single calls of a round
+    batch: int  # pairs of a batch
     shared_batch: int
     """Pairs of a batch that threads share: at 20,000, waking a second core takes a tenth."""
     rounds: int
-    starts: int
-    """New processes."""
+    starts: int  # new processes
 
 
 FULL = Effort(calls=2_000, batch=20_000, shared_batch=100_000, rounds=40, starts=20)
@@ -144,8 +137,7 @@ class Timing:
     """Times of one contestant [ns for each call or pair], over the rounds."""
 
     name: str
-    kind: str
-    """'single' or 'batch'; 'two threads' for a batch that two threads share."""
+    kind: str  # 'single' or 'batch'; 'two threads' for a batch that two threads share
     instruction_set: str
     rounds: list[float]
 
@@ -161,8 +153,7 @@ class Stint:
 
     name: str
     kind: str
-    count: int
-    """Calls or pairs of a run."""
+    count: int  # calls or pairs of a run
     run: Callable[[], object]
 
 

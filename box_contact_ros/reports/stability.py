@@ -27,12 +27,10 @@ from ..verification.fuzz import TOUCH_ULPS
 from ..verification.hard_poses import Cases, load
 from ..verification.judge import COORDINATE_ULPS, NOT_FINITE, NOT_UNIT, OUTSIDE, TOLERANCE, judge
 
-PATIENCE = 300.0
-"""For a family in a subprocess [s]."""
+PATIENCE = 300.0  # for a family in a subprocess [s]
 NUDGE = 1e-7
 """By how much poses are moved, of the size, and turned [rad], for the ratio of Δpoint to Δpose."""
-NUDGES = 3
-"""How often each."""
+NUDGES = 3  # how often each
 
 
 COUNTS = ('verdicts', 'normals', 'outside', 'not_finite')
@@ -48,24 +46,18 @@ class StabilityRow:
     family: str
     cases: int
     contacts: int = 0
-    verdicts: int = 0
-    """Wrong ones, where the gap or depth is more than rounding."""
+    verdicts: int = 0  # wrong ones, where the gap or depth is more than rounding
     normals: int = 0
     """Directions along which the boxes are deeper than the least depth, or that are not unit."""
-    outside: int = 0
-    """Points outside a box."""
+    outside: int = 0  # points outside a box
     not_finite: int = 0
-    depth: float = 0.0
-    """Worst depth error, of the size."""
+    depth: float = 0.0  # worst depth error, of the size
     point_p99: float = 0.0
     """Of contacts deeper than 1e-9 of the size, % of the smaller box's longest edge."""
     point_worst: float = 0.0
-    ratio: float = 0.0
-    """Worst |Δpoint| by |Δpose|."""
-    exact_ratio: float = 0.0
-    """The exact point's, on the same nudges."""
-    failure: str = ''
-    """What ended the model before its answers, if anything."""
+    ratio: float = 0.0  # worst |Δpoint| by |Δpose|
+    exact_ratio: float = 0.0  # the exact point's, on the same nudges
+    failure: str = ''  # what ended the model before its answers, if anything
 
 
 def _reach(pairs: Pairs) -> np.ndarray:

@@ -18,10 +18,8 @@ from ..resources import resource_path
 from ..solver.checks import shown
 from .scene_solver import Box, Pair, Place, Scene, dotted, faults
 
-LARGEST_FILE = 16 * 2**20
-"""Bytes that are read at most; some 100,000 pairs."""
-DEEPEST = 20
-"""Levels of nesting that are followed; a scene has four."""
+LARGEST_FILE = 16 * 2**20  # bytes that are read at most; some 100,000 pairs
+DEEPEST = 20  # levels of nesting that are followed; a scene has four
 
 
 class _Loader(getattr(yaml, 'CSafeLoader', yaml.SafeLoader)):  # type: ignore[misc]

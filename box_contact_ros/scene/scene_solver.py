@@ -17,8 +17,7 @@ from ..solver.checks import as_floats, pose_fault, shown, size_fault
 from ..solver.contact import Contact
 from ..solver.contact_solver import ContactSolver
 
-LARGEST_ID = 2**32 - 1
-"""Ids of pairs are uint32 in the cloud."""
+LARGEST_ID = 2**32 - 1  # ids of pairs are uint32 in the cloud
 
 _new_tuple = tuple.__new__  # a named tuple's own constructor is Python code
 
@@ -28,12 +27,9 @@ class Box:
     """A box of the scene: fixed if it has a pose, else moving."""
 
     name: str
-    size: tuple[float, ...]
-    """Three full extents [m]."""
-    pose: tuple[float, ...] | None = None
-    """`x y z qx qy qz qw` in the common frame, of a fixed box."""
-    pose_topic: str = ''
-    """Where a moving box's poses come from."""
+    size: tuple[float, ...]  # three full extents [m]
+    pose: tuple[float, ...] | None = None  # `x y z qx qy qz qw` in the common frame, of a fixed box
+    pose_topic: str = ''  # where a moving box's poses come from
 
 
 @dataclass(frozen=True)
@@ -41,8 +37,7 @@ class Pair:
     """Two boxes whose contact is asked for; the normal points from a to b."""
 
     id: int
-    name: str
-    """Prefix of its topics; empty for a scene of two boxes without a file."""
+    name: str  # prefix of its topics; empty for a scene of two boxes without a file
     a: str
     b: str
 
@@ -75,8 +70,7 @@ def two_boxes(size_a: Sequence[float], size_b: Sequence[float]) -> Scene:
     return Scene(boxes, (Pair(0, '', 'box_a', 'box_b'),))
 
 
-Place = tuple[str | int, ...]
-"""A value of a scene: ('boxes', 'load', 'size') or ('pairs', 3, 'a')."""
+Place = tuple[str | int, ...]  # A value of a scene: ('boxes', 'load', 'size') or ('pairs', 3, 'a')
 
 
 def dotted(place: Place) -> str:
@@ -120,12 +114,10 @@ def faults(boxes: Mapping[str, Box], pairs: Sequence[Pair]) -> Iterator[tuple[Pl
 class Answer(NamedTuple):
     """What one tick found."""
 
-    touching: list[tuple[Pair, Contact]]
-    """The pairs in contact."""
+    touching: list[tuple[Pair, Contact]]  # the pairs in contact
     stale: list[Pair]
     """The pairs that could not be evaluated, because a box has no pose that is recent enough."""
-    near: int
-    """How many pairs the conservative test left to the solver."""
+    near: int  # how many pairs the conservative test left to the solver
 
 
 class SceneSolver:

@@ -54,8 +54,7 @@ RESET = 1_000_000_000
 """Time has been set back if a stamp lies this far [ns] before an earlier one of its box."""
 NO_PARTNER = 'dropped: no partner'
 TOO_LATE = 'dropped: tick answered before'
-NEVER = -2**63
-"""Before any stamp [ns]."""
+NEVER = -2**63  # before any stamp [ns]
 REPEATED = 'refused: repeated stamp'
 OLD = 'refused: older than the last'
 RESETS = 'time went back'
@@ -64,11 +63,9 @@ RESETS = 'time went back'
 class StampedPose(NamedTuple):
     """A pose as it came."""
 
-    numbers: np.ndarray
-    """(7,) `x y z qx qy qz qw`."""
+    numbers: np.ndarray  # (7,) `x y z qx qy qz qw`
     frame_id: str
-    stamp: int
-    """[ns]"""
+    stamp: int  # [ns]
 
 
 Tick = list['StampedPose | None']
@@ -83,26 +80,21 @@ def _remembered() -> deque[int]:
 class BoxState:
     """What is known of one moving box; all stamps in ns."""
 
-    newest: int = NEVER
-    """Its latest stamp; NEVER: unseen."""
+    newest: int = NEVER  # its latest stamp; NEVER: unseen
     missing_since: int | None = None
     """Stamp of the first tick that lacks a pose of this box; None: current."""
-    joined: int = NEVER
-    """Newest tick that was answered before the box was in the scene."""
-    taken: deque[int] = field(default_factory=_remembered)
-    """Stamps of its poses that were taken."""
+    joined: int = NEVER  # newest tick that was answered before the box was in the scene
+    taken: deque[int] = field(default_factory=_remembered)  # stamps of its poses that were taken
     missed: deque[int] = field(default_factory=_remembered)
     """Ticks that were answered without the box."""
-    last: StampedPose | None = None
-    """Its last pose, for policy `latest`."""
+    last: StampedPose | None = None  # its last pose, for policy `latest`
 
 
 @dataclass(slots=True)
 class WaitingTick:
     """Poses of one stamp, by box, that wait for those of other boxes."""
 
-    number: int
-    """How many ticks began before."""
+    number: int  # how many ticks began before
     poses: dict[str, StampedPose] = field(default_factory=dict)
 
 

@@ -15,8 +15,7 @@ from numpy.typing import ArrayLike
 
 from ..core import LENGTH_MAX, LENGTH_MIN, QUATERNION_MAX, QUATERNION_MIN
 
-SHOWN = 200
-"""Characters of a refused value that an error shows."""
+SHOWN = 200  # characters of a refused value that an error shows
 _REPR = reprlib.Repr()
 _REPR.maxlist = _REPR.maxtuple = 8  # a pose, and whether there is more
 _REPR.maxlevel = 3

@@ -36,8 +36,7 @@ class Model(Protocol):
 class Exact:
     """Model `exact`: the centroid of the overlap in float64; see core/contact.hpp."""
 
-    single = 'exact', None
-    """The native model of single calls, and its network."""
+    single = 'exact', None  # the native model of single calls, and its network
 
     def __init__(self) -> None:
         self._pairs = native.PairSolver('exact', (1.0, 1.0, 1.0), (1.0, 1.0, 1.0))
@@ -58,13 +57,10 @@ class Exact:
 class Family:
     """Models of one entry that differ in a whole number N: `name` has the default, or `name-N`."""
 
-    argument: str
-    """The builder's name for N."""
+    argument: str  # the builder's name for N
     default: int
-    most: int
-    """N is 1 to this."""
-    reported: tuple[int, ...]
-    """The N that reports show."""
+    most: int  # N is 1 to this
+    reported: tuple[int, ...]  # the N that reports show
 
     def parse(self, name: str, text: str) -> int:
         """Return the N that `text` gives for the model `name`; raises ValueError for a bad one."""
@@ -81,22 +77,17 @@ class ModelEntry:
     """One model, or one family of them."""
 
     name: str
-    line: str
-    """How it finds the point, in a line."""
+    line: str  # how it finds the point, in a line
     builder: str
     """'module:function' that returns the `Model`; its module is imported when one is built."""
     takes: tuple[str, ...] = ()
     """The builder's keyword arguments: of size_a, size_b (1, 3), weights, and the family's."""
-    boxes: str = 'any'
-    """The boxes that it answers."""
-    extra: str = ''
-    """Extra of setup.py that brings its library."""
+    boxes: str = 'any'  # the boxes that it answers
+    extra: str = ''  # extra of setup.py that brings its library
     native_single: bool = False
     """Whether single calls are answered in C++, without a conversion in Python."""
-    native_batch: bool = False
-    """Whether the rows of a batch are answered in C++."""
-    gated: bool = False
-    """Whether fuzz, stability and the speed report hold it to their limits."""
+    native_batch: bool = False  # whether the rows of a batch are answered in C++
+    gated: bool = False  # whether fuzz, stability and the speed report hold it to their limits
     family: Family | None = None
 
     @property

@@ -38,8 +38,7 @@ class Network:
     """One perceptron, its numbers in one array."""
 
     name: str
-    widths: tuple[int, ...]
-    """Units per layer, inputs first: (6, 20, 18, 4)."""
+    widths: tuple[int, ...]  # units per layer, inputs first: (6, 20, 18, 4)
     packed: np.ndarray
     """float32: for each layer its weights (outputs × inputs, row-major), then its biases."""
 

@@ -39,13 +39,11 @@ from ..solver.models import gated_models
 from .judge import GATES, exact_gap, judge
 
 PAIRS, QUICK_PAIRS = 10_000_000, 60_000
-PIECE = 50_000
-"""Pairs that are drawn and judged at a time."""
+PIECE = 50_000  # pairs that are drawn and judged at a time
 TOUCH_ULPS = 8.0
 """Largest gap that is a touch, in units in the last place of the largest coordinate or size. The
 judge has to know this convention of the package."""
-SHOWN = 3
-"""Faults of a class and model that are printed."""
+SHOWN = 3  # faults of a class and model that are printed
 
 Sizes = Callable[[np.random.Generator, int], tuple[np.ndarray, np.ndarray]]
 
@@ -188,15 +186,12 @@ class Tally:
     model: str
     pairs: int = 0
     contacts: int = 0
-    near_touch: int = 0
-    """Pairs that were judged in 60 digits."""
+    near_touch: int = 0  # pairs that were judged in 60 digits
     exact_answers: int = 0
-    worst_depth: float = 0.0
-    """Largest depth error, by its tolerance."""
+    worst_depth: float = 0.0  # largest depth error, by its tolerance
     faults: dict[str, int] = field(default_factory=lambda: dict.fromkeys(
         (*GATES.values(), 'exception'), 0))
-    poses: list[str] = field(default_factory=list)
-    """The first faults, as code."""
+    poses: list[str] = field(default_factory=list)  # the first faults, as code
 
     @property
     def broken(self) -> int:

@@ -21,8 +21,7 @@ class Cases(NamedTuple):
     """A family as stored: n pairs with their truth."""
 
     pairs: Pairs
-    gap: np.ndarray
-    """(n,) largest gap over the fifteen axes, in 60 digits, rounded once [m]."""
+    gap: np.ndarray  # (n,) largest gap over the fifteen axes, in 60 digits, rounded once [m]
     centroid: np.ndarray
     """(n, 3) of the overlap as it is, in 60 digits, from A's position [m]; NaN if it has no
     volume or is shallower than what boxes are pressed in by."""

@@ -15,12 +15,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-TOLERANCE = 1e-12
-"""What separations and depths have to keep, of the size."""
+TOLERANCE = 1e-12  # what separations and depths have to keep, of the size
 COORDINATE_ULPS = 8.0
 """And far from the origin, of the coordinates' last place: poses are known no better."""
-DOUBT = 1e-14
-"""Gap, of the size, up to which its sign is not known in float64."""
+DOUBT = 1e-14  # gap, of the size, up to which its sign is not known in float64
 PRESSED = 3e-9
 """How far a corner moves, of the size, when boxes are pressed in along three axes. Contacts
 shallower than a third of this have the point of boxes pressed in."""
@@ -35,8 +33,7 @@ GATES = {MISSED: 'missed contact', PHANTOM: 'phantom contact', TOO_DEEP: 'too de
          TOO_SHALLOW: 'too shallow', WRONG_AXIS: 'wrong axis', NOT_UNIT: 'normal not unit',
          OUTSIDE: 'point outside', NOT_FINITE: 'NaN'}
 """Faults by bit; `judge` returns sums of them."""
-PIECE = 2048
-"""Pairs that are judged at a time: their corners fit a processor's caches."""
+PIECE = 2048  # pairs that are judged at a time: their corners fit a processor's caches
 _SIGNS = np.array([[0.5 if k >> c & 1 else -0.5 for c in range(3)] for k in range(8)])
 """(8, 3) corners of a box of edge 1."""
 
@@ -44,16 +41,12 @@ _SIGNS = np.array([[0.5 if k >> c & 1 else -0.5 for c in range(3)] for k in rang
 class Verdict(NamedTuple):
     """What `judge` found for n pairs."""
 
-    faults: np.ndarray
-    """(n,) sums of GATES' keys; of doubtful pairs only once they are settled."""
-    doubtful: np.ndarray
-    """(n,) whether float64 is not enough."""
+    faults: np.ndarray  # (n,) sums of GATES' keys; of doubtful pairs only once they are settled
+    doubtful: np.ndarray  # (n,) whether float64 is not enough
     depth_error: np.ndarray
     """(n,) |depth − true depth| by its tolerance, NaN where the solver says apart."""
-    tolerance: np.ndarray
-    """(n,) of depths [m]."""
-    along: np.ndarray
-    """(n,) gap along the solver's normal [m], NaN where it says apart."""
+    tolerance: np.ndarray  # (n,) of depths [m]
+    along: np.ndarray  # (n,) gap along the solver's normal [m], NaN where it says apart
 
     def settle(self, row: int, gap: float, found: tuple[np.ndarray, ...], touch: float) -> None:
         """Judge a doubtful pair by its exact gap; gaps to `touch` [m] count as contact.

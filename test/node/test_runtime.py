@@ -20,7 +20,7 @@ from box_contact_ros.node import contact_node, runtime, soup_node
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.parameters import answer_help
 from box_contact_ros.node.qos_events import QosEvents
-from box_contact_ros.scene.pairing import RESETS
+from box_contact_ros.scene.stamp_pairing import RESETS
 
 CUBES = {'size_a': [2.0, 2.0, 2.0], 'size_b': [2.0, 2.0, 2.0], 'model': 'exact'}
 TOUCHING = (0.5, 0.25, 1.875, 0, 0, 0, 1)

@@ -26,8 +26,7 @@ from ...output import percentiles
 from ...scene.patch_law import Patch
 from ...solver.contact import Contacts
 
-CONTACT_MESSAGES = ('cloud', 'point', 'normal')
-"""Kinds of message that a contact node answers with."""
+CONTACT_MESSAGES = ('cloud', 'point', 'normal')  # kinds of message that a contact node answers with
 ECHO_MESSAGES = ('echo',)
 WIDTHS = {'cloud': 7, 'point': 3, 'normal': 3, 'echo': 0}
 """Numbers kept of each, the first ones: see `first_row` for the cloud's."""
@@ -121,8 +120,7 @@ class AnswerLog:
         self.offers: set[int] = set()
         """Stamps [ns] of pairs that find out whether anyone answers; they count in no figure."""
         self.offers_answered: set[int] = set()
-        self.newest_contact = 0
-        """Stamp [ns] of the newest contact that is complete; 0 without any."""
+        self.newest_contact = 0  # stamp [ns] of the newest contact that is complete; 0 without any
         self.messages = self.matched = self.offer_messages = 0
         self._rows: dict[int, tuple[StreamLog, int]] = {}
 
@@ -209,17 +207,13 @@ class StreamResult:
     duplicates: int
     strangers: int
     wrong_verdicts: int
-    contradictions: int
-    """Answers whose cloud, point and normal disagree with each other."""
+    contradictions: int  # answers whose cloud, point and normal disagree with each other
     contacts: int
-    rate: float
-    """Pairs a second as they were really sent [Hz]."""
-    latencies: np.ndarray = field(repr=False)
-    """(answered,) [s]."""
+    rate: float  # pairs a second as they were really sent [Hz]
+    latencies: np.ndarray = field(repr=False)  # (answered,) [s]
     point_errors: np.ndarray = field(repr=False)
     """(n,) [m], where node and exact solver both report a contact."""
-    normal_errors: np.ndarray = field(repr=False)
-    """(n,) [deg], of the same."""
+    normal_errors: np.ndarray = field(repr=False)  # (n,) [deg], of the same
     lateness: np.ndarray = field(repr=False)
     """How far the client itself fell behind its schedule (sent,) [s]."""
 

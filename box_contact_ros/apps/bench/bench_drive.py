@@ -60,14 +60,10 @@ class MeasuredNode:
     """A node that is measured: how it is started, what it answered, its process while it runs."""
 
     log: AnswerLog
-    command: list[str]
-    """Arguments of Python; the sizes and the pose topics are added."""
-    poses: str = ''
-    """Prefix of the pose topics that it listens to."""
-    prefix: str = ''
-    """Of the topics it answers on."""
-    failed: bool = False
-    """Did not answer, or ended; for the group of streams that is under way."""
+    command: list[str]  # arguments of Python; the sizes and the pose topics are added
+    poses: str = ''  # prefix of the pose topics that it listens to
+    prefix: str = ''  # of the topics it answers on
+    failed: bool = False  # did not answer, or ended; for the group of streams that is under way
     process: subprocess.Popen[bytes] | None = None
     output: IO[bytes] | None = None
 
@@ -152,8 +148,7 @@ class Bench:
         """rate: pairs a second [Hz]; stop: set to call all off; node_cores: of the nodes."""
         self.nodes, self.client, self.executor, self.clock = nodes, client, executor, clock
         self.rate, self.node_cores, self.stop = rate, node_cores, stop
-        self.notes: list[str] = []
-        """What went wrong with the nodes as such."""
+        self.notes: list[str] = []  # what went wrong with the nodes as such
         self.on_answer: Callable[[], None] = lambda: None
         """Called after messages were handed to the logs."""
         self._last = 0

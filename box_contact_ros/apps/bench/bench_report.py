@@ -13,12 +13,10 @@ from matplotlib.ticker import LogFormatter
 from ...output import markdown_table, percentiles, subplots, write_csv
 from .answer_log import StreamResult
 
-LEAST_DRAWN = 1e-9
-"""Point errors [mm] are drawn as no less: a logarithmic axis has no zero."""
+LEAST_DRAWN = 1e-9  # point errors [mm] are drawn as no less: a logarithmic axis has no zero
 COLORS = {'contact': 'tab:blue', 'soup': 'tab:red', 'echo': 'tab:gray'}
 MARKERS = 'osD^vP*X<>hpd8'
-DIGITS = 9
-"""Significant digits of a figure in the CSV file."""
+DIGITS = 9  # significant digits of a figure in the CSV file
 COUNTS = [entry.name for entry in dataclasses.fields(StreamResult) if entry.type in ('str', 'int')]
 
 

@@ -22,8 +22,7 @@ COPLANAR_OFFSET = 0.8
 """Largest offset of stacked cubes along x and along y, as a share of the edge. Up to 0.85 the two
 faces of edge 2 overlap whatever the yaw t: 2·0.85·(cos t + sin t) < (cos t + sin t) + 1, the sum
 of their half-widths along a side of the rotated face."""
-GAPS = (1e-3, 1.0)
-"""Least and largest SAT gap of the pairs that are apart [m]."""
+GAPS = (1e-3, 1.0)  # least and largest SAT gap of the pairs that are apart [m]
 
 
 @dataclass(frozen=True)
@@ -31,14 +30,10 @@ class Stream:
     """n pairs of poses `x y z qx qy qz qw` in a common frame, in the order they are sent."""
 
     name: str
-    size_a: Size
-    """Full extents of box A [m]."""
-    size_b: Size
-    """Full extents of box B [m]."""
-    pose_a: np.ndarray
-    """(n, 7)."""
-    pose_b: np.ndarray
-    """(n, 7)."""
+    size_a: Size  # full extents of box A [m]
+    size_b: Size  # full extents of box B [m]
+    pose_a: np.ndarray  # (n, 7)
+    pose_b: np.ndarray  # (n, 7)
 
     def __len__(self) -> int:
         return len(self.pose_a)
@@ -53,8 +48,7 @@ class Stream:
 class Replay(Stream):
     """The pairs of poses of equal stamp of a recording, in the order of their stamps."""
 
-    stamps: np.ndarray
-    """(n,) as recorded [ns]."""
+    stamps: np.ndarray  # (n,) as recorded [ns]
 
     @property
     def described(self) -> str:

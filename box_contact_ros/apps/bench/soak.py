@@ -36,14 +36,12 @@ from .bench_report import bullets, write_results
 from .pose_streams import Stream, make_stream
 
 BLOCK_SECONDS = 10.0
-ECHO_SHARE = 0.25
-"""Of a block, for each echo node."""
+ECHO_SHARE = 0.25  # of a block, for each echo node
 SAME_POINT = 1e-9
 """How far [m] the node's point may lie from the one that the model gives here: another processor
 may round differently. Poses of the streams that follow each other differ by millimetres and more.
 """
-GROWTH_LIMIT = 1.0
-"""Of the contact node's resident memory after its first block [MB]."""
+GROWTH_LIMIT = 1.0  # of the contact node's resident memory after its first block [MB]
 P50_LIMIT, P99_LIMIT, START_LIMIT = 1.25, 1.5, 2.5
 """Aims: ratios to the latencies of the echo node that is served alike, and seconds from start to
 first answer."""

@@ -27,8 +27,7 @@ from rosbags.typesys import Stores, get_typestore
 from ...solver.checks import as_size, shown
 from ..bench.pose_streams import Replay, Size
 
-BAG_VERSION: Final = 9
-"""Of rosbag2's metadata: what Jazzy writes and reads."""
+BAG_VERSION: Final = 9  # of rosbag2's metadata: what Jazzy writes and reads
 NANOSECONDS = 1_000_000_000
 POSE = 'geometry_msgs/msg/PoseStamped'
 TYPES = {
@@ -67,8 +66,7 @@ class Recorder:
         types = get_typestore(Stores.ROS2_JAZZY)
         kinds = {topic: type_of(topic) for topic in topics}
         self.counts = Counter(dict.fromkeys(topics, 0))
-        self.span: tuple[int, int] | None = None
-        """Times of the first and the last message [ns]."""
+        self.span: tuple[int, int] | None = None  # times of the first and the last message [ns]
         try:
             self._writer = Writer(folder, version=BAG_VERSION, storage_plugin=StoragePlugin.MCAP)
             self._writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)

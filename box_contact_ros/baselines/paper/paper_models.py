@@ -41,10 +41,8 @@ class Paper:
     """
 
     model = 'paper'
-    experts: tuple[str, ...] = ('contact',)
-    """The networks of the weights file."""
-    fold_to = OCTANT
-    """The way into the networks' domain."""
+    experts: tuple[str, ...] = ('contact',)  # the networks of the weights file
+    fold_to = OCTANT  # the way into the networks' domain
 
     def __init__(self, size_a: np.ndarray, size_b: np.ndarray, weights: str | None) -> None:
         size = size_a[0]

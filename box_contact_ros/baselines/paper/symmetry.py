@@ -18,18 +18,12 @@ __all__ = ['EDGE_EDGE', 'FEATURES', 'Folds', 'NO_FOLD', 'OCTANT', 'VERTEX_FACE',
 class Folds:
     """n folded pairs: t' = M t, R' = M R Nᵀ."""
 
-    map_first: np.ndarray
-    """(n, 3, 3) M, a signed permutation of the first box's axes."""
-    map_second: np.ndarray
-    """(n, 3, 3) N, a signed permutation of the second box's axes."""
-    offset: np.ndarray
-    """(n, 3) t' of the second box [m]."""
-    rotation: np.ndarray
-    """(n, 3, 3) R', the second box's axes as columns."""
-    angles: np.ndarray
-    """(n, 3) roll, pitch, yaw [rad] of R' = Rz(yaw) Ry(pitch) Rx(roll)."""
-    subset: np.ndarray
-    """(n,) VERTEX_FACE or EDGE_EDGE after FEATURES, else −1."""
+    map_first: np.ndarray  # (n, 3, 3) M, a signed permutation of the first box's axes
+    map_second: np.ndarray  # (n, 3, 3) N, a signed permutation of the second box's axes
+    offset: np.ndarray  # (n, 3) t' of the second box [m]
+    rotation: np.ndarray  # (n, 3, 3) R', the second box's axes as columns
+    angles: np.ndarray  # (n, 3) roll, pitch, yaw [rad] of R' = Rz(yaw) Ry(pitch) Rx(roll)
+    subset: np.ndarray  # (n,) VERTEX_FACE or EDGE_EDGE after FEATURES, else −1
 
     def folded(self, vectors: np.ndarray) -> np.ndarray:
         """Return points or directions (n, 3) of the first box's frame, folded."""
