@@ -84,7 +84,7 @@ PROGRAMS = {
         'reports.stability', 'report soup',
         'what each model makes of families of hard poses'),
     'paper': _program(
-        'reports.paper_tables', 'report',
+        'reports.paper.paper_tables', 'report',
         "redo the source paper's tables, its figures beside ours"),
 }
 

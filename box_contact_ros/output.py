@@ -18,6 +18,8 @@ import numpy as np
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+REPORTS = Path(__file__).parent / 'reports'
+
 # --- where results go -----------------------------------------------------------------------------
 
 
@@ -69,6 +71,11 @@ def markdown_table(head: Sequence[str], rows: Iterable[Sequence[object]], *, wor
         lines = [[cell.ljust(width) if column < words else cell.rjust(width)
                   for column, (cell, width) in enumerate(zip(line, widths))] for line in lines]
     return '\n'.join('| ' + ' | '.join(line) + ' |' for line in (lines[0], rule, *lines[1:]))
+
+
+def page(template: str, **values: object) -> str:
+    """Return a page or a part of one: a Markdown file of reports/ with its `{fields}` filled in."""
+    return (REPORTS / f'{template}.md').read_text('utf-8').format(**values)
 
 
 def write_csv(path: Path, rows: Iterable[Mapping[str, object]], *, digits: int = 6) -> None:

@@ -38,7 +38,7 @@ from ..solver.models import find_model
 from ..solver.weights_file import WeightsError, load_weights
 from ..training.paper_recipe import dataset
 from ..training.paper_recipe.errors import errors_of, figures, figures_by_part, wrapped
-from .paper_tables import PAPER
+from .paper.paper_tables import PAPER
 
 
 class Limit(NamedTuple):
@@ -344,45 +344,11 @@ def csv_rows(rows: Sequence[AccuracyRow]) -> list[dict[str, object]]:
 def page(rows: Sequence[AccuracyRow], errors: dict[str, np.ndarray], drawn: int, command: str,
          seed: int, broken: Sequence[str]) -> str:
     """Return the Markdown page."""
-    verdict = f'BROKEN: {"; ".join(broken)}.' if broken else 'All limits hold.'
-    return f"""# Point error against the exact centroid
-
-Made by `{command}` on
-{output.machine(native)}; seed {seed}. {verdict}
-
-Errors are distances between a model's contact point and that of model `exact`, in % of the longest
-edge of the smaller box. `answered by exact`: pairs outside the network's range. Verdicts, normals
-and separations are compared with `exact`: they are SAT's in both, so nothing may differ.
-`corrected`: points that the network had put outside a box, and that were moved in. `outside`: the
-farthest that an answer is outside a box, as a fraction of the size, beside what boxes that only
-touch are pressed in by (1e-9).
-
-{table(rows)}
-
-![Distribution of the errors](accuracy.png)
-
-## Per class and per winning axis
-
-mean/p99/worst in %, and the share of the set's pairs. A contact is edge-edge if SAT's winner is a
-pair of edges whose axis is more than 6° from every face normal; otherwise it is named after how
-many corners of one box have gone through the plane of the other's best face: one (vertex-face), two
-(edge-face), more (face-face). `face axis` and `edge axis` are SAT's winners: in stacks many winners
-are pairs of edges although faces meet.
-
-{class_table(rows)}
-
-## The paper's figures
-
-Errors [rad] over azimuth and elevation of the impact point, seen from the first box's centre, and
-of the normal, on the external set of the weights of model `paper` (cubes of edge 2 that just touch,
-as labelled when they were drawn). {MAE_LIMIT:g} is the limit of `mlp`'s MAE.
-
-{paper_table(errors, drawn)}
-
-The labels are the points of touch; `exact` presses B in by 1e-9 of the size and takes the centroid
-of what overlaps. Its figures are the difference between the two definitions, and the floor of what
-`mlp` could reach.
-"""
+    return output.page(
+        'pages/accuracy', command=command, machine=output.machine(native), seed=seed,
+        verdict=f'BROKEN: {"; ".join(broken)}.' if broken else 'All limits hold.',
+        table=table(rows), class_table=class_table(rows), mae_limit=MAE_LIMIT,
+        paper_table=paper_table(errors, drawn))
 
 
 def draw(path: Path, rows: Sequence[AccuracyRow]) -> None:

@@ -44,7 +44,7 @@ from ..solver.arguments import program_parser
 from ..solver.models import MODELS
 from ..solver.weights_file import load_weights
 from .accuracy import CLASSES, classify
-from .paper_tables import PAPER_NETWORK, PAPER_SOUP
+from .paper.paper_tables import PAPER_NETWORK, PAPER_SOUP
 from .speed import pinned, take_turns, usable_cores, write_speed
 
 
@@ -327,35 +327,12 @@ def honesty(rows: Sequence[FrontierRow]) -> str:
 
 def page(rows: Sequence[FrontierRow], missing: Sequence[str], command: str) -> str:
     """Return the Markdown page."""
-    skipped = ''.join(f'\n\nLeft out: {line}.' for line in missing)
-    return f"""# Speed against error
-
-Made by `{command}` on one core of {output.machine(native)}.
-Times are from two poses to a result in Python; a call's includes the two readings of the clock
-(about 0.05 µs). Ratios within this run are what to trust.{skipped}
-
-![Point error over time, one panel a set](frontier.png)
-
-## In short
-
-Times are those on containers with sway; normals and verdicts are over all sets.
-
-{in_short(rows)}
-
-{honesty(rows)}
-
-## All sets
-
-Point errors in % of the smaller box's longest edge, as median/p99/worst, per contact class
-([accuracy](accuracy.md)). *Missed*: contacts of `exact` that were not reported; *invented*: the
-reverse. These and normals count only where the gap or depth is more than {VERDICT:g} of the size:
-at exact touch either verdict is right, and many normals. *Judged*: pairs asked; models with batches
-are asked for more. Random sizes are timed on {FEW_PAIRS} pairs of sizes. Engines that return
-several points are entered twice: their deepest, and the mean. `mlp N` are networks of N hidden
-units, trained for 60,000 steps.
-
-""" + '\n\n'.join(f'### {name.capitalize()}\n\n{getdoc(ALL_SETS[name])}\n\n'
-                  f'{set_table(rows, name)}' for name in ALL_SETS) + '\n'
+    return output.page(
+        'pages/frontier', command=command, machine=output.machine(native),
+        skipped=''.join(f'\n\nLeft out: {line}.' for line in missing), in_short=in_short(rows),
+        honesty=honesty(rows), verdict=VERDICT, few_pairs=FEW_PAIRS, sets='\n\n'.join(
+            f'### {name.capitalize()}\n\n{getdoc(ALL_SETS[name])}\n\n{set_table(rows, name)}'
+            for name in ALL_SETS))
 
 
 def csv_rows(rows: Sequence[FrontierRow]) -> list[dict[str, object]]:

@@ -24,6 +24,7 @@ import numpy as np
 from ..baselines.engines import Engine, fcl_collision, mujoco_distance, ours
 from ..core import FORCE, instruction_sets, native
 from ..output import machine, markdown_table, percentiles, write_csv
+from ..output import page as filled_page
 from ..scene.pose import quaternion_multiply
 from ..scene.pose_sets import CONTAINER, CUBE, SETS, Pairs, log_uniform, turns
 from ..solver.models import gated_models
@@ -330,21 +331,11 @@ def page(runs: Sequence[Sequence[Timing]], claims: Sequence[Claim], command: str
          effort: Effort) -> str:
     """Return the Markdown page."""
     here = machine(native, PACKAGES)
-    listed = '\n'.join(f'- {"" if claim.holds else "BROKEN: "}{claim.text}' for claim in claims)
-    tables = '\n\n'.join(f'## {run[0].instruction_set}\n\n{table(run)}' for run in runs)
-    return f"""# Speed
-
-Made by `{command}` on one core of {here.processor}; {here.compiler}; {here.versions}.
-
-Every time is from poses to a result in Python; that of MuJoCo and FCL includes the update of both
-poses. Each instruction set has a process of its own. In it the contestants take turns,
-{effort.rounds} rounds. Percentiles are over rounds of {effort.calls:,} calls, or of one batch of
-{effort.batch:,} pairs.
-
-{listed}
-
-{tables}
-"""
+    return filled_page(
+        'pages/speed', command=command, processor=here.processor, compiler=here.compiler,
+        versions=here.versions, effort=effort,
+        claims='\n'.join(f'- {"" if one.holds else "BROKEN: "}{one.text}' for one in claims),
+        tables='\n\n'.join(f'## {run[0].instruction_set}\n\n{table(run)}' for run in runs))
 
 
 def write_timings(path: Path, timings: Sequence[Timing]) -> None:

@@ -160,32 +160,13 @@ def gates(rows: Sequence[StabilityRow]) -> list[str]:
 def page(rows: Sequence[StabilityRow], command: str) -> str:
     """Return the Markdown page."""
     broken = gates(rows)
-    models = list(dict.fromkeys(row.model for row in rows))
-    parts = [f"""# Numerical stability
-
-Made by `{command}` on {output.machine(native)}.
-{"BROKEN: " + "; ".join(broken) + "." if broken else
-"Of `exact` and `mlp`, every verdict and normal is right, and every point in both boxes."}
-
-Families of poses that break collision tests: `test/helpers/hard_pose_recipes.py` describes each.
-Every case is also turned, swapped, renamed or scaled. Poses are stored as doubles, the truth in 60
-digits.
-
-- *Wrong verdict*: where the gap or depth is more than 16 units in the last place of the largest
-  coordinate.
-- *Wrong normal*: not the direction of least depth, to 1e-12 of the size, or not unit.
-- *Depth error*: of the size. Far from the origin (`f_far`) a unit in the coordinates' last place is
-  1e-10 of the size.
-- *Point error*: contacts deeper than 1e-9 of the size.
-- *Δpoint by Δpose*: B is nudged by 1e-7 of the size. Where several axes tie, or the overlap is as
-  thin as the nudge, even the exact point moves a lot. The column on the right is the exact point's.
-
-FCL's box-box and the soup are in the table so that users see what they would get otherwise. A
-process that ended is reported in its row.
-"""]
-    for model in models:
-        parts.append(f'## `{model}`\n\n{table([row for row in rows if row.model == model])}\n')
-    return '\n'.join(parts)
+    models = dict.fromkeys(row.model for row in rows)
+    return output.page(
+        'pages/stability', command=command, machine=output.machine(native),
+        verdict=f'BROKEN: {"; ".join(broken)}.' if broken else 'Of `exact` and `mlp`, every '
+        'verdict and normal is right, and every point in both boxes.', models='\n\n'.join(
+            f'## `{model}`\n\n{table([row for row in rows if row.model == model])}'
+            for model in models))
 
 
 def main(args: Sequence[str] | None = None) -> int:

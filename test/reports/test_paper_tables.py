@@ -13,7 +13,7 @@ pytest.importorskip('matplotlib')
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.baselines import soup
-from box_contact_ros.reports import paper_soup_tables, paper_tables
+from box_contact_ros.reports.paper import paper_soup_tables, paper_tables
 from box_contact_ros.training.paper_recipe import dataset
 
 EXACT = ContactSolver(poses.CUBE, poses.CUBE, model='exact')

@@ -13,7 +13,7 @@ from safetensors.numpy import load, load_file, save_file
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.baselines.paper import _networks
-from box_contact_ros.reports import paper_tables
+from box_contact_ros.reports.paper import paper_tables
 from box_contact_ros.resources import resource_path
 from box_contact_ros.solver.weights_file import (
     CARD_FIELDS,

@@ -25,17 +25,17 @@ import fcl
 import numpy as np
 from tqdm import tqdm
 
-from .. import output
-from ..baselines import soup
-from ..core import native
-from ..scene.pose import degrees_between
-from ..scene.pose_sets import CUBE, stacks
-from ..solver.contact import Contacts
-from ..solver.contact_solver import ContactSolver
-from ..training.paper_recipe.dataset import quaternion_from_euler
+from ... import output
+from ...baselines import soup
+from ...core import native
+from ...scene.pose import degrees_between
+from ...scene.pose_sets import CUBE, stacks
+from ...solver.contact import Contacts
+from ...solver.contact_solver import ContactSolver
+from ...training.paper_recipe.dataset import quaternion_from_euler
+from ..speed import no_garbage_collection, pinned, usable_cores
 from .paper_tables import PAPER_NETWORK
 from .paper_tables import PAPER_SOUP as PAPER
-from .speed import no_garbage_collection, pinned, usable_cores
 
 ALSO = (1, 2, 4, 32, 64)  # divisions at which only the accuracy is measured, on touching boxes
 
@@ -391,31 +391,15 @@ def section_3(result: SoupResult) -> str:
     counts = result.counts
     thin = ', '.join(f'{math.ceil(count.timed / count.thin):,} {name}'
                      for name, count in counts.items())
-    first, last = result.ends('coplanar')
+    _, last = result.ends('coplanar')
     share = 100 * (1 - last.alone.mean() / last.steps[::counts['coplanar'].thin].mean())
     network = result.rivals['paper'].milliseconds
-    slower = [cell.steps.mean() / network for cell in result.ends('touching')]
-    return f"""## Table 3: polygon soup, mean time
-
-ms, on two cubes of edge 2. *Touching*: {counts['touching'].timed:,} patterns of the external set
-of Table 1. *Near-parallel*: {counts['near-parallel'].timed:,}; one cube on the other, 1 mm deep,
-tilted by 1e-6 to 1e-3 rad. *Coplanar*: {counts['coplanar'].timed:,}; faces in one plane to the last
-bit, one in ten exactly on top, the others anywhere, half with parallel sides, half under any yaw.
-
-{table_3(result)}
-
-- *Step* is what the paper times: two placed soups in, all contacts out, here as python-fcl's list.
-  *FCL alone* is the same search without the list, as compiled code would see it ({share:.0f} % of
-  the coplanar step at N = {max(PAPER)} is the making of Python objects). *Answer* is a call of
-  model `soup`, with SAT, point and normal. The last two are timed on {thin} patterns.
-- A call of model `paper`, network, SAT and Python included, takes {1e3 * network:.1f} µs in the
-  same run, on any pattern: the step takes {slower[0]:.0f} times that at N = {min(PAPER)} and
-  {slower[1]:.0f} times at N = {max(PAPER)} on touching cubes, and
-  {first.steps.mean() / network:,.0f} to {last.steps.mean() / network:,.0f} times on coplanar
-  ones. The paper has 2 to 6 on the first.
-- A call of model `exact` takes {1e3 * result.exact:.1f} µs: it is the soup that is slow, not exact
-  geometry, and against that the paper's network wins nothing.
-"""
+    touching, coplanar = ([cell.steps.mean() / network for cell in result.ends(regime)]
+                          for regime in ('touching', 'coplanar'))
+    return output.page(
+        'paper/table_3', counts=counts, table=table_3(result), share=share, thin=thin,
+        low=min(PAPER), high=max(PAPER), network=1e3 * network, exact=1e3 * result.exact,
+        touching=touching, coplanar=coplanar)
 
 
 def section_4(result: SoupResult) -> str:
@@ -428,60 +412,19 @@ def section_4(result: SoupResult) -> str:
         return ' to '.join(f'{cell.pairs.max():,}' for cell in result.ends(regime))
 
     low, high = min(PAPER), max(PAPER)
-    few = max(result.times['touching', n].pairs.max() for n in PAPER)
-    return f"""## Table 4: polygon soup, the pattern with the most pairs
-
-Of the same patterns: the most pairs of triangles that meet, and that pattern's times (median of
-{REPEATS}).
-
-{table_4(result)}
-
-- The paper counts "tests" and does not say which. FCL counts its tests of volumes and triangles,
-  but python-fcl does not hand the numbers out: here are pairs that do meet.
-- Only exactly coplanar faces come near the paper's numbers ({most('coplanar')} pairs, against
-  {most('near-parallel')} of near-parallel ones): that is the regime of its worst case. A uniform
-  set of angles may well hold exact zeros, and so coplanar cubes; angles drawn at random, as
-  ours, do not, and touching cubes meet in {few} pairs at most.
-- What does not fit is the growth: from N = {low} to {high} the paper's worst time grows by a factor
-  of {PAPER[high][2] / PAPER[low][2]:.1f}, our coplanar one by {growth('coplanar'):.1f} (pairs fill
-  the patch and go with N²), our near-parallel one by {growth('near-parallel'):.1f} (pairs lie along
-  the patch's outline and go with N).
-"""
+    return output.page(
+        'paper/table_4', table=table_4(result), repeats=REPEATS, low=low, high=high,
+        growth_paper=PAPER[high][2] / PAPER[low][2], growth_coplanar=growth('coplanar'),
+        growth_parallel=growth('near-parallel'), most_coplanar=most('coplanar'),
+        most_parallel=most('near-parallel'),
+        few=max(result.times['touching', n].pairs.max() for n in PAPER))
 
 
 def section_errors(result: SoupResult) -> str:
     """Return the soup's errors, and what differs from the paper."""
-    counts = result.counts
     along = 1e3 * result.errors['near-parallel', max(PAPER)].point.mean()
-    return f"""## What the soup answers
-
-Errors against `exact`: point in mm (of cubes of 2,000 mm), normal in degrees, depth in mm.
-{counts['touching'].judged:,} touching patterns pressed to 1 mm of overlap,
-{counts['near-parallel'].judged:,} near-parallel ones (1 mm deep as they are) and
-{counts['coplanar'].judged:,} coplanar ones (depth zero).
-
-{table_of_errors(result)}
-
-- *Misses at exact touch*: patterns of Table 3 that touch by the axis test, but where no two
-  triangles meet, within rounding. Model `soup` then gives the axis test's normal and the exact
-  point, and counts it.
-- *Depth*: the deepest of FCL's contacts less the true depth, mean. It is measured to the corners of
-  triangles, so it shrinks with them and not with the overlap: useless at 1 mm. Model `soup` takes
-  separation and verdict from the axis test.
-- On near-parallel cubes the triangles that meet lie along the outline of the patch, not in it, so
-  the point stays {along:.0f} mm off, however small they are.
-- On touching cubes the normal hardly gets better with N: what counts is how many of the triangles
-  that meet are the face's, and how many the sides'.
-
-## What differs from the paper, Tables 3 and 4
-
-- The machine: the paper had a Pentium IV of 1.5 GHz. Compare ratios, not times.
-- FCL in place of RAPID: trees of oriented boxes there as here (FCL's `OBBRSS`), but other code, and
-  a list of Python objects in place of one in C.
-- CPU times of single calls, in place of gprof's samples.
-- The patterns are drawn at random; the paper's angles were a uniform set.
-- The paper's column "triangles/face" holds 12 N²: it is per cube.
-"""
+    return output.page('paper/soup_errors', counts=result.counts, table=table_of_errors(result),
+                       along=along)
 
 
 def section_figure_10(result: SoupResult, picture: str) -> str:

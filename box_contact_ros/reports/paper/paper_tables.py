@@ -15,13 +15,13 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import output
-from ..core import native
-from ..resources import resource_path
-from ..solver.weights_file import Weights, WeightsError, load_weights
-from ..training.paper_recipe import dataset
-from ..training.paper_recipe.dataset import SETS, Patterns
-from ..training.paper_recipe.errors import PARTS, errors_of, figures, figures_by_part, predict
+from ... import output
+from ...core import native
+from ...resources import resource_path
+from ...solver.weights_file import Weights, WeightsError, load_weights
+from ...training.paper_recipe import dataset
+from ...training.paper_recipe.dataset import SETS, Patterns
+from ...training.paper_recipe.errors import PARTS, errors_of, figures, figures_by_part, predict
 
 PAPER = {
     1: {'ME': (0.0332, 0.0259, -0.0005), 'MAE': (0.4161, 0.4383, 0.5624),
@@ -39,21 +39,6 @@ PAPER_NETWORK = 0.5  # the paper's time of its network [ms]
 TABLES, FIGURES = (1, 2, 3, 4), (9, 10)
 QUICK = 10  # `--quick` looks at every tenth pattern
 SHOWN = 150  # patterns in Figure 9
-
-_DIFFERENCES = """\
-## What differs from the paper, Tables 1 and 2
-
-- Table 1: the data are those of section 3, with points and angles drawn at random instead of on
-  grids the paper does not give. Equal halves are vertex-face and edge-edge.
-- Table 2: the paper does not say what its subsets are. Here SAT's winning axis, found from the pose
-  alone, chooses between two, and the cube's symmetries bring the features that meet to fixed
-  places. Some outputs are then constant by construction: the normal's two angles in vertex-face,
-  the normal's elevation and the point's azimuth in edge-edge. That is why its errors are so much
-  smaller than the paper's: it is an easier problem, not a like-for-like comparison.
-- The networks are the paper's (two hidden layers of tanh, linear output, backpropagation with
-  momentum stopped by cross-validation), with a learning rate that falls over the epochs, and the
-  best of several starts by the cross-validation error.
-"""
 
 _DATA_AS_DRAWN = """\
 - `paper` was trained on the data as drawn. `paper, folded` is the same network on the same boxes,
@@ -181,17 +166,7 @@ Ours is over both subsets taken together; each has as many patterns as the paper
 """)
     if 1 in tables:
         detail['containers'] = evaluate(_shipped('paper-12.192x2.438x2.591'), step)['contact']
-    sections += [_DIFFERENCES, f"""## Tables 1 and 2 in detail
-
-`all` is over the four outputs, `point` and `normal` over the two angles of each.
-
-{by_part(detail)}
-
-{folding}
-- `vertex_face`, `edge_edge`: the two subsets of Table 2.
-- `containers`: a network 6-20-18-4 for two boxes of 12.192 × 2.438 × 2.591 m, on folded data.
-"""]
-    return sections
+    return [*sections, output.page('paper/tables_1_2', by_part=by_part(detail), folding=folding)]
 
 
 def section_figure_9(picture: str) -> str:
