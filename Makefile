@@ -33,7 +33,7 @@ help:
 	echo 'make test     ruff, mypy and all tests'
 	echo 'make check    all linters, and the quick tests of core, solver and scene: a minute'
 	echo 'make test-arm the C++ test on an emulated 64-bit ARM'
-	echo 'make coverage share of the core that its own tests run'
+	echo 'make coverage lines of solver, scenes and nodes that their tests run'
 	echo 'make clean    remove .venv and everything that was generated'
 	echo
 	echo 'Each does its own set-up, in .venv. Arguments: make test ARGS="-k sat -x".'
@@ -62,11 +62,13 @@ test-arm:
 	@.ci/setup test
 	exec bash test/core/arm.sh $(PY)
 
-# Lines of the core's Python side, the solver and scenes, that their own tests run.
+# Lines of solver, scenes and nodes that their own tests run, in all processes.
 coverage:
 	@.ci/setup test
-	$(PY) -m coverage run -m pytest test/solver test/scene test/baselines/test_paper_models.py \
-	    test/package/test_package.py $(ARGS)
+	$(PY) -m coverage erase
+	$(PY) -m coverage run -m pytest test/solver test/scene test/node \
+	    test/baselines/test_paper_models.py test/package/test_package.py $(ARGS)
+	$(PY) -m coverage combine -q
 	$(PY) -m coverage report
 
 clean:

@@ -304,25 +304,11 @@ def honesty(rows: Sequence[FrontierRow]) -> str:
     exact, net = (by[name, 'containers'] for name in ('exact', 'mlp'))
     medians = {name: [by[name, s].batch for s in SETS] for name in ('exact', 'mlp')}
     spread = {name: max(values) / min(values) for name, values in medians.items()}
-    lines = [
-        f'- **The network saves time, and has an error.** A single call of `mlp` takes '
-        f'{net.single[0] / exact.single[0]:.2f} of the time of `exact`. From Python most of either '
-        f'is the call itself. A pair in a batch takes '
-        f'{net.batch / exact.batch:.2f} of the time of `exact` on containers, '
-        f'{by["mlp", "stacks"].batch / by["exact", "stacks"].batch:.2f} on stacks. From the '
-        f'cheapest set to the dearest its cost grows by a factor of {spread["mlp"]:.2f}, the cost '
-        f'of `exact` by {spread["exact"]:.2f}.',
-        '- **Only these two return the centroid.** The error of an engine is mostly not a fault: '
-        'an engine returns a deepest point or the corners of a patch, and so answers another '
-        'question. A user who needs one point for the whole patch is off by this distance.']
-    paper = by.get(('paper', 'random cubes'))
-    if paper and paper.errors.points:
-        lines.append(
-            f"- **The paper's own network is not a contact model.** Its median point error is "
-            f'{paper.errors.points["all"][1]:.0f} % of the edge on random cubes. A smooth network '
-            "answers with something between both sides of a jump. Its time is as constant as the "
-            "mlp's.")
-    return '\n'.join(lines)
+    return output.page(
+        'pages/frontier_honesty', single=net.single[0] / exact.single[0],
+        containers=net.batch / exact.batch,
+        stacks=by['mlp', 'stacks'].batch / by['exact', 'stacks'].batch, spread=spread,
+        paper=by['paper', 'random cubes'].errors.points['all'][1]).rstrip()
 
 
 def page(rows: Sequence[FrontierRow], missing: Sequence[str], command: str) -> str:

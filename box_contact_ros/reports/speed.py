@@ -7,7 +7,6 @@ follow. The exit status is 1 if a limit is broken.
 """
 from __future__ import annotations
 
-import gc
 import json
 import os
 import subprocess
@@ -23,7 +22,7 @@ import numpy as np
 
 from ..baselines.engines import Engine, fcl_collision, mujoco_distance, ours
 from ..core import FORCE, instruction_sets, native
-from ..output import machine, markdown_table, percentiles, write_csv
+from ..output import machine, markdown_table, no_garbage_collection, percentiles, write_csv
 from ..output import page as filled_page
 from ..scene.pose import quaternion_multiply
 from ..scene.pose_sets import CONTAINER, CUBE, SETS, Pairs, log_uniform, turns
@@ -78,17 +77,6 @@ def pinned(cores: Collection[int]) -> Iterator[None]:
         yield
     finally:
         os.sched_setaffinity(0, before)
-
-
-@contextmanager
-def no_garbage_collection() -> Iterator[None]:
-    """Collect the garbage now, and none until the end."""
-    gc.collect()
-    gc.disable()
-    try:
-        yield
-    finally:
-        gc.enable()
 
 
 def usable_cores() -> list[int]:

@@ -173,29 +173,8 @@ def exact_gap(pose_a: np.ndarray, pose_b: np.ndarray, size_a: np.ndarray, size_b
     from mpmath import mp, mpf
 
     with mp.workdps(60):
-        boxes = []
-        for pose, size in ((pose_a, size_a), (pose_b, size_b)):
-            x, y, z, w = (mpf(float(v)) for v in pose[3:])
-            n = 2 / (x * x + y * y + z * z + w * w)
-            axes = [(1 - n * (y * y + z * z), n * (x * y + z * w), n * (x * z - y * w)),
-                    (n * (x * y - z * w), 1 - n * (x * x + z * z), n * (y * z + x * w)),
-                    (n * (x * z + y * w), n * (y * z - x * w), 1 - n * (x * x + y * y))]
-            half = [mpf(float(v)) / 2 for v in size]
-            centre = [mpf(float(v)) for v in pose[:3]]
-            boxes.append((axes, [tuple(
-                centre[r] + sum((1 if k >> c & 1 else -1) * half[c] * axes[c][r]
-                                for c in range(3)) for r in range(3)) for k in range(8)]))
-        (axes_a, corners_a), (axes_b, corners_b) = boxes
-        crosses = [(u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2],
-                    u[0] * v[1] - u[1] * v[0]) for u in axes_a for v in axes_b]
-        best = None
-        for axis in (*axes_a, *axes_b, *crosses):
-            length = mp.sqrt(sum(v * v for v in axis))
-            if length < mpf(10)**-40:
-                continue
-            low_a, high_a, low_b, high_b = (
-                choose(sum(p * q for p, q in zip(axis, corner)) for corner in corners) / length
-                for corners in (corners_a, corners_b) for choose in (min, max))
-            gap = max(low_b - high_a, low_a - high_b)
-            best = gap if best is None or gap > best else best
-        return float(best)
+        in_digits = np.frompyfunc(lambda value: mpf(float(value)), 1, 1)
+        a, b, one, other = (in_digits(part)[:, None] for part in (pose_a, pose_b, size_a, size_b))
+        axes_a, axes_b = _axes(a[3:]), _axes(b[3:])
+        return float(_greatest_gap(axes_a, axes_b, _corners(axes_a, one, a[:3]),
+                                   _corners(axes_b, other, b[:3]))[0])

@@ -24,6 +24,7 @@ import numpy as np
 
 from ...output import percentiles
 from ...scene.patch_law import Patch
+from ...scene.pose import degrees_between
 from ...solver.contact import Contacts
 
 CONTACT_MESSAGES = ('cloud', 'point', 'normal')  # kinds of message that a contact node answers with
@@ -54,12 +55,6 @@ def touch_in(values: np.ndarray) -> Patch | None:
     if not len(values) or is_stale(values):
         return None
     return Patch(values[:3], values[3:6], float(values[6]), float(values[7]), values[_COVARIANCE])
-
-
-def angles(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Return the degrees (n,) between rows of vectors (n, 3); arccos would lose small ones."""
-    sines = np.linalg.norm(np.cross(first, second), axis=1)
-    return np.degrees(np.arctan2(sines, np.sum(first * second, axis=1)))
 
 
 class StreamLog:
@@ -271,7 +266,7 @@ def _result(node: AnswerLog, log: StreamLog) -> StreamResult:
         contradictory = evaluated & ~touching & either | answered & touching & apart
         measured = answered & touching & real
         point_errors = np.linalg.norm(point[measured] - log.truth.point[:sent][measured], axis=1)
-        normal_errors = angles(normal[measured], log.truth.normal[:sent][measured])
+        normal_errors = degrees_between(normal[measured], log.truth.normal[:sent][measured])
     lost = {'lost': ~answered, 'lost_evaluations': ~evaluated, 'not_evaluated': refused,
             'lost_contacts': evaluated & ~refused & ~answered}
     counts = lost | {'answered': answered, 'contacts': answered & touching,

@@ -6,7 +6,6 @@ in the main thread and only keeps the bytes, with the time. Everything else is d
 from __future__ import annotations
 
 import contextlib
-import gc
 import os
 import platform
 import struct
@@ -30,7 +29,7 @@ from tqdm import tqdm
 
 from ...node.messages import NANOSECONDS, make_header, read_cloud
 from ...node.runtime import let_callbacks_finish, spin_for
-from ...output import processor
+from ...output import no_garbage_collection, processor
 from ...solver.contact import Contacts
 from ..processes import Stop, asked_to_end, end, on_this_host, parameters, printed, program, start
 from ..ros_client import DEEP_RELIABLE, joined, pose_message
@@ -234,7 +233,7 @@ class Bench:
         pairs = _serialised(stream, range(len(stream)))
         sent: list[tuple[int, float]] = []
         who = ' '.join(node.name for node in turn)
-        with _bar(len(pairs), f'{stream.name} ({who})', 'pair') as bar, _no_collection():
+        with _bar(len(pairs), f'{stream.name} ({who})', 'pair') as bar, no_garbage_collection():
             self._send_and_receive(turn, pairs, sent, lambda: bar.update(len(sent) - bar.n))
         for stamp, lateness in sent:
             for node in turn:
@@ -382,18 +381,6 @@ def _serialised(stream: Stream, rows: Sequence[int]) -> list[tuple[tuple[bytes, 
             pair.append((data[:4], data[12:]))
         pairs.append(tuple(pair))
     return pairs
-
-
-@contextlib.contextmanager
-def _no_collection() -> Iterator[None]:
-    """Collect no garbage meanwhile: it takes milliseconds, which would count as a node's."""
-    gc.collect()
-    gc.freeze()
-    gc.disable()
-    try:
-        yield
-    finally:
-        gc.enable()
 
 
 def _bar(total: int, text: str, unit: str) -> tqdm:

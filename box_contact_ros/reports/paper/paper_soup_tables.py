@@ -33,7 +33,7 @@ from ...scene.pose_sets import CUBE, stacks
 from ...solver.contact import Contacts
 from ...solver.contact_solver import ContactSolver
 from ...training.paper_recipe.dataset import quaternion_from_euler
-from ..speed import no_garbage_collection, pinned, usable_cores
+from ..speed import pinned, usable_cores
 from .paper_tables import PAPER_NETWORK
 from .paper_tables import PAPER_SOUP as PAPER
 
@@ -292,7 +292,7 @@ def measure(inputs: np.ndarray, *, quick: bool = False) -> SoupResult:
     times, errors = {}, {}
     work = len(PAPER) * sum(c.timed + c.judged for c in counts.values())
     work += len(ALSO) * counts['touching'].judged
-    with (pinned({usable_cores()[-1]}), no_garbage_collection(),
+    with (pinned({usable_cores()[-1]}), output.no_garbage_collection(),
           tqdm(total=work, unit='pattern', disable=None) as bar):
         for divisions in sorted([*PAPER, *ALSO]):
             for regime in REGIMES if divisions in PAPER else ['touching']:
