@@ -5,13 +5,8 @@ accuracy.csv (a row per model, set and part of the set), accuracy.md and accurac
 status is 1 if `mlp` breaks one of the limits in `LIMITS`, or differs from `exact` in a separation
 or normal. A point outside a box, or a pair that `exact` answered, breaks them too.
 
-Classes. The features that meet are told from the pose, not from the SAT axis that wins. In stacks
-about half the winners are edge pairs although the contact is a patch.
-
-- edge-edge: the winner is a pair of edges, and its axis is farther than FACE_LIKE from the normals
-  of all faces. Two edges cross.
-- The rest has a reference face, that of the best face axis. Of the other box's corners, 1
-  (vertex-face), 2 (edge-face) or more (face-face) have gone through its plane.
+pages/accuracy.md defines the classes. The features that meet are told from the pose, not from the
+SAT axis that wins: in stacks half the winners are edge pairs although the contact is a patch.
 """
 from __future__ import annotations
 

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.core import native
+from box_contact_ros.scene import scene_file
 from box_contact_ros.scene.scene_file import SceneError, parse_scene, read_scene
 from box_contact_ros.scene.scene_solver import Box, Pair, Scene, SceneSolver, two_boxes
 from box_contact_ros.solver.checks import SHOWN
@@ -295,7 +296,17 @@ def test_a_refusal_names_line_and_field(old, new, words, tmp_path):
     assert len(str(refused.value)) < 3 * SHOWN + len(str(path))
 
 
-def test_files_that_cannot_be_read(tmp_path):
+@pytest.mark.parametrize('pairs, words', [
+    ((), 'pairs: a scene needs at least one pair'),
+    ((Pair(2**32, 'p', 'a', 'b'),), r'pairs\[0\].id: 4294967296 is outside 0 to 4294967295'),
+    ((Pair(0, 'p', 'a', 'c'),), r"pairs\[0\].b: 'c' is none of the boxes")])
+def test_a_scene_made_in_python_is_checked_too(pairs, words):
+    boxes = {name: Box(name, poses.CUBE, pose_topic=f'{name}/pose') for name in 'ab'}
+    with pytest.raises(ValueError, match=words):
+        Scene(boxes, pairs)
+
+
+def test_files_that_cannot_be_read(tmp_path, monkeypatch):
     (tmp_path / 'latin').write_bytes(b'boxes: \xff')
     fifo = tmp_path / 'fifo'  # opening it would wait for a writer
     os.mkfifo(fifo)
@@ -306,6 +317,9 @@ def test_files_that_cannot_be_read(tmp_path):
                           (fifo, 'no regular file'), ('{\ud800}', 'not UTF-8')):
         with pytest.raises(SceneError, match=words):
             read_scene(str(source))
+    monkeypatch.setattr(scene_file, 'LARGEST_FILE', 6)
+    with pytest.raises(SceneError, match='larger than 6 bytes'):
+        read_scene(str(tmp_path / 'latin'))
 
 
 JSON = st.recursive(st.none() | st.booleans() | st.floats() | st.integers() | st.text(max_size=8),

@@ -137,6 +137,12 @@ def test_unequal_batches_are_refused():
         SOLVER.batch(np.tile(poses.IDENTITY, (2, 1)), np.tile(poses.IDENTITY, (3, 1)))
 
 
+@pytest.mark.parametrize('threads', [0, -1, True, 1.0, '2', None])
+def test_threads_are_a_whole_number(threads):
+    with pytest.raises(ValueError, match='threads must be a whole number from 1 on'):
+        SOLVER.batch([poses.IDENTITY], [ABOVE], threads=threads)
+
+
 @pytest.mark.parametrize(('name', 'value'), [('model', None), ('model', 3), ('weights', 3)])
 def test_names_that_are_none(name, value):
     with pytest.raises(ValueError, match=name):

@@ -1,16 +1,8 @@
 """Tables 3 and 4 and Figure 10 of the source paper: what a polygon soup costs, and its errors.
 
 Times are CPU times of one thread on one pinned core, after a warm-up, with garbage collection off.
-Like the paper's gprof, they leave out what other programs take meanwhile. Three of them:
-
-- the step: `fcl.collide` as python-fcl has it, from two placed soups to a list of all contacts; the
-  paper times this. Making Python objects of the contacts is part of it;
-- FCL alone: the same search, asked for one contact and for costs. FCL stops at the first contact
-  only where no costs are asked for. So it tests all that the step tests, and returns next to
-  nothing: what compiled code would see.
-
-- the answer: a call of model `soup`, pose to point and normal, with SAT. Where the soup finds
-  nothing, the exact point stands in.
+Like the paper's gprof, they leave out what other programs take meanwhile. table_3.md says what is
+timed: the step, FCL alone, the answer.
 """
 from __future__ import annotations
 
@@ -29,7 +21,7 @@ from ... import output
 from ...baselines import soup
 from ...core import native
 from ...scene.pose import degrees_between
-from ...scene.pose_sets import CUBE, stacks
+from ...scene.pose_sets import CUBE, Pairs, at_depth, stacks
 from ...solver.contact import Contacts
 from ...solver.contact_solver import ContactSolver
 from ...training.paper_recipe.dataset import quaternion_from_euler
@@ -157,19 +149,15 @@ def _cubes(model: str) -> ContactSolver:
 
 def pressed(poses: Poses, depth: float) -> Poses:
     """Return the pairs that touch, B moved along SAT's normal until they are `depth` [m] deep."""
-    a, b = poses
-    found = _cubes('exact').batch(a, b)
-    rows = found.colliding
-    moved = b[rows].copy()
-    moved[:, :3] -= (found.separation + depth)[rows, None] * found.normal[rows]
-    return a[rows], moved
+    sizes = np.tile(CUBE, (len(poses[0]), 1))
+    return at_depth(Pairs(*poses, sizes, sizes), np.full(len(sizes), depth))[:2]
 
 
 # --- time -----------------------------------------------------------------------------------------
 
 
 def search(first: fcl.CollisionObject, second: fcl.CollisionObject) -> None:
-    """Search for all pairs; FCL returns one of them: see the module's docstring."""
+    """Search for all pairs; FCL returns one of them, and goes on because costs are asked for."""
     fcl.collide(first, second, fcl.CollisionRequest(num_max_contacts=1, enable_contact=True,
                                                     enable_cost=True), fcl.CollisionResult())
 

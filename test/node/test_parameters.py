@@ -1,0 +1,43 @@
+"""What is accepted as a parameter's value, without a node."""
+from __future__ import annotations
+
+from collections import Counter
+from types import SimpleNamespace
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from box_contact_ros.node import parameters
+from box_contact_ros.node.qos_events import QosEvents
+
+
+@pytest.mark.parametrize('check, value, words', [
+    (parameters.number(0.0, 1.0), 'fast', "p must be a number, not 'fast'"),
+    (parameters.number(0.0, 1.0), True, 'p must be a number, not True'),
+    (parameters.number(0.0, 1.0), 1.5, 'p must lie within 0 and 1, not 1.5'),
+    (parameters.whole_number(1, 9), 2.0, 'p must be a whole number from 1 to 9, not 2.0'),
+    (parameters.flag, 1, 'p must be true or false, not 1'),
+    (parameters.text, 7, 'p must be a string, not 7'),
+    (parameters.one_of(['a', 'b']), 'c', "p 'c' is not one of: a, b"),
+    (parameters.numbers(2), [1.0, float('nan')], 'p must be 2 finite numbers'),
+    (parameters.size, [1.0, 0.0, 1.0], r'p \(1, 0, 1\) is not positive')])
+def test_a_refusal_names_the_parameter_and_the_value(check, value, words):
+    with pytest.raises(ValueError, match=words):
+        check('p', value)
+
+
+def test_integers_are_as_good_as_floats():
+    assert parameters.number(0.0, 3.0)('p', 2) == 2.0
+    assert parameters.numbers(2)('p', [1, 2.5]) == (1.0, 2.5)
+
+
+@pytest.mark.parametrize('change, lost', [(2, 2), (0, 0), (-1, 0)])
+def test_publishers_that_show_no_life_are_counted(change, lost):
+    """Publishers that came back are none that are lost."""
+    said, counts = [], Counter()
+    node = SimpleNamespace(get_logger=lambda: SimpleNamespace(warning=said.append))
+    event = QosEvents(node, counts).callbacks('load', deadline=False).liveliness
+    event(SimpleNamespace(not_alive_count_change=change))
+    assert counts['liveliness lost'] == lost
+    assert said == ['load: a publisher of its poses shows no life'] * bool(lost)
