@@ -48,8 +48,7 @@ def model(name: str, value: Any) -> str:
     return str(value)
 
 
-NAMED_TOPICS = 3
-"""How many pose topics the node names when it is ready."""
+NAMED_TOPICS = 3  # how many pose topics the node names when it is ready
 CONTAINER = (12.192, 2.438, 2.591)  # ISO 40 ft [m]
 LONGEST = 1e6  # s, about twelve days
 PARAMETERS = {

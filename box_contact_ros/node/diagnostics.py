@@ -12,8 +12,7 @@ from rclpy.node import Node
 from .messages import make_header
 
 DIAGNOSTICS_SECONDS = 1.0
-UNMATCHED_SECONDS = 1.0
-"""Poses without an answer for this long are worth a warning."""
+UNMATCHED_SECONDS = 1.0  # poses without an answer for this long are worth a warning
 KEPT_TIMES = 4096
 """Evaluations whose computing times are kept for a report: more a second than any node makes."""
 

@@ -88,8 +88,7 @@ def parse_pose(data: bytes) -> tuple[tuple[float, ...], str, int, int]:
 class RawMessages:
     """Reads poses of all boxes, and makes answers. A shortcut knows the frame of the last pose."""
 
-    raw = True
-    """Whether subscriptions hand over bytes."""
+    raw = True  # whether subscriptions hand over bytes
 
     def __init__(self) -> None:
         self._frame: bytes | None = None

@@ -143,8 +143,7 @@ def is_of_two_boxes(rows: np.ndarray) -> bool:
 class TypedMessages:
     """The reference: messages as rclpy's objects."""
 
-    raw = False
-    """Whether subscriptions hand over bytes."""
+    raw = False  # whether subscriptions hand over bytes
 
     def read_pose(self, message: PoseStamped) -> StampedPose:
         """Return the pose of a message, or raise Refused."""

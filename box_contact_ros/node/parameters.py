@@ -30,8 +30,7 @@ class Setting:
     default: Any
     description: str
     check: Check
-    fixed: bool = False
-    """Whether it is for the start only."""
+    fixed: bool = False  # whether it is for the start only
 
 
 def _is_number(value: Any) -> bool:

@@ -29,13 +29,11 @@ REFUSALS = (ValueError, rclpy.exceptions.ParameterException, RCLError)
 POSE_QOS = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
 """Pose inputs: best effort matches every publisher; the depth bridges a second at 1 kHz, in which a
 scene of a thousand pairs can be read."""
-CONTACT_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
-"""Contact outputs."""
+CONTACT_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)  # contact outputs
 SPIN_SECONDS = 10.0
 """EventsExecutor hangs when it spins without a timeout, so it is spun in slices. Each leaves some
 32 bytes behind in rclpy (7.1): of slices this long, 0.3 MB a day."""
-LOG_SECONDS = 1.0
-"""The same complaint is logged at most this often."""
+LOG_SECONDS = 1.0  # the same complaint is logged at most this often
 
 
 def make_executor(context: Context) -> Any:

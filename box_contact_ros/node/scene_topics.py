@@ -29,10 +29,8 @@ class PoseSource(NamedTuple):
     """How the poses of a box are subscribed to."""
 
     topic: str
-    raw: bool
-    """Whether the callback gets the bytes of messages."""
-    deadline: float
-    """Longest time [s] between poses that publishers must offer; 0: none."""
+    raw: bool  # whether the callback gets the bytes of messages
+    deadline: float  # longest time [s] between poses that publishers must offer; 0: none
 
 
 class PairPublishers(NamedTuple):
@@ -46,8 +44,7 @@ class PairPublishers(NamedTuple):
 class SceneTopics:
     """Creates and destroys a node's topics, so that they are those of the current scene."""
 
-    contacts: Publisher
-    """The cloud of all pairs, there from the first `set_scene` to `close`."""
+    contacts: Publisher  # the cloud of all pairs, there from the first `set_scene` to `close`
 
     def __init__(self, node: Node, prefix: str, counts: Counter[str]) -> None:
         """Begin without topics; `prefix` stands before the names of contact topics."""

@@ -27,10 +27,8 @@ DESCRIPTION = 'cuts of the bounds by the slab, at nine sites'
 BOUNDS = {DESCRIPTION: 'slab', 'cuts of the unit cube, at nine sites': 'edges'}
 """Method of the bounds by the description in a card; weights made for another one are refused."""
 _NATIVE = {'slab': 'mlp', 'edges': 'mlp-edges'}  # names that the core has for the models
-ACTIVATION = 'relu'
-"""Activation of the hidden units; weights made for another one are refused."""
-UNITS_MAX = 64
-"""Most hidden units: as far as the search for their number goes."""
+ACTIVATION = 'relu'  # activation of the hidden units; weights made for another one are refused
+UNITS_MAX = 64  # most hidden units: as far as the search for their number goes
 SAME_EXTENT = 1e-6
 """Relative difference up to which an extent is a trained one: sizes may come through float32."""
 

@@ -22,8 +22,7 @@ from .samples import MlpSamples
 POINT_WEIGHT, TAIL_WEIGHT = 10.0, 3e3
 """Weights of the squared point error and of its square; the squared offset error has 1. Ten makes
 the first two alike over the data; the third counts from errors of 5 % of the edge."""
-CHUNK = 1024
-"""Contacts whose errors are computed at a time: large ensembles stay within 200 MB."""
+CHUNK = 1024  # contacts whose errors are computed at a time: large ensembles stay within 200 MB
 
 
 class SiteNetwork(torch.nn.Module):

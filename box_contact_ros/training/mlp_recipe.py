@@ -30,13 +30,11 @@ from .ensemble import Scaling, drawn
 from .mlp_fit import SiteNetwork, fit, point_errors, random_batches
 from .samples import MlpSamples, SizePair, draw_samples, mixture, scene_mixture
 
-HIDDEN = 12
-"""Hidden units: what fits the time that a batch has for the network (docs/search.md)."""
+HIDDEN = 12  # hidden units: what fits the time that a batch has for the network (docs/search.md)
 HARD_ROUNDS, HARD_PART, HARD_SHARE = (0.4, 0.55, 0.7, 0.85), 0.01, 0.2
 """After each of these parts of the steps, a pool of fresh pairs is searched for the hardest part.
 From then on, all that were found so far make up that share of what is learned from."""
-SHOWN_EVERY = 200
-"""Steps between two losses in the progress bar."""
+SHOWN_EVERY = 200  # steps between two losses in the progress bar
 
 PairMaker = Callable[[np.random.Generator, int], Pairs]
 
@@ -52,10 +50,8 @@ class MlpRecipe:
     steps: int
     batch: int = 4096
     rate: float
-    pool: int
-    """Pairs that each round of hard ones searches."""
-    metric_pairs: int = 100_000
-    """Pairs of each set in the model card's metrics."""
+    pool: int  # pairs that each round of hard ones searches
+    metric_pairs: int = 100_000  # pairs of each set in the model card's metrics
 
 
 GENERAL = MlpRecipe(pairs=1_500_000, steps=60_000, rate=2e-2, pool=2_000_000)

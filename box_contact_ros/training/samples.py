@@ -25,8 +25,7 @@ from ..scene.scene_file import read_scene
 
 SizePair = tuple[tuple[float, float, float], tuple[float, float, float]]
 """Full extents of two boxes [m]."""
-PIECE = 100_000
-"""Pairs that are made at a time."""
+PIECE = 100_000  # pairs that are made at a time
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,15 +35,12 @@ class MlpSamples:
     Arrays of float32, or tensors. The contacts are last, so that all operations run along them.
     """
 
-    features: Any
-    """(SITES, FEATURES, n)."""
+    features: Any  # (SITES, FEATURES, n)
     vectors: Any
     """(SITES, OUTPUTS, n): the factors of the outputs. The answer along q is the sum of the
     products over all outputs and f."""
-    offsets: Any
-    """(3, n): exact centroid from the middle of the bounds [half extents]."""
-    scale: Any
-    """(3, n): half extents [longest edge of the smaller box]."""
+    offsets: Any  # (3, n): exact centroid from the middle of the bounds [half extents]
+    scale: Any  # (3, n): half extents [longest edge of the smaller box]
 
     def __len__(self) -> int:
         """Return n."""

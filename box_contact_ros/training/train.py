@@ -24,8 +24,7 @@ from .paper_recipe import paper_jobs
 from .samples import SizePair, scene_sizes
 
 MLP = 'mlp'
-NAMES = (*paper_jobs.JOBS, MLP)
-"""What can be asked for."""
+NAMES = (*paper_jobs.JOBS, MLP)  # what can be asked for
 QUICK_COUNTS, QUICK_STARTS, QUICK_EPOCHS = (1000, 500, 2000), 3, 100
 """`--quick`, for the paper's: enough to see the error fall, in seconds."""
 

@@ -76,10 +76,8 @@ class CraneSummary:
     """The figures of one run, and whether it passed."""
 
     result: StreamResult
-    latencies: np.ndarray
-    """From the poses' stamp to a contact [s]."""
-    edge: float
-    """What point errors are a share of [m]."""
+    latencies: np.ndarray  # from the poses' stamp to a contact [s]
+    edge: float  # what point errors are a share of [m]
 
     @property
     def lost(self) -> int:

@@ -35,18 +35,14 @@ from .mujoco_crane import LANDING_OVERLAP, Crane, CraneScenario
 
 SETTLING, WINDOW = 10.0, 5.0
 """The load has to be at rest from `SETTLING` s after the first touch on, for `WINDOW` s."""
-CORNER_SPEED_LIMIT = 0.010
-"""Speed of the load's fastest corner at rest [m/s]."""
+CORNER_SPEED_LIMIT = 0.010  # speed of the load's fastest corner at rest [m/s]
 SLOW_CORNER_SPEED_LIMIT, SLOW_RATE = 0.020, 200.0
 """The same [m/s] at rates [1/s] up to `SLOW_RATE`, where the law is scaled down."""
 FORCE_LIMIT = 0.01
 """Deviation of the contact force's vertical part from the weight, as a share of the weight."""
-TILT_LIMIT = math.radians(0.5)
-"""Angle between the load's and the world's vertical [rad]."""
-DEPTH_LIMIT = 0.01
-"""Depth as a share of the load's height."""
-GAP_LIMIT = 0.020
-"""Gap after the first touch [m]: how high it may bounce."""
+TILT_LIMIT = math.radians(0.5)  # angle between the load's and the world's vertical [rad]
+DEPTH_LIMIT = 0.01  # depth as a share of the load's height
+GAP_LIMIT = 0.020  # gap after the first touch [m]: how high it may bounce
 
 LANDING_DURATION = 25.0
 """Length of a landing [s]. The first touch comes after 5 to 8 s, and 15 s more are looked at."""
@@ -73,18 +69,13 @@ def landing_scenario(**fields: Any) -> CraneScenario:
 class LandingCase:
     """What is varied from landing to landing. Angles in degrees, lengths in m."""
 
-    rope_angle: float
-    """Of the ropes at the start, from the plumb line."""
+    rope_angle: float  # of the ropes at the start, from the plumb line
     rope_heading: float
-    tilt: float
-    """Of the load at the start."""
-    tilt_heading: float
-    """The share of pitch (its cosine) and roll (its sine)."""
-    overhang: float
-    """Lateral distance of the two centres at the first touch."""
+    tilt: float  # of the load at the start
+    tilt_heading: float  # the share of pitch (its cosine) and roll (its sine)
+    overhang: float  # lateral distance of the two centres at the first touch
     overhang_heading: float
-    yaw: float
-    """Of the load at the start."""
+    yaw: float  # of the load at the start
 
 
 def cases(*, rope_angles: Sequence[float] = (0.5, 1.25, 2.0, 3.0),
@@ -131,33 +122,21 @@ def scenario_of(case: LandingCase) -> CraneScenario:
 class LandingResult:
     """Figures of one landing. SI units, angles in rad; NaN where nothing was measured."""
 
-    touched: float = math.nan
-    """Time of the first touch [s], NaN for never."""
-    overhang: float = math.nan
-    """Lateral distance of the two centres then [m]."""
+    touched: float = math.nan  # time of the first touch [s], NaN for never
+    overhang: float = math.nan  # lateral distance of the two centres then [m]
     settled: float = math.nan
     """Time from the first touch until corners stay within the limit [s], NaN for never."""
-    corner_speed: float = math.nan
-    """Of the fastest corner in the window [m/s]."""
+    corner_speed: float = math.nan  # of the fastest corner in the window [m/s]
     corner_speed_limit: float = CORNER_SPEED_LIMIT
-    rope_tension: float = math.nan
-    """Of the tautest rope in the window [N]."""
-    force_error: float = math.nan
-    """|mean contact force − weight| / weight over the window."""
-    force_worst: float = math.nan
-    """The same of the window's worst tick."""
-    tilt: float = math.nan
-    """Largest in the window [rad]."""
-    depth: float = math.nan
-    """Largest ever, as a share of the load's height."""
-    gap: float = math.nan
-    """Largest after the first touch [m]."""
-    point_step: float = math.nan
-    """Largest |Δpoint| between neighbouring ticks in the window [m]."""
-    exact_point_step: float = math.nan
-    """The same of the exact point on the same poses."""
-    point_step_ever: float = math.nan
-    """Largest |Δpoint| over the whole contact [m]."""
+    rope_tension: float = math.nan  # of the tautest rope in the window [N]
+    force_error: float = math.nan  # |mean contact force − weight| / weight over the window
+    force_worst: float = math.nan  # the same of the window's worst tick
+    tilt: float = math.nan  # largest in the window [rad]
+    depth: float = math.nan  # largest ever, as a share of the load's height
+    gap: float = math.nan  # largest after the first touch [m]
+    point_step: float = math.nan  # largest |Δpoint| between neighbouring ticks in the window [m]
+    exact_point_step: float = math.nan  # the same of the exact point on the same poses
+    point_step_ever: float = math.nan  # largest |Δpoint| over the whole contact [m]
     exact_point_step_ever: float = math.nan
 
     @property

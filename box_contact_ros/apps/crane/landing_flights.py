@@ -20,8 +20,7 @@ from .crane_parameters import PARAMETERS, SCENARIO
 from .landing import LandingResult
 from .mujoco_crane import CraneScenario
 
-PATIENCE = 30.0
-"""For the node to answer [s]."""
+PATIENCE = 30.0  # for the node to answer [s]
 
 
 @contextmanager

@@ -9,15 +9,13 @@ import numpy as np
 
 from ...scene.patch_law import Patch
 
-Colour = tuple[int, int, int]
-"""Red, green, blue, 0 to 255."""
+Colour = tuple[int, int, int]  # red, green, blue, 0 to 255
 
 BOX_A: Colour = (238, 150, 50)
 BOX_B: Colour = (70, 120, 170)
 CONTACT: Colour = (230, 20, 110)
 EXACT: Colour = (0, 130, 110)
-BOX_OPACITY = 0.4
-"""The contact is inside the boxes, so they are translucent."""
+BOX_OPACITY = 0.4  # the contact is inside the boxes, so they are translucent
 STALE = 500_000_000
 """Poses newer than the last answer by more than this [ns]: nobody answers, no contact is drawn."""
 

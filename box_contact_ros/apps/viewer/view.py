@@ -36,10 +36,8 @@ from .view_node import ViewNode
 from .view_page import CraneRun, Page
 
 FRAME_PERIOD = 1 / 30
-PAUSE = 1.5
-"""Time [s] between the end of a run and the next, to see how it ended."""
-WAIT = 60.0
-"""How long the crane waits for the contact node, which starts at the same time [s]."""
+PAUSE = 1.5  # time [s] between the end of a run and the next, to see how it ended
+WAIT = 60.0  # how long the crane waits for the contact node, which starts at the same time [s]
 
 
 class Simulation:

@@ -24,12 +24,10 @@ from ...solver.contact_solver import ContactSolver
 from ..bench.answer_log import first_row, touch_in
 from .style import STALE
 
-WINDOW = 2.0
-"""Figures are those of the answers to the poses of the last so many seconds."""
+WINDOW = 2.0  # figures are those of the answers to the poses of the last so many seconds
 LOST_AFTER = NANOSECONDS
 """A pair without an answer is lost once a pair that is so much newer [ns] has come."""
-KEPT = 20_000
-"""Answers kept at most, whatever their stamps: `WINDOW` at 10 kHz."""
+KEPT = 20_000  # answers kept at most, whatever their stamps: `WINDOW` at 10 kHz
 
 Poses = tuple[np.ndarray, np.ndarray]
 
@@ -41,8 +39,7 @@ class AnsweredPair:
     stamp: int
     received: int
     poses: Poses
-    touch: Patch | None
-    """None for no contact."""
+    touch: Patch | None  # None for no contact
 
     @property
     def latency(self) -> float:
@@ -54,8 +51,7 @@ class Snapshot(NamedTuple):
     """What is drawn: poses (7,), the answer to them, and their exact contact."""
 
     poses: Poses
-    answer: AnsweredPair | None
-    """None if nobody answers."""
+    answer: AnsweredPair | None  # none if nobody answers
     exact: Contact
 
 
@@ -67,12 +63,9 @@ class ViewFigures:
     latency_p99: float
     point_error_median: float
     point_error_p99: float
-    edge: float
-    """Longest edge of the smaller box, what point errors are a share of."""
-    rate: float
-    """Answers that came within the last second."""
-    answered: int
-    """Since the start of the run, and so are the lost."""
+    edge: float  # longest edge of the smaller box, what point errors are a share of
+    rate: float  # answers that came within the last second
+    answered: int  # since the start of the run, and so are the lost
     lost: int
 
 

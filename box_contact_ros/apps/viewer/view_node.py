@@ -31,12 +31,9 @@ class ViewNode(Listener):
     def __init__(self, context: Context, target: str, **options: Any) -> None:
         """`target` is the name of the contact node."""
         self.log: ViewLog | None = None
-        self.settings: Mapping[str, Any] = {}
-        """The contact node's parameters, those of ASKED."""
-        self.wish = ''
-        """The model that was asked for last, until it is granted."""
-        self.refusal = ''
-        """Why the last model that was asked for was refused."""
+        self.settings: Mapping[str, Any] = {}  # the contact node's parameters, those of ASKED
+        self.wish = ''  # the model that was asked for last, until it is granted
+        self.refusal = ''  # why the last model that was asked for was refused
         self._answered = 0.0
         self._question: Future | None = None
         # Contacts best effort: the view must never hold up the contact node.

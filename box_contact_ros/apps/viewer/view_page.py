@@ -35,10 +35,8 @@ from .view_log import Snapshot, ViewFigures
 
 CHART_LEAST, CHART_MOST = ({'pad': 0.1, 'soft': value, 'mode': 1} for value in (-20.0, 20.0))
 """Of the separation [mm]: the chart shows at least this, so that it does not magnify noise."""
-READ_OUT_PERIOD = 0.2
-"""Time [s] between new figures: faster, nobody can read them."""
-HISTORY = 12.0
-"""Length [s] of the chart."""
+READ_OUT_PERIOD = 0.2  # time [s] between new figures: faster, nobody can read them
+HISTORY = 12.0  # length [s] of the chart
 PANEL_WIDTH = 410  # pixels
 GROUND, LINES = (236, 238, 241), (206, 211, 217)
 

@@ -36,8 +36,7 @@ from ..paper_recipe.paper_jobs import JOBS, PaperJob
 from ..samples import MlpSamples, draw_samples, mixture
 from .successive_halving import Candidate, CheckpointError, Rung, Rungs, Scores, Search, ranking
 
-UNITS = np.arange(4, UNITS_MAX + 1, 4)
-"""Hidden units that are tried."""
+UNITS = np.arange(4, UNITS_MAX + 1, 4)  # hidden units that are tried
 
 # Streams of random numbers.
 _CANDIDATES, _TRAINING, _CHECKING = 1001, 1003, 1004

@@ -23,13 +23,11 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
-SAVE_EVERY = 10.0
-"""Least time between two checkpoints [s]."""
+SAVE_EVERY = 10.0  # least time between two checkpoints [s]
 
 Scores = dict[str, float]
 """What is known of a network after a rung; 'error' is what candidates are ranked by."""
-Rungs = list[dict[int, Scores]]
-"""For each rung, the scores by the candidates' numbers."""
+Rungs = list[dict[int, Scores]]  # for each rung, the scores by the candidates' numbers
 
 
 @dataclass(frozen=True)
@@ -41,8 +39,7 @@ class Candidate:
     rate: float
     momentum: float = 0.0
     initial: float = 1.0
-    shipped: bool = False
-    """The settings in use: they go on to the end, to be compared with."""
+    shipped: bool = False  # the settings in use: they go on to the end, to be compared with
 
 
 @dataclass(frozen=True)
@@ -50,11 +47,9 @@ class Rung:
     """A stage: how many candidates are in it, and how long each is trained."""
 
     candidates: int
-    effort: int
-    """Steps, or epochs."""
+    effort: int  # steps, or epochs
     batch: int
-    group: int
-    """Candidates that are trained at once."""
+    group: int  # candidates that are trained at once
 
 
 class CheckpointError(ValueError):

@@ -35,16 +35,12 @@ from ...baselines.paper.symmetry import fold as fold_pairs
 from ...core import Stages, stages
 from ...scene.pose import quaternion_multiply, rotation_matrix
 
-CUBE = (2.0, 2.0, 2.0)
-"""The paper's boxes: cubes with edges of length 2."""
-CONTAINER = (12.192, 2.438, 2.591)
-"""A 40 ft container [m]."""
+CUBE = (2.0, 2.0, 2.0)  # the paper's boxes: cubes with edges of length 2
+CONTAINER = (12.192, 2.438, 2.591)  # A 40 ft container [m]
 
 SETS = ('training', 'cross-validation', 'external')
-PAPER_COUNTS = (8000, 5000, 75000)
-"""Patterns per set, with discontinuities."""
-CONTINUOUS_COUNTS = (10000, 6000, 50000)
-"""Patterns per set and subset, without discontinuities."""
+PAPER_COUNTS = (8000, 5000, 75000)  # patterns per set, with discontinuities
+CONTINUOUS_COUNTS = (10000, 6000, 50000)  # patterns per set and subset, without discontinuities
 SUBSETS = {'vertex_face': VERTEX_FACE, 'edge_edge': EDGE_EDGE}
 
 INPUTS = ('t_x', 't_y', 't_z', 'roll', 'pitch', 'yaw')
@@ -59,22 +55,17 @@ POLE = 1e-12
 """Sine of the angle to the z axis below which a direction is the pole and its azimuth is 0. It is
 far above the rounding of a unit vector, and far below anything that is drawn."""
 
-CHUNK = 1 << 15
-"""Candidates drawn at a time."""
+CHUNK = 1 << 15  # candidates drawn at a time
 
 
 @dataclass(frozen=True)
 class Placements:
     """n pairs of boxes of the same size that just touch, in the first box's frame."""
 
-    size: tuple[float, float, float]
-    """Full extents of either box [m]."""
-    pose: np.ndarray
-    """(n, 7) pose of the second box, x y z qx qy qz qw."""
-    point: np.ndarray
-    """(n, 3) impact point [m]."""
-    normal: np.ndarray
-    """(n, 3) unit normal, out of the first box."""
+    size: tuple[float, float, float]  # full extents of either box [m]
+    pose: np.ndarray  # (n, 7) pose of the second box, x y z qx qy qz qw
+    point: np.ndarray  # (n, 3) impact point [m]
+    normal: np.ndarray  # (n, 3) unit normal, out of the first box
 
     def __len__(self) -> int:
         return len(self.pose)
@@ -87,8 +78,7 @@ class Placements:
 class Patterns:
     """n patterns for a network: see the module's docstring, 2."""
 
-    inputs: np.ndarray
-    """(n, 6) t [m]; roll, pitch, yaw [rad]."""
+    inputs: np.ndarray  # (n, 6) t [m]; roll, pitch, yaw [rad]
     outputs: np.ndarray
     """(n, 4) azimuth and elevation [rad] of the impact point, then of the normal."""
 
@@ -208,14 +198,10 @@ def query(placements: Placements) -> Stages:
 class Folded:
     """n placements in a network's domain."""
 
-    inputs: np.ndarray
-    """(n, 6) t [m]; roll, pitch, yaw [rad]."""
-    point: np.ndarray
-    """(n, 3) impact point [m]."""
-    normal: np.ndarray
-    """(n, 3)."""
-    subset: np.ndarray
-    """(n,) VERTEX_FACE or EDGE_EDGE after FEATURES, else −1."""
+    inputs: np.ndarray  # (n, 6) t [m]; roll, pitch, yaw [rad]
+    point: np.ndarray  # (n, 3) impact point [m]
+    normal: np.ndarray  # (n, 3)
+    subset: np.ndarray  # (n,) VERTEX_FACE or EDGE_EDGE after FEATURES, else −1
 
     def patterns(self, rows: np.ndarray | slice = slice(None)) -> Patterns:
         """Return the inputs and outputs of some rows."""

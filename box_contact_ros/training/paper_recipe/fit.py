@@ -26,16 +26,14 @@ from ..ensemble import Ensemble, Layers, Scaling, drawn
 from .dataset import Patterns
 from .errors import wrapped
 
-CHECKS = 200
-"""Least number of times that the cross-validation error is looked at in a training."""
+CHECKS = 200  # least number of times that the cross-validation error is looked at in a training
 
 
 @dataclass(frozen=True)
 class PaperSettings:
     """One training of several networks. Sequences have an entry for each; numbers hold for all."""
 
-    widths: tuple[int, ...]
-    """Units of each layer, inputs first: (6, 20, 18, 4)."""
+    widths: tuple[int, ...]  # units of each layer, inputs first: (6, 20, 18, 4)
     networks: int = 12
     epochs: int = 800
     batch: int = 50
@@ -76,13 +74,10 @@ class Momentum(torch.optim.Optimizer):
 class Fitted:
     """Networks in training, with their best weights by cross-validation."""
 
-    networks: Ensemble
-    """With the best weights."""
+    networks: Ensemble  # with the best weights
     scaling: Scaling
-    error: Tensor
-    """(networks,) least root mean square cross-validation error [rad]."""
-    epoch: Tensor
-    """(networks,) epoch of the best weights."""
+    error: Tensor  # (networks,) least root mean square cross-validation error [rad]
+    epoch: Tensor  # (networks,) epoch of the best weights
     history: list[Tensor]
     """Per check, cross-validation errors (networks,) [rad] in the course of the training."""
 

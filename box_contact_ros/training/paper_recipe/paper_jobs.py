@@ -17,19 +17,14 @@ from .fit import PaperSettings, fit
 class PaperJob:
     """One weights file."""
 
-    name: str
-    """Of the file, without its ending."""
-    model: str
-    """The solver's model that it serves."""
-    size: tuple[float, float, float]
-    """Full extents [m] of either box."""
+    name: str  # of the file, without its ending
+    model: str  # the solver's model that it serves
+    size: tuple[float, float, float]  # full extents [m] of either box
     counts: tuple[int, int, int]
     """Patterns in the training, cross-validation and external set (per subset)."""
     settings: PaperSettings
-    recipe: str
-    """The data in words, for the model card; `_FOLDED` is added for model `paper`."""
-    folded_in: bool = True
-    """Whether the data are folded into the domain in which the solver asks."""
+    recipe: str  # the data in words, for the model card; `_FOLDED` is added for model `paper`
+    folded_in: bool = True  # whether the data are folded into the domain in which the solver asks
 
 
 _DRAWN = ('Boxes that just touch, one fixed: impact points uniform by area on its trihedron +x +y '
