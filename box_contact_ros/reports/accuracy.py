@@ -420,7 +420,3 @@ def main(args: Sequence[str] | None = None) -> int:
     for text in broken:
         print(f'accuracy: limit broken: {text}', file=sys.stderr)
     return 1 if broken else 0
-
-
-if __name__ == '__main__':
-    sys.exit(main())

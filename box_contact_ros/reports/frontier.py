@@ -437,7 +437,3 @@ def main(args: Sequence[str] | None = None) -> int:
     draw(folder / 'frontier.png', rows)
     print(in_short(rows), honesty(rows), sep='\n\n')
     return 0
-
-
-if __name__ == '__main__':
-    sys.exit(main())

@@ -202,7 +202,3 @@ def main(args: Sequence[str] | None = None) -> int:
     for text in gates(rows):
         print(f'stability: gate broken: {text}', file=sys.stderr)
     return 1 if gates(rows) else 0
-
-
-if __name__ == '__main__':
-    sys.exit(main())

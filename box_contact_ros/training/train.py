@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import argparse
 import subprocess
-import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -153,7 +152,3 @@ def main(args: Sequence[str] | None = None) -> int:
         else:
             _train_paper(options, paper_jobs.JOBS[name])
     return 0
-
-
-if __name__ == '__main__':
-    sys.exit(main())

@@ -9,7 +9,6 @@ pose, ready to be pasted into a test; the exit status is then 1.
 from __future__ import annotations
 
 import os
-import sys
 import time
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -329,7 +328,3 @@ def main(args: Sequence[str] | None = None) -> int:
           f'{(time.monotonic() - began) / 60:.1f} minutes, seed {options.seed}, '
           f'{machine(native)}')
     return 1 if broken else 0
-
-
-if __name__ == '__main__':
-    sys.exit(main())

@@ -262,7 +262,3 @@ def main(args: Sequence[str] | None = None) -> int:
     options.out.write_text(page, encoding='utf-8')
     print(f'written to {options.out}')
     return 0
-
-
-if __name__ == '__main__':
-    sys.exit(main())

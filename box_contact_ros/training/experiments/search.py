@@ -346,7 +346,3 @@ def main(args: Sequence[str] | None = None) -> int:
         path.unlink()
     print(text)
     return 0
-
-
-if __name__ == '__main__':
-    sys.exit(main())
