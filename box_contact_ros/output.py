@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
 REPORTS = Path(__file__).parent / 'reports'
 
-# --- where results go -----------------------------------------------------------------------------
-
 
 def make_folder(parser: argparse.ArgumentParser, folder: Path) -> Path:
     """Create the folder of `--out`, or refuse, before the work, one that cannot be written to."""
@@ -52,9 +50,6 @@ def command_line(program: str, args: Sequence[str] | None) -> str:
     """Return the command that a page names; `args` as `main` received them."""
     given = sys.argv[1:] if args is None else args
     return ' '.join(['python -m', program, *given])
-
-
-# --- tables, files, pictures ----------------------------------------------------------------------
 
 
 def markdown_table(head: Sequence[str], rows: Iterable[Sequence[object]], *, words: int = 1,
@@ -108,9 +103,6 @@ def subplots(rows: int, columns: int, size: tuple[float, float], **shared: Any,
     return figure, figure.subplots(rows, columns, squeeze=False, **shared)
 
 
-# --- figures --------------------------------------------------------------------------------------
-
-
 def percentiles(values: Sequence[float] | np.ndarray, *percents: float) -> tuple[float, ...]:
     """Return percentiles of values (n,), 0 being the least and 100 the largest; NaN of none."""
     if not len(values):
@@ -143,8 +135,6 @@ def no_garbage_collection() -> Iterator[None]:
         gc.enable()
         gc.unfreeze()
 
-
-# --- the machine ----------------------------------------------------------------------------------
 
 _AMD = ((23, 0x00, 0x2f, 'Zen'), (23, 0x30, 0xff, 'Zen 2'), (25, 0x00, 0x0f, 'Zen 3'),
         (25, 0x10, 0x1f, 'Zen 4'), (25, 0x20, 0x5f, 'Zen 3'), (25, 0x60, 0x7f, 'Zen 4'),

@@ -51,9 +51,6 @@ class Engine:
     any_boxes: bool = True  # whether it answers for boxes of any sizes
 
 
-# --- this package's models ------------------------------------------------------------------------
-
-
 def ours(model: str, name: str | None = None, weights: str | None = None) -> Engine:
     """Return a model of this package, which reports show as `name`."""
     entry, _ = find_model('model', model)
@@ -75,9 +72,6 @@ def ours(model: str, name: str | None = None, weights: str | None = None) -> Eng
 
     return Engine(name=name or model, prepare=prepare, read=read, any_boxes=entry.any_boxes,
                   prepare_batch=prepare_batch if entry.native_batch else None)
-
-
-# --- MuJoCo ---------------------------------------------------------------------------------------
 
 
 def mujoco_distance() -> Engine:
@@ -152,9 +146,6 @@ def _mujoco_model(p: np.ndarray, q: np.ndarray) -> tuple[Any, Any]:
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     return model, data
-
-
-# --- FCL, Coal, Bullet ----------------------------------------------------------------------------
 
 
 def fcl_collision(choice: str) -> Engine:
@@ -250,9 +241,6 @@ def bullet_points(choice: str) -> Engine:
                                np.array([-c[8] for c in contacts]))
 
     return Engine(name=f'PyBullet getClosestPoints, {choice}', prepare=prepare, read=read)
-
-
-# --- all of them ----------------------------------------------------------------------------------
 
 
 def _deepest(points: np.ndarray, normals: np.ndarray, depths: np.ndarray) -> EngineAnswer:

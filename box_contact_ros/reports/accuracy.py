@@ -69,9 +69,6 @@ FACE_LIKE = math.cos(math.radians(6.0))
 """Cosine of the angle to a face's normal up to which an edge pair's axis stands for the face."""
 
 
-# --- one set --------------------------------------------------------------------------------------
-
-
 def classify(pairs: Pairs) -> tuple[np.ndarray, np.ndarray]:
     """Return indices (n,) into CLASSES and into WINNERS of pairs that touch: see the module."""
     found = stages(*pairs, names=('axis', 'face', 'normal', 'rotation', 'pressed_offset_a',
@@ -224,9 +221,6 @@ def statistics(errors: np.ndarray) -> tuple[float, float, float]:
     return (float(errors.mean()), *output.percentiles(errors, 99, 100))
 
 
-# --- the paper's figures --------------------------------------------------------------------------
-
-
 def paper_errors(models: Sequence[str], weights: str | None = None, step: int = 1,
                  ) -> tuple[dict[str, np.ndarray], int]:
     """Return wrapped errors (n, 4) [rad] on the paper's external set, per model, and n as drawn.
@@ -278,9 +272,6 @@ def paper_broken(errors: dict[str, np.ndarray], drawn: int) -> list[str]:
     checks = {f'MAE {mae:.4f} > {MAE_LIMIT:g} rad': mae <= MAE_LIMIT,
               f'{missed} contacts missed': missed == 0}
     return [f"mlp, the paper's external set: {text}" for text, holds in checks.items() if not holds]
-
-
-# --- the report -----------------------------------------------------------------------------------
 
 
 def table(rows: Sequence[AccuracyRow]) -> str:

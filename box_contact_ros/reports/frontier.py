@@ -122,9 +122,6 @@ class FrontierRow:
     errors: EngineErrors
 
 
-# --- measuring ------------------------------------------------------------------------------------
-
-
 def contestants(members: int = FULL.members) -> tuple[list[Engine], list[str]]:
     """Return all that can be measured here, and a line about each that cannot."""
     sizes = {}
@@ -251,9 +248,6 @@ def measure_all(found: Sequence[Engine], *, seed: int = 3, plan: Plan = FULL) ->
             take_turns([trial.time for trial in trials], plan.rounds, bar.update)
             rows += [trial.row() for trial in trials]
     return rows
-
-
-# --- the report -----------------------------------------------------------------------------------
 
 
 def _errors(values: Sequence[float]) -> str:

@@ -62,8 +62,6 @@ class Effort:
 FULL = Effort(calls=2_000, batch=20_000, shared_batch=100_000, rounds=40, starts=20)
 QUICK = Effort(calls=200, batch=1_000, shared_batch=1_000, rounds=3, starts=2)
 
-# --- the timing that all reports share ------------------------------------------------------------
-
 
 @contextmanager
 def pinned(cores: Collection[int]) -> Iterator[None]:
@@ -92,9 +90,6 @@ def take_turns(runs: Sequence[Callable[[], object]], rounds: int,
             for run in runs:
                 run()
                 after_each()
-
-
-# --- contestants ----------------------------------------------------------------------------------
 
 
 def flush_stacks(rng: np.random.Generator, n: int) -> Pairs:
@@ -181,9 +176,6 @@ def batch(model: str, name: str, count: int, threads: int = 1) -> Stint:
                  count=count, run=prepare(_drawn(name, count), threads=threads))
 
 
-# --- measuring ------------------------------------------------------------------------------------
-
-
 def timed(stints: Sequence[Stint], rounds: int) -> list[Timing]:
     """Time all in turn, `rounds` times, after a warm-up."""
     times: list[list[float]] = [[] for _ in stints]
@@ -239,9 +231,6 @@ def measure_starts(count: int) -> list[float]:
         if not answered or new.returncode:
             raise RuntimeError('a new process gave no contact')
     return times[1:]
-
-
-# --- the gates ------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -301,9 +290,6 @@ def start_claim(seconds: Sequence[float]) -> Claim:
     """Return the claim about the start of a process, by its median."""
     return _at_most(f'A new process has its first contact after {{:.3f}} s, median of '
                     f'{len(seconds)} starts without ROS', float(np.median(seconds)), START_LIMIT)
-
-
-# --- the report -----------------------------------------------------------------------------------
 
 
 def table(timings: Sequence[Timing]) -> str:

@@ -131,8 +131,6 @@ def examine_apart(model: str, family: str, cases: Cases) -> StabilityRow:
         return StabilityRow(model, family, len(cases.gap), failure=str(error))
 
 
-# --- the report -----------------------------------------------------------------------------------
-
 HEAD = ('family', 'cases', 'contacts', 'wrong verdicts', 'wrong normals', 'points outside', 'NaN',
         'depth error, worst [of the size]', 'point error p99 / worst [% of the edge]',
         'Δpoint by Δpose, worst', "exact's")

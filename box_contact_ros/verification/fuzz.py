@@ -47,9 +47,6 @@ SHOWN = 3  # faults of a class and model that are printed
 Sizes = Callable[[np.random.Generator, int], tuple[np.ndarray, np.ndarray]]
 
 
-# --- what is drawn --------------------------------------------------------------------------------
-
-
 def _cube(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray]:
     """Draw equal cubes, 1 cm to 10 m."""
     size = np.repeat(log_uniform(rng, 0.01, 10.0, n)[:, None], 3, axis=1)
@@ -172,9 +169,6 @@ def _brought_together(rng: np.random.Generator, axes: np.ndarray, size_a: np.nda
 def _axes(rng: np.random.Generator, n: int) -> np.ndarray:
     axes = rng.normal(size=(n, 3))
     return axes / np.linalg.norm(axes, axis=1, keepdims=True)
-
-
-# --- the judgement --------------------------------------------------------------------------------
 
 
 @dataclass

@@ -177,8 +177,6 @@ class Bench:
                 turns.setdefault(node.poses, []).append(node)
         return list(turns.values())
 
-    # --- processes -------------------------------------------------------------------------------
-
     def _await_answers(self, stream: Stream) -> None:
         """Offer pairs until every node has answered one, then some at the rate, to warm up."""
         answered_before = {node.name: len(node.log.offers_answered) for node in self.nodes}
@@ -221,8 +219,6 @@ class Bench:
             if node.output:
                 node.output.close()
             node.process = node.output = None
-
-    # --- sending and receiving -------------------------------------------------------------------
 
     def play(self, stream: Stream, truth: Contacts | None, turn: list[MeasuredNode]) -> None:
         """Send a stream to the nodes of one turn, and wait for their last answers."""

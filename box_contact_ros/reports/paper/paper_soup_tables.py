@@ -104,9 +104,6 @@ class SoupResult:
         return self.times[regime, min(PAPER)], self.times[regime, max(PAPER)]
 
 
-# --- the patterns ---------------------------------------------------------------------------------
-
-
 def touching(inputs: np.ndarray) -> Poses:
     """Return the paper's patterns (n, 6), offset [m] and roll, pitch, yaw [rad], as poses."""
     b = np.concatenate([inputs[:, :3], quaternion_from_euler(inputs[:, 3:])], axis=1)
@@ -151,9 +148,6 @@ def pressed(poses: Poses, depth: float) -> Poses:
     """Return the pairs that touch, B moved along SAT's normal until they are `depth` [m] deep."""
     sizes = np.tile(CUBE, (len(poses[0]), 1))
     return at_depth(Pairs(*poses, sizes, sizes), np.full(len(sizes), depth))[:2]
-
-
-# --- time -----------------------------------------------------------------------------------------
 
 
 def search(first: fcl.CollisionObject, second: fcl.CollisionObject) -> None:
@@ -203,9 +197,6 @@ def time_soup(divisions: int, poses: Poses, thin: int, bar: tqdm) -> SoupTimes:
     return SoupTimes(steps=steps, pairs=pairs, alone=np.array(alone), answers=np.array(answers),
                      worst_step=worst_step, worst_alone=worst_alone, touching=int(found.sum()),
                      misses=int((found & (pairs == 0)).sum()))
-
-
-# --- accuracy -------------------------------------------------------------------------------------
 
 
 def judge_soup(divisions: int, poses: Poses, exact: Contacts) -> SoupErrors:
@@ -261,9 +252,6 @@ def crossing(errors: Mapping[int, float], level: float) -> float:
     return math.inf
 
 
-# --- all of it ------------------------------------------------------------------------------------
-
-
 def measure(inputs: np.ndarray, *, quick: bool = False) -> SoupResult:
     """Time and judge every N on every regime; inputs: the paper's external set (n, 6)."""
     counts = QUICK if quick else FULL
@@ -294,9 +282,6 @@ def measure(inputs: np.ndarray, *, quick: bool = False) -> SoupResult:
                   for model in ('paper', 'paper-continuous')}
         exact = time_calls(_cubes('exact'), judged['touching'])
     return SoupResult(times=times, errors=errors, rivals=rivals, exact=exact, counts=counts)
-
-
-# --- what is written ------------------------------------------------------------------------------
 
 
 def _ms(value: float) -> str:

@@ -172,8 +172,6 @@ def paper_searches(*, seed: int, count: int, quick: bool, device: str) -> list[P
                           count=count // 4, **common) for subset, sets in subsets.items())]
 
 
-# --- page, table, plot ----------------------------------------------------------------------------
-
 _PAGES = {
     'mlp': """# How large the MLP should be
 
@@ -275,9 +273,6 @@ def plot(path: Path, results: Sequence[tuple[Search, Rungs]]) -> None:
         axes[0].set_ylabel(f'{search.name}\nerror')
         axes[-1].legend(fontsize=6)
     figure.savefig(path)
-
-
-# --- the program ----------------------------------------------------------------------------------
 
 
 def _options(args: Sequence[str] | None) -> argparse.Namespace:

@@ -91,9 +91,6 @@ def _joined(parts: Sequence[Placements]) -> Placements:
                                        for name in ('pose', 'point', 'normal')))
 
 
-# --- 1. placements --------------------------------------------------------------------------------
-
-
 def quaternion_from_euler(angles: np.ndarray) -> np.ndarray:
     """Quaternions (n, 4) xyzw of Rz(yaw) Ry(pitch) Rx(roll); angles (n, 3) roll, pitch, yaw."""
     about = []
@@ -182,9 +179,6 @@ def mixed(rng: np.random.Generator, count: int, size: Sequence[float], edge_shar
     return _joined(parts)[rng.permutation(count)]
 
 
-# --- 2. patterns ----------------------------------------------------------------------------------
-
-
 def query(placements: Placements) -> Stages:
     """Return separation, axis, normal, offset_a and rotation of every placement, by SAT."""
     first = np.zeros_like(placements.pose)
@@ -232,9 +226,6 @@ def spherical(direction: np.ndarray) -> np.ndarray:
     across = np.hypot(x, y)
     pole = across <= POLE * np.abs(z)
     return np.column_stack([np.where(pole, 0.0, np.arctan2(y, x)), np.arctan2(z, across)])
-
-
-# --- the sets -------------------------------------------------------------------------------------
 
 
 def _streams(seed: int, counts: Sequence[int], sets: Sequence[str],
