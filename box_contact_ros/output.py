@@ -20,7 +20,7 @@ import numpy as np
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-REPORTS = Path(__file__).parent / 'reports'
+PACKAGE = Path(__file__).parent
 
 
 def make_folder(parser: argparse.ArgumentParser, folder: Path) -> Path:
@@ -71,8 +71,8 @@ def markdown_table(head: Sequence[str], rows: Iterable[Sequence[object]], *, wor
 
 
 def page(template: str, **values: object) -> str:
-    """Return a page or a part of one: a Markdown file of reports/ with its `{fields}` filled in."""
-    return (REPORTS / f'{template}.md').read_text('utf-8').format(**values)
+    """Return a page or a part of one: a Markdown file of the package, its `{fields}` filled in."""
+    return (PACKAGE / f'{template}.md').read_text('utf-8').format(**values)
 
 
 def write_csv(path: Path, rows: Iterable[Mapping[str, object]], *, digits: int = 6) -> None:
@@ -108,6 +108,15 @@ def percentiles(values: Sequence[float] | np.ndarray, *percents: float) -> tuple
     if not len(values):
         return (math.nan,) * len(percents)
     return tuple(float(value) for value in np.percentile(values, percents))
+
+
+def pareto(points: Sequence[tuple[float, float]]) -> list[int]:
+    """Return which points (cost, error) have no other as cheap and as good, cheapest first."""
+    found: list[int] = []
+    for place in sorted(range(len(points)), key=lambda place: points[place]):
+        if not found or points[place][1] < points[found[-1]][1]:
+            found.append(place)
+    return found
 
 
 def number(value: float, digits: int = 3) -> str:

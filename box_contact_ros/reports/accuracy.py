@@ -331,7 +331,7 @@ def page(rows: Sequence[AccuracyRow], errors: dict[str, np.ndarray], drawn: int,
          seed: int, broken: Sequence[str]) -> str:
     """Return the Markdown page."""
     return output.page(
-        'pages/accuracy', command=command, machine=output.machine(native), seed=seed,
+        'reports/pages/accuracy', command=command, machine=output.machine(native), seed=seed,
         verdict=f'BROKEN: {"; ".join(broken)}.' if broken else 'All limits hold.',
         table=table(rows), class_table=class_table(rows), mae_limit=MAE_LIMIT,
         paper_table=paper_table(errors, drawn))

@@ -299,7 +299,7 @@ def honesty(rows: Sequence[FrontierRow]) -> str:
     medians = {name: [by[name, s].batch for s in SETS] for name in ('exact', 'mlp')}
     spread = {name: max(values) / min(values) for name, values in medians.items()}
     return output.page(
-        'pages/frontier_honesty', single=net.single[0] / exact.single[0],
+        'reports/pages/frontier_honesty', single=net.single[0] / exact.single[0],
         containers=net.batch / exact.batch,
         stacks=by['mlp', 'stacks'].batch / by['exact', 'stacks'].batch, spread=spread,
         paper=by['paper', 'random cubes'].errors.points['all'][1]).rstrip()
@@ -308,7 +308,7 @@ def honesty(rows: Sequence[FrontierRow]) -> str:
 def page(rows: Sequence[FrontierRow], missing: Sequence[str], command: str) -> str:
     """Return the Markdown page."""
     return output.page(
-        'pages/frontier', command=command, machine=output.machine(native),
+        'reports/pages/frontier', command=command, machine=output.machine(native),
         skipped=''.join(f'\n\nLeft out: {line}.' for line in missing), in_short=in_short(rows),
         honesty=honesty(rows), verdict=VERDICT, few_pairs=FEW_PAIRS, sets='\n\n'.join(
             f'### {name.capitalize()}\n\n{getdoc(ALL_SETS[name])}\n\n{set_table(rows, name)}'
@@ -328,15 +328,6 @@ def csv_rows(rows: Sequence[FrontierRow]) -> list[dict[str, object]]:
                 'calls': row.calls, 'batch_p50': row.batch, 'judged': row.judged,
                 'normal_p99': errors.normal[0], 'normal_worst': errors.normal[1],
                 'missed': errors.missed, 'invented': errors.invented, **asdict(here)})
-    return found
-
-
-def pareto(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Return those (time, error) than which none is both faster and better, by time."""
-    found: list[tuple[float, float]] = []
-    for when, error in sorted(points):
-        if not found or error < found[-1][1]:
-            found.append((when, error))
     return found
 
 
@@ -401,7 +392,7 @@ def _draw_set(axis: Any, rows: Sequence[FrontierRow]) -> dict[str, Any]:
             axis.plot(batch, error, marker, color=colour, markersize=6, fillstyle='none')
             axis.plot([batch, single], [error, error], color=colour, linewidth=0.5)
     for points, style in ((singles, '-'), (batches, '--')):
-        if line := pareto(points):
+        if line := [points[place] for place in output.pareto(points)]:
             axis.step(*zip(*line), style, where='post', color='0.4', linewidth=1.0, zorder=0)
     return shown
 

@@ -306,7 +306,7 @@ def page(runs: Sequence[Sequence[Timing]], claims: Sequence[Claim], command: str
     """Return the Markdown page."""
     here = machine(native, PACKAGES)
     return filled_page(
-        'pages/speed', command=command, processor=here.processor, compiler=here.compiler,
+        'reports/pages/speed', command=command, processor=here.processor, compiler=here.compiler,
         versions=here.versions, effort=effort,
         claims='\n'.join(f'- {"" if one.holds else "BROKEN: "}{one.text}' for one in claims),
         tables='\n\n'.join(f'## {run[0].instruction_set}\n\n{table(run)}' for run in runs))

@@ -20,11 +20,13 @@ FAMILIES = {'random': poses.random_pairs, 'near-parallel': poses.near_parallel_p
 THIN = {'ridges': poses.ridges, 'cards': poses.cards, 'flush': poses.flush_pairs,
         'sharing an axis': poses.sharing_an_axis, 'equal thickness': poses.equal_thickness}
 
+CHUNKS = [0, 1, *(pytest.param(chunk, marks=pytest.mark.slow) for chunk in range(2, 10))]
+
 # Rows of 200,000 ridges.
 SLIVERS = [3650, 16297, 79049, 85246, 85698, 105096, 105366, 110647, 158096, 158626]
 
 
-@pytest.mark.parametrize('chunk', range(10))
+@pytest.mark.parametrize('chunk', CHUNKS)
 @pytest.mark.parametrize('family', FAMILIES)
 def test_agrees_with_the_oracle(family, chunk):
     """Verdict beyond 1e-12·size; depth and axis to 1e-12·size.

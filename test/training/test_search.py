@@ -94,7 +94,8 @@ def test_checkpoint_of_another_search_is_refused(tmp_path: Path) -> None:
 
 def test_frontier() -> None:
     """Cheapest first, each better than all before; equal cost: the better one."""
-    assert search.frontier([3, 1, 2, 2, 5], [0.3, 0.9, 0.5, 0.4, 0.35]) == [1, 3, 0]
+    points = [(3, 0.3), (1, 0.9), (2, 0.5), (2, 0.4), (5, 0.35)]
+    assert search.pareto(points) == [1, 3, 0]
 
 
 def test_small_networks_are_kept_though_they_are_worse() -> None:

@@ -370,7 +370,7 @@ def section_3(result: SoupResult) -> str:
     touching, coplanar = ([cell.steps.mean() / network for cell in result.ends(regime)]
                           for regime in ('touching', 'coplanar'))
     return output.page(
-        'paper/table_3', counts=counts, table=table_3(result), share=share, thin=thin,
+        'reports/paper/table_3', counts=counts, table=table_3(result), share=share, thin=thin,
         low=min(PAPER), high=max(PAPER), network=1e3 * network, exact=1e3 * result.exact,
         touching=touching, coplanar=coplanar)
 
@@ -386,7 +386,7 @@ def section_4(result: SoupResult) -> str:
 
     low, high = min(PAPER), max(PAPER)
     return output.page(
-        'paper/table_4', table=table_4(result), repeats=REPEATS, low=low, high=high,
+        'reports/paper/table_4', table=table_4(result), repeats=REPEATS, low=low, high=high,
         growth_paper=PAPER[high][2] / PAPER[low][2], growth_coplanar=growth('coplanar'),
         growth_parallel=growth('near-parallel'), most_coplanar=most('coplanar'),
         most_parallel=most('near-parallel'),
@@ -396,8 +396,8 @@ def section_4(result: SoupResult) -> str:
 def section_errors(result: SoupResult) -> str:
     """Return the soup's errors, and what differs from the paper."""
     along = 1e3 * result.errors['near-parallel', max(PAPER)].point.mean()
-    return output.page('paper/soup_errors', counts=result.counts, table=table_of_errors(result),
-                       along=along)
+    return output.page('reports/paper/soup_errors', counts=result.counts, along=along,
+                       table=table_of_errors(result))
 
 
 def section_figure_10(result: SoupResult, picture: str) -> str:

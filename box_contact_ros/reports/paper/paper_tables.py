@@ -166,7 +166,8 @@ Ours is over both subsets taken together; each has as many patterns as the paper
 """)
     if 1 in tables:
         detail['containers'] = evaluate(_shipped('paper-12.192x2.438x2.591'), step)['contact']
-    return [*sections, output.page('paper/tables_1_2', by_part=by_part(detail), folding=folding)]
+    return [*sections, output.page('reports/paper/tables_1_2', by_part=by_part(detail),
+                                   folding=folding)]
 
 
 def section_figure_9(picture: str) -> str:

@@ -22,7 +22,7 @@ import numpy as np
 import torch
 
 from ...core import FEATURES, OUTPUTS, SITES, native
-from ...output import machine, make_folder, markdown_table, subplots, write_csv
+from ...output import machine, make_folder, markdown_table, page, pareto, subplots, write_csv
 from ...scene.pose_sets import log_uniform
 from ...solver.arguments import seed_number
 from ...solver.mlp import UNITS_MAX
@@ -172,31 +172,6 @@ def paper_searches(*, seed: int, count: int, quick: bool, device: str) -> list[P
                           count=count // 4, **common) for subset, sets in subsets.items())]
 
 
-_PAGES = {
-    'mlp': """# How large the MLP should be
-
-{made}
-
-{total:,} networks with 4 to 64 hidden units, in steps of 4, and learning rates of 0.001 to 0.1 were
-trained by successive halving: all of them a little, then the best of every class of cost longer.
-The error is the 99th percentile of the point error against `exact`, on contacts of the training
-mixture, in % of the smaller box's longest edge. These trainings are short, so compare sizes. What
-a hidden unit costs in time: [network](network.md).
-""",
-    'paper': """# The paper's search, done again
-
-{made}
-
-The paper trained over 2,000 networks to set learning rate, momentum, hidden units and the range of
-the initial weights. Here {total:,} were trained, by successive halving: all a few epochs, the
-better quarter longer, and so on. Each rung is a full training, in which the learning rate falls to
-zero and which is stopped by cross-validation. Ranges: 6 to 24 units in either layer, learning rate
-0.003 to 1, momentum 0 to 0.97, initial weights to ± 0.1 to 3 / √(inputs of the layer). RMSE is over
-the four angles, in rad. The settings in use take part to the end. They are meant for longer
-trainings than those here.
-"""}
-
-
 def settings_of(search: Search, one: Candidate) -> dict[str, float]:
     """Return the settings that the search varies, by their names on the page."""
     found = {'multiply-adds': search.cost(one), 'learning rate': one.rate}
@@ -205,23 +180,13 @@ def settings_of(search: Search, one: Candidate) -> dict[str, float]:
     return found
 
 
-def frontier(costs: Sequence[float], errors: Sequence[float]) -> list[int]:
-    """Return which have no other that is as cheap and as good, cheapest first."""
-    kept: list[int] = []
-    for k in sorted(range(len(costs)), key=lambda k: (costs[k], errors[k])):
-        if not kept or errors[k] < errors[kept[-1]]:
-            kept.append(k)
-    return kept
-
-
 def section(search: Search, done: Rungs) -> str:
     """Return a search's rungs, its best finalists and the rank of the settings in use."""
     last = done[-1]
     ranked = ranking([one for one in search.candidates() if one.number in last], last)
     rank = next(place for place, one in enumerate(ranked, start=1) if one.shipped)
     if search.name == 'mlp':
-        front = frontier([search.cost(one) for one in ranked],
-                         [last[one.number]['error'] for one in ranked])
+        front = pareto([(search.cost(one), last[one.number]['error']) for one in ranked])
         shown = [one for place, one in enumerate(ranked) if place in front or one.shipped]
         shown.sort(key=search.cost)
         what = 'The frontier: no other finalist is both cheaper and better.'
@@ -329,8 +294,8 @@ def main(args: Sequence[str] | None = None) -> int:
     command = 'python -m box_contact_ros search ' + ' '.join(sys.argv[1:] if args is None else args)
     made = (f'Made by `{command}` in {(time.monotonic() - began) / 60.0:.1f} minutes '
             f'({options.device}) on {machine(native, ("numpy", "torch"))}.')
-    text = _PAGES[options.what].format(
-        made=made, total=sum(len(done[0]) for _, done in results))
+    text = page(f'training/experiments/search_{options.what}', made=made,
+                total=sum(len(done[0]) for _, done in results))
     text += f'\n![Settings and errors]({name}.png)\n' + ''.join(
         section(*result) for result in results)
     text += f'\nAll candidates: [{name}.csv]({name}.csv).\n'
