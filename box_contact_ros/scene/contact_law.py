@@ -26,6 +26,7 @@ frame.
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -117,11 +118,18 @@ class ContactLaw:
                    torsion_radius=((length**2 + width**2) / 12.0)**0.5,
                    rocking=(rocking[0], rocking[1]))
 
-    def wrench(self, touch: Touch | None, pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-        """Wrench (6,) on the load at `pose` (7,) with `velocity` (6,); zeros without a contact."""
+    def wrench(self, touches: Sequence[Touch], pose: np.ndarray, velocity: np.ndarray,
+               ) -> np.ndarray:
+        """Return the wrench (6,) on the load at `pose` (7,) with `velocity` (6,).
+
+        The law is made for one contact; those of several add up.
+        """
+        return np.sum([np.zeros(6), *(self._of(touch, pose, velocity) for touch in touches)],
+                      axis=0)
+
+    def _of(self, touch: Touch, pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+        """Return the wrench (6,) of one contact."""
         result = np.zeros(6)
-        if touch is None:
-            return result
         normal, linear, angular = touch.normal, velocity[:3], velocity[3:]
         arm = touch.point - pose[:3]
         at_point = linear + cross(angular, arm)

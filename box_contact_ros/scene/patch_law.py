@@ -1,4 +1,4 @@
-"""From one contact to a wrench: an elastic foundation over the whole patch.
+"""From contacts to a wrench: an elastic foundation over the whole patch.
 
 A contact query says where two boxes touch, in which direction they push, and how they overlap.
 Forces are the simulator's business. Box A is the load. Box B is the stack, which does not move. The
@@ -17,12 +17,15 @@ v_c is the closing speed at c, ω the load's angular velocity, C_t the covarianc
 plane, and r = √tr C_t. The foundation never pulls: P ≥ 0, and M is at most what pressures p ≥ 0 can
 give. The damping is that of Hunt and Crossley (1975): it vanishes with the overlap.
 
-The modulus κ = k / A follows the patch's own area A = 12·√(λ₁λ₂), by the eigenvalues of C_t. A is
-exact for a rectangle. So V / A is the mean depth, k a total stiffness, and an edge that lands first
-does not sink deeper than a whole face. Below `LEAST_AREA` the modulus stays as it is.
+The modulus κ follows the patch: κ = Ω² / λ_max(M⁻¹K). K is the stiffness of a foundation of modulus
+1 on the patch's area A = 12·√(λ₁λ₂), by the eigenvalues of C_t, and M is the load's inertia. So no
+oscillation of the load on the patch is faster than Ω, and a held wrench is stable. A whole face
+rests at the depth g / Ω², whatever its area. A corner that lands alone is softer, as the load
+resists less there. Several contacts share one modulus.
 
-No constant knows the size of the load. A wrench is computed from a contact and from the state of
-the load at the time the contact was asked for, and is then held (`contact_law.HeldWrench`).
+No constant knows the size of the load. A wrench is computed from contacts and from the state of the
+load at the time they were asked for, and is then held (`contact_law.HeldWrench`).
+docs/force.md derives all of this.
 
 Conventions: those of `pose`; SI units. A wrench is (6,): force [N], then torque about the load's
 centre of mass [N m], both in the common frame. So is a velocity (6,): linear [m/s], then angular
@@ -31,30 +34,53 @@ centre of mass [N m], both in the common frame. So is a velocity (6,): linear [m
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
 from .contact_law import FRICTION, GRAVITY, SLIP_SPEED, Touch
-from .pose import cross
+from .pose import cross, rotation_matrix
 
 __all__ = ['Patch', 'PatchLaw']
 
-LEAST_PENETRATION = 1e-3
-"""Least depth at which the foundation carries the weight [m]: k ≤ m·g / 1 mm."""
+LEAST_PENETRATION = 5e-4
+"""Least depth at which the foundation carries the weight [m]: Ω² ≤ g / 0.5 mm. A stiffer one stops
+a load of 0.3 m/s within a tick or two, and the damping, proportional to the force, overshoots."""
 
-DELAY_LIMIT = 0.35
-"""√(k/m)·T ≤ 0.35 [1], with T the latency and half the period: a held wrench is that late on
-average. Lateness feeds energy into each oscillation, and the damping takes out more up to a limit.
-Of 12 landings each at 200 Hz with 2 and 5 ms and at 1 kHz with 5 ms, all settle with 0.40. With
-0.45, two to seven diverge. 0.35 leaves a fifth."""
+DELAY_LIMIT = 0.45
+"""Ω·T ≤ 0.45 [1], with T the latency and half the period: a held wrench is that late on average.
+Lateness feeds energy into each oscillation, and the damping takes out more up to a limit. Of 12
+landings each at 200 Hz, all settle with 0.55. With 0.65 and 2 ms six diverge, with 0.6 and 5 ms
+two."""
 
-DAMPING_RATIO = 1.0
-"""λ·m·g = 2·1·√(k·m): the critical damping of the heaving load at its static penetration."""
+DAMPING_RATIO = 0.7
+"""λ = 2·0.7·Ω / g: of the critical damping of the heaving load at its static penetration."""
 
-LEAST_AREA = 2.0
-"""Area [m²] below which the modulus grows no further. A corner that lands alone would otherwise
-have the whole stiffness k at the load's end, where a fifth of the mass resists."""
+LEAST_ASPECT = 1e-7
+"""Width of a patch by its length, at least [1]: λ₁λ₂ is a difference of products, which rounding
+spoils by 1e-16 of λ₁². So much area keeps κ finite where an edge only just touches."""
+
+
+class Overlap(Protocol):
+    """What the law reads of a contact: a `Patch`, or a `Contact` of a solver."""
+
+    @property
+    def point(self) -> np.ndarray:
+        """Centroid (3,) [m]."""
+
+    @property
+    def normal(self) -> np.ndarray:
+        """Unit normal (3,) from the load to the stack."""
+
+    @property
+    def volume(self) -> float:
+        """Volume of the overlap [m³]; 0 without contact."""
+
+    @property
+    def covariance(self) -> np.ndarray:
+        """Second central moments (3, 3) of the overlap by its volume [m²]."""
 
 
 @dataclass(frozen=True)
@@ -72,47 +98,80 @@ class Patch(Touch):
 class PatchLaw:
     """The law's constants; make them with `for_loop`.
 
-    stiffness   k [N/m] of the whole patch
+    mass        m of the load [kg]
+    inertia     its principal moments (3,) about the axes of its own frame [kg m²]
+    frequency   Ω [1/s]
     damping     λ [s/m]
     friction    μ [1]
     slip_speed  v_s [m/s]
     """
 
-    stiffness: float
+    mass: float
+    inertia: np.ndarray
+    frequency: float
     damping: float
     friction: float = FRICTION
     slip_speed: float = SLIP_SPEED
 
     @classmethod
-    def for_loop(cls, mass: float, rate_hz: float, latency: float = 0.0) -> PatchLaw:
-        """Return constants for a load of `mass` [kg] in a loop of that rate [1/s] and latency [s].
+    def for_loop(cls, mass: float, inertia: Sequence[float] | np.ndarray, rate_hz: float,
+                 latency: float = 0.0) -> PatchLaw:
+        """Return constants for a load in a loop of that rate [1/s] and latency [s].
 
-        k = m·min(g / LEAST_PENETRATION, (DELAY_LIMIT / T)²) with T = 1 / (2·rate) + latency, and
-        λ = 2·DAMPING_RATIO·√(k·m) / (m·g).
+        Ω = min(√(g / LEAST_PENETRATION), DELAY_LIMIT / T) with T = 1 / (2·rate) + latency, and
+        λ = 2·DAMPING_RATIO·Ω / g.
         """
         delay = 0.5 / rate_hz + latency
-        stiffness = mass * min(GRAVITY / LEAST_PENETRATION, (DELAY_LIMIT / delay)**2)
-        damping = 2.0 * DAMPING_RATIO * math.sqrt(stiffness * mass) / (mass * GRAVITY)
-        return cls(stiffness=stiffness, damping=damping)
+        frequency = min(math.sqrt(GRAVITY / LEAST_PENETRATION), DELAY_LIMIT / delay)
+        return cls(mass=mass, inertia=np.array(inertia, dtype=float), frequency=frequency,
+                   damping=2.0 * DAMPING_RATIO * frequency / GRAVITY)
 
-    def wrench(self, patch: Patch | None, pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-        """Return the force and torque (6,) on the load at `pose` (7,) with `velocity` (6,).
+    def wrench(self, overlaps: Sequence[Overlap], pose: np.ndarray, velocity: np.ndarray,
+               ) -> np.ndarray:
+        """Return the wrench (6,) on the load of contacts that act at the same time.
 
-        Without a patch it is zero.
+        pose, velocity: of the load's centre of mass, (7,) and (6,). Contacts without volume do
+        nothing. ValueError: a contact whose model gives the point alone.
         """
-        result = np.zeros(6)
-        if patch is None or patch.volume <= 0.0:
-            return result
-        normal, linear, angular = patch.normal, velocity[:3], velocity[3:]
-        arm = patch.point - pose[:3]
+        touching = [overlap for overlap in overlaps if _has_volume(overlap)]
+        if not touching:
+            return np.zeros(6)
+        covariances = [_tangential(overlap) for overlap in touching]
+        modulus = self.modulus(touching, covariances, pose)
+        return np.sum([self._of(overlap, covariance, modulus * overlap.volume, pose, velocity)
+                       for overlap, covariance in zip(touching, covariances)], axis=0)
+
+    def modulus(self, overlaps: Sequence[Overlap], covariances: Sequence[np.ndarray],
+                pose: np.ndarray) -> float:
+        """Return κ [N/m³] on which no oscillation is faster than Ω.
+
+        covariances: C_t (3, 3) of each contact. Motions are scaled so that M is 1: per √m along the
+        load's axes, and per √I about them.
+        """
+        axes = rotation_matrix(pose[3:])
+        linear, angular = 1.0 / math.sqrt(self.mass), axes.T / np.sqrt(self.inertia)[:, None]
+        stiffness = np.zeros((6, 6))  # of the scaled load on a foundation of modulus 1
+        for overlap, covariance in zip(overlaps, covariances):
+            normal, area = overlap.normal, _area(covariance)
+            push = np.concatenate([linear * normal,
+                                   angular @ cross(overlap.point - pose[:3], normal)])
+            x, y, z = normal
+            turn = angular @ [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]
+            stiffness += area * np.outer(push, push)
+            stiffness[3:, 3:] += area * (turn @ covariance @ turn.T)
+        return self.frequency**2 / float(np.linalg.eigvalsh(stiffness)[-1])
+
+    def _of(self, overlap: Overlap, covariance: np.ndarray, elastic: float, pose: np.ndarray,
+            velocity: np.ndarray) -> np.ndarray:
+        """Return the wrench (6,) of one contact with the force `elastic` = κ·V at rest."""
+        normal, linear, angular = overlap.normal, velocity[:3], velocity[3:]
+        arm = overlap.point - pose[:3]
         at_centroid = linear + cross(angular, arm)
         closing = float(at_centroid @ normal)
-        tangent = np.eye(3) - np.outer(normal, normal)
-        covariance = tangent @ patch.covariance @ tangent
-        modulus = self.stiffness / max(_area(covariance), LEAST_AREA)
-
         share = 1.0 + self.damping * closing  # of the elastic pressure at the centroid
-        push = max(0.0, modulus * patch.volume * share)
+        if share <= 0.0:
+            return np.zeros(6)
+        push = elastic * share
         slip = at_centroid - closing * normal
         grip = self.friction * push
         force = -push * normal - grip / max(_length(slip), self.slip_speed) * slip
@@ -120,11 +179,8 @@ class PatchLaw:
         radius = math.sqrt(max(0.0, float(np.trace(covariance))))
         rim = radius * float(angular @ normal)  # slip at the radius of gyration
         torsion = -grip * radius * rim / max(abs(rim), self.slip_speed) * normal
-        result[:3] = force
-        result[3:] = cross(arm, force) + torsion
-        if push > 0.0:
-            result[3:] += self._rocking(normal, angular, covariance, share) * modulus * patch.volume
-        return result
+        rocking = elastic * self._rocking(normal, angular, covariance, share)
+        return np.concatenate([force, cross(arm, force) + torsion + rocking])
 
     def _rocking(self, normal: np.ndarray, angular: np.ndarray, covariance: np.ndarray,
                  share: float) -> np.ndarray:
@@ -140,15 +196,33 @@ class PatchLaw:
         return -cross(spread, normal) * min(1.0, share / at_rim if at_rim > 0.0 else 1.0)
 
 
+def _has_volume(overlap: Overlap) -> bool:
+    """Return whether there is a contact; ValueError for one that has no patch."""
+    # Without contact a solver's covariance is NaN and its volume 0.
+    if overlap.volume == 0.0:
+        return False
+    if not (math.isfinite(overlap.volume) and np.isfinite(overlap.covariance).all()):
+        raise ValueError(f'the contact has no patch (volume {overlap.volume}): its model gives the '
+                         'point alone, and the law needs volume and covariance')
+    return True
+
+
+def _tangential(overlap: Overlap) -> np.ndarray:
+    """Return the covariance (3, 3) within the tangent plane."""
+    tangent = np.eye(3) - np.outer(overlap.normal, overlap.normal)
+    covariance: np.ndarray = tangent @ overlap.covariance @ tangent
+    return covariance
+
+
 def _area(covariance: np.ndarray) -> float:
     """Return 12·√(λ₁λ₂) [m²] of a covariance (3, 3) that is flat in one direction.
 
-    λ₁λ₂ is the sum of its three principal minors of two rows.
+    λ₁λ₂ is the sum of its three principal minors of two rows. See `LEAST_ASPECT`.
     """
     c = covariance
     product = (c[0, 0] * c[1, 1] - c[0, 1] * c[1, 0] + c[1, 1] * c[2, 2] - c[1, 2] * c[2, 1]
                + c[2, 2] * c[0, 0] - c[2, 0] * c[0, 2])
-    return 12.0 * math.sqrt(max(0.0, float(product)))
+    return 12.0 * max(math.sqrt(max(0.0, float(product))), LEAST_ASPECT * float(np.trace(c)))
 
 
 def _length(a: np.ndarray) -> float:

@@ -11,22 +11,26 @@ pytest.importorskip('mujoco')
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.apps.crane.landing import (
-    SETTLING,
-    WINDOW,
+    CORNER_SPEED_LIMIT,
+    WATCHED,
+    LandingCase,
     LandingRecord,
     LandingResult,
     cases,
     land,
     landing_scenario,
     scenario_of,
+    solvers,
 )
-from box_contact_ros.apps.crane.mujoco_crane import Crane
-from box_contact_ros.scene.contact_law import GRAVITY
-from box_contact_ros.scene.patch_law import PatchLaw
+from box_contact_ros.apps.crane.mujoco_crane import Crane, CraneScenario
+from box_contact_ros.scene.contact_law import GRAVITY, ContactLaw
 
 CASES = list(cases())
 HANGING_OVER = 17
 """Tilt of 3°, 0.6 m of overhang: the patch is about to lift off on one side."""
+
+WELL_AIMED = LandingCase(rope_angle=0.5, rope_heading=70.0, tilt=1.0, tilt_heading=30.0,
+                         overhang=0.05, overhang_heading=160.0, yaw=0.1)
 
 
 def landed(number: int, model: str = 'exact', **options) -> LandingResult:
@@ -45,44 +49,54 @@ def test_the_grid_covers_what_is_asked_for():
     assert -1.0 <= min(yaws) < -0.8 and 0.8 < max(yaws) <= 1.0
 
 
-@pytest.mark.parametrize('number', [5, HANGING_OVER, 31])
-def test_the_exact_point_lands_at_200_hz_with_latency(number):
-    """Among the hardest of the grid: at twice the stiffness, none of these three comes to rest."""
-    result = landed(number, rate_hz=200.0, latency=0.002)
+@pytest.mark.parametrize(('number', 'rate_hz', 'latency'), [
+    (5, 200.0, 0.002), (HANGING_OVER, 200.0, 0.002), (31, 200.0, 0.002), (31, 200.0, 0.005),
+    (HANGING_OVER, 200.0, 0.0), (HANGING_OVER, 1000.0, 0.002)])
+def test_the_patch_lands_flat(number, rate_hz, latency):
+    """Among the hardest of the grid: the patch all but lifts off on one side."""
+    result = landed(number, rate_hz=rate_hz, latency=latency)
     assert result.at_rest, f'\n{result}'
     assert result.overhang == pytest.approx(CASES[number].overhang, abs=0.01)
-    assert result.settled < SETTLING / 2
-
-
-@pytest.mark.parametrize('rate_hz, latency', [(200.0, 0.0), (200.0, 0.004), (1000.0, 0.0),
-                                              (1000.0, 0.002)])
-def test_the_exact_point_lands_at_either_rate(rate_hz, latency):
-    result = landed(HANGING_OVER, rate_hz=rate_hz, latency=latency)
-    assert result.at_rest, f'\n{result}'
     assert result.point_step == result.exact_point_step < 1e-4
+    assert result.energy_gain < 1.0 and result.creep < 0.3e-3
 
 
-@pytest.mark.parametrize(('rate_hz', 'latency'), [(200.0, 0.002), (1000.0, 0.0)])
-def test_the_patch_lands_without_a_footprint(rate_hz, latency):
-    """The elastic foundation: flat, and quieter than any law with one point (docs/decisions)."""
-    scenario = scenario_of(CASES[HANGING_OVER])
-    solver = ContactSolver(scenario.size, scenario.stack_size, model='exact')
-    law = PatchLaw.for_loop(scenario.mass, rate_hz, latency)
-    result = land(scenario, solver, rate_hz=rate_hz, latency=latency, law=law).judge()
-    assert result.at_rest, str(result)
-    assert result.corner_speed < 0.3e-3
-    assert math.degrees(result.tilt) < 0.06
-    assert result.force_worst < 1e-6
-    assert result.settled < 3.0
+def test_a_model_without_a_patch_is_refused_by_name():
+    pytest.importorskip('fcl')
+    scenario = scenario_of(CASES[0])
+    with pytest.raises(ValueError, match='model fcl: .* needs volume and covariance'):
+        land(scenario, solvers(scenario, 'fcl'))
+
+
+@pytest.mark.parametrize('fields', [
+    {'mass_offset': (1.2, 0.0, 0.0)}, {'castings': True, 'size': (12.192, 2.438, 1.5)},
+    {'size': (6.058, 2.438, 2.591), 'mass': 12_000.0}, {'stack_size': (6.0, 2.0, 1.0)}],
+    ids=['off centre', 'castings', '20 ft', 'pedestal'])
+def test_other_loads_and_stacks_land_flat(fields):
+    """One law, whose constants know the load's mass and inertia and no size."""
+    scenario = scenario_of(WELL_AIMED, **fields)
+    result = land(scenario, solvers(scenario, 'exact'), latency=0.002).judge()
+    assert result.at_rest, f'\n{result}'
+
+
+def test_a_load_that_hangs_over_too_far_falls():
+    """Its middle is beyond the stack's edge: it tips off until the ropes hold it again."""
+    scenario = scenario_of(LandingCase(
+        rope_angle=0.5, rope_heading=0.0, tilt=0.5, tilt_heading=0.0, overhang=1.35,
+        overhang_heading=90.0, yaw=0.0))
+    result = land(scenario, solvers(scenario, 'exact'), latency=0.002).judge()
+    assert not result.at_rest
+    assert result.drop > 0.1
 
 
 @pytest.mark.parametrize('rate_hz', [200.0, 1000.0])
 def test_the_deepest_point_does_not_land(rate_hz):
     """The deepest contact of FCL jumps between corners, metres a tick, and the load rattles."""
     pytest.importorskip('fcl')
-    result = landed(HANGING_OVER, 'fcl', rate_hz=rate_hz)
-    assert not result.at_rest
-    assert not result.verdicts['corner speed'] and not result.verdicts['force']
+    law = ContactLaw.for_load(20_000.0, CraneScenario().size, rate_hz)
+    result = landed(HANGING_OVER, 'fcl', rate_hz=rate_hz, law=law)
+    assert not result.at_rest and math.isnan(result.settled)
+    assert not result.limits['corner speed'][0] and not result.limits['force'][0]
     assert result.corner_speed > 0.04
     assert result.point_step > 5.0
 
@@ -114,20 +128,35 @@ def test_without_contact_nothing_is_judged():
     assert not LandingRecord(scenario, 200.0).judge().at_rest
 
 
-def test_every_criterion_counts():
+def test_every_limit_counts():
     """A landing that meets all limits but one is not at rest, and says which."""
-    good = {'corner_speed': 0.001, 'rope_tension': 0.0, 'force_worst': 1e-3, 'tilt': 1e-3,
+    good = {'corner_speed': 1e-4, 'rope_tension': 0.0, 'force_worst': 1e-7, 'static_tilt': 1e-3,
             'depth': 5e-3, 'gap': 0.0, 'settled': 1.0, 'touched': 7.0}
     assert LandingResult(**good).at_rest
     for field, value, name in (
-            ('corner_speed', 0.011, 'corner speed'), ('rope_tension', 1e-9, 'ropes slack'),
-            ('force_worst', 0.011, 'force'), ('tilt', math.radians(0.51), 'tilt'),
-            ('depth', 0.011, 'depth'), ('gap', 0.021, 'gap')):
+            ('corner_speed', 1.01 * CORNER_SPEED_LIMIT, 'corner speed'),
+            ('rope_tension', 1e-9, 'ropes slack'), ('force_worst', 1.1e-6, 'force'),
+            ('static_tilt', math.radians(0.061), 'static tilt'), ('depth', 0.011, 'depth'),
+            ('gap', 0.021, 'gap'), ('settled', 3.1, 'settled')):
         bad = LandingResult(**good | {field: value})
-        assert [key for key, met in bad.verdicts.items() if not met] == [name]
+        assert [key for key, (met, _) in bad.limits.items() if not met] == [name]
         assert str(bad).count('not met') == 1 and 'NOT AT REST' in str(bad)
-    nothing = LandingResult()
-    assert not any(nothing.verdicts.values())
+    assert not any(met for met, _ in LandingResult().limits.values())
+
+
+def test_a_swinging_load_keeps_its_energy():
+    """Kinetic and potential energy of a load out of its middle, on ropes that do not move."""
+    scenario = landing_scenario(lowering_speed=0.0, overlap=-0.5, mass_offset=(0.6, 0.1, -0.2),
+                                rope_angle=3.0)
+    crane, record = Crane(scenario, 200.0), LandingRecord(scenario, 200.0)
+    for _ in range(1000):
+        record.poses.append(crane.load_pose)
+        record.velocities.append(crane.load_velocity)
+        crane.step()
+    energies = record.energies()[400:]  # at first the ropes stretch
+    swing = np.ptp(scenario.mass * GRAVITY * np.array(record.poses)[400:, 2])
+    assert swing > 300.0
+    assert np.ptp(energies) < 0.1 * swing
 
 
 def test_corner_speeds_and_tilts_are_rigid_motion():
@@ -150,7 +179,7 @@ def test_the_hoist_of_a_landing_never_lifts():
     assert heights[0] == scenario.lowering_distance > scenario.overlap
     assert scenario.hoist_height(0.5 * scenario.duration) == pytest.approx(0.0, abs=1e-12)
     assert heights[-1] == pytest.approx(0.0, abs=1e-12)
-    assert SETTLING + WINDOW < 0.7 * scenario.duration
+    assert WATCHED < 0.7 * scenario.duration
 
 
 def test_a_wrench_may_change_within_a_tick():

@@ -1,14 +1,10 @@
-"""A container set down by one contact point per tick, and whether it came to rest. No ROS.
+"""A container set down by its contacts, one per box of the stack and tick. No ROS.
 
 A `ClosedLoop` steps a crane under a `ForceLaw`, wherever the contacts come from, and records what
 happened; `land` closes it with any function of the two poses. `LandingRecord.judge` measures the
-record against these criteria, from `SETTLING` s after the first touch on, for `WINDOW` s:
-
-- No corner of the load moves faster than `corner_speed_limit`. All ropes are slack.
-- The contact force is within `FORCE_LIMIT` of the weight at every tick.
-- The load is tilted by less than `TILT_LIMIT`.
-- Always: the depth is less than `DEPTH_LIMIT` of the load's height.
-- After the first touch, no gap opens wider than `GAP_LIMIT`.
+record. The load settles if, from some time on, no corner moves faster than `SETTLED_SPEED`, until
+`WATCHED` s after the first touch. It is at rest if it meets every limit of `LandingResult.limits`.
+The window is the last `WINDOW` s of the time that is watched.
 
 Depth, gap and first touch are those of the exact solver on the recorded poses, whatever model gave
 the contacts. Conventions: those of `pose`, `contact_law` and `mujoco_crane`.
@@ -17,7 +13,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 from typing import Any, NamedTuple, Protocol
@@ -25,8 +21,8 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from ...output import percentiles
-from ...scene.contact_law import GRAVITY, ContactLaw, HeldWrench, Touch
-from ...scene.patch_law import Patch
+from ...scene.contact_law import GRAVITY, HeldWrench
+from ...scene.patch_law import Patch, PatchLaw
 from ...scene.pose import rotation_matrix
 from ...solver.contact import Contact
 from ...solver.contact_solver import ContactSolver
@@ -35,14 +31,21 @@ from .mujoco_crane import LANDING_OVERLAP, Crane, CraneScenario
 
 SETTLING, WINDOW = 10.0, 5.0
 """The load has to be at rest from `SETTLING` s after the first touch on, for `WINDOW` s."""
-CORNER_SPEED_LIMIT = 0.010  # speed of the load's fastest corner at rest [m/s]
-SLOW_CORNER_SPEED_LIMIT, SLOW_RATE = 0.020, 200.0
-"""The same [m/s] at rates [1/s] up to `SLOW_RATE`, where the law is scaled down."""
-FORCE_LIMIT = 0.01
+WATCHED = SETTLING + WINDOW
+SETTLED_SPEED = 0.010
+"""Speed of the load's fastest corner [m/s] below which it has settled."""
+SETTLED_LIMIT = 3.0
+"""Time from the first touch until then [s]."""
+CORNER_SPEED_LIMIT = 0.3e-3
+"""Speed of the fastest corner in the window [m/s]."""
+FORCE_LIMIT = 1e-6
 """Deviation of the contact force's vertical part from the weight, as a share of the weight."""
-TILT_LIMIT = math.radians(0.5)  # angle between the load's and the world's vertical [rad]
-DEPTH_LIMIT = 0.01  # depth as a share of the load's height
-GAP_LIMIT = 0.020  # gap after the first touch [m]: how high it may bounce
+TILT_LIMIT = math.radians(0.06)
+"""Mean angle between the load's and the world's vertical in the window [rad]."""
+DEPTH_LIMIT = 0.01
+"""Depth as a share of the load's height, always."""
+GAP_LIMIT = 0.020
+"""Gap after the first touch [m]: how high it may bounce."""
 
 LANDING_DURATION = 25.0
 """Length of a landing [s]. The first touch comes after 5 to 8 s, and 15 s more are looked at."""
@@ -51,12 +54,10 @@ ContactSource = Callable[[np.ndarray, np.ndarray], Contact | None]
 """From pose_a and pose_b (7,) to their contact; None stands for an answer that was lost."""
 
 
-def touch_of(contact: Contact) -> Patch | None:
-    """Return the part of a contact that a law needs; None where the boxes are apart."""
-    if not contact.colliding:
-        return None
-    depth = max(0.0, -contact.separation)
-    return Patch(contact.point, contact.normal, depth, contact.volume, contact.covariance)
+def touches_in(contacts: Iterable[Contact | None]) -> list[Patch]:
+    """Return the part that a law needs of those contacts in which the boxes touch."""
+    return [Patch(one.point, one.normal, max(0.0, -one.separation), one.volume, one.covariance)
+            for one in contacts if one is not None and one.colliding]
 
 
 def landing_scenario(**fields: Any) -> CraneScenario:
@@ -94,8 +95,10 @@ AIMING_RATE = 100.0
 """Ticks a second while the trolley is placed; the load moves 5 mm a tick at most."""
 
 
-def scenario_of(case: LandingCase) -> CraneScenario:
+def scenario_of(case: LandingCase, **fields: Any) -> CraneScenario:
     """Return the scenario of a case: the trolley stands where the load sways to its overhang.
+
+    fields: further ones of CraneScenario.
 
     Moving the trolley moves the whole motion before the touch, so the trolley is shifted by what
     was missed. It is shifted twice: the first shift may change which corner touches.
@@ -105,11 +108,13 @@ def scenario_of(case: LandingCase) -> CraneScenario:
     wanted = case.overhang * np.array([math.cos(hanging), math.sin(hanging)])
     scenario = landing_scenario(
         offset=tuple(wanted), rope_angle=case.rope_angle, rope_heading=case.rope_heading,
-        pitch=tilt * math.cos(heading), roll=tilt * math.sin(heading), yaw=case.yaw)
-    solver = ContactSolver(scenario.size, scenario.stack_size, model='exact')
+        pitch=tilt * math.cos(heading), roll=tilt * math.sin(heading), yaw=case.yaw, **fields)
+    exact = solvers(scenario, 'exact')
+    boxes = [pose for pose, _ in scenario.stack_boxes]
     for _ in range(2):
         crane = Crane(scenario, AIMING_RATE)
-        while not solver(crane.load_pose, crane.stack_pose).colliding:
+        while not any(solver(crane.load_pose, pose).colliding
+                      for solver, pose in zip(exact, boxes)):
             if crane.time > scenario.duration:
                 raise ValueError(f'the load never touches: {case}')
             crane.step()
@@ -125,61 +130,81 @@ class LandingResult:
     touched: float = math.nan  # time of the first touch [s], NaN for never
     overhang: float = math.nan  # lateral distance of the two centres then [m]
     settled: float = math.nan
-    """Time from the first touch until corners stay within the limit [s], NaN for never."""
-    corner_speed: float = math.nan  # of the fastest corner in the window [m/s]
-    corner_speed_limit: float = CORNER_SPEED_LIMIT
-    rope_tension: float = math.nan  # of the tautest rope in the window [N]
-    force_error: float = math.nan  # |mean contact force − weight| / weight over the window
-    force_worst: float = math.nan  # the same of the window's worst tick
-    tilt: float = math.nan  # largest in the window [rad]
-    depth: float = math.nan  # largest ever, as a share of the load's height
-    gap: float = math.nan  # largest after the first touch [m]
-    point_step: float = math.nan  # largest |Δpoint| between neighbouring ticks in the window [m]
-    exact_point_step: float = math.nan  # the same of the exact point on the same poses
-    point_step_ever: float = math.nan  # largest |Δpoint| over the whole contact [m]
+    """Time from the first touch until corners stay below `SETTLED_SPEED` [s], NaN for never."""
+    corner_speed: float = math.nan
+    """Of the fastest corner in the window [m/s]."""
+    rope_tension: float = math.nan
+    """Of the tautest rope in the window [N]."""
+    force_error: float = math.nan
+    """|mean contact force − weight| / weight over the window."""
+    force_worst: float = math.nan
+    """The same of the window's worst tick."""
+    tilt: float = math.nan
+    """Largest in the window [rad]."""
+    static_tilt: float = math.nan
+    """Mean over the window [rad]."""
+    tilt_limit: float = TILT_LIMIT
+    """What the scenario's static tilt is held to [rad]."""
+    creep: float = math.nan
+    """Mean lateral speed of the load's centre over the window [m/s]."""
+    energy_gain: float = math.nan
+    """Largest gain of kinetic and potential energy over the window's start [J]."""
+    depth: float = math.nan
+    """Largest ever, as a share of the load's height."""
+    gap: float = math.nan
+    """Largest after the first touch [m]."""
+    drop: float = math.nan
+    """How far the load's centre ends below its place on the stack [m]."""
+    point_step: float = math.nan
+    """Largest |Δpoint| between neighbouring ticks in the window [m]."""
+    exact_point_step: float = math.nan
+    """The same of the exact point on the same poses."""
+    point_step_ever: float = math.nan
+    """Largest |Δpoint| over the whole contact [m]."""
     exact_point_step_ever: float = math.nan
 
     @property
-    def verdicts(self) -> dict[str, bool]:
-        """Whether each criterion is met, by name; what was not measured is not met."""
+    def limits(self) -> dict[str, tuple[bool, str]]:
+        """Whether each limit is met, by name, and figure and limit in words.
+
+        What was not measured is not met.
+        """
         return {
-            'corner speed': self.corner_speed < self.corner_speed_limit,
-            'ropes slack': self.rope_tension == 0.0,
-            'force': self.force_worst < FORCE_LIMIT,
-            'tilt': self.tilt < TILT_LIMIT,
-            'depth': self.depth < DEPTH_LIMIT,
-            'gap': self.gap < GAP_LIMIT,
+            'settled': (self.settled <= SETTLED_LIMIT,
+                        f'{self.settled:.2f} s after the first touch (limit {SETTLED_LIMIT:g})'),
+            'corner speed': (self.corner_speed <= CORNER_SPEED_LIMIT,
+                             f'{1e3 * self.corner_speed:.3g} mm/s at most '
+                             f'(limit {1e3 * CORNER_SPEED_LIMIT:g})'),
+            'ropes slack': (self.rope_tension == 0.0, f'{self.rope_tension:.3g} N at most'),
+            'force': (self.force_worst <= FORCE_LIMIT,
+                      f'{self.force_worst:.1g} of the weight off it (limit {FORCE_LIMIT:g})'),
+            'static tilt': (self.static_tilt <= self.tilt_limit,
+                            f'{math.degrees(self.static_tilt):.2g} deg '
+                            f'(limit {math.degrees(self.tilt_limit):g})'),
+            'depth': (self.depth < DEPTH_LIMIT, f'{100 * self.depth:.2g} % of the height '
+                                                f'(limit {100 * DEPTH_LIMIT:g})'),
+            'gap': (self.gap < GAP_LIMIT, f'{1e3 * self.gap:.2g} mm after the first touch '
+                                          f'(limit {1e3 * GAP_LIMIT:g})'),
         }
 
     @property
     def at_rest(self) -> bool:
-        """Whether all criteria are met."""
-        return all(self.verdicts.values())
+        """Whether all limits are met."""
+        return all(met for met, _ in self.limits.values())
 
     def __str__(self) -> str:
         """Return a few lines for people: every figure with its limit."""
         if math.isnan(self.corner_speed):
-            return ('  landing ................ not judged: it takes a touch and '
-                    f'{SETTLING + WINDOW:g} s after it')
-        figures = {
-            'corner speed': f'{1e3 * self.corner_speed:.3g} mm/s at most '
-                            f'(limit {1e3 * self.corner_speed_limit:g})',
-            'ropes slack': f'{self.rope_tension:.3g} N at most',
-            'force': f'{100 * self.force_worst:.2g} % off the weight at worst, '
-                     f'{100 * self.force_error:.2g} % on average (limit {100 * FORCE_LIMIT:g})',
-            'tilt': f'{math.degrees(self.tilt):.2g} deg (limit {math.degrees(TILT_LIMIT):g})',
-            'depth': f'{100 * self.depth:.2g} % of the height (limit {100 * DEPTH_LIMIT:g})',
-            'gap': f'{1e3 * self.gap:.2g} mm after the first touch (limit {1e3 * GAP_LIMIT:g})',
-        }
-        still = 'never' if math.isnan(self.settled) else f'{self.settled:.2g} s after it'
+            return f'  landing ................ not judged: it takes a touch and {WATCHED:g} s more'
         rows = [('landing', f'{"at rest" if self.at_rest else "NOT AT REST"} (first touch at '
-                            f'{self.touched:.2f} s; corners below their limit: {still})')]
-        rows += [(name, figures[name] + ('' if met else '  <-- not met'))
-                 for name, met in self.verdicts.items()]
-        rows.append(('point steps', f'{1e3 * self.point_step:.2g} mm at most between ticks (exact: '
-                                    f'{1e3 * self.exact_point_step:.2g}), while settling '
-                                    f'{1e3 * self.point_step_ever:.2g} mm (exact: '
-                                    f'{1e3 * self.exact_point_step_ever:.2g})'))
+                            f'{self.touched:.2f} s)')]
+        rows += [(name, figure + ('' if met else '  <-- not met'))
+                 for name, (met, figure) in self.limits.items()]
+        rows += [('creep', f'{1e3 * self.creep:.2g} mm/s'),
+                 ('point steps', f'{1e3 * self.point_step:.2g} mm at most between ticks (exact: '
+                                 f'{1e3 * self.exact_point_step:.2g}), while settling '
+                                 f'{1e3 * self.point_step_ever:.2g} mm (exact: '
+                                 f'{1e3 * self.exact_point_step_ever:.2g})')]
         return table(rows)
 
 
@@ -201,7 +226,7 @@ class LandingRecord:
         signs = np.array(list(product((-0.5, 0.5), repeat=3)))
         poses, velocities = np.array(self.poses), np.array(self.velocities)
         arms = np.einsum('nij,kj->nki', rotation_matrix(poses[:, 3:]),
-                         signs * self.scenario.size)
+                         signs * self.scenario.size - self.scenario.mass_offset)
         speeds = velocities[:, None, :3] + np.cross(velocities[:, None, 3:], arms)
         return np.linalg.norm(speeds, axis=2).max(axis=1)
 
@@ -209,6 +234,18 @@ class LandingRecord:
         """Return the angle [rad] between the load's vertical and the world's, per tick (n,)."""
         up = rotation_matrix(np.array(self.poses)[:, 3:])[:, :, 2]
         return np.arctan2(np.hypot(up[:, 0], up[:, 1]), up[:, 2])
+
+    def energies(self) -> np.ndarray:
+        """Return kinetic and potential energy [J] per tick (n,)."""
+        scenario = self.scenario
+        poses, velocities = np.array(self.poses), np.array(self.velocities)
+        axes = rotation_matrix(poses[:, 3:])
+        spins = np.einsum('nij,ni->nj', axes, velocities[:, 3:])
+        height = poses[:, 2] + axes[:, 2] @ scenario.mass_offset
+        energies: np.ndarray = 0.5 * (
+            scenario.mass * np.square(velocities[:, :3]).sum(axis=1)
+            + np.square(spins) @ scenario.inertia) + scenario.mass * GRAVITY * height
+        return energies
 
     def vertical_forces(self) -> np.ndarray:
         """Return the vertical part [N] of the contact force, per tick (n,)."""
@@ -221,91 +258,118 @@ class LandingRecord:
             path[tick] = point
         return path
 
-    def judge(self) -> LandingResult:
-        """Measure the landing; what would have to be measured later than its end is NaN."""
+    def judge(self, *, tilt_limit: float = TILT_LIMIT) -> LandingResult:
+        """Measure the landing; what would have to be measured later than its end is NaN.
+
+        tilt_limit: of the static tilt [rad], for a scenario in which the load cannot lie flatter.
+        """
         scenario, ticks = self.scenario, len(self.forces)
-        limit = SLOW_CORNER_SPEED_LIMIT if self.rate_hz <= SLOW_RATE else CORNER_SPEED_LIMIT
         if not ticks:
-            return LandingResult(corner_speed_limit=limit)
+            return LandingResult()
         poses = np.array(self.poses)[:ticks]
-        stack = np.broadcast_to(Crane(scenario, self.rate_hz).stack_pose, (ticks, 7))
-        exact = ContactSolver(scenario.size, scenario.stack_size, model='exact').batch(poses, stack)
-        if not exact.colliding.any():
-            return LandingResult(corner_speed_limit=limit)
-        first = int(np.argmax(exact.colliding))
+        colliding, separation, exact_points = _exact(scenario, poses)
+        if not colliding.any():
+            return LandingResult()
+        first = int(np.argmax(colliding))
         speeds = self.corner_speeds()[:ticks]
-        fast = np.flatnonzero(speeds[first:] >= limit)
+        fast = np.flatnonzero(speeds[first:] >= SETTLED_SPEED)
         still = fast[-1] + 1 if len(fast) else 0
-        steps, exact_steps = _steps(self.point_path()[:ticks]), _steps(exact.point)
+        steps, exact_steps = _steps(self.point_path()[:ticks]), _steps(exact_points)
+        place = scenario.stack_size[2] + 0.5 * scenario.size[2]
         figures = {
             'touched': first / self.rate_hz,
-            'overhang': float(np.hypot(*(poses - stack)[first, :2])),
+            'overhang': float(np.hypot(*(poses[first, :2] - scenario.drop_position))),
             'settled': still / self.rate_hz if first + still < ticks else math.nan,
-            'corner_speed_limit': limit,
-            'depth': float(np.max(-exact.separation)) / scenario.size[2],
-            'gap': float(max(0.0, np.max(exact.separation[first:]))),
+            'tilt_limit': tilt_limit,
+            'depth': float(np.max(-separation)) / scenario.size[2],
+            'gap': float(max(0.0, np.max(separation[first:]))),
+            'drop': place - float(poses[-1, 2]),
             'point_step_ever': _largest(steps[first:]),
             'exact_point_step_ever': _largest(exact_steps[first:]),
         }
         window = slice(first + round(SETTLING * self.rate_hz),
-                       first + round((SETTLING + WINDOW) * self.rate_hz))
+                       first + round(WATCHED * self.rate_hz))
         if window.stop <= ticks:
-            weight = scenario.mass * GRAVITY
-            forces = self.vertical_forces()[window]
-            figures |= {
-                'corner_speed': float(speeds[window].max()),
-                'rope_tension': float(np.array(self.tensions)[window].max()),
-                'force_error': abs(float(forces.mean()) / weight - 1.0),
-                'force_worst': float(np.abs(forces / weight - 1.0).max()),
-                'tilt': float(self.tilts()[:ticks][window].max()),
-                'point_step': _largest(steps[window]),
-                'exact_point_step': _largest(exact_steps[window]),
-            }
+            figures |= self._in(window) | {'point_step': _largest(steps[window]),
+                                           'exact_point_step': _largest(exact_steps[window])}
         return LandingResult(**figures)
+
+    def _in(self, window: slice) -> dict[str, float]:
+        """Return the figures of a window of ticks."""
+        weight = self.scenario.mass * GRAVITY
+        forces, energies = self.vertical_forces()[window], self.energies()[window]
+        tilts, places = self.tilts()[window], np.array(self.poses)[window, :2]
+        return {
+            'corner_speed': float(self.corner_speeds()[window].max()),
+            'rope_tension': float(np.array(self.tensions)[window].max()),
+            'force_error': abs(float(forces.mean()) / weight - 1.0),
+            'force_worst': float(np.abs(forces / weight - 1.0).max()),
+            'tilt': float(tilts.max()), 'static_tilt': float(tilts.mean()),
+            'creep': float(np.hypot(*(places[-1] - places[0]))) / WINDOW,
+            'energy_gain': float(energies.max() - energies[0]),
+        }
+
+
+def _exact(scenario: CraneScenario, poses: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Return of the load's poses (n, 7): touching (n,), separation (n,), exact points (n, 3).
+
+    The least separation of the stack's boxes, and the point on the first of them.
+    """
+    found = [ContactSolver(scenario.size, size, model='exact').batch(
+        poses, np.broadcast_to(pose, poses.shape)) for pose, size in scenario.stack_boxes]
+    return (np.any([one.colliding for one in found], axis=0),
+            np.min([one.separation for one in found], axis=0), found[0].point)
 
 
 class ForceLaw(Protocol):
-    """From one contact to the force and the torque on the load."""
+    """From contacts to the force and the torque on the load."""
 
-    def wrench(self, touch: Any, pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-        """Return the force and torque (6,) on the load at `pose` (7,) with `velocity` (6,).
+    def wrench(self, touches: Sequence[Any], pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+        """Return the wrench (6,) on the load at `pose` (7,) with `velocity` (6,).
 
-        touch: what the law needs of a contact, a `Touch` or a `Patch`; None without contact.
+        touches: what the law needs of contacts, `Touch` or `Patch`; empty without contact.
         """
 
 
 class LoopState(NamedTuple):
-    """The load's state when its contact is asked for."""
+    """The load's state when its contacts are asked for."""
 
     tick: int
     time: float
     pose: np.ndarray
+    """Of the load's box (7,)."""
+    mass_pose: np.ndarray
+    """Of its centre of mass (7,), and so is the velocity (6,)."""
     velocity: np.ndarray
 
 
 class ClosedLoop:
     """A crane under the wrench of a law, recorded tick by tick, wherever contacts come from."""
 
-    def __init__(self, scenario: CraneScenario, rate_hz: float,
+    def __init__(self, scenario: CraneScenario, rate_hz: float, *, latency: float = 0.0,
                  law: ForceLaw | None = None) -> None:
-        """Take the standard law for this load and rate where `law` is None."""
+        """Take the patch law for this load, rate and latency [s] where `law` is None."""
         self.record = LandingRecord(scenario, rate_hz)
-        self._law = law or ContactLaw.for_load(scenario.mass, scenario.size, rate_hz)
+        self._law = law or PatchLaw.for_loop(scenario.mass, scenario.inertia, rate_hz, latency)
         self._held = HeldWrench()
 
     def ask(self, crane: Crane) -> LoopState:
-        """Begin a tick; return the state whose contact is asked for."""
-        state = LoopState(len(self.record.poses), crane.time, crane.load_pose, crane.load_velocity)
+        """Begin a tick; return the state whose contacts are asked for."""
+        state = LoopState(len(self.record.poses), crane.time, crane.load_pose, crane.mass_pose,
+                          crane.load_velocity)
         self.record.poses.append(state.pose)
         self.record.velocities.append(state.velocity)
         return state
 
-    def answer(self, state: LoopState, touch: Touch | None, *, latency: float) -> None:
-        """Take the contact of a state; it acts `latency` [s] after it was asked for."""
-        if touch is not None:
-            self.record.points[state.tick] = np.array(touch.point)
-        self._held.answer(self._law.wrench(touch, state.pose, state.velocity), asked=state.time,
-                          due=state.time + latency)
+    def answer(self, state: LoopState, touches: Sequence[Patch], *, latency: float) -> None:
+        """Take the contacts of a state; they act `latency` [s] after they were asked for.
+
+        ValueError: the law needs what a contact's model does not give.
+        """
+        if touches:
+            self.record.points[state.tick] = np.array(touches[0].point)
+        self._held.answer(self._law.wrench(touches, state.mass_pose, state.velocity),
+                          asked=state.time, due=state.time + latency)
 
     def step(self, crane: Crane) -> None:
         """End the tick: advance the crane under the wrench that is due."""
@@ -313,20 +377,41 @@ class ClosedLoop:
         self.record.tensions.append(crane.rope_tensions)
         self.record.forces.append(self._held.current[:3].copy())
 
+    @property
+    def watched(self) -> bool:
+        """Whether all that is judged has been recorded."""
+        first = next(iter(self.record.points), len(self.record.poses))
+        return len(self.record.forces) - first > WATCHED * self.record.rate_hz
 
-def land(scenario: CraneScenario, source: ContactSource, *, rate_hz: float = 200.0,
-         latency: float = 0.0, law: ForceLaw | None = None) -> LandingRecord:
-    """Run one landing with contacts from `source`, which act `latency` s after they were asked for.
 
-    The source may be a ContactSolver; where it gives None, the last wrench is held.
+def solvers(scenario: CraneScenario, model: str) -> list[ContactSolver]:
+    """Return a solver of that model for each box of the stack."""
+    return [ContactSolver(scenario.size, size, model=model) for _, size in scenario.stack_boxes]
+
+
+def land(scenario: CraneScenario, sources: ContactSource | Sequence[ContactSource], *,
+         rate_hz: float = 200.0, latency: float = 0.0, law: ForceLaw | None = None,
+         ) -> LandingRecord:
+    """Run one landing with contacts that act `latency` s after they were asked for.
+
+    sources: for each box of the stack, such as `solvers`; where one gives None, the last wrench is
+    held. ValueError: a contact lacks what the law needs; its source's model is named.
     """
-    crane, loop = Crane(scenario, rate_hz), ClosedLoop(scenario, rate_hz, law)
+    each = [sources] if callable(sources) else list(sources)
+    boxes = [pose for pose, _ in scenario.stack_boxes]
+    crane = Crane(scenario, rate_hz)
+    loop = ClosedLoop(scenario, rate_hz, latency=latency, law=law)
     for _ in range(round(scenario.duration * rate_hz)):
         state = loop.ask(crane)
-        contact = source(state.pose, crane.stack_pose)
-        if contact is not None:
-            loop.answer(state, touch_of(contact), latency=latency)
+        contacts = [source(state.pose, pose) for source, pose in zip(each, boxes)]
+        if None not in contacts:
+            try:
+                loop.answer(state, touches_in(contacts), latency=latency)
+            except ValueError as error:
+                raise ValueError(f'model {getattr(each[0], "model", "unknown")}: {error}') from None
         loop.step(crane)
+        if loop.watched:
+            break
     return loop.record
 
 

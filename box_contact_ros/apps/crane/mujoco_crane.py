@@ -6,6 +6,9 @@ limit. Nothing else holds or damps the load, so it sways. The ropes converge tow
 so the load pitches and rolls as it sways. The stack is static. MuJoCo's own contact is switched
 off. Without a wrench from outside, the load sinks a few centimetres into the stack.
 
+The load may have its mass out of its middle, and may meet the stack at corner castings alone. For
+comparison, MuJoCo's own contact can be switched on instead (`own_contact`).
+
 The hoist's programme is given as shares of the scenario's duration (`HOIST_SHARES`): hang, lower,
 stay, lift, hang. While it stays, the start tilt is trimmed out rope by rope, as a spreader does.
 A short run therefore meets the same contacts as a long one; the load comes from another height.
@@ -28,7 +31,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from ...scene.contact_law import GRAVITY
+from ...scene.contact_law import FRICTION, GRAVITY
+from ...scene.pose import cross, rotation_matrix
 from ...scene.pose_sets import CONTAINER
 
 PHYSICS_STEP = 5e-4
@@ -66,6 +70,11 @@ LIMITS = {'mass': (1.0, 1e6), 'rope_length': (1.0, 200.0), 'rope_spread': (0.0, 
           'overlap': (-1e3, 1.0), 'duration': (0.1, 86_400.0)}
 """Least and largest value of the numbers of a `CraneScenario`."""
 
+CASTING = (0.178, 0.162, 0.118)
+"""Full extents of a corner casting (ISO 1161), m."""
+FRICTION_OF_OWN_CONTACT = (FRICTION, 0.005, 0.0001)
+"""MuJoCo's friction along, about and across the normal: the law's, then MuJoCo's own defaults."""
+
 _CORNERS = np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]], dtype=float)
 
 
@@ -76,7 +85,9 @@ class CraneScenario:
     | field | meaning |
     |---|---|
     | size, stack_size | full extents (length x, width y, height z) of load and stack |
-    | mass | of the load, kg, spread evenly over its box |
+    | mass | of the load, kg, with the moments of a full box |
+    | mass_offset | x, y, z of the centre of mass from the load's centre, in the load's axes |
+    | castings | the load meets four corner castings, flush with the stack's top, and not the rest |
     | drop_position | x, y of the stack's centre; the stack stands on the ground, not rotated |
     | offset | x, y of the trolley from the stack's centre: the lateral error of the drop |
     | rope_length | height of the trolley over the load's top once the load is down |
@@ -94,6 +105,8 @@ class CraneScenario:
     size: tuple[float, float, float] = CONTAINER
     stack_size: tuple[float, float, float] = CONTAINER
     mass: float = 20_000.0
+    mass_offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    castings: bool = False
     drop_position: tuple[float, float] = (0.0, 0.0)
     offset: tuple[float, float] = (0.25, -0.15)
     rope_length: float = 15.0
@@ -110,11 +123,12 @@ class CraneScenario:
 
     def __post_init__(self) -> None:
         """Raise ValueError naming field and value if the scenario makes no sense."""
-        for field, length in (('size', 3), ('stack_size', 3), ('drop_position', 2), ('offset', 2)):
+        for field, length in (('size', 3), ('stack_size', 3), ('drop_position', 2), ('offset', 2),
+                              ('mass_offset', 3)):
             values = tuple(float(value) for value in getattr(self, field))
             if len(values) != length or not all(map(math.isfinite, values)):
                 raise ValueError(f'{field} must be {length} finite numbers, got {values}')
-            if length == 3 and min(values) <= 0.0:
+            if field.endswith('size') and min(values) <= 0.0:
                 raise ValueError(f'{field} must be positive, got {values}')
             object.__setattr__(self, field, values)
         for field, (low, high) in LIMITS.items():
@@ -149,6 +163,26 @@ class CraneScenario:
         return cls(**(drawn | fixed))
 
     @property
+    def inertia(self) -> np.ndarray:
+        """Principal moments (3,) of the load about its own axes through its centre of mass."""
+        squares = np.square(self.size)
+        return self.mass / 12.0 * (squares.sum() - squares)
+
+    @property
+    def stack_boxes(self) -> list[tuple[np.ndarray, tuple[float, float, float]]]:
+        """The boxes that the load may meet: pose (7,) and full extents [m] of each."""
+        top = np.array([*self.drop_position, self.stack_size[2], 0.0, 0.0, 0.0, 1.0])
+        size = CASTING if self.castings else self.stack_size
+        corners = _CORNERS if self.castings else np.zeros((1, 2))
+        inset = 0.5 * (np.array(self.stack_size) - size)
+        boxes = []
+        for corner in corners:
+            pose = top.copy()
+            pose[:3] += [*(corner * inset[:2]), -0.5 * size[2]]
+            boxes.append((pose, size))
+        return boxes
+
+    @property
     def lowering_distance(self) -> float:
         """How far the hoist lowers the load, m; its mean speed is half the top speed."""
         shares = LANDING_SHARES if self.land else HOIST_SHARES
@@ -180,15 +214,19 @@ class CraneScenario:
 class Crane:
     """The running simulation: load, stack and ropes, advanced by ticks of 1 / rate_hz seconds."""
 
-    def __init__(self, scenario: CraneScenario | None = None, rate_hz: float = 200.0) -> None:
-        """Build the model and put the load at its start; `rate_hz` is ticks per second."""
+    def __init__(self, scenario: CraneScenario | None = None, rate_hz: float = 200.0, *,
+                 own_contact: bool = False) -> None:
+        """Build the model and put the load at its start; `rate_hz` is ticks per second.
+
+        own_contact: MuJoCo computes contacts and their forces itself, at every physics step.
+        """
         if not (math.isfinite(rate_hz) and rate_hz > 0.0):
             raise ValueError(f'rate_hz must be positive, got {rate_hz}')
         self.scenario = scenario = scenario or CraneScenario()
         self._substeps = math.ceil(1.0 / (rate_hz * PHYSICS_STEP))
         self._rate_hz = float(rate_hz)
         self._ticks = 0
-        self._model = _build(scenario)
+        self._model = _build(scenario, own_contact)
         self._model.opt.timestep = 1.0 / (rate_hz * self._substeps)
         self._data = mujoco.MjData(self._model)
         self._load = self._model.body('load').id
@@ -214,11 +252,28 @@ class Crane:
 
     @property
     def load_velocity(self) -> np.ndarray:
-        """Velocity of the load's centre and its angular velocity, world frame: (6,) m/s, rad/s."""
+        """Velocity of the load's centre of mass, angular velocity, world frame: (6,) m/s, rad/s."""
         angular = np.empty(3)
         # MuJoCo keeps a free joint's angular velocity in the body's own frame.
         mujoco.mju_rotVecQuat(angular, self._data.qvel[3:], self._data.qpos[3:])
-        return np.concatenate([self._data.qvel[:3], angular])
+        return np.concatenate([self._data.qvel[:3] + cross(angular, self._arm()), angular])
+
+    @property
+    def mass_pose(self) -> np.ndarray:
+        """Pose of the load's centre of mass, with the load's axes, world frame, (7,)."""
+        pose = self.load_pose
+        pose[:3] += self._arm()
+        return pose
+
+    @property
+    def own_contact_force(self) -> np.ndarray:
+        """Force (3,) [N] of MuJoCo's own contacts on the load in the last physics step."""
+        total, force = np.zeros(3), np.zeros(6)
+        for number in range(self._data.ncon):
+            mujoco.mj_contactForce(self._model, self._data, number, force)
+            # Rows of a frame are axes; its normal points to the load, the body of higher number.
+            total += self._data.contact[number].frame.reshape(3, 3).T @ force[:3]
+        return total
 
     @property
     def rope_tensions(self) -> np.ndarray:
@@ -244,6 +299,11 @@ class Crane:
             self._set_ropes(self.scenario.hoist_height(time), self.scenario.trim(time))
             mujoco.mj_step(self._model, self._data)
         self._ticks += 1
+
+    def _arm(self) -> np.ndarray:
+        """Return the way from the load's centre to its centre of mass (3,), world frame."""
+        offset = self.scenario.mass_offset
+        return rotation_matrix(self.load_pose[3:]) @ offset if any(offset) else np.zeros(3)
 
     def _start(self) -> np.ndarray:
         """Put the load at its start and return each rope's extra length (4,) that holds its tilt.
@@ -318,9 +378,11 @@ def _pose(position: np.ndarray, quaternion_wxyz: np.ndarray) -> np.ndarray:
     return np.concatenate([position, quaternion_wxyz[1:], quaternion_wxyz[:1]])
 
 
-def _build(scenario: CraneScenario) -> mujoco.MjModel:
+def _build(scenario: CraneScenario, own_contact: bool) -> mujoco.MjModel:
     """Return the scenario as a MuJoCo model: static trolley and stack, free load, four ropes."""
     half, stack_half = np.array(scenario.size) / 2.0, np.array(scenario.stack_size) / 2.0
+    contact = {'contype': int(own_contact), 'conaffinity': int(own_contact),
+               'friction': FRICTION_OF_OWN_CONTACT, 'type': mujoco.mjtGeom.mjGEOM_BOX}
     stack_centre = np.array([*scenario.drop_position, stack_half[2]])
     lowest_top = 2.0 * stack_half[2] - scenario.overlap + 2.0 * half[2]
     above = stack_centre[:2] + scenario.offset
@@ -332,9 +394,11 @@ def _build(scenario: CraneScenario) -> mujoco.MjModel:
         ('trolley', [*above, lowest_top + scenario.rope_length]), ('stack', stack_centre),
         ('load', [*above, lowest_top])))
     load.add_freejoint()
-    for body, extents, mass in ((stack, stack_half, 0.0), (load, half, scenario.mass)):
-        body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=extents, mass=mass, contype=0,
-                      conaffinity=0)
+    load.mass, load.inertia, load.ipos = scenario.mass, scenario.inertia, scenario.mass_offset
+    load.explicitinertial = True
+    load.add_geom(size=half, **contact)
+    for pose, size in scenario.stack_boxes:
+        stack.add_geom(size=np.array(size) / 2.0, pos=pose[:3] - stack_centre, **contact)
     for i, corner in enumerate(_CORNERS * half[:2]):
         trolley.add_site(name=f'hold_{i}', pos=[*(scenario.rope_spread * corner), 0.0])
         load.add_site(name=f'corner_{i}', pos=[*corner, half[2]])
