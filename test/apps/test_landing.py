@@ -23,7 +23,8 @@ from box_contact_ros.apps.crane.landing import (
     solvers,
 )
 from box_contact_ros.apps.crane.mujoco_crane import Crane, CraneScenario
-from box_contact_ros.scene.contact_law import GRAVITY, ContactLaw
+from box_contact_ros.baselines.point_law import PointLaw
+from box_contact_ros.scene.contact_law import GRAVITY
 
 CASES = list(cases())
 HANGING_OVER = 17
@@ -93,7 +94,7 @@ def test_a_load_that_hangs_over_too_far_falls():
 def test_the_deepest_point_does_not_land(rate_hz):
     """The deepest contact of FCL jumps between corners, metres a tick, and the load rattles."""
     pytest.importorskip('fcl')
-    law = ContactLaw.for_load(20_000.0, CraneScenario().size, rate_hz)
+    law = PointLaw.for_load(20_000.0, CraneScenario().size, rate_hz)
     result = landed(HANGING_OVER, 'fcl', rate_hz=rate_hz, law=law)
     assert not result.at_rest and math.isnan(result.settled)
     assert not result.limits['corner speed'][0] and not result.limits['force'][0]
