@@ -23,7 +23,7 @@ from ..scene.pose_sets import Pairs
 from ..solver.arguments import add_models, program_parser
 from ..solver.contact_solver import ContactSolver
 from ..solver.models import MODELS, find_model, gated_models
-from ..verification.fuzz import TOUCH_ULPS
+from ..verification.fuzz import TOUCH_ULPS, last_place
 from ..verification.hard_poses import Cases, load
 from ..verification.judge import COORDINATE_ULPS, NOT_FINITE, NOT_UNIT, OUTSIDE, TOLERANCE, judge
 
@@ -60,19 +60,15 @@ class StabilityRow:
     failure: str = ''  # what ended the model before its answers, if anything
 
 
-def _reach(pairs: Pairs) -> np.ndarray:
-    """Return the largest coordinates (n,) [m]."""
-    return np.maximum(np.abs(pairs.pose_a[:, :3]), np.abs(pairs.pose_b[:, :3])).max(axis=1)
-
-
 def tolerance(pairs: Pairs) -> np.ndarray:
     """Return the slack (n,) of separations [m]: 1e-12 of the size, or the coordinates' ulp."""
-    return TOLERANCE * pairs.size + COORDINATE_ULPS * np.finfo(float).eps * _reach(pairs)
+    reach = np.abs(np.hstack([pairs.pose_a[:, :3], pairs.pose_b[:, :3]])).max(axis=1)
+    return TOLERANCE * pairs.size + COORDINATE_ULPS * np.finfo(float).eps * reach
 
 
 def unsure(pairs: Pairs) -> np.ndarray:
     """Return the gap or depth (n,) [m] below which either verdict is right: two touches."""
-    return 2.0 * TOUCH_ULPS * np.spacing(np.maximum(_reach(pairs), pairs.size))
+    return 2.0 * TOUCH_ULPS * last_place(pairs)
 
 
 def examine(model: str, family: str, cases: Cases) -> StabilityRow:
