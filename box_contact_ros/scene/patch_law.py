@@ -21,7 +21,9 @@ The modulus κ follows the patch: κ = Ω² / λ_max(M⁻¹K). K is the stiffnes
 1 on the patch's area A = 12·√(λ₁λ₂), by the eigenvalues of C_t, and M is the load's inertia. So no
 oscillation of the load on the patch is faster than Ω, and a held wrench is stable. A whole face
 rests at the depth g / Ω², whatever its area. A corner that lands alone is softer, as the load
-resists less there. Several contacts share one modulus.
+resists less there, and λ is less in the same measure, A / (m·λ_max). Several contacts share one
+modulus. Within a contact κ falls at once and rises slowly (`RISE_TIME`): a law keeps its last κ, so
+it serves one load, tick by tick.
 
 No constant knows the size of the load. A wrench is computed from contacts and from the state of the
 load at the time they were asked for, and is then held (`contact_law.HeldWrench`).
@@ -35,7 +37,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -51,12 +53,21 @@ a load of 0.3 m/s within a tick or two, and the damping, proportional to the for
 
 DELAY_LIMIT = 0.45
 """Ω·T ≤ 0.45 [1], with T the latency and half the period: a held wrench is that late on average.
-Lateness feeds energy into each oscillation, and the damping takes out more up to a limit. Of 12
-landings each at 200 Hz, all settle with 0.55. With 0.65 and 2 ms six diverge, with 0.6 and 5 ms
-two."""
+Lateness feeds energy into each oscillation, and the damping takes out more up to a limit, which
+docs/decisions/patch-law.md measures."""
 
-DAMPING_RATIO = 0.7
-"""λ = 2·0.7·Ω / g: of the critical damping of the heaving load at its static penetration."""
+DAMPING_RATIO = 1.2
+"""λ = 2·1.2·Ω / g: of the critical damping of the heaving load at its static penetration. A load
+that overhangs until its patch lifts off on one side rocks with a small part of that. With 2.8 a
+touch-down overshoots at 200 Hz and 2 ms."""
+
+RISE_TIME = 1.0
+"""κ falls at once to what the loop bears, which takes energy away, and rises with this time
+constant [s]. A κ that rose at once with the patch would feed energy into rocking: a load that
+overhangs by 40 % of its length fluttered."""
+STEADY_SHARE = 0.98
+"""Share of what the loop bears up to which κ rises [1]: at rest it is a constant. The price is a
+static penetration 2 % deeper."""
 
 LEAST_ASPECT = 1e-7
 """Width of a patch by its length, at least [1]: λ₁λ₂ is a difference of products, which rounding
@@ -94,7 +105,7 @@ class Patch(Touch):
     covariance: np.ndarray
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(kw_only=True)
 class PatchLaw:
     """The law's constants; make them with `for_loop`.
 
@@ -104,6 +115,7 @@ class PatchLaw:
     damping     λ [s/m]
     friction    μ [1]
     slip_speed  v_s [m/s]
+    rise        share of what κ lacks that it gains per answer [1]
     """
 
     mass: float
@@ -112,6 +124,8 @@ class PatchLaw:
     damping: float
     friction: float = FRICTION
     slip_speed: float = SLIP_SPEED
+    rise: float = 1.0
+    _modulus: float = field(default=math.inf, init=False, repr=False, compare=False)
 
     @classmethod
     def for_loop(cls, mass: float, inertia: Sequence[float] | np.ndarray, rate_hz: float,
@@ -124,7 +138,8 @@ class PatchLaw:
         delay = 0.5 / rate_hz + latency
         frequency = min(math.sqrt(GRAVITY / LEAST_PENETRATION), DELAY_LIMIT / delay)
         return cls(mass=mass, inertia=np.array(inertia, dtype=float), frequency=frequency,
-                   damping=2.0 * DAMPING_RATIO * frequency / GRAVITY)
+                   damping=2.0 * DAMPING_RATIO * frequency / GRAVITY,
+                   rise=min(1.0, 1.0 / (RISE_TIME * rate_hz)))
 
     def wrench(self, overlaps: Sequence[Overlap], pose: np.ndarray, velocity: np.ndarray,
                ) -> np.ndarray:
@@ -135,40 +150,47 @@ class PatchLaw:
         """
         touching = [overlap for overlap in overlaps if _has_volume(overlap)]
         if not touching:
+            self._modulus = math.inf
             return np.zeros(6)
         covariances = [_tangential(overlap) for overlap in touching]
-        modulus = self.modulus(touching, covariances, pose)
-        return np.sum([self._of(overlap, covariance, modulus * overlap.volume, pose, velocity)
+        areas = [_area(covariance) for covariance in covariances]
+        softness = 1.0 / self.fastest(touching, covariances, areas, pose)
+        borne = self.frequency**2 * softness
+        lacking = max(0.0, STEADY_SHARE * borne - self._modulus)
+        modulus = self._modulus = min(self._modulus + self.rise * lacking, borne)
+        damping = self.damping * sum(areas) * softness / self.mass
+        return np.sum([self._of(overlap, covariance, modulus * overlap.volume, damping, pose,
+                                velocity)
                        for overlap, covariance in zip(touching, covariances)], axis=0)
 
-    def modulus(self, overlaps: Sequence[Overlap], covariances: Sequence[np.ndarray],
-                pose: np.ndarray) -> float:
-        """Return κ [N/m³] on which no oscillation is faster than Ω.
+    def fastest(self, overlaps: Sequence[Overlap], covariances: Sequence[np.ndarray],
+                areas: Sequence[float], pose: np.ndarray) -> float:
+        """Return λ_max(M⁻¹K): the fastest oscillation's ω² on a foundation of modulus 1.
 
-        covariances: C_t (3, 3) of each contact. Motions are scaled so that M is 1: per √m along the
-        load's axes, and per √I about them.
+        covariances, areas: C_t (3, 3) and A of each contact. Motions are scaled so that M is 1: per
+        √m along the load's axes, and per √I about them.
         """
         axes = rotation_matrix(pose[3:])
         linear, angular = 1.0 / math.sqrt(self.mass), axes.T / np.sqrt(self.inertia)[:, None]
         stiffness = np.zeros((6, 6))  # of the scaled load on a foundation of modulus 1
-        for overlap, covariance in zip(overlaps, covariances):
-            normal, area = overlap.normal, _area(covariance)
+        for overlap, covariance, area in zip(overlaps, covariances, areas):
+            normal = overlap.normal
             push = np.concatenate([linear * normal,
                                    angular @ cross(overlap.point - pose[:3], normal)])
             x, y, z = normal
             turn = angular @ [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]
             stiffness += area * np.outer(push, push)
             stiffness[3:, 3:] += area * (turn @ covariance @ turn.T)
-        return self.frequency**2 / float(np.linalg.eigvalsh(stiffness)[-1])
+        return float(np.linalg.eigvalsh(stiffness)[-1])
 
-    def _of(self, overlap: Overlap, covariance: np.ndarray, elastic: float, pose: np.ndarray,
-            velocity: np.ndarray) -> np.ndarray:
+    def _of(self, overlap: Overlap, covariance: np.ndarray, elastic: float, damping: float,
+            pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:
         """Return the wrench (6,) of one contact with the force `elastic` = κ·V at rest."""
         normal, linear, angular = overlap.normal, velocity[:3], velocity[3:]
         arm = overlap.point - pose[:3]
         at_centroid = linear + cross(angular, arm)
         closing = float(at_centroid @ normal)
-        share = 1.0 + self.damping * closing  # of the elastic pressure at the centroid
+        share = 1.0 + damping * closing  # of the elastic pressure at the centroid
         if share <= 0.0:
             return np.zeros(6)
         push = elastic * share
@@ -179,21 +201,20 @@ class PatchLaw:
         radius = math.sqrt(max(0.0, float(np.trace(covariance))))
         rim = radius * float(angular @ normal)  # slip at the radius of gyration
         torsion = -grip * radius * rim / max(abs(rim), self.slip_speed) * normal
-        rocking = elastic * self._rocking(normal, angular, covariance, share)
+        rocking = elastic * _rocking(damping * cross(normal, angular), normal, covariance, share)
         return np.concatenate([force, cross(arm, force) + torsion + rocking])
 
-    def _rocking(self, normal: np.ndarray, angular: np.ndarray, covariance: np.ndarray,
-                 share: float) -> np.ndarray:
-        """Return the damping's moment (3,) about the centroid [m], by the elastic force κ·V.
 
-        λ·v changes over the patch by λ·g·x, x from the centroid. Where that would exceed `share`
-        at the patch's rim, √3 standard deviations away, pressures would be negative: the slope is
-        cut to it.
-        """
-        slope = self.damping * cross(normal, angular)
-        spread = covariance @ slope
-        at_rim = math.sqrt(3.0 * max(0.0, float(slope @ spread)))
-        return -cross(spread, normal) * min(1.0, share / at_rim if at_rim > 0.0 else 1.0)
+def _rocking(slope: np.ndarray, normal: np.ndarray, covariance: np.ndarray,
+             share: float) -> np.ndarray:
+    """Return the damping's moment (3,) about the centroid [m], by the elastic force κ·V.
+
+    λ·v changes over the patch by `slope`·x, x from the centroid. Where that would exceed `share` at
+    the patch's rim, √3 standard deviations away, pressures would be negative: it is cut to that.
+    """
+    spread = covariance @ slope
+    at_rim = math.sqrt(3.0 * max(0.0, float(slope @ spread)))
+    return -cross(spread, normal) * min(1.0, share / at_rim if at_rim > 0.0 else 1.0)
 
 
 def _has_volume(overlap: Overlap) -> bool:

@@ -25,6 +25,11 @@ SUNK = GRAVITY / LAW.frequency**2
 """Depth of a load that rests on a whole face [m]."""
 
 
+def fresh():
+    """A law that has seen no contact yet."""
+    return dataclasses.replace(LAW)
+
+
 def moving(*, linear=(0, 0, 0), angular=(0, 0, 0)):
     return np.array([*linear, *angular], dtype=float)
 
@@ -54,16 +59,16 @@ def patch_of_columns(places, areas, thickness):
 
 def test_no_contact_is_no_wrench():
     velocity = moving(linear=(1, 2, 3), angular=(1, 2, 3))
-    assert not LAW.wrench([], LEVEL, velocity).any()
+    assert not fresh().wrench([], LEVEL, velocity).any()
     apart = ContactSolver(SIZE, SIZE, model='exact')(LEVEL, LEVEL + [0, 0, 9.0, 0, 0, 0, 0])
-    assert not LAW.wrench([apart], LEVEL, velocity).any()
+    assert not fresh().wrench([apart], LEVEL, velocity).any()
 
 
 def test_a_contact_of_a_solver_is_taken_as_it_is():
     """A container on its like, `SUNK` deep: its weight, and no torque."""
     solver = ContactSolver(SIZE, SIZE, model='exact')
     contact = solver(LEVEL, LEVEL - [0, 0, SIZE[2] - SUNK, 0, 0, 0, 0])
-    wrench = LAW.wrench([contact], LEVEL, STILL)
+    wrench = fresh().wrench([contact], LEVEL, STILL)
     assert wrench == pytest.approx([0, 0, WEIGHT, 0, 0, 0], rel=1e-9, abs=1e-3)
 
 
@@ -73,13 +78,13 @@ def test_a_point_alone_is_refused(volume, covariance):
     """A model that gives no patch must not end in a force of NaN."""
     bare = Patch(LEVEL[:3], DOWN, 1e-3, volume, np.full((3, 3), covariance))
     with pytest.raises(ValueError, match='needs volume and covariance'):
-        LAW.wrench([slab(), bare], LEVEL, STILL)
+        fresh().wrench([slab(), bare], LEVEL, STILL)
 
 
 @pytest.mark.parametrize(('length', 'width'), [(12.0, 2.4), (2.0, 2.0), (3.0, 0.8), (0.1, 0.1)])
 def test_the_static_penetration_does_not_depend_on_the_area(length, width):
     """A level load rests at the depth g / Ω², whatever the area of its face."""
-    wrench = LAW.wrench([slab(length, width, SUNK)], LEVEL, STILL)
+    wrench = fresh().wrench([slab(length, width, SUNK)], LEVEL, STILL)
     assert wrench == pytest.approx([0, 0, WEIGHT, 0, 0, 0], rel=1e-12, abs=1e-6)
 
 
@@ -89,7 +94,7 @@ def test_a_corner_that_lands_alone_is_softer():
     patch = slab(1e-3, 1e-3, SUNK, centre=(1.0 + x, 2.0 + y, 1.7))
     felt = 1.0 / (1.0 / MASS + x**2 / INERTIA[1] + y**2 / INERTIA[0])
     assert felt < 0.2 * MASS
-    assert LAW.wrench([patch], LEVEL, STILL)[2] == pytest.approx(felt * GRAVITY, rel=1e-6)
+    assert fresh().wrench([patch], LEVEL, STILL)[2] == pytest.approx(felt * GRAVITY, rel=1e-6)
 
 
 @pytest.mark.parametrize('turn', [0.0, 0.7])
@@ -104,7 +109,7 @@ def test_several_contacts_share_one_modulus(turn):
     fastest = max(1.0 / MASS, y**2 / INERTIA[0], x**2 / INERTIA[1])
     assert fastest > 2.0 / MASS
     expected = GRAVITY / fastest
-    assert LAW.wrench(feet, pose, STILL) == pytest.approx([0, 0, expected, 0, 0, 0], rel=1e-5,
+    assert fresh().wrench(feet, pose, STILL) == pytest.approx([0, 0, expected, 0, 0, 0], rel=1e-5,
                                                           abs=1e-3)
 
 
@@ -114,7 +119,7 @@ def test_an_edge_that_only_just_touches_gives_a_finite_force(depth):
     turn = rotation_matrix(np.array([0, 0, math.sin(0.2), math.cos(0.2)]))
     covariance = turn @ np.diag([144.0, 1e-18, 1e-20]) @ turn.T
     needle = Patch(np.array([1.0, 2.0, 1.7]), DOWN, depth, 12e-9 * depth, covariance)
-    force = LAW.wrench([needle], LEVEL, STILL)[2]
+    force = fresh().wrench([needle], LEVEL, STILL)[2]
     assert 0.0 <= force <= WEIGHT * depth / SUNK
 
 
@@ -124,7 +129,7 @@ def test_the_push_is_against_the_normal_and_turns_about_the_centre():
     patch = slab(1e-3, 1e-3, centre=(5.0, 1.0, 1.7))
     patch = Patch(patch.point, normal, patch.depth, patch.volume,
                   frame @ patch.covariance @ frame.T)
-    wrench = LAW.wrench([patch], LEVEL, STILL)
+    wrench = fresh().wrench([patch], LEVEL, STILL)
     felt = 1.0 / (1.0 / MASS + (np.square(np.cross(patch.point - LEVEL[:3], normal))
                                 / INERTIA).sum())
     force = -normal * LAW.frequency**2 * felt * 1e-3
@@ -138,10 +143,13 @@ def test_the_wrench_is_the_sum_over_the_columns(angular):
     columns = wedge_columns()
     patch, velocity = patch_of_columns(*columns), moving(linear=(0, 0, -0.01), angular=angular)
     places, areas, thickness = columns
-    modulus = LAW.modulus([patch], [patch.covariance * [[1, 1, 0], [1, 1, 0], [0, 0, 0]]], LEVEL)
+    flat = patch.covariance * [[1, 1, 0], [1, 1, 0], [0, 0, 0]]
+    area = 12.0 * math.sqrt(patch.covariance[0, 0] * patch.covariance[1, 1])
+    fastest = LAW.fastest([patch], [flat], [area], LEVEL)
+    modulus, damping = LAW.frequency**2 / fastest, LAW.damping * area / (MASS * fastest)
     arms = places - LEVEL[:3]
     speeds = (velocity[:3] + np.cross(velocity[3:], arms)) @ DOWN
-    pressures = modulus * thickness * (1.0 + LAW.damping * speeds)
+    pressures = modulus * thickness * (1.0 + damping * speeds)
     assert np.all(pressures > 0.0)
     forces = -(pressures * areas)[:, None] * DOWN
     frictionless = dataclasses.replace(LAW, friction=0.0)
@@ -154,7 +162,7 @@ def test_the_wrench_is_the_sum_over_the_columns(angular):
 def test_the_foundation_never_pulls(speed):
     """Parting at a speed beyond 1/λ there is no force, and no moment of the damping either."""
     velocity = moving(linear=(0, 0, speed), angular=(0.3, 0.2, 0))
-    wrench = LAW.wrench([slab()], LEVEL, velocity)
+    wrench = fresh().wrench([slab()], LEVEL, velocity)
     expected = max(0.0, WEIGHT * 1e-3 / SUNK * (1.0 - LAW.damping * speed))
     assert wrench[2] == pytest.approx(expected)
     if expected == 0.0:
@@ -163,7 +171,7 @@ def test_the_foundation_never_pulls(speed):
 
 def test_fast_rocking_gives_no_more_moment_than_pressures_can():
     """The centre of pressure stays within the patch, however fast the load rocks."""
-    wrench = LAW.wrench([slab()], LEVEL, moving(angular=(0, 3.0, 0)))
+    wrench = fresh().wrench([slab()], LEVEL, moving(angular=(0, 3.0, 0)))
     assert abs(wrench[4]) <= 0.5 * 12.0 * wrench[2]
 
 
@@ -173,7 +181,7 @@ def test_friction_opposes_the_slip(speed, heading):
     """Coulomb's μ·P above v_s, in proportion to the slip below, against the slip in either case."""
     along = np.array([math.cos(math.radians(heading)), math.sin(math.radians(heading)), 0.0])
     patch = slab(depth=SUNK)
-    wrench = LAW.wrench([patch], LEVEL, moving(linear=speed * along))
+    wrench = fresh().wrench([patch], LEVEL, moving(linear=speed * along))
     size = 0.5 * WEIGHT * min(1.0, speed / 0.1)
     assert wrench[:3] == pytest.approx(-size * along + [0, 0, WEIGHT], rel=1e-9, abs=1e-6)
 
@@ -183,7 +191,7 @@ def test_torsion_opposes_the_spin(spin):
     """μ·P·r about the normal beyond v_s / r, with r the patch's radius of gyration."""
     radius = math.sqrt((12.0**2 + 2.4**2) / 12.0)
     patch = slab(depth=SUNK)
-    wrench = LAW.wrench([patch], LEVEL, moving(angular=(0, 0, spin)))
+    wrench = fresh().wrench([patch], LEVEL, moving(angular=(0, 0, spin)))
     share = min(1.0, abs(spin) * radius / 0.1)
     assert wrench[5] == pytest.approx(-math.copysign(0.5 * WEIGHT * radius * share, spin))
 
@@ -201,7 +209,7 @@ def test_a_bounce_never_gains_energy():
     last = first = energy()
     for _ in range(60_000):
         patches = [slab(depth=-height)] if height < 0.0 else []
-        force = LAW.wrench(patches, LEVEL, moving(linear=(0, 0, speed)))[2]
+        force = fresh().wrench(patches, LEVEL, moving(linear=(0, 0, speed)))[2]
         speed += step * (force / MASS - GRAVITY)
         height += step * speed
         # A symplectic step keeps an oscillator's energy to ω·step: 140 rad/s · 1e-5 s.
@@ -221,6 +229,30 @@ def test_the_constants_follow_rate_and_latency(rate, latency):
     assert law.damping * GRAVITY == pytest.approx(2.0 * patch_law.DAMPING_RATIO * law.frequency)
 
 
+def test_the_modulus_falls_at_once_and_rises_slowly():
+    """A patch that halves keeps κ at first; κ doubles with the time constant, nearly to the end.
+
+    Without contact κ is forgotten.
+    """
+    law = PatchLaw.for_loop(MASS, INERTIA, 200.0)
+
+    def modulus(patch):
+        return law.wrench([patch], LEVEL, STILL)[2] / patch.volume
+
+    whole, half = slab(4.0, 2.0), slab(2.0, 2.0)
+    small = modulus(whole)
+    assert modulus(half) == pytest.approx(small, rel=0.01)
+    for _ in range(200):
+        at_1_s = modulus(half)
+    assert at_1_s / small == pytest.approx(2.0 * 0.98 - 0.96 * math.exp(-1.0), rel=0.01)
+    for _ in range(3000):
+        modulus(half)
+    assert modulus(half) / small == pytest.approx(2.0 * 0.98, rel=1e-6)
+    assert modulus(whole) == pytest.approx(small)
+    law.wrench([], LEVEL, STILL)
+    assert modulus(half) == pytest.approx(2.0 * small)
+
+
 @pytest.mark.parametrize('scale', [1e-3, 0.1, 10.0])
 def test_no_constant_knows_the_size(scale):
     """A load and a patch `scale` times as long, of the same density, at the same depth.
@@ -233,6 +265,6 @@ def test_no_constant_knows_the_size(scale):
     pose = np.concatenate([scale * LEVEL[:3], LEVEL[3:]])
     grown = Patch(scale * patch.point, DOWN, patch.depth, scale**2 * patch.volume,
                   patch.covariance * scale**2)
-    small, large = LAW.wrench([patch], LEVEL, STILL), larger.wrench([grown], pose, STILL)
+    small, large = fresh().wrench([patch], LEVEL, STILL), larger.wrench([grown], pose, STILL)
     assert large[:3] == pytest.approx(scale**3 * small[:3], rel=1e-9)
     assert large[3:] == pytest.approx(scale**4 * small[3:], rel=1e-9, abs=1e-9)
