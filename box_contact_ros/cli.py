@@ -83,6 +83,9 @@ PROGRAMS = {
     'stability': _program(
         'reports.stability', 'report soup',
         'what each model makes of families of hard poses'),
+    'landing': _program(
+        'reports.landing.landing_report', 'sim soup report',
+        'whether a load comes to rest by each way of contact and force, as table and picture'),
     'paper': _program(
         'reports.paper.paper_tables', 'report',
         "redo the source paper's tables, its figures beside ours"),

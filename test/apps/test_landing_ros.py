@@ -48,10 +48,10 @@ def test_lands_in_lockstep_faster_than_real_time(program, node):
 
 
 def test_a_flight_of_the_report_is_the_landing_offline():
-    """What `report.landing --dds` runs: in lockstep the transport changes nothing."""
+    """What `landing --dds` runs: in lockstep the transport changes nothing."""
     scenario = scenario_of(next(cases()))
     with answering_node('exact', scenario) as domain:
-        flown = fly_over_dds(domain, scenario, rate_hz=200.0, latency=0.002)
+        flown = fly_over_dds(domain, scenario, rate_hz=200.0, latency=0.002).judge()
     solver = ContactSolver(scenario.size, scenario.stack_size, model='exact')
     offline = land(scenario, solver, rate_hz=200.0, latency=0.002).judge()
     assert flown.at_rest

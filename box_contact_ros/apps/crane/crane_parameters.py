@@ -25,6 +25,9 @@ PARAMETERS = {
                     whole_number(0, 2**31)),
     'size_a': Setting(STANDARD.size, 'full extents of the load [m]', size),
     'size_b': Setting(STANDARD.stack_size, 'full extents of the stack [m]', size),
+    'mass': Setting(STANDARD.mass, 'mass of the load [kg]', number(*LIMITS['mass'])),
+    'mass_offset': Setting(STANDARD.mass_offset, "centre of mass from the load's centre, in its "
+                           'own axes [m]', numbers(3)),
     'offset': Setting(STANDARD.offset, 'x, y of the trolley from the centre of the stack [m]',
                       numbers(2)),
     'rope_angle': Setting(STANDARD.rope_angle, 'ropes from the plumb line at the start [deg]',
@@ -44,8 +47,8 @@ PARAMETERS = {
                        f'{LANDING_OVERLAP:g} beyond the load at rest', number(*LIMITS['overlap'])),
 }
 SCENARIO = {name: {'size_a': 'size', 'size_b': 'stack_size'}.get(name, name) for name in (
-    'duration', 'size_a', 'size_b', 'offset', 'rope_angle', 'rope_heading', 'pitch', 'roll', 'yaw',
-    'lowering_speed', 'overlap')}
+    'duration', 'size_a', 'size_b', 'mass', 'mass_offset', 'offset', 'rope_angle', 'rope_heading',
+    'pitch', 'roll', 'yaw', 'lowering_speed', 'overlap')}
 """Parameter: the field of CraneScenario that it sets."""
 
 

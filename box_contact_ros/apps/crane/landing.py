@@ -221,6 +221,12 @@ class LandingRecord:
     points: dict[int, np.ndarray] = field(default_factory=dict)
     """Contact points (3,) by the tick they were asked for; none where there was no contact."""
 
+    @property
+    def watched(self) -> bool:
+        """Whether all that is judged has been recorded."""
+        first = next(iter(self.points), len(self.poses))
+        return len(self.forces) - first > WATCHED * self.rate_hz
+
     def corner_speeds(self) -> np.ndarray:
         """Return the speed [m/s] of the fastest of the load's eight corners, per tick (n,)."""
         signs = np.array(list(product((-0.5, 0.5), repeat=3)))
@@ -377,12 +383,6 @@ class ClosedLoop:
         self.record.tensions.append(crane.rope_tensions)
         self.record.forces.append(self._held.current[:3].copy())
 
-    @property
-    def watched(self) -> bool:
-        """Whether all that is judged has been recorded."""
-        first = next(iter(self.record.points), len(self.record.poses))
-        return len(self.record.forces) - first > WATCHED * self.record.rate_hz
-
 
 def solvers(scenario: CraneScenario, model: str) -> list[ContactSolver]:
     """Return a solver of that model for each box of the stack."""
@@ -410,7 +410,7 @@ def land(scenario: CraneScenario, sources: ContactSource | Sequence[ContactSourc
             except ValueError as error:
                 raise ValueError(f'model {getattr(each[0], "model", "unknown")}: {error}') from None
         loop.step(crane)
-        if loop.watched:
+        if loop.record.watched:
             break
     return loop.record
 

@@ -1,6 +1,6 @@
 """Landings over DDS, in lockstep: the crane client here, the contact node in its own process.
 
-What `landing_report --dds` runs: the same cases as offline, one `CraneNode` per landing, and one
+What `landing --dds` runs: the same cases as offline, one `CraneNode` per landing, and one
 contact node that answers all landings of a model.
 """
 from __future__ import annotations
@@ -17,7 +17,7 @@ from .. import processes
 from ..ros_client import joined
 from .crane_node import CraneNode, fly
 from .crane_parameters import PARAMETERS, SCENARIO
-from .landing import LandingResult
+from .landing import LandingRecord
 from .mujoco_crane import CraneScenario
 
 PATIENCE = 30.0  # for the node to answer [s]
@@ -38,7 +38,7 @@ def answering_node(model: str, scenario: CraneScenario) -> Iterator[int]:
 
 
 def fly_over_dds(domain: int, scenario: CraneScenario, *, rate_hz: float, latency: float,
-                 ) -> LandingResult:
+                 ) -> LandingRecord:
     """Run one landing in lockstep. RuntimeError if an answer was lost or wrong."""
     # The discovery range has no other way in; the domain has.
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
@@ -50,7 +50,7 @@ def fly_over_dds(domain: int, scenario: CraneScenario, *, rate_hz: float, latenc
     with joined(partial(CraneNode, parameter_overrides=given), domain=domain) as (node, executor):
         assert node.scenario == scenario, (node.scenario, scenario)
         fly(node, executor)
-        summary, landing = node.summary(), node.landing()
-    if summary is None or not summary.passed or landing is None:
+        summary = node.summary()
+    if summary is None or not summary.passed or node.feedback is None:
         raise RuntimeError(f'a landing over DDS lost something:\n{summary}')
-    return landing
+    return node.feedback.record

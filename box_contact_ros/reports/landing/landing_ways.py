@@ -1,0 +1,223 @@
+"""Which landings are run, and by which ways of contact and force.
+
+A `Way` is a law and what gives its contacts. The patch law asks this package's models. Engines give
+a point, so theirs go to the point law, which knows the load's footprint. MuJoCo's own manifold is
+the bar to reach: forces of several points, implicit, within the simulator, at every physics step.
+
+`ADDED` are landings beside the grid of `landing.cases`, each with what it is expected to do.
+"""
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+
+from ...apps.crane.landing import (
+    TILT_LIMIT,
+    ContactSource,
+    LandingCase,
+    LandingRecord,
+    LandingResult,
+    cases,
+    land,
+    solvers,
+)
+from ...apps.crane.mujoco_crane import Crane, CraneScenario
+from ...baselines.engines import CHOICES
+from ...baselines.point_law import PointLaw
+from ...scene.pose_sets import CONTAINER
+from ...solver.contact import Contact
+
+# --- cases ----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlannedLanding:
+    """One landing and what is expected of it beforehand."""
+
+    name: str
+    case: LandingCase
+    fields: dict[str, Any] = field(default_factory=dict)
+    """Further fields of CraneScenario."""
+    falls: bool = False
+    """Whether the load must fall; else it must come to rest within all limits."""
+    tilt_limit: float = TILT_LIMIT
+
+    def as_expected(self, result: LandingResult) -> bool:
+        """Return whether a landing did what it was expected to do."""
+        if self.falls:
+            return not result.at_rest and result.drop > LEAST_DROP
+        return result.at_rest
+
+
+LEAST_DROP = 0.05
+"""A load has fallen if its centre ends so far below its place on the stack [m]. The ropes, paid
+out by 0.8 m, catch it then."""
+
+
+def _aimed(overhang: float = 0.05, heading: float = 160.0, **fields: float) -> LandingCase:
+    values: dict[str, float] = {'rope_angle': 0.5, 'rope_heading': 70.0, 'tilt': 1.0,
+                                'tilt_heading': 30.0, 'yaw': 0.1}
+    return LandingCase(**values | fields, overhang=overhang, overhang_heading=heading)
+
+
+_LENGTH, _WIDTH, _ = CONTAINER
+_SMALL = (6.058, 2.438, 2.591)
+_SPREADER = {'size': (_LENGTH, _WIDTH, 1.5), 'mass': 15_000.0, 'castings': True}
+ADDED = [
+    PlannedLanding(name='mass 10 % of the length off the middle', case=_aimed(),
+                   fields={'mass_offset': (0.1 * _LENGTH, 0.0, 0.0)}),
+    PlannedLanding(name='mass 10 % of length and width off', case=_aimed(tilt=2.0, yaw=-0.8),
+                   fields={'mass_offset': (-0.1 * _LENGTH, 0.1 * _WIDTH, 0.0)}),
+    PlannedLanding(name='on a pedestal, 6 × 2 m', case=_aimed(tilt=2.0),
+                   fields={'stack_size': (6.0, 2.0, 1.0)}),
+    PlannedLanding(name='on a platform, 14 × 4 m', case=_aimed(overhang=0.3, rope_angle=2.0),
+                   fields={'stack_size': (14.0, 4.0, 1.0)}),
+    PlannedLanding(name='20 ft on 40 ft', case=_aimed(overhang=0.3, heading=0.0, tilt=2.0),
+                   fields={'size': _SMALL, 'mass': 12_000.0}),
+    PlannedLanding(name='20 ft at the end of 40 ft', case=_aimed(overhang=3.0, heading=0.0),
+                   fields={'size': _SMALL, 'mass': 12_000.0}),
+    PlannedLanding(name='a cube of 0.5 m, 300 kg', case=_aimed(overhang=0.02),
+                   fields={'size': (0.5, 0.5, 0.5), 'mass': 300.0}),
+    PlannedLanding(name='overhanging by 40 % of the length',
+                   case=_aimed(overhang=0.4 * _LENGTH, heading=0.0)),
+    PlannedLanding(name='overhanging by 30 % of the width',
+                   case=_aimed(overhang=0.3 * _WIDTH, heading=90.0), tilt_limit=math.radians(0.1)),
+    PlannedLanding(name='spreader on four corner castings', case=_aimed(), fields=_SPREADER),
+    PlannedLanding(name='the same, tilted by 2°', case=_aimed(tilt=2.0, yaw=-0.3),
+                   fields=_SPREADER),
+    PlannedLanding(name='overhanging by 55 % of the width',
+                   case=_aimed(overhang=0.55 * _WIDTH, heading=90.0), falls=True),
+    PlannedLanding(name='overhanging by 55 % of the length',
+                   case=_aimed(overhang=0.55 * _LENGTH, heading=180.0), falls=True),
+]
+"""Landings beside the grid. Where the load's middle is a fifth of the width within the edge, its
+weight rests on a strip of three fifths, whose other end is bare: it cannot lie as flat."""
+
+
+def grid(seed: int = 1) -> list[PlannedLanding]:
+    """Return the 36 landings of the grid."""
+    return [PlannedLanding(name=f'grid {number}', case=case)
+            for number, case in enumerate(cases(seed=seed))]
+
+
+# --- ways -----------------------------------------------------------------------------------------
+
+
+class Timing(NamedTuple):
+    """Ticks a second, and the time [s] from asking for contacts to their force."""
+
+    rate_hz: float
+    latency: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Way:
+    """A law and what gives its contacts."""
+
+    law: str
+    contacts: str
+    fly: Callable[[CraneScenario, Timing], LandingRecord]
+    every: int = 1
+    """Of the grid's landings, each so manieth is run."""
+    added: bool = False
+    """Whether the added landings are run too."""
+    timed: bool = True
+    """Whether rate and latency matter."""
+
+
+def patch_way(model: str) -> Way:
+    """Return the patch law with a model of this package."""
+    def fly(scenario: CraneScenario, timing: Timing) -> LandingRecord:
+        return land(scenario, solvers(scenario, model), **timing._asdict())
+    return Way(law='patch', contacts=model, fly=fly, added=True)
+
+
+def point_way(contacts: str, sources: Callable[[CraneScenario], Sequence[ContactSource]],
+              every: int = 1) -> Way:
+    """Return the point law with a point from anywhere."""
+    def fly(scenario: CraneScenario, timing: Timing) -> LandingRecord:
+        law = PointLaw.for_load(scenario.mass, scenario.size, timing.rate_hz)
+        return land(scenario, sources(scenario), law=law, **timing._asdict())
+    return Way(law='point', contacts=contacts, fly=fly, every=every)
+
+
+def model_point(model: str, every: int = 1) -> Way:
+    """Return the point law with the point of a model."""
+    return point_way(model, lambda scenario: solvers(scenario, model), every)
+
+
+def mujoco_point(choice: str) -> Way:
+    """Return the point law with one point made of MuJoCo's contacts."""
+    def sources(scenario: CraneScenario) -> list[MujocoSource]:
+        return [MujocoSource(scenario.size, size, choice) for _, size in scenario.stack_boxes]
+    return point_way(f'MuJoCo, {choice} point', sources, every=3)
+
+
+class MujocoSource:
+    """One point of the contacts of two boxes that `mj_collision` finds."""
+
+    def __init__(self, size_a: Sequence[float], size_b: Sequence[float], choice: str) -> None:
+        """Make the two boxes; `choice` is one of `CHOICES`."""
+        spec = mujoco.MjSpec()
+        for name, size in (('a', size_a), ('b', size_b)):
+            body = spec.worldbody.add_body(name=name)
+            body.add_freejoint()
+            body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=np.array(size) / 2.0)
+        self._model = spec.compile()
+        self._data = mujoco.MjData(self._model)
+        self._choice = CHOICES[choice]
+
+    def __call__(self, pose_a: np.ndarray, pose_b: np.ndarray) -> Contact:
+        """Return the contact, without a patch; its depth is the deepest one's."""
+        found = self.all_of(pose_a, pose_b)
+        answer = self._choice(np.array(found.pos), np.array(found.frame)[:, :3],
+                              -np.array(found.dist))
+        nothing = np.full(3, math.nan)
+        if answer.normal is None or answer.point is None:
+            return Contact(False, math.nan, nothing, nothing, 0.0, np.full((3, 3), math.nan))
+        return Contact(True, float(np.min(found.dist)), answer.normal, answer.point, math.nan,
+                       np.full((3, 3), math.nan))
+
+    def all_of(self, pose_a: np.ndarray, pose_b: np.ndarray) -> Any:
+        """Return MuJoCo's contacts, until the next call."""
+        self._data.qpos[:] = np.concatenate([pose_a[:3], np.roll(pose_a[3:], 1), pose_b[:3],
+                                             np.roll(pose_b[3:], 1)])
+        mujoco.mj_kinematics(self._model, self._data)
+        mujoco.mj_collision(self._model, self._data)
+        return self._data.contact
+
+
+def own_contact(scenario: CraneScenario, timing: Timing) -> LandingRecord:
+    """Run one landing on MuJoCo's own contacts; it ends when all that is judged was seen."""
+    crane = Crane(scenario, timing.rate_hz, own_contact=True)
+    record = LandingRecord(scenario, timing.rate_hz)
+    for tick in range(round(scenario.duration * timing.rate_hz)):
+        record.poses.append(crane.load_pose)
+        record.velocities.append(crane.load_velocity)
+        crane.step()
+        record.tensions.append(crane.rope_tensions)
+        record.forces.append(crane.own_contact_force)
+        if record.forces[-1].any():
+            record.points[tick] = np.full(3, math.nan)
+        if record.watched:
+            break
+    return record
+
+
+WAYS = {
+    'exact': patch_way('exact'),
+    'mlp': patch_way('mlp'),
+    'manifold': Way(law='MuJoCo', contacts='its manifold, in the simulator', fly=own_contact,
+                    added=True, timed=False),
+    'point': model_point('exact'),
+    'mujoco-mean': mujoco_point('mean'),
+    'mujoco-deepest': mujoco_point('deepest'),
+    'fcl': model_point('fcl', every=3),
+    'soup': model_point('soup', every=12),
+}
+"""By name: the ways that the table has."""
