@@ -31,7 +31,7 @@ help:
 	@echo 'make demo     the crane, the contact node, and contacts live in this terminal'
 	echo 'make view     the same in the browser, with models to switch and runs to repeat'
 	echo 'make test     ruff, mypy and all tests'
-	echo 'make check    all linters, and the quick tests of core, solver and scene: a minute'
+	echo 'make check    linters, and the quick tests of core, solver and scene: a minute'
 	echo 'make test-arm the C++ test on an emulated 64-bit ARM'
 	echo 'make coverage lines of solver, scenes and nodes that their tests run'
 	echo 'make clean    remove .venv and everything that was generated'

@@ -26,6 +26,7 @@ def run(linter: str, *words: str) -> None:
     assert done.returncode == 0, done.stdout
 
 
+@pytest.mark.slow  # ruff has most of its rules
 def test_flake8() -> None:
     run('ament_flake8', '--config', CONFIG, *SOURCES)
 
