@@ -31,7 +31,7 @@ def stamp_of(message: Any) -> int:
 
 
 def row_of(contact: Contact) -> tuple[float, ...]:
-    """The row of pair 0 in a `contacts` cloud that says all of a contact."""
+    """Return the row of pair 0 in a `contacts` cloud that says all of a contact."""
     return (*contact.point, *contact.normal, -contact.separation, 0, contact.volume,
             *contact.covariance[np.triu_indices(3)])
 

@@ -140,7 +140,7 @@ def test_memory_for_frames_is_bounded():
 
 
 def as_message(rows, *, only=None, **changes):
-    """A cloud whose fields are those of an array, or `only` some; its own words may be changed."""
+    """Return a cloud with the fields of an array, or `only` some; its own words may be changed."""
     datatypes = {'u4': PointField.UINT32, 'f4': PointField.FLOAT32, 'f8': PointField.FLOAT64}
     fields = [PointField(name=name, offset=offset, datatype=datatypes[kind.str[1:]], count=1)
               for name, (kind, offset) in rows.dtype.fields.items() if name in (only or name)]
