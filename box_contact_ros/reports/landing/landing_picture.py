@@ -15,11 +15,11 @@ from ... import output
 from ...apps.crane.landing import CORNER_SPEED_LIMIT, WATCHED, LandingRecord, solvers
 from ...apps.crane.mujoco_crane import CraneScenario
 from ...scene.pose import rotation_matrix
-from .landing_ways import WAYS, MujocoSource, Timing
+from .landing_ways import WAYS, LoopTiming, MujocoSource
 
 SHOWN_WAYS = {'exact': 'patch law', 'point': 'point law', 'fcl': 'deepest point',
               'manifold': "MuJoCo's manifold"}
-TIMING = Timing(200.0, 0.002)
+TIMING = LoopTiming(200.0, 0.002)
 EXAGGERATION = 15.0
 """Of the tilt: a third of a degree would not be seen."""
 LATEST = 1.0

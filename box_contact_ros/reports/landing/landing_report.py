@@ -27,7 +27,7 @@ from ...apps.crane.mujoco_crane import CraneScenario
 from ...core import native
 from ...solver.arguments import program_parser
 from .landing_picture import draw
-from .landing_ways import ADDED, WAYS, PlannedLanding, Timing, grid
+from .landing_ways import ADDED, WAYS, LoopTiming, PlannedLanding, grid
 
 QUICK = 9
 """`--quick` runs every ninth landing of the grid, and every third of the added ones."""
@@ -42,7 +42,7 @@ class Landing(NamedTuple):
     """One landing to run."""
 
     way: str
-    timing: Timing
+    timing: LoopTiming
     planned: PlannedLanding
     scenario: CraneScenario
 
@@ -74,7 +74,7 @@ def judged(landing: Landing, record: LandingRecord) -> Landed:
     return Landed(landing, record.judge(tilt_limit=landing.planned.tilt_limit))
 
 
-def landings_of(ways: Sequence[str], timings: Sequence[Timing], of_grid: Sequence[PlannedLanding],
+def landings_of(ways: Sequence[str], timings: Sequence[LoopTiming], of_grid: Sequence[PlannedLanding],
                 added: Sequence[PlannedLanding], scenarios: dict[str, CraneScenario],
                 ) -> Iterator[Landing]:
     """Yield the landings of a sweep."""
@@ -210,7 +210,7 @@ def main(args: Sequence[str] | None = None) -> int:
     ways = options.ways
     if options.dds:
         added = [one for one in added if not one.fields.get('castings')]
-    timings = [Timing(rate, latency) for rate in options.rates for latency in options.latency]
+    timings = [LoopTiming(rate, latency) for rate in options.rates for latency in options.latency]
     everything = [*of_grid, *added]
     with ProcessPoolExecutor(options.workers) as pool:
         scenarios = dict(zip([one.name for one in everything], tqdm(

@@ -108,7 +108,7 @@ def grid(seed: int = 1) -> list[PlannedLanding]:
 # --- ways -----------------------------------------------------------------------------------------
 
 
-class Timing(NamedTuple):
+class LoopTiming(NamedTuple):
     """Ticks a second, and the time [s] from asking for contacts to their force."""
 
     rate_hz: float
@@ -121,7 +121,7 @@ class Way:
 
     law: str
     contacts: str
-    fly: Callable[[CraneScenario, Timing], LandingRecord]
+    fly: Callable[[CraneScenario, LoopTiming], LandingRecord]
     every: int = 1
     """Of the grid's landings, each so manieth is run."""
     added: bool = False
@@ -132,7 +132,7 @@ class Way:
 
 def patch_way(model: str) -> Way:
     """Return the patch law with a model of this package."""
-    def fly(scenario: CraneScenario, timing: Timing) -> LandingRecord:
+    def fly(scenario: CraneScenario, timing: LoopTiming) -> LandingRecord:
         return land(scenario, solvers(scenario, model), **timing._asdict())
     return Way(law='patch', contacts=model, fly=fly, added=True)
 
@@ -140,7 +140,7 @@ def patch_way(model: str) -> Way:
 def point_way(contacts: str, sources: Callable[[CraneScenario], Sequence[ContactSource]],
               every: int = 1) -> Way:
     """Return the point law with a point from anywhere."""
-    def fly(scenario: CraneScenario, timing: Timing) -> LandingRecord:
+    def fly(scenario: CraneScenario, timing: LoopTiming) -> LandingRecord:
         law = PointLaw.for_load(scenario.mass, scenario.size, timing.rate_hz)
         return land(scenario, sources(scenario), law=law, **timing._asdict())
     return Way(law='point', contacts=contacts, fly=fly, every=every)
@@ -192,7 +192,7 @@ class MujocoSource:
         return self._data.contact
 
 
-def own_contact(scenario: CraneScenario, timing: Timing) -> LandingRecord:
+def own_contact(scenario: CraneScenario, timing: LoopTiming) -> LandingRecord:
     """Run one landing on MuJoCo's own contacts; it ends when all that is judged was seen."""
     crane = Crane(scenario, timing.rate_hz, own_contact=True)
     record = LandingRecord(scenario, timing.rate_hz)
