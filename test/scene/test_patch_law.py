@@ -26,7 +26,7 @@ SUNK = GRAVITY / LAW.frequency**2
 
 
 def fresh():
-    """A law that has seen no contact yet."""
+    """Return a law that has seen no contact yet."""
     return dataclasses.replace(LAW)
 
 

@@ -74,9 +74,9 @@ def judged(landing: Landing, record: LandingRecord) -> Landed:
     return Landed(landing, record.judge(tilt_limit=landing.planned.tilt_limit))
 
 
-def landings_of(ways: Sequence[str], timings: Sequence[LoopTiming], of_grid: Sequence[PlannedLanding],
-                added: Sequence[PlannedLanding], scenarios: dict[str, CraneScenario],
-                ) -> Iterator[Landing]:
+def landings_of(ways: Sequence[str], timings: Sequence[LoopTiming],
+                of_grid: Sequence[PlannedLanding], added: Sequence[PlannedLanding],
+                scenarios: dict[str, CraneScenario]) -> Iterator[Landing]:
     """Yield the landings of a sweep."""
     for name in ways:
         way = WAYS[name]
