@@ -52,10 +52,11 @@ ASPECT_MAX, SIZE_RATIO_MAX, DEPTH_MAX = (
 """The range of the MLP: edge ratio of a box, size ratio of both, depth by the shortest edge."""
 CENTROID_REACH = native.CENTROID_REACH
 """Farthest that a centroid is from the middle of its bounding box [half extents]."""
-SITES, FEATURES, OUTPUTS = 9, 12, 3
-"""Sites at which the MLP is asked, features and outputs of each: see mlp.hpp."""
+SITES, FEATURES, OUTPUTS, POINT_OUTPUTS = 9, 12, 7, 3
+"""Sites at which the MLP is asked, features and outputs of each, those for the point: mlp.hpp."""
 
 __all__ = [
     'ASPECT_MAX', 'CENTROID_REACH', 'CONTACT_ULPS', 'DEPTH_FLOOR', 'DEPTH_MAX', 'FEATURES',
-    'FORCE', 'LENGTH_MAX', 'LENGTH_MIN', 'OUTPUTS', 'QUATERNION_MAX', 'QUATERNION_MIN', 'SITES',
+    'FORCE', 'LENGTH_MAX', 'LENGTH_MIN', 'OUTPUTS', 'POINT_OUTPUTS', 'QUATERNION_MAX',
+    'QUATERNION_MIN', 'SITES',
     'SIZE_RATIO_MAX', 'Stages', 'instruction_sets', 'native', 'stages']

@@ -18,10 +18,11 @@
 //   point [m], common frame: the centroid of A∩B. Model `exact` errs by at most
 //       max(1e-9, 1e-14 · size / depth) · size. Model `mlp` errs by a few per cent of the smaller
 //       box, and its point is inside both boxes.
-//   volume [m³] of A∩B. Model `exact` errs by at most max(1e-9, 1e-14 · size / depth) of it. NaN from
-//       model `mlp`.
+//   volume [m³] of A∩B. Model `exact` errs by at most max(1e-9, 1e-14 · size / depth) of it. Model
+//       `mlp` errs by some per cent, and its volume is positive.
 //   covariance [m²], common frame: the second central moments of A∩B by its volume, symmetric. Model
-//       `exact` errs by at most max(1e-8, 1e-14 · size / depth) of its trace. NaN from model `mlp`.
+//       `exact` errs by at most max(1e-8, 1e-14 · size / depth) of its trace. Model `mlp` errs by
+//       some per cent of the trace, and its covariance is positive semidefinite.
 //
 // Without contact, `normal`, `point` and `covariance` are NaN, and `volume` is zero. A contact
 // shallower than 1e-9 · size has the point, volume and covariance of boxes that were pressed in to

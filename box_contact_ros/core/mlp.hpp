@@ -1,17 +1,26 @@
-// Model `mlp`: SAT decides and gives normal and depth; a multilayer perceptron gives the point.
+// Model `mlp`: SAT decides and gives normal and depth; a multilayer perceptron gives the point, the
+// volume and the covariance.
 //
 // 1. `bounds_by_slab`: a box about A∩B in one of the boxes' frames (overlap/bounds.hpp).
-// 2. `describe` and `forward`: where in these bounds the centroid is. Only these run in float32.
+// 2. `describe`, `forward` and `ask`: centroid, volume and covariance in these bounds. Only these run
+//    in float32.
 // 3. `place`: the point is moved into both boxes.
 //
-// Guarantee: the point lies in both boxes, to 2⁻⁴⁶ of the size, whatever the weights are. `place`
-// ends with a clamp to the box of the bounds' frame, and then tests the point against the other box.
-// A point that fails the test, NaN included, is replaced by the exact centroid, and counted. With
-// trained weights none of 600,000 points of the pose sets fails.
+// Guarantees, whatever the weights are:
+//
+// - The point lies in both boxes, to 2⁻⁴⁶ of the size. `place` ends with a clamp to the box of the
+//   bounds' frame, and then tests the point against the other box.
+// - The volume is positive, and at most that of the bounds. The covariance is positive definite, but
+//   for rounding: it is the inverse of a matrix that is (`ask`).
+//
+// Where the point fails its test, or volume or covariance is NaN, all three are the exact ones, and
+// the contact is counted. With trained weights none of 600,000 points of the pose sets fails.
 //
 // Outside the range that the network was trained for the answer is the exact one, too.
 #pragma once
 
+#include <algorithm>
+#include <initializer_list>
 #include <vector>
 
 #include "contact.hpp"
@@ -44,10 +53,13 @@ constexpr double place_tolerance = 0x1p-46;
 //
 // The network is asked at nine sites, a pair of faces f by an axis q of the cube. A site has twelve
 // features: four of its own, four of its faces, four of its axis. All are invariant under the
-// cube's 48 symmetries, which only take one site to another. Its three outputs multiply the
-// components q of three vectors that turn along (Villar et al., Scalars are universal, 2021).
+// cube's 48 symmetries, which only take one site to another. Its outputs for the point multiply the
+// components q of three vectors that turn along (Villar et al., Scalars are universal, 2021). What
+// the four others do, `ask` says.
 
-constexpr int site_count = 9, site_features = 12, site_outputs = 3;
+constexpr int site_count = 9, site_features = 12, point_outputs = 3;
+// Places of the other outputs.
+constexpr int to_volume = 3, to_precision = 4, to_coupling = 5, to_push = 6, site_outputs = 7;
 
 // The cut cube, for lanes F of either precision. Rows of `slant` are the normals of the pairs of
 // faces. So its columns, like the other triples, have one number for each pair of faces f.
@@ -70,11 +82,11 @@ struct SiteFeatures {
   // another axis · cut.
   Triple<F> of_site[3][4];
 };
-// What the outputs of site (f, q) multiply: the push of the faces f along their normal; the push of
+// What the outputs of site (f, q) for the point multiply: the push of the faces f along their normal; the push of
 // the others along these faces, times their cut; what the others' normals have of this push.
 template <class F>
 struct SiteVectors {
-  Triple<F> along[3][site_outputs];  // [q], by f
+  Triple<F> along[3][point_outputs];  // [q], by f
 };
 
 // Slants and pushes are shortened by this. It is far below float32's rounding of what they are added
@@ -193,22 +205,37 @@ struct SiteOutputs {
   Triple<F> at[3][site_outputs];  // [q], by f
 };
 
-// The outputs at all sites. What sites share is summed once.
-template <class F>
+// Units whose shared sums are kept at a time: they stay in the first cache.
+constexpr int units_at_once = 16;
+
+// The first `count` outputs at all sites. What sites share is summed once. The sites of one axis
+// come one after the other, so that the sums of their outputs stay in registers.
+template <int count, class F>
 inline void forward(const Network& network, const SiteFeatures<F>& features,
                     SiteOutputs<F>& outputs) {
   for (auto& axis : outputs.at)
-    for (int k = 0; k < site_outputs; ++k) axis[k] = uniform(splat<F>(network.output_bias[k]));
-  for (const Network::Unit& unit : network.units) {
-    Triple<F> of_faces =
-        weighted_sum(uniform(splat<F>(unit.bias)), unit.of_faces, features.of_faces);
-    Triple<F> of_axis = weighted_sum(Triple<F>{}, unit.of_axis, features.of_axis);
+    for (int k = 0; k < count; ++k) axis[k] = uniform(splat<F>(network.output_bias[k]));
+  const Network::Unit *unit = network.units.data(), *end = unit + network.units.size();
+  for (; unit < end; unit += units_at_once) {
+    Triple<F> of_faces[units_at_once], of_axis[units_at_once];
+    int units = int(std::min<long>(units_at_once, end - unit));
+    for (int n = 0; n < units; ++n) {
+      of_faces[n] =
+          weighted_sum(uniform(splat<F>(unit[n].bias)), unit[n].of_faces, features.of_faces);
+      of_axis[n] = weighted_sum(Triple<F>{}, unit[n].of_axis, features.of_axis);
+    }
 #pragma GCC unroll 3
     for (int q = 0; q < 3; ++q) {
-      Triple<F> shared = of_faces + spread(of_axis, q);
-      Triple<F> hidden = max(weighted_sum(shared, unit.of_site, features.of_site[q]), Triple<F>{});
-      for (int k = 0; k < site_outputs; ++k)
-        outputs.at[q][k] = multiply_add(unit.to_outputs[k], hidden, outputs.at[q][k]);
+      Triple<F> sums[count];
+      for (int k = 0; k < count; ++k) sums[k] = outputs.at[q][k];
+      for (int n = 0; n < units; ++n) {
+        Triple<F> shared = of_faces[n] + spread(of_axis[n], q);
+        Triple<F> hidden =
+            max(weighted_sum(shared, unit[n].of_site, features.of_site[q]), Triple<F>{});
+        for (int k = 0; k < count; ++k)
+          sums[k] = multiply_add(unit[n].to_outputs[k], hidden, sums[k]);
+      }
+      for (int k = 0; k < count; ++k) outputs.at[q][k] = sums[k];
     }
   }
 }
@@ -275,26 +302,131 @@ template <class T, int group>
   return cube;
 }
 
-// The network's answers for a group of cubes: centroids from the middles of their bounding boxes, in
-// half extents.
-template <class T, int group>
+// --- The answer ---
+
+// eˣ for x from −80 to 80, to 2 ulp; NaN for NaN. For lanes F of float32.
+template <class F>
+[[gnu::always_inline]] inline F exp(F x) {
+  using Bits = std::conditional_t<is_scalar<F>, uint32_t, Mask<F>>;
+  constexpr float rounder = 0x1.8p23F;  // added, it leaves a whole number in the low bits
+  F shifted = x * 0x1.715476p0F + rounder, whole = shifted - rounder;
+  F rest = (x - whole * 0x1.62ep-1F) - whole * 0x1.0bfbe8p-15F;  // x − whole · ln 2
+  F series = splat<F>(1.0F / 720.0F);
+  for (float factor : {1.0F / 120.0F, 1.0F / 24.0F, 1.0F / 6.0F, 0.5F, 1.0F, 1.0F})
+    series = series * rest + factor;
+  Bits power;
+  std::memcpy(&power, &shifted, sizeof power);
+  power = (power << 23) + 0x3f800000;  // the bits of 2 to the power of the whole number
+  F scale;
+  std::memcpy(&scale, &power, sizeof scale);
+  return series * scale;
+}
+
+// Volumes are at least this power of e by those of the bounds. Precisions along an axis are at most
+// this power of e by that of an uncut cube.
+constexpr float least_log_volume = -80.0F, most_stretch = 6.0F;
+
+// Precision of an uncut cube along an axis: its variance is 1/3.
+constexpr float cube_precision = 3.0F;
+
+// Couplings are cut to this, four times what trained weights give. Scaled to a unit diagonal of its
+// first term, the precision then has eigenvalues from 1 to 1,200. Cofactors in float32 err by at
+// most 2⁻²¹ of the square of the latter, which keeps their matrix, of eigenvalues from 1 on,
+// positive definite.
+constexpr float coupling_reach = 12.0F;
+
+// What the network says of a cut cube, in half extents.
+template <class T>
+struct CubeMoments {
+  Triple<T> centroid;             // from the middle
+  Triple<T> volume;               // by that of the cube, three times
+  Triple<T> variance, covariant;  // of the covariance: xx, yy, zz, and yz, xz, xy
+};
+
+// The sums over the faces f of three numbers by f: [q] becomes q.
+template <class F>
+[[gnu::always_inline]] inline Triple<F> over_faces(const Columns<F>& parts) {
+  Columns<F> by_axis = transpose(parts);
+  return (by_axis[0] + by_axis[1]) + by_axis[2];
+}
+
+// The inverse of the matrix P of a diagonal xx, yy, zz and the rest yz, xz, xy, by its cofactors.
+template <class F>
+[[gnu::always_inline]] inline void invert(Triple<F>& diagonal, Triple<F>& rest) {
+  auto next = [](const Triple<F>& x) { return rotated(x); };
+  auto last = [](const Triple<F>& x) { return rotated(rotated(x)); };
+  Triple<F> cofactors = next(diagonal) * last(diagonal) - rest * rest;
+  Triple<F> others = next(rest) * last(rest) - diagonal * rest;
+  F determinant = (diagonal[0] * cofactors[0] + rest[1] * others[1]) + rest[2] * others[2];
+  Triple<F> inverse = uniform(splat<F>(1.0F) / determinant);
+  diagonal = cofactors * inverse;
+  rest = others * inverse;
+}
+
+// Volume and covariance from the outputs o at the sites (f, q), with slants s, cuts k, pushes p:
+//
+//   volume of the cube · exp(min(0, Σ_fq |s_fq| k_f o_volume))
+//   covariance = P⁻¹,  P = diag(D) + Σ_f k_f b_f b_fᵀ + v vᵀ
+//   D_q = 3 exp(Σ_f |s_fq| k_f o_precision) ≥ 3
+//   b_f(q) = s_fq o_coupling,  v(q) = Σ_f s_fq p_f o_push
+//
+// A cut by two parallel planes adds to a Gaussian's precision along their normal, hence the form of
+// P. It is positive definite, as k ≥ 0 and D > 0. An uncut cube is exact. A sign change of the faces
+// f turns s_f and p_f, one of the axis q turns b(q) and v(q): the covariance turns along.
+template <class F>
+[[gnu::always_inline]] inline void ask_for_patch(const CutCube<F>& cube,
+                                                 const SiteFeatures<F>& features,
+                                                 const SiteVectors<F>& vectors,
+                                                 const SiteOutputs<F>& outputs,
+                                                 CubeMoments<F>& said) {
+  Triple<F> reach = uniform(splat<F>(coupling_reach));
+  Columns<F> volumes, stretches, couplings, pushes, squares, products;
+  for (int q = 0; q < 3; ++q) {
+    const auto& out = outputs.at[q];
+    const Triple<F>& slanted = features.of_site[q][0];
+    volumes[q] = slanted * out[to_volume];
+    stretches[q] = slanted * out[to_precision];
+    couplings[q] = clamp(cube.slant[q] * out[to_coupling], reach);
+    pushes[q] = vectors.along[q][0] * out[to_push];
+  }
+  for (int q = 0; q < 3; ++q) {
+    squares[q] = cube.cut * (couplings[q] * couplings[q]);
+    products[q] = cube.cut * (couplings[(q + 1) % 3] * couplings[(q + 2) % 3]);
+  }
+  F log_volume = total((volumes[0] + volumes[1]) + volumes[2])[0];
+  said.volume = uniform(exp(min(F{}, max(splat<F>(least_log_volume), log_volume))));
+
+  Triple<F> most = uniform(splat<F>(most_stretch));
+  Triple<F> stretch = min(most, max(Triple<F>{}, over_faces(stretches)));
+  Triple<F> push = clamp(over_faces(pushes), reach);
+  Triple<F> own = cube_precision * each([](auto x) { return exp(x); }, stretch);
+  said.variance = (own + over_faces(squares)) + push * push;
+  said.covariant = over_faces(products) + rotated(push) * rotated(rotated(push));
+  invert<F>(said.variance, said.covariant);
+}
+
+// What the network says of a group of cubes, by its first `asked` outputs.
+template <int asked, class T, int group>
 [[gnu::always_inline]] inline void ask(const Network& network, const CutCube<T> (&cubes)[group],
-                                       Triple<T> (&answers)[group]) {
+                                       CubeMoments<T> (&answers)[group]) {
   using F = Narrow<T>;
+  CutCube<F> cube = narrow(cubes);
   SiteFeatures<F> features;
   SiteVectors<F> vectors;
   SiteOutputs<F> outputs;
-  describe(narrow(cubes), features, vectors);
-  forward(network, features, outputs);
+  describe(cube, features, vectors);
+  forward<asked>(network, features, outputs);
   Columns<F> parts;  // [q], by f
   for (int q = 0; q < 3; ++q) {
     const auto &out = outputs.at[q], &along = vectors.along[q];
     parts[q] = (out[0] * along[0] + out[1] * along[1]) + out[2] * along[2];
   }
-  Columns<F> by_axis = transpose(parts);  // [f], by q
-  Triple<F> sum{};
-  for (int f = 0; f < 3; ++f) sum = sum + by_axis[f];
-  for (int g = 0; g < group; ++g) answers[g] = widen<T>(sum, g);
+  CubeMoments<F> said{};
+  said.centroid = over_faces(parts);
+  if constexpr (asked == site_outputs) ask_for_patch(cube, features, vectors, outputs, said);
+  for (int g = 0; g < group; ++g)
+    answers[g] = {widen<T>(said.centroid, g), widen<T>(said.volume, g), widen<T>(said.variance, g),
+                  widen<T>(said.covariant, g)};
 }
 
 // The answer [m] from the middle of the bounding box, cut to where a centroid can be.
@@ -348,14 +480,28 @@ template <class T>
   return (excess <= range_slack) & (smallest(components<T>(bounds.half)) >= flat * pair.size);
 }
 
+// Volume and covariance of the overlap, bounds' frame.
+template <class T>
+[[gnu::always_inline]] inline void scale_patch(const OverlapBounds<T>& bounds,
+                                               const CubeMoments<T>& said, Moments<T>& found) {
+  Vec<T> half = components<T>(bounds.half);
+  found.volume = (8.0 * said.volume[0]) * (half[0] * half[1] * half[2]);
+  for (int k = 0; k < 3; ++k) {
+    found.covariance(k, k) = said.variance[k] * (half[k] * half[k]);
+    int i = (k + 1) % 3, j = (k + 2) % 3;
+    found.covariance(i, j) = said.covariant[k] * (half[i] * half[j]);
+  }
+}
+
 // The model for bounds of one method.
 template <Network::Bounds method>
 struct MlpModelBy {
   const Network& network;
 
-  // The network gives the centroid alone.
+  // By the slab the network gives all moments; by the edges, as it did formerly, the centroid alone.
+  static constexpr bool gives_patch = method == Network::Bounds::slab;
   template <class T>
-  using Found = Vec<T>;
+  using Found = std::conditional_t<gives_patch, Moments<T>, Vec<T>>;
   // How many queries of T it takes at once: float32 lanes are twice as many.
   template <class T>
   static constexpr int group = is_scalar<T> ? 1 : 2;
@@ -371,13 +517,14 @@ struct MlpModelBy {
     }
   }
 
-  // Contact points in A's frame [m], for the pairs that touch.
+  // What it finds in A's frame, for the pairs that touch.
   template <class T, int count>
-  [[gnu::always_inline]] void solve(const Query<T> (&queries)[count], Vec<T> (&found)[count],
+  [[gnu::always_inline]] void solve(const Query<T> (&queries)[count], Found<T> (&found)[count],
                                     Counts& counts) const {
     OverlapBounds<T> bounds[count];
     CutCube<T> cubes[count];
-    Triple<T> answers[count], pressed_offset[count];
+    CubeMoments<T> answers[count];
+    Triple<T> pressed_offset[count];
     for (int g = 0; g < count; ++g) {
       Pair<T> pair = queries[g].pair;
       enforce_minimum_depth(pair, queries[g].axis);
@@ -385,21 +532,33 @@ struct MlpModelBy {
       bounds[g] = bounds_of(pair, queries[g].axis);
       cubes[g] = cut_cube(bounds[g], pair.size);
     }
-    ask(network, cubes, answers);
+    ask<gives_patch ? site_outputs : point_outputs>(network, cubes, answers);
     for (int g = 0; g < count; ++g) {
       const Query<T>& q = queries[g];
-      Placed<T> placed = place(bounds[g], answers[g], q.pair.size);
-      Triple<T> from_b = pressed_offset[g] + columns(q.pair.rotation) * placed.point;
-      found[g] = components<T>(select(bounds[g].in_b, from_b, placed.point));
+      Placed<T> placed = place(bounds[g], answers[g].centroid, q.pair.size);
       Mask<T> answered = in_range(q.pair, q.axis.separation, bounds[g]) & placed.inside;
+      Moments<T> one;
+      Triple<T> from_b = pressed_offset[g] + columns(q.pair.rotation) * placed.point;
+      one.centroid = components<T>(select(bounds[g].in_b, from_b, placed.point));
+      if constexpr (gives_patch) {
+        scale_patch(bounds[g], answers[g], one);
+        answered &= (one.volume > 0.0) & (trace(one.covariance) > 0.0);
+        one.covariance =
+            select(bounds[g].in_b, rotated(q.pair.rotation, one.covariance), one.covariance);
+      }
       Mask<T> fallback = (answered == 0) & q.touching;
       if (any(fallback)) {
         for (int i = 0; i < width<T>; ++i) {
           if (!lane(fallback, i)) continue;
           ++counts.exact;
           Counts unused;
-          set_lane(found[g], i, ExactModel{}.solve(lane(q, i), unused).centroid);
+          set_lane(one, i, ExactModel{}.solve(lane(q, i), unused));
         }
+      }
+      if constexpr (gives_patch) {
+        found[g] = one;
+      } else {
+        found[g] = one.centroid;
       }
     }
   }

@@ -56,9 +56,17 @@ class Stages(NamedTuple):
     features: np.ndarray = _UNASKED
     """(n, 9, 12) float32 features of the sites f · 3 + q: four of the site, of its faces, axis."""
     vectors: np.ndarray = _UNASKED
-    """(n, 9, 3) float32 what the outputs of the sites are multiplied with."""
+    """(n, 9, 3) float32 what the outputs of the sites for the point are multiplied with."""
+    slant: np.ndarray = _UNASKED
+    """(n, 3, 3) float32 normals of the other box's pairs of faces as rows, in the cut cube."""
+    cut: np.ndarray = _UNASKED
+    """(n, 3) float32 how far both faces of each pair cut into the cube."""
     answer: np.ndarray = _UNASKED
-    """(n, 3) the network's answer, from `bounds_middle` [half extents]; needs `network`."""
+    """(n, 3) the network's centroid, from `bounds_middle` [half extents]; needs `network`."""
+    answer_volume: np.ndarray = _UNASKED
+    """(n,) its volume by that of the bounds; needs `network`."""
+    answer_covariance: np.ndarray = _UNASKED
+    """(n, 3, 3) its covariance, bounds' frame [half extents]; needs `network`."""
 
 
 def stages(poses_a: ArrayLike, poses_b: ArrayLike, size_a: ArrayLike, size_b: ArrayLike, *,
@@ -79,8 +87,8 @@ def stages(poses_a: ArrayLike, poses_b: ArrayLike, size_a: ArrayLike, size_b: Ar
         raise ValueError(f'names {unknown} are not fields of Stages')
     if bounds not in BOUNDS:
         raise ValueError(f'bounds {bounds!r} is not one of: {", ".join(BOUNDS)}')
-    if 'answer' in names and network is None:
-        raise ValueError("'answer' needs a network")
+    if network is None and (unanswered := [name for name in names if name.startswith('answer')]):
+        raise ValueError(f'{unanswered[0]!r} needs a network')
     a, b, one, other = (np.asarray(values, dtype=np.float64)
                         for values in (poses_a, poses_b, size_a, size_b))
     arrays, refused = native.stages(a, b, one, other, network, tuple(names), bounds == 'edges')

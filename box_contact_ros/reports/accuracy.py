@@ -1,9 +1,10 @@
-"""Program `accuracy`: how far a model's contact point is from the exact one, per set and class.
+"""Program `accuracy`: how far a model's contacts are from the exact ones, per set and class.
 
-Every set of `pose_sets` is drawn anew from `--seed`; model `exact` gives the truth. Written are
-accuracy.csv (a row per model, set and part of the set), accuracy.md and accuracy.png. The exit
-status is 1 if `mlp` breaks one of the limits in `LIMITS`, or differs from `exact` in a separation
-or normal. A point outside a box, or a pair that `exact` answered, breaks them too.
+Measured are the point, the volume and the covariance. Every set of `pose_sets` is drawn anew from
+`--seed`; model `exact` gives the truth. Written are accuracy.csv (a row per model, set, quantity
+and part of the set), accuracy.md and accuracy.png. The exit status is 1 if `mlp` breaks one of its
+limits (`limit_of`), or differs from `exact` in a separation or normal. A point outside a box, or a
+pair that `exact` answered, breaks them too.
 
 pages/accuracy.md defines the classes. The features that meet are told from the pose, not from the
 SAT axis that wins: in stacks half the winners are edge pairs although the contact is a patch.
@@ -24,7 +25,7 @@ from .. import output
 from ..core import CENTROID_REACH, DEPTH_FLOOR, Stages, native, stages
 from ..resources import resource_path
 from ..scene.pose import rotation_matrix
-from ..scene.pose_sets import SETS, Pairs
+from ..scene.pose_sets import SETS, ContactErrors, Pairs, contact_errors
 from ..solver.arguments import add_models, program_parser, within
 from ..solver.contact import Contacts
 from ..solver.contact_solver import ContactSolver
@@ -37,7 +38,7 @@ from .paper.paper_tables import PAPER
 
 
 class Limit(NamedTuple):
-    """Largest point error allowed, in % of the smaller box's longest edge."""
+    """Largest error allowed, in % as in `ContactErrors`."""
 
     mean: float
     p99: float
@@ -52,7 +53,19 @@ LIMITS = {
     'tilted stacks': Limit(0.35, 1.3, 4.5),
     'containers': Limit(0.06, 0.5, 2.5),
 }
-"""What model `mlp` has to keep, by set."""
+"""What the point of model `mlp` has to keep, by set."""
+PATCH_GOALS = {'volume': Limit(1.0, 6.0, math.inf), 'covariance': Limit(1.4, 7.0, math.inf)}
+"""What its volume and covariance should keep on every set."""
+PATCH_LIMITS = {
+    ('volume', 'random cubes'): Limit(1.0, 6.3, math.inf),
+    ('volume', 'stacks'): Limit(1.2, 6.0, math.inf),
+    ('volume', 'tilted stacks'): Limit(1.5, 8.0, math.inf),
+    ('covariance', 'random cubes'): Limit(1.7, 8.5, math.inf),
+    ('covariance', 'stacks'): Limit(2.5, 9.5, math.inf),
+    ('covariance', 'tilted stacks'): Limit(2.7, 13.0, math.inf),
+    ('covariance', 'containers'): Limit(1.9, 8.5, math.inf),
+}
+"""What they have to keep where they miss the goal."""
 MAE_LIMIT = 0.005  # mean absolute error [rad] of `mlp` on the paper's external set
 OUTSIDE = 2.0**-44
 """How far outside a box a point may be, of the size (5.7e-14), on top of the minimum depth."""
@@ -67,6 +80,11 @@ WINNERS = ('face axis', 'edge axis')
 SHOWN = (1e-4, 100.0)  # errors that are drawn [%]
 FACE_LIKE = math.cos(math.radians(6.0))
 """Cosine of the angle to a face's normal up to which an edge pair's axis stands for the face."""
+
+
+def limit_of(quantity: str, name: str) -> Limit:
+    """Return the limit of a field of `ContactErrors` on a set."""
+    return PATCH_LIMITS.get((quantity, name)) or PATCH_GOALS.get(quantity) or LIMITS[name]
 
 
 def classify(pairs: Pairs) -> tuple[np.ndarray, np.ndarray]:
@@ -130,8 +148,7 @@ class AccuracyRow:
 
     model: str
     set: str
-    errors: np.ndarray
-    """(n,) point errors of pairs that touch by both, % of the smaller box's longest edge."""
+    errors: ContactErrors  # of the n pairs that touch by both
     classes: np.ndarray  # (n,) index into CLASSES
     winners: np.ndarray  # (n,) index into WINNERS
     pairs: int
@@ -143,20 +160,26 @@ class AccuracyRow:
     corrected_share: float
     """Share of points that the network had put outside a box; NaN for another model."""
 
-    def parts(self) -> dict[str, np.ndarray]:
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """The fields of `ContactErrors` that the model gives."""
+        return ContactErrors._fields if np.isfinite(self.errors.volume).all() else ('point',)
+
+    def parts(self) -> dict[str, ContactErrors]:
         """Return errors of all pairs, per class and per winner; empty parts are left out."""
-        found = {'all': self.errors}
-        found |= {name: self.errors[self.classes == k] for k, name in enumerate(CLASSES)}
-        found |= {name: self.errors[self.winners == k] for k, name in enumerate(WINNERS)}
-        return {name: errors for name, errors in found.items() if len(errors)}
+        rows = {'all': self.classes >= 0}
+        rows |= {name: self.classes == k for k, name in enumerate(CLASSES)}
+        rows |= {name: self.winners == k for k, name in enumerate(WINNERS)}
+        return {name: self.errors.rows(chosen) for name, chosen in rows.items() if chosen.any()}
 
     def broken(self) -> list[str]:
         """Return the limits of `mlp` that do not hold, in words."""
         if self.model != 'mlp':
             return []
-        found, limit = statistics(self.errors), LIMITS[self.set]
-        checks = {f'{name} {value:.3f} > {most:g} %': value <= most
-                  for name, value, most in zip(limit._fields, found, limit)}
+        checks = {f'{quantity}, {name} {value:.3f} > {most:g} %': value <= most
+                  for quantity, errors in self.errors._asdict().items()
+                  for name, value, most in zip(Limit._fields, statistics(errors),
+                                               limit_of(quantity, self.set))}
         checks |= {
             f'{self.verdict_errors} verdicts differ': self.verdict_errors == 0,
             'normals differ': self.normal_difference == 0.0,
@@ -182,9 +205,10 @@ def measure(model: str, name: str, pairs: Pairs, truth: Contacts, weights: str |
     both = truth.colliding & found.colliding
     touching = pairs.rows(both)
     classes, winners = classify(touching)
-    apart = np.linalg.norm(found.point[both] - truth.point[both], axis=1)
+    errors = contact_errors(*(Contacts(*(part[both] for part in contacts))
+                              for contacts in (found, truth)), touching.edge)
     return AccuracyRow(
-        model=model, set=name, errors=100.0 * apart / touching.edge, classes=classes,
+        model=model, set=name, errors=errors, classes=classes,
         winners=winners, pairs=len(both),
         exact_share=solver.exact_answers / max(1, int(found.colliding.sum())),
         verdict_errors=int((found.colliding != truth.colliding).sum()),
@@ -275,10 +299,10 @@ def paper_broken(errors: dict[str, np.ndarray], drawn: int) -> list[str]:
 
 
 def table(rows: Sequence[AccuracyRow]) -> str:
-    """Return the errors of whole sets, and their limits."""
+    """Return the point errors of whole sets, and their limits."""
     lines = []
     for r in rows:
-        mean, p99, worst = statistics(r.errors)
+        mean, p99, worst = statistics(r.errors.point)
         lines.append([
             f'{r.model}, {r.set}', f'{r.pairs:,}', f'{mean:.3f}', f'{p99:.2f}', f'{worst:.2f}',
             '/'.join(f'{value:g}' for value in LIMITS[r.set]) if r.model == 'mlp' else '',
@@ -291,36 +315,55 @@ def table(rows: Sequence[AccuracyRow]) -> str:
          'verdicts wrong', 'normal off', 'separation off', 'corrected', 'outside'], lines)
 
 
-def class_table(rows: Sequence[AccuracyRow]) -> str:
+def patch_table(rows: Sequence[AccuracyRow]) -> str:
+    """Return the errors of volume and covariance over whole sets, and their limits."""
+    lines = []
+    for r in rows:
+        for quantity, goal in PATCH_GOALS.items() if 'volume' in r.quantities else ():
+            mean, p99, worst = statistics(getattr(r.errors, quantity))
+            limit = limit_of(quantity, r.set)
+            lines.append([f'{r.model}, {r.set}', quantity, f'{mean:.2f}', f'{p99:.1f}',
+                          f'{worst:.1f}', f'{goal.mean:g}/{goal.p99:g}',
+                          'yes' if mean <= goal.mean and p99 <= goal.p99 else 'no',
+                          f'{limit.mean:g}/{limit.p99:g}' if r.model == 'mlp' else ''])
+    return output.markdown_table(['model, set', 'quantity', 'mean', 'p99', 'worst', 'goal',
+                                  'reached', 'limits'], lines, words=2)
+
+
+def class_table(rows: Sequence[AccuracyRow], quantity: str) -> str:
     """Return mean/p99/worst per class and winner, with the share of the pairs."""
     def cell(row: AccuracyRow, name: str) -> str:
-        errors = row.parts().get(name)
-        if errors is None:
+        part = row.parts().get(name)
+        if part is None:
             return '–'
+        errors = getattr(part, quantity)
         mean, p99, worst = statistics(errors)
-        share = 100.0 * len(errors) / len(row.errors)
+        share = 100.0 * len(errors) / len(row.classes)
         return f'{mean:.3f}/{p99:.2f}/{worst:.1f} ({share:.0f} %)'
 
     names = (*CLASSES, *WINNERS)
     return output.markdown_table(['model, set', *names], [
-        [f'{row.model}, {row.set}', *(cell(row, name) for name in names)] for row in rows])
+        [f'{row.model}, {row.set}', *(cell(row, name) for name in names)]
+        for row in rows if quantity in row.quantities])
 
 
 def csv_rows(rows: Sequence[AccuracyRow]) -> list[dict[str, object]]:
-    """Return a row per model, set and part: errors in %, differences of the size.
+    """Return a row per model, set, part and quantity: errors in %, differences of the size.
 
-    The row of a whole set ends with what is known of the set only.
+    A row of a whole set ends with its limits, the point's also with what is known of the set only.
     """
     found: list[dict[str, object]] = []
-    for row in rows:
-        limits = LIMITS[row.set] if row.model == 'mlp' else (None,) * 3
-        for part, errors in row.parts().items():
+    for row, quantity in [(one, name) for one in rows for name in one.quantities]:
+        limits = limit_of(quantity, row.set) if row.model == 'mlp' else (None,) * 3
+        for part, of_part in row.parts().items():
+            errors = getattr(of_part, quantity)
             mean, p99, worst = statistics(errors)
-            found.append({'model': row.model, 'set': row.set, 'part': part, 'pairs': len(errors),
-                          'mean': mean, 'p50': float(np.median(errors)), 'p99': p99,
-                          'worst': worst})
+            found.append({'model': row.model, 'set': row.set, 'part': part, 'quantity': quantity,
+                          'pairs': len(errors), 'mean': mean, 'p50': float(np.median(errors)),
+                          'p99': p99, 'worst': worst})
             if part == 'all':
                 found[-1] |= dict(zip(('limit_mean', 'limit_p99', 'limit_worst'), limits))
+            if part == 'all' and quantity == 'point':
                 found[-1] |= {name: getattr(row, name) for name in (
                     'exact_share', 'verdict_errors', 'normal_difference', 'separation_difference',
                     'corrected_share', 'outside')}
@@ -333,14 +376,15 @@ def page(rows: Sequence[AccuracyRow], errors: dict[str, np.ndarray], drawn: int,
     return output.page(
         'reports/pages/accuracy', command=command, machine=output.machine(native), seed=seed,
         verdict=f'BROKEN: {"; ".join(broken)}.' if broken else 'All limits hold.',
-        table=table(rows), class_table=class_table(rows), mae_limit=MAE_LIMIT,
-        paper_table=paper_table(errors, drawn))
+        table=table(rows), patch_table=patch_table(rows), mae_limit=MAE_LIMIT,
+        point_classes=class_table(rows, 'point'), volume_classes=class_table(rows, 'volume'),
+        covariance_classes=class_table(rows, 'covariance'), paper_table=paper_table(errors, drawn))
 
 
 def draw(path: Path, rows: Sequence[AccuracyRow]) -> None:
     """Draw the share of pairs with a larger error, per set, logarithmic; limits marked."""
     figure, axes = output.subplots(2, 3, (12.5, 7.0), sharex=True, sharey=True)
-    lowest = 1.0 / max(len(row.errors) for row in rows)
+    lowest = 1.0 / max(len(row.classes) for row in rows)
     for axis, name in zip(axes.flat, dict.fromkeys(row.set for row in rows)):
         axis.set(title=name, xlim=SHOWN, ylim=(0.7 * lowest, 1.3))
         axis.grid(color='0.9', linewidth=0.5)
@@ -364,15 +408,15 @@ def draw(path: Path, rows: Sequence[AccuracyRow]) -> None:
 
 def _draw_row(axis: Any, row: AccuracyRow, colour: str) -> None:
     """Draw a model's errors; of `mlp` per class too."""
-    _curve(axis, row.errors, linewidth=1.6, color='C0' if row.model == 'mlp' else colour,
+    _curve(axis, row.errors.point, linewidth=1.6, color='C0' if row.model == 'mlp' else colour,
            label=row.model)
     if row.model != 'mlp':
         return
     for k, part in enumerate(CLASSES):
-        _curve(axis, row.errors[row.classes == k], linewidth=0.8, linestyle='--',
+        _curve(axis, row.errors.point[row.classes == k], linewidth=0.8, linestyle='--',
                color=f'C{1 + k}', label=part)
-    if row.errors.max() < SHOWN[0]:
-        axis.text(0.03, 0.5, f'{row.model}: all below {row.errors.max():.1g} %', fontsize=9,
+    if row.errors.point.max() < SHOWN[0]:
+        axis.text(0.03, 0.5, f'{row.model}: all below {row.errors.point.max():.1g} %', fontsize=9,
                   transform=axis.transAxes)
 
 
@@ -407,7 +451,9 @@ def main(args: Sequence[str] | None = None) -> int:
     (folder / 'accuracy.md').write_text(
         page(rows, errors, drawn, command, options.seed, broken), encoding='utf-8')
     draw(folder / 'accuracy.png', rows)
-    print(table(rows), class_table(rows), paper_table(errors, drawn), sep='\n\n')
+    print(table(rows), patch_table(rows),
+          *(class_table(rows, name) for name in ContactErrors._fields),
+          paper_table(errors, drawn), sep='\n\n')
     for text in broken:
         print(f'accuracy: limit broken: {text}', file=sys.stderr)
     return 1 if broken else 0

@@ -124,18 +124,16 @@ class FrontierRow:
 
 def contestants(members: int = FULL.members) -> tuple[list[Engine], list[str]]:
     """Return all that can be measured here, and a line about each that cannot."""
-    sizes = {}
-    for path in resource_path('weights').glob('mlp-*.safetensors'):
-        card = load_weights(path).card
-        if not card['sizes']:  # those of a scene are for its boxes alone
-            sizes[tuple(card['architecture'][1:-1])] = str(path)
+    others = {}
+    for path in sorted(resource_path('weights').glob('mlp-*.safetensors')):
+        if not load_weights(path).card['sizes']:  # those of a scene are for its boxes alone
+            others[path.stem.replace('-', ' ')] = str(path)
     found = []
     for entry in MODELS.values():
         with suppress(ImportError):  # of an extra whose libraries `missing` names
             entry.load()
             found += map(ours, entry.reported_names[:members])
-    found += [ours('mlp', f'mlp {"-".join(map(str, units))}', path)
-              for units, path in sorted(sizes.items())]
+    found += [ours('mlp', name, path) for name, path in others.items()]
     rivals, missing = installed()
     return [*found, *rivals], missing
 

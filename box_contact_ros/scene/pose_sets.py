@@ -52,6 +52,30 @@ class Pairs(NamedTuple):
         return solver.batch(self.pose_a, self.pose_b, size_a=self.size_a, size_b=self.size_b)
 
 
+class ContactErrors(NamedTuple):
+    """Errors of n contacts against the exact ones, in %."""
+
+    point: np.ndarray
+    """(n,) of the smaller box's longest edge."""
+    volume: np.ndarray
+    """(n,) of the exact volume; NaN from models that give the point alone."""
+    covariance: np.ndarray
+    """(n,) Frobenius norm, of the exact covariance's trace; NaN like the volume's."""
+
+    def rows(self, chosen: np.ndarray) -> ContactErrors:
+        """Return some of the errors."""
+        return ContactErrors(*(errors[chosen] for errors in self))
+
+
+def contact_errors(found: Contacts, truth: Contacts, edge: np.ndarray) -> ContactErrors:
+    """Return the errors of n contacts; edge: see `Pairs.edge`. All pairs touch, by both."""
+    off = np.linalg.norm(found.covariance - truth.covariance, axis=(1, 2))
+    return ContactErrors(*(100.0 * error for error in (
+        np.linalg.norm(found.point - truth.point, axis=1) / edge,
+        np.abs(found.volume - truth.volume) / truth.volume,
+        off / np.trace(truth.covariance, axis1=1, axis2=2))))
+
+
 Generator = Callable[[np.random.Generator, int], Pairs]
 
 

@@ -1,4 +1,4 @@
-"""Model `mlp`: SAT decides and gives normal and depth exactly; a network gives the point.
+"""Model `mlp`: SAT decides and gives normal and depth; a network gives point, volume, covariance.
 
 The algorithm is that of core/mlp.hpp. Here its weights are read and checked. Outside the range that
 the network was trained for, the answer is the exact one, and counted. So it is for boxes that the
@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..core import FEATURES, OUTPUTS, native
+from ..core import FEATURES, OUTPUTS, POINT_OUTPUTS, native
 from ..resources import resource_path
-from .contact import Contacts, without_patch
+from .contact import Contacts
 from .models import Exact
 from .weights_file import Network, Weights, WeightsError, load_weights, unpacked
 
@@ -26,6 +26,7 @@ DESCRIPTION = 'cuts of the bounds by the slab, at nine sites'
 """What the features of shipped weights mean; see core/overlap/bounds.hpp."""
 BOUNDS = {DESCRIPTION: 'slab', 'cuts of the unit cube, at nine sites': 'edges'}
 """Method of the bounds by the description in a card; weights made for another one are refused."""
+_OUTPUTS = {'slab': OUTPUTS, 'edges': POINT_OUTPUTS}  # the latter give the point alone
 _NATIVE = {'slab': 'mlp', 'edges': 'mlp-edges'}  # names that the core has for the models
 ACTIVATION = 'relu'  # activation of the hidden units; weights made for another one are refused
 UNITS_MAX = 64  # most hidden units: as far as the search for their number goes
@@ -34,19 +35,21 @@ SAME_EXTENT = 1e-6
 
 
 def core_numbers(network: Network) -> np.ndarray:
-    """Return a network as the core reads it: float32 (3 + 16 · units,).
+    """Return a network as the core reads it: float32 (7 + 20 · units,).
 
     The biases of the outputs come first. For each unit follow its bias, its weights for features of
-    faces, axis and site, and its weights to the outputs.
+    faces, axis and site, and its weights to the outputs. Outputs that the network lacks are zeros.
     """
     (first, bias), (last, last_bias) = unpacked(network)
+    missing = OUTPUTS - len(last_bias)
+    last, last_bias = np.pad(last, ((0, missing), (0, 0))), np.pad(last_bias, (0, missing))
     units = np.concatenate([bias[:, None], first[:, 4:8], first[:, 8:12], first[:, :4], last.T],
                            axis=1)
     return np.concatenate([last_bias, units.ravel()]).astype(np.float32)
 
 
 class Mlp:
-    """SAT and a network for the point, for any sizes or for those that the weights' card lists.
+    """SAT and a network, for boxes of any sizes or for those that the weights' card lists.
 
     size_a, size_b: (1, 3) full extents of single calls [m]; weights: a file, or None for the
     shipped one. Raises `WeightsError` for a file that does not fit.
@@ -83,14 +86,15 @@ class Mlp:
     def _solve_partly(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
                       threads: int, listed: np.ndarray) -> tuple[Contacts, int]:
         """`solve`, by the network for rows of `listed` (n,) sizes and exactly for the others."""
-        exact, refused = self._exact.solve(a, b, size_a, size_b, threads)
-        found = without_patch(*exact[:4])
+        found, refused = self._exact.solve(a, b, size_a, size_b, threads)
         if refused >= 0:
             return found, refused
         self._answered_exactly += int(np.count_nonzero(found.colliding & ~listed))
         rows = np.flatnonzero(listed)
         one, other = (size if len(size) == 1 else size[rows] for size in (size_a, size_b))
-        found.point[rows] = self._pairs.solve(a[rows], b[rows], one, other, threads)[3]
+        by_network = Contacts(*self._pairs.solve(a[rows], b[rows], one, other, threads)[:-1])
+        for all_rows, some in zip(found, by_network):
+            all_rows[rows] = some
         return found, refused
 
     def _in_card(self, size_a: np.ndarray, size_b: np.ndarray) -> np.ndarray:
@@ -124,15 +128,16 @@ def load_mlp(weights: str | None = None) -> Weights:
             "model 'mlp' has no weights: train them, name a file with `weights`, or use model "
             "'exact', which needs none") from error
     found = load_weights(path)
-    network = found.networks.get('point')
-    if network is None or (network.widths[0], network.widths[-1]) != (FEATURES, OUTPUTS):
+    network, bounds = found.networks.get('point'), found.card['inputs'].get('description')
+    ends = (FEATURES, _OUTPUTS.get(BOUNDS.get(bounds, ''), OUTPUTS))
+    if network is None or (network.widths[0], network.widths[-1]) != ends:
         raise WeightsError(
-            f"weights file {path} has no network 'point' with {FEATURES} inputs and {OUTPUTS} "
+            f"weights file {path} has no network 'point' with {ends[0]} inputs and {ends[1]} "
             f"outputs, which model 'mlp' needs")
     if len(network.widths) != 3 or network.widths[1] > UNITS_MAX:
         raise WeightsError(f"weights file {path}: network 'point' must have one hidden layer, "
                            f'of at most {UNITS_MAX} units')
-    if found.card['inputs'].get('description') not in BOUNDS:
+    if bounds not in BOUNDS:
         raise WeightsError(f'weights file {path} is for other inputs than this version has')
     if found.card.get('activation') != ACTIVATION:
         raise WeightsError(f"weights file {path}: this version's units are {ACTIVATION!r}, not "

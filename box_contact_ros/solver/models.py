@@ -140,7 +140,7 @@ SOUP_DIVISIONS, MOST_SOUP_DIVISIONS = 8, 64
 _NEEDS = ('size_a', 'size_b', 'weights')
 _ENTRIES = (
     ModelEntry(
-        name='mlp', line='SAT, and a network for the point; constant cost; the default',
+        name='mlp', line='SAT, and a network for point and patch; constant cost; the default',
         builder='box_contact_ros.solver.mlp:Mlp', takes=_NEEDS,
         native_single=True, native_batch=True, gated=True),
     ModelEntry(

@@ -22,15 +22,16 @@ from tqdm import tqdm
 from ..core import ASPECT_MAX, DEPTH_MAX, FEATURES, OUTPUTS, SIZE_RATIO_MAX
 from ..output import percentiles
 from ..resources import resource_path
-from ..scene.pose_sets import SETS, Pairs
+from ..scene.pose_sets import SETS, ContactErrors, Pairs, contact_errors
 from ..solver.contact_solver import ContactSolver
 from ..solver.mlp import ACTIVATION, DESCRIPTION, FEATURE_NAMES
 from ..solver.weights_file import load_weights, save_weights, unpacked
-from .ensemble import Scaling, drawn
-from .mlp_fit import SiteNetwork, fit, point_errors, random_batches
+from .ensemble import Scaling
+from .mlp_fit import SiteNetwork, evaluated, fit, point_errors, random_batches, started
 from .samples import MlpSamples, SizePair, draw_samples, mixture, scene_mixture
 
-HIDDEN = 12  # hidden units: what fits the time that a batch has for the network (docs/search.md)
+HIDDEN = 20
+"""Hidden units: what fits the time that a batch has for the network (docs/search.md)."""
 HARD_ROUNDS, HARD_PART, HARD_SHARE = (0.4, 0.55, 0.7, 0.85), 0.01, 0.2
 """After each of these parts of the steps, a pool of fresh pairs is searched for the hardest part.
 From then on, all that were found so far make up that share of what is learned from."""
@@ -54,7 +55,7 @@ class MlpRecipe:
     metric_pairs: int = 100_000  # pairs of each set in the model card's metrics
 
 
-GENERAL = MlpRecipe(pairs=1_500_000, steps=60_000, rate=2e-2, pool=2_000_000)
+GENERAL = MlpRecipe(pairs=1_000_000, steps=30_000, rate=1e-2, pool=1_000_000)
 SCENE = MlpRecipe(pairs=1_000_000, steps=25_000, rate=3e-3, pool=1_000_000)
 QUICK = {'pairs': 20_000, 'steps': 400, 'pool': 20_000, 'metric_pairs': 2_000}
 """What `--quick` replaces: enough to see the error fall, in seconds."""
@@ -87,7 +88,7 @@ def train(path: Path, *, seed: int, commit: str, quick: bool = False, hidden: in
         network.load(scaling.unfolded(unpacked(general.networks['point'])))
         recipe_card['started from'] = general.card['sha256']
     else:
-        network = drawn(SiteNetwork(hidden), torch.Generator().manual_seed(seed))
+        network = started(hidden, torch.Generator().manual_seed(seed))
     network.to(device)
 
     batches = harder_batches(network, data, scaling, recipe, make, seed)
@@ -128,8 +129,8 @@ def harder_batches(network: SiteNetwork, data: MlpSamples, scaling: Scaling, rec
 
 
 def hardest(network: SiteNetwork, data: MlpSamples, scaling: Scaling) -> MlpSamples:
-    """Return the part of the samples in which the network errs most."""
-    errors = point_errors(network, data, scaling)
+    """Return the part of the samples in which the network's point errs most."""
+    errors = evaluated(network, data, scaling, point_errors)
     count = max(1, round(HARD_PART * len(errors)))
     return data.part(np.sort(np.argsort(errors, kind='stable')[-count:]))
 
@@ -147,43 +148,43 @@ def model_card(path: Path, network: SiteNetwork, recipe: MlpRecipe, data: dict[s
         'inputs': {'description': DESCRIPTION, 'names': FEATURE_NAMES,
                    'range': {'aspect': ASPECT_MAX, 'size ratio': SIZE_RATIO_MAX,
                              'depth by the shortest edge': DEPTH_MAX}},
-        'outputs': ['of the push', 'of the pull along the faces', 'of what others pass on'],
+        'outputs': ['of the push', 'of the pull along the faces', 'of what others pass on',
+                    'volume', 'precision along an axis', 'coupling by the faces',
+                    'coupling by their push'],
         'data': data, 'metrics': {},
         'training': {'algorithm': 'Adam', 'steps': recipe.steps, 'batch': recipe.batch,
                      'rate': recipe.rate, 'device': parameter.device.type,
                      'threads': torch.get_num_threads()}}
 
 
-def solver_errors(pairs: Pairs, weights: Path | None) -> np.ndarray:
-    """Return point errors (n,) of `mlp` against `exact` [longest edge of the smaller box]."""
-    found = []
-    for model, file in (('exact', None), ('mlp', weights and str(weights))):
-        solver = ContactSolver((1, 1, 1), (1, 1, 1), model=model, weights=file)
-        found.append(solver.batch(pairs.pose_a, pairs.pose_b, size_a=pairs.size_a,
-                                  size_b=pairs.size_b).point)
-    edge = np.minimum(pairs.size_a.max(axis=1), pairs.size_b.max(axis=1))
-    return np.linalg.norm(found[0] - found[1], axis=1) / edge
+def solver_errors(pairs: Pairs, weights: Path | None) -> ContactErrors:
+    """Return the errors of `mlp` against `exact` in contacts of n pairs."""
+    solver = ContactSolver((1, 1, 1), (1, 1, 1), model='mlp', weights=weights and str(weights))
+    return contact_errors(pairs.contacts(solver), pairs.contacts(), pairs.edge)
 
 
 def error_summary(errors: np.ndarray) -> dict[str, float]:
-    """Return mean, 99th percentile and worst, in per cent."""
-    p99, worst = percentiles(100.0 * errors, 99, 100)
-    return {'mean': 100.0 * float(errors.mean()), 'p99': p99, 'worst': worst}
+    """Return mean, 99th percentile and worst of errors."""
+    p99, worst = percentiles(errors, 99, 100)
+    return {'mean': float(errors.mean()), 'p99': p99, 'worst': worst}
 
 
 def measured(path: Path, sizes: Sequence[SizePair], seed: int, count: int) -> dict[str, Any]:
-    """Return the errors on each pose set.
+    """Return the errors of point, volume and covariance on each pose set.
 
     For a scene: those for each pair of sizes, of the general network and of this one.
     """
+    def summaries(pairs: Pairs, weights: Path | None) -> dict[str, dict[str, float]]:
+        errors = solver_errors(pairs, weights)
+        return {name: error_summary(values) for name, values in errors._asdict().items()}
+
     makers: dict[str, PairMaker] = {text(pair): partial(scene_mixture, sizes=[pair])
                                     for pair in sizes}
     found: dict[str, Any] = {}
     for number, (name, make) in enumerate((makers or SETS).items()):
         pairs = make(np.random.default_rng([seed, _METRICS, number]), count)
-        after = error_summary(solver_errors(pairs, path))
-        found[name] = {'before': error_summary(solver_errors(pairs, None)),
-                       'after': after} if sizes else after
+        after = summaries(pairs, path)
+        found[name] = {'before': summaries(pairs, None), 'after': after} if sizes else after
     return found
 
 
@@ -204,14 +205,17 @@ def metrics_table(card: dict[str, Any]) -> str:
     def shown(f: dict[str, float]) -> str:
         return f'{f["mean"]:.3f} / {f["p99"]:.2f} / {f["worst"]:.1f}'
 
-    lines = ["point error against exact, % of the smaller box's longest edge: mean / p99 / worst"]
+    lines = ["errors against exact, %: mean / p99 / worst; the point's by the smaller box's "
+             "longest edge, the covariance's by its trace"]
     width = max(map(len, card['metrics']))
     for name, entry in card['metrics'].items():
-        if 'before' not in entry:
-            lines.append(f'{name:<{width}}  {shown(entry)}')
-            continue
-        before, after = entry['before'], entry['after']
-        saved = ' / '.join(f'{100.0 * (1.0 - after[key] / before[key]):.0f} %' for key in before)
-        lines.append(f'{name:<{width}}  general {shown(before)}, this {shown(after)}: '
-                     f'saved {saved}')
+        after = entry.get('after', entry)
+        for quantity in after:
+            line = f'{name:<{width}}  {quantity:<10}  '
+            if 'before' not in entry:
+                lines.append(line + shown(after[quantity]))
+                continue
+            old, new = entry['before'][quantity], after[quantity]
+            saved = ' / '.join(f'{100.0 * (1.0 - new[key] / old[key]):.0f} %' for key in old)
+            lines.append(f'{line}general {shown(old)}, this {shown(new)}: saved {saved}')
     return '\n'.join(f'  {line}' for line in lines)

@@ -25,7 +25,10 @@ from ..scene.scene_file import read_scene
 
 SizePair = tuple[tuple[float, float, float], tuple[float, float, float]]
 """Full extents of two boxes [m]."""
-PIECE = 100_000  # pairs that are made at a time
+ROW, COLUMN = [0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1]
+"""Places of the six numbers of a symmetric matrix: xx, yy, zz, yz, xz, xy."""
+PIECE = 100_000
+"""Pairs that are made at a time."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,10 +40,22 @@ class MlpSamples:
 
     features: Any  # (SITES, FEATURES, n)
     vectors: Any
-    """(SITES, OUTPUTS, n): the factors of the outputs. The answer along q is the sum of the
-    products over all outputs and f."""
-    offsets: Any  # (3, n): exact centroid from the middle of the bounds [half extents]
-    scale: Any  # (3, n): half extents [longest edge of the smaller box]
+    """(SITES, 3, n): the factors of the outputs for the point. The answer along q is the sum of
+    the products over these outputs and f."""
+    slant: Any
+    """(3, 3, n): normals of the other box's pairs of faces f, by q."""
+    cut: Any
+    """(3, n): how far both faces f cut into the bounds."""
+    offsets: Any
+    """(3, n): exact centroid from the middle of the bounds [half extents]."""
+    scale: Any
+    """(3, n): half extents [longest edge of the smaller box]."""
+    volume: Any
+    """(n): exact volume by that of the bounds."""
+    covariance: Any
+    """(6, n): exact covariance xx, yy, zz, yz, xz, xy, frame of the bounds [half extents]."""
+    spread: Any
+    """(3, n): half extents [root of the covariance's trace]."""
 
     def __len__(self) -> int:
         """Return n."""
@@ -66,14 +81,21 @@ class MlpSamples:
 def describe(pairs: Pairs) -> MlpSamples:
     """Return the samples of pairs that overlap."""
     found = stages(*pairs, names=(
-        'features', 'vectors', 'centroid', 'frame_b', 'rotation', 'pressed_offset_a',
-        'bounds_middle', 'bounds_half'))
-    from_b = np.einsum('nji,nj->ni', found.rotation, found.centroid - found.pressed_offset_a)
+        'features', 'vectors', 'slant', 'cut', 'centroid', 'volume', 'covariance', 'frame_b',
+        'rotation', 'pressed_offset_a', 'bounds_middle', 'bounds_half'))
+    turn, half = found.rotation, found.bounds_half
+    from_b = np.einsum('nji,nj->ni', turn, found.centroid - found.pressed_offset_a)
     centroid = np.where(found.frame_b[:, None], from_b, found.centroid)
+    seen_from_b = np.swapaxes(turn, 1, 2) @ found.covariance @ turn
+    covariance = np.where(found.frame_b[:, None, None], seen_from_b, found.covariance)
     edge = np.minimum(pairs.size_a.max(axis=1), pairs.size_b.max(axis=1))[:, None]
-    samples = MlpSamples(features=found.features, vectors=found.vectors,
-                         offsets=(centroid - found.bounds_middle) / found.bounds_half,
-                         scale=found.bounds_half / edge)
+    trace = np.trace(covariance, axis1=1, axis2=2)[:, None]
+    samples = MlpSamples(
+        features=found.features, vectors=found.vectors, slant=found.slant, cut=found.cut,
+        offsets=(centroid - found.bounds_middle) / half, scale=half / edge,
+        volume=found.volume / (8.0 * half.prod(axis=1)),
+        covariance=covariance[:, ROW, COLUMN] / (half[:, ROW] * half[:, COLUMN]),
+        spread=half / np.sqrt(trace))
     return samples.each(lambda array: np.moveaxis(array.astype(np.float32), 0, -1).copy())
 
 

@@ -36,7 +36,7 @@ def _parser() -> argparse.ArgumentParser:
         '  paper             two boxes of edge 2, with discontinuities     2 minutes\n'
         '  paper-continuous  the same without, one network per subset      8 minutes\n'
         '  containers        two boxes of 12.192 x 2.438 x 2.591 m         2 minutes\n'
-        '  mlp               any two boxes, the point alone                4 minutes\n'
+        '  mlp               any two boxes                                 5 minutes\n'
         '  --scene FILE      the boxes of one scene, from the general mlp  2 minutes')
     add = parser.add_argument
     add('what', nargs='*', metavar='what', help=f'{", ".join(NAMES)}, or all (default)')
@@ -50,8 +50,7 @@ def _parser() -> argparse.ArgumentParser:
         'to 1000, by job)')
     add('--hidden', type=int, metavar='UNITS', help='of the MLP: units of its hidden layer '
         f'(default: {mlp_recipe.HIDDEN}), named in the file')
-    add('--steps', type=int, help=f'of the MLP (default: {mlp_recipe.GENERAL.steps:,}; a third of '
-        'them make errors a tenth larger)')
+    add('--steps', type=int, help=f'of the MLP (default: {mlp_recipe.GENERAL.steps:,})')
     add('--out', type=Path, help='folder to write to (default: weights/)')
     add('--fold', action=argparse.BooleanOptionalAction, default=True, help='for paper and '
         'containers: data folded into the domain in which the solver asks, or as drawn (default: '

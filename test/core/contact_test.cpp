@@ -493,10 +493,10 @@ void check_damaged_weights(const std::string& path, const std::string& scratch) 
                                    [&] { box_contact::read_network(scratch + ".none"); });
   for (size_t length : {size_t(0), size_t(7), size_t(8), size_t(500)})
     refused(whole.substr(0, length), "is no safetensors file");
-  refused(whole.substr(0, whole.size() - 1), "shape [3,");
+  refused(whole.substr(0, whole.size() - 1), "shape [7,");
   refused(replaced("point.1.weight", "point.1.height"), "has no tensor point.1.weight");
   refused(replaced("\"F32\"", "\"I32\""), "has no tensor point.0.bias of float32");
-  refused(replaced("\"shape\":[3]", "\"shape\":[4]"), "has no tensor point.1.bias");
+  refused(replaced("\"shape\":[7]", "\"shape\":[8]"), "has no tensor point.1.bias");
   refused(replaced(R"(\"sizes\": [])", R"(\"sizes\": 1 )"), "boxes of some sizes only");
   std::remove(scratch.c_str());
 }

@@ -22,6 +22,7 @@ import pytest
 import box_contact_ros
 from box_contact_ros import Contact, ContactSolver
 from box_contact_ros.core import FORCE, instruction_sets, native, stages
+from box_contact_ros.resources import resource_path
 from box_contact_ros.scene.pose_sets import SETS, Pairs
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.mlp import core_numbers, load_mlp
@@ -34,6 +35,7 @@ SETS_HERE = instruction_sets()
 OTHER_SETS = [name for name in SETS_HERE
               if name != native.__name__.rpartition('.')[2].removeprefix('_')]
 POINT_ROUNDING = 1e-6
+PATCH_ROUNDING = 1e-5
 """Difference between instruction sets of the MLP's point [of the smaller box's longest edge]."""
 
 every_model = pytest.mark.parametrize('model', MODELS)
@@ -104,7 +106,7 @@ np.savez(sys.argv[2], **found)
 def test_every_instruction_set_gives_the_same_bits(tmp_path: Path) -> None:
     """Verdict, separation and normal; 60,000 pairs of the fuzz, the pose sets, flush boxes.
 
-    So has the point of `exact`. The network of `mlp` rounds its sums as the machine can.
+    So have the moments of `exact`. The network of `mlp` rounds its sums as the machine can.
     """
     if len(SETS_HERE) == 1:
         pytest.skip('this machine has one instruction set only')
@@ -127,13 +129,19 @@ def test_every_instruction_set_gives_the_same_bits(tmp_path: Path) -> None:
     assert 0.3 < touching.mean() < 0.9
     for name, answers in found.items():
         for field, value in answers.items():
-            if field != 'mlp point':
+            if field not in ('mlp point', 'mlp volume', 'mlp covariance'):
                 assert np.array_equal(value, wanted[field], equal_nan=True), (name, field)
         # Far from the origin, a point is as good as the coordinates.
         near = touching & (np.abs(pairs.pose_a[:, :3]).max(axis=1) < 100.0 * edge)
         off = np.linalg.norm(answers['mlp point'] - wanted['mlp point'], axis=1) / edge
         assert near.sum() > 10_000
         assert off[near].max() <= POINT_ROUNDING, name
+        volume, covariance = wanted['mlp volume'], wanted['mlp covariance']
+        off = np.abs(answers['mlp volume'] - volume)[touching]
+        assert np.all(off <= PATCH_ROUNDING * volume[touching]), name
+        off = np.linalg.norm(answers['mlp covariance'] - covariance, axis=(1, 2))[touching]
+        trace = np.trace(covariance, axis1=1, axis2=2)[touching]
+        assert np.all(off <= PATCH_ROUNDING * trace), name
 
 
 @pytest.mark.parametrize('name', SETS_HERE)
@@ -353,12 +361,15 @@ def test_a_batch_is_its_single_calls(model: str, single_solvers: dict) -> None:
     assert many.colliding.sum() > 10_000
 
 
-@pytest.mark.parametrize('model', ['mlp', 'paper', 'fcl', 'soup-2'])
+@pytest.mark.parametrize('model', ['mlp by edges', 'paper', 'fcl', 'soup-2'])
 def test_models_that_give_the_point_alone(model: str) -> None:
     """Volume and covariance are NaN in contact. Without contact the volume is zero, as of all."""
     if model in ('fcl', 'soup-2'):
         pytest.importorskip('fcl')
-    solver = ContactSolver(poses.CUBE, poses.CUBE, model=model)
+    weights = None
+    if model == 'mlp by edges':
+        model, weights = 'mlp', resource_path('weights', 'mlp-edges-8.safetensors')
+    solver = ContactSolver(poses.CUBE, poses.CUBE, model=model, weights=weights)
     apart = poses.IDENTITY + (0, 0, 3, 0, 0, 0, 0)
     many = solver.batch([poses.IDENTITY] * 2, [ABOVE, apart])
     for row, b in enumerate((ABOVE, apart)):
@@ -561,7 +572,7 @@ def test_references_and_memory_stay(model: str, traced: None) -> None:
 
 def test_networks_are_freed() -> None:
     """Each solver has its own numbers, outside of what Python counts."""
-    numbers = np.zeros(3 + 16 * 20_000, dtype=np.float32)  # 1.3 MB
+    numbers = np.zeros(7 + 20 * 16_000, dtype=np.float32)  # 1.3 MB
 
     def make() -> native.PairSolver:
         return native.PairSolver('mlp', (1.0, 1.0, 1.0), (1.0, 1.0, 1.0), numbers)

@@ -11,6 +11,7 @@ from box_contact_ros.core import (
     CENTROID_REACH,
     FEATURES,
     OUTPUTS,
+    POINT_OUTPUTS,
     SITES,
     Stages,
     native,
@@ -27,7 +28,8 @@ ROUNDING = 2e-5
 """Of float32 sums of some ten numbers about one, with weights up to some ten."""
 FLUSH = 2.0**-46
 """By which faces are wider [of the size], as in the bounds."""
-NAMES = tuple(name for name in Stages._fields if name != 'answer')
+ANSWERS = ('answer', 'answer_volume', 'answer_covariance')
+NAMES = tuple(name for name in Stages._fields if name not in ANSWERS)
 UNIT = (1.0, 1.0, 1.0)
 
 
@@ -42,7 +44,7 @@ def random_network(rng: np.random.Generator, units: int) -> Network:
 NETWORKS = {'shipped': SHIPPED, 'random': random_network(np.random.default_rng(3), 20),
             'five units': random_network(np.random.default_rng(4), 5),
             'most units': random_network(np.random.default_rng(6), UNITS_MAX),
-            'one unit': random_network(np.random.default_rng(7), 1)}
+            'one unit': random_network(np.random.default_rng(8), 1)}
 
 
 @pytest.fixture(params=NETWORKS)
@@ -72,7 +74,7 @@ def cuts_of(found: Stages) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def described(normal: np.ndarray, upper: np.ndarray, lower: np.ndarray,
               ) -> tuple[np.ndarray, np.ndarray]:
     """Return features (3, 3, 12) and vectors (3, 3, 3) of one overlap: loops over all sites."""
-    features, vectors = np.empty((3, 3, FEATURES)), np.empty((3, 3, OUTPUTS))
+    features, vectors = np.empty((3, 3, FEATURES)), np.empty((3, 3, POINT_OUTPUTS))
     cut, push = upper + lower, (lower - upper)[:, None] * normal
     slanted = np.abs(normal) * cut[:, None]
     for f, q in itertools.product(range(3), range(3)):
@@ -91,14 +93,27 @@ def described(normal: np.ndarray, upper: np.ndarray, lower: np.ndarray,
 
 
 def reference(network: Network, normal: np.ndarray, upper: np.ndarray, lower: np.ndarray,
-              ) -> np.ndarray:
-    """Return the answer (3,) for one overlap, by the words of core/mlp.hpp, in float64."""
+              ) -> tuple[np.ndarray, float, np.ndarray]:
+    """Return centroid (3,), volume and covariance (3, 3) of one overlap in its bounds.
+
+    By the words of core/mlp.hpp, in float64.
+    """
     (first, bias), (last, last_bias) = ([part.astype(float) for part in layer]
                                         for layer in unpacked(network))
     features, vectors = described(normal, upper, lower)
     hidden = np.maximum(features @ first.T + bias, 0.0)
     outputs = hidden @ last.T + last_bias
-    return (outputs * vectors).sum(axis=(0, 2))
+    cut, push = upper + lower, (lower - upper)[:, None] * normal
+    slanted = np.abs(normal) * cut[:, None]
+    stretch = np.clip((slanted * outputs[:, :, 4]).sum(axis=0), 0.0, 6.0)
+    coupling = np.clip(normal * outputs[:, :, 5], -12.0, 12.0)
+    pushed = np.clip((push * outputs[:, :, 6]).sum(axis=0), -12.0, 12.0)
+    precision = np.diag(3.0 * np.exp(stretch)) + np.outer(pushed, pushed)
+    for f in range(3):
+        precision += cut[f] * np.outer(coupling[f], coupling[f])
+    share = np.exp(np.clip((slanted * outputs[:, :, 3]).sum(), -80.0, 0.0))
+    return ((outputs[:, :, :3] * vectors).sum(axis=(0, 2)), float(share),
+            np.linalg.inv(precision))
 
 
 def placed(found: Stages, row: int, answer: np.ndarray, own: np.ndarray,
@@ -132,11 +147,13 @@ def test_features_and_vectors_are_the_references(pairs: Pairs) -> None:
 
 
 def test_the_answer_is_the_references(pairs: Pairs, network: Network) -> None:
-    found = stages(*pairs, names=(*NAMES, 'answer'), network=core_numbers(network))
+    found = stages(*pairs, names=(*NAMES, *ANSWERS), network=core_numbers(network))
     for row, cuts in enumerate(zip(*cuts_of(found))):
-        truth = reference(network, *cuts)
+        truth, volume, covariance = reference(network, *cuts)
         np.testing.assert_allclose(found.answer[row], truth,
                                    atol=ROUNDING * max(1.0, np.abs(truth).max()))
+        np.testing.assert_allclose(found.answer_volume[row], volume, rtol=20 * ROUNDING)
+        np.testing.assert_allclose(found.answer_covariance[row], covariance, atol=ROUNDING)
 
 
 def test_the_answer_comes_from_the_features(pairs: Pairs, network: Network) -> None:
@@ -144,7 +161,7 @@ def test_the_answer_comes_from_the_features(pairs: Pairs, network: Network) -> N
     found = stages(*pairs, names=(*NAMES, 'answer'), network=core_numbers(network))
     (first, bias), (last, last_bias) = unpacked(network)
     outputs = np.maximum(found.features @ first.T + bias, 0.0) @ last.T + last_bias
-    answers = (outputs * found.vectors).reshape(N, 3, 3, OUTPUTS).sum(axis=(1, 3))
+    answers = (outputs[..., :POINT_OUTPUTS] * found.vectors).reshape(N, 3, 3, -1).sum(axis=(1, 3))
     largest = np.maximum(1.0, np.abs(answers).max(axis=1, keepdims=True))
     assert np.all(np.abs(answers - found.answer) <= ROUNDING * largest)
 
@@ -154,12 +171,12 @@ def test_points_are_the_references(pairs: Pairs, network: Network) -> None:
     numbers = core_numbers(network)
     found = stages(*pairs, names=NAMES, network=numbers)
     assert found.in_range.all()
-    colliding, _, _, points, _ = native.PairSolver('mlp', UNIT, UNIT, numbers).solve(*pairs, 1)
+    colliding, _, _, points, *_ = native.PairSolver('mlp', UNIT, UNIT, numbers).solve(*pairs, 1)
     assert colliding.all()
     by_network = 0
     for row, cuts in enumerate(zip(*cuts_of(found))):
         own = 0.5 * (pairs.size_b if found.frame_b[row] else pairs.size_a)[row]
-        local, beyond = placed(found, row, reference(network, *cuts), own)
+        local, beyond = placed(found, row, reference(network, *cuts)[0], own)
         if beyond > 1e-6 * found.size[row]:  # a point that is left outside is the exact one
             local = found.centroid[row]
         elif beyond > 1e-16 * found.size[row]:
@@ -182,15 +199,19 @@ def test_the_reference_has_all_symmetries() -> None:
     upper, lower = rng.uniform(0.0, 1.0, (2, 3))
     for network in NETWORKS.values():
         truth = reference(network, normal, upper, lower)
+        centroid, volume, covariance = truth
         for order in itertools.permutations(range(3)):
             for signs in itertools.product((1.0, -1.0), repeat=3):
                 found = reference(network, normal[:, order] * signs, upper, lower)
-                np.testing.assert_allclose(found, truth[list(order)] * signs, atol=1e-12)
+                turned = covariance[np.ix_(order, order)] * np.outer(signs, signs)
+                for one, wanted in zip(found, (centroid[list(order)] * signs, volume, turned)):
+                    np.testing.assert_allclose(one, wanted, atol=1e-12)
                 side = np.array(signs) < 0.0
                 found = reference(network, (normal * np.array(signs)[:, None])[list(order)],
                                   np.where(side, lower, upper)[list(order)],
                                   np.where(side, upper, lower)[list(order)])
-                np.testing.assert_allclose(found, truth, atol=1e-12)
+                for one, wanted in zip(found, truth):
+                    np.testing.assert_allclose(one, wanted, atol=1e-12)
 
 
 def test_a_symmetric_overlap_is_answered_with_its_middle(network: Network) -> None:
@@ -215,8 +236,9 @@ def test_used_up_symmetries_leave_no_steps(network: Network) -> None:
         upper[1], lower[1] = upper[2] + lower[2], 0.0
         for change in (tiny, -tiny):
             moved = upper + np.array([change, -change, change])
-            np.testing.assert_allclose(reference(network, normal, moved, lower),
-                                       reference(network, normal, upper, lower), atol=1e-6)
+            for one, other in zip(reference(network, normal, moved, lower),
+                                  reference(network, normal, upper, lower)):
+                np.testing.assert_allclose(one, other, atol=1e-6)
 
 
 @pytest.mark.parametrize('names, words', [
@@ -251,7 +273,7 @@ def test_stages_are_those_of_a_batch(pairs: Pairs) -> None:
     b = np.concatenate([poses.rotate(turn, pairs.pose_b[:, :3] - pairs.pose_a[:, :3]),
                         poses.multiply(turn, pairs.pose_b[:, 3:])], axis=1)
     again = stages(at_origin, b, *pairs[2:], names=NAMES)
-    colliding, separation, normal, point, _ = one.solve(at_origin, b, *pairs[2:], 1)
+    colliding, separation, normal, point, *_ = one.solve(at_origin, b, *pairs[2:], 1)
     assert np.array_equal(again.colliding, colliding)
     assert np.array_equal(again.separation, separation)
     assert np.array_equal(again.normal, normal)

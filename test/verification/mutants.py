@@ -37,6 +37,7 @@ class Mutant(NamedTuple):
 
 FAMILIES = 'test/verification/test_hard_poses.py'
 LAWS = 'test/core/test_laws.py'
+MLP = 'test/solver/test_mlp.py'
 EVALUATOR = 'node/evaluator.py'
 MESSAGES = 'node/messages.py'
 TEST_BYTES = 'test/node/test_message_bytes.py'
@@ -180,7 +181,31 @@ MUTANTS = {
         'Four<T> length = t - s, middle = 0.5 * (s + t) - origin[j];',
         f'{TEST_CORE} -k certain'),
     'point left outside': Mutant(
-        'core/mlp.hpp', ' & placed.inside;', ';', 'test/solver/test_mlp.py -k garbage_for_weights'),
+        'core/mlp.hpp', ' & placed.inside;', ';', f'{MLP} -k contacts_are_sound'),
+    'patch that is no number': Mutant(
+        'core/mlp.hpp', 'answered &= (one.volume > 0.0) & (trace(one.covariance) > 0.0);', '',
+        f'{MLP} -k no_numbers'),
+    'volume larger than its bounds': Mutant(
+        'core/mlp.hpp', 'exp(min(F{}, max(', 'exp(min(splat<F>(9.0F), max(',
+        f'{MLP} -k fit_the_bounds'),
+    'volume by one half extent': Mutant(
+        'core/mlp.hpp', '(half[0] * half[1] * half[2])', '(half[0] * half[0] * half[0])',
+        f'{MLP} -k box_symmetries'),
+    'precision without what cuts add': Mutant(
+        'core/mlp.hpp', 'said.variance = (own + over_faces(squares)) + push * push;',
+        'said.variance = own;', f'{MLP} -k fit_the_bounds'),
+    'coupling of any sign': Mutant(
+        'core/mlp.hpp', 'clamp(cube.slant[q] * out[to_coupling], reach)',
+        'clamp(abs(cube.slant[q]) * out[to_coupling], reach)', f'{MLP} -k box_symmetries'),
+    'covariance by one half extent': Mutant(
+        'core/mlp.hpp', 'said.variance[k] * (half[k] * half[k])', 'said.variance[k] * half[k]',
+        f'{MLP} -k scale_by_powers'),
+    'covariance left in the frame of the bounds': Mutant(
+        'core/mlp.hpp', 'rotated(q.pair.rotation, one.covariance), one.covariance);',
+        'one.covariance, one.covariance);', f'{MLP} -k swap'),
+    'exponential in steps': Mutant(
+        'core/mlp.hpp', 'whole * 0x1.62ep-1F', 'whole * 0.69F',
+        'test/scene/test_series.py -k patches_are_continuous'),
     'smaller bounding box, always': Mutant(
         'core/overlap/bounds.hpp', 'clearly_smaller = 0.8;', 'clearly_smaller = 1.0 - 1e-6;',
         'test/core/test_overlap_bounds.py -k keep_their_frame'),
@@ -189,11 +214,11 @@ MUTANTS = {
         'constexpr double flush = 0.0;', 'test/core/test_overlap_bounds.py -k whole_patch'),
     'side of a pair of faces taken as it comes': Mutant(
         'core/mlp.hpp', 'features.of_faces[1] = abs(push);', 'features.of_faces[1] = push;',
-        'test/solver/test_mlp.py -k box_symmetries'),
+        f'{MLP} -k box_symmetries'),
     'range without its depth': Mutant(
         'core/mlp.hpp', 'excess = max(excess, -separation / (2.0 * depth_max',
         'excess = max(excess, 0.0 * -separation / (2.0 * depth_max',
-        'test/solver/test_mlp.py -k limits_belong'),
+        f'{MLP} -k limits_belong'),
     'threads overlap': Mutant(
         'core/binding/module.cpp', 'long begin = chunk * rows_per_chunk,',
         'long begin = std::max(0L, chunk * rows_per_chunk - lanes),',

@@ -85,7 +85,7 @@ bool read_network(PyObject* object, std::unique_ptr<Network>& network) {
   constexpr npy_intp per_unit = sizeof(Network::Unit) / sizeof(float);
   npy_intp of_units = array.length(0) - site_outputs;
   if (of_units < 0 || of_units % per_unit != 0)
-    return fail(PyExc_ValueError, "a network has 3 + 16 · units numbers");
+    return fail(PyExc_ValueError, "a network has 7 + 20 · units numbers");
   network = std::make_unique<Network>();
   network->units.resize(of_units / per_unit);
   std::memcpy(network->output_bias, array.numbers, sizeof(network->output_bias));

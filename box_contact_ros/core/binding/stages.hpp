@@ -13,8 +13,9 @@ struct StageArrays {
   double *pressed_offset_a{}, *pressed_offset_b{}, *centroid{}, *clipped_centroid{};
   double *volume{}, *clipped_volume{}, *covariance{}, *clipped_covariance{};
   double *bounds_middle{}, *bounds_half{};
-  double *other_axes{}, *other_offset{}, *other_half{}, *answer{};
-  float *features{}, *vectors{};
+  double *other_axes{}, *other_offset{}, *other_half{}, *answer{}, *answer_volume{},
+      *answer_covariance{};
+  float *features{}, *vectors{}, *slant{}, *cut{};
 
   // Call visit(name, pointer, shape of a row) for each array.
   template <class Visit>
@@ -46,8 +47,12 @@ struct StageArrays {
     visit("other_offset", other_offset, {3});
     visit("other_half", other_half, {3});
     visit("answer", answer, {3});
+    visit("answer_volume", answer_volume, {});
+    visit("answer_covariance", answer_covariance, {3, 3});
     visit("features", features, {site_count, site_features});
-    visit("vectors", vectors, {site_count, site_outputs});
+    visit("vectors", vectors, {site_count, point_outputs});
+    visit("slant", slant, {3, 3});
+    visit("cut", cut, {3});
   }
 };
 
@@ -66,8 +71,10 @@ inline void put(double* array, long row, const Mat<double>& m) {
 inline void put_features(const StageArrays& arrays, long row, const CutCube<double> (&cubes)[1]) {
   SiteFeatures<float> features;
   SiteVectors<float> vectors;
-  describe(narrow(cubes), features, vectors);
-  for (int f = 0; f < 3; ++f)
+  CutCube<float> cube = narrow(cubes);
+  describe(cube, features, vectors);
+  for (int f = 0; f < 3; ++f) {
+    put(arrays.cut, 3 * row + f, cube.cut[f]);
     for (int q = 0; q < 3; ++q) {
       long site = site_count * row + 3 * f + q;
       for (int k = 0; arrays.features && k < 4; ++k) {
@@ -76,9 +83,11 @@ inline void put_features(const StageArrays& arrays, long row, const CutCube<doub
         at[4] = features.of_faces[k][f];
         at[8] = features.of_axis[k][q];
       }
-      for (int k = 0; arrays.vectors && k < site_outputs; ++k)
-        arrays.vectors[site_outputs * site + k] = vectors.along[q][k][f];
+      for (int k = 0; arrays.vectors && k < point_outputs; ++k)
+        arrays.vectors[point_outputs * site + k] = vectors.along[q][k][f];
+      put(arrays.slant, site, cube.slant[q][f]);
     }
+  }
 }
 
 // Fill one row. Returns false if its poses or sizes are refused. `network` may be nullptr.
@@ -123,12 +132,17 @@ bool fill_stages(const Rows& rows, long row, const Network* network, const Stage
   put(arrays.other_offset, row, components<double>(bounds.other_offset));
   put(arrays.other_half, row, components<double>(bounds.other_half));
   CutCube<double> cubes[1] = {cut_cube(bounds, q.pair.size)};
-  if (network && arrays.answer) {
-    Triple<double> answers[1];
-    ask(*network, cubes, answers);
-    put(arrays.answer, row, components<double>(answers[0]));
+  if (network) {
+    CubeMoments<double> said[1];
+    ask<site_outputs>(*network, cubes, said);
+    const auto &diagonal = said[0].variance, &rest = said[0].covariant;
+    put(arrays.answer, row, components<double>(said[0].centroid));
+    put(arrays.answer_volume, row, said[0].volume[0]);
+    put(arrays.answer_covariance, row,
+        matrix(Sym<double>{{diagonal[0], diagonal[1], diagonal[2], rest[0], rest[1], rest[2]}}));
   }
-  if (arrays.features || arrays.vectors) put_features(arrays, row, cubes);
+  if (arrays.features || arrays.vectors || arrays.slant || arrays.cut)
+    put_features(arrays, row, cubes);
   return true;
 }
 

@@ -27,8 +27,8 @@ from ...scene.pose_sets import log_uniform
 from ...solver.arguments import seed_number
 from ...solver.mlp import UNITS_MAX
 from .. import mlp_recipe
-from ..ensemble import Ensemble, Scaling, drawn
-from ..mlp_fit import SiteNetwork, fit, point_errors, random_batches
+from ..ensemble import Ensemble, Scaling
+from ..mlp_fit import evaluated, fit, point_errors, random_batches, started
 from ..paper_recipe import dataset
 from ..paper_recipe.fit import PaperSettings
 from ..paper_recipe.fit import fit as fit_paper
@@ -90,15 +90,15 @@ class MlpSearch(Search):
         training, checking, scaling = self.data
         generator = torch.Generator().manual_seed(seed)
         widest = max(one.hidden[0] for one in group)
-        networks = Ensemble([drawn(SiteNetwork(widest), generator, hidden=one.hidden)
+        networks = Ensemble([started(widest, generator, hidden=one.hidden)
                              for one in group], [one.rate for one in group]).to(self.device)
         batches = random_batches(training, scaling, np.random.default_rng(seed), size=rung.batch,
                                  count=rung.effort, device=self.device)
         for _ in fit(networks, batches, steps=rung.effort, rate=1.0):
             pass
         return [{'error': found['p99'], 'mean': found['mean'], 'worst': found['worst']}
-                for found in map(mlp_recipe.error_summary,
-                                 point_errors(networks, checking, scaling))]
+                for found in map(mlp_recipe.error_summary, 100.0 * evaluated(
+                    networks, checking, scaling, point_errors))]
 
     def keep(self, ranked: Sequence[Candidate], count: int) -> list[Candidate]:
         """Return the best of every class of cost in turn."""
