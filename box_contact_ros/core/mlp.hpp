@@ -517,7 +517,7 @@ struct MlpModelBy {
     }
   }
 
-  // What it finds in A's frame, for the pairs that touch.
+  // What it finds, for the pairs that touch.
   template <class T, int count>
   [[gnu::always_inline]] void solve(const Query<T> (&queries)[count], Found<T> (&found)[count],
                                     Counts& counts) const {
@@ -543,8 +543,8 @@ struct MlpModelBy {
       if constexpr (gives_patch) {
         scale_patch(bounds[g], answers[g], one);
         answered &= (one.volume > 0.0) & (trace(one.covariance) > 0.0);
-        one.covariance =
-            select(bounds[g].in_b, rotated(q.pair.rotation, one.covariance), one.covariance);
+        Mat<T> axes = select(bounds[g].in_b, q.pair.axes_b, q.pair.axes_a);
+        one.covariance = rotated(axes, one.covariance);
       }
       Mask<T> fallback = (answered == 0) & q.touching;
       if (any(fallback)) {

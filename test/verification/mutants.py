@@ -201,8 +201,8 @@ MUTANTS = {
         'core/mlp.hpp', 'said.variance[k] * (half[k] * half[k])', 'said.variance[k] * half[k]',
         f'{MLP} -k scale_by_powers'),
     'covariance left in the frame of the bounds': Mutant(
-        'core/mlp.hpp', 'rotated(q.pair.rotation, one.covariance), one.covariance);',
-        'one.covariance, one.covariance);', f'{MLP} -k swap'),
+        'core/mlp.hpp', 'select(bounds[g].in_b, q.pair.axes_b, q.pair.axes_a);', 'q.pair.axes_a;',
+        f'{MLP} -k swap'),
     'exponential in steps': Mutant(
         'core/mlp.hpp', 'whole * 0x1.62ep-1F', 'whole * 0.69F',
         'test/scene/test_series.py -k patches_are_continuous'),
