@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from box_contact_ros.apps.crane.crane_log import CraneLog, LiveReport, live_line
+from box_contact_ros.apps.crane.crane_log import CraneLog
 
 MS = 1_000_000  # ns
 START = 1_700_000_000_000_000_000  # ns: stamps as large as real ones
@@ -186,24 +186,3 @@ def test_without_contacts_a_run_fails():
     assert len(summary.latencies) == 0
     assert not summary.passed
     assert 'nan' not in str(summary)
-
-
-def test_a_live_line_has_millimetres_and_no_minus_zero():
-    """A separation of -1.5 cm prints as -15 mm; a normal of -1e-9 prints as 0."""
-    line = live_line(12.345, -0.015, (1.0, 2.0, 3.0), (-1e-9, 0.0, -1.0))
-    assert line.split() == [
-        '12.35', '-15.000', '1.0000', '2.0000', '3.0000', '0.00000', '0.00000', '-1.00000']
-
-
-def test_the_live_report_prints_the_newest_contact_once(capsys):
-    """A header, one line for the newest contact in full, and nothing while nothing is new."""
-    log = CraneLog(TICKS)
-    report = LiveReport(log)
-    report.update()
-    play(log, lost=((149, 'normal'),))
-    report.update()
-    report.update()
-    lines = capsys.readouterr().out.splitlines()
-    assert len(lines) == 3
-    # Tick 148 is 98 mm deep, 148 * 5 ms after the start.
-    assert lines[2].split()[:2] == ['0.74', '-98.000']

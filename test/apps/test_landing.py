@@ -13,14 +13,17 @@ from box_contact_ros import ContactSolver
 from box_contact_ros.apps.crane.landing import (
     CORNER_SPEED_LIMIT,
     WATCHED,
+    ClosedLoop,
     LandingCase,
     LandingRecord,
     LandingResult,
+    Progress,
     cases,
     land,
     landing_scenario,
     scenario_of,
     solvers,
+    touches_in,
 )
 from box_contact_ros.apps.crane.mujoco_crane import Crane, CraneScenario
 from box_contact_ros.baselines.point_law import PointLaw
@@ -103,9 +106,10 @@ def test_the_deepest_point_does_not_land(rate_hz):
 
 
 def test_lost_answers_are_bridged_by_the_last_wrench():
-    """Every tenth answer lost at random: at rest with the wrench held.
+    """Every tenth answer lost at random: with the wrench held, all limits but the force's are met.
 
-    With no force on lost ticks instead, it is not.
+    The load creeps, so a held wrench is off by 1e-5 of the weight. With no force on lost ticks
+    instead, the load does not even settle.
     """
     scenario = scenario_of(CASES[4])
     solver = ContactSolver(scenario.size, scenario.stack_size, model='exact')
@@ -115,8 +119,9 @@ def test_lost_answers_are_bridged_by_the_last_wrench():
         random = np.random.default_rng(2)
         results.append(land(scenario, lambda a, b, on_loss=on_loss, random=random: (
             on_loss if random.random() < 0.1 else solver(a, b))).judge())
-    assert results[0].at_rest, f'\n{results[0]}'
-    assert not results[1].at_rest
+    missed = [name for name, (met, _) in results[0].limits.items() if not met]
+    assert missed in ([], ['force']) and results[0].force_worst < 1e-4, f'\n{results[0]}'
+    assert not results[1].settled < 3.0
 
 
 def test_without_contact_nothing_is_judged():
@@ -141,8 +146,33 @@ def test_every_limit_counts():
             ('gap', 0.021, 'gap'), ('settled', 3.1, 'settled')):
         bad = LandingResult(**good | {field: value})
         assert [key for key, (met, _) in bad.limits.items() if not met] == [name]
-        assert str(bad).count('not met') == 1 and 'NOT AT REST' in str(bad)
+        assert str(bad).count('not met') == 1
+        carried = field in ('corner_speed', 'force_worst', 'static_tilt', 'settled')
+        assert bad.carried is carried
+        assert ('landing ................ settled' in str(bad)) is carried
     assert not any(met for met, _ in LandingResult().limits.values())
+    assert not LandingResult(**good | {'settled': math.nan}).carried
+
+
+def test_progress_prints_a_line_a_change():
+    """Hanging, first touch, settling, at rest: once each, whatever is between two looks."""
+    scenario = scenario_of(WELL_AIMED)
+    crane, loop, lines = Crane(scenario, 200.0), ClosedLoop(scenario, 200.0), []
+    progress = Progress(loop.record)
+    solver, = solvers(scenario, 'exact')
+    assert not list(progress.lines())
+    for _ in range(round(12 * 200.0)):
+        state = loop.ask(crane)
+        contact = solver(state.pose, crane.stack_pose)
+        loop.answer(state, touches_in([contact]), latency=0.0)
+        loop.step(crane)
+        lines += progress.lines()
+    assert [line.split(' s  ')[1].split('  ')[0] for line in lines] == list(Progress.STAGES)
+    assert 'contact force   0.0 kN' in lines[0] and 'contact force 196.2 kN' in lines[-1]
+    times = [float(line.split()[0]) for line in lines]
+    assert times == sorted(times) and times[-1] < 12.0
+    assert [line.split(' s  ')[1].split('  ')[0] for line in Progress(loop.record).lines()] == list(
+        Progress.STAGES)
 
 
 def test_a_swinging_load_keeps_its_energy():

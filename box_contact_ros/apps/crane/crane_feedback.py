@@ -24,9 +24,6 @@ from .mujoco_crane import Crane, CraneScenario
 
 ANSWER_SHARE = 0.8
 """Share of a tick that waits for its answer in real time; the rest is for simulating it."""
-REAL_TIME_LATENCY = 2e-3
-"""Latency [s] that the law's constants are made for in real time, at least: some times the usual
-one, so that a busy machine does not make the load rattle."""
 LOCKSTEP_PATIENCE = 1.0
 """Time [s] after which lockstep takes an answer for lost, and goes on with the wrench it has."""
 LOCKSTEP_LOST_MOST = 5
@@ -39,9 +36,12 @@ class CraneFeedback:
 
     def __init__(self, scenario: CraneScenario, rate_hz: float, *, latency: float,
                  lockstep: bool, stop: threading.Event) -> None:
-        """No contact acts before `latency` [s] after asking; `stop` ends every waiting."""
+        """No contact acts before `latency` [s] after asking; `stop` ends every waiting.
+
+        In real time answers are lost, so the law's constants are made for a period's latency.
+        """
         self._loop = ClosedLoop(scenario, rate_hz, latency=latency if lockstep else
-                                max(latency, REAL_TIME_LATENCY))
+                                max(latency, 1.0 / rate_hz))
         self.record = self._loop.record
         self._rate_hz, self._latency, self._lockstep = rate_hz, latency, lockstep
         self._stop = stop
@@ -87,7 +87,10 @@ class CraneFeedback:
         self._loop.step(crane)
 
     def _apply(self) -> bool:
-        """Turn what has arrived into wrenches; return whether there was anything."""
+        """Turn what has arrived into wrenches; return whether there was anything.
+
+        ValueError: a contact without volume and covariance.
+        """
         arrived = False
         while self._arrived:
             stamp, touch, received = self._arrived.popleft()
@@ -97,5 +100,10 @@ class CraneFeedback:
             arrived = True
             # Answers take as long in simulated time as they really took, unless time waits.
             took = 0.0 if self._lockstep else (received - stamp) * 1e-9
-            self._loop.answer(state, [touch] if touch else [], latency=max(self._latency, took))
+            try:
+                self._loop.answer(state, [touch] if touch else [],
+                                  latency=max(self._latency, took))
+            except ValueError as error:
+                raise ValueError(f"the contact node's model cannot carry a load: {error}; start "
+                                 'contact_node with another one, such as exact') from None
         return arrived

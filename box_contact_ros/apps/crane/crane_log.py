@@ -1,8 +1,6 @@
 """What the crane sent, what came back, and how good it was, for people to read. No ROS."""
 from __future__ import annotations
 
-import math
-import time
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -11,13 +9,6 @@ import numpy as np
 from ...output import percentiles
 from ...solver.contact import Contacts
 from ..bench.answer_log import AnswerLog, StreamResult
-
-LIVE_PERIOD = 0.2  # s between live lines
-
-LIVE_HEADER = (
-    '   time   separation              point (x, y, z)                 normal (x, y, z)\n'
-    '      s           mm                            m                                -'
-)
 
 
 def table(rows: list[tuple[str, str]]) -> str:
@@ -46,12 +37,6 @@ class CraneLog(AnswerLog):
         self._poses.append((np.array(pose_a), np.array(pose_b)))
         self.sent(stamp)
 
-    def live_line(self, stamp: int) -> str:
-        """Return a line under `LIVE_HEADER` on the contact that was sent under a stamp [ns]."""
-        row = self._stream.stamps.index(stamp)
-        cloud, point, normal = (self._stream.values[kind][row] for kind in self.kinds)
-        return live_line((stamp - self._stream.stamps[0]) * 1e-9, -cloud[6], point, normal)
-
     def summary(self, solver: ContactReference, edge: float) -> CraneSummary | None:
         """Compare the answers with a reference; None if nothing was sent.
 
@@ -61,14 +46,6 @@ class CraneLog(AnswerLog):
             self._stream.truth = solver.batch(*map(np.array, zip(*self._poses)))
         latencies = self._stream.latencies[self._stream.contacts]
         return next((CraneSummary(result, latencies, edge) for result in self.results()), None)
-
-
-def live_line(seconds: float, separation: float, point: np.ndarray, normal: np.ndarray) -> str:
-    """Return a line under `LIVE_HEADER`; separation and point [m], a negative one is the depth."""
-    # Adding 0.0 turns a rounded -0.0, which says nothing, into 0.0.
-    place = ' '.join(f'{round(float(value), 4) + 0.0:9.4f}' for value in point)
-    direction = ' '.join(f'{round(float(value), 5) + 0.0:9.5f}' for value in normal)
-    return f'{seconds:7.2f} {1e3 * separation:+12.3f}   {place}    {direction}'
 
 
 @dataclass(frozen=True)
@@ -123,21 +100,3 @@ class CraneSummary:
         if r.strangers:
             rows.append(('answers to no pose', f'{r.strangers}'))
         return table(rows)
-
-
-class LiveReport:
-    """Prints the newest contact, at most every `LIVE_PERIOD` seconds and only if it is new."""
-
-    def __init__(self, log: CraneLog) -> None:
-        self._log, self._shown, self._next = log, 0, -math.inf
-
-    def update(self) -> None:
-        """Print a line if one is due, and the header before the first."""
-        stamp = self._log.newest_contact
-        if stamp <= self._shown or time.monotonic() < self._next:
-            return
-        if not self._shown:
-            print(LIVE_HEADER)
-        self._shown, self._next = stamp, time.monotonic() + LIVE_PERIOD
-        # Flushed, because a reader of a pipe wants it live as well.
-        print(self._log.live_line(stamp), flush=True)

@@ -15,7 +15,8 @@ PARAMETERS = {
                         f'closed loop takes {LANDING_DURATION:g}', number(*LIMITS['duration'])),
     'wait': Setting(10.0, 'patience for a contact node to answer [s]', number(0, 600)),
     'frame_id': Setting('world', 'frame of the published poses', text),
-    'report': Setting(False, 'print live lines while in contact', flag),
+    'report': Setting(False, 'closed loop: print a line when the load hangs, touches, '
+                      'settles, and is at rest', flag),
     'closed_loop': Setting(False, 'apply the contacts as a force: the load is set down, the ropes '
                            'go slack, and the exit status says whether it came to rest', flag),
     'lockstep': Setting(False, 'closed loop: no real time, every tick waits for its answer', flag),

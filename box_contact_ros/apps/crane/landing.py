@@ -192,12 +192,22 @@ class LandingResult:
         """Whether all limits are met."""
         return all(met for met, _ in self.limits.values())
 
+    @property
+    def carried(self) -> bool:
+        """Whether the stack carries the load, still for good, though perhaps not flat.
+
+        A load that overhangs a lot cannot lie flat on an elastic stack.
+        """
+        return not math.isnan(self.settled) and all(
+            self.limits[name][0] for name in ('ropes slack', 'depth', 'gap'))
+
     def __str__(self) -> str:
         """Return a few lines for people: every figure with its limit."""
         if math.isnan(self.corner_speed):
             return f'  landing ................ not judged: it takes a touch and {WATCHED:g} s more'
-        rows = [('landing', f'{"at rest" if self.at_rest else "NOT AT REST"} (first touch at '
-                            f'{self.touched:.2f} s)')]
+        state = ('at rest' if self.at_rest else 'settled, not within all limits' if self.carried
+                 else 'NOT AT REST')
+        rows = [('landing', f'{state} (first touch at {self.touched:.2f} s)')]
         rows += [(name, figure + ('' if met else '  <-- not met'))
                  for name, (met, figure) in self.limits.items()]
         rows += [('creep', f'{1e3 * self.creep:.2g} mm/s'),
@@ -227,10 +237,13 @@ class LandingRecord:
         first = next(iter(self.points), len(self.poses))
         return len(self.forces) - first > WATCHED * self.rate_hz
 
-    def corner_speeds(self) -> np.ndarray:
-        """Return the speed [m/s] of the fastest of the load's eight corners, per tick (n,)."""
+    def corner_speeds(self, first: int = 0) -> np.ndarray:
+        """Return the speed [m/s] of the fastest of the load's eight corners, per tick (n,).
+
+        first: the tick to begin with; a negative one counts from the end.
+        """
         signs = np.array(list(product((-0.5, 0.5), repeat=3)))
-        poses, velocities = np.array(self.poses), np.array(self.velocities)
+        poses, velocities = np.array(self.poses[first:]), np.array(self.velocities[first:])
         arms = np.einsum('nij,kj->nki', rotation_matrix(poses[:, 3:]),
                          signs * self.scenario.size - self.scenario.mass_offset)
         speeds = velocities[:, None, :3] + np.cross(velocities[:, None, 3:], arms)
@@ -277,10 +290,15 @@ class LandingRecord:
         if not colliding.any():
             return LandingResult()
         first = int(np.argmax(colliding))
+        window = slice(first + round(SETTLING * self.rate_hz),
+                       first + round(WATCHED * self.rate_hz))
+        seen, ticks = ticks, min(ticks, window.stop)  # what comes later is not looked at
+        separation, poses = separation[:ticks], poses[:ticks]
         speeds = self.corner_speeds()[:ticks]
         fast = np.flatnonzero(speeds[first:] >= SETTLED_SPEED)
         still = fast[-1] + 1 if len(fast) else 0
-        steps, exact_steps = _steps(self.point_path()[:ticks]), _steps(exact_points)
+        steps, exact_steps = (_steps(points[:ticks])
+                              for points in (self.point_path(), exact_points))
         place = scenario.stack_size[2] + 0.5 * scenario.size[2]
         figures = {
             'touched': first / self.rate_hz,
@@ -293,9 +311,7 @@ class LandingRecord:
             'point_step_ever': _largest(steps[first:]),
             'exact_point_step_ever': _largest(exact_steps[first:]),
         }
-        window = slice(first + round(SETTLING * self.rate_hz),
-                       first + round(WATCHED * self.rate_hz))
-        if window.stop <= ticks:
+        if window.stop <= seen:
             figures |= self._in(window) | {'point_step': _largest(steps[window]),
                                            'exact_point_step': _largest(exact_steps[window])}
         return LandingResult(**figures)
@@ -382,6 +398,31 @@ class ClosedLoop:
         crane.step(self._held.at)
         self.record.tensions.append(crane.rope_tensions)
         self.record.forces.append(self._held.current[:3].copy())
+
+
+class Progress:
+    """The landing's stages as they come: a line a change, for people who watch."""
+
+    STAGES = ('hanging', 'first touch', 'settling', 'at rest')
+
+    def __init__(self, record: LandingRecord) -> None:
+        """Follow a record while it grows."""
+        self._record, self._seen = record, -1
+
+    def lines(self) -> Iterator[str]:
+        """Yield a line for each stage that was reached since the last call."""
+        record = self._record
+        if not record.forces:
+            return
+        tick, speed = len(record.forces), float(record.corner_speeds(-1)[-1])
+        slack = not record.tensions[-1].any()
+        reached = (0 if not record.points else 1 if not slack else
+                   2 if speed > CORNER_SPEED_LIMIT else 3)
+        for stage in range(self._seen + 1, reached + 1):
+            yield (f'{tick / record.rate_hz:7.2f} s  {self.STAGES[stage]:<12} '
+                   f'fastest corner {1e3 * speed:8.3g} mm/s, '
+                   f'contact force {record.forces[-1][2] / 1e3:5.1f} kN')
+        self._seen = max(self._seen, reached)
 
 
 def solvers(scenario: CraneScenario, model: str) -> list[ContactSolver]:
