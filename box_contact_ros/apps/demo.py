@@ -1,7 +1,7 @@
 """The demonstration: a contact node and a crane, two processes that talk over DDS.
 
 `python -m box_contact_ros.apps.demo` starts both, shows the crane's live contacts and its summary,
-and ends both again, within a minute. The contacts push the load, one point per tick. The crane
+and ends both again, within a minute. The contacts push the load, one per tick. The crane
 reports whether the load came to rest on the stack. With `--open-loop` contacts are only recorded.
 
 Both run in a ROS domain of their own on this host, so that nothing else hears them. The environment
@@ -34,7 +34,7 @@ DOMAIN_VARIABLE = 'BOX_CONTACT_DEMO_DOMAIN'
 TIME_LIMIT = 60.0 - END_PATIENCE  # s: a demo ends within a minute, whatever happens
 OVERHEAD = 8.0  # s of it for starting, for the last answers and for the summary
 LANDING_LEAST = 22.0  # s: a shorter landing ends before it can be judged
-LANDING_MODEL = 'mlp'  # the closed loop's default: it needs a point without jumps
+LANDING_MODEL = 'mlp'  # the closed loop's default: it needs volume and covariance
 
 NEXT = """
 Next:

@@ -46,6 +46,8 @@ TEST_PAIRING = 'test/scene/test_stamp_pairing.py'
 TEST_SCENE_NODE = 'test/node/test_scene_node.py'
 TEST_CORE = 'test/core/test_core.py'
 EXACT = 'test/core/test_exact.py'
+PATCH_LAW = 'scene/patch_law.py'
+TEST_PATCH_LAW = 'test/scene/test_patch_law.py'
 MUTANTS = {
     'normal flipped': Mutant(
         'core/separating_axis.hpp', 'select<T>(along >= 0.0, splat<T>(1.0), splat<T>(-1.0));',
@@ -341,6 +343,34 @@ MUTANTS = {
     'publishers gone by what is left': Mutant(
         'node/qos_events.py', 'event.total_count_change - event.current_count_change',
         'max(0, -event.current_count_change)', f'{TEST_SCENE_NODE} -k come_and_go_between'),
+    'the modulus rises at once': Mutant(
+        PATCH_LAW, 'self._modulus = min(self._modulus + self.rise * lacking, borne)',
+        'self._modulus = borne', f'{TEST_PATCH_LAW} -k rises_slowly'),
+    'the modulus survives the contact': Mutant(
+        PATCH_LAW, '            self._modulus = math.inf\n', '',
+        f'{TEST_PATCH_LAW} -k rises_slowly'),
+    'a point alone goes through': Mutant(
+        PATCH_LAW, 'if not (math.isfinite(overlap.volume) and', 'if False and not (True and',
+        f'{TEST_PATCH_LAW} -k point_alone'),
+    'the foundation pulls': Mutant(
+        PATCH_LAW, 'if share <= 0.0:', 'if False:', f'{TEST_PATCH_LAW} -k never_pulls'),
+    'rocking beyond what pressures can': Mutant(
+        PATCH_LAW, 'min(1.0, share / at_rim if at_rim > 0.0 else 1.0)', '1.0',
+        f'{TEST_PATCH_LAW} -k fast_rocking'),
+    'no area of a needle': Mutant(
+        PATCH_LAW, 'LEAST_ASPECT = 1e-7', 'LEAST_ASPECT = 0.0',
+        f'{TEST_PATCH_LAW} -k only_just_touches'),
+    'a corner as stiff as a face': Mutant(
+        PATCH_LAW, 'stiffness = np.zeros((6, 6))',
+        'stiffness = np.zeros((6, 6)); angular = 0.0 * angular',
+        f'{TEST_PATCH_LAW} -k softer'),
+    'damping as under a whole face': Mutant(
+        PATCH_LAW, 'damping = self.damping * sum(areas) * softness / self.mass',
+        'damping = self.damping', f'{TEST_PATCH_LAW} -k sum_over_the_columns'),
+    'the point law pulls': Mutant(
+        'baselines/point_law.py', 'push = max(0.0, self.stiffness * touch.depth',
+        'push = (self.stiffness * touch.depth',
+        'test/baselines/test_point_law.py -k damping_acts'),
     'room in shared memory not asked for': Mutant(
         'cli.py', 'room < LEAST_ROOM', 'False', 'test/node/test_faults.py -k memory_is_full'),
     'little shared memory used': Mutant(

@@ -123,7 +123,7 @@ class Way:
     contacts: str
     fly: Callable[[CraneScenario, LoopTiming], LandingRecord]
     every: int = 1
-    """Of the grid's landings, each so manieth is run."""
+    """One of so many landings of the grid is run."""
     added: bool = False
     """Whether the added landings are run too."""
     timed: bool = True
