@@ -97,7 +97,7 @@ class PointLaw:
 
     def wrench(self, touches: Sequence[Touch], pose: np.ndarray, velocity: np.ndarray,
                ) -> np.ndarray:
-        """Return the wrench (6,) on the load at `pose` (7,) with `velocity` (6,).
+        """Return force and torque (6,) on the load at `pose` (7,) with `velocity` (6,).
 
         The law is made for one contact; those of several add up.
         """

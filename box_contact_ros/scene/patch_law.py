@@ -83,7 +83,7 @@ class Overlap(Protocol):
 
     @property
     def normal(self) -> np.ndarray:
-        """Unit normal (3,) from the load to the stack."""
+        """Unit vector (3,) from the load to the stack."""
 
     @property
     def volume(self) -> float:
@@ -143,7 +143,7 @@ class PatchLaw:
 
     def wrench(self, overlaps: Sequence[Overlap], pose: np.ndarray, velocity: np.ndarray,
                ) -> np.ndarray:
-        """Return the wrench (6,) on the load of contacts that act at the same time.
+        """Return force and torque (6,) on the load of contacts that act at the same time.
 
         pose, velocity: of the load's centre of mass, (7,) and (6,). Contacts without volume do
         nothing. ValueError: a contact whose model gives the point alone.

@@ -109,8 +109,8 @@ def test_several_contacts_share_one_modulus(turn):
     fastest = max(1.0 / MASS, y**2 / INERTIA[0], x**2 / INERTIA[1])
     assert fastest > 2.0 / MASS
     expected = GRAVITY / fastest
-    assert fresh().wrench(feet, pose, STILL) == pytest.approx([0, 0, expected, 0, 0, 0], rel=1e-5,
-                                                          abs=1e-3)
+    wrench = fresh().wrench(feet, pose, STILL)
+    assert wrench == pytest.approx([0, 0, expected, 0, 0, 0], rel=1e-5, abs=1e-3)
 
 
 @pytest.mark.parametrize('depth', [0.0, 1e-12])
@@ -130,8 +130,8 @@ def test_the_push_is_against_the_normal_and_turns_about_the_centre():
     patch = Patch(patch.point, normal, patch.depth, patch.volume,
                   frame @ patch.covariance @ frame.T)
     wrench = fresh().wrench([patch], LEVEL, STILL)
-    felt = 1.0 / (1.0 / MASS + (np.square(np.cross(patch.point - LEVEL[:3], normal))
-                                / INERTIA).sum())
+    lever = np.cross(patch.point - LEVEL[:3], normal)
+    felt = 1.0 / (1.0 / MASS + (np.square(lever) / INERTIA).sum())
     force = -normal * LAW.frequency**2 * felt * 1e-3
     assert wrench[:3] == pytest.approx(force, rel=1e-5)
     assert wrench[3:] == pytest.approx(np.cross(patch.point - LEVEL[:3], force), rel=1e-5)

@@ -347,7 +347,7 @@ class ForceLaw(Protocol):
     """From contacts to the force and the torque on the load."""
 
     def wrench(self, touches: Sequence[Any], pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-        """Return the wrench (6,) on the load at `pose` (7,) with `velocity` (6,).
+        """Return force and torque (6,) on the load at `pose` (7,) with `velocity` (6,).
 
         touches: what the law needs of contacts, `Touch` or `Patch`; empty without contact.
         """

@@ -103,8 +103,8 @@ SHOWN_WORST = {
     'creep [mm/s]': ('creep', 1e3), 'force [of weight]': ('force_worst', 1.0),
     'static tilt [°]': ('static_tilt', 180.0 / math.pi), 'tilt [°]': ('tilt', 180.0 / math.pi),
     'energy [J]': ('energy_gain', 1.0), 'depth [%]': ('depth', 100.0), 'gap [mm]': ('gap', 1e3),
-    'point step, window [mm]': ('point_step', 1e3), 'point step, ever [mm]': ('point_step_ever',
-                                                                             1e3)}
+    'point step, window [mm]': ('point_step', 1e3),
+    'point step, ever [mm]': ('point_step_ever', 1e3)}
 """By column: a figure of `LandingResult`, whose worst value the table shows, and its factor."""
 
 
