@@ -83,7 +83,7 @@ template <class T>
                                                       const EdgeWeights& weights) {
   EdgePieces<T> pieces;
   Four<T> lengths[steps<T>]{}, means[3][steps<T>]{};
-#pragma GCC unroll 1  // unrolled, the code would not fit the first cache
+#pragma GCC unroll 3
   for (int j = 0; j < 3; ++j) {
     int a = (j + 1) % 3, b = (j + 2) % 3;
     Vec<T> along = column(inverse, j), slab;
@@ -92,7 +92,7 @@ template <class T>
     for (int n = 0; n < steps<T>; ++n) {
       Four<T> at_a = sigma<T>(n) * half_x[a], at_b = tau<T>(n) * half_x[b];
       Four<T> back = Four<T>{} + half_x[j], t = back;  // back: −s
-#pragma GCC unroll 1  // unrolled, the code would not fit the first cache
+#pragma GCC unroll 3
       for (int k = 0; k < 3; ++k) {
         Four<T> x = (centre[k] + (at_a * axes[k][a] + at_b * axes[k][b])) * along[k];
         back = min(back, slab[k] + x);
