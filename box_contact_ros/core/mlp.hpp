@@ -418,7 +418,8 @@ template <int asked, class T, int group>
   forward<asked>(network, features, outputs);
   Columns<F> parts;  // [q], by f
   for (int q = 0; q < 3; ++q) {
-    const auto &out = outputs.at[q], &along = vectors.along[q];
+    const auto& out = outputs.at[q];
+    const auto& along = vectors.along[q];
     parts[q] = (out[0] * along[0] + out[1] * along[1]) + out[2] * along[2];
   }
   CubeMoments<F> said{};

@@ -162,7 +162,7 @@ class AccuracyRow:
 
     @property
     def quantities(self) -> tuple[str, ...]:
-        """The fields of `ContactErrors` that the model gives."""
+        """Return the fields of `ContactErrors` that the model gives."""
         return ContactErrors._fields if np.isfinite(self.errors.volume).all() else ('point',)
 
     def parts(self) -> dict[str, ContactErrors]:

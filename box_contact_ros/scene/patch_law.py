@@ -83,7 +83,7 @@ class Overlap(Protocol):
 
     @property
     def normal(self) -> np.ndarray:
-        """Unit vector (3,) from the load to the stack."""
+        """Return the unit vector (3,) from the load to the stack."""
 
     @property
     def volume(self) -> float:

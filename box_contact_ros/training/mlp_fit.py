@@ -173,7 +173,7 @@ def fit(network: torch.nn.Module, batches: Iterable[MlpSamples], *, steps: int, 
 
 @torch.no_grad()
 def evaluated(network: torch.nn.Module, data: MlpSamples, scaling: Scaling,
-             measure: Callable[[MlpAnswers, MlpSamples], Tensor]) -> np.ndarray:
+              measure: Callable[[MlpAnswers, MlpSamples], Tensor]) -> np.ndarray:
     """Return what `measure` says of a network's answers, some contacts after the other."""
     device = next(network.parameters()).device.type
     found = []

@@ -80,8 +80,12 @@ struct Answers {
   std::vector<double> separation, normal, point, volume, covariance;
 
   explicit Answers(long count)
-      : colliding(new bool[count]()), separation(count), normal(3 * count), point(3 * count),
-        volume(count), covariance(9 * count) {}
+      : colliding(new bool[count]()),
+        separation(count),
+        normal(3 * count),
+        point(3 * count),
+        volume(count),
+        covariance(9 * count) {}
   Results results() {
     return {colliding.get(), separation.data(), normal.data(),
             point.data(),    volume.data(),     covariance.data()};

@@ -170,7 +170,7 @@ class CraneScenario:
 
     @property
     def stack_boxes(self) -> list[tuple[np.ndarray, tuple[float, float, float]]]:
-        """The boxes that the load may meet: pose (7,) and full extents [m] of each."""
+        """Return the boxes that the load may meet: pose (7,) and full extents [m] of each."""
         top = np.array([*self.drop_position, self.stack_size[2], 0.0, 0.0, 0.0, 1.0])
         size = CASTING if self.castings else self.stack_size
         corners = _CORNERS if self.castings else np.zeros((1, 2))
