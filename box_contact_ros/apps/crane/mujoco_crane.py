@@ -23,6 +23,7 @@ Conventions: SI units; world frame with z up and the ground at z = 0. A pose is 
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -34,6 +35,9 @@ import numpy as np
 from ...scene.contact_law import FRICTION, GRAVITY
 from ...scene.pose import cross, rotation_matrix
 from ...scene.pose_sets import CONTAINER
+
+# MuJoCo would write warnings to a file MUJOCO_LOG.TXT in the working directory.
+mujoco.set_mju_user_warning(logging.getLogger(__name__).warning)
 
 PHYSICS_STEP = 5e-4
 """Longest physics step, s. A tick of publication is cut into equal steps no longer than this."""
