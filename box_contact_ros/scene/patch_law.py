@@ -159,6 +159,9 @@ class PatchLaw:
         lacking = max(0.0, STEADY_SHARE * borne - self._modulus)
         modulus = self._modulus = min(self._modulus + self.rise * lacking, borne)
         damping = self.damping * sum(areas) * softness / self.mass
+        # Beyond the weight the damper stays the one at rest: a stiffer one throws the load back.
+        elastic = modulus * sum(overlap.volume for overlap in touching)
+        damping *= min(1.0, self.mass * GRAVITY / elastic)
         return np.sum([self._of(overlap, covariance, modulus * overlap.volume, damping, pose,
                                 velocity)
                        for overlap, covariance in zip(touching, covariances)], axis=0)

@@ -147,6 +147,7 @@ def test_the_wrench_is_the_sum_over_the_columns(angular):
     area = 12.0 * math.sqrt(patch.covariance[0, 0] * patch.covariance[1, 1])
     fastest = LAW.fastest([patch], [flat], [area], LEVEL)
     modulus, damping = LAW.frequency**2 / fastest, LAW.damping * area / (MASS * fastest)
+    damping *= min(1.0, WEIGHT / (modulus * patch.volume))
     arms = places - LEVEL[:3]
     speeds = (velocity[:3] + np.cross(velocity[3:], arms)) @ DOWN
     pressures = modulus * thickness * (1.0 + damping * speeds)
@@ -163,10 +164,21 @@ def test_the_foundation_never_pulls(speed):
     """Parting at a speed beyond 1/λ there is no force, and no moment of the damping either."""
     velocity = moving(linear=(0, 0, speed), angular=(0.3, 0.2, 0))
     wrench = fresh().wrench([slab()], LEVEL, velocity)
-    expected = max(0.0, WEIGHT * 1e-3 / SUNK * (1.0 - LAW.damping * speed))
+    damping = LAW.damping * min(1.0, SUNK / 1e-3)
+    expected = max(0.0, WEIGHT * 1e-3 / SUNK * (1.0 - damping * speed))
     assert wrench[2] == pytest.approx(expected)
     if expected == 0.0:
         assert not wrench.any()
+
+
+@pytest.mark.parametrize('times', [1.0, 2.0, 10.0])
+def test_beyond_the_weight_the_damper_is_the_one_at_rest(times):
+    """A load that is pressed in by more than its weight meets 2·ζ·Ω·m, which the loop bears."""
+    patch, speed = slab(depth=times * SUNK), 0.2
+    still, closing = (fresh().wrench([patch], LEVEL, velocity)[2]
+                      for velocity in (STILL, moving(linear=(0, 0, -speed))))
+    damper = 2.0 * patch_law.DAMPING_RATIO * LAW.frequency * MASS
+    assert closing - still == pytest.approx(damper * speed, rel=1e-6)
 
 
 def test_fast_rocking_gives_no_more_moment_than_pressures_can():

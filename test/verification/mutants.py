@@ -367,6 +367,9 @@ MUTANTS = {
     'damping as under a whole face': Mutant(
         PATCH_LAW, 'damping = self.damping * sum(areas) * softness / self.mass',
         'damping = self.damping', f'{TEST_PATCH_LAW} -k sum_over_the_columns'),
+    'damping that grows beyond the weight': Mutant(
+        PATCH_LAW, '        damping *= min(1.0, self.mass * GRAVITY / elastic)\n', '',
+        f'{TEST_PATCH_LAW} -k beyond_the_weight'),
     'the point law pulls': Mutant(
         'baselines/point_law.py', 'push = max(0.0, self.stiffness * touch.depth',
         'push = (self.stiffness * touch.depth',
