@@ -1,7 +1,7 @@
 """From a contact's point and depth to a wrench: a spring and a damper at the point, a baseline.
 
 It is what a simulator does with an engine that gives one point. The load's footprint has to be
-known, for the dampers that stand for the patch. `scene.patch_law` needs none of that.
+known, for the dampers that stand for the patch. `scene.force.patch_law` needs none of that.
 
 Box A is the load. Box B is the stack, which does not move. The normal n points from A to B, so the
 stack pushes the load along −n. With the velocity v of the load's material point at the contact
@@ -15,7 +15,7 @@ point and v_n = −v·n, positive while the boxes part:
 Lines 1 and 2 act at the ONE point, so the point has to be the middle of the contact region. The
 others are what a patch does and a point cannot, and act only while the boxes touch. Rocking is the
 damping c spread evenly over an upright load's bottom, twice: c·∫x²dA / A = c·L²/12.
-docs/decisions/contact-law.md has what was measured for each constant.
+docs/decisions/point-law.md has what was measured for each constant.
 
 Conventions: those of `pose`; SI units. A wrench (6,) is a force [N], then a torque about the load's
 centre of mass [N m]. A velocity (6,) is linear [m/s], then angular [rad/s]. Both are in the common
@@ -28,7 +28,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..scene.contact_law import FRICTION, GRAVITY, SLIP_SPEED, Touch
+from ..scene.force.held_wrench import FRICTION, GRAVITY, SLIP_SPEED, Touch
 from ..scene.pose import cross, rotation_matrix
 
 STATIC_PENETRATION = 5e-3

@@ -1,1 +1,1 @@
-"""Scenes without ROS: boxes and pairs, scene files, pairing by stamps, pose sets, the law."""
+"""Scenes without ROS: boxes and pairs, scene files, pairing by stamps, pose sets, forces."""

@@ -11,7 +11,7 @@ import pytest
 pytest.importorskip('mujoco')
 
 from box_contact_ros.apps.crane.mujoco_crane import MAX_HOIST_SPEED, Crane, CraneScenario
-from box_contact_ros.scene.contact_law import GRAVITY
+from box_contact_ros.scene.force.held_wrench import GRAVITY
 from box_contact_ros.scene.pose_sets import CONTAINER
 
 LENGTH, WIDTH, HEIGHT = CONTAINER

@@ -27,7 +27,7 @@ from box_contact_ros.apps.crane.landing import (
 )
 from box_contact_ros.apps.crane.mujoco_crane import Crane, CraneScenario
 from box_contact_ros.baselines.point_law import PointLaw
-from box_contact_ros.scene.contact_law import GRAVITY
+from box_contact_ros.scene.force.held_wrench import GRAVITY
 
 CASES = list(cases())
 HANGING_OVER = 17

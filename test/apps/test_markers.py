@@ -20,7 +20,7 @@ from box_contact_ros.apps.viewer.markers import PARAMETERS, MarkersNode, box_mar
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import make_cloud, make_header
 from box_contact_ros.resources import resource_path
-from box_contact_ros.scene.patch_law import Patch
+from box_contact_ros.scene.force.patch_law import Patch
 from box_contact_ros.scene.scene_solver import Answer, Pair
 from box_contact_ros.scene.stamp_pairing import StampedPose
 from box_contact_ros.solver.contact import Contact

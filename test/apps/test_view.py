@@ -31,7 +31,7 @@ from box_contact_ros.apps.viewer.view_node import ViewNode
 from box_contact_ros.apps.viewer.view_page import _edges, _quaternion_from_z, read_out
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import CLOUD_ROW, NANOSECONDS
-from box_contact_ros.scene.patch_law import Patch
+from box_contact_ros.scene.force.patch_law import Patch
 from box_contact_ros.scene.pose import rotation_matrix
 
 ORIGIN = poses.IDENTITY

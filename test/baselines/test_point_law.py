@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from box_contact_ros.baselines.point_law import STATIC_PENETRATION, PointLaw, effective_mass
-from box_contact_ros.scene.contact_law import GRAVITY, Touch
+from box_contact_ros.scene.force.held_wrench import GRAVITY, Touch
 from box_contact_ros.scene.pose import rotation_matrix
 
 CONTAINER = (12.192, 2.438, 2.591)

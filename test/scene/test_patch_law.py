@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from box_contact_ros import ContactSolver
-from box_contact_ros.scene import patch_law
-from box_contact_ros.scene.contact_law import GRAVITY
-from box_contact_ros.scene.patch_law import Patch, PatchLaw
+from box_contact_ros.scene.force import patch_law
+from box_contact_ros.scene.force.held_wrench import GRAVITY
+from box_contact_ros.scene.force.patch_law import Patch, PatchLaw
 from box_contact_ros.scene.pose import rotation_matrix
 
 MASS = 20_000.0

@@ -46,7 +46,7 @@ TEST_PAIRING = 'test/scene/test_stamp_pairing.py'
 TEST_SCENE_NODE = 'test/node/test_scene_node.py'
 TEST_CORE = 'test/core/test_core.py'
 EXACT = 'test/core/test_exact.py'
-PATCH_LAW = 'scene/patch_law.py'
+PATCH_LAW = 'scene/force/patch_law.py'
 TEST_PATCH_LAW = 'test/scene/test_patch_law.py'
 MUTANTS = {
     'normal flipped': Mutant(

@@ -23,7 +23,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...output import percentiles
-from ...scene.patch_law import Patch
+from ...scene.force.patch_law import Patch
 from ...scene.pose import degrees_between
 from ...solver.contact import Contacts
 

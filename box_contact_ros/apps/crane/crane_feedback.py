@@ -17,7 +17,7 @@ from collections import deque
 
 import numpy as np
 
-from ...scene.contact_law import Touch
+from ...scene.force.held_wrench import Touch
 from ..bench.answer_log import is_stale, touch_in
 from .landing import ClosedLoop, LoopState
 from .mujoco_crane import Crane, CraneScenario

@@ -7,7 +7,7 @@ record. The load settles if, from some time on, no corner moves faster than `SET
 The window is the last `WINDOW` s of the time that is watched.
 
 Depth, gap and first touch are those of the exact solver on the recorded poses, whatever model gave
-the contacts. Conventions: those of `pose`, `contact_law` and `mujoco_crane`.
+the contacts. Conventions: those of `pose`, `held_wrench` and `mujoco_crane`.
 """
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from ...output import percentiles
-from ...scene.contact_law import GRAVITY, HeldWrench
-from ...scene.patch_law import Patch, PatchLaw
+from ...scene.force.held_wrench import GRAVITY, HeldWrench
+from ...scene.force.patch_law import Patch, PatchLaw
 from ...scene.pose import rotation_matrix
 from ...solver.contact import Contact
 from ...solver.contact_solver import ContactSolver

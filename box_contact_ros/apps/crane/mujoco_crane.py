@@ -32,7 +32,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from ...scene.contact_law import FRICTION, GRAVITY
+from ...scene.force.held_wrench import FRICTION, GRAVITY
 from ...scene.pose import cross, rotation_matrix
 from ...scene.pose_sets import CONTAINER
 

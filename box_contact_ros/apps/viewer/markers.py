@@ -18,7 +18,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from ...node.messages import NANOSECONDS, make_header
 from ...node.parameters import CheckedParameters, Setting, answer_help, number, size
 from ...node.runtime import CONTACT_QOS, run_node
-from ...scene.patch_law import Patch
+from ...scene.force.patch_law import Patch
 from ...scene.pose_sets import CONTAINER
 from ...scene.stamp_pairing import StampedPose
 from ..bench.answer_log import first_row, touch_in

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...scene.patch_law import Patch
+from ...scene.force.patch_law import Patch
 
 Colour = tuple[int, int, int]  # red, green, blue, 0 to 255
 

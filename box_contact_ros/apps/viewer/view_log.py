@@ -16,7 +16,7 @@ import numpy as np
 
 from ...node.messages import NANOSECONDS
 from ...output import percentiles
-from ...scene.patch_law import Patch
+from ...scene.force.patch_law import Patch
 from ...scene.scene_solver import two_boxes
 from ...scene.stamp_pairing import PAIRINGS, StampedPose
 from ...solver.contact import Contact

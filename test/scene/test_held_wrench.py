@@ -3,7 +3,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from box_contact_ros.scene.contact_law import HeldWrench
+from box_contact_ros.scene.force.held_wrench import HeldWrench
 
 
 def test_a_wrench_is_held_until_the_next_is_due():

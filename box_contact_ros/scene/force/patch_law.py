@@ -26,7 +26,7 @@ modulus. Within a contact κ falls at once and rises slowly (`RISE_TIME`): a law
 it serves one load, tick by tick.
 
 No constant knows the size of the load. A wrench is computed from contacts and from the state of the
-load at the time they were asked for, and is then held (`contact_law.HeldWrench`).
+load at the time they were asked for, and is then held (`held_wrench.HeldWrench`).
 docs/force.md derives all of this.
 
 Conventions: those of `pose`; SI units. A wrench is (6,): force [N], then torque about the load's
@@ -42,8 +42,8 @@ from typing import Protocol
 
 import numpy as np
 
-from .contact_law import FRICTION, GRAVITY, SLIP_SPEED, Touch
-from .pose import cross, rotation_matrix
+from ..pose import cross, rotation_matrix
+from .held_wrench import FRICTION, GRAVITY, SLIP_SPEED, Touch
 
 __all__ = ['Patch', 'PatchLaw']
 
