@@ -34,7 +34,8 @@ def _parser() -> argparse.ArgumentParser:
         description='Make the data sets, fit the networks, write the weights files.\n\n'
         'Measured on a machine with two cores (each uses one):\n'
         '  paper             two boxes of edge 2, with discontinuities     2 minutes\n'
-        '  paper-continuous  the same without, one network per subset      8 minutes\n'
+        "  paper-as-drawn    the same, not folded into the solver's domain  2 minutes\n"
+        '  paper-continuous  without discontinuities, one network a subset 8 minutes\n'
         '  containers        two boxes of 12.192 x 2.438 x 2.591 m         2 minutes\n'
         '  mlp               any two boxes                                 5 minutes\n'
         '  --scene FILE      the boxes of one scene, from the general mlp  2 minutes')
@@ -52,9 +53,6 @@ def _parser() -> argparse.ArgumentParser:
         f'(default: {mlp_recipe.HIDDEN}), named in the file')
     add('--steps', type=int, help=f'of the MLP (default: {mlp_recipe.GENERAL.steps:,})')
     add('--out', type=Path, help='folder to write to (default: weights/)')
-    add('--fold', action=argparse.BooleanOptionalAction, default=True, help='for paper and '
-        'containers: data folded into the domain in which the solver asks, or as drawn (default: '
-        'folded)')
     add('--quick', action='store_true', help='small sets and few epochs, to try it out; needs '
         '--out')
     add('--threads', type=int, default=1, help="of PyTorch (default 1; the paper's gain nothing "
@@ -131,7 +129,7 @@ def _train_paper(options: argparse.Namespace, job: paper_jobs.PaperJob) -> None:
     if options.quick:
         starts, epochs = QUICK_STARTS, QUICK_EPOCHS
         job = replace(job, counts=QUICK_COUNTS)
-    job = replace(job, folded_in=options.fold or job.model != 'paper', settings=replace(
+    job = replace(job, settings=replace(
         job.settings, networks=options.starts or starts, epochs=options.epochs or epochs))
     card = paper_jobs.train_paper(job, seed=options.seed, commit=_commit(), folder=options.out)
     print(f'{options.out / job.name}.safetensors, {card["training"]["minutes"]} min\n'

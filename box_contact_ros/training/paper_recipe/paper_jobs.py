@@ -45,6 +45,8 @@ _SMOOTH = PaperSettings((6, 20, 17, 4), networks=24, epochs=1000, rate=0.2)
 
 JOBS = {
     'paper': PaperJob('paper', 'paper', dataset.CUBE, dataset.PAPER_COUNTS, _JUMPS, _DRAWN),
+    'paper-as-drawn': PaperJob('paper-as-drawn', 'paper', dataset.CUBE, dataset.PAPER_COUNTS,
+                               _JUMPS, _DRAWN, folded_in=False),
     'paper-continuous': PaperJob(
         'paper-continuous', 'paper-continuous', dataset.CUBE, dataset.CONTINUOUS_COUNTS, _SMOOTH,
         _DRAWN + 'Split by the winning axis of SAT (a face of the first box: vertex_face; an edge '
