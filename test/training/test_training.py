@@ -151,12 +151,13 @@ def test_train_again_is_the_same_file_but_for_the_clock(quick: Path, tmp_path: P
     assert first['metrics'] == again['metrics']
 
 
-def test_folded_on_request(tmp_path: Path) -> None:
-    arguments = ['paper', '--quick', '--fold', '--epochs', '2', '--starts', '1']
-    assert train.main([*arguments, '--out', str(tmp_path)]) == 0
-    card = load_weights(tmp_path / 'paper.safetensors').card
-    assert card['data']['folded_in'] is True
-    assert all(entry['min'] >= 0.0 for entry in card['inputs']['contact'][:3])
+@pytest.mark.parametrize(('job', 'folded'), [('paper', True), ('paper-as-drawn', False)])
+def test_one_job_is_folded_and_one_as_drawn(job: str, folded: bool, tmp_path: Path) -> None:
+    arguments = [job, '--quick', '--epochs', '2', '--starts', '1', '--out', str(tmp_path)]
+    assert train.main(arguments) == 0
+    card = load_weights(tmp_path / f'{job}.safetensors').card
+    assert card['data']['folded_in'] is folded
+    assert all((entry['min'] >= 0.0) is folded for entry in card['inputs']['contact'][:3])
     assert card['training']['contact']['starts'] == 1
 
 
@@ -172,7 +173,8 @@ def test_a_folder_that_cannot_be_written_is_said_at_once(
     (['--quick'], 'name a folder with --out'),
     *([] if torch.cuda.is_available() else [
         (['paper', '--out', '.', '--device', 'cuda'], '--device: cuda: PyTorch finds no GPU')]),
-    (['papers'], "'papers' is not one of paper, paper-continuous, containers, mlp, all"),
+    (['papers'], "'papers' is not one of paper, paper-as-drawn, paper-continuous, containers, "
+     'mlp, all'),
     (['paper', '--starts', '0'], '--starts 0 is too small'),
     (['paper', '--seed', '-1'], "'-1' is no whole number from 0"),
 ])
