@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PACKAGE = Path(__file__).parent
+RESULTS, QUICK_RESULTS = Path('docs/results'), Path('quick-results')
 
 
 def make_folder(parser: argparse.ArgumentParser, folder: Path) -> Path:
@@ -43,7 +44,7 @@ def make_room(parser: argparse.ArgumentParser, path: Path) -> Path:
 
 def results_folder(parser: argparse.ArgumentParser, options: argparse.Namespace) -> Path:
     """Return the folder of results; a quick run replaces a full run's only where `--out` says."""
-    return make_folder(parser, options.out or Path('quick-results' if options.quick else 'docs'))
+    return make_folder(parser, options.out or (QUICK_RESULTS if options.quick else RESULTS))
 
 
 def command_line(program: str, args: Sequence[str] | None) -> str:

@@ -10,7 +10,7 @@ a bounding volume tree per box. The rest replaces the paper's "additional algori
   [m²], the most in which they can meet.
 - Normal: the mean of the contacts' normals with the same weights, made unit.
 - Separation and verdict: SAT's. FCL's depths are those of the triangles' far corners and are off
-  by a triangle's size: `docs/paper_tables.md` has figures.
+  by a triangle's size: `docs/results/paper_tables.md` has figures.
 
 Some contacts have no pair of triangles: a box inside another, and some exact touches. There, and
 where the normals cancel, SAT's normal and the exact point are the answer. `Soup.exact_answers`

@@ -1,1 +1,1 @@
-"""Programs that write docs/."""
+"""Programs that write docs/results/."""

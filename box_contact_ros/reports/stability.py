@@ -174,11 +174,12 @@ def main(args: Sequence[str] | None = None) -> int:
     parser.add_argument('--families', nargs='+', default=list(cases), choices=list(cases),
                         metavar='FAMILY', help='default: all')
     parser.add_argument('--out', type=Path, metavar='DIR',
-                        help='folder for stability.md and stability.csv (default: docs, or '
-                             'quick-results with fewer models or families than that)')
+                        help='folder for stability.md and stability.csv (default: docs/results, '
+                             'or quick-results with fewer models or families than that)')
     options = parser.parse_args(args)
     whole = set(options.models) >= set(reported) and set(options.families) == set(cases)
-    folder = output.make_folder(parser, options.out or Path('docs' if whole else 'quick-results'))
+    folder = output.make_folder(parser, options.out or (
+        output.RESULTS if whole else output.QUICK_RESULTS))
     rows = []
     with tqdm(total=len(options.models) * len(options.families), desc='stability',
               unit='family') as bar:

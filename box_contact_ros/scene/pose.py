@@ -1,6 +1,6 @@
 """Quaternions and rotation matrices of poses, for arrays of them.
 
-Conventions (docs/conventions.md has them for users)
+Conventions (docs/reference/conventions.md has them for users)
     Units are SI, frames right-handed. A pose is 7 numbers `x y z qx qy qz qw` in a frame common to
     both boxes. A size is three FULL extents in metres.
 """

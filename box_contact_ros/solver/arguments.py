@@ -30,7 +30,7 @@ def program_parser(program: str, doc: str | None, *, quick: str = '', seed: int 
                             help='of what is drawn at random (default: %(default)s)')
     if out:
         parser.add_argument('--out', type=Path, metavar='DIR', help=f'folder for {out} (default: '
-                            'docs, or quick-results with --quick)')
+                            'docs/results, or quick-results with --quick)')
     return parser
 
 

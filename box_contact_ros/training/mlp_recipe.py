@@ -31,7 +31,7 @@ from .mlp_fit import SiteNetwork, evaluated, fit, point_errors, random_batches, 
 from .samples import MlpSamples, SizePair, draw_samples, mixture, scene_mixture
 
 HIDDEN = 20
-"""Hidden units: what fits the time that a batch has for the network (docs/search.md)."""
+"""Hidden units: what fits the time that a batch has for the network (docs/results/search.md)."""
 HARD_ROUNDS, HARD_PART, HARD_SHARE = (0.4, 0.55, 0.7, 0.85), 0.01, 0.2
 """After each of these parts of the steps, a pool of fresh pairs is searched for the hardest part.
 From then on, all that were found so far make up that share of what is learned from."""

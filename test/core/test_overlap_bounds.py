@@ -289,7 +289,7 @@ def test_boxes_that_lie_on_each_other_keep_their_frame(method):
     """A container rocks on another: its frame does not change, or the point would jump."""
     rng = np.random.default_rng(6)
     n = 2000
-    # Tilt and yaw of containers that have landed: docs/landing.csv.
+    # Tilt and yaw of containers that have landed: docs/results/landing.csv.
     axes = rng.normal(size=(n, 3)) * (1.0, 0.1, 1.0)
     turns = poses.small_rotations(axes, rng.uniform(0, 0.01, n))
     a, b, size_a, size_b = sheared(rng, n, poses.CONTAINER, poses.CONTAINER, turns,

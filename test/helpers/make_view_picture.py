@@ -1,4 +1,4 @@
-"""Take docs/view.png: the page of `view`, in a headless Chromium, while the load settles.
+"""Take docs/figures/view.png: the page of `view`, in a headless Chromium, while the load settles.
 
 Run as `python test/helpers/make_view_picture.py [--out FILE]`.
 """
@@ -21,7 +21,7 @@ SEED = 3
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--out', type=Path, default=ROOT / 'docs' / 'view.png')
+    parser.add_argument('--out', type=Path, default=ROOT / 'docs' / 'figures' / 'view.png')
     out = parser.parse_args().out
     view = subprocess.Popen(
         [sys.executable, '-u', '-m', 'box_contact_ros', 'view', '--no-browser',

@@ -389,7 +389,7 @@ def test_no_shared_memory_is_left_behind(start, client):
     """A node that ends by itself leaves no segment of its own in /dev/shm.
 
     Ports are shared with others. One that is killed does leave segments, which
-    docs/troubleshooting.md tells how to clear.
+    docs/how-to/troubleshooting.md tells how to clear.
     """
     before = set(os.listdir('/dev/shm')) if os.path.isdir('/dev/shm') else set()
     node = start()

@@ -1,6 +1,6 @@
 """Bad input at the contact node's doors: raw bytes and poses on topics, requests to services.
 
-The policy is the table "Bad input" in docs/conventions.md. The node runs as a process of its own,
+The policy: docs/reference/conventions.md, "Bad input". The node runs as a process of its own,
 as it does for users; what is sent is CDR, byte by byte, so that nothing on this side repairs it.
 """
 from __future__ import annotations

@@ -272,9 +272,9 @@ def test_files_named_in_backticks_exist():
 
 
 def test_figures_are_made(tmp_path):
-    """The script draws all the figures there are."""
+    """The script draws all the figures there are; a browser takes the view's."""
     folder = ROOT / 'docs' / 'figures'
     run(sys.executable, str(folder / 'make_figures.py'), '--out', str(tmp_path), MPLBACKEND='Agg',
         PYTHONPATH=os.pathsep.join([str(ROOT), os.environ.get('PYTHONPATH', '')]))
     assert {path.name for path in tmp_path.iterdir()} == {
-        path.name for path in folder.glob('*.png')}
+        path.name for path in folder.glob('*.png')} - {'view.png'}

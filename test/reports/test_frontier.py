@@ -167,14 +167,14 @@ def test_quick_run(tmp_path: Path) -> None:
 
 
 def test_the_readme_has_the_table_of_the_report() -> None:
-    text = (ROOT / 'docs' / 'frontier.md').read_text()
+    text = (ROOT / 'docs' / 'results' / 'frontier.md').read_text()
     lines = text.split('## In short')[1].split('\n\n')[2]
     assert lines.count('\n') == 1 + len(frontier.IN_SHORT)
     assert lines in (ROOT / 'README.md').read_text()
 
 
 def test_the_committed_report_has_all_of_them() -> None:
-    with (ROOT / 'docs' / 'frontier.csv').open() as file:
+    with (ROOT / 'docs' / 'results' / 'frontier.csv').open() as file:
         names = {row['contestant'] for row in csv.DictReader(file)}
     assert {*frontier.IN_SHORT, 'mlp 8', 'mlp edges 64', 'paper-continuous',
             *MODELS['soup'].reported_names} <= names

@@ -1,6 +1,6 @@
 """Bad input at the doors without ROS: the Python API, weights and scene files.
 
-The policy is the table "Bad input" in docs/conventions.md; test_hygiene_ros.py has the node's.
+The policy: docs/reference/conventions.md, "Bad input". test_hygiene_ros.py has the node's.
 """
 from __future__ import annotations
 

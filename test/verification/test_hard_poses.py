@@ -18,7 +18,7 @@ MODELS = ('exact', 'mlp')
 EPS = np.finfo(float).eps
 STATED = 4.0
 """Error of the MLP's point [% of the smaller box's longest edge] that nothing here exceeds;
-docs/accuracy.md has 2.9 as the worst of 600,000."""
+docs/results/accuracy.md has 2.9 as the worst of 600,000."""
 
 
 def solve(model, pairs):

@@ -119,7 +119,7 @@ def intro(quick: bool) -> str:
     note = f' Quick run: every {QUICK}th pattern only, and fewer for the soup.' if quick else ''
     return f"""# The paper's tables and figures, redone
 
-Made by `python -m box_contact_ros paper --out docs/paper_tables.md` on
+Made by `python -m box_contact_ros paper --out docs/results/paper_tables.md` on
 {output.machine(native)}, from the shipped weights and the seeds in their model cards.{note}
 Each table and figure can be made by itself: `--table 3`, `--figure 9`. Numbers under "paper" are
 the paper's.

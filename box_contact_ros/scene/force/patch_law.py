@@ -27,7 +27,7 @@ it serves one load, tick by tick.
 
 No constant knows the size of the load. A wrench is computed from contacts and from the state of the
 load at the time they were asked for, and is then held (`held_wrench.HeldWrench`).
-docs/force.md derives all of this.
+docs/explanation/force.md derives all of this.
 
 Conventions: those of `pose`; SI units. A wrench is (6,): force [N], then torque about the load's
 centre of mass [N m], both in the common frame. So is a velocity (6,): linear [m/s], then angular
