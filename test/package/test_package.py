@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+import box_contact_ros
 from box_contact_ros import __main__ as command_line
 from box_contact_ros import cli, resources
 from box_contact_ros.resources import resource_path
@@ -322,13 +323,20 @@ def test_a_build_without_a_compiler_names_it() -> None:
         '(Debian, Ubuntu: apt install g++)')
 
 
-def test_import_stays_small() -> None:
+@pytest.mark.parametrize('code', ['import box_contact_ros', 'from box_contact_ros import *'])
+def test_import_stays_small(code: str) -> None:
     """The core is for everybody: no ROS, PyTorch, FCL, MuJoCo or Numba comes with it."""
-    done = _run(
-        '-c',
-        'import sys, box_contact_ros\n'
-        'print(*{name.partition(".")[0] for name in sys.modules})',
-    )
+    done = _run('-c', f'import sys; {code}\n'
+                      'print(*{name.partition(".")[0] for name in sys.modules})')
     assert done.returncode == 0, done.stderr
-    assert 'box_contact_ros' in done.stdout.split()
-    assert not {'rclpy', 'torch', 'fcl', 'mujoco', 'matplotlib', 'numba'} & set(done.stdout.split())
+    loaded = set(done.stdout.split())
+    assert 'box_contact_ros' in loaded
+    assert not {'rclpy', 'torch', 'fcl', 'mujoco', 'matplotlib', 'numba'} & loaded
+    assert ('yaml' in loaded) == ('*' in code), 'scenes are loaded when they are used'
+
+
+def test_exported_names_are_what_dir_lists() -> None:
+    """A misspelt name fails as in any module."""
+    assert set(box_contact_ros.__all__) <= set(dir(box_contact_ros))
+    with pytest.raises(AttributeError, match='SceneSolvr'):
+        _ = box_contact_ros.SceneSolvr
