@@ -20,7 +20,7 @@ from rclpy.context import Context
 from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 
-from ..scene.scene_file import read_scene
+from ..scene.files.scene_file import read_scene
 from ..scene.scene_solver import Scene, SceneSolver, two_boxes
 from ..scene.stamp_pairing import PAIRINGS
 from ..solver.checks import shown

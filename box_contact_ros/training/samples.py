@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..core import stages
+from ..scene.files.scene_file import read_scene
 from ..scene.pose import quaternion_multiply, rotation_matrix
 from ..scene.pose_sets import (
     CONTAINER,
@@ -21,7 +22,6 @@ from ..scene.pose_sets import (
     stacked,
     turns,
 )
-from ..scene.scene_file import read_scene
 
 SizePair = tuple[tuple[float, float, float], tuple[float, float, float]]
 """Full extents of two boxes [m]."""

@@ -15,7 +15,7 @@ import torch
 
 from ..output import make_folder
 from ..resources import resource_path
-from ..scene.scene_file import SceneError
+from ..scene.files.scene_file import SceneError
 from ..solver.arguments import seed_number
 from ..solver.mlp import UNITS_MAX
 from . import mlp_recipe

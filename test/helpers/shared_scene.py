@@ -19,7 +19,7 @@ from sensor_msgs.msg import PointCloud2
 
 from box_contact_ros.node.messages import make_header, read_cloud
 from box_contact_ros.node.runtime import make_executor
-from box_contact_ros.scene.scene_file import read_scene
+from box_contact_ros.scene.files.scene_file import read_scene
 from box_contact_ros.scene.scene_solver import SceneSolver
 
 PERIOD = 0.005

@@ -19,7 +19,7 @@ import yaml
 
 from box_contact_ros.cli import PROGRAMS
 from box_contact_ros.node.contact_node import PARAMETERS
-from box_contact_ros.scene.scene_file import read_scene
+from box_contact_ros.scene.files.scene_file import read_scene
 from box_contact_ros.scene.scene_solver import Scene
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -45,7 +45,7 @@ exec(PROGRAM)
 SOLVER = """
 from box_contact_ros import ContactSolver
 from box_contact_ros.scene.scene_solver import SceneSolver
-from box_contact_ros.scene.scene_file import read_scene
+from box_contact_ros.scene.files.scene_file import read_scene
 for model in ('exact', 'mlp', 'paper'):
     ContactSolver((2, 2, 2), (2, 2, 2), model=model)([0] * 6 + [1], [0] * 6 + [1])
 SceneSolver(read_scene('config/scenes/yard_bay.yaml'))

@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.core import native
-from box_contact_ros.scene import scene_file
-from box_contact_ros.scene.scene_file import SceneError, parse_scene, read_scene
+from box_contact_ros.scene.files import scene_file
+from box_contact_ros.scene.files.scene_file import SceneError, parse_scene, read_scene
 from box_contact_ros.scene.scene_solver import Box, Pair, Scene, SceneSolver, two_boxes
 from box_contact_ros.solver.checks import SHOWN
 from box_contact_ros.verification import hard_poses

@@ -328,7 +328,7 @@ MUTANTS = {
         'return SetParametersResult(successful=False, reason=reason_of(error))',
         'return SetParametersResult(successful=True)', f'{TEST_SCENE_NODE} -k bad_scene'),
     'nesting without limit': Mutant(
-        'scene/scene_file.py', 'if depth > DEEPEST:', 'if False:',
+        'scene/files/scene_file.py', 'if depth > DEEPEST:', 'if False:',
         'test/scene/test_scene.py -k refusal_names'),
     'answers kept for whoever does not read': Mutant(
         'node/runtime.py', 'CONTACT_QOS = QoSProfile(depth=10,',

@@ -14,9 +14,9 @@ from typing import Any
 
 import yaml
 
-from ..resources import resource_path
-from ..solver.checks import shown
-from .scene_solver import Box, Pair, Place, Scene, dotted, faults
+from ...resources import resource_path
+from ...solver.checks import shown
+from ..scene_solver import Box, Pair, Place, Scene, dotted, faults
 
 LARGEST_FILE = 16 * 2**20  # bytes that are read at most; some 100,000 pairs
 DEEPEST = 20  # levels of nesting that are followed; a scene has four
