@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 
 from .. import output
-from ..baselines.engines import Engine, installed, ours
+from ..baselines.engines.engine import Engine, installed, ours
 from ..core import native
 from ..output import markdown_table, number, percentiles
 from ..resources import resource_path

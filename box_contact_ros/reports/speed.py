@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..baselines.engines import Engine, fcl_collision, mujoco_distance, ours
+from ..baselines.engines.engine import Engine, fcl_collision, mujoco_distance, ours
 from ..core import FORCE, instruction_sets, native
 from ..output import machine, markdown_table, no_garbage_collection, percentiles, write_csv
 from ..output import page as filled_page

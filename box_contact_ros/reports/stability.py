@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from .. import output
-from ..baselines.engines import in_subprocess
+from ..baselines.engines.engine import in_subprocess
 from ..core import native
 from ..scene.pose import quaternion_multiply
 from ..scene.pose_sets import Pairs

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from box_contact_ros import output
-from box_contact_ros.baselines.engines import Engine, installed, ours
+from box_contact_ros.baselines.engines.engine import Engine, installed, ours
 from box_contact_ros.reports import frontier
 from box_contact_ros.scene.pose import rotation_matrix
 from box_contact_ros.scene.pose_sets import SETS, Pairs

@@ -27,7 +27,7 @@ from ...apps.crane.landing import (
     solvers,
 )
 from ...apps.crane.mujoco_crane import Crane, CraneScenario
-from ...baselines.engines import CHOICES
+from ...baselines.engines.engine import CHOICES
 from ...baselines.point_law import PointLaw
 from ...scene.pose_sets import CONTAINER
 from ...solver.contact import Contact

@@ -17,11 +17,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..scene.pose import rotation_matrix
-from ..scene.pose_sets import Pairs
-from ..solver.contact import Contacts
-from ..solver.contact_solver import ContactSolver
-from ..solver.models import find_model
+from ...scene.pose import rotation_matrix
+from ...scene.pose_sets import Pairs
+from ...solver.contact import Contacts
+from ...solver.contact_solver import ContactSolver
+from ...solver.models import find_model
 
 MOST_CONTACTS = 16  # contacts asked for; two boxes have at most eight
 
