@@ -75,7 +75,7 @@ PROGRAMS = {
         'reports.accuracy', 'report',
         'point error of a model against the exact one, per set of poses and contact class'),
     'frontier': _program(
-        'reports.frontier', 'report',
+        'reports.frontier.frontier', 'report',
         'speed against error of every model and of the engines beside them, as table and picture'),
     'fuzz': _program(
         'verification.fuzz', 'report fuzz',

@@ -10,7 +10,7 @@ import pytest
 
 from box_contact_ros import output
 from box_contact_ros.baselines.engines.engine import Engine, installed, ours
-from box_contact_ros.reports import frontier
+from box_contact_ros.reports.frontier import frontier
 from box_contact_ros.scene.pose import rotation_matrix
 from box_contact_ros.scene.pose_sets import SETS, Pairs
 from box_contact_ros.solver.contact_solver import ContactSolver

@@ -12,8 +12,8 @@ import pytest
 from box_contact_ros import ContactSolver
 from box_contact_ros.core import instruction_sets, stages
 from box_contact_ros.output import processor, versions
-from box_contact_ros.reports import frontier, speed
-from box_contact_ros.reports.speed import UNIT, Timing
+from box_contact_ros.reports.frontier import frontier, speed
+from box_contact_ros.reports.frontier.speed import UNIT, Timing
 from box_contact_ros.solver.models import gated_models
 
 

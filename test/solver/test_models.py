@@ -116,7 +116,8 @@ def test_the_solver_imports_no_baseline():
 @pytest.mark.slow
 def test_an_added_model_is_in_reports_and_programs(lifted, tmp_path, capsys):
     """None of them has a list of its own."""
-    from box_contact_ros.reports import frontier, speed, stability
+    from box_contact_ros.reports import stability
+    from box_contact_ros.reports.frontier import frontier, speed
     from box_contact_ros.verification import fuzz
 
     assert {'lifted-1', 'lifted-7'} <= {engine.name for engine in frontier.contestants()[0]}

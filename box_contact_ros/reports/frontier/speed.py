@@ -20,13 +20,13 @@ from pathlib import Path
 
 import numpy as np
 
-from ..baselines.engines.engine import Engine, fcl_collision, mujoco_distance, ours
-from ..core import FORCE, instruction_sets, native
-from ..output import machine, markdown_table, no_garbage_collection, percentiles, write_csv
-from ..output import page as filled_page
-from ..scene.pose import quaternion_multiply
-from ..scene.pose_sets import CONTAINER, CUBE, SETS, Pairs, log_uniform, turns
-from ..solver.models import gated_models
+from ...baselines.engines.engine import Engine, fcl_collision, mujoco_distance, ours
+from ...core import FORCE, instruction_sets, native
+from ...output import machine, markdown_table, no_garbage_collection, percentiles, write_csv
+from ...output import page as filled_page
+from ...scene.pose import quaternion_multiply
+from ...scene.pose_sets import CONTAINER, CUBE, SETS, Pairs, log_uniform, turns
+from ...solver.models import gated_models
 
 UNIT = 'MuJoCo mj_geomDistance'  # the contestant whose median single call is the unit of all ratios
 PACKAGES = ('numpy', 'mujoco', 'python-fcl')

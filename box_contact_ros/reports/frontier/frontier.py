@@ -24,13 +24,13 @@ from typing import Any
 
 import numpy as np
 
-from .. import output
-from ..baselines.engines.engine import Engine, installed, ours
-from ..core import native
-from ..output import markdown_table, number, percentiles
-from ..resources import resource_path
-from ..scene.pose import degrees_between
-from ..scene.pose_sets import (
+from ... import output
+from ...baselines.engines.engine import Engine, installed, ours
+from ...core import native
+from ...output import markdown_table, number, percentiles
+from ...resources import resource_path
+from ...scene.pose import degrees_between
+from ...scene.pose_sets import (
     CONTAINER,
     SETS,
     Generator,
@@ -40,11 +40,11 @@ from ..scene.pose_sets import (
     log_uniform,
     stacked,
 )
-from ..solver.arguments import program_parser
-from ..solver.models import MODELS
-from ..solver.weights_file import load_weights
-from .accuracy import CLASSES, classify
-from .paper.paper_tables import PAPER_NETWORK, PAPER_SOUP
+from ...solver.arguments import program_parser
+from ...solver.models import MODELS
+from ...solver.weights_file import load_weights
+from ..accuracy import CLASSES, classify
+from ..paper.paper_tables import PAPER_NETWORK, PAPER_SOUP
 from .speed import pinned, take_turns, usable_cores, write_speed
 
 

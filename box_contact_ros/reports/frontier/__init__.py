@@ -1,0 +1,1 @@
+"""Speed against error: the program `frontier`, its speed gates."""
