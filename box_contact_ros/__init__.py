@@ -11,17 +11,17 @@ from .solver.contact_solver import ContactSolver
 from .solver.models import MODELS
 
 if TYPE_CHECKING:
+    from .scene.files.scene_file import SceneError, read_scene
     from .scene.force.held_wrench import HeldWrench
     from .scene.force.patch_law import PatchLaw
-    from .scene.scene_file import SceneError, read_scene
     from .scene.scene_solver import Scene, SceneSolver
 
 __all__ = ['MODELS', 'Contact', 'ContactSolver', 'Contacts', 'HeldWrench', 'PatchLaw', 'Scene',
            'SceneError', 'SceneSolver', 'read_scene']
 
 _LOADED_WHEN_USED = {'HeldWrench': 'scene.force.held_wrench', 'PatchLaw': 'scene.force.patch_law',
-                     'Scene': 'scene.scene_solver', 'SceneError': 'scene.scene_file',
-                     'SceneSolver': 'scene.scene_solver', 'read_scene': 'scene.scene_file'}
+                     'Scene': 'scene.scene_solver', 'SceneError': 'scene.files.scene_file',
+                     'SceneSolver': 'scene.scene_solver', 'read_scene': 'scene.files.scene_file'}
 
 
 def __getattr__(name: str) -> Any:
