@@ -86,8 +86,9 @@ def describe(pairs: Pairs) -> MlpSamples:
     turn, half = found.rotation, found.bounds_half
     from_b = np.einsum('nji,nj->ni', turn, found.centroid - found.pressed_offset_a)
     centroid = np.where(found.frame_b[:, None], from_b, found.centroid)
-    seen_from_b = np.swapaxes(turn, 1, 2) @ found.covariance @ turn
-    covariance = np.where(found.frame_b[:, None, None], seen_from_b, found.covariance)
+    axes = rotation_matrix(np.where(
+        found.frame_b[:, None], pairs.pose_b[:, 3:], pairs.pose_a[:, 3:]))
+    covariance = np.swapaxes(axes, 1, 2) @ found.covariance @ axes
     edge = np.minimum(pairs.size_a.max(axis=1), pairs.size_b.max(axis=1))[:, None]
     trace = np.trace(covariance, axis1=1, axis2=2)[:, None]
     samples = MlpSamples(

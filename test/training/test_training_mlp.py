@@ -12,6 +12,7 @@ torch = pytest.importorskip('torch')
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.core import stages
+from box_contact_ros.scene.pose import rotation_matrix
 from box_contact_ros.scene.pose_sets import Pairs, containers, cubes, size_pairs, tilted
 from box_contact_ros.solver.mlp import UNITS_MAX, core_numbers
 from box_contact_ros.solver.weights_file import (
@@ -138,10 +139,11 @@ def test_the_network_is_the_cores() -> None:
 
 
 def test_samples_are_the_exact_overlap() -> None:
-    """A point of a covariance is seen from the bounds' frame: moved back, it is the exact one."""
+    """The covariance is seen from the bounds' frame: moved back, it is that of model `exact`."""
     pairs = size_pairs(np.random.default_rng(6), 500)
     data = samples.describe(pairs)
-    found = stages(*pairs, names=('covariance', 'volume', 'bounds_half', 'rotation', 'frame_b'))
+    found = stages(*pairs, names=('bounds_half', 'frame_b'))
+    exact = pairs.contacts(ContactSolver((1, 1, 1), (1, 1, 1), model='exact'))
     assert 50 < found.frame_b.sum() < 450
     for k in range(500):
         half = found.bounds_half[k]
@@ -149,11 +151,11 @@ def test_samples_are_the_exact_overlap() -> None:
         covariance[samples.ROW, samples.COLUMN] = data.covariance[:, k]
         covariance[samples.COLUMN, samples.ROW] = data.covariance[:, k]
         covariance *= np.outer(half, half)
-        if found.frame_b[k]:
-            covariance = found.rotation[k] @ covariance @ found.rotation[k].T
-        trace = np.trace(found.covariance[k])
-        np.testing.assert_allclose(covariance, found.covariance[k], atol=1e-6 * trace)
-        assert data.volume[k] * 8.0 * half.prod() == pytest.approx(found.volume[k], rel=1e-6)
+        axes = rotation_matrix((pairs.pose_b if found.frame_b[k] else pairs.pose_a)[k, 3:])
+        trace = np.trace(exact.covariance[k])
+        np.testing.assert_allclose(axes @ covariance @ axes.T, exact.covariance[k],
+                                   atol=1e-6 * trace)
+        assert data.volume[k] * 8.0 * half.prod() == pytest.approx(exact.volume[k], rel=1e-6)
         np.testing.assert_allclose(data.spread[:, k], half / np.sqrt(trace), rtol=1e-6)
 
 
