@@ -6,7 +6,7 @@ SHELL := bash
 .ONESHELL:
 .NOTPARALLEL:
 .DEFAULT_GOAL := help
-.PHONY: help demo view test check test-arm coverage clean
+.PHONY: help demo view test check reports test-arm coverage clean
 
 # Arguments for the program behind the target: make test ARGS='-k sat -x'
 ARGS ?=
@@ -57,6 +57,10 @@ check:
 	$(LINT)
 	exec $(PYTEST) -m 'not slow' test/core test/solver test/scene \
 	    test/package/test_house.py test/package/test_ament.py $(ARGS)
+
+reports:
+	@.ci/setup test
+	exec $(PY) -m box_contact_ros reports $(ARGS)
 
 test-arm:
 	@.ci/setup test

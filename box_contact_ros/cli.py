@@ -89,6 +89,9 @@ PROGRAMS = {
     'paper': _program(
         'reports.paper.paper_tables', 'report',
         "redo the source paper's tables, its figures beside ours"),
+    'reports': _program(
+        'reports.remake.remake', 'ros sim soup train report fuzz peers',
+        'remake every table and picture of docs/results, with the programs above'),
 }
 
 # What each extra brings, by top-level module. A module that is missing and not listed here is a

@@ -1,0 +1,1 @@
+"""Every report at once, and the page that joins those of latency."""

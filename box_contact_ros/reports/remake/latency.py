@@ -1,0 +1,78 @@
+"""The page of latencies: solver, nodes and transport, from the CSVs of three other reports."""
+from __future__ import annotations
+
+import csv
+from collections import defaultdict
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from ... import output
+
+RUNS = {'node alone, 1 kHz': '1000-in-turn', 'beside others, 200 Hz': '200-side-by-side',
+        'beside others, 1 kHz': '1000-side-by-side'}
+"""Folders of the bench by load."""
+NODES = {'contact': 'contact node', 'soup': 'soup node', 'echo': 'echo node'}
+SOLVERS = ('mlp', 'exact')
+
+Row = list[str]
+
+
+def _read(path: Path) -> list[dict[str, str]]:
+    with path.open(encoding='utf-8') as file:
+        return list(csv.DictReader(file))
+
+
+def solver_rows(rows: list[dict[str, str]]) -> Iterator[Row]:
+    """Yield single calls of the models, by instruction set."""
+    times = defaultdict(list)
+    for row in rows:
+        if row['kind'] == 'single' and row['name'] in SOLVERS:
+            times[row['instruction_set'], row['name']].append(1e-3 * float(row['ns']))
+    for (instruction_set, name), found in times.items():
+        yield [f'solver, `{name}`', instruction_set, '', '',
+               *(output.number(value) for value in output.percentiles(found, 50, 99)), '']
+
+
+def node_rows(load: str, rows: list[dict[str, str]]) -> Iterator[Row]:
+    """Yield a row for each node of a run of the bench."""
+    p50 = {}
+    for node in NODES:
+        mine = [row for row in rows if row['node'] == node]
+        p50[node] = _median(mine, 'latency_p50 [s]')
+    for node, title in NODES.items():
+        mine = [row for row in rows if row['node'] == node]
+        if mine:
+            yield [title, load, f'{sum(int(row["sent"]) for row in mine):,}',
+                   f'{sum(int(row["lost"]) for row in mine):,}',
+                   output.number(p50[node]), output.number(_median(mine, 'latency_p99 [s]')),
+                   output.number(p50[node] / p50['echo'])]
+
+
+def _median(rows: list[dict[str, str]], column: str) -> float:
+    """Return the median [µs] of a column [s] over streams."""
+    found = [1e6 * float(row[column]) for row in rows if row[column]]
+    return float(np.median(found)) if found else float('nan')
+
+
+def page(folder: Path) -> str:
+    """Return the page from the CSVs of a folder; runs that it lacks are left out."""
+    rows, machine = [], 'no machine'
+    if (folder / 'speed.csv').exists():
+        rows += solver_rows(_read(folder / 'speed.csv'))
+    for load, name in RUNS.items():
+        path = folder / 'bench' / name / 'bench.csv'
+        if path.exists():
+            run = _read(path)
+            machine = run[0]['machine']
+            rows += node_rows(load, run)
+    head = ['what', 'load, or instruction set', 'sent', 'lost', 'p50 [µs]', 'p99 [µs]',
+            'p50 by echo']
+    return output.page('reports/remake/latency', machine=machine,
+                       table=output.markdown_table(head, rows, words=2))
+
+
+def write_page(folder: Path) -> None:
+    """Write latency.md."""
+    (folder / 'latency.md').write_text(page(folder), 'utf-8')

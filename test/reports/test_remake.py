@@ -1,0 +1,72 @@
+"""All reports at once: what runs, what failed, and the page of latencies."""
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip('tqdm')
+
+from box_contact_ros.cli import PROGRAMS
+from box_contact_ros.output import RESULTS
+from box_contact_ros.reports.remake import latency, remake
+from box_contact_ros.reports.remake.remake import REPORTS, Report
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def test_every_report_is_a_program() -> None:
+    assert {report.arguments[0] for report in REPORTS} <= PROGRAMS.keys()
+    assert len({report.name for report in REPORTS}) == len(REPORTS)
+
+
+def test_every_result_has_a_report(tmp_path: Path) -> None:
+    """No page of docs/results is written by a hand or by a program that `reports` forgets."""
+    programs = {report.arguments[0] for report in REPORTS}
+    for page in sorted((ROOT / RESULTS).rglob('*.md')):
+        text = page.read_text('utf-8')
+        made_by = [name for name in PROGRAMS if f'python -m box_contact_ros {name}' in text]
+        assert page.name in ('README.md', 'bench.md') or set(made_by) & {*programs, 'reports'}, page
+
+
+def test_the_minutes_keep_the_promise() -> None:
+    """All reports together take at most 45 minutes on two cores."""
+    side_by_side = sum(report.minutes for report in REPORTS if not report.alone) / 2.0
+    assert side_by_side + sum(report.minutes for report in REPORTS if report.alone) <= 45.0
+
+
+def test_a_report_that_fails_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+                                      capsys: pytest.CaptureFixture[str]) -> None:
+    """The others run all the same; the status is 1, and the log has the reason."""
+    reports = (Report(name='good', minutes=1.0, arguments=('paper', '--help'), quick=()),
+               Report(name='bad', minutes=1.0, arguments=('paper', '--table', '9'), quick=(),
+                      alone=False))
+    monkeypatch.setattr(remake, 'REPORTS', reports)
+    assert remake.main(['--out', str(tmp_path)]) == 1
+    words = capsys.readouterr().err
+    assert 'bad ended with status 2' in words and 'good ended' not in words
+    log = Path(words.partition('its output: ')[2].split()[0])
+    assert 'invalid choice' in log.read_text()
+    assert 'usage: paper' in (log.parent / 'good.log').read_text()
+    assert remake.main(['--out', str(tmp_path), '--only', 'good']) == 0
+
+
+def test_the_committed_page_of_latencies_is_that_of_the_tables() -> None:
+    assert (ROOT / RESULTS / 'latency.md').read_text('utf-8') == latency.page(ROOT / RESULTS)
+
+
+def test_latencies_are_medians_over_streams_and_ratios_to_the_echo(tmp_path: Path) -> None:
+    """Of 100, 300 and 200 µs the median is 200, twice the echo's 100."""
+    folder = tmp_path / 'bench' / '1000-in-turn'
+    folder.mkdir(parents=True)
+    with (folder / 'bench.csv').open('w', newline='') as file:
+        write = csv.writer(file)
+        write.writerow(['node', 'sent', 'lost', 'latency_p50 [s]', 'latency_p99 [s]', 'machine'])
+        for p50 in (1e-4, 3e-4, 2e-4):
+            write.writerow(['contact', 1000, 1, p50, 1e-3, 'here'])
+        write.writerow(['echo', 1000, 0, 1e-4, 4e-4, 'here'])
+    page = latency.page(tmp_path)
+    assert '| contact node | node alone, 1 kHz | 3,000 | 3 | 200 | 1,000 | 2.00 |' in page
+    assert '| echo node | node alone, 1 kHz | 1,000 | 0 | 100 | 400 | 1.00 |' in page
+    assert 'ran on: here' in page and 'soup node |' not in page
