@@ -25,7 +25,7 @@ from ...scene.pose_sets import CUBE, Pairs, at_depth, stacks
 from ...solver.contact import Contacts
 from ...solver.contact_solver import ContactSolver
 from ...training.paper_recipe.dataset import quaternion_from_euler
-from ..speed import pinned, usable_cores
+from ..frontier.speed import pinned, usable_cores
 from .paper_tables import PAPER_NETWORK
 from .paper_tables import PAPER_SOUP as PAPER
 
