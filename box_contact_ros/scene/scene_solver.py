@@ -5,6 +5,7 @@ axis-aligned bounding boxes come near each other. These go through the solver as
 """
 from __future__ import annotations
 
+import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -32,8 +33,7 @@ class Box:
     pose_topic: str = ''  # where a moving box's poses come from
 
 
-@dataclass(frozen=True)
-class Pair:
+class Pair(NamedTuple):
     """Two boxes whose contact is asked for; the normal points from a to b."""
 
     id: int
@@ -41,26 +41,38 @@ class Pair:
     a: str
     b: str
 
+    @classmethod
+    def between(cls, a: str, b: str) -> Pair:
+        """Return the pair of two boxes, with the name and id that a scene file gives it."""
+        return cls(id_of(f'{a}_{b}'), f'{a}_{b}', a, b)
+
+
+def id_of(name: str) -> int:
+    """Return the id of a pair that has only a name: the CRC-32 of the name in UTF-8."""
+    return zlib.crc32(name.encode())
+
 
 @dataclass(frozen=True)
 class Scene:
-    """Boxes by name, and the pairs. Raises ValueError for anything that cannot be computed."""
+    """Boxes by name, and the pairs. Raises Fault for anything that cannot be computed."""
 
     boxes: Mapping[str, Box]
     pairs: tuple[Pair, ...]
     frame_id: str = ''
     """The common frame that all poses must be in; empty: any, as long as it is the same."""
+    pose_array: bool = False
+    """Whether one message has the poses of all moving boxes; else each box has a topic."""
 
     def __post_init__(self) -> None:
         for place, reason in faults(self.boxes, self.pairs):
-            raise ValueError(f'{dotted(place)}: {reason}')
+            raise Fault(place, reason)
 
     @cached_property
     def moving(self) -> tuple[str, ...]:
-        """Names of the moving boxes that occur in a pair, in the order of the boxes."""
+        """Names of the moving boxes in their order; without an array, only of those in a pair."""
         listed = {name for pair in self.pairs for name in (pair.a, pair.b)}
         return tuple(name for name, box in self.boxes.items()
-                     if box.pose is None and name in listed)
+                     if box.pose is None and (self.pose_array or name in listed))
 
 
 def two_boxes(size_a: Sequence[float], size_b: Sequence[float]) -> Scene:
@@ -79,6 +91,14 @@ def dotted(place: Place) -> str:
     return text.removeprefix('.')
 
 
+class Fault(ValueError):
+    """What is wrong with a scene, and where."""
+
+    def __init__(self, place: Place, reason: str) -> None:
+        super().__init__(f'{dotted(place)}: {reason}')
+        self.place, self.reason = place, reason
+
+
 def faults(boxes: Mapping[str, Box], pairs: Sequence[Pair]) -> Iterator[tuple[Place, str]]:
     """Yield the place and the reason of everything that is wrong with a scene."""
     for name, box in boxes.items():
@@ -90,25 +110,27 @@ def faults(boxes: Mapping[str, Box], pairs: Sequence[Pair]) -> Iterator[tuple[Pl
             yield ('boxes', name, 'pose'), fault
     if not pairs:
         yield ('pairs',), 'a scene needs at least one pair'
-    # Number of the first pair with an id, a name, two boxes.
-    seen: dict[tuple[str, object], int] = {}
     for number, pair in enumerate(pairs):
-        place = ('pairs', number)
+        place, a, b = ('pairs', number), boxes.get(pair.a), boxes.get(pair.b)
         if not 0 <= pair.id <= LARGEST_ID:
             yield (*place, 'id'), f'{pair.id} is outside 0 to {LARGEST_ID}'
-        unknown = [side for side in ('a', 'b') if getattr(pair, side) not in boxes]
-        for side in unknown:
-            yield (*place, side), f'{shown(getattr(pair, side))} is none of the boxes'
+        for side, name in (('a', pair.a), ('b', pair.b)):
+            if name not in boxes:
+                yield (*place, side), f'{shown(name)} is none of the boxes'
         if pair.a == pair.b:
             yield (*place, 'b'), f'{shown(pair.b)} is the same box as a'
-        elif not unknown and boxes[pair.a].pose and boxes[pair.b].pose:
+        elif a and b and a.pose and b.pose:
             yield place, f'{shown(pair.a)} and {shown(pair.b)} are both fixed'
-        for what, value in (('id', pair.id), ('name', pair.name),
-                            ('pair of boxes', frozenset((pair.a, pair.b)))):
-            first = seen.setdefault((what, value), number)
-            if first != number:
-                yield (place if what == 'pair of boxes' else (*place, what),
-                       f'the same {what} as pairs[{first}]')
+    for what, field, values in (
+            ('id', ('id',), [pair.id for pair in pairs]),
+            ('name', ('name',), [pair.name for pair in pairs]),
+            ('pair of boxes', (), [tuple(sorted(pair[2:])) for pair in pairs])):
+        if len(set(values)) < len(values):
+            seen: dict[object, Pair] = {}
+            number, first = next((n, first) for n, value in enumerate(values)
+                                 if (first := seen.setdefault(value, pairs[n])) is not pairs[n])
+            yield ('pairs', number, *field), (
+                f'the same {what} as that of {shown(first.a)} and {shown(first.b)}')
 
 
 class Answer(NamedTuple):

@@ -193,6 +193,13 @@ def test_ids_are_never_used_again(node, client):
     assert set_scene(node, WITH_CRATE).successful
 
 
+def test_shipped_scenes_replace_each_other(node):
+    """Their ids follow from the names of their pairs."""
+    for name in ('two_boxes', 'yard_bay', 'spreader_container_stack', 'yard_bay', 'two_boxes'):
+        result = set_scene(node, f'config/scenes/{name}.yaml')
+        assert result.successful, result.reason
+
+
 def test_a_stale_box_is_nan_and_never_an_old_contact(client):
     """The lorry falls silent while the load lies on it: its pair becomes a row of NaN.
 

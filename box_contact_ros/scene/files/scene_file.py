@@ -16,7 +16,8 @@ import yaml
 
 from ...resources import resource_path
 from ...solver.checks import shown
-from ..scene_solver import Box, Pair, Place, Scene, dotted, faults
+from ..scene_solver import Fault, Place, Scene, dotted
+from .short_forms import expand_boxes, expand_pairs
 
 LARGEST_FILE = 16 * 2**20  # bytes that are read at most; some 100,000 pairs
 DEEPEST = 20  # levels of nesting that are followed; a scene has four
@@ -91,19 +92,49 @@ def parse_scene(text: str, name: str = 'scene') -> Scene:
     fault = _first_fault(data, lines)
     if fault:
         raise refusal(*fault)
-    boxes = {}
-    for key, box in data['boxes'].items():
-        topic = '' if 'pose' in box else box.get('pose_topic', f'{key}/pose')
-        try:
-            pose = tuple(map(float, box['pose'])) if 'pose' in box else None
-            boxes[key] = Box(key, tuple(map(float, box['size'])), pose, topic)
-        except OverflowError:
-            raise refusal(('boxes', key), 'a number is too large') from None
-    pairs = tuple(Pair(int(pair['id']), pair['name'], pair['a'], pair['b'])
-                  for pair in data['pairs'])
-    for place, reason in faults(boxes, pairs):
-        raise refusal(place, reason)
-    return Scene(boxes, pairs, data.get('frame_id', ''))
+    try:
+        boxes, key_of = expand_boxes(data)
+        pairs, entry_of = expand_pairs(data['pairs'], boxes)
+    except Fault as error:
+        raise refusal(error.place, error.reason) from None
+    try:
+        return Scene(boxes, pairs, data.get('frame_id', ''), data.get('poses') == 'array')
+    except Fault as error:
+        place = error.place
+        if place[0] == 'boxes' and len(place) > 1:
+            place = ('boxes', key_of[str(place[1])], *place[2:])
+        elif len(place) > 1:
+            place = ('pairs', entry_of[int(place[1])], *place[2:])
+        raise refusal(place, error.reason) from None
+
+
+def scene_text(scene: Scene) -> str:
+    """Return a scene as the text of a file, which `read_scene` reads as the same scene.
+
+    Raises ValueError for a scene that a file cannot describe, such as one with a name that no topic
+    can have.
+    """
+    lines = ['frame_id: ' + json.dumps(scene.frame_id)] if scene.frame_id else []
+    lines += ['poses: array'] if scene.pose_array else []
+    lines.append('boxes:')
+    for name, box in scene.boxes.items():
+        fields = {'size': box.size} | ({'pose': box.pose} if box.pose else {}) | (
+            {'pose_topic': box.pose_topic} if box.pose_topic else {})
+        lines.append(f'  {json.dumps(name)}: {json.dumps(fields)}')
+    lines.append('pairs:')
+    lines += [f'  - {json.dumps(pair._asdict())}' for pair in scene.pairs]
+    text = '\n'.join([*lines, ''])
+    if len(text.encode()) > LARGEST_FILE:
+        raise ValueError(f'{len(scene.pairs)} pairs need more than {LARGEST_FILE} bytes')
+    if parse_scene(text) != scene:
+        raise ValueError('not all fields of this scene can stand in a file')
+    return text
+
+
+def write_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
+    """Write a scene to a file, as `scene_text` has it."""
+    text = scene_text(scene)
+    Path(path).write_text(text, 'utf-8')
 
 
 def _plain(text: str, lines: dict[Place, int], refusal: Any) -> Any:
@@ -169,7 +200,10 @@ def _first_fault(data: Any, lines: dict[Place, int]) -> tuple[Place, str] | None
 def _words(error: Any) -> str:
     value = shown(error.instance)
     if error.validator == 'not':
-        return 'has both pose (it is fixed) and pose_topic (it moves)'
+        return 'has both {} and {}'.format(*error.validator_value['required'])
+    if error.validator == 'oneOf':
+        return 'needs one of: ' + '; '.join(
+            ' and '.join(choice['required']) for choice in error.validator_value)
     if error.validator in ('minItems', 'maxItems') and error.validator_value > 1:
         return f'must be {error.validator_value} numbers, not {value}'
     if error.validator == 'exclusiveMinimum':
