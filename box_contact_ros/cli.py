@@ -94,6 +94,9 @@ PROGRAMS = {
         'remake every table and picture of docs/results, with the programs above'),
 }
 
+_CHECK = _program('scene.files.scene_check', '', 'what a scene file means, without ROS')
+"""What `contact_node --check FILE` starts."""
+
 # What each extra brings, by top-level module. A module that is missing and not listed here is a
 # fault of the package, not of the user's installation, and keeps its traceback.
 MODULES_OF_EXTRA = {
@@ -119,8 +122,9 @@ def run(name: str, args: Sequence[str]) -> int:
     if name not in PROGRAMS:
         print(_unknown(name), file=sys.stderr)
         return 2
-    module, _, function = PROGRAMS[name].target.partition(':')
-    if 'ros' in PROGRAMS[name].extras and not _shared_memory_has_room():
+    program = _CHECK if name == 'contact_node' and '--check' in args else PROGRAMS[name]
+    module, _, function = program.target.partition(':')
+    if 'ros' in program.extras and not _shared_memory_has_room():
         return 1
     # argparse takes the program's name from here: the same one in usage lines, however started.
     sys.argv = [name, *args]

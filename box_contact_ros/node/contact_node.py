@@ -6,6 +6,7 @@ contacts (sensor_msgs/PointCloud2, one row per contact) on every evaluation, and
 
 With a scene file: <box>/pose of every moving box, and <pair>/contact/point, <pair>/contact/normal.
 It is a lifecycle node that configures and activates itself, unless autostart is false.
+`contact_node --check FILE` tells what a scene file means, without ROS.
 """
 from __future__ import annotations
 

@@ -20,6 +20,9 @@ from ..solver.contact_solver import ContactSolver
 
 LARGEST_ID = 2**32 - 1  # ids of pairs are uint32 in the cloud
 
+POSE_ARRAY = 'poses'
+"""Topic of the poses of all moving boxes, where they come as one message."""
+
 _new_tuple = tuple.__new__  # a named tuple's own constructor is Python code
 
 

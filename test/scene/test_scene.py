@@ -322,16 +322,26 @@ def test_files_that_cannot_be_read(tmp_path, monkeypatch):
         read_scene(str(tmp_path / 'latin'))
 
 
+SHORT_FORMS = """\
+{poses: array, types: {t: {size: [1, 1, 1]}}, boxes: {m: {type: t, count: 3}, s: {stack: {type: t,
+rows: 2, columns: 5, tiers: [1, 3], gap: 0.1, origin: [0, 0, 6]}}}, pairs: [{moving: all, fixed: s}]}
+"""
+SHORT = ['array', '{t: {size: [1, 1, 1]}}', '[1, 1, 1]', '3', '2', '5', '[1, 3]', '0.1',
+         '[0, 0, 6]', 'all', 'fixed: s', '{moving', 'type: t', 't']
 JSON = st.recursive(st.none() | st.booleans() | st.floats() | st.integers() | st.text(max_size=8),
                     lambda inner: st.lists(inner, max_size=4) | st.dictionaries(
-                        st.sampled_from(['boxes', 'pairs', 'size', 'pose', 'id', 'name', 'a', 'b']),
+                        st.sampled_from(['boxes', 'pairs', 'size', 'pose', 'id', 'name', 'a', 'b',
+                                         'types', 'type', 'stack', 'rows', 'tiers', 'count',
+                                         'moving', 'fixed', 'poses', 'gap', 'origin']),
                         inner, max_size=4), max_leaves=12)
 
 
 @settings(deadline=None)
 @given(st.one_of(st.text(max_size=200), JSON.map(json.dumps),
                  st.tuples(st.integers(0, len(GOOD)), st.text(max_size=5)).map(
-                     lambda edit: GOOD[:edit[0]] + edit[1] + GOOD[edit[0]:])))
+                     lambda edit: GOOD[:edit[0]] + edit[1] + GOOD[edit[0]:]),
+                 st.tuples(st.sampled_from(SHORT), JSON).map(
+                     lambda edit: SHORT_FORMS.replace(edit[0], json.dumps(edit[1])))))
 def test_any_text_is_a_scene_or_refused(text):
     """Nothing but SceneError comes out, and what is a scene can be computed."""
     try:

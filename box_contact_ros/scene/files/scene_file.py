@@ -211,7 +211,9 @@ def _words(error: Any) -> str:
     if error.validator == 'type':
         kinds = {'object': 'a mapping', 'array': 'a list', 'number': 'a number',
                  'integer': 'a whole number', 'string': 'a string'}
-        return f'{value} is not {kinds.get(error.validator_value, error.validator_value)}'
+        accepted = error.validator_value
+        return f'{value} is not ' + ' or '.join(
+            kinds[kind] for kind in ([accepted] if isinstance(accepted, str) else accepted))
     if error.validator == 'pattern':
         return f'{value} is no name that a topic can have'
     if error.validator in ('required', 'additionalProperties'):
