@@ -12,9 +12,10 @@ This is the one place that knows; everything else asks `resource_path`.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 _PACKAGE = Path(__file__).resolve().parent
@@ -41,6 +42,44 @@ def resource_path(*parts: str) -> Path:
         f'box_contact_ros has no {os.path.join(*parts)}; looked at:'
         + ''.join(f'\n  {path}' for path in looked_at)
     )
+
+
+def find_file(name: str | os.PathLike[str]) -> Path:
+    """Return the path that a user names, of one of the package's own where it leads nowhere."""
+    path = Path(name)
+    if not path.is_absolute() and not path.exists():
+        with contextlib.suppress(FileNotFoundError):
+            path = resource_path(str(name))
+    return path
+
+
+class OpenFiles:
+    """The files that anybody on a network may name.
+
+    They are those below some directories, a few by name, and the package's scenes and weights.
+    """
+
+    def __init__(self, directories: Iterable[str], files: Iterable[str]) -> None:
+        """Take both as they are now: neither a link nor the working directory moves them later."""
+        self._files = {_real(name) for name in files}
+        # A service that starts in / would open the whole disk: / counts only if it is written.
+        self._roots = [Path(os.path.realpath(name)) for name in directories
+                       if name and (name == '/' or os.path.realpath(name) != '/')]
+        for folder in ('config', 'weights'):
+            with contextlib.suppress(FileNotFoundError):
+                self._roots.append(resource_path(folder).resolve())
+
+    def find(self, name: str) -> str:
+        """Return a file's path without links and `..`, or raise ValueError. It may not exist."""
+        found = _real(name)
+        if found in self._files or any(found.is_relative_to(root) for root in self._roots):
+            return str(found)
+        raise ValueError(f'{found} is not below the directories of files_from')
+
+
+def _real(name: str) -> Path:
+    """Return where a name leads."""
+    return Path(os.path.realpath(find_file(name)))
 
 
 def _roots() -> Iterator[Path]:

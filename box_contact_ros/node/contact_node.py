@@ -11,6 +11,7 @@ It is a lifecycle node that configures and activates itself, unless autostart is
 from __future__ import annotations
 
 import gc
+import os
 from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any, ClassVar
@@ -20,8 +21,10 @@ from rclpy.clock_type import ClockType
 from rclpy.context import Context
 from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.logging import get_logger
 
-from ..scene.files.scene_file import read_scene
+from ..resources import OpenFiles
+from ..scene.files.scene_file import is_inline, read_scene
 from ..scene.scene_solver import Scene, SceneSolver, two_boxes
 from ..scene.stamp_pairing import PAIRINGS
 from ..solver.checks import shown
@@ -39,7 +42,8 @@ from .parameters import (
     size,
     text,
 )
-from .runtime import run_node
+from .rclpy_workarounds import refuse_transitions
+from .runtime import LOG_SECONDS, run_node
 from .scene_topics import SceneTopics
 
 
@@ -49,6 +53,15 @@ def model(name: str, value: Any) -> str:
     return str(value)
 
 
+def scene_source(name: str, value: Any) -> str:
+    """Check the path of a scene file, or a scene as text, by its length."""
+    if len(text(name, value)) > LARGEST_TEXT:
+        raise ValueError(f'{name}: a text of {len(value)} characters; at most {LARGEST_TEXT}, '
+                         'and a file may be larger')
+    return str(value)
+
+
+LARGEST_TEXT = 2**18  # characters of a scene as text: some 2,000 pairs, read in a second or two
 NAMED_TOPICS = 3  # how many pose topics the node names when it is ready
 CONTAINER = (12.192, 2.438, 2.591)  # ISO 40 ft [m]
 LONGEST = 1e6  # s, about twelve days
@@ -56,7 +69,7 @@ PARAMETERS = {
     'size_a': Setting(CONTAINER, 'full extents of box A, three numbers > 0 [m]', size),
     'size_b': Setting(CONTAINER, 'full extents of box B, three numbers > 0 [m]', size),
     'scene': Setting('', 'scene file (or the scene itself, as text) with boxes and pairs; replaces '
-                         'size_a and size_b; set again, it is read again', text),
+                         'size_a and size_b; set again, it is read again', scene_source),
     'model': Setting('mlp', f'how the contact point is found: {model_names()}', model),
     'weights': Setting('', 'weights file to use in place of the shipped one', text),
     'pairing': Setting('stamp', 'stamp: answer once, when poses of equal stamp are in; latest: '
@@ -73,7 +86,18 @@ PARAMETERS = {
                                     'objects, slower, the reference', one_of(SERIALIZATIONS)),
     'autostart': Setting(True, 'whether the node configures and activates itself', flag,
                          fixed=True),
+    'files_from': Setting('.', "directories, with ':' between them, below which `scene` and "
+                               "`weights` may name files while the node runs, beside the package's "
+                               'own', text, fixed=True),
+    'locked': Setting(False, 'whether all parameters and states stay as they are after the start',
+                      flag, fixed=True),
 }
+
+
+def _files(settings: Mapping[str, Any]) -> dict[str, str]:
+    """Return the files that `scene` and `weights` name, as far as they do."""
+    return {name: settings[name] for name in ('scene', 'weights') if settings.get(name)
+            and not (name == 'scene' and is_inline(settings[name]))}
 
 
 class ContactNode(LifecycleNode):
@@ -93,6 +117,11 @@ class ContactNode(LifecycleNode):
         self.counts: Counter[str] = Counter()
         self._evaluator: Evaluator | None = None  # from configure to cleanup
         self._settings = CheckedParameters(self, self.parameters, self._change)
+        values = self._settings.values
+        if values['locked'] and not values['autostart']:
+            raise ValueError('locked: a node that does not start itself could never be started')
+        self._open_files = OpenFiles(values['files_from'].split(os.pathsep),
+                                     _files(values).values())
         self._topics = SceneTopics(self, self.prefix, self.counts)
         self._diagnostics = Diagnostics(self)
         # On a clock of its own: simulated time may stand still.
@@ -102,14 +131,16 @@ class ContactNode(LifecycleNode):
             JumpThreshold(min_forward=None, min_backward=Duration(nanoseconds=-1),
                           on_clock_change=True), post_callback=self._clock_jumped)
         self._fault: Exception | None = None
-        self._raises_faults = self._settings.values['autostart']
+        self._raises_faults = values['autostart']
         if self._raises_faults:
             for transition in (self.trigger_configure, self.trigger_activate):
                 if transition() != TransitionCallbackReturn.SUCCESS:
                     raise self._fault or ValueError('the node did not start')
         self._raises_faults = False
+        if values['locked']:
+            refuse_transitions(self)
         # Last: a program that waits for this line may end the node at once.
-        self._log_scene('ready', self._settings.values)
+        self._log_scene('ready', values)
 
     @staticmethod
     def make_solver(settings: Mapping[str, Any], scene: Scene) -> SceneSolver:
@@ -190,6 +221,28 @@ class ContactNode(LifecycleNode):
 
     def _apply(self, settings: dict[str, Any]) -> None:
         """Apply parameters as a whole, or raise ValueError or RCLError and keep the old.
+
+        While the node runs, anybody may have set them. So the answer is the same for all files that
+        do not serve: it tells neither what a file holds nor whether there is one.
+        """
+        files = _files(settings)
+        try:
+            self._replace(settings | {name: self._open_files.find(file)
+                                      for name, file in files.items()})
+        except ImportError:  # an extra is not installed
+            raise
+        except Exception as error:
+            if not files or self._raises_faults:
+                raise
+            # A logger of no node: /rosout does not publish it.
+            get_logger(f'{self.get_logger().name}.local').error(
+                reason_of(error), throttle_duration_sec=LOG_SECONDS)
+            named = ' and '.join(f'{name} {shown(file)}' for name, file in files.items())
+            raise ValueError(f'{named} refused: the log on the machine of the node says why') \
+                from None
+
+    def _replace(self, settings: Mapping[str, Any]) -> None:
+        """Replace scene, solver and topics, or raise and keep the old.
 
         Boxes that stay keep their subscriptions and the poses that wait.
         """

@@ -23,6 +23,10 @@ Check = Callable[[str, Any], Any]
 """From a parameter's name and value to the value as the node uses it; ValueError if it is wrong."""
 
 
+LONGEST_REASON = 1000  # characters: it may quote what a stranger sent
+LOCKED = 'the node is locked: nothing can be changed after its start'
+
+
 @dataclass(frozen=True)
 class Setting:
     """One parameter: its default, what it means (with its unit), and what is accepted."""
@@ -141,6 +145,8 @@ class CheckedParameters:
         node.add_on_set_parameters_callback(self._on_set)
 
     def _on_set(self, parameters: list[Parameter]) -> SetParametersResult:
+        if self.values.get('locked'):  # other nodes' parameters, such as use_sim_time, too
+            return SetParametersResult(successful=False, reason=LOCKED)
         changes = {p.name: p.value for p in parameters if p.name in self._settings}
         try:
             values = checked(self._settings, {**self.values, **changes})
@@ -154,7 +160,7 @@ class CheckedParameters:
 def reason_of(error: Exception) -> str:
     """Return what an error says; with its type, unless it is a refusal or a missing library."""
     known = isinstance(error, (ValueError, ImportError))
-    return str(error) if known else f'{type(error).__name__}: {error}'
+    return (str(error) if known else f'{type(error).__name__}: {error}')[:LONGEST_REASON]
 
 
 def answer_help(program: str, doc: str | None, settings: Mapping[str, Setting],

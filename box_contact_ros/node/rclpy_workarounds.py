@@ -9,6 +9,7 @@ from typing import Any
 
 from rclpy.event_handler import EventHandler
 from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.lifecycle import LifecycleNode
 from rclpy.node import Node
 from rclpy.subscription import Subscription
 
@@ -61,6 +62,15 @@ def silence(subscription: Subscription) -> None:
     Test: test_faults.py::test_topics_go_while_others_ask_for_what_they_do_not_offer.
     """
     subscription.callback = lambda _: None
+
+
+def refuse_transitions(node: LifecycleNode) -> None:
+    """Answer every request for a transition with a refusal.
+
+    Symptom: a lifecycle node has all of its services or none, and those that read are wanted.
+    Test: test_strangers.py::test_a_locked_node_takes_no_changes.
+    """
+    node._service_change_state.callback = lambda _, response: response  # success is false in it
 
 
 def keep_for_ever(executor: Any) -> None:

@@ -272,7 +272,7 @@ def test_weights_while_it_runs(node, client, tmp_path):
     for path in (tmp_path, tmp_path / 'nothing', garbage, 'x' * 5000):
         reply = call(client, SetParametersAtomically, 'set_parameters_atomically', [
             ('model', string('mlp')), ('weights', string(str(path)))])
-        assert not reply.result.successful and reply.result.reason.startswith('weights file ')
+        assert not reply.result.successful and reply.result.reason.startswith('weights ')
         client.assert_answered()
 
 

@@ -176,6 +176,11 @@ def sourced(words: list[str], **_) -> None:
     assert words[1] in ('/opt/ros/jazzy/setup.bash', 'install/setup.bash', f'{VENV}/bin/activate')
 
 
+def export(words: list[str], **_) -> None:
+    """Name a file of the checkout."""
+    assert (ROOT / words[1].partition('=$PWD/')[2]).is_file()
+
+
 VENV = '.venv-contact'
 
 
@@ -197,6 +202,7 @@ COMMANDS = {
     r'sudo apt install .+': apt,
     r'colcon build .+': colcon,
     r'source \S+': sourced,
+    r'export \S+': export,
     r'python3 -m venv \S+': venv,
 }
 

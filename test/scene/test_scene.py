@@ -324,7 +324,8 @@ def test_files_that_cannot_be_read(tmp_path, monkeypatch):
 
 SHORT_FORMS = """\
 {poses: array, types: {t: {size: [1, 1, 1]}}, boxes: {m: {type: t, count: 3}, s: {stack: {type: t,
-rows: 2, columns: 5, tiers: [1, 3], gap: 0.1, origin: [0, 0, 6]}}}, pairs: [{moving: all, fixed: s}]}
+rows: 2, columns: 5, tiers: [1, 3], gap: 0.1, origin: [0, 0, 6]}}},
+pairs: [{moving: all, fixed: s}]}
 """
 SHORT = ['array', '{t: {size: [1, 1, 1]}}', '[1, 1, 1]', '3', '2', '5', '[1, 3]', '0.1',
          '[0, 0, 6]', 'all', 'fixed: s', '{moving', 'type: t', 't']

@@ -40,6 +40,8 @@ LAWS = 'test/core/test_laws.py'
 MLP = 'test/solver/test_mlp.py'
 EVALUATOR = 'node/evaluator.py'
 MESSAGES = 'node/messages.py'
+NODE = 'node/contact_node.py'
+STRANGERS = 'test/node/test_strangers.py'
 TEST_BYTES = 'test/node/test_message_bytes.py'
 TOPICS = 'node/scene_topics.py'
 TEST_PAIRING = 'test/scene/test_stamp_pairing.py'
@@ -330,6 +332,29 @@ MUTANTS = {
     'nesting without limit': Mutant(
         'scene/files/scene_file.py', 'if depth > DEEPEST:', 'if False:',
         'test/scene/test_scene.py -k refusal_names'),
+    'a file is quoted': Mutant(
+        NODE, 'if not files or self._raises_faults:', 'if True:', f'{STRANGERS} -k quoted'),
+    'a refused file in /rosout': Mutant(
+        NODE, "get_logger(f'{self.get_logger().name}.local').error(", 'self.get_logger().error(',
+        f'{STRANGERS} -k "quoted or transition"'),
+    'files from anywhere': Mutant(
+        'resources.py', 'if found in self._files or any(', 'if found.name or any(',
+        f'{STRANGERS} -k open'),
+    'links not followed': Mutant(
+        'resources.py', 'os.path.realpath(find_file(name))', 'os.path.abspath(find_file(name))',
+        f'{STRANGERS} -k open'),
+    'all files of a node that starts in /': Mutant(
+        'resources.py', "if name and (name == '/' or os.path.realpath(name) != '/')", 'if name',
+        f'{STRANGERS} -k open'),
+    'a scene as text of any length': Mutant(
+        NODE, '> LARGEST_TEXT:', '> 2**40:', f'{STRANGERS} -k texts'),
+    'a reason as long as what is refused': Mutant(
+        'node/parameters.py', '[:LONGEST_REASON]', '', f'{STRANGERS} -k texts'),
+    'a locked node takes parameters': Mutant(
+        'node/parameters.py', "if self.values.get('locked'):", 'if False:',
+        f'{STRANGERS} -k locked'),
+    'a locked node makes transitions': Mutant(
+        NODE, 'refuse_transitions(self)', 'pass', f'{STRANGERS} -k locked'),
     'answers kept for whoever does not read': Mutant(
         'node/runtime.py', 'CONTACT_QOS = QoSProfile(depth=10,',
         'CONTACT_QOS = QoSProfile(history=2,', 'test/node/test_faults.py -k never_reads'),

@@ -8,19 +8,20 @@ from __future__ import annotations
 import json
 import os
 import re
-from contextlib import suppress
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-from ...resources import resource_path
+from ...resources import find_file, resource_path
 from ...solver.checks import shown
 from ..scene_solver import Fault, Place, Scene, dotted
 from .short_forms import expand_boxes, expand_pairs
 
 LARGEST_FILE = 16 * 2**20  # bytes that are read at most; some 100,000 pairs
 DEEPEST = 20  # levels of nesting that are followed; a scene has four
+MOST_FAULTS = 1000  # that are looked for to name the first: all of a megabyte would take a minute
 
 
 class _Loader(getattr(yaml, 'CSafeLoader', yaml.SafeLoader)):  # type: ignore[misc]
@@ -43,10 +44,10 @@ def read_scene(source: str | os.PathLike[str]) -> Scene:
     """
     if not isinstance(source, str):
         source = os.fspath(source)
-    elif source.lstrip().startswith('{') or '\n' in source:
+    elif is_inline(source):
         return parse_scene(source, 'scene')
     try:
-        path = scene_path(source)
+        path = find_file(source)
         if path.exists() and not path.is_file() and not path.is_dir():
             raise OSError('it is no regular file')  # opening a FIFO would wait for its writer
         with path.open('rb') as file:
@@ -62,13 +63,9 @@ def read_scene(source: str | os.PathLike[str]) -> Scene:
     return parse_scene(text, source)
 
 
-def scene_path(source: str) -> Path:
-    """Return the path of a scene file, one of the package's own where the path leads nowhere."""
-    path = Path(source)
-    if not path.is_absolute() and not path.exists():
-        with suppress(FileNotFoundError):
-            path = resource_path(source)
-    return path
+def is_inline(source: str) -> bool:
+    """Return whether a text is the scene itself, not the path of its file."""
+    return source.lstrip().startswith('{') or '\n' in source
 
 
 def parse_scene(text: str, name: str = 'scene') -> Scene:
@@ -189,8 +186,8 @@ def _first_fault(data: Any, lines: dict[Place, int]) -> tuple[Place, str] | None
     from jsonschema import Draft202012Validator  # only here: it takes 0.1 s
 
     schema = json.loads(resource_path('msg_schemas', 'scene.json').read_text('utf-8'))
-    found = [(tuple(error.absolute_path), error)
-             for error in Draft202012Validator(schema).iter_errors(data)]
+    found = [(tuple(error.absolute_path), error) for error in islice(
+        Draft202012Validator(schema).iter_errors(data), MOST_FAULTS)]
     if not found:
         return None
     path, error = min(found, key=lambda entry: (lines.get(entry[0], 0), entry[0] == ()))
