@@ -8,20 +8,23 @@ import math
 import platform
 import sys
 import tempfile
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 PACKAGE = Path(__file__).parent
 RESULTS, QUICK_RESULTS = Path('docs/results'), Path('quick-results')
+DPI = 110  # of pictures
+LABEL_STEP = 0.14  # height of a line of labels in a picture [inch]
 
 
 def make_folder(parser: argparse.ArgumentParser, folder: Path) -> Path:
@@ -95,13 +98,67 @@ def _cell(value: object, digits: int) -> object:
     return value  # the writer leaves a None empty
 
 
-def subplots(rows: int, columns: int, size: tuple[float, float], **shared: Any,
-             ) -> tuple[Figure, np.ndarray]:
-    """Return a figure of a size [inch], and its axes (rows, columns); no display is needed."""
+def figure(size: tuple[float, float], layout: Literal['constrained'] | None = 'constrained',
+           ) -> Figure:
+    """Return an empty figure of a size [inch]; no display is needed."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=size, layout='constrained', dpi=110)
-    return figure, figure.subplots(rows, columns, squeeze=False, **shared)
+    return Figure(figsize=size, layout=layout, dpi=DPI)
+
+
+def subplots(rows: int, columns: int, size: tuple[float, float], **shared: Any,
+             ) -> tuple[Figure, np.ndarray]:
+    """Return a figure of a size [inch], and its axes (rows, columns)."""
+    empty = figure(size)
+    return empty, empty.subplots(rows, columns, squeeze=False, **shared)
+
+
+def log_errors(axis: Axes, least: float, most: float, zero: str = 'exact (0)',
+               ) -> Callable[[float], float]:
+    """Make the y axis logarithmic, with a band for 0 below; return where an error is drawn.
+
+    Errors between 0 and `least` are drawn at `least`.
+    """
+    bottom, middle = least / 10.0**0.7, least / 10.0**0.35
+    ticks = [10.0**power for power in range(math.ceil(math.log10(least)),
+                                            math.floor(math.log10(most)) + 1)]
+    axis.set_yscale('log')
+    axis.set_ylim(bottom, most)
+    axis.set_yticks([middle, *ticks], [zero, *(f'{tick:g}' for tick in ticks)])
+    axis.minorticks_off()
+    axis.axhspan(bottom, least / 1.1, color='0.92', zorder=0)
+    axis.grid(color='0.9', linewidth=0.5)
+    axis.set_axisbelow(True)
+    return lambda error: middle if error == 0.0 else min(max(error, least), most)
+
+
+def name_points(axis: Axes, points: Sequence[tuple[float, float, str, str]]) -> None:
+    """Name points (x, y, label, colour) of an axis in a column on its right, joined by lines."""
+    ordered = sorted(points, key=lambda point: (point[1], -point[0]))
+    wanted = [float(axis.transAxes.inverted().transform(axis.transData.transform(point[:2]))[1])
+              for point in ordered]
+    step = min(1.0 / max(1, len(wanted)), LABEL_STEP * DPI / axis.get_window_extent().height)
+    places = spread(wanted, step)
+    for (x, y, label, colour), place in zip(ordered, places):
+        line = {'arrowstyle': '-', 'color': '0.75', 'linewidth': 0.5, 'relpos': (0.0, 0.5)}
+        axis.annotate(label, (x, y), xytext=(1.02, place), textcoords='axes fraction', fontsize=7.5,
+                      va='center', color=colour, annotation_clip=False, arrowprops=line)
+
+
+def spread(wanted: Sequence[float], step: float) -> list[float]:
+    """Return places in [0, 1], in the order of those wanted (ascending), at least a step apart."""
+    def pushed(values: Sequence[float]) -> list[float]:
+        found: list[float] = []
+        for value in values:
+            found.append(max(value, found[-1] + step if found else 0.0))
+        return found
+
+    def from_above(values: Sequence[float]) -> list[float]:
+        return [1.0 - value for value in pushed([1.0 - value for value in values[::-1]])][::-1]
+
+    # Pushed up and pushed down: what lies between keeps the steps, too.
+    up, down = from_above(pushed(wanted)), pushed(from_above(wanted))
+    return [0.5 * (one + two) for one, two in zip(up, down)]
 
 
 def percentiles(values: Sequence[float] | np.ndarray, *percents: float) -> tuple[float, ...]:

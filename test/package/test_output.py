@@ -62,3 +62,14 @@ def test_a_machine_names_all_that_a_time_depends_on() -> None:
     ('GenuineIntel', 6, 1, None), ('unknown', 25, 17, None)])
 def test_generations(vendor: str, family: int, model: int, expected: str | None) -> None:
     assert output.generation(vendor, family, model) == expected
+
+
+def test_labels_are_spread(rng_seed: int = 5) -> None:
+    """At least a step apart, in order, within [0, 1], and unmoved where there is room."""
+    rng = np.random.default_rng(rng_seed)
+    for count in (1, 5, 20):
+        wanted = np.sort(rng.uniform(size=count) ** 4).tolist()
+        places = np.array(output.spread(wanted, 0.04))
+        assert (np.diff(places) >= 0.04 - 1e-12).all()
+        assert places[0] >= -1e-12 and places[-1] <= 1.0 + 1e-12
+    assert output.spread([0.1, 0.5, 0.9], 0.04) == pytest.approx([0.1, 0.5, 0.9])

@@ -2,15 +2,18 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import math
+import os
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from box_contact_ros import output
-from box_contact_ros.baselines.engines.engine import Engine, installed, ours
-from box_contact_ros.reports.frontier import frontier
+from box_contact_ros.baselines.engines import installed
+from box_contact_ros.baselines.engines.engine import Engine, Manifold, chosen, ours
+from box_contact_ros.reports.frontier import frontier, trials
 from box_contact_ros.scene.pose import rotation_matrix
 from box_contact_ros.scene.pose_sets import SETS, Pairs
 from box_contact_ros.solver.contact_solver import ContactSolver
@@ -33,7 +36,7 @@ def answers(pairs: Pairs) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def wrong_verdicts(pairs: Pairs, *given: np.ndarray) -> tuple[int, int]:
     """Return how many contacts were missed and invented."""
-    found = frontier.judge(pairs, *given)
+    found = trials.judge(pairs, *given)
     return found.missed, found.invented
 
 
@@ -41,7 +44,7 @@ def wrong_verdicts(pairs: Pairs, *given: np.ndarray) -> tuple[int, int]:
 
 
 def test_no_error_is_found_where_there_is_none(containers: Pairs) -> None:
-    found = frontier.judge(containers, *answers(containers))
+    found = trials.judge(containers, *answers(containers))
     assert found.points['all'] == (len(containers.pose_a), 0.0, 0.0, 0.0)
     assert (found.normal, found.missed, found.invented) == ((0.0, 0.0), 0, 0)
 
@@ -49,7 +52,7 @@ def test_no_error_is_found_where_there_is_none(containers: Pairs) -> None:
 def test_a_flipped_normal_shows(containers: Pairs) -> None:
     colliding, normals, points = answers(containers)
     normals[17] *= -1.0
-    assert frontier.judge(containers, colliding, normals, points).normal[1] == pytest.approx(180.0)
+    assert trials.judge(containers, colliding, normals, points).normal[1] == pytest.approx(180.0)
 
 
 def test_a_normal_off_by_a_tenth_of_a_degree_shows(containers: Pairs) -> None:
@@ -57,7 +60,7 @@ def test_a_normal_off_by_a_tenth_of_a_degree_shows(containers: Pairs) -> None:
     across = np.cross(normals, [0.3, 0.5, 0.2])
     across /= np.linalg.norm(across, axis=1, keepdims=True)
     turn = math.radians(0.1)
-    worst = frontier.judge(containers, colliding,
+    worst = trials.judge(containers, colliding,
                            math.cos(turn) * normals + math.sin(turn) * across, points).normal[1]
     assert worst == pytest.approx(0.1, rel=1e-6)
 
@@ -66,7 +69,7 @@ def test_a_point_shifted_by_a_centimetre_shows(containers: Pairs) -> None:
     """In its class, as 1 cm of 12.192 m."""
     colliding, normals, points = answers(containers)
     points[:, 0] += 0.01
-    found = frontier.judge(containers, colliding, normals, points).points
+    found = trials.judge(containers, colliding, normals, points).points
     assert len(found) > 2
     for _, *errors in found.values():
         assert errors == pytest.approx([100.0 * 0.01 / 12.192] * 3, rel=1e-9)
@@ -76,7 +79,7 @@ def test_wrong_verdicts_show(containers: Pairs) -> None:
     colliding, normals, points = answers(containers)
     colliding[[3, 5]] = False
     assert wrong_verdicts(containers, colliding, normals, points) == (2, 0)
-    gaps = frontier.apart(np.random.default_rng(1), 60)
+    gaps = trials.apart(np.random.default_rng(1), 60)
     colliding, normals, points = answers(gaps)
     assert not colliding.any()
     colliding[7] = True
@@ -109,12 +112,14 @@ def test_conventions(engine: Engine) -> None:
     pairs = Pairs(np.hstack([place, turn]), np.hstack([place + (2.591 - 0.02) * up, turn]), size,
                   size)
     for call, middle, normal in zip(engine.prepare(pairs), place + 0.5 * 2.591 * up, up):
-        answer = engine.read(call())
-        assert answer.touching and answer.normal is not None and answer.point is not None
-        np.testing.assert_allclose(answer.normal, normal, atol=1e-5)
-        off = answer.point - middle
-        assert abs(off @ normal) <= 0.0201
-        assert np.linalg.norm(off - (off @ normal) * normal) <= 0.5 * math.hypot(12.2, 2.44)
+        found = engine.read(call())
+        for choice in engine.choices:
+            answer = chosen(found, choice)
+            assert answer.touching and answer.normal is not None and answer.point is not None
+            np.testing.assert_allclose(answer.normal, normal, atol=1e-5)
+            off = answer.point - middle
+            assert abs(off @ normal) <= 0.0201
+            assert np.linalg.norm(off - (off @ normal) * normal) <= 0.5 * math.hypot(12.2, 2.44)
 
 
 @pytest.mark.parametrize('engine', [ours('exact'), *RIVALS], ids=lambda one: one.name)
@@ -122,14 +127,58 @@ def test_boxes_apart(engine: Engine) -> None:
     size = np.tile((2.0, 2.0, 2.0), (1, 1))
     pose = np.array([[0.0, 0, 0, 0, 0, 0, 1]])
     pairs = Pairs(pose, pose + [[0, 0, 2.5, 0, 0, 0, 0]], size, size)
-    answer = engine.read(engine.prepare(pairs)[0]())
-    assert answer == (False, None, None)
+    found = engine.read(engine.prepare(pairs)[0]())
+    assert chosen(found, engine.choices[0]) == (False, None, None)
 
 
 def test_what_is_not_installed_is_said() -> None:
     """The extras `sim` and `soup` are there in the tests; other peers may be."""
     assert not any('mujoco' in line or 'fcl' in line for line in MISSING)
     assert all("extra 'peers'" in line for line in MISSING)
+
+
+def aborting() -> Engine:
+    """Return an engine that aborts on cubes, raises on containers, and answers on others."""
+    exact = ours('exact')
+
+    def prepare(pairs: Pairs) -> list:
+        if tuple(pairs.size_a[0]) == (2.0, 2.0, 2.0):
+            os.abort()
+
+        def call() -> None:
+            raise RuntimeError('planted')
+
+        return [call] * len(pairs.size) if pairs.size_a[0, 0] > 10.0 else exact.prepare(pairs)
+
+    return dataclasses.replace(exact, name='aborting', prepare=prepare, prepare_batch=None,
+                               make=aborting)
+
+
+def test_aborts_and_exceptions_are_findings() -> None:
+    sets = {name: SETS[name](np.random.default_rng(1), 30)
+            for name in ('random cubes', 'random sizes', 'containers')}
+    plan = dataclasses.replace(trials.QUICK, subprocesses=True)
+    engine = aborting()
+    found = trials.answers_of(engine, sets, plan)
+    row = {name: trials.Trial(engine, name, pairs, found[name], plan).row()
+           for name, pairs in sets.items()}
+    assert row['random cubes'].failure == 'ended by signal 6'
+    assert (row['random cubes'].judged, row['random sizes'].failure) == (0, '')
+    assert row['random sizes'].errors.points['all'][1:] == (0.0, 0.0, 0.0)
+    assert row['containers'].exceptions == row['containers'].judged > 10
+    odd = frontier.odd_cells(list(row.values()), [engine])
+    assert {kind for _, kind in odd} == {'failure', 'missed'}
+
+
+def test_the_centroid_of_a_polygon() -> None:
+    """An L cannot be: the points are convex; their order does not matter, nor do inner ones."""
+    corners = np.array([[0, 0, 1], [4, 0, 1], [4, 2, 1], [0, 2, 1], [4, 1, 1]], float)
+    found = chosen(Manifold(corners[[0, 2, 4, 1, 3]], np.tile([0, 0, 1.0], (5, 1)), np.ones(5)),
+                   'patch centroid')
+    np.testing.assert_allclose(found.point, [2, 1, 1], atol=1e-12)
+    triangle = corners[:3] @ rotation_matrix(np.array([0.5, 0.5, 0.5, 0.5])).T
+    found = chosen(Manifold(triangle, np.tile([1.0, 0, 0], (3, 1)), np.ones(3)), 'patch centroid')
+    np.testing.assert_allclose(found.point, triangle.mean(axis=0), atol=1e-12)
 
 
 # --- the frontier ---------------------------------------------------------------------------------
@@ -149,7 +198,7 @@ def test_quick_run(tmp_path: Path) -> None:
     with (tmp_path / 'frontier.csv').open() as file:
         rows = list(csv.DictReader(file))
     assert {'exact', 'mlp', 'paper', 'fcl', 'soup-8'} <= {row['contestant'] for row in rows}
-    assert {row['set'] for row in rows} == set(frontier.ALL_SETS)
+    assert {row['set'] for row in rows} == set(trials.ALL_SETS)
     ours = [row for row in rows if row['contestant'].split()[0] in ('exact', 'mlp')]
     for row in ours:
         assert (row['missed'], row['invented']) == ('0', '0')
@@ -169,7 +218,7 @@ def test_quick_run(tmp_path: Path) -> None:
 def test_the_readme_has_the_table_of_the_report() -> None:
     text = (ROOT / 'docs' / 'results' / 'frontier.md').read_text()
     lines = text.split('## In short')[1].split('\n\n')[2]
-    assert lines.count('\n') == 1 + len(frontier.IN_SHORT)
+    assert lines.count('\n') > 1 + len(frontier.IN_SHORT)
     assert lines in (ROOT / 'README.md').read_text()
 
 

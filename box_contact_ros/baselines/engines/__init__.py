@@ -1,1 +1,26 @@
-"""What answers for a pair of boxes: this package's models and the engines that users would take."""
+"""What answers for a pair of boxes: this package's models and the engines that users would take.
+
+Each `*_engines.py` imports one library and lists its `ENGINES`, functions that make them.
+"""
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from importlib import import_module
+
+from .engine import Engine
+
+RIVALS = {'mujoco': 'sim', 'fcl': 'soup', 'coal': 'peers', 'bullet': 'peers'}
+"""The engines' modules, each with the extra of this package that brings its library."""
+
+
+def installed(modules: Iterable[str] = tuple(RIVALS)) -> tuple[list[Engine], list[str]]:
+    """Return the rivals that can be imported, and a line about each that cannot."""
+    found, missing = [], []
+    for module in modules:
+        try:
+            makers = import_module(f'.{module}_engines', __name__).ENGINES
+            found += [replace(make(), make=make) for make in makers]
+        except ImportError as error:
+            missing.append(f"{error.name or module} is not installed (extra '{RIVALS[module]}')")
+    return found, missing

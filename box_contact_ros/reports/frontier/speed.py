@@ -15,12 +15,12 @@ import time
 from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from ...baselines.engines.engine import Engine, fcl_collision, mujoco_distance, ours
+from ...baselines.engines import installed
+from ...baselines.engines.engine import Engine, ours
 from ...core import FORCE, instruction_sets, native
 from ...output import machine, markdown_table, no_garbage_collection, percentiles, write_csv
 from ...output import page as filled_page
@@ -29,6 +29,7 @@ from ...scene.pose_sets import CONTAINER, CUBE, SETS, Pairs, log_uniform, turns
 from ...solver.models import gated_models
 
 UNIT = 'MuJoCo mj_geomDistance'  # the contestant whose median single call is the unit of all ratios
+UNITS = (UNIT, 'python-fcl collide')
 PACKAGES = ('numpy', 'mujoco', 'python-fcl')
 
 SINGLE_LIMIT = 0.36  # single call of `exact` with the best instruction set [calls of UNIT]
@@ -149,12 +150,10 @@ def _drawn(name: str, count: int) -> Pairs:
 
 def single_calls(count: int) -> list[Stint]:
     """Return the contestants for equal cubes, from two poses to a result in Python."""
-    engines = [ours(model) for model in gated_models()]
-    for make in (mujoco_distance, partial(fcl_collision, 'deepest')):
-        try:
-            engines.append(make())
-        except ImportError as error:
-            print(f'{error.name} is not installed: left out', file=sys.stderr)
+    rivals, missing = installed(('mujoco', 'fcl'))
+    for line in missing:
+        print(f'left out: {line}', file=sys.stderr)
+    engines = [*map(ours, gated_models()), *(one for one in rivals if one.name in UNITS)]
 
     def stint(engine: Engine) -> Stint:
         calls = engine.prepare(pairs)

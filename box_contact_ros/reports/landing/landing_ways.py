@@ -27,7 +27,7 @@ from ...apps.crane.landing import (
     solvers,
 )
 from ...apps.crane.mujoco_crane import Crane, CraneScenario
-from ...baselines.engines.engine import CHOICES
+from ...baselines.engines.engine import Manifold, chosen
 from ...baselines.point_law import PointLaw
 from ...scene.pose_sets import CONTAINER
 from ...solver.contact import Contact
@@ -162,7 +162,7 @@ class MujocoSource:
     """One point of the contacts of two boxes that `mj_collision` finds."""
 
     def __init__(self, size_a: Sequence[float], size_b: Sequence[float], choice: str) -> None:
-        """Make the two boxes; `choice` is one of `CHOICES`."""
+        """Make the two boxes; `choice` is one of the engines' `CHOICES`."""
         spec = mujoco.MjSpec()
         for name, size in (('a', size_a), ('b', size_b)):
             body = spec.worldbody.add_body(name=name)
@@ -170,13 +170,13 @@ class MujocoSource:
             body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=np.array(size) / 2.0)
         self._model = spec.compile()
         self._data = mujoco.MjData(self._model)
-        self._choice = CHOICES[choice]
+        self._choice = choice
 
     def __call__(self, pose_a: np.ndarray, pose_b: np.ndarray) -> Contact:
         """Return the contact, without a patch; its depth is the deepest one's."""
         found = self.all_of(pose_a, pose_b)
-        answer = self._choice(np.array(found.pos), np.array(found.frame)[:, :3],
-                              -np.array(found.dist))
+        answer = chosen(Manifold(np.array(found.pos), np.array(found.frame)[:, :3],
+                                 -np.array(found.dist)), self._choice)
         nothing = np.full(3, math.nan)
         if answer.normal is None or answer.point is None:
             return Contact(False, math.nan, nothing, nothing, 0.0, np.full((3, 3), math.nan))

@@ -1,0 +1,73 @@
+"""Bullet (PyBullet): closest points of a query, and the persistent manifold of its world."""
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pybullet as bullet
+
+from ...scene.pose_sets import Pairs
+from .engine import APART, Engine, Manifold, per_sizes, rows
+
+FILLING = 4
+"""Detections of the same pose before the manifold is read: it takes up to four points."""
+GROUPS = 30  # pairs of sizes that one world keeps apart, a bit of the filter for each
+
+
+def points(persistent: bool) -> Engine:
+    """Return `getClosestPoints` at distance 0, or `getContactPoints` of the filled manifold."""
+    client = bullet.connect(bullet.DIRECT)
+    place = partial(bullet.resetBasePositionAndOrientation, physicsClientId=client)
+    detect = partial(bullet.performCollisionDetection, physicsClientId=client)
+
+    def bodies(p: np.ndarray, q: np.ndarray) -> list[int]:
+        # Bodies of other sizes are in the same world, and not in the way.
+        group = 1 << bullet.getNumBodies(physicsClientId=client) // 2 % GROUPS
+        found = []
+        for size in (p, q):
+            shape = bullet.createCollisionShape(
+                bullet.GEOM_BOX, halfExtents=list(0.5 * size), physicsClientId=client)
+            body = bullet.createMultiBody(1.0, shape, physicsClientId=client)
+            bullet.setCollisionFilterGroupMask(body, -1, group, group, physicsClientId=client)
+            found.append(body)
+        return found
+
+    def ask(one: int, two: int, a: Any, b: Any, quat_a: Any, quat_b: Any) -> Any:
+        place(one, a, quat_a)
+        place(two, b, quat_b)
+        if not persistent:
+            return bullet.getClosestPoints(one, two, 0.0, physicsClientId=client)
+        for _ in range(FILLING):
+            detect()
+        return bullet.getContactPoints(one, two, physicsClientId=client)
+
+    def prepare(pairs: Pairs) -> list[Callable[[], Any]]:
+        # Bodies stay in the world and slow its broad phase down: only those of these pairs.
+        bullet.resetSimulation(physicsClientId=client)
+        made = per_sizes(bodies)
+        return [partial(ask, *made(p, q), *(tuple(part) for part in (a[:3], b[:3], a[3:], b[3:])))
+                for a, b, p, q in rows(pairs)]
+
+    def read(contacts: Any) -> Manifold:
+        # 5, 6: the points on A and B; 7: the normal on B, towards A; 8: the distance.
+        # The manifold keeps points that are up to its margin apart.
+        contacts = [contact for contact in contacts if contact[8] <= 0.0]
+        if not contacts:
+            return APART
+        return Manifold(np.array([0.5 * (np.array(c[5]) + np.array(c[6])) for c in contacts]),
+                        np.array([-np.array(c[7]) for c in contacts]),
+                        np.array([-c[8] for c in contacts]))
+
+    if persistent:
+        return Engine(name='PyBullet getContactPoints', package='pybullet',
+                      call=f'{FILLING} × performCollisionDetection, getContactPoints',
+                      returns='up to 4 points with depths, normals',
+                      choices=('deepest', 'mean', 'patch centroid'), prepare=prepare, read=read)
+    return Engine(name='PyBullet getClosestPoints', call='getClosestPoints(a, b, 0.0)',
+                  returns='one point on each box, depth, normal', package='pybullet',
+                  choices=('deepest',), prepare=prepare, read=read)
+
+
+ENGINES = [partial(points, False), partial(points, True)]

@@ -1,0 +1,63 @@
+"""Coal, which grew out of FCL: its deepest point, and its contact patches."""
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import coal
+import numpy as np
+
+from ...scene.pose import rotation_matrix
+from ...scene.pose_sets import Pairs
+from .engine import APART, MOST_CONTACTS, Engine, Manifold, one_contact, per_sizes, rows
+
+
+def collision(patches: bool) -> Engine:
+    """Return Coal's `collide`: the deepest point; or the polygon of its contact patch after it."""
+    request, result = coal.CollisionRequest(), coal.CollisionResult()
+    request.enable_contact = True
+    request.num_max_contacts = MOST_CONTACTS
+    patch_request, patch_result = coal.ContactPatchRequest(), coal.ContactPatchResult()
+
+    def ask(one: Any, two: Any, at_one: Any, at_two: Any, a: np.ndarray, b: np.ndarray,
+            matrix_a: np.ndarray, matrix_b: np.ndarray) -> Any:
+        at_one.setTranslation(a)
+        at_one.setRotation(matrix_a)
+        at_two.setTranslation(b)
+        at_two.setRotation(matrix_b)
+        result.clear()
+        coal.collide(one, at_one, two, at_two, request, result)
+        if patches:
+            patch_result.clear()
+            coal.computeContactPatch(one, at_one, two, at_two, result, patch_request, patch_result)
+        return result
+
+    def prepare(pairs: Pairs) -> list[Callable[[], Any]]:
+        boxes = per_sizes(lambda p, q: (coal.Box(*p), coal.Box(*q), coal.Transform3s(),
+                                        coal.Transform3s()))
+        return [partial(partial(ask, *boxes(p, q)), a[:3], b[:3], rotation_matrix(a[3:]),
+                        rotation_matrix(b[3:])) for a, b, p, q in rows(pairs)]
+
+    def read(_: Any) -> Manifold:
+        if not result.numContacts():
+            return APART
+        contact = result.getContact(0)
+        normal, depth = np.array(contact.normal), -contact.penetration_depth
+        if not patches or not patch_result.numContactPatches():
+            return one_contact(np.array(contact.pos), depth, normal)
+        patch = patch_result.getContactPatch(0)
+        points = np.array([patch.getPoint(k) for k in range(patch.size())])
+        return Manifold(points, np.tile(normal, (len(points), 1)), np.full(len(points), depth))
+
+    if patches:
+        return Engine(name='Coal collide, contact patch',
+                      call='coal.collide, coal.computeContactPatch', returns='polygon, normal',
+                      patch='area', package='coal', choices=('mean', 'patch centroid'),
+                      prepare=prepare, read=read)
+    return Engine(name='Coal collide', call='coal.collide, enable_contact',
+                  returns='deepest point, depth, normal', package='coal', choices=('deepest',),
+                  prepare=prepare, read=read)
+
+
+ENGINES = [partial(collision, False), partial(collision, True)]

@@ -1,0 +1,118 @@
+"""MuJoCo: signed distance and collision, by each of its colliders of convex shapes.
+
+`mj_collision` takes two boxes by a collider of their own, whatever the flags say. Boxes as meshes
+of eight corners are what it takes by CCD.
+"""
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from itertools import product
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from ...scene.pose_sets import Pairs
+from .engine import APART, Engine, Manifold, one_contact, per_sizes, rows, wxyz
+
+Shape = Callable[[str, np.ndarray], tuple[str, str]]  # (name, size) -> asset, geom
+FARTHEST = 1.0  # distance up to which mj_geomDistance looks [m]
+
+
+def distance(name: str, flags: str) -> Engine:
+    """Return `mj_geomDistance`: signed distance and two nearest points; their middle."""
+    ends = np.zeros(6)
+    measure, matrix = mujoco.mj_geomDistance, mujoco.mju_quat2Mat
+
+    def ask(model: Any, data: Any, place_a: Any, place_b: Any, turn_a: Any, turn_b: Any,
+            a: np.ndarray, b: np.ndarray, quat_a: np.ndarray, quat_b: np.ndarray) -> float:
+        place_a[:] = a
+        place_b[:] = b
+        matrix(turn_a, quat_a)
+        matrix(turn_b, quat_b)
+        return measure(model, data, 0, 1, FARTHEST, ends)
+
+    def prepare(pairs: Pairs) -> list[Callable[[], Any]]:
+        models = per_sizes(partial(_model, _boxes, flags))
+        return [partial(ask, model, data, *data.geom_xpos, *data.geom_xmat, *wxyz(a, b))
+                for a, b, p, q in rows(pairs) for model, data in [models(p, q)]]
+
+    def read(result: float) -> Manifold:
+        if result > 0.0:
+            return APART
+        start, end = ends[:3], ends[3:]
+        length = np.linalg.norm(start - end)
+        normal = (start - end) / length if length else np.full(3, np.nan)
+        return one_contact(0.5 * (start + end), -result, normal)
+
+    return Engine(name=f'MuJoCo mj_geomDistance{name}', call=f'mj_geomDistance(model, data, 0, 1, '
+                  f'1.0, fromto){flags and f", {flags}"}', returns='distance, two nearest points',
+                  package='mujoco', choices=('deepest',), prepare=prepare, read=read)
+
+
+def collision(name: str, shape: Shape, flags: str) -> Engine:
+    """Return `mj_collision`, after `mj_kinematics`: up to eight contacts."""
+    kinematics, collide = mujoco.mj_kinematics, mujoco.mj_collision
+
+    def ask(model: Any, data: Any, places: np.ndarray, poses: np.ndarray) -> Any:
+        places[:] = poses
+        kinematics(model, data)
+        collide(model, data)
+        return data
+
+    def prepare(pairs: Pairs) -> list[Callable[[], Any]]:
+        models = per_sizes(partial(_model, shape, flags))
+        calls: list[Callable[[], Any]] = []
+        for a, b, p, q in rows(pairs):
+            model, data = models(p, q)
+            place_a, place_b, quat_a, quat_b = wxyz(a, b)
+            calls.append(partial(ask, model, data, data.qpos, np.concatenate(
+                [place_a, quat_a, place_b, quat_b])))
+        return calls
+
+    def read(data: Any) -> Manifold:
+        found = data.contact
+        if not data.ncon:
+            return APART
+        # A frame's first row is the normal, from the geom of lower number to the other.
+        return Manifold(np.array(found.pos), np.array(found.frame)[:, :3], -np.array(found.dist))
+
+    return Engine(name=f'MuJoCo mj_collision{name}', call=f'mj_kinematics, mj_collision'
+                  f'{flags and f", {flags}"}', returns='up to 8 points with depths, normals',
+                  package='mujoco', choices=('deepest', 'mean', 'patch centroid'),
+                  prepare=prepare, read=read)
+
+
+def _boxes(name: str, size: np.ndarray) -> tuple[str, str]:
+    return '', f'<geom type="box" size="{_text(0.5 * size)}"/>'
+
+
+def _meshes(name: str, size: np.ndarray) -> tuple[str, str]:
+    corners = np.array(list(product((-0.5, 0.5), repeat=3))) * size
+    return f'<mesh name="{name}" vertex="{_text(corners)}"/>', f'<geom type="mesh" mesh="{name}"/>'
+
+
+def _text(numbers: np.ndarray) -> str:
+    return ' '.join(map(repr, numbers.ravel().tolist()))
+
+
+def _model(shape: Shape, flags: str, p: np.ndarray, q: np.ndarray) -> tuple[Any, Any]:
+    assets, geoms = zip(shape('a', p), shape('b', q))
+    bodies = ''.join(f'<body><freejoint/>{geom}</body>' for geom in geoms)
+    model = mujoco.MjModel.from_xml_string(
+        f'<mujoco><option><flag {flags}/></option><asset>{"".join(assets)}</asset>'
+        f'<worldbody>{bodies}</worldbody></mujoco>')
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    return model, data
+
+
+LIBCCD = 'nativeccd="disable"'
+ENGINES = [
+    partial(distance, '', ''), partial(distance, ', libccd', LIBCCD),
+    partial(collision, '', _boxes, ''),
+    partial(collision, ', meshes', _meshes, 'multiccd="enable"'),
+    partial(collision, ', meshes, one point', _meshes, 'multiccd="disable"'),
+    partial(collision, ', meshes, libccd', _meshes, f'{LIBCCD} multiccd="enable"'),
+]

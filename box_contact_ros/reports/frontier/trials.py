@@ -1,0 +1,319 @@
+"""Contestants on sets of poses: their answers against the exact ones, and their times."""
+from __future__ import annotations
+
+import math
+import os
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ...baselines.engines.engine import APART, Engine, chosen, in_subprocess
+from ...core import FORCE, native
+from ...output import percentiles
+from ...scene.pose import degrees_between
+from ...scene.pose_sets import (
+    CONTAINER,
+    SETS,
+    Generator,
+    Pairs,
+    any_pose,
+    at_depth,
+    log_uniform,
+    stacked,
+)
+from ..accuracy import CLASSES, classify
+from .speed import take_turns
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plan:
+    """How much is judged and timed."""
+
+    batch_pairs: int  # pairs on which models with batches are judged and timed
+    single_pairs: int
+    """Pairs on which the others are judged, and on which all are timed call by call."""
+    seconds: float
+    """Time that a contestant has to be asked on a set, once for answers and once for timing."""
+    rounds: int
+    members: int  # models of a family, at most
+    subprocesses: bool
+    """Whether other engines are judged in subprocesses, so that an abort is a finding."""
+
+
+FULL = Plan(batch_pairs=20_000, single_pairs=1_000, seconds=1.0, rounds=5, members=99,
+            subprocesses=True)
+QUICK = Plan(batch_pairs=1_000, single_pairs=40, seconds=0.05, rounds=2, members=1,
+             subprocesses=False)
+FEW_PAIRS = 16
+"""Pairs of sizes that are prepared at once where each row has others."""
+LEAST_PAIRS = 10  # pairs judged and timed whatever they take
+BATCHES = 3  # batches timed in a round
+PATIENCE = 120.0  # for an engine's answers in a subprocess [s]
+LONGEST_RUN = 3600.0  # of another instruction set [s]
+VERDICT = 1e-9
+"""Least gap or depth, of the size, at which verdicts and normals are judged. At exact touch both
+verdicts are right, and a normal may be any that keeps the boxes apart."""
+
+
+def apart(rng: np.random.Generator, n: int) -> Pairs:
+    """Draw boxes 1e-6 to 0.1 m apart: half containers almost stacked, half cubes in any pose."""
+    half = n // 2
+    size = np.tile((2.0, 2.0, 2.0), (half, 1))
+    cubes = any_pose(rng, size, size, np.full(half, 0.01))
+    yard = stacked(rng, CONTAINER, log_uniform(rng, 1e-6, 0.05, n - half),
+                   rng.uniform(-0.1, 0.1, n - half), np.full(n - half, 0.01))
+    parts = []
+    for pairs in (cubes, yard):
+        parts.append(at_depth(pairs, -log_uniform(rng, 1e-6, 0.1, len(pairs.pose_a))))
+    return Pairs(*(np.concatenate(columns) for columns in zip(*parts)))
+
+
+ALL_SETS: dict[str, Generator] = {**SETS, 'just apart': apart}
+
+
+@dataclass(frozen=True, kw_only=True)
+class EngineErrors:
+    """Answers on a set against the exact ones."""
+
+    points: dict[str, tuple[int, float, float, float]]
+    """By class, or 'all': contacts, and the point error's median, p99, worst [%]."""
+    normal: tuple[float, float]  # p99 and worst of the normal's error [deg]; NaN: none was judged
+    missed: int
+    invented: int
+    odd: Mapping[str, int] = field(default_factory=dict)
+    """The pair of the first missed, the first invented contact, the worst normal."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Answers:
+    """What an engine answers on the first n pairs of a set."""
+
+    colliding: np.ndarray  # (n,)
+    normals: np.ndarray  # (n, 3)
+    points: dict[str, np.ndarray]  # (n, 3), by choice
+    exceptions: int = 0  # pairs at which the engine raised one; they count as apart
+
+    def judged(self, pairs: Pairs) -> dict[str, EngineErrors]:
+        """Return the errors by choice."""
+        first = pairs.rows(slice(len(self.colliding)))
+        return {choice: judge(first, self.colliding, self.normals, points)
+                for choice, points in self.points.items()}
+
+
+@dataclass(frozen=True, kw_only=True)
+class FrontierRow:
+    """One contestant on one set. NaN: not measured."""
+
+    name: str
+    set: str
+    instruction_set: str
+    judged: int
+    calls: int
+    single: tuple[float, ...]  # p50, p99, max of a call [ns]
+    batch: float  # p50 of a pair in a batch [ns]
+    choices: dict[str, EngineErrors]  # by the way in which a point was made
+    exceptions: int = 0
+    failure: str = ''  # what ended the engine before its answers, if anything
+    poses: Mapping[str, tuple[list[float], ...]] = field(default_factory=dict)
+    """Poses and sizes of the odd pairs of `EngineErrors`."""
+
+    @property
+    def best(self) -> str:
+        """Return the choice with the least p99 of the point error."""
+        return min(self.choices, key=lambda one: self.choices[one].points.get(
+            'all', (0, math.nan, math.inf, math.nan))[2])
+
+    @property
+    def errors(self) -> EngineErrors:
+        """Return the errors of the best choice."""
+        return self.choices[self.best]
+
+
+def judge(pairs: Pairs, colliding: np.ndarray, normals: np.ndarray, points: np.ndarray,
+          ) -> EngineErrors:
+    """Compare answers (n,), (n, 3), (n, 3) with the exact ones."""
+    truth = pairs.contacts()
+    both = colliding & truth.colliding
+    found: dict[str, tuple[int, float, float, float]] = {}
+    if both.any():
+        touching = pairs.rows(both)
+        errors = 100.0 * np.linalg.norm(points[both] - truth.point[both], axis=1) / touching.edge
+        classes = classify(touching)[0]
+        parts = {'all': errors, **{c: errors[classes == k] for k, c in enumerate(CLASSES)}}
+        found = {label: (len(part), *percentiles(part, 50, 99, 100))
+                 for label, part in parts.items() if len(part)}
+    clear = np.abs(truth.separation) > VERDICT * pairs.size
+    rows = np.flatnonzero(both & clear & np.isfinite(normals).all(axis=1))
+    angles = degrees_between(normals[rows], truth.normal[rows])
+    wrong = {'missed': np.flatnonzero(truth.colliding & ~colliding & clear),
+             'invented': np.flatnonzero(colliding & ~truth.colliding & clear)}
+    odd = {kind: int(rows[0]) for kind, rows in wrong.items() if len(rows)}
+    if len(rows):
+        odd['normal'] = int(rows[np.argmax(angles)])
+    return EngineErrors(points=found, normal=percentiles(angles, 99, 100), odd=odd,
+                        missed=len(wrong['missed']), invented=len(wrong['invented']))
+
+
+def ask(engine: Engine, pairs: Pairs, plan: Plan) -> Answers:
+    """Return answers to as many pairs as there is time to ask."""
+    if engine.prepare_batch and engine.make is None:
+        found = engine.prepare_batch(pairs)()
+        return Answers(colliding=found.colliding, normals=found.normal,
+                       points={engine.choices[0]: found.point})
+    pairs = pairs.rows(slice(plan.single_pairs))
+    nothing, asked, exceptions, began = np.full(3, math.nan), [], 0, time.monotonic()
+    step = len(pairs.size) if _one_size(pairs) else FEW_PAIRS
+    for first in range(0, len(pairs.size), step):
+        for call in engine.prepare(pairs.rows(slice(first, first + step))):
+            try:
+                found = engine.read(call())
+                asked.append([chosen(found, choice) for choice in engine.choices])
+            except Exception:
+                exceptions += 1
+                asked.append([chosen(APART, choice) for choice in engine.choices])
+        if time.monotonic() - began > plan.seconds and len(asked) >= LEAST_PAIRS:
+            break
+    return Answers(
+        colliding=np.array([answers[0].touching for answers in asked]),
+        normals=np.array([_or(answers[0].normal, nothing) for answers in asked]),
+        points={choice: np.array([_or(answers[k].point, nothing) for answers in asked])
+                for k, choice in enumerate(engine.choices)}, exceptions=exceptions)
+
+
+def _or(value: np.ndarray | None, default: np.ndarray) -> np.ndarray:
+    return default if value is None else value
+
+
+def _one_size(pairs: Pairs) -> bool:
+    return all((sizes == sizes[0]).all() for sizes in (pairs.size_a, pairs.size_b))
+
+
+def answers_of(engine: Engine, sets: Mapping[str, Pairs], plan: Plan) -> dict[str, Answers | str]:
+    """Return answers by set, or what ended the engine; sets with boxes not for it are left out."""
+    if engine.make is None or not plan.subprocesses:
+        return _ask_all(engine, sets, plan)
+    few = {name: pairs.rows(slice(plan.single_pairs)) for name, pairs in sets.items()}
+    try:
+        return in_subprocess(_make_and_ask, engine.make, few, plan, patience=PATIENCE)
+    except RuntimeError as error:
+        if len(sets) == 1:
+            return {name: str(error) for name in sets}
+    return {name: answers for one in few.items()
+            for name, answers in answers_of(engine, dict([one]), plan).items()}
+
+
+def _make_and_ask(make: Callable[[], Engine], sets: Mapping[str, Pairs], plan: Plan,
+                  ) -> dict[str, Answers | str]:
+    return _ask_all(make(), sets, plan)
+
+
+def _ask_all(engine: Engine, sets: Mapping[str, Pairs], plan: Plan) -> dict[str, Answers | str]:
+    found: dict[str, Answers | str] = {}
+    for name, pairs in sets.items():
+        try:
+            found[name] = ask(engine, pairs, plan)
+        except ValueError:
+            if engine.any_boxes:
+                raise
+    return found
+
+
+class Trial:
+    """A contestant on a set: its answers, judged, and its times, gathered in rounds."""
+
+    def __init__(self, engine: Engine, name: str, pairs: Pairs, answers: Answers | str,
+                 plan: Plan) -> None:
+        """Judge, and prepare the calls; an engine that failed is not timed."""
+        self._engine, self._set, self._pairs, self._answers = engine, name, pairs, answers
+        self._seconds = plan.seconds / plan.rounds
+        self._calls: Sequence[Callable[[], object]] = ()
+        self._ask_all = None
+        if isinstance(answers, Answers) and not answers.exceptions:
+            self._calls = engine.prepare(pairs.rows(slice(
+                plan.single_pairs if _one_size(pairs) else FEW_PAIRS)))
+            self._ask_all = engine.prepare_batch and engine.prepare_batch(pairs)
+        self._singles: list[int] = []
+        self._batches: list[float] = []
+
+    def time(self) -> None:
+        """Time one round: single calls for the time there is, then batches."""
+        clock, times = time.perf_counter_ns, self._singles
+        for call in self._calls[:LEAST_PAIRS]:
+            call()
+        until = clock() + int(1e9 * self._seconds)
+        least = len(times) + LEAST_PAIRS
+        while self._calls and clock() < until:
+            for call in self._calls:
+                began = clock()
+                call()
+                ended = clock()
+                times.append(ended - began)
+                if ended > until and len(times) >= least:
+                    break
+        for _ in range(BATCHES if self._ask_all else 0):
+            began = clock()
+            self._ask_all()
+            self._batches.append((clock() - began) / len(self._pairs.size))
+
+    def row(self) -> FrontierRow:
+        """Return what was found."""
+        answers, failure = self._answers, ''
+        if isinstance(answers, str):
+            answers, failure = Answers(
+                colliding=np.zeros(0, bool), normals=np.zeros((0, 3)),
+                points={choice: np.zeros((0, 3)) for choice in self._engine.choices}), answers
+        choices = answers.judged(self._pairs)
+        odd = {kind: row for errors in choices.values() for kind, row in errors.odd.items()}
+        return FrontierRow(
+            name=self._engine.name, set=self._set, instruction_set=native.instruction_set,
+            judged=len(answers.colliding), calls=len(self._singles),
+            single=percentiles(self._singles, 50, 99, 100),
+            batch=percentiles(self._batches, 50)[0], choices=choices,
+            exceptions=answers.exceptions, failure=failure,
+            poses={kind: tuple(part[row].tolist() for part in self._pairs)
+                   for kind, row in odd.items()})
+
+
+def measure_all(found: Sequence[Engine], *, seed: int = 3, plan: Plan = FULL) -> list[FrontierRow]:
+    """Return all rows, set by set, the contestants in turn."""
+    from tqdm import tqdm
+
+    count, rows = plan.batch_pairs, []
+    sets = {name: make(np.random.default_rng([seed, place]), count + count // 10 + 20).rows(
+        slice(count)) for place, (name, make) in enumerate(ALL_SETS.items())}
+    with tqdm(total=len(found) * (1 + len(sets) * plan.rounds), desc='frontier',
+              unit='step') as bar:
+        answers = []
+        for engine in found:
+            bar.set_postfix_str(engine.name)
+            answers.append(answers_of(engine, sets, plan))
+            bar.update()
+        for name, pairs in sets.items():
+            bar.set_postfix_str(name)
+            trials = [Trial(engine, name, pairs, given[name], plan)
+                      for engine, given in zip(found, answers) if name in given]
+            bar.update(plan.rounds * (len(found) - len(trials)))
+            take_turns([trial.time for trial in trials], plan.rounds, bar.update)
+            rows += [trial.row() for trial in trials]
+    return rows
+
+
+def measure_with(instruction_set: str, make: Callable[[], Sequence[Engine]], *, seed: int,
+                 plan: Plan) -> list[FrontierRow]:
+    """Measure what `make` returns in a subprocess that is made to use an instruction set."""
+    before = os.environ.get(FORCE)
+    os.environ[FORCE] = instruction_set
+    try:
+        return in_subprocess(_measure_made, make, seed, plan, patience=LONGEST_RUN)
+    finally:
+        if before is None:
+            del os.environ[FORCE]
+        else:
+            os.environ[FORCE] = before
+
+
+def _measure_made(make: Callable[[], Sequence[Engine]], seed: int, plan: Plan,
+                  ) -> list[FrontierRow]:
+    return measure_all(make(), seed=seed, plan=plan)
