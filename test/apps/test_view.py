@@ -25,10 +25,10 @@ from browser import chromium, open_page
 from PIL import Image
 
 from box_contact_ros import ContactSolver
+from box_contact_ros.apps.viewer.listener import ViewNode
+from box_contact_ros.apps.viewer.page.view_page import _edges, _quaternion_from_z, read_out
 from box_contact_ros.apps.viewer.style import BOX_A, BOX_B, STALE, patch_ellipse
 from box_contact_ros.apps.viewer.view_log import LOST_AFTER, ViewLog
-from box_contact_ros.apps.viewer.view_node import ViewNode
-from box_contact_ros.apps.viewer.view_page import _edges, _quaternion_from_z, read_out
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import CLOUD_ROW, NANOSECONDS
 from box_contact_ros.scene.force.patch_law import Patch

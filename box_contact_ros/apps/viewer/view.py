@@ -32,8 +32,8 @@ from ...solver.arguments import model_name, within
 from .. import processes
 from ..processes import DOMAINS, Stop, asked_to_end, on_this_host, printed, program
 from ..ros_client import joined
-from .view_node import ViewNode
-from .view_page import CraneRun, Page
+from .listener import ViewNode
+from .page.view_page import CraneRun, Page
 
 FRAME_PERIOD = 1 / 30
 PAUSE = 1.5  # time [s] between the end of a run and the next, to see how it ended

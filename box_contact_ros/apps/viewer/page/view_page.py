@@ -19,9 +19,9 @@ from dataclasses import dataclass
 import numpy as np
 import viser
 
-from ...scene.pose import rotation_matrix
-from ...solver.models import MODELS
-from .style import (
+from ....scene.pose import rotation_matrix
+from ....solver.models import MODELS
+from ..style import (
     BOX_A,
     BOX_B,
     BOX_OPACITY,
@@ -31,7 +31,7 @@ from .style import (
     proportions,
     unit_pose,
 )
-from .view_log import Snapshot, ViewFigures
+from ..view_log import Snapshot, ViewFigures
 
 CHART_LEAST, CHART_MOST = ({'pad': 0.1, 'soft': value, 'mode': 1} for value in (-20.0, 20.0))
 """Of the separation [mm]: the chart shows at least this, so that it does not magnify noise."""
