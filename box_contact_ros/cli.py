@@ -52,7 +52,7 @@ PROGRAMS = {
         'the same node on a polygon soup, under soup/: what the source paper compares with'),
     'view': _program(
         'apps.viewer.view', 'ros sim view',
-        'a page in the browser: the crane, the boxes, the contact and its figures, live'),
+        'a page in the browser: all boxes of a scene, their contacts and figures, live'),
     'markers': _program(
         'apps.viewer.markers', 'ros',
         'draw boxes and contacts as markers for RViz'),

@@ -2,7 +2,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
@@ -17,7 +18,10 @@ from std_msgs.msg import Header
 
 from ..node.messages import NANOSECONDS
 from ..node.runtime import make_executor, uninterrupted
+from ..resources import resource_path
 
+SCENES = ('config', 'scenes')
+"""Where the package's own scenes are."""
 NodeKind = TypeVar('NodeKind', bound=Node)
 
 DEEP_RELIABLE = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
@@ -53,6 +57,14 @@ def joined(make_node: Callable[[Context], NodeKind], args: Sequence[str] | None 
             if node is not None:
                 node.destroy_node()
             context.try_shutdown()
+
+
+def scene_source(name: str) -> str:
+    """Return what `read_scene` takes: a bare name is that of a scene of the package's own."""
+    if Path(name).name == name and not Path(name).suffix and not Path(name).exists():
+        with suppress(FileNotFoundError):
+            return str(resource_path(*SCENES, f'{name}.yaml'))
+    return name
 
 
 def stamp_of(header: Header) -> int:

@@ -3,7 +3,6 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import replace
 
 import numpy as np
 import poses
@@ -16,19 +15,30 @@ from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import Marker, MarkerArray
 
 from box_contact_ros import ContactSolver
-from box_contact_ros.apps.viewer.markers import PARAMETERS, MarkersNode, box_marker, contact_markers
+from box_contact_ros.apps.viewer.markers import (
+    NAMESPACES,
+    PARAMETERS,
+    MarkersNode,
+    scene_markers,
+)
+from box_contact_ros.apps.viewer.style import LISTED
+from box_contact_ros.apps.viewer.view_log import ViewLog
 from box_contact_ros.node.contact_node import ContactNode
-from box_contact_ros.node.messages import make_cloud, make_header
+from box_contact_ros.node.messages import make_cloud, make_header, read_cloud
 from box_contact_ros.resources import resource_path
-from box_contact_ros.scene.force.patch_law import Patch
-from box_contact_ros.scene.scene_solver import Answer, Pair
-from box_contact_ros.scene.stamp_pairing import StampedPose
+from box_contact_ros.scene.scene_solver import Answer, Box, Pair, Scene
 from box_contact_ros.solver.contact import Contact
 
 SLAB, CUBE = (2.0, 4.0, 1.0), (2.0, 2.0, 2.0)
-HEADER = make_header(1_500_000_000, 'yard')
-TOUCH = Patch(np.array([1.0, 2.0, 3.0]), np.array([0.0, 0.6, 0.8]), 0.0125, 0.05, np.eye(3) / 12)
-NO_PATCH = replace(TOUCH, volume=math.nan, covariance=np.full((3, 3), math.nan))
+STAMP = 1_500_000_000
+HEADER = make_header(STAMP, 'yard')
+YARD = Scene({'slab': Box('slab', SLAB, pose_topic='slab/pose'),
+              's1': Box('s1', CUBE, (1.0, 2.0, 3.0, 0.0, 0.0, 1.2, 1.6)),
+              's2': Box('s2', CUBE, (9.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0))},
+             (Pair(4, 'slab_s1', 'slab', 's1'), Pair(7, 'slab_s2', 'slab', 's2')))
+CONTACT = Contact(True, -0.0125, np.array([0.0, 0.6, 0.8]), np.array([1.0, 2.0, 3.0]), 0.05,
+                  np.eye(3) / 12)
+NO_PATCH = CONTACT._replace(volume=math.nan, covariance=np.full((3, 3), math.nan))
 TOUCHING = np.array([0.5, 0.25, 1.875, 0, 0, 0, 1])
 APART = np.array([0.5, 0.25, 2.5, 0, 0, 0, 1])
 
@@ -37,27 +47,43 @@ def xyz(values):
     return values.x, values.y, values.z
 
 
+def drawing(touching=(), stale=(), scene=YARD):
+    """Return the markers of a scene, and those of each namespace."""
+    log = ViewLog(scene)
+    for box in scene.moving:
+        log.pose(box, STAMP, np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 2.0]), 'yard')
+    cloud = make_cloud(HEADER, Answer(list(touching), list(stale), 1))
+    log.cloud(STAMP, read_cloud(cloud), STAMP, 'yard')
+    markers = scene_markers(log.snapshot())
+    return markers, {name: [m for m in markers if m.ns == name] for name in NAMESPACES}
+
+
 def test_a_box_is_a_cube_of_its_full_extents_at_its_pose():
-    """Stamp and frame are the pose's; a quaternion of length 2 is made one of length 1."""
-    pose = StampedPose(np.array([1.0, 2.0, 3.0, 0.0, 0.0, 1.2, 1.6]), 'yard', 1_500_000_000)
-    a, b = (box_marker(box, pose, SLAB) for box in (0, 1))
-    assert (a.type, a.action, a.header) == (Marker.CUBE, Marker.ADD, HEADER)
-    assert xyz(a.pose.position) == (1.0, 2.0, 3.0)
-    q = a.pose.orientation
+    """Of every box of the scene; a quaternion of length 2 is made one of length 1."""
+    markers, found = drawing()
+    assert markers == found['boxes'] and [m.id for m in markers] == [0, 1, 2]
+    assert all((m.type, m.action, m.header) == (Marker.CUBE, Marker.ADD, HEADER) for m in markers)
+    assert [xyz(m.scale) for m in markers] == [SLAB, CUBE, CUBE]
+    assert xyz(markers[1].pose.position) == (1.0, 2.0, 3.0)
+    q = markers[1].pose.orientation
     assert (q.x, q.y, q.z, q.w) == pytest.approx((0.0, 0.0, 0.6, 0.8))
-    assert xyz(a.scale) == SLAB
-    assert 0.0 < a.color.a < 1.0
-    assert (a.ns, a.color) != (b.ns, b.color)
+    assert all(0.0 < m.color.a < 1.0 for m in markers)
+    assert markers[0].color != markers[1].color == markers[2].color  # a, and b of pairs
 
 
-def test_a_contact_is_point_normal_and_depth():
-    """The sphere is at the point; the arrow goes from it, along the normal; the depth is in mm."""
-    point, normal, depth, _ = contact_markers(HEADER, TOUCH, SLAB, CUBE)
-    assert [m.type for m in (point, normal, depth)] == [
-        Marker.SPHERE, Marker.ARROW, Marker.TEXT_VIEW_FACING]
+def test_a_contact_is_point_normal_depth_and_patch():
+    """The sphere is at the point; the arrow goes from it, along the normal; the depth is in mm.
+
+    The patch is a closed line in the contact plane: of a square of 1 m the circle in it.
+    """
+    _, found = drawing([(YARD.pairs[0], CONTACT)])
+    (point,), (normal,), (depth,), (patch,) = (found[name] for name in (
+        'points', 'normals', 'depths', 'patches'))
+    assert [m.type for m in (point, normal, depth, patch)] == [
+        Marker.SPHERE_LIST, Marker.ARROW, Marker.TEXT_VIEW_FACING, Marker.LINE_LIST]
     assert all(m.action == Marker.ADD and m.header == HEADER and m.color.a == 1.0
-               for m in (point, normal, depth))
-    assert xyz(point.pose.position) == (1.0, 2.0, 3.0)
+               for m in (point, normal, depth, patch))
+    assert [xyz(place) for place in point.points] == [(1.0, 2.0, 3.0)]
     tail, tip = (np.array(xyz(end)) for end in normal.points)
     assert tail == pytest.approx([1.0, 2.0, 3.0])
     length = np.linalg.norm(tip - tail)
@@ -65,41 +91,47 @@ def test_a_contact_is_point_normal_and_depth():
     # Seen beside the smaller box, whose edge is 2 m: neither a speck nor larger than the box.
     assert 0.1 < length < 1.0 and 0.02 < point.scale.x < 0.2
     assert depth.text == 'depth 12.50 mm'
+    ends = np.array([xyz(end) for end in patch.points]).reshape(-1, 2, 3) - CONTACT.point
+    assert np.roll(ends[:, 1], 1, axis=0) == pytest.approx(ends[:, 0], abs=1e-12)
+    assert np.abs(ends @ CONTACT.normal).max() < 1e-12
+    assert np.linalg.norm(ends, axis=2) == pytest.approx(0.5)
 
 
-def test_a_patch_is_an_ellipse_around_the_point():
-    """A line in the contact plane, closed; of a square of 1 m it is the circle in it."""
-    *_, patch = contact_markers(HEADER, TOUCH, SLAB, CUBE)
-    assert (patch.type, patch.action, patch.header) == (Marker.LINE_STRIP, Marker.ADD, HEADER)
-    assert xyz(patch.pose.position) == (1.0, 2.0, 3.0)
-    line = np.array([xyz(point) for point in patch.points])
-    assert line[0] == pytest.approx(line[-1], abs=1e-12)
-    assert np.abs(line @ TOUCH.normal).max() < 1e-12
-    assert np.linalg.norm(line, axis=1) == pytest.approx(0.5)
-
-
-def test_a_model_without_patch_has_its_ellipse_deleted():
+def test_a_model_without_patch_has_no_ellipse():
     """The point, normal and depth are drawn all the same."""
-    assert [m.action for m in contact_markers(HEADER, NO_PATCH, SLAB, CUBE)] == [
-        Marker.ADD, Marker.ADD, Marker.ADD, Marker.DELETE]
+    _, found = drawing([(YARD.pairs[0], NO_PATCH)])
+    assert [len(found[name]) for name in NAMESPACES] == [3, 1, 1, 0, 1]
 
 
-def test_without_contact_the_same_markers_are_deleted():
-    """A marker is known by namespace and id, so those of both must be the same."""
-    drawn, deleted = (contact_markers(HEADER, touch, SLAB, CUBE) for touch in (TOUCH, None))
-    assert [(m.ns, m.id) for m in deleted] == [(m.ns, m.id) for m in drawn]
-    assert len({(m.ns, m.id) for m in drawn}) == 4
-    assert all(m.action == Marker.DELETE for m in deleted)
+def test_all_contacts_are_drawn_and_the_deepest_labelled():
+    """With normals of their own; ids count from the deepest on, so that they stay the same."""
+    boxes = {f's{n}': Box(f's{n}', CUBE, (n, 0, 0, 0, 0, 0, 1)) for n in range(30)}
+    boxes['load'] = Box('load', CUBE, pose_topic='load/pose')
+    pairs = tuple(Pair(n, f'p{n}', 'load', f's{n}') for n in range(30))
+    touching = [(pair, CONTACT._replace(separation=-1e-3 * (pair.id % 7),
+                                        point=np.full(3, pair.id)))
+                for pair in pairs]
+    _, found = drawing(touching, scene=Scene(boxes, pairs))
+    assert [xyz(place)[0] for place in found['points'][0].points] == list(range(30))
+    assert [m.id for m in found['normals']] == list(range(30))
+    assert [m.text for m in found['depths']] == [
+        f'depth {n:.2f} mm' for n in sorted((n % 7 for n in range(30)), reverse=True)[:LISTED]]
+    assert len(found['patches'][0].points) == 30 * 48 * 2
+
+
+def test_a_stale_box_is_grey():
+    """Its pair has no contact; the fixed box keeps its colour."""
+    _, found = drawing(stale=YARD.pairs)
+    colours = [m.color for m in found['boxes']]
+    assert colours[0].r == colours[0].g == colours[0].b
+    assert colours[1] == drawing()[1]['boxes'][1].color
 
 
 def test_the_rviz_config_names_topics_and_namespaces_that_exist():
     config = yaml.safe_load(resource_path('config', 'contact.rviz').read_text('utf-8'))
     displays = {display['Class'].rpartition('/')[2]: display
                 for display in config['Visualization Manager']['Displays']}
-    pose = StampedPose(poses.IDENTITY, 'yard', 0)
-    markers = [box_marker(0, pose, CUBE), box_marker(1, pose, CUBE),
-               *contact_markers(HEADER, TOUCH, CUBE, CUBE)]
-    assert set(displays['MarkerArray']['Namespaces']) == {marker.ns for marker in markers}
+    assert set(displays['MarkerArray']['Namespaces']) == set(NAMESPACES)
     assert displays['MarkerArray']['Topic']['Value'] == 'markers'
     assert displays['PointStamped']['Topic']['Value'] == 'contact/point'
     assert displays['Grid']['Enabled']
@@ -137,7 +169,7 @@ def contact_node():
 
 
 def actions(array):
-    return {marker.ns: marker.action for marker in array.markers}
+    return {(marker.ns, marker.id): marker.action for marker in array.markers}
 
 
 def offer_until_drawn(client, count):
@@ -145,14 +177,14 @@ def offer_until_drawn(client, count):
     deadline = time.monotonic() + MATCH_SECONDS
     while not (client.arrays and len(client.arrays[-1].markers) == count):
         assert time.monotonic() < deadline, 'no markers'
-        client.send(poses.IDENTITY, APART)
+        client.send(poses.IDENTITY, TOUCHING)
         client.spin(lambda: False, 0.1)
 
 
 def drawn(client, wanted):
     """Wait until what shows the contact has this action in the last array."""
-    names = 'point', 'normal', 'depth', 'patch'
-    return client.spin(lambda: [actions(client.arrays[-1]).get(name) for name in names] == [
+    names = 'points', 'normals', 'patches', 'depths'
+    return client.spin(lambda: [actions(client.arrays[-1]).get((name, 0)) for name in names] == [
         wanted] * len(names), 10.0)
 
 
@@ -160,16 +192,20 @@ def test_draws_what_the_contact_node_answers(client, node, contact_node):
     """In contact with its point; apart, taken away; the boxes in both cases."""
     offer_until_drawn(client, 6)
     stamp = client.ask(poses.IDENTITY, TOUCHING, frames=('yard', 'yard'))
+    assert client.spin(lambda: client.arrays[-1].markers[0].header == client.clouds[stamp].header,
+                       10.0)
     assert drawn(client, Marker.ADD)
     markers = {marker.ns: marker for marker in client.arrays[-1].markers}
-    assert set(markers) == {'box_a', 'box_b', 'point', 'normal', 'depth', 'patch'}
+    assert set(markers) == set(NAMESPACES)
     assert {marker.header.frame_id for marker in markers.values()} == {'yard'}
-    assert markers['point'].header == client.clouds[stamp].header
     wanted = ContactSolver(CUBE, CUBE, model='exact')(poses.IDENTITY, TOUCHING)
-    assert xyz(markers['point'].pose.position) == tuple(wanted.point)
+    assert xyz(markers['points'].points[0]) == tuple(wanted.point)
+    client.arrays.clear()
     client.ask(poses.IDENTITY, APART)
-    assert drawn(client, Marker.DELETE)
-    assert actions(client.arrays[-1])['box_b'] == Marker.ADD
+    # Once taken away: the next arrays need not say so again.
+    assert client.spin(lambda: any(actions(array).get(('points', 0)) == Marker.DELETE
+                                   for array in client.arrays), 10.0)
+    assert actions(client.arrays[-1])['boxes', 1] == Marker.ADD
     assert client.spin(lambda: xyz(client.arrays[-1].markers[1].pose.position) == (0.5, 0.25, 2.5),
                        10.0)
 
@@ -188,20 +224,32 @@ def test_nobody_answers_any_more(client, node):
 
 
 def test_contacts_of_another_scene_are_not_drawn(client, node, capfd):
-    """A row of a pair that is not the two boxes', and two rows: said, and no point put anywhere."""
+    """A row of a pair that the scene has not: said, and no point put anywhere."""
     offer_until_drawn(client, 2)
     publisher = client.node.create_publisher(PointCloud2, 'contacts', 10)
     assert client.spin(lambda: publisher.get_subscription_count() > 1, 10.0)  # ours, and markers'
-    contact = Contact(True, -0.1, np.array([0.0, 0.0, 1.0]), np.zeros(3), 0.0, np.zeros((3, 3)))
     for pairs in ([Pair(3, 'p', 'a', 'b')], [Pair(0, 'p', 'a', 'b'), Pair(1, 'q', 'a', 'c')]):
         publisher.publish(make_cloud(make_header(client.next_stamp(), 'map'), Answer(
-            [(pair, contact) for pair in pairs], [], len(pairs))))
+            [(pair, CONTACT) for pair in pairs], [], len(pairs))))
         client.spin(lambda: False, 0.2)
         client.arrays.clear()
         client.send(poses.IDENTITY, TOUCHING)
         assert client.spin(lambda: client.arrays, 5.0)
-        assert not any('point' in actions(array) for array in client.arrays)
-    assert 'with other pairs' in capfd.readouterr().err
+        assert not any(marker.ns == 'points' for array in client.arrays for marker in array.markers)
+    assert 'which the scene that is drawn has not' in capfd.readouterr().err
+
+
+def test_another_scene(client, node):
+    """Set while it runs: its boxes are subscribed to and drawn, a bad one is refused."""
+    result, = node.set_parameters([Parameter('scene', value='no_such_scene')])
+    assert not result.successful and 'no_such_scene' in result.reason
+    offer_until_drawn(client, 2)
+    result, = node.set_parameters([Parameter('scene', value='two_boxes')])
+    assert result.successful
+    client.arrays.clear()
+    offer_until_drawn(client, 2)
+    assert client.spin(lambda: xyz(client.arrays[-1].markers[0].scale) == (12.192, 2.438, 2.591),
+                       10.0)
 
 
 def test_no_more_often_than_asked(client, node, contact_node):
@@ -224,6 +272,7 @@ def test_no_more_often_than_asked(client, node, contact_node):
 def test_bad_poses_are_not_drawn(client, node):
     """Neither NaN nor a quaternion of zero length; the box stays where it was."""
     offer_until_drawn(client, 2)
+    client.send(poses.IDENTITY, APART)
     client.spin(lambda: False, 0.3)
     client.arrays.clear()
     for bad in ((math.nan, 0, 0, 0, 0, 0, 1), (0, 0, 0, 0, 0, 0, 0)):

@@ -9,7 +9,6 @@ import signal
 import subprocess
 import sys
 import time
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -26,13 +25,29 @@ from PIL import Image
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.apps.viewer.listener import ViewNode
-from box_contact_ros.apps.viewer.page.view_page import _edges, _quaternion_from_z, read_out
-from box_contact_ros.apps.viewer.style import BOX_A, BOX_B, STALE, patch_ellipse
-from box_contact_ros.apps.viewer.view_log import LOST_AFTER, ViewLog
+from box_contact_ros.apps.viewer.page.read_outs import deepest_contacts, legend, read_out
+from box_contact_ros.apps.viewer.style import (
+    BOX_A,
+    BOX_B,
+    LEGEND,
+    LISTED,
+    STALE,
+    box_edges,
+    patch_areas,
+    patch_axes,
+    patch_outlines,
+)
+from box_contact_ros.apps.viewer.view_log import LOST_AFTER, OtherSceneError, ViewLog
 from box_contact_ros.node.contact_node import ContactNode
-from box_contact_ros.node.messages import CLOUD_ROW, NANOSECONDS
-from box_contact_ros.scene.force.patch_law import Patch
+from box_contact_ros.node.messages import (
+    CLOUD_ROW,
+    NANOSECONDS,
+    make_cloud,
+    make_header,
+    read_cloud,
+)
 from box_contact_ros.scene.pose import rotation_matrix
+from box_contact_ros.scene.scene_solver import Box, Pair, Scene, SceneSolver, two_boxes
 
 ORIGIN = poses.IDENTITY
 TOUCHING = np.array([0.5, 0.25, 1.875, 0, 0, 0, 1])
@@ -41,6 +56,7 @@ CUBE = (2.0, 2.0, 2.0)
 EXACT = ContactSolver(CUBE, CUBE, model='exact')(ORIGIN, TOUCHING)
 NO_ROWS = np.zeros(0, CLOUD_ROW)
 NOT_EVALUATED = np.array([(*[math.nan] * 7, 0, *[math.nan] * 7)], CLOUD_ROW)
+BOTH = two_boxes(CUBE, CUBE)
 START = 1_000 * NANOSECONDS
 MS = 1_000_000
 
@@ -54,12 +70,12 @@ def rows(shift=0.0):
 
 @pytest.fixture
 def log():
-    return ViewLog(CUBE, CUBE, 'stamp')
+    return ViewLog(BOTH)
 
 
 def send(log, stamp, b=TOUCHING):
-    log.pose(0, stamp, ORIGIN)
-    log.pose(1, stamp, b)
+    log.pose('box_a', stamp, ORIGIN)
+    log.pose('box_b', stamp, b)
 
 
 # --- figures --------------------------------------------------------------------------------------
@@ -68,15 +84,16 @@ def send(log, stamp, b=TOUCHING):
 @pytest.mark.parametrize('cloud_at', [0, 1, 2])
 def test_an_answer_belongs_to_the_poses_of_its_stamp(log, cloud_at):
     """Whichever of the three messages comes first; latency is from the stamp to the cloud."""
-    news = [lambda: log.pose(0, START, ORIGIN), lambda: log.pose(1, START, TOUCHING)]
+    news = [lambda: log.pose('box_a', START, ORIGIN), lambda: log.pose('box_b', START, TOUCHING)]
     news.insert(cloud_at, lambda: log.cloud(START, rows(), START + 3 * MS))
     for one in news:
         one()
     seen, figures = log.snapshot(), log.figures(START + 4 * MS)
     assert np.array_equal(seen.poses, (ORIGIN, TOUCHING))
-    assert np.array_equal(seen.answer.touch.point, EXACT.point)
-    assert np.array_equal(seen.answer.touch.normal, EXACT.normal)
-    assert seen.answer.touch.depth == -EXACT.separation == -seen.exact.separation
+    assert np.array_equal(seen.answer.points, [EXACT.point])
+    assert np.array_equal(seen.answer.normals, [EXACT.normal])
+    assert np.array_equal(seen.answer.covariances, [EXACT.covariance])
+    assert seen.answer.contacts['depth'] == -EXACT.separation == -seen.separation
     assert figures.latency_median == pytest.approx(3e-3)
     assert (figures.answered, figures.lost) == (1, 0)
 
@@ -108,7 +125,7 @@ def test_no_contact_has_no_point_and_no_error(log, cloud):
     send(log, START, APART)
     log.cloud(START, cloud, START + MS)
     seen, figures = log.snapshot(), log.figures(START)
-    assert seen.answer.touch is None and seen.exact.separation == pytest.approx(0.5)
+    assert not len(seen.answer.pairs) and seen.separation == pytest.approx(0.5)
     assert math.isnan(figures.point_error_median) and figures.answered == 1
 
 
@@ -158,12 +175,112 @@ def test_a_run_starts_anew(log):
 
 
 def test_latest_pairing_answers_with_the_newer_stamp():
-    """A at 10 ms with B at 0 ms: the cloud carries 10 ms."""
-    log = ViewLog(CUBE, CUBE, 'latest')
-    log.pose(1, START, TOUCHING)
-    log.pose(0, START + 10 * MS, ORIGIN)
-    log.cloud(START + 10 * MS, rows(), START + 11 * MS)
-    assert np.array_equal(log.snapshot().answer.touch.point, EXACT.point)
+    """A at 10 ms with B at 0 ms: the cloud carries 10 ms; by stamps alone, no error is known."""
+    for pairing, errors in (('latest', 1), ('stamp', 0)):
+        log = ViewLog(BOTH, pairing=pairing)
+        log.pose('box_b', START, TOUCHING)
+        log.pose('box_a', START + 10 * MS, ORIGIN)
+        log.cloud(START + 10 * MS, rows(), START + 11 * MS)
+        seen = log.snapshot()
+        assert np.array_equal(seen.poses, (ORIGIN, TOUCHING))
+        assert len(seen.answer.point_errors) == errors
+
+
+# --- a scene of more boxes ------------------------------------------------------------------------
+
+
+def stacks(count):
+    """Return a scene of loads over fixed cubes, 5 m apart; each load with its own and the next."""
+    boxes = {f'load_{n}': Box(f'load_{n}', CUBE, pose_topic=f'load_{n}/pose')
+             for n in range(count)}
+    boxes |= {f's{n}': Box(f's{n}', CUBE, (5.0 * n, 0, 0, 0, 0, 0, 1)) for n in range(count)}
+    pairs = [Pair(10 + n, f'load_{n}_s{n}', f'load_{n}', f's{n}') for n in range(count)]
+    pairs += [Pair(1000 + n, f'near_{n}', f'load_{n}', f's{n + 1}') for n in range(count - 1)]
+    return Scene(boxes, tuple(pairs), 'yard')
+
+
+def cloud_of(answer):
+    message = make_cloud(make_header(0, 'yard'), answer)
+    return read_cloud(message)
+
+
+def loads(count, depths):
+    """Return a pose for each load over its own cube, so deep."""
+    return [np.array([5.0 * n, 0.0, 2.0 - depths[n], 0, 0, 0, 1]) for n in range(count)]
+
+
+def test_contacts_of_many_pairs_against_the_solver():
+    """Points, normals, patches and errors are those of each pair, whatever the rows' order."""
+    scene = stacks(20)
+    depths = 1e-3 * np.random.default_rng(1).permutation(np.arange(-5, 15))
+    answer = SceneSolver(scene, model='exact')(loads(20, depths))
+    log = ViewLog(scene)
+    for name, pose in zip(scene.moving, loads(20, depths)):
+        log.pose(name, START, pose, 'yard')
+    log.cloud(START, cloud_of(answer)[::-1], START + MS, 'yard')
+    seen = log.snapshot()
+    assert not np.isnan(seen.poses).any() and seen.frame_id == 'yard'
+    touching = [(pair.name, contact) for pair, contact in reversed(answer.touching)]
+    assert [scene.pairs[row].name for row in seen.answer.pairs] == [name for name, _ in touching]
+    assert len(touching) == np.sum(depths >= 0.0)
+    for number, (_, contact) in enumerate(touching):
+        assert np.array_equal(seen.answer.points[number], contact.point)
+        assert np.array_equal(seen.answer.covariances[number], contact.covariance)
+    assert seen.answer.point_errors == pytest.approx(0.0, abs=1e-15)
+    assert len(seen.answer.point_errors) == len(touching)
+    assert seen.separation == pytest.approx(-depths.max())
+    listed = re.findall(r'<tr><td>(load_\d+)_s\d+</td><td[^>]*>([\d.]+)<', deepest_contacts(seen))
+    deepest = np.argsort(-depths)[:LISTED]
+    assert listed == [(f'load_{n}', f'{1e3 * depths[n]:.2f}') for n in deepest]
+    assert f'and {len(touching) - LISTED} more' in deepest_contacts(seen)
+    text = read_out(seen, log.figures(START + 2 * MS), 'exact')
+    assert shown(text, 'pairs') == f'{len(touching)} of 39'
+
+
+def test_a_silent_box_is_grey_and_stays_where_it_was():
+    """Of a stale pair the box that is not heard of, never one that is fixed or sends."""
+    scene = stacks(3)
+    solver, log = SceneSolver(scene, model='exact'), ViewLog(scene)
+    placed = loads(3, [0.01, 0.01, 0.01])
+    for name, pose in zip(scene.moving, placed):
+        log.pose(name, START, pose)
+    log.cloud(START, cloud_of(solver(placed)), START)
+    assert not log.snapshot().stale_boxes.any()
+    log.pose('load_0', START + MS, placed[0])
+    log.pose('load_2', START + MS, placed[2])
+    log.cloud(START + MS, cloud_of(solver([placed[0], None, placed[2]])), START + MS)
+    seen = log.snapshot()
+    assert [name for name, stale in zip(scene.boxes, seen.stale_boxes) if stale] == ['load_1']
+    assert np.array_equal(seen.poses[1], placed[1])
+    assert [scene.pairs[row].name for row in seen.answer.pairs] == ['load_0_s0', 'load_2_s2']
+    assert 'stale: load_1_s1, near_1' in deepest_contacts(seen)
+
+
+def test_of_two_moving_boxes_the_older_is_grey(log):
+    send(log, START)
+    log.cloud(START, rows(), START)
+    log.pose('box_a', START + MS, ORIGIN)
+    log.cloud(START + MS, NOT_EVALUATED, START + MS)
+    assert log.snapshot().stale_boxes.tolist() == [False, True]
+
+
+def test_a_pair_that_the_scene_has_not_is_refused(log):
+    """And what was drawn stays."""
+    send(log, START)
+    log.cloud(START, rows(), START)
+    other = rows()
+    other['pair'] = 7
+    with pytest.raises(OtherSceneError, match='pair 7'):
+        log.cloud(START + MS, other, START + MS)
+    assert log.snapshot().answer.stamp == START
+
+
+def test_time_that_is_set_back_begins_anew(log):
+    """A simulation that starts again from zero is drawn from its first pose."""
+    send(log, START)
+    log.cloud(START, rows(), START)
+    send(log, 0, APART)
+    assert log.snapshot().stamp == 0 and log.figures(0).answered == 0
 
 
 # --- what is shown --------------------------------------------------------------------------------
@@ -181,8 +298,8 @@ def test_read_out_says_lengths_in_mm_and_shares_of_the_edge(log):
     assert shown(text, 'verdict') == 'contact'
     assert shown(text, 'separation') == '-125.00 mm'
     assert shown(text, 'error') == '3.0 mm = 0.15 %'
-    assert shown(text, 'volume') == '0.328 m³'  # 1.5 × 1.75 × 0.125 m
-    assert shown(text, 'area') == '2.62 m²'
+    assert '>0.328</td>' in deepest_contacts(log.snapshot())  # 1.5 × 1.75 × 0.125 m³
+    assert '>2.62</td>' in deepest_contacts(log.snapshot())
     assert shown(text, 'latency') == '2.00 ms'
     assert shown(text, 'lost') == '0 of 1'
     assert 'point error of soup' in text
@@ -197,7 +314,12 @@ def test_read_out_without_contact_answer_or_poses(log):
     log.cloud(START, NO_ROWS, START)
     text = read_out(log.snapshot(), log.figures(START), 'exact')
     assert (shown(text, 'verdict'), shown(text, 'error')) == ('no contact', '–')
-    assert (shown(text, 'volume'), shown(text, 'area')) == ('– m³', '– m²')
+    assert deepest_contacts(None) == '' and '</td></tr></table>' in deepest_contacts(log.snapshot())
+
+
+def test_the_legend_names_every_colour():
+    text = legend()
+    assert all(f'rgb{colour}' in text and name in text for colour, name in LEGEND)
 
 
 @pytest.mark.parametrize('turn', [(0, 0, 0, 1), (0.1, -0.5, 0.3, 0.8)])
@@ -207,45 +329,35 @@ def test_the_ellipse_of_a_rectangle(turn):
     turned = rotation_matrix(turn)
     contact = ContactSolver(CUBE, CUBE, model='exact')(
         (0, 0, 0, *turn), (*turned @ [0.5, 0.25, 1.875], *turn))
-    patch = Patch(contact.point, contact.normal, 0.125, contact.volume, contact.covariance)
-    ellipse = patch_ellipse(patch)
+    semi_axes = patch_axes(contact.normal[None], contact.covariance[None])
     longer, shorter = turned @ (0, length / 2, 0), turned @ (width / 2, 0, 0)
-    for found, wanted in zip(ellipse.semi_axes, (longer, shorter), strict=True):
+    for found, wanted in zip(semi_axes[0], (longer, shorter), strict=True):
         assert found * np.sign(found @ wanted) == pytest.approx(wanted, abs=1e-12)
-    assert ellipse.area == pytest.approx(length * width)
-    line = ellipse.outline @ turned  # in the boxes' frame
+    assert patch_areas(semi_axes) == pytest.approx(length * width)
+    line = patch_outlines(semi_axes)[0] @ turned  # in the boxes' frame
     assert np.abs(line).max(axis=0) == pytest.approx([width / 2, length / 2, 0.0], abs=1e-12)
     assert (line[:, 0] / width)**2 + (line[:, 1] / length)**2 == pytest.approx(0.25)
+    assert line[0] == pytest.approx(line[-1])
 
 
 def test_the_ellipse_of_a_line_of_a_point_and_of_no_patch():
     """Variances of zero, or below by rounding, have no width; NaN has no ellipse."""
-    down = np.array([0.0, 0.0, -1.0])
-    line = Patch(np.zeros(3), down, 0.0, 1e-9, np.diag([3.0, -1e-17, 1e-20]))
-    longer, shorter = patch_ellipse(line).semi_axes
-    assert np.abs(longer) == pytest.approx([3.0, 0.0, 0.0])
-    assert not shorter.any() and patch_ellipse(line).area == 0.0
-    assert not patch_ellipse(replace(line, covariance=-1e-17 * np.eye(3))).semi_axes.any()
-    assert patch_ellipse(replace(line, covariance=np.full((3, 3), math.nan))) is None
-
-
-@pytest.mark.parametrize('direction', [
-    (0, 0, 1), (0, 0, -1), (1, 0, 0), (0, -1, 0), (0.36, 0.48, -0.8), (1e-12, 0, -1)])
-def test_the_arrow_is_turned_along_the_normal(direction):
-    """Turned by a unit quaternion (w, v), z is v·(2 v_z) + z·(w² − v·v) + 2 w v × z."""
-    w, *v = _quaternion_from_z(np.array(direction, float))
-    v, z = np.array(v), np.array([0.0, 0.0, 1.0])
-    assert w * w + v @ v == pytest.approx(1.0)
-    turned = 2 * v * v[2] + z * (w * w - v @ v) + 2 * w * np.cross(v, z)
-    assert turned == pytest.approx(np.array(direction, float), abs=1e-9)
+    down = np.tile([0.0, 0.0, -1.0], (3, 1))
+    line, point = np.diag([3.0, -1e-17, 1e-20]), -1e-17 * np.eye(3)
+    semi_axes = patch_axes(down, np.array([line, point, np.full((3, 3), math.nan)]))
+    assert np.abs(semi_axes[0, 0]) == pytest.approx([3.0, 0.0, 0.0])
+    assert not semi_axes[0, 1].any() and not semi_axes[1].any()
+    assert patch_areas(semi_axes)[:2] == pytest.approx(0.0)
+    assert np.isnan(semi_axes[2]).all()
 
 
 def test_a_box_has_twelve_edges():
-    """Four of each extent, all on the surface."""
-    edges = _edges((1.0, 2.0, 4.0))
+    """Four of each extent, all on the surface, wherever the box is."""
+    pose = np.array([3.0, -4.0, 5.0, *(0.5, 0.5, 0.5, 0.5)])  # x to y, y to z, z to x
+    edges = box_edges(pose[None], np.array([[1.0, 2.0, 4.0]]))[0]
     lengths = np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)
     assert sorted(lengths) == [1.0] * 4 + [2.0] * 4 + [4.0] * 4
-    assert (np.abs(edges) == [0.5, 1.0, 2.0]).all()
+    assert np.abs(edges - pose[:3]) == pytest.approx(np.broadcast_to([2.0, 0.5, 1.0], (12, 2, 3)))
 
 
 # --- over DDS -------------------------------------------------------------------------------------
@@ -290,11 +402,11 @@ def test_it_hears_poses_and_answers(view, client):
     stamp = client.ask(ORIGIN, TOUCHING)
     assert client.spin(lambda: view.log.snapshot().answer.stamp == stamp, 10.0)
     seen = view.log.snapshot()
-    assert seen.answer.touch.point == pytest.approx(seen.exact.point)
+    assert seen.answer.points == pytest.approx(seen.answer.exact_points)
     assert 0.0 < seen.answer.latency < 5.0
     client.send(ORIGIN, (math.nan, 0, 0, 0, 0, 0, 1))
     client.ask(ORIGIN, APART)
-    assert client.spin(lambda: view.log.snapshot().answer.touch is None, 10.0)
+    assert client.spin(lambda: not len(view.log.snapshot().answer.pairs), 10.0)
 
 
 def test_it_switches_the_model_of_the_running_node(view, client, contact_node):
@@ -319,9 +431,9 @@ def test_another_size_is_another_log(view, client, contact_node):
     result, = contact_node.set_parameters([Parameter('size_b', value=[2.0, 2.0, 3.0])])
     assert result.successful
     assert client.spin(lambda: view.log is not old, 10.0)
-    view.log.pose(0, START, ORIGIN)
-    view.log.pose(1, START, TOUCHING)
-    assert view.log.snapshot().exact.separation == pytest.approx(1.875 - 2.5)
+    view.log.pose('box_a', START, ORIGIN)
+    view.log.pose('box_b', START, TOUCHING)
+    assert view.log.snapshot().separation == pytest.approx(1.875 - 2.5)
     contact_node.set_parameters([Parameter('size_b', value=[2.0, 2.0, 2.5])])  # as others expect
     assert client.spin(lambda: list(view.settings['size_b']) == [2.0, 2.0, 2.5], 10.0)
 

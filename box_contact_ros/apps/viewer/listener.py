@@ -1,6 +1,6 @@
-"""Nodes that hear what markers and view show: the poses of two boxes, and their contacts.
+"""Nodes that hear what is drawn: poses of all boxes of a scene, and contacts.
 
-`ViewNode` has a hand on the contact node, too: the parameter `model`.
+`ViewNode` learns the scene from the contact node's parameters, and sets its model.
 """
 from __future__ import annotations
 
@@ -9,73 +9,93 @@ import time
 from collections.abc import Callable, Mapping
 from typing import Any
 
-import numpy as np
 from geometry_msgs.msg import PoseStamped
 from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.qos import QoSProfile
+from rclpy.subscription import Subscription
 from rclpy.task import Future
 from sensor_msgs.msg import PointCloud2
-from std_msgs.msg import Header
 
-from ...node.messages import OTHER_SCENE, Refused, TypedMessages, is_of_two_boxes, read_cloud
+from ...node.message_bytes import RawMessages
+from ...node.messages import Refused, read_cloud
 from ...node.runtime import LOG_SECONDS, POSE_QOS
-from ...scene.stamp_pairing import StampedPose
+from ...scene.scene_file import SceneError, read_scene
+from ...scene.scene_solver import Scene, two_boxes
 from ..ros_client import stamp_of
-from .view_log import ViewLog
+from .view_log import OtherSceneError, ViewLog
 
 ASK_PERIOD = 0.5
 """Time [s] between looks at the contact node's parameters: somebody else may change them too."""
 ANSWER_PATIENCE = 3.0
 """Without an answer for so long [s], the contact node is not there, or is busy."""
-ASKED = ('size_a', 'size_b', 'pairing', 'model')
+ASKED = ('size_a', 'size_b', 'scene', 'pairing', 'tolerance', 'model')
+OF_SCENE = ASKED[:-1]
+"""With another value of one of these, what came before is forgotten."""
 
 
 class Listener(Node):
-    """Hands on poses and clouds; what the contact node refuses or another scene sends, it drops."""
+    """Writes what it hears to `log`; what the contact node refuses or another scene sends, drops.
+
+    log: of the scene that is listened to; None before the first.
+    """
 
     def __init__(self, name: str, context: Context, contacts_qos: QoSProfile,
                  **options: Any) -> None:
         super().__init__(name, context=context, **options)
-        for box, topic in enumerate(('box_a/pose', 'box_b/pose')):
-            self.create_subscription(PoseStamped, topic, self._pose_callback(box), POSE_QOS)
+        self.log: ViewLog | None = None
+        self._poses_of: list[Subscription] = []
         self.create_subscription(PointCloud2, 'contacts', self._on_cloud, contacts_qos)
 
-    def on_pose(self, box: int, pose: StampedPose) -> None:
-        """Take a pose of box 0 (A) or 1 (B)."""
-        raise NotImplementedError
+    def listen_to(self, scene: Scene, **options: Any) -> None:
+        """Replace the scene; options go to `ViewLog`."""
+        for subscription in self._poses_of:
+            self.destroy_subscription(subscription)
+        self.log = log = ViewLog(scene, **options)
+        # The only place that knows how poses come.
+        self._poses_of = [
+            self.create_subscription(PoseStamped, scene.boxes[box].pose_topic,
+                                     self._pose_callback(log, box), POSE_QOS, raw=True)
+            for box in scene.moving]
 
-    def on_cloud(self, header: Header, rows: np.ndarray) -> None:
-        """Take the rows (messages.CLOUD_ROW) of a `contacts` cloud."""
-        raise NotImplementedError
+    def heard(self) -> None:
+        """Do what is to be done when something was written to `log`."""
 
-    def _pose_callback(self, box: int) -> Callable[[PoseStamped], None]:
-        read = TypedMessages().read_pose
+    def _pose_callback(self, log: ViewLog, box: str) -> Callable[[bytes], None]:
+        read = RawMessages().read_pose
 
-        def callback(message: PoseStamped) -> None:
+        def callback(data: bytes) -> None:
             with contextlib.suppress(Refused):  # the contact node counts and reports it
-                self.on_pose(box, read(message))
+                pose = read(data)
+                log.pose(box, pose.stamp, pose.numbers, pose.frame_id)
+                self.heard()
         return callback
 
     def _on_cloud(self, message: PointCloud2) -> None:
-        rows = read_cloud(message)
-        if is_of_two_boxes(rows):
-            self.on_cloud(message.header, rows)
+        if self.log is None:
+            return
+        header = message.header
+        try:
+            self.log.cloud(stamp_of(header), read_cloud(message),
+                           self.get_clock().now().nanoseconds, header.frame_id)
+        except (Refused, OtherSceneError) as error:
+            self.get_logger().warning(str(error), throttle_duration_sec=LOG_SECONDS)
         else:
-            self.get_logger().warning(OTHER_SCENE, throttle_duration_sec=LOG_SECONDS)
+            self.heard()
 
 
 class ViewNode(Listener):
-    """Writes what it hears to `log`, which there is once the contact node has named its sizes."""
+    """Listens to the scene that the contact node is set to, or to a given one."""
 
-    def __init__(self, context: Context, target: str, **options: Any) -> None:
-        """`target` is the name of the contact node."""
-        self.log: ViewLog | None = None
+    def __init__(self, context: Context, target: str, scene: Scene | None = None,
+                 **options: Any) -> None:
+        """`target` is the name of the contact node; `scene` replaces the one that it names."""
         self.settings: Mapping[str, Any] = {}  # the contact node's parameters, those of ASKED
         self.wish = ''  # the model that was asked for last, until it is granted
-        self.refusal = ''  # why the last model that was asked for was refused
+        self.refusal = ''  # why the last wish was refused, or the scene cannot be read
+        self._scene = scene
         self._answered = 0.0
         self._question: Future | None = None
         # Contacts best effort: the view must never hold up the contact node.
@@ -87,6 +107,11 @@ class ViewNode(Listener):
     def connected(self) -> bool:
         """Whether the contact node answers questions."""
         return time.monotonic() - self._answered < ANSWER_PATIENCE
+
+    @property
+    def model(self) -> str:
+        """Return the contact node's model; empty before it is known."""
+        return str(self.settings.get('model', ''))
 
     def set_model(self, name: str) -> None:
         """Ask the contact node for another model; `wish`, then `settings` or `refusal`, tell."""
@@ -113,16 +138,15 @@ class ViewNode(Listener):
         self._question, self._answered = None, time.monotonic()
         settings = dict(zip(ASKED, map(parameter_value_to_python, future.result().values)))
         old, self.settings = self.settings, settings
-        if self.log is None or any(list(settings[name]) != list(old[name])
-                                   for name in ('size_a', 'size_b', 'pairing')):
-            self.log = ViewLog(settings['size_a'], settings['size_b'], settings['pairing'])
+        if any(str(settings[name]) != str(old.get(name)) for name in OF_SCENE):
+            try:
+                self.listen_to(self._scene or self._named_scene(), pairing=settings['pairing'],
+                               tolerance=float(settings['tolerance']))
+            except SceneError as error:
+                self.refusal = f'{error} (--scene names the scene)'
 
-    def on_pose(self, box: int, pose: StampedPose) -> None:
-        """Write a pose to the log."""
-        if self.log is not None:
-            self.log.pose(box, pose.stamp, pose.numbers)
-
-    def on_cloud(self, header: Header, rows: np.ndarray) -> None:
-        """Write a cloud to the log, with the time."""
-        if self.log is not None:
-            self.log.cloud(stamp_of(header), rows, self.get_clock().now().nanoseconds)
+    def _named_scene(self) -> Scene:
+        """Return the scene of the contact node's parameters."""
+        if self.settings['scene']:
+            return read_scene(self.settings['scene'])
+        return two_boxes(self.settings['size_a'], self.settings['size_b'])

@@ -1,12 +1,13 @@
-"""Markers for RViz: both boxes, and while they touch the point, normal, depth and patch.
+"""Markers for RViz and Foxglove: all boxes of a scene; point, normal, patch, depth of contacts.
 
-Subscribes box_a/pose, box_b/pose and the contact node's contacts. Publishes markers
+Subscribes the poses of all moving boxes, and the contact node's contacts. Publishes markers
 (visualization_msgs/MarkerArray), at most `rate` times a second and only what is new. RViz with
-config/contact.rviz shows them. The patch is an ellipse that touches the edges of a rectangle.
+config/contact.rviz shows them, Foxglove with config/contact.foxglove.json. A patch is an ellipse
+that touches the edges of a rectangle. Boxes without a recent pose are grey.
 """
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,84 +17,97 @@ from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
 from ...node.messages import NANOSECONDS, make_header
-from ...node.parameters import CheckedParameters, Setting, answer_help, number, size
+from ...node.parameters import CheckedParameters, Setting, answer_help, number, size, text
 from ...node.runtime import CONTACT_QOS, run_node
-from ...scene.force.patch_law import Patch
 from ...scene.pose_sets import CONTAINER
-from ...scene.stamp_pairing import StampedPose
-from ..bench.answer_log import first_row, touch_in
-from ..ros_client import set_pose, stamp_of
+from ...scene.scene_file import read_scene
+from ...scene.scene_solver import two_boxes
+from ..ros_client import scene_source, set_pose
 from .listener import Listener
 from .style import (
     BOX_A,
     BOX_B,
     BOX_OPACITY,
     CONTACT,
-    STALE,
+    LISTED,
+    STALE_BOX,
     Colour,
-    patch_ellipse,
+    patch_outlines,
     proportions,
-    unit_pose,
+    unit_poses,
 )
+from .view_log import AnsweredTick, Snapshot
 
 PARAMETERS = {
     'size_a': Setting(CONTAINER, 'full extents of box A, three numbers > 0 [m]', size),
     'size_b': Setting(CONTAINER, 'full extents of box B, three numbers > 0 [m]', size),
+    'scene': Setting('', 'scene file, its text, or the bare name of one in config/scenes/; '
+                         'replaces size_a and size_b', text),
     'rate': Setting(30.0, 'most marker arrays published per second [Hz]', number(0.1, 1000)),
 }
-BOXES = (('box_a', BOX_A), ('box_b', BOX_B))
+NAMESPACES = ('boxes', 'points', 'normals', 'patches', 'depths')
+"""RViz shows a tick box for each. Of boxes, normals and depths every marker has its own id."""
+WHITE: Colour = (255, 255, 255)
 
 
-def box_marker(box: int, pose: StampedPose, extents: Sequence[float]) -> Marker:
-    """Return a cube for box 0 (A) or 1 (B) with full extents [m], translucent."""
-    name, colour = BOXES[box]
-    marker = _marker(make_header(pose.stamp, pose.frame_id), name, Marker.CUBE)
-    set_pose(marker.pose, unit_pose(pose.numbers))
-    _set(marker.scale, extents)
-    marker.color = _colour(colour, BOX_OPACITY)
-    return marker
-
-
-def contact_markers(header: Header, touch: Patch | None, size_a: Sequence[float],
-                    size_b: Sequence[float]) -> list[Marker]:
-    """Return point, normal (from A to B), depth in words and patch of a contact; None deletes them.
-
-    The patch is deleted, too, where the model gives none.
-    """
-    point, normal, depth, patch = markers = [_marker(header, name, kind) for name, kind in (
-        ('point', Marker.SPHERE), ('normal', Marker.ARROW), ('depth', Marker.TEXT_VIEW_FACING),
-        ('patch', Marker.LINE_STRIP))]
-    if touch is None:
-        for marker in markers:
-            marker.action = Marker.DELETE
-        return markers
-    look = proportions(size_a, size_b)
-    arrow = look.normal_length * touch.normal
-    _set(point.pose.position, touch.point)
-    _set(point.scale, [2.0 * look.point_radius] * 3)
-    normal.points = [_set(Point(), end) for end in (touch.point, touch.point + arrow)]
-    # Of an arrow with two points: diameter of the shaft, diameter and length of the head.
-    _set(normal.scale, np.array([0.8, 1.8, 3.0]) * look.point_radius)
-    # At the arrow's tail, where neither point nor arrow is.
-    _set(depth.pose.position, touch.point - 0.5 * arrow)
-    depth.scale.z = look.text_height
-    depth.text = f'depth {1e3 * touch.depth:.2f} mm'
-    for marker in markers:
-        marker.color = _colour(CONTACT, 1.0)
-    depth.color = _colour((255, 255, 255), 1.0)
-    ellipse = patch_ellipse(touch)
-    if ellipse is None:
-        patch.action = Marker.DELETE
-        return markers
-    _set(patch.pose.position, touch.point)
-    patch.scale.x = 0.5 * look.point_radius  # the line's width
-    patch.points = [_set(Point(), place) for place in ellipse.outline]
+def scene_markers(snapshot: Snapshot) -> list[Marker]:
+    """Return what draws a snapshot: boxes by their row as id, contacts the deepest first."""
+    header = make_header(snapshot.stamp, snapshot.frame_id)
+    markers = list(_boxes(header, snapshot))
+    if snapshot.answer is not None and len(snapshot.answer.pairs):
+        markers += _contacts(header, snapshot.answer)
     return markers
 
 
-def _marker(header: Header, name: str, kind: int) -> Marker:
-    """Return a marker with a namespace of its own: RViz shows a tick box for each."""
-    return Marker(header=header, ns=name, id=0, type=kind, action=Marker.ADD)
+def _boxes(header: Header, snapshot: Snapshot) -> Iterator[Marker]:
+    """Yield a translucent cube for each box that has a pose."""
+    scene = snapshot.scene
+    for row in np.flatnonzero(~np.isnan(snapshot.poses[:, 0])):
+        colour = (STALE_BOX if snapshot.stale_boxes[row] else
+                  BOX_A if scene.is_a[row] else BOX_B)
+        marker = _marker(header, 'boxes', Marker.CUBE, colour, BOX_OPACITY, number=int(row))
+        set_pose(marker.pose, unit_poses(snapshot.poses[row, None])[0])
+        _set(marker.scale, scene.sizes[row])
+        yield marker
+
+
+def _contacts(header: Header, answer: AnsweredTick) -> Iterator[Marker]:
+    """Yield points and patches of all contacts, a normal for each, depths of the deepest."""
+    spheres = _marker(header, 'points', Marker.SPHERE_LIST, CONTACT)
+    spheres.points = [_set(Point(), point) for point in answer.points]
+    looks = [proportions(edge) for edge in answer.scene.edges[answer.pairs]]
+    _set(spheres.scale, [2.0 * looks[0].point_radius] * 3)
+    yield spheres
+    arrows = [look.normal_length for look in looks] * answer.normals.T
+    for rank, row in enumerate(answer.deepest):
+        point, arrow = answer.points[row], arrows[:, row]
+        normal = _marker(header, 'normals', Marker.ARROW, CONTACT, number=rank)
+        normal.points = [_set(Point(), end) for end in (point, point + arrow)]
+        # Of an arrow with two points: diameter of the shaft, diameter and length of the head.
+        _set(normal.scale, np.array([0.8, 1.8, 3.0]) * looks[row].point_radius)
+        yield normal
+        if rank < LISTED:
+            depth = _marker(header, 'depths', Marker.TEXT_VIEW_FACING, WHITE, number=rank)
+            # At the arrow's tail, where neither point nor arrow is.
+            _set(depth.pose.position, point - 0.5 * arrow)
+            depth.scale.z = looks[row].text_height
+            depth.text = f'depth {1e3 * answer.contacts["depth"][row]:.2f} mm'
+            yield depth
+    outlines = answer.points[:, None] + patch_outlines(answer.semi_axes)
+    outlines = outlines[~np.isnan(outlines[:, 0, 0])]
+    if len(outlines):
+        patches = _marker(header, 'patches', Marker.LINE_LIST, CONTACT)
+        patches.scale.x = 0.5 * looks[0].point_radius  # the lines' width
+        ends = np.stack([outlines[:, :-1], outlines[:, 1:]], axis=2).reshape(-1, 3)
+        patches.points = [_set(Point(), end) for end in ends]
+        yield patches
+
+
+def _marker(header: Header, name: str, kind: int, colour: Colour, opacity: float = 1.0, *,
+            number: int = 0) -> Marker:
+    red, green, blue = (value / 255.0 for value in colour)
+    return Marker(header=header, ns=name, id=number, type=kind, action=Marker.ADD,
+                  color=ColorRGBA(r=red, g=green, b=blue, a=opacity))
 
 
 def _set(xyz: Any, values: Sequence[float] | np.ndarray) -> Any:
@@ -102,51 +116,42 @@ def _set(xyz: Any, values: Sequence[float] | np.ndarray) -> Any:
     return xyz
 
 
-def _colour(colour: Colour, opacity: float) -> ColorRGBA:
-    red, green, blue = (value / 255.0 for value in colour)
-    return ColorRGBA(r=red, g=green, b=blue, a=opacity)
-
-
 class MarkersNode(Listener):
-    """Keeps what came last, and draws it when a timer triggers."""
+    """Draws what its log has when a timer triggers; takes away what is drawn no more."""
 
     def __init__(self, context: Context, **options: Any) -> None:
-        self._poses: dict[int, StampedPose] = {}
-        self._answer: tuple[Header, Patch | None] | None = None
+        self._drawn: set[tuple[str, int]] = set()
         self._changed = False
         super().__init__('markers', context, CONTACT_QOS, **options)
         self._settings = CheckedParameters(self, PARAMETERS, self._apply)
         self._markers = self.create_publisher(MarkerArray, 'markers', CONTACT_QOS)
-        rate = self._settings.values['rate']
-        self._timer = self.create_timer(1.0 / rate, self._publish)
-        self.get_logger().info(f'ready: at most {rate:g} Hz')
+        self._timer = self.create_timer(1.0, self._publish)
+        self._apply(self._settings.values, PARAMETERS)
+        self.get_logger().info(f'ready: at most {self._settings.values["rate"]:g} Hz')
 
-    def _apply(self, settings: dict[str, Any], _: Collection[str]) -> None:
+    def _apply(self, settings: dict[str, Any], names: Collection[str]) -> None:
+        if not {'scene', 'size_a', 'size_b'}.isdisjoint(names):
+            self.listen_to(read_scene(scene_source(settings['scene'])) if settings['scene'] else
+                           two_boxes(settings['size_a'], settings['size_b']))
         self._timer.timer_period_ns = round(NANOSECONDS / settings['rate'])
         self._changed = True
 
-    def on_pose(self, box: int, pose: StampedPose) -> None:
-        """Draw the box there next time."""
-        self._poses[box], self._changed = pose, True
-
-    def on_cloud(self, header: Header, rows: np.ndarray) -> None:
-        """Draw the contact next time."""
-        self._answer, self._changed = (header, touch_in(first_row(rows))), True
+    def heard(self) -> None:
+        """Draw the next time."""
+        self._changed = True
 
     def _publish(self) -> None:
-        if self._changed:
-            self._changed = False
-            self._markers.publish(MarkerArray(markers=self._drawn()))
-
-    def _drawn(self) -> list[Marker]:
-        sizes = [self._settings.values[name] for name in ('size_a', 'size_b')]
-        markers = [box_marker(box, self._poses[box], sizes[box]) for box in sorted(self._poses)]
-        if self._answer is not None:
-            header, touch = self._answer
-            if any(pose.stamp - stamp_of(header) > STALE for pose in self._poses.values()):
-                touch = None
-            markers += contact_markers(header, touch, *sizes)
-        return markers
+        snapshot = self.log.snapshot() if self.log and self._changed else None
+        self._changed = False
+        if snapshot is None:
+            return
+        markers = scene_markers(snapshot)
+        drawn = {(marker.ns, marker.id) for marker in markers}
+        header = make_header(snapshot.stamp, snapshot.frame_id)
+        gone = [Marker(header=header, ns=name, id=key, action=Marker.DELETE)
+                for name, key in sorted(self._drawn - drawn)]
+        self._drawn = drawn
+        self._markers.publish(MarkerArray(markers=markers + gone))
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -2,19 +2,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from ...scene.force.patch_law import Patch
+from ...scene.pose import rotation_matrix
 
 Colour = tuple[int, int, int]  # red, green, blue, 0 to 255
 
 BOX_A: Colour = (238, 150, 50)
 BOX_B: Colour = (70, 120, 170)
+STALE_BOX: Colour = (150, 150, 150)
 CONTACT: Colour = (230, 20, 110)
 EXACT: Colour = (0, 130, 110)
+ROPE: Colour = (60, 60, 70)
+LEGEND = ((BOX_A, 'box a of a pair'), (BOX_B, 'box b of a pair'), (STALE_BOX, 'no recent pose'),
+          (CONTACT, 'contact: point, normal from a to b, patch'), (EXACT, 'exact point'))
+LISTED = 10  # contacts that are listed and labelled, the deepest
+PATCH_OPACITY = 0.35
 BOX_OPACITY = 0.4  # the contact is inside the boxes, so they are translucent
 STALE = 500_000_000
 """Poses newer than the last answer by more than this [ns]: nobody answers, no contact is drawn."""
@@ -28,9 +33,8 @@ class Proportions(NamedTuple):
     text_height: float
 
 
-def proportions(size_a: Sequence[float], size_b: Sequence[float]) -> Proportions:
-    """Return those of a contact between boxes of these full extents [m]: seen on the smaller."""
-    edge = min(max(size_a), max(size_b))
+def proportions(edge: float) -> Proportions:
+    """Return those of a contact on a box with this longest edge [m]."""
     return Proportions(point_radius=0.015 * edge, normal_length=0.15 * edge,
                        text_height=0.04 * edge)
 
@@ -41,33 +45,44 @@ w/√12, so its ellipse has l/2 and w/2 and touches its edges. Two would reach o
 _CIRCLE = np.linspace(0.0, 2.0 * math.pi, 49)
 
 
-class Ellipse(NamedTuple):
-    """How far a patch reaches in the contact plane, by its covariance."""
+def patch_axes(normals: np.ndarray, covariances: np.ndarray) -> np.ndarray:
+    """Return the semi-axes (k, 2, 3) [m] of the ellipses of patches, the longer one first.
 
-    semi_axes: np.ndarray
-    """(2, 3) [m], perpendicular, the longer one first, in the common frame."""
-
-    @property
-    def area(self) -> float:
-        """Area of the patch [m²]: of the rectangle around the ellipse, exact for a rectangle."""
-        return float(4.0 * np.prod(np.linalg.norm(self.semi_axes, axis=1)))
-
-    @property
-    def outline(self) -> np.ndarray:
-        """Points (49, 3) [m] once around, from the patch's point; the last is the first."""
-        return np.stack([np.cos(_CIRCLE), np.sin(_CIRCLE)], axis=1) @ self.semi_axes
+    They lie in the contact planes, in the common frame. NaN where the model gives the point alone.
+    """
+    known = np.isfinite(covariances).all(axis=(1, 2))
+    tangents = np.eye(3) - normals[:, :, None] * normals[:, None, :]
+    flat = tangents @ np.where(known[:, None, None], covariances, 0.0) @ tangents
+    variances, axes = np.linalg.eigh(flat)  # ascending; the first axis is the normal
+    deviations = np.sqrt(np.maximum(variances[:, :0:-1], 0.0))  # below zero by rounding
+    semi_axes = ELLIPSE_SIGMAS * deviations[:, :, None] * np.swapaxes(axes[:, :, :0:-1], 1, 2)
+    return np.where(known[:, None, None], semi_axes, math.nan)
 
 
-def patch_ellipse(patch: Patch) -> Ellipse | None:
-    """Return the ellipse of a patch; None where the model gives the point alone."""
-    if not np.isfinite(patch.covariance).all():
-        return None
-    tangent = np.eye(3) - np.outer(patch.normal, patch.normal)
-    variances, axes = np.linalg.eigh(tangent @ patch.covariance @ tangent)  # ascending
-    deviations = np.sqrt(np.maximum(variances[:0:-1], 0.0))  # below zero by rounding
-    return Ellipse(ELLIPSE_SIGMAS * deviations[:, None] * axes[:, :0:-1].T)
+def patch_areas(semi_axes: np.ndarray) -> np.ndarray:
+    """Return the areas (k,) [m²] of the rectangles around ellipses, exact for rectangular patches.
+
+    semi_axes: those of `patch_axes`.
+    """
+    areas: np.ndarray = 4.0 * np.prod(np.linalg.norm(semi_axes, axis=2), axis=1)
+    return areas
 
 
-def unit_pose(pose: np.ndarray) -> np.ndarray:
-    """Return a pose (7,) whose quaternion has unit length, which drawing needs."""
-    return np.concatenate([pose[:3], pose[3:] / np.linalg.norm(pose[3:])])
+def patch_outlines(semi_axes: np.ndarray) -> np.ndarray:
+    """Return points (k, 49, 3) [m] once around, from the patch's point; the last is the first."""
+    return np.stack([np.cos(_CIRCLE), np.sin(_CIRCLE)], axis=1) @ semi_axes
+
+
+def unit_poses(poses: np.ndarray) -> np.ndarray:
+    """Return poses (n, 7) whose quaternions have unit length, which drawing needs."""
+    lengths = np.linalg.norm(poses[:, 3:], axis=1, keepdims=True)
+    return np.concatenate([poses[:, :3], poses[:, 3:] / lengths], axis=1)
+
+
+def box_edges(poses: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+    """Return the ends (n, 12, 2, 3) of the edges of boxes with poses (n, 7) and full extents."""
+    corners = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+    placed = (corners * sizes[:, None]) @ np.swapaxes(rotation_matrix(poses[:, 3:]), 1, 2)
+    ends = [(i, i | bit) for i in range(8) for bit in (1, 2, 4) if not i & bit]
+    edges: np.ndarray = (placed + poses[:, None, :3])[:, ends]
+    return edges

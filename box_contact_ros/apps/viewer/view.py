@@ -1,9 +1,10 @@
-"""A page in the browser: the crane, both boxes, the contact and its figures, live.
+"""A page in the browser: all boxes of a scene, their contacts and figures, live.
 
-It starts a contact node and, again and again, a crane, in a ROS domain of their own. With --attach
-it listens to a contact node and a simulator that run already. On the page the contact node
-is switched from model to model while it runs, and the crane lands again with other settings. It
-ends with Ctrl-C, and what it has started with it.
+It starts a contact node and, again and again, a crane, in a ROS domain of their own. With --scene
+it starts a contact node for that scene, and moves its boxes. With --attach it listens to a contact
+node and a simulator that run already. On the page the contact node is switched from model to model
+while it runs, and the crane lands again with other settings. It ends with Ctrl-C, and what it has
+started with it.
 """
 from __future__ import annotations
 
@@ -28,19 +29,46 @@ from rclpy.utilities import remove_ros_args
 from ...node.contact_node import PARAMETERS
 from ...node.runtime import REFUSALS
 from ...scene.pose_sets import CONTAINER
+from ...scene.scene_file import read_scene
+from ...scene.scene_solver import Scene
 from ...solver.arguments import model_name, within
 from .. import processes
 from ..processes import DOMAINS, Stop, asked_to_end, on_this_host, printed, program
-from ..ros_client import joined
+from ..ros_client import joined, scene_source
+from . import scene_driver
 from .listener import ViewNode
 from .page.view_page import CraneRun, Page
 
 FRAME_PERIOD = 1 / 30
+CRANE_RATE, SCENE_RATE = 200.0, 50.0  # ticks a second, where nothing else is asked for
 PAUSE = 1.5  # time [s] between the end of a run and the next, to see how it ended
 WAIT = 60.0  # how long the crane waits for the contact node, which starts at the same time [s]
 
 
-class Simulation:
+class Programs:
+    """Programs that the view has started; none of them may end by itself."""
+
+    def __init__(self, **commands: Sequence[str]) -> None:
+        self._outputs = {name: tempfile.TemporaryFile() for name in commands}
+        self._running = {name: processes.start(command, self._outputs[name])
+                         for name, command in commands.items()}
+
+    def step(self) -> bool:
+        """Return whether another run was started: never. RuntimeError if a program ended."""
+        for name, process in self._running.items():
+            if process.poll() is not None:
+                raise RuntimeError(f'{name} ended, status {process.returncode}; it printed:\n'
+                                   f'{printed(self._outputs[name])}')
+        return False
+
+    def close(self) -> None:
+        """End everything."""
+        processes.end(list(self._running.values()))
+        for output in self._outputs.values():
+            output.close()
+
+
+class Simulation(Programs):
     """A contact node, and a crane that is started again whenever it has ended."""
 
     def __init__(self, model: str, run: CraneRun) -> None:
@@ -48,17 +76,14 @@ class Simulation:
         self.run = run
         self.last_run: tuple[bool, str] | None = None
         """Whether the last run that ended by itself passed, and the crane's report of it."""
-        self._node_output, self._crane_output = (tempfile.TemporaryFile() for _ in range(2))
+        self._crane_output = tempfile.TemporaryFile()
         self._crane: subprocess.Popen[bytes] | None = None
         self._next_at = 0.0
-        self._node = processes.start(program('contact_node', model=model, **self._sizes),
-                                     self._node_output)
+        super().__init__(contact_node=program('contact_node', model=model, **self._sizes))
 
     def step(self) -> bool:
         """Start a crane if it is time; return whether one was. RuntimeError if the node ended."""
-        if self._node.poll() is not None:
-            raise RuntimeError(f'contact_node ended, status {self._node.returncode}; it printed:\n'
-                               f'{printed(self._node_output)}')
+        super().step()
         now = time.monotonic()
         if self._crane is not None and self._crane.poll() is not None:
             self.last_run = self._crane.returncode == 0, printed(self._crane_output)
@@ -83,15 +108,15 @@ class Simulation:
 
     def close(self) -> None:
         """End everything."""
-        processes.end([process for process in (self._crane, self._node) if process is not None])
-        self._node_output.close()
+        processes.end([self._crane] if self._crane is not None else [])
         self._crane_output.close()
+        super().close()
 
 
 @contextmanager
-def listening(target: str, args: Sequence[str]) -> Iterator[ViewNode]:
+def listening(target: str, scene: Scene | None, args: Sequence[str]) -> Iterator[ViewNode]:
     """Give a ViewNode that is served by a thread; `target` is the contact node's name."""
-    with joined(partial(ViewNode, target=target), args) as (node, executor):
+    with joined(partial(ViewNode, target=target, scene=scene), args) as (node, executor):
         stop = threading.Event()
 
         def serve() -> None:
@@ -111,7 +136,7 @@ def listening(target: str, args: Sequence[str]) -> Iterator[ViewNode]:
             thread.join()
 
 
-def watch(node: ViewNode, page: Page, simulation: Simulation | None,
+def watch(node: ViewNode, page: Page, started: Programs | None,
           wishes: queue.SimpleQueue[Callable[[], None]], stop: Stop) -> None:
     """Draw, and do what the page's users wish for, until `stop` is set."""
     frame_end = 0.0
@@ -119,20 +144,19 @@ def watch(node: ViewNode, page: Page, simulation: Simulation | None,
         frame_end = time.monotonic() + FRAME_PERIOD
         while not wishes.empty():
             wishes.get()()
-        if simulation is not None and simulation.step():
-            page.show_run(simulation.run)
-            if simulation.last_run is not None:
-                page.show_last_run(*simulation.last_run)
-            if node.log is not None:
-                node.log.start_anew()
-        log, snapshot, figures = node.log, None, None
-        if log is not None:
-            page.set_sizes(node.settings['size_a'], node.settings['size_b'])
-            snapshot = log.snapshot()
-            page.draw(snapshot)
-            figures = log.figures(node.get_clock().now().nanoseconds)
-        page.show(snapshot, figures, model=node.settings.get('model', ''), wish=node.wish,
-                  refusal=node.refusal, connected=node.connected)
+        log = node.log
+        if started is not None and started.step() and isinstance(started, Simulation):
+            page.show_run(started.run)
+            if started.last_run is not None:
+                page.show_last_run(*started.last_run)
+            if log is not None:
+                log.start_anew()
+        snapshot = log.snapshot() if log else None
+        page.draw(snapshot)
+        if page.due:
+            figures = log.figures(node.get_clock().now().nanoseconds) if log else None
+            page.show(snapshot, figures, model=node.model, wish=node.wish, refusal=node.refusal,
+                      connected=node.connected)
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -153,19 +177,27 @@ def main(args: Sequence[str] | None = None) -> int:
 
 
 def serve(options: argparse.Namespace, args: Sequence[str], stop: Stop) -> None:
-    """Serve the page until `stop` is set; RuntimeError if the contact node ends."""
+    """Serve the page until `stop` is set; RuntimeError if a program that was started ends."""
     wishes: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
-    run = None if options.attach else CraneRun(options.seed, options.rate, not options.open_loop)
-    page = simulation = None
+    run = (None if options.attach or options.scene else
+           CraneRun(options.seed, options.rate, not options.open_loop))
+    scene = read_scene(options.scene) if options.scene else None
+    page: Page | None = None
+    started: Programs | None = None
 
     def land(wish: CraneRun) -> None:
-        if simulation is not None:
-            simulation.land(wish)
+        if isinstance(started, Simulation):
+            started.land(wish)
 
     try:
-        with listening(options.node, args) as node:
+        with listening(options.node, scene, args) as node:
             if run is not None:
-                simulation = Simulation(options.model, run)
+                started = Simulation(options.model, run)
+            elif not options.attach:
+                started = Programs(
+                    contact_node=program('contact_node', model=options.model, scene=options.scene),
+                    scene_driver=['-m', scene_driver.__name__, '--scene', options.scene, '--rate',
+                                  str(options.rate)])
             page = Page(options.host, options.port, run=run,
                         on_model=lambda name: wishes.put(partial(node.set_model, name)),
                         on_land=lambda wish: wishes.put(partial(land, wish)))
@@ -174,10 +206,10 @@ def serve(options: argparse.Namespace, args: Sequence[str], stop: Stop) -> None:
             print(f'view: {page.url}{where}; Ctrl-C ends it', flush=True)
             if not options.no_browser and _has_display():
                 webbrowser.open(page.url)
-            watch(node, page, simulation, wishes, stop)
+            watch(node, page, started, wishes, stop)
     finally:
-        if simulation is not None:
-            simulation.close()
+        if started is not None:
+            started.close()
         if page is not None:
             page.close()
 
@@ -202,14 +234,19 @@ def _options(args: Sequence[str]) -> argparse.Namespace:
                         help='start nothing: listen to nodes that run already')
     parser.add_argument('--node', default='contact_node', metavar='NAME',
                         help='of the contact node (default: %(default)s)')
+    parser.add_argument('--scene', metavar='NAME', type=scene_source,
+                        help='draw this scene, and move its boxes: a file, or the bare name of one '
+                             'in config/scenes/; with --attach in place of the one that the '
+                             'contact node names')
     processes.add_domain(parser, '; with --attach, ROS_DOMAIN_ID')
     parser.set_defaults(domain=None)
     parser.add_argument('--model', type=model_name, default=PARAMETERS['model'].default,
                         metavar='NAME', help='the contact node starts with (default: %(default)s)')
     parser.add_argument('--seed', type=within(0, 2**31), default=0, metavar='N',
                         help='of the first landing (default: %(default)s)')
-    parser.add_argument('--rate', type=within(20.0, 1000.0), default=200.0, metavar='HZ',
-                        help='pairs of poses a second (default: %(default)g)')
+    parser.add_argument('--rate', type=within(1.0, 1000.0), metavar='HZ',
+                        help=f'ticks a second (default: crane {CRANE_RATE:g}, scene '
+                             f'{SCENE_RATE:g})')
     parser.add_argument('--open-loop', action='store_true',
                         help='contacts are shown, but do not carry the load')
     options = parser.parse_args(list(args))
@@ -217,6 +254,9 @@ def _options(args: Sequence[str]) -> argparse.Namespace:
         if options.attach and getattr(options, name) != parser.get_default(name):
             parser.error(f'--{name.replace("_", "-")} is for what the view starts itself, and '
                          '--attach starts nothing')
+    if options.scene and (options.seed or options.open_loop):
+        parser.error('--seed and --open-loop are for the crane, and --scene starts none')
+    options.rate = options.rate or (SCENE_RATE if options.scene else CRANE_RATE)
     if options.domain is None and not options.attach:
         options.domain = random.choice(DOMAINS)
     return options

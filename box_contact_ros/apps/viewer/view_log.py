@@ -1,58 +1,165 @@
-"""What the view hears, and the figures it shows of it; works without a ROS graph.
+"""What is drawn of a scene, and the figures shown of it, whether ROS or a recording fills it.
 
-Poses are paired as the contact node pairs them; a cloud belongs to the pair with its stamp. The
-view listens in from outside, so both may come in any order. A pose that only the view has missed
-must not count as a loss. Stamps are nanoseconds; lengths metres, latencies seconds.
+A `ViewLog` takes poses by box and clouds of contacts. Its `snapshot` is the one model of what is
+drawn. Page and markers read it. A cloud's poses are the last of each box up to its stamp.
+
+The view listens in from outside. Messages may come in any order, and only the view may have missed
+one: that must not count as a loss. Stamps are nanoseconds; lengths metres, latencies seconds.
 """
 from __future__ import annotations
 
 import threading
 from collections import OrderedDict, deque
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from ...node.messages import NANOSECONDS
 from ...output import percentiles
-from ...scene.force.patch_law import Patch
-from ...scene.scene_solver import two_boxes
-from ...scene.stamp_pairing import PAIRINGS, StampedPose
-from ...solver.contact import Contact
+from ...scene.scene_solver import Scene
+from ...scene.stamp_pairing import RESET
+from ...solver.contact import Contacts
 from ...solver.contact_solver import ContactSolver
-from ..bench.answer_log import first_row, touch_in
-from .style import STALE
+from .style import STALE, patch_axes
 
 WINDOW = 2.0  # figures are those of the answers to the poses of the last so many seconds
 LOST_AFTER = NANOSECONDS
-"""A pair without an answer is lost once a pair that is so much newer [ns] has come."""
+"""A tick without an answer is lost once a tick that is so much newer [ns] has come."""
 KEPT = 20_000  # answers kept at most, whatever their stamps: `WINDOW` at 10 kHz
 
-Poses = tuple[np.ndarray, np.ndarray]
+
+class SceneArrays:
+    """A scene as arrays: a row a box, a row a pair, each in the scene's order."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self.names = list(scene.boxes)
+        numbers = {name: number for number, name in enumerate(self.names)}
+        self.sizes = np.array([box.size for box in scene.boxes.values()], dtype=float)
+        self.fixed = np.array([box.pose or [np.nan] * 7 for box in scene.boxes.values()])
+        """Poses (n, 7), NaN for boxes that move."""
+        self.moves = np.isnan(self.fixed[:, 0])
+        self.moving = {name: numbers[name] for name in scene.moving}
+        self.first = np.array([numbers[pair.a] for pair in scene.pairs])
+        self.second = np.array([numbers[pair.b] for pair in scene.pairs])
+        self.labels = [pair.name or f'{pair.a}, {pair.b}' for pair in scene.pairs]
+        self.row_of_id = {pair.id: row for row, pair in enumerate(scene.pairs)}
+        self.is_a = np.isin(np.arange(len(self.names)), self.first)
+        """Which boxes (n,) are box a of a pair: normals point away from them."""
+        longest = self.sizes.max(axis=1)
+        self.edges = np.minimum(longest[self.first], longest[self.second])
+        """Longest edge of each pair's smaller box, what errors are a share of."""
+        self._exact = ContactSolver(self.sizes[0], self.sizes[0], model='exact')
+
+    def with_poses(self, poses: np.ndarray, pairs: np.ndarray) -> np.ndarray:
+        """Return where in `pairs`, rows of pairs, are those whose boxes have poses (n, 7)."""
+        known = ~np.isnan(poses[:, 0])
+        return np.flatnonzero(known[self.first[pairs]] & known[self.second[pairs]])
+
+    def exact(self, poses: np.ndarray, pairs: np.ndarray) -> Contacts:
+        """Return the exact contacts of some pairs, by their rows, under poses (n, 7)."""
+        first, second = self.first[pairs], self.second[pairs]
+        return self._exact.batch(poses[first], poses[second], size_a=self.sizes[first],
+                                 size_b=self.sizes[second])
 
 
-@dataclass(frozen=True)
-class AnsweredPair:
-    """A pair of poses (7,) and the contact that the node answered with."""
+@dataclass(frozen=True, eq=False)
+class AnsweredTick:
+    """A cloud, and the poses that it answers."""
 
+    scene: SceneArrays
     stamp: int
     received: int
-    poses: Poses
-    touch: Patch | None  # None for no contact
+    frame_id: str
+    contacts: np.ndarray  # rows (messages.CLOUD_ROW) of the pairs in contact
+    pairs: np.ndarray  # which pair each contact is of: its row in the scene
+    stale: np.ndarray  # rows of the pairs that could not be evaluated
+    poses: np.ndarray  # (n, 7), NaN for a box that has none
+    stamps: np.ndarray  # (n,) of the poses; that of the tick for fixed boxes
+    tolerance: int  # poses further from the tick [ns] may not be those that were answered
 
     @property
     def latency(self) -> float:
         """Time from the poses' stamp to the cloud."""
         return (self.received - self.stamp) * 1e-9
 
+    @property
+    def points(self) -> np.ndarray:
+        """Return where the contacts are, (k, 3)."""
+        return _columns(self.contacts, 'x', 'y', 'z')
 
-class Snapshot(NamedTuple):
-    """What is drawn: poses (7,), the answer to them, and their exact contact."""
+    @property
+    def normals(self) -> np.ndarray:
+        """Return unit vectors (k, 3) from a to b."""
+        return _columns(self.contacts, 'normal_x', 'normal_y', 'normal_z')
 
-    poses: Poses
-    answer: AnsweredPair | None  # none if nobody answers
-    exact: Contact
+    @property
+    def covariances(self) -> np.ndarray:
+        """Second moments (k, 3, 3) of the patches; NaN from models that give the point alone."""
+        columns = _columns(self.contacts, 'cov_xx', 'cov_xy', 'cov_xz', 'cov_yy', 'cov_yz',
+                           'cov_zz')
+        return columns[:, [[0, 1, 2], [1, 3, 4], [2, 4, 5]]]
+
+    @cached_property
+    def semi_axes(self) -> np.ndarray:
+        """Semi-axes (k, 2, 3) of the patches' ellipses: see `style.patch_axes`."""
+        return patch_axes(self.normals, self.covariances)
+
+    @property
+    def deepest(self) -> np.ndarray:
+        """Rows of `contacts`, the deepest first."""
+        return np.argsort(-self.contacts['depth'], kind='stable')
+
+    @cached_property
+    def exact_points(self) -> np.ndarray:
+        """Exact contact points (k, 3), NaN where the boxes do not touch or have no pose."""
+        points = np.full((len(self.pairs), 3), np.nan)
+        rows = self.scene.with_poses(self.poses, self.pairs)
+        points[rows] = self.scene.exact(self.poses, self.pairs[rows]).point
+        return points
+
+    @cached_property
+    def point_errors(self) -> np.ndarray:
+        """Distances of points from the exact ones, of those pairs whose poses are the tick's."""
+        late = np.abs(self.stamps - self.stamp) > self.tolerance
+        rows = ~(late[self.scene.first[self.pairs]] | late[self.scene.second[self.pairs]])
+        errors: np.ndarray = np.linalg.norm(self.points - self.exact_points, axis=1)
+        return errors[rows & ~np.isnan(errors)]
+
+
+def _columns(rows: np.ndarray, *names: str) -> np.ndarray:
+    return np.stack([rows[name] for name in names], axis=-1)
+
+
+@dataclass(frozen=True, eq=False)
+class Snapshot:
+    """What is drawn: every box with its pose, and the last answer."""
+
+    scene: SceneArrays
+    stamp: int
+    frame_id: str
+    poses: np.ndarray  # (n, 7), NaN for a box that has none
+    answer: AnsweredTick | None  # None if nobody answers
+
+    @cached_property
+    def stale_boxes(self) -> np.ndarray:
+        """Which boxes (n,) keep a pair from being evaluated: of its two the one not heard of."""
+        stale = np.zeros(len(self.poses), dtype=bool)
+        if self.answer is not None:
+            rows = self.answer.stale
+            ends = np.stack([self.scene.first[rows], self.scene.second[rows]])
+            stamps = self.answer.stamps[ends]
+            stale[ends[stamps == stamps.min(axis=0)]] = True
+        return stale & self.scene.moves
+
+    @cached_property
+    def separation(self) -> float:
+        """Return the least exact separation of all pairs that have poses; NaN without any."""
+        pairs = self.scene.with_poses(self.poses, np.arange(len(self.scene.labels)))
+        if not len(pairs):
+            return np.nan
+        return float(self.scene.exact(self.poses, pairs).separation.min())
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,79 +170,109 @@ class ViewFigures:
     latency_p99: float
     point_error_median: float
     point_error_p99: float
-    edge: float  # longest edge of the smaller box, what point errors are a share of
+    edge: float  # median of `SceneArrays.edges`, what point errors are a share of
     rate: float  # answers that came within the last second
     answered: int  # since the start of the run, and so are the lost
     lost: int
 
 
-class ViewLog:
-    """Takes what comes in one thread; `figures` may be asked for in another."""
+class OtherSceneError(ValueError):
+    """A cloud with a pair that the scene does not have."""
 
-    def __init__(self, size_a: Sequence[float], size_b: Sequence[float], pairing: str) -> None:
-        """For boxes of these full extents [m], and a contact node of this `pairing`."""
-        self._exact = ContactSolver(size_a, size_b, model='exact')
-        self._edge = min(max(size_a), max(size_b))
-        self._scene = two_boxes(size_a, size_b)
-        self._new_pairing = PAIRINGS[pairing]
+
+class ViewLog:
+    """Takes what comes in one thread; `snapshot` and `figures` may be asked for in another."""
+
+    def __init__(self, scene: Scene, *, pairing: str = 'stamp', tolerance: float = 0.0) -> None:
+        """Begin for a scene, and for a contact node of this `pairing` and `tolerance` [s]."""
+        self.scene = SceneArrays(scene)
+        self._tolerance = (round(tolerance * NANOSECONDS) if pairing == 'stamp'
+                           else WINDOW * NANOSECONDS)
         self._lock = threading.Lock()
         self.start_anew()
 
     def start_anew(self) -> None:
         """Forget everything: another run begins."""
         with self._lock:
-            self._pairing = self._new_pairing(self._scene)
-            self._pairs: OrderedDict[int, Poses] = OrderedDict()  # not answered yet
-            self._clouds: OrderedDict[int, tuple[np.ndarray, int]] = OrderedDict()  # no pair yet
-            self._answers: deque[AnsweredPair] = deque(maxlen=KEPT)
-            self._newest: tuple[int, Poses] | None = None
-            self._answered = self._lost = 0
+            self._forget()
 
-    def pose(self, box: int, stamp: int, numbers: np.ndarray) -> None:
-        """Take a pose of box 0 (A) or 1 (B), as numbers (7,)."""
+    def _forget(self) -> None:
+        self._tracks: dict[str, deque[tuple[int, np.ndarray]]] = {
+            name: deque() for name in self.scene.moving}
+        self._newest = self._frame_id = None
+        self._counts: OrderedDict[int, int] = OrderedDict()  # poses by stamp, not answered yet
+        self._early: OrderedDict[int, None] = OrderedDict()  # stamps answered before their poses
+        self._answers: deque[AnsweredTick] = deque(maxlen=KEPT)
+        self._answered = self._lost = 0
+
+    def pose(self, box: str, stamp: int, numbers: np.ndarray, frame_id: str = '') -> None:
+        """Take where a moving box is: numbers (7,)."""
         with self._lock:
-            for tick in self._pairing.add(self._scene.moving[box],
-                                          StampedPose(numbers, '', stamp)):
-                if all(pose is not None for pose in tick):
-                    self._take(max(pose.stamp for pose in tick),
-                               tuple(pose.numbers for pose in tick))
+            track = self._tracks.get(box)
+            if track is None:  # it was of the scene before this one
+                return
+            if track and stamp < track[-1][0] - RESET:
+                self._forget()
+                track = self._tracks[box]
+            track.append((stamp, numbers))
+            while stamp - track[0][0] > WINDOW * NANOSECONDS:
+                track.popleft()
+            if self._newest is None or stamp > self._newest:
+                self._newest, self._frame_id = stamp, frame_id
+                self._give_up(stamp)
+            if stamp not in self._early:
+                self._counts[stamp] = self._counts.get(stamp, 0) + 1
 
-    def _take(self, stamp: int, poses: Poses) -> None:
-        if self._newest is None or stamp >= self._newest[0]:
-            self._newest = stamp, poses
-        early = self._clouds.pop(stamp, None)
-        if early is not None:
-            self._answer(stamp, poses, *early)
-        else:
-            self._pairs[stamp] = poses
-        self._give_up(stamp)
-
-    def cloud(self, stamp: int, rows: np.ndarray, received: int) -> None:
+    def cloud(self, stamp: int, rows: np.ndarray, received: int, frame_id: str = '') -> None:
         """Take the rows (messages.CLOUD_ROW) of a `contacts` cloud, received at this time [ns].
 
-        A row of NaN says that the pair could not be evaluated, which is an answer without contact.
+        A row of NaN says that its pair could not be evaluated. Raises OtherSceneError.
         """
+        try:
+            pairs = np.array([self.scene.row_of_id[number] for number in rows['pair'].tolist()],
+                             dtype=int)
+        except KeyError as error:
+            raise OtherSceneError(f'the contacts have pair {error}, which the scene that is drawn '
+                                  'has not: not drawn') from error
+        stale = np.isnan(rows['depth'])
         with self._lock:
-            poses = self._pairs.pop(stamp, None)
-            if poses is None:
-                self._clouds[stamp] = rows, received
-            else:
-                self._answer(stamp, poses, rows, received)
+            if self._answers:
+                self._answers[-1] = self._with_poses(self._answers[-1])
+            if self._counts.pop(stamp, 0) < len(self.scene.moving):
+                self._early[stamp] = None
+            if not self._answered:
+                self._first = stamp
+            self._answered += 1
+            self._answers.append(AnsweredTick(
+                self.scene, stamp, received, frame_id, rows[~stale], pairs[~stale], pairs[stale],
+                *self._poses_at(stamp), self._tolerance))
 
-    def _answer(self, stamp: int, poses: Poses, rows: np.ndarray, received: int) -> None:
-        if not self._answered:
-            self._first = stamp
-        self._answers.append(AnsweredPair(stamp, received, poses, touch_in(first_row(rows))))
-        self._answered += 1
+    def _with_poses(self, answer: AnsweredTick) -> AnsweredTick:
+        """Return an answer with its poses as they are known now: they may come after the cloud."""
+        poses, stamps = self._poses_at(answer.stamp)
+        return replace(answer, poses=poses, stamps=stamps)
+
+    def _poses_at(self, stamp: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return the last pose (n, 7) of each box up to a stamp, and their stamps (n,)."""
+        poses = self.scene.fixed.copy()
+        stamps = np.full(len(poses), stamp)
+        for name, number in self.scene.moving.items():
+            stamps[number] = 0
+            for at, numbers in reversed(self._tracks[name]):
+                stamps[number], poses[number] = at, numbers
+                if at <= stamp:
+                    break
+        return poses, stamps
 
     def _give_up(self, now: int) -> None:
         """Drop what is too old by the poses' clock [ns]."""
-        while self._pairs and now - next(iter(self._pairs)) > LOST_AFTER:
-            stamp, _ = self._pairs.popitem(last=False)
+        while self._counts and now - next(iter(self._counts)) > LOST_AFTER:
+            stamp, count = self._counts.popitem(last=False)
             # Before the first answer nobody need have been there.
-            self._lost += bool(self._answered and stamp > self._first)
-        while self._clouds and now - next(iter(self._clouds)) > LOST_AFTER:
-            self._clouds.popitem(last=False)
+            self._lost += bool(count >= len(self.scene.moving) and self._answered
+                               and stamp > self._first)
+        while self._early and now - next(iter(self._early)) > LOST_AFTER:
+            self._early.popitem(last=False)
         while self._answers and now - self._answers[0].stamp > WINDOW * NANOSECONDS:
             self._answers.popleft()
 
@@ -144,33 +281,24 @@ class ViewLog:
         with self._lock:
             if self._newest is None:
                 return None
-            stamp, poses = self._newest
+            newest, frame_id = self._newest, self._frame_id
             answer = self._answers[-1] if self._answers else None
-        if answer is not None and stamp - answer.stamp > STALE:
-            answer = None
-        if answer is not None:
-            poses = answer.poses
-        return Snapshot(poses, answer, self._exact(*poses))
+            if answer is not None and newest - answer.stamp <= STALE:
+                answer = self._answers[-1] = self._with_poses(answer)
+                return Snapshot(self.scene, answer.stamp, answer.frame_id, answer.poses, answer)
+            return Snapshot(self.scene, newest, frame_id, self._poses_at(newest)[0], None)
 
     def figures(self, now: int) -> ViewFigures:
         """Return the figures as things stand at this time [ns], of the clock of `cloud`."""
         with self._lock:
+            if self._answers:
+                self._answers[-1] = self._with_poses(self._answers[-1])
             answers, answered, lost = list(self._answers), self._answered, self._lost
-        latencies = np.array([answer.latency for answer in answers])
-        errors = self._point_errors(answers)
-        median, p99 = percentiles(latencies, 50, 99)
+        median, p99 = percentiles(np.array([answer.latency for answer in answers]), 50, 99)
+        errors = np.concatenate([np.zeros(0), *(answer.point_errors for answer in answers)])
         error_median, error_p99 = percentiles(errors, 50, 99)
         return ViewFigures(
             latency_median=median, latency_p99=p99, point_error_median=error_median,
-            point_error_p99=error_p99, edge=self._edge,
+            point_error_p99=error_p99, edge=float(np.median(self.scene.edges)),
             rate=sum(now - answer.received < NANOSECONDS for answer in answers),
             answered=answered, lost=lost)
-
-    def _point_errors(self, answers: Sequence[AnsweredPair]) -> np.ndarray:
-        """Return distances (n,) of points from the exact ones, where both report a contact."""
-        touching = [(*answer.poses, answer.touch.point) for answer in answers if answer.touch]
-        if not touching:
-            return np.zeros(0)
-        poses_a, poses_b, points = map(np.array, zip(*touching))
-        exact = self._exact.batch(poses_a, poses_b)
-        return np.linalg.norm(points - exact.point, axis=1)[exact.colliding]

@@ -1,0 +1,238 @@
+"""The drawing on the page: boxes, contacts, ropes, as objects of viser. No ROS.
+
+Boxes are instances of one cube: a tick moves all of them by one message. The origin of the drawing
+is where boxes were first seen. Browsers draw in float32, which is half a metre coarse in map
+coordinates.
+"""
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import viser
+
+from ....scene.pose import rotation_matrix
+from ..style import (
+    BOX_A,
+    BOX_B,
+    BOX_OPACITY,
+    CONTACT,
+    EXACT,
+    LISTED,
+    PATCH_OPACITY,
+    ROPE,
+    STALE_BOX,
+    box_edges,
+    patch_outlines,
+    proportions,
+    unit_poses,
+)
+from ..view_log import AnsweredTick, SceneArrays, Snapshot
+
+GROUND, LINES, SECTIONS = (236, 238, 241), (206, 211, 217), (176, 183, 191)
+VIEWPOINT = np.array([-0.55, -0.78, 0.42])
+"""Direction from the boxes to the camera at first."""
+CUBE = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+CUBE_FACES = np.array([[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],
+                       [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]])
+GAMMA = 2.2  # of the colours of screens
+LINE = {'thickness': 2.0, 'thickness_units': 'screen'}
+
+
+class BoxGroup:
+    """Boxes that are drawn together: all that move, or all that do not."""
+
+    def __init__(self, server: viser.ViserServer, name: str, scene: SceneArrays,
+                 rows: np.ndarray) -> None:
+        self._rows, self._sizes = rows, scene.sizes[rows]
+        self._colours = np.where(scene.is_a[rows, None], BOX_A, BOX_B).astype(np.uint8)
+        places = np.zeros((len(rows), 3))
+        self._faces = server.scene.add_batched_meshes_simple(
+            f'/boxes/{name}', CUBE, CUBE_FACES, np.tile([1.0, 0.0, 0.0, 0.0], (len(rows), 1)),
+            places, batched_scales=np.zeros((len(rows), 3)), batched_colors=_linear(self._colours),
+            lod='off', opacity=BOX_OPACITY, flat_shading=True, cast_shadow=False,
+            receive_shadow=False)
+        self._edges = server.scene.add_line_segments(
+            f'/edges/{name}', np.zeros((12 * len(rows), 2, 3)), self._edge_colours(self._colours),
+            **LINE)
+
+    @staticmethod
+    def _edge_colours(colours: np.ndarray) -> np.ndarray:
+        return np.repeat(_linear(colours // 2), 24, axis=0).reshape(-1, 2, 3)
+
+    def draw(self, snapshot: Snapshot, origin: np.ndarray) -> None:
+        """Move the boxes; those without a pose shrink to nothing, those that are stale turn grey.
+
+        What has not changed is not sent.
+        """
+        poses = snapshot.poses[self._rows]
+        known = ~np.isnan(poses[:, :1])
+        poses = unit_poses(np.where(known, poses, [0, 0, 0, 0, 0, 0, 1]))
+        poses[:, :3] -= np.where(known, origin, 0.0)
+        sizes = np.where(known, self._sizes, 0.0)
+        stale = snapshot.stale_boxes[self._rows, None]
+        colours = np.where(stale, STALE_BOX, self._colours).astype(np.uint8)
+        self._faces.batched_positions = poses[:, :3]
+        self._faces.batched_wxyzs = np.roll(poses[:, 3:], 1, axis=1)
+        self._faces.batched_scales = sizes
+        self._faces.batched_colors = _linear(colours)
+        self._edges.points = box_edges(poses, sizes).reshape(-1, 2, 3)
+        self._edges.colors = self._edge_colours(colours)
+
+    def remove(self) -> None:
+        """Take the boxes away."""
+        self._faces.remove()
+        self._edges.remove()
+
+
+class Stage:
+    """All that is drawn; `draw` brings it up to a snapshot."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        self._server = server
+        self._scene: SceneArrays | None = None
+        self._origin: np.ndarray | None = None
+        self._seen = 0  # boxes; each that joins brings all of them into view
+        self._groups: list[BoxGroup] = []
+        server.on_client_connect(self._aim)
+        self._light()
+        scene = server.scene
+        self._ground = scene.add_grid('/ground', 60.0, 60.0, cell_size=1.0, section_size=5.0,
+                                      cell_color=LINES, section_color=SECTIONS,
+                                      plane_color=GROUND, plane_opacity=1.0, shadow_opacity=0.0,
+                                      fade_distance=60.0, visible=False)
+        one = np.zeros((1, 2, 3))
+        self._points = scene.add_point_cloud('/contact/points', one[:, 0], CONTACT,
+                                             point_shape='circle', precision='float32',
+                                             visible=False)
+        self._normals = scene.add_arrows('/contact/normals', one, CONTACT, visible=False)
+        self._patches = scene.add_mesh_simple(
+            '/contact/patches', np.zeros((3, 3)), np.array([[0, 1, 2]]), color=CONTACT,
+            opacity=PATCH_OPACITY, side='double', flat_shading=True, cast_shadow=False,
+            receive_shadow=False, visible=False)
+        self._outlines = scene.add_line_segments('/contact/outlines', one, CONTACT, visible=False,
+                                                 **LINE)
+        # Crosses, so that they are seen through the points, which are often at the same place.
+        self._exact = scene.add_line_segments('/contact/exact', one, EXACT, thickness=3.0,
+                                              thickness_units='screen', visible=False)
+        self._ropes = scene.add_line_segments('/crane/ropes', one, ROPE, visible=False, **LINE)
+        self._depths = [scene.add_label(f'/contact/depth_{number}', '', visible=False,
+                                        anchor='bottom-left') for number in range(LISTED)]
+
+    def _light(self) -> None:
+        scene = self._server.scene
+        scene.configure_environment_map(None)
+        scene.configure_default_lights(False)
+        scene.add_light_hemisphere('/light/sky', sky_color=(255, 255, 255),
+                                   ground_color=(190, 190, 195), intensity=2.2)
+        scene.add_light_directional('/light/sun', color=(255, 250, 240), intensity=2.2,
+                                    position=(-6.0, -9.0, 14.0))
+
+    def draw(self, snapshot: Snapshot) -> None:
+        """Show boxes and contacts."""
+        with self._server.atomic():
+            if snapshot.scene is not self._scene:
+                self._set_scene(snapshot.scene)
+            known = ~np.isnan(snapshot.poses[:, 0])
+            if known.sum() > self._seen:
+                self._look_at(snapshot, known)
+            for group in self._groups:
+                group.draw(snapshot, self._origin)
+            self._draw_contacts(snapshot.answer)
+
+    def draw_ropes(self, lines: np.ndarray) -> None:
+        """Show the ropes of a crane: the ends (n, 2, 3) of straight lines."""
+        if self._origin is not None:
+            _show(self._ropes, points=lines - self._origin)
+
+    def _set_scene(self, scene: SceneArrays) -> None:
+        """Replace the boxes; the origin of the drawing is found anew."""
+        for group in self._groups:
+            group.remove()
+        self._scene, self._origin, self._seen = scene, None, 0
+        rows = {'moving': np.array(list(scene.moving.values())),
+                'fixed': np.flatnonzero(~scene.moves)}
+        self._groups = [BoxGroup(self._server, name, scene, found)
+                        for name, found in rows.items() if len(found)]
+        look = proportions(float(np.median(scene.edges)))
+        self._points.point_size = 2.0 * look.point_radius
+        self._normals.shaft_radius = 0.45 * look.point_radius
+        self._normals.head_radius = 1.1 * look.point_radius
+        self._normals.head_length = 2.6 * look.point_radius
+        self._normal_length = look.normal_length
+        self._cross = 2.5 * look.point_radius * np.stack([-np.eye(3), np.eye(3)], axis=1)
+
+    def _draw_contacts(self, answer: AnsweredTick | None) -> None:
+        shown = answer is not None and len(answer.pairs) > 0
+        for node in (self._points, self._normals, self._patches, self._outlines, self._exact):
+            node.visible = shown
+        deepest = answer.deepest[:LISTED] if shown else ()
+        for label in self._depths[len(deepest):]:
+            label.visible = False
+        if not shown:
+            return
+        points = answer.points - self._origin
+        normals = answer.normals
+        self._points.points = points
+        self._normals.points = np.stack([points, points + self._normal_length * normals], axis=1)
+        outlines = points[:, None] + patch_outlines(answer.semi_axes)
+        outlines = outlines[~np.isnan(outlines[:, 0, 0])]
+        _show(self._outlines, points=np.stack([outlines[:, :-1], outlines[:, 1:]], axis=2).reshape(
+            -1, 2, 3))
+        self._patches.visible = len(outlines) > 0
+        if len(outlines):
+            self._patches.vertices = outlines.reshape(-1, 3)
+            self._patches.faces = _fans(*outlines.shape[:2])
+        exact = answer.exact_points - self._origin
+        _show(self._exact, points=(exact[~np.isnan(exact[:, 0]), None, None] + self._cross).reshape(
+            -1, 2, 3))
+        for label, row in zip(self._depths, deepest):
+            label.text = f'{1e3 * answer.contacts["depth"][row]:.1f} mm'
+            label.position = points[row] - 0.6 * self._normal_length * normals[row]
+            label.visible = True
+
+    def _look_at(self, snapshot: Snapshot, known: np.ndarray) -> None:
+        """Put origin, ground and camera where the boxes `known` (n,) are."""
+        self._seen = known.sum()
+        poses, sizes = snapshot.poses[known], snapshot.scene.sizes[known]
+        # Half the extents along the frame's axes.
+        half = 0.5 * np.einsum('nij,nj->ni', np.abs(rotation_matrix(poses[:, 3:])), sizes)
+        low, high = (poses[:, :3] - half).min(axis=0), (poses[:, :3] + half).max(axis=0)
+        self._origin = middle = 0.5 * (low + high)
+        self._ground.position = (0.0, 0.0, float(low[2] - middle[2]))
+        extent = float(np.linalg.norm(high - low))
+        for name in ('width', 'height', 'fade_distance'):
+            setattr(self._ground, name, max(60.0, 3.0 * extent))
+        self._ground.visible = True
+        initial = self._server.initial_camera  # what the button "reset view" goes back to
+        initial.position = 0.85 * extent * VIEWPOINT
+        initial.look_at = np.zeros(3)
+        for client in self._server.get_clients().values():
+            self._aim(client)
+
+    def _aim(self, client: viser.ClientHandle) -> None:
+        """Bring a browser's camera to where it is to start."""
+        if self._origin is None:
+            return
+        # In this order: setting the position moves the other along.
+        client.camera.position = self._server.initial_camera.position
+        client.camera.look_at = self._server.initial_camera.look_at
+
+
+def _linear(colours: np.ndarray) -> np.ndarray:
+    """Return colours (n, 3) as light: viser takes those of single instances for that."""
+    return (255.0 * (colours / 255.0) ** GAMMA).astype(np.uint8)
+
+
+def _show(node: Any, *, points: np.ndarray) -> None:
+    """Give lines their ends (n, 2, 3), or hide them where there are none."""
+    node.visible = len(points) > 0
+    if len(points):
+        node.points = points
+
+
+def _fans(count: int, corners: int) -> np.ndarray:
+    """Return the triangles (n, 3) of so many polygons: a fan each."""
+    corner = np.arange(1, corners - 1)
+    fan = np.stack([np.zeros_like(corner), corner, corner + 1], axis=1)
+    return (fan + corners * np.arange(count)[:, None, None]).reshape(-1, 3)

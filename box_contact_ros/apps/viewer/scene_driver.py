@@ -1,0 +1,164 @@
+"""Moves all boxes of a scene, so that there is something to see: no physics, no contacts.
+
+`python -m box_contact_ros.apps.viewer.scene_driver --scene yard_bay` publishes their poses. A box
+with fixed partners is set down on one after the other. A box with moving partners rides on one of
+them, and is lifted off now and then. All others stand on the ground.
+"""
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from geometry_msgs.msg import PoseStamped
+from rclpy.context import Context
+from rclpy.node import Node
+from rclpy.utilities import remove_ros_args
+
+from ...node.messages import make_header
+from ...node.runtime import CONTACT_QOS, REFUSALS, run_node
+from ...scene.pose import quaternion_multiply, rotation_matrix
+from ...scene.scene_file import read_scene
+from ...scene.scene_solver import Scene
+from ...solver.arguments import within
+from ..ros_client import pose_message, scene_source
+
+VISIT = 8.0
+"""Time [s] from one partner to the next."""
+DOWN, UP = (0.30, 0.45), (0.75, 0.90)
+"""Shares of a visit between which a box is lowered, and lifted."""
+CLEARANCE = 1.2
+"""Height [m] above the highest partner, on the way."""
+DEPTH = 0.012
+"""Depth to which a box is set down [m]."""
+LIFT = 0.3
+"""Height to which a rider is lifted off [m]."""
+TIERS = 5
+"""Boxes that ride on each other, at most."""
+TILT = math.radians(0.3)
+GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
+"""Phases of boxes are its multiples: no two are the same."""
+
+Motion = Callable[[float], np.ndarray]
+"""From the time [s] to a pose (7,)."""
+
+
+def motions(scene: Scene) -> dict[str, Motion]:
+    """Return the motion of each moving box."""
+    found: dict[str, Motion] = {}
+    tier_of: dict[str, int] = {}
+    pitch = 1.2 * max(max(box.size[:2]) for box in scene.boxes.values())
+    columns = math.ceil(math.sqrt(len(scene.moving)))
+    partners: dict[str, list[str]] = {name: [] for name in scene.boxes}
+    for pair in scene.pairs:
+        partners[pair.a].append(pair.b)
+        partners[pair.b].append(pair.a)
+    # What a box rides on has to move before it: boxes b come after boxes a in most scenes.
+    for number, name in enumerate(reversed(scene.moving)):
+        size, phase = scene.boxes[name].size, GOLDEN * number
+        fixed = [scene.boxes[other] for other in partners[name] if scene.boxes[other].pose]
+        carriers = [other for other in partners[name] if tier_of.get(other, TIERS) < TIERS - 1]
+        if carriers:
+            below = carriers[-1]
+            tier_of[name] = tier_of[below] + 1
+            height = 0.5 * (size[2] + scene.boxes[below].size[2])
+            found[name] = _riding(found[below], height, phase)
+        elif fixed:
+            tier_of[name] = 0
+            places = np.array([_on_top(box.pose, box.size, size) for box in fixed])
+            found[name] = _visiting(places, phase, 0.1 * size[1])
+        else:
+            tier_of[name] = 0
+            row, column = divmod(number, columns)
+            found[name] = _standing(pitch * column, pitch * row, 0.5 * size[2])
+    return found
+
+
+def _on_top(pose: Sequence[float] | None, below: Sequence[float], size: Sequence[float],
+            ) -> np.ndarray:
+    """Return where the centre (3,) of a box is that lies on a fixed one."""
+    assert pose is not None
+    half = 0.5 * float(np.abs(rotation_matrix(np.array(pose[3:]))[2]) @ below)
+    return np.array(pose[:3]) + [0.0, 0.0, half + 0.5 * size[2]]
+
+
+def _standing(x: float, y: float, z: float) -> Motion:
+    pose = np.array([x, y, z, 0.0, 0.0, 0.0, 1.0])
+    return lambda _: pose
+
+
+def _riding(below: Motion, height: float, phase: float) -> Motion:
+    def motion(time: float) -> np.ndarray:
+        pose = below(time).copy()
+        gap = LIFT * max(0.0, math.sin(2.0 * math.pi * (time / VISIT + phase))) - DEPTH
+        pose[:3] += rotation_matrix(pose[3:]) @ [0.0, 0.0, height + gap]
+        return pose
+    return motion
+
+
+def _visiting(places: np.ndarray, phase: float, sway: float) -> Motion:
+    """Return a motion over places (n, 3), from one to the next, with a little sway and tilt."""
+    high = float(places[:, 2].max()) + CLEARANCE
+
+    def motion(time: float) -> np.ndarray:
+        visit, share = divmod(time / VISIT + phase, 1.0)
+        here, last = (places[(int(visit) - back) % len(places)] for back in (0, 1))
+        at = last + _ramp(share / DOWN[0]) * (here - last)
+        lowered = (_ramp((share - DOWN[0]) / (DOWN[1] - DOWN[0]))
+                   - _ramp((share - UP[0]) / (UP[1] - UP[0])))
+        angle = 2.0 * math.pi * (2.0 * time / VISIT + phase)
+        at[:2] += sway * math.sin(0.5 * angle), sway * math.cos(0.5 * angle)
+        at[2] = high + lowered * (here[2] - DEPTH - high)
+        roll, pitch = TILT * math.sin(angle), 0.3 * TILT * math.cos(angle)
+        turn = quaternion_multiply(np.array([0.5 * roll, 0.0, 0.0, 1.0]),
+                                   np.array([0.0, 0.5 * pitch, 0.0, 1.0]))
+        return np.concatenate([at, turn / np.linalg.norm(turn)])
+    return motion
+
+
+def _ramp(share: float) -> float:
+    share = min(max(share, 0.0), 1.0)
+    return share * share * (3.0 - 2.0 * share)
+
+
+class SceneDriver(Node):
+    """Publishes a pose of every moving box, all under one stamp, at a rate."""
+
+    def __init__(self, context: Context, scene: Scene, rate: float) -> None:
+        super().__init__('scene_driver', context=context)
+        self._scene, self._motions = scene, motions(scene)
+        self._topics = {name: self.create_publisher(
+            PoseStamped, scene.boxes[name].pose_topic, CONTACT_QOS) for name in scene.moving}
+        self._start = self.get_clock().now().nanoseconds
+        self.create_timer(1.0 / rate, self._publish)
+        self.get_logger().info(f'ready: {len(self._topics)} boxes at {rate:g} Hz')
+
+    def _publish(self) -> None:
+        stamp = self.get_clock().now().nanoseconds
+        header = make_header(stamp, self._scene.frame_id or 'world')
+        time = 1e-9 * (stamp - self._start)
+        for name, publisher in self._topics.items():
+            publisher.publish(pose_message(header, self._motions[name](time)))
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Publish until SIGINT or SIGTERM."""
+    args = list(sys.argv[1:] if args is None else args)
+    parser = argparse.ArgumentParser(prog='scene_driver', description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('--scene', required=True, metavar='NAME', help='bare name, or a path')
+    parser.add_argument('--rate', type=within(0.1, 1000.0), default=50.0, metavar='HZ',
+                        help='ticks a second (default: %(default)g)')
+    options = parser.parse_args(remove_ros_args(['scene_driver', *args])[1:])
+    try:
+        scene = read_scene(scene_source(options.scene))
+        return run_node(lambda context: SceneDriver(context, scene, options.rate), args)
+    except REFUSALS as error:
+        print(f'error: {error}', file=sys.stderr)
+        return 1
+
+
+if __name__ == '__main__':
+    sys.exit(main())
