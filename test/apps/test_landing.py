@@ -24,10 +24,12 @@ from box_contact_ros.apps.crane.landing import (
     scenario_of,
     solvers,
     touches_in,
+    with_patch,
 )
 from box_contact_ros.apps.crane.mujoco_crane import Crane, CraneScenario
 from box_contact_ros.baselines.point_law import PointLaw
 from box_contact_ros.scene.force.held_wrench import GRAVITY
+from box_contact_ros.scene.force.patch_law import PatchLaw
 
 CASES = list(cases())
 HANGING_OVER = 17
@@ -70,6 +72,23 @@ def test_a_model_without_a_patch_is_refused_by_name():
     scenario = scenario_of(CASES[0])
     with pytest.raises(ValueError, match='model fcl: .* needs volume and covariance'):
         land(scenario, solvers(scenario, 'fcl'))
+
+
+def test_the_patch_of_a_flat_load_is_that_of_the_whole_load():
+    """Where the bottom lies flat, the patch that is assumed without one is the exact one."""
+    turn = (0.0, 0.0, math.sin(0.2), math.cos(0.2))
+    load, stack = (12.0, 2.0, 3.0), (20.0, 20.0, 1.0)
+    pose = np.array([1.0, 2.0, 1.98, *turn])
+    exact, = touches_in([ContactSolver(load, stack, model='exact')(pose, (0, 0, 0, 0, 0, 0, 1))])
+    alone = dataclasses.replace(exact, volume=math.nan, covariance=np.full((3, 3), math.nan))
+    assumed = with_patch(alone, pose, load)
+    assert with_patch(exact, pose, load) is exact
+    assert assumed.volume == pytest.approx(exact.volume) == pytest.approx(12.0 * 2.0 * 0.02)
+    assert assumed.covariance[:2, :2] == pytest.approx(exact.covariance[:2, :2])
+    law = PatchLaw.for_loop(20_000.0, (1e4, 2e5, 2e5), 200.0)
+    moving = np.array([0.1, 0.0, -0.2, 0.01, 0.02, 0.03])
+    wrenches = [law.wrench([patch], pose, moving) for patch in (exact, assumed)]
+    assert wrenches[1] == pytest.approx(wrenches[0], rel=1e-9, abs=1e-3)
 
 
 @pytest.mark.parametrize('fields', [

@@ -124,16 +124,29 @@ def test_answers_that_say_nothing_are_held_over(client, monkeypatch):
     assert pushes[0] > 0.0 and pushes[1] == pushes[0] and pushes[2] == 0.0
 
 
-def test_a_point_alone_is_refused(client):
-    """The node's model gives no volume: an error that says so, and no force of NaN."""
+def test_a_model_without_a_patch_does_not_end_the_crane(program):
+    """The whole load stands for the patch: a run is flown to its end, judged, and says so."""
+    program('contact_node', '--ros-args', '-p', 'model:=paper').wait_for_output('ready', 120)
+    crane = program('crane', *arguments(closed_loop=True, lockstep=True, duration=12.0))
+    assert crane.wait(100) == 1, crane.output
+    assert 'crane: done after 12 s' in crane.output and 'Traceback' not in crane.output
+    assert 'messages lost .......... 0 ' in crane.output
+    assert crane.output.count('without a patch: the whole load stands for it') == 1
+
+
+def test_a_point_alone_pushes(client):
+    """Up, by a finite force; contacts of both kinds may follow each other."""
     crane, _ = client
     feedback, simulated = crane.feedback, crane_node.Crane(crane.scenario, crane.rate)
-    row = np.array([0.0, 0.0, 2.6, 0.0, 0.0, -1.0, 1e-3, *[np.nan] * 7])
-    feedback.ask(1, simulated)
-    feedback.answer(1, row, 1)
-    with pytest.raises(ValueError, match="contact node's model .* volume and covariance"):
-        feedback.step(1, simulated)
-    assert not feedback.record.forces
+    row = np.array([0.0, 0.0, 2.6, 0.0, 0.0, -1.0, 1e-3, 0.03, 12.0, 0.0, 0.0, 0.5, 0.0, 1e-7])
+    alone = np.where(np.arange(14) < 7, row, np.nan)
+    for stamp, values in enumerate((alone, row, alone), start=1):
+        feedback.ask(stamp, simulated)
+        feedback.answer(stamp, values, stamp)
+        feedback.step(stamp, simulated)
+    assert np.isfinite(feedback.record.forces).all()
+    assert all(force[2] > 0.0 for force in feedback.record.forces)
+    assert feedback.points_alone == 2
 
 
 def test_lockstep_ends_when_nobody_answers(client, monkeypatch):

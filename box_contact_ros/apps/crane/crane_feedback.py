@@ -17,9 +17,9 @@ from collections import deque
 
 import numpy as np
 
-from ...scene.force.held_wrench import Touch
+from ...scene.force.patch_law import Patch
 from ..bench.answer_log import is_stale, touch_in
-from .landing import ClosedLoop, LoopState
+from .landing import ClosedLoop, LoopState, with_patch
 from .mujoco_crane import Crane, CraneScenario
 
 ANSWER_SHARE = 0.8
@@ -44,9 +44,10 @@ class CraneFeedback:
                                 max(latency, 1.0 / rate_hz))
         self.record = self._loop.record
         self._rate_hz, self._latency, self._lockstep = rate_hz, latency, lockstep
-        self._stop = stop
+        self._size, self._stop = scenario.size, stop
+        self.points_alone = 0  # contacts whose model gave no patch
         self._asked: dict[int, LoopState] = {}
-        self._arrived: deque[tuple[int, Touch | None, int]] = deque()
+        self._arrived: deque[tuple[int, Patch | None, int]] = deque()
         self._news = threading.Condition()
         self._lost_in_a_row = 0
 
@@ -87,10 +88,7 @@ class CraneFeedback:
         self._loop.step(crane)
 
     def _apply(self) -> bool:
-        """Turn what has arrived into wrenches; return whether there was anything.
-
-        ValueError: a contact without volume and covariance.
-        """
+        """Turn what has arrived into wrenches; return whether there was anything."""
         arrived = False
         while self._arrived:
             stamp, touch, received = self._arrived.popleft()
@@ -100,10 +98,7 @@ class CraneFeedback:
             arrived = True
             # Answers take as long in simulated time as they really took, unless time waits.
             took = 0.0 if self._lockstep else (received - stamp) * 1e-9
-            try:
-                self._loop.answer(state, [touch] if touch else [],
-                                  latency=max(self._latency, took))
-            except ValueError as error:
-                raise ValueError(f"the contact node's model cannot carry a load: {error}; start "
-                                 'contact_node with another one, such as exact') from None
+            touches = [with_patch(touch, state.pose, self._size)] if touch else []
+            self.points_alone += bool(touch and touches[0] is not touch)
+            self._loop.answer(state, touches, latency=max(self._latency, took))
         return arrived

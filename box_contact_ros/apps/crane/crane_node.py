@@ -36,6 +36,8 @@ from .landing import LandingResult, Progress
 from .mujoco_crane import Crane
 
 OFFER_PERIOD = 0.1  # s between the pairs that only ask whether anyone answers
+POINTS_ALONE = ("the contact node's model gives contacts without a patch: the whole load stands "
+                'for it, and may not come to rest')
 DRAIN = 1.0  # s of patience for the last answers
 
 
@@ -102,6 +104,8 @@ class CraneNode(Node):
                 crane.step()
             else:
                 self.feedback.step(stamp, crane)
+                if self.feedback.points_alone:
+                    self.get_logger().warning(POINTS_ALONE, once=True)
         deadline = time.monotonic() + DRAIN
         while self.log.outstanding and time.monotonic() < deadline:
             if self.stop.wait(0.02):

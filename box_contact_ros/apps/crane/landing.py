@@ -60,6 +60,21 @@ def touches_in(contacts: Iterable[Contact | None]) -> list[Patch]:
             for one in contacts if one is not None and one.colliding]
 
 
+def with_patch(touch: Patch, pose: np.ndarray, size: Sequence[float]) -> Patch:
+    """Return a contact with a patch: that of the whole load where its model gives the point alone.
+
+    pose, size: of the load, (7,) and full extents [m]. Volume = depth · V / h with the load's
+    volume V and its extent h along the normal; covariance = that of the load. For the law, this is
+    a spring at the point, with the dampers of the whole bottom.
+    """
+    if math.isfinite(touch.volume):
+        return touch
+    axes = rotation_matrix(pose[3:])
+    along = float(np.abs(touch.normal @ axes) @ size)
+    return dataclasses.replace(touch, volume=touch.depth * float(np.prod(size)) / along,
+                               covariance=(axes * np.square(size) / 12.0) @ axes.T)
+
+
 def landing_scenario(**fields: Any) -> CraneScenario:
     """Return a scenario that sets the load down; `fields` are those of CraneScenario."""
     fields = {'land': True, 'overlap': LANDING_OVERLAP, 'duration': LANDING_DURATION} | fields
