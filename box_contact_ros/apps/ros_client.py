@@ -8,18 +8,21 @@ from typing import Any, TypeVar
 
 import numpy as np
 import rclpy
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import Point, PoseStamped
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
-from std_msgs.msg import Header
+from std_msgs.msg import ColorRGBA, Header
+from visualization_msgs.msg import Marker, MarkerArray
 
 from ..node.messages import NANOSECONDS
 from ..node.runtime import make_executor, uninterrupted
 from ..resources import resource_path
 
+CRANE_MARKERS = 'crane/markers'
+"""Where the crane publishes its ropes and its spreader, as lines."""
 SCENES = ('config', 'scenes')
 """Where the package's own scenes are."""
 NodeKind = TypeVar('NodeKind', bound=Node)
@@ -65,6 +68,24 @@ def scene_source(name: str) -> str:
         with suppress(FileNotFoundError):
             return str(resource_path(*SCENES, f'{name}.yaml'))
     return name
+
+
+def line_marker(header: Header, name: str, lines: np.ndarray, *, width: float,
+                colour: tuple[int, int, int]) -> Marker:
+    """Return the marker of straight lines with ends (n, 2, 3) [m]; colour: 0 to 255."""
+    red, green, blue = (value / 255.0 for value in colour)
+    marker = Marker(header=header, ns=name, type=Marker.LINE_LIST, action=Marker.ADD,
+                    color=ColorRGBA(r=red, g=green, b=blue, a=1.0))
+    marker.scale.x = float(width)
+    marker.points = [Point(x=x, y=y, z=z) for x, y, z in lines.reshape(-1, 3).tolist()]
+    return marker
+
+
+def lines_of(message: MarkerArray) -> np.ndarray:
+    """Return the ends (n, 2, 3) of all lines of a `line_marker`."""
+    ends = [(point.x, point.y, point.z) for marker in message.markers
+            if marker.type == Marker.LINE_LIST for point in marker.points]
+    return np.array(ends).reshape(-1, 2, 3)
 
 
 def stamp_of(header: Header) -> int:

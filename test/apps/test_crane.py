@@ -12,6 +12,7 @@ pytest.importorskip('mujoco')
 
 from box_contact_ros.apps.crane.mujoco_crane import MAX_HOIST_SPEED, Crane, CraneScenario
 from box_contact_ros.scene.force.held_wrench import GRAVITY
+from box_contact_ros.scene.pose import rotation_matrix
 from box_contact_ros.scene.pose_sets import CONTAINER
 
 LENGTH, WIDTH, HEIGHT = CONTAINER
@@ -122,6 +123,22 @@ def test_ropes_carry_the_weight(spread):
     # The ropes stretch, but by millimetres only.
     level = HEIGHT + 0.5 + HEIGHT / 2
     assert level - 0.005 < crane.load_pose[2] < level
+
+
+def test_ropes_run_from_the_trolley_to_the_corners_of_the_load():
+    """Upper ends stand still; lower ends move with the load; taut ropes are as long as they are."""
+    crane = Crane(CraneScenario(rope_angle=2.0, yaw=1.0), rate_hz=200.0)
+    before = crane.ropes
+    for _ in range(200):
+        crane.step()
+    ropes = crane.ropes
+    assert np.array_equal(ropes[:, 0], before[:, 0])
+    load, lower = crane.load_pose, ropes[:, 1]
+    half = 0.5 * np.array(crane.scenario.size)
+    local = (lower - load[:3]) @ rotation_matrix(load[3:])
+    assert local == pytest.approx(np.array([[1, 1, 1], [1, -1, 1], [-1, 1, 1], [-1, -1, 1]]) * half)
+    lengths = np.linalg.norm(ropes[:, 1] - ropes[:, 0], axis=1)
+    assert lengths == pytest.approx(crane._data.ten_length, abs=1e-3)
 
 
 def test_ropes_are_slack_while_the_load_is_held_up():

@@ -15,6 +15,7 @@ from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import Marker, MarkerArray
 
 from box_contact_ros import ContactSolver
+from box_contact_ros.apps.ros_client import CRANE_MARKERS
 from box_contact_ros.apps.viewer.markers import (
     NAMESPACES,
     PARAMETERS,
@@ -129,12 +130,12 @@ def test_a_stale_box_is_grey():
 
 def test_the_rviz_config_names_topics_and_namespaces_that_exist():
     config = yaml.safe_load(resource_path('config', 'contact.rviz').read_text('utf-8'))
-    displays = {display['Class'].rpartition('/')[2]: display
-                for display in config['Visualization Manager']['Displays']}
-    assert set(displays['MarkerArray']['Namespaces']) == set(NAMESPACES)
-    assert displays['MarkerArray']['Topic']['Value'] == 'markers'
-    assert displays['PointStamped']['Topic']['Value'] == 'contact/point'
-    assert displays['Grid']['Enabled']
+    displays = config['Visualization Manager']['Displays']
+    topics = {display['Topic']['Value']: display for display in displays if 'Topic' in display}
+    assert set(topics) == {'markers', CRANE_MARKERS, 'contact/point'}
+    assert set(topics['markers']['Namespaces']) == set(NAMESPACES)
+    assert set(topics[CRANE_MARKERS]['Namespaces']) == {'ropes', 'spreader'}
+    assert all(display['Enabled'] for display in displays)
 
 
 # --- the node -------------------------------------------------------------------------------------

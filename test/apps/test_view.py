@@ -16,6 +16,7 @@ import poses
 import pytest
 from rclpy.parameter import Parameter
 from ros_client import MATCH_SECONDS, Client, serving
+from visualization_msgs.msg import MarkerArray
 
 pytest.importorskip('viser')
 pytest.importorskip('mujoco')
@@ -24,6 +25,7 @@ from browser import chromium, open_page
 from PIL import Image
 
 from box_contact_ros import ContactSolver
+from box_contact_ros.apps.ros_client import CRANE_MARKERS, line_marker
 from box_contact_ros.apps.viewer.listener import ViewNode
 from box_contact_ros.apps.viewer.page.read_outs import deepest_contacts, legend, read_out
 from box_contact_ros.apps.viewer.style import (
@@ -407,6 +409,21 @@ def test_it_hears_poses_and_answers(view, client):
     client.send(ORIGIN, (math.nan, 0, 0, 0, 0, 0, 1))
     client.ask(ORIGIN, APART)
     assert client.spin(lambda: not len(view.log.snapshot().answer.pairs), 10.0)
+
+
+def test_it_hears_the_crane(view, client):
+    """Lines of every kind that the crane draws, in their order."""
+    lines = np.arange(36.0).reshape(6, 2, 3)
+    publisher = client.node.create_publisher(MarkerArray, CRANE_MARKERS, 10)
+    header = make_header(1, 'world')
+    deadline = time.monotonic() + MATCH_SECONDS
+    while not len(view.lines):
+        assert time.monotonic() < deadline, 'nothing heard'
+        publisher.publish(MarkerArray(markers=[
+            line_marker(header, name, part, width=0.1, colour=(0, 0, 0))
+            for name, part in (('ropes', lines[:4]), ('spreader', lines[4:]))]))
+        client.spin(lambda: False, 0.05)
+    assert np.array_equal(view.lines, lines)
 
 
 def test_it_switches_the_model_of_the_running_node(view, client, contact_node):

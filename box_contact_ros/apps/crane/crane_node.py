@@ -9,6 +9,7 @@ only if contacts came through, nothing was lost, and, closed loop, the stack car
 from __future__ import annotations
 
 import gc
+import math
 import sys
 import threading
 import time
@@ -16,19 +17,29 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
+import numpy as np
 from geometry_msgs.msg import PointStamped, PoseStamped, Vector3Stamped
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import PointCloud2
+from visualization_msgs.msg import MarkerArray
 
 from ...node.messages import make_header, read_cloud
 from ...node.parameters import answer_help, declare
-from ...node.runtime import REFUSALS
+from ...node.runtime import CONTACT_QOS, REFUSALS
 from ...solver.contact_solver import ContactSolver
 from ..bench.answer_log import first_row
-from ..ros_client import DEEP_RELIABLE, joined, pose_message, stamp_of
+from ..ros_client import (
+    CRANE_MARKERS,
+    DEEP_RELIABLE,
+    joined,
+    line_marker,
+    pose_message,
+    stamp_of,
+)
+from ..viewer.style import ROPE
 from .crane_feedback import CraneFeedback
 from .crane_log import CraneLog, CraneSummary
 from .crane_parameters import PARAMETERS, scenario_from
@@ -38,6 +49,7 @@ from .mujoco_crane import Crane
 OFFER_PERIOD = 0.1  # s between the pairs that only ask whether anyone answers
 POINTS_ALONE = ("the contact node's model gives contacts without a patch: the whole load stands "
                 'for it, and may not come to rest')
+DRAW_RATE = 30.0  # Hz at most
 DRAIN = 1.0  # s of patience for the last answers
 
 
@@ -51,6 +63,7 @@ class CraneNode(Node):
         self.rate, self.wait = values['rate'], values['wait']
         self.report, self.frame_id = values['report'], values['frame_id']
         self.scenario = scenario_from(values)
+        self._draw_every = math.ceil(self.rate / DRAW_RATE)
         self.ticks = round(self.scenario.duration * self.rate)
         self.log = CraneLog(self.ticks)
         self.stop = threading.Event()
@@ -60,6 +73,7 @@ class CraneNode(Node):
             stop=self.stop) if values['closed_loop'] else None
         self.solver = ContactSolver(self.scenario.size, self.scenario.stack_size, model='exact')
 
+        self._crane_markers = self.create_publisher(MarkerArray, CRANE_MARKERS, CONTACT_QOS)
         self._publishers_ab = [self.create_publisher(PoseStamped, f'{box}/pose', DEEP_RELIABLE)
                                for box in ('box_a', 'box_b')]
         self._answers = [
@@ -100,6 +114,8 @@ class CraneNode(Node):
             if self.stop.wait(max(0.0, early)):
                 return
             stamp = self._publish(crane)
+            if tick % self._draw_every == 0:
+                self._draw(stamp, crane)
             if self.feedback is None:
                 crane.step()
             else:
@@ -134,6 +150,17 @@ class CraneNode(Node):
         for publisher, pose in zip(self._publishers_ab, poses):
             publisher.publish(pose_message(header, pose))
         return stamp
+
+    def _draw(self, stamp: int, crane: Crane) -> None:
+        """Publish ropes, and the spreader's frame between their lower ends, if anyone looks."""
+        if not self._crane_markers.get_subscription_count():
+            return
+        header, ropes = make_header(stamp, self.frame_id), crane.ropes
+        corners = ropes[[0, 1, 3, 2], 1]  # once around
+        spreader = np.stack([corners, np.roll(corners, 1, axis=0)], axis=1)
+        self._crane_markers.publish(MarkerArray(markers=[
+            line_marker(header, name, lines, width=width, colour=ROPE)
+            for name, lines, width in (('ropes', ropes, 0.04), ('spreader', spreader, 0.15))]))
 
     def _now(self) -> int:
         return int(self.get_clock().now().nanoseconds)

@@ -290,6 +290,15 @@ class Crane:
         tensions[self._data.efc_id[rows]] = self._data.efc_force[rows]
         return tensions
 
+    @property
+    def ropes(self) -> np.ndarray:
+        """Upper and lower end of the four ropes, world frame, (4, 2, 3); order as tensions."""
+        corners = np.column_stack([_CORNERS, np.ones(len(_CORNERS))]) * self.scenario.size / 2.0
+        pose = self.load_pose
+        holds = [self._data.site(f'hold_{i}').xpos for i in range(len(_CORNERS))]
+        lower = pose[:3] + corners @ rotation_matrix(pose[3:]).T
+        return np.stack([np.array(holds), lower], axis=1)
+
     def step(self, wrench: Callable[[float], np.ndarray] | None = None) -> None:
         """Advance one tick, under a wrench that may change from one physics step to the next.
 

@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Mapping
 from typing import Any
 
+import numpy as np
 from geometry_msgs.msg import PoseStamped
 from rclpy.context import Context
 from rclpy.node import Node
@@ -18,13 +19,14 @@ from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 from rclpy.task import Future
 from sensor_msgs.msg import PointCloud2
+from visualization_msgs.msg import MarkerArray
 
 from ...node.message_bytes import RawMessages
 from ...node.messages import Refused, read_cloud
 from ...node.runtime import LOG_SECONDS, POSE_QOS
 from ...scene.scene_file import SceneError, read_scene
 from ...scene.scene_solver import Scene, two_boxes
-from ..ros_client import stamp_of
+from ..ros_client import CRANE_MARKERS, lines_of, stamp_of
 from .view_log import OtherSceneError, ViewLog
 
 ASK_PERIOD = 0.5
@@ -95,6 +97,7 @@ class ViewNode(Listener):
         self.settings: Mapping[str, Any] = {}  # the contact node's parameters, those of ASKED
         self.wish = ''  # the model that was asked for last, until it is granted
         self.refusal = ''  # why the last wish was refused, or the scene cannot be read
+        self.lines = np.zeros((0, 2, 3))  # ends of the crane's lines, where a crane runs
         self._scene = scene
         self._answered = 0.0
         self._question: Future | None = None
@@ -102,6 +105,7 @@ class ViewNode(Listener):
         super().__init__('view', context, POSE_QOS, **options)
         self._target = AsyncParameterClient(self, target)
         self.create_timer(ASK_PERIOD, self._ask)
+        self.create_subscription(MarkerArray, CRANE_MARKERS, self._on_crane, POSE_QOS)
 
     @property
     def connected(self) -> bool:
@@ -125,6 +129,9 @@ class ViewNode(Listener):
             if result.successful:
                 self.settings = {**self.settings, 'model': name}
         future.add_done_callback(done)
+
+    def _on_crane(self, message: MarkerArray) -> None:
+        self.lines = lines_of(message)
 
     def _ask(self) -> None:
         if self._question is not None and not self.connected:

@@ -22,7 +22,7 @@ from ...node.runtime import CONTACT_QOS, run_node
 from ...scene.pose_sets import CONTAINER
 from ...scene.scene_file import read_scene
 from ...scene.scene_solver import two_boxes
-from ..ros_client import scene_source, set_pose
+from ..ros_client import line_marker, scene_source, set_pose
 from .listener import Listener
 from .style import (
     BOX_A,
@@ -96,11 +96,9 @@ def _contacts(header: Header, answer: AnsweredTick) -> Iterator[Marker]:
     outlines = answer.points[:, None] + patch_outlines(answer.semi_axes)
     outlines = outlines[~np.isnan(outlines[:, 0, 0])]
     if len(outlines):
-        patches = _marker(header, 'patches', Marker.LINE_LIST, CONTACT)
-        patches.scale.x = 0.5 * looks[0].point_radius  # the lines' width
-        ends = np.stack([outlines[:, :-1], outlines[:, 1:]], axis=2).reshape(-1, 3)
-        patches.points = [_set(Point(), end) for end in ends]
-        yield patches
+        lines = np.stack([outlines[:, :-1], outlines[:, 1:]], axis=2)
+        yield line_marker(header, 'patches', lines, width=0.5 * looks[0].point_radius,
+                          colour=CONTACT)
 
 
 def _marker(header: Header, name: str, kind: int, colour: Colour, opacity: float = 1.0, *,

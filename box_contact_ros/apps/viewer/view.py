@@ -152,7 +152,7 @@ def watch(node: ViewNode, page: Page, started: Programs | None,
             if log is not None:
                 log.start_anew()
         snapshot = log.snapshot() if log else None
-        page.draw(snapshot)
+        page.draw(snapshot, node.lines)
         if page.due:
             figures = log.figures(node.get_clock().now().nanoseconds) if log else None
             page.show(snapshot, figures, model=node.model, wish=node.wish, refusal=node.refusal,

@@ -115,7 +115,7 @@ class Stage:
         # Crosses, so that they are seen through the points, which are often at the same place.
         self._exact = scene.add_line_segments('/contact/exact', one, EXACT, thickness=3.0,
                                               thickness_units='screen', visible=False)
-        self._ropes = scene.add_line_segments('/crane/ropes', one, ROPE, visible=False, **LINE)
+        self._crane = scene.add_line_segments('/crane', one, ROPE, visible=False, **LINE)
         self._depths = [scene.add_label(f'/contact/depth_{number}', '', visible=False,
                                         anchor='bottom-left') for number in range(LISTED)]
 
@@ -128,8 +128,8 @@ class Stage:
         scene.add_light_directional('/light/sun', color=(255, 250, 240), intensity=2.2,
                                     position=(-6.0, -9.0, 14.0))
 
-    def draw(self, snapshot: Snapshot) -> None:
-        """Show boxes and contacts."""
+    def draw(self, snapshot: Snapshot, lines: np.ndarray) -> None:
+        """Show boxes, contacts, and the lines (n, 2, 3) of a crane."""
         with self._server.atomic():
             if snapshot.scene is not self._scene:
                 self._set_scene(snapshot.scene)
@@ -139,11 +139,7 @@ class Stage:
             for group in self._groups:
                 group.draw(snapshot, self._origin)
             self._draw_contacts(snapshot.answer)
-
-    def draw_ropes(self, lines: np.ndarray) -> None:
-        """Show the ropes of a crane: the ends (n, 2, 3) of straight lines."""
-        if self._origin is not None:
-            _show(self._ropes, points=lines - self._origin)
+            _show(self._crane, points=lines - self._origin)
 
     def _set_scene(self, scene: SceneArrays) -> None:
         """Replace the boxes; the origin of the drawing is found anew."""

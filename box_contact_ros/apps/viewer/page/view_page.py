@@ -92,12 +92,10 @@ class Page:
             with self._report:
                 self._last_run = gui.add_html('')
 
-    def draw(self, snapshot: Snapshot | None, ropes: np.ndarray | None = None) -> None:
-        """Show boxes and contacts; ropes: ends (n, 2, 3) of a crane's."""
+    def draw(self, snapshot: Snapshot | None, lines: np.ndarray) -> None:
+        """Show boxes, contacts, and the lines (n, 2, 3) of a crane."""
         if snapshot is not None:
-            self._stage.draw(snapshot)
-            if ropes is not None:
-                self._stage.draw_ropes(ropes)
+            self._stage.draw(snapshot, lines)
 
     @property
     def due(self) -> bool:
