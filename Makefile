@@ -6,7 +6,7 @@ SHELL := bash
 .ONESHELL:
 .NOTPARALLEL:
 .DEFAULT_GOAL := help
-.PHONY: help demo view test check reports test-arm coverage clean
+.PHONY: help demo view test check reports docs docs-links tables test-arm coverage clean
 
 # Arguments for the program behind the target: make test ARGS='-k sat -x'
 ARGS ?=
@@ -34,6 +34,8 @@ help:
 	echo 'make check    linters, and the quick tests of core, solver and scene: a minute'
 	echo 'make test-arm the C++ test on an emulated 64-bit ARM'
 	echo 'make coverage lines of solver, scenes and nodes that their tests run'
+	echo 'make docs     the documentation as HTML, in build/docs'
+	echo 'make tables   write the figures of docs/results/ into README and docs'
 	echo 'make clean    remove .venv and everything that was generated'
 	echo
 	echo 'Each does its own set-up, in .venv. Arguments: make test ARGS="-k sat -x".'
@@ -74,6 +76,10 @@ coverage:
 	    test/baselines/test_paper_models.py test/package/test_package.py $(ARGS)
 	$(PY) -m coverage combine -q
 	$(PY) -m coverage report
+
+tables:
+	@.ci/setup demo
+	exec $(PY) docs/tables.py $(ARGS)
 
 clean:
 	@if [ -e .venv ] && [ ! -e .venv/.made-by-make ]; then

@@ -57,7 +57,7 @@ def let_callbacks_finish() -> None:
     """Keep this process's other threads from interrupting the one that calls this (Linux).
 
     Every reliable publish wakes two or three threads of the middleware. As batch threads they wait
-    until this one is idle: docs/how-to/performance.md.
+    until this one is idle: docs/decisions/contact-node.md.
     """
     try:
         mine = threading.get_native_id()

@@ -1,7 +1,7 @@
 """The registry of models: what each is called, what it is for, and how it is built.
 
 A new model is a module with its class and an entry of `MODELS`. Solver, node, programs and tests
-read the table. The README's table of models is tested against it.
+read the table. A test compares the table in docs/how-to/models.md.
 """
 from __future__ import annotations
 

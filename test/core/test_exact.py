@@ -43,7 +43,7 @@ def test_agrees_with_the_oracle(family, chunk):
 def test_thin_overlaps(family, chunk):
     """Overlaps a millionth as thick as long, cut off obliquely; sides in one plane but for ulps.
 
-    And edges exactly in sides, where sums over edges go wrong: docs/explanation/method.md.
+    And edges exactly in sides, where sums over edges go wrong: docs/explanation/contact_point.md.
     """
     colliding = check(family, chunk, *THIN[family](np.random.default_rng([2027, chunk]), CHUNK))
     assert colliding.mean() > 0.4

@@ -472,18 +472,18 @@ def test_node_has_no_other_topics(node, live):
     assert names == {f'/{address.removeprefix("/")}' for address in ADDRESSES.values()}
 
 
-# --- the README's tables --------------------------------------------------------------------------
+# --- tables of the docs ---------------------------------------------------------------------------
 
 
-def table(heading: str) -> list[list[str]]:
-    """Cells of the first table below a heading of the README, without backticks and the head."""
-    text = (ROOT / 'README.md').read_text('utf-8').split(f'\n{heading}\n', 1)[1]
+def table(page: str) -> list[list[str]]:
+    """Cells of the contact node's table on a page, without backticks and the head."""
+    text = (ROOT / 'docs' / 'reference' / page).read_text('utf-8').split('\n## Of the ', 1)[1]
     lines = re.search(r'(?:^\|.*\n)+', text, re.MULTILINE).group().splitlines()[2:]
     return [[cell.strip().replace('`', '') for cell in line.strip('|').split('|')]
             for line in lines]
 
 
-def test_readme_lists_the_topics():
+def test_docs_list_the_topics():
     """Topic, type, direction and QoS of every operation, in the document's order."""
     expected = []
     for operation in OPERATIONS.values():
@@ -493,10 +493,10 @@ def test_readme_lists_the_topics():
             message_of(operation)['name'].replace('/msg', ''),
             {'receive': 'in', 'send': 'out'}[operation['action']],
             f'{policies["reliability"].replace("_", " ")}, {operation["x-depth"]}'])
-    assert [row[:4] for row in table('### Topics')] == expected
+    assert [row[:4] for row in table('topics.md')] == expected
 
 
-def test_readme_lists_the_parameters():
+def test_docs_list_the_parameters():
     """Name, type, unit and default of every parameter, in the node's order."""
     expected = []
     for name, setting in PARAMETERS.items():
@@ -507,4 +507,4 @@ def test_readme_lists_the_parameters():
             kind, default = f'double[{len(default)}]', f'[{",".join(map(str, default))}]'
         default = str(default).lower() if isinstance(default, bool) else str(default) or 'none'
         expected.append([name, kind, unit.group(1) if unit else '', default])
-    assert [row[:4] for row in table('### Parameters')] == expected
+    assert [row[:4] for row in table('parameters.md')] == expected

@@ -12,6 +12,7 @@ import io
 import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
@@ -76,7 +77,8 @@ def make(words: list[str], **_) -> None:
     """Check that the targets exist: a dry run plans them."""
     env = {name: value for name, value in os.environ.items()
            if not name.startswith(('MAKE', 'MFLAGS'))}  # `make test` may be what runs this
-    done = subprocess.run(['make', '-n', *words[1:]], cwd=ROOT, env=env, capture_output=True,
+    here = ['-C', ROOT, *words[3:]] if words[1:3] == ['-C', 'box_contact_ros'] else words[1:]
+    done = subprocess.run(['make', '-n', *here], cwd=ROOT, env=env, capture_output=True,
                           text=True, timeout=60)
     assert done.returncode == 0, done.stderr
     if words[1] == 'demo' and len(words) > 2:  # what ARGS hands on
@@ -176,9 +178,15 @@ def sourced(words: list[str], **_) -> None:
     assert words[1] in ('/opt/ros/jazzy/setup.bash', 'install/setup.bash', f'{VENV}/bin/activate')
 
 
-def export(words: list[str], **_) -> None:
-    """Name a file of the checkout."""
-    assert (ROOT / words[1].partition('=$PWD/')[2]).is_file()
+def clone(words: list[str], **_) -> None:
+    """Clone into the folder that the next command names; the address is the reader's."""
+    assert words[2:] == ['REPOSITORY', 'box_contact_ros']
+
+
+def exported(words: list[str], **_) -> None:
+    """Set a variable that ROS reads, or name a file of the checkout."""
+    name, _, value = words[1].partition('=')
+    assert name == 'ROS_LOG_DIR' or (ROOT / value.removeprefix('$PWD/')).is_file()
 
 
 VENV = '.venv-contact'
@@ -191,7 +199,9 @@ def venv(words: list[str], **_) -> None:
 
 
 COMMANDS = {
-    r'make \w+( .*)?': make,
+    r'git clone .+': clone,
+    r'export \S+': exported,
+    r'make (-C \w+ )?[\w-]+( .*)?': make,
     r'(ros2 run|python -m) box_contact_ros \w+( .*)?': start,
     r'box_contact_\w+( .*)?': start,
     r'ros2 topic echo \S+': topic,
@@ -202,7 +212,6 @@ COMMANDS = {
     r'sudo apt install .+': apt,
     r'colcon build .+': colcon,
     r'source \S+': sourced,
-    r'export \S+': export,
     r'python3 -m venv \S+': venv,
 }
 
@@ -214,9 +223,10 @@ def test_command(command, program, setup_arguments):
     matching[0](shlex.split(command), program=program, setup_arguments=setup_arguments)
 
 
-def test_first_commands_are_demo_and_test():
+def test_first_commands_are_clone_and_demo():
     """What a newcomer types first stands first."""
-    assert commands()[:2] == ['make demo', 'make test']
+    assert commands()[:2] == ['git clone REPOSITORY box_contact_ros',
+                              'make -C box_contact_ros demo']
 
 
 # --- the rest of the pages ------------------------------------------------------------------------
@@ -237,8 +247,9 @@ def test_python_example(text, program):
 
 
 def test_extras_of_every_program():
-    """The README's table has every program once, with the extras that it needs."""
-    text = (ROOT / 'README.md').read_text('utf-8').split('| Program | What | Extras |', 1)[1]
+    """The table of programs has every program once, with the extras that it needs."""
+    page = ROOT / 'docs' / 'reference' / 'programs.md'
+    text = page.read_text('utf-8').split('| Program | What | Extras |', 1)[1]
     listed = {}
     for line in re.search(r'(?:^\|.*\n)+', text, re.MULTILINE).group().splitlines()[1:]:
         programs, _, extras = (cell.strip() for cell in line.strip('|').split('|'))
@@ -278,9 +289,36 @@ def test_files_named_in_backticks_exist():
 
 
 def test_figures_are_made(tmp_path):
-    """The script draws all the figures there are; a browser takes the view's."""
+    """The scripts draw all the figures there are; a browser takes the view's."""
     folder = ROOT / 'docs' / 'figures'
-    run(sys.executable, str(folder / 'make_figures.py'), '--out', str(tmp_path), MPLBACKEND='Agg',
-        PYTHONPATH=os.pathsep.join([str(ROOT), os.environ.get('PYTHONPATH', '')]))
+    for script in ('make_figures.py', 'make_architecture.py'):
+        run(sys.executable, str(folder / script), '--out', str(tmp_path), MPLBACKEND='Agg',
+            PYTHONPATH=os.pathsep.join([str(ROOT), os.environ.get('PYTHONPATH', '')]))
     assert {path.name for path in tmp_path.iterdir()} == {
-        path.name for path in folder.glob('*.png')} - {'view.png'}
+        path.name for path in folder.iterdir() if path.suffix in ('.png', '.svg')} - {'view.png'}
+    name = 'architecture.svg'
+    assert (tmp_path / name).read_text() == (folder / name).read_text(), (
+        'imports have changed: python docs/figures/make_architecture.py')
+
+
+def test_tables_have_the_figures_of_the_reports():
+    """No number stands in two places with two values: `make tables` renews them."""
+    assert run(sys.executable, 'docs/tables.py', '--check',
+               PYTHONPATH=os.pathsep.join([str(ROOT), os.environ.get('PYTHONPATH', '')])) == ''
+
+
+def test_the_readme_is_short():
+    assert len((ROOT / 'README.md').read_text('utf-8').splitlines()) <= 150
+
+
+@pytest.mark.parametrize('text', [text for _, _, text in blocks('cpp')])
+def test_cpp_example(text, tmp_path):
+    """It compiles, and prints what the comments behind its prints say."""
+    if not shutil.which('g++'):
+        pytest.skip('g++ is not installed')
+    (tmp_path / 'box_contact').symlink_to(ROOT / 'box_contact_ros' / 'core')
+    (tmp_path / 'example.cpp').write_text(text, 'utf-8')
+    run('g++', '-std=c++17', '-ffp-contract=off', '-Wno-psabi', f'-I{tmp_path}',
+        str(tmp_path / 'example.cpp'), '-o', str(tmp_path / 'example'))
+    assert run(str(tmp_path / 'example')).splitlines() == re.findall(
+        r'printf\(.*\);  // (.*)$', text, re.MULTILINE)

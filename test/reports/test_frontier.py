@@ -61,7 +61,7 @@ def test_a_normal_off_by_a_tenth_of_a_degree_shows(containers: Pairs) -> None:
     across /= np.linalg.norm(across, axis=1, keepdims=True)
     turn = math.radians(0.1)
     worst = trials.judge(containers, colliding,
-                           math.cos(turn) * normals + math.sin(turn) * across, points).normal[1]
+                         math.cos(turn) * normals + math.sin(turn) * across, points).normal[1]
     assert worst == pytest.approx(0.1, rel=1e-6)
 
 
@@ -213,13 +213,6 @@ def test_quick_run(tmp_path: Path) -> None:
 
 
 # --- what is committed ----------------------------------------------------------------------------
-
-
-def test_the_readme_has_the_table_of_the_report() -> None:
-    text = (ROOT / 'docs' / 'results' / 'frontier.md').read_text()
-    lines = text.split('## In short')[1].split('\n\n')[2]
-    assert lines.count('\n') > 1 + len(frontier.IN_SHORT)
-    assert lines in (ROOT / 'README.md').read_text()
 
 
 def test_the_committed_report_has_all_of_them() -> None:

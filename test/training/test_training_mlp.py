@@ -350,8 +350,9 @@ def write(folder: Path, text: str) -> Path:
 
 
 def test_the_example_in_the_docs(tmp_path: Path) -> None:
-    """docs/how-to/training.md: three pairs of sizes, all within the range."""
-    page = (Path(__file__).parents[2] / 'docs' / 'how-to' / 'training.md').read_text('utf-8')
+    """docs/tutorials: three pairs of sizes, all within the range."""
+    folder = Path(__file__).parents[2] / 'docs' / 'tutorials'
+    page = (folder / 'train_for_your_boxes.md').read_text('utf-8')
     text = re.search(r'^```yaml\n(.*?)^```$', page, re.MULTILINE | re.DOTALL).group(1)
     sizes = scene_sizes(write(tmp_path, text))
     assert len(sizes) == 3 and all(map(mlp_recipe.in_range, sizes))

@@ -24,7 +24,7 @@ from visualization_msgs.msg import MarkerArray
 from ...node.message_bytes import RawMessages
 from ...node.messages import Refused, read_cloud
 from ...node.runtime import LOG_SECONDS, POSE_QOS
-from ...scene.scene_file import SceneError, read_scene
+from ...scene.files.scene_file import SceneError, read_scene
 from ...scene.scene_solver import Scene, two_boxes
 from ..ros_client import CRANE_MARKERS, lines_of, stamp_of
 from .view_log import OtherSceneError, ViewLog

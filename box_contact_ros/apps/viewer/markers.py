@@ -19,8 +19,8 @@ from visualization_msgs.msg import Marker, MarkerArray
 from ...node.messages import NANOSECONDS, make_header
 from ...node.parameters import CheckedParameters, Setting, answer_help, number, size, text
 from ...node.runtime import CONTACT_QOS, run_node
+from ...scene.files.scene_file import read_scene
 from ...scene.pose_sets import CONTAINER
-from ...scene.scene_file import read_scene
 from ...scene.scene_solver import two_boxes
 from ..ros_client import line_marker, scene_source, set_pose
 from .listener import Listener

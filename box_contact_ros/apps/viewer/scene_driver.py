@@ -19,8 +19,8 @@ from rclpy.utilities import remove_ros_args
 
 from ...node.messages import make_header
 from ...node.runtime import CONTACT_QOS, REFUSALS, run_node
+from ...scene.files.scene_file import read_scene
 from ...scene.pose import quaternion_multiply, rotation_matrix
-from ...scene.scene_file import read_scene
 from ...scene.scene_solver import Scene
 from ...solver.arguments import within
 from ..ros_client import pose_message, scene_source

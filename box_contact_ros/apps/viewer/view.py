@@ -28,8 +28,8 @@ from rclpy.utilities import remove_ros_args
 
 from ...node.contact_node import PARAMETERS
 from ...node.runtime import REFUSALS
+from ...scene.files.scene_file import read_scene
 from ...scene.pose_sets import CONTAINER
-from ...scene.scene_file import read_scene
 from ...scene.scene_solver import Scene
 from ...solver.arguments import model_name, within
 from .. import processes

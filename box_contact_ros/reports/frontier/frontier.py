@@ -108,7 +108,7 @@ def _oddness(row: FrontierRow, kind: str) -> float:
 
 
 def in_short(rows: Sequence[FrontierRow], odd: Mapping[Odd, str]) -> str:
-    """Return the table for the README: containers and stacks, what a crane has all day."""
+    """Return the short table: containers and stacks, what a crane has all day."""
     by = {(row.name, row.instruction_set, row.set): row for row in rows}
     best, notes, lines = native.instruction_set, list(odd), []
     rivals = [name for name in dict.fromkeys(row.name for row in rows) if ' ' in name

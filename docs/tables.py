@@ -1,0 +1,112 @@
+"""Fill the tables of the README and of docs/ with the figures of docs/results/*.csv.
+
+`python docs/tables.py` rewrites each page that has a table between `<!-- table NAME -->` and
+`<!-- end of table -->`. `--check` only reports pages whose tables are not those of the CSV files.
+"""
+from __future__ import annotations
+
+import argparse
+import csv
+import re
+import sys
+from pathlib import Path
+
+from box_contact_ros.output import markdown_table, number
+
+ROOT = Path(__file__).resolve().parents[1]
+RESULTS = ROOT / 'docs' / 'results'
+PAGES = [ROOT / 'README.md', *sorted((ROOT / 'docs').rglob('*.md'))]
+BLOCK = re.compile(r'(<!-- table ([\w-]+) -->\n).*?(<!-- end of table -->)', re.DOTALL)
+
+Row = dict[str, str]
+
+CHOICES = {
+    'mlp': ('`mlp`, the default', 'speed; a small error is fine'),
+    'exact': ('`exact`', 'ground truth, judging other models'),
+    'paper': ("`paper`, the paper's network", 'repeating the paper'),
+    'soup-8': ('`soup-8`, polygon soup', 'comparing with what the paper replaced'),
+    'fcl': ("`fcl`, FCL's deepest point", 'comparing with a common engine'),
+}
+SETS = {
+    'random cubes': 'cubes in any pose, 0.1–10 % deep',
+    'touching': "cubes that just touch (the paper's setting)",
+    'random sizes': 'random pairs of sizes, to 1:20',
+    'stacks': 'stacks, tilt 1e-6–1e-3 rad',
+    'tilted stacks': 'stacks, tilt 1e-3–0.1 rad',
+    'containers': '40 ft containers, 5° sway',
+}
+
+
+def rows(name: str, **wanted: str) -> list[Row]:
+    """Return the rows of a CSV file whose columns have the wanted values."""
+    with (RESULTS / name).open(encoding='utf-8', newline='') as file:
+        return [row for row in csv.DictReader(file)
+                if all(row[column] == value for column, value in wanted.items())]
+
+
+def cell(row: Row, column: str, scale: float = 1.0, digits: int = 3) -> str:
+    """Return a number of a CSV row to so many digits; a dash where the cell is empty."""
+    return number(float(f'{scale * float(row[column] or "nan"):.{digits}g}'), digits)
+
+
+def models() -> str:
+    """Return what each model costs and errs, and when to take it; a row per instruction set."""
+    measured = {model: rows('frontier.csv', contestant=model, set='containers', **{'class': 'all'})
+                for model in CHOICES}
+    sets = {row['instruction_set'] for found in measured.values() for row in found}
+    body = []
+    for model, (name, when) in CHOICES.items():
+        for row in measured[model]:
+            label = f'{name} ({row["instruction_set"]})' if len(sets) > 1 else name
+            body.append([label, cell(row, 'call_p50', 1e-3), cell(row, 'batch_p50'),
+                         cell(row, 'point_p50'), cell(row, 'point_p99'), when])
+    table = markdown_table(['Model', 'single call [µs]', 'batch [ns a pair]', 'median error [%]',
+                            'p99 error [%]', 'take it for'], body)
+    about = rows('frontier.csv', contestant='mlp', set='containers', **{'class': 'all'})
+    return (f'{table}\n\nMedian times on one core: {about[0]["processor"]}, '
+            f'{" and ".join(sorted(sets))}.')
+
+
+def mlp_errors() -> str:
+    """Return the errors of `mlp` by pose set: point, volume, covariance."""
+    body = []
+    for name, words in SETS.items():
+        errors = {row['quantity']: row
+                  for row in rows('accuracy.csv', model='mlp', set=name, part='all')}
+        body.append([words, *(cell(errors['point'], column, digits=2)
+                              for column in ('mean', 'p99', 'worst')),
+                     *(cell(errors[quantity], column, digits=2)
+                       for quantity in ('volume', 'covariance') for column in ('mean', 'p99'))])
+    return markdown_table(['Set', 'point: mean', 'p99', 'worst', 'volume: mean', 'p99',
+                           'covariance: mean', 'p99'], body)
+
+
+TABLES = {'models': models, 'mlp-errors': mlp_errors}
+
+
+def filled(text: str) -> str:
+    """Return a page with its tables made from the CSV files."""
+    return BLOCK.sub(lambda found: f'{found[1]}{TABLES[found[2]]()}\n{found[3]}', text)
+
+
+def main() -> int:
+    """Rewrite the pages, or with `--check` report which would change; 1 where one would."""
+    parser = argparse.ArgumentParser(description='Fill the tables of README.md and docs/ with the '
+                                                 'figures of docs/results/*.csv.')
+    parser.add_argument('--check', action='store_true',
+                        help='change nothing, and name the pages whose tables are out of date')
+    options = parser.parse_args()
+    changed = False
+    for page in PAGES:
+        text = page.read_text('utf-8')
+        made = filled(text)
+        if made != text:
+            changed = True
+            print(f'{page.relative_to(ROOT)}: {"out of date" if options.check else "renewed"}')
+            if not options.check:
+                page.write_text(made, 'utf-8')
+    return int(changed and options.check)
+
+
+if __name__ == '__main__':
+    sys.exit(main())
