@@ -6,9 +6,11 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from ..scene.scene_solver import SceneSolver
+import numpy as np
+
+from ..scene.scene_solver import ALL_BOXES, SceneSolver
 from ..scene.stamp_pairing import NEVER, PAIRINGS, RESETS, Pairing, StampedPose, Tick
-from ..solver.checks import shown
+from ..solver.checks import absent_poses, are_poses, pose_fault, shown
 from .diagnostics import UNMATCHED_SECONDS, Diagnostics
 from .message_bytes import RawMessages
 from .messages import NANOSECONDS, Refused, TypedMessages
@@ -52,6 +54,7 @@ class Evaluator:
         if settings['serialization'] != old.get('serialization'):
             self._messages = SERIALIZATIONS[settings['serialization']]()
         self.solver, self._settings = solver, settings
+        self._absent = np.zeros(0, dtype=bool)  # which boxes the last array had no pose of
 
     def close(self) -> None:
         """Keep the count of a solver that goes."""
@@ -67,11 +70,13 @@ class Evaluator:
         self._pairing.reset()
 
     def pose_callback(self, box: str, topic: str) -> Callable[[Any], None]:
-        """Return the callback for the poses of a box; it raises nothing, whatever happens."""
+        """Return the callback for the poses of a box, or of all; it raises nothing at all."""
+        read = self._read_all if box == ALL_BOXES else self._read_one
+
         def callback(message: Any) -> None:
             self.counts['poses'] += 1
             try:
-                ticks = self._pairing.add(box, self._messages.read_pose(message))
+                ticks = self._pairing.add(box, read(message))
             except Exception as error:
                 self._refuse(error, topic)
                 return
@@ -82,12 +87,33 @@ class Evaluator:
                     self._refuse(error, topic)
         return callback
 
+    def _read_one(self, message: Any) -> StampedPose:
+        return self._messages.read_pose(message)
+
+    def _read_all(self, message: Any) -> StampedPose:
+        """Return the poses of all moving boxes; a bad one is counted, and its box absent."""
+        poses, moving = self._messages.read_poses(message), self.solver.scene.moving
+        if len(poses.numbers) != len(moving):
+            raise Refused('wrong number of poses',
+                          f'{len(poses.numbers)} poses, but {len(moving)} boxes move')
+        bad = ~are_poses(poses.numbers) & ~absent_poses(poses.numbers)
+        if bad.any():
+            first = int(bad.argmax())
+            self.counts['refused: bad pose'] += int(bad.sum()) - 1
+            self._refuse(Refused('bad pose', f'{pose_fault(poses.numbers[first])}'), moving[first])
+            poses.numbers[bad] = np.nan
+        self._absent = absent_poses(poses.numbers)
+        return poses
+
     def report(self) -> None:
         """Publish the diagnostics; warn of poses that come and cannot be answered."""
         counts = +self.counts
         counts[OUTSIDE] += self.solver.exact_answers
-        unanswered = self._diagnostics.publish(
-            counts, len(self.solver.scene.pairs), self._pairing.stale())
+        scene = self.solver.scene
+        stale = self._pairing.stale()
+        if scene.pose_array:
+            stale = [box for box, absent in zip(scene.moving, self._absent) if absent]
+        unanswered = self._diagnostics.publish(counts, len(scene.pairs), stale)
         if unanswered > UNMATCHED_SECONDS:
             self._logger.warning(
                 f'poses arrive, but none could be answered for {UNMATCHED_SECONDS:g} s (pairing '
@@ -97,7 +123,8 @@ class Evaluator:
     def _answer(self, tick: Tick) -> None:
         stamp, frame_id = self._header_of(tick)
         started = time.perf_counter_ns()
-        answer = self.solver([pose and pose.numbers for pose in tick])
+        answer = self.solver(tick[0].numbers if tick[0] and self.solver.scene.pose_array
+                             else [pose and pose.numbers for pose in tick])
         took = time.perf_counter_ns() - started
         messages = self._messages
         messages.begin(stamp, frame_id)
@@ -131,7 +158,7 @@ class Evaluator:
     def _frames(self, tick: Tick, odd: StampedPose) -> str:
         """Describe the frame of a tick, by the scene or the first box, and that of a pose."""
         scene = self.solver.scene
-        known = [(box, pose) for box, pose in zip(scene.moving, tick) if pose is not None]
+        known = [(box, pose) for box, pose in zip(scene.sources, tick) if pose is not None]
         one, frame = ('the scene', scene.frame_id) if scene.frame_id else (
             known[0][0], known[0][1].frame_id)
         box = next(box for box, pose in known if pose is odd)

@@ -22,6 +22,7 @@ from .messages import (
     NANOSECONDS,
     Refused,
     checked_pose,
+    headed,
     make_cloud,
     make_header,
     make_normal,
@@ -67,22 +68,44 @@ def numbers_at(length: int) -> int:
 
 def parse_pose(data: bytes) -> tuple[tuple[float, ...], str, int, int]:
     """Return numbers, frame_id, seconds and nanoseconds of a PoseStamped, or raise Refused."""
-    if len(data) < FRAME_AT or data[0] != 0 or data[1] > 1:
-        raise Refused('not a PoseStamped', f'{len(data)} bytes that are no plain CDR message')
-    order = '<' if data[1] else '>'
-    sec, nanosec, length = struct.unpack_from(f'{order}iII', data, ENCAPSULATION)
+    order, sec, nanosec, length = _parse_head(data, 'PoseStamped')
     at = numbers_at(length)
     if len(data) != at + _POSE.size:
         raise Refused('not a PoseStamped',
                       f'{len(data)} bytes, where a frame_id of {length} needs {at + _POSE.size}')
+    frame_id = _parse_frame(data, length, 'PoseStamped')
+    return struct.unpack_from(f'{order}7d', data, at), frame_id, sec, nanosec
+
+
+def parse_poses(data: bytes) -> tuple[np.ndarray, str, int, int]:
+    """Return numbers (n, 7), frame_id, seconds and nanoseconds of a PoseArray, or raise Refused."""
+    order, sec, nanosec, length = _parse_head(data, 'PoseArray')
+    count_at = -(-(FRAME_AT + length) // 4) * 4
+    count = struct.unpack_from(f'{order}I', data, count_at)[0] if count_at + 4 <= len(data) else 0
+    at = ENCAPSULATION + -(-count_at // 8) * 8 if count else count_at + 4
+    if len(data) != at + count * _POSE.size:
+        raise Refused('not a PoseArray', f'{len(data)} bytes, where {count} poses with a frame_id '
+                                         f'of {length} need {at + count * _POSE.size}')
+    numbers = np.frombuffer(data, f'{order}f8', 7 * count, at).reshape(count, 7).astype(np.float64)
+    return numbers, _parse_frame(data, length, 'PoseArray'), sec, nanosec
+
+
+def _parse_head(data: bytes, kind: str) -> tuple[str, int, int, int]:
+    """Return the order of bytes, seconds, nanoseconds, and the length of frame_id."""
+    if len(data) < FRAME_AT or data[0] != 0 or data[1] > 1:
+        raise Refused(f'not a {kind}', f'{len(data)} bytes that are no plain CDR message')
+    order = '<' if data[1] else '>'
+    return (order, *struct.unpack_from(f'{order}iII', data, ENCAPSULATION))
+
+
+def _parse_frame(data: bytes, length: int, kind: str) -> str:
     frame = data[FRAME_AT:FRAME_AT + length]
     if length and frame.find(b'\0') != length - 1:
-        raise Refused('not a PoseStamped', 'frame_id does not end with its first zero')
+        raise Refused(f'not a {kind}', 'frame_id does not end with its first zero')
     try:
-        frame_id = frame[:-1].decode('utf-8')
+        return frame[:-1].decode('utf-8')
     except UnicodeDecodeError:
         raise Refused('bad header', f'frame_id {frame[:-1][:100]!r} is not UTF-8') from None
-    return struct.unpack_from(f'{order}7d', data, at), frame_id, sec, nanosec
 
 
 class RawMessages:
@@ -122,6 +145,10 @@ class RawMessages:
                 self._unpack = struct.Struct(
                     _LAYOUT.format(end - start, numbers_at(length) - end)).unpack
         return pose
+
+    def read_poses(self, data: bytes) -> StampedPose:
+        """Return all poses of a serialised message, numbers (n, 7), or raise Refused."""
+        return headed(*parse_poses(bytes(data)))
 
     def begin(self, stamp: int, frame_id: str) -> None:
         """Set stamp [ns] and frame of the messages that follow."""

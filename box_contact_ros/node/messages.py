@@ -10,7 +10,7 @@ from functools import lru_cache
 
 import numpy as np
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import Point, PointStamped, PoseStamped, Vector3, Vector3Stamped
+from geometry_msgs.msg import Point, PointStamped, PoseArray, PoseStamped, Vector3, Vector3Stamped
 from sensor_msgs.msg import PointCloud2, PointField
 from std_msgs.msg import Header
 
@@ -46,14 +46,20 @@ class Refused(ValueError):
 
 def checked_pose(numbers: Sequence[float], frame_id: str, sec: int, nanosec: int) -> StampedPose:
     """Return a pose that can be answered, or raise Refused."""
+    pose = headed(np.array(numbers), frame_id, sec, nanosec)
+    fault = pose_fault(numbers)
+    if fault:
+        raise Refused('bad pose', fault)
+    return pose
+
+
+def headed(numbers: np.ndarray, frame_id: str, sec: int, nanosec: int) -> StampedPose:
+    """Return numbers with the stamp and frame of their message, or raise Refused for these."""
     if nanosec >= NANOSECONDS:
         raise Refused('bad header', f'stamp has {nanosec} nanoseconds, a second or more')
     if '\N{REPLACEMENT CHARACTER}' in frame_id:  # rclpy's word for bytes it cannot decode
         raise Refused('bad header', f'frame_id {shown(frame_id)} is not UTF-8')
-    fault = pose_fault(numbers)
-    if fault:
-        raise Refused('bad pose', fault)
-    return StampedPose(np.array(numbers), frame_id, sec * NANOSECONDS + nanosec)
+    return StampedPose(numbers, frame_id, sec * NANOSECONDS + nanosec)
 
 
 def make_header(stamp: int, frame_id: str) -> Header:
@@ -150,6 +156,14 @@ class TypedMessages:
         p, q, header = message.pose.position, message.pose.orientation, message.header
         return checked_pose((p.x, p.y, p.z, q.x, q.y, q.z, q.w), header.frame_id,
                             header.stamp.sec, header.stamp.nanosec)
+
+    def read_poses(self, message: PoseArray) -> StampedPose:
+        """Return all poses of a message, numbers (n, 7) as they are, or raise Refused."""
+        numbers = [(p.position.x, p.position.y, p.position.z, p.orientation.x, p.orientation.y,
+                    p.orientation.z, p.orientation.w) for p in message.poses]
+        header = message.header
+        return headed(np.array(numbers, dtype=float).reshape(-1, 7), header.frame_id,
+                      header.stamp.sec, header.stamp.nanosec)
 
     def begin(self, stamp: int, frame_id: str) -> None:
         """Set stamp [ns] and frame of the messages that follow."""

@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Mapping
 from functools import partial
 from typing import Any, NamedTuple
 
-from geometry_msgs.msg import PointStamped, PoseStamped, Vector3Stamped
+from geometry_msgs.msg import PointStamped, PoseArray, PoseStamped, Vector3Stamped
 from rclpy.duration import Duration
 from rclpy.event_handler import PublisherEventCallbacks, UnsupportedEventTypeError
 from rclpy.node import Node
@@ -15,18 +15,22 @@ from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import PointCloud2
 
-from ..scene.scene_solver import Pair, Scene
+from ..scene.scene_solver import ALL_BOXES, Pair, Scene
 from ..solver.checks import shown
 from .qos_events import QosEvents
 from .rclpy_workarounds import RCLError, silence
-from .runtime import CONTACT_QOS, POSE_QOS
+from .runtime import ARRAY_QOS, CONTACT_QOS, POSE_QOS
 
 TOPICS_OF_EVERY_NODE = ('/diagnostics', '/parameter_events', '/rosout', '/clock')
 """Topics of other types than poses."""
 
 
+MOST_PAIRS_WITH_TOPICS = 1000
+"""Two publishers a pair take milliseconds and memory, here and in every process that listens."""
+
+
 class PoseSource(NamedTuple):
-    """How the poses of a box are subscribed to."""
+    """How the poses of a box, or of all boxes, are subscribed to."""
 
     topic: str
     raw: bool  # whether the callback gets the bytes of messages
@@ -68,13 +72,15 @@ class SceneTopics:
                 raise ValueError(f'scene: id {pair.id} of pair {pair.name} was given to '
                                  f'{before.name} ({before.a}, {before.b}) before: ids are never '
                                  f'used again while a node runs (start it anew)')
+        if pair_topics and len(scene.pairs) > MOST_PAIRS_WITH_TOPICS:
+            raise ValueError(f'scene: {len(scene.pairs)} pairs are too many for topics of their '
+                             f'own (at most {MOST_PAIRS_WITH_TOPICS}): set pair_topics to false')
         own = [f'{self._prefix}contacts', '~/transition_event', *TOPICS_OF_EVERY_NODE]
         if pair_topics:
             own += [f'{self._topic_of(pair)}/{kind}' for pair in scene.pairs
                     for kind in ('point', 'normal')]
         taken = {self._resolved(topic) for topic in own}
-        for box in scene.moving:
-            topic = scene.boxes[box].pose_topic
+        for box, topic in scene.sources.items():
             if self._resolved(topic) in taken:
                 raise ValueError(f'scene: pose_topic {shown(topic)} of box {box} is a topic of '
                                  'this node that carries no poses')
@@ -82,8 +88,7 @@ class SceneTopics:
     def set_scene(self, scene: Scene, *, pair_topics: bool, raw: bool, deadline: float) -> None:
         """Replace the topics by those of a scene; on RCLError bring the old ones back."""
         old, was_open = self._wanted, self._is_open
-        sources = {box: PoseSource(scene.boxes[box].pose_topic, raw, deadline)
-                   for box in scene.moving}
+        sources = {box: PoseSource(topic, raw, deadline) for box, topic in scene.sources.items()}
         try:
             self._change(sources, scene.pairs if pair_topics else ())
         except RCLError:
@@ -169,10 +174,11 @@ class SceneTopics:
 
     def _subscribe(self, box: str, source: PoseSource, callback: Callable[[Any], None],
                    ) -> Subscription:
-        qos = QoSProfile(depth=POSE_QOS.depth, reliability=POSE_QOS.reliability)
+        kind, usual = (PoseArray, ARRAY_QOS) if box == ALL_BOXES else (PoseStamped, POSE_QOS)
+        qos = QoSProfile(depth=usual.depth, reliability=usual.reliability)
         if source.deadline:
             qos.deadline = Duration(seconds=source.deadline)
-        create = partial(self._node.create_subscription, PoseStamped, source.topic, callback, qos,
+        create = partial(self._node.create_subscription, kind, source.topic, callback, qos,
                          raw=source.raw)
         try:
             return create(event_callbacks=self.events.callbacks(

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import native
-from ..solver.checks import as_floats, pose_fault, shown, size_fault
+from ..solver.checks import absent_poses, as_floats, pose_fault, shown, size_fault
 from ..solver.contact import Contact
 from ..solver.contact_solver import ContactSolver
 
@@ -22,6 +22,8 @@ LARGEST_ID = 2**32 - 1  # ids of pairs are uint32 in the cloud
 
 POSE_ARRAY = 'poses'
 """Topic of the poses of all moving boxes, where they come as one message."""
+ALL_BOXES = 'all boxes'
+"""Source of these poses: no box of a scene file can have this name."""
 
 _new_tuple = tuple.__new__  # a named tuple's own constructor is Python code
 
@@ -76,6 +78,13 @@ class Scene:
         listed = {name for pair in self.pairs for name in (pair.a, pair.b)}
         return tuple(name for name, box in self.boxes.items()
                      if box.pose is None and (self.pose_array or name in listed))
+
+    @cached_property
+    def sources(self) -> Mapping[str, str]:
+        """Topics of poses by source: each box of `moving`, or ALL_BOXES in its place."""
+        if self.pose_array:
+            return {ALL_BOXES: POSE_ARRAY}
+        return {name: self.boxes[name].pose_topic for name in self.moving}
 
 
 def two_boxes(size_a: Sequence[float], size_b: Sequence[float]) -> Scene:
@@ -215,14 +224,22 @@ class SceneSolver:
         """Return the two poses of the only pair."""
         return [poses[place] if fixed is None else fixed for place, fixed in self._sides]
 
-    def __call__(self, poses: Sequence[np.ndarray | None]) -> Answer:
+    def __call__(self, poses: Sequence[np.ndarray | None] | np.ndarray) -> Answer:
         """Return the answer to one tick: a pose (7,) or None for each box of `scene.moving`.
 
+        Or an array (n, 7) with a row for each, all NaN for None.
         Raises ValueError for numbers that are no pose, and for more or fewer poses than that.
         """
         if len(poses) != len(self.scene.moving):
             raise ValueError(f'{len(poses)} poses, but {len(self.scene.moving)} boxes move: '
                              f'{shown(list(self.scene.moving))}')
+        if isinstance(poses, np.ndarray):
+            rows = as_floats(poses, 'poses', 'poses (n, 7)', (None, 7))
+            absent = absent_poses(rows)
+            if self._only is None:
+                self._poses[self._moving], self._known[self._moving] = rows, ~absent
+                return self._tick()
+            poses = [None if gone else pose for pose, gone in zip(rows, absent)]
         if self._only is not None:
             a, b = poses if self._in_order else self._both(poses)
             if a is None or b is None:
@@ -237,6 +254,10 @@ class SceneSolver:
                     box = list(self.scene.boxes)[number]
                     pose = as_floats(pose, f'pose of {box}', 'a pose (7,)', (7,))
                 self._poses[number] = pose
+        return self._tick()
+
+    def _tick(self) -> Answer:
+        """Return the answer to the poses that are set."""
         count, left_out = self._near_pairs(self._moving)
         if count < 0:
             box = list(self.scene.boxes)[left_out]

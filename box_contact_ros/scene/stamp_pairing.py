@@ -117,8 +117,8 @@ class Pairing(ABC):
 
     def set_scene(self, scene: Scene) -> None:
         """Replace the scene; boxes that stay keep their state and their poses."""
-        self._boxes = {box: self._boxes.get(box) or BoxState() for box in scene.moving}
-        self._partners = [tuple({pair.a, pair.b} & self._boxes.keys()) for pair in scene.pairs]
+        self._boxes = {box: self._boxes.get(box) or BoxState() for box in scene.sources}
+        self._partners = {tuple({pair.a, pair.b} & self._boxes.keys()) for pair in scene.pairs}
 
     def reset(self) -> None:
         """Forget all poses and stamps, as when time is set back."""

@@ -52,6 +52,21 @@ def pose_fault(pose: Sequence[float] | np.ndarray) -> str | None:
     return None
 
 
+def absent_poses(poses: np.ndarray) -> np.ndarray:
+    """Return which rows of poses (n, 7) are all NaN, as that of a box that is not there."""
+    return np.isnan(poses).all(axis=1)
+
+
+def are_poses(poses: np.ndarray) -> np.ndarray:
+    """Return which rows (n, 7) are poses: those in which `pose_fault` finds nothing."""
+    qx, qy, qz, qw = poses[:, 3:].T
+    with np.errstate(over='ignore', invalid='ignore'):
+        norm2 = (qx * qx + qy * qy) + (qz * qz + qw * qw)
+        return ((np.abs(poses[:, :3]).max(axis=1) <= LENGTH_MAX)
+                & (norm2 >= QUATERNION_MIN * QUATERNION_MIN)
+                & (norm2 <= QUATERNION_MAX * QUATERNION_MAX))
+
+
 def size_fault(size: Sequence[float] | np.ndarray) -> str | None:
     """Return why three full extents [m] are not a size, or None."""
     extents = [float(value) for value in size]

@@ -5,7 +5,7 @@ import struct
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import PointStamped, PoseStamped, Vector3Stamped
+from geometry_msgs.msg import PointStamped, PoseArray, PoseStamped, Vector3Stamped
 from hypothesis import given
 from hypothesis import strategies as st
 from rclpy.serialization import deserialize_message, serialize_message
@@ -222,3 +222,52 @@ def test_a_row_is_the_contact_again():
         assert (found.depth, found.volume) == (-wanted.separation, wanted.volume)
         for name in ('point', 'normal', 'covariance'):
             assert np.array_equal(getattr(found, name), getattr(wanted, name))
+
+
+# --- pose arrays ----------------------------------------------------------------------------------
+
+
+def array_message(rows, frame_id='map', stamp=5_000_000_007):
+    result = PoseArray(header=make_header(stamp, frame_id))
+    result.poses = [message(row).pose for row in rows]
+    return result
+
+
+@given(st.lists(st.tuples(*[FLOATS] * 7), max_size=4), FRAMES, STAMPS)
+def test_pose_arrays_are_read_alike(rows, frame_id, stamp):
+    """Numbers to the bit, of any count and any frame, whose length moves all that follows."""
+    one = array_message(rows, frame_id, stamp)
+    found = outcome(RawMessages().read_poses, bytes(serialize_message(one)))
+    assert found == outcome(TypedMessages().read_poses, one)
+    assert found == (np.array(rows, dtype=float).tobytes(), frame_id, stamp)
+
+
+ARRAY = bytes(serialize_message(array_message([(1, 2, 3, 0, 0, 0, 1)] * 2)))
+COUNT_AT = ARRAY.index(b'\2\0\0\0')
+
+
+@pytest.mark.parametrize('data', [
+    b'', ARRAY[:4], ARRAY[:COUNT_AT], ARRAY[:-1], ARRAY + b'\0', b'\1' + ARRAY[1:],
+    ARRAY[:COUNT_AT] + b'\3\0\0\0' + ARRAY[COUNT_AT + 4:],
+    ARRAY[:COUNT_AT] + b'\xff' * 4 + ARRAY[COUNT_AT + 4:],
+    ARRAY[:12] + b'\xff' * 4 + ARRAY[16:], GOOD], ids=range(10))
+def test_bytes_that_are_no_pose_array_are_refused(data):
+    with pytest.raises(Refused) as refused:
+        RawMessages().read_poses(data)
+    assert refused.value.reason == 'not a PoseArray'
+
+
+def test_headers_of_pose_arrays_are_checked():
+    late = ARRAY[:8] + struct.pack('<I', 10**9) + ARRAY[12:]
+    for data in (late, ARRAY.replace(b'map\0', b'm\xffp\0')):
+        with pytest.raises(Refused) as refused:
+            RawMessages().read_poses(data)
+        assert refused.value.reason == 'bad header'
+
+
+def test_a_big_endian_pose_array():
+    head = struct.pack('>iII', 5, 7, 4) + b'map\0' + struct.pack('>I', 1)
+    data = b'\0\0\0\0' + head + b'\0' * (-len(head) % 8) + struct.pack('>7d', *range(7))
+    poses = RawMessages().read_poses(data)
+    assert poses.numbers.tolist() == [[0, 1, 2, 3, 4, 5, 6]] and poses.frame_id == 'map'
+    assert poses.numbers.dtype == np.float64 and poses.stamp == 5 * 10**9 + 7

@@ -8,13 +8,14 @@ import re
 import shutil
 import subprocess
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import yaml
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import Point, Pose, PoseArray, PoseStamped, Quaternion
 from jsonschema import Draft202012Validator
 from rclpy.duration import Infinite
 from rclpy.parameter import Parameter
@@ -291,9 +292,56 @@ def client():
 
 
 @pytest.fixture(scope='module')
+def array_node(live):
+    """Serve a node that takes all poses as one message, once the other has been looked at."""
+    with serving(lambda context: ContactNode(context, namespace='/many', parameter_overrides=[
+            Parameter('scene', value='poses: array\nboxes: {b: {size: [2, 2, 2], count: 3}}\n'
+                                     "pairs: [{a: '*', b: '*'}]")])) as node:
+        yield node
+
+
+@pytest.fixture(scope='module')
+def live_arrays(array_node) -> list[PoseArray]:
+    """Return pose arrays that were answered: one with all boxes, one that lacks a box."""
+    client = Client('/many')
+    sent: list[PoseArray] = []
+    publisher = client.node.create_publisher(PoseArray, 'poses', 100)
+    client.node.create_subscription(PoseArray, 'poses', sent.append, 100)
+    try:
+        for gone in (0.0, math.nan):
+            numbers = [gone + number for number in (9.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)]
+            message = PoseArray(poses=[_pose(numbers), _pose(ORIGIN), _pose(TOUCHING)])
+            stamp = 0
+            for _ in range(600):
+                if stamp in client.clouds:
+                    break
+                stamp = client.next_stamp()
+                message.header = make_header(stamp, 'map')
+                publisher.publish(message)
+                client.spin(partial(client.clouds.__contains__, stamp), 0.1)
+            found = read_cloud(client.clouds[stamp])
+            assert np.isnan(found['depth']).sum() == 2 * math.isnan(gone)
+        return sent[:1] + sent[-1:]
+    finally:
+        client.close()
+
+
+def _pose(numbers):
+    x, y, z, *turn = map(float, numbers)
+    return Pose(position=Point(x=x, y=y, z=z),
+                orientation=Quaternion(**dict(zip('xyzw', turn))))
+
+
+@pytest.fixture(scope='module')
+def everything(live, live_arrays):
+    return live | {'poses': live_arrays}
+
+
+@pytest.fixture(scope='module')
 def live(node, client) -> dict[str, list[Any]]:
     """Messages by topic: poses in contact, apart and refused, the answers, the diagnostics."""
-    got: dict[str, list[Any]] = {address: [] for address in ADDRESSES.values()}
+    got: dict[str, list[Any]] = {
+        address: [] for address in ADDRESSES.values() if address != 'poses'}
     for topic in ('box_a/pose', 'box_b/pose'):
         client.node.create_subscription(PoseStamped, topic, got[topic].append, 100)
     got['/diagnostics'] = client.diagnostics
@@ -314,17 +362,17 @@ def live(node, client) -> dict[str, list[Any]]:
     return got
 
 
-def test_live_messages_validate(live):
+def test_live_messages_validate(everything):
     """Everything that went over the wire, but for the one pose that was refused."""
-    for address, messages in live.items():
+    for address, messages in everything.items():
         check = validator(schema_at(address))
         faults = [[error.message for error in check.iter_errors(plain(m))] for m in messages]
         wrong = [fault for fault in faults if fault]
         assert len(wrong) == (address == 'box_b/pose'), (address, wrong)
         assert len(messages) > 1
-    texts = {message.status[0].message for message in live['/diagnostics']}
+    texts = {message.status[0].message for message in everything['/diagnostics']}
     assert {'no poses', 'poses refused'} <= texts
-    assert {len(cloud.data) for cloud in live['contacts']} == {0, ROW}
+    assert {len(cloud.data) for cloud in everything['contacts']} == {0, ROW}
 
 
 def rows(cloud):
@@ -374,6 +422,8 @@ WRONG_MESSAGES = {
     'big-endian': ('contacts', set_in('is_bigendian', True)),
     'half a row': ('contacts', set_in('row_step', 30)),
     'pose at 1e51 m': ('box_a/pose', set_in('pose.position.x', 1e51)),
+    'half a pose in an array': ('poses', set_in('poses.0.position.x', math.nan)),
+    'half an absent pose': ('poses', set_in('poses.0.orientation.w', math.nan)),
     'NaN in the quaternion': ('box_a/pose', set_in('pose.orientation.w', math.nan)),
     'quaternion of zero length': ('box_a/pose', set_in('pose.orientation.w', 0.0)),
     'unknown level': ('/diagnostics', set_in('status.0.level', b'\x02')),
@@ -382,20 +432,20 @@ WRONG_MESSAGES = {
 
 
 @pytest.mark.parametrize('name', WRONG_MESSAGES)
-def test_wrong_messages_do_not_validate(live, name):
+def test_wrong_messages_do_not_validate(everything, name):
     """Each is a live message, which is valid, with one thing made wrong."""
     address, change = WRONG_MESSAGES[name]
     check = validator(schema_at(address))
-    message = copy.deepcopy(live[address][0])
+    message = copy.deepcopy(everything[address][0])
     assert check.is_valid(plain(message))
     change(message)
     assert not check.is_valid(plain(message))
 
 
 @pytest.mark.parametrize('address', ADDRESSES.values())
-def test_missing_and_extra_fields_do_not_validate(live, address):
+def test_missing_and_extra_fields_do_not_validate(everything, address):
     check = validator(schema_at(address))
-    message = plain(live[address][0])
+    message = plain(everything[address][0])
     assert check.is_valid(message)
     for name in message:
         assert not check.is_valid({key: message[key] for key in message if key != name}), name
@@ -444,7 +494,7 @@ def declared_qos(operation: dict[str, Any]) -> QoSProfile:
 
 
 @pytest.mark.parametrize('name', OPERATIONS)
-def test_qos_is_the_documents(node, client, live, name):
+def test_qos_is_the_documents(node, client, array_node, name):
     """As the ROS graph reports the node's endpoint.
 
     The graph knows no history and no depth, so those are taken from the endpoint itself.
@@ -454,7 +504,11 @@ def test_qos_is_the_documents(node, client, live, name):
     sends = operation['action'] == 'send'
     find = (client.node.get_publishers_info_by_topic if sends
             else client.node.get_subscriptions_info_by_topic)
-    endpoint, = (info for info in find(address) if info.node_name == 'contact_node')
+    if address == 'poses':
+        node, address = array_node, '/many/poses'
+    assert client.spin(lambda: bool(find(address)), 60.0)
+    endpoint, = (info for info in find(address)
+                 if (info.node_name, info.node_namespace) == ('contact_node', node.get_namespace()))
     assert endpoint.topic_type == message_of(operation)['name']
     declared, reported = declared_qos(operation), endpoint.qos_profile
     for policy in ('reliability', 'durability', 'liveliness', 'deadline', 'lifespan',
@@ -469,7 +523,7 @@ def test_node_has_no_other_topics(node, live):
     """The document names every topic of the node but those that rclpy gives each node."""
     own = {'/parameter_events', '/rosout'}
     names = {entity.topic_name for entity in (*node.publishers, *node.subscriptions)} - own
-    assert names == {f'/{address.removeprefix("/")}' for address in ADDRESSES.values()}
+    assert names == {f'/{address.removeprefix("/")}' for address in live}
 
 
 # --- tables of the docs ---------------------------------------------------------------------------

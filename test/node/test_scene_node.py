@@ -10,7 +10,7 @@ import numpy as np
 import poses
 import pytest
 import rclpy
-from geometry_msgs.msg import PointStamped, PoseStamped
+from geometry_msgs.msg import Point, PointStamped, Pose, PoseArray, PoseStamped, Quaternion
 from lifecycle_msgs.srv import ChangeState, GetState
 from rclpy.context import Context
 from rclpy.duration import Duration
@@ -227,6 +227,123 @@ def test_a_stale_box_is_nan_and_never_an_old_contact(client):
         client.tick(lorry=LORRY)
         rows = client.rows(client.tick(load=ON_LORRY, lorry=LORRY))
         assert rows[5]['depth'] == pytest.approx(0.2)
+
+
+ARRAY = SCENE.replace('boxes:', 'poses: array\nboxes:').replace(', pose_topic: /traffic/lorry', '')
+GONE = (math.nan,) * 7
+
+
+class ArrayClient(Client):
+    """Publishes poses of all boxes as one message."""
+
+    def __init__(self):
+        super().__init__()
+        self.poses = self.node.create_publisher(PoseArray, 'poses', QoSProfile(depth=1000))
+
+    def tick(self, *rows, stamp=None, frame='map'):
+        stamp = self.next_stamp() if stamp is None else stamp
+        message = PoseArray(header=make_header(stamp, frame))
+        for row in rows:
+            x, y, z, *turn = map(float, row)
+            message.poses.append(Pose(position=Point(x=x, y=y, z=z), orientation=Quaternion(
+                **dict(zip('xyzw', turn)))))
+        self.poses.publish(message)
+        return stamp
+
+    def rows(self, *rows, **options):
+        """Return what is answered to a tick, by the pair's id."""
+        stamp = self.tick(*rows, **options)
+        assert self.spin(lambda: stamp in self.clouds, 5.0), 'no answer'
+        return {int(row['pair']): row for row in read_cloud(self.clouds[stamp])}
+
+    def is_answered(self, stamp):
+        return self.spin(lambda: stamp in self.clouds, 0.2)
+
+
+@pytest.fixture
+def array_client():
+    client = ArrayClient()
+    yield client
+    client.close()
+
+
+@pytest.fixture(params=[('raw', 'stamp'), ('typed', 'latest')], ids='-'.join)
+def array_node(array_client, request):
+    serialization, pairing = request.param
+    with scene_node(scene='frame_id: map\n' + ARRAY, serialization=serialization,
+                    pairing=pairing) as node:
+        while not array_client.is_answered(array_client.tick(ON_FLOOR, LORRY)):
+            pass
+        yield node
+
+
+def test_one_message_has_all_poses(array_node, array_client):
+    """In the order of the boxes; a tick a message; the same answers as by a topic a box."""
+    assert {entity.topic_name for entity in array_node.subscriptions
+            if 'pose' in entity.topic_name} == {'/poses'}
+    rows = array_client.rows(ON_LORRY, LORRY)
+    assert set(rows) == {5} and rows[5]['depth'] == pytest.approx(0.2)
+    rows = array_client.rows(LORRY, ON_LORRY)
+    assert set(rows) == {3, 5} and rows[5]['normal_z'] == -1  # the lorry is on the load
+    assert array_client.rows((9, 9, 9, 0, 0, 0, 1), LORRY) == {}
+
+
+def test_a_box_that_is_not_there_is_nan(array_node, array_client):
+    """In this tick alone, whatever the pairing; diagnostics name it."""
+    rows = array_client.rows(ON_FLOOR, GONE)
+    assert set(rows) == {3, 5} and rows[3]['depth'] == pytest.approx(0.1)
+    assert all(math.isnan(rows[5][name]) for name in ('x', 'normal_x', 'depth', 'volume'))
+    assert array_client.diagnostic('stale boxes') == 'lorry'
+    assert not math.isnan(array_client.rows(ON_LORRY, LORRY)[5]['depth'])
+    assert set(array_client.rows(GONE, GONE)) == {3, 5}
+
+
+@pytest.mark.parametrize('bad', [
+    (math.nan, 0, 0, 0, 0, 0, 1), (0, 0, 1e60, 0, 0, 0, 1), (0, 0, 0, 0, 0, 0, 0)], ids=str)
+def test_a_bad_pose_is_counted_and_its_box_not_there(array_node, array_client, bad):
+    rows = array_client.rows(ON_FLOOR, bad)
+    assert rows[3]['depth'] == pytest.approx(0.1) and math.isnan(rows[5]['depth'])
+    assert array_node.counts['refused: bad pose'] == 1
+
+
+def test_an_array_of_another_length_or_frame_is_refused(array_node, array_client):
+    for rows in ((), (ON_FLOOR,), (ON_FLOOR, LORRY, LORRY)):
+        assert not array_client.is_answered(array_client.tick(*rows))
+    assert not array_client.is_answered(array_client.tick(ON_FLOOR, LORRY, frame='odom'))
+    counts = array_node.counts
+    assert counts['refused: wrong number of poses'] == 3
+    assert counts['refused: frame_id differs'] == 1
+    assert set(array_client.rows(ON_FLOOR, LORRY)) == {3, 5}
+
+
+def test_arrays_are_answered_by_their_stamps(array_node, array_client):
+    """A late one once with `stamp`, never with `latest`; a repeated one the other way round."""
+    late = array_client.next_stamp()
+    stamp = array_client.tick(ON_FLOOR, LORRY, stamp=late + 10 * MS)
+    assert array_client.is_answered(stamp)
+    by_stamp = array_node.get_parameter('pairing').value == 'stamp'
+    assert array_client.is_answered(array_client.tick(ON_FLOOR, LORRY, stamp=late)) == by_stamp
+    evaluations = array_node.counts['evaluations']
+    array_client.tick(ON_FLOOR, LORRY, stamp=stamp)
+    array_client.spin(lambda: False, 0.2)
+    assert array_node.counts['evaluations'] - evaluations == (not by_stamp)
+    assert array_node.counts['refused: repeated stamp'] == by_stamp
+
+
+def test_a_scene_of_topics_becomes_one_of_an_array(array_node, array_client):
+    """And back, while the node runs: a stamp of before is no repeated one."""
+    assert set_scene(array_node, 'frame_id: map\n' + SCENE).successful
+    assert not any(entity.topic_name == '/poses' for entity in array_node.subscriptions)
+    assert set_scene(array_node, ARRAY).successful
+    while not array_client.is_answered(array_client.tick(ON_FLOOR, LORRY, frame='odom')):
+        pass
+    assert set(array_client.rows(ON_FLOOR, LORRY)) == {3, 5}
+
+
+def test_too_many_pairs_for_topics_of_their_own(node):
+    text = "{boxes: {m: {size: [1, 1, 1], count: 60}}, pairs: [{a: '*', b: '*'}]}"
+    refused = set_scene(node, text)
+    assert not refused.successful and 'set pair_topics to false' in refused.reason
 
 
 def test_latest_pairs_boxes_of_different_rates(client):

@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 from box_contact_ros import ContactSolver
 from box_contact_ros.core import LENGTH_MAX, LENGTH_MIN, QUATERNION_MAX, QUATERNION_MIN
 from box_contact_ros.scene.files.scene_file import SceneError, read_scene
-from box_contact_ros.solver.checks import pose_fault, size_fault
+from box_contact_ros.solver.checks import absent_poses, are_poses, pose_fault, size_fault
 
 MODELS = ('exact', 'mlp')
 SOLVERS = {model: ContactSolver(poses.CUBE, poses.CUBE, model=model) for model in MODELS}
@@ -54,6 +54,17 @@ def assert_sound(contact):
     else:
         assert contact.separation > 0.0
         assert np.isnan(contact.normal).all() and np.isnan(contact.point).all()
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.lists(st.tuples(*[st.floats(width=64) | st.sampled_from(
+    [LENGTH_MAX, -2 * LENGTH_MAX, QUATERNION_MIN, QUATERNION_MAX, 0.0])] * 7),
+                min_size=1, max_size=5))
+def test_poses_are_checked_by_rows_as_alone(rows):
+    """One rule, for a pose and for an array of them; NaN alone is no bad pose but an absent one."""
+    array = np.array([*rows, (math.nan,) * 7])
+    assert are_poses(array).tolist() == [pose_fault(row) is None for row in array]
+    assert absent_poses(array).tolist() == [all(map(math.isnan, row)) for row in array]
 
 
 # --- quaternions ----------------------------------------------------------------------------------

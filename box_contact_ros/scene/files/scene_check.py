@@ -32,8 +32,9 @@ def main(args: Sequence[str] | None = None) -> int:
 
 def meaning(scene: Scene) -> Iterator[str]:
     """Yield what a scene means, line by line."""
-    source_of = {name: f'{POSE_ARRAY}[{number}]' if scene.pose_array else
-                 scene.boxes[name].pose_topic for number, name in enumerate(scene.moving)}
+    source_of = dict(scene.sources)
+    if scene.pose_array:
+        source_of = {name: f'{POSE_ARRAY}[{number}]' for number, name in enumerate(scene.moving)}
     for name, box in scene.boxes.items():
         where = (f'moves: {source_of[name]}' if name in source_of else
                  'fixed at ' + ' '.join(f'{number:g}' for number in box.pose) if box.pose else
@@ -43,7 +44,7 @@ def meaning(scene: Scene) -> Iterator[str]:
         yield f'pair {pair.name}: id {pair.id}, from {pair.a} to {pair.b}'
     for size, count in Counter(box.size for box in scene.boxes.values()).items():
         yield f'size {_size(size)}: {count}'
-    topics = [POSE_ARRAY] if scene.pose_array else list(source_of.values())
+    topics = list(scene.sources.values())
     yield f'frame: {scene.frame_id or "any, the same for all poses"}'
     more = ', ...' if len(topics) > 3 else ''
     yield f'topics in: {len(topics)} ({", ".join(topics[:3])}{more})'
