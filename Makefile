@@ -1,4 +1,4 @@
-# On a machine with git, a C++ compiler and Python 3.11 or 3.12, each target makes what it needs in
+# On a machine with git, a C++ compiler and Python 3.11 to 3.14, each target makes what it needs in
 # .venv (.ci/setup), then does the work. A second call starts at once.
 
 SHELL := bash
@@ -6,7 +6,7 @@ SHELL := bash
 .ONESHELL:
 .NOTPARALLEL:
 .DEFAULT_GOAL := help
-.PHONY: help demo view test check reports docs docs-links tables test-arm coverage clean
+.PHONY: help demo view test check reports docs docs-links tables test-arm test-debian13 coverage clean
 
 # Arguments for the program behind the target: make test ARGS='-k sat -x'
 ARGS ?=
@@ -33,13 +33,14 @@ help:
 	echo 'make test     ruff, mypy and all tests'
 	echo 'make check    linters, and the quick tests of core, solver and scene: a minute'
 	echo 'make test-arm the C++ test on an emulated 64-bit ARM'
+	echo 'make test-debian13  the first two commands of the README on a fresh Debian 13 (root)'
 	echo 'make coverage lines of solver, scenes and nodes that their tests run'
 	echo 'make docs     the documentation as HTML, in build/docs'
 	echo 'make tables   write the figures of docs/results/ into README and docs'
 	echo 'make clean    remove .venv and everything that was generated'
 	echo
 	echo 'Each does its own set-up, in .venv. Arguments: make test ARGS="-k sat -x".'
-	echo 'The set-up looks for Python 3.11 or 3.12; another place: make demo PYTHON=/path/to/python3.12'
+	echo 'The set-up looks for Python 3.11 to 3.14; another place: make demo PYTHON=/path/to/python3.12'
 
 demo:
 	@.ci/setup demo
@@ -67,6 +68,11 @@ reports:
 test-arm:
 	@.ci/setup test
 	exec bash test/core/arm.sh $(PY)
+
+# Another release, another command: make test-debian13 DEBIAN=forky ARGS='"make demo"'
+DEBIAN ?= trixie
+test-debian13:
+	@exec bash test/package/debian.sh $(DEBIAN) $(ARGS)
 
 # Lines of solver, scenes and nodes that their own tests run, in all processes.
 coverage:

@@ -147,7 +147,8 @@ def test_another_python(checkout: Path, offer: Callable, tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize('python, tried', [
-    ('', 'python3.12: 3.10.4; python3.11: not found; python3: does not start'),
+    ('', 'python3.12: 3.10.4; python3.11: not found; python3.13: not found; '
+     'python3.14: not found; python3: does not start'),
     ('/no/such/python', '/no/such/python: not found'),
     ('python3.12', 'python3.12: 3.10.4')])
 def test_no_usable_python(checkout: Path, offer: Callable, python: str, tried: str) -> None:
@@ -157,10 +158,42 @@ def test_no_usable_python(checkout: Path, offer: Callable, python: str, tried: s
     done = set_up(checkout, python=python)
     assert done.returncode == 1
     assert done.stdout == (
-        f'error: Python 3.11 or 3.12 is needed ({tried}). Install one (apt install python3.12 '
-        'python3.12-venv, or pyenv install 3.12), or say where it is: '
+        f'error: Python 3.11 to 3.14 is needed ({tried}). Install one (apt install python3-dev '
+        'python3-venv, or pyenv install 3.12), or say where it is: '
         'make demo PYTHON=/path/to/python3.12\n')
     assert not (checkout / '.venv').exists()
+
+
+@pytest.mark.parametrize('version, taken', [
+    ((3, 10), False), ((3, 11), True), ((3, 12), True), ((3, 13), True), ((3, 14), True),
+    ((3, 15), False), ((4, 0), False)], ids=lambda value: '.'.join(map(str, value)) if isinstance(
+        value, tuple) else None)
+def test_every_current_python(checkout: Path, offer: Callable, version: tuple[int, int],
+                              taken: bool) -> None:
+    """From 3.11, the first with all that is used, to the last that ROS has wheels for."""
+    code = f'import sys; sys.version_info = {(*version, 0)}; exec(sys.argv.pop(1))'
+    offer('python3', PYTHON.replace('*) exec', f"""*-c*)
+        shift
+        exec {sys.executable} -c '{code}' "$@" ;;
+    *) exec"""))
+    done = set_up(checkout)
+    assert (done.returncode == 0) is taken, done.stdout
+    if not taken:
+        assert f'python3: {version[0]}.{version[1]}.0' in done.stdout
+
+
+def test_another_debian_needs_root_and_a_mirror(tmp_path: Path) -> None:
+    """What is missing is said before anything is made."""
+    for tool in ('awk', 'bash', 'dirname', 'head', 'sed', 'sort'):
+        (tmp_path / tool).symlink_to(shutil.which(tool))
+    program = tmp_path / 'id'
+    for answer, error in (('1000', 'error: only root can make another Debian'),
+                          ('0', 'error: debootstrap is not installed')):
+        program.write_text(f'#!/bin/sh\necho {answer}\n')
+        program.chmod(0o755)
+        done = subprocess.run(['bash', ROOT / 'test' / 'package' / 'debian.sh', 'trixie'],
+                              env={'PATH': str(tmp_path)}, capture_output=True, text=True)
+        assert done.returncode == 1 and done.stderr.startswith(error)
 
 
 def test_a_python_without_venv(checkout: Path, offer: Callable) -> None:
