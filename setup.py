@@ -117,7 +117,7 @@ setup(
     maintainer_email='maintainers@box-contact-ros.org',
     license='Apache-2.0',
     packages=find_packages(exclude=['test', 'test.*']),
-    package_data={NAME: ['py.typed', '**/*.pyi', 'verification/*.npz', '**/*.md']},
+    package_data={NAME: ['py.typed', '**/*.pyi', 'verification/*.npz', '**/*.md', '**/*.yaml']},
     ext_modules=extensions(),
     data_files=data_files(),
     entry_points={'console_scripts': cli['entry_points']('box_contact_' if BY_PIP else '')},

@@ -5,6 +5,9 @@ writes stability.md and .csv. The tables have wrong verdicts, wrong normals, the
 depth and point, and how far the point moves when a pose is nudged. The truth is stored, in 60
 digits. Models that build on FCL run in a subprocess, family by family: an abort is a finding, not
 an end.
+
+`--named` replays public reports about pairs of boxes instead, with every model and every other
+engine that is installed, and writes named_failures.md: see `named_failures`.
 """
 from __future__ import annotations
 
@@ -26,6 +29,7 @@ from ..solver.models import MODELS, find_model, gated_models
 from ..verification.fuzz import TOUCH_ULPS, last_place
 from ..verification.hard_poses import Cases, load
 from ..verification.judge import COORDINATE_ULPS, NOT_FINITE, NOT_UNIT, OUTSIDE, TOLERANCE, judge
+from .named_report import write_named
 
 PATIENCE = 300.0  # for a family in a subprocess [s]
 NUDGE = 1e-7
@@ -176,7 +180,13 @@ def main(args: Sequence[str] | None = None) -> int:
     parser.add_argument('--out', type=Path, metavar='DIR',
                         help='folder for stability.md and stability.csv (default: docs/results, '
                              'or quick-results with fewer models or families than that)')
+    parser.add_argument('--named', action='store_true',
+                        help='the named public reports instead, as named_failures.md (default '
+                             'folder: docs/reference)')
     options = parser.parse_args(args)
+    if options.named:
+        return write_named(output.make_folder(parser, options.out or Path('docs/reference')),
+                           output.command_line('box_contact_ros stability', args))
     whole = set(options.models) >= set(reported) and set(options.families) == set(cases)
     folder = output.make_folder(parser, options.out or (
         output.RESULTS if whole else output.QUICK_RESULTS))

@@ -50,6 +50,8 @@ TEST_CORE = 'test/core/test_core.py'
 EXACT = 'test/core/test_exact.py'
 PATCH_LAW = 'scene/force/patch_law.py'
 TEST_PATCH_LAW = 'test/scene/test_patch_law.py'
+NAMED = 'verification/named_failures.py'
+TEST_NAMED = 'test/verification/test_named_failures.py'
 MUTANTS = {
     'normal flipped': Mutant(
         'core/separating_axis.hpp', 'select<T>(along >= 0.0, splat<T>(1.0), splat<T>(-1.0));',
@@ -403,6 +405,12 @@ MUTANTS = {
         'cli.py', 'room < LEAST_ROOM', 'False', 'test/node/test_faults.py -k memory_is_full'),
     'little shared memory used': Mutant(
         'cli.py', 'room < USUAL_ROOM', 'False', 'test/node/test_faults.py -k almost_full'),
+    'phantom depth passes': Mutant(
+        NAMED, 'deepest = int(np.argmax(found.depths))', 'deepest = 0',
+        f'{TEST_NAMED} -k every_fault'),
+    'a normal across the contact passes': Mutant(
+        NAMED, 'if np.isfinite(normal).all() and not _gap', 'if False and not _gap',
+        f'{TEST_NAMED} -k every_fault'),
 }
 
 

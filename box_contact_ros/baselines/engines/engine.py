@@ -154,6 +154,26 @@ def in_subprocess(work: Callable[..., Any], *arguments: Any, patience: float) ->
         process.join()
 
 
+def part_by_part(work: Callable[..., dict[str, Any]], make: Callable[[], Engine],
+                 parts: Mapping[str, Any], *arguments: Any, patience: float) -> dict[str, Any]:
+    """Return what `work` returns by part for an engine in a subprocess.
+
+    Where the engine ends the subprocess, the parts are asked one by one, and what ended it is the
+    answer, a string.
+    """
+    try:
+        return in_subprocess(_work_with, work, make, parts, *arguments, patience=patience)
+    except RuntimeError as error:
+        if len(parts) == 1:
+            return {name: str(error) for name in parts}
+    return {name: answer for part in parts.items() for name, answer in part_by_part(
+        work, make, dict([part]), *arguments, patience=patience).items()}
+
+
+def _work_with(work: Callable[..., Any], make: Callable[[], Engine], *arguments: Any) -> Any:
+    return work(make(), *arguments)
+
+
 def _answer_to(pipe: Any, work: Callable[..., Any], *arguments: Any) -> None:
     pipe.send(work(*arguments))
 

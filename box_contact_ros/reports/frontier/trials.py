@@ -9,7 +9,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...baselines.engines.engine import APART, Engine, chosen, in_subprocess
+from ...baselines.engines.engine import (
+    APART,
+    Engine,
+    chosen,
+    in_subprocess,
+    part_by_part,
+)
 from ...core import FORCE, native
 from ...output import percentiles
 from ...scene.pose import degrees_between
@@ -195,18 +201,7 @@ def answers_of(engine: Engine, sets: Mapping[str, Pairs], plan: Plan) -> dict[st
     if engine.make is None or not plan.subprocesses:
         return _ask_all(engine, sets, plan)
     few = {name: pairs.rows(slice(plan.single_pairs)) for name, pairs in sets.items()}
-    try:
-        return in_subprocess(_make_and_ask, engine.make, few, plan, patience=PATIENCE)
-    except RuntimeError as error:
-        if len(sets) == 1:
-            return {name: str(error) for name in sets}
-    return {name: answers for one in few.items()
-            for name, answers in answers_of(engine, dict([one]), plan).items()}
-
-
-def _make_and_ask(make: Callable[[], Engine], sets: Mapping[str, Pairs], plan: Plan,
-                  ) -> dict[str, Answers | str]:
-    return _ask_all(make(), sets, plan)
+    return part_by_part(_ask_all, engine.make, few, plan, patience=PATIENCE)
 
 
 def _ask_all(engine: Engine, sets: Mapping[str, Pairs], plan: Plan) -> dict[str, Answers | str]:
