@@ -20,6 +20,8 @@ from visualization_msgs.msg import Marker, MarkerArray
 from ..node.messages import NANOSECONDS
 from ..node.runtime import make_executor, uninterrupted
 from ..resources import resource_path
+from ..scene.scene_file import read_scene, scene_path
+from ..scene.scene_solver import Scene
 
 CRANE_MARKERS = 'crane/markers'
 """Where the crane publishes its ropes and its spreader, as lines."""
@@ -68,6 +70,13 @@ def scene_source(name: str) -> str:
         with suppress(FileNotFoundError):
             return str(resource_path(*SCENES, f'{name}.yaml'))
     return name
+
+
+def read_scene_text(source: str) -> tuple[str, Scene]:
+    """Return the text of a scene that is a file, or a text itself, and the scene; SceneError."""
+    scene = read_scene(source)
+    path = scene_path(source)
+    return path.read_text('utf-8') if path.is_file() else source, scene
 
 
 def line_marker(header: Header, name: str, lines: np.ndarray, *, width: float,

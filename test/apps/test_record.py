@@ -21,19 +21,25 @@ from mcap_ros2.decoder import DecoderFactory
 from rclpy.context import Context
 from rclpy.serialization import serialize_message
 from test_bench import bench, rows_of
+from visualization_msgs.msg import MarkerArray
 
 from box_contact_ros import ContactSolver
+from box_contact_ros.apps.recording import bag_player
 from box_contact_ros.apps.recording.bag_file import (
     TOPICS,
     Recorder,
     RecordingError,
+    read_recording,
     read_replay,
     type_of,
 )
 from box_contact_ros.apps.recording.record import RecordNode
-from box_contact_ros.node.messages import make_header, read_cloud
+from box_contact_ros.apps.ros_client import line_marker, pose_message
+from box_contact_ros.node.messages import make_cloud, make_header, read_cloud
 from box_contact_ros.reports.accuracy import LIMITS
 from box_contact_ros.resources import resource_path
+from box_contact_ros.scene.scene_file import read_scene
+from box_contact_ros.scene.scene_solver import SceneSolver
 
 ROOT = Path(__file__).resolve().parents[2]
 SHIPPED = resource_path('recordings', 'crane_landing')
@@ -214,6 +220,30 @@ def test_remapped_topics_and_sigterm(program, tmp_path):
     assert list(found) == ['/yard/load/pose'] and list(found['/yard/load/pose']) == [*range(5)]
 
 
+def test_a_scene_is_recorded_with_itself(program, tmp_path):
+    """The poses of all boxes that move, contacts and markers; the scene's text is in the bag."""
+    out = tmp_path / 'run'
+    running = recording(program, out, '--scene', 'yard_bay', '--model', 'exact')
+    client = Client()
+    publisher = client.node.create_publisher(PoseStamped, '/crane/load/pose', 10)
+    try:
+        assert client.spin(lambda: publisher.get_subscription_count() == 1, 15.0)
+        client.spin(lambda: False, 0.5)
+        for k in range(5):
+            publisher.publish(PoseStamped(header=make_header(k, 'map')))
+        client.spin(lambda: False, 0.5)
+    finally:
+        client.close()
+    running.signal(signal.SIGINT)
+    assert running.wait(30) == 0, running.output
+    found = read_recording(out)
+    assert found.scene == read_scene('config/scenes/yard_bay.yaml')
+    assert found.about['model'] == 'exact'
+    assert [topic for _, topic, _ in found.messages] == ['crane/load/pose'] * 5
+    for topic in ('/contacts 0', '/markers 0', '/crane/markers 0'):
+        assert f'  {topic}\n' in running.output
+
+
 def test_nothing_is_overwritten(program, tmp_path):
     """A folder that exists is refused in one line, and left as it was."""
     (tmp_path / 'kept').touch()
@@ -228,6 +258,8 @@ def test_nothing_is_overwritten(program, tmp_path):
     ('', 2, '--out'),
     ('--out {} --topics box_a/pose scan', 2, "'scan': its type is known only if it ends in"),
     ('--out {} --size-a 1 0 1', 2, '--size-a'),
+    ('--out {} --size-a 1 1 1 --scene yard_bay', 2, '--scene says all sizes'),
+    ('--out {} --scene no_such_scene', 1, 'error: scene'),
     ('--out {} --ros-args -r nonsense', 1, 'error: '),
 ])
 def test_bad_options(program, tmp_path, arguments, status, words):
@@ -253,6 +285,78 @@ def test_a_full_disk_ends_the_recording(tmp_path, monkeypatch):
     with pytest.raises(RecordingError, match='run is not complete: .*No space left'):
         node.destroy_node()
     node.recorder.close()
+
+
+# --- playing a recording --------------------------------------------------------------------------
+
+
+class Clock:
+    """Time that a test sets."""
+
+    def __init__(self):
+        self.seconds = 0.0
+
+    def monotonic(self):
+        return self.seconds
+
+
+def test_a_recording_is_played_into_a_log(monkeypatch):
+    """At its own pace, contacts and errors as recorded, and again from the beginning."""
+    clock = Clock()
+    monkeypatch.setattr(bag_player, 'time', clock)
+    player = bag_player.BagPlayer(SHIPPED)
+    assert player.model == 'mlp'
+    assert player.step()
+    assert player.log.snapshot() is not None
+    for seconds, touching in ((0.3, 0), (2.0, 1), (3.9, 1)):
+        clock.seconds = seconds
+        assert not player.step()
+        seen = player.log.snapshot()
+        assert len(seen.answer.pairs) == touching
+        assert len(seen.answer.point_errors) == touching
+        assert player.log.figures(player.now()).answered == pytest.approx(200 * seconds, abs=2)
+    assert player.log.figures(player.now()).lost == 0
+    clock.seconds += 1.0
+    assert not player.step()
+    assert player.log.figures(player.now()).answered == 800
+    clock.seconds += bag_player.PAUSE
+    assert player.step()
+    assert player.log.figures(player.now()).answered <= 1
+
+
+def test_a_recording_of_a_scene_is_played(tmp_path, monkeypatch):
+    """Every box and pair of it, and the lines of a crane."""
+    clock = Clock()
+    monkeypatch.setattr(bag_player, 'time', clock)
+    text = Path('config/scenes/spreader_container_stack.yaml').read_text('utf-8')
+    scene = read_scene(text)
+    solver = SceneSolver(scene, model='exact')
+    poses = [np.array([0.0, 0, 10.65, 0, 0, 0, 1]), np.array([0.0, 0, 9.06, 0, 0, 0, 1])]
+    topics = ['/crane/spreader/pose', '/crane/load/pose', '/contacts', '/crane/markers']
+    header, lines = make_header(1000, 'map'), np.arange(6.0).reshape(1, 2, 3)
+    recorder = Recorder(tmp_path / 'run', topics, {'scene': text})
+    for topic, message in zip(topics, [
+            *(pose_message(header, pose) for pose in poses), make_cloud(header, solver(poses)),
+            MarkerArray(markers=[line_marker(header, 'ropes', lines, width=1, colour=(0, 0, 0))])]):
+        recorder.write(topic, 2000, serialize_message(message))
+    recorder.close()
+    player = bag_player.BagPlayer(tmp_path / 'run')
+    player.step()
+    clock.seconds = 0.1
+    player.step()
+    seen = player.log.snapshot()
+    assert not np.isnan(seen.poses).any()
+    assert {scene.pairs[row].name for row in seen.answer.pairs} == {'load_stack', 'spreader_load'}
+    assert np.array_equal(player.lines, lines)
+
+
+def test_a_recording_without_its_scene_is_not_played(tmp_path):
+    """Neither scene nor sizes: said, with the options that would have kept them."""
+    with pytest.raises(RecordingError, match='says neither .* record with --scene'):
+        bag_player.BagPlayer(written(tmp_path / 'bag', [1], [1]))
+    with pytest.raises(RecordingError, match='none of the topics'):
+        bag_player.BagPlayer(written(tmp_path / 'other', [1], [1], ('/c/pose', '/d/pose'),
+                                     size_a=CONTAINER, size_b=CONTAINER))
 
 
 # --- replay ---------------------------------------------------------------------------------------

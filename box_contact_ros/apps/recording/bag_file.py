@@ -2,14 +2,15 @@
 
 A recording is a folder RUN with metadata.yaml and RUN.mcap. `ros2 bag` takes the folder, Foxglove
 the .mcap file: the definitions of all message types are in it. Messages are kept as the bytes (CDR)
-that they came as; the time of a message is that of its receipt. The sizes of the boxes, which no
-message carries, are in the bag's custom data, where they were known.
+that they came as; the time of a message is that of its receipt. No message carries the scene, or
+the sizes of two boxes: they are in the bag's custom data, where they were known.
 """
 from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -24,6 +25,8 @@ from rosbags.rosbag2 import (
 )
 from rosbags.typesys import Stores, get_typestore
 
+from ...scene.scene_file import parse_scene
+from ...scene.scene_solver import Scene, two_boxes
 from ...solver.checks import as_size, shown
 from ..bench.pose_streams import Replay, Size
 
@@ -35,10 +38,13 @@ TYPES = {
     'contact/point': 'geometry_msgs/msg/PointStamped',
     'contact/normal': 'geometry_msgs/msg/Vector3Stamped',
     'contacts': 'sensor_msgs/msg/PointCloud2',
+    'markers': 'visualization_msgs/msg/MarkerArray',
 }
 """Type of a topic by the end of its name."""
 TOPICS = ('box_a/pose', 'box_b/pose', 'contact/point', 'contact/normal', 'contacts')
-"""What the contact node hears and says."""
+"""What the contact node hears and says of two boxes."""
+DRAWN = ('markers', 'crane/markers')
+"""What Foxglove draws: see `markers`, and the crane."""
 
 
 class RecordingError(ValueError):
@@ -57,14 +63,16 @@ def type_of(topic: str) -> str:
 class Recorder:
     """Writes a recording, message by message; a recording that is not closed has no index."""
 
-    def __init__(self, folder: Path, topics: Sequence[str], about: Mapping[str, Any]) -> None:
+    def __init__(self, folder: Path, topics: Sequence[str], about: Mapping[str, Any],
+                 poses: Collection[str] = ()) -> None:
         """Begin a recording in a folder that does not exist yet.
 
-        topics: absolute names. about: what is kept with the messages, as JSON: `size_a`, `size_b`
-        (full extents [m]), `model`. Raises RecordingError.
+        topics: absolute names; `poses` are those that carry poses, whatever their names. about:
+        what is kept with the messages, as JSON: `size_a`, `size_b` (full extents [m]), or `scene`
+        (its text), and `model`. Raises RecordingError.
         """
         types = get_typestore(Stores.ROS2_JAZZY)
-        kinds = {topic: type_of(topic) for topic in topics}
+        kinds = {topic: POSE if topic in poses else type_of(topic) for topic in topics}
         self.counts = Counter(dict.fromkeys(topics, 0))
         self.span: tuple[int, int] | None = None  # times of the first and the last message [ns]
         try:
@@ -88,6 +96,35 @@ class Recorder:
     def close(self) -> None:
         """Write what is still in memory, index and metadata."""
         self._writer.close()
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A recording, whole."""
+
+    scene: Scene
+    about: Mapping[str, Any]  # what was kept with the messages
+    messages: Sequence[tuple[int, str, bytes]]
+    """Time of receipt [ns], topic without its leading slash, bytes; in order of time."""
+
+
+def read_recording(path: Path) -> Recording:
+    """Return a bag that says its scene, or the sizes of its two boxes. Raises RecordingError."""
+    try:
+        with Reader(path) as reader:
+            known = {name: json.loads(value)
+                     for name, value in (reader.storage.metadata.custom or {}).items()}
+            messages = [(at, connection.topic.lstrip('/'), data)
+                        for connection, at, data in reader.messages()]
+    except Exception as error:  # rosbags lets through whatever reading garbage ends in
+        raise RecordingError(f'{path} cannot be read as a bag: {error}') from error
+    try:
+        scene = (parse_scene(known['scene'], str(path)) if 'scene' in known else
+                 two_boxes(known['size_a'], known['size_b']))
+    except KeyError:
+        raise RecordingError(f'{path} says neither its scene nor the sizes of two boxes: record '
+                             'with --scene, or with --size-a and --size-b') from None
+    return Recording(scene, known, messages)
 
 
 def read_replay(path: Path, topic_a: str = TOPICS[0], topic_b: str = TOPICS[1], *,

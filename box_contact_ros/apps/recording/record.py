@@ -1,14 +1,14 @@
 """Records poses and contacts of running nodes, as a rosbag2 bag with MCAP storage.
 
-`--out RUN` is a new folder with metadata.yaml and RUN.mcap: `ros2 bag play RUN` plays it, Foxglove
-opens RUN/RUN.mcap, and `bench --replay RUN` drives the nodes with it. Ctrl-C or SIGTERM ends the
-recording, and completes the bag. Messages are kept as the bytes that they came as.
+`--out RUN` is a new folder with metadata.yaml and RUN.mcap: `view --replay RUN` and `ros2 bag play
+RUN` play it, Foxglove opens RUN/RUN.mcap, `bench --replay RUN` drives the nodes with it. Ctrl-C or
+SIGTERM ends the recording, and completes the bag. Messages are kept as the bytes that they came as.
 """
 from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -18,13 +18,15 @@ from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.utilities import remove_ros_args
 from sensor_msgs.msg import PointCloud2
+from visualization_msgs.msg import MarkerArray
 
 from ...node.runtime import POSE_QOS, REFUSALS, run_node
 from ...solver.checks import as_size
-from ..ros_client import DEEP_RELIABLE
-from .bag_file import NANOSECONDS, POSE, TOPICS, TYPES, Recorder, RecordingError, type_of
+from ..ros_client import DEEP_RELIABLE, read_scene_text, scene_source
+from .bag_file import DRAWN, NANOSECONDS, POSE, TOPICS, TYPES, Recorder, RecordingError, type_of
 
-MESSAGES = dict(zip(TYPES.values(), (PoseStamped, PointStamped, Vector3Stamped, PointCloud2)))
+MESSAGES = dict(zip(TYPES.values(), (PoseStamped, PointStamped, Vector3Stamped, PointCloud2,
+                                     MarkerArray)))
 PROGRESS_SECONDS = 1.0
 
 
@@ -32,13 +34,14 @@ class RecordNode(Node):
     """Hands every message of its topics to a `Recorder`; ends where that cannot write any more."""
 
     def __init__(self, context: Context, folder: Path, topics: Sequence[str],
-                 about: Mapping[str, Any]) -> None:
+                 about: Mapping[str, Any], poses: Collection[str] = ()) -> None:
         super().__init__('record', context=context)
         resolved = {self.resolve_topic_name(topic): topic for topic in topics}
-        self.folder, self.recorder = folder, Recorder(folder, list(resolved), about)
+        of_poses = [name for name, topic in resolved.items() if topic in poses]
+        self.folder, self.recorder = folder, Recorder(folder, list(resolved), about, of_poses)
         self._fault: OSError | None = None
         for name, topic in resolved.items():
-            kind = type_of(name)
+            kind = POSE if name in of_poses else type_of(name)
             # Poses as the contact node takes them, from whatever publisher; contacts without loss.
             self.create_subscription(MESSAGES[kind], topic, self._keep(name),
                                      POSE_QOS if kind == POSE else DEEP_RELIABLE, raw=True)
@@ -89,8 +92,13 @@ def main(args: Sequence[str] | None = None) -> int:
         options = _options(remove_ros_args(args))
         about = {name: value for name in ('size_a', 'size_b', 'model')
                  if (value := getattr(options, name)) is not None}
-        return run_node(partial(RecordNode, folder=options.out, topics=options.topics, about=about),
-                        args)
+        topics, poses = options.topics, []
+        if options.scene is not None:
+            about['scene'], scene = read_scene_text(options.scene)
+            poses = [scene.boxes[box].pose_topic for box in scene.moving]
+            topics = topics or [*poses, 'contacts', *DRAWN]
+        return run_node(partial(RecordNode, folder=options.out, about=about, poses=poses,
+                                topics=topics or [*TOPICS, *DRAWN]), args)
     except REFUSALS as error:
         print(f'error: {error}', file=sys.stderr)
         return 1
@@ -102,17 +110,23 @@ def _options(args: Sequence[str]) -> argparse.Namespace:
         epilog='Topics are remapped as those of any node: --ros-args -r box_a/pose:=/crane/pose')
     parser.add_argument('--out', type=Path, required=True, metavar='RUN',
                         help='folder of the bag; never overwritten')
-    parser.add_argument('--topics', nargs='+', default=list(TOPICS), metavar='NAME',
+    parser.add_argument('--topics', nargs='+', default=[], metavar='NAME',
                         help='what is recorded; a name says the type by its end: '
-                             f'{", ".join(TYPES)} (default: {" ".join(TOPICS)})')
+                             f'{", ".join(TYPES)} (default: {" ".join((*TOPICS, *DRAWN))}; of a '
+                             'scene the poses of all moving boxes, contacts, and markers)')
+    parser.add_argument('--scene', metavar='NAME', type=scene_source,
+                        help='the scene that is recorded, kept in the bag: a file, or the bare '
+                             'name of one in config/scenes/')
     for name in 'ab':
         parser.add_argument(f'--size-{name}', type=float, nargs=3, metavar=('X', 'Y', 'Z'),
                             help=f'full extents of box {name.upper()} [m], kept in the bag for '
                                  'bench --replay: no message carries them')
     parser.add_argument('--model', help='the model that gives the contacts, kept in the bag')
     options = parser.parse_args(list(args))
+    if options.scene is not None and (options.size_a or options.size_b):
+        parser.error('--size-a and --size-b are of two boxes, and --scene says all sizes')
     try:
-        for topic in options.topics:
+        for topic in options.topics if options.scene is None else ():
             type_of(topic)
         for name in ('size_a', 'size_b'):
             if getattr(options, name) is not None:

@@ -117,6 +117,10 @@ class ViewNode(Listener):
         """Return the contact node's model; empty before it is known."""
         return str(self.settings.get('model', ''))
 
+    def now(self) -> int:
+        """Return the clock's time [ns]."""
+        return int(self.get_clock().now().nanoseconds)
+
     def set_model(self, name: str) -> None:
         """Ask the contact node for another model; `wish`, then `settings` or `refusal`, tell."""
         self.wish, self.refusal = name, ''

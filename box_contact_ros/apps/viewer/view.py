@@ -2,9 +2,9 @@
 
 It starts a contact node and, again and again, a crane, in a ROS domain of their own. With --scene
 it starts a contact node for that scene, and moves its boxes. With --attach it listens to a contact
-node and a simulator that run already. On the page the contact node is switched from model to model
-while it runs, and the crane lands again with other settings. It ends with Ctrl-C, and what it has
-started with it.
+node and a simulator that run already. With --replay it plays a recording. On the page the contact
+node is switched from model to model while it runs, and the crane lands again with other settings.
+It ends with Ctrl-C, and what it has started with it.
 """
 from __future__ import annotations
 
@@ -23,6 +23,8 @@ import webbrowser
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rclpy.utilities import remove_ros_args
 
@@ -38,6 +40,9 @@ from ..ros_client import joined, scene_source
 from . import scene_driver
 from .listener import ViewNode
 from .page.view_page import CraneRun, Page
+
+if TYPE_CHECKING:
+    from ..recording.bag_player import BagPlayer
 
 FRAME_PERIOD = 1 / 30
 CRANE_RATE, SCENE_RATE = 200.0, 50.0  # ticks a second, where nothing else is asked for
@@ -136,7 +141,7 @@ def listening(target: str, scene: Scene | None, args: Sequence[str]) -> Iterator
             thread.join()
 
 
-def watch(node: ViewNode, page: Page, started: Programs | None,
+def watch(node: ViewNode | BagPlayer, page: Page, started: Programs | BagPlayer | None,
           wishes: queue.SimpleQueue[Callable[[], None]], stop: Stop) -> None:
     """Draw, and do what the page's users wish for, until `stop` is set."""
     frame_end = 0.0
@@ -154,7 +159,7 @@ def watch(node: ViewNode, page: Page, started: Programs | None,
         snapshot = log.snapshot() if log else None
         page.draw(snapshot, node.lines)
         if page.due:
-            figures = log.figures(node.get_clock().now().nanoseconds) if log else None
+            figures = log.figures(node.now()) if log else None
             page.show(snapshot, figures, model=node.model, wish=node.wish, refusal=node.refusal,
                       connected=node.connected)
 
@@ -163,17 +168,41 @@ def main(args: Sequence[str] | None = None) -> int:
     """Serve the page until SIGINT (0), SIGTERM or SIGHUP (128 + number); 1 if the node ends."""
     args = list(sys.argv[1:] if args is None else args)
     options = _options(remove_ros_args(['view', *args])[1:])
-    if not options.attach:  # nothing else on this network hears what is played here
+    # Nothing else on this network hears what is started here.
+    if not options.attach and not options.replay:
         os.environ |= on_this_host(options.domain)
     elif options.domain is not None:
         os.environ['ROS_DOMAIN_ID'] = str(options.domain)
     with asked_to_end() as stop:
         try:
-            serve(options, args, stop)
+            if options.replay:
+                replay(options, stop)
+            else:
+                serve(options, args, stop)
         except (*REFUSALS, RuntimeError, OSError) as error:
             print(f'error: {error}', file=sys.stderr)
             return 1
     return 0 if stop.signals[0] == signal.SIGINT else stop.status
+
+
+def replay(options: argparse.Namespace, stop: Stop) -> None:
+    """Serve the page with a recording, again and again, until `stop` is set."""
+    from ..recording.bag_player import BagPlayer  # only here: rosbags is an extra
+
+    player = BagPlayer(options.replay)
+    page = Page(options.host, options.port)
+    try:
+        announce(page, options, 'a recording')
+        watch(player, page, player, queue.SimpleQueue(), stop)
+    finally:
+        page.close()
+
+
+def announce(page: Page, options: argparse.Namespace, what: str) -> None:
+    """Print where the page is, and open a browser where there is a display."""
+    print(f'view: {page.url} ({what}); Ctrl-C ends it', flush=True)
+    if not options.no_browser and _has_display():
+        webbrowser.open(page.url)
 
 
 def serve(options: argparse.Namespace, args: Sequence[str], stop: Stop) -> None:
@@ -201,11 +230,8 @@ def serve(options: argparse.Namespace, args: Sequence[str], stop: Stop) -> None:
             page = Page(options.host, options.port, run=run,
                         on_model=lambda name: wishes.put(partial(node.set_model, name)),
                         on_land=lambda wish: wishes.put(partial(land, wish)))
-            where = ('' if options.domain is None else
-                     f' (ROS_DOMAIN_ID={options.domain} for ros2 and RViz)')
-            print(f'view: {page.url}{where}; Ctrl-C ends it', flush=True)
-            if not options.no_browser and _has_display():
-                webbrowser.open(page.url)
+            announce(page, options, 'the domain of this shell' if options.domain is None else
+                     f'ROS_DOMAIN_ID={options.domain} for ros2 and RViz')
             watch(node, page, started, wishes, stop)
     finally:
         if started is not None:
@@ -238,6 +264,8 @@ def _options(args: Sequence[str]) -> argparse.Namespace:
                         help='draw this scene, and move its boxes: a file, or the bare name of one '
                              'in config/scenes/; with --attach in place of the one that the '
                              'contact node names')
+    parser.add_argument('--replay', type=Path, metavar='RUN',
+                        help='start nothing: play a recording, a folder that `record` made')
     processes.add_domain(parser, '; with --attach, ROS_DOMAIN_ID')
     parser.set_defaults(domain=None)
     parser.add_argument('--model', type=model_name, default=PARAMETERS['model'].default,
@@ -254,9 +282,11 @@ def _options(args: Sequence[str]) -> argparse.Namespace:
         if options.attach and getattr(options, name) != parser.get_default(name):
             parser.error(f'--{name.replace("_", "-")} is for what the view starts itself, and '
                          '--attach starts nothing')
+    if options.replay and (options.attach or options.scene):
+        parser.error('--replay plays a recording alone')
     if options.scene and (options.seed or options.open_loop):
         parser.error('--seed and --open-loop are for the crane, and --scene starts none')
     options.rate = options.rate or (SCENE_RATE if options.scene else CRANE_RATE)
-    if options.domain is None and not options.attach:
+    if options.domain is None and not options.attach and not options.replay:
         options.domain = random.choice(DOMAINS)
     return options

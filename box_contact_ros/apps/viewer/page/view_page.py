@@ -38,9 +38,10 @@ class CraneRun:
 class Page:
     """Wishes of whoever looks at it go to `on_model` and `on_land`, in threads of viser's."""
 
-    def __init__(self, host: str, port: int, *, run: CraneRun | None,
-                 on_model: Callable[[str], None], on_land: Callable[[CraneRun], None]) -> None:
-        """Serve at a port, or the next that is free; `run` None: no crane to be asked."""
+    def __init__(self, host: str, port: int, *, run: CraneRun | None = None,
+                 on_model: Callable[[str], None] | None = None,
+                 on_land: Callable[[CraneRun], None] | None = None) -> None:
+        """Serve at a port, or the next that is free; None: no crane, no node to be asked."""
         # viser would wait for ever for a server that cannot start.
         with socket.create_server((host, 0), family=socket.getaddrinfo(host, 0)[0][0]):
             pass
@@ -60,10 +61,11 @@ class Page:
         server.gui.add_html(legend())
         self._add_chart()
         self._next_read_out = 0.0
-        self._model = server.gui.add_button_group('model', tuple(MODELS))
-        self._model.on_click(lambda event: on_model(event.target.value))
+        if on_model is not None:
+            self._model = server.gui.add_button_group('model', tuple(MODELS))
+            self._model.on_click(lambda event: on_model(event.target.value))
         self._status = server.gui.add_html('')
-        if run is not None:
+        if run is not None and on_land is not None:
             self._add_crane(run, on_land)
 
     def _add_chart(self) -> None:

@@ -1,0 +1,84 @@
+"""A recording that is played into a `ViewLog`, again and again: no ROS graph, no contact node."""
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import PointCloud2
+from visualization_msgs.msg import MarkerArray
+
+from ...node.message_bytes import RawMessages
+from ...node.messages import Refused, read_cloud
+from ..ros_client import CRANE_MARKERS, lines_of, stamp_of
+from ..viewer.view_log import OtherSceneError, ViewLog
+from .bag_file import NANOSECONDS, RecordingError, read_recording
+
+PAUSE = 1.5  # time [s] between the end of a recording and its next beginning
+
+
+class BagPlayer:
+    """To the page what a `ViewNode` is, with the same `log`, `lines`, `model`, `wish`, …."""
+
+    wish = refusal = ''
+    connected = True
+
+    def __init__(self, path: Path) -> None:
+        """Read a recording that says its scene, or both sizes. Raises RecordingError."""
+        recording = read_recording(path)
+        self.model = recording.about.get('model', 'the recording')
+        self.log = ViewLog(recording.scene)
+        self.lines = np.zeros((0, 2, 3))
+        self._take: dict[str, Callable[[int, bytes], None]] = {
+            'contacts': self._on_cloud, CRANE_MARKERS: self._on_crane}
+        self._take |= {recording.scene.boxes[box].pose_topic.lstrip('/'): self._on_pose(box)
+                       for box in recording.scene.moving}
+        self._messages = [message for message in recording.messages if message[1] in self._take]
+        if not self._messages:
+            raise RecordingError(f'{path} has none of the topics of its scene')
+        self._played = self._play()
+
+    def now(self) -> int:
+        """Return the recording's time [ns]."""
+        return self._now
+
+    def step(self) -> bool:
+        """Play what is due; return whether the recording began anew."""
+        return next(self._played)
+
+    def close(self) -> None:
+        """End: nothing was started."""
+
+    def _play(self) -> Iterator[bool]:
+        while True:
+            self.log.start_anew()
+            first, start = self._messages[0][0], time.monotonic()
+            self._now, began = first, True
+            for at, topic, data in self._messages:
+                while self._now < at:
+                    yield began
+                    began = False
+                    self._now = first + round(NANOSECONDS * (time.monotonic() - start))
+                with contextlib.suppress(Refused, OtherSceneError):
+                    self._take[topic](at, data)
+            end = time.monotonic() + PAUSE
+            while time.monotonic() < end:
+                yield False
+
+    def _on_pose(self, box: str) -> Callable[[int, bytes], None]:
+        read = RawMessages().read_pose
+
+        def callback(_: int, data: bytes) -> None:
+            pose = read(data)
+            self.log.pose(box, pose.stamp, pose.numbers, pose.frame_id)
+        return callback
+
+    def _on_cloud(self, at: int, data: bytes) -> None:
+        message = deserialize_message(data, PointCloud2)
+        self.log.cloud(stamp_of(message.header), read_cloud(message), at, message.header.frame_id)
+
+    def _on_crane(self, _: int, data: bytes) -> None:
+        self.lines = lines_of(deserialize_message(data, MarkerArray))
