@@ -1,6 +1,7 @@
 """Markers: what is drawn of poses and contacts, at what rate, and that it is taken away again."""
 from __future__ import annotations
 
+import json
 import math
 import time
 
@@ -136,6 +137,34 @@ def test_the_rviz_config_names_topics_and_namespaces_that_exist():
     assert set(topics['markers']['Namespaces']) == set(NAMESPACES)
     assert set(topics[CRANE_MARKERS]['Namespaces']) == {'ropes', 'spreader'}
     assert all(display['Enabled'] for display in displays)
+
+
+def leaves(layout):
+    """Return the panels that a Foxglove layout places."""
+    return [layout] if isinstance(layout, str) else [
+        name for half in ('first', 'second') for name in leaves(layout[half])]
+
+
+def test_the_foxglove_layout_names_topics_and_fields_that_exist():
+    """Topics of the schema, or of markers; what is plotted is a number of the message's schema."""
+    config = json.loads(resource_path('config', 'contact.foxglove.json').read_text('utf-8'))
+    panels = config['configById']
+    assert sorted(leaves(config['layout'])) == sorted(panels)
+    channels = yaml.safe_load(resource_path('msg_schemas', 'asyncapi.yaml').read_text('utf-8'))[
+        'channels']
+    known = {'/' + channel['address'].lstrip('/') for channel in channels.values()}
+    drawn = {topic for topic, shown in panels['3D!scene']['topics'].items() if shown['visible']}
+    assert drawn == {'/markers', f'/{CRANE_MARKERS}'}
+    assert set(panels['3D!scene']['topics']) - drawn < known
+    assert panels['DiagnosticSummary!node']['topicToRender'] in known
+    schemas = {'/contact/point': 'point_stamped.json', '/contact/normal': 'vector3_stamped.json'}
+    for panel in (panels['Plot!point'], panels['Plot!normal']):
+        for path in panel['paths']:
+            topic, *fields = path['value'].split('.')
+            found = json.loads(resource_path('msg_schemas', schemas[topic]).read_text('utf-8'))
+            for field in fields:
+                found = found['properties'][field]
+            assert topic in known and path['enabled']
 
 
 # --- the node -------------------------------------------------------------------------------------
