@@ -35,7 +35,8 @@ help:
 	echo 'make test-arm the C++ test on an emulated 64-bit ARM'
 	echo 'make test-debian13  the first two commands of the README on a fresh Debian 13 (root)'
 	echo 'make coverage lines of solver, scenes and nodes that their tests run'
-	echo 'make docs     the documentation as HTML, in build/docs'
+	echo 'make docs     the documentation as HTML: build/docs/README.html'
+	echo 'make docs-links asks every link to another site'
 	echo 'make tables   write the figures of docs/results/ into README and docs'
 	echo 'make clean    remove .venv and everything that was generated'
 	echo
@@ -82,6 +83,21 @@ coverage:
 	    test/baselines/test_paper_models.py test/package/test_package.py $(ARGS)
 	$(PY) -m coverage combine -q
 	$(PY) -m coverage report
+
+# The tools of the extra `docs`; .venv may have them already.
+DOCS_TOOLS := myst-parser sphinx sphinx-rtd-theme
+define sphinx
+	@.ci/setup demo
+	$(PY) -c 'import myst_parser, sphinx, sphinx_rtd_theme' 2>/dev/null || \
+	    $(PY) -m pip install -q -c constraints.txt $(DOCS_TOOLS)
+	exec $(PY) -m sphinx -q -W --keep-going -b
+endef
+
+docs:
+	$(sphinx) html docs build/docs $(ARGS)
+
+docs-links:
+	$(sphinx) linkcheck docs build/docs-links $(ARGS)
 
 tables:
 	@.ci/setup demo

@@ -108,6 +108,8 @@ def data_files() -> list[tuple[str, list[str]]]:
     return list(files.items())
 
 
+DOCS = ['myst-parser', 'sphinx', 'sphinx-rtd-theme']
+
 setup(
     name=NAME,
     version='0.1.0',
@@ -143,6 +145,10 @@ setup(
         'fuzz': ['gmpy2', 'mpmath', 'tqdm'],
         # Engines that only the report `frontier` compares with.
         'peers': ['coal', 'mujoco', 'pybullet', 'python-fcl'],
+        # `make docs`.
+        'docs': DOCS,
+        # The example that shares ten million pairs among machines.
+        'cluster': ['distributed'],
         # colcon test looks for pytest in here, and runs nothing without it.
         'test': [
             'catkin-pkg',
@@ -157,6 +163,8 @@ setup(
             'mcap-ros2-support',
             'mpmath',
             'mypy',
+            *DOCS,
+            'distributed',
             'pydocstyle',
             'pytest',
             'pytest-cov',

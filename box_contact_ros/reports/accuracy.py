@@ -11,9 +11,10 @@ SAT axis that wins: in stacks half the winners are edge pairs although the conta
 """
 from __future__ import annotations
 
+import argparse
 import math
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -26,11 +27,11 @@ from ..core import CENTROID_REACH, DEPTH_FLOOR, Stages, native, stages
 from ..resources import resource_path
 from ..scene.pose import rotation_matrix
 from ..scene.pose_sets import SETS, ContactErrors, Pairs, contact_errors
-from ..solver.arguments import add_models, program_parser, within
+from ..solver.arguments import add_models, model_name, program_parser, within
 from ..solver.contact import Contacts
 from ..solver.contact_solver import ContactSolver
 from ..solver.mlp import bounds_of, core_numbers
-from ..solver.models import find_model
+from ..solver.models import MODELS, ModelEntry, find_model
 from ..solver.weights_file import WeightsError, load_weights
 from ..training.paper_recipe import dataset
 from ..training.paper_recipe.errors import errors_of, figures, figures_by_part, wrapped
@@ -220,6 +221,38 @@ def measure(model: str, name: str, pairs: Pairs, truth: Contacts, weights: str |
             touching, weights or resource_path('weights', 'mlp.safetensors')))
 
 
+def drawn_pairs(count: int, seed: int) -> Iterator[tuple[str, Pairs, Contacts]]:
+    """Yield name, `count` pairs and exact contacts of every set."""
+    for number, (name, make) in enumerate(SETS.items()):
+        # A few draws miss, up to 3 in 100.
+        pairs = make(np.random.default_rng([seed, number]),
+                     count + count // 20 + 10).rows(slice(count))
+        yield name, pairs, pairs.contacts()
+
+
+def export(folder: Path, count: int, seed: int) -> None:
+    """Write every set to a file .npz: poses and sizes, and the fields of the exact contacts."""
+    for name, pairs, truth in drawn_pairs(count, seed):
+        path = folder / f'{name.replace(" ", "_")}.npz'
+        np.savez_compressed(path, **pairs._asdict(), **truth._asdict())
+        print(f'{path}: {len(truth.colliding)} pairs')
+
+
+def model_or_class(text: str) -> str:
+    """Return the name of a model; `package.module:Class` becomes one in this process."""
+    if ':' not in text:
+        return model_name(text)
+    sys.path.insert(0, '')  # modules of the current folder, however the program was started
+    own = ModelEntry(name=text, line='a class of your own', builder=text,
+                     takes=('size_a', 'size_b'))
+    try:
+        own.load()
+    except (ImportError, AttributeError) as error:
+        raise argparse.ArgumentTypeError(f'{text}: {error}') from error
+    MODELS[text] = own
+    return text
+
+
 def measure_all(models: Sequence[str], count: int, seed: int, weights: str | None,
                 ) -> list[AccuracyRow]:
     """Measure models on `count` pairs of every set, model by model."""
@@ -227,11 +260,7 @@ def measure_all(models: Sequence[str], count: int, seed: int, weights: str | Non
 
     rows = []
     with tqdm(total=len(SETS) * len(models), desc='accuracy', unit='set') as bar:
-        for number, (name, make) in enumerate(SETS.items()):
-            # A few draws miss, up to 3 in 100.
-            pairs = make(np.random.default_rng([seed, number]),
-                         count + count // 20 + 10).rows(slice(count))
-            truth = pairs.contacts()
+        for name, pairs, truth in drawn_pairs(count, seed):
             for model in models:
                 bar.set_postfix_str(f'{model}, {name}')
                 rows.append(measure(model, name, pairs, truth,
@@ -431,13 +460,18 @@ def main(args: Sequence[str] | None = None) -> int:
     """Measure, print, write; 1 if a limit is broken."""
     parser = program_parser('accuracy', __doc__, quick=f'{QUICK_PAIRS} pairs a set', seed=2,
                             out='accuracy.md, accuracy.csv, accuracy.png')
-    add_models(parser, '--model', ['mlp'])
+    add_models(parser, '--model', ['mlp'], model_or_class)
+    parser.add_argument('--export', type=Path, metavar='DIR',
+                        help='only write the sets with their exact contacts as .npz')
     parser.add_argument('--weights', help='weights file of MLP, default: the shipped one')
     parser.add_argument('--pairs', type=within(1), default=PAIRS,
                         help='a set, default: %(default)s')
     options = parser.parse_args(args)
-    folder = output.results_folder(parser, options)
     count = min(options.pairs, QUICK_PAIRS) if options.quick else options.pairs
+    if options.export:
+        export(output.make_folder(parser, options.export), count, options.seed)
+        return 0
+    folder = output.results_folder(parser, options)
     try:
         rows = measure_all(options.model, count, options.seed, options.weights)
         errors, drawn = paper_errors(['exact', *(m for m in options.model if m == 'mlp')],

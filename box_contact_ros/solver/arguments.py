@@ -34,11 +34,16 @@ def program_parser(program: str, doc: str | None, *, quick: str = '', seed: int 
     return parser
 
 
-def add_models(parser: argparse.ArgumentParser, flag: str, default: str | Sequence[str]) -> None:
-    """Add an option of one model, or of several where the default is a list."""
-    parser.add_argument(flag, nargs=None if isinstance(default, str) else '+', type=model_name,
-                        default=default, metavar='MODEL',
-                        help=f'of {model_names()} (default: %(default)s)')
+def add_models(parser: argparse.ArgumentParser, flag: str, default: str | Sequence[str],
+               kind: Callable[[str], str] | None = None) -> None:
+    """Add an option of one model, or of several where the default is a list.
+
+    kind: the type of its arguments, a function that takes more than the names of models.
+    """
+    more = ', or package.module:Class' if kind else ''
+    parser.add_argument(flag, nargs=None if isinstance(default, str) else '+',
+                        type=kind or model_name, default=default, metavar='MODEL',
+                        help=f'of {model_names()}{more} (default: %(default)s)')
 
 
 def model_name(text: str) -> str:

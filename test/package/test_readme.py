@@ -178,6 +178,19 @@ def sourced(words: list[str], **_) -> None:
     assert words[1] in ('/opt/ros/jazzy/setup.bash', 'install/setup.bash', f'{VENV}/bin/activate')
 
 
+def example(words: list[str], **_) -> None:
+    """Leave the program to test_examples.py, which runs it."""
+    assert (ROOT / words[1]).is_file()
+
+
+def built(words: list[str], **_) -> None:
+    """Build with the flags of `test_cpp_example`, in the clone."""
+    if words[0] == 'g++':
+        assert {'-std=c++17', '-ffp-contract=off', '-Wno-psabi', '-I.'} <= set(words)
+    if words[0] == 'ln':
+        assert (ROOT / words[2] / f'{words[3]}.hpp').is_file()
+
+
 def clone(words: list[str], **_) -> None:
     """Clone into the folder that the next command names; the address is the reader's."""
     assert words[2:] == ['REPOSITORY', 'box_contact_ros']
@@ -200,6 +213,7 @@ def venv(words: list[str], **_) -> None:
 
 COMMANDS = {
     r'git clone .+': clone,
+    r'(g\+\+|ln -s|\./first).*': built,
     r'export \S+': exported,
     r'make (-C \w+ )?[\w-]+( .*)?': make,
     r'(ros2 run|python -m) box_contact_ros \w+( .*)?': start,
@@ -207,6 +221,7 @@ COMMANDS = {
     r'ros2 topic echo \S+': topic,
     r'ros2 param set \S+ \S+ \S+': parameter,
     r'ros2 launch \S+ \S+( .*)?': launch,
+    r'python docs/examples/\w+\.py': example,
     r'rviz2 -d .+': rviz,
     r'pip install .+': pip,
     r'sudo apt install .+': apt,
@@ -231,19 +246,30 @@ def test_first_commands_are_clone_and_demo():
 
 # --- the rest of the pages ------------------------------------------------------------------------
 
-EXAMPLES = [pytest.param(text, id=f'{page.name}-{number}')
-            for number, (page, _, text) in enumerate(blocks('python'))]
+def examples() -> Iterator[object]:
+    """Yield the Python blocks with the lines that they print.
+
+    A block of text right below says them, or the comments behind the prints.
+    """
+    for page in PAGES:
+        text = page.read_text('utf-8')
+        for number, found in enumerate(FENCE.finditer(text)):
+            if found[1] == 'python':
+                shown = re.match(r'\s*```text\n(.*?)^```$', text[found.end():],
+                                 re.MULTILINE | re.DOTALL)
+                lines = (shown[1].splitlines() if shown else
+                         re.findall(r'^print\(.*\)  # (.*)$', found[2], re.MULTILINE))
+                yield pytest.param(found[2], lines, id=f'{page.name}-{number}')
 
 
-@pytest.mark.parametrize('text', EXAMPLES)
-def test_python_example(text, program):
-    """It runs, beside a node if a client, and prints what the comments behind its prints say."""
+@pytest.mark.parametrize(('text', 'lines'), list(examples()))
+def test_python_example(text, lines, program):
+    """It runs, next to a node if a client, and prints what the page says."""
     if 'rclpy' in text:
         program('contact_node', '--ros-args', '-p', 'model:=exact').wait_for_output('ready', 120)
     with contextlib.redirect_stdout(io.StringIO()) as printed:
         exec(compile(text, 'example', 'exec'), {'__name__': 'example'})
-    assert printed.getvalue().splitlines() == re.findall(r'^print\(.*\)  # (.*)$', text,
-                                                         re.MULTILINE)
+    assert printed.getvalue().splitlines() == lines
 
 
 def test_extras_of_every_program():
@@ -322,3 +348,13 @@ def test_cpp_example(text, tmp_path):
         str(tmp_path / 'example.cpp'), '-o', str(tmp_path / 'example'))
     assert run(str(tmp_path / 'example')).splitlines() == re.findall(
         r'printf\(.*\);  // (.*)$', text, re.MULTILINE)
+
+
+def test_pages_build_without_a_warning(tmp_path):
+    """`make docs`: every page is in a table of contents, and every link and reference leads on."""
+    pytest.importorskip('myst_parser')
+    pytest.importorskip('sphinx_rtd_theme')
+    run(sys.executable, '-m', 'sphinx', '-q', '-W', '--keep-going', '-b', 'html', 'docs',
+        str(tmp_path), PYTHONPATH=os.pathsep.join([str(ROOT), os.environ.get('PYTHONPATH', '')]))
+    assert 'Return the contacts of n pairs' in (
+        tmp_path / 'reference' / 'python_api.html').read_text('utf-8')

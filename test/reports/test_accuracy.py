@@ -1,6 +1,7 @@
 """The report `accuracy`: contact classes by the definition, and points that had to be moved in."""
 from __future__ import annotations
 
+import csv
 from pathlib import Path
 
 import numpy as np
@@ -73,3 +74,39 @@ def test_quick_run(tmp_path: Path) -> None:
     assert (tmp_path / 'accuracy.png').stat().st_size > 10_000
     head, *rows = (tmp_path / 'accuracy.csv').read_text('utf-8').splitlines()
     assert head.startswith('model,set,part') and {row.split(',')[1] for row in rows} == set(SETS)
+
+
+# --- a model of your own, and the sets as files ---------------------------------------------------
+
+
+def test_a_class_is_measured_like_a_model(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The example's middle of the bounding boxes is no centroid; its depth is the exact one."""
+    monkeypatch.syspath_prepend(Path(__file__).parents[2] / 'docs' / 'examples')
+    monkeypatch.setattr(accuracy, 'MODELS', accuracy.MODELS.copy())
+    monkeypatch.setattr('box_contact_ros.solver.models.MODELS', accuracy.MODELS)
+    status = accuracy.main(['--model', 'own_model:Middle', '--pairs', '200', '--quick',
+                            '--out', str(tmp_path)])
+    with (tmp_path / 'accuracy.csv').open() as file:
+        rows = [row for row in csv.DictReader(file) if row['part'] == 'all']
+    assert status == 0 and {row['set'] for row in rows} == set(SETS)
+    assert {row['quantity'] for row in rows} == {'point'}
+    assert float({row['set']: row for row in rows}['tilted stacks']['mean']) > 1.0
+    assert all(float(row['separation_difference']) == 0.0 for row in rows)
+
+
+@pytest.mark.parametrize('name', ['nowhere:Class', 'json:Nothing'])
+def test_a_class_that_cannot_be_imported(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match='2'):
+        accuracy.main(['--model', name])
+    assert name in capsys.readouterr().err
+
+
+def test_exported_sets_are_those_of_the_report(tmp_path: Path) -> None:
+    """Poses, sizes and the exact contacts of every set, ready for another program."""
+    assert accuracy.main(['--export', str(tmp_path), '--pairs', '30']) == 0
+    files = {path.stem.replace('_', ' '): np.load(path) for path in tmp_path.iterdir()}
+    assert files.keys() == SETS.keys()
+    for file in files.values():
+        pairs = Pairs(*(file[field] for field in Pairs._fields))
+        for field, values in pairs.contacts()._asdict().items():
+            np.testing.assert_array_equal(file[field], values)

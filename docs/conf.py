@@ -1,0 +1,71 @@
+"""How Sphinx builds the pages: `make docs`. The pages are also plain Markdown for a forge.
+
+A folder's README.md is its index. Its table of contents is made from its links, in their order, and
+pages of the folder that it does not link come after them.
+"""
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from sphinx.application import Sphinx
+
+DOCS = Path(__file__).parent
+ROOT = DOCS.parent
+
+project, author = 'box_contact_ros', 'The box_contact_ros maintainers'
+copyright = author  # noqa: A001
+release = re.search(r"version='(.+?)'", (ROOT / 'setup.py').read_text('utf-8'))[1]
+
+extensions = ['myst_parser', 'sphinx.ext.autodoc']
+source_suffix = {'.md': 'markdown'}
+root_doc = 'README'
+exclude_patterns = ['figures']
+html_theme = 'sphinx_rtd_theme'
+html_theme_options = {'navigation_depth': 2}
+html_show_sphinx = html_show_copyright = html_copy_source = False
+
+# Anchors of headings as a forge makes them, so that links work in both places.
+myst_heading_anchors = 4
+# Files outside docs/ are no pages: they are linked as downloads.
+myst_all_links_external = False
+autodoc_typehints = 'none'  # docstrings have shapes and units
+autodoc_member_order = 'bysource'
+add_module_names = False
+default_role = 'literal'  # docstrings are plain text with `names`
+linkcheck_anchors = False
+linkcheck_timeout = 20
+
+
+def contents(app: Sphinx, page: str, source: list[str]) -> None:
+    """Append a hidden table of contents to the index of a folder, and to pages that link below."""
+    folder, _, name = page.rpartition('/')
+    linked = [link for link in re.findall(r'\]\(([\w/.-]+)\.md\)', source[0])
+              if '/' in link.removeprefix('../') or name == 'README']
+    if name == 'README':
+        linked += sorted(path.stem for path in (DOCS / folder).glob('*.md') if path.stem != name)
+    below = [link for link in dict.fromkeys(linked)
+             if (DOCS / folder / f'{link}.md').exists() and not link.startswith('..')]
+    if below:
+        source[0] += '\n\n```{toctree}\n:hidden:\n\n' + '\n'.join(below) + '\n```\n'
+
+
+def plain_docstring(app: Sphinx, kind: str, name: str, item: object, options: object,
+                    lines: list[str]) -> None:
+    """Turn a docstring of plain text into reStructuredText: code blocks, and no markup else."""
+    made, code = [], False
+    for line in lines:
+        if line.startswith('```'):
+            code = not code
+            made += ['', '.. code-block:: python', ''] if code else ['']
+        elif code:
+            made.append(f'   {line}')
+        else:
+            made.append(re.sub(r'([*|_])(?![^`]*`(?:[^`]*`[^`]*`)*[^`]*$)', r'\\\1', line))
+    lines[:] = made
+
+
+def setup(app: Sphinx) -> None:
+    """Connect both to Sphinx."""
+    app.connect('source-read', contents)
+    app.connect('autodoc-process-docstring', plain_docstring)

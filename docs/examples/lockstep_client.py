@@ -1,0 +1,74 @@
+"""Ask a contact node in lockstep: `python docs/examples/lockstep_client.py`.
+
+Start `contact_node` first. A simulator that waits for each answer loses none, however fast or slow
+it runs. It sends both poses with one stamp, and waits for the cloud of that stamp. The stamps are
+the simulator's own time.
+"""
+import numpy as np
+import rclpy
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import PoseStamped
+from rclpy.node import Node
+from sensor_msgs.msg import PointCloud2
+
+from box_contact_ros.node.messages import read_cloud
+
+
+class LockstepClient(Node):
+    """Sends poses `x y z qx qy qz qw` of box_a and box_b, and waits for their contacts."""
+
+    def __init__(self) -> None:
+        super().__init__('lockstep_client')
+        self.poses = [self.create_publisher(PoseStamped, f'box_{name}/pose', 10) for name in 'ab']
+        self.create_subscription(PointCloud2, 'contacts', self.receive, 10)
+        self.cloud: PointCloud2 | None = None
+
+    def receive(self, cloud: PointCloud2) -> None:
+        """Keep the newest answer."""
+        self.cloud = cloud
+
+    def wait_for_node(self) -> None:
+        """Wait until the node listens to both poses and this client hears its answers."""
+        while not (all(pose.get_subscription_count() for pose in self.poses)
+                   and self.count_publishers('contacts')):
+            rclpy.spin_once(self, timeout_sec=0.05)
+
+    def ask(self, time_ns: int, *poses: np.ndarray, patience: float = 0.5) -> np.ndarray:
+        """Return the rows of `contacts` for two poses at a time; lost poses are sent again."""
+        stamp = Time(sec=time_ns // 10**9, nanosec=time_ns % 10**9)
+        while self.cloud is None or self.cloud.header.stamp != stamp:
+            for publisher, pose in zip(self.poses, poses):
+                publisher.publish(message(stamp, pose))
+            until = self.get_clock().now().nanoseconds + patience * 1e9
+            while ((self.cloud is None or self.cloud.header.stamp != stamp)
+                   and self.get_clock().now().nanoseconds < until):
+                rclpy.spin_once(self, timeout_sec=0.01)
+        return read_cloud(self.cloud)
+
+
+def message(stamp: Time, pose: np.ndarray) -> PoseStamped:
+    """Return the message of a pose; messages want Python's floats, not NumPy's."""
+    made = PoseStamped()
+    made.header.stamp, made.header.frame_id = stamp, 'world'
+    p, q = made.pose.position, made.pose.orientation
+    p.x, p.y, p.z, q.x, q.y, q.z, q.w = map(float, pose)
+    return made
+
+
+def main() -> None:
+    """Lower a container by a millimetre a step until it is 3 mm deep."""
+    rclpy.init()
+    client = LockstepClient()
+    client.wait_for_node()
+    stack = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+    load = np.array([0.0, 0.0, 2.5925, 0.0, 0.0, 0.0, 1.0])
+    for tick in range(1, 6):
+        rows = client.ask(tick * 5_000_000, load, stack)  # 5 ms of simulated time a step
+        depth = 1e3 * rows['depth'][0] if len(rows) else 0.0
+        print(f'{5 * tick} ms: {"contact" if len(rows) else "no contact"}, {depth:.1f} mm deep')
+        load[2] -= 1e-3
+    rclpy.shutdown()
+
+
+if __name__ == '__main__':
+    main()

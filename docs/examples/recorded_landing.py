@@ -1,0 +1,35 @@
+"""Analyse a recorded landing: `python docs/examples/recorded_landing.py [BAG]`.
+
+Reads the two boxes' poses from a bag, solves all of them again in one batch, and prints when the
+load touched, how deep it went, and how far model `mlp` was from the exact point. Needs the extra
+`bag`. Without a bag it takes the shipped one.
+"""
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from box_contact_ros import ContactSolver
+from box_contact_ros.apps.recording.bag_file import read_replay
+from box_contact_ros.resources import resource_path
+
+
+def main() -> None:
+    """Print the analysis of one recording."""
+    bag = Path(sys.argv[1]) if len(sys.argv) > 1 else resource_path('recordings', 'crane_landing')
+    replay = read_replay(bag)
+    contacts = {model: ContactSolver(replay.size_a, replay.size_b, model=model).batch(
+        replay.pose_a, replay.pose_b) for model in ('exact', 'mlp')}
+    exact, network = contacts['exact'], contacts['mlp']
+    touching = exact.colliding
+    depth = -exact.separation[touching]
+    wander = np.linalg.norm(np.diff(exact.point[touching], axis=0), axis=1)
+    error = np.linalg.norm((network.point - exact.point)[touching], axis=1) / max(replay.size_a)
+    print(f'{len(touching)} ticks, {touching.sum()} in contact, first at tick {touching.argmax()}')
+    print(f'depth: {1e3 * depth.max():.1f} mm at most, {1e3 * depth[-1]:.2f} mm at the end')
+    print(f'point: {1e3 * wander[-100:].max():.3f} mm a tick at most in the last 100 ticks')
+    print(f'mlp: {100 * np.median(error):.2f} % of the longest edge off the exact point (median)')
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,49 @@
+"""The programs of docs/examples: each runs, and prints what the page shows."""
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+EXAMPLES = ROOT / 'docs' / 'examples'
+PAGE = (EXAMPLES / 'README.md').read_text('utf-8')
+NEEDS = {'mujoco_loop.py': 'mujoco', 'recorded_landing.py': 'rosbags',
+         'dask_pairs.py': 'distributed', 'lockstep_client.py': 'rclpy'}
+QUICK = {'vectorised_env.py': 'main(100)', 'dask_pairs.py': 'main(40_000, 10_000)'}
+"""Shorter runs, whose figures are not those of the page."""
+
+
+def shown(name: str) -> list[str]:
+    """Return the lines that the page shows below the command of an example."""
+    found = re.search(rf'^\$ python docs/examples/{name}\n(.*?)^```', PAGE,
+                      re.MULTILINE | re.DOTALL)
+    assert found, f'{name} is not on the page'
+    return found[1].splitlines()
+
+
+@pytest.mark.parametrize('name', sorted(path.name for path in EXAMPLES.glob('*.py')
+                                        if path.name != 'own_model.py'))  # test_accuracy.py
+def test_example(name: str, program, tmp_path: Path) -> None:
+    """Figures agree to the printed digits; shorter runs print as many lines in the same words."""
+    pytest.importorskip(NEEDS.get(name, 'numpy'))
+    if name == 'lockstep_client.py':
+        program('contact_node', '--ros-args', '-p', 'model:=exact').wait_for_output('ready', 120)
+    command = [str(EXAMPLES / name)]
+    if name in QUICK:
+        module = name.removesuffix('.py')
+        command = ['-c', f'import {module}\nif __name__ == "__main__": {module}.{QUICK[name]}']
+    done = subprocess.run(
+        [sys.executable, *command], cwd=tmp_path, capture_output=True, text=True, timeout=120,
+        env=os.environ | {'PYTHONPATH': os.pathsep.join(
+            [str(EXAMPLES), str(ROOT), os.environ.get('PYTHONPATH', '')])})
+    assert done.returncode == 0, done.stderr
+    printed, expected = done.stdout.splitlines(), shown(name)
+    if name in QUICK:
+        printed, expected = ([re.sub(r'[-\d.,]+', '#', line) for line in lines]
+                             for lines in (printed, expected))
+    assert printed == expected
