@@ -86,7 +86,7 @@ TABLES = {'models': models, 'mlp-errors': mlp_errors}
 
 def filled(text: str) -> str:
     """Return a page with its tables made from the CSV files."""
-    return BLOCK.sub(lambda found: f'{found[1]}{TABLES[found[2]]()}\n{found[3]}', text)
+    return BLOCK.sub(lambda found: f'{found[1]}\n{TABLES[found[2]]()}\n\n{found[3]}', text)
 
 
 def main() -> int:

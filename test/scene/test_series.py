@@ -34,7 +34,7 @@ NETWORK = load_weights(resource_path('weights', 'mlp.safetensors')).networks['po
 
 K = 1.0
 """|Δpoint| ≤ K · |Δpose| · size / depth, wherever the network is asked the same way before and
-after: see docs/reference/testing.md, which has the figures measured."""
+after: see docs/explanation/motion.md, which has the figures measured."""
 
 
 class Series(NamedTuple):
