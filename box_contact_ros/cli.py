@@ -11,7 +11,7 @@ installed. Its top imports the standard library alone.
 
 A program is a function `main(args=None) -> int` that returns the exit status. `args` are the words
 after the program's name, unchanged. `rclpy.init(args=args)` finds `--ros-args ...` in them, and
-`rclpy.utilities.remove_ros_args(args)` leaves the rest for argparse.
+`node.parameters.outside_ros_args(args)` leaves the rest for argparse.
 """
 
 from __future__ import annotations
@@ -22,9 +22,14 @@ import importlib
 import importlib.util
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
-from types import SimpleNamespace
+from importlib.abc import Loader, MetaPathFinder
+from importlib.machinery import ModuleSpec
+from itertools import chain
+from types import ModuleType, SimpleNamespace
+from typing import Any
 
 
 @dataclass(frozen=True)
@@ -116,8 +121,8 @@ MODULES_OF_EXTRA = {
 def run(name: str, args: Sequence[str]) -> int:
     """Start program `name` with the arguments after its name; return its exit status.
 
-    A module of an extra that is not installed gives one line on stderr and status 1. An unknown
-    name gives one line and status 2, as argparse does.
+    A module of an extra that is not installed gives one line on stderr and status 1; `--help` needs
+    none of them. An unknown name gives one line and status 2, as argparse does.
     """
     if name not in PROGRAMS:
         print(_unknown(name), file=sys.stderr)
@@ -130,15 +135,14 @@ def run(name: str, args: Sequence[str]) -> int:
     sys.argv = [name, *args]
     try:
         try:
-            status = getattr(importlib.import_module(module), function)(list(args))
+            with help_without_extras() if {'-h', '--help'} & set(args) else nullcontext():
+                status = getattr(importlib.import_module(module), function)(list(args))
         finally:  # --help, too, which leaves by SystemExit
             sys.stdout.flush()
     except ModuleNotFoundError as error:
         message = _missing_module(name, error.name or '')
         if message is None:
             raise
-        if {'-h', '--help'} & set(args):
-            print(f'{name}: {PROGRAMS[name].description}\n')
         print(message, file=sys.stderr)
         return 1
     except KeyboardInterrupt:
@@ -238,3 +242,62 @@ def _missing_module(name: str, module: str) -> str | None:
     if 'ros' in bring_it:
         text += ', or apt install ros-jazzy-ros-base and source /opt/ros/jazzy/setup.bash'
     return text
+
+
+# --- help without extras --------------------------------------------------------------------------
+
+
+class _AlsoNothing(type):
+    """Attributes, items and calls of the class are the class itself."""
+
+    def __getattr__(cls, name: str) -> Any:
+        if name.startswith('__'):
+            raise AttributeError(name)
+        return Nothing
+
+    def __call__(cls, *args: Any, **options: Any) -> Any:
+        return Nothing
+
+    def __getitem__(cls, key: Any) -> Any:
+        return Nothing
+
+    def __iter__(cls) -> Iterator[Any]:
+        return iter(())
+
+
+class Nothing(Exception, metaclass=_AlsoNothing):
+    """Any name of a module that is not installed: a base, a decorator, a default, an exception."""
+
+
+class _StandIn(ModuleType):
+    """A module, or a package, of which every name is `Nothing`."""
+
+    __path__ = []
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(Nothing, name)
+
+
+class _StandIns(MetaPathFinder, Loader):
+    """Finds stand-ins for the modules of all extras."""
+
+    def find_spec(self, name: str, path: Any = None, target: Any = None) -> ModuleSpec | None:
+        known = name.partition('.')[0] in chain(*MODULES_OF_EXTRA.values())
+        return ModuleSpec(name, self) if known else None
+
+    def create_module(self, spec: ModuleSpec) -> ModuleType:
+        return _StandIn(spec.name)
+
+    def exec_module(self, module: ModuleType) -> None:
+        pass
+
+
+@contextmanager
+def help_without_extras() -> Iterator[None]:
+    """Let programs import stand-ins for what is not installed: their parsers need none of it."""
+    finder = _StandIns()
+    sys.meta_path.append(finder)  # last: what is installed is found before
+    try:
+        yield
+    finally:
+        sys.meta_path.remove(finder)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any
@@ -173,20 +173,21 @@ def answer_help(program: str, doc: str | None, settings: Mapping[str, Setting],
         prog=program, description=doc, formatter_class=argparse.RawDescriptionHelpFormatter,
         usage=f'{program} [-h] [--ros-args -p NAME:=VALUE ... -r FROM:=TO ...]',
         epilog='parameters (--ros-args -p NAME:=VALUE):\n' + '\n'.join(lines))
-    _, unknown = parser.parse_known_args(list(_outside_ros_args(args or ())))
+    _, unknown = parser.parse_known_args(outside_ros_args(args or ()))
     if unknown:
         hint = ' (parameters stand after --ros-args)' if '-p' in unknown else ''
         parser.error(f'unrecognized arguments: {" ".join(unknown)}{hint}')
 
 
-def _outside_ros_args(args: Sequence[str]) -> Iterator[str]:
-    """Yield what is not between `--ros-args` and `--`; rclpy's function fails on a bad value."""
-    inside = False
+def outside_ros_args(args: Sequence[str]) -> list[str]:
+    """Return what is not between `--ros-args` and `--`; rclpy's function fails on a bad value."""
+    found, inside = [], False
     for arg in args:
         if arg == '--ros-args' or (inside and arg == '--'):
             inside = arg == '--ros-args'
         elif not inside:
-            yield arg
+            found.append(arg)
+    return found
 
 
 def _show(default: Any) -> str:

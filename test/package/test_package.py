@@ -226,6 +226,45 @@ def test_missing_extra_is_one_line_that_names_it(
     assert f"'.[{extras.removeprefix('ros,')}]'" in capsys.readouterr().err
 
 
+HELP_WITHOUT_EXTRAS = """
+import contextlib, importlib.machinery, io, json, sys
+from box_contact_ros import cli
+
+absent = {name for names in cli.MODULES_OF_EXTRA.values() for name in names}
+
+class Installed(importlib.machinery.PathFinder):
+    @classmethod
+    def find_spec(cls, name, path=None, target=None):
+        if name.partition('.')[0] not in absent:
+            return importlib.machinery.PathFinder.find_spec(name, path, target)
+
+sys.meta_path = [Installed if finder is importlib.machinery.PathFinder else finder
+                 for finder in sys.meta_path]
+found = {}
+for name in cli.PROGRAMS:
+    with contextlib.redirect_stdout(io.StringIO()) as printed:
+        try:
+            status = cli.run(name, ['--help'])
+        except SystemExit as end:
+            status = end.code
+    found[name] = [status or 0, printed.getvalue()]
+print(json.dumps(found))
+"""
+
+
+def test_help_needs_no_extra() -> None:
+    """A newcomer sees the options of every program before installing what it needs."""
+    done = _run('-c', HELP_WITHOUT_EXTRAS)
+    assert done.returncode == 0 and done.stderr == '', done.stderr
+    found = json.loads(done.stdout)
+    assert found.keys() == cli.PROGRAMS.keys()
+    for name, (status, text) in found.items():
+        assert status == 0 and text.startswith(f'usage: {name}'), name
+    # What stands behind defaults and choices is the package's own.
+    assert '(default: [12.192,2.438,2.591])' in found['contact_node'][1]
+    assert found['bench'][1] == _run('-m', 'box_contact_ros', 'bench', '--help').stdout
+
+
 def test_missing_module_of_our_own_keeps_its_traceback(
     probe: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -18,10 +18,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from rclpy.utilities import remove_ros_args
 from tqdm import tqdm
 
 from ...node.contact_node import PARAMETERS
+from ...node.parameters import outside_ros_args
 from ...node.runtime import REFUSALS
 from ...output import make_folder, percentiles
 from ...solver.arguments import add_models, program_parser, within
@@ -43,7 +43,7 @@ def main(args: Sequence[str] | None = None) -> int:
     """Run the bench; 0 only if all nodes answered, all adds up, the contact node is faultless."""
     args = list(args or ())
     try:
-        options = _options(remove_ros_args(args))
+        options = _options(outside_ros_args(args))
     except REFUSALS as error:
         print(f'error: {error}', file=sys.stderr)
         return 1

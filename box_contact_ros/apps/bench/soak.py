@@ -21,9 +21,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from rclpy.utilities import remove_ros_args
 
 from ...node.contact_node import PARAMETERS
+from ...node.parameters import outside_ros_args
 from ...node.runtime import REFUSALS
 from ...output import make_folder, markdown_table, percentiles
 from ...solver.arguments import add_models, program_parser, within
@@ -63,7 +63,7 @@ def resident(pid: int) -> float:
 def main(args: Sequence[str] | None = None) -> int:
     """Run the soak; 0 only if all was right."""
     args = list(args or ())
-    options = _options(remove_ros_args(args))
+    options = _options(outside_ros_args(args))
     nodes = [_contact(options),
              echo_node('bare echo', poses='for_bare/', prefix='bare/', bare=True),
              echo_node('echo', poses='for_served/', prefix='served/')]

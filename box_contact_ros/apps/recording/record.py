@@ -16,10 +16,10 @@ from typing import Any
 from geometry_msgs.msg import PointStamped, PoseStamped, Vector3Stamped
 from rclpy.context import Context
 from rclpy.node import Node
-from rclpy.utilities import remove_ros_args
 from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import MarkerArray
 
+from ...node.parameters import outside_ros_args
 from ...node.runtime import POSE_QOS, REFUSALS, run_node
 from ...solver.checks import as_size
 from ..ros_client import DEEP_RELIABLE, read_scene_text, scene_source
@@ -89,7 +89,7 @@ def main(args: Sequence[str] | None = None) -> int:
     """Record until SIGINT or SIGTERM."""
     args = list(args or ())
     try:
-        options = _options(remove_ros_args(args))
+        options = _options(outside_ros_args(args))
         about = {name: value for name in ('size_a', 'size_b', 'model')
                  if (value := getattr(options, name)) is not None}
         topics, poses = options.topics, []

@@ -26,9 +26,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rclpy.utilities import remove_ros_args
-
 from ...node.contact_node import PARAMETERS
+from ...node.parameters import outside_ros_args
 from ...node.runtime import REFUSALS
 from ...scene.files.scene_file import read_scene
 from ...scene.pose_sets import CONTAINER
@@ -167,7 +166,7 @@ def watch(node: ViewNode | BagPlayer, page: Page, started: Programs | BagPlayer 
 def main(args: Sequence[str] | None = None) -> int:
     """Serve the page until SIGINT (0), SIGTERM or SIGHUP (128 + number); 1 if the node ends."""
     args = list(sys.argv[1:] if args is None else args)
-    options = _options(remove_ros_args(['view', *args])[1:])
+    options = _options(outside_ros_args(args))
     # Nothing else on this network hears what is started here.
     if not options.attach and not options.replay:
         os.environ |= on_this_host(options.domain)
