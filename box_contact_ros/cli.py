@@ -86,7 +86,7 @@ PROGRAMS = {
         'verification.fuzz', 'report fuzz',
         'millions of random pairs, judged by an independent test; gates at zero'),
     'stability': _program(
-        'reports.stability', 'report soup',
+        'reports.hard.stability', 'report soup',
         'what each model makes of families of hard poses'),
     'landing': _program(
         'reports.landing.landing_report', 'sim soup report',

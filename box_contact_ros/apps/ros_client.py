@@ -19,8 +19,8 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from ..node.messages import NANOSECONDS
 from ..node.runtime import make_executor, uninterrupted
-from ..resources import resource_path
-from ..scene.scene_file import read_scene, scene_path
+from ..resources import find_file, resource_path
+from ..scene.files.scene_file import read_scene
 from ..scene.scene_solver import Scene
 
 CRANE_MARKERS = 'crane/markers'
@@ -75,7 +75,7 @@ def scene_source(name: str) -> str:
 def read_scene_text(source: str) -> tuple[str, Scene]:
     """Return the text of a scene that is a file, or a text itself, and the scene; SceneError."""
     scene = read_scene(source)
-    path = scene_path(source)
+    path = find_file(source)
     return path.read_text('utf-8') if path.is_file() else source, scene
 
 

@@ -38,7 +38,7 @@ from box_contact_ros.apps.ros_client import line_marker, pose_message
 from box_contact_ros.node.messages import make_cloud, make_header, read_cloud
 from box_contact_ros.reports.accuracy import LIMITS
 from box_contact_ros.resources import resource_path
-from box_contact_ros.scene.scene_file import read_scene
+from box_contact_ros.scene.files.scene_file import read_scene
 from box_contact_ros.scene.scene_solver import SceneSolver
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -117,8 +117,8 @@ def test_the_solver_imports_no_baseline():
 @pytest.mark.slow
 def test_an_added_model_is_in_reports_and_programs(lifted, tmp_path, capsys):
     """None of them has a list of its own."""
-    from box_contact_ros.reports import stability
     from box_contact_ros.reports.frontier import frontier, speed
+    from box_contact_ros.reports.hard import stability
     from box_contact_ros.verification import fuzz
 
     assert {'lifted-1', 'lifted-7'} <= {engine.name for engine in frontier.contestants()[0]}
@@ -131,8 +131,8 @@ def test_an_added_model_is_in_reports_and_programs(lifted, tmp_path, capsys):
 
 @pytest.mark.slow
 @pytest.mark.parametrize('module', [
-    'reports.accuracy', 'reports.landing_report', 'reports.stability', 'verification.fuzz',
-    'apps.bench.bench', 'apps.bench.soak'])
+    'reports.accuracy', 'reports.hard.stability', 'verification.fuzz', 'apps.bench.bench',
+    'apps.bench.soak'])
 def test_programs_accept_an_added_model(lifted, module, capsys):
     main = pytest.importorskip(f'box_contact_ros.{module}').main
     with pytest.raises(SystemExit, match='0'):

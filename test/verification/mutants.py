@@ -275,10 +275,11 @@ MUTANTS = {
         'apps/bench/answer_log.py', 'np.isnan(values[:7]).any()', 'np.isnan(values).any()',
         'test/apps/test_landing_ros.py -k say_nothing'),
     'an ellipse of NaN': Mutant(
-        'apps/viewer/style.py', 'if not np.isfinite(patch.covariance).all():', 'if False:',
+        'apps/viewer/style.py', 'known = np.isfinite(covariances).all(axis=(1, 2))',
+        'known = np.ones(len(covariances), dtype=bool)',
         'test/apps/test_markers.py -k without_patch'),
     'roots of variances below zero': Mutant(
-        'apps/viewer/style.py', 'np.maximum(variances[:0:-1], 0.0)', 'variances[:0:-1]',
+        'apps/viewer/style.py', 'np.maximum(variances[:, :0:-1], 0.0)', 'variances[:, :0:-1]',
         'test/apps/test_view.py -k of_a_line'),
     'numbers of a pose not checked': Mutant(
         'node/message_bytes.py', 'and _LEAST < hypot(qx, qy, qz, qw) < _MOST):', '):',

@@ -9,7 +9,7 @@ import pytest
 from gmpy2 import mpfr
 
 from box_contact_ros import ContactSolver
-from box_contact_ros.reports import stability
+from box_contact_ros.reports.hard import stability
 from box_contact_ros.scene.pose_sets import Pairs
 from box_contact_ros.verification import hard_poses, judge
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from box_contact_ros.reports import stability
+from box_contact_ros.reports.hard import stability
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.verification import hard_poses

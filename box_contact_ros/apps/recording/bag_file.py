@@ -25,7 +25,7 @@ from rosbags.rosbag2 import (
 )
 from rosbags.typesys import Stores, get_typestore
 
-from ...scene.scene_file import parse_scene
+from ...scene.files.scene_file import parse_scene
 from ...scene.scene_solver import Scene, two_boxes
 from ...solver.checks import as_size, shown
 from ..bench.pose_streams import Replay, Size

@@ -4,12 +4,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from .. import output
-from ..baselines.engines import installed
-from ..baselines.engines.engine import Engine, ours
-from ..core import native
-from ..solver.models import MODELS, gated_models
-from ..verification.named_failures import NamedFailure, load, replay_apart
+from ... import output
+from ...baselines.engines import installed
+from ...baselines.engines.engine import Engine, ours
+from ...core import native
+from ...solver.models import MODELS, gated_models
+from ...verification.named_failures import NamedFailure, load, replay_apart
 
 
 def contestants() -> tuple[list[Engine], list[str]]:

@@ -18,17 +18,17 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import output
-from ..baselines.engines.engine import in_subprocess
-from ..core import native
-from ..scene.pose import quaternion_multiply
-from ..scene.pose_sets import Pairs
-from ..solver.arguments import add_models, program_parser
-from ..solver.contact_solver import ContactSolver
-from ..solver.models import MODELS, find_model, gated_models
-from ..verification.fuzz import TOUCH_ULPS, last_place
-from ..verification.hard_poses import Cases, load
-from ..verification.judge import COORDINATE_ULPS, NOT_FINITE, NOT_UNIT, OUTSIDE, TOLERANCE, judge
+from ... import output
+from ...baselines.engines.engine import in_subprocess
+from ...core import native
+from ...scene.pose import quaternion_multiply
+from ...scene.pose_sets import Pairs
+from ...solver.arguments import add_models, program_parser
+from ...solver.contact_solver import ContactSolver
+from ...solver.models import MODELS, find_model, gated_models
+from ...verification.fuzz import TOUCH_ULPS, last_place
+from ...verification.hard_poses import Cases, load
+from ...verification.judge import COORDINATE_ULPS, NOT_FINITE, NOT_UNIT, OUTSIDE, TOLERANCE, judge
 from .named_report import write_named
 
 PATIENCE = 300.0  # for a family in a subprocess [s]

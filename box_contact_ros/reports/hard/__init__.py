@@ -1,0 +1,1 @@
+"""Reports on hard poses: the families, and public reports replayed."""
