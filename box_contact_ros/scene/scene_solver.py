@@ -1,7 +1,7 @@
 """A scene: boxes, fixed or moving, the pairs of them that matter, and what one tick computes.
 
-Nothing outside the listed pairs is looked at. A cheap conservative test leaves the pairs whose
-axis-aligned bounding boxes come near each other. These go through the solver as one batch.
+Nothing outside the listed pairs is answered. A broad phase leaves the pairs whose axis-aligned
+bounding boxes come near each other. These go through the solver as one batch.
 """
 from __future__ import annotations
 
@@ -24,6 +24,10 @@ POSE_ARRAY = 'poses'
 """Topic of the poses of all moving boxes, where they come as one message."""
 ALL_BOXES = 'all boxes'
 """Source of these poses: no box of a scene file can have this name."""
+
+SWEPT_FROM = 64
+"""Pairs a box from which on the broad phase sweeps the boxes, instead of testing each pair: a sweep
+of a crowd costs as much as that many tests a box."""
 
 _new_tuple = tuple.__new__  # a named tuple's own constructor is Python code
 
@@ -151,7 +155,7 @@ class Answer(NamedTuple):
     touching: list[tuple[Pair, Contact]]  # the pairs in contact
     stale: list[Pair]
     """The pairs that could not be evaluated, because a box has no pose that is recent enough."""
-    near: int  # how many pairs the conservative test left to the solver
+    near: int  # how many pairs the broad phase left to the solver
 
 
 class SceneSolver:
@@ -175,8 +179,14 @@ class SceneSolver:
         self._known = np.array([box.pose is not None for box in boxes])
         self._low, self._high = np.empty((2, len(boxes), 3))
         self._near, self._unknown = np.empty((2, len(scene.pairs)), dtype=np.int64)
+        self._moves = ~self._known
         # Fixed boxes are bounded here, once and for all.
         self._near_pairs(np.flatnonzero(self._known))
+        self._is_swept = len(scene.pairs) > SWEPT_FROM * len(boxes)
+        if self._is_swept:
+            keys = self._key(self._first, self._second)
+            self._by_key = np.argsort(keys)
+            self._keys = keys[self._by_key]
         pair = scene.pairs[0]
         self._solver = ContactSolver(scene.boxes[pair.a].size, scene.boxes[pair.b].size,
                                      model=model, weights=weights)
@@ -192,14 +202,36 @@ class SceneSolver:
         """Contacts so far that the model handed to `exact`: see `mlp`."""
         return self._solver.exact_answers - self._warm_up_answers
 
-    def _near_pairs(self, moved: np.ndarray) -> tuple[int, int]:
-        """Bound the boxes `moved` anew, then write to `_near` which pairs may touch.
+    def _near_pairs(self, moved: np.ndarray, *, listed: bool = True) -> tuple[int, int]:
+        """Bound the boxes `moved` anew, then, if `listed`, write to `_near` which pairs may touch.
 
         Pairs without poses go to `_unknown`. Returns how many there are of each; or −1, and the
         number of a box whose pose is not valid.
         """
+        pairs = slice(None) if listed else slice(0)
         return native.near_pairs(self._poses, self._size, moved, self._low, self._high, self._known,
-                                 self._first, self._second, self._near, self._unknown)
+                                 self._first[pairs], self._second[pairs], self._near, self._unknown)
+
+    def _key(self, one: np.ndarray, other: np.ndarray) -> np.ndarray:
+        """Return a number for every two boxes, the same for both orders."""
+        return np.minimum(one, other) * len(self._known) + np.maximum(one, other)
+
+    def _broad_phase(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the pairs that may touch and those without poses; ValueError for a bad pose."""
+        count, left_out = self._near_pairs(self._moving, listed=not self._is_swept)
+        if count < 0:
+            box = list(self.scene.boxes)[left_out]
+            raise ValueError(f'pose of {box}: {pose_fault(self._poses[left_out])}')
+        if not self._is_swept:
+            return self._near[:count], self._unknown[:left_out]
+        # Sorted keys are looked up several times faster.
+        keys = np.sort(self._key(*native.near_boxes(
+            self._low, self._high, self._known, self._moves).T))
+        at = np.searchsorted(self._keys, keys)
+        is_pair = self._keys[np.minimum(at, len(self._keys) - 1)] == keys
+        unknown = self._unknown[:0] if self._known.all() else np.flatnonzero(
+            ~(self._known[self._first] & self._known[self._second]))
+        return np.sort(self._by_key[at[is_pair]]), unknown
 
     def _warm_up(self) -> None:
         """Let the model refuse sizes that it has no answer for.
@@ -208,7 +240,10 @@ class SceneSolver:
         the depth that an MLP was not trained for.
         """
         size_a, size_b = self._size[self._first], self._size[self._second]
-        _, first = np.unique(np.hstack((size_a, size_b)), axis=0, return_index=True)
+        kinds, kind = np.unique(self._size, axis=0, return_inverse=True)
+        kind = kind.reshape(-1)  # NumPy 2.0 gave it another shape
+        _, first = np.unique(kind[self._first] * len(kinds) + kind[self._second],
+                             return_index=True)
         a, b = np.zeros((2, len(first), 7))
         a[:, 6] = b[:, 6] = 1.0
         b[:, :3] = 0.5 * (size_a[first] + size_b[first]) - 0.02 * np.minimum(
@@ -217,7 +252,7 @@ class SceneSolver:
         self.sizes_answered_exactly = self._solver.exact_answers
         """Pairs of sizes that a `mlp` was not trained for."""
         self._solver(a[0], b[0])
-        self([a[0]] * len(self.scene.moving))
+        self([None] * len(self.scene.moving))
         self._warm_up_answers = self._solver.exact_answers
 
     def _both(self, poses: Sequence[np.ndarray | None]) -> list[np.ndarray | None]:
@@ -258,15 +293,11 @@ class SceneSolver:
 
     def _tick(self) -> Answer:
         """Return the answer to the poses that are set."""
-        count, left_out = self._near_pairs(self._moving)
-        if count < 0:
-            box = list(self.scene.boxes)[left_out]
-            raise ValueError(f'pose of {box}: {pose_fault(self._poses[left_out])}')
+        near, unknown = self._broad_phase()
         pairs = self.scene.pairs
-        stale = [pairs[i] for i in self._unknown[:left_out]]
+        stale = [pairs[i] for i in unknown]
         touching = []
-        if count:
-            near = self._near[:count]
+        if len(near):
             first, second = self._first[near], self._second[near]
             found = self._solver.batch(self._poses[first], self._poses[second],
                                        size_a=self._size[first], size_b=self._size[second])
@@ -274,4 +305,4 @@ class SceneSolver:
                 touching.append((pairs[near[row]], Contact(
                     True, float(found.separation[row]), found.normal[row], found.point[row],
                     float(found.volume[row]), found.covariance[row])))
-        return Answer(touching, stale, int(count))
+        return Answer(touching, stale, len(near))

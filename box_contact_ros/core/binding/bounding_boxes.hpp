@@ -1,7 +1,9 @@
-// Axis-aligned bounding boxes of posed boxes: which of the listed pairs can touch at all.
+// Axis-aligned bounding boxes of posed boxes: which pairs can touch at all.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
+#include <vector>
 
 #include "../poses.hpp"
 
@@ -32,16 +34,67 @@ struct BoundingBoxes {
     return true;
   }
 
+  // The largest coordinate or extent of a bounding box [m].
+  double scale(int64_t box) const {
+    double largest = 0.0;
+    for (int64_t i = 3 * box; i < 3 * box + 3; ++i)
+      largest = max(largest, max(max(abs(low[i]), abs(high[i])), high[i] - low[i]));
+    return largest;
+  }
+
   bool are_near(int64_t a, int64_t b) const {
-    double gap = 0.0, scale = 0.0;
-    for (int k = 0; k < 3; ++k) {
-      double low_a = low[3 * a + k], high_a = high[3 * a + k];
-      double low_b = low[3 * b + k], high_b = high[3 * b + k];
-      gap = max(gap, max(low_a - high_b, low_b - high_a));
-      scale = max(scale, max(max(abs(low_a), abs(high_a)), max(abs(low_b), abs(high_b))));
-      scale = max(scale, max(high_a - low_a, high_b - low_b));
+    double gap = 0.0;
+    for (int k = 0; k < 3; ++k)
+      gap = max(gap, max(low[3 * a + k] - high[3 * b + k], low[3 * b + k] - high[3 * a + k]));
+    return gap <= near * max(scale(a), scale(b));
+  }
+
+  // The axis on which the middles of the boxes are spread most.
+  int widest_axis(const std::vector<int64_t>& boxes) const {
+    Vec<double> sum{}, squares{};
+    double count = double(boxes.size());
+    for (int64_t box : boxes)
+      for (int k = 0; k < 3; ++k) {
+        double middle = 0.5 * (low[3 * box + k] + high[3 * box + k]);
+        sum[k] += middle / count;
+        squares[k] += middle * middle / count;
+      }
+    Vec<double> variance;
+    for (int k = 0; k < 3; ++k) variance[k] = squares[k] - sum[k] * sum[k];
+    return int(std::max_element(variance.v, variance.v + 3) - variance.v);
+  }
+
+  // Call `visit` with every two of the boxes that are near, and of which one moves: sweep and prune.
+  // Each box has an interval on one axis. Where it begins, the box meets those that have begun and
+  // not ended. Intervals are widened, so that are_near, which decides, sees all that it would take.
+  template <class Visit>
+  void sweep(const std::vector<int64_t>& boxes, const bool* moves, Visit visit) const {
+    struct Interval {
+      double begin, end;
+      int64_t box;
+    };
+    int axis = widest_axis(boxes);
+    std::vector<Interval> intervals;
+    for (int64_t box : boxes) {
+      double margin = 2.0 * near * scale(box);
+      intervals.push_back({low[3 * box + axis] - margin, high[3 * box + axis] + margin, box});
     }
-    return gap <= near * scale;
+    std::sort(intervals.begin(), intervals.end(),
+              [](const Interval& a, const Interval& b) { return a.begin < b.begin; });
+    std::vector<Interval> begun[2];  // boxes that do not move, boxes that do
+    for (const Interval& interval : intervals) {
+      bool is_moving = moves[interval.box];
+      for (int kind = is_moving ? 0 : 1; kind < 2; ++kind) {
+        size_t kept = 0;
+        for (const Interval& other : begun[kind]) {
+          if (other.end < interval.begin) continue;
+          if (are_near(other.box, interval.box)) visit(other.box, interval.box);
+          begun[kind][kept++] = other;
+        }
+        begun[kind].resize(kept);
+      }
+      begun[is_moving].push_back(interval);
+    }
   }
 };
 

@@ -389,6 +389,30 @@ PyObject* near_pairs(PyObject*, PyObject* const* args, Py_ssize_t count) {
   return Py_BuildValue("(nn)", left, left_out);
 }
 
+// near_boxes(low, high, known, moves): all near pairs of boxes, whichever are listed.
+PyObject* near_boxes(PyObject*, PyObject* const* args, Py_ssize_t count) {
+  Array<double> low, high;
+  Array<bool> known, moves;
+  if (count != 4) return fail(PyExc_TypeError, "near_boxes(low, high, known, moves)");
+  if (!read(args[0], "low", {any_length, 3}, low)) return nullptr;
+  npy_intp n = low.length(0);
+  if (!read(args[1], "high", {n, 3}, high) || !read(args[2], "known", {n}, known) ||
+      !read(args[3], "moves", {n}, moves))
+    return nullptr;
+  std::vector<int64_t> boxes, found;
+  for (npy_intp box = 0; box < n; ++box)
+    if (known.numbers[box]) boxes.push_back(box);
+  BoundingBoxes{nullptr, nullptr, low.numbers, high.numbers}.sweep(
+      boxes, moves.numbers, [&](int64_t a, int64_t b) {
+        found.push_back(std::min(a, b));
+        found.push_back(std::max(a, b));
+      });
+  Array<int64_t> pairs;
+  if (!make({npy_intp(found.size() / 2), 2}, pairs)) return nullptr;
+  std::copy(found.begin(), found.end(), pairs.numbers);
+  return pairs.object.release();
+}
+
 // Names of the modules that this machine can run, best last.
 PyObject* supported(PyObject*, PyObject*) {
 #if defined(__x86_64__)
@@ -411,6 +435,10 @@ PyMethodDef module_methods[] = {
      "near_pairs(poses, sizes, moved, low, high, known, first, second, near, unknown)\n--\n\n"
      "Write numbers of pairs that may touch, and of those without poses; return how many.\n\n"
      "Boxes `moved` are bounded anew in low, high (boxes, 3). Returns -1 and the box for no pose."},
+    {"near_boxes", fastcall(near_boxes), METH_FASTCALL,
+     "near_boxes(low, high, known, moves)\n--\n\n"
+     "Return the pairs (n, 2) of known boxes that may touch and of which one moves, in no order.\n\n"
+     "low, high (boxes, 3): bounding boxes as near_pairs leaves them."},
     {nullptr, nullptr, 0, nullptr}};
 
 struct Constant {

@@ -1,0 +1,140 @@
+"""The broad phase of scenes with many pairs: a sweep finds what a test of every pair finds."""
+from __future__ import annotations
+
+import numpy as np
+import poses
+import pytest
+
+from box_contact_ros import ContactSolver
+from box_contact_ros.core import native
+from box_contact_ros.scene import scene_solver
+from box_contact_ros.scene.files.scene_file import parse_scene
+from box_contact_ros.scene.scene_solver import Box, Pair, Scene, SceneSolver
+
+NEAR = 1e-9
+"""Share of the largest coordinate or extent up to which bounding boxes count as near."""
+
+
+def scattered(rng, n):
+    return np.exp(rng.uniform(-1, 1, (n, 3))), rng.uniform(-4, 4, (n, 3))
+
+
+def clusters(rng, n):
+    return (np.exp(rng.uniform(-1, 1, (n, 3))),
+            20.0 * rng.integers(0, 3, (n, 3)) + rng.uniform(-1, 1, (n, 3)))
+
+
+def one_place(rng, n):
+    return np.exp(rng.uniform(-1, 1, (n, 3))), np.full((n, 3), 7.0)
+
+
+def huge_beside_small(rng, n):
+    return 10.0**rng.uniform(-3, 2, (n, 1)) * np.ones(3), rng.uniform(-9, 9, (n, 3))
+
+
+def grid(rng, n):
+    """Cubes that touch exactly, in a row or a block; no axis tells more than the others."""
+    return np.ones((n, 3)), rng.permutation(np.argwhere(np.ones((5, 5, 5))))[:n].astype(float)
+
+
+def far_away(rng, n):
+    """At 5e6 m, where gaps of some micrometres count as near or do not."""
+    size, place = np.ones((n, 3)), 5e6 + rng.integers(0, 4, (n, 3)).astype(float)
+    return size, place + rng.uniform(-0.02, 0.02, (n, 3)) * rng.integers(0, 2, (n, 1))
+
+
+KINDS = (scattered, clusters, one_place, huge_beside_small, grid, far_away)
+
+
+def made(rng, kind, n, upright):
+    """Return sizes and poses."""
+    size, place = kind(rng, n)
+    turn = np.tile([0.0, 0, 0, 1], (n, 1)) if upright else poses.unit_quaternions(rng, n)
+    return size, np.hstack((place, turn))
+
+
+@pytest.mark.parametrize('kind', KINDS)
+@pytest.mark.parametrize('upright', [True, False])
+def test_boxes_that_are_near(kind, upright):
+    """The set is that of the rule itself, for every two boxes of which one moves."""
+    rng = np.random.default_rng(3)
+    found = 0
+    for n in (1, 2, 40, 90):
+        size, pose = made(rng, kind, n, upright)
+        known, moves = rng.random(n) < 0.9, rng.random(n) < 0.6
+        low, high = np.full((2, n, 3), np.nan)
+        none = np.zeros(0, dtype=np.int64)
+        native.near_pairs(pose, size, np.arange(n), low, high, known, none, none, none, none)
+        near = [tuple(pair) for pair in native.near_boxes(low, high, known, moves)]
+        scale = np.max([abs(low), abs(high), high - low], axis=(0, 2))
+        gap = (low[:, None] - high).max(axis=2)
+        gap = np.maximum(np.maximum(gap, gap.T), 0.0)
+        wanted = ((gap <= NEAR * np.maximum(scale[:, None], scale)) & known[:, None] & known
+                  & (moves[:, None] | moves))
+        assert len(near) == len(set(near))
+        assert set(near) == set(zip(*np.nonzero(np.triu(wanted, 1))))
+        found += len(near)
+    assert found > 30
+
+
+def random_scene(rng, kind, n, upright):
+    """Return a scene of a third of all pairs, and where its boxes are."""
+    size, pose = made(rng, kind, n, upright)
+    names = [f'b{number}' for number in range(n)]
+    boxes = {name: Box(name, tuple(size[i]), tuple(pose[i]) if i % 4 == 0 else None)
+             for i, name in enumerate(names)}
+    pairs = [Pair.between(*rng.permutation([names[i], names[j]])) for i in range(n)
+             for j in range(i) if (i % 4 or j % 4) and rng.random() < 1 / 3]
+    return Scene(boxes, tuple(pairs[place] for place in rng.permutation(len(pairs))),
+                 pose_array=True), pose
+
+
+def told(answer):
+    """Return all that an answer says, to the bit."""
+    return ([(pair, contact.separation, contact.point.tobytes()) for pair, contact
+             in answer.touching], answer.stale, answer.near)
+
+
+@pytest.mark.parametrize('kind', KINDS)
+@pytest.mark.parametrize('upright', [True, False])
+def test_a_sweep_answers_as_a_test_of_every_pair(kind, upright, monkeypatch):
+    """The same contacts to the bit, in the same order, stale pairs too; both lose none."""
+    rng = np.random.default_rng(4)
+    scene, pose = random_scene(rng, kind, 60, upright)
+    solvers = []
+    for swept_from in (0, 10**9):
+        monkeypatch.setattr(scene_solver, 'SWEPT_FROM', swept_from)
+        solvers.append(SceneSolver(scene, model='exact'))
+    assert [solver._is_swept for solver in solvers] == [True, False]
+    number = {name: place for place, name in enumerate(scene.boxes)}
+    for tick in range(4):
+        pose[:, :3] += rng.uniform(-0.1, 0.1, (len(pose), 3)) * (np.arange(60) % 4 != 0)[:, None]
+        rows = pose[[number[name] for name in scene.moving]]
+        rows[rng.random(len(rows)) < 0.1 * (tick == 3)] = np.nan
+        swept, listed = (solver(rows) for solver in solvers)
+        assert told(swept) == told(listed)
+    assert swept.stale
+    a, b = ([number[pair[side]] for pair in scene.pairs] for side in (2, 3))
+    size = np.array([box.size for box in scene.boxes.values()])
+    colliding = ContactSolver((1, 1, 1), (1, 1, 1), model='exact').batch(
+        pose[a], pose[b], size_a=size[a], size_b=size[b]).colliding
+    gone = set(swept.stale)
+    touching = [pair for pair, hit in zip(scene.pairs, colliding) if hit and pair not in gone]
+    assert [pair for pair, _ in swept.touching] == touching
+
+
+def test_bad_poses_are_refused_in_a_sweep(monkeypatch):
+    monkeypatch.setattr(scene_solver, 'SWEPT_FROM', 0)
+    scene = parse_scene("{poses: array, boxes: {m: {size: [1, 1, 1], count: 9}}, pairs: "
+                        "[{a: '*', b: '*'}]}")
+    rows = np.tile(poses.IDENTITY, (9, 1))
+    rows[4, 0] = np.inf
+    with pytest.raises(ValueError, match='pose of m05: position'):
+        SceneSolver(scene, model='exact')(rows)
+
+
+def test_many_pairs_are_swept_and_few_are_not():
+    crowd = "{poses: array, boxes: {m: {size: [1, 1, 1], count: 200}}, pairs: [{a: '*', b: '*'}]}"
+    assert SceneSolver(parse_scene(crowd), model='exact')._is_swept
+    star = crowd.replace("{a: '*'", '{a: m01')
+    assert not SceneSolver(parse_scene(star), model='exact')._is_swept
