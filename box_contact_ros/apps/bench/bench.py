@@ -4,6 +4,8 @@ Contact node, soup node and an echo node run as processes of their own, in a ROS
 own on this host. Each stream goes to one of them after the other, so that they do not compete for
 cores. Every answer is paired by stamp with what was sent, and compared with the exact contact. The
 streams for cubes come first; for the containers the nodes are restarted, with the other sizes.
+With --boxes N one contact node alone gets a pose array of N moving boxes a tick, five pairs a box.
+Prints what was lost or wrong, the node's share of its core, and latencies; writes no files.
 With --replay the stream is a recording's pairs of poses of equal stamp, sent at --rate. Prints two
 tables and writes bench.csv, bench.md and bench.png.
 
@@ -24,15 +26,24 @@ from ...node.contact_node import PARAMETERS
 from ...node.parameters import outside_ros_args
 from ...node.runtime import REFUSALS
 from ...output import make_folder, percentiles
+from ...scene.scene_solver import SceneSolver
 from ...solver.arguments import add_models, program_parser, within
 from ...solver.contact import Contacts
 from ...solver.contact_solver import ContactSolver
 from ...solver.models import MOST_SOUP_DIVISIONS, SOUP_DIVISIONS
 from ..processes import add_domain
 from .answer_log import StreamResult
-from .bench_drive import Bench, MeasuredNode, about_the_machine, echo_node, open_bench, solver_node
+from .bench_drive import (
+    Bench,
+    MeasuredNode,
+    about_the_machine,
+    drive_array,
+    echo_node,
+    open_bench,
+    solver_node,
+)
 from .bench_report import all_latencies, bullets, draw, error_table, latency_table, write_results
-from .pose_streams import STREAMS, Replay, Stream, by_sizes, make_stream
+from .pose_streams import STREAMS, Replay, Stream, by_sizes, crowd, make_stream
 
 NODES = ('contact', 'soup', 'echo')
 SECONDS, LONGEST = 60.0, 3600.0  # of sending, in all: the default, and what is accepted
@@ -47,6 +58,8 @@ def main(args: Sequence[str] | None = None) -> int:
     except REFUSALS as error:
         print(f'error: {error}', file=sys.stderr)
         return 1
+    if options.boxes:
+        return _bench_array(options, args)
     nodes = _nodes(options)
     try:
         with open_bench(nodes, args, rate=options.rate, domain=options.domain) as bench:
@@ -90,6 +103,8 @@ def _options(args: Sequence[str]) -> argparse.Namespace:
                              '(default: each stream goes to one node after the other)')
     parser.add_argument('--out', type=Path, default=Path('bench-results'), metavar='FOLDER',
                         help='for bench.csv, bench.md, bench.png (default: %(default)s/)')
+    parser.add_argument('--boxes', type=within(8, 10_000), default=0, metavar='N',
+                        help='moving boxes, all in one message, in place of the streams')
     add_domain(parser)
     options = parser.parse_args(list(args))
     if options.replay is None:
@@ -217,3 +232,28 @@ def _sum(name: str, results: Sequence[StreamResult]) -> str:
         p50, p99 = percentiles(latencies, 50, 99)
         text += f', p50 {p50:.3f} ms, p99 {p99:.3f} ms'
     return f'{text} ({"; ".join(faults)})' if faults else text
+
+
+def _bench_array(options: argparse.Namespace, args: Sequence[str]) -> int:
+    """Drive one contact node with pose arrays; 0 only if nothing was lost or wrong."""
+    scene, poses = crowd(options.boxes, options.seed)
+    solver = SceneSolver(scene, model=options.model)
+    truths = [{pair.id for pair, _ in solver(tick).touching} for tick in poses]
+    try:
+        found = drive_array(scene, poses, args, model=options.model, rate=options.rate,
+                            seconds=options.duration, domain=options.domain)
+    except REFUSALS as error:
+        print(f'error: {error}', file=sys.stderr)
+        return 1
+    wrong = sum(ids != truths[number % len(truths)] for number, ids in found.ids.items())
+    lost = found.sent - len(found.ids)
+    latencies = percentiles(1e3 * np.array(found.latencies), 50, 99, 99.9, 100)
+    for name, value in (found.about | {
+            'scene': f'{options.boxes} moving boxes, {len(scene.pairs)} pairs, '
+                     f'{np.mean([*map(len, truths)]):.0f} contacts a tick',
+            'sent': f'{found.sent} at {options.rate:g} Hz, {lost} lost, {wrong} wrong',
+            'CPU of the node': f'{100.0 * found.cpu_share:.1f} % of one core',
+            'latency [ms]': 'p50 {:.2f}, p99 {:.2f}, p99.9 {:.2f}, max {:.2f}'.format(*latencies),
+    }).items():
+        print(f'{name}: {value}')
+    return 0 if found.sent and not lost and not wrong else 1

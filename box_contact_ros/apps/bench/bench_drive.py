@@ -14,12 +14,12 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from typing import IO, Any
 
 import numpy as np
-from geometry_msgs.msg import PointStamped, PoseStamped, Vector3Stamped
+from geometry_msgs.msg import PointStamped, PoseArray, PoseStamped, Vector3Stamped
 from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.serialization import deserialize_message, serialize_message
@@ -30,6 +30,8 @@ from tqdm import tqdm
 from ...node.messages import NANOSECONDS, make_header, read_cloud
 from ...node.runtime import let_callbacks_finish, spin_for
 from ...output import no_garbage_collection, processor
+from ...scene.files.scene_file import write_scene
+from ...scene.scene_solver import Scene
 from ...solver.contact import Contacts
 from ..processes import Stop, asked_to_end, end, on_this_host, parameters, printed, program, start
 from ..ros_client import DEEP_RELIABLE, joined, pose_message
@@ -339,6 +341,77 @@ def open_bench(nodes: Sequence[MeasuredNode], args: Sequence[str], *, rate: floa
                     bench.end()
         finally:
             os.sched_setaffinity(0, cores)
+
+
+@dataclass
+class ArrayRun:
+    """What one contact node did with pose arrays."""
+
+    about: dict[str, str]
+    sent: int = 0
+    ids: dict[int, set[int]] = field(default_factory=dict)  # of pairs in contact, by tick
+    latencies: list[float] = field(default_factory=list)  # [s], from stamp to cloud
+    cpu_share: float = 0.0  # of one core
+
+
+def drive_array(scene: Scene, poses: np.ndarray, args: Sequence[str], *, model: str, rate: float,
+                seconds: float, domain: int) -> ArrayRun:
+    """Send poses (ticks, boxes, 7) over and over as arrays to a contact node on one core."""
+    with tempfile.NamedTemporaryFile('w', suffix='.yaml') as file:
+        write_scene(scene, file.name)
+        node = MeasuredNode(AnswerLog('contact', model, CONTACT_MESSAGES), program(
+            'contact_node', scene=file.name, model=model, pair_topics=False))
+        with open_bench([], args, rate=rate, domain=domain) as bench:
+            cores = {min(bench.node_cores)}
+            bench.nodes, found = [node], ArrayRun(about_the_machine(cores))
+            node.output = tempfile.TemporaryFile()
+            node.process = start(node.command, node.output)
+            os.sched_setaffinity(node.process.pid, cores)
+            arrivals: list[tuple[int, bytes]] = []
+            bench.client.create_subscription(
+                PointCloud2, 'contacts', lambda data: arrivals.append((bench.clock(), data)),
+                DEEP_RELIABLE, raw=True)
+            publish = bench.client.create_publisher(PoseArray, 'poses', DEEP_RELIABLE).publish
+            ticks = [bytes(serialize_message(PoseArray(
+                header=make_header(0, 'world'), poses=[pose_message(Header(), pose).pose
+                                                       for pose in tick]))) for tick in poses]
+
+            def send(number: int) -> int:
+                stamp, data = bench.clock(), ticks[number % len(ticks)]
+                publish(data[:4] + struct.pack('<iI', *divmod(stamp, NANOSECONDS)) + data[12:])
+                return stamp
+
+            deadline = time.monotonic() + START_LIMIT
+            while not arrivals and not bench.stop.is_set():
+                if node.ended() is not None or time.monotonic() > deadline:
+                    raise ValueError(f'the node does not answer: {printed(node.output)[-500:]}')
+                send(0)
+                spin_for(bench.executor, OFFER_PERIOD)
+            spin_for(bench.executor, DRAIN_SILENCE)
+            arrivals.clear()
+            number_of: dict[int, int] = {}
+            with no_garbage_collection():
+                started, before = time.perf_counter(), _cpu_seconds(node.process.pid)
+                while len(number_of) < rate * seconds and not bench.stop.is_set():
+                    number_of[send(len(number_of))] = len(number_of)
+                    left = started + len(number_of) / rate - time.perf_counter()
+                    spin_for(bench.executor, max(left, 1e-4))
+                took = time.perf_counter() - started
+                found.cpu_share = (_cpu_seconds(node.process.pid) - before) / took
+                spin_for(bench.executor, DRAIN_SILENCE)
+    found.sent = len(number_of)
+    for received, data in arrivals:
+        stamp, rows = raw_stamp(data), read_cloud(deserialize_message(data, PointCloud2))
+        found.ids[number_of[stamp]] = set(rows['pair'].tolist())
+        found.latencies.append(1e-9 * (received - stamp))
+    return found
+
+
+def _cpu_seconds(pid: int) -> float:
+    """Return the processor time that a process has taken (Linux)."""
+    with open(f'/proc/{pid}/stat') as file:
+        fields = file.read().rpartition(')')[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf('SC_CLK_TCK')
 
 
 def about_the_machine(node_cores: set[int]) -> dict[str, str]:

@@ -13,6 +13,7 @@ import numpy as np
 
 from ...scene import pose_sets
 from ...scene.pose_sets import CONTAINER, CUBE, Generator, Pairs
+from ...scene.scene_solver import Box, Pair, Scene
 
 Size = tuple[float, float, float]
 
@@ -152,3 +153,27 @@ def by_sizes(streams: Sequence[Stream]) -> list[list[Stream]]:
     for stream in streams:
         groups.setdefault(stream.sizes, []).append(stream)
     return list(groups.values())
+
+
+SWING_TICKS = 100  # of a period of the crowd's motion
+STEPS = ((1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0), (0, 1, 1), (1, 0, 1))
+"""From a box of the crowd to its neighbours, the likeliest to touch first."""
+
+
+def crowd(boxes: int, seed: int = 1) -> tuple[Scene, np.ndarray]:
+    """Return cubes that swing in a block, five pairs a box, and poses (ticks, boxes, 7).
+
+    Neighbours are 1.1 edges apart and swing by 0.08 along each axis: some touch in every tick.
+    """
+    rng = np.random.default_rng([seed, boxes])
+    side = int(np.ceil(boxes ** (1 / 3)))
+    places = np.argwhere(np.ones((side, side, side)))[:boxes]
+    names = {tuple(place): f'b{number}' for number, place in enumerate(places)}
+    pairs = [Pair.between(name, names[other]) for step in STEPS for place, name in names.items()
+             if (other := tuple(np.add(place, step))) in names]
+    swing = np.arange(SWING_TICKS)[:, None, None] / SWING_TICKS + rng.random((boxes, 3))
+    poses = np.zeros((SWING_TICKS, boxes, 7))
+    poses[..., :3] = 1.1 * places + 0.08 * np.sin(2.0 * np.pi * swing)
+    poses[..., 6] = 1.0
+    return Scene({name: Box(name, (1.0, 1.0, 1.0)) for name in names.values()},
+                 tuple(pairs[:5 * boxes]), pose_array=True), poses
