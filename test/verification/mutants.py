@@ -358,6 +358,23 @@ MUTANTS = {
         f'{STRANGERS} -k locked'),
     'a locked node makes transitions': Mutant(
         NODE, 'refuse_transitions(self)', 'pass', f'{STRANGERS} -k locked'),
+    'names of one checksum share an id': Mutant(
+        'scene/files/short_forms.py', 'while key in taken:', 'while False:',
+        'test/scene/test_short_forms.py -k one_checksum'),
+    'intervals of a sweep not widened': Mutant(
+        'core/binding/bounding_boxes.hpp', 'double margin = 2.0 * near * scale(box);',
+        'double margin = 0.0;', 'test/scene/test_broad_phase.py -k boxes_that_are_near'),
+    'a sweep answers in its own order': Mutant(
+        'scene/scene_solver.py', 'np.sort(self._by_key[at[is_pair]])', 'self._by_key[at[is_pair]]',
+        'test/scene/test_broad_phase.py -k answers_as'),
+    'length of a pose array not checked': Mutant(
+        'node/message_bytes.py', 'if len(data) != at + count * _POSE.size:', 'if False:',
+        'test/node/test_message_bytes.py -k no_pose_array'),
+    'a pose array for any number of boxes': Mutant(
+        EVALUATOR, 'if len(poses.numbers) != len(moving):', 'if False:',
+        f'{TEST_SCENE_NODE} -k another_length'),
+    'a bad pose of an array goes through': Mutant(
+        EVALUATOR, 'poses.numbers[bad] = np.nan', 'pass', f'{TEST_SCENE_NODE} -k bad_pose'),
     'answers kept for whoever does not read': Mutant(
         'node/runtime.py', 'CONTACT_QOS = QoSProfile(depth=10,',
         'CONTACT_QOS = QoSProfile(history=2,', 'test/node/test_faults.py -k never_reads'),
