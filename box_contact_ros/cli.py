@@ -113,7 +113,7 @@ MODULES_OF_EXTRA = {
     'view': ('viser',),
     'train': ('safetensors', 'torch', 'tqdm'),
     'report': ('matplotlib', 'tqdm'),
-    'peers': ('coal', 'pybullet'),
+    'peers': ('coal', 'dartpy', 'pybullet', 'rapier3d'),
     'fuzz': ('mpmath',),
 }
 

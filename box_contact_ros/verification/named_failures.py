@@ -80,13 +80,14 @@ def fault(one: NamedFailure, found: Manifold, bound: float) -> str:
     if one.separation > 0.0 and not unsure:
         return 'invented'
     deepest = int(np.argmax(found.depths))
-    if not abs(found.depths[deepest] + one.separation) <= bound:
-        return f'depth {found.depths[deepest]:.3g}'
+    depth = float(found.depths[deepest])  # NaN: none is given
+    if abs(depth + one.separation) > bound:
+        return f'depth {depth:.3g}'
     normal = found.normals[deepest]
     if np.isfinite(normal).all() and not _gap_along(one, normal) >= one.separation - bound:
         return f'depth {-_gap_along(one, normal):.3g} along the normal'
     # Models press boxes that just touch in.
-    reach = bound + max(0.0, float(found.depths[deepest])) + PRESSED * float(one.pairs.size[0])
+    reach = bound + max(0.0, -one.separation, depth) + PRESSED * float(one.pairs.size[0])
     beyond = max(_beyond(point, pose, size) for point in found.points for pose, size in (
         (one.pose_a, one.size_a), (one.pose_b, one.size_b)))
     return '' if beyond <= reach else f'point {beyond:.3g} outside'

@@ -21,6 +21,8 @@ from box_contact_ros.solver.models import MODELS
 
 ROOT = Path(__file__).resolve().parents[2]
 RIVALS, MISSING = installed()
+COARSE = {'Drake hydroelastic': 0.03}
+"""What a component of a normal may be off by, where more than 1e-5."""
 
 
 @pytest.fixture(scope='module')
@@ -116,7 +118,7 @@ def test_conventions(engine: Engine) -> None:
         for choice in engine.choices:
             answer = chosen(found, choice)
             assert answer.touching and answer.normal is not None and answer.point is not None
-            np.testing.assert_allclose(answer.normal, normal, atol=1e-5)
+            np.testing.assert_allclose(answer.normal, normal, atol=COARSE.get(engine.name, 1e-5))
             off = answer.point - middle
             assert abs(off @ normal) <= 0.0201
             assert np.linalg.norm(off - (off @ normal) * normal) <= 0.5 * math.hypot(12.2, 2.44)
@@ -134,7 +136,7 @@ def test_boxes_apart(engine: Engine) -> None:
 def test_what_is_not_installed_is_said() -> None:
     """The extras `sim` and `soup` are there in the tests; other peers may be."""
     assert not any('mujoco' in line or 'fcl' in line for line in MISSING)
-    assert all("extra 'peers'" in line for line in MISSING)
+    assert all("extra 'peers'" in line or 'pip install' in line for line in MISSING)
 
 
 def aborting() -> Engine:

@@ -10,8 +10,11 @@ from importlib import import_module
 
 from .engine import Engine
 
-RIVALS = {'mujoco': 'sim', 'fcl': 'soup', 'coal': 'peers', 'bullet': 'peers'}
-"""The engines' modules, each with the extra of this package that brings its library."""
+RIVALS = {'mujoco': "extra 'sim'", 'fcl': "extra 'soup'", 'coal': "extra 'peers'",
+          'bullet': "extra 'peers'", 'optional.rapier': "extra 'peers'",
+          'optional.dart': "extra 'peers'",
+          'optional.drake': 'pip install drake', 'optional.newton': 'pip install newton'}
+"""The engines' modules, each with what brings its library."""
 
 
 def installed(modules: Iterable[str] = tuple(RIVALS)) -> tuple[list[Engine], list[str]]:
@@ -22,5 +25,5 @@ def installed(modules: Iterable[str] = tuple(RIVALS)) -> tuple[list[Engine], lis
             makers = import_module(f'.{module}_engines', __name__).ENGINES
             found += [replace(make(), make=make) for make in makers]
         except ImportError as error:
-            missing.append(f"{error.name or module} is not installed (extra '{RIVALS[module]}')")
+            missing.append(f'{error.name or module} is not installed ({RIVALS[module]})')
     return found, missing

@@ -64,10 +64,14 @@ def points(persistent: bool) -> Engine:
         return Engine(name='PyBullet getContactPoints', package='pybullet',
                       call=f'{FILLING} × performCollisionDetection, getContactPoints',
                       returns='up to 4 points with depths, normals',
-                      choices=('deepest', 'mean', 'patch centroid'), prepare=prepare, read=read)
+                      choices=('deepest', 'mean', 'patch centroid'), prepare=prepare, read=read,
+                      causes={'invented': 'The axis test adds 1e-5 to every entry of the rotation, '
+                              'so gaps of some 1e-5 of the size count as contact.'})
     return Engine(name='PyBullet getClosestPoints', call='getClosestPoints(a, b, 0.0)',
                   returns='one point on each box, depth, normal', package='pybullet',
-                  choices=('deepest',), prepare=prepare, read=read)
+                  choices=('its point',), prepare=prepare, read=read, causes={
+                      'missed': 'The query rounds edges and corners by a margin of 1 mm: a corner '
+                      'recedes by up to 0.7 mm. The same boxes 1,000 times as large miss none.'})
 
 
 ENGINES = [partial(points, False), partial(points, True)]

@@ -56,7 +56,7 @@ def collision(patches: bool) -> Engine:
                       patch='area', package='coal', choices=('mean', 'patch centroid'),
                       prepare=prepare, read=read)
     return Engine(name='Coal collide', call='coal.collide, enable_contact',
-                  returns='deepest point, depth, normal', package='coal', choices=('deepest',),
+                  returns='deepest point, depth, normal', package='coal', choices=('its point',),
                   prepare=prepare, read=read)
 
 

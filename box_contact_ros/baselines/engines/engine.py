@@ -91,7 +91,7 @@ def ours(model: str, name: str | None = None, weights: str | None = None) -> Eng
         return one_contact(contact.point, -contact.separation, contact.normal)
 
     return Engine(name=name or model, call='ContactSolver(…)(pose_a, pose_b)',
-                  returns='one contact', patch='volume, covariance', choices=('deepest',),
+                  returns='one contact', patch='volume, covariance', choices=('its point',),
                   prepare=prepare, read=read, any_boxes=entry.any_boxes,
                   prepare_batch=prepare_batch if entry.native_batch else None)
 
@@ -121,7 +121,8 @@ def _patch_centroid(points: np.ndarray, normals: np.ndarray, depths: np.ndarray)
 
 
 CHOICES: dict[str, Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]] = {
-    'deepest': _deepest, 'mean': _mean, 'patch centroid': _patch_centroid}
+    'its point': _deepest, 'deepest': _deepest, 'mean': _mean,
+    'patch centroid': _patch_centroid}
 """One point of n > 0 points (n, 3), with their normals (n, 3) and depths (n,)."""
 
 

@@ -17,6 +17,7 @@ from ...scene.pose_sets import Pairs
 from .engine import APART, Engine, Manifold, one_contact, per_sizes, rows, wxyz
 
 Shape = Callable[[str, np.ndarray], tuple[str, str]]  # (name, size) -> asset, geom
+_CCD_ENDS = 'The search for the depth ends at 0, on boxes of very unequal sizes.'
 FARTHEST = 1.0  # distance up to which mj_geomDistance looks [m]
 
 
@@ -48,10 +49,13 @@ def distance(name: str, flags: str) -> Engine:
 
     return Engine(name=f'MuJoCo mj_geomDistance{name}', call=f'mj_geomDistance(model, data, 0, 1, '
                   f'1.0, fromto){flags and f", {flags}"}', returns='distance, two nearest points',
-                  package='mujoco', choices=('deepest',), prepare=prepare, read=read)
+                  package='mujoco', choices=('its point',), prepare=prepare, read=read,
+                  causes={'normal': _CCD_ENDS + ' The two nearest points coincide, and give no '
+                          'direction.'})
 
 
-def collision(name: str, shape: Shape, flags: str) -> Engine:
+def collision(name: str, shape: Shape, flags: str, choices: tuple[str, ...] = (
+        'deepest', 'mean', 'patch centroid'), normal: str = '') -> Engine:
     """Return `mj_collision`, after `mj_kinematics`: up to eight contacts."""
     kinematics, collide = mujoco.mj_kinematics, mujoco.mj_collision
 
@@ -80,8 +84,8 @@ def collision(name: str, shape: Shape, flags: str) -> Engine:
 
     return Engine(name=f'MuJoCo mj_collision{name}', call=f'mj_kinematics, mj_collision'
                   f'{flags and f", {flags}"}', returns='up to 8 points with depths, normals',
-                  package='mujoco', choices=('deepest', 'mean', 'patch centroid'),
-                  prepare=prepare, read=read)
+                  package='mujoco', choices=choices, prepare=prepare, read=read, causes={
+                      'missed': _CCD_ENDS, 'normal': normal})
 
 
 def _boxes(name: str, size: np.ndarray) -> tuple[str, str]:
@@ -112,7 +116,9 @@ LIBCCD = 'nativeccd="disable"'
 ENGINES = [
     partial(distance, '', ''), partial(distance, ', libccd', LIBCCD),
     partial(collision, '', _boxes, ''),
-    partial(collision, ', meshes', _meshes, 'multiccd="enable"'),
-    partial(collision, ', meshes, one point', _meshes, 'multiccd="disable"'),
-    partial(collision, ', meshes, libccd', _meshes, f'{LIBCCD} multiccd="enable"'),
+    partial(collision, ', meshes', _meshes, 'multiccd="enable"', normal='multiccd takes the normal '
+            'of a face near the direction of least depth; with one point the normal is right.'),
+    partial(collision, ', meshes, one point', _meshes, 'multiccd="disable"', ('its point',)),
+    partial(collision, ', meshes, libccd', _meshes, f'{LIBCCD} multiccd="enable"',
+            normal='libccd ends its search for the depth early, too deep and off in direction.'),
 ]

@@ -91,7 +91,7 @@ def odd_cells(rows: Sequence[FrontierRow], found: Sequence[Engine]) -> dict[Odd,
             if worst is None or _oddness(worst, kind) <= (ODD_NORMAL if kind == 'normal' else 0.0):
                 continue
             what = worst.failure or f'{kind} {_oddness(worst, kind):.3g}'
-            cause = engine.causes.get(kind, 'Cause unknown.')
+            cause = engine.causes.get(kind) or 'Cause unknown.'
             pose = '; '.join(f'{part} {tuple(values)}' for part, values in zip(
                 ('pose A', 'pose B', 'size A', 'size B'), worst.poses.get(kind, ())))
             lines[engine.name, kind] = (

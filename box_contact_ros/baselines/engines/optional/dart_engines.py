@@ -1,0 +1,62 @@
+"""DART, by its own detector."""
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import dartpy as dart
+import numpy as np
+
+from ....scene.pose import rotation_matrix
+from ....scene.pose_sets import Pairs
+from ..engine import APART, MOST_CONTACTS, Engine, Manifold, per_sizes, rows
+
+
+def collision() -> Engine:
+    """Return DART's `CollisionGroup.collide`: up to eight contacts."""
+    detector = dart.collision.DARTCollisionDetector()
+    option, result = dart.collision.CollisionOption(), dart.collision.CollisionResult()
+    option.enableContact, option.maxNumContacts = True, MOST_CONTACTS
+
+    def boxes(p: np.ndarray, q: np.ndarray) -> tuple[Any, ...]:
+        frames, groups = [], []
+        for size in (p, q):
+            frame = dart.dynamics.SimpleFrame()
+            frame.setShape(dart.dynamics.BoxShape(size))
+            group = detector.createCollisionGroup()
+            group.addShapeFrame(frame)
+            frames.append(frame)
+            groups.append(group)
+        return *frames, *groups
+
+    def ask(one: Any, two: Any, group: Any, other: Any, a: np.ndarray, b: np.ndarray,
+            matrix_a: np.ndarray, matrix_b: np.ndarray) -> Any:
+        one.setTranslation(a)
+        one.setRotation(matrix_a)
+        two.setTranslation(b)
+        two.setRotation(matrix_b)
+        result.clear()
+        group.collide(other, option, result)
+        return b - a
+
+    def prepare(pairs: Pairs) -> list[Callable[[], Any]]:
+        made = per_sizes(boxes)
+        return [partial(partial(ask, *made(p, q)), a[:3], b[:3], rotation_matrix(a[3:]),
+                        rotation_matrix(b[3:])) for a, b, p, q in rows(pairs)]
+
+    def read(_: Any) -> Manifold:
+        contacts = [result.getContact(k) for k in range(result.getNumContacts())]
+        if not contacts:
+            return APART
+        # DART's normals point from the second object to the first.
+        return Manifold(np.array([c.point for c in contacts]),
+                        np.array([-np.array(c.normal) for c in contacts]),
+                        np.array([c.penetrationDepth for c in contacts]))
+
+    return Engine(name='DART collide', call='CollisionGroup.collide', package='dartpy',
+                  returns='up to 8 points with depths, normals',
+                  choices=('deepest', 'mean', 'patch centroid'), prepare=prepare, read=read)
+
+
+ENGINES = [collision]

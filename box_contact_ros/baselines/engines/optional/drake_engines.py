@@ -1,0 +1,97 @@
+"""Drake: point pairs, and the surface of its hydroelastic contact."""
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+from pydrake import geometry
+from pydrake.common.eigen_geometry import Quaternion
+from pydrake.math import RigidTransform
+
+from ....scene.pose_sets import Pairs
+from ..engine import APART, Engine, Manifold, one_contact, per_sizes, rows
+
+MODULUS = 1e5  # hydroelastic modulus [Pa]; equal on both boxes, so that it shifts nothing
+
+
+class _DrakeScene:
+    """Two boxes in a scene graph."""
+
+    def __init__(self, surfaces: bool, p: np.ndarray, q: np.ndarray) -> None:
+        self._graph = geometry.SceneGraph()
+        source = self._graph.RegisterSource('boxes')
+        self._frames, shapes = [], []
+        for name, size in (('a', p), ('b', q)):
+            frame = self._graph.RegisterFrame(source, geometry.GeometryFrame(name))
+            shape = self._graph.RegisterGeometry(source, frame, geometry.GeometryInstance(
+                RigidTransform(), geometry.Box(*size), name))
+            properties = geometry.ProximityProperties()
+            geometry.AddCompliantHydroelasticProperties(float(size.max()), MODULUS, properties)
+            self._graph.AssignRole(source, shape, properties)
+            self._frames.append(frame)
+            shapes.append(shape)
+        self._context = self._graph.CreateDefaultContext()
+        self._port, self._poses = (self._graph.get_source_pose_port(source),
+                                   geometry.FramePoseVector())
+        self._surfaces = surfaces
+        self.first = shapes[0]
+
+    def __call__(self, at_a: Any, at_b: Any) -> tuple[Any, list[Any]]:
+        self._poses.set_value(self._frames[0], at_a)
+        self._poses.set_value(self._frames[1], at_b)
+        self._port.FixValue(self._context, self._poses)
+        query = self._graph.get_query_output_port().Eval(self._context)
+        if self._surfaces:
+            return self.first, query.ComputeContactSurfaces(
+                geometry.HydroelasticContactRepresentation.kPolygon)
+        return self.first, query.ComputePointPairPenetration()
+
+
+def _engine(surfaces: bool, read: Callable[[Any], Manifold], **about: Any) -> Engine:
+    def place(pose: np.ndarray) -> Any:
+        x, y, z, w = pose[3:] / np.linalg.norm(pose[3:])
+        return RigidTransform(Quaternion(w, x, y, z), pose[:3])
+
+    def prepare(pairs: Pairs) -> list[Callable[[], Any]]:
+        scenes = per_sizes(partial(_DrakeScene, surfaces))
+        return [partial(scenes(p, q), place(a), place(b)) for a, b, p, q in rows(pairs)]
+
+    return Engine(package='drake', choices=('its point',), prepare=prepare, read=read, **about)
+
+
+def point_pair() -> Engine:
+    """Return Drake's `ComputePointPairPenetration`: two points; their middle."""
+    def read(found: Any) -> Manifold:
+        first, pairs = found
+        if not pairs:
+            return APART
+        pair = pairs[0]
+        towards = -1.0 if pair.id_A == first else 1.0  # the normal points from B to A
+        return one_contact(0.5 * (np.array(pair.p_WCa) + pair.p_WCb), pair.depth,
+                           towards * np.array(pair.nhat_BA_W))
+
+    return _engine(False, read, name='Drake point pair', returns='two points, depth, normal',
+                   call='QueryObject.ComputePointPairPenetration')
+
+
+def surface() -> Engine:
+    """Return Drake's `ComputeContactSurfaces`: the surface of equal pressure, its centroid."""
+    def read(found: Any) -> Manifold:
+        first, surfaces = found
+        if not surfaces:
+            return APART
+        one = surfaces[0]
+        normal = sum(one.area(k) * np.array(one.face_normal(k)) for k in range(one.num_faces()))
+        towards = -1.0 if one.id_M() == first else 1.0  # face normals point from N to M
+        return one_contact(np.array(one.centroid()), float('nan'),
+                           towards * normal / np.linalg.norm(normal))
+
+    return _engine(True, read, name='Drake hydroelastic', returns='polygons with pressure, normals',
+                   call='QueryObject.ComputeContactSurfaces, kPolygon', patch='area, pressure',
+                   causes={'normal': 'The surface of equal pressure bends round edges and corners: '
+                           'its normal is not that of the least depth.'})
+
+
+ENGINES = [point_pair, surface]

@@ -1,0 +1,74 @@
+"""Rapier, whose colliders are Parry's, in float32."""
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+import rapier3d as rapier
+
+from ....scene.pose import rotation_matrix
+from ....scene.pose_sets import Pairs
+from ..engine import APART, Engine, Manifold, per_sizes, rows
+
+
+class _RapierWorld:
+    """Two boxes, and what updates the contacts between them."""
+
+    def __init__(self, p: np.ndarray, q: np.ndarray) -> None:
+        self._bodies, self._colliders = rapier.RigidBodySet(), rapier.ColliderSet()
+        self._narrow = rapier.NarrowPhase()
+        self._parts = (rapier.IslandManager(), rapier.BroadPhaseBvh(), self._narrow, self._bodies,
+                       self._colliders)
+        self._detect = rapier.CollisionPipeline()
+        self._handles, shapes = [], []
+        for size in (p, q):
+            builder = rapier.RigidBodyBuilder(rapier.RigidBodyType.DYNAMIC)
+            self._handles.append(self._bodies.insert(builder))
+            shapes.append(self._colliders.insert_with_parent(
+                rapier.Collider.cuboid(*(0.5 * size).tolist()), self._handles[-1],
+                self._bodies))
+        self._shapes = tuple(shapes)
+
+    def __call__(self, at_a: Any, at_b: Any, poses: np.ndarray) -> tuple[Any, np.ndarray]:
+        for handle, at in zip(self._handles, (at_a, at_b)):
+            self._bodies[handle].position = at
+        self._detect.step(0.0, *self._parts)
+        return self._narrow.contact_pair(*self._shapes), poses
+
+
+def collision() -> Engine:
+    """Return Rapier's contacts after a step of detection: up to four points."""
+
+    def place(pose: np.ndarray) -> Any:
+        x, y, z, w = (pose[3:] / np.linalg.norm(pose[3:])).tolist()
+        return rapier.Isometry3(tuple(pose[:3].tolist()), rapier.Rotation3(w, x, y, z))
+
+    def prepare(pairs: Pairs) -> list[Callable[[], Any]]:
+        worlds = per_sizes(_RapierWorld)
+        return [partial(worlds(p, q), place(a), place(b), np.array([a, b]))
+                for a, b, p, q in rows(pairs)]
+
+    def read(found: tuple[Any, np.ndarray]) -> Manifold:
+        pair, poses = found
+        turns = rotation_matrix(poses[:, 3:])
+        points, normals, depths = [], [], []
+        for manifold in pair.manifolds if pair else ():
+            for point in manifold.points:
+                if point.dist <= 0.0:
+                    ends = [pose[:3] + turn @ [local.x, local.y, local.z] for pose, turn, local in
+                            zip(poses, turns, (point.local_p1, point.local_p2))]
+                    normal = manifold.local_n1
+                    points.append(0.5 * (ends[0] + ends[1]))
+                    normals.append(turns[0] @ [normal.x, normal.y, normal.z])
+                    depths.append(-point.dist)
+        return Manifold(*map(np.array, (points, normals, depths))) if points else APART
+
+    return Engine(name='Rapier contact_pair', package='rapier3d',
+                  call='CollisionPipeline.step, NarrowPhase.contact_pair',
+                  returns='up to 4 points with depths, normals; float32',
+                  choices=('deepest', 'mean', 'patch centroid'), prepare=prepare, read=read)
+
+
+ENGINES = [collision]
