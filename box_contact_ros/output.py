@@ -119,7 +119,8 @@ def log_errors(axis: Axes, least: float, most: float, zero: str = 'exact (0)',
 
     Errors between 0 and `least` are drawn at `least`.
     """
-    bottom, middle = least / 10.0**0.7, least / 10.0**0.35
+    band = max(0.7, 0.1 * math.log10(most / least))  # its height in decades
+    bottom, middle = least / 10.0**band, least / 10.0**(0.5 * band)
     ticks = [10.0**power for power in range(math.ceil(math.log10(least)),
                                             math.floor(math.log10(most)) + 1)]
     axis.set_yscale('log')

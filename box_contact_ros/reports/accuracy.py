@@ -412,9 +412,14 @@ def page(rows: Sequence[AccuracyRow], errors: dict[str, np.ndarray], drawn: int,
 
 def draw(path: Path, rows: Sequence[AccuracyRow]) -> None:
     """Draw the share of pairs with a larger error, per set, logarithmic; limits marked."""
-    figure, axes = output.subplots(2, 3, (12.5, 7.0), sharex=True, sharey=True)
+    figure, axes = output.subplots(3, 2, (8.0, 8.4))
     lowest = 1.0 / max(len(row.classes) for row in rows)
-    for axis, name in zip(axes.flat, dict.fromkeys(row.set for row in rows)):
+    largest: dict[str, float] = {}
+    for row in rows:
+        largest[row.set] = max(largest.get(row.set, 0.0), row.errors.point.max())
+    drawn = {name: worst for name, worst in largest.items() if worst >= SHOWN[0]}
+    shown: dict[str, Any] = {}
+    for axis, name in zip(axes.flat, drawn):
         axis.set(title=name, xlim=SHOWN, ylim=(0.7 * lowest, 1.3))
         axis.grid(color='0.9', linewidth=0.5)
         for k, row in enumerate(row for row in rows if row.set == name):
@@ -424,14 +429,16 @@ def draw(path: Path, rows: Sequence[AccuracyRow]) -> None:
             axis.plot([value], [height], marker='v', color='black', markersize=6)
             axis.annotate(label, (value, height), xytext=(5, 4), textcoords='offset points',
                           fontsize=8)
-        axis.axvline(limit.mean, color='black', linewidth=0.7, linestyle=':')
-        axis.legend(fontsize=7, loc='lower left')
-    for axis in axes[-1]:
-        axis.set_xlabel("point error [% of the smaller box's longest edge]")
-    for axis in axes[:, 0]:
-        axis.set_ylabel('share of pairs with a larger error')
-    figure.suptitle('Point error against exact; dashed: mlp per class; '
-                    '▼ its limits, dotted: of its mean')
+        shown['limit of the mean'] = axis.axvline(limit.mean, color='black', linewidth=0.7,
+                                                  linestyle=':')
+        shown |= {line.get_label(): line for line in axis.lines if line.get_label()[0] != '_'}
+    below = [f'{name}: all below {largest[name]:.1g} %' for name in largest if name not in drawn]
+    for axis in axes.flat[len(drawn):]:
+        axis.set_axis_off()
+    axes.flat[-1].text(0.1, 0.5, '\n'.join(below), fontsize=9)
+    figure.legend(shown.values(), shown, loc='outside upper center', ncols=3, fontsize=9)
+    figure.supxlabel("point error [% of the smaller box's longest edge]; ▼ limits", fontsize=10)
+    figure.supylabel('share of pairs with a larger error', fontsize=10)
     figure.savefig(path)
 
 
@@ -443,10 +450,7 @@ def _draw_row(axis: Any, row: AccuracyRow, colour: str) -> None:
         return
     for k, part in enumerate(CLASSES):
         _curve(axis, row.errors.point[row.classes == k], linewidth=0.8, linestyle='--',
-               color=f'C{1 + k}', label=part)
-    if row.errors.point.max() < SHOWN[0]:
-        axis.text(0.03, 0.5, f'{row.model}: all below {row.errors.point.max():.1g} %', fontsize=9,
-                  transform=axis.transAxes)
+               color=f'C{1 + k}', label=f'mlp, {part}')
 
 
 def _curve(axis: Any, errors: np.ndarray, **style: Any) -> None:

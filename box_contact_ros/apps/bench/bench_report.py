@@ -10,10 +10,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import LogFormatter
 
-from ...output import markdown_table, percentiles, subplots, write_csv
+from ...output import log_errors, markdown_table, percentiles, subplots, write_csv
 from .answer_log import StreamResult
 
-LEAST_DRAWN = 1e-9  # point errors [mm] are drawn as no less: a logarithmic axis has no zero
+ERRORS = (1e-6, 1e5)
+"""Point errors that are drawn to scale [mm]; 0 has a band of its own below."""
 COLORS = {'contact': 'tab:blue', 'soup': 'tab:red', 'echo': 'tab:gray'}
 MARKERS = 'osD^vP*X<>hpd8'
 DIGITS = 9  # significant digits of a figure in the CSV file
@@ -80,10 +81,10 @@ def all_latencies(results: Iterable[StreamResult], node: str) -> np.ndarray:
 
 def draw(path: Path, results: Sequence[StreamResult], title: str) -> None:
     """Draw latency distributions, latencies by stream, and errors over latencies."""
-    figure, axes = subplots(1, 3, (16.0, 5.6))
+    figure, axes = subplots(3, 1, (8.0, 11.0))
     nodes = list(dict.fromkeys(result.node for result in results))
     colors = {node: COLORS.get(node, f'C{i}') for i, node in enumerate(nodes)}
-    for axis, drawn in zip(axes[0], (_draw_tails, _draw_streams, _draw_errors)):
+    for axis, drawn in zip(axes[:, 0], (_draw_tails, _draw_streams, _draw_errors)):
         drawn(axis, results, colors)
         axis.grid(alpha=0.3, axis='x' if drawn is _draw_streams else 'both')
     figure.suptitle(title)
@@ -120,21 +121,21 @@ def _draw_streams(axis: Axes, results: Sequence[StreamResult], colors: Mapping[s
 
 
 def _draw_errors(axis: Axes, results: Sequence[StreamResult], colors: Mapping[str, str]) -> None:
-    axis.set(xscale='log', yscale='log', xlabel='latency, p50 [ms]',
-             ylabel='point error, median to p99 [mm]',
-             title=f'error beside latency (≤ {LEAST_DRAWN:g} mm is drawn there)')
+    height = log_errors(axis, *ERRORS, zero='0')
+    axis.set(xscale='log', xlabel='latency, p50 [ms]', ylabel='point error, median to p99 [mm]',
+             title='error against latency')
     markers = dict(zip(dict.fromkeys(result.stream for result in results), MARKERS))
     for result in results:
         if result.node == 'echo' or not result.point_errors.size:
             continue
         color, latency = colors[result.node], 1e3 * result.latency['p50']
-        low, high = np.maximum(percentiles(1e3 * result.point_errors, 50, 99), LEAST_DRAWN)
+        low, high = map(height, percentiles(1e3 * result.point_errors, 50, 99))
         axis.plot([latency] * 2, [low, high], color=color, alpha=0.4)
         axis.plot(latency, low, markers.get(result.stream, 'o'), color=color)
     for name, marker in markers.items():  # the shape tells the stream, whatever the node
         axis.plot([], [], marker, color='black', label=name)
     floor = all_latencies(results, 'echo')
     if floor.size:
-        axis.axvline(float(np.median(floor)), color=colors['echo'], linestyle='--')
+        axis.axvline(float(np.median(floor)), color=colors['echo'], linestyle='--', label='echo')
     axis.xaxis.set_minor_formatter(LogFormatter(minor_thresholds=(1.0, 0.4)))
-    axis.legend(fontsize='small')
+    axis.legend(fontsize='small', loc='center left', bbox_to_anchor=(1.0, 0.5))

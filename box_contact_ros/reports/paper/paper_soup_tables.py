@@ -409,8 +409,8 @@ def section_figure_10(result: SoupResult, picture: str) -> str:
 
 ![Two graphs over the divisions N: times of soup and network, and the soup's point error]({picture})
 
-Left, the step's mean and the time of Table 4's pattern, with a call of model `paper`; grey, the
-paper's. Right, the mean point error on touching cubes 1 mm deep: the soup's equals {words}. The
+Above, the step's mean and the time of Table 4's pattern, with a call of model `paper`; grey, the
+paper's. Below, the mean point error on touching cubes 1 mm deep: the soup's equals {words}. The
 dashed line marks where. The paper draws one such line; its text gives neither the number nor the
 measure of accuracy.
 """
@@ -418,24 +418,22 @@ measure of accuracy.
 
 def draw_figure_10(result: SoupResult, path: Path) -> None:
     """Draw times and errors against N."""
-    figure, ((left, right),) = output.subplots(1, 2, (11.0, 4.8))
-    _draw_times(left, result)
+    figure, ((upper,), (lower,)) = output.subplots(2, 1, (8.0, 8.4))
+    _draw_times(upper, result)
     ticks = [1, 2, 4, 8, 16, 32, 64]
     errors = _touching_errors(result)
-    right.plot(list(errors), [1e3 * error for error in errors.values()], '-o', color='tab:blue',
+    lower.plot(list(errors), [1e3 * error for error in errors.values()], '-o', color='tab:blue',
                markersize=3.5, label='soup, touching')
     for (name, n), colour in zip(equal_at(result).items(), ('tab:orange', 'tab:purple')):
-        right.axhline(1e3 * result.rivals[name].point, color=colour, label=f'{name}: {in_words(n)}')
-        if 0.0 < n < math.inf:
-            right.axvline(n, color=colour, linestyle='--')
-            if min(PAPER) <= n <= max(PAPER):
-                left.axvline(n, color=colour, linestyle='--')
-    right.set(xscale='log', yscale='log', xlabel='divisions N of an edge',
+        lower.axhline(1e3 * result.rivals[name].point, color=colour, label=f'{name}: {in_words(n)}')
+        for axes in (upper, lower) if min(PAPER) <= n <= max(PAPER) else ():
+            axes.axvline(n, color=colour, linestyle='--', label=f'as exact as {name}')
+    lower.set(xscale='log', yscale='log', xlabel='divisions N of an edge',
               ylabel='mean point error [mm]')
-    right.set_xticks(ticks, [str(tick) for tick in ticks])
-    right.set_xticks([], minor=True)
-    right.legend(fontsize=8)
-    for axes in (left, right):
+    lower.set_xticks(ticks, [str(tick) for tick in ticks])
+    lower.set_xticks([], minor=True)
+    for axes in (upper, lower):
+        axes.legend(fontsize=8.5, loc='upper left', bbox_to_anchor=(1.01, 1.0))
         axes.grid(color='0.9', which='both', linewidth=0.6)
         axes.set_axisbelow(True)
     figure.savefig(path)
@@ -455,8 +453,6 @@ def _draw_times(axes: Any, result: SoupResult) -> None:
                   label=f"the paper's soup, {label}")
     axes.axhline(PAPER_NETWORK, color='0.6', linestyle='--', label="the paper's network")
     axes.set(yscale='log', xlabel='divisions N of an edge', ylabel='time [ms]', xticks=divisions)
-    # Room for the legend below the curves.
-    axes.legend(fontsize=7.5, loc='upper center', bbox_to_anchor=(0.5, -0.14), ncols=3)
 
 
 def csv_rows(result: SoupResult) -> Iterator[dict[str, object]]:

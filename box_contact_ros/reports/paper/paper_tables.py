@@ -170,15 +170,19 @@ def section_figure_9(picture: str) -> str:
 ![A line with dots that scatter about it; a line with dots on it]({picture})
 
 The azimuth of the impact point, for the first {SHOWN} patterns of the external set, sorted by what
-is desired (line); dots: what the network says. Left, one network on data with discontinuities
-(model `paper`, Table 1); right, model `paper-continuous` on its subset `vertex_face` (on
+is desired (line); dots: what the network says. Above, one network on data with discontinuities
+(model `paper`, Table 1); below, model `paper-continuous` on its subset `vertex_face` (on
 `edge_edge` this output is constant by construction).
+
+The paper draws the first of the four outputs for a part of its external set, with discontinuities:
+a solid line for what is desired, dots for the model. The picture to compare is the upper one. In
+words it gives a mean absolute error of almost 10 % of the range, and no bias.
 """
 
 
 def draw_figure_9(path: Path) -> None:
     """Draw the first output, desired and modelled."""
-    picture, panels = output.subplots(1, 2, (11.0, 4.2), sharex=True)
+    picture, panels = output.subplots(2, 1, (8.0, 7.6), sharex=True)
     for axes, (name, network) in zip(panels.flat, (('paper', 'contact'),
                                                    ('paper-continuous', 'vertex_face'))):
         weights = _shipped(name)
@@ -189,9 +193,10 @@ def draw_figure_9(path: Path) -> None:
         axes.plot(wanted[order], color='black', label='desired')
         axes.plot(said[order], '.', color='tab:red', markersize=5, label='modelled')
         axes.set(title=name if network == 'contact' else f'{name}, {network}',
-                 xlabel='pattern of the external set, sorted', ylabel='azimuth of the point [rad]')
+                 ylabel='azimuth of the point [rad]')
         axes.grid(color='0.9', linewidth=0.6)
-        axes.legend()
+    panels[0, 0].legend()
+    axes.set_xlabel('pattern of the external set, sorted')
     picture.savefig(path)
 
 
