@@ -10,7 +10,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Protocol
@@ -79,12 +79,15 @@ def page(template: str, **values: object) -> str:
     return (PACKAGE / f'{template}.md').read_text('utf-8').format(**values)
 
 
-def write_csv(path: Path, rows: Iterable[Mapping[str, object]], *, digits: int = 6) -> None:
+def write_csv(path: Path, rows: Iterable[Mapping[str, object]], *, digits: int = 6,
+              about: Machine | None = None) -> None:
     """Write rows by column name; the columns are those of all rows, in the order of appearance.
 
-    A float has `digits` significant digits. A missing value, None and NaN are empty cells.
+    about: the machine, whose columns every row gets at its end. A float has `digits` significant
+    digits. A missing value, None and NaN are empty cells.
     """
-    listed = list(rows)
+    here = asdict(about) if about else {}
+    listed = [{**row, **here} for row in rows]
     columns = list(dict.fromkeys(name for row in listed for name in row))
     with path.open('w', newline='', encoding='utf-8') as file:
         writer = csv.writer(file, lineterminator='\n')
@@ -207,10 +210,17 @@ def no_garbage_collection() -> Iterator[None]:
 _AMD = ((23, 0x00, 0x2f, 'Zen'), (23, 0x30, 0xff, 'Zen 2'), (25, 0x00, 0x0f, 'Zen 3'),
         (25, 0x10, 0x1f, 'Zen 4'), (25, 0x20, 0x5f, 'Zen 3'), (25, 0x60, 0x7f, 'Zen 4'),
         (25, 0xa0, 0xaf, 'Zen 4'), (26, 0x00, 0xff, 'Zen 5'))
-_INTEL = ((6, 85, 85, 'Skylake-SP or Cascade Lake'), (6, 106, 108, 'Ice Lake-SP'),
-          (6, 140, 141, 'Tiger Lake'), (6, 143, 143, 'Sapphire Rapids'),
-          (6, 151, 151, 'Alder Lake'), (6, 154, 154, 'Alder Lake'), (6, 173, 174, 'Granite Rapids'),
-          (6, 183, 183, 'Raptor Lake'), (6, 207, 207, 'Emerald Rapids'))
+_INTEL = ((6, 61, 61, 'Broadwell'), (6, 63, 63, 'Haswell-EP'), (6, 71, 71, 'Broadwell'),
+          (6, 78, 78, 'Skylake'), (6, 79, 79, 'Broadwell-EP'),
+          (6, 85, 85, 'Skylake-SP or Cascade Lake'), (6, 106, 108, 'Ice Lake-SP'),
+          (6, 125, 126, 'Ice Lake'), (6, 140, 141, 'Tiger Lake'),
+          (6, 142, 142, 'Kaby Lake or later'), (6, 143, 143, 'Sapphire Rapids'),
+          (6, 151, 151, 'Alder Lake'), (6, 154, 154, 'Alder Lake'),
+          (6, 158, 158, 'Kaby Lake or later'), (6, 167, 167, 'Rocket Lake'),
+          (6, 170, 170, 'Meteor Lake'), (6, 173, 174, 'Granite Rapids'),
+          (6, 175, 175, 'Sierra Forest'), (6, 183, 183, 'Raptor Lake'),
+          (6, 189, 189, 'Lunar Lake'), (6, 197, 198, 'Arrow Lake'),
+          (6, 207, 207, 'Emerald Rapids'))
 _GENERATIONS = {'AuthenticAMD': _AMD, 'GenuineIntel': _INTEL}
 """By vendor: CPU family, first and last model, generation."""
 

@@ -316,7 +316,8 @@ def main(args: Sequence[str] | None = None) -> int:
         for pose in tally.poses:
             print(f'\n{pose}')
     if options.out:
-        write_csv(options.out, csv_rows(tallies.values()), digits=3)
+        write_csv(options.out, csv_rows(tallies.values()), digits=3,
+                  about=machine(native))
     broken = sum(tally.broken for tally in tallies.values())
     print(f'\n{"BROKEN: " + str(broken) + " faults" if broken else "all gates at zero"} after '
           f'{(time.monotonic() - began) / 60:.1f} minutes, seed {options.seed}, '

@@ -73,3 +73,12 @@ def test_labels_are_spread(rng_seed: int = 5) -> None:
         assert (np.diff(places) >= 0.04 - 1e-12).all()
         assert places[0] >= -1e-12 and places[-1] <= 1.0 + 1e-12
     assert output.spread([0.1, 0.5, 0.9], 0.04) == pytest.approx([0.1, 0.5, 0.9])
+
+
+def test_rows_name_the_machine(tmp_path: Path) -> None:
+    """At their end, all its columns."""
+    about = output.machine(native, ('numpy',))
+    output.write_csv(tmp_path / 'a.csv', [{'x': 1}, {'x': 2}], about=about)
+    with (tmp_path / 'a.csv').open() as file:
+        rows = list(csv.DictReader(file))
+    assert rows == [{'x': x, **asdict(about)} for x in ('1', '2')]

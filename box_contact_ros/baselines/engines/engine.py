@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import multiprocessing
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from typing import Any, NamedTuple
 
@@ -172,7 +172,7 @@ def part_by_part(work: Callable[..., dict[str, Any]], make: Callable[[], Engine]
 
 
 def _work_with(work: Callable[..., Any], make: Callable[[], Engine], *arguments: Any) -> Any:
-    return work(make(), *arguments)
+    return work(replace(make(), make=make), *arguments)
 
 
 def _answer_to(pipe: Any, work: Callable[..., Any], *arguments: Any) -> None:

@@ -31,6 +31,7 @@ from ...verification.hard_poses import Cases, load
 from ...verification.judge import COORDINATE_ULPS, NOT_FINITE, NOT_UNIT, OUTSIDE, TOLERANCE, judge
 from .named_report import write_named
 
+PACKAGES = ('numpy', 'python-fcl')  # whose versions are named
 PATIENCE = 300.0  # for a family in a subprocess [s]
 NUDGE = 1e-7
 """By how much poses are moved, of the size, and turned [rad], for the ratio of Δpoint to Δpose."""
@@ -160,7 +161,7 @@ def page(rows: Sequence[StabilityRow], command: str) -> str:
     broken = gates(rows)
     models = dict.fromkeys(row.model for row in rows)
     return output.page(
-        'reports/pages/stability', command=command, machine=output.machine(native),
+        'reports/pages/stability', command=command, machine=output.machine(native, PACKAGES),
         verdict=f'BROKEN: {"; ".join(broken)}.' if broken else 'Of `exact` and `mlp`, every '
         'verdict and normal is right, and every point in both boxes.', models='\n\n'.join(
             f'## `{model}`\n\n{table([row for row in rows if row.model == model])}'
@@ -199,7 +200,8 @@ def main(args: Sequence[str] | None = None) -> int:
                 bar.set_postfix_str(f'{model}, {name}')
                 rows.append((examine_apart if apart else examine)(model, name, cases[name]))
                 bar.update()
-    output.write_csv(folder / 'stability.csv', map(asdict, rows), digits=4)
+    output.write_csv(folder / 'stability.csv', map(asdict, rows), digits=4,
+                     about=output.machine(native, PACKAGES))
     (folder / 'stability.md').write_text(
         page(rows, output.command_line('box_contact_ros stability', args)), encoding='utf-8')
     for model in options.models:

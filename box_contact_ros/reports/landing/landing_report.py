@@ -33,6 +33,7 @@ QUICK = 9
 """`--quick` runs every ninth landing of the grid, and every third of the added ones."""
 SHOWN = 17
 """The landing that is drawn: sway of 1.25°, tilt of 3°, 0.6 m of overhang."""
+PACKAGES = ('numpy', 'mujoco')  # whose versions are named
 GATED = ('exact', 'mlp')
 """Ways that have to do all that is expected."""
 OVER_DDS = ('exact', 'mlp')
@@ -194,7 +195,7 @@ def against_manifold(results: Sequence[Landed]) -> str:
 def page(results: Sequence[Landed], command: str, *, dds: bool = False) -> str:
     """Return the Markdown page."""
     gated = [one for one in results if one.landing.way in GATED]
-    values = {'command': command, 'machine': output.machine(native), 'all': len(gated),
+    values = {'command': command, 'machine': output.machine(native, PACKAGES), 'all': len(gated),
               'good': sum(one.as_expected for one in gated), 'grid': grid_table(results),
               'added': added_table(results)}
     if dds:
@@ -222,7 +223,8 @@ def main(args: Sequence[str] | None = None) -> int:
     if not options.dds:
         draw(folder / 'landing.png', scenarios[of_grid[-1].name] if options.quick else
              scenarios[f'grid {SHOWN}'])
-    output.write_csv(folder / f'{name}.csv', map(csv_row, results))
+    output.write_csv(folder / f'{name}.csv', map(csv_row, results),
+                     about=output.machine(native, PACKAGES))
     command = output.command_line('box_contact_ros landing', args)
     (folder / f'{name}.md').write_text(page(results, command, dds=options.dds), encoding='utf-8')
     print(f'{grid_table(results)}\n\n{added_table(results)}')

@@ -426,8 +426,9 @@ def draw_figure_10(result: SoupResult, path: Path) -> None:
                markersize=3.5, label='soup, touching')
     for (name, n), colour in zip(equal_at(result).items(), ('tab:orange', 'tab:purple')):
         lower.axhline(1e3 * result.rivals[name].point, color=colour, label=f'{name}: {in_words(n)}')
-        for axes in (upper, lower) if min(PAPER) <= n <= max(PAPER) else ():
-            axes.axvline(n, color=colour, linestyle='--', label=f'as exact as {name}')
+        for axes in (upper, lower) if min(PAPER) <= n <= max(PAPER) else (lower,):
+            if 0.0 < n < math.inf:
+                axes.axvline(n, color=colour, linestyle='--', label=f'as exact as {name}')
     lower.set(xscale='log', yscale='log', xlabel='divisions N of an edge',
               ylabel='mean point error [mm]')
     lower.set_xticks(ticks, [str(tick) for tick in ticks])

@@ -36,6 +36,7 @@ from ..paper_recipe.paper_jobs import JOBS, PaperJob
 from ..samples import MlpSamples, draw_samples, mixture
 from .successive_halving import Candidate, CheckpointError, Rung, Rungs, Scores, Search, ranking
 
+PACKAGES = ('numpy', 'torch')  # whose versions are named
 UNITS = np.arange(4, UNITS_MAX + 1, 4)  # hidden units that are tried
 
 # Streams of random numbers.
@@ -216,7 +217,7 @@ def write_table(path: Path, results: Sequence[tuple[Search, Rungs]]) -> None:
             rows.append({'search': search.name, 'number': entry.pop('number'), **units,
                          'multiply_adds': search.cost(one), **entry, 'rungs': len(scores),
                          **scores[-1]})
-    write_csv(path, rows)
+    write_csv(path, rows, about=machine(native, PACKAGES))
 
 
 def plot(path: Path, results: Sequence[tuple[Search, Rungs]]) -> None:
@@ -293,7 +294,7 @@ def main(args: Sequence[str] | None = None) -> int:
             return 1
     command = 'python -m box_contact_ros search ' + ' '.join(sys.argv[1:] if args is None else args)
     made = (f'Made by `{command}` in {(time.monotonic() - began) / 60.0:.1f} minutes '
-            f'({options.device}) on {machine(native, ("numpy", "torch"))}.')
+            f'({options.device}) on {machine(native, PACKAGES)}.')
     text = page(f'training/experiments/search_{options.what}', made=made,
                 total=sum(len(done[0]) for _, done in results))
     text += f'\n![Settings and errors]({name}.png)\n' + ''.join(
