@@ -21,7 +21,7 @@ from .judge import PRESSED
 FILE = Path(__file__).with_suffix('.yaml')
 SINGLE = 1e-6  # error that float32 costs, of the size
 PREFERENCE = 0.06  # share of the depth by which engines may prefer a face to an edge, 5 % usually
-PATIENCE = 60.0  # for an engine's answers in a subprocess [s]
+PATIENCE = 180.0  # for an engine's answers in a subprocess [s]
 
 
 @dataclass(frozen=True, kw_only=True)

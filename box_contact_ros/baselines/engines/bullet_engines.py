@@ -13,6 +13,7 @@ from .engine import APART, Engine, Manifold, per_sizes, rows
 
 FILLING = 4
 """Detections of the same pose before the manifold is read: it takes up to four points."""
+FAR = (1e6, 0.0, 0.0)
 GROUPS = 30  # pairs of sizes that one world keeps apart, a bit of the filter for each
 
 
@@ -36,6 +37,9 @@ def points(persistent: bool) -> Engine:
 
     def ask(one: int, two: int, a: Any, b: Any, quat_a: Any, quat_b: Any) -> Any:
         place(one, a, quat_a)
+        if persistent:  # the manifold would keep points of the pair before
+            place(two, FAR, quat_b)
+            detect()
         place(two, b, quat_b)
         if not persistent:
             return bullet.getClosestPoints(one, two, 0.0, physicsClientId=client)

@@ -22,7 +22,7 @@ GROUPS = {'this package': ('C0', 'o', ('exact', 'mlp')),
           'FCL, Coal': ('C2', 's', ('fcl', 'python', 'Coal')),
           'MuJoCo': ('C1', '^', ('MuJoCo',)), 'Bullet': ('C3', 'v', ('PyBullet',)),
           'Drake': ('C6', 'P', ('Drake',)), 'DART': ('C8', 'p', ('DART',)),
-          'float32': ('C9', '<', ('Rapier', 'Newton')),
+          'Rapier, Newton': ('C9', '<', ('Rapier', 'Newton')),
           'others': ('0.35', 'h', ('',))}
 """Colour, marker, and how names of the group begin; the first that fits."""
 LEFT_OUT = ('paper-continuous', *(f'soup-{n}' for n in list(PAPER_SOUP)[1:-1]))
