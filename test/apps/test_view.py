@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import io
+import itertools
 import math
 import os
 import re
@@ -25,12 +26,15 @@ from browser import chromium, open_page
 from PIL import Image
 
 from box_contact_ros import ContactSolver
-from box_contact_ros.apps.ros_client import CRANE_MARKERS, line_marker
+from box_contact_ros.apps.ros_client import CRANE_MARKERS, line_marker, scene_source
 from box_contact_ros.apps.viewer.listener import ViewNode
 from box_contact_ros.apps.viewer.page.read_outs import deepest_contacts, legend, read_out
+from box_contact_ros.apps.viewer.page.view_page import Page
+from box_contact_ros.apps.viewer.scene_driver import DEPTH, LIFT, TIERS, VISIT, motions
 from box_contact_ros.apps.viewer.style import (
     BOX_A,
     BOX_B,
+    CONTACT,
     LEGEND,
     LISTED,
     STALE,
@@ -49,6 +53,7 @@ from box_contact_ros.node.messages import (
     read_cloud,
 )
 from box_contact_ros.scene.pose import rotation_matrix
+from box_contact_ros.scene.scene_file import read_scene
 from box_contact_ros.scene.scene_solver import Box, Pair, Scene, SceneSolver, two_boxes
 
 ORIGIN = poses.IDENTITY
@@ -191,11 +196,16 @@ def test_latest_pairing_answers_with_the_newer_stamp():
 # --- a scene of more boxes ------------------------------------------------------------------------
 
 
+def place(number):
+    """Return x, y of a stack: rows of ten, 5 m apart."""
+    return 5.0 * (number % 10), 5.0 * (number // 10)
+
+
 def stacks(count):
-    """Return a scene of loads over fixed cubes, 5 m apart; each load with its own and the next."""
+    """Return a scene of loads over fixed cubes; each load is paired with its own and the next."""
     boxes = {f'load_{n}': Box(f'load_{n}', CUBE, pose_topic=f'load_{n}/pose')
              for n in range(count)}
-    boxes |= {f's{n}': Box(f's{n}', CUBE, (5.0 * n, 0, 0, 0, 0, 0, 1)) for n in range(count)}
+    boxes |= {f's{n}': Box(f's{n}', CUBE, (*place(n), 0, 0, 0, 0, 1)) for n in range(count)}
     pairs = [Pair(10 + n, f'load_{n}_s{n}', f'load_{n}', f's{n}') for n in range(count)]
     pairs += [Pair(1000 + n, f'near_{n}', f'load_{n}', f's{n + 1}') for n in range(count - 1)]
     return Scene(boxes, tuple(pairs), 'yard')
@@ -208,7 +218,7 @@ def cloud_of(answer):
 
 def loads(count, depths):
     """Return a pose for each load over its own cube, so deep."""
-    return [np.array([5.0 * n, 0.0, 2.0 - depths[n], 0, 0, 0, 1]) for n in range(count)]
+    return [np.array([*place(n), 2.0 - depths[n], 0, 0, 0, 1]) for n in range(count)]
 
 
 def test_contacts_of_many_pairs_against_the_solver():
@@ -360,6 +370,38 @@ def test_a_box_has_twelve_edges():
     lengths = np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)
     assert sorted(lengths) == [1.0] * 4 + [2.0] * 4 + [4.0] * 4
     assert np.abs(edges - pose[:3]) == pytest.approx(np.broadcast_to([2.0, 0.5, 1.0], (12, 2, 3)))
+
+
+# --- moved without a simulator -------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('name, in_contact', [
+    ('yard_bay', {'load_r01_t5'}), ('two_boxes', {'box_a_box_b'}),
+    ('spreader_container_stack', {'load_stack', 'load_neighbour', 'spreader_load'})])
+def test_the_driver_sets_boxes_down_on_their_partners(name, in_contact):
+    """One after the other, by some centimetres at most; in between nothing but riders touch."""
+    scene = read_scene(scene_source(name))
+    solver, moves, found = SceneSolver(scene, model='exact'), motions(scene), []
+    for time_ in np.arange(0.0, 2.0 * VISIT, 0.1):
+        answer = solver([moves[box](time_) for box in scene.moving])
+        assert all(contact.separation > -0.05 for _, contact in answer.touching)
+        found.append({pair.name for pair, _ in answer.touching})
+    assert in_contact <= set().union(*found)
+    assert len(set(map(frozenset, found))) > 1
+
+
+def test_riders_make_towers_and_towers_stand_apart():
+    """Of 23 boxes that all move and are all paired, none is deep in another."""
+    boxes = {f'b{n}': Box(f'b{n}', (2.0, 1.0, 0.5), pose_topic=f'b{n}/pose') for n in range(23)}
+    pairs = [(one, other) for one, other in itertools.combinations(boxes, 2)]
+    scene = Scene(boxes, tuple(Pair(n, f'p{n}', *pair) for n, pair in enumerate(pairs)))
+    solver, moves = SceneSolver(scene, model='exact'), motions(scene)
+    answers = [solver([moves[box](time_) for box in scene.moving])
+               for time_ in np.arange(0.0, VISIT, 0.5)]
+    assert all(contact.separation >= -DEPTH - 1e-9
+               for answer in answers for _, contact in answer.touching)
+    assert any(answer.touching for answer in answers)
+    assert max(moves[box](0.0)[2] for box in boxes) < 0.5 * TIERS + LIFT * TIERS
 
 
 # --- over DDS -------------------------------------------------------------------------------------
@@ -556,3 +598,37 @@ def test_the_page_in_a_browser(program):
         tab.wait_for('document.getElementById("model-status").innerText == "running: soup"')
         tab.click('land again')
         tab.wait_for('document.getElementById("verdict").innerText == "no contact"')
+
+
+@pytest.mark.timeout(600)
+@pytest.mark.skipif(chromium() is None, reason='no Chromium here: apt install chromium')
+def test_two_hundred_boxes_in_a_browser():
+    """All are drawn, of all contacts the ten deepest are listed; a silent box is named in grey."""
+    scene = stacks(100)
+    depths = np.linspace(0.001, 0.1, 100)
+    answer = SceneSolver(scene, model='exact')([None, *loads(100, depths)[1:]])
+    log = ViewLog(scene)
+    for name, pose in zip(scene.moving, loads(100, depths)):
+        log.pose(name, START - (name == 'load_0'), pose, 'yard')
+    log.cloud(START, cloud_of(answer), START + MS, 'yard')
+    page = Page('127.0.0.1', 8400)
+    try:
+        page.draw(log.snapshot(), np.zeros((0, 2, 3)))
+        page.show(log.snapshot(), log.figures(START + MS), model='exact', wish='', refusal='',
+                  connected=True)
+        with open_page(page.url) as tab:
+            tab.wait_for('document.getElementById("pairs")?.innerText == "99 of 199"', 400)
+            table = tab.text('deepest').split('\n')
+            assert [row.split('\t')[0] for row in table[1:1 + LISTED]] == [
+                f'load_{n}_s{n}' for n in range(99, 89, -1)]
+            assert table[1 + LISTED] == f'and {99 - LISTED} more'
+            assert tab.text('stale') == 'stale: load_0_s0, near_0'
+            assert all(text in tab.text('legend') for _, text in LEGEND)
+            deadline = time.monotonic() + 60.0
+            shares = [0.0]  # of pixels: some hundred of each
+            while min(shares) < 5e-4 and time.monotonic() < deadline:  # meshes come after the texts
+                picture = np.array(Image.open(io.BytesIO(tab.picture())).convert('RGB'), float)
+                shares = [near(picture[:, :800], colour, 0.1) for colour in (BOX_A, BOX_B, CONTACT)]
+            assert min(shares) > 5e-4, shares
+    finally:
+        page.close()

@@ -48,7 +48,7 @@ Motion = Callable[[float], np.ndarray]
 def motions(scene: Scene) -> dict[str, Motion]:
     """Return the motion of each moving box."""
     found: dict[str, Motion] = {}
-    tier_of: dict[str, int] = {}
+    tier_of: dict[str, int] = {}  # of boxes that can carry one more
     pitch = 1.2 * max(max(box.size[:2]) for box in scene.boxes.values())
     columns = math.ceil(math.sqrt(len(scene.moving)))
     partners: dict[str, list[str]] = {name: [] for name in scene.boxes}
@@ -59,10 +59,12 @@ def motions(scene: Scene) -> dict[str, Motion]:
     for number, name in enumerate(reversed(scene.moving)):
         size, phase = scene.boxes[name].size, GOLDEN * number
         fixed = [scene.boxes[other] for other in partners[name] if scene.boxes[other].pose]
-        carriers = [other for other in partners[name] if tier_of.get(other, TIERS) < TIERS - 1]
-        if carriers:
-            below = carriers[-1]
-            tier_of[name] = tier_of[below] + 1
+        free = [other for other in partners[name] if other in tier_of]
+        if free:
+            below = free[-1]
+            tier = tier_of.pop(below) + 1  # it carries no second box
+            if tier < TIERS - 1:
+                tier_of[name] = tier
             height = 0.5 * (size[2] + scene.boxes[below].size[2])
             found[name] = _riding(found[below], height, phase)
         elif fixed:
