@@ -1,0 +1,139 @@
+"""Make docs/figures/landing.gif: one landing from the side, with contact point, patch and forces.
+
+Run as `python docs/figures/make_landing_gif.py [--out FILE]`. The crane lands by the exact contact,
+offline, as `landing` does it. Tilt and gap are drawn larger, and the picture says so.
+"""
+from __future__ import annotations
+
+import argparse
+import io
+import math
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+
+matplotlib.use('Agg')
+
+import matplotlib.pyplot as plt
+import numpy as np
+from PIL import Image
+
+from box_contact_ros.apps.crane.landing import LandingRecord, land, landing_scenario, solvers
+from box_contact_ros.apps.crane.mujoco_crane import CraneScenario
+from box_contact_ros.apps.viewer.style import BOX_A, BOX_B, CONTACT, ROPE
+from box_contact_ros.scene.force.held_wrench import GRAVITY
+from box_contact_ros.scene.pose import rotation_matrix
+
+RATE = 200.0
+PICTURES = 12  # a second
+BEFORE, AFTER, STILL = 1.0, 2.0, 1.5  # s of the landing around the touch, and of its last picture
+TILT = 6.0
+"""Factor by which tilt and gap are drawn larger: 1.2 degrees would hardly be seen."""
+WIDTH, HEIGHT, DPI = 7.2, 4.0, 100
+COLOURS = {name: tuple(value / 255.0 for value in colour) for name, colour in (
+    ('load', BOX_A), ('stack', BOX_B), ('contact', CONTACT), ('rope', ROPE))}
+GREEN = (0.0, 0.45, 0.3)
+
+
+def side(scenario: CraneScenario, pose: np.ndarray) -> np.ndarray:
+    """Return the corners (4, 2) of the load, x and z, once around, its tilt drawn larger."""
+    length, _, height = scenario.size
+    pitch = TILT * math.asin(float(-rotation_matrix(pose[3:])[2, 0]))
+    turn = np.array([[math.cos(pitch), math.sin(pitch)], [-math.sin(pitch), math.cos(pitch)]])
+    corners = 0.5 * np.array([[-length, -height], [length, -height], [length, height],
+                              [-length, height]])
+    top = scenario.stack_size[2]
+    # The lowest corner keeps its height over the stack, drawn larger, too.
+    low = float((rotation_matrix(pose[3:]) @ (0.5 * _CORNERS * scenario.size).T)[2].min())
+    placed = corners @ turn.T
+    placed[:, 1] += top + TILT * (pose[2] + low - top) - placed[:, 1].min()
+    placed[:, 0] += pose[0]
+    return placed
+
+
+_CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+
+
+def draw(axes: Any, record: LandingRecord, tick: int, touched: int) -> None:
+    """Draw one tick: load, stack, ropes, contact, forces, and a line of words."""
+    scenario, pose = record.scenario, record.poses[tick]
+    length, height = scenario.stack_size[0], scenario.stack_size[2]
+    axes.set(xlim=(-10.4, 10.4), ylim=(-0.2, 10.4), aspect='equal')
+    axes.axis('off')
+    axes.axhline(0.0, color='0.75', linewidth=1)
+    axes.add_patch(plt.Rectangle((-0.5 * length, 0.0), length, height, facecolor=COLOURS['stack'],
+                                 edgecolor='black', alpha=0.75, linewidth=1))
+    load = side(scenario, pose)
+    slack = not record.tensions[tick].any()
+    for corner in (2, 3):
+        x, z = load[corner]
+        axes.plot([x, 0.85 * x], [z, 12.0], color=COLOURS['rope'], linewidth=1.6,
+                  linestyle=(0, (2, 2)) if slack else '-')
+    axes.fill(*load.T, facecolor=COLOURS['load'], edgecolor='black', alpha=0.75, linewidth=1)
+    left = 0.7 * load.mean(axis=0) + 0.3 * load[[0, 3]].mean(axis=0)
+    axes.text(*left, f'{scenario.mass / 1000:g} t', ha='center', va='center', fontsize=13)
+    axes.text(0.0, 0.5 * height, 'stack', ha='center', va='center', fontsize=13)
+    weight = scenario.mass * GRAVITY
+    contact = solvers(scenario, 'exact')[0](pose, scenario.stack_boxes[0][0])
+    carried = float(record.forces[tick][2])
+    if contact.colliding:
+        half = math.sqrt(3.0 * contact.covariance[0, 0])
+        x = float(contact.point[0])
+        # The patch has its moments' width, as far as the boxes reach.
+        reach = max(load[0, 0], -0.5 * length), min(load[1, 0], 0.5 * length)
+        axes.plot(np.clip([x - half, x + half], *reach), [height, height], linewidth=7,
+                  color=COLOURS['contact'], solid_capstyle='butt', alpha=0.55)
+        axes.plot(x, height, 'o', color=COLOURS['contact'], markersize=11, zorder=5)
+        _arrow(axes, x, height, 2.0 * carried / weight, COLOURS['contact'])
+    ropes = float(record.tensions[tick].sum())
+    _arrow(axes, float(load[:, 0].mean()), float(load[:, 1].max()), 2.0 * ropes / weight, GREEN)
+    words = ('the load hangs on its ropes' if tick < touched else
+             'it touches: one contact, its patch grows' if not slack else
+             'the patch carries the load, the ropes are slack')
+    axes.set_title(words, fontsize=15, pad=2)
+    axes.text(-10.3, 0.85, f't = {(tick - touched) / RATE:+.1f} s', fontsize=11)
+    axes.text(-10.3, 0.25, f'tilt, gap × {TILT:g}', fontsize=11)
+    for row, (text, value, colour) in enumerate((
+            ('ropes', ropes, GREEN), ('contact', carried, COLOURS['contact']))):
+        axes.text(6.35, 1.0 - 0.75 * row, f'{text}: {value / 1e3:.0f} kN', fontsize=11,
+                  color=colour)
+
+
+def _arrow(axes: Any, x: float, z: float, length: float, colour: tuple[float, ...]) -> None:
+    if length > 0.05:
+        axes.annotate('', (x, z + length), (x, z), zorder=6, arrowprops={
+            'color': colour, 'width': 5, 'headwidth': 15, 'headlength': 12, 'shrink': 0})
+
+
+def main() -> None:
+    """Land, draw, and write the GIF."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('--out', type=Path, default=Path(__file__).with_name('landing.gif'))
+    parser.add_argument('--picture', type=Path, help='folder for each picture, to look at')
+    options = parser.parse_args()
+    scenario = landing_scenario(pitch=1.2, roll=0.4, offset=(-0.15, 0.1))
+    record = land(scenario, solvers(scenario, 'exact'), rate_hz=RATE, latency=0.002)
+    touched = min(record.points)
+    ticks = np.arange(touched - BEFORE * RATE, touched + AFTER * RATE, RATE / PICTURES).astype(int)
+    pictures = []
+    for tick in ticks:
+        figure, axes = plt.subplots(figsize=(WIDTH, HEIGHT), dpi=DPI)
+        figure.subplots_adjust(left=0.01, right=0.99, bottom=0.01, top=0.91)
+        draw(axes, record, int(tick), touched)
+        file = io.BytesIO()
+        figure.savefig(file, format='png')
+        plt.close(figure)
+        pictures.append(Image.open(file).convert('RGB').quantize(64))
+    last = round(1000 * STILL)
+    pictures[0].save(options.out, save_all=True, append_images=pictures[1:], loop=0, optimize=True,
+                     duration=[1000 // PICTURES] * (len(pictures) - 1) + [last])
+    if options.picture:
+        options.picture.mkdir(exist_ok=True)
+        for number, picture in enumerate(pictures):
+            picture.convert('RGB').save(options.picture / f'{number:03d}.png')
+    print(f'{options.out}: {len(pictures)} pictures, {options.out.stat().st_size / 1e3:.0f} kB')
+
+
+if __name__ == '__main__':
+    main()
