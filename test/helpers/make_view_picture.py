@@ -28,7 +28,7 @@ def main() -> None:
          '--seed', str(SEED)], cwd=ROOT, stdout=subprocess.PIPE, text=True)
     try:
         url = re.search(r'http://\S+', view.stdout.readline()).group()
-        with open_page(url, 1280, 680) as tab:
+        with open_page(url, 1280, 780) as tab:
             # The page says that rendering in software is slow; that is no news here.
             tab.wait_for('!!document.querySelector(".mantine-Notification-closeButton")')
             tab.evaluate('document.querySelector(".mantine-Notification-closeButton").click()')

@@ -275,12 +275,23 @@ MUTANTS = {
         'apps/bench/answer_log.py', 'np.isnan(values[:7]).any()', 'np.isnan(values).any()',
         'test/apps/test_landing_ros.py -k say_nothing'),
     'an ellipse of NaN': Mutant(
-        'apps/viewer/style.py', 'known = np.isfinite(covariances).all(axis=(1, 2))',
-        'known = np.ones(len(covariances), dtype=bool)',
-        'test/apps/test_markers.py -k without_patch'),
+        'apps/viewer/style.py', 'return np.where(known[:, None, None], semi_axes, math.nan)',
+        'return semi_axes', 'test/apps/test_markers.py -k without_patch'),
     'roots of variances below zero': Mutant(
         'apps/viewer/style.py', 'np.maximum(variances[:, :0:-1], 0.0)', 'variances[:, :0:-1]',
         'test/apps/test_view.py -k of_a_line'),
+    'a box that sends turns grey': Mutant(
+        'apps/viewer/view_log.py', 'stale[ends[stamps == stamps.min(axis=0)]] = True',
+        'stale[ends] = True', 'test/apps/test_view.py -k of_two_moving'),
+    'errors by the poses of another tick': Mutant(
+        'apps/viewer/view_log.py', '> self.tolerance', '> 10**12',
+        'test/apps/test_view.py -k latest_pairing'),
+    'two boxes ride on one': Mutant(
+        'apps/viewer/scene_driver.py', 'tier_of.pop(below)', 'tier_of[below]',
+        'test/apps/test_view.py -k riders'),
+    'a point alone has no patch': Mutant(
+        'apps/crane/landing.py', 'if math.isfinite(touch.volume):', 'if True:',
+        'test/apps/test_landing.py -k whole_load'),
     'numbers of a pose not checked': Mutant(
         'node/message_bytes.py', 'and _LEAST < hypot(qx, qy, qz, qw) < _MOST):', '):',
         'test/node/test_faults.py -k half_of_the_poses'),
