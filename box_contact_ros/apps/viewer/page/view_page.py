@@ -76,7 +76,7 @@ class Page:
             axes=({'label': 'time [s]', 'size': 30, 'labelSize': 18},
                   {'label': 'separation [mm]', 'size': 56, 'labelSize': 18}),
             scales={'x': {'time': False}, 'y': {'range': {'min': CHART_LEAST, 'max': CHART_MOST}}},
-            legend={'show': False}, height=140)
+            legend={'show': False}, height=160)
 
     def _add_crane(self, run: CraneRun, on_land: Callable[[CraneRun], None]) -> None:
         gui = self._server.gui
