@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
@@ -313,6 +314,8 @@ def test_versions_agree() -> None:
     assert done.stdout.split() == [name, version]
     for file in ('CITATION.cff', 'msg_schemas/asyncapi.yaml'):
         assert f'version: {version}\n' in (ROOT / file).read_text('utf-8'), file
+    changelog = (ROOT / 'CHANGELOG.rst').read_text('utf-8')
+    assert re.search(rf'^{version} \(\d{{4}}-\d\d-\d\d\)\n-+\n', changelog, re.MULTILINE)
 
 
 def test_manifest_is_valid() -> None:

@@ -28,7 +28,7 @@ from box_contact_ros.node.contact_node import PARAMETERS
 from box_contact_ros.resources import resource_path
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGES = [ROOT / 'README.md', ROOT / 'CONTRIBUTING.md', ROOT / 'QUALITY_DECLARATION.md',
+PAGES = [*sorted(ROOT.glob('*.md'), key=lambda page: page.name != 'README.md'),
          *sorted((ROOT / 'docs').rglob('*.md'))]
 FENCE = re.compile(r'^```(\w*)\n(.*?)^```$', re.MULTILINE | re.DOTALL)
 
