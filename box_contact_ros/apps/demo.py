@@ -43,8 +43,8 @@ Next:
   {python} -m box_contact_ros contact_node --ros-args \\
           -p size_a:=[12.192,2.438,2.591] -p size_b:=[12.192,2.438,2.591]
       starts the node for your own box_a/pose, box_b/pose
-  README.md
-      topics, parameters, figures"""
+  docs/README.md
+      tutorials, topics, parameters, figures"""
 
 
 def _python() -> str:

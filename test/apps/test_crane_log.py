@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import io
 import math
+import sys
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from box_contact_ros.apps.crane.crane_log import CraneLog
+from box_contact_ros.apps.crane.crane_log import CraneLog, Screen, table
 
 MS = 1_000_000  # ns
 START = 1_700_000_000_000_000_000  # ns: stamps as large as real ones
@@ -186,3 +188,36 @@ def test_without_contacts_a_run_fails():
     assert len(summary.latencies) == 0
     assert not summary.passed
     assert 'nan' not in str(summary)
+
+
+# --- what people see ------------------------------------------------------------------------------
+
+
+def test_a_pipe_gets_plain_lines(capsys: pytest.CaptureFixture[str]) -> None:
+    """No colours, no progress line, and the lines as they are."""
+    screen = Screen('the crane moves', 25.0)
+    with screen:
+        screen.progress(7.0)
+        screen.line('7.00 s  first touch')
+    screen.tables('crane: done', table([('depth', '0.4 % (limit 1)')]))
+    assert capsys.readouterr().out == (
+        '7.00 s  first touch\ncrane: done\n  depth .................. 0.4 % (limit 1)\n')
+
+
+def test_a_terminal_gets_a_table(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With every figure, and those in red that do not meet their limit."""
+    class Terminal(io.StringIO):
+        def isatty(self) -> bool:
+            return True
+
+    monkeypatch.setattr(sys, 'stdout', Terminal())
+    monkeypatch.setenv('TERM', 'xterm-256color')
+    monkeypatch.delenv('NO_COLOR', raising=False)
+    screen = Screen('the crane moves', 25.0)
+    with screen:
+        screen.progress(7.0)
+        screen.line('7.00 s  first touch')
+    screen.tables('crane: done', table([('depth', '0.4 %'), ('gap', '30 mm  <-- not met')]))
+    shown = sys.stdout.getvalue()
+    assert '7 of 25 s' in shown and 'first touch' in shown and '│ depth │' in shown
+    assert '\x1b[31m30 mm  <-- not met' in shown and '\x1b[31m0.4' not in shown

@@ -1,10 +1,14 @@
 """What the crane sent, what came back, and how good it was, for people to read. No ROS."""
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from rich.progress import BarColumn, Progress, TextColumn
+from rich.table import Table
+from rich.text import Text
 
 from ...output import percentiles
 from ...solver.contact import Contacts
@@ -14,6 +18,54 @@ from ..bench.answer_log import AnswerLog, StreamResult
 def table(rows: list[tuple[str, str]]) -> str:
     """Return lines of names and values, dots between them."""
     return '\n'.join(f'  {name + " ":.<24} {value}' for name, value in rows)
+
+
+class Screen:
+    """Lines and tables for people: in colour, with a progress line, on a terminal; plain elsewhere.
+
+    Used as a context: it shows the progress line until its end.
+    """
+
+    def __init__(self, what: str, seconds: float) -> None:
+        """Say what takes how long [s]."""
+        self._bar: Progress | None = None
+        if sys.stdout.isatty():
+            self._bar = Progress(TextColumn(what), BarColumn(), TextColumn(
+                '{task.completed:.0f} of {task.total:.0f} s'), transient=True)
+            self._bar.add_task(what, total=seconds)
+
+    def __enter__(self) -> Screen:
+        if self._bar:
+            self._bar.start()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        if self._bar:
+            self._bar.stop()
+
+    def progress(self, seconds: float) -> None:
+        """Show how much is done [s]."""
+        if self._bar:
+            self._bar.update(self._bar.task_ids[0], completed=seconds)
+
+    def line(self, text: str) -> None:
+        """Print a line; a reader of a pipe wants it live as well."""
+        if self._bar:
+            self._bar.console.print(text, highlight=False, markup=False)
+        else:
+            print(text, flush=True)
+
+    def tables(self, title: str, *tables: object) -> None:
+        """Print texts that `table` made, below a title."""
+        if not self._bar:
+            print(title, *tables, sep='\n', flush=True)
+            return
+        shown = Table(title=title, title_justify='left', show_header=False)
+        for line in '\n'.join(map(str, tables)).splitlines():
+            name, _, value = line.strip().partition(' .')
+            colour = 'red' if 'not met' in value or 'NOT' in value else 'default'
+            shown.add_row(name, Text(value.lstrip('. '), colour))
+        self._bar.console.print(shown)
 
 
 class ContactReference(Protocol):
@@ -36,6 +88,11 @@ class CraneLog(AnswerLog):
         """Note poses (7,) under their stamp [ns] BEFORE they are published: answers may be fast."""
         self._poses.append((np.array(pose_a), np.array(pose_b)))
         self.sent(stamp)
+
+    @property
+    def sent_pairs(self) -> int:
+        """Pairs of poses sent so far."""
+        return len(self._poses)
 
     def summary(self, solver: ContactReference, edge: float) -> CraneSummary | None:
         """Compare the answers with a reference; None if nothing was sent.

@@ -15,6 +15,7 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 from typing import Any
 
 import numpy as np
@@ -41,7 +42,7 @@ from ..ros_client import (
 )
 from ..viewer.style import ROPE
 from .crane_feedback import CraneFeedback
-from .crane_log import CraneLog, CraneSummary
+from .crane_log import CraneLog, CraneSummary, Screen
 from .crane_parameters import PARAMETERS, scenario_from
 from .landing import LandingResult, Progress
 from .mujoco_crane import Crane
@@ -181,7 +182,8 @@ class CraneNode(Node):
         self.log.answer('cloud', stamp, received, values)
 
 
-def receive_while(node: CraneNode, executor: Any, work: Callable[[], None]) -> None:
+def receive_while(node: CraneNode, executor: Any, work: Callable[[], None],
+                  screen: Screen | None = None) -> None:
     """Receive while `work` runs in a thread of its own; raise what it raises."""
     progress = Progress(node.feedback.record) if node.report and node.feedback else None
     with ThreadPoolExecutor(max_workers=1) as pool:
@@ -191,18 +193,21 @@ def receive_while(node: CraneNode, executor: Any, work: Callable[[], None]) -> N
                 executor.spin_once(timeout_sec=0.05)
                 if not node.context.ok():  # SIGTERM; the executor may return without a word
                     raise ExternalShutdownException
-                for line in progress.lines() if progress else ():
-                    print(line, flush=True)  # a reader of a pipe wants it live as well
+                if screen:
+                    screen.progress(node.log.sent_pairs / node.rate)
+                    for line in progress.lines() if progress else ():
+                        screen.line(line)
         except BaseException:
             node.stop.set()
             raise
     future.result()
 
 
-def fly(node: CraneNode, executor: Any) -> None:
+def fly(node: CraneNode, executor: Any, screen: Screen | None = None) -> None:
     """Run the whole motion, as soon as somebody answers."""
     receive_while(node, executor, node.await_answers)
-    receive_while(node, executor, node.lower)
+    with screen or nullcontext():
+        receive_while(node, executor, node.lower, screen)
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -212,7 +217,8 @@ def main(args: Sequence[str] | None = None) -> int:
     try:
         # Handlers have to be asked for where the context is not the default one.
         with joined(CraneNode, args, signals=SignalHandlerOptions.ALL) as (node, executor):
-            fly(node, executor)
+            screen = Screen('the crane moves', node.scenario.duration)
+            fly(node, executor, screen)
     except KeyboardInterrupt:
         signalled = 130  # 128 + SIGINT, as shells report it
     except ExternalShutdownException:
@@ -223,10 +229,9 @@ def main(args: Sequence[str] | None = None) -> int:
     summary, landing = (node.summary(), node.landing()) if node else (None, None)
     if node is None or summary is None:
         return signalled
-    print(f'crane: {"interrupted" if signalled else "done"} after '
-          f'{summary.result.sent / node.rate:g} s of motion at {node.rate:g} Hz\n{summary}',
-          flush=True)
-    if landing:
-        print(landing, flush=True)
+    screen.tables(
+        f'crane: {"interrupted" if signalled else "done"} after '
+        f'{summary.result.sent / node.rate:g} s of motion at {node.rate:g} Hz',
+        *filter(None, (summary, landing)))
     passed = summary.passed and (landing is None or landing.carried)
     return signalled or (0 if passed else 1)
