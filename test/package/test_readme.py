@@ -184,7 +184,7 @@ def example(words: list[str], **_) -> None:
 
 
 def built(words: list[str], **_) -> None:
-    """Build with the flags of `test_cpp_example`, in the clone."""
+    """Build with the flags of `test_cpp_examples`, in the clone."""
     if words[0] == 'g++':
         assert {'-std=c++17', '-ffp-contract=off', '-Wno-psabi', '-I.'} <= set(words)
     if words[0] == 'ln':
@@ -337,17 +337,22 @@ def test_the_readme_is_short():
     assert len((ROOT / 'README.md').read_text('utf-8').splitlines()) <= 150
 
 
-@pytest.mark.parametrize('text', [text for _, _, text in blocks('cpp')])
-def test_cpp_example(text, tmp_path):
-    """It compiles, and prints what the comments behind its prints say."""
+def test_cpp_examples(tmp_path):
+    """They compile, as one program to save time, and print what the comments say."""
     if not shutil.which('g++'):
         pytest.skip('g++ is not installed')
+    texts = [text for _, _, text in blocks('cpp')]
+    names = [f'example_{number}' for number in range(len(texts))]
+    program = [text.replace('int main()', f'int {name}()', 1).rstrip().removesuffix('}')
+               + '  return 0;\n}' for name, text in zip(names, texts)]
+    calls = ' '.join(f'{name}();' for name in names)
+    (tmp_path / 'examples.cpp').write_text('\n'.join([*program, f'int main() {{ {calls} }}']))
     (tmp_path / 'box_contact').symlink_to(ROOT / 'box_contact_ros' / 'core')
-    (tmp_path / 'example.cpp').write_text(text, 'utf-8')
     run('g++', '-std=c++17', '-ffp-contract=off', '-Wno-psabi', f'-I{tmp_path}',
-        str(tmp_path / 'example.cpp'), '-o', str(tmp_path / 'example'))
-    assert run(str(tmp_path / 'example')).splitlines() == re.findall(
-        r'printf\(.*\);  // (.*)$', text, re.MULTILINE)
+        str(tmp_path / 'examples.cpp'), '-o', str(tmp_path / 'examples'))
+    assert run(str(tmp_path / 'examples')).splitlines() == [
+        line for text in texts
+        for line in re.findall(r'printf\(.*\);  // (.*)$', text, re.MULTILINE)]
 
 
 def test_pages_build_without_a_warning(tmp_path):
