@@ -9,7 +9,10 @@ set -euo pipefail
 
 checkout=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 suite=$1
-commands=${2:-$(awk '/^```bash/ {inside = 1; next} /^```/ && inside {exit} inside' "$checkout/README.md")}
+commands=$(awk '/^```bash/ {inside = 1; next} /^```/ && inside {exit} inside' "$checkout/README.md")
+if [ -n "${2-}" ]; then
+    commands=$(head -n 1 <<<"$commands")$'\n'"cd box_contact_ros && $2"
+fi
 
 fail() {
     echo "error: $1" >&2
@@ -34,7 +37,7 @@ debootstrap --variant=minbase --include=ca-certificates "$suite" "$debian" "$mir
 # A network may have its own names and certificates.
 cp /etc/resolv.conf /etc/hosts "$debian/etc/"
 cp /etc/ssl/certs/ca-certificates.crt "$debian/etc/ssl/certs/"
-git -c safe.directory='*' clone --quiet "$checkout" "$debian/home/newcomer/box_contact_ros"
+git -c safe.directory='*' clone --quiet "$checkout" "$debian/home/newcomer/REPOSITORY"
 
 inside=$(cat <<'INSIDE'
 mount -t proc proc "$debian/proc"
@@ -49,7 +52,7 @@ settings=$(env | grep -E '^(PIP_|https?_proxy=)' | grep -v '^PIP_FIND_LINKS=' ||
 readarray -t settings <<<"$settings"
 chroot --userspec newcomer "$debian" env -i HOME=/home/newcomer USER=newcomer LANG=C.UTF-8 \
     PATH=/usr/local/bin:/usr/bin:/bin ${settings[0]:+"${settings[@]}"} bash -euo pipefail -c '
-    cd ~/box_contact_ros
+    cd
     . /etc/os-release
     echo "$PRETTY_NAME, $(python3 --version), $(nproc) processors, as $(id -un)"
     while read -r command; do
