@@ -69,7 +69,7 @@ PROGRAMS = {
         'write poses and contacts of running nodes to a bag (MCAP) for Foxglove and ros2 bag'),
     'soak': _program(
         'apps.bench.soak', 'ros sim report',
-        'ten minutes at 1 kHz: losses, mispairs, memory, latency beside echo nodes'),
+        'ten minutes at 1 kHz: losses, mispairs, memory, latency next to echo nodes'),
     'train': _program(
         'training.train', 'train',
         'make the data sets, fit the networks, write weights/'),
@@ -81,7 +81,7 @@ PROGRAMS = {
         'point error of a model against the exact one, per set of poses and contact class'),
     'frontier': _program(
         'reports.frontier.frontier', 'report',
-        'speed against error of every model and of the engines beside them, as table and picture'),
+        'speed against error of every model and of other engines, as table and picture'),
     'fuzz': _program(
         'verification.fuzz', 'report fuzz',
         'millions of random pairs, judged by an independent test; gates at zero'),
@@ -93,7 +93,7 @@ PROGRAMS = {
         'whether a load comes to rest by each way of contact and force, as table and picture'),
     'paper': _program(
         'reports.paper.paper_tables', 'report',
-        "redo the source paper's tables, its figures beside ours"),
+        "redo the source paper's tables, with its figures and ours"),
     'reports': _program(
         'reports.remake.remake', 'ros sim soup train report fuzz peers',
         'remake every table and picture of docs/results, with the programs above'),

@@ -68,20 +68,20 @@ LONGEST = 1e6  # s, about twelve days
 PARAMETERS = {
     'size_a': Setting(CONTAINER, 'full extents of box A, three numbers > 0 [m]', size),
     'size_b': Setting(CONTAINER, 'full extents of box B, three numbers > 0 [m]', size),
-    'scene': Setting('', 'scene file (or the scene itself, as text) with boxes and pairs; replaces '
-                         'size_a and size_b; set again, it is read again', scene_source),
+    'scene': Setting('', 'scene file, or the scene itself as text, with boxes and pairs; replaces '
+                         'size_a and size_b; setting it again reads it again', scene_source),
     'model': Setting('mlp', f'how the contact point is found: {model_names()}', model),
-    'weights': Setting('', 'weights file to use in place of the shipped one', text),
+    'weights': Setting('', 'weights file to use instead of the shipped one', text),
     'pairing': Setting('stamp', 'stamp: answer once, when poses of equal stamp are in; latest: '
                                 "answer every pose with the other boxes' last", one_of(PAIRINGS)),
     'tolerance': Setting(0.0, 'with pairing stamp: stamps this far apart still belong together [s]',
                          number(0.0, LONGEST)),
-    'max_age': Setting(1.0, 'a pose further than this from the tick, by their stamps, is stale: '
-                            'its pairs are answered with NaN; longer than the slowest '
+    'max_age': Setting(1.0, 'a pose that is older than this at its tick, by the stamps, is '
+                            'stale: its pairs are answered with NaN; longer than the slowest '
                             'period; 0: never [s]', number(0.0, LONGEST)),
-    'deadline': Setting(0.0, 'quality of service asked of pose publishers, who must offer as much: '
-                             'longest time between poses; 0: none [s]', number(0.0, LONGEST)),
-    'pair_topics': Setting(True, 'whether pairs have topics of their own beside the cloud', flag),
+    'deadline': Setting(0.0, 'quality of service that pose publishers must offer: longest time '
+                             'between poses; 0: none [s]', number(0.0, LONGEST)),
+    'pair_topics': Setting(True, 'whether pairs have topics of their own next to the cloud', flag),
     'serialization': Setting('raw', 'raw: read and write the bytes of messages; typed: message '
                                     'objects, slower, the reference', one_of(SERIALIZATIONS)),
     'autostart': Setting(True, 'whether the node configures and activates itself', flag,

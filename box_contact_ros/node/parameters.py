@@ -125,7 +125,7 @@ def _say_unknown(node: Node, settings: Mapping[str, Setting]) -> None:
         # Those of topics are declared with the topics.
         if not node.has_parameter(name) and not name.startswith('qos_overrides.'):
             near = ' or '.join(get_close_matches(name, settings))
-            node.get_logger().warning(f'there is no parameter {shown(name)}, its value is ignored'
+            node.get_logger().warning(f'unknown parameter {shown(name)} is ignored'
                                       + (f' (did you mean {near}?)' if near else ''))
 
 

@@ -98,7 +98,7 @@ def _options(args: Sequence[str]) -> argparse.Namespace:
     parser.add_argument('--divisions', type=within(1, MOST_SOUP_DIVISIONS), default=SOUP_DIVISIONS,
                         metavar='N', help='of an edge in the polygon soup (default: %(default)s)')
     parser.add_argument('--side-by-side', action='store_true',
-                        help='one input for all nodes at the same time, as they would run beside a '
+                        help='one input for all nodes at the same time, as they would run next to a '
                              'simulator; they then compete for cores, and the floor with them '
                              '(default: each stream goes to one node after the other)')
     parser.add_argument('--out', type=Path, default=Path('bench-results'), metavar='FOLDER',
@@ -127,7 +127,7 @@ def _add_source(parser: argparse.ArgumentParser) -> None:
     source.add_argument('--streams', nargs='+', choices=STREAMS, default=list(STREAMS),
                         metavar='NAME', help='which of the streams below (default: all)')
     source.add_argument('--replay', type=Path, metavar='BAG',
-                        help='a recording in place of the streams: the folder of a rosbag2 bag, or '
+                        help='a recording instead of the streams: the folder of a rosbag2 bag, or '
                              'an .mcap file')
     for box in 'ab':
         parser.add_argument(f'--topic-{box}', default=f'box_{box}/pose', metavar='NAME',

@@ -250,7 +250,7 @@ def _options(args: Sequence[str]) -> argparse.Namespace:
         prog='view', description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog='What follows --ros-args is for the view itself; with --attach, -r remaps topics.')
     parser.add_argument('--host', default='127.0.0.1',
-                        help='address to serve at; whoever reaches it can change the model '
+                        help='address to serve at; everybody who reaches it can change the model '
                              '(default: %(default)s)')
     parser.add_argument('--port', type=within(1, 65535), default=8080,
                         help='to serve at, or the next that is free (default: %(default)s)')

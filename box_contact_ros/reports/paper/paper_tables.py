@@ -232,14 +232,14 @@ def report(tables: Collection[int], drawn: Collection[int], *, quick: bool = Fal
 def main(args: Sequence[str] | None = None) -> int:
     """Print the page, or write it to a file, with pictures in the same folder."""
     parser = argparse.ArgumentParser(
-        description="The source paper's Tables 1 to 4 and Figures 9 and 10 beside ours, as "
+        description="The source paper's Tables 1 to 4 and Figures 9 and 10, and ours, as "
         'Markdown. All of them, unless some are chosen.')
     parser.add_argument('--table', type=int, action='append', choices=TABLES,
                         help='only this table; may be given several times')
     parser.add_argument('--figure', type=int, action='append', choices=FIGURES,
                         help='only this figure; may be given several times')
     parser.add_argument('--out', type=Path,
-                        help='file to write; pictures and paper_soup.csv go beside it (default: '
+                        help='file to write; pictures and paper_soup.csv go to the same folder (default: '
                         'print; pictures asked for by --figure go to the current folder)')
     parser.add_argument('--quick', action='store_true',
                         help=f'look at every {QUICK}th pattern only, and at fewer for the soup')
