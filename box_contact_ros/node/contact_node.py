@@ -87,8 +87,8 @@ PARAMETERS = {
     'autostart': Setting(True, 'whether the node configures and activates itself', flag,
                          fixed=True),
     'files_from': Setting('.', "directories, with ':' between them, below which `scene` and "
-                               "`weights` may name files while the node runs, beside the package's "
-                               'own', text, fixed=True),
+                               '`weights` may name files while the node runs, next to the '
+                               "package's own", text, fixed=True),
     'locked': Setting(False, 'whether all parameters and states stay as they are after the start',
                       flag, fixed=True),
 }

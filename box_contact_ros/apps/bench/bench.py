@@ -98,8 +98,8 @@ def _options(args: Sequence[str]) -> argparse.Namespace:
     parser.add_argument('--divisions', type=within(1, MOST_SOUP_DIVISIONS), default=SOUP_DIVISIONS,
                         metavar='N', help='of an edge in the polygon soup (default: %(default)s)')
     parser.add_argument('--side-by-side', action='store_true',
-                        help='one input for all nodes at the same time, as they would run next to a '
-                             'simulator; they then compete for cores, and the floor with them '
+                        help='one input for all nodes at the same time, as they would run next to '
+                             'a simulator; they then compete for cores, and the floor with them '
                              '(default: each stream goes to one node after the other)')
     parser.add_argument('--out', type=Path, default=Path('bench-results'), metavar='FOLDER',
                         help='for bench.csv, bench.md, bench.png (default: %(default)s/)')

@@ -239,8 +239,8 @@ def main(args: Sequence[str] | None = None) -> int:
     parser.add_argument('--figure', type=int, action='append', choices=FIGURES,
                         help='only this figure; may be given several times')
     parser.add_argument('--out', type=Path,
-                        help='file to write; pictures and paper_soup.csv go to the same folder (default: '
-                        'print; pictures asked for by --figure go to the current folder)')
+                        help='file to write; pictures and paper_soup.csv go to the same folder '
+                        '(default: print; pictures asked for by --figure go to the current folder)')
     parser.add_argument('--quick', action='store_true',
                         help=f'look at every {QUICK}th pattern only, and at fewer for the soup')
     options = parser.parse_args(args)
