@@ -22,6 +22,7 @@ source_suffix = {'.md': 'markdown'}
 root_doc = 'README'
 exclude_patterns = ['figures']
 html_theme = 'sphinx_rtd_theme'
+html_static_path, html_css_files = ['_static'], ['tables.css']
 html_theme_options = {'navigation_depth': 2}
 html_show_sphinx = html_show_copyright = html_copy_source = False
 
@@ -40,8 +41,10 @@ linkcheck_timeout = 20
 def contents(app: Sphinx, page: str, source: list[str]) -> None:
     """Append a hidden table of contents to the index of a folder, and to pages that link below."""
     folder, _, name = page.rpartition('/')
-    linked = [link for link in re.findall(r'\]\(([\w/.-]+)\.md\)', source[0])
-              if '/' in link.removeprefix('../') or name == 'README']
+    linked = re.findall(r'\]\(([\w/.-]+)\.md\)', source[0])
+    # An index has its own pages and the indexes below; another page what lies below it.
+    linked = [link for link in linked if ('/' not in link or link.endswith('/README')
+                                          if name == 'README' else '/' in link)]
     if name == 'README':
         linked += sorted(path.stem for path in (DOCS / folder).glob('*.md') if path.stem != name)
     below = [link for link in dict.fromkeys(linked)

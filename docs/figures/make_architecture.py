@@ -13,7 +13,7 @@ from pathlib import Path
 PACKAGE = Path(__file__).resolve().parents[2] / 'box_contact_ros'
 PLACES = {  # column and row of a folder's box, and what it is for
     'reports': (1, 0, 'what writes docs/results'),
-    'verification': (0, 2, 'hard poses, judge, fuzz'), 'training': (1, 1, 'weights of the MLP'),
+    'verification': (0, 1, 'hard poses, judge, fuzz'), 'training': (1, 1, 'weights of the MLP'),
     'apps': (2, 1, 'crane, view, record, bench'), 'baselines': (1, 2, 'what we compare with'),
     'node': (2, 2, 'all rclpy of the product'), 'scene': (1, 3, 'boxes, pairs, ticks, forces'),
     'solver': (1, 4, 'ContactSolver, models'), 'core': (1, 5, 'poses → contact, C++17')}
@@ -57,8 +57,15 @@ def drawing() -> str:
              '</defs>', f'<rect width="{width:g}" height="{height:g}" fill="white"/>']
     for name, other in arrows():
         (x1, y1), (x2, y2) = middle[name], middle[other]
-        lines.append(f'<line x1="{x1:g}" y1="{y1 + HEIGHT / 2:g}" x2="{x2:g}" '
-                     f'y2="{y2 - HEIGHT / 2:g}" stroke="#555" marker-end="url(#head)"/>')
+        aside = WIDTH / 2 if x2 > x1 else -WIDTH / 2
+        if PLACES[name][0] == 1 and x1 != x2:  # from the middle column to the side
+            x1, y2 = x1 + aside, y2 - HEIGHT / 2
+        elif x1 != x2:
+            x2, y1 = x2 - aside, y1 + HEIGHT / 2
+        else:
+            y1, y2 = y1 + HEIGHT / 2, y2 - HEIGHT / 2
+        lines.append(f'<line x1="{x1:g}" y1="{y1:g}" x2="{x2:g}" y2="{y2:g}" stroke="#555" '
+                     'marker-end="url(#head)"/>')
     for name, (x, y) in middle.items():
         lines += [f'<rect x="{x - WIDTH / 2:g}" y="{y - HEIGHT / 2:g}" width="{WIDTH}" '
                   f'height="{HEIGHT}" rx="6" fill="#e8eef5" stroke="#4477aa"/>',
