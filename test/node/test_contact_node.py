@@ -156,7 +156,7 @@ def test_parameters_are_checked_before_they_are_applied(node, client):
                                ('size_a', 'big', 'size_a must be 3 finite numbers'),
                                ('model', 'exakt', "model 'exakt' is not one of"),
                                ('model', 7, 'model must be a string'),
-                               ('weights', '/nowhere.safetensors', None),
+                               ('weights', 'nowhere.safetensors', None),
                                ('pairing', 'first', "pairing 'first' is not one of")):
         result, = node.set_parameters([Parameter(name, value=value)])
         if words is None:  # model 'exact' reads no weights
