@@ -45,7 +45,9 @@ mount --rbind /dev "$debian/dev"
 mount -t tmpfs tmpfs "$debian/dev/shm"
 chroot "$debian" bash -euo pipefail -c '
     export DEBIAN_FRONTEND=noninteractive
-    { apt-get update && apt-get install -y git make g++ python3-dev python3-venv; } >/var/log/newcomer
+    # A mirror may be weeks behind.
+    apt-get -o Acquire::Check-Valid-Until=false update >/var/log/newcomer
+    apt-get install -y git make g++ python3-dev python3-venv >>/var/log/newcomer
     useradd --create-home --shell /bin/bash newcomer 2>/dev/null
     chown -R newcomer: /home/newcomer'
 settings=$(env | grep -E '^(PIP_|https?_proxy=)' | grep -v '^PIP_FIND_LINKS=' || true)
