@@ -164,7 +164,8 @@ def launch(words: list[str], **_) -> None:
     """Check that the file exists and declares the arguments; `launch` has no wheel to run it."""
     assert words[2] == 'box_contact_ros'
     text = (ROOT / 'launch' / words[3]).read_text('utf-8')
-    assert all(f"'{word.partition(':=')[0]}'" in text for word in words[4:])
+    names = [word.partition(':=')[0] for word in words[4:]]
+    assert all(f"'{name}'" in text or 'PARAMETERS' in text and name in PARAMETERS for name in names)
 
 
 def colcon(words: list[str], **_) -> None:
