@@ -59,10 +59,10 @@ def run_of(exact: float, batches: list[float], unit: float | None = 1000.0) -> l
 
 
 @pytest.mark.parametrize(('timings', 'best', 'expected'), [
-    (run_of(350.0, [100.0, 110.0, 120.0]), True, [True, True, True]),
-    (run_of(370.0, [100.0, 110.0, 120.0]), True, [False, True, True]),
-    (run_of(370.0, [100.0, 110.0, 120.0]), False, [True, True]),
-    (run_of(350.0, [115.0, 120.0, 126.0]), True, [True, False, True]),
+    (run_of(480.0, [140.0, 150.0, 160.0]), True, [True, True, True]),
+    (run_of(490.0, [100.0, 110.0, 120.0]), True, [False, True, True]),
+    (run_of(490.0, [100.0, 110.0, 120.0]), False, [True, True]),
+    (run_of(480.0, [155.0, 160.0, 169.0]), True, [True, False, True]),
     (run_of(350.0, [70.0, 80.0, 100.0]), True, [True, True, False]),
     (run_of(350.0, [100.0, 110.0, 120.0], unit=None), True, [False, False, True]),
 ])

@@ -46,6 +46,8 @@ REPORTS = (
     Report(name='accuracy', minutes=3.0, alone=False, arguments=('accuracy', '--out', OUT)),
     Report(name='stability', minutes=1.0, alone=False, arguments=('stability', '--out', OUT),
            quick=('--families', 'A')),
+    Report(name='named', minutes=1.0, alone=False, arguments=('stability', '--named'), quick=(
+        '--out', OUT)),
     Report(name='fuzz', minutes=2.0, arguments=('fuzz', '--pairs', '1000000',
                                                 '--out', f'{OUT}/fuzz.csv')),
     Report(name='landing', minutes=12.0, arguments=('landing', '--out', OUT)),
@@ -60,8 +62,8 @@ REPORTS = (
 
 def run(report: Report, folder: Path, log: Path, *, quick: bool) -> tuple[Report, int]:
     """Run a report, its output in a log file; return it with its exit status."""
-    words = [word.replace(OUT, str(folder)) for word in report.arguments]
-    words += report.quick if quick else ()
+    words = [word.replace(OUT, str(folder))
+             for word in (*report.arguments, *(report.quick if quick else ()))]
     with log.open('w') as output:
         done = subprocess.run([sys.executable, '-m', 'box_contact_ros', *words], stdout=output,
                               stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, check=False)
