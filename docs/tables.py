@@ -81,7 +81,40 @@ def mlp_errors() -> str:
                            'covariance: mean', 'p99'], body)
 
 
-TABLES = {'models': models, 'mlp-errors': mlp_errors}
+def network() -> str:
+    """Return what a pair costs with `mlp` and `exact`: in contact, apart, by instruction set."""
+    body = []
+    for one in dict.fromkeys(row['instruction_set'] for row in rows('frontier.csv')):
+        for name in ('mlp', 'exact'):
+            found = {row['set']: row for row in rows('frontier.csv', contestant=name,
+                                                     instruction_set=one, **{'class': 'all'})}
+            touching = [row for kind, row in found.items() if kind in SETS]
+            batch, call = ([float(row[column]) for row in touching]
+                           for column in ('batch_p50', 'call_p50'))
+            apart = found['just apart']
+            body.append([f'`{name}`, {one}', f'{min(batch):.0f}–{max(batch):.0f}',
+                         cell(apart, 'batch_p50'), f'{min(call) / 1e3:.2f}–{max(call) / 1e3:.2f}',
+                         cell(apart, 'call_p50', 1e-3)])
+    return markdown_table(['', 'batch [ns a pair], in contact', 'just apart',
+                           'single call [µs], in contact', 'just apart'], body)
+
+
+def sizes() -> str:
+    """Return cost and error of each size and description of the network, on stacks."""
+    names = {'mlp 8': 'slab, 8 units', 'mlp': 'slab, 20 units, shipped as `mlp`',
+             'mlp 32': 'slab, 32 units', 'mlp edges 8': '24 edges, 8 units, point alone',
+             'mlp edges 32': '24 edges, 32 units, point alone',
+             'mlp edges 64': '24 edges, 64 units, point alone', 'exact': '`exact`'}
+    best = rows('frontier.csv', contestant='mlp')[0]['instruction_set']
+    body = [[words, cell(row, 'batch_p50'), cell(row, 'call_p50', 1e-3), cell(row, 'point_p99')]
+            for name, words in names.items()
+            for row in rows('frontier.csv', contestant=name, set='stacks', instruction_set=best,
+                            **{'class': 'all'})]
+    return markdown_table(['description, size', 'batch [ns a pair]', 'single call [µs]',
+                           'p99 point error [%]'], body)
+
+
+TABLES = {'models': models, 'mlp-errors': mlp_errors, 'network': network, 'sizes': sizes}
 
 
 def filled(text: str) -> str:
