@@ -137,15 +137,6 @@ def _cloud_layout(fields: tuple[tuple[str, int, int, int], ...], step: int, big:
         'formats': [CLOUD_ROW[name].newbyteorder('>' if big else '<') for name in names]})
 
 
-OTHER_SCENE = ('the contacts are those of a scene with other pairs than the default one: not '
-               'drawn, only two boxes are')
-
-
-def is_of_two_boxes(rows: np.ndarray) -> bool:
-    """Whether rows of a cloud may be those of the default scene, which has pair 0 alone."""
-    return len(rows) <= 1 and not rows['pair'].any()
-
-
 class TypedMessages:
     """The reference: messages as rclpy's objects."""
 
