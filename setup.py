@@ -115,7 +115,7 @@ setup(
     version='0.1.0',
     description='ROS 2 node that answers, for every pair of box poses, with one contact point and '
     'one normal: exact separating-axis test, then a small neural network',
-    long_description=Path(__file__).with_name('README.md').read_text('utf-8'),
+    long_description=Path(__file__).resolve().with_name('README.md').read_text('utf-8'),
     long_description_content_type='text/markdown',
     maintainer='The box_contact_ros maintainers',
     maintainer_email='maintainers@box-contact-ros.org',

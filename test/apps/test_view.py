@@ -22,7 +22,6 @@ from visualization_msgs.msg import MarkerArray
 pytest.importorskip('viser')
 pytest.importorskip('mujoco')
 
-from box_contact_ros.scene.scene_file import read_scene
 from browser import chromium, open_page
 from PIL import Image
 
@@ -53,6 +52,7 @@ from box_contact_ros.node.messages import (
     make_header,
     read_cloud,
 )
+from box_contact_ros.scene.files.scene_file import read_scene
 from box_contact_ros.scene.pose import rotation_matrix
 from box_contact_ros.scene.scene_solver import Box, Pair, Scene, SceneSolver, two_boxes
 

@@ -264,8 +264,9 @@ def examples() -> Iterator[object]:
 
 
 @pytest.mark.parametrize(('text', 'lines'), list(examples()))
-def test_python_example(text, lines, program):
+def test_python_example(text, lines, program, tmp_path, monkeypatch):
     """It runs, next to a node if a client, and prints what the page says."""
+    monkeypatch.chdir(tmp_path)  # some write files
     if 'rclpy' in text:
         program('contact_node', '--ros-args', '-p', 'model:=exact').wait_for_output('ready', 120)
     with contextlib.redirect_stdout(io.StringIO()) as printed:

@@ -21,8 +21,9 @@ from ...node.messages import make_header
 from ...node.runtime import CONTACT_QOS, REFUSALS, run_node
 from ...scene.files.scene_file import read_scene
 from ...scene.pose import quaternion_multiply, rotation_matrix
-from ...scene.scene_solver import Scene
+from ...scene.scene_solver import Box, Scene
 from ...solver.arguments import within
+from ...solver.contact_solver import ContactSolver
 from ..ros_client import pose_message, scene_source
 
 VISIT = 8.0
@@ -69,13 +70,24 @@ def motions(scene: Scene) -> dict[str, Motion]:
             found[name] = _riding(found[below], height, phase)
         elif fixed:
             tier_of[name] = 0
-            places = np.array([_on_top(box.pose, box.size, size) for box in fixed])
-            found[name] = _visiting(places, phase, 0.1 * size[1])
+            found[name] = _visiting(_free_places(fixed, size), phase, 0.1 * size[1])
         else:
             tier_of[name] = 0
             row, column = divmod(number, columns)
             found[name] = _standing(pitch * column, pitch * row, 0.5 * size[2])
     return found
+
+
+def _free_places(fixed: Sequence[Box], size: Sequence[float]) -> np.ndarray:
+    """Return the centres (n, 3) of a box on fixed ones, but for those that others cover."""
+    places = np.array([_on_top(box.pose, box.size, size) for box in fixed])
+    count = len(fixed)
+    poses = np.repeat(np.hstack([places, np.tile([0.0, 0.0, 0.0, 1.0], (count, 1))]), count, axis=0)
+    sizes = np.tile([box.size for box in fixed], (count, 1))
+    found = ContactSolver(size, size, model='exact').batch(
+        poses, np.tile([box.pose for box in fixed], (count, 1)), size_b=sizes)
+    free = (found.separation > -DEPTH).reshape(count, count).all(axis=1)
+    return places[free] if free.any() else places
 
 
 def _on_top(pose: Sequence[float] | None, below: Sequence[float], size: Sequence[float],
