@@ -37,6 +37,7 @@ help:
 	echo 'make test-debian13  the first two commands of the README on a fresh Debian 13 (root)'
 	echo 'make dist     wheel and source distribution in dist/, both installed and tried'
 	echo 'make coverage lines of solver, scenes and nodes that their tests run'
+	echo 'make reports  every table and picture of docs, in 45 minutes'
 	echo 'make docs     the documentation as HTML: build/docs/README.html'
 	echo 'make docs-links asks every link to another site'
 	echo 'make tables   write the figures of docs/results/ into README and docs'
@@ -66,7 +67,10 @@ check:
 
 reports:
 	@.ci/setup test
-	exec $(PY) -m box_contact_ros reports $(ARGS)
+	$(PY) -m box_contact_ros reports $(ARGS) || status=$$?
+	$(PY) docs/figures/make_figures.py
+	$(PY) docs/tables.py
+	exit $${status:-0}
 
 test-arm:
 	@.ci/setup test

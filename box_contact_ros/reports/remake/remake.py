@@ -48,8 +48,7 @@ REPORTS = (
            quick=('--families', 'A')),
     Report(name='named', minutes=1.0, alone=False, arguments=('stability', '--named'), quick=(
         '--out', OUT)),
-    Report(name='fuzz', minutes=2.0, arguments=('fuzz', '--pairs', '1000000',
-                                                '--out', f'{OUT}/fuzz.csv')),
+    Report(name='fuzz', minutes=5.0, arguments=('fuzz', '--out', f'{OUT}/fuzz.csv')),
     Report(name='landing', minutes=12.0, arguments=('landing', '--out', OUT)),
     Report(name='frontier', minutes=8.0, arguments=('frontier', '--out', OUT)),
     Report(name='speed', minutes=4.0, arguments=('frontier', '--speed', '--out', OUT)),
