@@ -23,7 +23,7 @@ Row = dict[str, str]
 CHOICES = {
     'mlp': ('`mlp`, the default', 'speed; a small error is fine'),
     'exact': ('`exact`', 'ground truth, judging other models'),
-    'paper': ("`paper`, the paper's network", 'repeating the paper'),
+    'paper': ("`paper`, the paper's kind of network", 'repeating the paper'),
     'soup-8': ('`soup-8`, polygon soup', 'comparing with what the paper replaced'),
     'fcl': ("`fcl`, FCL's deepest point", 'comparing with a common engine'),
 }

@@ -17,8 +17,9 @@ try:
     from . import _baseline
 except ImportError as error:
     raise ImportError(
-        'the native core of box_contact_ros is not built: run `pip install .` in its checkout, '
-        'which needs a C++17 compiler (Debian, Ubuntu: apt install g++ python3-dev)') from error
+        f'{os.path.dirname(__file__)} has no built native core: run `pip install -e .` in the '
+        'checkout, which needs a C++17 compiler (Debian, Ubuntu: apt install g++ python3-dev), or '
+        'leave the checkout if box_contact_ros is installed elsewhere') from error
 
 
 def instruction_sets() -> tuple[str, ...]:

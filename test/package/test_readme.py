@@ -200,7 +200,7 @@ def clone(words: list[str], **_) -> None:
 def exported(words: list[str], **_) -> None:
     """Set a variable that ROS reads, or name a file of the checkout."""
     name, _, value = words[1].partition('=')
-    assert name == 'ROS_LOG_DIR' or (ROOT / value.removeprefix('$PWD/')).is_file()
+    assert name == 'ROS_LOG_DIR' or (ROOT / value.removeprefix('$PWD/')).exists()
 
 
 VENV = '.venv-contact'
