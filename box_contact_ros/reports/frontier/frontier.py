@@ -57,14 +57,15 @@ def contestants(members: int = FULL.members) -> tuple[list[Engine], list[str]]:
     for path in resource_path('weights').glob('mlp-*.safetensors'):
         card = load_weights(path).card
         if not card['sizes']:  # those of a scene are for its boxes alone
-            sizes[tuple(card['architecture'][1:-1])] = str(path)
+            words = path.stem.split('-')  # mlp-edges-32: the description, and its units
+            sizes[tuple(words[1:-1]), int(words[-1])] = str(path)
     found = []
     for entry in MODELS.values():
         with suppress(ImportError):  # of an extra whose libraries `missing` names
             entry.load()
             found += map(ours, entry.reported_names[:members])
-    found += [ours('mlp', f'mlp {"-".join(map(str, units))}', path)
-              for units, path in sorted(sizes.items())]
+    found += [ours('mlp', ' '.join(['mlp', *description, str(units)]), path)
+              for (description, units), path in sorted(sizes.items())]
     rivals, missing = installed()
     return [*found, *rivals], missing
 
