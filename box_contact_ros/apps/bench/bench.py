@@ -202,7 +202,7 @@ def _report(options: argparse.Namespace, bench: Bench, about: Mapping[str, str])
         (options.out / 'bench.md').write_text(
             f'# Bench\n\n{bullets(about)}\n\n{text}\n{bullets(lines)}\n', 'utf-8')
         draw(options.out / 'bench.png', results,
-             f'{options.rate:g} Hz, nodes {about["nodes run"]}, {about["machine"]}')
+             f'{options.rate:g} Hz, nodes {about["nodes run"]}\n{about["machine"]}')
         print(f'results: {options.out}/bench.csv, bench.md, bench.png', flush=True)
     faulty = any(r.faults for r in results if r.node == 'contact')
     return bool(results) and adds_up and not bench.notes and not faulty and not bench.stop.is_set()
