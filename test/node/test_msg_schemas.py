@@ -506,9 +506,14 @@ def test_qos_is_the_documents(node, client, array_node, name):
             else client.node.get_subscriptions_info_by_topic)
     if address == 'poses':
         node, address = array_node, '/many/poses'
-    assert client.spin(lambda: bool(find(address)), 60.0)
-    endpoint, = (info for info in find(address)
-                 if (info.node_name, info.node_namespace) == ('contact_node', node.get_namespace()))
+
+    def of_the_node():
+        # The graph knows an endpoint before it knows the name of its node.
+        return [info for info in find(address) if (info.node_name, info.node_namespace) == (
+            'contact_node', node.get_namespace())]
+
+    assert client.spin(lambda: bool(of_the_node()), 60.0)
+    endpoint, = of_the_node()
     assert endpoint.topic_type == message_of(operation)['name']
     declared, reported = declared_qos(operation), endpoint.qos_profile
     for policy in ('reliability', 'durability', 'liveliness', 'deadline', 'lifespan',
