@@ -1,14 +1,41 @@
 """Box-box contact for simulators: whether two boxes touch, where, and which way they push.
 
-Names that are exported here are the stable Python API.
+Names that are exported here are the stable Python API. Those of scenes and forces are loaded when
+they are first used, so `import box_contact_ros` stays cheap.
 """
-from .scene.files.scene_file import SceneError, read_scene, write_scene
-from .scene.force.held_wrench import HeldWrench
-from .scene.force.patch_law import PatchLaw
-from .scene.scene_solver import Box, Pair, Scene, SceneSolver
+from importlib import import_module as _import_module
+from typing import TYPE_CHECKING, Any
+
 from .solver.contact import Contact, Contacts
 from .solver.contact_solver import ContactSolver
 from .solver.models import MODELS
 
+if TYPE_CHECKING:
+    from .scene.files.scene_file import SceneError, read_scene, write_scene
+    from .scene.force.held_wrench import HeldWrench
+    from .scene.force.patch_law import PatchLaw
+    from .scene.scene_solver import Box, Pair, Scene, SceneSolver
+
 __all__ = ['MODELS', 'Box', 'Contact', 'ContactSolver', 'Contacts', 'HeldWrench', 'Pair',
            'PatchLaw', 'Scene', 'SceneError', 'SceneSolver', 'read_scene', 'write_scene']
+
+_LOADED_WHEN_USED = {
+    'scene.files.scene_file': ('SceneError', 'read_scene', 'write_scene'),
+    'scene.force.held_wrench': ('HeldWrench',),
+    'scene.force.patch_law': ('PatchLaw',),
+    'scene.scene_solver': ('Box', 'Pair', 'Scene', 'SceneSolver'),
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Return an exported name whose module was not imported yet."""
+    for module, names in _LOADED_WHEN_USED.items():
+        if name in names:
+            globals()[name] = value = getattr(_import_module(f'.{module}', __name__), name)
+            return value
+    raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
+
+
+def __dir__() -> list[str]:
+    """Return the exported names too that were not used yet."""
+    return sorted({*globals(), *__all__})

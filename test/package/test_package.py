@@ -374,6 +374,7 @@ def test_import_stays_small(code: str) -> None:
     loaded = set(done.stdout.split())
     assert 'box_contact_ros' in loaded
     assert not {'rclpy', 'torch', 'fcl', 'mujoco', 'matplotlib', 'numba'} & loaded
+    assert ('yaml' in loaded) == ('*' in code), 'scenes are loaded when they are used'
 
 
 def test_exported_names_are_what_dir_lists() -> None:
