@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import csv
+import functools
 import re
 import sys
 from pathlib import Path
@@ -38,11 +39,16 @@ SETS = {
 }
 
 
+@functools.cache
+def _table(name: str) -> list[Row]:
+    with (RESULTS / name).open(encoding='utf-8', newline='') as file:
+        return list(csv.DictReader(file))
+
+
 def rows(name: str, **wanted: str) -> list[Row]:
     """Return the rows of a CSV file whose columns have the wanted values."""
-    with (RESULTS / name).open(encoding='utf-8', newline='') as file:
-        return [row for row in csv.DictReader(file)
-                if all(row[column] == value for column, value in wanted.items())]
+    return [row for row in _table(name)
+            if all(row[column] == value for column, value in wanted.items())]
 
 
 def cell(row: Row, column: str, scale: float = 1.0, digits: int = 3) -> str:
@@ -66,9 +72,13 @@ def models() -> str:
                      when])
     table = markdown_table(['Model', 'single call [µs]', 'batch [ns a pair]', 'median error [%]',
                             'p99 error [%]', 'take it for'], body)
-    about = rows('frontier.csv', contestant='mlp')[0]
     return (f'{table}\n\nMedian times on one core, {" / ".join(SHOWN)} where there are two: '
-            f'{about["processor"]}.')
+            f'{processor()}.')
+
+
+def processor() -> str:
+    """Return the processor of the frontier's run, with its generation."""
+    return rows('frontier.csv', contestant='mlp')[0]['processor']
 
 
 def mlp_errors() -> str:
@@ -99,8 +109,9 @@ def network() -> str:
             body.append([f'`{name}`, {one}', f'{min(batch):.0f}–{max(batch):.0f}',
                          cell(apart, 'batch_p50'), f'{min(call) / 1e3:.2f}–{max(call) / 1e3:.2f}',
                          cell(apart, 'call_p50', 1e-3)])
-    return markdown_table(['', 'batch [ns a pair], in contact', 'just apart',
-                           'single call [µs], in contact', 'just apart'], body)
+    table = markdown_table(['', 'batch [ns a pair], in contact', 'just apart',
+                            'single call [µs], in contact', 'just apart'], body)
+    return f'{table}\n\nMedian times on one core: {processor()}.'
 
 
 def sizes() -> str:
@@ -114,8 +125,9 @@ def sizes() -> str:
             for name, words in names.items()
             for row in rows('frontier.csv', contestant=name, set='stacks', instruction_set=best,
                             **{'class': 'all'})]
-    return markdown_table(['description, size', 'batch [ns a pair]', 'single call [µs]',
-                           'p99 point error [%]'], body)
+    table = markdown_table(['description, size', 'batch [ns a pair]', 'single call [µs]',
+                            'p99 point error [%]'], body)
+    return f'{table}\n\nMedian times on one core: {processor()}, {best}.'
 
 
 TABLES = {'models': models, 'mlp-errors': mlp_errors, 'network': network, 'sizes': sizes}
