@@ -198,21 +198,26 @@ def test_a_live_recording(program, tmp_path):
     assert replay.sizes == (CONTAINER, CONTAINER)
 
 
+def publish_five_poses(namespace, topic, frame_id):
+    """Publish poses of ticks 0 to 4, once a subscriber is there."""
+    client = Client(namespace)
+    publisher = client.node.create_publisher(PoseStamped, topic, 10)
+    try:
+        assert client.spin(lambda: publisher.get_subscription_count() == 1, 15.0)
+        client.spin(lambda: False, 0.5)
+        for k in range(5):
+            publisher.publish(PoseStamped(header=make_header(k, frame_id)))
+        client.spin(lambda: False, 0.5)
+    finally:
+        client.close()
+
+
 def test_remapped_topics_and_sigterm(program, tmp_path):
     """One topic under another name; SIGTERM completes the bag too."""
     out = tmp_path / 'run'
     running = recording(program, out, '--topics', 'box_a/pose', '--ros-args', '-r',
                         'box_a/pose:=/yard/load/pose')
-    client = Client('/yard')
-    publisher = client.node.create_publisher(PoseStamped, '/yard/load/pose', 10)
-    try:
-        assert client.spin(lambda: publisher.get_subscription_count() == 1, 15.0)
-        client.spin(lambda: False, 0.5)
-        for k in range(5):
-            publisher.publish(PoseStamped(header=make_header(k, 'yard')))
-        client.spin(lambda: False, 0.5)
-    finally:
-        client.close()
+    publish_five_poses('/yard', '/yard/load/pose', 'yard')
     running.signal(signal.SIGTERM)
     assert running.wait(30) == 0, running.output
     assert '  /yard/load/pose 5\n' in running.output
@@ -224,16 +229,7 @@ def test_a_scene_is_recorded_with_itself(program, tmp_path):
     """The poses of all boxes that move, contacts and markers; the scene's text is in the bag."""
     out = tmp_path / 'run'
     running = recording(program, out, '--scene', 'yard_bay', '--model', 'exact')
-    client = Client()
-    publisher = client.node.create_publisher(PoseStamped, '/crane/load/pose', 10)
-    try:
-        assert client.spin(lambda: publisher.get_subscription_count() == 1, 15.0)
-        client.spin(lambda: False, 0.5)
-        for k in range(5):
-            publisher.publish(PoseStamped(header=make_header(k, 'map')))
-        client.spin(lambda: False, 0.5)
-    finally:
-        client.close()
+    publish_five_poses('', '/crane/load/pose', 'map')
     running.signal(signal.SIGINT)
     assert running.wait(30) == 0, running.output
     found = read_recording(out)

@@ -15,9 +15,9 @@ import numpy as np
 from geometry_msgs.msg import PoseStamped
 from rclpy.context import Context
 from rclpy.node import Node
-from rclpy.utilities import remove_ros_args
 
 from ...node.messages import make_header
+from ...node.parameters import outside_ros_args
 from ...node.runtime import CONTACT_QOS, REFUSALS, run_node
 from ...scene.files.scene_file import read_scene
 from ...scene.pose import quaternion_multiply, rotation_matrix
@@ -165,7 +165,7 @@ def main(args: Sequence[str] | None = None) -> int:
     parser.add_argument('--scene', required=True, metavar='NAME', help='bare name, or a path')
     parser.add_argument('--rate', type=within(0.1, 1000.0), default=50.0, metavar='HZ',
                         help='ticks a second (default: %(default)g)')
-    options = parser.parse_args(remove_ros_args(['scene_driver', *args])[1:])
+    options = parser.parse_args(outside_ros_args(args))
     try:
         scene = read_scene(scene_source(options.scene))
         return run_node(lambda context: SceneDriver(context, scene, options.rate), args)

@@ -37,17 +37,14 @@ def solver_rows(rows: list[dict[str, str]]) -> Iterator[Row]:
 
 def node_rows(load: str, rows: list[dict[str, str]]) -> Iterator[Row]:
     """Yield a row for each node of a run of the bench."""
-    p50 = {}
-    for node in NODES:
-        mine = [row for row in rows if row['node'] == node]
-        p50[node] = _median(mine, 'latency_p50 [s]')
-    for node, title in NODES.items():
-        mine = [row for row in rows if row['node'] == node]
+    rows_of = {node: [row for row in rows if row['node'] == node] for node in NODES}
+    floor = _median(rows_of['echo'], 'latency_p50 [s]')
+    for node, mine in rows_of.items():
         if mine:
-            yield [title, load, f'{sum(int(row["sent"]) for row in mine):,}',
-                   f'{sum(int(row["lost"]) for row in mine):,}',
-                   output.number(p50[node]), output.number(_median(mine, 'latency_p99 [s]')),
-                   output.number(p50[node] / p50['echo'])]
+            p50 = _median(mine, 'latency_p50 [s]')
+            yield [NODES[node], load, f'{sum(int(row["sent"]) for row in mine):,}',
+                   f'{sum(int(row["lost"]) for row in mine):,}', output.number(p50),
+                   output.number(_median(mine, 'latency_p99 [s]')), output.number(p50 / floor)]
 
 
 def _median(rows: list[dict[str, str]], column: str) -> float:
