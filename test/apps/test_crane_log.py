@@ -212,7 +212,8 @@ def test_a_terminal_gets_a_table(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(sys, 'stdout', Terminal())
     monkeypatch.setenv('TERM', 'xterm-256color')
-    monkeypatch.delenv('NO_COLOR', raising=False)
+    for name in ('NO_COLOR', 'TTY_COMPATIBLE', 'TTY_INTERACTIVE', 'COLUMNS'):
+        monkeypatch.delenv(name, raising=False)
     screen = Screen('the crane moves', 25.0)
     with screen:
         screen.progress(7.0)

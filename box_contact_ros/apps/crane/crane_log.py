@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 from rich.table import Table
 from rich.text import Text
@@ -31,7 +32,7 @@ class Screen:
         self._bar: Progress | None = None
         if sys.stdout.isatty():
             self._bar = Progress(TextColumn(what), BarColumn(), TextColumn(
-                '{task.completed:.0f} of {task.total:.0f} s'), transient=True)
+                '{task.completed:.0f} of {task.total:.0f} s'), transient=True, console=Console())
             self._bar.add_task(what, total=seconds)
 
     def __enter__(self) -> Screen:
