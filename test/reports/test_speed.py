@@ -4,6 +4,7 @@ from __future__ import annotations
 import csv
 import gc
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -48,27 +49,39 @@ def test_all_take_their_turn() -> None:
     assert ''.join(seen) == 'a.b.a.b.' and gc.isenabled()
 
 
-def run_of(exact: float, batches: list[float], unit: float | None = 1000.0) -> list[Timing]:
+def run_of(exact: float, batches: list[float], *, unit: float | None = 1000.0,
+           mlp: float = 300.0, mlp_batches: Sequence[float] = (80.0, 80.0, 80.0)) -> list[Timing]:
     """Return timings of one instruction set [ns]."""
     common = {'instruction_set': 'AVX2'}
-    found = [Timing(name='exact', kind='single', rounds=[exact], **common)]
-    if unit is not None:
-        found.append(Timing(name=UNIT, kind='single', rounds=[unit], **common))
-    return found + [Timing(name=f'exact: set {k}', kind='batch', rounds=[value], **common)
-                    for k, value in enumerate(batches)]
+    found = [Timing(name=name, kind='single', rounds=[value], **common)
+             for name, value in (('exact', exact), ('mlp', mlp), (UNIT, unit)) if value is not None]
+    return found + [Timing(name=f'{model}: set {k}', kind='batch', rounds=[value], **common)
+                    for model, values in (('exact', batches), ('mlp', mlp_batches))
+                    for k, value in enumerate(values)]
 
 
-@pytest.mark.parametrize(('timings', 'best', 'expected'), [
-    (run_of(480.0, [140.0, 150.0, 160.0]), True, [True, True, True]),
-    (run_of(490.0, [100.0, 110.0, 120.0]), True, [False, True, True]),
-    (run_of(490.0, [100.0, 110.0, 120.0]), False, [True, True]),
-    (run_of(480.0, [155.0, 160.0, 169.0]), True, [True, False, True]),
-    (run_of(350.0, [70.0, 80.0, 100.0]), True, [True, True, False]),
-    (run_of(350.0, [100.0, 110.0, 120.0], unit=None), True, [False, False, True]),
+EXACT_BATCHES = [140.0, 150.0, 160.0]
+
+
+@pytest.mark.parametrize(('timings', 'broken'), [
+    (run_of(480.0, EXACT_BATCHES), []),
+    (run_of(490.0, EXACT_BATCHES), ['single call of `exact`']),
+    (run_of(480.0, EXACT_BATCHES, mlp=361.0), ['single call of `mlp`']),
+    (run_of(480.0, [155.0, 160.0, 169.0]), ['in a batch of `exact`']),
+    (run_of(480.0, [140.0, 145.0, 175.0], unit=1100.0), ['set 2 take `exact`']),
+    (run_of(480.0, EXACT_BATCHES, mlp_batches=[80.0, 80.0, 85.0]), ['set 2 take `mlp`']),
+    (run_of(480.0, EXACT_BATCHES, mlp_batches=[85.0, 84.0, 84.0]), ['`exact` on set 0']),
+    (run_of(480.0, EXACT_BATCHES, unit=None),
+     ['single call of `mlp`', 'single call of `exact`', 'in a batch of `exact`']),
 ])
-def test_limits_break(timings: list[Timing], best: bool, expected: list[bool]) -> None:
-    """Single call, slowest batch, slowest by median; without the unit nothing by it holds."""
-    assert [claim.holds for claim in speed.claims_of(timings, best)] == expected
+def test_limits_break(timings: list[Timing], broken: list[str]) -> None:
+    """Each limit alone; without the unit nothing by it holds."""
+    claims = speed.claims_of(timings, best=True)
+    assert len(claims) == 6
+    found = [claim.text for claim in claims if not claim.holds]
+    assert len(found) == len(broken)
+    assert all(part in text for part, text in zip(broken, found))
+    assert len(speed.claims_of(timings, best=False)) == 4
 
 
 def test_limits_of_threads_and_starts_break() -> None:

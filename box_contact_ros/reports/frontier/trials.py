@@ -233,7 +233,7 @@ class Trial:
         self._batches: list[float] = []
 
     def time(self) -> None:
-        """Time one round: single calls for the time there is, then batches."""
+        """Time one round, after a warm-up: single calls for the time there is, then batches."""
         clock, times = time.perf_counter_ns, self._singles
         for call in self._calls[:LEAST_PAIRS]:
             call()
@@ -247,10 +247,12 @@ class Trial:
                 times.append(ended - began)
                 if ended > until and len(times) >= least:
                     break
-        for _ in range(BATCHES if self._ask_all else 0):
-            began = clock()
+        if self._ask_all:
             self._ask_all()
-            self._batches.append((clock() - began) / len(self._pairs.size))
+            for _ in range(BATCHES):
+                began = clock()
+                self._ask_all()
+                self._batches.append((clock() - began) / len(self._pairs.size))
 
     def row(self) -> FrontierRow:
         """Return what was found."""
