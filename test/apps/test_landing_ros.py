@@ -1,6 +1,7 @@
 """Landings over DDS: the crane client closes the loop with a contact node in another process."""
 from __future__ import annotations
 
+import os
 import time
 
 import numpy as np
@@ -13,10 +14,15 @@ from rclpy.context import Context
 from rclpy.parameter import Parameter
 
 from box_contact_ros.apps.crane import crane_feedback, crane_node
-from box_contact_ros.apps.crane.landing import LANDING_DURATION, cases, land, scenario_of
-from box_contact_ros.apps.crane.landing_flights import answering_node, fly_over_dds
+from box_contact_ros.apps.crane.landing import (
+    LANDING_DURATION,
+    cases,
+    land,
+    scenario_of,
+    solvers,
+)
+from box_contact_ros.apps.crane.landing_flights import fly_over_dds
 from box_contact_ros.node.runtime import make_executor
-from box_contact_ros.solver.contact_solver import ContactSolver
 
 EXACT = ('--ros-args', '-p', 'model:=exact')
 HARD = {'rope_angle': 3.0, 'rope_heading': 100.0, 'pitch': 2.0, 'roll': -2.0, 'yaw': 1.0,
@@ -47,15 +53,16 @@ def test_lands_in_lockstep_faster_than_real_time(program, node):
     assert took < LANDING_DURATION, f'{took:.1f} s for {LANDING_DURATION:g} s of motion'
 
 
-def test_a_flight_of_the_report_is_the_landing_offline():
-    """What `landing --dds` runs: in lockstep the transport changes nothing."""
-    scenario = scenario_of(next(cases()))
-    with answering_node('exact', scenario) as domain:
-        flown = fly_over_dds(domain, scenario, rate_hz=200.0, latency=0.002).judge()
-    solver = ContactSolver(scenario.size, scenario.stack_size, model='exact')
-    offline = land(scenario, solver, rate_hz=200.0, latency=0.002).judge()
-    assert flown.at_rest
-    assert flown == offline
+def test_flights_of_the_report_are_the_landings_offline():
+    """What `landing --dds` runs: in lockstep neither transport nor company changes anything."""
+    case = next(cases())
+    scenarios = [scenario_of(case), scenario_of(case, castings=True, size=(12.192, 2.438, 1.5))]
+    flown = fly_over_dds('exact', scenarios, (0.002, 0.0), rate_hz=200.0,
+                         domain=int(os.environ['ROS_DOMAIN_ID']))
+    for scenario, record, latency in zip(scenarios, flown, (0.002, 0.0)):
+        offline = land(scenario, solvers(scenario, 'exact'), rate_hz=200.0, latency=latency)
+        assert record.judge() == offline.judge()
+    assert flown[0].judge().at_rest
 
 
 def test_a_landing_that_does_not_rest_fails(program, node):

@@ -1,56 +1,163 @@
-"""Landings over DDS, in lockstep: the crane client here, the contact node in its own process.
+"""Landings over DDS, in lockstep: many cranes here, one contact node in a process of its own.
 
-What `landing --dds` runs: the same cases as offline, one `CraneNode` per landing, and one
-contact node that answers all landings of a model.
+What `landing --dds` runs. Landings of one model and rate share a scene: each has its load, a
+moving box, and its own stack. A tick sends the poses of all loads as one message, and waits for the
+answer.
 """
 from __future__ import annotations
 
 import os
-import random
-from collections.abc import Iterator
+import tempfile
+import time
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from functools import partial
+from typing import Any
 
-from rclpy.parameter import Parameter
+import numpy as np
+from geometry_msgs.msg import Pose, PoseArray
+from rclpy.context import Context
+from rclpy.node import Node
+from sensor_msgs.msg import PointCloud2
 
+from ...node.messages import make_header, read_cloud
+from ...scene.files.scene_file import write_scene
+from ...scene.force.patch_law import Patch
+from ...scene.scene_solver import POSE_ARRAY, Box, Pair, Scene
 from .. import processes
-from ..ros_client import joined
-from .crane_node import CraneNode, fly
-from .crane_parameters import PARAMETERS, SCENARIO
-from .landing import LandingRecord
-from .mujoco_crane import CraneScenario
+from ..bench.answer_log import first_row, is_stale, touch_in
+from ..ros_client import DEEP_RELIABLE, joined, set_pose, stamp_of
+from .landing import ClosedLoop, LandingRecord
+from .mujoco_crane import Crane, CraneScenario
 
 PATIENCE = 30.0  # for the node to answer [s]
+OFFER_PERIOD = 0.1  # s between the ticks that only ask whether the node answers
+
+
+def scene_of(scenarios: Sequence[CraneScenario]) -> Scene:
+    """Return the scene of all landings: `load_k`, and the boxes `stack_k_n` that it may meet."""
+    boxes, pairs = {}, []
+    for number, scenario in enumerate(scenarios):
+        load = f'load_{number}'
+        boxes[load] = Box(load, scenario.size)
+        for place, (pose, size) in enumerate(scenario.stack_boxes):
+            stack = f'stack_{number}_{place}'
+            boxes[stack] = Box(stack, size, tuple(pose.tolist()))
+            pairs.append(Pair(len(pairs), f'{load}_{stack}', load, stack))
+    return Scene(boxes, tuple(pairs), pose_array=True)
+
+
+class Flight:
+    """One landing under way."""
+
+    def __init__(self, scenario: CraneScenario, rate_hz: float, latency: float) -> None:
+        self._crane = Crane(scenario, rate_hz)
+        self._loop = ClosedLoop(scenario, rate_hz, latency=latency)
+        self._latency = latency
+        self._ticks = round(scenario.duration * rate_hz)
+
+    @property
+    def record(self) -> LandingRecord:
+        """What happened so far."""
+        return self._loop.record
+
+    @property
+    def pose(self) -> np.ndarray:
+        """Pose of the load (7,)."""
+        return self._crane.load_pose
+
+    @property
+    def ended(self) -> bool:
+        """Whether all that is judged was seen."""
+        return self.record.watched or len(self.record.forces) == self._ticks
+
+    def step(self, touches: Sequence[Patch]) -> None:
+        """Advance a tick under the contacts of its pose; they act a latency later."""
+        self._loop.answer(self._loop.ask(self._crane), touches, latency=self._latency)
+        self._loop.step(self._crane)
+
+
+class FlightNode(Node):
+    """Sends the poses of all loads, and awaits their contacts."""
+
+    def __init__(self, context: Context) -> None:
+        super().__init__('flights', context=context)
+        self._poses = self.create_publisher(PoseArray, POSE_ARRAY, DEEP_RELIABLE)
+        self.create_subscription(PointCloud2, 'contacts', self._on_cloud, DEEP_RELIABLE)
+        self._clouds: dict[int, np.ndarray] = {}
+
+    def _on_cloud(self, message: PointCloud2) -> None:
+        self._clouds[stamp_of(message.header)] = read_cloud(message)
+
+    def contacts(self, executor: Any, poses: Sequence[np.ndarray], patience: float,
+                 ) -> dict[int, Patch]:
+        """Return the contacts of poses (7,), by the id of their pair.
+
+        TimeoutError: none came within `patience` [s]. RuntimeError: a pair was not evaluated.
+        """
+        message = PoseArray(header=make_header(self.get_clock().now().nanoseconds, 'world'))
+        message.poses = [Pose() for _ in poses]
+        for one, pose in zip(message.poses, poses):
+            set_pose(one, pose)
+        self._poses.publish(message)
+        stamp, deadline = stamp_of(message.header), time.monotonic() + patience
+        while stamp not in self._clouds:
+            left = deadline - time.monotonic()
+            if left <= 0.0:
+                raise TimeoutError(f'the contact node gave no answer within {patience:g} s')
+            executor.spin_once(timeout_sec=left)
+        rows = self._clouds.pop(stamp)
+        found = {int(rows[n]['pair']): first_row(rows[n:]) for n in range(len(rows))}
+        if any(map(is_stale, found.values())):
+            raise RuntimeError('the contact node did not evaluate all pairs')
+        return {pair: touch for pair, values in found.items() if (touch := touch_in(values))}
+
+    def await_node(self, executor: Any, poses: Sequence[np.ndarray]) -> None:
+        """Offer poses until they are answered; TimeoutError after PATIENCE."""
+        deadline = time.monotonic() + PATIENCE
+        while True:
+            try:
+                self.contacts(executor, poses, OFFER_PERIOD)
+                return
+            except TimeoutError:
+                if time.monotonic() > deadline:
+                    raise TimeoutError(f'no contact node within {PATIENCE:g} s') from None
 
 
 @contextmanager
-def answering_node(model: str, scenario: CraneScenario) -> Iterator[int]:
-    """Run a contact node in a ROS domain of its own on this host; give the domain."""
-    domain = random.choice(processes.DOMAINS)
-    node = processes.start(
-        processes.program('contact_node', model=model, size_a=scenario.size,
-                          size_b=scenario.stack_size),
-        env=os.environ | processes.on_this_host(domain))
-    try:
-        yield domain
-    finally:
-        processes.end([node])
+def answering_node(model: str, scene: Scene, domain: int) -> Iterator[None]:
+    """Run a contact node for a scene in a ROS domain on this host."""
+    with tempfile.NamedTemporaryFile('w', suffix='.yaml') as file:
+        write_scene(scene, file.name)
+        node = processes.start(
+            processes.program('contact_node', model=model, scene=file.name, pair_topics=False),
+            env=os.environ | processes.on_this_host(domain))
+        try:
+            yield
+        finally:
+            processes.end([node])
 
 
-def fly_over_dds(domain: int, scenario: CraneScenario, *, rate_hz: float, latency: float,
-                 ) -> LandingRecord:
-    """Run one landing in lockstep. RuntimeError if an answer was lost or wrong."""
+def fly_over_dds(model: str, scenarios: Sequence[CraneScenario], latencies: Sequence[float], *,
+                 rate_hz: float, domain: int) -> list[LandingRecord]:
+    """Run landings together, each with its latency [s]; return their records.
+
+    Raises TimeoutError where an answer does not come, RuntimeError where one lacks a pair.
+    """
     # The discovery range has no other way in; the domain has.
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
-    values = {'closed_loop': True, 'lockstep': True, 'rate': rate_hz, 'latency': latency,
-              'wait': PATIENCE} | {name: getattr(scenario, field)
-                                   for name, field in SCENARIO.items()}
-    given = [Parameter(name, value=list(map(float, value)) if isinstance(value, tuple) else value)
-             for name, value in values.items() if value != PARAMETERS[name].default]
-    with joined(partial(CraneNode, parameter_overrides=given), domain=domain) as (node, executor):
-        assert node.scenario == scenario, (node.scenario, scenario)
-        fly(node, executor)
-        summary = node.summary()
-    if summary is None or not summary.passed or node.feedback is None:
-        raise RuntimeError(f'a landing over DDS lost something:\n{summary}')
-    return node.feedback.record
+    scene = scene_of(scenarios)
+    flights = [Flight(scenario, rate_hz, latency)
+               for scenario, latency in zip(scenarios, latencies)]
+    pairs_of = defaultdict(list)
+    for pair in scene.pairs:
+        pairs_of[scene.moving.index(pair.a)].append(pair.id)
+    with answering_node(model, scene, domain), joined(FlightNode, domain=domain) as (
+            node, executor):
+        node.await_node(executor, [flight.pose for flight in flights])
+        while not all(flight.ended for flight in flights):
+            found = node.contacts(executor, [flight.pose for flight in flights], PATIENCE)
+            for number, flight in enumerate(flights):
+                if not flight.ended:
+                    flight.step([found[pair] for pair in pairs_of[number] if pair in found])
+    return [flight.record for flight in flights]
