@@ -69,6 +69,14 @@ class BuildCore(build_ext):
         super().run()
 
     def build_extension(self, ext):
+        # An editable install takes over what `build_ext --inplace` has made of the same sources.
+        here, inputs = Path(self.get_ext_filename(ext.name)), [__file__, *ext.sources, *ext.depends]
+        if getattr(self, 'editable_mode', False) and here.is_file() and all(
+                Path(one).stat().st_mtime < here.stat().st_mtime for one in inputs):
+            path = self.get_ext_fullpath(ext.name)
+            self.mkpath(os.path.dirname(path))
+            self.copy_file(str(here), path)
+            return
         # The extensions of the core are made from one source: each gets objects of its own.
         builder = copy.copy(self)
         builder.build_temp = os.path.join(self.build_temp, ext.name)
