@@ -10,6 +10,7 @@ import contextlib
 import os
 import runpy
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -46,8 +47,23 @@ def _domain_id() -> int:
     run = os.environ.get('PYTEST_XDIST_TESTRUNUID', str(os.getpid()))
     worker = int(os.environ.get('PYTEST_XDIST_WORKER', 'gw0').removeprefix('gw'))
     workers = int(os.environ.get('PYTEST_XDIST_WORKER_COUNT', '1'))
-    number = (zlib.crc32(run.encode()) + next(_modules)) % max(1, 101 // workers)
-    return 1 + (number * workers + worker) % 101
+    each = max(1, 101 // workers)
+    for _ in range(each):
+        number = (zlib.crc32(run.encode()) + next(_modules)) % each
+        domain = 1 + (number * workers + worker) % 101
+        if _is_free(domain):
+            break
+    return domain
+
+
+def _is_free(domain: int) -> bool:
+    """Whether no participant of this host is in a domain: the first one takes this port."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+        try:
+            taken.bind(('', 7400 + 250 * domain + 10))
+        except OSError:
+            return False
+    return True
 
 
 os.environ['ROS_DOMAIN_ID'] = str(_domain_id())

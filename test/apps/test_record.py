@@ -4,13 +4,14 @@ from __future__ import annotations
 import errno
 import signal
 import time
+from itertools import count
 from pathlib import Path
 
 import numpy as np
 import pytest
 import rclpy
 import yaml
-from ros_client import Client, stamp_of
+from ros_client import PATIENCE, Client, stamp_of
 
 pytest.importorskip('rosbags')
 
@@ -171,7 +172,7 @@ def test_a_live_recording(program, tmp_path):
     running = recording(program, out, '--size-a', *size, '--size-b', *size, '--model', 'exact')
     client = Client()
     try:
-        deadline = time.monotonic() + 60.0
+        deadline = time.monotonic() + PATIENCE
         while not all(f'receiving /{topic}\n' in running.output for topic in TOPICS):
             assert time.monotonic() < deadline, running.output
             client.send(STACK, (0.0, 0.0, 2.5, *STACK[3:]))
@@ -182,7 +183,7 @@ def test_a_live_recording(program, tmp_path):
     finally:
         client.close()
     running.signal(signal.SIGINT)
-    assert running.wait(30) == 0, running.output
+    assert running.wait() == 0, running.output
     assert 'Traceback' not in running.output and '  /contacts ' in running.output
     found = decoded(out)
     for topic in ('/box_a/pose', '/box_b/pose', '/contacts'):
@@ -198,18 +199,31 @@ def test_a_live_recording(program, tmp_path):
     assert replay.sizes == (CONTAINER, CONTAINER)
 
 
-def publish_five_poses(namespace, topic, frame_id):
-    """Publish poses of ticks 0 to 4, once a subscriber is there."""
+def publish_poses(running, namespace, topic, frame_id):
+    """Publish poses of ticks 0, 1, ... until they are heard, and four more; return all ticks."""
     client = Client(namespace)
     publisher = client.node.create_publisher(PoseStamped, topic, 10)
+
+    sent = count()
+
+    def publish():
+        publisher.publish(PoseStamped(header=make_header(next(sent), frame_id)))
+
+    def heard():
+        return f'receiving {topic}\n' in running.output
+
+    deadline = time.monotonic() + PATIENCE
     try:
-        assert client.spin(lambda: publisher.get_subscription_count() == 1, 15.0)
-        client.spin(lambda: False, 0.5)
-        for k in range(5):
-            publisher.publish(PoseStamped(header=make_header(k, frame_id)))
+        while not heard():
+            assert time.monotonic() < deadline, running.output
+            publish()
+            client.spin(heard, 0.1)
+        for _ in range(4):
+            publish()
         client.spin(lambda: False, 0.5)
     finally:
         client.close()
+    return list(range(next(sent)))
 
 
 def test_remapped_topics_and_sigterm(program, tmp_path):
@@ -217,25 +231,28 @@ def test_remapped_topics_and_sigterm(program, tmp_path):
     out = tmp_path / 'run'
     running = recording(program, out, '--topics', 'box_a/pose', '--ros-args', '-r',
                         'box_a/pose:=/yard/load/pose')
-    publish_five_poses('/yard', '/yard/load/pose', 'yard')
+    sent = publish_poses(running, '/yard', '/yard/load/pose', 'yard')
     running.signal(signal.SIGTERM)
-    assert running.wait(30) == 0, running.output
-    assert '  /yard/load/pose 5\n' in running.output
+    assert running.wait() == 0, running.output
     found = decoded(out)
-    assert list(found) == ['/yard/load/pose'] and list(found['/yard/load/pose']) == [*range(5)]
+    assert list(found) == ['/yard/load/pose']
+    heard = list(found['/yard/load/pose'])
+    assert len(heard) >= 5 and heard == sent[-len(heard):]
+    assert f'  /yard/load/pose {len(heard)}\n' in running.output
 
 
 def test_a_scene_is_recorded_with_itself(program, tmp_path):
     """The poses of all boxes that move, contacts and markers; the scene's text is in the bag."""
     out = tmp_path / 'run'
     running = recording(program, out, '--scene', 'yard_bay', '--model', 'exact')
-    publish_five_poses('', '/crane/load/pose', 'map')
+    sent = publish_poses(running, '', '/crane/load/pose', 'map')
     running.signal(signal.SIGINT)
-    assert running.wait(30) == 0, running.output
+    assert running.wait() == 0, running.output
     found = read_recording(out)
     assert found.scene == read_scene('config/scenes/yard_bay.yaml')
     assert found.about['model'] == 'exact'
-    assert [topic for _, topic, _ in found.messages] == ['crane/load/pose'] * 5
+    topics = [topic for _, topic, _ in found.messages]
+    assert 5 <= len(topics) <= len(sent) and set(topics) == {'crane/load/pose'}
     for topic in ('/contacts 0', '/markers 0', '/crane/markers 0'):
         assert f'  {topic}\n' in running.output
 

@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import csv
+import os
 import time
 
 import numpy as np
@@ -19,7 +20,8 @@ MS = 1_000_000  # ns
 
 def test_a_short_soak(program, tmp_path):
     """Two seconds at 1 kHz: nothing lost, mispaired or wrong, and a table beside the echo nodes."""
-    running = program('soak', '--quick', '--out', str(tmp_path))
+    running = program('soak', '--quick', '--domain', os.environ['ROS_DOMAIN_ID'], '--out',
+                      str(tmp_path))
     assert running.wait(280) == 0, running.output
     for line in ('lost: 0', 'mispaired or wrong: 0', 'sent: 2000'):
         assert line in running.output

@@ -3,9 +3,11 @@ from __future__ import annotations
 
 import gc
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future
 from contextlib import contextmanager
-from threading import Event, Thread
+from queue import SimpleQueue
+from threading import Event, Thread, current_thread
 from typing import Any
 
 import numpy as np
@@ -21,9 +23,13 @@ from box_contact_ros.node.messages import NANOSECONDS, make_header
 from box_contact_ros.node.runtime import make_executor
 from box_contact_ros.solver.contact import Contact
 
-MATCH_SECONDS = 60.0
-"""Discovery takes a fraction of a second; on a busy machine, in a process that has had hundreds of
-participants, more than fifteen were seen. A limit against hanging, no more."""
+PATIENCE = 60.0
+"""Time [s] for what has to come: a limit against hanging, no more. Discovery takes a fraction of a
+second; on a busy machine, in a process that has had hundreds of participants, fifteen were seen."""
+
+AHEAD = 20
+"""Pairs of a stream that may be unanswered. Of more, a machine that stands still for a moment loses
+poses, which are best effort, and all but the last ten answers."""
 
 
 def stamp_of(message: Any) -> int:
@@ -37,7 +43,13 @@ def row_of(contact: Contact) -> tuple[float, ...]:
 
 
 class Client:
-    """Talks to a contact node under `namespace` (like '' or '/yard')."""
+    """Talks to a contact node under `namespace` (like '' or '/yard').
+
+    A node that answers with a cloud has matched the points and normals too, those of `pairs`
+    included: readers are made known in the order in which they are made, and clouds come last.
+    """
+
+    pairs: tuple[str, ...] = ()
 
     def __init__(self, namespace: str = '') -> None:
         self.context = Context()
@@ -48,12 +60,15 @@ class Client:
         self.points: dict[int, PointStamped] = {}
         self.normals: dict[int, Vector3Stamped] = {}
         self.clouds: dict[int, PointCloud2] = {}
+        self.of_pair: dict[str, dict[int, PointStamped]] = {pair: {} for pair in self.pairs}
         self.order: list[tuple[str, int]] = []
         self.diagnostics: list[DiagnosticArray] = []
         deep = QoSProfile(depth=10_000)
         self.publishers = [
             self.node.create_publisher(PoseStamped, f'box_{box}/pose', deep) for box in 'ab']
-        for kind, topic, kept in ((PointStamped, 'contact/point', self.points),
+        of_pairs = ((PointStamped, f'{pair}/contact/point', kept)
+                    for pair, kept in self.of_pair.items())
+        for kind, topic, kept in (*of_pairs, (PointStamped, 'contact/point', self.points),
                                   (Vector3Stamped, 'contact/normal', self.normals),
                                   (PointCloud2, 'contacts', self.clouds)):
             self.node.create_subscription(kind, topic, self._keep(topic, kept), deep)
@@ -86,15 +101,20 @@ class Client:
             publisher.publish(message)
         return max(stamps) if stamps else stamp
 
-    def spin(self, done: Callable[[], bool], timeout: float) -> bool:
+    def spin(self, done: Callable[[], bool], timeout: float = PATIENCE) -> bool:
         """Serve until `done()` or the time is over; returns done()."""
         deadline = time.monotonic() + timeout
         while not done() and time.monotonic() < deadline:
             self.executor.spin_once(timeout_sec=0.01)
         return done()
 
+    def keep_up(self, stamps: Sequence[int]) -> None:
+        """Wait until of a stream no more than `AHEAD` are unanswered."""
+        if len(stamps) > AHEAD:
+            assert self.spin(lambda: stamps[-AHEAD - 1] in self.clouds), 'no answer in mid-stream'
+
     def offer_until_answered(self, pose_a: Any, pose_b: Any,
-                             timeout: float = MATCH_SECONDS) -> float:
+                             timeout: float = PATIENCE) -> float:
         """Send a pair every 50 ms until one is answered: both sides have matched. Seconds taken."""
         started = time.monotonic()
         offered: list[int] = []
@@ -109,13 +129,13 @@ class Client:
     def ask(self, pose_a: Any, pose_b: Any, **options: Any) -> int:
         """Send a pair and wait for its cloud; returns the stamp."""
         stamp = self.send(pose_a, pose_b, **options)
-        assert self.spin(lambda: stamp in self.clouds, 5.0), 'no answer'
+        assert self.spin(lambda: stamp in self.clouds), 'no answer'
         return stamp
 
-    def diagnostic(self, key: str, timeout: float = 5.0) -> str:
+    def diagnostic(self, key: str) -> str:
         """Value of a key in a diagnostic that was sent after this call."""
         seen = len(self.diagnostics)
-        assert self.spin(lambda: len(self.diagnostics) > seen + 1, timeout), 'no diagnostics'
+        assert self.spin(lambda: len(self.diagnostics) > seen + 1), 'no diagnostics'
         values = {entry.key: entry.value for entry in self.diagnostics[-1].status[0].values}
         return values.get(key, '')
 
@@ -138,7 +158,7 @@ class Client:
         """
         for _ in range(3):
             service = self.node.create_client(kind, name)
-            if self.spin(service.service_is_ready, MATCH_SECONDS / 3):
+            if self.spin(service.service_is_ready, PATIENCE / 3):
                 return service
             self.node.destroy_client(service)
         raise AssertionError(f'no service {name}')
@@ -164,21 +184,46 @@ class Client:
 
 @contextmanager
 def serving(make_node: Callable[[Context], Node]) -> Iterator[Node]:
-    """Serve a node of the package in this process by a thread, with a context of its own."""
+    """Serve a node of the package in this process by a thread, with a context of its own.
+
+    That thread sets parameters and makes transitions too, as it does for services.
+    """
     context = Context()
     rclpy.init(context=context)
     node = make_node(context)
     executor = make_executor(context)
     executor.add_node(node)
     stop = Event()
+    asked: SimpleQueue[Callable[[], None]] = SimpleQueue()
 
     def serve() -> None:
         while not stop.is_set():
+            while not asked.empty():
+                asked.get()()
             try:
-                executor.spin_once(timeout_sec=0.05)
+                executor.spin_once(timeout_sec=0.01)
             except Exception as error:  # as `runtime.spin`: a client that is gone before its reply
                 node.get_logger().error(f'a request failed: {type(error).__name__}: {error}')
 
+    def by_thread(function: Callable[..., Any]) -> Callable[..., Any]:
+        def call(*arguments: Any) -> Any:
+            if current_thread() is thread:
+                return function(*arguments)
+            future: Future[Any] = Future()
+
+            def answer() -> None:
+                try:
+                    future.set_result(function(*arguments))
+                except Exception as error:
+                    future.set_exception(error)
+
+            asked.put(answer)
+            return future.result(PATIENCE)
+        return call
+
+    for name in dir(node):
+        if name == 'set_parameters' or name.startswith('trigger_'):
+            setattr(node, name, by_thread(getattr(node, name)))
     thread = Thread(target=serve)
     thread.start()
     try:

@@ -345,9 +345,9 @@ def live(node, client) -> dict[str, list[Any]]:
     for topic in ('box_a/pose', 'box_b/pose'):
         client.node.create_subscription(PoseStamped, topic, got[topic].append, 100)
     got['/diagnostics'] = client.diagnostics
-    assert client.spin(lambda: len(client.diagnostics) > 1, 60.0)  # before the first pose
+    assert client.spin(lambda: len(client.diagnostics) > 1)  # before the first pose
     client.offer_until_answered(ORIGIN, APART)
-    client.spin(lambda: got['box_a/pose'] and got['box_b/pose'], 5.0)
+    assert client.spin(lambda: got['box_a/pose'] and got['box_b/pose'])
     for _ in range(3):
         client.ask(ORIGIN, TOUCHING)
         client.ask(ORIGIN, APART)
@@ -512,7 +512,7 @@ def test_qos_is_the_documents(node, client, array_node, name):
         return [info for info in find(address) if (info.node_name, info.node_namespace) == (
             'contact_node', node.get_namespace())]
 
-    assert client.spin(lambda: bool(of_the_node()), 60.0)
+    assert client.spin(lambda: bool(of_the_node()))
     endpoint, = of_the_node()
     assert endpoint.topic_type == message_of(operation)['name']
     declared, reported = declared_qos(operation), endpoint.qos_profile

@@ -201,6 +201,6 @@ def test_a_node_is_told_of_its_clock_and_of_names_that_are_none(client, capfd):
         result, = node.set_parameters([Parameter('pair_topics', value='yes')])
         assert result.reason == "pair_topics must be true or false, not 'yes'"
         node.set_parameters([Parameter('use_sim_time', value=True)])
-        assert client.spin(lambda: node.counts[RESETS] == 1, 5.0)
+        assert client.spin(lambda: node.counts[RESETS] == 1)
         node.trigger_shutdown()
         assert not any('pose' in entity.topic_name for entity in node.subscriptions)

@@ -41,7 +41,7 @@ class Stranger(RawClient):
         """Return the reply of a service of the node."""
         service = self.client_of(kind, f'/contact_node/{name}')
         future = service.call_async(kind.Request(**fields))
-        assert self.spin(future.done, 30.0)
+        assert self.spin(future.done)
         self.node.destroy_client(service)
         return future.result()
 
@@ -145,7 +145,7 @@ def test_a_refused_file_is_not_told_by_a_transition(start, stranger):
     (running.home / 'scene').write_text(f'boxes: {SECRET}')
     assert stranger.set(scene='scene').successful
     assert not stranger.ask_for(Transition.TRANSITION_CONFIGURE)
-    assert stranger.spin(lambda: any('refused' in line for line in stranger.heard_logs), 10.0)
+    assert stranger.spin(lambda: any('refused' in line for line in stranger.heard_logs))
     assert not any(SECRET in line for line in stranger.heard_logs)
     assert SECRET in running.output and stranger.state() == 'unconfigured'
 

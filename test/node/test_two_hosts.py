@@ -121,7 +121,7 @@ def test_simulator_and_node_on_two_hosts(program, hosts):
     assert crane.wait(120) == 0, crane.output
     assert 'messages lost .......... 0' in crane.output
     node.signal(signal.SIGTERM)
-    assert node.wait(5) == 0
+    assert node.wait() == 0
 
 
 def test_a_bad_cable(program, far_hosts):
