@@ -123,6 +123,13 @@ def step_back() -> None:
             Path('/proc/self/autogroup').write_text(str(NICE))
 
 
+@pytest.fixture(autouse=True)
+def same_arguments_and_path(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Take back what programs that run in this process do to sys.argv and sys.path."""
+    monkeypatch.setattr(sys, 'argv', [*sys.argv])
+    monkeypatch.setattr(sys, 'path', [*sys.path])
+
+
 @pytest.fixture
 def setup_arguments(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     """Return what setup.py hands to setuptools."""

@@ -293,6 +293,7 @@ def test_no_more_often_than_asked(client, node, contact_node):
     while time.monotonic() - started < 1.0:
         client.send(poses.IDENTITY, TOUCHING)
         client.spin(lambda: False, 0.002)
+
     def quiet():
         """Whether half a second, ten periods, brings nothing."""
         count = len(client.arrays)

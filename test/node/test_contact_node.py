@@ -1,6 +1,7 @@
 """The contact node over DDS: in this process and as a process of its own."""
 from __future__ import annotations
 
+import gc
 import math
 import signal
 import time
@@ -295,3 +296,4 @@ def test_two_contexts_do_not_share_state():
     assert two.ok()
     second.destroy_node()
     two.try_shutdown()
+    gc.unfreeze()

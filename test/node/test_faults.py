@@ -261,7 +261,7 @@ def test_a_subscriber_that_never_reads(start, client, program):
     crane.signal(signal.SIGSTOP)
     before = memory(node)
     stamps = []
-    for _ in rate_limited(8000, 1000):  # the middleware keeps 5,000 where all is to be kept
+    for _ in rate_limited(6000, 1500):  # the middleware keeps 5,000 where all is to be kept
         stamps.append(client.send_pair(ORIGIN, TOUCHING))
         client.keep_up(stamps)
         client.poll()

@@ -166,7 +166,6 @@ def probe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(
         cli.PROGRAMS, 'probe', cli.Program('probe_program:main', 'a test', ())
     )
-    monkeypatch.setattr(sys, 'argv', list(sys.argv))  # programs.run sets it
 
 
 @pytest.mark.parametrize('arguments', [[], ['--ros-args', '-p', 'model:=exact', '--', '--help']])
@@ -211,7 +210,6 @@ def test_missing_extra_is_one_line_that_names_it(
     def main(args: list[str]) -> int:
         raise ModuleNotFoundError(f'No module named {module!r}', name=module)
 
-    monkeypatch.setattr(sys, 'argv', list(sys.argv))
     fake = type(sys)('fake')
     fake.main = main
     monkeypatch.setattr(cli.importlib, 'import_module', lambda _: fake)

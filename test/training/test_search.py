@@ -2,7 +2,6 @@
 from __future__ import annotations
 
 import csv
-import os
 import signal
 import subprocess
 import sys
@@ -118,30 +117,18 @@ def test_candidates_are_over_the_whole_range() -> None:
     assert len({one.rate for one in found}) == 2048
 
 
-def start(folder: Path, *arguments: str, **options) -> subprocess.Popen[str]:
-    return subprocess.Popen(
-        [sys.executable, '-m', 'box_contact_ros', 'search', *arguments, '--out', str(folder)],
-        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env={**os.environ, **options})
-
-
-def run(folder: Path, *arguments: str) -> str:
-    process = start(folder, *arguments)
-    output, _ = process.communicate(timeout=200)
-    assert process.returncode == 0, output
-    return output
-
-
 def table(folder: Path, name: str) -> str:
     return (folder / f'{name}.csv').read_text('utf-8')
 
 
 @pytest.mark.parametrize(('what', 'name', 'networks'), [
     ('mlp', 'search', 48), ('paper', 'search_paper', 48)])
-def test_killed_and_started_again_it_ends_the_same(tmp_path: Path, what: str, name: str,
-                                                   networks: int) -> None:
+def test_killed_and_started_again_it_ends_the_same(
+        tmp_path: Path, what: str, name: str, networks: int,
+        capsys: pytest.CaptureFixture[str]) -> None:
     """The program, killed when its first checkpoint is there; then the page, table and plot."""
     whole, killed = tmp_path / 'whole', tmp_path / 'killed'
-    run(whole, what, *QUICK)
+    assert search.main([what, *QUICK, '--out', str(whole)]) == 0
     # A checkpoint after every group.
     process = subprocess.Popen(
         [sys.executable, '-c', 'import sys\n'
@@ -157,7 +144,8 @@ def test_killed_and_started_again_it_ends_the_same(tmp_path: Path, what: str, na
     process.wait()
     if (killed / f'{name}.csv').exists():
         pytest.skip('it was faster than the signal')
-    assert 'going on from' in run(killed, what, *QUICK)
+    assert search.main([what, *QUICK, '--out', str(killed)]) == 0
+    assert 'going on from' in capsys.readouterr().out
     assert table(killed, name) == table(whole, name)
     rows = list(csv.DictReader(table(whole, name).splitlines()))
     assert len(rows) == networks
