@@ -6,8 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...scene.pose import rotation_matrix
-
 Colour = tuple[int, int, int]  # red, green, blue, 0 to 255
 
 BOX_A: Colour = (238, 150, 50)
@@ -77,12 +75,3 @@ def unit_poses(poses: np.ndarray) -> np.ndarray:
     """Return poses (n, 7) whose quaternions have unit length, which drawing needs."""
     lengths = np.linalg.norm(poses[:, 3:], axis=1, keepdims=True)
     return np.concatenate([poses[:, :3], poses[:, 3:] / lengths], axis=1)
-
-
-def box_edges(poses: np.ndarray, sizes: np.ndarray) -> np.ndarray:
-    """Return the ends (n, 12, 2, 3) of the edges of boxes with poses (n, 7) and full extents."""
-    corners = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
-    placed = (corners * sizes[:, None]) @ np.swapaxes(rotation_matrix(poses[:, 3:]), 1, 2)
-    ends = [(i, i | bit) for i in range(8) for bit in (1, 2, 4) if not i & bit]
-    edges: np.ndarray = (placed + poses[:, None, :3])[:, ends]
-    return edges

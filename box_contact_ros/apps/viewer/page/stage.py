@@ -1,8 +1,8 @@
 """The drawing on the page: boxes, contacts, ropes, as objects of viser. No ROS.
 
-Boxes are instances of one cube: a tick moves all of them by one message. The origin of the drawing
-is where boxes were first seen. Browsers draw in float32, which is half a metre coarse in map
-coordinates.
+Boxes are instances of one cube's faces and edges: a tick moves all of them together. The origin of
+the drawing is where boxes were first seen. Browsers draw in float32, which is half a metre coarse
+in map coordinates.
 """
 from __future__ import annotations
 
@@ -22,7 +22,6 @@ from ..style import (
     PATCH_OPACITY,
     ROPE,
     STALE_BOX,
-    box_edges,
     patch_outlines,
     proportions,
     unit_poses,
@@ -35,6 +34,9 @@ VIEWPOINT = np.array([-0.55, -0.78, 0.42])
 CUBE = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
 CUBE_FACES = np.array([[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],
                        [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]])
+_ENDS = np.array([(i, i | bit) for i in range(8) for bit in (1, 2, 4) if not i & bit])
+CUBE_EDGES = np.concatenate([CUBE[_ENDS], 1.0001 * CUBE[_ENDS[:, :1]]], axis=1)
+"""Corners (12, 3, 3) of a triangle an edge, so thin that its wireframe is the edge."""
 GAMMA = 2.2  # of the colours of screens
 LINE = {'thickness': 2.0, 'thickness_units': 'screen'}
 
@@ -46,19 +48,18 @@ class BoxGroup:
                  rows: np.ndarray) -> None:
         self._rows, self._sizes = rows, scene.sizes[rows]
         self._colours = np.where(scene.is_a[rows, None], BOX_A, BOX_B).astype(np.uint8)
-        places = np.zeros((len(rows), 3))
-        self._faces = server.scene.add_batched_meshes_simple(
-            f'/boxes/{name}', CUBE, CUBE_FACES, np.tile([1.0, 0.0, 0.0, 0.0], (len(rows), 1)),
-            places, batched_scales=np.zeros((len(rows), 3)), batched_colors=_linear(self._colours),
-            lod='off', opacity=BOX_OPACITY, flat_shading=True, cast_shadow=False,
-            receive_shadow=False)
-        self._edges = server.scene.add_line_segments(
-            f'/edges/{name}', np.zeros((12 * len(rows), 2, 3)), self._edge_colours(self._colours),
-            **LINE)
+        no_turn, nothing = np.tile([1.0, 0.0, 0.0, 0.0], (len(rows), 1)), np.zeros((len(rows), 3))
 
-    @staticmethod
-    def _edge_colours(colours: np.ndarray) -> np.ndarray:
-        return np.repeat(_linear(colours // 2), 24, axis=0).reshape(-1, 2, 3)
+        def add(path: str, corners: np.ndarray, triangles: np.ndarray, **look: Any) -> Any:
+            return server.scene.add_batched_meshes_simple(
+                f'/{path}/{name}', corners, triangles, no_turn, nothing, batched_scales=nothing,
+                lod='off', cast_shadow=False, receive_shadow=False, **look)
+
+        # Browsers without a GPU draw a toon's faces, which are flat, in half of a standard's time.
+        self._faces = add('boxes', CUBE, CUBE_FACES, opacity=BOX_OPACITY, flat_shading=True,
+                          material='toon5')
+        self._edges = add('edges', CUBE_EDGES.reshape(-1, 3), np.arange(36).reshape(12, 3),
+                          wireframe=True)
 
     def draw(self, snapshot: Snapshot, origin: np.ndarray) -> None:
         """Move the boxes; those without a pose shrink to nothing, those that are stale turn grey.
@@ -72,12 +73,11 @@ class BoxGroup:
         sizes = np.where(known, self._sizes, 0.0)
         stale = snapshot.stale_boxes[self._rows, None]
         colours = np.where(stale, STALE_BOX, self._colours).astype(np.uint8)
-        self._faces.batched_positions = poses[:, :3]
-        self._faces.batched_wxyzs = np.roll(poses[:, 3:], 1, axis=1)
-        self._faces.batched_scales = sizes
-        self._faces.batched_colors = _linear(colours)
-        self._edges.points = box_edges(poses, sizes).reshape(-1, 2, 3)
-        self._edges.colors = self._edge_colours(colours)
+        for mesh, shades in ((self._faces, colours), (self._edges, colours // 2)):
+            mesh.batched_positions = poses[:, :3]
+            mesh.batched_wxyzs = np.roll(poses[:, 3:], 1, axis=1)
+            mesh.batched_scales = sizes
+            mesh.batched_colors = _linear(shades)
 
     def remove(self) -> None:
         """Take the boxes away."""
