@@ -20,6 +20,8 @@ from pathlib import Path
 
 _PACKAGE = Path(__file__).resolve().parent
 _SHARE = Path('share', 'box_contact_ros')
+SCENES = ('config', 'scenes')
+"""Where the package's own scenes are."""
 
 
 def resource_path(*parts: str) -> Path:
@@ -45,11 +47,16 @@ def resource_path(*parts: str) -> Path:
 
 
 def find_file(name: str | os.PathLike[str]) -> Path:
-    """Return the path that a user names, of one of the package's own where it leads nowhere."""
+    """Return the path that a user names, of one of the package's own where it leads nowhere.
+
+    A bare name, such as `yard_bay`, is that of a scene in config/scenes/.
+    """
     path = Path(name)
-    if not path.is_absolute() and not path.exists():
+    if path.is_absolute() or path.exists():
+        return path
+    for parts in ([str(name)], [*SCENES, f'{name}.yaml']):
         with contextlib.suppress(FileNotFoundError):
-            path = resource_path(str(name))
+            return resource_path(*parts)
     return path
 
 

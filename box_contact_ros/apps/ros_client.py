@@ -2,8 +2,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
-from pathlib import Path
+from contextlib import contextmanager
 from typing import Any, TypeVar
 
 import numpy as np
@@ -19,14 +18,12 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from ..node.messages import NANOSECONDS
 from ..node.runtime import make_executor, uninterrupted
-from ..resources import find_file, resource_path
+from ..resources import find_file
 from ..scene.files.scene_file import read_scene
 from ..scene.scene_solver import Scene
 
 CRANE_MARKERS = 'crane/markers'
 """Where the crane publishes its ropes and its spreader, as lines."""
-SCENES = ('config', 'scenes')
-"""Where the package's own scenes are."""
 NodeKind = TypeVar('NodeKind', bound=Node)
 
 DEEP_RELIABLE = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
@@ -62,14 +59,6 @@ def joined(make_node: Callable[[Context], NodeKind], args: Sequence[str] | None 
             if node is not None:
                 node.destroy_node()
             context.try_shutdown()
-
-
-def scene_source(name: str) -> str:
-    """Return what `read_scene` takes: a bare name is that of a scene of the package's own."""
-    if Path(name).name == name and not Path(name).suffix and not Path(name).exists():
-        with suppress(FileNotFoundError):
-            return str(resource_path(*SCENES, f'{name}.yaml'))
-    return name
 
 
 def read_scene_text(source: str) -> tuple[str, Scene]:

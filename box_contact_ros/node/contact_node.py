@@ -68,8 +68,9 @@ LONGEST = 1e6  # s, about twelve days
 PARAMETERS = {
     'size_a': Setting(CONTAINER, 'full extents of box A, three numbers > 0 [m]', size),
     'size_b': Setting(CONTAINER, 'full extents of box B, three numbers > 0 [m]', size),
-    'scene': Setting('', 'scene file, or the scene itself as text, with boxes and pairs; replaces '
-                         'size_a and size_b; setting it again reads it again', scene_source),
+    'scene': Setting('', 'scene file, its text, or the bare name of one in config/scenes/; '
+                         'replaces size_a and size_b; setting it again reads it again',
+                     scene_source),
     'model': Setting('mlp', f'how the contact point is found: {model_names()}', model),
     'weights': Setting('', 'weights file to use instead of the shipped one', text),
     'pairing': Setting('stamp', 'stamp: answer once, when poses of equal stamp are in; latest: '

@@ -26,7 +26,7 @@ from browser import chromium, open_page
 from PIL import Image
 
 from box_contact_ros import ContactSolver
-from box_contact_ros.apps.ros_client import CRANE_MARKERS, line_marker, scene_source
+from box_contact_ros.apps.ros_client import CRANE_MARKERS, line_marker
 from box_contact_ros.apps.viewer.listener import ViewNode
 from box_contact_ros.apps.viewer.page.read_outs import deepest_contacts, legend, read_out
 from box_contact_ros.apps.viewer.page.stage import CUBE_EDGES
@@ -380,7 +380,7 @@ def test_a_cube_has_twelve_edges():
     ('spreader_container_stack', {'load_stack', 'load_neighbour', 'spreader_load'})])
 def test_the_driver_sets_boxes_down_on_their_partners(name, in_contact):
     """One after the other, by some centimetres at most; in between nothing but riders touch."""
-    scene = read_scene(scene_source(name))
+    scene = read_scene(name)
     solver, moves, found = SceneSolver(scene, model='exact'), motions(scene), []
     for time_ in np.arange(0.0, 2.0 * VISIT, 0.1):
         answer = solver([moves[box](time_) for box in scene.moving])

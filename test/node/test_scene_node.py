@@ -195,7 +195,7 @@ def test_ids_are_never_used_again(node, client):
 def test_shipped_scenes_replace_each_other(node):
     """Their ids follow from the names of their pairs."""
     for name in ('two_boxes', 'yard_bay', 'spreader_container_stack', 'yard_bay', 'two_boxes'):
-        result = set_scene(node, f'config/scenes/{name}.yaml')
+        result = set_scene(node, name)
         assert result.successful, result.reason
 
 

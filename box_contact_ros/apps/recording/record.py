@@ -22,7 +22,7 @@ from visualization_msgs.msg import MarkerArray
 from ...node.parameters import outside_ros_args
 from ...node.runtime import POSE_QOS, REFUSALS, run_node
 from ...solver.checks import as_size
-from ..ros_client import DEEP_RELIABLE, read_scene_text, scene_source
+from ..ros_client import DEEP_RELIABLE, read_scene_text
 from .bag_file import DRAWN, NANOSECONDS, POSE, TOPICS, TYPES, Recorder, RecordingError, type_of
 
 MESSAGES = dict(zip(TYPES.values(), (PoseStamped, PointStamped, Vector3Stamped, PointCloud2,
@@ -114,7 +114,7 @@ def _options(args: Sequence[str]) -> argparse.Namespace:
                         help='what is recorded; a name says the type by its end: '
                              f'{", ".join(TYPES)} (default: {" ".join((*TOPICS, *DRAWN))}; of a '
                              'scene the poses of all moving boxes, contacts, and markers)')
-    parser.add_argument('--scene', metavar='NAME', type=scene_source,
+    parser.add_argument('--scene', metavar='NAME',
                         help='the scene that is recorded, kept in the bag: a file, or the bare '
                              'name of one in config/scenes/')
     for name in 'ab':

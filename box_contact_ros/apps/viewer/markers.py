@@ -22,7 +22,7 @@ from ...node.runtime import CONTACT_QOS, run_node
 from ...scene.files.scene_file import read_scene
 from ...scene.pose_sets import CONTAINER
 from ...scene.scene_solver import two_boxes
-from ..ros_client import line_marker, scene_source, set_pose
+from ..ros_client import line_marker, set_pose
 from .listener import Listener
 from .style import (
     BOX_A,
@@ -129,7 +129,7 @@ class MarkersNode(Listener):
 
     def _apply(self, settings: dict[str, Any], names: Collection[str]) -> None:
         if not {'scene', 'size_a', 'size_b'}.isdisjoint(names):
-            self.listen_to(read_scene(scene_source(settings['scene'])) if settings['scene'] else
+            self.listen_to(read_scene(settings['scene']) if settings['scene'] else
                            two_boxes(settings['size_a'], settings['size_b']))
         self._timer.timer_period_ns = round(NANOSECONDS / settings['rate'])
         self._changed = True

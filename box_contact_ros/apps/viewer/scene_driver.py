@@ -24,7 +24,7 @@ from ...scene.pose import quaternion_multiply, rotation_matrix
 from ...scene.scene_solver import Box, Scene
 from ...solver.arguments import within
 from ...solver.contact_solver import ContactSolver
-from ..ros_client import pose_message, scene_source
+from ..ros_client import pose_message
 
 VISIT = 8.0
 """Time [s] from one partner to the next."""
@@ -167,7 +167,7 @@ def main(args: Sequence[str] | None = None) -> int:
                         help='ticks a second (default: %(default)g)')
     options = parser.parse_args(outside_ros_args(args))
     try:
-        scene = read_scene(scene_source(options.scene))
+        scene = read_scene(options.scene)
         return run_node(lambda context: SceneDriver(context, scene, options.rate), args)
     except REFUSALS as error:
         print(f'error: {error}', file=sys.stderr)

@@ -35,7 +35,7 @@ from ...scene.scene_solver import Scene
 from ...solver.arguments import model_name, within
 from .. import processes
 from ..processes import DOMAINS, Stop, asked_to_end, on_this_host, printed, program
-from ..ros_client import joined, scene_source
+from ..ros_client import joined
 from . import scene_driver
 from .listener import ViewNode
 from .page.view_page import CraneRun, Page
@@ -259,7 +259,7 @@ def _options(args: Sequence[str]) -> argparse.Namespace:
                         help='start nothing: listen to nodes that run already')
     parser.add_argument('--node', default='contact_node', metavar='NAME',
                         help='of the contact node (default: %(default)s)')
-    parser.add_argument('--scene', metavar='NAME', type=scene_source,
+    parser.add_argument('--scene', metavar='NAME',
                         help='draw this scene, and move its boxes: a file, or the bare name of one '
                              'in config/scenes/; with --attach in place of the one that the '
                              'contact node names')

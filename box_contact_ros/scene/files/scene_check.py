@@ -19,7 +19,7 @@ def main(args: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog='contact_node', description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('--check', metavar='FILE', required=True,
-                        help='a scene file, or the scene itself as text')
+                        help='a scene file, its text, or the bare name of one in config/scenes/')
     try:
         scene = read_scene(parser.parse_args(args).check)
     except SceneError as error:

@@ -39,7 +39,8 @@ class SceneError(ValueError):
 def read_scene(source: str | os.PathLike[str]) -> Scene:
     """Return the scene of a file, or of a text that begins with `{` or has more than one line.
 
-    A path that leads to no file from here may be one of the package's own: config/scenes/….
+    A path that leads to no file from here may be one of the package's own: config/scenes/…, or the
+    bare name of a scene there, such as `yard_bay`.
     Raises SceneError, whose words name file, line and field.
     """
     if not isinstance(source, str):
