@@ -3,7 +3,6 @@ from __future__ import annotations
 
 import sys
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from rich.console import Console
@@ -12,7 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ...output import percentiles
-from ...solver.contact import Contacts
+from ...solver.contact_solver import ContactSolver
 from ..bench.answer_log import AnswerLog, StreamResult
 
 
@@ -69,13 +68,6 @@ class Screen:
         self._bar.console.print(shown)
 
 
-class ContactReference(Protocol):
-    """What answers are compared with, such as a ContactSolver."""
-
-    def batch(self, poses_a: np.ndarray, poses_b: np.ndarray, /) -> Contacts:
-        """Return the contacts of poses (n, 7)."""
-
-
 class CraneLog(AnswerLog):
     """The answers to one run of the crane, and the poses that it sent."""
 
@@ -95,7 +87,7 @@ class CraneLog(AnswerLog):
         """Pairs of poses sent so far."""
         return len(self._poses)
 
-    def summary(self, solver: ContactReference, edge: float) -> CraneSummary | None:
+    def summary(self, solver: ContactSolver, edge: float) -> CraneSummary | None:
         """Compare the answers with a reference; None if nothing was sent.
 
         edge: longest edge of the smaller box [m], what the point error is a share of.

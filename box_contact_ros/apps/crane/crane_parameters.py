@@ -4,15 +4,22 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from ...node.parameters import Setting, flag, number, numbers, size, text, whole_number
+from ...node.parameters import Check, Setting, flag, number, numbers, size, text, whole_number
 from .landing import LANDING_DURATION
 from .mujoco_crane import LANDING_OVERLAP, LIMITS, CraneScenario
 
 STANDARD = CraneScenario()
+
+
+def _of_scenario(field: str, description: str, check: Check | None = None) -> Setting:
+    """Return the setting of a field of CraneScenario; without a check, within its limits."""
+    return Setting(getattr(STANDARD, field), description, check or number(*LIMITS[field]))
+
+
 PARAMETERS = {
     'rate': Setting(200.0, 'pairs of poses published per second [Hz]', number(1, 2000)),
-    'duration': Setting(STANDARD.duration, f'length of the motion [s]; left at its default, a '
-                        f'closed loop takes {LANDING_DURATION:g}', number(*LIMITS['duration'])),
+    'duration': _of_scenario('duration', f'length of the motion [s]; left at its default, a '
+                             f'closed loop takes {LANDING_DURATION:g}'),
     'wait': Setting(10.0, 'patience for a contact node to answer [s]', number(0, 600)),
     'frame_id': Setting('world', 'frame of the published poses', text),
     'report': Setting(False, 'closed loop: print a line when the load hangs, touches, '
@@ -24,28 +31,23 @@ PARAMETERS = {
                        'published [s]', number(0, 1)),
     'seed': Setting(0, '0: the standard scenario; n > 0: offset and angles drawn at random',
                     whole_number(0, 2**31)),
-    'size_a': Setting(STANDARD.size, 'full extents of the load [m]', size),
-    'size_b': Setting(STANDARD.stack_size, 'full extents of the stack [m]', size),
-    'mass': Setting(STANDARD.mass, 'mass of the load [kg]', number(*LIMITS['mass'])),
-    'mass_offset': Setting(STANDARD.mass_offset, "centre of mass from the load's centre, in its "
-                           'own axes [m]', numbers(3)),
-    'offset': Setting(STANDARD.offset, 'x, y of the trolley from the centre of the stack [m]',
-                      numbers(2)),
-    'rope_angle': Setting(STANDARD.rope_angle, 'ropes from the plumb line at the start [deg]',
-                          number(*LIMITS['rope_angle'])),
-    'rope_heading': Setting(STANDARD.rope_heading, 'whereto, counter-clockwise from x [deg]',
-                            number(*LIMITS['rope_heading'])),
-    'pitch': Setting(STANDARD.pitch, 'tilt of the load about y at the start [deg]',
-                     number(*LIMITS['pitch'])),
-    'roll': Setting(STANDARD.roll, 'tilt of the load about x at the start [deg]',
-                    number(*LIMITS['roll'])),
-    'yaw': Setting(STANDARD.yaw, 'turn of the load about the plumb line at the start [deg]',
-                   number(*LIMITS['yaw'])),
-    'lowering_speed': Setting(STANDARD.lowering_speed, 'top speed of the hoist [m/s]',
-                              number(0, 0.8)),
-    'overlap': Setting(STANDARD.overlap, 'depth to which the load is lowered into the stack [m]; '
-                       f'left at its default, a closed loop pays the ropes out by '
-                       f'{LANDING_OVERLAP:g} beyond the load at rest', number(*LIMITS['overlap'])),
+    'size_a': _of_scenario('size', 'full extents of the load [m]', size),
+    'size_b': _of_scenario('stack_size', 'full extents of the stack [m]', size),
+    'mass': _of_scenario('mass', 'mass of the load [kg]'),
+    'mass_offset': _of_scenario('mass_offset', "centre of mass from the load's centre, in its own "
+                                'axes [m]', numbers(3)),
+    'offset': _of_scenario('offset', 'x, y of the trolley from the centre of the stack [m]',
+                           numbers(2)),
+    'rope_angle': _of_scenario('rope_angle', 'ropes from the plumb line at the start [deg]'),
+    'rope_heading': _of_scenario('rope_heading', 'whereto, counter-clockwise from x [deg]'),
+    'pitch': _of_scenario('pitch', 'tilt of the load about y at the start [deg]'),
+    'roll': _of_scenario('roll', 'tilt of the load about x at the start [deg]'),
+    'yaw': _of_scenario('yaw', 'turn of the load about the plumb line at the start [deg]'),
+    'lowering_speed': _of_scenario('lowering_speed', 'top speed of the hoist [m/s]',
+                                   number(0, 0.8)),
+    'overlap': _of_scenario('overlap', 'depth to which the load is lowered into the stack [m]; '
+                            f'left at its default, a closed loop pays the ropes out by '
+                            f'{LANDING_OVERLAP:g} beyond the load at rest'),
 }
 SCENARIO = {name: {'size_a': 'size', 'size_b': 'stack_size'}.get(name, name) for name in (
     'duration', 'size_a', 'size_b', 'mass', 'mass_offset', 'offset', 'rope_angle', 'rope_heading',

@@ -146,36 +146,22 @@ class LandingResult:
     overhang: float = math.nan  # lateral distance of the two centres then [m]
     settled: float = math.nan
     """Time from the first touch until corners stay below `SETTLED_SPEED` [s], NaN for never."""
-    corner_speed: float = math.nan
-    """Of the fastest corner in the window [m/s]."""
-    rope_tension: float = math.nan
-    """Of the tautest rope in the window [N]."""
-    force_error: float = math.nan
-    """|mean contact force − weight| / weight over the window."""
-    force_worst: float = math.nan
-    """The same of the window's worst tick."""
-    tilt: float = math.nan
-    """Largest in the window [rad]."""
-    static_tilt: float = math.nan
-    """Mean over the window [rad]."""
-    tilt_limit: float = TILT_LIMIT
-    """What the scenario's static tilt is held to [rad]."""
-    creep: float = math.nan
-    """Mean lateral speed of the load's centre over the window [m/s]."""
+    corner_speed: float = math.nan  # of the fastest corner in the window [m/s]
+    rope_tension: float = math.nan  # of the tautest rope in the window [N]
+    force_error: float = math.nan  # |mean contact force − weight| / weight over the window
+    force_worst: float = math.nan  # the same of the window's worst tick
+    tilt: float = math.nan  # largest in the window [rad]
+    static_tilt: float = math.nan  # mean over the window [rad]
+    tilt_limit: float = TILT_LIMIT  # what the scenario's static tilt is held to [rad]
+    creep: float = math.nan  # mean lateral speed of the load's centre over the window [m/s]
     energy_gain: float = math.nan
     """Largest gain of kinetic and potential energy over the window's start [J]."""
-    depth: float = math.nan
-    """Largest ever, as a share of the load's height."""
-    gap: float = math.nan
-    """Largest after the first touch [m]."""
-    drop: float = math.nan
-    """How far the load's centre ends below its place on the stack [m]."""
-    point_step: float = math.nan
-    """Largest |Δpoint| between neighbouring ticks in the window [m]."""
-    exact_point_step: float = math.nan
-    """The same of the exact point on the same poses."""
-    point_step_ever: float = math.nan
-    """Largest |Δpoint| over the whole contact [m]."""
+    depth: float = math.nan  # largest ever, as a share of the load's height
+    gap: float = math.nan  # largest after the first touch [m]
+    drop: float = math.nan  # how far the load's centre ends below its place on the stack [m]
+    point_step: float = math.nan  # largest |Δpoint| between neighbouring ticks in the window [m]
+    exact_point_step: float = math.nan  # the same of the exact point on the same poses
+    point_step_ever: float = math.nan  # largest |Δpoint| over the whole contact [m]
     exact_point_step_ever: float = math.nan
 
     @property
@@ -281,10 +267,6 @@ class LandingRecord:
             + np.square(spins) @ scenario.inertia) + scenario.mass * GRAVITY * height
         return energies
 
-    def vertical_forces(self) -> np.ndarray:
-        """Return the vertical part [N] of the contact force, per tick (n,)."""
-        return np.array(self.forces)[:, 2]
-
     def point_path(self) -> np.ndarray:
         """Return contact points (n, 3) [m], NaN where there was no contact or no answer."""
         path = np.full((len(self.poses), 3), math.nan)
@@ -334,7 +316,7 @@ class LandingRecord:
     def _in(self, window: slice) -> dict[str, float]:
         """Return the figures of a window of ticks."""
         weight = self.scenario.mass * GRAVITY
-        forces, energies = self.vertical_forces()[window], self.energies()[window]
+        forces, energies = np.array(self.forces)[window, 2], self.energies()[window]
         tilts, places = self.tilts()[window], np.array(self.poses)[window, :2]
         return {
             'corner_speed': float(self.corner_speeds()[window].max()),

@@ -84,46 +84,29 @@ _CORNERS = np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]], dtype=float)
 
 @dataclass(frozen=True, kw_only=True)
 class CraneScenario:
-    """What hangs where, and how it is lowered. Lengths in m, angles in degrees, world frame.
+    """What hangs where, and how it is lowered. Lengths in m, angles in degrees, world frame."""
 
-    | field | meaning |
-    |---|---|
-    | size, stack_size | full extents (length x, width y, height z) of load and stack |
-    | mass | of the load, kg, with the moments of a full box |
-    | mass_offset | x, y, z of the centre of mass from the load's centre, in the load's axes |
-    | castings | the load meets four corner castings, flush with the stack's top, and not the rest |
-    | drop_position | x, y of the stack's centre; the stack stands on the ground, not rotated |
-    | offset | x, y of the trolley from the stack's centre: the lateral error of the drop |
-    | rope_length | height of the trolley over the load's top once the load is down |
-    | rope_spread | spacing of the ropes at the trolley by that at the load; 0: one point |
-    | rope_angle | the load is released at rest with its ropes this far from the plumb line |
-    | rope_heading | direction it is pulled aside to, counter-clockwise from x |
-    | pitch, roll | tilt at the start, about y and about x, held by unequal ropes |
-    | yaw | rotation about the plumb line at the start |
-    | lowering_speed | top speed of the hoist, m/s; lifting uses it as well |
-    | overlap | depth to which the load, at rest and level, is lowered into the stack |
-    | duration | of the whole programme, s |
-    | land | lower until the ropes are slack (give an `overlap` for it), never lift |
-    """
-
-    size: tuple[float, float, float] = CONTAINER
-    stack_size: tuple[float, float, float] = CONTAINER
-    mass: float = 20_000.0
+    size: tuple[float, float, float] = CONTAINER  # full extents of the load
+    stack_size: tuple[float, float, float] = CONTAINER  # it stands on the ground, not rotated
+    mass: float = 20_000.0  # of the load, kg, with the moments of a full box
     mass_offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """The centre of mass from the load's centre, in the load's axes."""
     castings: bool = False
-    drop_position: tuple[float, float] = (0.0, 0.0)
+    """The load meets four corner castings, flush with the stack's top, and not the rest."""
+    drop_position: tuple[float, float] = (0.0, 0.0)  # x, y of the stack's centre
     offset: tuple[float, float] = (0.25, -0.15)
-    rope_length: float = 15.0
-    rope_spread: float = 0.8
-    rope_angle: float = 1.5
-    rope_heading: float = 35.0
-    pitch: float = 0.25
-    roll: float = -0.4
-    yaw: float = 0.6
-    lowering_speed: float = 0.3
-    overlap: float = 0.025
-    duration: float = 18.0
-    land: bool = False
+    """x, y of the trolley from the stack's centre: the lateral error of the drop."""
+    rope_length: float = 15.0  # height of the trolley over the load's top once the load is down
+    rope_spread: float = 0.8  # ropes: spacing at the trolley by that at the load; 0: one point
+    rope_angle: float = 1.5  # the load is released at rest, its ropes this far from the plumb line
+    rope_heading: float = 35.0  # direction it is pulled aside to, counter-clockwise from x
+    pitch: float = 0.25  # tilt about y at the start, held by unequal ropes
+    roll: float = -0.4  # the same about x
+    yaw: float = 0.6  # rotation about the plumb line at the start
+    lowering_speed: float = 0.3  # top speed of the hoist, m/s; lifting uses it as well
+    overlap: float = 0.025  # depth to which the load, at rest and level, is lowered into the stack
+    duration: float = 18.0  # of the whole programme, s
+    land: bool = False  # lower until the ropes are slack (give an `overlap` for it), never lift
 
     def __post_init__(self) -> None:
         """Raise ValueError naming field and value if the scenario makes no sense."""

@@ -38,10 +38,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
 
 import numpy as np
 
+from ...solver.contact import Contact
 from ..pose import cross, rotation_matrix
 from .held_wrench import FRICTION, GRAVITY, SLIP_SPEED, Touch
 
@@ -74,26 +74,6 @@ LEAST_ASPECT = 1e-7
 spoils by 1e-16 of λ₁². So much area keeps κ finite where an edge only just touches."""
 
 
-class Overlap(Protocol):
-    """What the law reads of a contact: a `Patch`, or a `Contact` of a solver."""
-
-    @property
-    def point(self) -> np.ndarray:
-        """Centroid (3,) [m]."""
-
-    @property
-    def normal(self) -> np.ndarray:
-        """Return the unit vector (3,) from the load to the stack."""
-
-    @property
-    def volume(self) -> float:
-        """Volume of the overlap [m³]; 0 without contact."""
-
-    @property
-    def covariance(self) -> np.ndarray:
-        """Second central moments (3, 3) of the overlap by its volume [m²]."""
-
-
 @dataclass(frozen=True)
 class Patch(Touch):
     """One contact with its patch: volume [m³] and covariance (3, 3) [m²] of the overlap.
@@ -103,6 +83,10 @@ class Patch(Touch):
 
     volume: float
     covariance: np.ndarray
+
+
+Overlap = Patch | Contact
+"""What the law reads of a contact: its own type, or that of a solver."""
 
 
 @dataclass(kw_only=True)
@@ -199,7 +183,7 @@ class PatchLaw:
         push = elastic * share
         slip = at_centroid - closing * normal
         grip = self.friction * push
-        force = -push * normal - grip / max(_length(slip), self.slip_speed) * slip
+        force = -push * normal - grip / max(math.sqrt(slip @ slip), self.slip_speed) * slip
 
         radius = math.sqrt(max(0.0, float(np.trace(covariance))))
         rim = radius * float(angular @ normal)  # slip at the radius of gyration
@@ -247,7 +231,3 @@ def _area(covariance: np.ndarray) -> float:
     product = (c[0, 0] * c[1, 1] - c[0, 1] * c[1, 0] + c[1, 1] * c[2, 2] - c[1, 2] * c[2, 1]
                + c[2, 2] * c[0, 0] - c[2, 0] * c[0, 2])
     return 12.0 * max(math.sqrt(max(0.0, float(product))), LEAST_ASPECT * float(np.trace(c)))
-
-
-def _length(a: np.ndarray) -> float:
-    return math.sqrt(float(a @ a))
