@@ -1,64 +1,41 @@
-"""What clients of the contact node need of rclpy: a node that is served, messages as numbers."""
+"""What clients of the contact node need of rclpy: messages as numbers."""
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from typing import Any, TypeVar
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
-import rclpy
-from geometry_msgs.msg import Point, PoseStamped
-from rclpy.context import Context
-from rclpy.executors import ExternalShutdownException
-from rclpy.node import Node
+from geometry_msgs.msg import Point, PointStamped, PoseStamped, Vector3Stamped
 from rclpy.qos import QoSProfile, ReliabilityPolicy
-from rclpy.signals import SignalHandlerOptions
+from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
-from ..node.messages import NANOSECONDS
-from ..node.runtime import make_executor, uninterrupted
+from ..node.messages import NANOSECONDS, read_cloud
 from ..resources import find_file
 from ..scene.files.scene_file import read_scene
 from ..scene.scene_solver import Scene
+from .bench.answer_log import first_row
 
+ANSWERS: dict[str, tuple[type, str]] = {
+    'point': (PointStamped, 'contact/point'),
+    'normal': (Vector3Stamped, 'contact/normal'),
+    'cloud': (PointCloud2, 'contacts'),
+}
+"""Type and topic of what a contact node answers with, by the kinds of an `AnswerLog`."""
 CRANE_MARKERS = 'crane/markers'
 """Where the crane publishes its ropes and its spreader, as lines."""
-NodeKind = TypeVar('NodeKind', bound=Node)
 
 DEEP_RELIABLE = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
 """What the DDS layer delivers while Python is busy must not push out the rest."""
 
 
-@contextmanager
-def joined(make_node: Callable[[Context], NodeKind], args: Sequence[str] | None = None, *,
-           domain: int | None = None, signals: SignalHandlerOptions = SignalHandlerOptions.NO,
-           ) -> Iterator[tuple[NodeKind, Any]]:
-    """Give a node and its executor in a context of their own; end all three afterwards.
-
-    signals: which handlers of rclpy's are installed; none where the caller has its own. After a
-    signal, whatever was under way fails; that is raised as ExternalShutdownException.
-    """
-    context = Context()
-    rclpy.init(args=None if args is None else list(args), context=context, domain_id=domain,
-               signal_handler_options=signals)
-    node = executor = None
-    try:
-        node = make_node(context)
-        executor = make_executor(context)
-        executor.add_node(node)
-        yield node, executor
-    except Exception as error:
-        if context.ok():
-            raise
-        raise ExternalShutdownException from error
-    finally:
-        with uninterrupted():
-            if executor is not None:
-                executor.shutdown()
-            if node is not None:
-                node.destroy_node()
-            context.try_shutdown()
+def answer_values(kind: str, message: Any) -> Sequence[float] | np.ndarray:
+    """Return the numbers of an answer of two boxes; of a cloud those of its `first_row`."""
+    if kind == 'cloud':
+        return first_row(read_cloud(message))
+    vector = message.point if kind == 'point' else message.vector
+    return vector.x, vector.y, vector.z
 
 
 def read_scene_text(source: str) -> tuple[str, Scene]:
@@ -68,12 +45,18 @@ def read_scene_text(source: str) -> tuple[str, Scene]:
     return path.read_text('utf-8') if path.is_file() else source, scene
 
 
+def make_marker(header: Header, name: str, kind: int, colour: tuple[int, int, int],
+                opacity: float = 1.0, *, number: int = 0) -> Marker:
+    """Return a marker of a kind (`Marker.CUBE`, ...) without pose and scale; colour: 0 to 255."""
+    red, green, blue = (value / 255.0 for value in colour)
+    return Marker(header=header, ns=name, id=number, type=kind, action=Marker.ADD,
+                  color=ColorRGBA(r=red, g=green, b=blue, a=opacity))
+
+
 def line_marker(header: Header, name: str, lines: np.ndarray, *, width: float,
                 colour: tuple[int, int, int]) -> Marker:
     """Return the marker of straight lines with ends (n, 2, 3) [m]; colour: 0 to 255."""
-    red, green, blue = (value / 255.0 for value in colour)
-    marker = Marker(header=header, ns=name, type=Marker.LINE_LIST, action=Marker.ADD,
-                    color=ColorRGBA(r=red, g=green, b=blue, a=1.0))
+    marker = make_marker(header, name, Marker.LINE_LIST, colour)
     marker.scale.x = float(width)
     marker.points = [Point(x=x, y=y, z=z) for x, y, z in lines.reshape(-1, 3).tolist()]
     return marker

@@ -5,7 +5,6 @@ Parameters are declared with dynamic typing, because a plain declaration refuses
 """
 from __future__ import annotations
 
-import argparse
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from ..solver.arguments import program_parser
 from ..solver.checks import shown, size_fault
 from .rclpy_workarounds import parameter_overrides
 
@@ -169,9 +169,8 @@ def answer_help(program: str, doc: str | None, settings: Mapping[str, Setting],
     width = max(map(len, settings))
     lines = [f'  {name:<{width}}  {setting.description} (default: {_show(setting.default)})'
              for name, setting in settings.items()]
-    parser = argparse.ArgumentParser(
-        prog=program, description=doc, formatter_class=argparse.RawDescriptionHelpFormatter,
-        usage=f'{program} [-h] [--ros-args -p NAME:=VALUE ... -r FROM:=TO ...]',
+    parser = program_parser(
+        program, doc, usage=f'{program} [-h] [--ros-args -p NAME:=VALUE ... -r FROM:=TO ...]',
         epilog='parameters (--ros-args -p NAME:=VALUE):\n' + '\n'.join(lines))
     _, unknown = parser.parse_known_args(outside_ros_args(args or ()))
     if unknown:

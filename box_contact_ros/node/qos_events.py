@@ -2,7 +2,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from rclpy.event_handler import EventHandler, SubscriptionEventCallbacks
@@ -24,8 +24,9 @@ class QosEvents:
     def callbacks(self, box: str, *, deadline: bool) -> SubscriptionEventCallbacks:
         """Return the callbacks for events of the poses of a box."""
         return SubscriptionEventCallbacks(
-            matched=self.on_matched(box), liveliness=self._on_liveliness(box),
-            message_lost=self._on_lost, deadline=self._on_deadline(box) if deadline else None)
+            matched=partial(self.on_matched, box), liveliness=partial(self._on_liveliness, box),
+            message_lost=self._on_lost,
+            deadline=partial(self._on_deadline, box) if deadline else None)
 
     def watch(self, entity: Publisher | Subscription) -> None:
         """Serve the events of a publisher or subscription from now on."""
@@ -50,31 +51,25 @@ class QosEvents:
                 handler.destroy()
         self._handlers_of.clear()
 
-    def on_matched(self, box: str) -> Callable[[Any], None]:
-        """Return the callback for publishers of a box's poses that come and go."""
-        def callback(event: Any) -> None:
-            # A publisher that came and went since the last event is in no current count.
-            gone = event.total_count_change - event.current_count_change
-            self._counts['publishers gone'] += gone
-            if gone:
-                self._node.get_logger().info(f'{box}: a publisher of its poses is gone, '
-                                             f'{event.current_count} left')
-        return callback
+    def on_matched(self, box: str, event: Any) -> None:
+        """Count publishers of a box's poses that have gone."""
+        # A publisher that came and went since the last event is in no current count.
+        gone = event.total_count_change - event.current_count_change
+        self._counts['publishers gone'] += gone
+        if gone:
+            self._node.get_logger().info(f'{box}: a publisher of its poses is gone, '
+                                         f'{event.current_count} left')
 
-    def _on_deadline(self, box: str) -> Callable[[Any], None]:
-        def callback(event: Any) -> None:
-            self._counts['deadlines missed'] += event.total_count_change
-            self._node.get_logger().warning(f'{box}: no pose within the deadline',
-                                            throttle_duration_sec=LOG_SECONDS)
-        return callback
+    def _on_deadline(self, box: str, event: Any) -> None:
+        self._counts['deadlines missed'] += event.total_count_change
+        self._node.get_logger().warning(f'{box}: no pose within the deadline',
+                                        throttle_duration_sec=LOG_SECONDS)
 
-    def _on_liveliness(self, box: str) -> Callable[[Any], None]:
-        def callback(event: Any) -> None:
-            lost = max(0, event.not_alive_count_change)
-            self._counts['liveliness lost'] += lost
-            if lost:
-                self._node.get_logger().warning(f'{box}: a publisher of its poses shows no life')
-        return callback
+    def _on_liveliness(self, box: str, event: Any) -> None:
+        lost = max(0, event.not_alive_count_change)
+        self._counts['liveliness lost'] += lost
+        if lost:
+            self._node.get_logger().warning(f'{box}: a publisher of its poses shows no life')
 
     def _on_lost(self, event: Any) -> None:
         self._counts['lost in transport'] += event.total_count_change

@@ -3,12 +3,13 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import functools
 import os
 import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 import rclpy
 from rclpy.context import Context
@@ -35,6 +36,7 @@ CONTACT_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)  # co
 SPIN_SECONDS = 10.0
 """EventsExecutor hangs when it spins without a timeout, so it is spun in slices. Each leaves some
 32 bytes behind in rclpy (7.1): of slices this long, 0.3 MB a day."""
+NodeKind = TypeVar('NodeKind', bound=Node)
 LOG_SECONDS = 1.0  # the same complaint is logged at most this often
 
 
@@ -71,35 +73,6 @@ def let_callbacks_finish() -> None:
         pass
 
 
-def spin(node: Node, *, undisturbed: bool = True) -> None:
-    """Serve a node until its context is shut down (SIGINT, SIGTERM, or `context.shutdown()`).
-
-    An exception of a callback is logged and ends nothing. `undisturbed`: `let_callbacks_finish`.
-    """
-    executor = make_executor(node.context)
-    try:
-        executor.add_node(node)
-        if undisturbed:
-            let_callbacks_finish()
-        while node.context.ok():
-            try:
-                spin_for(executor, SPIN_SECONDS)
-            except ExternalShutdownException:
-                raise
-            except Exception as error:
-                if not node.context.ok():  # it may fail at anything once a signal has ended it
-                    break
-                # rclpy's own services are callbacks too, and raise on requests that they cannot
-                # read, such as a parameter of an unknown type.
-                node.get_logger().error(f'a request failed: {type(error).__name__}: {error}',
-                                        throttle_duration_sec=LOG_SECONDS)
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    finally:
-        executor.shutdown()
-        keep_for_ever(executor)
-
-
 @contextlib.contextmanager
 def uninterrupted() -> Iterator[None]:
     """Ignore SIGINT, so that a second Ctrl-C does not break the clean end that is under way.
@@ -118,28 +91,84 @@ def uninterrupted() -> Iterator[None]:
         atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)
 
 
-def run_node(make_node: Callable[[Context], Node], args: Sequence[str] | None, *,
-             undisturbed: bool = True) -> int:
-    """Start a node and `spin`; return 0 after a clean end, 1 (and print why) if it cannot start."""
+@contextlib.contextmanager
+def joined(make_node: Callable[[Context], NodeKind], args: Sequence[str] | None = None, *,
+           domain: int | None = None, signals: SignalHandlerOptions = SignalHandlerOptions.NO,
+           ) -> Iterator[tuple[NodeKind, Any]]:
+    """Give a node and its executor in a context of their own; end all three afterwards.
+
+    signals: which handlers of rclpy's are installed; none where the caller has its own. After a
+    signal, whatever was under way fails; that is raised as ExternalShutdownException.
+    """
     context = Context()
-    node, joined = None, False
+    # Handlers have to be asked for where the context is not the default one.
+    rclpy.init(args=None if args is None else list(args), context=context, domain_id=domain,
+               signal_handler_options=signals)
+    node = executor = None
     try:
-        # Handlers have to be asked for where the context is not the default one.
-        rclpy.init(args=None if args is None else list(args), context=context,
-                   signal_handler_options=SignalHandlerOptions.ALL)
-        joined = True
         node = make_node(context)
-        spin(node, undisturbed=undisturbed)
-    except REFUSALS as error:
-        # Where a signal has ended the context, whatever was under way fails for that.
-        if context.ok() or not joined:
-            print(f'error: {error}', file=sys.stderr)
-            return 1
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
+        executor = make_executor(context)
+        executor.add_node(node)
+        yield node, executor
+    except Exception as error:
+        if context.ok():
+            raise
+        raise ExternalShutdownException from error
     finally:
         with uninterrupted():
+            if executor is not None:
+                executor.shutdown()
+                keep_for_ever(executor)
             if node is not None:
                 node.destroy_node()
             context.try_shutdown()
+
+
+def spin(node: Node, executor: Any) -> None:
+    """Serve a node until its context is shut down (SIGINT, SIGTERM, or `context.shutdown()`).
+
+    An exception of a callback is logged and ends nothing.
+    """
+    while node.context.ok():
+        try:
+            spin_for(executor, SPIN_SECONDS)
+        except ExternalShutdownException:
+            raise
+        except Exception as error:
+            if not node.context.ok():  # it may fail at anything once a signal has ended it
+                break
+            # rclpy's own services are callbacks too, and raise on requests that they cannot read,
+            # such as a parameter of an unknown type.
+            node.get_logger().error(f'a request failed: {type(error).__name__}: {error}',
+                                    throttle_duration_sec=LOG_SECONDS)
+
+
+def refusals_end(main: Callable[[Sequence[str] | None], int]) -> Callable[..., int]:
+    """Decorate a program: REFUSALS end it with one line and status 1."""
+    @functools.wraps(main)
+    def run(args: Sequence[str] | None = None) -> int:
+        try:
+            return main(args)
+        except REFUSALS as error:
+            print(f'error: {error}', file=sys.stderr)
+            return 1
+    return run
+
+
+def run_node(make_node: Callable[[Context], Node], args: Sequence[str] | None, *,
+             undisturbed: bool = True) -> int:
+    """Start a node and `spin`; return 0 after a clean end, 1 (and print why) if it cannot start.
+
+    undisturbed: `let_callbacks_finish`.
+    """
+    try:
+        with joined(make_node, args, signals=SignalHandlerOptions.ALL) as (node, executor):
+            if undisturbed:
+                let_callbacks_finish()
+            spin(node, executor)
+    except REFUSALS as error:
+        print(f'error: {error}', file=sys.stderr)
+        return 1
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
     return 0

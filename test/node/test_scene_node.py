@@ -416,7 +416,7 @@ def test_publishers_that_come_and_go_between_two_looks_are_counted(node):
     """Events are looked at once a second: what went is what came less what is more than before."""
     for came, more, gone in ((1, 1, 0), (1, 0, 1), (0, -1, 1), (3, -2, 5)):
         before = node.counts['publishers gone']
-        node._topics.events.on_matched('lorry')(SimpleNamespace(
+        node._topics.events.on_matched('lorry', SimpleNamespace(
             total_count_change=came, current_count_change=more, current_count=1))
         assert node.counts['publishers gone'] == before + gone
 

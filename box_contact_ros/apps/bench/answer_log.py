@@ -115,6 +115,7 @@ class AnswerLog:
         self.offers: set[int] = set()
         """Stamps [ns] of pairs that find out whether anyone answers; they count in no figure."""
         self.offers_answered: set[int] = set()
+        self.first_answer = math.nan  # when the first of them was received [ns]
         self.newest_contact = 0  # stamp [ns] of the newest contact that is complete; 0 without any
         self.messages = self.matched = self.offer_messages = 0
         self._rows: dict[int, tuple[StreamLog, int]] = {}
@@ -147,6 +148,8 @@ class AnswerLog:
         self.messages += 1
         if stamp in self.offers:
             self.offer_messages += 1
+            if not self.offers_answered:
+                self.first_answer = received
             self.offers_answered.add(stamp)
             return
         found = self.find(stamp)

@@ -15,7 +15,6 @@ The contact node must lose nothing, and give no wrong verdict and no answer twic
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -24,12 +23,10 @@ from tqdm import tqdm
 
 from ...node.contact_node import PARAMETERS
 from ...node.parameters import outside_ros_args
-from ...node.runtime import REFUSALS
+from ...node.runtime import refusals_end
 from ...output import make_folder, percentiles
 from ...scene.scene_solver import SceneSolver
 from ...solver.arguments import add_models, program_parser, within
-from ...solver.contact import Contacts
-from ...solver.contact_solver import ContactSolver
 from ...solver.models import MOST_SOUP_DIVISIONS, SOUP_DIVISIONS
 from ..processes import add_domain
 from .answer_log import StreamResult
@@ -50,32 +47,24 @@ SECONDS, LONGEST = 60.0, 3600.0  # of sending, in all: the default, and what is 
 QUICK_SECONDS = 0.5  # of every stream, with --quick
 
 
+@refusals_end
 def main(args: Sequence[str] | None = None) -> int:
     """Run the bench; 0 only if all nodes answered, all adds up, the contact node is faultless."""
     args = list(args or ())
-    try:
-        options = _options(outside_ros_args(args))
-    except REFUSALS as error:
-        print(f'error: {error}', file=sys.stderr)
-        return 1
+    options = _options(outside_ros_args(args))
     if options.boxes:
         return _bench_array(options, args)
-    nodes = _nodes(options)
-    try:
-        with open_bench(nodes, args, rate=options.rate, domain=options.domain) as bench:
-            streams = _streams(options)
-            truths = {stream.name: _truth(stream) for stream in streams}
-            about = _about(options, streams, bench.node_cores)
-            print('\n'.join(f'{name}: {value}' for name, value in about.items()), flush=True)
+    with open_bench(_nodes(options), args, rate=options.rate, domain=options.domain) as bench:
+        streams = _streams(options)
+        truths = {stream.name: stream.contacts('exact') for stream in streams}
+        about = _about(options, streams, bench.node_cores)
+        print('\n'.join(f'{name}: {value}' for name, value in about.items()), flush=True)
 
-            def play(stream: Stream) -> None:
-                for turn in bench.turns():
-                    bench.play(stream, truths[stream.name], turn)
+        def play(stream: Stream) -> None:
+            for turn in bench.turns():
+                bench.play(stream, truths[stream.name], turn)
 
-            bench.run(by_sizes(streams), play)
-    except REFUSALS as error:
-        print(f'error: {error}', file=sys.stderr)
-        return 1
+        bench.run(by_sizes(streams), play)
     passed = _report(options, bench, about)
     return bench.stop.status or (0 if passed else 1)
 
@@ -164,11 +153,6 @@ def _streams(options: argparse.Namespace) -> list[Stream]:
             for name in tqdm(options.streams, desc='make streams', disable=None, leave=False)]
 
 
-def _truth(stream: Stream) -> Contacts:
-    solver = ContactSolver(stream.size_a, stream.size_b, model='exact')
-    return solver.batch(stream.pose_a, stream.pose_b)
-
-
 def _about(options: argparse.Namespace, streams: list[Stream], node_cores: set[int],
            ) -> dict[str, str]:
     """Return where and how it ran, for the output and every row of the CSV."""
@@ -239,12 +223,8 @@ def _bench_array(options: argparse.Namespace, args: Sequence[str]) -> int:
     scene, poses = crowd(options.boxes, options.seed)
     solver = SceneSolver(scene, model=options.model)
     truths = [{pair.id for pair, _ in solver(tick).touching} for tick in poses]
-    try:
-        found = drive_array(scene, poses, args, model=options.model, rate=options.rate,
-                            seconds=options.duration, domain=options.domain)
-    except REFUSALS as error:
-        print(f'error: {error}', file=sys.stderr)
-        return 1
+    found = drive_array(scene, poses, args, model=options.model, rate=options.rate,
+                        seconds=options.duration, domain=options.domain)
     wrong = sum(ids != truths[number % len(truths)] for number, ids in found.ids.items())
     lost = found.sent - len(found.ids)
     latencies = percentiles(1e3 * np.array(found.latencies), 50, 99, 99.9, 100)

@@ -19,7 +19,7 @@ from functools import partial
 from typing import IO, Any
 
 import numpy as np
-from geometry_msgs.msg import PointStamped, PoseArray, PoseStamped, Vector3Stamped
+from geometry_msgs.msg import PoseArray, PoseStamped
 from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.serialization import deserialize_message, serialize_message
@@ -28,14 +28,14 @@ from std_msgs.msg import Header
 from tqdm import tqdm
 
 from ...node.messages import NANOSECONDS, make_header, read_cloud
-from ...node.runtime import let_callbacks_finish, spin_for
+from ...node.runtime import joined, let_callbacks_finish, spin_for
 from ...output import no_garbage_collection, processor
 from ...scene.files.scene_file import write_scene
 from ...scene.scene_solver import Scene
 from ...solver.contact import Contacts
 from ..processes import Stop, asked_to_end, end, on_this_host, parameters, printed, program, start
-from ..ros_client import DEEP_RELIABLE, joined, pose_message
-from .answer_log import CONTACT_MESSAGES, ECHO_MESSAGES, AnswerLog, first_row
+from ..ros_client import ANSWERS, DEEP_RELIABLE, answer_values, pose_message
+from .answer_log import CONTACT_MESSAGES, ECHO_MESSAGES, AnswerLog
 from .echo_node import raw_stamp
 from .pose_streams import Stream
 
@@ -47,12 +47,7 @@ DRAIN_SILENCE = 1.0  # s without an answer: what is still out is lost
 DRAIN_LIMIT = 15.0  # s for the last answers of a node that has fallen behind
 SLICE = 0.05  # s between looks at whether the bench was called off
 
-MESSAGES = {
-    'cloud': (PointCloud2, 'contacts'),
-    'point': (PointStamped, 'contact/point'),
-    'normal': (Vector3Stamped, 'contact/normal'),
-    'echo': (Header, 'echo'),
-}
+MESSAGES = ANSWERS | {'echo': (Header, 'echo')}
 """Type and topic of each kind of answer; the soup's topics stand under soup/."""
 
 
@@ -73,15 +68,14 @@ class MeasuredNode:
         """Return what tables call the node."""
         return self.log.node
 
-    def start(self, stream: Stream, cores: set[int]) -> None:
+    def start(self, cores: set[int], stream: Stream | None = None) -> None:
         """Start the process on some cores, for the boxes of a stream."""
-        sizes = {'size_a': stream.size_a, 'size_b': stream.size_b}
-        remaps = [word for box in ('box_a', 'box_b') for word in (
+        words = [word for box in ('box_a', 'box_b') for word in (
             '-r', f'{box}/pose:={self.poses}{box}/pose') if self.poses]
-        has_sizes = self.log.kinds != ECHO_MESSAGES
+        if stream is not None and self.log.kinds != ECHO_MESSAGES:
+            words += parameters(size_a=stream.size_a, size_b=stream.size_b)
         self.failed, self.output = False, tempfile.TemporaryFile()
-        self.process = start([*self.command, *(parameters(**sizes) if has_sizes else []), *remaps],
-                             self.output)
+        self.process = start([*self.command, *words], self.output)
         # It has inherited this process's core; now, before it has threads, it gets its own.
         with contextlib.suppress(ProcessLookupError):
             os.sched_setaffinity(self.process.pid, cores)
@@ -150,8 +144,6 @@ class Bench:
         self.nodes, self.client, self.executor, self.clock = nodes, client, executor, clock
         self.rate, self.node_cores, self.stop = rate, node_cores, stop
         self.notes: list[str] = []  # what went wrong with the nodes as such
-        self.on_answer: Callable[[], None] = lambda: None
-        """Called after messages were handed to the logs."""
         self._last = 0
 
     def run(self, groups: list[list[Stream]], play: Callable[[Stream], None]) -> None:
@@ -164,7 +156,7 @@ class Bench:
                 return
             try:
                 for node in self.nodes:
-                    node.start(streams[0], self.node_cores)
+                    node.start(self.node_cores, streams[0])
                 self._await_answers(streams[0])
                 for stream in streams:
                     play(stream)
@@ -307,11 +299,9 @@ class Bench:
         for received, number, kind, data in arrivals:
             values: Sequence[float] | np.ndarray = ()
             if kind != 'echo':
-                message = deserialize_message(data, MESSAGES[kind][0])
-                values = _values(kind, message)
+                values = answer_values(kind, deserialize_message(data, MESSAGES[kind][0]))
             self.nodes[number].log.answer(kind, raw_stamp(data), received, values)
         arrivals.clear()
-        self.on_answer()
         return count
 
 
@@ -364,9 +354,7 @@ def drive_array(scene: Scene, poses: np.ndarray, args: Sequence[str], *, model: 
         with open_bench([], args, rate=rate, domain=domain) as bench:
             cores = {min(bench.node_cores)}
             bench.nodes, found = [node], ArrayRun(about_the_machine(cores))
-            node.output = tempfile.TemporaryFile()
-            node.process = start(node.command, node.output)
-            os.sched_setaffinity(node.process.pid, cores)
+            node.start(cores)
             arrivals: list[tuple[int, bytes]] = []
             bench.client.create_subscription(
                 PointCloud2, 'contacts', lambda data: arrivals.append((bench.clock(), data)),
@@ -428,13 +416,6 @@ def about_the_machine(node_cores: set[int]) -> dict[str, str]:
 def _unanswered(turn: list[MeasuredNode], offers: set[int]) -> int:
     """Return how many answers to these offers (stamps) have not come."""
     return sum(len(offers - node.log.offers_answered) for node in turn)
-
-
-def _values(kind: str, message: Any) -> Sequence[float] | np.ndarray:
-    if kind == 'cloud':
-        return first_row(read_cloud(message))  # of pair 0, the only one
-    vector = message.point if kind == 'point' else message.vector
-    return vector.x, vector.y, vector.z
 
 
 def _serialised(stream: Stream, rows: Sequence[int]) -> list[tuple[tuple[bytes, bytes], ...]]:

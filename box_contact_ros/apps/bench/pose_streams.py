@@ -14,6 +14,8 @@ import numpy as np
 from ...scene import pose_sets
 from ...scene.pose_sets import CONTAINER, CUBE, Generator, Pairs
 from ...scene.scene_solver import Box, Pair, Scene
+from ...solver.contact import Contacts
+from ...solver.contact_solver import ContactSolver
 
 Size = tuple[float, float, float]
 
@@ -43,6 +45,10 @@ class Stream:
     def sizes(self) -> tuple[Size, Size]:
         """Full extents of both boxes [m]: what the nodes have to be started with."""
         return self.size_a, self.size_b
+
+    def contacts(self, model: str) -> Contacts:
+        """Return what a model answers to each pair."""
+        return ContactSolver(*self.sizes, model=model).batch(self.pose_a, self.pose_b)
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,7 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import math
-import sys
-import time
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -24,11 +23,10 @@ import numpy as np
 
 from ...node.contact_node import PARAMETERS
 from ...node.parameters import outside_ros_args
-from ...node.runtime import REFUSALS
+from ...node.runtime import refusals_end
 from ...output import make_folder, markdown_table, percentiles
 from ...solver.arguments import add_models, program_parser, within
 from ...solver.contact import Contacts
-from ...solver.contact_solver import ContactSolver
 from ..processes import add_domain
 from .answer_log import AnswerLog, StreamLog, StreamResult
 from .bench_drive import Bench, MeasuredNode, about_the_machine, echo_node, open_bench, solver_node
@@ -52,14 +50,13 @@ STREAMS = ('containers', 'crane')
 def resident(pid: int) -> float:
     """Resident memory of a process [MB], NaN where it is not told."""
     try:
-        for line in Path(f'/proc/{pid}/status').read_text().splitlines():
-            if line.startswith('VmRSS:'):
-                return int(line.split()[1]) / 1024
+        pages = int(Path(f'/proc/{pid}/statm').read_text().split()[1])
     except OSError:
-        pass
-    return float('nan')
+        return math.nan
+    return pages * os.sysconf('SC_PAGE_SIZE') / 2**20
 
 
+@refusals_end
 def main(args: Sequence[str] | None = None) -> int:
     """Run the soak; 0 only if all was right."""
     args = list(args or ())
@@ -67,19 +64,15 @@ def main(args: Sequence[str] | None = None) -> int:
     nodes = [_contact(options),
              echo_node('bare echo', poses='for_bare/', prefix='bare/', bare=True),
              echo_node('echo', poses='for_served/', prefix='served/')]
-    try:
-        blocks, truths = _blocks(options)
-        first_answer, status = _time_start(options, args, blocks[0])
-        if status:
-            return status
-        with open_bench(nodes, args, rate=options.rate, domain=options.domain) as bench:
-            about = about_the_machine(bench.node_cores) | {
-                'set rate [Hz]': f'{options.rate:g}', 'model': options.model}
-            print('\n'.join(f'{name}: {value}' for name, value in about.items()), flush=True)
-            memory = _play(bench, blocks, truths)
-    except REFUSALS as error:
-        print(f'error: {error}', file=sys.stderr)
-        return 1
+    blocks, truths = _blocks(options)
+    first_answer, status = _time_start(options, args, blocks[0])
+    if status:
+        return status
+    with open_bench(nodes, args, rate=options.rate, domain=options.domain) as bench:
+        about = about_the_machine(bench.node_cores) | {
+            'set rate [Hz]': f'{options.rate:g}', 'model': options.model}
+        print('\n'.join(f'{name}: {value}' for name, value in about.items()), flush=True)
+        memory = _play(bench, blocks, truths)
     passed = _report(options, bench, memory, first_answer, about)
     return bench.stop.status or (0 if passed else 1)
 
@@ -90,18 +83,11 @@ def _time_start(options: argparse.Namespace, args: Sequence[str], stream: Stream
 
     Return the seconds to its first answer, and the exit status if a signal came.
     """
-    node, first = _contact(options), math.nan
+    node = _contact(options)
     with open_bench([node], args, rate=options.rate, domain=options.domain) as bench:
-        started = time.monotonic()
-
-        def look() -> None:
-            nonlocal first
-            if math.isnan(first) and node.log.offers_answered:
-                first = time.monotonic() - started
-
-        bench.on_answer = look
+        started = bench.clock()
         bench.run([[stream]], lambda _: None)
-    return first, bench.stop.status
+    return (node.log.first_answer - started) * 1e-9, bench.stop.status
 
 
 def _play(bench: Bench, blocks: list[Stream], truths: Mapping[str, Contacts]) -> list[float]:
@@ -149,8 +135,7 @@ def _blocks(options: argparse.Namespace) -> tuple[list[Stream], dict[str, Contac
     count = max(2, round(options.seconds / BLOCK_SECONDS))
     rows = round(options.rate * options.seconds / count)
     streams = [make_stream(name, rows) for name in STREAMS]
-    solver = ContactSolver(*streams[0].sizes, model=options.model)
-    answers = [solver.batch(stream.pose_a, stream.pose_b) for stream in streams]
+    answers = [stream.contacts(options.model) for stream in streams]
     blocks, truths = [], {}
     for number in range(count):
         which = number % len(streams)

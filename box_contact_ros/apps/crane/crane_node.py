@@ -16,26 +16,26 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
+from functools import partial
 from typing import Any
 
 import numpy as np
-from geometry_msgs.msg import PointStamped, PoseStamped, Vector3Stamped
+from geometry_msgs.msg import PoseStamped
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
-from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import MarkerArray
 
-from ...node.messages import make_header, read_cloud
+from ...node.messages import make_header
 from ...node.parameters import answer_help, declare
-from ...node.runtime import CONTACT_QOS, REFUSALS
+from ...node.runtime import CONTACT_QOS, REFUSALS, joined
 from ...solver.contact_solver import ContactSolver
-from ..bench.answer_log import first_row
 from ..ros_client import (
+    ANSWERS,
     CRANE_MARKERS,
     DEEP_RELIABLE,
-    joined,
+    answer_values,
     line_marker,
     pose_message,
     stamp_of,
@@ -78,10 +78,8 @@ class CraneNode(Node):
         self._publishers_ab = [self.create_publisher(PoseStamped, f'{box}/pose', DEEP_RELIABLE)
                                for box in ('box_a', 'box_b')]
         self._answers = [
-            self.create_subscription(kind, topic, callback, DEEP_RELIABLE)
-            for kind, topic, callback in ((PointStamped, 'contact/point', self._on_point),
-                                          (Vector3Stamped, 'contact/normal', self._on_normal),
-                                          (PointCloud2, 'contacts', self._on_cloud))]
+            self.create_subscription(message, topic, partial(self._on_answer, kind), DEEP_RELIABLE)
+            for kind, (message, topic) in ANSWERS.items()]
 
     def unmatched(self) -> list[str]:
         """Return the topics that have no counterpart yet."""
@@ -166,20 +164,12 @@ class CraneNode(Node):
     def _now(self) -> int:
         return int(self.get_clock().now().nanoseconds)
 
-    def _on_point(self, message: PointStamped) -> None:
-        point = (message.point.x, message.point.y, message.point.z)
-        self.log.answer('point', stamp_of(message.header), self._now(), point)
-
-    def _on_normal(self, message: Vector3Stamped) -> None:
-        normal = (message.vector.x, message.vector.y, message.vector.z)
-        self.log.answer('normal', stamp_of(message.header), self._now(), normal)
-
-    def _on_cloud(self, message: PointCloud2) -> None:
+    def _on_answer(self, kind: str, message: Any) -> None:
         received, stamp = self._now(), stamp_of(message.header)
-        values = first_row(read_cloud(message))
-        if self.feedback:  # before the log: here somebody waits
-            self.feedback.answer(stamp, values, received)
-        self.log.answer('cloud', stamp, received, values)
+        values = answer_values(kind, message)
+        if kind == 'cloud' and self.feedback:  # before the log: here somebody waits
+            self.feedback.answer(stamp, np.asarray(values), received)
+        self.log.answer(kind, stamp, received, values)
 
 
 def receive_while(node: CraneNode, executor: Any, work: Callable[[], None],
@@ -215,7 +205,6 @@ def main(args: Sequence[str] | None = None) -> int:
     answer_help('crane', __doc__, PARAMETERS, args)
     node, signalled = None, 0
     try:
-        # Handlers have to be asked for where the context is not the default one.
         with joined(CraneNode, args, signals=SignalHandlerOptions.ALL) as (node, executor):
             screen = Screen('the crane moves', node.scenario.duration)
             fly(node, executor, screen)

@@ -21,12 +21,13 @@ from rclpy.node import Node
 from sensor_msgs.msg import PointCloud2
 
 from ...node.messages import make_header, read_cloud
+from ...node.runtime import joined
 from ...scene.files.scene_file import write_scene
 from ...scene.force.patch_law import Patch
 from ...scene.scene_solver import POSE_ARRAY, Box, Pair, Scene
 from .. import processes
 from ..bench.answer_log import first_row, is_stale, touch_in
-from ..ros_client import DEEP_RELIABLE, joined, set_pose, stamp_of
+from ..ros_client import DEEP_RELIABLE, set_pose, stamp_of
 from .landing import ClosedLoop, LandingRecord
 from .mujoco_crane import Crane, CraneScenario
 

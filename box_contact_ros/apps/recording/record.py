@@ -20,7 +20,8 @@ from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import MarkerArray
 
 from ...node.parameters import outside_ros_args
-from ...node.runtime import POSE_QOS, REFUSALS, run_node
+from ...node.runtime import POSE_QOS, refusals_end, run_node
+from ...solver.arguments import program_parser
 from ...solver.checks import as_size
 from ..ros_client import DEEP_RELIABLE, read_scene_text
 from .bag_file import DRAWN, NANOSECONDS, POSE, TOPICS, TYPES, Recorder, RecordingError, type_of
@@ -85,28 +86,25 @@ class RecordNode(Node):
             print(f'  {topic} {count}', flush=True)
 
 
+@refusals_end
 def main(args: Sequence[str] | None = None) -> int:
     """Record until SIGINT or SIGTERM."""
     args = list(args or ())
-    try:
-        options = _options(outside_ros_args(args))
-        about = {name: value for name in ('size_a', 'size_b', 'model')
-                 if (value := getattr(options, name)) is not None}
-        topics, poses = options.topics, []
-        if options.scene is not None:
-            about['scene'], scene = read_scene_text(options.scene)
-            poses = [scene.boxes[box].pose_topic for box in scene.moving]
-            topics = topics or [*poses, 'contacts', *DRAWN]
-        return run_node(partial(RecordNode, folder=options.out, about=about, poses=poses,
-                                topics=topics or [*TOPICS, *DRAWN]), args)
-    except REFUSALS as error:
-        print(f'error: {error}', file=sys.stderr)
-        return 1
+    options = _options(outside_ros_args(args))
+    about = {name: value for name in ('size_a', 'size_b', 'model')
+             if (value := getattr(options, name)) is not None}
+    topics, poses = options.topics, []
+    if options.scene is not None:
+        about['scene'], scene = read_scene_text(options.scene)
+        poses = [scene.boxes[box].pose_topic for box in scene.moving]
+        topics = topics or [*poses, 'contacts', *DRAWN]
+    return run_node(partial(RecordNode, folder=options.out, about=about, poses=poses,
+                            topics=topics or [*TOPICS, *DRAWN]), args)
 
 
 def _options(args: Sequence[str]) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(
-        prog='record', description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter,
+    parser = program_parser(
+        'record', __doc__,
         epilog='Topics are remapped as those of any node: --ros-args -r box_a/pose:=/crane/pose')
     parser.add_argument('--out', type=Path, required=True, metavar='RUN',
                         help='folder of the bag; never overwritten')

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from geometry_msgs.msg import Point
 from rclpy.context import Context
-from std_msgs.msg import ColorRGBA, Header
+from std_msgs.msg import Header
 from visualization_msgs.msg import Marker, MarkerArray
 
 from ...node.messages import NANOSECONDS, make_header
@@ -22,7 +22,7 @@ from ...node.runtime import CONTACT_QOS, run_node
 from ...scene.files.scene_file import read_scene
 from ...scene.pose_sets import CONTAINER
 from ...scene.scene_solver import two_boxes
-from ..ros_client import line_marker, set_pose
+from ..ros_client import line_marker, make_marker, set_pose
 from .listener import Listener
 from .style import (
     BOX_A,
@@ -30,10 +30,12 @@ from .style import (
     BOX_OPACITY,
     CONTACT,
     LISTED,
+    NORMAL_LENGTH,
+    POINT_RADIUS,
     STALE_BOX,
+    TEXT_HEIGHT,
     Colour,
     patch_outlines,
-    proportions,
     unit_poses,
 )
 from .view_log import AnsweredTick, Snapshot
@@ -65,7 +67,7 @@ def _boxes(header: Header, snapshot: Snapshot) -> Iterator[Marker]:
     for row in np.flatnonzero(~np.isnan(snapshot.poses[:, 0])):
         colour = (STALE_BOX if snapshot.stale_boxes[row] else
                   BOX_A if scene.is_a[row] else BOX_B)
-        marker = _marker(header, 'boxes', Marker.CUBE, colour, BOX_OPACITY, number=int(row))
+        marker = make_marker(header, 'boxes', Marker.CUBE, colour, BOX_OPACITY, number=int(row))
         set_pose(marker.pose, unit_poses(snapshot.poses[row, None])[0])
         _set(marker.scale, scene.sizes[row])
         yield marker
@@ -73,39 +75,32 @@ def _boxes(header: Header, snapshot: Snapshot) -> Iterator[Marker]:
 
 def _contacts(header: Header, answer: AnsweredTick) -> Iterator[Marker]:
     """Yield points and patches of all contacts, a normal for each, depths of the deepest."""
-    spheres = _marker(header, 'points', Marker.SPHERE_LIST, CONTACT)
+    spheres = make_marker(header, 'points', Marker.SPHERE_LIST, CONTACT)
     spheres.points = [_set(Point(), point) for point in answer.points]
-    looks = [proportions(edge) for edge in answer.scene.edges[answer.pairs]]
-    _set(spheres.scale, [2.0 * looks[0].point_radius] * 3)
+    edges = answer.scene.edges[answer.pairs]
+    radii, arrows = POINT_RADIUS * edges, NORMAL_LENGTH * edges * answer.normals.T
+    _set(spheres.scale, [2.0 * radii[0]] * 3)
     yield spheres
-    arrows = [look.normal_length for look in looks] * answer.normals.T
     for rank, row in enumerate(answer.deepest):
         point, arrow = answer.points[row], arrows[:, row]
-        normal = _marker(header, 'normals', Marker.ARROW, CONTACT, number=rank)
+        normal = make_marker(header, 'normals', Marker.ARROW, CONTACT, number=rank)
         normal.points = [_set(Point(), end) for end in (point, point + arrow)]
         # Of an arrow with two points: diameter of the shaft, diameter and length of the head.
-        _set(normal.scale, np.array([0.8, 1.8, 3.0]) * looks[row].point_radius)
+        _set(normal.scale, np.array([0.8, 1.8, 3.0]) * radii[row])
         yield normal
         if rank < LISTED:
-            depth = _marker(header, 'depths', Marker.TEXT_VIEW_FACING, WHITE, number=rank)
+            depth = make_marker(header, 'depths', Marker.TEXT_VIEW_FACING, WHITE, number=rank)
             # At the arrow's tail, where neither point nor arrow is.
             _set(depth.pose.position, point - 0.5 * arrow)
-            depth.scale.z = looks[row].text_height
+            depth.scale.z = TEXT_HEIGHT * float(edges[row])
             depth.text = f'depth {1e3 * answer.contacts["depth"][row]:.2f} mm'
             yield depth
     outlines = answer.points[:, None] + patch_outlines(answer.semi_axes)
     outlines = outlines[~np.isnan(outlines[:, 0, 0])]
     if len(outlines):
         lines = np.stack([outlines[:, :-1], outlines[:, 1:]], axis=2)
-        yield line_marker(header, 'patches', lines, width=0.5 * looks[0].point_radius,
+        yield line_marker(header, 'patches', lines, width=0.5 * radii[0],
                           colour=CONTACT)
-
-
-def _marker(header: Header, name: str, kind: int, colour: Colour, opacity: float = 1.0, *,
-            number: int = 0) -> Marker:
-    red, green, blue = (value / 255.0 for value in colour)
-    return Marker(header=header, ns=name, id=number, type=kind, action=Marker.ADD,
-                  color=ColorRGBA(r=red, g=green, b=blue, a=opacity))
 
 
 def _set(xyz: Any, values: Sequence[float] | np.ndarray) -> Any:

@@ -6,7 +6,6 @@ them, and is lifted off now and then. All others stand on the ground.
 """
 from __future__ import annotations
 
-import argparse
 import math
 import sys
 from collections.abc import Callable, Sequence
@@ -18,11 +17,11 @@ from rclpy.node import Node
 
 from ...node.messages import make_header
 from ...node.parameters import outside_ros_args
-from ...node.runtime import CONTACT_QOS, REFUSALS, run_node
+from ...node.runtime import CONTACT_QOS, refusals_end, run_node
 from ...scene.files.scene_file import read_scene
 from ...scene.pose import quaternion_multiply, rotation_matrix
 from ...scene.scene_solver import Box, Scene
-from ...solver.arguments import within
+from ...solver.arguments import program_parser, within
 from ...solver.contact_solver import ContactSolver
 from ..ros_client import pose_message
 
@@ -157,21 +156,17 @@ class SceneDriver(Node):
             publisher.publish(pose_message(header, self._motions[name](time)))
 
 
+@refusals_end
 def main(args: Sequence[str] | None = None) -> int:
     """Publish until SIGINT or SIGTERM."""
     args = list(sys.argv[1:] if args is None else args)
-    parser = argparse.ArgumentParser(prog='scene_driver', description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = program_parser('scene_driver', __doc__)
     parser.add_argument('--scene', required=True, metavar='NAME', help='bare name, or a path')
     parser.add_argument('--rate', type=within(0.1, 1000.0), default=50.0, metavar='HZ',
                         help='ticks a second (default: %(default)g)')
     options = parser.parse_args(outside_ros_args(args))
-    try:
-        scene = read_scene(options.scene)
-        return run_node(lambda context: SceneDriver(context, scene, options.rate), args)
-    except REFUSALS as error:
-        print(f'error: {error}', file=sys.stderr)
-        return 1
+    scene = read_scene(options.scene)
+    return run_node(lambda context: SceneDriver(context, scene, options.rate), args)
 
 
 if __name__ == '__main__':

@@ -2,7 +2,6 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
@@ -21,22 +20,8 @@ PATCH_OPACITY = 0.35
 BOX_OPACITY = 0.4  # the contact is inside the boxes, so they are translucent
 STALE = 500_000_000
 """Poses newer than the last answer by more than this [ns]: nobody answers, no contact is drawn."""
-
-
-class Proportions(NamedTuple):
-    """Lengths [m] of what has no size of its own."""
-
-    point_radius: float
-    normal_length: float
-    text_height: float
-
-
-def proportions(edge: float) -> Proportions:
-    """Return those of a contact on a box with this longest edge [m]."""
-    return Proportions(point_radius=0.015 * edge, normal_length=0.15 * edge,
-                       text_height=0.04 * edge)
-
-
+POINT_RADIUS, NORMAL_LENGTH, TEXT_HEIGHT = 0.015, 0.15, 0.04
+"""Lengths of what has no size of its own, as shares of the box's longest edge."""
 ELLIPSE_SIGMAS = math.sqrt(3.0)
 """Semi-axes of a patch's ellipse in standard deviations. A uniform rectangle l × w has l/√12 and
 w/√12, so its ellipse has l/2 and w/2 and touches its edges. Two would reach out of the boxes."""

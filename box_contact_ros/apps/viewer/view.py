@@ -28,14 +28,13 @@ from typing import TYPE_CHECKING
 
 from ...node.contact_node import PARAMETERS
 from ...node.parameters import outside_ros_args
-from ...node.runtime import REFUSALS
+from ...node.runtime import REFUSALS, joined
 from ...scene.files.scene_file import read_scene
 from ...scene.pose_sets import CONTAINER
 from ...scene.scene_solver import Scene
-from ...solver.arguments import model_name, within
+from ...solver.arguments import model_name, program_parser, within
 from .. import processes
 from ..processes import DOMAINS, Stop, asked_to_end, on_this_host, printed, program
-from ..ros_client import joined
 from . import scene_driver
 from .listener import ViewNode
 from .page.view_page import CraneRun, Page
@@ -246,9 +245,9 @@ def _has_display() -> bool:
 
 
 def _options(args: Sequence[str]) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(
-        prog='view', description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter,
-        epilog='What follows --ros-args is for the view itself; with --attach, -r remaps topics.')
+    parser = program_parser(
+        'view', __doc__, epilog='What follows --ros-args is for the view itself; with --attach, '
+                                '-r remaps topics.')
     parser.add_argument('--host', default='127.0.0.1',
                         help='address to serve at; everybody who reaches it can change the model '
                              '(default: %(default)s)')

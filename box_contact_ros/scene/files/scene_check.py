@@ -5,19 +5,18 @@ for a file that is refused.
 """
 from __future__ import annotations
 
-import argparse
 import sys
 from collections import Counter
 from collections.abc import Iterator, Sequence
 
+from ...solver.arguments import program_parser
 from ..scene_solver import POSE_ARRAY, Scene
 from .scene_file import SceneError, read_scene
 
 
 def main(args: Sequence[str] | None = None) -> int:
     """Check the scene file that follows `--check`."""
-    parser = argparse.ArgumentParser(prog='contact_node', description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = program_parser('contact_node', __doc__)
     parser.add_argument('--check', metavar='FILE', required=True,
                         help='a scene file, its text, or the bare name of one in config/scenes/')
     try:

@@ -19,11 +19,12 @@ from ..style import (
     CONTACT,
     EXACT,
     LISTED,
+    NORMAL_LENGTH,
     PATCH_OPACITY,
+    POINT_RADIUS,
     ROPE,
     STALE_BOX,
     patch_outlines,
-    proportions,
     unit_poses,
 )
 from ..view_log import AnsweredTick, SceneArrays, Snapshot
@@ -150,13 +151,14 @@ class Stage:
                 'fixed': np.flatnonzero(~scene.moves)}
         self._groups = [BoxGroup(self._server, name, scene, found)
                         for name, found in rows.items() if len(found)]
-        look = proportions(float(np.median(scene.edges)))
-        self._points.point_size = 2.0 * look.point_radius
-        self._normals.shaft_radius = 0.45 * look.point_radius
-        self._normals.head_radius = 1.1 * look.point_radius
-        self._normals.head_length = 2.6 * look.point_radius
-        self._normal_length = look.normal_length
-        self._cross = 2.5 * look.point_radius * np.stack([-np.eye(3), np.eye(3)], axis=1)
+        edge = float(np.median(scene.edges))
+        radius = POINT_RADIUS * edge
+        self._points.point_size = 2.0 * radius
+        self._normals.shaft_radius = 0.45 * radius
+        self._normals.head_radius = 1.1 * radius
+        self._normals.head_length = 2.6 * radius
+        self._normal_length = NORMAL_LENGTH * edge
+        self._cross = 2.5 * radius * np.stack([-np.eye(3), np.eye(3)], axis=1)
 
     def _draw_contacts(self, answer: AnsweredTick | None) -> None:
         shown = answer is not None and len(answer.pairs) > 0
