@@ -17,17 +17,7 @@ from ..core import LENGTH_MAX, QUATERNION_MAX, QUATERNION_MIN
 from ..scene.scene_solver import Answer
 from ..scene.stamp_pairing import StampedPose
 from ..solver.contact import Contact
-from .messages import (
-    CLOUD_ROW,
-    NANOSECONDS,
-    Refused,
-    checked_pose,
-    headed,
-    make_cloud,
-    make_header,
-    make_normal,
-    make_point,
-)
+from .messages import CLOUD_ROW, NANOSECONDS, Refused, TypedMessages, checked_pose, headed
 
 ENCAPSULATION = 4
 """Bytes before the body: 0, then 1 for little endian or 0 for big, then two that say nothing."""
@@ -188,10 +178,11 @@ def _upper(square: bytes) -> bytes:
 
 
 def _in_frame(frame_id: str) -> _FrameBytes:
-    header = make_header(0, frame_id)
-    point = bytes(serialize_message(make_point(header, _NOTHING)))
-    normal = bytes(serialize_message(make_normal(header, _NOTHING)))
-    cloud = bytes(serialize_message(make_cloud(header, Answer([], [], 0))))
+    messages = TypedMessages()
+    messages.begin(0, frame_id)
+    point, normal, cloud = (bytes(serialize_message(message)) for message in (
+        messages.point(_NOTHING), messages.normal(_NOTHING),
+        messages.cloud(Answer([], [], 0))))
     if point[:2] != LITTLE:
         raise RuntimeError('rclpy does not serialise little-endian here: use serialization:=typed')
     body = FRAME_AT - 4  # behind the stamp

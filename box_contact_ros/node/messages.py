@@ -68,18 +68,6 @@ def make_header(stamp: int, frame_id: str) -> Header:
                   frame_id=frame_id)
 
 
-def make_point(header: Header, contact: Contact) -> PointStamped:
-    """Make `contact/point`; values are made float, as messages do not check them."""
-    x, y, z = map(float, contact.point)
-    return PointStamped(header=header, point=Point(x=x, y=y, z=z))
-
-
-def make_normal(header: Header, contact: Contact) -> Vector3Stamped:
-    """Make `contact/normal`."""
-    x, y, z = map(float, contact.normal)
-    return Vector3Stamped(header=header, vector=Vector3(x=x, y=y, z=z))
-
-
 def make_cloud(header: Header, answer: Answer) -> PointCloud2:
     """Make `contacts`: a row for each pair in contact, a row of NaN for each stale pair."""
     rows = [(*c.point, *c.normal, -c.separation, pair.id, c.volume, *c.covariance[_UPPER])
@@ -161,12 +149,14 @@ class TypedMessages:
         self._header = make_header(stamp, frame_id)
 
     def point(self, contact: Contact) -> PointStamped:
-        """Make `contact/point`."""
-        return make_point(self._header, contact)
+        """Make `contact/point`; values are made float, as messages do not check them."""
+        x, y, z = map(float, contact.point)
+        return PointStamped(header=self._header, point=Point(x=x, y=y, z=z))
 
     def normal(self, contact: Contact) -> Vector3Stamped:
         """Make `contact/normal`."""
-        return make_normal(self._header, contact)
+        x, y, z = map(float, contact.normal)
+        return Vector3Stamped(header=self._header, vector=Vector3(x=x, y=y, z=z))
 
     def cloud(self, answer: Answer) -> PointCloud2:
         """Make `contacts`."""

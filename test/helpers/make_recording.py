@@ -10,21 +10,14 @@ import argparse
 import shutil
 from pathlib import Path
 
-import numpy as np
-from geometry_msgs.msg import PoseStamped
 from rclpy.serialization import serialize_message
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.apps.crane.landing import LandingCase, land, scenario_of
 from box_contact_ros.apps.crane.mujoco_crane import Crane
 from box_contact_ros.apps.recording.bag_file import TOPICS, Recorder
-from box_contact_ros.node.messages import (
-    NANOSECONDS,
-    make_cloud,
-    make_header,
-    make_normal,
-    make_point,
-)
+from box_contact_ros.apps.ros_client import pose_message
+from box_contact_ros.node.messages import NANOSECONDS, TypedMessages, make_header
 from box_contact_ros.scene.scene_solver import Answer, two_boxes
 
 FOLDER = Path(__file__).resolve().parents[2] / 'recordings' / 'crane_landing'
@@ -47,26 +40,22 @@ def make(folder: Path) -> Recorder:
     stack = Crane(scenario, RATE).stack_pose
     recorder = Recorder(folder, [f'/{topic}' for topic in TOPICS], {
         'size_a': scenario.size, 'size_b': scenario.stack_size, 'model': MODEL})
+    typed = TypedMessages()
     ticks = range(touched - round(BEFORE * RATE), touched + round(AFTER * RATE))
     for tick, load in zip(ticks, record.poses[ticks.start:ticks.stop]):
         stamp = START + round((tick - ticks.start) / RATE * NANOSECONDS)
         header, contact = make_header(stamp, 'world'), solver(load, stack)
+        typed.begin(stamp, 'world')
         answer = Answer([(PAIR, contact)] if contact.colliding else [], [], 1)
-        messages = [_pose(header, load), _pose(header, stack), make_cloud(header, answer)]
+        messages = [pose_message(header, load), pose_message(header, stack),
+                    typed.cloud(answer)]
         if contact.colliding:
-            messages[2:2] = [make_point(header, contact), make_normal(header, contact)]
+            messages[2:2] = [typed.point(contact), typed.normal(contact)]
         topics = TOPICS if contact.colliding else (*TOPICS[:2], TOPICS[4])
         for topic, message in zip(topics, messages):
             recorder.write(f'/{topic}', stamp, serialize_message(message))
     recorder.close()
     return recorder
-
-
-def _pose(header, values: np.ndarray) -> PoseStamped:
-    message = PoseStamped(header=header)
-    p, q = message.pose.position, message.pose.orientation
-    p.x, p.y, p.z, q.x, q.y, q.z, q.w = map(float, values)
-    return message
 
 
 if __name__ == '__main__':
