@@ -8,7 +8,6 @@ from __future__ import annotations
 import contextlib
 import os
 import platform
-import struct
 import subprocess
 import tempfile
 import threading
@@ -27,7 +26,7 @@ from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header
 from tqdm import tqdm
 
-from ...node.messages import NANOSECONDS, make_header, read_cloud
+from ...node.messages import make_header, read_cloud
 from ...node.runtime import joined, let_callbacks_finish, spin_for
 from ...output import no_garbage_collection, processor
 from ...scene.files.scene_file import write_scene
@@ -36,7 +35,7 @@ from ...solver.contact import Contacts
 from ..processes import Stop, asked_to_end, end, on_this_host, parameters, printed, program, start
 from ..ros_client import ANSWERS, DEEP_RELIABLE, answer_values, pose_message
 from .answer_log import CONTACT_MESSAGES, ECHO_MESSAGES, AnswerLog
-from .echo_node import raw_stamp
+from .echo_node import raw_stamp, with_stamp
 from .pose_streams import Stream
 
 # Bounds on everything that waits, so that a bench always ends.
@@ -230,7 +229,7 @@ class Bench:
                 node.log.sent(stamp, lateness)
         self._drain(lambda: sum(node.log.outstanding for node in turn))
 
-    def _send_and_receive(self, turn: list[MeasuredNode], pairs: list[Any],
+    def _send_and_receive(self, turn: list[MeasuredNode], pairs: list[list[bytes]],
                           sent: list[tuple[int, float]],
                           show: Callable[[], object] = lambda: None) -> None:
         """Send pairs in a thread, receive meanwhile, and `show` how far it is."""
@@ -240,25 +239,23 @@ class Bench:
             self._spin(time.monotonic() + SLICE)
             show()
 
-    def _send(self, poses: str, pairs: list[tuple[tuple[bytes, bytes], ...]],
-              sent: list[tuple[int, float]]) -> None:
+    def _send(self, poses: str, pairs: list[list[bytes]], sent: list[tuple[int, float]]) -> None:
         """Send pairs at the rate; the schedule is absolute, so lateness is not handed on."""
         publish_a, publish_b = self.client.senders(poses)
         period, stopped = 1.0 / self.rate, self.stop.is_set
         start = time.perf_counter() + SLICE
-        for row, ((head, tail_a), (_, tail_b)) in enumerate(pairs):
+        for row, (pose_a, pose_b) in enumerate(pairs):
             due = start + row * period
             while (left := due - time.perf_counter()) > 0.0 and not stopped():
                 time.sleep(min(left, SLICE))
             if stopped():
                 return
             stamp = self._stamp()
-            middle = head + struct.pack('<iI', *divmod(stamp, NANOSECONDS))
-            publish_a(middle + tail_a)
-            publish_b(middle + tail_b)
+            publish_a(with_stamp(pose_a, stamp))
+            publish_b(with_stamp(pose_b, stamp))
             sent.append((stamp, max(0.0, -left)))
 
-    def _offer(self, turn: list[MeasuredNode], pairs: list[Any]) -> set[int]:
+    def _offer(self, turn: list[MeasuredNode], pairs: list[list[bytes]]) -> set[int]:
         """Send pairs that count in no figure; return their stamps [ns]."""
         sent: list[tuple[int, float]] = []
         self._send_and_receive(turn, pairs, sent)
@@ -365,8 +362,8 @@ def drive_array(scene: Scene, poses: np.ndarray, args: Sequence[str], *, model: 
                                                        for pose in tick]))) for tick in poses]
 
             def send(number: int) -> int:
-                stamp, data = bench.clock(), ticks[number % len(ticks)]
-                publish(data[:4] + struct.pack('<iI', *divmod(stamp, NANOSECONDS)) + data[12:])
+                stamp = bench.clock()
+                publish(with_stamp(ticks[number % len(ticks)], stamp))
                 return stamp
 
             deadline = time.monotonic() + START_LIMIT
@@ -418,19 +415,10 @@ def _unanswered(turn: list[MeasuredNode], offers: set[int]) -> int:
     return sum(len(offers - node.log.offers_answered) for node in turn)
 
 
-def _serialised(stream: Stream, rows: Sequence[int]) -> list[tuple[tuple[bytes, bytes], ...]]:
-    """Return the pairs of some rows, each message cut in two: the stamp goes between."""
-    pairs = []
-    for row in rows:
-        pair = []
-        for values in (stream.pose_a[row], stream.pose_b[row]):
-            data = serialize_message(pose_message(make_header(0, 'world'), values))
-            # Little endian whatever the machine's order, since the stamp is packed so.
-            if data[1] != 1:
-                raise NotImplementedError('messages are serialised big endian here')
-            pair.append((data[:4], data[12:]))
-        pairs.append(tuple(pair))
-    return pairs
+def _serialised(stream: Stream, rows: Sequence[int]) -> list[list[bytes]]:
+    """Return the pairs of some rows as messages under a stamp of 0."""
+    return [[serialize_message(pose_message(make_header(0, 'world'), poses[row]))
+             for poses in (stream.pose_a, stream.pose_b)] for row in rows]
 
 
 def _bar(total: int, text: str, unit: str) -> tqdm:

@@ -21,27 +21,31 @@ from typing import Any
 from geometry_msgs.msg import PoseStamped
 from rclpy.context import Context
 from rclpy.node import Node
+from rclpy.serialization import serialize_message
 from std_msgs.msg import Header
 
 from ...node.messages import NANOSECONDS
 from ...node.runtime import CONTACT_QOS, POSE_QOS, run_node
 from ...scene.stamp_pairing import WAITING_TICKS
 
-STAMP_AT = 4
+STAMP = slice(4, 12)
 """CDR: four bytes of encapsulation, the second of them 1 for little endian, then the stamp."""
-EMPTY_FRAME = struct.pack('<I', 1) + b'\0'
-"""CDR of an empty string: its length with the closing zero."""
+
+
+def _order(data: bytes) -> str:
+    return '<iI' if data[1] else '>iI'
 
 
 def raw_stamp(data: bytes) -> int:
     """Return the stamp [ns] of a serialised message that begins with a header."""
-    sec, nanosec = struct.unpack_from('<iI' if data[1] else '>iI', data, STAMP_AT)
+    sec, nanosec = struct.unpack(_order(data), data[STAMP])
     return sec * NANOSECONDS + nanosec
 
 
-def raw_header(stamp: int) -> bytes:
-    """Return a serialised Header of a stamp [ns] and no frame."""
-    return b'\0\1\0\0' + struct.pack('<iI', *divmod(stamp, NANOSECONDS)) + EMPTY_FRAME
+def with_stamp(data: bytes, stamp: int) -> bytes:
+    """Return a serialised message that begins with a header, under another stamp [ns]."""
+    packed = struct.pack(_order(data), *divmod(stamp, NANOSECONDS))
+    return data[:STAMP.start] + packed + data[STAMP.stop:]
 
 
 class EchoNode(Node):
@@ -59,12 +63,12 @@ class EchoNode(Node):
         self.get_logger().info('ready')
 
     def _pose_callback(self, box: int) -> Callable[[bytes], None]:
-        waiting = self._waiting
+        waiting, echo = self._waiting, serialize_message(Header())
 
         def callback(data: bytes) -> None:
             stamp = raw_stamp(data)
             if waiting.pop(stamp, box) != box:
-                self._echo.publish(raw_header(stamp))
+                self._echo.publish(with_stamp(echo, stamp))
                 return
             waiting[stamp] = box
             if len(waiting) > WAITING_TICKS:
