@@ -32,20 +32,15 @@ from .mujoco_crane import LANDING_OVERLAP, Crane, CraneScenario
 SETTLING, WINDOW = 10.0, 5.0
 """The load has to be at rest from `SETTLING` s after the first touch on, for `WINDOW` s."""
 WATCHED = SETTLING + WINDOW
-SETTLED_SPEED = 0.010
-"""Speed of the load's fastest corner [m/s] below which it has settled."""
-SETTLED_LIMIT = 3.0
-"""Time from the first touch until then [s]."""
-CORNER_SPEED_LIMIT = 0.3e-3
-"""Speed of the fastest corner in the window [m/s]."""
+SETTLED_SPEED = 0.010  # speed of the load's fastest corner [m/s] below which it has settled
+SETTLED_LIMIT = 3.0  # time from the first touch until then [s]
+CORNER_SPEED_LIMIT = 0.3e-3  # speed of the fastest corner in the window [m/s]
 FORCE_LIMIT = 1e-6
 """Deviation of the contact force's vertical part from the weight, as a share of the weight."""
 TILT_LIMIT = math.radians(0.06)
 """Mean angle between the load's and the world's vertical in the window [rad]."""
-DEPTH_LIMIT = 0.01
-"""Depth as a share of the load's height, always."""
-GAP_LIMIT = 0.020
-"""Gap after the first touch [m]: how high it may bounce."""
+DEPTH_LIMIT = 0.01  # depth as a share of the load's height, always
+GAP_LIMIT = 0.020  # gap after the first touch [m]: how high it may bounce
 
 LANDING_DURATION = 25.0
 """Length of a landing [s]. The first touch comes after 5 to 8 s, and 15 s more are looked at."""
@@ -355,10 +350,8 @@ class LoopState(NamedTuple):
 
     tick: int
     time: float
-    pose: np.ndarray
-    """Of the load's box (7,)."""
-    mass_pose: np.ndarray
-    """Of its centre of mass (7,), and so is the velocity (6,)."""
+    pose: np.ndarray  # of the load's box (7,)
+    mass_pose: np.ndarray  # of its centre of mass (7,), and so is the velocity (6,)
     velocity: np.ndarray
 
 

@@ -25,24 +25,17 @@ from ...solver.arguments import program_parser, within
 from ...solver.contact_solver import ContactSolver
 from ..ros_client import pose_message
 
-VISIT = 8.0
-"""Time [s] from one partner to the next."""
+VISIT = 8.0  # time [s] from one partner to the next
 DOWN, UP = (0.30, 0.45), (0.75, 0.90)
 """Shares of a visit between which a box is lowered, and lifted."""
-CLEARANCE = 1.2
-"""Height [m] above the highest partner, on the way."""
-DEPTH = 0.012
-"""Depth to which a box is set down [m]."""
-LIFT = 0.3
-"""Height to which a rider is lifted off [m]."""
-TIERS = 5
-"""Boxes that ride on each other, at most."""
+CLEARANCE = 1.2  # height [m] above the highest partner, on the way
+DEPTH = 0.012  # depth to which a box is set down [m]
+LIFT = 0.3  # height to which a rider is lifted off [m]
+TIERS = 5  # boxes that ride on each other, at most
 TILT = math.radians(0.3)
-GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
-"""Phases of boxes are its multiples: no two are the same."""
+GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0  # phases of boxes are its multiples: no two are the same
 
-Motion = Callable[[float], np.ndarray]
-"""From the time [s] to a pose (7,)."""
+Motion = Callable[[float], np.ndarray]  # from the time [s] to a pose (7,)
 
 
 def motions(scene: Scene) -> dict[str, Motion]:
