@@ -125,7 +125,8 @@ def test_files_are_neither_quoted_nor_told_apart(node, stranger, tmp_path):
     paths += [path.replace(str(node.home), str(outside)) for path in paths]
     paths += [f'way out/{Path(path).name}' for path in paths[-12:]]
     paths += ['../outside/line file', 'line file', '/etc/passwd', '/dev/zero', '/proc/self/environ',
-              '/nowhere', 'x' * 5000, 'nul\0', '/dev/stdin', '~/line file']
+              '/nowhere', 'x' * 5000, 'nul\0', '/dev/stdin', '~/line file', 'no_bay',
+              '../scenes/no_bay']
     for name, other in (('scene', {}), ('weights', {'model': 'mlp'})):
         for path in paths:
             result = stranger.set(**{name: path}, **other)

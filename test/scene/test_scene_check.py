@@ -52,6 +52,8 @@ def test_a_file_is_checked_without_ros(tmp_path):
     """One that is good and one that is not: line and field on stderr, exit status 1."""
     (tmp_path / 'bad.yaml').write_text(TEXT.replace('tiers: 2', 'tiers: x'))
     for path, status, words in (('config/scenes/yard_bay.yaml', 0, '51 boxes, 1 of them moving'),
+                                ('yard_bay', 0, '51 boxes, 1 of them moving'),
+                                ('no_bay', 1, "'no_bay' cannot be read: No such file"),
                                 (tmp_path / 'bad.yaml', 1, "bad.yaml:5: boxes.s.stack.tiers: 'x'")):
         done = subprocess.run([sys.executable, '-c', WITHOUT_ROS, path], capture_output=True,
                               text=True, timeout=60)
