@@ -135,10 +135,6 @@ class AnswerLog:
         log.stamps.append(stamp)
         log.lateness.append(lateness)
 
-    def find(self, stamp: int) -> tuple[StreamLog, int] | None:
-        """Return the stream and the row that were sent under a stamp [ns]."""
-        return self._rows.get(stamp)
-
     def answer(self, kind: str, stamp: int, received: int,
                values: Sequence[float] | np.ndarray = ()) -> None:
         """Note a message received at `received` [ns]; values: see WIDTHS, none for no contact.
@@ -152,7 +148,7 @@ class AnswerLog:
                 self.first_answer = received
             self.offers_answered.add(stamp)
             return
-        found = self.find(stamp)
+        found = self._rows.get(stamp)
         if found is None:
             if self.streams:
                 self.streams[-1].strangers += 1

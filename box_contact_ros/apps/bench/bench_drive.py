@@ -112,10 +112,11 @@ class BenchNode(Node):
         super().__init__('bench', context=context)
         self.arrivals: list[tuple[int, int, str, bytes]] = []
         """(received [ns], number of the node, kind, message)."""
-        self._publishers_ab = {
-            poses: [self.create_publisher(PoseStamped, f'{poses}{box}/pose', DEEP_RELIABLE)
+        self.senders = {
+            poses: [self.create_publisher(PoseStamped, f'{poses}{box}/pose', DEEP_RELIABLE).publish
                     for box in ('box_a', 'box_b')]
             for poses in dict.fromkeys(node.poses for node in nodes)}
+        """What sends a serialised pose of box A, and of box B, by the topics' prefix."""
         for number, node in enumerate(nodes):
             for kind in node.log.kinds:
                 message, topic = MESSAGES[kind]
@@ -128,10 +129,6 @@ class BenchNode(Node):
         def callback(data: bytes) -> None:
             arrivals.append((now(), number, kind, data))
         return callback
-
-    def senders(self, poses: str) -> list[Callable[[bytes], None]]:
-        """Return what sends a serialised pose of box A, and of box B, under that prefix."""
-        return [publisher.publish for publisher in self._publishers_ab[poses]]
 
 
 class Bench:
@@ -241,7 +238,7 @@ class Bench:
 
     def _send(self, poses: str, pairs: list[list[bytes]], sent: list[tuple[int, float]]) -> None:
         """Send pairs at the rate; the schedule is absolute, so lateness is not handed on."""
-        publish_a, publish_b = self.client.senders(poses)
+        publish_a, publish_b = self.client.senders[poses]
         period, stopped = 1.0 / self.rate, self.stop.is_set
         start = time.perf_counter() + SLICE
         for row, (pose_a, pose_b) in enumerate(pairs):
