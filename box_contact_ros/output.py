@@ -95,6 +95,12 @@ def write_csv(path: Path, rows: Iterable[Mapping[str, object]], *, digits: int =
         writer.writerows([_cell(row.get(name), digits) for name in columns] for row in listed)
 
 
+def read_csv(path: Path) -> list[dict[str, str]]:
+    """Return the rows of a CSV file by column name."""
+    with path.open(encoding='utf-8', newline='') as file:
+        return list(csv.DictReader(file))
+
+
 def _cell(value: object, digits: int) -> object:
     if isinstance(value, float):
         return '' if math.isnan(value) else f'{value:.{digits}g}'

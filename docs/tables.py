@@ -6,13 +6,12 @@
 from __future__ import annotations
 
 import argparse
-import csv
 import functools
 import re
 import sys
 from pathlib import Path
 
-from box_contact_ros.output import markdown_table, number
+from box_contact_ros.output import markdown_table, number, read_csv
 
 ROOT = Path(__file__).resolve().parents[1]
 RESULTS = ROOT / 'docs' / 'results'
@@ -39,15 +38,12 @@ SETS = {
 }
 
 
-@functools.cache
-def _table(name: str) -> list[Row]:
-    with (RESULTS / name).open(encoding='utf-8', newline='') as file:
-        return list(csv.DictReader(file))
+_table = functools.cache(read_csv)
 
 
 def rows(name: str, **wanted: str) -> list[Row]:
     """Return the rows of a CSV file whose columns have the wanted values."""
-    return [row for row in _table(name)
+    return [row for row in _table(RESULTS / name)
             if all(row[column] == value for column, value in wanted.items())]
 
 

@@ -2,7 +2,6 @@
 from __future__ import annotations
 
 import argparse
-import csv
 import math
 from pathlib import Path
 
@@ -14,6 +13,7 @@ matplotlib.use('Agg')  # before pyplot: no display is needed
 from matplotlib import pyplot as plt  # noqa: E402
 
 from box_contact_ros import ContactSolver  # noqa: E402
+from box_contact_ros.output import read_csv  # noqa: E402
 
 STACK, LOAD, OVERLAP, POINT, CORNER = '#8c8c8c', '#4477aa', '#ccbb44', '#222222', '#ee6677'
 CONTAINER = (12.192, 2.438, 2.591)
@@ -98,9 +98,8 @@ EXACT_SHOWN = 0.1  # where error 0 is drawn [%], below the least error
 
 def network_sizes(axes: plt.Axes) -> None:
     """Draw point error over cost of every network of the frontier, on stacks."""
-    with (RESULTS / 'frontier.csv').open(encoding='utf-8', newline='') as file:
-        rows = [row for row in csv.DictReader(file)
-                if row['set'] == 'stacks' and row['class'] == 'all']
+    rows = [row for row in read_csv(RESULTS / 'frontier.csv')
+            if row['set'] == 'stacks' and row['class'] == 'all']
     best = next(row['instruction_set'] for row in rows if row['contestant'] == 'mlp')
     found = {row['contestant']: (float(row['batch_p50']), float(row['point_p99'])) for row in rows
              if row['instruction_set'] == best and row['batch_p50']}

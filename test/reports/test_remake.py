@@ -8,9 +8,10 @@ import pytest
 
 pytest.importorskip('tqdm')
 
+from box_contact_ros import output
 from box_contact_ros.cli import PROGRAMS
 from box_contact_ros.output import RESULTS
-from box_contact_ros.reports.remake import latency, remake
+from box_contact_ros.reports.remake import compare, latency, remake
 from box_contact_ros.reports.remake.remake import REPORTS, Report
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -70,3 +71,42 @@ def test_latencies_are_medians_over_streams_and_ratios_to_the_echo(tmp_path: Pat
     assert '| contact node | node alone, 1 kHz | 3,000 | 3 | 200 | 1,000 | 2.00 |' in page
     assert '| echo node | node alone, 1 kHz | 1,000 | 0 | 100 | 400 | 1.00 |' in page
     assert 'ran on: here' in page and 'soup node |' not in page
+
+
+def _second_run(folder: Path, exact: float, rival: float) -> Path:
+    """Write the CSV of a made-up run: times of two contestants and of the unit [ns]."""
+    folder.mkdir()
+    times = {'exact': exact, 'rival': rival, compare.UNIT: 3000.0}
+    output.write_csv(folder / 'speed.csv', [
+        {'name': name, 'kind': 'single', 'instruction_set': 'AVX2', 'round': number,
+         'ns': value * disturbed}
+        for name, value in times.items() for number, disturbed in enumerate((1.0, 0.99, 7.0))])
+    return folder
+
+
+@pytest.mark.parametrize(('faster', 'rival', 'status'), [
+    (1.0, 6000.0, 0), (1.0, 6500.0, 0), (1.0, 6700.0, 1), (1.0, 5400.0, 1), (2.0, 6000.0, 1)])
+def test_a_second_run_changes_no_ratio_by_more_than_a_tenth(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str], faster: float, rival: float,
+        status: int) -> None:
+    """Of three rounds one was disturbed: the median is compared, by that of the unit."""
+    first = _second_run(tmp_path / 'first', 1300.0, 6000.0)
+    second = _second_run(tmp_path / 'second', 1300.0 / faster, rival)
+    assert remake.main(['--compare', str(first), '--out', str(second)]) == status
+    words = capsys.readouterr().out
+    largest = words.splitlines()[2]
+    assert ('exact' if faster > 1.0 else 'rival' if rival != 6000.0 else '0.0') in largest
+    assert f'2 ratios, {status} changed by more than 10 %; 0 in one folder alone' in words
+
+
+def test_runs_without_a_ratio_in_common_do_not_agree(tmp_path: Path) -> None:
+    assert compare.compare(tmp_path, _second_run(tmp_path / 'one', 1300.0, 6000.0)) == 1
+
+
+def test_every_committed_csv_of_times_is_compared() -> None:
+    """A file or column that is renamed would drop out unseen."""
+    found = compare.ratios_of(ROOT / RESULTS)
+    for printed in compare.PRINTED:
+        assert any(name.startswith(printed.files.partition('*')[0])
+                   and name.endswith(f'{printed.times[-1]}, by {printed.by[0]}')
+                   for name in found), printed

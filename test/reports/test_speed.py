@@ -88,7 +88,7 @@ def test_limits_of_threads_and_starts_break() -> None:
     def timings(gain: float) -> list[Timing]:
         return [Timing(name=f'{model}: set', kind=kind, instruction_set='AVX2', rounds=[value])
                 for model in gated_models()
-                for kind, value in (('batch', gain), ('two threads', 1.0))]
+                for kind, value in zip(speed.SHARED, (gain, 1.0))]
 
     assert all(claim.holds for claim in speed.thread_claims(timings(1.81)))
     broken, = (claim for claim in speed.thread_claims(timings(1.79)) if not claim.holds)

@@ -122,12 +122,16 @@ BATCH_SETS = {**SETS, 'aligned flush stacks': flush_stacks}
 """Sets of poses that batches are timed on."""
 
 
+SHARED = ('one thread', 'two threads')
+"""Kinds of timings of a large batch, which threads share."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Timing:
     """Times of one contestant [ns for each call or pair], over the rounds."""
 
     name: str
-    kind: str  # 'single' or 'batch'; 'two threads' for a batch that two threads share
+    kind: str  # 'single' or 'batch'; for a large batch 'one thread' or 'two threads'
     instruction_set: str
     rounds: list[float]
 
@@ -172,12 +176,12 @@ def single_calls(count: int) -> list[Stint]:
     return [stint(engine) for engine in engines]
 
 
-def batch(model: str, name: str, count: int, threads: int = 1) -> Stint:
+def batch(model: str, name: str, count: int, kind: str = 'batch', threads: int = 1) -> Stint:
     """Return the contestant for a batch of a model on a set, every row its own sizes."""
     prepare = ours(model).prepare_batch
     assert prepare is not None
-    return Stint(name=f'{model}: {name}', kind='two threads' if threads == 2 else 'batch',
-                 count=count, run=prepare(_drawn(name, count), threads=threads))
+    return Stint(name=f'{model}: {name}', kind=kind, count=count,
+                 run=prepare(_drawn(name, count), threads=threads))
 
 
 def timed(stints: Sequence[Stint], rounds: int) -> list[Timing]:
@@ -221,8 +225,9 @@ def measure_with(instruction_set: str, core: int, effort: Effort) -> list[Timing
 def measure_threads(cores: Sequence[int], effort: Effort) -> list[Timing]:
     """Measure batches with one thread and with two, on these cores."""
     with pinned(cores):
-        return timed([batch(model, 'random cubes', effort.shared_batch, threads)
-                      for model in gated_models() for threads in (1, 2)], effort.rounds)
+        return timed([batch(model, 'random cubes', effort.shared_batch, kind, threads)
+                      for model in gated_models() for threads, kind in enumerate(SHARED, start=1)],
+                     effort.rounds)
 
 
 def measure_starts(count: int) -> list[float]:
@@ -296,7 +301,7 @@ def thread_claims(timings: Sequence[Timing]) -> list[Claim]:
     claims = []
     for model in gated_models():
         one, two = (next(t.median for t in timings if t.kind == kind and t.name.startswith(model))
-                    for kind in ('batch', 'two threads'))
+                    for kind in SHARED)
         limit = THREADS_LIMIT if model == 'exact' else None
         claims.append(Claim(
             text=f'Two threads are {one / two:.2f} times as fast as one, large batch of `{model}` '

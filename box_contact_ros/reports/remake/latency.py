@@ -1,7 +1,6 @@
 """The page of latencies: solver, nodes and transport, from the CSVs of three other reports."""
 from __future__ import annotations
 
-import csv
 from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,11 +16,6 @@ NODES = {'contact': 'contact node', 'soup': 'soup node', 'echo': 'echo node'}
 SOLVERS = ('mlp', 'exact')
 
 Row = list[str]
-
-
-def _read(path: Path) -> list[dict[str, str]]:
-    with path.open(encoding='utf-8') as file:
-        return list(csv.DictReader(file))
 
 
 def solver_rows(rows: list[dict[str, str]]) -> Iterator[Row]:
@@ -57,11 +51,11 @@ def page(folder: Path) -> str:
     """Return the page from the CSVs of a folder; runs that it lacks are left out."""
     rows, machine = [], 'no machine'
     if (folder / 'speed.csv').exists():
-        rows += solver_rows(_read(folder / 'speed.csv'))
+        rows += solver_rows(output.read_csv(folder / 'speed.csv'))
     for load, name in RUNS.items():
         path = folder / 'bench' / name / 'bench.csv'
         if path.exists():
-            run = _read(path)
+            run = output.read_csv(path)
             machine = run[0]['machine']
             rows += node_rows(load, run)
     head = ['what', 'load, or instruction set', 'sent', 'lost', 'p50 [µs]', 'p99 [µs]',

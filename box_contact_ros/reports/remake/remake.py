@@ -2,6 +2,9 @@
 
 Each report is a program of its own, and runs as a subprocess. Programs that measure time run alone;
 the others share the cores. The exit status is 1 if a program failed or a limit was broken.
+
+`--compare DIR` runs nothing, and compares the ratios of times in DIR with those in the folder of
+results. The exit status is 1 if a ratio changed by more than 10 %: see `compare`.
 """
 from __future__ import annotations
 
@@ -17,6 +20,7 @@ from pathlib import Path
 from ...output import results_folder
 from ...solver.arguments import program_parser
 from . import latency
+from .compare import compare
 
 OUT = '{out}'  # stands for the folder of the results
 
@@ -102,8 +106,12 @@ def main(args: Sequence[str] | None = None) -> int:
                             out='all pages, tables and pictures')
     parser.add_argument('--only', nargs='+', choices=names, metavar='REPORT', default=names,
                         help=f'of: {", ".join(names)} (default: all)')
+    parser.add_argument('--compare', type=Path, metavar='DIR',
+                        help='compare the ratios of another run, and run nothing')
     options = parser.parse_args(args)
     folder = results_folder(parser, options)
+    if options.compare:
+        return compare(options.compare, folder)
     failed = run_all([report for report in REPORTS if report.name in options.only], folder,
                      quick=options.quick)
     latency.write_page(folder)
