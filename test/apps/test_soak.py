@@ -14,6 +14,7 @@ from box_contact_ros import ContactSolver
 from box_contact_ros.apps.bench.answer_log import AnswerLog
 from box_contact_ros.apps.bench.pose_streams import make_stream
 from box_contact_ros.apps.bench.soak import mispairs, without_contact
+from box_contact_ros.core import native
 
 MS = 1_000_000  # ns
 
@@ -31,6 +32,7 @@ def test_a_short_soak(program, tmp_path):
     assert [row['node'] for row in rows] == [
         name for name in ('contact', 'bare echo', 'echo') for _ in range(2)]
     assert all(row['lost'] == '0' for row in rows)
+    assert all(f', {native.instruction_set}, ' in row['machine'] for row in rows)
 
 
 def test_bad_options_are_refused(program):

@@ -26,9 +26,10 @@ from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header
 from tqdm import tqdm
 
+from ...core import native
 from ...node.messages import make_header, read_cloud
 from ...node.runtime import joined, let_callbacks_finish, spin_for
-from ...output import no_garbage_collection, processor
+from ...output import machine, no_garbage_collection
 from ...scene.files.scene_file import write_scene
 from ...scene.scene_solver import Scene
 from ...solver.contact import Contacts
@@ -45,6 +46,8 @@ WARM_UP = 100  # pairs sent at the rate, and not counted, before the first strea
 DRAIN_SILENCE = 1.0  # s without an answer: what is still out is lost
 DRAIN_LIMIT = 15.0  # s for the last answers of a node that has fallen behind
 SLICE = 0.05  # s between looks at whether the bench was called off
+
+PACKAGES = ('numpy', 'rclpy', 'ros-fastrtps')  # whose versions are named
 
 MESSAGES = ANSWERS | {'echo': (Header, 'echo')}
 """Type and topic of each kind of answer; the soup's topics stand under soup/."""
@@ -401,10 +404,9 @@ def about_the_machine(node_cores: set[int]) -> dict[str, str]:
     def listed(cores: set[int]) -> str:
         return ' '.join(map(str, sorted(cores)))
 
-    return {'machine': f'{platform.node()}: {processor()}, {os.cpu_count()} cores',
+    return {'machine': f'{platform.node()}: {machine(native, PACKAGES)}, {os.cpu_count()} cores',
             'cores': f'bench on {listed(os.sched_getaffinity(0))}, nodes on {listed(node_cores)}',
-            'load at start': f'{os.getloadavg()[0]:.2f}',
-            'python': platform.python_version()}
+            'load at start': f'{os.getloadavg()[0]:.2f}'}
 
 
 def _unanswered(turn: list[MeasuredNode], offers: set[int]) -> int:
