@@ -12,7 +12,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import IO, Any
 
 from ..solver.arguments import within
@@ -120,10 +120,25 @@ def asked_to_end() -> Iterator[Stop]:
     def take(number: int, _frame: Any) -> None:
         stop.signals.append(number)
 
-    before = {number: signal.signal(number, take)
-              for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
-    try:
+    with _handled_by(take, signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         yield stop
+
+
+@contextlib.contextmanager
+def left_when_asked() -> Iterator[None]:
+    """Turn SIGTERM and SIGHUP into SystemExit, so that subprocesses are ended on the way out."""
+    def leave(number: int, _frame: Any) -> None:
+        sys.exit(128 + number)
+
+    with _handled_by(leave, signal.SIGTERM, signal.SIGHUP):
+        yield
+
+
+@contextlib.contextmanager
+def _handled_by(handler: Callable[[int, Any], None], *numbers: signal.Signals) -> Iterator[None]:
+    before = {number: signal.signal(number, handler) for number in numbers}
+    try:
+        yield
     finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+        for number, earlier in before.items():
+            signal.signal(number, earlier)

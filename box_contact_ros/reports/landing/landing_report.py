@@ -13,9 +13,10 @@ import math
 import os
 import sys
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict
 from itertools import groupby
+from multiprocessing import Pool
+from multiprocessing.pool import Pool as PoolType
 from pathlib import Path
 from random import sample
 from typing import NamedTuple
@@ -25,7 +26,7 @@ from tqdm import tqdm
 from ... import output
 from ...apps.crane.landing import LandingRecord, LandingResult, scenario_of
 from ...apps.crane.mujoco_crane import CraneScenario
-from ...apps.processes import DOMAINS
+from ...apps.processes import DOMAINS, left_when_asked
 from ...core import native
 from ...solver.arguments import program_parser
 from .landing_picture import draw
@@ -172,22 +173,24 @@ def together(landings: Sequence[Landing]) -> Iterator[list[Landing]]:
         yield from (flights[first:first + TOGETHER] for first in range(0, len(flights), TOGETHER))
 
 
-def run_over_dds(landings: Sequence[Landing], domain: int) -> list[Landed]:
-    """Run and judge landings that fly together, their contacts from a contact node; in lockstep."""
+def run_over_dds(flight: tuple[Sequence[Landing], int]) -> list[Landed]:
+    """Run and judge landings that fly together, their contacts from a node in a ROS domain."""
     # Only here: needs ROS.
     from ...apps.crane.landing_flights import fly_over_dds
 
+    landings, domain = flight
     first = landings[0]
-    records = fly_over_dds(
-        first.way, [one.scenario for one in landings], [one.timing.latency for one in landings],
-        rate_hz=first.timing.rate_hz, domain=domain)
+    with left_when_asked():
+        records = fly_over_dds(
+            first.way, [one.scenario for one in landings],
+            [one.timing.latency for one in landings], rate_hz=first.timing.rate_hz, domain=domain)
     return [judged(one, record) for one, record in zip(landings, records)]
 
 
-def over_dds(pool: ProcessPoolExecutor, landings: Sequence[Landing]) -> Iterator[Landed]:
+def over_dds(pool: PoolType, landings: Sequence[Landing]) -> Iterator[Landed]:
     """Run and judge landings over DDS, each group in a ROS domain of its own."""
     groups = list(together(landings))
-    for found in pool.map(run_over_dds, groups, sample(DOMAINS, len(groups))):
+    for found in pool.imap(run_over_dds, zip(groups, sample(DOMAINS, len(groups)))):
         yield from found
 
 
@@ -230,11 +233,12 @@ def main(args: Sequence[str] | None = None) -> int:
     ways = options.ways
     timings = [LoopTiming(rate, latency) for rate in options.rates for latency in options.latency]
     everything = [*of_grid, *added]
-    with ProcessPoolExecutor(options.workers) as pool:
+    # Leaving the pool ends its workers, and they their contact nodes.
+    with left_when_asked(), Pool(options.workers) as pool:
         scenarios = dict(zip([one.name for one in everything], tqdm(
-            pool.map(aimed, everything), total=len(everything), desc='aiming', unit='')))
+            pool.imap(aimed, everything), total=len(everything), desc='aiming', unit='')))
         landings = list(landings_of(ways, timings, of_grid, added, scenarios))
-        flown = over_dds(pool, landings) if options.dds else pool.map(run, landings)
+        flown = over_dds(pool, landings) if options.dds else pool.imap(run, landings)
         results = list(tqdm(flown, total=len(landings), desc='landings', unit=''))
     name = 'landing_dds' if options.dds else 'landing'
     if not options.dds:
