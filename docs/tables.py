@@ -68,8 +68,8 @@ def models() -> str:
                      when])
     table = markdown_table(['Model', 'single call [µs]', 'batch [ns a pair]', 'median error [%]',
                             'p99 error [%]', 'take it for'], body)
-    return (f'{table}\n\nMedian times on one core, {" / ".join(SHOWN)} where there are two: '
-            f'{processor()}.')
+    return (f'{table}\n\nMedian times on containers, on one core, {" / ".join(SHOWN)} where there '
+            f'are two: {processor()}.')
 
 
 def processor() -> str:
@@ -123,7 +123,7 @@ def sizes() -> str:
                             **{'class': 'all'})]
     table = markdown_table(['description, size', 'batch [ns a pair]', 'single call [µs]',
                             'p99 point error [%]'], body)
-    return f'{table}\n\nMedian times on one core: {processor()}, {best}.'
+    return f'{table}\n\nMedian times on stacks, on one core: {processor()}, {best}.'
 
 
 TABLES = {'models': models, 'mlp-errors': mlp_errors, 'network': network, 'sizes': sizes}

@@ -14,6 +14,7 @@ from box_contact_ros import output
 from box_contact_ros.baselines.engines import installed
 from box_contact_ros.baselines.engines.engine import Engine, Manifold, chosen, ours
 from box_contact_ros.reports.frontier import frontier, trials
+from box_contact_ros.resources import resource_path
 from box_contact_ros.scene.pose import rotation_matrix
 from box_contact_ros.scene.pose_sets import SETS, Pairs
 from box_contact_ros.solver.contact_solver import ContactSolver
@@ -201,6 +202,8 @@ def test_quick_run(tmp_path: Path) -> None:
         rows = list(csv.DictReader(file))
     assert {'exact', 'mlp', 'paper', 'fcl', 'soup-8'} <= {row['contestant'] for row in rows}
     assert {row['set'] for row in rows} == set(trials.ALL_SETS)
+    sizes = {path.stem.replace('-', ' ') for path in resource_path('weights').glob('mlp-*')}
+    assert len(sizes) >= 5 and sizes <= {row['contestant'] for row in rows}
     ours = [row for row in rows if row['contestant'].split()[0] in ('exact', 'mlp')]
     for row in ours:
         assert (row['missed'], row['invented']) == ('0', '0')
