@@ -28,7 +28,7 @@ from dataclasses import dataclass
 from importlib.abc import Loader, MetaPathFinder
 from importlib.machinery import ModuleSpec
 from itertools import chain
-from types import ModuleType, SimpleNamespace
+from types import SimpleNamespace
 from typing import Any
 
 
@@ -269,26 +269,17 @@ class Nothing(Exception, metaclass=_AlsoNothing):
     """Any name of a module that is not installed: a base, a decorator, a default, an exception."""
 
 
-class _StandIn(ModuleType):
-    """A module, or a package, of which every name is `Nothing`."""
-
-    __path__ = []
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(Nothing, name)
-
-
 class _StandIns(MetaPathFinder, Loader):
-    """Finds stand-ins for the modules of all extras."""
+    """Finds stand-ins for the modules of all extras: classes, of which every name is `Nothing`."""
 
     def find_spec(self, name: str, path: Any = None, target: Any = None) -> ModuleSpec | None:
         known = name.partition('.')[0] in chain(*MODULES_OF_EXTRA.values())
         return ModuleSpec(name, self) if known else None
 
-    def create_module(self, spec: ModuleSpec) -> ModuleType:
-        return _StandIn(spec.name)
+    def create_module(self, spec: ModuleSpec) -> Any:
+        return _AlsoNothing(spec.name, (Nothing,), {'__path__': []})
 
-    def exec_module(self, module: ModuleType) -> None:
+    def exec_module(self, module: object) -> None:
         pass
 
 

@@ -16,7 +16,7 @@ import torch
 from ..output import make_folder
 from ..resources import resource_path
 from ..scene.files.scene_file import SceneError
-from ..solver.arguments import seed_number
+from ..solver.arguments import program_parser, within
 from ..solver.mlp import UNITS_MAX
 from . import mlp_recipe
 from .paper_recipe import paper_jobs
@@ -29,34 +29,31 @@ QUICK_COUNTS, QUICK_STARTS, QUICK_EPOCHS = (1000, 500, 2000), 3, 100
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        description='Make the data sets, fit the networks, write the weights files.\n\n'
+    parser = program_parser(
+        'train', 'Make the data sets, fit the networks, write the weights files.\n\n'
         'Measured on a machine with two cores (each uses one):\n'
         '  paper             two boxes of edge 2, with discontinuities     2 minutes\n'
         "  paper-as-drawn    the same, not folded into the solver's domain  2 minutes\n"
         '  paper-continuous  without discontinuities, one network a subset 8 minutes\n'
         '  containers        two boxes of 12.192 x 2.438 x 2.591 m         2 minutes\n'
         '  mlp               any two boxes                                 5 minutes\n'
-        '  --scene FILE      the boxes of one scene, from the general mlp  2 minutes')
+        '  --scene FILE      the boxes of one scene, from the general mlp  2 minutes', seed=1,
+        quick='small sets and few epochs, to try it out; needs --out')
     add = parser.add_argument
     add('what', nargs='*', metavar='what', help=f'{", ".join(NAMES)}, or all (default)')
     add('--scene', type=Path, metavar='FILE', help='train an MLP for the sizes of the pairs in '
         'this scene file alone, and say how much error that saves; writes mlp-FILE.safetensors to '
         'the current folder, or --out')
-    add('--seed', type=seed_number, default=1, help='of data and weights (default 1)')
-    add('--starts', type=int, help="networks trained at once, of which the best is kept, of the "
-        "paper's (default: 24 to 96, by job)")
-    add('--epochs', type=int, help="passes through the training set, of the paper's (default: 300 "
-        'to 1000, by job)')
-    add('--hidden', type=int, metavar='UNITS', help='of the MLP: units of its hidden layer '
-        f'(default: {mlp_recipe.HIDDEN}), named in the file')
-    add('--steps', type=int, help=f'of the MLP (default: {mlp_recipe.GENERAL.steps:,})')
+    add('--starts', type=within(1), help='networks trained at once, of which the best is kept, '
+        "of the paper's (default: 24 to 96, by job)")
+    add('--epochs', type=within(1), help="passes through the training set, of the paper's "
+        '(default: 300 to 1000, by job)')
+    add('--hidden', type=within(1, UNITS_MAX), metavar='UNITS', help='of the MLP: units of its '
+        f'hidden layer (default: {mlp_recipe.HIDDEN}), named in the file')
+    add('--steps', type=within(1), help=f'of the MLP (default: {mlp_recipe.GENERAL.steps:,})')
     add('--out', type=Path, help='folder to write to (default: weights/)')
-    add('--quick', action='store_true', help='small sets and few epochs, to try it out; needs '
-        '--out')
-    add('--threads', type=int, default=1, help="of PyTorch (default 1; the paper's gain nothing "
-        'from more)')
+    add('--threads', type=within(1), default=1, help="of PyTorch (default 1; the paper's gain "
+        'nothing from more)')
     add('--device', choices=('cpu', 'cuda', 'auto'), type=mlp_recipe.device_of, default='cpu',
         help='of the MLP (default cpu: the same weights everywhere; matrices this small gain '
         'little from a GPU)')
@@ -77,12 +74,6 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
             parser.error(f'--scene goes on from the shipped network: leave out --{name}')
     if options.quick and options.out is None and not options.scene:
         parser.error('--quick would replace the weights in weights/: name a folder with --out')
-    for name in ('starts', 'epochs', 'steps', 'threads'):
-        value = getattr(options, name)
-        if value is not None and value < 1:
-            parser.error(f'--{name} {value} is too small')
-    if options.hidden is not None and not 1 <= options.hidden <= UNITS_MAX:
-        parser.error(f'--hidden {options.hidden} is not between 1 and {UNITS_MAX}')
     options.what = NAMES if 'all' in wanted else [name for name in NAMES if name in wanted]
     options.sizes = _sizes(parser, options.scene) if options.scene else []
     shipped = resource_path('package.xml').parent / 'weights'

@@ -159,7 +159,7 @@ def test_killed_and_started_again_it_ends_the_same(
 
 @pytest.mark.parametrize(('arguments', 'message'), [
     (['committe'], 'invalid choice'),
-    (['paper', '--candidates', '3'], '--candidates 3 is too small'),
+    (['paper', '--candidates', '3'], '--candidates: must be at least 16, got 3'),
     (['paper', '--seed', '-1'], "'-1' is no whole number from 0"),
 ])
 def test_refused_arguments(arguments: list[str], message: str,

@@ -175,7 +175,7 @@ def test_a_folder_that_cannot_be_written_is_said_at_once(
         (['paper', '--out', '.', '--device', 'cuda'], '--device: cuda: PyTorch finds no GPU')]),
     (['papers'], "'papers' is not one of paper, paper-as-drawn, paper-continuous, containers, "
      'mlp, all'),
-    (['paper', '--starts', '0'], '--starts 0 is too small'),
+    (['paper', '--starts', '0'], '--starts: must be at least 1, got 0'),
     (['paper', '--seed', '-1'], "'-1' is no whole number from 0"),
 ])
 def test_refused_arguments(arguments: list[str], message: str,

@@ -312,7 +312,7 @@ def test_hidden_units_on_request(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(('arguments', 'message'), [
-    (['mlp', '--hidden', str(UNITS_MAX + 1)], f'--hidden {UNITS_MAX + 1} is not between 1'),
+    (['mlp', '--hidden', str(UNITS_MAX + 1)], f'--hidden: must lie in 1 to {UNITS_MAX}'),
     (['mlp', '--scene', 'x.yaml'], "leave out 'mlp'"),
     (['--scene', 'x.yaml', '--hidden', '8'], 'leave out --hidden'),
     (['--scene', 'x.yaml', '--steps', '8'], 'leave out --steps'),

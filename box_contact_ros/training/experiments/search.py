@@ -22,9 +22,18 @@ import numpy as np
 import torch
 
 from ...core import FEATURES, OUTPUTS, SITES, native
-from ...output import machine, make_folder, markdown_table, page, pareto, subplots, write_csv
+from ...output import (
+    command_line,
+    machine,
+    make_folder,
+    markdown_table,
+    page,
+    pareto,
+    subplots,
+    write_csv,
+)
 from ...scene.pose_sets import log_uniform
-from ...solver.arguments import seed_number
+from ...solver.arguments import program_parser, within
 from ...solver.mlp import UNITS_MAX
 from .. import mlp_recipe
 from ..ensemble import Ensemble, Scaling
@@ -242,31 +251,25 @@ def plot(path: Path, results: Sequence[tuple[Search, Rungs]]) -> None:
 
 
 def _options(args: Sequence[str] | None) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        description='Train thousands of networks at once, keep the best, train those longer.\n\n'
+    parser = program_parser(
+        'search', 'Train thousands of networks at once, keep the best, train those longer.\n\n'
         'Measured on one core, without a GPU:\n'
         '  mlp        size and learning rate of the MLP                    5 minutes\n'
         "  paper      the paper's search for its two networks              5 minutes\n\n"
         'Stopped, it goes on from its checkpoint file when it is started again with the same\n'
-        'options, and ends with the same result.')
+        'options, and ends with the same result.', seed=1,
+        quick='little data and two short rungs, to try it out in seconds')
     add = parser.add_argument
     add('what', choices=('mlp', 'paper'), help='what is searched for')
-    add('--candidates', type=int, default=2048, metavar='N', help='networks to begin with (default '
-        '2048); the time grows with them')
-    add('--seed', type=seed_number, default=1, help='of everything random (default 1)')
+    add('--candidates', type=within(16), default=2048, metavar='N', help='networks to begin with '
+        '(default 2048); the time grows with them')
     add('--out', type=Path, default=Path(), help='folder for the page, the table, the plot and, '
         'until the end, the checkpoint (default: the current one)')
     add('--device', choices=('auto', 'cpu', 'cuda'), type=mlp_recipe.device_of, default='auto',
         help='auto: a GPU where there is one (default)')
-    add('--threads', type=int, default=1, help='of PyTorch (default 1; matrices this small gain '
-        'little from more)')
-    add('--quick', action='store_true', help='little data and two short rungs, to try it out in '
-        'seconds')
+    add('--threads', type=within(1), default=1, help='of PyTorch (default 1; matrices this small '
+        'gain little from more)')
     options = parser.parse_args(args)
-    for name, least in (('candidates', 16), ('threads', 1)):
-        if getattr(options, name) < least:
-            parser.error(f'--{name} {getattr(options, name)} is too small: {least} or more')
     make_folder(parser, options.out)
     return options
 
@@ -292,9 +295,9 @@ def main(args: Sequence[str] | None = None) -> int:
         except CheckpointError as error:
             print(f'search: {error}', file=sys.stderr)
             return 1
-    command = 'python -m box_contact_ros search ' + ' '.join(sys.argv[1:] if args is None else args)
-    made = (f'Made by `{command}` in {(time.monotonic() - began) / 60.0:.1f} minutes '
-            f'({options.device}) on {machine(native, PACKAGES)}.')
+    made = (f'Made by `{command_line("box_contact_ros search", args)}` in '
+            f'{(time.monotonic() - began) / 60.0:.1f} minutes ({options.device}) on '
+            f'{machine(native, PACKAGES)}.')
     text = page(f'training/experiments/search_{options.what}', made=made,
                 total=sum(len(done[0]) for _, done in results))
     text += f'\n![Settings and errors]({name}.png)\n' + ''.join(
