@@ -285,8 +285,7 @@ def paper_errors(models: Sequence[str], weights: str | None = None, step: int = 
     file = load_weights(resource_path('weights', 'paper.safetensors'))
     patterns = dataset.of_card(file.card, sets=('external',))['contact']['external']
     inputs, outputs = patterns.inputs[::step], patterns.outputs[::step]
-    pose_b = np.concatenate([inputs[:, :3], dataset.quaternion_from_euler(inputs[:, 3:])], axis=1)
-    pose_a = np.tile((0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0), (len(pose_b), 1))
+    pose_a, pose_b = dataset.as_poses(inputs)
     size = file.card['sizes'][0]
     # The boxes touch exactly; writing their poses as angles has opened some.
     azimuth, elevation = outputs[:, 2], outputs[:, 3]

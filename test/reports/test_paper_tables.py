@@ -49,7 +49,7 @@ def test_near_parallel_cubes_are_a_millimetre_deep():
 
 def test_touching_poses_are_the_patterns(small):
     """They touch to within rounding, and pressed they are as deep as was asked for."""
-    given = paper_soup_tables.touching(small)
+    given = dataset.as_poses(small)
     assert np.abs(EXACT.batch(*given).separation).max() < 1e-14
     pressed = paper_soup_tables.pressed(given, 1e-3)
     assert len(pressed[0]) > 100
@@ -84,7 +84,7 @@ def test_crossing_is_on_log_log_paper():
 
 def test_planted_errors_show(small, monkeypatch):
     """A point shifted by 10 mm, a normal turned round, contacts withheld: each is seen."""
-    given = paper_soup_tables.pressed(paper_soup_tables.touching(small[:40]), 1e-3)
+    given = paper_soup_tables.pressed(dataset.as_poses(small[:40]), 1e-3)
     truth = EXACT.batch(*given)
     answer = soup.point_and_normal
 

@@ -9,10 +9,9 @@ from poses import IDENTITY
 from box_contact_ros import ContactSolver
 from box_contact_ros.baselines.paper.symmetry import fold
 from box_contact_ros.scene.pose import rotation_matrix
+from box_contact_ros.scene.pose_sets import CONTAINER, CUBE
 from box_contact_ros.training.paper_recipe import dataset
 from box_contact_ros.training.paper_recipe.dataset import (
-    CONTAINER,
-    CUBE,
     FEATURES,
     GENERATORS,
     NO_FOLD,
@@ -138,11 +137,6 @@ def test_impact_point_is_what_the_solver_calls_the_point(placements: Placements)
 # --- folding --------------------------------------------------------------------------------------
 
 
-def pose_of(inputs: np.ndarray) -> np.ndarray:
-    """Poses (n, 7) of network inputs (n, 6)."""
-    return np.concatenate([inputs[:, :3], dataset.quaternion_from_euler(inputs[:, 3:])], axis=1)
-
-
 def direction(angles: np.ndarray) -> np.ndarray:
     """Return unit vectors (n, 3) of azimuth and elevation (n, 2)."""
     azimuth, elevation = angles.T
@@ -155,7 +149,7 @@ def test_folded_boxes_touch_where_the_folded_label_says(how: int, cubes: Placeme
     """What a network is taught is a touching pose with its right answer."""
     result = dataset.fold(cubes, how)
     patterns = result.patterns()
-    again = Placements(CUBE, pose_of(patterns.inputs), result.point, result.normal)
+    again = Placements(CUBE, dataset.as_poses(patterns.inputs)[1], result.point, result.normal)
     sat = dataset.query(again)
     assert np.abs(sat.separation).max() < 1e-11
     assert np.sum(sat.normal * again.normal, axis=1).min() > 1.0 - 1e-9
@@ -203,7 +197,7 @@ def test_labels_unfold(cubes: Placements) -> None:
             np.testing.assert_allclose(folds.unfolded(found), label, rtol=0, atol=1e-15)
             np.testing.assert_allclose(folds.folded(label), found, rtol=0, atol=1e-15)
         np.testing.assert_array_equal(folds.offset, result.inputs[:, :3])
-        turn = rotation_matrix(pose_of(result.inputs)[:, 3:])
+        turn = rotation_matrix(dataset.as_poses(result.inputs)[1][:, 3:])
         np.testing.assert_allclose(folds.rotation, turn, atol=1e-12)
 
 

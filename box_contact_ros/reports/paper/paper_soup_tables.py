@@ -24,7 +24,7 @@ from ...scene.pose import degrees_between
 from ...scene.pose_sets import CUBE, Pairs, at_depth, stacks
 from ...solver.contact import Contacts
 from ...solver.contact_solver import ContactSolver
-from ...training.paper_recipe.dataset import quaternion_from_euler
+from ...training.paper_recipe.dataset import as_poses
 from ..frontier.speed import pinned, usable_cores
 from .paper_tables import PAPER_NETWORK
 from .paper_tables import PAPER_SOUP as PAPER
@@ -102,12 +102,6 @@ class SoupResult:
     def ends(self, regime: str) -> tuple[SoupTimes, SoupTimes]:
         """Return the times of the least N of Table 3, and of the largest."""
         return self.times[regime, min(PAPER)], self.times[regime, max(PAPER)]
-
-
-def touching(inputs: np.ndarray) -> Poses:
-    """Return the paper's patterns (n, 6), offset [m] and roll, pitch, yaw [rad], as poses."""
-    b = np.concatenate([inputs[:, :3], quaternion_from_euler(inputs[:, 3:])], axis=1)
-    return _origin(len(b)), b
 
 
 def near_parallel(rng: np.random.Generator, n: int) -> Poses:
@@ -256,7 +250,7 @@ def measure(inputs: np.ndarray, *, quick: bool = False) -> SoupResult:
     """Time and judge every N on every regime; inputs: the paper's external set (n, 6)."""
     counts = QUICK if quick else FULL
     rng = np.random.default_rng(SEED)
-    poses = {'touching': touching(inputs[:counts['touching'].timed]),
+    poses = {'touching': as_poses(inputs[:counts['touching'].timed]),
              'near-parallel': near_parallel(rng, counts['near-parallel'].timed),
              'coplanar': coplanar(rng, counts['coplanar'].timed)}
     judged = {name: tuple(p[:counts[name].judged] for p in given)
@@ -297,24 +291,6 @@ def _by_regime(head: Sequence[str], titles: Sequence[str], paper: Callable[[int]
         [divisions, *paper(divisions),
          *(cell for regime in REGIMES for cell in ours(result.times[regime, divisions]))]
         for divisions in PAPER], words=0)
-
-
-def table_3(result: SoupResult) -> str:
-    """Return mean times by N and regime, the paper's first."""
-    return _by_regime(
-        ['triangles a cube', 'paper: touching'], ['step', 'FCL alone', 'answer'],
-        lambda n: [f'{12 * n**2:,}', f'{PAPER[n][0]:.2f}'],
-        lambda cell: [_ms(float(t.mean())) for t in (cell.steps, cell.alone, cell.answers)],
-        result)
-
-
-def table_4(result: SoupResult) -> str:
-    """Return the largest number of pairs, and the times of that pattern, by N and regime."""
-    return _by_regime(
-        ['paper: tests', 'paper: ms'], ['pairs', 'step, ms', 'FCL alone, ms'],
-        lambda n: [f'{PAPER[n][1]:,}', f'{PAPER[n][2]:.2f}'],
-        lambda cell: [f'{cell.pairs.max():,}', _ms(cell.worst_step), _ms(cell.worst_alone)],
-        result)
 
 
 def table_of_errors(result: SoupResult) -> str:
@@ -360,7 +336,12 @@ def in_words(divisions: float) -> str:
 
 
 def section_3(result: SoupResult) -> str:
-    """Return Table 3 with its notes."""
+    """Return Table 3, mean times by N and regime, with its notes."""
+    table = _by_regime(
+        ['triangles a cube', 'paper: touching'], ['step', 'FCL alone', 'answer'],
+        lambda n: [f'{12 * n**2:,}', f'{PAPER[n][0]:.2f}'],
+        lambda cell: [_ms(float(t.mean())) for t in (cell.steps, cell.alone, cell.answers)],
+        result)
     counts = result.counts
     thin = ', '.join(f'{math.ceil(count.timed / count.thin):,} {name}'
                      for name, count in counts.items())
@@ -370,13 +351,19 @@ def section_3(result: SoupResult) -> str:
     touching, coplanar = ([cell.steps.mean() / network for cell in result.ends(regime)]
                           for regime in ('touching', 'coplanar'))
     return output.page(
-        'reports/paper/table_3', counts=counts, table=table_3(result), share=share, thin=thin,
+        'reports/paper/pages/table_3', counts=counts, table=table, share=share, thin=thin,
         low=min(PAPER), high=max(PAPER), network=1e3 * network, exact=1e3 * result.exact,
         touching=touching, coplanar=coplanar)
 
 
 def section_4(result: SoupResult) -> str:
-    """Return Table 4 with its notes."""
+    """Return Table 4, the patterns with the most pairs and their times, with its notes."""
+    table = _by_regime(
+        ['paper: tests', 'paper: ms'], ['pairs', 'step, ms', 'FCL alone, ms'],
+        lambda n: [f'{PAPER[n][1]:,}', f'{PAPER[n][2]:.2f}'],
+        lambda cell: [f'{cell.pairs.max():,}', _ms(cell.worst_step), _ms(cell.worst_alone)],
+        result)
+
     def growth(regime: str) -> float:
         first, last = result.ends(regime)
         return last.worst_step / first.worst_step
@@ -386,7 +373,7 @@ def section_4(result: SoupResult) -> str:
 
     low, high = min(PAPER), max(PAPER)
     return output.page(
-        'reports/paper/table_4', table=table_4(result), repeats=REPEATS, low=low, high=high,
+        'reports/paper/pages/table_4', table=table, repeats=REPEATS, low=low, high=high,
         growth_paper=PAPER[high][2] / PAPER[low][2], growth_coplanar=growth('coplanar'),
         growth_parallel=growth('near-parallel'), most_coplanar=most('coplanar'),
         most_parallel=most('near-parallel'),
@@ -396,24 +383,15 @@ def section_4(result: SoupResult) -> str:
 def section_errors(result: SoupResult) -> str:
     """Return the soup's errors, and what differs from the paper."""
     along = 1e3 * result.errors['near-parallel', max(PAPER)].point.mean()
-    return output.page('reports/paper/soup_errors', counts=result.counts, along=along,
+    return output.page('reports/paper/pages/soup_errors', counts=result.counts, along=along,
                        table=table_of_errors(result))
 
 
-def section_figure_10(result: SoupResult, picture: str) -> str:
+def section_figure_10(result: SoupResult) -> str:
     """Return Figure 10's caption."""
-    equal = equal_at(result)
-    words = '; '.join(f"`{name}`'s ({1e3 * result.rivals[name].point:.0f} mm) at {in_words(n)}"
-                      for name, n in equal.items())
-    return f"""## Figure 10: soup and network against N
-
-![Two graphs over the divisions N: times of soup and network, and the soup's point error]({picture})
-
-Above, the step's mean and the time of Table 4's pattern, with a call of model `paper`; grey, the
-paper's. Below, the mean point error on touching cubes 1 mm deep: the soup's equals {words}. The
-dashed line marks where. The paper draws one such line; its text gives neither the number nor the
-measure of accuracy.
-"""
+    return output.page('reports/paper/pages/figure_10', equal='; '.join(
+        f"`{name}`'s ({1e3 * result.rivals[name].point:.0f} mm) at {in_words(n)}"
+        for name, n in equal_at(result).items()))
 
 
 def draw_figure_10(result: SoupResult, path: Path) -> None:

@@ -114,6 +114,10 @@ def filled(page: str) -> str:
         break_on_hyphens=False) for line in lines) + '\n'
 
 
+def _page(name: str, **values: object) -> str:
+    return output.page(f'reports/paper/pages/{name}', **values)
+
+
 def intro(quick: bool) -> str:
     """Return the head of the page."""
     note = f' Quick run: every {QUICK}th pattern only, and fewer for the soup.' if quick else ''
@@ -133,51 +137,16 @@ def sections_1_and_2(tables: Collection[int], step: int) -> list[str]:
         ours = {title: evaluate(_shipped(name), step)['contact']
                 for title, name in (('as drawn', 'paper-as-drawn'), ('folded', 'paper'))}
         detail |= {f'paper, {title}': errors for title, errors in ours.items()}
-        sections.append(f"""## Table 1: with discontinuities, one network 6-20-18-4
-
-Errors in rad over the four output angles, differences wrapped so that −π and π are the same
-direction; the azimuth of the poles is 0.
-
-- *as drawn*: on the paper's terms. Compare these columns with the paper's.
-- *folded*: boxes brought by their symmetries to t ≥ 0 and angles in [−π/2, π/2], as model `paper`
-  asks its network. This is an easier problem.
-
-{beside_paper(1, ours)}
-""")
+        sections.append(_page('table_1', table=beside_paper(1, ours)))
     if 2 in tables:
         subsets = evaluate(_shipped('paper-continuous'), step)
         pooled = {name: np.concatenate([errors[name] for errors in subsets.values()])
                   for name in SETS}
         detail |= subsets
-        sections.append(f"""## Table 2: without discontinuities, one network 6-20-17-4 per subset
-
-The paper does not say what its subsets are. *Easier* are ours, because symmetries bring the
-features that meet to fixed places: 4 of the 8 outputs vary, the others are constant.
-
-{beside_paper(2, {'ours, easier': pooled})}
-
-Ours is over both subsets taken together; each has as many patterns as the paper's set.
-""")
+        sections.append(_page('table_2', table=beside_paper(2, {'ours, easier': pooled})))
     if 1 in tables:
         detail['containers'] = evaluate(_shipped('paper-12.192x2.438x2.591'), step)['contact']
-    return [*sections, output.page('reports/paper/tables_1_2', by_part=by_part(detail))]
-
-
-def section_figure_9(picture: str) -> str:
-    """Return Figure 9's caption."""
-    return f"""## Figure 9: desired and modelled first output
-
-![A line with dots that scatter about it; a line with dots on it]({picture})
-
-The azimuth of the impact point, for the first {SHOWN} patterns of the external set, sorted by what
-is desired (line); dots: what the network says. Above, one network on data with discontinuities
-(model `paper`, Table 1); below, model `paper-continuous` on its subset `vertex_face` (on
-`edge_edge` this output is constant by construction).
-
-The paper draws the first of the four outputs for a part of its external set, with discontinuities:
-a solid line for what is desired, dots for the model. The picture to compare is the upper one. In
-words it gives a mean absolute error of almost 10 % of the range, and no bias.
-"""
+    return [*sections, _page('tables_1_2', by_part=by_part(detail))]
 
 
 def draw_figure_9(path: Path) -> None:
@@ -209,7 +178,7 @@ def report(tables: Collection[int], drawn: Collection[int], *, quick: bool = Fal
     if 9 in drawn:
         if folder:
             draw_figure_9(folder / 'paper_figure_9.png')
-        sections.append(section_figure_9('paper_figure_9.png'))
+        sections.append(_page('figure_9', shown=SHOWN))
     if {3, 4} & set(tables) or 10 in drawn:
         from . import paper_soup_tables  # only here: python-fcl is an extra
 
@@ -224,7 +193,7 @@ def report(tables: Collection[int], drawn: Collection[int], *, quick: bool = Fal
         if 10 in drawn:
             if folder:
                 paper_soup_tables.draw_figure_10(result, folder / 'paper_figure_10.png')
-            sections.append(paper_soup_tables.section_figure_10(result, 'paper_figure_10.png'))
+            sections.append(paper_soup_tables.section_figure_10(result))
         sections.append(paper_soup_tables.section_errors(result))
     return filled('\n'.join(sections))
 

@@ -34,9 +34,7 @@ from ...baselines.paper.symmetry import EDGE_EDGE, FEATURES, NO_FOLD, OCTANT, VE
 from ...baselines.paper.symmetry import fold as fold_pairs
 from ...core import Stages, stages
 from ...scene.pose import quaternion_multiply, rotation_matrix
-
-CUBE = (2.0, 2.0, 2.0)  # the paper's boxes: cubes with edges of length 2
-CONTAINER = (12.192, 2.438, 2.591)  # A 40 ft container [m]
+from ...scene.pose_sets import CUBE, turns
 
 SETS = ('training', 'cross-validation', 'external')
 PAPER_COUNTS = (8000, 5000, 75000)  # patterns per set, with discontinuities
@@ -93,13 +91,14 @@ def _joined(parts: Sequence[Placements]) -> Placements:
 
 def quaternion_from_euler(angles: np.ndarray) -> np.ndarray:
     """Quaternions (n, 4) xyzw of Rz(yaw) Ry(pitch) Rx(roll); angles (n, 3) roll, pitch, yaw."""
-    about = []
-    for k in range(3):
-        q = np.zeros((len(angles), 4))
-        q[:, k] = np.sin(0.5 * angles[:, k])
-        q[:, 3] = np.cos(0.5 * angles[:, k])
-        about.append(q)
-    return quaternion_multiply(about[2], quaternion_multiply(about[1], about[0]))
+    roll, pitch, yaw = (turns(axis, angle) for axis, angle in zip(np.eye(3), angles.T))
+    return quaternion_multiply(yaw, quaternion_multiply(pitch, roll))
+
+
+def as_poses(inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return poses (n, 7) of A and B of inputs (n, 6): offset [m] and roll, pitch, yaw [rad]."""
+    pose_a = np.tile([0.0, 0, 0, 0, 0, 0, 1], (len(inputs), 1))
+    return pose_a, np.concatenate([inputs[:, :3], quaternion_from_euler(inputs[:, 3:])], axis=1)
 
 
 def vertex_face_candidates(rng: np.random.Generator, count: int, half: np.ndarray) -> Placements:

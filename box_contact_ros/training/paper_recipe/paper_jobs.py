@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from ...scene.pose_sets import CONTAINER, CUBE
 from ...solver.weights_file import load_weights, save_weights
 from . import dataset
 from .errors import errors_of, figures_by_part
@@ -44,14 +45,14 @@ _CONTAINERS = PaperSettings((6, 20, 18, 4), networks=48, epochs=400, rate=0.1, i
 _SMOOTH = PaperSettings((6, 20, 17, 4), networks=24, epochs=1000, rate=0.2)
 
 JOBS = {
-    'paper': PaperJob('paper', 'paper', dataset.CUBE, dataset.PAPER_COUNTS, _JUMPS, _DRAWN),
-    'paper-as-drawn': PaperJob('paper-as-drawn', 'paper', dataset.CUBE, dataset.PAPER_COUNTS,
+    'paper': PaperJob('paper', 'paper', CUBE, dataset.PAPER_COUNTS, _JUMPS, _DRAWN),
+    'paper-as-drawn': PaperJob('paper-as-drawn', 'paper', CUBE, dataset.PAPER_COUNTS,
                                _JUMPS, _DRAWN, folded_in=False),
     'paper-continuous': PaperJob(
-        'paper-continuous', 'paper-continuous', dataset.CUBE, dataset.CONTINUOUS_COUNTS, _SMOOTH,
+        'paper-continuous', 'paper-continuous', CUBE, dataset.CONTINUOUS_COUNTS, _SMOOTH,
         _DRAWN + 'Split by the winning axis of SAT (a face of the first box: vertex_face; an edge '
         'pair: edge_edge), which is also what the features are folded by (cube symmetries).'),
-    'containers': PaperJob('paper-12.192x2.438x2.591', 'paper', dataset.CONTAINER,
+    'containers': PaperJob('paper-12.192x2.438x2.591', 'paper', CONTAINER,
                            dataset.PAPER_COUNTS, _CONTAINERS, _DRAWN),
 }
 
