@@ -56,7 +56,7 @@ class BoxGroup:
                 f'/{path}/{name}', corners, triangles, no_turn, nothing, batched_scales=nothing,
                 lod='off', cast_shadow=False, receive_shadow=False, **look)
 
-        # Flat faces look the same as toons, and cost a browser without a GPU much less.
+        # Flat faces look the same as toons, and cost a browser without a GPU some 10 % less.
         self._faces = add('boxes', CUBE, CUBE_FACES, opacity=BOX_OPACITY, flat_shading=True,
                           material='toon5')
         self._edges = add('edges', CUBE_EDGES.reshape(-1, 3), np.arange(36).reshape(12, 3),
