@@ -9,7 +9,7 @@ import numpy as np
 import pybullet as bullet
 
 from ...scene.pose_sets import Pairs
-from .engine import APART, Engine, Manifold, per_sizes, rows
+from .engine import APART, Engine, Manifold, per_pair
 
 FILLING = 4
 """Detections of the same pose before the manifold is read: it takes up to four points."""
@@ -23,7 +23,7 @@ def points(persistent: bool) -> Engine:
     place = partial(bullet.resetBasePositionAndOrientation, physicsClientId=client)
     detect = partial(bullet.performCollisionDetection, physicsClientId=client)
 
-    def bodies(p: np.ndarray, q: np.ndarray) -> list[int]:
+    def bodies(p: np.ndarray, q: np.ndarray) -> Callable[..., Any]:
         # Bodies of other sizes are in the same world, and not in the way.
         group = 1 << bullet.getNumBodies(physicsClientId=client) // 2 % GROUPS
         found = []
@@ -33,7 +33,7 @@ def points(persistent: bool) -> Engine:
             body = bullet.createMultiBody(1.0, shape, physicsClientId=client)
             bullet.setCollisionFilterGroupMask(body, -1, group, group, physicsClientId=client)
             found.append(body)
-        return found
+        return partial(ask, *found)
 
     def ask(one: int, two: int, a: Any, b: Any, quat_a: Any, quat_b: Any) -> Any:
         place(one, a, quat_a)
@@ -50,9 +50,8 @@ def points(persistent: bool) -> Engine:
     def prepare(pairs: Pairs) -> list[Callable[[], Any]]:
         # Bodies stay in the world and slow its broad phase down: only those of these pairs.
         bullet.resetSimulation(physicsClientId=client)
-        made = per_sizes(bodies)
-        return [partial(ask, *made(p, q), *(tuple(part) for part in (a[:3], b[:3], a[3:], b[3:])))
-                for a, b, p, q in rows(pairs)]
+        return per_pair(bodies, lambda a, b: tuple(
+            map(tuple, (a[:3], b[:3], a[3:], b[3:]))))(pairs)
 
     def read(contacts: Any) -> Manifold:
         # 5, 6: the points on A and B; 7: the normal on B, towards A; 8: the distance.
@@ -68,7 +67,7 @@ def points(persistent: bool) -> Engine:
         return Engine(name='PyBullet getContactPoints', package='pybullet',
                       call=f'{FILLING} × performCollisionDetection, getContactPoints',
                       returns='up to 4 points with depths, normals',
-                      choices=('deepest', 'mean', 'patch centroid'), prepare=prepare, read=read,
+                      prepare=prepare, read=read,
                       causes={'invented': 'The axis test adds 1e-5 to every entry of the rotation, '
                               'so gaps of some 1e-5 of the size count as contact.'})
     return Engine(name='PyBullet getClosestPoints', call='getClosestPoints(a, b, 0.0)',

@@ -8,9 +8,7 @@ from typing import Any
 import coal
 import numpy as np
 
-from ...scene.pose import rotation_matrix
-from ...scene.pose_sets import Pairs
-from .engine import APART, MOST_CONTACTS, Engine, Manifold, one_contact, per_sizes, rows
+from .engine import APART, MOST_CONTACTS, Engine, Manifold, matrices, one_contact, per_pair
 
 
 def collision(patches: bool) -> Engine:
@@ -33,11 +31,8 @@ def collision(patches: bool) -> Engine:
             coal.computeContactPatch(one, at_one, two, at_two, result, patch_request, patch_result)
         return result
 
-    def prepare(pairs: Pairs) -> list[Callable[[], Any]]:
-        boxes = per_sizes(lambda p, q: (coal.Box(*p), coal.Box(*q), coal.Transform3s(),
-                                        coal.Transform3s()))
-        return [partial(partial(ask, *boxes(p, q)), a[:3], b[:3], rotation_matrix(a[3:]),
-                        rotation_matrix(b[3:])) for a, b, p, q in rows(pairs)]
+    def boxes(p: np.ndarray, q: np.ndarray) -> Callable[..., Any]:
+        return partial(ask, coal.Box(*p), coal.Box(*q), coal.Transform3s(), coal.Transform3s())
 
     def read(_: Any) -> Manifold:
         if not result.numContacts():
@@ -54,10 +49,10 @@ def collision(patches: bool) -> Engine:
         return Engine(name='Coal collide, contact patch',
                       call='coal.collide, coal.computeContactPatch', returns='polygon, normal',
                       patch='area', package='coal', choices=('mean', 'patch centroid'),
-                      prepare=prepare, read=read)
+                      prepare=per_pair(boxes, matrices), read=read)
     return Engine(name='Coal collide', call='coal.collide, enable_contact',
                   returns='deepest point, depth, normal', package='coal', choices=('its point',),
-                  prepare=prepare, read=read)
+                  prepare=per_pair(boxes, matrices), read=read)
 
 
 ENGINES = [partial(collision, False), partial(collision, True)]

@@ -7,13 +7,14 @@ and is not timed. Setting both poses is timed.
 from __future__ import annotations
 
 import multiprocessing
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...scene.pose import rotation_matrix
 from ...scene.pose_sets import Pairs
 from ...solver.contact_solver import ContactSolver
 from ...solver.models import find_model
@@ -49,7 +50,7 @@ class Engine:
     returns: str
     patch: str = '–'  # what it says of the patch beyond points: its volume or area
     package: str = ''  # distribution whose version reports name
-    choices: tuple[str, ...]
+    choices: tuple[str, ...] = ('deepest', 'mean', 'patch centroid')
     """Ways, of `CHOICES`, in which users make one point of the answer."""
     prepare: Callable[[Pairs], list[Callable[[], Any]]]
     """Return a call for each pair, to be timed. ValueError: not for boxes of these sizes."""
@@ -76,10 +77,6 @@ def ours(model: str, name: str | None = None, weights: str | None = None) -> Eng
     def solver(p: np.ndarray, q: np.ndarray) -> ContactSolver:
         return ContactSolver(p, q, model=model, weights=weights)
 
-    def prepare(pairs: Pairs) -> list[Callable[[], Any]]:
-        solvers = per_sizes(solver)
-        return [partial(solvers(p, q), a, b) for a, b, p, q in rows(pairs)]
-
     def prepare_batch(pairs: Pairs, threads: int = 1) -> Callable[[], Any]:
         a, b, size_a, size_b = pairs
         return partial(solver(size_a[0], size_b[0]).batch, a, b, size_a=size_a, size_b=size_b,
@@ -92,7 +89,8 @@ def ours(model: str, name: str | None = None, weights: str | None = None) -> Eng
 
     return Engine(name=name or model, call='ContactSolver(…)(pose_a, pose_b)',
                   returns='one contact', patch='volume, covariance', choices=('its point',),
-                  prepare=prepare, read=read, any_boxes=entry.any_boxes,
+                  prepare=per_pair(solver, lambda a, b: (a, b)), read=read,
+                  any_boxes=entry.any_boxes,
                   prepare_batch=prepare_batch if entry.native_batch else None)
 
 
@@ -179,9 +177,19 @@ def _answer_to(pipe: Any, work: Callable[..., Any], *arguments: Any) -> None:
     pipe.send(work(*arguments))
 
 
-def rows(pairs: Pairs) -> Iterator[tuple[np.ndarray, ...]]:
-    """Yield contiguous rows: pose_a, pose_b, size_a, size_b."""
-    return zip(*(np.ascontiguousarray(part) for part in pairs))
+def per_pair(make: Callable[[np.ndarray, np.ndarray], Callable[..., Any]],
+             at: Callable[[np.ndarray, np.ndarray], tuple[Any, ...]],
+             ) -> Callable[[Pairs], list[Callable[[], Any]]]:
+    """Return an `Engine.prepare`, whose calls are `make(size_a, size_b)(*at(pose_a, pose_b))`.
+
+    make: called once for each pair of sizes; at: returns the poses in the engine's own form.
+    """
+    def prepare(pairs: Pairs) -> list[Callable[[], Any]]:
+        made = cache(lambda p, q: make(np.array(p), np.array(q)))
+        return [partial(made(tuple(p), tuple(q)), *at(a, b))
+                for a, b, p, q in zip(*map(np.ascontiguousarray, pairs))]
+
+    return prepare
 
 
 def wxyz(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -189,7 +197,6 @@ def wxyz(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, ...]:
     return a[:3], b[:3], np.roll(a[3:], 1), np.roll(b[3:], 1)
 
 
-def per_sizes(make: Callable[[np.ndarray, np.ndarray], Any]) -> Callable[..., Any]:
-    """Return `make`, called once for each pair of sizes."""
-    cached = cache(lambda p, q: make(np.array(p), np.array(q)))
-    return lambda p, q: cached(tuple(p), tuple(q))
+def matrices(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Return places (3,) of both poses, then how they are turned, (3, 3) each."""
+    return a[:3], b[:3], rotation_matrix(a[3:]), rotation_matrix(b[3:])

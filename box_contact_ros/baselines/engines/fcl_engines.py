@@ -8,8 +8,7 @@ from typing import Any
 import fcl
 import numpy as np
 
-from ...scene.pose_sets import Pairs
-from .engine import APART, MOST_CONTACTS, Engine, Manifold, per_sizes, rows, wxyz
+from .engine import APART, MOST_CONTACTS, Engine, Manifold, per_pair, wxyz
 
 
 def collision() -> Engine:
@@ -24,10 +23,8 @@ def collision() -> Engine:
         fcl.collide(one, two, request, result)
         return result
 
-    def prepare(pairs: Pairs) -> list[Callable[[], Any]]:
-        boxes = per_sizes(lambda p, q: (fcl.CollisionObject(fcl.Box(*p)),
-                                        fcl.CollisionObject(fcl.Box(*q))))
-        return [partial(ask, *boxes(p, q), *wxyz(a, b)) for a, b, p, q in rows(pairs)]
+    def boxes(p: np.ndarray, q: np.ndarray) -> Callable[..., Any]:
+        return partial(ask, *(fcl.CollisionObject(fcl.Box(*size)) for size in (p, q)))
 
     def read(result: Any) -> Manifold:
         contacts = result.contacts
@@ -39,7 +36,7 @@ def collision() -> Engine:
 
     return Engine(name='python-fcl collide', call='fcl.collide, enable_contact',
                   returns='up to 8 points with depths, normals', package='python-fcl',
-                  choices=('deepest', 'mean', 'patch centroid'), prepare=prepare, read=read)
+                  prepare=per_pair(boxes, wxyz), read=read)
 
 
 ENGINES = [collision]

@@ -13,8 +13,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from ...scene.pose_sets import Pairs
-from .engine import APART, Engine, Manifold, one_contact, per_sizes, rows, wxyz
+from .engine import APART, Engine, Manifold, one_contact, per_pair, wxyz
 
 Shape = Callable[[str, np.ndarray], tuple[str, str]]  # (name, size) -> asset, geom
 _CCD_ENDS = 'The search for the depth ends at 0, on boxes of very unequal sizes.'
@@ -34,10 +33,9 @@ def distance(name: str, flags: str) -> Engine:
         matrix(turn_b, quat_b)
         return measure(model, data, 0, 1, FARTHEST, ends)
 
-    def prepare(pairs: Pairs) -> list[Callable[[], Any]]:
-        models = per_sizes(partial(_model, _boxes, flags))
-        return [partial(ask, model, data, *data.geom_xpos, *data.geom_xmat, *wxyz(a, b))
-                for a, b, p, q in rows(pairs) for model, data in [models(p, q)]]
+    def boxes(p: np.ndarray, q: np.ndarray) -> Callable[..., Any]:
+        model, data = _model(_boxes, flags, p, q)
+        return partial(ask, model, data, *data.geom_xpos, *data.geom_xmat)
 
     def read(result: float) -> Manifold:
         if result > 0.0:
@@ -49,7 +47,8 @@ def distance(name: str, flags: str) -> Engine:
 
     return Engine(name=f'MuJoCo mj_geomDistance{name}', call=f'mj_geomDistance(model, data, 0, 1, '
                   f'1.0, fromto){flags and f", {flags}"}', returns='distance, two nearest points',
-                  package='mujoco', choices=('its point',), prepare=prepare, read=read,
+                  package='mujoco', choices=('its point',), prepare=per_pair(boxes, wxyz),
+                  read=read,
                   causes={'normal': _CCD_ENDS + ' The two nearest points coincide, and give no '
                           'direction.'})
 
@@ -65,15 +64,13 @@ def collision(name: str, shape: Shape, flags: str, choices: tuple[str, ...] = (
         collide(model, data)
         return data
 
-    def prepare(pairs: Pairs) -> list[Callable[[], Any]]:
-        models = per_sizes(partial(_model, shape, flags))
-        calls: list[Callable[[], Any]] = []
-        for a, b, p, q in rows(pairs):
-            model, data = models(p, q)
-            place_a, place_b, quat_a, quat_b = wxyz(a, b)
-            calls.append(partial(ask, model, data, data.qpos, np.concatenate(
-                [place_a, quat_a, place_b, quat_b])))
-        return calls
+    def boxes(p: np.ndarray, q: np.ndarray) -> Callable[..., Any]:
+        model, data = _model(shape, flags, p, q)
+        return partial(ask, model, data, data.qpos)
+
+    def at(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray]:
+        place_a, place_b, quat_a, quat_b = wxyz(a, b)
+        return (np.concatenate([place_a, quat_a, place_b, quat_b]),)
 
     def read(data: Any) -> Manifold:
         found = data.contact
@@ -84,8 +81,8 @@ def collision(name: str, shape: Shape, flags: str, choices: tuple[str, ...] = (
 
     return Engine(name=f'MuJoCo mj_collision{name}', call=f'mj_kinematics, mj_collision'
                   f'{flags and f", {flags}"}', returns='up to 8 points with depths, normals',
-                  package='mujoco', choices=choices, prepare=prepare, read=read, causes={
-                      'missed': _CCD_ENDS, 'normal': normal})
+                  package='mujoco', choices=choices, prepare=per_pair(boxes, at), read=read,
+                  causes={'missed': _CCD_ENDS, 'normal': normal})
 
 
 def _boxes(name: str, size: np.ndarray) -> tuple[str, str]:

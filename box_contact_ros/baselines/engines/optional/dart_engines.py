@@ -8,9 +8,7 @@ from typing import Any
 import dartpy as dart
 import numpy as np
 
-from ....scene.pose import rotation_matrix
-from ....scene.pose_sets import Pairs
-from ..engine import APART, MOST_CONTACTS, Engine, Manifold, per_sizes, rows
+from ..engine import APART, MOST_CONTACTS, Engine, Manifold, matrices, per_pair
 
 
 def collision() -> Engine:
@@ -19,7 +17,7 @@ def collision() -> Engine:
     option, result = dart.collision.CollisionOption(), dart.collision.CollisionResult()
     option.enableContact, option.maxNumContacts = True, MOST_CONTACTS
 
-    def boxes(p: np.ndarray, q: np.ndarray) -> tuple[Any, ...]:
+    def boxes(p: np.ndarray, q: np.ndarray) -> Callable[..., Any]:
         frames, groups = [], []
         for size in (p, q):
             frame = dart.dynamics.SimpleFrame()
@@ -28,7 +26,7 @@ def collision() -> Engine:
             group.addShapeFrame(frame)
             frames.append(frame)
             groups.append(group)
-        return *frames, *groups
+        return partial(ask, *frames, *groups)
 
     def ask(one: Any, two: Any, group: Any, other: Any, a: np.ndarray, b: np.ndarray,
             matrix_a: np.ndarray, matrix_b: np.ndarray) -> Any:
@@ -39,11 +37,6 @@ def collision() -> Engine:
         result.clear()
         group.collide(other, option, result)
         return b - a
-
-    def prepare(pairs: Pairs) -> list[Callable[[], Any]]:
-        made = per_sizes(boxes)
-        return [partial(partial(ask, *made(p, q)), a[:3], b[:3], rotation_matrix(a[3:]),
-                        rotation_matrix(b[3:])) for a, b, p, q in rows(pairs)]
 
     def read(_: Any) -> Manifold:
         contacts = [result.getContact(k) for k in range(result.getNumContacts())]
@@ -56,7 +49,7 @@ def collision() -> Engine:
 
     return Engine(name='DART collide', call='CollisionGroup.collide', package='dartpy',
                   returns='up to 8 points with depths, normals',
-                  choices=('deepest', 'mean', 'patch centroid'), prepare=prepare, read=read)
+                  prepare=per_pair(boxes, matrices), read=read)
 
 
 ENGINES = [collision]

@@ -10,8 +10,7 @@ from pydrake import geometry
 from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RigidTransform
 
-from ....scene.pose_sets import Pairs
-from ..engine import APART, Engine, Manifold, one_contact, per_sizes, rows
+from ..engine import APART, Engine, Manifold, one_contact, per_pair
 
 MODULUS = 1e5  # hydroelastic modulus [Pa]; equal on both boxes, so that it shifts nothing
 
@@ -54,11 +53,8 @@ def _engine(surfaces: bool, read: Callable[[Any], Manifold], **about: Any) -> En
         x, y, z, w = pose[3:] / np.linalg.norm(pose[3:])
         return RigidTransform(Quaternion(w, x, y, z), pose[:3])
 
-    def prepare(pairs: Pairs) -> list[Callable[[], Any]]:
-        scenes = per_sizes(partial(_DrakeScene, surfaces))
-        return [partial(scenes(p, q), place(a), place(b)) for a, b, p, q in rows(pairs)]
-
-    return Engine(package='drake', choices=('its point',), prepare=prepare, read=read, **about)
+    return Engine(package='drake', choices=('its point',), read=read, prepare=per_pair(
+        partial(_DrakeScene, surfaces), lambda a, b: (place(a), place(b))), **about)
 
 
 def point_pair() -> Engine:

@@ -11,7 +11,7 @@ import warp
 
 from ....scene.pose import rotation_matrix
 from ....scene.pose_sets import Pairs
-from ..engine import APART, Engine, Manifold, per_sizes, rows
+from ..engine import APART, Engine, Manifold, per_pair
 
 warp.config.quiet = True
 
@@ -39,11 +39,6 @@ class _NewtonModel:
 
 def collision() -> Engine:
     """Return Newton's `CollisionPipeline.collide`: up to four points or so."""
-    def prepare(pairs: Pairs) -> list[Callable[[], Any]]:
-        models = per_sizes(lambda p, q: _NewtonModel(p[None], q[None]))
-        return [partial(models(p, q), np.array([a, b], dtype=np.float32))
-                for a, b, p, q in rows(pairs)]
-
     def prepare_batch(pairs: Pairs, threads: int = 1) -> Callable[[], Any]:
         poses = np.stack([pairs.pose_a, pairs.pose_b], axis=1).reshape(-1, 7)
         return partial(_NewtonModel(pairs.size_a, pairs.size_b), poses.astype(np.float32))
@@ -68,7 +63,8 @@ def collision() -> Engine:
 
     return Engine(name='Newton collide', call='CollisionPipeline.collide',
                   returns='up to 5 points with normals; float32', package='newton',
-                  choices=('deepest', 'mean', 'patch centroid'), prepare=prepare, read=read,
+                  prepare=per_pair(lambda p, q: _NewtonModel(p[None], q[None]),
+                                   lambda a, b: (np.array([a, b], dtype=np.float32),)), read=read,
                   prepare_batch=prepare_batch)
 
 

@@ -1,16 +1,13 @@
 """Rapier, whose colliders are Parry's, in float32."""
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import numpy as np
 import rapier3d as rapier
 
 from ....scene.pose import rotation_matrix
-from ....scene.pose_sets import Pairs
-from ..engine import APART, Engine, Manifold, per_sizes, rows
+from ..engine import APART, Engine, Manifold, per_pair
 
 
 class _RapierWorld:
@@ -45,11 +42,6 @@ def collision() -> Engine:
         x, y, z, w = (pose[3:] / np.linalg.norm(pose[3:])).tolist()
         return rapier.Isometry3(tuple(pose[:3].tolist()), rapier.Rotation3(w, x, y, z))
 
-    def prepare(pairs: Pairs) -> list[Callable[[], Any]]:
-        worlds = per_sizes(_RapierWorld)
-        return [partial(worlds(p, q), place(a), place(b), np.array([a, b]))
-                for a, b, p, q in rows(pairs)]
-
     def read(found: tuple[Any, np.ndarray]) -> Manifold:
         pair, poses = found
         turns = rotation_matrix(poses[:, 3:])
@@ -68,7 +60,8 @@ def collision() -> Engine:
     return Engine(name='Rapier contact_pair', package='rapier3d',
                   call='CollisionPipeline.step, NarrowPhase.contact_pair',
                   returns='up to 4 points with depths, normals; float32',
-                  choices=('deepest', 'mean', 'patch centroid'), prepare=prepare, read=read)
+                  prepare=per_pair(_RapierWorld, lambda a, b: (
+                      place(a), place(b), np.array([a, b]))), read=read)
 
 
 ENGINES = [collision]
