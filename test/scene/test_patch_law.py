@@ -213,18 +213,18 @@ def test_a_bounce_never_gains_energy():
 
     Stepped as finely as to be continuous, its energy m (v² + Ω² depth²) / 2 + m g z never grows.
     """
-    step, height, speed = 1e-5, 0.002, -0.3
+    step, height, speed = 2e-5, 0.002, -0.3
 
     def energy() -> float:
         return MASS * (speed**2 + (LAW.frequency * max(0.0, -height))**2) / 2 + WEIGHT * height
 
     last = first = energy()
-    for _ in range(60_000):
+    for _ in range(20_000):
         patches = [slab(depth=-height)] if height < 0.0 else []
         force = fresh().wrench(patches, LEVEL, moving(linear=(0, 0, speed)))[2]
         speed += step * (force / MASS - GRAVITY)
         height += step * speed
-        # A symplectic step keeps an oscillator's energy to ω·step: 140 rad/s · 1e-5 s.
+        # A symplectic step keeps an oscillator's energy to ω·step: 140 rad/s · 2e-5 s.
         assert energy() < last + 1e-3 * first
         last = energy()
     assert height == pytest.approx(-SUNK, rel=1e-3)
