@@ -7,7 +7,7 @@ and is not timed. Setting both poses is timed.
 from __future__ import annotations
 
 import multiprocessing
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from typing import Any, NamedTuple
@@ -63,6 +63,11 @@ class Engine:
     """Why it is 'missed', 'invented' or 'normal' in a report, where that is known."""
     make: Callable[[], Engine] | None = None
     """Makes the engine again in a subprocess, where another's library may abort."""
+
+
+def packages_of(engines: Sequence[Engine]) -> list[str]:
+    """Return the distributions whose versions a report of these engines names."""
+    return list(dict.fromkeys(['numpy', *(one.package for one in engines if one.package)]))
 
 
 def one_contact(points: np.ndarray, depth: float, normal: np.ndarray) -> Manifold:

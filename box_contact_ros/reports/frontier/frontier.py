@@ -24,7 +24,7 @@ from inspect import getdoc
 
 from ... import output
 from ...baselines.engines import installed
-from ...baselines.engines.engine import Engine, ours
+from ...baselines.engines.engine import Engine, ours, packages_of
 from ...core import FORCE, instruction_sets, native
 from ...output import markdown_table, number
 from ...resources import resource_path
@@ -182,17 +182,13 @@ def honesty(rows: Sequence[FrontierRow]) -> str:
         paper=by['paper', 'random cubes'].errors.points['all'][1]).rstrip()
 
 
-def _packages(found: Sequence[Engine]) -> list[str]:
-    return list(dict.fromkeys(['numpy', *(one.package for one in found if one.package)]))
-
-
 def page(rows: Sequence[FrontierRow], found: Sequence[Engine], missing: Sequence[str],
          command: str) -> str:
     """Return the Markdown page."""
     odd = odd_cells(rows, found)
     return output.page(
         'reports/pages/frontier', command=command,
-        machine=output.machine(native, _packages(found)),
+        machine=output.machine(native, packages_of(found)),
         skipped=''.join(f'\n\nLeft out: {line}.' for line in missing),
         in_short=in_short(rows, odd), odd='\n'.join(
             f'{place}. {line}' for place, line in enumerate(odd.values(), start=1)) or 'None.',

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ... import output
 from ...baselines.engines import installed
-from ...baselines.engines.engine import Engine, ours
+from ...baselines.engines.engine import Engine, ours, packages_of
 from ...core import native
 from ...solver.models import MODELS, gated_models
 from ...verification.named_failures import NamedFailure, load, replay_apart
@@ -48,11 +48,10 @@ def write_named(folder: Path, command: str) -> int:
     failures = load()
     engines, missing = contestants()
     found = {engine.name: replay_apart(engine, failures) for engine in engines}
-    packages = dict.fromkeys(['numpy', *(one.package for one in engines if one.package)])
     place = {name: number for number, name in enumerate(failures, start=1)}
     text = output.page(
         'reports/pages/named_failures', command=command,
-        machine=output.machine(native, list(packages)), reports=reports_table(failures),
+        machine=output.machine(native, packages_of(engines)), reports=reports_table(failures),
         passes=passes_table(found), skipped=''.join(f'\n\nLeft out: {line}.' for line in missing),
         faults='\n'.join(f'- {name}: {", ".join(wrong)}.' for name, faults in found.items()
                          if (wrong := [f'{place[one]} {text}' for one, text in faults.items()
