@@ -18,6 +18,8 @@ PYTHON = f"""#!/bin/sh
 case "$1 $2" in
     '-m venv') mkdir -p .venv/bin && cp "$0" .venv/bin/python ;;
     '-m pip') echo "$*" >>calls; if [ -e broken ]; then echo 'no network'; exit 1; fi ;;
+    'setup.py -q') echo "$*" >>calls; if [ -e uncompiled ]; then echo 'no g++'; exit 1; fi ;;
+    *run_setup*) echo numpy ;;
     *) exec {sys.executable} "$@" ;;
 esac
 """
@@ -95,6 +97,20 @@ def test_a_change_installs_again(checkout: Path, offer: Callable, changed: str) 
     later = (checkout / '.venv' / '.installed-demo').stat().st_mtime + 1.0
     os.utime(checkout / changed, (later, later))
     assert 'making' not in set_up(checkout).stdout
+    assert installed(checkout) == ['ros,sim']
+
+
+def test_the_core_is_compiled_beside(checkout: Path, offer: Callable) -> None:
+    """While pip fetches the rest; a failure of the compiler is one of the set-up."""
+    offer('python3.12', PYTHON)
+    (checkout / 'uncompiled').touch()
+    failed = set_up(checkout)
+    assert failed.returncode == 1 and 'no g++' in failed.stdout
+    calls = (checkout / 'calls').read_text()
+    assert 'setup.py -q build_ext --inplace' in calls and '-r .venv/requirements.txt' in calls
+    assert installed(checkout) == []
+    (checkout / 'uncompiled').unlink()
+    assert set_up(checkout).returncode == 0
     assert installed(checkout) == ['ros,sim']
 
 
