@@ -68,7 +68,7 @@ check:
 reports:
 	@.ci/setup test
 	$(PY) -m box_contact_ros reports $(ARGS) || status=$$?
-	$(PY) docs/figures/make_figures.py
+	for figures in docs/figures/make_*.py; do $(PY) $$figures; done
 	$(PY) docs/tables.py
 	exit $${status:-0}
 

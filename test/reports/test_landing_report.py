@@ -84,7 +84,7 @@ def test_a_run_writes_table_and_rows(tmp_path, one_case, capsys):
 
 def test_what_is_not_as_expected_ends_with_status_1(tmp_path, one_case, monkeypatch, capsys):
     monkeypatch.setattr(landing_report, 'run', _diverged)
-    monkeypatch.setattr(landing_report, 'ProcessPoolExecutor', _Here)
+    monkeypatch.setattr(landing_report, 'Pool', _Here)
     assert landing_report.main(['--quick', '--ways', 'exact', '--rates', '200', '--latency', '0',
                                 '--out', str(tmp_path)]) == 1
     assert 'exact at 200 Hz, grid 4: not as expected' in capsys.readouterr().err
@@ -99,7 +99,7 @@ class _Here:
     """A pool that works in this process."""
 
     def __init__(self, workers):
-        self.map = map
+        self.imap = map
 
     def __enter__(self):
         return self

@@ -59,12 +59,12 @@ class Flight:
 
     @property
     def record(self) -> LandingRecord:
-        """What happened so far."""
+        """Return what happened so far."""
         return self._loop.record
 
     @property
     def pose(self) -> np.ndarray:
-        """Pose of the load (7,)."""
+        """Return the pose of the load (7,)."""
         return self._crane.load_pose
 
     @property
