@@ -65,7 +65,7 @@ class Effort:
     starts: int  # new processes
 
 
-FULL = Effort(calls=2_000, batch=20_000, shared_batch=100_000, rounds=40, starts=20)
+FULL = Effort(calls=2_000, batch=20_000, shared_batch=100_000, rounds=120, starts=20)
 QUICK = Effort(calls=200, batch=1_000, shared_batch=1_000, rounds=3, starts=2)
 
 
@@ -185,11 +185,7 @@ def batch(model: str, name: str, count: int, kind: str = 'batch', threads: int =
 
 
 def timed(stints: Sequence[Stint], rounds: int) -> list[Timing]:
-    """Time all in turn, `rounds` times, each right after an untimed run of its own.
-
-    Without that run the first batch after single calls took a tenth longer than the others: it
-    wakes the wide lanes, and its data have left the caches.
-    """
+    """Time all in turn, `rounds` times, each right after an untimed run of its own."""
     times: list[list[float]] = [[] for _ in stints]
 
     def clocked(one: Stint, found: list[float]) -> Callable[[], None]:
@@ -207,11 +203,12 @@ def timed(stints: Sequence[Stint], rounds: int) -> list[Timing]:
 
 def print_timings(core: int, effort: Effort) -> None:
     """Print times of single calls and batches on one core as JSON, for `measure_with`."""
+    batches = [batch(model, name, effort.batch) for model in gated_models() for name in BATCH_SETS]
     with pinned({core}):
-        stints = single_calls(effort.calls)
-        stints += [batch(model, name, effort.batch)
-                   for model in gated_models() for name in BATCH_SETS]
-        print(json.dumps([asdict(one) for one in timed(stints, effort.rounds)]))
+        # Apart: what follows the scalar calls of other engines is slow for some milliseconds.
+        found = [one for stints in (single_calls(effort.calls), batches)
+                 for one in timed(stints, effort.rounds)]
+    print(json.dumps([asdict(one) for one in found]))
 
 
 def measure_with(instruction_set: str, core: int, effort: Effort) -> list[Timing]:
