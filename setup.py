@@ -28,11 +28,10 @@ if platform.machine() in ('x86_64', 'AMD64'):
 # Not imported from the package: its __init__.py needs what is only about to be installed.
 cli = runpy.run_path(str(Path(__file__).with_name(NAME) / 'cli.py'))
 
-# colcon (like bloom's Debian packages) runs `setup.py install|develop` and wants programs in
-# lib/box_contact_ros, each under its bare name for `ros2 run`: setup.cfg says where. pip and other
-# PEP 517 front ends have no such folder; there they land in bin/, among the programs of all other
-# packages, hence the prefix. Told apart by the caller: PEP 517 comes through this module of
-# setuptools, and pip sets this variable for everything it builds, its old `setup.py develop` too.
+# colcon and bloom run `setup.py install` or `develop`. `ros2 run` needs programs in
+# lib/box_contact_ros under their bare names: setup.cfg says where. pip puts programs into bin/,
+# among those of all other packages, so they get a prefix there. Two signs tell who calls:
+# setuptools has this module for PEP 517, and pip sets this variable for all that it builds.
 BY_PIP = 'setuptools.build_meta' in sys.modules or 'PIP_BUILD_TRACKER' in os.environ
 
 

@@ -14,12 +14,16 @@ def rotation_matrix(quaternion: np.ndarray) -> np.ndarray:
 
     Dividing by the squared norm needs no square root; q and −q give the same bits.
     """
-    x, y, z, w = np.moveaxis(np.asarray(quaternion, dtype=np.float64), -1, 0)
+    quaternion = np.asarray(quaternion, dtype=np.float64)
+    single = quaternion.ndim == 1
+    # Python's floats take a fifth of the time of NumPy's scalars.
+    x, y, z, w = quaternion.tolist() if single else np.moveaxis(quaternion, -1, 0)
     s = 2.0 / ((x * x + y * y) + (z * z + w * w))
     entries = (1.0 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y),
                s * (x * y + w * z), 1.0 - s * (x * x + z * z), s * (y * z - w * x),
                s * (x * z - w * y), s * (y * z + w * x), 1.0 - s * (x * x + y * y))
-    return np.stack(entries, axis=-1).reshape(*np.shape(x), 3, 3)
+    matrices = np.array(entries) if single else np.stack(entries, axis=-1)
+    return matrices.reshape(*quaternion.shape[:-1], 3, 3)
 
 
 def quaternion_multiply(p: np.ndarray, q: np.ndarray) -> np.ndarray:
@@ -40,5 +44,6 @@ def degrees_between(one: np.ndarray, other: np.ndarray) -> np.ndarray:
 
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Return a × b of vectors (3,); np.cross takes ten times as long on single vectors."""
-    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2],
-                     a[0] * b[1] - a[1] * b[0]])
+    ax, ay, az = a.tolist()
+    bx, by, bz = b.tolist()
+    return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])

@@ -24,8 +24,12 @@ PRESSED = 3e-9
 shallower than a third of this have the point of boxes pressed in."""
 INSIDE = 2.0**-43
 """How far outside a box a point may be, of the size and the coordinates: roundings."""
+AXES = 15  # normals of A's faces, of B's, and cross products of their edges
 TINY = 1e-140
 """Least length of a cross product that is made a unit vector; its square must not underflow."""
+FAR_BEHIND, MOSTLY_ROUNDING = 1e-9, 1e-6
+"""An axis is not taken in 60 digits if its gap in float64 is less than the greatest by so much of
+the size. Its edges must cross at a larger sine than the second: else its direction is rounding."""
 
 MISSED, PHANTOM, TOO_DEEP, TOO_SHALLOW, WRONG_AXIS, NOT_UNIT, OUTSIDE, NOT_FINITE = (
     1 << k for k in range(8))
@@ -91,7 +95,8 @@ def _judge(pose_a: np.ndarray, pose_b: np.ndarray, size_a: np.ndarray, size_b: n
     axes_a, axes_b = _axes(pose_a[:, 3:].T), _axes(pose_b[:, 3:].T)
     corners_a = _corners(axes_a, size_a.T, np.zeros((3, len(size))))
     corners_b = _corners(axes_b, size_b.T, (pose_b[:, :3] - pose_a[:, :3]).T)
-    true = _greatest_gap(axes_a, axes_b, corners_a, corners_b)
+    true = np.max([_gap_both_ways(_axis(axes_a, axes_b, number), corners_a, corners_b)[0]
+                   for number in range(AXES)], axis=0)
     with np.errstate(invalid='ignore'):  # NaN is what some of the answers are
         along = _gap_along(normal.T, corners_a, corners_b)
         # The point of a shallow contact is that of boxes pressed in.
@@ -141,19 +146,27 @@ def _gap_along(axis: np.ndarray, corners_a: np.ndarray, corners_b: np.ndarray) -
     return _dot(axis, corners_b).min(axis=0) - _dot(axis, corners_a).max(axis=0)
 
 
-def _greatest_gap(axes_a: np.ndarray, axes_b: np.ndarray, corners_a: np.ndarray,
-                  corners_b: np.ndarray) -> np.ndarray:
-    """Return the greatest gaps (n,) over the fifteen axes, taken in both directions."""
-    crosses = [np.cross(u, v, axis=0) for u in axes_a for v in axes_b]
-    best = np.full(axes_a.shape[2], -np.inf)
-    for axis in (*axes_a, *axes_b, *crosses):
-        length = np.sqrt((axis**2).sum(axis=0))
-        usable = length > TINY
-        unit = axis / np.where(usable, length, 1.0)
-        a, b = _dot(unit, corners_a), _dot(unit, corners_b)
-        gap = np.maximum(b.min(axis=0) - a.max(axis=0), a.min(axis=0) - b.max(axis=0))
-        best = np.where(usable, np.maximum(best, gap), best)
-    return best
+def _axis(axes_a: np.ndarray, axes_b: np.ndarray, number: int) -> np.ndarray:
+    """Return one of the fifteen axes (3, n); a cross product is as long as the sine."""
+    if number < 6:
+        return np.asarray((axes_a, axes_b)[number // 3][number % 3])
+    u, v = axes_a[(number - 6) // 3], axes_b[number % 3]
+    return np.array([u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2],
+                     u[0] * v[1] - u[1] * v[0]])
+
+
+def _gap_both_ways(axis: np.ndarray, corners_a: np.ndarray, corners_b: np.ndarray,
+                   ) -> tuple[np.ndarray, np.ndarray]:
+    """Return the gaps (n,) along axes (3, n), the greater of both directions, and their lengths.
+
+    The gap of an axis that is too short is −inf.
+    """
+    length = np.sqrt((axis**2).sum(axis=0))
+    usable = length > TINY
+    unit = axis / np.where(usable, length, 1.0)
+    a, b = _dot(unit, corners_a), _dot(unit, corners_b)
+    gap = np.maximum(b.min(axis=0) - a.max(axis=0), a.min(axis=0) - b.max(axis=0))
+    return np.where(usable, gap, -np.inf), length
 
 
 def _beyond(axes: np.ndarray, size: np.ndarray, offset: np.ndarray) -> np.ndarray:
@@ -172,9 +185,26 @@ def exact_gap(pose_a: np.ndarray, pose_b: np.ndarray, size_a: np.ndarray, size_b
     """Return the largest gap of a pair over the fifteen axes, in 60 digits, rounded once."""
     from mpmath import mp, mpf
 
+    pair = [np.asarray(part, dtype=np.float64)[:, None]
+            for part in (pose_a, pose_b, size_a, size_b)]
+    axes, corners = _axes_and_corners(*pair)
+    rough = [_gap_both_ways(_axis(*axes, number), *corners) for number in range(AXES)]
+    reach, size = max(np.abs(part[:3]).max() for part in pair), max(pair[2].max(), pair[3].max())
+    least = max(gap[0] for gap, _ in rough) - FAR_BEHIND * size - 16.0 * np.spacing(reach)
+    needed = [number for number, (gap, length) in enumerate(rough)
+              if gap[0] >= least or length[0] < MOSTLY_ROUNDING]
     with mp.workdps(60):
         in_digits = np.frompyfunc(lambda value: mpf(float(value)), 1, 1)
-        a, b, one, other = (in_digits(part)[:, None] for part in (pose_a, pose_b, size_a, size_b))
-        axes_a, axes_b = _axes(a[3:]), _axes(b[3:])
-        return float(_greatest_gap(axes_a, axes_b, _corners(axes_a, one, a[:3]),
-                                   _corners(axes_b, other, b[:3]))[0])
+        axes, corners = _axes_and_corners(*map(in_digits, pair))
+        return float(max(_gap_both_ways(_axis(*axes, number), *corners)[0][0]
+                         for number in needed))
+
+
+Both = tuple[np.ndarray, np.ndarray]
+
+
+def _axes_and_corners(pose_a: np.ndarray, pose_b: np.ndarray, size_a: np.ndarray,
+                      size_b: np.ndarray) -> tuple[Both, Both]:
+    """Return axes and corners of A and of B, for poses (7, n) and extents (3, n)."""
+    axes = _axes(pose_a[3:]), _axes(pose_b[3:])
+    return axes, (_corners(axes[0], size_a, pose_a[:3]), _corners(axes[1], size_b, pose_b[:3]))

@@ -4,13 +4,15 @@ An `AnswerLog` matches messages to poses by their stamp. Its results compare the
 contacts. Stamps and times of receipt are nanoseconds of one clock; positions are metres in the
 poses' common frame.
 
-A pair is answered when the cloud came, and, if it reports a contact, point and normal came too.
-Every other pair is lost, for one of three reasons that are found independently: no cloud (lost
-evaluation); a cloud without its point or normal (lost contact); a cloud that reports that the pair
-could not be evaluated.
+A pair is answered when the cloud came. If it reports a contact, point and normal must come too.
+Every other pair is lost, for one of three reasons:
+
+- lost evaluation: no cloud came;
+- lost contact: point or normal did not come;
+- not evaluated: the cloud says that the node could not evaluate the pair.
 
 The latency runs from the stamp, taken just before the poses are published, to the last message of
-a contact (point or normal), or to the cloud that reports no contact.
+the answer.
 
 The echo node answers with one message; it has latencies, but no verdicts and no errors.
 """

@@ -164,9 +164,9 @@ class PatchLaw:
             normal = overlap.normal
             push = np.concatenate([linear * normal,
                                    angular @ cross(overlap.point - pose[:3], normal)])
-            x, y, z = normal
+            x, y, z = normal.tolist()
             turn = angular @ [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]
-            stiffness += area * np.outer(push, push)
+            stiffness += area * (push[:, None] * push)
             stiffness[3:, 3:] += area * (turn @ covariance @ turn.T)
         return float(np.linalg.eigvalsh(stiffness)[-1])
 
@@ -217,7 +217,7 @@ def _has_volume(overlap: Overlap) -> bool:
 
 def _tangential(overlap: Overlap) -> np.ndarray:
     """Return the covariance (3, 3) within the tangent plane."""
-    tangent = np.eye(3) - np.outer(overlap.normal, overlap.normal)
+    tangent = np.eye(3) - overlap.normal[:, None] * overlap.normal
     covariance: np.ndarray = tangent @ overlap.covariance @ tangent
     return covariance
 

@@ -1,11 +1,10 @@
 """Program `search`: which size and settings a network should have, by training thousands at once.
 
 - `search mlp`: hidden units and learning rate of the MLP, and the frontier of cost against error.
-- `search paper`: the paper's own search for its two networks, over learning rate, momentum, hidden
-  units and range of the initial weights; and the rank of the settings in use.
+- `search paper`: the paper's search for its two networks: learning rate, momentum, hidden units and
+  range of the initial weights. It also ranks the settings in use.
 
-Both are by successive halving. Results are a page of Markdown, a table of all candidates as CSV,
-and a plot.
+Both use successive halving. Each writes a page of Markdown, a CSV of all candidates and a plot.
 """
 from __future__ import annotations
 
