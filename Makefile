@@ -66,7 +66,7 @@ check:
 	    test/package/test_house.py test/package/test_ament.py $(ARGS)
 
 reports:
-	@.ci/setup test
+	@.ci/setup reports
 	$(PY) -m box_contact_ros reports $(ARGS) || status=$$?
 	for figures in docs/figures/make_*.py; do $(PY) $$figures; done
 	$(PY) docs/tables.py

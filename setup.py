@@ -127,7 +127,7 @@ setup(
     maintainer='The box_contact_ros maintainers',
     maintainer_email='maintainers@box-contact-ros.org',
     license='Apache-2.0',
-    packages=find_packages(exclude=['test', 'test.*']),
+    packages=find_packages(include=[NAME, f'{NAME}.*']),
     package_data={NAME: ['py.typed', '**/*.pyi', 'verification/*.npz', '**/*.md', '**/*.yaml']},
     ext_modules=extensions(),
     data_files=data_files(),

@@ -30,7 +30,7 @@ CHOICES = {
 SHOWN = ('AVX-512', 'AVX2')  # instruction sets in the README
 SETS = {
     'random cubes': 'cubes in any pose, 0.1–10 % deep',
-    'touching': "cubes that just touch (the paper's setting)",
+    'touching': 'cubes in any pose that just touch',
     'random sizes': 'random pairs of sizes, to 1:20',
     'stacks': 'stacks, tilt 1e-6–1e-3 rad',
     'tilted stacks': 'stacks, tilt 1e-3–0.1 rad',

@@ -32,7 +32,8 @@ POSE_QOS = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
 scene of a thousand pairs can be read."""
 ARRAY_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
 """Pose arrays, as pose inputs: a second at 100 Hz; 1,000 poses are 56 kB."""
-CONTACT_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)  # contact outputs
+CONTACT_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
+"""Contact outputs: what a network loses is sent again, for a tenth of a second at 1 kHz."""
 SPIN_SECONDS = 10.0
 """EventsExecutor hangs when it spins without a timeout, so it is spun in slices. Each leaves some
 32 bytes behind in rclpy (7.1): of slices this long, 0.3 MB a day."""
@@ -74,20 +75,35 @@ def let_callbacks_finish() -> None:
 
 
 @contextlib.contextmanager
-def uninterrupted() -> Iterator[None]:
-    """Ignore SIGINT, so that a second Ctrl-C does not break the clean end that is under way.
+def interrupted_once() -> Iterator[Callable[[], None]]:
+    """Let the first Ctrl-C raise KeyboardInterrupt, and ignore others until the process has ended.
 
-    rclpy takes its handlers back after the first. Another one within the next 130 ms, until the
-    interpreter has ended, would kill the process.
+    A further one would break the clean end that is under way. Yields a function that begins the
+    end: from its call on Ctrl-C is ignored. Handlers of the caller's own stay.
     """
-    if threading.current_thread() is not threading.main_thread():  # only that one may
-        yield
+    if (threading.current_thread() is not threading.main_thread()  # only that one may
+            or signal.getsignal(signal.SIGINT) is not signal.default_int_handler):
+        yield lambda: None
         return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    ending = heard = False
+
+    def interrupt(number: int, frame: object) -> None:
+        nonlocal ending, heard
+        if not ending:
+            ending = heard = True
+            raise KeyboardInterrupt
+
+    def end() -> None:
+        nonlocal ending
+        ending = True
+
+    signal.signal(signal.SIGINT, interrupt)
     try:
-        yield
+        yield end
     finally:
-        signal.signal(signal.SIGINT, before)
+        if not heard:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+        # While the interpreter ends it takes its handlers back, and a signal would kill it.
         atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)
 
 
@@ -101,21 +117,22 @@ def joined(make_node: Callable[[Context], NodeKind], args: Sequence[str] | None 
     signal, whatever was under way fails; that is raised as ExternalShutdownException.
     """
     context = Context()
-    # Handlers have to be asked for where the context is not the default one.
-    rclpy.init(args=None if args is None else list(args), context=context, domain_id=domain,
-               signal_handler_options=signals)
     node = executor = None
-    try:
-        node = make_node(context)
-        executor = make_executor(context)
-        executor.add_node(node)
-        yield node, executor
-    except Exception as error:
-        if context.ok():
-            raise
-        raise ExternalShutdownException from error
-    finally:
-        with uninterrupted():
+    with interrupted_once() as begin_end:
+        # Handlers have to be asked for where the context is not the default one.
+        rclpy.init(args=None if args is None else list(args), context=context, domain_id=domain,
+                   signal_handler_options=signals)
+        try:
+            node = make_node(context)
+            executor = make_executor(context)
+            executor.add_node(node)
+            yield node, executor
+        except Exception as error:
+            if context.ok():
+                raise
+            raise ExternalShutdownException from error
+        finally:
+            begin_end()
             if executor is not None:
                 executor.shutdown()
                 keep_for_ever(executor)

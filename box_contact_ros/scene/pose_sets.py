@@ -197,7 +197,7 @@ def cubes(rng: np.random.Generator, n: int) -> Pairs:
 
 
 def touching(rng: np.random.Generator, n: int) -> Pairs:
-    """Cubes of edge 2 in any pose that just touch: the paper's setting."""
+    """Cubes of edge 2 in any pose that just touch: the paper's boxes, but for its angles."""
     sizes = np.tile(CUBE, (n, 1))
     return any_pose(rng, sizes, sizes, np.zeros(n))
 

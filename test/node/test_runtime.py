@@ -97,20 +97,42 @@ def test_other_threads_become_batch_threads(monkeypatch):
     runtime.let_callbacks_finish()
 
 
-def test_only_the_main_thread_ignores_interrupts(monkeypatch):
-    """Another thread may not set handlers, and leaves them alone."""
+def test_the_first_interrupt_counts(monkeypatch):
+    """And none once the end has begun. What was there before comes back, if none was heard."""
     monkeypatch.setattr(runtime.atexit, 'register', lambda *_: None)
-    before, seen = signal.getsignal(signal.SIGINT), []
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with runtime.interrupted_once() as begin_end:
+            begin_end()
+            signal.raise_signal(signal.SIGINT)
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+        with pytest.raises(KeyboardInterrupt), runtime.interrupted_once():
+            signal.raise_signal(signal.SIGINT)
+        signal.raise_signal(signal.SIGINT)
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def test_handlers_of_other_threads_and_callers_stay():
+    """Another thread may not set handlers; a handler of the caller's own is not replaced."""
+    def own(*_):
+        pass
+
+    seen, before = [], signal.getsignal(signal.SIGINT)
 
     def look():
-        with runtime.uninterrupted():
+        with runtime.interrupted_once():
             seen.append(signal.getsignal(signal.SIGINT))
 
-    look()
     thread = Thread(target=look)
     thread.start()
     thread.join()
-    assert seen == [signal.SIG_IGN, before] and signal.getsignal(signal.SIGINT) == before
+    try:
+        signal.signal(signal.SIGINT, own)
+        look()
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert seen == [before, own]
 
 
 def test_rclpy_without_events_executor(monkeypatch):

@@ -187,9 +187,10 @@ def example(words: list[str], **_) -> None:
 def built(words: list[str], **_) -> None:
     """Build with the flags of `test_cpp_examples`, in the clone."""
     if words[0] == 'g++':
-        assert {'-std=c++17', '-ffp-contract=off', '-Wno-psabi', '-I.'} <= set(words)
+        assert {'-std=c++17', '-ffp-contract=off', '-Wno-psabi', '-Ibuild/include'} <= set(words)
     if words[0] == 'ln':
-        assert (ROOT / words[2] / f'{words[3]}.hpp').is_file()
+        folder = ROOT / words[2].removeprefix('$PWD/')
+        assert (folder / f'{Path(words[3]).name}.hpp').is_file()
 
 
 def clone(words: list[str], **_) -> None:
@@ -214,7 +215,7 @@ def venv(words: list[str], **_) -> None:
 
 COMMANDS = {
     r'git clone .+': clone,
-    r'(g\+\+|ln -s|\./first).*': built,
+    r'(mkdir -p build|ln -sfn|g\+\+|\./first).*': built,
     r'export \S+': exported,
     r'make (-C \w+ )?[\w-]+( .*)?': make,
     r'(ros2 run|python -m) box_contact_ros \w+( .*)?': start,

@@ -244,7 +244,7 @@ def main(args: Sequence[str] | None = None) -> int:
         here = os.environ.get(FORCE, instruction_sets()[-1])
         for name in [one for one in reversed(instruction_sets()) if one != here]:
             rows += measure_with(name, native_contestants, seed=options.seed, plan=plan)
-    output.write_csv(folder / 'frontier.csv', csv_rows(rows, found), digits=4)
+    output.write_csv(folder / 'frontier.csv', csv_rows(rows, found))
     (folder / 'frontier.md').write_text(page(rows, found, missing, command), encoding='utf-8')
     draw(folder / 'frontier.png', rows)
     print(in_short(rows, odd_cells(rows, found)), honesty(rows), sep='\n\n')

@@ -1,16 +1,19 @@
 """Ratios of times in two folders of results: whether a second run agrees with the first.
 
 Only ratios within a run are compared: absolute times depend on the machine and on its hour. Each
-is one median by another, over the rounds, streams or blocks of a CSV file.
+is the median over the rounds, streams or blocks of a CSV file of their own ratios.
 """
 from __future__ import annotations
 
 from collections import defaultdict
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+
 from ... import output
-from ..frontier.speed import UNIT
+from ..frontier.speed import SHARED, UNIT
 
 LIMIT = 0.10  # largest change of a ratio, of the smaller value, between runs that agree
 SHOWN = 12  # largest changes in the table
@@ -21,6 +24,7 @@ class Ratios:
     """Ratios that a page prints: times of all rows by those of one."""
 
     files: str  # pattern below the folder of results
+    rows: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  # values of those that count
     within: tuple[str, ...] = ()  # columns that both rows of a ratio share
     of: tuple[str, ...]  # columns that tell the rows apart
     by: tuple[str, ...]  # their values in the row that divides
@@ -29,8 +33,10 @@ class Ratios:
 
 _LATENCIES = ('latency_p50 [s]', 'latency_p99 [s]')
 PRINTED = (
-    Ratios(files='speed.csv', within=('instruction_set',), of=('name', 'kind'),
-           by=(UNIT, 'single'), times=('ns',)),
+    Ratios(files='speed.csv', rows={'kind': ('single', 'batch')}, within=('instruction_set',),
+           of=('name', 'kind'), by=(UNIT, 'single'), times=('ns',)),
+    Ratios(files='speed.csv', rows={'kind': SHARED}, within=('name',), of=('kind',),
+           by=SHARED[:1], times=('ns',)),
     Ratios(files='frontier.csv', within=('set', 'instruction_set'), of=('contestant',),
            by=('exact',), times=('call_p50', 'batch_p50')),
     # Also the page of latencies, whose ratios are of the bench's p50.
@@ -45,20 +51,27 @@ def ratios_of(folder: Path) -> dict[str, float]:
     found = {}
     for printed in PRINTED:
         for path in sorted(folder.glob(printed.files)):
-            rows = output.read_csv(path)
+            rows = [row for row in output.read_csv(path)
+                    if all(row[column] in wanted for column, wanted in printed.rows.items())]
             for column in printed.times:
                 values = defaultdict(list)
                 for row in rows:
                     if row[column]:
                         key = tuple(row[name] for name in (*printed.within, *printed.of))
                         values[key].append(float(row[column]))
-                medians = {key: output.percentiles(of, 50)[0] for key, of in values.items()}
-                for key, value in medians.items():
-                    unit = medians.get((*key[:len(printed.within)], *printed.by))
+                for key, mine in values.items():
+                    unit = values.get((*key[:len(printed.within)], *printed.by))
                     if unit and key[len(printed.within):] != printed.by:
                         words = [str(path.relative_to(folder)), *key, column]
-                        found[f'{", ".join(words)}, by {printed.by[0]}'] = value / unit
+                        found[f'{", ".join(words)}, by {printed.by[0]}'] = _ratio(mine, unit)
     return found
+
+
+def _ratio(times: list[float], units: list[float]) -> float:
+    """Return the median ratio of times that belong together; of others, that of their medians."""
+    if len(times) == len(units):
+        return float(np.median(np.divide(times, units)))
+    return float(np.median(times) / np.median(units))
 
 
 def compare(first: Path, second: Path) -> int:

@@ -9,21 +9,21 @@ the overlap along n, and v the closing speed there. Volume V, centroid c and cov
 overlap give the resultant exactly, without a loop over the patch:
 
     1. Pressure   P = κ·V·(1 + λ·v_c)                 −n·P at c
-    2. Rocking    M = −κ·V·λ·(C_t g) × n, g = n × ω   damping by the speed's slope over the patch
+    2. Rocking    L = −κ·V·λ·(C_t u) × n, u = n × ω   damping by the speed's slope over the patch
     3. Friction   μ·P against the slip at c           proportional to the slip below v_s
     4. Torsion    μ·P·r about n against the spin ω·n  proportional to the slip r·ω·n below v_s
 
 v_c is the closing speed at c, ω the load's angular velocity, C_t the covariance in the tangent
-plane, and r = √tr C_t. The foundation never pulls: P ≥ 0, and M is at most what pressures p ≥ 0 can
+plane, and r = √tr C_t. The foundation never pulls: P ≥ 0, and L is at most what pressures p ≥ 0 can
 give. The damping is that of Hunt and Crossley (1975): it vanishes with the overlap.
 
-The modulus κ follows the patch: κ = Ω² / λ_max(M⁻¹K). K is the stiffness of a foundation of modulus
-1 on the patch's area A = 12·√(λ₁λ₂), by the eigenvalues of C_t, and M is the load's inertia. So no
-oscillation of the load on the patch is faster than Ω, and a held wrench is stable. A whole face
-rests at the depth g / Ω², whatever its area. A corner that lands alone is softer, as the load
-resists less there, and λ is less in the same measure, A / (m·λ_max). Several contacts share one
-modulus. Within a contact κ falls at once and rises slowly (`RISE_TIME`): a law keeps its last κ, so
-it serves one load, tick by tick.
+The modulus κ follows the patch: κ = Ω² / w, w the largest eigenvalue of M⁻¹K. K is the stiffness of
+a foundation of modulus 1 on the patch's area A = 12·√(e₁·e₂), by the eigenvalues of C_t. M is the
+load's inertia. So no oscillation of the load on the patch is faster than Ω, and a held wrench is
+stable. A whole face rests at the depth g / Ω², whatever its area. A corner that lands alone is
+softer, as the load resists less there, and λ is less in the same measure, A / (m·w). Several
+contacts share one modulus. Within a contact κ falls at once and rises slowly (`RISE_TIME`): a law
+keeps its last κ, so it serves one load, tick by tick.
 
 No constant knows the size of the load. A wrench is computed from contacts and from the state of the
 load at the time they were asked for, and is then held (`held_wrench.HeldWrench`).
@@ -70,8 +70,8 @@ STEADY_SHARE = 0.98
 static penetration 2 % deeper."""
 
 LEAST_ASPECT = 1e-7
-"""Width of a patch by its length, at least [1]: λ₁λ₂ is a difference of products, which rounding
-spoils by 1e-16 of λ₁². So much area keeps κ finite where an edge only just touches."""
+"""Width of a patch by its length, at least [1]: e₁·e₂ is a difference of products, which rounding
+spoils by 1e-16 of e₁². So much area keeps κ finite where an edge only just touches."""
 
 
 @dataclass(frozen=True)
@@ -152,7 +152,7 @@ class PatchLaw:
 
     def fastest(self, overlaps: Sequence[Overlap], covariances: Sequence[np.ndarray],
                 areas: Sequence[float], pose: np.ndarray) -> float:
-        """Return λ_max(M⁻¹K): the fastest oscillation's ω² on a foundation of modulus 1.
+        """Return the largest eigenvalue of M⁻¹K: ω² of the fastest oscillation, on a modulus of 1.
 
         covariances, areas: C_t (3, 3) and A of each contact. Motions are scaled so that M is 1: per
         √m along the load's axes, and per √I about them.
@@ -223,9 +223,9 @@ def _tangential(overlap: Overlap) -> np.ndarray:
 
 
 def _area(covariance: np.ndarray) -> float:
-    """Return 12·√(λ₁λ₂) [m²] of a covariance (3, 3) that is flat in one direction.
+    """Return 12·√(e₁·e₂) [m²] of a covariance (3, 3) that is flat in one direction.
 
-    λ₁λ₂ is the sum of its three principal minors of two rows. See `LEAST_ASPECT`.
+    e₁·e₂ is the sum of its three principal minors of two rows. See `LEAST_ASPECT`.
     """
     c = covariance
     product = (c[0, 0] * c[1, 1] - c[0, 1] * c[1, 0] + c[1, 1] * c[2, 2] - c[1, 2] * c[2, 1]
