@@ -32,8 +32,7 @@ POSE_QOS = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
 scene of a thousand pairs can be read."""
 ARRAY_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
 """Pose arrays, as pose inputs: a second at 100 Hz; 1,000 poses are 56 kB."""
-CONTACT_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
-"""Contact outputs: what a network loses is sent again, for a tenth of a second at 1 kHz."""
+CONTACT_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)  # contact outputs
 SPIN_SECONDS = 10.0
 """EventsExecutor hangs when it spins without a timeout, so it is spun in slices. Each leaves some
 32 bytes behind in rclpy (7.1): of slices this long, 0.3 MB a day."""

@@ -29,7 +29,7 @@ second; on a busy machine, in a process that has had hundreds of participants, f
 
 AHEAD = 20
 """Pairs of a stream that may be unanswered. Of more, a machine that stands still for a moment loses
-poses, which are best effort, and all but the last hundred answers."""
+poses, which are best effort, and all but the last ten answers."""
 
 
 def stamp_of(message: Any) -> int:

@@ -129,7 +129,7 @@ def test_a_bad_cable(program, far_hosts):
 
     Poses are lost, since they are sent best effort and one that is late is worth nothing. Point and
     normal, of which 4 in 100 would lack one, are sent again, as long as they are among the last
-    hundred, which here is a second.
+    ten, which here is 100 ms.
     """
     here, there = far_hosts
     node = program('contact_node', '--ros-args', *CUBES, env=SUBNET, within=there)
@@ -139,8 +139,8 @@ def test_a_bad_cable(program, far_hosts):
     crane.wait(120)
     lost, = (line for line in crane.output.splitlines() if 'messages lost' in line)
     _, evaluations, contacts = numbers_of(lost)
-    assert 0 < evaluations < 100  # of 800; 4 % lack one pose or the other
-    assert contacts == 0  # of some 435
+    assert 0 < evaluations < 100  # of 800; 4 % lack one pose or the other, 2 % the cloud
+    assert contacts < 9  # of some 435, of which 4 in 100 are 17; measured 2 to 4
     assert 'wrong verdicts ......... 0' in crane.output
 
 

@@ -44,21 +44,21 @@ def _bench(rate: int, seconds: int, *words: str) -> Report:
 
 
 REPORTS = (
-    Report(name='search-mlp', minutes=6.0, alone=False, arguments=('search', 'mlp', '--out', OUT)),
-    Report(name='search-paper', minutes=3.0, alone=False,
+    Report(name='search-mlp', minutes=7.0, alone=False, arguments=('search', 'mlp', '--out', OUT)),
+    Report(name='search-paper', minutes=6.0, alone=False,
            arguments=('search', 'paper', '--out', OUT)),
-    Report(name='accuracy', minutes=3.0, alone=False, arguments=('accuracy', '--out', OUT)),
-    Report(name='stability', minutes=1.0, alone=False, arguments=('stability', '--out', OUT),
+    Report(name='accuracy', minutes=0.5, alone=False, arguments=('accuracy', '--out', OUT)),
+    Report(name='stability', minutes=0.6, alone=False, arguments=('stability', '--out', OUT),
            quick=('--families', 'A')),
-    Report(name='named', minutes=1.0, alone=False, arguments=('stability', '--named'), quick=(
+    Report(name='named', minutes=0.4, alone=False, arguments=('stability', '--named'), quick=(
         '--out', OUT)),
-    Report(name='fuzz', minutes=5.0, arguments=('fuzz', '--out', f'{OUT}/fuzz.csv')),
-    Report(name='landing', minutes=12.0, arguments=('landing', '--out', OUT)),
-    Report(name='frontier', minutes=8.0, arguments=('frontier', '--out', OUT)),
-    Report(name='speed', minutes=4.0, arguments=('frontier', '--speed', '--out', OUT)),
+    Report(name='fuzz', minutes=4.0, arguments=('fuzz', '--out', f'{OUT}/fuzz.csv')),
+    Report(name='landing', minutes=13.0, arguments=('landing', '--out', OUT)),
+    Report(name='frontier', minutes=8.5, arguments=('frontier', '--out', OUT)),
+    Report(name='speed', minutes=2.5, arguments=('frontier', '--speed', '--out', OUT)),
     Report(name='paper', minutes=3.0, arguments=('paper', '--out', f'{OUT}/paper_tables.md')),
     _bench(200, 30, '--side-by-side'), _bench(1000, 30, '--side-by-side'), _bench(1000, 90),
-    Report(name='soak', minutes=2.5, arguments=('soak', '--minutes', '1', '--out', OUT)),
+    Report(name='soak', minutes=2.0, arguments=('soak', '--minutes', '1', '--out', OUT)),
 )
 """In the order in which they run; the page of latencies follows the last."""
 
