@@ -47,9 +47,9 @@ def rows(name: str, **wanted: str) -> list[Row]:
             if all(row[column] == value for column, value in wanted.items())]
 
 
-def cell(row: Row, column: str, scale: float = 1.0, digits: int = 3) -> str:
-    """Return a number of a CSV row to so many digits; a dash where the cell is empty."""
-    return number(float(f'{scale * float(row[column] or "nan"):.{digits}g}'), digits)
+def cell(row: Row, column: str, unit: float = 1.0, digits: int = 3) -> str:
+    """Return a number of a CSV row in a unit, to so many digits; a dash where it is empty."""
+    return number(float(f'{float(row[column] or "nan") / unit:.{digits}g}'), digits)
 
 
 def models() -> str:
@@ -62,7 +62,7 @@ def models() -> str:
         # A number stands in one table: that of 100,000 pairs, where the model has one.
         errors = rows('accuracy.csv', model=model, set='containers', part='all', quantity='point')
         judged, prefix = (errors[0], '') if errors else (shown[0], 'point_')
-        body.append([name, ' / '.join(cell(row, 'call_p50', 1e-3) for row in shown),
+        body.append([name, ' / '.join(cell(row, 'call_p50', 1e3) for row in shown),
                      ' / '.join(cell(row, 'batch_p50') for row in shown),
                      *(cell(judged, f'{prefix}{column}', digits=2) for column in ('p50', 'p99')),
                      when])
@@ -104,7 +104,7 @@ def network() -> str:
             apart = found['just apart']
             body.append([f'`{name}`, {one}', f'{min(batch):.0f}–{max(batch):.0f}',
                          cell(apart, 'batch_p50'), f'{min(call) / 1e3:.2f}–{max(call) / 1e3:.2f}',
-                         cell(apart, 'call_p50', 1e-3)])
+                         cell(apart, 'call_p50', 1e3)])
     table = markdown_table(['', 'batch [ns a pair], in contact', 'just apart',
                             'single call [µs], in contact', 'just apart'], body)
     return f'{table}\n\nMedian times on one core: {processor()}.'
@@ -117,7 +117,7 @@ def sizes() -> str:
              'mlp edges 32': '24 edges, 32 units, point alone',
              'mlp edges 64': '24 edges, 64 units, point alone', 'exact': '`exact`'}
     best = rows('frontier.csv', contestant='mlp')[0]['instruction_set']
-    body = [[words, cell(row, 'batch_p50'), cell(row, 'call_p50', 1e-3), cell(row, 'point_p99')]
+    body = [[words, cell(row, 'batch_p50'), cell(row, 'call_p50', 1e3), cell(row, 'point_p99')]
             for name, words in names.items()
             for row in rows('frontier.csv', contestant=name, set='stacks', instruction_set=best,
                             **{'class': 'all'})]
