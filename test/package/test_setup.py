@@ -13,12 +13,16 @@ from pathlib import Path
 
 import pytest
 
+from box_contact_ros.core import instruction_sets
+
 ROOT = Path(__file__).resolve().parents[2]
 PYTHON = f"""#!/bin/sh
 case "$1 $2" in
     '-m venv') mkdir -p .venv/bin && cp "$0" .venv/bin/python ;;
     '-m pip') echo "$*" >>calls; if [ -e broken ]; then echo 'no network'; exit 1; fi ;;
-    'setup.py -q') echo "$*" >>calls; if [ -e uncompiled ]; then echo 'no g++'; exit 1; fi ;;
+    'setup.py -q')
+        echo "$* ${{BOX_CONTACT_BUILD:-all}}" >>calls
+        if [ -e uncompiled ]; then echo 'no g++'; exit 1; fi ;;
     *run_setup*) echo numpy ;;
     *) exec {sys.executable} "$@" ;;
 esac
@@ -107,11 +111,22 @@ def test_the_core_is_compiled_beside(checkout: Path, offer: Callable) -> None:
     failed = set_up(checkout)
     assert failed.returncode == 1 and 'no g++' in failed.stdout
     calls = (checkout / 'calls').read_text()
-    assert 'setup.py -q build_ext --inplace' in calls and '-r .venv/requirements.txt' in calls
+    assert 'setup.py -q build_ext --inplace best' in calls and '-r .venv/requirements.txt' in calls
     assert installed(checkout) == []
     (checkout / 'uncompiled').unlink()
     assert set_up(checkout).returncode == 0
     assert installed(checkout) == ['ros,sim']
+    set_up(checkout, 'view')
+    assert 'setup.py -q build_ext --inplace all' in (checkout / 'calls').read_text()
+
+
+def test_the_demo_builds_the_best_instruction_set_alone(
+        monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> None:
+    """And the baseline, which tells what the machine can run."""
+    monkeypatch.setenv('BOX_CONTACT_BUILD', 'best')
+    built = [one.name.rpartition('._')[2]
+             for one in request.getfixturevalue('setup_arguments')['ext_modules']]
+    assert built == [*dict.fromkeys(['baseline', instruction_sets()[-1]]), 'networks']
 
 
 def test_a_failed_installation_is_taken_up(checkout: Path, offer: Callable) -> None:
