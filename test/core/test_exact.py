@@ -38,7 +38,7 @@ def test_agrees_with_the_oracle(family, chunk):
     assert 0.2 < colliding.mean() < 0.9  # both verdicts are really tested
 
 
-@pytest.mark.parametrize('chunk', range(2))
+@pytest.mark.parametrize('chunk', [0, pytest.param(1, marks=pytest.mark.slow)])
 @pytest.mark.parametrize('family', THIN)
 def test_thin_overlaps(family, chunk):
     """Overlaps a millionth as thick as long, cut off obliquely; sides in one plane but for ulps.

@@ -31,5 +31,6 @@ def test_flake8() -> None:
     run('ament_flake8', '--config', CONFIG, *SOURCES)
 
 
+@pytest.mark.slow
 def test_pep257() -> None:
     run('ament_pep257', '--add-ignore', *NOT_FOLLOWED, '--', *SOURCES)

@@ -374,6 +374,7 @@ def cells(page: str) -> list[str]:
             for cell in line.split('|')]
 
 
+@pytest.mark.slow
 def test_tables_in_the_docs_are_the_shipped_weights(tmp_path: Path) -> None:
     """The first tables of docs/results/paper_tables.md, 1 and 2, are the shipped weights'.
 
