@@ -117,9 +117,16 @@ class ModelEntry:
             self.name,)
 
     def load(self) -> Callable[..., Model]:
-        """Return the builder; ImportError where its extra is not installed."""
+        """Return the builder; ModuleNotFoundError, which names the extra, where it is missing."""
         module, _, function = self.builder.partition(':')
-        build: Callable[..., Model] = getattr(import_module(module), function)
+        try:
+            build: Callable[..., Model] = getattr(import_module(module), function)
+        except ModuleNotFoundError as error:
+            if not self.extra:
+                raise
+            raise ModuleNotFoundError(
+                f'{error}: model {self.name!r} needs the extra {self.extra!r} of box_contact_ros',
+                name=error.name) from None
         return build
 
     def options(self, name: str) -> dict[str, int] | None:

@@ -86,6 +86,13 @@ def test_entries_say_what_their_models_do(name):
     assert hasattr(made, 'weights') == MODELS[name].reads_weights
 
 
+def test_a_missing_library_is_named_with_its_extra(monkeypatch):
+    monkeypatch.setitem(sys.modules, 'fcl', None)
+    monkeypatch.delitem(sys.modules, 'box_contact_ros.baselines.fcl_box', raising=False)
+    with pytest.raises(ModuleNotFoundError, match="fcl.*model 'fcl' needs the extra 'soup'"):
+        ContactSolver((1, 1, 1), (1, 1, 1), model='fcl')
+
+
 def test_the_docs_have_a_row_for_every_entry():
     """Names, boxes and extra."""
     page = ROOT / 'docs' / 'how-to' / 'models.md'
