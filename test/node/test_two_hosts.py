@@ -116,8 +116,8 @@ def test_simulator_and_node_on_two_hosts(program, hosts):
     here, there = hosts
     node = program('contact_node', '--ros-args', *CUBES, env=SUBNET, within=there)
     node.wait_for_output('ready', 120)
-    crane = program('crane', '--ros-args', *CUBES, '-p', 'duration:=10', '-p', 'rate:=100', '-p',
-                    'wait:=20', env=SUBNET, within=here)
+    crane = program('crane', '--ros-args', *CUBES, '-p', 'duration:=5', '-p', 'wait:=20',
+                    env=SUBNET, within=here)
     assert crane.wait(120) == 0, crane.output
     assert 'messages lost .......... 0' in crane.output
     node.signal(signal.SIGTERM)
