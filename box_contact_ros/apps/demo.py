@@ -65,9 +65,9 @@ def main(args: Sequence[str] | None = None) -> int:
     what = ('sets one container down on another' if options.closed_loop
             else 'lowers one container onto another and lifts it')
     how = 'its contacts hold the load up' if options.closed_loop else 'nothing is done with it'
-    print(f'A crane {what}, {options.duration:g} s in real time; it publishes both poses at '
-          f'{options.rate:g} Hz.\nA contact node answers; {how}. Both are ROS 2 processes of their '
-          f'own, in domain {options.domain} on this host.', flush=True)
+    print(f'A crane {what}, {options.duration:g} s in real time at most; it publishes both poses '
+          f'at {options.rate:g} Hz.\nA contact node answers; {how}. Both are ROS 2 processes of '
+          f'their own, in domain {options.domain} on this host.', flush=True)
     deadline = time.monotonic() + TIME_LIMIT
     started: list[subprocess.Popen[bytes]] = []
     with tempfile.TemporaryFile() as node_output:
@@ -107,7 +107,7 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
                         help='pairs of poses a second (default: %(default)g)')
     open_loop = CraneScenario().duration
     parser.add_argument('--duration', type=float, metavar='S',
-                        help=f'length of the motion, closed loop {LANDING_LEAST:g} to 40 s '
+                        help=f'longest motion, closed loop {LANDING_LEAST:g} to 40 s '
                              f'(default: {LANDING_DURATION:g}), open loop 1 to 40 s (default: '
                              f'{open_loop:g})')
     options = parser.parse_args(args)

@@ -102,7 +102,10 @@ class CraneNode(Node):
             self.stop.wait(OFFER_PERIOD)
 
     def lower(self) -> None:
-        """Run the whole motion, then wait a moment for the last answers."""
+        """Run the motion, then wait a moment for the last answers.
+
+        A landing ends when all that is judged was seen.
+        """
         crane = Crane(self.scenario, self.rate)
         gc.collect()
         gc.freeze()  # a full collection would hold up the poses for milliseconds
@@ -121,6 +124,8 @@ class CraneNode(Node):
                 self.feedback.step(stamp, crane)
                 if self.feedback.points_alone:
                     self.get_logger().warning(POINTS_ALONE, once=True)
+                if self.feedback.record.watched:
+                    break
         deadline = time.monotonic() + DRAIN
         while self.log.outstanding and time.monotonic() < deadline:
             if self.stop.wait(0.02):

@@ -19,7 +19,8 @@ def _of_scenario(field: str, description: str, check: Check | None = None) -> Se
 PARAMETERS = {
     'rate': Setting(200.0, 'pairs of poses published per second [Hz]', number(1, 2000)),
     'duration': _of_scenario('duration', f'length of the motion [s]; left at its default, a '
-                             f'closed loop takes {LANDING_DURATION:g}'),
+                             f'closed loop takes {LANDING_DURATION:g}, or less: it ends when all '
+                             'that is judged was seen'),
     'wait': Setting(10.0, 'patience for a contact node to answer [s]', number(0, 600)),
     'frame_id': Setting('world', 'frame of the published poses', text),
     'report': Setting(False, 'closed loop: print a line when the load hangs, touches, '
