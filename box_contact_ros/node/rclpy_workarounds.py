@@ -5,6 +5,9 @@ All were seen with rclpy 7.1 (Jazzy). Each names the symptom, and the test that 
 from __future__ import annotations
 
 import ctypes
+import faulthandler
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from rclpy.event_handler import EventHandler
@@ -71,6 +74,21 @@ def refuse_transitions(node: LifecycleNode) -> None:
     Test: test_strangers.py::test_a_locked_node_takes_no_changes.
     """
     node._service_change_state.callback = lambda _, response: response  # success is false in it
+
+
+@contextmanager
+def ends_within(seconds: float) -> Iterator[None]:
+    """End the process with status 1, and its threads' tracebacks, if the block takes longer.
+
+    Symptom: destroying a node spins for ever in Fast DDS (`DomainParticipant::set_listener`), with
+    Python's lock, while another participant of the host stands still. It is rare.
+    Test: test_runtime.py::test_an_end_that_hangs_is_ended.
+    """
+    faulthandler.dump_traceback_later(seconds, exit=True, file=2)  # standard error
+    try:
+        yield
+    finally:
+        faulthandler.cancel_dump_traceback_later()
 
 
 def keep_for_ever(executor: Any) -> None:

@@ -19,7 +19,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
-from .rclpy_workarounds import RCLError, keep_for_ever
+from .rclpy_workarounds import RCLError, ends_within, keep_for_ever
 
 EventsExecutor: Any = None
 with contextlib.suppress(ImportError):  # rclpy before 7.1.4
@@ -36,6 +36,7 @@ CONTACT_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)  # co
 SPIN_SECONDS = 10.0
 """EventsExecutor hangs when it spins without a timeout, so it is spun in slices. Each leaves some
 32 bytes behind in rclpy (7.1): of slices this long, 0.3 MB a day."""
+END_SECONDS = 8.0  # for a clean end; launch kills after ten
 NodeKind = TypeVar('NodeKind', bound=Node)
 LOG_SECONDS = 1.0  # the same complaint is logged at most this often
 
@@ -132,12 +133,13 @@ def joined(make_node: Callable[[Context], NodeKind], args: Sequence[str] | None 
             raise ExternalShutdownException from error
         finally:
             begin_end()
-            if executor is not None:
-                executor.shutdown()
-                keep_for_ever(executor)
-            if node is not None:
-                node.destroy_node()
-            context.try_shutdown()
+            with ends_within(END_SECONDS):
+                if executor is not None:
+                    executor.shutdown()
+                    keep_for_ever(executor)
+                if node is not None:
+                    node.destroy_node()
+                context.try_shutdown()
 
 
 def spin(node: Node, executor: Any) -> None:

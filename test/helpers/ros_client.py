@@ -20,6 +20,7 @@ from rclpy.qos import QoSProfile
 from sensor_msgs.msg import PointCloud2
 
 from box_contact_ros.node.messages import NANOSECONDS, make_header
+from box_contact_ros.node.rclpy_workarounds import ends_within
 from box_contact_ros.node.runtime import make_executor
 from box_contact_ros.solver.contact import Contact
 
@@ -177,9 +178,10 @@ class Client:
         raise AssertionError(f'{name} does not answer')
 
     def close(self) -> None:
-        self.executor.shutdown()
-        self.node.destroy_node()
-        self.context.try_shutdown()
+        with ends_within(PATIENCE):
+            self.executor.shutdown()
+            self.node.destroy_node()
+            self.context.try_shutdown()
 
 
 @contextmanager

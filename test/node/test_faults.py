@@ -259,16 +259,18 @@ def test_a_subscriber_that_never_reads(start, client, program):
                     '-r', 'box_a/pose:=other/a', '-r', 'box_b/pose:=other/b')
     assert client.spin(lambda: client.node.count_subscribers('/contacts') > 1)
     crane.signal(signal.SIGSTOP)
-    before = memory(node)
-    stamps = []
-    for _ in rate_limited(6000, 1500):  # the middleware keeps 5,000 where all is to be kept
-        stamps.append(client.send_pair(ORIGIN, TOUCHING))
-        client.keep_up(stamps)
-        client.poll()
-    assert client.spin(lambda: all(stamp in client.points for stamp in stamps))
-    assert memory(node) - before < LEAK
-    client.assert_answered()
-    crane.signal(signal.SIGCONT)
+    try:
+        before = memory(node)
+        stamps = []
+        for _ in rate_limited(6000, 1500):  # the middleware keeps 5,000 where all is to be kept
+            stamps.append(client.send_pair(ORIGIN, TOUCHING))
+            client.keep_up(stamps)
+            client.poll()
+        assert client.spin(lambda: all(stamp in client.points for stamp in stamps))
+        assert memory(node) - before < LEAK
+        client.assert_answered()
+    finally:
+        crane.signal(signal.SIGCONT)
 
 
 def set_scene(client, service, text):

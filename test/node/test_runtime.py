@@ -3,6 +3,8 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import sys
 from collections import Counter
 from threading import Event, Thread, get_native_id
 from types import SimpleNamespace
@@ -63,6 +65,28 @@ def test_an_interrupt_is_a_clean_end(run, capfd):
     assert run(lambda context: Short(context, interrupt)) == 0
     assert run(lambda context: interrupt()) == 0
     assert 'Traceback' not in capfd.readouterr().err
+
+
+HANGING = """
+import ctypes
+from rclpy.node import Node
+from box_contact_ros.node import runtime
+
+class Hanging(Node):
+    def destroy_node(self):
+        ctypes.PyDLL(None).sleep(60)  # with Python's lock
+
+runtime.END_SECONDS = 0.2
+with runtime.joined(lambda context: Hanging('hanging', context=context)):
+    pass
+"""
+
+
+def test_an_end_that_hangs_is_ended():
+    """Although it has Python's lock; the traceback says where it hangs."""
+    done = subprocess.run([sys.executable, '-c', HANGING], capture_output=True, text=True,
+                          timeout=50)
+    assert done.returncode == 1 and 'destroy_node' in done.stderr
 
 
 def test_a_node_that_cannot_start_says_why(run, capsys):
