@@ -24,7 +24,7 @@ from .samples import SizePair, scene_sizes
 
 MLP = 'mlp'
 NAMES = (*paper_jobs.JOBS, MLP)  # what can be asked for
-QUICK_COUNTS, QUICK_STARTS, QUICK_EPOCHS = (1000, 500, 2000), 3, 100
+QUICK_COUNTS, QUICK_STARTS, QUICK_EPOCHS = (1000, 500, 2000), 3, 70
 """`--quick`, for the paper's: enough to see the error fall, in seconds."""
 
 

@@ -14,6 +14,7 @@ from box_contact_ros import output
 from box_contact_ros.baselines.engines import installed
 from box_contact_ros.baselines.engines.engine import Engine, Manifold, chosen, ours
 from box_contact_ros.reports.frontier import frontier, trials
+from box_contact_ros.reports.frontier.speed import take_turns
 from box_contact_ros.resources import resource_path
 from box_contact_ros.scene.pose import rotation_matrix
 from box_contact_ros.scene.pose_sets import SETS, Pairs
@@ -163,11 +164,16 @@ def test_aborts_and_exceptions_are_findings() -> None:
     plan = dataclasses.replace(trials.QUICK, subprocesses=True)
     engine = aborting()
     found = trials.answers_of(engine, sets, plan)
-    row = {name: trials.Trial(engine, name, pairs, found[name], plan).row()
-           for name, pairs in sets.items()}
+    row = {}
+    for name, pairs in sets.items():
+        exact, trial = (trials.Trial(one, name, pairs, answers, plan) for one, answers in (
+            (ours('exact'), trials.ask(ours('exact'), pairs, plan)), (engine, found[name])))
+        take_turns([exact.time, trial.time], plan.rounds)
+        row[name] = trial.row(exact)
     assert row['random cubes'].failure == 'ended by signal 6'
     assert (row['random cubes'].judged, row['random sizes'].failure) == (0, '')
     assert row['random sizes'].errors.points['all'][1:] == (0.0, 0.0, 0.0)
+    assert row['random sizes'].by_exact[0] > 0.0 and math.isnan(row['random sizes'].by_exact[1])
     assert row['containers'].exceptions == row['containers'].judged > 10
     odd = frontier.odd_cells(list(row.values()), [engine])
     assert {kind for _, kind in odd} == {'failure', 'missed'}

@@ -108,5 +108,5 @@ def test_every_committed_csv_of_times_is_compared() -> None:
     found = compare.ratios_of(ROOT / RESULTS)
     for printed in compare.PRINTED:
         assert any(name.startswith(printed.files.partition('*')[0])
-                   and name.endswith(f'{printed.times[-1]}, by {printed.by[0]}')
+                   and name.endswith(f'{(*printed.times, *printed.ratios)[-1]}, by {printed.by[0]}')
                    for name in found), printed

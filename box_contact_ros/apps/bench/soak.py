@@ -178,11 +178,12 @@ def _report(options: argparse.Namespace, bench: Bench, memory: Sequence[float],
     write_results(options.out / 'soak.csv', sum(results, []),
                   {name: value for name, value in about.items() if name != 'model'})
     (options.out / 'soak.md').write_text(
-        '# Soak\n\nMade by `python -m box_contact_ros soak`: blocks of poses to the contact node '
-        'and to two echo nodes in turn,\na bare one and one whose threads are scheduled as the '
-        "contact node's are. Latencies run from the stamp of the\nposes to the later of point and "
-        'normal. The aims are for the ratio to the echo node served alike. Errors in soak.csv are\n'
-        f"against the same model's answers.\n\n{bullets(about)}\n\n{table}\n\n{text}\n", 'utf-8')
+        '# Soak\n\nMade by `python -m box_contact_ros soak`. Blocks of poses go to the contact '
+        'node and to two echo\nnodes in turn. One echo node is bare, and the threads of the other '
+        "are scheduled as the contact\nnode's are. Latencies run from the stamp of the poses to "
+        'the later of point and normal.\nThe aims are for the ratio to the echo node served alike. '
+        "Errors in soak.csv are against the same\nmodel's answers."
+        f"\n\n{bullets(about)}\n\n{table}\n\n{text}\n", 'utf-8')
     print(f'results: {options.out}/soak.csv, soak.md')
     adds_up = (all(r.adds_up for r in sum(results, []))
                and all(node.log.adds_up for node in bench.nodes))

@@ -172,13 +172,12 @@ def honesty(rows: Sequence[FrontierRow]) -> str:
     """Return where the network loses and what it is for, with this run's figures."""
     by = {(row.name, row.set): row for row in rows
           if row.instruction_set == native.instruction_set}
-    exact, net = (by[name, 'containers'] for name in ('exact', 'mlp'))
+    net = by['mlp', 'containers']
     medians = {name: [by[name, s].batch for s in SETS] for name in ('exact', 'mlp')}
     spread = {name: max(values) / min(values) for name, values in medians.items()}
     return output.page(
-        'reports/pages/frontier_honesty', single=net.single[0] / exact.single[0],
-        containers=net.batch / exact.batch,
-        stacks=by['mlp', 'stacks'].batch / by['exact', 'stacks'].batch, spread=spread,
+        'reports/pages/frontier_honesty', single=net.by_exact[0], containers=net.by_exact[1],
+        stacks=by['mlp', 'stacks'].by_exact[1], spread=spread,
         paper=by['paper', 'random cubes'].errors.points['all'][1]).rstrip()
 
 
@@ -213,7 +212,9 @@ def csv_rows(rows: Sequence[FrontierRow], found: Sequence[Engine]) -> list[dict[
                     **dict(zip(('point_p50', 'point_p99', 'point_worst'), point)),
                     **dict(zip(('call_p50', 'call_p99', 'call_max'),
                                (round(one) if one == one else one for one in row.single))),
-                    'calls': row.calls, 'batch_p50': row.batch, 'judged': row.judged,
+                    'calls': row.calls, 'batch_p50': row.batch,
+                    **dict(zip(('call_by_exact', 'batch_by_exact'), row.by_exact)),
+                    'judged': row.judged,
                     'normal_p99': errors.normal[0], 'normal_worst': errors.normal[1],
                     'missed': errors.missed, 'invented': errors.invented,
                     'exceptions': row.exceptions, 'failure': row.failure,

@@ -48,14 +48,14 @@ class Plan:
     """Whether other engines are judged in subprocesses, so that an abort is a finding."""
 
 
-FULL = Plan(batch_pairs=20_000, single_pairs=1_000, seconds=1.0, rounds=5, members=99,
+FULL = Plan(batch_pairs=20_000, single_pairs=1_000, seconds=1.0, rounds=20, members=99,
             subprocesses=True)
 QUICK = Plan(batch_pairs=1_000, single_pairs=40, seconds=0.05, rounds=2, members=1,
              subprocesses=False)
 FEW_PAIRS = 16
 """Pairs of sizes that are prepared at once where each row has others."""
-LEAST_PAIRS = 10  # pairs judged and timed whatever they take
-BATCHES = 3  # batches timed in a round
+LEAST_PAIRS = 10  # pairs judged whatever they take
+LEAST_CALLS = 3  # calls timed in a round whatever they take
 PATIENCE = 120.0  # for an engine's answers in a subprocess [s]
 LONGEST_RUN = 3600.0  # of another instruction set [s]
 VERDICT = 1e-9
@@ -119,6 +119,8 @@ class FrontierRow:
     calls: int
     single: tuple[float, ...]  # p50, p99, max of a call [ns]
     batch: float  # p50 of a pair in a batch [ns]
+    by_exact: list[float]
+    """Single call and batch by those of `exact`: medians over the rounds of their own ratios."""
     choices: dict[str, EngineErrors]  # by the way in which a point was made
     exceptions: int = 0
     failure: str = ''  # what ended the engine before its answers, if anything
@@ -221,6 +223,7 @@ class Trial:
     def __init__(self, engine: Engine, name: str, pairs: Pairs, answers: Answers | str,
                  plan: Plan) -> None:
         """Judge, and prepare the calls; an engine that failed is not timed."""
+        self.name = engine.name
         self._engine, self._set, self._pairs, self._answers = engine, name, pairs, answers
         self._seconds = plan.seconds / plan.rounds
         self._calls: Sequence[Callable[[], object]] = ()
@@ -230,32 +233,33 @@ class Trial:
                 plan.single_pairs if _one_size(pairs) else FEW_PAIRS)))
             self._ask_all = engine.prepare_batch and engine.prepare_batch(pairs)
         self._singles: list[int] = []
-        self._batches: list[float] = []
+        self.rounds: list[tuple[float, float]] = []
+        """Of each round: the median single call, and a pair in a batch [ns]."""
 
     def time(self) -> None:
-        """Time one round, after a warm-up: single calls for the time there is, then batches."""
-        clock, times = time.perf_counter_ns, self._singles
-        for call in self._calls[:LEAST_PAIRS]:
+        """Time one round, after a warm-up: single calls for the time there is, then a batch."""
+        clock, times, batch = time.perf_counter_ns, list[int](), math.nan
+        for call in self._calls[:LEAST_CALLS]:
             call()
         until = clock() + int(1e9 * self._seconds)
-        least = len(times) + LEAST_PAIRS
         while self._calls and clock() < until:
             for call in self._calls:
                 began = clock()
                 call()
                 ended = clock()
                 times.append(ended - began)
-                if ended > until and len(times) >= least:
+                if ended > until and len(times) >= LEAST_CALLS:
                     break
         if self._ask_all:
             self._ask_all()
-            for _ in range(BATCHES):
-                began = clock()
-                self._ask_all()
-                self._batches.append((clock() - began) / len(self._pairs.size))
+            began = clock()
+            self._ask_all()
+            batch = (clock() - began) / len(self._pairs.size)
+        self._singles += times
+        self.rounds.append((percentiles(times, 50)[0], batch))
 
-    def row(self) -> FrontierRow:
-        """Return what was found."""
+    def row(self, exact: Trial) -> FrontierRow:
+        """Return what was found; times also by those of `exact` in the same rounds."""
         answers, failure = self._answers, ''
         if isinstance(answers, str):
             answers, failure = Answers(
@@ -267,7 +271,8 @@ class Trial:
             name=self._engine.name, set=self._set, instruction_set=native.instruction_set,
             judged=len(answers.colliding), calls=len(self._singles),
             single=percentiles(self._singles, 50, 99, 100),
-            batch=percentiles(self._batches, 50)[0], choices=choices,
+            batch=float(np.median([batch for _, batch in self.rounds])), choices=choices,
+            by_exact=np.median(np.divide(self.rounds, exact.rounds), axis=0).tolist(),
             exceptions=answers.exceptions, failure=failure,
             poses={kind: tuple(part[row].tolist() for part in self._pairs)
                    for kind, row in odd.items()})
@@ -293,7 +298,8 @@ def measure_all(found: Sequence[Engine], *, seed: int = 3, plan: Plan = FULL) ->
                       for engine, given in zip(found, answers) if name in given]
             bar.update(plan.rounds * (len(found) - len(trials)))
             take_turns([trial.time for trial in trials], plan.rounds, bar.update)
-            rows += [trial.row() for trial in trials]
+            exact = next(trial for trial in trials if trial.name == 'exact')
+            rows += [trial.row(exact) for trial in trials]
     return rows
 
 

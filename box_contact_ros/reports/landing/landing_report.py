@@ -209,7 +209,8 @@ def against_manifold(results: Sequence[Landed]) -> str:
         ours, bar = factor * largest(GATED, name), factor * largest(['manifold'], name)
         ratio = ours / bar if bar else math.inf
         rows.append([title, f'{ours:.2g}', f'{bar:.2g}',
-                     f'{ratio:.2g} × worse' if ratio > 1.0 else f'{1.0 / ratio:.2g} × better'])
+                     f'{output.number(ratio, 2)} × worse' if ratio > 1.0 else
+                     f'{output.number(1.0 / ratio, 2)} × better'])
     return output.markdown_table(['worst of the grid', 'patch law', "MuJoCo's manifold",
                                   'patch law is'], rows)
 

@@ -28,7 +28,8 @@ class Ratios:
     within: tuple[str, ...] = ()  # columns that both rows of a ratio share
     of: tuple[str, ...]  # columns that tell the rows apart
     by: tuple[str, ...]  # their values in the row that divides
-    times: tuple[str, ...]  # columns of times
+    times: tuple[str, ...] = ()  # columns of times
+    ratios: tuple[str, ...] = ()  # columns of ratios by that row already
 
 
 _LATENCIES = ('latency_p50 [s]', 'latency_p99 [s]')
@@ -38,7 +39,7 @@ PRINTED = (
     Ratios(files='speed.csv', rows={'kind': SHARED}, within=('name',), of=('kind',),
            by=SHARED[:1], times=('ns',)),
     Ratios(files='frontier.csv', within=('set', 'instruction_set'), of=('contestant',),
-           by=('exact',), times=('call_p50', 'batch_p50')),
+           by=('exact',), ratios=('call_by_exact', 'batch_by_exact')),
     # Also the page of latencies, whose ratios are of the bench's p50.
     Ratios(files='bench/*/bench.csv', of=('node',), by=('echo',), times=_LATENCIES[:1]),
     Ratios(files='soak.csv', of=('node',), by=('echo',), times=_LATENCIES),
@@ -53,7 +54,7 @@ def ratios_of(folder: Path) -> dict[str, float]:
         for path in sorted(folder.glob(printed.files)):
             rows = [row for row in output.read_csv(path)
                     if all(row[column] in wanted for column, wanted in printed.rows.items())]
-            for column in printed.times:
+            for column in (*printed.times, *printed.ratios):
                 values = defaultdict(list)
                 for row in rows:
                     if row[column]:
@@ -63,7 +64,8 @@ def ratios_of(folder: Path) -> dict[str, float]:
                     unit = values.get((*key[:len(printed.within)], *printed.by))
                     if unit and key[len(printed.within):] != printed.by:
                         words = [str(path.relative_to(folder)), *key, column]
-                        found[f'{", ".join(words)}, by {printed.by[0]}'] = _ratio(mine, unit)
+                        found[f'{", ".join(words)}, by {printed.by[0]}'] = _ratio(
+                            mine, unit if column in printed.times else [1.0] * len(mine))
     return found
 
 
