@@ -28,8 +28,8 @@
 // shallower than 1e-9 · size has the point, volume and covariance of boxes that were pressed in to
 // this depth.
 //
-// Compile with `-std=c++17 -O3 -ffp-contract=off -fno-tree-slp-vectorize`, by g++ and by clang++.
-// The third flag alone does not stop g++: its SLP pass still fuses products and sums.
+// Compile with `-std=c++17 -O3 -ffp-contract=off -fno-tree-slp-vectorize -Wno-psabi`, by g++ and by
+// clang++. -ffp-contract=off alone does not stop g++: its SLP pass still fuses products and sums.
 // Never use -ffast-math. With `-march=x86-64-v3` or `-v4` a batch has more lanes.
 #pragma once
 
@@ -73,7 +73,7 @@ class Solver {
     check_size("size_b", size_b);
   }
 
-  // Model `mlp`. mlp_weights.hpp reads a network. Throws std::invalid_argument also for weights
+  // Model `mlp`, with its own copy of a network. mlp_weights.hpp reads one. Throws std::invalid_argument also for weights
   // that are not finite or beyond ±1e4.
   Solver(const Size& size_a, const Size& size_b, Network network) : Solver(size_a, size_b) {
     for (const Network::Unit& unit : network.units) {
@@ -109,8 +109,8 @@ class Solver {
   // The contacts of `count` pairs, bit for bit those of single calls. Poses: rows of seven numbers
   // `x y z qx qy qz qw`. Results: `count` rows each, normals and points of three numbers, covariances
   // of nine.
-  // Returns the first row that is refused, or −1. A refused row gets `colliding` false, and its
-  // other fields have no meaning. All other rows are solved.
+  // Returns the first row that is refused, or −1. A refused row gets `colliding` false and
+  // `separation` NaN, and its other fields have no meaning. All other rows are solved.
   long batch(const double* poses_a, const double* poses_b, long count,
              const Results& results) const {
     return solve({poses_a, poses_b, size_a_.v, size_b_.v, 0, 0}, count, results);

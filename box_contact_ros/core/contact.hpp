@@ -242,7 +242,10 @@ template <class T, class Found>
     if (results.covariance)
       for (int k = 0; k < 9; ++k)
         results.covariance[9 * row + k] = lane(covariance[k / 3][k % 3], i);
-    if (!lane(q.pair.valid, i) && refused < 0) refused = row;
+    if (!lane(q.pair.valid, i)) {
+      results.separation[row] = std::numeric_limits<double>::quiet_NaN();
+      if (refused < 0) refused = row;
+    }
   }
   return refused;
 }
@@ -256,8 +259,8 @@ inline void fetch_rows(const Results& results, long first, long last) {
     __builtin_prefetch(results.covariance + k, 1);
 }
 
-// Solve rows `begin` to `end`. Returns the first row whose poses or sizes are refused, or −1; what
-// is written to such a row has no meaning.
+// Solve rows `begin` to `end`. Returns the first row whose poses or sizes are refused, or −1. Such
+// rows get `colliding` false and `separation` NaN.
 template <class T, class Model>
 long solve_rows(const Model& model, const Rows& rows, long begin, long end, const Results& results,
                 Counts& counts) {

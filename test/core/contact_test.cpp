@@ -470,8 +470,9 @@ void check_refusals(const Network& network) {
     check(refused == std::min(bad_row, 17L), "batch", "the first refused row", bad_row);
     for (long row = 0; row < 20; ++row) {
       bool good_row = row != bad_row && row != 17;
-      check(found.colliding[row] == good_row && (!good_row || found.separation[row] == -1.0),
-            "batch", "the other rows are solved", row);
+      double separation = found.separation[row];
+      check(found.colliding[row] == good_row, "batch", "the other rows are solved", row);
+      check(good_row ? separation == -1.0 : std::isnan(separation), "batch", "NaN if refused", row);
     }
     pairs.sizes_b[3 * 5] = 0.0;
     refused = solver.batch(pairs.poses_a.data(), pairs.poses_b.data(), pairs.sizes_a.data(),

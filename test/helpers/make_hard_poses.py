@@ -1,11 +1,13 @@
 """Write box_contact_ros/verification/hard_poses.npz: the hard poses, with their truth in 60 digits.
 
-    python test/helpers/make_hard_poses.py
+    python test/helpers/make_hard_poses.py [FAMILY ...]
 
-Once written, the file is what tests and reports read
-(see `box_contact_ros.verification.hard_poses`).
+Families that are not named stay as they are: another machine may round a recipe differently. Once
+written, the file is what tests and reports read (see `box_contact_ros.verification.hard_poses`).
 """
 from __future__ import annotations
+
+import argparse
 
 import hard_pose_recipes as recipes
 import numpy as np
@@ -34,15 +36,30 @@ def truth(a, b, size_a, size_b):
     return float(gap), centroid, float(volume), covariance
 
 
+def judged(name):
+    """Return a family's arrays as its recipe draws it, every case judged."""
+    pairs = recipes.generate(name)
+    found = zip(*(truth(*row) for row in zip(*pairs)))
+    return {f'{name}.{part}': values for part, values in pairs._asdict().items()} | {
+        f'{name}.{part}': np.array(values) for part, values in zip(
+            hard_poses.Cases._fields[1:], found, strict=True)}
+
+
 def main():
-    """Generate all families and judge every case."""
+    """Write all families, those that are named anew."""
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('families', nargs='*', metavar='FAMILY', help='names of recipes')
+    chosen = parser.parse_args().families or list(recipes.FAMILIES)
+    if unknown := set(chosen) - set(recipes.FAMILIES):
+        parser.error(f'no recipe: {", ".join(sorted(unknown))}')
+    with np.load(hard_poses.FILE) as stored:
+        kept = {key: values for key, values in stored.items()
+                if key.partition('.')[0] not in chosen}
     arrays = {}
     for name in tqdm(recipes.FAMILIES, unit='family'):
-        pairs = recipes.generate(name)
-        found = zip(*(truth(*row) for row in zip(*pairs)))
-        arrays |= {f'{name}.{part}': values for part, values in pairs._asdict().items()}
-        arrays |= {f'{name}.{part}': np.array(values) for part, values in zip(
-            hard_poses.Cases._fields[1:], found, strict=True)}
+        arrays |= judged(name) if name in chosen else {
+            key: values for key, values in kept.items() if key.partition('.')[0] == name}
     np.savez_compressed(hard_poses.FILE, **arrays)
     total = sum(len(values) for key, values in arrays.items() if key.endswith('.gap'))
     print(f'{hard_poses.FILE}: {total} cases, {hard_poses.FILE.stat().st_size / 1e6:.2f} MB')

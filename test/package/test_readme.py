@@ -77,12 +77,12 @@ def make(words: list[str], **_) -> None:
     """Check that the targets exist: a dry run plans them."""
     env = {name: value for name, value in os.environ.items()
            if not name.startswith(('MAKE', 'MFLAGS'))}  # `make test` may be what runs this
-    here = ['-C', ROOT, *words[3:]] if words[1:3] == ['-C', 'box_contact_ros'] else words[1:]
+    here = words[words.index('make') + 1:]
     done = subprocess.run(['make', '-n', *here], cwd=ROOT, env=env, capture_output=True,
                           text=True, timeout=60)
     assert done.returncode == 0, done.stderr
-    if words[1] == 'demo' and len(words) > 2:  # what ARGS hands on
-        arguments = shlex.split(words[2].partition('=')[2])
+    if here[0] == 'demo' and len(here) > 1:  # what ARGS hands on
+        arguments = shlex.split(here[1].partition('=')[2])
         assert all(word in help_of('box_contact_ros.apps.demo')
                    for word in arguments if word.startswith('--'))
 
@@ -215,9 +215,9 @@ def venv(words: list[str], **_) -> None:
 
 COMMANDS = {
     r'git clone .+': clone,
-    r'(mkdir -p build|ln -sfn|g\+\+|\./first).*': built,
+    r'(mkdir -p build|ln -sfn|g\+\+|build/first).*': built,
     r'export \S+': exported,
-    r'make (-C \w+ )?[\w-]+( .*)?': make,
+    r'(cd box_contact_ros && )?make [\w-]+( .*)?': make,
     r'(ros2 run|python -m) box_contact_ros \w+( .*)?': start,
     r'box_contact_\w+( .*)?': start,
     r'ros2 topic echo \S+': topic,
@@ -243,7 +243,7 @@ def test_command(command, program, setup_arguments):
 def test_first_commands_are_clone_and_demo():
     """What a newcomer types first stands first."""
     assert commands()[:2] == ['git clone REPOSITORY box_contact_ros',
-                              'make -C box_contact_ros demo']
+                              'cd box_contact_ros && make demo']
 
 
 # --- the rest of the pages ------------------------------------------------------------------------

@@ -1,6 +1,8 @@
 """Gates at zero on the stored families of hard poses, for `exact` and `mlp`."""
 from __future__ import annotations
 
+from pathlib import Path
+
 import hard_pose_recipes as recipes
 import numpy as np
 import oracle
@@ -39,6 +41,12 @@ def test_the_file_holds_what_the_generators_draw():
     for name, cases in CASES.items():
         for stored, drawn in zip(cases.pairs, recipes.generate(name)):
             np.testing.assert_allclose(stored, drawn, rtol=1e-12, atol=1e-12, err_msg=name)
+
+
+def test_the_docs_know_how_many():
+    count = sum(len(cases.gap) for cases in CASES.values())
+    page = Path(__file__).resolve().parents[2] / 'docs' / 'reference' / 'testing.md'
+    assert f'{count:,} cases in {len(CASES)} families' in page.read_text('utf-8')
 
 
 @pytest.mark.parametrize('name', CASES)
