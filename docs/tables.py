@@ -10,6 +10,7 @@ import functools
 import re
 import sys
 from pathlib import Path
+from statistics import median
 
 from box_contact_ros.output import markdown_table, number, read_csv
 
@@ -99,8 +100,12 @@ def network() -> str:
             found = {row['set']: row for row in rows('frontier.csv', contestant=name,
                                                      instruction_set=one, **{'class': 'all'})}
             touching = [row for kind, row in found.items() if kind in SETS]
-            batch, call = ([float(row[column]) for row in touching]
-                           for column in ('batch_p50', 'call_p50'))
+            call = [float(row['call_p50']) for row in touching]
+            rounds: dict[str, list[float]] = {}
+            for row in rows('speed.csv', kind='batch', instruction_set=one):
+                if row['name'].startswith(f'{name}: '):
+                    rounds.setdefault(row['name'], []).append(float(row['ns']))
+            batch = [median(times) for times in rounds.values()]
             apart = found['just apart']
             body.append([f'`{name}`, {one}', f'{min(batch):.0f}–{max(batch):.0f}',
                          cell(apart, 'batch_p50'), f'{min(call) / 1e3:.2f}–{max(call) / 1e3:.2f}',

@@ -28,7 +28,6 @@ from ...baselines.engines.engine import Engine, ours, packages_of
 from ...core import FORCE, instruction_sets, native
 from ...output import markdown_table, number
 from ...resources import resource_path
-from ...scene.pose_sets import SETS
 from ...solver.arguments import program_parser
 from ...solver.models import MODELS, gated_models
 from ...solver.weights_file import load_weights
@@ -173,11 +172,9 @@ def honesty(rows: Sequence[FrontierRow]) -> str:
     by = {(row.name, row.set): row for row in rows
           if row.instruction_set == native.instruction_set}
     net = by['mlp', 'containers']
-    medians = {name: [by[name, s].batch for s in SETS] for name in ('exact', 'mlp')}
-    spread = {name: max(values) / min(values) for name, values in medians.items()}
     return output.page(
         'reports/pages/frontier_honesty', single=net.by_exact[0], containers=net.by_exact[1],
-        stacks=by['mlp', 'stacks'].by_exact[1], spread=spread,
+        stacks=by['mlp', 'stacks'].by_exact[1],
         paper=by['paper', 'random cubes'].errors.points['all'][1]).rstrip()
 
 
