@@ -484,8 +484,7 @@ def main(args: Sequence[str] | None = None) -> int:
         print(f'accuracy: {error}', file=sys.stderr)
         return 1
     broken = [text for row in rows for text in row.broken()] + paper_broken(errors, drawn)
-    output.write_csv(folder / 'accuracy.csv', csv_rows(rows), digits=5,
-                     about=output.machine(native))
+    output.write_csv(folder / 'accuracy.csv', csv_rows(rows), about=output.machine(native))
     command = output.command_line('box_contact_ros accuracy', args)
     (folder / 'accuracy.md').write_text(
         page(rows, errors, drawn, command, options.seed, broken), encoding='utf-8')
