@@ -54,8 +54,8 @@ QUICK = Plan(batch_pairs=1_000, single_pairs=40, seconds=0.05, rounds=2, members
              subprocesses=False)
 FEW_PAIRS = 16
 """Pairs of sizes that are prepared at once where each row has others."""
-LEAST_PAIRS = 10  # pairs judged whatever they take
-LEAST_CALLS = 3  # calls timed in a round whatever they take
+LEAST_PAIRS = 10  # pairs judged, and timed in every round, whatever they take
+WARM_UP = 3  # calls before a round
 PATIENCE = 120.0  # for an engine's answers in a subprocess [s]
 LONGEST_RUN = 3600.0  # of another instruction set [s]
 VERDICT = 1e-9
@@ -217,6 +217,21 @@ def _ask_all(engine: Engine, sets: Mapping[str, Pairs], plan: Plan) -> dict[str,
     return found
 
 
+def calls_of_a_round(calls: Sequence[Callable[[], object]], seconds: float,
+                     ) -> Sequence[Callable[[], object]]:
+    """Return the first calls, as many as fit into a round of so long, LEAST_PAIRS at least.
+
+    Every round times the same pairs: where some cost fifty times as much as others, the median of a
+    round would depend on how many were reached.
+    """
+    began = time.perf_counter()
+    for count, call in enumerate(calls, start=1):
+        call()
+        if time.perf_counter() - began > seconds and count >= LEAST_PAIRS:
+            return calls[:count]
+    return calls
+
+
 class Trial:
     """A contestant on a set: its answers, judged, and its times, gathered in rounds."""
 
@@ -229,27 +244,24 @@ class Trial:
         self._calls: Sequence[Callable[[], object]] = ()
         self._ask_all = None
         if isinstance(answers, Answers) and not answers.exceptions:
-            self._calls = engine.prepare(pairs.rows(slice(
-                plan.single_pairs if _one_size(pairs) else FEW_PAIRS)))
+            self._calls = calls_of_a_round(engine.prepare(pairs.rows(slice(
+                plan.single_pairs if _one_size(pairs) else FEW_PAIRS))), self._seconds)
             self._ask_all = engine.prepare_batch and engine.prepare_batch(pairs)
         self._singles: list[int] = []
         self.rounds: list[tuple[float, float]] = []
         """Of each round: the median single call, and a pair in a batch [ns]."""
 
     def time(self) -> None:
-        """Time one round, after a warm-up: single calls for the time there is, then a batch."""
+        """Time one round, after a warm-up: all single calls, again and again, then a batch."""
         clock, times, batch = time.perf_counter_ns, list[int](), math.nan
-        for call in self._calls[:LEAST_CALLS]:
+        for call in self._calls[:WARM_UP]:
             call()
         until = clock() + int(1e9 * self._seconds)
         while self._calls and clock() < until:
             for call in self._calls:
                 began = clock()
                 call()
-                ended = clock()
-                times.append(ended - began)
-                if ended > until and len(times) >= LEAST_CALLS:
-                    break
+                times.append(clock() - began)
         if self._ask_all:
             self._ask_all()
             began = clock()
