@@ -65,12 +65,14 @@ def test_latencies_are_medians_over_streams_and_ratios_to_the_echo(tmp_path: Pat
         write = csv.writer(file)
         write.writerow(['node', 'sent', 'lost', 'latency_p50 [s]', 'latency_p99 [s]', 'machine'])
         for p50 in (1e-4, 3e-4, 2e-4):
-            write.writerow(['contact', 1000, 1, p50, 1e-3, 'here'])
+            write.writerow(['contact', 1000, 0, p50, 1e-3, 'here'])
+            write.writerow(['soup', 1000, 1, p50, 1e-3, 'here'])
         write.writerow(['echo', 1000, 0, 1e-4, 4e-4, 'here'])
     page = latency.page(tmp_path)
-    assert '| contact node | node alone, 1 kHz | 3,000 | 3 | 200 | 1,000 | 2.00 |' in page
+    assert '| contact node | node alone, 1 kHz | 3,000 | 0 | 200 | 1,000 | 2.00 |' in page
+    assert '| soup node | node alone, 1 kHz | 3,000 | 3 | 200 | 1,000 | – |' in page
     assert '| echo node | node alone, 1 kHz | 1,000 | 0 | 100 | 400 | 1.00 |' in page
-    assert 'ran on: here' in page and 'soup node |' not in page
+    assert 'ran on: here' in page
 
 
 def _second_run(folder: Path, exact: float, rival: float) -> Path:

@@ -41,7 +41,8 @@ PRINTED = (
     Ratios(files='frontier.csv', within=('set', 'instruction_set'), of=('contestant',),
            by=('exact',), ratios=('call_by_exact', 'batch_by_exact')),
     # Also the page of latencies, whose ratios are of the bench's p50.
-    Ratios(files='bench/*/bench.csv', of=('node',), by=('echo',), times=_LATENCIES[:1]),
+    Ratios(files='bench/*-in-turn/bench.csv', rows={'node': ('contact', 'echo')}, of=('node',),
+           by=('echo',), times=_LATENCIES[:1]),
     Ratios(files='soak.csv', of=('node',), by=('echo',), times=_LATENCIES),
     Ratios(files='soak.csv', of=('node',), by=('bare echo',), times=_LATENCIES),
 )

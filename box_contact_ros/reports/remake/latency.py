@@ -9,7 +9,8 @@ import numpy as np
 
 from ... import output
 
-RUNS = {'node alone, 1 kHz': '1000-in-turn', 'beside others, 200 Hz': '200-side-by-side',
+ALONE = 'node alone'
+RUNS = {f'{ALONE}, 1 kHz': '1000-in-turn', 'beside others, 200 Hz': '200-side-by-side',
         'beside others, 1 kHz': '1000-side-by-side'}
 """Folders of the bench by load."""
 NODES = {'contact': 'contact node', 'soup': 'soup node', 'echo': 'echo node'}
@@ -32,13 +33,14 @@ def solver_rows(rows: list[dict[str, str]]) -> Iterator[Row]:
 def node_rows(load: str, rows: list[dict[str, str]]) -> Iterator[Row]:
     """Yield a row for each node of a run of the bench."""
     rows_of = {node: [row for row in rows if row['node'] == node] for node in NODES}
+    alone = load.startswith(ALONE)
     floor = _median(rows_of['echo'], 'latency_p50 [s]')
     for node, mine in rows_of.items():
         if mine:
-            p50 = _median(mine, 'latency_p50 [s]')
-            yield [NODES[node], load, f'{sum(int(row["sent"]) for row in mine):,}',
-                   f'{sum(int(row["lost"]) for row in mine):,}', output.number(p50),
-                   output.number(_median(mine, 'latency_p99 [s]')), output.number(p50 / floor)]
+            p50, lost = _median(mine, 'latency_p50 [s]'), sum(int(row['lost']) for row in mine)
+            yield [NODES[node], load, f'{sum(int(row["sent"]) for row in mine):,}', f'{lost:,}',
+                   output.number(p50), output.number(_median(mine, 'latency_p99 [s]')),
+                   output.number(p50 / floor) if alone and not lost else '–']
 
 
 def _median(rows: list[dict[str, str]], column: str) -> float:
