@@ -38,8 +38,10 @@ class Plan:
     """How much is judged and timed."""
 
     batch_pairs: int  # pairs on which models with batches are judged and timed
-    single_pairs: int
-    """Pairs on which the others are judged, and on which all are timed call by call."""
+    single_pairs: int  # pairs on which the others are judged
+    timed_pairs: int
+    """Pairs that every round times call by call, whatever they take. Some cost fifty times as much
+    as others, so the median of a round that ends by the clock depends on how many it reached."""
     seconds: float
     """Time that a contestant has to be asked on a set, once for answers and once for timing."""
     rounds: int
@@ -48,13 +50,13 @@ class Plan:
     """Whether other engines are judged in subprocesses, so that an abort is a finding."""
 
 
-FULL = Plan(batch_pairs=20_000, single_pairs=1_000, seconds=1.0, rounds=20, members=99,
-            subprocesses=True)
-QUICK = Plan(batch_pairs=1_000, single_pairs=40, seconds=0.05, rounds=2, members=1,
+FULL = Plan(batch_pairs=20_000, single_pairs=1_000, timed_pairs=200, seconds=1.0, rounds=20,
+            members=99, subprocesses=True)
+QUICK = Plan(batch_pairs=1_000, single_pairs=40, timed_pairs=10, seconds=0.05, rounds=2, members=1,
              subprocesses=False)
 FEW_PAIRS = 16
 """Pairs of sizes that are prepared at once where each row has others."""
-LEAST_PAIRS = 10  # pairs judged, and timed in every round, whatever they take
+LEAST_PAIRS = 10  # pairs judged, whatever they take
 WARM_UP = 3  # calls before a round
 PATIENCE = 120.0  # for an engine's answers in a subprocess [s]
 LONGEST_RUN = 3600.0  # of another instruction set [s]
@@ -217,35 +219,20 @@ def _ask_all(engine: Engine, sets: Mapping[str, Pairs], plan: Plan) -> dict[str,
     return found
 
 
-def calls_of_a_round(calls: Sequence[Callable[[], object]], seconds: float,
-                     ) -> Sequence[Callable[[], object]]:
-    """Return the first calls, as many as fit into a round of so long, LEAST_PAIRS at least.
-
-    Every round times the same pairs: where some cost fifty times as much as others, the median of a
-    round would depend on how many were reached.
-    """
-    began = time.perf_counter()
-    for count, call in enumerate(calls, start=1):
-        call()
-        if time.perf_counter() - began > seconds and count >= LEAST_PAIRS:
-            return calls[:count]
-    return calls
-
-
 class Trial:
     """A contestant on a set: its answers, judged, and its times, gathered in rounds."""
 
     def __init__(self, engine: Engine, name: str, pairs: Pairs, answers: Answers | str,
                  plan: Plan) -> None:
         """Judge, and prepare the calls; an engine that failed is not timed."""
-        self.name = engine.name
-        self._engine, self._set, self._pairs, self._answers = engine, name, pairs, answers
+        self.name, self.set = engine.name, name
+        self._engine, self._pairs, self._answers = engine, pairs, answers
         self._seconds = plan.seconds / plan.rounds
         self._calls: Sequence[Callable[[], object]] = ()
         self._ask_all = None
         if isinstance(answers, Answers) and not answers.exceptions:
-            self._calls = calls_of_a_round(engine.prepare(pairs.rows(slice(
-                plan.single_pairs if _one_size(pairs) else FEW_PAIRS))), self._seconds)
+            self._calls = engine.prepare(pairs.rows(slice(
+                plan.timed_pairs if _one_size(pairs) else FEW_PAIRS)))
             self._ask_all = engine.prepare_batch and engine.prepare_batch(pairs)
         self._singles: list[int] = []
         self.rounds: list[tuple[float, float]] = []
@@ -280,7 +267,7 @@ class Trial:
         choices = answers.judged(self._pairs)
         odd = {kind: row for errors in choices.values() for kind, row in errors.odd.items()}
         return FrontierRow(
-            name=self._engine.name, set=self._set, instruction_set=native.instruction_set,
+            name=self.name, set=self.set, instruction_set=native.instruction_set,
             judged=len(answers.colliding), calls=len(self._singles),
             single=percentiles(self._singles, 50, 99, 100),
             batch=float(np.median([batch for _, batch in self.rounds])), choices=choices,
@@ -291,10 +278,13 @@ class Trial:
 
 
 def measure_all(found: Sequence[Engine], *, seed: int = 3, plan: Plan = FULL) -> list[FrontierRow]:
-    """Return all rows, set by set, the contestants in turn."""
+    """Return all rows, set by set. All contestants on all sets take turns.
+
+    A neighbour that slows the machine for seconds then slows few rounds of a set, not all of them.
+    """
     from tqdm import tqdm
 
-    count, rows = plan.batch_pairs, []
+    count = plan.batch_pairs
     sets = {name: make(np.random.default_rng([seed, place]), count + count // 10 + 20).rows(
         slice(count)) for place, (name, make) in enumerate(ALL_SETS.items())}
     with tqdm(total=len(found) * (1 + len(sets) * plan.rounds), desc='frontier',
@@ -304,15 +294,12 @@ def measure_all(found: Sequence[Engine], *, seed: int = 3, plan: Plan = FULL) ->
             bar.set_postfix_str(engine.name)
             answers.append(answers_of(engine, sets, plan))
             bar.update()
-        for name, pairs in sets.items():
-            bar.set_postfix_str(name)
-            trials = [Trial(engine, name, pairs, given[name], plan)
-                      for engine, given in zip(found, answers) if name in given]
-            bar.update(plan.rounds * (len(found) - len(trials)))
-            take_turns([trial.time for trial in trials], plan.rounds, bar.update)
-            exact = next(trial for trial in trials if trial.name == 'exact')
-            rows += [trial.row(exact) for trial in trials]
-    return rows
+        trials = [Trial(engine, name, pairs, given[name], plan) for name, pairs in sets.items()
+                  for engine, given in zip(found, answers) if name in given]
+        bar.total = len(found) + len(trials) * plan.rounds
+        take_turns([trial.time for trial in trials], plan.rounds, bar.update)
+    exact = {trial.set: trial for trial in trials if trial.name == 'exact'}
+    return [trial.row(exact[trial.set]) for trial in trials]
 
 
 def measure_with(instruction_set: str, make: Callable[[], Sequence[Engine]], *, seed: int,
