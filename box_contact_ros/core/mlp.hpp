@@ -207,6 +207,17 @@ struct SiteOutputs {
 
 // Units whose shared sums are kept at a time: they stay in the first cache.
 constexpr int units_at_once = 16;
+// Outputs that are summed at a time: three lanes of each stay in sixteen registers.
+constexpr int outputs_at_once = 4;
+
+// Add what hidden units give to the outputs from `first` to before `last`, at the sites of one axis.
+template <int first, int last, class Three>
+[[gnu::always_inline]] inline void add_outputs(const Network::Unit* unit, int units,
+                                               const Three* hidden, Three* outputs) {
+  for (int n = 0; n < units; ++n)
+    for (int k = first; k < last; ++k)
+      outputs[k] = multiply_add(unit[n].to_outputs[k], hidden[n], outputs[k]);
+}
 
 // The first `count` outputs at all sites. What sites share is summed once. The sites of one axis
 // come one after the other, so that the sums of their outputs stay in registers.
@@ -226,16 +237,14 @@ inline void forward(const Network& network, const SiteFeatures<F>& features,
     }
 #pragma GCC unroll 3
     for (int q = 0; q < 3; ++q) {
-      Triple<F> sums[count];
-      for (int k = 0; k < count; ++k) sums[k] = outputs.at[q][k];
+      Triple<F> hidden[units_at_once];
       for (int n = 0; n < units; ++n) {
         Triple<F> shared = of_faces[n] + spread(of_axis[n], q);
-        Triple<F> hidden =
-            max(weighted_sum(shared, unit[n].of_site, features.of_site[q]), Triple<F>{});
-        for (int k = 0; k < count; ++k)
-          sums[k] = multiply_add(unit[n].to_outputs[k], hidden, sums[k]);
+        hidden[n] = max(weighted_sum(shared, unit[n].of_site, features.of_site[q]), Triple<F>{});
       }
-      for (int k = 0; k < count; ++k) outputs.at[q][k] = sums[k];
+      constexpr int middle = std::min(count, outputs_at_once);
+      add_outputs<0, middle>(unit, units, hidden, outputs.at[q]);
+      add_outputs<middle, count>(unit, units, hidden, outputs.at[q]);
     }
   }
 }

@@ -114,20 +114,29 @@ struct FaceSums {
   }
 };
 
-// Terms of the four signs, those with σ ≠ τ negative, summed for each σ.
+// Terms of the four signs, those with σ ≠ τ negative, summed for each σ or each τ.
 template <class T>
-struct BySigma {
+struct BySign {
   T low, high;
 
-  [[gnu::always_inline]] explicit BySigma(const Four<T> (&terms)[steps<T>]) {
-    if constexpr (is_scalar<T>) {
-      low = terms[0][0] - terms[0][2], high = terms[0][3] - terms[0][1];
-    } else {
-      low = terms[0] - terms[2], high = terms[3] - terms[1];
-    }
-  }
   [[gnu::always_inline]] T sum() const { return low + high; }
 };
+template <class T>
+[[gnu::always_inline]] inline BySign<T> by_sigma(const Four<T> (&terms)[steps<T>]) {
+  if constexpr (is_scalar<T>) {
+    return {terms[0][0] - terms[0][2], terms[0][3] - terms[0][1]};
+  } else {
+    return {terms[0] - terms[2], terms[3] - terms[1]};
+  }
+}
+template <class T>
+[[gnu::always_inline]] inline BySign<T> by_tau(const Four<T> (&terms)[steps<T>]) {
+  if constexpr (is_scalar<T>) {
+    return {terms[0][0] - terms[0][1], terms[0][3] - terms[0][2]};
+  } else {
+    return {terms[0] - terms[1], terms[3] - terms[2]};
+  }
+}
 
 // Second moments need no sums for each face. An edge belongs to two faces, and counts with the weight
 //
@@ -142,7 +151,7 @@ template <class T, Side side>
                                                    const Vec<T>& half, const Vec<T>& origin,
                                                    FaceSums<T, side>& faces, Sym<T>& squares) {
   int a = (j + 1) % 3, b = (j + 2) % 3;
-  Four<T> w[steps<T>], w_g[steps<T>], w_gg[steps<T>], w_x[steps<T>], w_gx[steps<T>], w_xx[steps<T>];
+  Four<T> w[steps<T>], w_g[steps<T>], w_x[steps<T>], w_xx[steps<T>], w_ll[steps<T>];
 #pragma GCC unroll 4
   for (int n = 0; n < steps<T>; ++n) {
     Four<T> f = sigma<T>(n) * half[a] - origin[a], g = tau<T>(n) * half[b] - origin[b];
@@ -154,33 +163,28 @@ template <class T, Side side>
     // The distance of either face is the distance in the other.
     w[n] = by_f * (g + g);
     w_g[n] = w[n] * g;
-    w_gg[n] = w_g[n] * g;
     w_x[n] = w[n] * middle;
-    w_gx[n] = w_g[n] * middle;
-    w_xx[n] = w_x[n] * middle + (1.0 / 12.0) * ((w[n] * length) * length);
+    w_xx[n] = w_x[n] * middle;
+    w_ll[n] = (w[n] * length) * length;
   }
   T f_low = -half[a] - origin[a], f_high = half[a] - origin[a];
-  BySigma<T> by_w(w), by_g(w_g), by_x(w_x);
-  squares(a, a) += (f_low * f_low) * by_w.low + (f_high * f_high) * by_w.high;
-  squares(a, b) += f_low * by_g.low + f_high * by_g.high;
-  squares(a, j) += f_low * by_x.low + f_high * by_x.high;
-  squares(b, b) += BySigma<T>(w_gg).sum();
-  squares(b, j) += BySigma<T>(w_gx).sum();
-  squares(j, j) += BySigma<T>(w_xx).sum();
+  T g_low = -half[b] - origin[b], g_high = half[b] - origin[b];
+  BySign<T> w_f = by_sigma<T>(w), w_t = by_tau<T>(w), g_f = by_sigma<T>(w_g);
+  BySign<T> x_f = by_sigma<T>(w_x), x_t = by_tau<T>(w_x);
+  squares(a, a) += (f_low * f_low) * w_f.low + (f_high * f_high) * w_f.high;
+  squares(b, b) += (g_low * g_low) * w_t.low + (g_high * g_high) * w_t.high;
+  squares(a, b) += f_low * g_f.low + f_high * g_f.high;
+  squares(a, j) += f_low * x_f.low + f_high * x_f.high;
+  squares(b, j) += g_low * x_t.low + g_high * x_t.high;
+  squares(j, j) += by_sigma<T>(w_xx).sum() + (1.0 / 12.0) * by_sigma<T>(w_ll).sum();
 }
 
 template <class T, Side side>
 [[gnu::always_inline]] inline void add_edges(const EdgePieces<T>& pieces, const Vec<T>& half,
                                              const Vec<T>& origin, FaceSums<T, side>& faces,
                                              Sym<T>& squares) {
-  if constexpr (is_scalar<T>) {
-    add_edges_along(0, pieces, half, origin, faces, squares);
-    add_edges_along(1, pieces, half, origin, faces, squares);
-    add_edges_along(2, pieces, half, origin, faces, squares);
-  } else {
-#pragma GCC unroll 1  // unrolled, the code would not fit the first cache
-    for (int j = 0; j < 3; ++j) add_edges_along(j, pieces, half, origin, faces, squares);
-  }
+#pragma GCC unroll 3
+  for (int j = 0; j < 3; ++j) add_edges_along(j, pieces, half, origin, faces, squares);
 }
 
 // A piece of the line in which a face of A, at the sign σ of axis i, meets a face of B, at τ of axis
@@ -279,20 +283,20 @@ template <class T>
       along[n] = w * (span * span);
     }
     // Along d, whose coordinates are 0, −r_zj and r_yj.
-    T square = (1.0 / 12.0) * BySigma<T>(along).sum();
+    T square = (1.0 / 12.0) * by_sigma<T>(along).sum();
     T by_y = square * r[y][j], by_z = square * r[z][j];
     squares(y, y) += by_z * r[z][j];
     squares(y, z) -= by_y * r[z][j];
     squares(z, z) += by_y * r[y][j];
   }
   T f_low = -pair.half_a[i] - origin_a[i], f_high = pair.half_a[i] - origin_a[i];
-  BySigma<T> by_w(w_all), by_y(w_y), by_z(w_z);
-  squares(i, i) += (f_low * f_low) * by_w.low + (f_high * f_high) * by_w.high;
-  squares(i, y) += f_low * by_y.low + f_high * by_y.high;
-  squares(i, z) += f_low * by_z.low + f_high * by_z.high;
-  squares(y, y) += BySigma<T>(w_yy).sum();
-  squares(y, z) += BySigma<T>(w_yz).sum();
-  squares(z, z) += BySigma<T>(w_zz).sum();
+  BySign<T> all_f = by_sigma<T>(w_all), y_f = by_sigma<T>(w_y), z_f = by_sigma<T>(w_z);
+  squares(i, i) += (f_low * f_low) * all_f.low + (f_high * f_high) * all_f.high;
+  squares(i, y) += f_low * y_f.low + f_high * y_f.high;
+  squares(i, z) += f_low * z_f.low + f_high * z_f.high;
+  squares(y, y) += by_sigma<T>(w_yy).sum();
+  squares(y, z) += by_sigma<T>(w_yz).sum();
+  squares(z, z) += by_sigma<T>(w_zz).sum();
 }
 
 template <class T>
@@ -342,7 +346,7 @@ template <class T>
 struct SurfaceIntegrals {
   Mat<T> x_n;     // ∫ x nᵀ dA; rows are components of x
   Vec<T> first;   // Σ distance of the face · ∫ x dA
-  Sym<T> second;  // Σ distance of the face · ∫ x xᵀ dA
+  Sym<T> second;  // four times Σ distance of the face · ∫ x xᵀ dA
   Vec<T> normal;  // 2 ∫ n dA
   Vec<T> area;    // of both faces across each axis, signed sums: about their area
 };
@@ -356,7 +360,7 @@ template <class T, Side side>
                                                             const Vec<T>& origin) {
   SurfaceIntegrals<T> sum;
   sum.first = {};
-  sum.second = splat<T>(0.25) * squares;
+  sum.second = squares;
   for (int i = 0; i < 3; ++i) {
     int y = (i + 1) % 3, z = (i + 2) % 3;
     T low = -half[i] - origin[i], high = half[i] - origin[i];
@@ -371,9 +375,9 @@ template <class T, Side side>
     sum.first[y] += high * y_high - low * y_low;
     sum.first[z] += high * z_high - low * z_low;
     T low2 = low * low, high2 = high * high;
-    sum.second(i, i) += 0.5 * (high2 * x_high - low2 * x_low);
-    sum.second(i, y) += 0.25 * (high2 * y_high - low2 * y_low);
-    sum.second(i, z) += 0.25 * (high2 * z_high - low2 * z_low);
+    sum.second(i, i) += 2.0 * (high2 * x_high - low2 * x_low);
+    sum.second(i, y) += high2 * y_high - low2 * y_low;
+    sum.second(i, z) += high2 * z_high - low2 * z_low;
     sum.normal[i] = area_high - area_low;
     sum.area[i] = 0.5 * abs(area_low + area_high);
   }
@@ -497,11 +501,12 @@ template <class T>
     for (int j = 0; j < 3; ++j) x_n[i][j] = of_a.x_n[i][j] + dot(row(turned, i), row(r, j));
   CertifiedOverlap<T> found;
   T volume = (x_n[0][0] + x_n[1][1] + x_n[2][2]) * (1.0 / 3.0);
-  Vec<T> from_origin = (0.25 / volume) * (of_a.first + r * of_b.first);
+  T by_volume = 1.0 / volume;
+  Vec<T> from_origin = (0.25 * by_volume) * (of_a.first + r * of_b.first);
   Vec<T> centroid = origin_a + from_origin;
   // Little cancels: the origin is a point of the overlap.
   Sym<T> covariance =
-      (0.2 / volume) * (of_a.second + rotated(r, of_b.second)) - squared(from_origin);
+      (0.05 * by_volume) * (of_a.second + rotated(r, of_b.second)) - squared(from_origin);
   Vec<T> area, normal = of_a.normal + r * of_b.normal;
   for (int i = 0; i < 3; ++i) area[i] = of_a.area[i] + dot(abs(row(r, i)), of_b.area);
   T length = edges_a.length + edges_b.length;
