@@ -9,10 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from ..core import FEATURES, OUTPUTS, POINT_OUTPUTS, native
-from ..resources import resource_path
 from .contact import Contacts
 from .models import Exact
-from .weights_file import Network, Weights, WeightsError, load_weights, unpacked
+from .weights_file import Network, Weights, WeightsError, weights_for
 
 FEATURE_NAMES = (
     'slant · cut', '|slant · push|', 'slant · push of these faces · of the others',
@@ -25,8 +24,8 @@ FEATURE_NAMES = (
 DESCRIPTION = 'cuts of the bounds by the slab, at nine sites'
 """What the features of shipped weights mean; see core/overlap/bounds.hpp."""
 BOUNDS = {DESCRIPTION: 'slab', 'cuts of the unit cube, at nine sites': 'edges'}
-"""Method of the bounds by the description in a card; weights made for another one are refused."""
-_OUTPUTS = {'slab': OUTPUTS, 'edges': POINT_OUTPUTS}  # the latter give the point alone
+"""Method of the bounds by the description in a card; weights made for another one are refused.
+Those for 'edges' give the point alone."""
 _NATIVE = {'slab': 'mlp', 'edges': 'mlp-edges'}  # names that the core has for the models
 ACTIVATION = 'relu'  # activation of the hidden units; weights made for another one are refused
 UNITS_MAX = 64  # most hidden units: as far as the search for their number goes
@@ -40,7 +39,7 @@ def core_numbers(network: Network) -> np.ndarray:
     The biases of the outputs come first. For each unit follow its bias, its weights for features of
     faces, axis and site, and its weights to the outputs. Outputs that the network lacks are zeros.
     """
-    (first, bias), (last, last_bias) = unpacked(network)
+    (first, bias), (last, last_bias) = network.layers
     missing = OUTPUTS - len(last_bias)
     last, last_bias = np.pad(last, ((0, missing), (0, 0))), np.pad(last_bias, (0, missing))
     units = np.concatenate([bias[:, None], first[:, 4:8], first[:, 8:12], first[:, :4], last.T],
@@ -121,27 +120,18 @@ class Mlp:
 
 def load_mlp(weights: str | None = None) -> Weights:
     """Read the weights of an MLP, the shipped ones for None; raises `WeightsError`."""
-    try:
-        path = weights or resource_path('weights', 'mlp.safetensors')
-    except FileNotFoundError as error:
-        raise WeightsError(
-            "model 'mlp' has no weights: train them, name a file with `weights`, or use model "
-            "'exact', which needs none") from error
-    found = load_weights(path)
-    network, bounds = found.networks.get('point'), found.card['inputs'].get('description')
-    ends = (FEATURES, _OUTPUTS.get(BOUNDS.get(bounds, ''), OUTPUTS))
-    if network is None or (network.widths[0], network.widths[-1]) != ends:
-        raise WeightsError(
-            f"weights file {path} has no network 'point' with {ends[0]} inputs and {ends[1]} "
-            f"outputs, which model 'mlp' needs")
+    found = weights_for('mlp', weights, shipped='mlp')
+    bounds = found.card['inputs'].get('description')
+    outputs = POINT_OUTPUTS if BOUNDS.get(bounds) == 'edges' else OUTPUTS
+    network = found.network('point', FEATURES, outputs, model='mlp')
     if len(network.widths) != 3 or network.widths[1] > UNITS_MAX:
-        raise WeightsError(f"weights file {path}: network 'point' must have one hidden layer, "
-                           f'of at most {UNITS_MAX} units')
+        raise WeightsError(f"weights file {found.path}: network 'point' must have one hidden "
+                           f'layer, of at most {UNITS_MAX} units')
     if bounds not in BOUNDS:
-        raise WeightsError(f'weights file {path} is for other inputs than this version has')
+        raise WeightsError(f'weights file {found.path} is for other inputs than this version has')
     if found.card.get('activation') != ACTIVATION:
-        raise WeightsError(f"weights file {path}: this version's units are {ACTIVATION!r}, not "
-                           f"{found.card.get('activation')!r}")
+        raise WeightsError(f"weights file {found.path}: this version's units are {ACTIVATION!r}, "
+                           f"not {found.card.get('activation')!r}")
     return found
 
 

@@ -20,6 +20,8 @@ from typing import Any
 
 import numpy as np
 
+from ..resources import resource_path
+
 CARD_FIELDS = ('name', 'model', 'architecture', 'inputs', 'outputs', 'sizes', 'data', 'seed',
                'commit', 'metrics', 'sha256')
 """Entries that every model card has: `inputs` with their ranges, `sizes` it was trained for, the
@@ -33,14 +35,26 @@ WEIGHT_LIMIT = 1e4
 not."""
 
 
+class WeightsError(ValueError):
+    """A weights file that is missing, damaged, or not what its card says."""
+
+
 @dataclass(frozen=True)
 class Network:
-    """One perceptron, its numbers in one array."""
+    """One perceptron."""
 
-    name: str
-    widths: tuple[int, ...]  # units per layer, inputs first: (6, 20, 18, 4)
-    packed: np.ndarray
-    """float32: for each layer its weights (outputs × inputs, row-major), then its biases."""
+    layers: list[tuple[np.ndarray, np.ndarray]]
+    """Weight (outputs, inputs) and bias (outputs,) of every layer, float32."""
+
+    @property
+    def widths(self) -> tuple[int, ...]:
+        """Return the units per layer, inputs first: (6, 20, 18, 4)."""
+        return (self.layers[0][0].shape[1], *(len(bias) for _, bias in self.layers))
+
+    @property
+    def packed(self) -> np.ndarray:
+        """Return for each layer its weights, row-major, then its biases, in one array."""
+        return np.concatenate([part.ravel() for layer in self.layers for part in layer])
 
 
 @dataclass(frozen=True)
@@ -51,9 +65,14 @@ class Weights:
     networks: dict[str, Network]
     card: dict[str, Any]
 
-
-class WeightsError(ValueError):
-    """A weights file that is missing, damaged, or not what its card says."""
+    def network(self, name: str, inputs: int, outputs: int, model: str) -> Network:
+        """Return a network for a model; raises `WeightsError` where there is none of that shape."""
+        found = self.networks.get(name)
+        if found is None or (found.widths[0], found.widths[-1]) != (inputs, outputs):
+            raise WeightsError(
+                f'weights file {self.path} has no network {name!r} with {inputs} inputs and '
+                f'{outputs} outputs, which model {model!r} needs')
+        return found
 
 
 def tensors_digest(tensors: dict[str, np.ndarray]) -> str:
@@ -77,12 +96,16 @@ def save_weights(path: Path, networks: dict[str, list[tuple[np.ndarray, np.ndarr
             tensors[f'{name}.{number}.weight'] = np.ascontiguousarray(weight, dtype=np.float32)
             tensors[f'{name}.{number}.bias'] = np.ascontiguousarray(bias, dtype=np.float32)
     card = {**card, 'sha256': tensors_digest(tensors)}
-    missing = [field for field in CARD_FIELDS if field not in card]
-    if missing:
-        raise ValueError(f'the model card lacks {", ".join(missing)}')
+    _check_complete(card)
     path.parent.mkdir(parents=True, exist_ok=True)
     # Not safetensors' save_file, which leaves the file readable to its owner only.
     path.write_bytes(save(tensors, metadata={'card': json.dumps(card, ensure_ascii=False)}))
+
+
+def _check_complete(card: dict[str, Any]) -> None:
+    missing = [field for field in CARD_FIELDS if field not in card]
+    if missing:
+        raise ValueError(f'the model card lacks {", ".join(missing)}')
 
 
 def read_tensors(data: bytes) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
@@ -108,15 +131,26 @@ def read_tensors(data: bytes) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     return tensors, metadata
 
 
+def weights_for(model: str, path: str | None, shipped: str, boxes: str = '') -> Weights:
+    """Read the weights of a model from `path`, or for None the shipped ones of that name.
+
+    boxes: what the error calls the boxes that have none. Raises `WeightsError`.
+    """
+    try:
+        return load_weights(path or resource_path('weights', f'{shipped}.safetensors'))
+    except FileNotFoundError as error:
+        raise WeightsError(
+            f'model {model!r} has no weights{boxes}: train them, name a file with `weights`, or '
+            f"use model 'exact', which needs none") from error
+
+
 def load_weights(path: Path | str) -> Weights:
     """Read and check a weights file; raises `WeightsError` that says what is wrong with it."""
     path = Path(path)
     try:
-        return _checked(path, *read_tensors(_read(path)))
+        return Weights(path, *_checked(*read_tensors(_read(path))))
     except FileNotFoundError as error:
         raise WeightsError(f'weights file {path} does not exist') from error
-    except WeightsError:
-        raise
     except (OSError, ValueError, TypeError, LookupError, AttributeError, RecursionError) as error:
         raise WeightsError(f'weights file {path} cannot be read: {error}') from error
 
@@ -131,59 +165,43 @@ def _read(path: Path) -> bytes:
     return data
 
 
-def _checked(path: Path, tensors: dict[str, np.ndarray], metadata: dict[str, Any]) -> Weights:
-    """Return the weights of a file, or raise `WeightsError`."""
+def _checked(tensors: dict[str, np.ndarray], metadata: dict[str, Any],
+             ) -> tuple[dict[str, Network], dict[str, Any]]:
+    """Return the networks and the card of a file; raises ValueError where they do not fit."""
     try:
-        card = json.loads(metadata['card'])
-        missing = [field for field in CARD_FIELDS if field not in card.keys()]
-    except (LookupError, TypeError, ValueError, AttributeError, RecursionError) as error:
-        raise WeightsError(f'weights file {path} has no readable model card') from error
-    if missing:
-        raise WeightsError(f'weights file {path}: the model card lacks {", ".join(missing)}')
+        card = dict(json.loads(metadata['card']))
+    except (LookupError, TypeError, ValueError, RecursionError) as error:
+        raise ValueError('it has no readable model card') from error
+    _check_complete(card)
     if not isinstance(card['inputs'], dict):
-        raise WeightsError(f'weights file {path}: inputs of the model card is no object')
+        raise ValueError('inputs of the model card is no object')
     for name, array in tensors.items():
         if not np.all(np.abs(array) <= WEIGHT_LIMIT):  # nor is NaN
-            raise WeightsError(
-                f'weights file {path}: {name} holds values that are not finite or beyond '
-                f'±{WEIGHT_LIMIT:g}')
+            raise ValueError(
+                f'{name} holds values that are not finite or beyond ±{WEIGHT_LIMIT:g}')
     if tensors_digest(tensors) != card['sha256']:
-        raise WeightsError(f'weights file {path}: checksum differs from its model card')
-    networks = {name: _pack(name, tensors, path)
+        raise ValueError('checksum differs from its model card')
+    networks = {name: _network(name, tensors)
                 for name in sorted({key.split('.')[0] for key in tensors})}
     for name, network in networks.items():
         if list(network.widths) != card['architecture']:
-            raise WeightsError(f'weights file {path}: {name} is {network.widths}, the model card '
-                               f'says {card["architecture"]}')
+            raise ValueError(
+                f'{name} is {network.widths}, the model card says {card["architecture"]}')
     if not networks:
-        raise WeightsError(f'weights file {path} holds no network')
-    return Weights(path, networks, card)
+        raise ValueError('it holds no network')
+    return networks, card
 
 
-def _pack(name: str, tensors: dict[str, np.ndarray], path: Path) -> Network:
-    widths: list[int] = []
-    parts: list[np.ndarray] = []
-    while f'{name}.{len(parts) // 2}.weight' in tensors:
-        layer = f'{name}.{len(parts) // 2}'
-        weight, bias = tensors[f'{layer}.weight'], tensors.get(f'{layer}.bias')
-        fits = weight.ndim == 2 and (not widths or weight.shape[1] == widths[-1])
+def _network(name: str, tensors: dict[str, np.ndarray]) -> Network:
+    own = {key: array for key, array in tensors.items() if key.split('.')[0] == name}
+    layers: list[tuple[np.ndarray, np.ndarray]] = []
+    while f'{name}.{len(layers)}.weight' in own:
+        layer = f'{name}.{len(layers)}'
+        weight, bias = own.pop(f'{layer}.weight'), own.pop(f'{layer}.bias', None)
+        fits = weight.ndim == 2 and (not layers or weight.shape[1] == len(layers[-1][1]))
         if not fits or bias is None or bias.shape != weight.shape[:1]:
-            raise WeightsError(f'weights file {path}: {layer} does not fit its neighbours')
-        widths = (widths or [weight.shape[1]]) + [weight.shape[0]]
-        parts += [weight.ravel(), bias]
-    used = sum(len(part) for part in parts)
-    mine = [array for key, array in tensors.items() if key.split('.')[0] == name]
-    if not parts or used != sum(array.size for array in mine):
-        raise WeightsError(f'weights file {path}: {name} has tensors that belong to no layer')
-    return Network(name, tuple(widths), np.concatenate(parts))
-
-
-def unpacked(network: Network) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Return (weight (outputs, inputs), bias (outputs,)) of every layer."""
-    layers, place = [], 0
-    for inputs, outputs in zip(network.widths, network.widths[1:]):
-        end = place + inputs * outputs
-        layers.append((network.packed[place:end].reshape(outputs, inputs),
-                       network.packed[end:end + outputs]))
-        place = end + outputs
-    return layers
+            raise ValueError(f'{layer} does not fit its neighbours')
+        layers.append((weight, bias))
+    if own:
+        raise ValueError(f'{name} has tensors that belong to no layer')
+    return Network(layers)

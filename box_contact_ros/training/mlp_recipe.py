@@ -25,7 +25,7 @@ from ..resources import resource_path
 from ..scene.pose_sets import SETS, ContactErrors, Pairs, contact_errors
 from ..solver.contact_solver import ContactSolver
 from ..solver.mlp import ACTIVATION, DESCRIPTION, FEATURE_NAMES
-from ..solver.weights_file import load_weights, save_weights, unpacked
+from ..solver.weights_file import load_weights, save_weights
 from .ensemble import Scaling
 from .mlp_fit import SiteNetwork, evaluated, fit, point_errors, random_batches, started
 from .samples import MlpSamples, SizePair, draw_samples, mixture, scene_mixture
@@ -84,8 +84,9 @@ def train(path: Path, *, seed: int, commit: str, quick: bool = False, hidden: in
     recipe_card: dict[str, Any] = {'recipe': getdoc(scene_mixture if sizes else mixture)}
     if sizes:
         general = load_weights(resource_path('weights', 'mlp.safetensors'))
-        network = SiteNetwork(general.networks['point'].widths[1])
-        network.load(scaling.unfolded(unpacked(general.networks['point'])))
+        start = general.networks['point']
+        network = SiteNetwork(start.widths[1])
+        network.load(scaling.unfolded(start.layers))
         recipe_card['started from'] = general.card['sha256']
     else:
         network = started(hidden, torch.Generator().manual_seed(seed))

@@ -20,7 +20,7 @@ from box_contact_ros.core import (
 from box_contact_ros.resources import resource_path
 from box_contact_ros.scene.pose_sets import SETS, Pairs
 from box_contact_ros.solver.mlp import FEATURE_NAMES, UNITS_MAX, core_numbers
-from box_contact_ros.solver.weights_file import Network, load_weights, unpacked
+from box_contact_ros.solver.weights_file import Network, load_weights
 
 SHIPPED = load_weights(resource_path('weights', 'mlp.safetensors')).networks['point']
 N = 100
@@ -36,9 +36,12 @@ UNIT = (1.0, 1.0, 1.0)
 def random_network(rng: np.random.Generator, units: int) -> Network:
     """Weights of a size that leaves units about one."""
     widths = (FEATURES, units, OUTPUTS)
-    packed = np.concatenate([rng.normal(size=a * b + b) / np.sqrt(a)
-                             for a, b in zip(widths, widths[1:])])
-    return Network('point', widths, packed.astype(np.float32))
+    layers = []
+    for inputs, outputs in zip(widths, widths[1:]):
+        drawn = rng.normal(size=(inputs + 1) * outputs) / np.sqrt(inputs)
+        weight, bias = np.split(drawn.astype(np.float32), [inputs * outputs])
+        layers.append((weight.reshape(outputs, inputs), bias))
+    return Network(layers)
 
 
 NETWORKS = {'shipped': SHIPPED, 'random': random_network(np.random.default_rng(3), 20),
@@ -99,7 +102,7 @@ def reference(network: Network, normal: np.ndarray, upper: np.ndarray, lower: np
     By the words of core/mlp.hpp, in float64.
     """
     (first, bias), (last, last_bias) = ([part.astype(float) for part in layer]
-                                        for layer in unpacked(network))
+                                        for layer in network.layers)
     features, vectors = described(normal, upper, lower)
     hidden = np.maximum(features @ first.T + bias, 0.0)
     outputs = hidden @ last.T + last_bias
@@ -159,7 +162,7 @@ def test_the_answer_is_the_references(pairs: Pairs, network: Network) -> None:
 def test_the_answer_comes_from_the_features(pairs: Pairs, network: Network) -> None:
     """What training sees as features and vectors is what the forward pass uses."""
     found = stages(*pairs, names=(*NAMES, 'answer'), network=core_numbers(network))
-    (first, bias), (last, last_bias) = unpacked(network)
+    (first, bias), (last, last_bias) = network.layers
     outputs = np.maximum(found.features @ first.T + bias, 0.0) @ last.T + last_bias
     answers = (outputs[..., :POINT_OUTPUTS] * found.vectors).reshape(N, 3, 3, -1).sum(axis=(1, 3))
     largest = np.maximum(1.0, np.abs(answers).max(axis=1, keepdims=True))

@@ -12,7 +12,7 @@ from box_contact_ros.reports import accuracy
 from box_contact_ros.reports.accuracy import CLASSES
 from box_contact_ros.resources import resource_path
 from box_contact_ros.scene.pose_sets import CUBE, SETS, Pairs
-from box_contact_ros.solver.weights_file import load_weights, save_weights, unpacked
+from box_contact_ros.solver.weights_file import load_weights, save_weights
 
 SHIPPED = resource_path('weights', 'mlp.safetensors')
 
@@ -63,7 +63,7 @@ def test_points_that_were_moved_in(name: str, tmp_path: Path) -> None:
     weights = load_weights(SHIPPED)
     rng = np.random.default_rng(1)
     drawn = [(rng.normal(0.0, 30.0, weight.shape), rng.normal(0.0, 30.0, bias.shape))
-             for weight, bias in unpacked(weights.networks['point'])]
+             for weight, bias in weights.networks['point'].layers]
     save_weights(tmp_path / 'drawn.safetensors', {'point': drawn}, weights.card)
     assert accuracy.share_corrected(pairs, tmp_path / 'drawn.safetensors') > 0.05
 

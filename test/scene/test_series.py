@@ -6,7 +6,6 @@ at 1 kHz and family I of the hard cases: approaches at 100 Hz. Tests print what 
 """
 from __future__ import annotations
 
-import dataclasses
 from functools import cache
 from typing import NamedTuple
 
@@ -398,7 +397,7 @@ def test_a_rougher_network_breaks_the_law():
 
     It is still continuous and inside both boxes.
     """
-    rough = dataclasses.replace(NETWORK, packed=10.0 * NETWORK.packed)
+    rough = Network([(10.0 * weight, 10.0 * bias) for weight, bias in NETWORK.layers])
     slope, same = walked('containers', rough)
     assert slope[same].max() > 1.5 * K
 

@@ -30,7 +30,7 @@ from box_contact_ros.scene.pose_sets import (
     turns,
 )
 from box_contact_ros.solver.mlp import ACTIVATION, DESCRIPTION, UNITS_MAX, core_numbers
-from box_contact_ros.solver.weights_file import WeightsError, load_weights, save_weights, unpacked
+from box_contact_ros.solver.weights_file import WeightsError, load_weights, save_weights
 
 N = 10_000
 LANES = native.lanes
@@ -567,7 +567,7 @@ def test_missing_weights_name_the_model_that_needs_none(monkeypatch):
     def nowhere(*parts):
         raise FileNotFoundError(parts)
 
-    monkeypatch.setattr('box_contact_ros.solver.mlp.resource_path', nowhere)
+    monkeypatch.setattr('box_contact_ros.solver.weights_file.resource_path', nowhere)
     with pytest.raises(WeightsError, match="'exact'"):
         ContactSolver(UNIT, UNIT, model='mlp')
 
@@ -613,7 +613,7 @@ def test_weights_of_another_model_are_refused(tmp_path):
 def listing(path, sizes):
     """Return a copy of the shipped network whose card lists pairs of sizes."""
     shipped = load_weights(resource_path('weights', 'mlp.safetensors'))
-    save_weights(path, {'point': unpacked(shipped.networks['point'])},
+    save_weights(path, {'point': shipped.networks['point'].layers},
                  shipped.card | {'sizes': sizes})
     return str(path)
 

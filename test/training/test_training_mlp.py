@@ -20,7 +20,6 @@ from box_contact_ros.solver.weights_file import (
     WeightsError,
     load_weights,
     save_weights,
-    unpacked,
 )
 from box_contact_ros.training import mlp_fit, mlp_recipe, samples, train
 from box_contact_ros.training.ensemble import Ensemble, Scaling
@@ -122,8 +121,7 @@ def test_the_network_is_the_cores() -> None:
     """What is trained beside core/mlp.hpp, with hidden units on both sides of zero."""
     pairs = size_pairs(np.random.default_rng(6), 1000)
     module = network_of(8)
-    network = Network('point', (12, 8, 7), np.concatenate([part.ravel() for layer in module.layers()
-                                                           for part in layer]))
+    network = Network(module.layers())
     core = stages(*pairs, names=('features', 'vectors', 'slant', 'cut', 'answer', 'answer_volume',
                                  'answer_covariance'), network=core_numbers(network))
     inputs = [torch.tensor(part).movedim(0, -1) for part in (core.features, core.vectors,
@@ -513,7 +511,7 @@ def test_sizes_changed_in_place_are_looked_up_again(expert: Path) -> None:
 def test_a_card_with_bad_sizes_is_refused(expert: Path, tmp_path: Path, sizes) -> None:
     weights = load_weights(expert)
     path = tmp_path / 'bad.safetensors'
-    save_weights(path, {'point': unpacked(weights.networks['point'])},
+    save_weights(path, {'point': weights.networks['point'].layers},
                  {**weights.card, 'sizes': sizes})
     with pytest.raises(WeightsError, match='no pairs of three extents'):
         solver(path)

@@ -11,10 +11,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...resources import resource_path
 from ...solver.checks import as_size
 from ...solver.contact import Contacts, without_patch
-from ...solver.weights_file import Network, Weights, WeightsError, load_weights
+from ...solver.weights_file import WeightsError, weights_for
 from . import _networks
 from ._networks import FEATURES, INPUTS, OCTANT, OUTPUTS
 
@@ -47,8 +46,10 @@ class Paper:
     def __init__(self, size_a: np.ndarray, size_b: np.ndarray, weights: str | None) -> None:
         size = size_a[0]
         self._check_equal(size_a, size_b)
-        self.weights = self._load(size, weights)
-        networks = [self._network(name) for name in self.experts]
+        self.weights = weights_for(self.model, weights, weights_name(self.model, size),
+                                   f' for boxes of size {_text(size)}')
+        networks = [self.weights.network(name, INPUTS, OUTPUTS, self.model)
+                    for name in self.experts]
         try:
             self._size = as_size(self.weights.card['sizes'][0], 'size')[0]
         except (LookupError, TypeError, ValueError) as error:
@@ -58,25 +59,6 @@ class Paper:
         self._check_sizes(size_a, size_b)
         self._packed = np.stack([network.packed for network in networks])
         self._widths = np.array(networks[0].widths, dtype=np.int64)
-
-    def _load(self, size: np.ndarray, weights: str | None) -> Weights:
-        if weights:
-            return load_weights(weights)
-        name = f'{weights_name(self.model, size)}.safetensors'
-        try:
-            return load_weights(resource_path('weights', name))
-        except FileNotFoundError as error:
-            raise WeightsError(
-                f'model {self.model!r} has no weights for boxes of size {_text(size)}: train them, '
-                f"name a file with `weights`, or use model 'exact', which needs none") from error
-
-    def _network(self, name: str) -> Network:
-        network = self.weights.networks.get(name)
-        if network is None or (network.widths[0], network.widths[-1]) != (INPUTS, OUTPUTS):
-            raise WeightsError(
-                f'weights file {self.weights.path} has no network {name!r} with {INPUTS} inputs '
-                f'and {OUTPUTS} outputs, which model {self.model!r} needs')
-        return network
 
     def _check_equal(self, size_a: np.ndarray, size_b: np.ndarray) -> None:
         differs = np.any(np.abs(size_a - size_b) > SAME_SIZE * size_a, axis=1)
