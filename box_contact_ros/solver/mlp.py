@@ -76,25 +76,20 @@ class Mlp:
               threads: int = 1) -> tuple[Contacts, int]:
         """Return contacts for poses (n, 7), sizes (n or 1, 3), and the first refused row or −1."""
         listed = self._in_card(size_a, size_b)
-        if not listed.all():
-            rows = np.broadcast_to(listed, len(a))
-            return self._solve_partly(a, b, size_a, size_b, threads, rows)
-        *found, refused = self._pairs.solve(a, b, size_a, size_b, threads)
-        return Contacts(*found), refused
-
-    def _solve_partly(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
-                      threads: int, listed: np.ndarray) -> tuple[Contacts, int]:
-        """`solve`, by the network for rows of `listed` (n,) sizes and exactly for the others."""
-        found, refused = self._exact.solve(a, b, size_a, size_b, threads)
+        if listed.all():
+            *found, refused = self._pairs.solve(a, b, size_a, size_b, threads)
+            return Contacts(*found), refused
+        answers, refused = self._exact.solve(a, b, size_a, size_b, threads)
         if refused >= 0:
-            return found, refused
-        self._answered_exactly += int(np.count_nonzero(found.colliding & ~listed))
+            return answers, refused
+        listed = np.broadcast_to(listed, len(a))
+        self._answered_exactly += int(np.count_nonzero(answers.colliding & ~listed))
         rows = np.flatnonzero(listed)
         one, other = (size if len(size) == 1 else size[rows] for size in (size_a, size_b))
-        by_network = Contacts(*self._pairs.solve(a[rows], b[rows], one, other, threads)[:-1])
-        for all_rows, some in zip(found, by_network):
+        *by_network, _ = self._pairs.solve(a[rows], b[rows], one, other, threads)
+        for all_rows, some in zip(answers, by_network):
             all_rows[rows] = some
-        return found, refused
+        return answers, refused
 
     def _in_card(self, size_a: np.ndarray, size_b: np.ndarray) -> np.ndarray:
         """(n or 1,) whether the card lists these sizes (n or 1, 3), or any.
@@ -107,12 +102,11 @@ class Mlp:
         key = size_a.tobytes() + size_b.tobytes() if shared else b''
         if shared and key == self._looked_up[0]:
             return self._looked_up[1]
-        one, other = np.sort(size_a, axis=-1), np.sort(size_b, axis=-1)
-        listed = np.zeros(max(len(one), len(other)), dtype=np.bool_)
-        for p, q in self._listed:
-            for first, second in ((one, other), (other, one)):
-                listed |= ((abs(first - p) <= SAME_EXTENT * p).all(axis=1)
-                           & (abs(second - q) <= SAME_EXTENT * q).all(axis=1))
+        sizes = np.sort(np.stack(np.broadcast_arrays(size_a, size_b), axis=1))
+        listed = np.zeros(len(sizes), dtype=np.bool_)
+        for pair in self._listed:
+            for known in (pair, pair[::-1]):
+                listed |= (abs(sizes - known) <= SAME_EXTENT * known).all(axis=(1, 2))
         if shared:
             self._looked_up = (key, listed)
         return listed
