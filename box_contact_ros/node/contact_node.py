@@ -269,7 +269,7 @@ class ContactNode(LifecycleNode):
             return
         solver, scene = self._evaluator.solver, self._evaluator.solver.scene
         entry, _ = find_model('model', solver.model)
-        if settings.get('weights') and not entry.reads_weights:
+        if settings.get('weights') and 'weights' not in entry.takes:
             logger.warning(f'model {solver.model!r} uses no weights: '
                            f'{shown(settings["weights"])} is ignored')
         elif solver.sizes_answered_exactly:  # 0 for models that answer themselves

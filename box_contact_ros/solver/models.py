@@ -6,6 +6,7 @@ read the table. A test compares the table in docs/how-to/models.md.
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
@@ -62,15 +63,6 @@ class Family:
     most: int  # N is 1 to this
     reported: tuple[int, ...]  # the N that reports show
 
-    def parse(self, name: str, text: str) -> int:
-        """Return the N that `text` gives for the model `name`; raises ValueError for a bad one."""
-        # int() refuses thousands of digits in words of its own.
-        if (text.isascii() and text.isdecimal() and len(text) < 10
-                and 1 <= int(text) <= self.most):
-            return int(text)
-        raise ValueError(f'model {shown(f"{name}-{text}")}: the {self.argument} N of {name}-N must '
-                         f'be a whole number from 1 to {self.most}')
-
 
 @dataclass(frozen=True, kw_only=True)
 class ModelEntry:
@@ -96,11 +88,6 @@ class ModelEntry:
         return self.boxes == 'any'
 
     @property
-    def reads_weights(self) -> bool:
-        """Whether the model reads a weights file."""
-        return 'weights' in self.takes
-
-    @property
     def names(self) -> tuple[str, ...]:
         """Return the names under which users ask for it."""
         return (self.name, f'{self.name}-N') if self.family else (self.name,)
@@ -120,26 +107,29 @@ class ModelEntry:
         """Return the builder; ModuleNotFoundError, which names the extra, where it is missing."""
         module, _, function = self.builder.partition(':')
         try:
-            build: Callable[..., Model] = getattr(import_module(module), function)
+            return getattr(import_module(module), function)
         except ModuleNotFoundError as error:
             if not self.extra:
                 raise
             raise ModuleNotFoundError(
                 f'{error}: model {self.name!r} needs the extra {self.extra!r} of box_contact_ros',
                 name=error.name) from None
-        return build
 
     def options(self, name: str) -> dict[str, int] | None:
         """Return what a name says to the builder, or None for the name of another model.
 
         Raises ValueError for a bad number of a family.
         """
+        family = self.family
         if name == self.name:
-            return {self.family.argument: self.family.default} if self.family else {}
-        text = name.removeprefix(f'{self.name}-')
-        if self.family is None or text == name:
+            return {family.argument: family.default} if family else {}
+        number = name.removeprefix(f'{self.name}-')
+        if family is None or number == name:
             return None
-        return {self.family.argument: self.family.parse(self.name, text)}
+        if not re.fullmatch('[0-9]{1,9}', number) or not 1 <= int(number) <= family.most:
+            raise ValueError(f'model {shown(name)}: the {family.argument} N of {self.name}-N must '
+                             f'be a whole number from 1 to {family.most}')
+        return {family.argument: int(number)}
 
 
 SOUP_DIVISIONS, MOST_SOUP_DIVISIONS = 8, 64

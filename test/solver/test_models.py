@@ -83,7 +83,7 @@ def test_entries_say_what_their_models_do(name):
     made = ContactSolver(poses.CUBE, poses.CUBE, model=name)._solver
     assert MODELS[name].name == name and find_model('model', name)[0] is MODELS[name]
     assert (getattr(made, 'single', (None, None))[0] is not None) == MODELS[name].native_single
-    assert hasattr(made, 'weights') == MODELS[name].reads_weights
+    assert hasattr(made, 'weights') == ('weights' in MODELS[name].takes)
 
 
 def test_a_missing_library_is_named_with_its_extra(monkeypatch):
