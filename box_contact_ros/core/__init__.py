@@ -38,14 +38,13 @@ else:
                           + ', '.join(instruction_sets()))
     native = import_module(f'._{_forced or instruction_sets()[-1]}', __name__)
 
-from .stages import Stages, stages  # noqa: E402  (needs `native`)
+from .stages import Stages as Stages  # noqa: E402  (needs `native`)
+from .stages import stages as stages  # noqa: E402
 
 LENGTH_MIN, LENGTH_MAX = native.LENGTH_MIN, native.LENGTH_MAX
 """Least extent, and largest extent or coordinate, that are accepted [m]."""
 QUATERNION_MIN, QUATERNION_MAX = native.QUATERNION_MIN, native.QUATERNION_MAX
 """Least and largest norm of a quaternion that are accepted."""
-CONTACT_ULPS = native.CONTACT_ULPS
-"""Boxes touch up to so many ulp of the largest coordinate or size."""
 DEPTH_FLOOR = native.DEPTH_FLOOR
 """Least depth to which B is pressed in before the overlap is taken [of the size]."""
 ASPECT_MAX, SIZE_RATIO_MAX, DEPTH_MAX = (
@@ -55,9 +54,3 @@ CENTROID_REACH = native.CENTROID_REACH
 """Farthest that a centroid is from the middle of its bounding box [half extents]."""
 SITES, FEATURES, OUTPUTS, POINT_OUTPUTS = 9, 12, 7, 3
 """Sites at which the MLP is asked, features and outputs of each, those for the point: mlp.hpp."""
-
-__all__ = [
-    'ASPECT_MAX', 'CENTROID_REACH', 'CONTACT_ULPS', 'DEPTH_FLOOR', 'DEPTH_MAX', 'FEATURES',
-    'FORCE', 'LENGTH_MAX', 'LENGTH_MIN', 'OUTPUTS', 'POINT_OUTPUTS', 'QUATERNION_MAX',
-    'QUATERNION_MIN', 'SITES',
-    'SIZE_RATIO_MAX', 'Stages', 'instruction_sets', 'native', 'stages']
