@@ -21,13 +21,6 @@ SAME_SIZE = 1e-9
 """Relative difference of extents up to which a size is the one that the weights were made for."""
 
 
-def weights_name(model: str, size: np.ndarray) -> str:
-    """Return the name of the shipped weights of a paper model for boxes of `size` (3,) [m]."""
-    if _is_cube(size):
-        return model
-    return f'{model}-' + 'x'.join(f'{extent:g}' for extent in size)
-
-
 def _is_cube(size: np.ndarray) -> bool:
     return bool(np.ptp(size) <= SAME_SIZE * size.max())
 
@@ -44,10 +37,11 @@ class Paper:
     fold_to = OCTANT  # the way into the networks' domain
 
     def __init__(self, size_a: np.ndarray, size_b: np.ndarray, weights: str | None) -> None:
-        size = size_a[0]
         self._check_equal(size_a, size_b)
-        self.weights = weights_for(self.model, weights, weights_name(self.model, size),
-                                   f' for boxes of size {_text(size)}')
+        size = size_a[0]
+        suffix = '' if _is_cube(size) else '-' + 'x'.join(f'{extent:g}' for extent in size)
+        self.weights = weights_for(self.model, weights, shipped=self.model + suffix,
+                                   boxes=f' for boxes of size {_text(size)}')
         networks = [self.weights.network(name, INPUTS, OUTPUTS, self.model)
                     for name in self.experts]
         try:

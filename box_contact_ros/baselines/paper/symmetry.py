@@ -4,7 +4,7 @@ baselines/paper/symmetry.hpp has the formulas and the ways into a domain: NO_FOL
 """
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,8 +14,7 @@ from ._networks import EDGE_EDGE, FEATURES, NO_FOLD, OCTANT, VERTEX_FACE
 __all__ = ['EDGE_EDGE', 'FEATURES', 'Folds', 'NO_FOLD', 'OCTANT', 'VERTEX_FACE', 'fold']
 
 
-@dataclass(frozen=True, kw_only=True)
-class Folds:
+class Folds(NamedTuple):
     """n folded pairs: t' = M t, R' = M R Nᵀ."""
 
     map_first: np.ndarray  # (n, 3, 3) M, a signed permutation of the first box's axes
@@ -42,6 +41,4 @@ def fold(to: int, offset: np.ndarray, rotation: np.ndarray, *, axis: np.ndarray,
     separating-axis test: see `core.Stages`; frame: the first box's. FEATURES needs cubes, and
     raises ValueError where a face of the second box wins.
     """
-    maps = _networks.fold(to, offset, rotation, np.asarray(axis, dtype=np.int64), normal)
-    names = ('map_first', 'map_second', 'offset', 'rotation', 'angles', 'subset')
-    return Folds(**dict(zip(names, maps)))
+    return Folds(*_networks.fold(to, offset, rotation, np.asarray(axis, dtype=np.int64), normal))
