@@ -18,6 +18,8 @@ import numpy as np
 from ..solver.contact import Contacts, without_patch
 from ..solver.models import Exact
 
+Size = tuple[float, ...]  # three full extents [m], as a key of what is kept
+
 MOST_CONTACTS = 16
 """FCL's box-box makes at most eight contacts (two rectangles cut each other in an octagon)."""
 
@@ -25,23 +27,23 @@ MOST_CONTACTS = 16
 class FclModel:
     """A model that asks FCL about the pairs in contact; `exact` answers where FCL does not.
 
-    make: returns FCL's object of a box of full extents (x, y, z) [m].
+    make: returns FCL's object of a box of a size.
     """
 
-    def __init__(self, make: Callable[[tuple[float, ...]], fcl.CollisionObject]) -> None:
+    def __init__(self, make: Callable[[Size], fcl.CollisionObject]) -> None:
         self._exact = Exact()
         # A scene has few sizes. Each solver keeps objects of its own, one for A and one for B,
         # because placing moves them.
         self._object = functools.lru_cache(maxsize=64)(lambda size, box: make(size))
 
-    def place(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
+    def place(self, a: np.ndarray, b: np.ndarray, size_a: Size, size_b: Size,
               ) -> tuple[fcl.CollisionObject, fcl.CollisionObject]:
-        """Return objects of full extents (3,) at poses (7,), about A's centre; until the next call.
+        """Return objects of these sizes at poses (7,), about A's centre; until the next call.
 
         Directions are the common frame's. B − A is formed in float64 here, so that FCL adds no
         rounding far from the origin.
         """
-        first, second = self._object(tuple(size_a), 0), self._object(tuple(size_b), 1)
+        first, second = self._object(size_a, 0), self._object(size_b, 1)
         for placed, position, quaternion in ((first, np.zeros(3), a[3:]),
                                              (second, b[:3] - a[:3], b[3:])):
             x, y, z, w = quaternion / np.linalg.norm(quaternion)
@@ -54,7 +56,7 @@ class FclModel:
         exact, refused = self._exact.solve(a, b, size_a, size_b, threads)
         found = without_patch(*exact[:4])
         for row in np.flatnonzero(found.colliding) if refused < 0 else ():
-            sizes = size_a[row % len(size_a)], size_b[row % len(size_b)]
+            sizes = tuple(size_a[row % len(size_a)]), tuple(size_b[row % len(size_b)])
             answer = self.ask(*self.place(a[row], b[row], *sizes), *sizes)
             if answer is not None:
                 point, found.normal[row], depth = answer
@@ -63,8 +65,8 @@ class FclModel:
                     found.separation[row] = -depth
         return found, refused
 
-    def ask(self, first: fcl.CollisionObject, second: fcl.CollisionObject, size_a: np.ndarray,
-            size_b: np.ndarray) -> tuple[np.ndarray, np.ndarray, float | None] | None:
+    def ask(self, first: fcl.CollisionObject, second: fcl.CollisionObject, size_a: Size,
+            size_b: Size) -> tuple[np.ndarray, np.ndarray, float | None] | None:
         """Return point (3,) from A's centre, normal (3,), and the depth or None for SAT's.
 
         None: FCL has no answer.
@@ -79,8 +81,8 @@ class FclBox(FclModel):
         super().__init__(lambda size: fcl.CollisionObject(fcl.Box(*size)))
         self._request = fcl.CollisionRequest(num_max_contacts=MOST_CONTACTS, enable_contact=True)
 
-    def ask(self, first: fcl.CollisionObject, second: fcl.CollisionObject, size_a: np.ndarray,
-            size_b: np.ndarray) -> tuple[np.ndarray, np.ndarray, float | None] | None:
+    def ask(self, first: fcl.CollisionObject, second: fcl.CollisionObject, size_a: Size,
+            size_b: Size) -> tuple[np.ndarray, np.ndarray, float | None] | None:
         """Return the deepest of FCL's contacts, with its depth."""
         result = fcl.CollisionResult()
         fcl.collide(first, second, self._request, result)

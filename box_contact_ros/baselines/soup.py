@@ -25,7 +25,7 @@ from typing import NamedTuple
 import fcl
 import numpy as np
 
-from .fcl_box import FclModel
+from .fcl_box import FclModel, Size
 
 FIRST_CONTACTS = 1 << 16
 """Contacts asked for at first: two cubes exactly on top of each other make 27,400 with N = 22."""
@@ -67,13 +67,9 @@ def triangles(size: Sequence[float] | np.ndarray, divisions: int) -> np.ndarray:
     return np.concatenate(faces)
 
 
-def mesh(size: Sequence[float] | np.ndarray, divisions: int) -> Mesh:
-    """Return the soup of a box of three full extents [m]; kept, as a scene has few sizes."""
-    return _mesh(tuple(float(extent) for extent in size), divisions)
-
-
 @functools.lru_cache(maxsize=64)
-def _mesh(size: tuple[float, float, float], divisions: int) -> Mesh:
+def mesh(size: Size, divisions: int) -> Mesh:
+    """Return the soup of a box; kept, as a scene has few sizes."""
     corners = triangles(size, divisions)
     model = fcl.BVHModel()
     model.beginModel(len(corners), 3 * len(corners))
@@ -127,12 +123,8 @@ class Soup(FclModel):
         self.divisions = divisions
         self.exact_answers = 0
 
-    def __reduce__(self) -> tuple[type[Soup], tuple[int]]:
-        """Pickled without what is kept, which FCL cannot write: for pools of processes."""
-        return Soup, (self.divisions,)
-
-    def ask(self, first: fcl.CollisionObject, second: fcl.CollisionObject, size_a: np.ndarray,
-            size_b: np.ndarray) -> tuple[np.ndarray, np.ndarray, float | None] | None:
+    def ask(self, first: fcl.CollisionObject, second: fcl.CollisionObject, size_a: Size,
+            size_b: Size) -> tuple[np.ndarray, np.ndarray, float | None] | None:
         """Return the weighted mean of the contacts; the depth is SAT's."""
         answer = point_and_normal(collide(first, second), *(
             mesh(size, self.divisions).areas for size in (size_a, size_b)))
