@@ -70,8 +70,6 @@ class PointLaw:
 
     stiffness: float  # k [N/m]
     damping: float  # c [N s/m]
-    friction: float = FRICTION  # μ [1]
-    slip_speed: float = SLIP_SPEED  # v_s [m/s]
     torsion_radius: float  # r [m]
     rocking: tuple[float, float]  # dampers on roll and on pitch [N m s]
 
@@ -106,7 +104,6 @@ class PointLaw:
 
     def _of(self, touch: Touch, pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:
         """Return the wrench (6,) of one contact."""
-        result = np.zeros(6)
         normal, linear, angular = touch.normal, velocity[:3], velocity[3:]
         arm = touch.point - pose[:3]
         at_point = linear + cross(angular, arm)
@@ -114,16 +111,14 @@ class PointLaw:
         push = max(0.0, self.stiffness * touch.depth + self.damping * closing)
 
         slip = at_point - closing * normal
-        grip = self.friction * push
-        force = -push * normal - grip / max(float(slip @ slip)**0.5, self.slip_speed) * slip
+        grip = FRICTION * push
+        force = -push * normal - grip / max(float(slip @ slip)**0.5, SLIP_SPEED) * slip
 
         spin = float(angular @ normal)
         rim = self.torsion_radius * spin  # speed at the radius that stands for the patch
-        torsion = -grip * self.torsion_radius * rim / max(abs(rim), self.slip_speed)
+        torsion = -grip * self.torsion_radius * rim / max(abs(rim), SLIP_SPEED)
 
         axes = rotation_matrix(pose[3:])
         rocking = (self.rocking[0] * float(axes[:, 0] @ angular) * axes[:, 0]
                    + self.rocking[1] * float(axes[:, 1] @ angular) * axes[:, 1])
-        result[:3] = force
-        result[3:] = cross(arm, force) + torsion * normal - rocking
-        return result
+        return np.concatenate([force, cross(arm, force) + torsion * normal - rocking])
