@@ -34,6 +34,9 @@ WEIGHT_LIMIT = 1e4
 """Largest weight a loader believes: trained weights stay below 1e2, a flipped exponent bit does
 not."""
 
+Layers = list[tuple[np.ndarray, np.ndarray]]
+"""Weight (outputs, inputs) and bias (outputs,) of each layer, float32."""
+
 
 class WeightsError(ValueError):
     """A weights file that is missing, damaged, or not what its card says."""
@@ -43,8 +46,7 @@ class WeightsError(ValueError):
 class Network:
     """One perceptron."""
 
-    layers: list[tuple[np.ndarray, np.ndarray]]
-    """Weight (outputs, inputs) and bias (outputs,) of every layer, float32."""
+    layers: Layers
 
     @property
     def widths(self) -> tuple[int, ...]:
@@ -85,8 +87,7 @@ def tensors_digest(tensors: dict[str, np.ndarray]) -> str:
     return digest.hexdigest()
 
 
-def save_weights(path: Path, networks: dict[str, list[tuple[np.ndarray, np.ndarray]]],
-                 card: dict[str, Any]) -> None:
+def save_weights(path: Path, networks: dict[str, Layers], card: dict[str, Any]) -> None:
     """Write networks, each a list of (weight, bias) per layer, and their model card."""
     from safetensors.numpy import save  # only here: it is an extra
 
@@ -194,7 +195,7 @@ def _checked(tensors: dict[str, np.ndarray], metadata: dict[str, Any],
 
 def _network(name: str, tensors: dict[str, np.ndarray]) -> Network:
     own = {key: array for key, array in tensors.items() if key.split('.')[0] == name}
-    layers: list[tuple[np.ndarray, np.ndarray]] = []
+    layers: Layers = []
     while f'{name}.{len(layers)}.weight' in own:
         layer = f'{name}.{len(layers)}'
         weight, bias = own.pop(f'{layer}.weight'), own.pop(f'{layer}.bias', None)

@@ -11,8 +11,7 @@ import torch
 from torch import Tensor
 from torch.func import functional_call, stack_module_state, vmap
 
-Layers = list[tuple[np.ndarray, np.ndarray]]
-"""(weight (outputs, inputs), bias (outputs,)) of each layer, float32."""
+from ..solver.weights_file import Layers
 
 
 class Ensemble(torch.nn.Module):
