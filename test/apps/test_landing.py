@@ -176,15 +176,15 @@ def test_every_limit_counts():
 def test_progress_prints_a_line_a_change():
     """Hanging, first touch, settling, at rest: once each, whatever is between two looks."""
     scenario = scenario_of(WELL_AIMED)
-    crane, loop, lines = Crane(scenario, 200.0), ClosedLoop(scenario, 200.0), []
+    loop, lines = ClosedLoop(scenario, 200.0), []
     progress = Progress(loop.record)
     solver, = solvers(scenario, 'exact')
     assert not list(progress.lines())
     for _ in range(round(12 * 200.0)):
-        state = loop.ask(crane)
-        contact = solver(state.pose, crane.stack_pose)
+        state = loop.ask()
+        contact = solver(state.pose, loop.crane.stack_pose)
         loop.answer(state, touches_in([contact]), latency=0.0)
-        loop.step(crane)
+        loop.step()
         lines += progress.lines()
     assert [line.split(' s  ')[1].split('  ')[0] for line in lines] == list(Progress.STAGES)
     assert 'contact force   0.0 kN' in lines[0] and 'contact force 196.2 kN' in lines[-1]

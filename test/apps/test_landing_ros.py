@@ -95,8 +95,8 @@ def test_lost_ticks_are_bridged(node, client, monkeypatch):
     As in real time, the law is made for a period's latency.
     """
     crane, executor = client
-    crane.feedback._loop = crane_feedback.ClosedLoop(crane.scenario, crane.rate, latency=0.005)
-    crane.feedback.record = crane.feedback._loop.record
+    crane.feedback.loop = crane_feedback.ClosedLoop(crane.scenario, crane.rate, latency=0.005)
+    crane.crane = crane.feedback.loop.crane
     monkeypatch.setattr(crane_feedback, 'LOCKSTEP_PATIENCE', 0.01)
     monkeypatch.setattr(crane_feedback, 'LOCKSTEP_LOST_MOST', 100)  # a busy machine pauses for 1 s
     answer, count = crane.feedback.answer, 0
@@ -112,7 +112,7 @@ def test_lost_ticks_are_bridged(node, client, monkeypatch):
     crane_node.receive_while(crane, executor, crane.lower)
     result = crane.landing()
     assert count > 4000
-    assert len(crane.feedback.record.points) < 0.95 * crane.summary().result.contacts
+    assert len(crane.feedback.loop.record.points) < 0.95 * crane.summary().result.contacts
     assert result.carried and result.force_worst < 1e-3, f'\n{result}'
 
 
@@ -120,14 +120,14 @@ def test_answers_that_say_nothing_are_held_over(client, monkeypatch):
     """Rows of NaN are no answer, an empty cloud is "no contact", a contact pushes up."""
     crane, _ = client
     monkeypatch.setattr(crane_feedback, 'LOCKSTEP_PATIENCE', 0.01)
-    feedback, simulated = crane.feedback, crane_node.Crane(crane.scenario, crane.rate)
+    feedback = crane.feedback
     row = np.array([0.0, 0.0, 2.6, 0.0, 0.0, -1.0, 1e-3, 0.03, 12.0, 0.0, 0.0, 0.5, 0.0, 1e-7])
     pushes = []
     for stamp, values in enumerate((row, np.full(14, np.nan), row[:0]), start=1):
-        feedback.ask(stamp, simulated)
+        feedback.ask(stamp)
         feedback.answer(stamp, values, stamp)
-        feedback.step(stamp, simulated)
-        pushes.append(feedback.record.forces[-1][2])
+        feedback.step(stamp)
+        pushes.append(feedback.loop.record.forces[-1][2])
     assert pushes[0] > 0.0 and pushes[1] == pushes[0] and pushes[2] == 0.0
 
 
@@ -144,15 +144,15 @@ def test_a_model_without_a_patch_does_not_end_the_crane(program):
 def test_a_point_alone_pushes(client):
     """Up, by a finite force; contacts of both kinds may follow each other."""
     crane, _ = client
-    feedback, simulated = crane.feedback, crane_node.Crane(crane.scenario, crane.rate)
+    feedback = crane.feedback
     row = np.array([0.0, 0.0, 2.6, 0.0, 0.0, -1.0, 1e-3, 0.03, 12.0, 0.0, 0.0, 0.5, 0.0, 1e-7])
     alone = np.where(np.arange(14) < 7, row, np.nan)
     for stamp, values in enumerate((alone, row, alone), start=1):
-        feedback.ask(stamp, simulated)
+        feedback.ask(stamp)
         feedback.answer(stamp, values, stamp)
-        feedback.step(stamp, simulated)
-    assert np.isfinite(feedback.record.forces).all()
-    assert all(force[2] > 0.0 for force in feedback.record.forces)
+        feedback.step(stamp)
+    assert np.isfinite(feedback.loop.record.forces).all()
+    assert all(force[2] > 0.0 for force in feedback.loop.record.forces)
     assert feedback.points_alone == 2
 
 
@@ -160,9 +160,8 @@ def test_lockstep_ends_when_nobody_answers(client, monkeypatch):
     """A lost answer is waited for, within bounds, and so is a node that is gone."""
     crane, _ = client
     monkeypatch.setattr(crane_feedback, 'LOCKSTEP_PATIENCE', 0.01)
-    simulated = crane_node.Crane(crane.scenario, crane.rate)
     with pytest.raises(TimeoutError, match='no answer to 5 pairs'):
         for stamp in range(1, 7):
-            crane.feedback.ask(stamp, simulated)
-            crane.feedback.step(stamp, simulated)
+            crane.feedback.ask(stamp)
+            crane.feedback.step(stamp)
     assert stamp == 5

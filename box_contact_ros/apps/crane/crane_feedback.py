@@ -13,14 +13,14 @@ from __future__ import annotations
 
 import threading
 import time
-from collections import deque
+from queue import Empty, SimpleQueue
 
 import numpy as np
 
 from ...scene.force.patch_law import Patch
 from ..bench.answer_log import is_stale, touch_in
 from .landing import ClosedLoop, LoopState, with_patch
-from .mujoco_crane import Crane, CraneScenario
+from .mujoco_crane import CraneScenario
 
 ANSWER_SHARE = 0.8
 """Share of a tick that waits for its answer in real time; the rest is for simulating it."""
@@ -40,34 +40,28 @@ class CraneFeedback:
 
         In real time answers are lost, so the law's constants are made for a period's latency.
         """
-        self._loop = ClosedLoop(scenario, rate_hz, latency=latency if lockstep else
-                                max(latency, 1.0 / rate_hz))
-        self.record = self._loop.record
+        self.loop = ClosedLoop(scenario, rate_hz, latency=latency if lockstep else
+                               max(latency, 1.0 / rate_hz))
         self._rate_hz, self._latency, self._lockstep = rate_hz, latency, lockstep
         self._size, self._stop = scenario.size, stop
         self.points_alone = 0  # contacts whose model gave no patch
         self._asked: dict[int, LoopState] = {}
-        self._arrived: deque[tuple[int, Patch | None, int]] = deque()
-        self._news = threading.Condition()
+        self._arrived: SimpleQueue[tuple[int, Patch | None, int]] = SimpleQueue()
         self._lost_in_a_row = 0
 
-    def ask(self, stamp: int, crane: Crane) -> None:
+    def ask(self, stamp: int) -> None:
         """Note the state whose poses are about to be published under `stamp` [ns]."""
-        self._asked[stamp] = self._loop.ask(crane)
+        self._asked[stamp] = self.loop.ask()
 
     def answer(self, stamp: int, values: np.ndarray, received: int) -> None:
         """Take the first row of a `contacts` cloud, received at `received` [ns] of the same clock.
 
         No row is no contact; a row of NaN could not be evaluated, which is no answer.
         """
-        if is_stale(values):
-            return
-        touch = touch_in(values)
-        with self._news:
-            self._arrived.append((stamp, touch, received))
-            self._news.notify()
+        if not is_stale(values):
+            self._arrived.put((stamp, touch_in(values), received))
 
-    def step(self, stamp: int, crane: Crane) -> None:
+    def step(self, stamp: int) -> None:
         """Advance the tick whose poses went out under `stamp`, waiting for its answer first.
 
         Raises TimeoutError in lockstep when answers stay away altogether.
@@ -75,30 +69,25 @@ class CraneFeedback:
         patience = LOCKSTEP_PATIENCE if self._lockstep else ANSWER_SHARE / self._rate_hz
         deadline = time.monotonic() + patience
         while stamp in self._asked and not self._stop.is_set():
-            with self._news:
-                left = deadline - time.monotonic()
-                if not self._arrived and left > 0.0:
-                    self._news.wait(min(left, POLL))
-            if not self._apply() and time.monotonic() >= deadline:
-                break
+            left = deadline - time.monotonic()
+            try:
+                self._apply(*self._arrived.get(timeout=max(0.0, min(left, POLL))))
+            except Empty:
+                if left <= 0.0:
+                    break
         self._lost_in_a_row = self._lost_in_a_row + 1 if stamp in self._asked else 0
         if self._lockstep and self._lost_in_a_row >= LOCKSTEP_LOST_MOST:
             raise TimeoutError(f'no answer to {LOCKSTEP_LOST_MOST} pairs in a row, each awaited '
                                f'for {LOCKSTEP_PATIENCE:g} s')
-        self._loop.step(crane)
+        self.loop.step()
 
-    def _apply(self) -> bool:
-        """Turn what has arrived into wrenches; return whether there was anything."""
-        arrived = False
-        while self._arrived:
-            stamp, touch, received = self._arrived.popleft()
-            state = self._asked.pop(stamp, None)
-            if state is None:  # an offer's answer, or one that came twice
-                continue
-            arrived = True
-            # Answers take as long in simulated time as they really took, unless time waits.
-            took = 0.0 if self._lockstep else (received - stamp) * 1e-9
-            touches = [with_patch(touch, state.pose, self._size)] if touch else []
-            self.points_alone += bool(touch and touches[0] is not touch)
-            self._loop.answer(state, touches, latency=max(self._latency, took))
-        return arrived
+    def _apply(self, stamp: int, touch: Patch | None, received: int) -> None:
+        """Turn an answer into a wrench."""
+        state = self._asked.pop(stamp, None)
+        if state is None:  # an offer's answer, or one that came twice
+            return
+        # Answers take as long in simulated time as they really took, unless time waits.
+        took = 0.0 if self._lockstep else (received - stamp) * 1e-9
+        touches = [with_patch(touch, state.pose, self._size)] if touch else []
+        self.points_alone += bool(touch and touches[0] is not touch)
+        self.loop.answer(state, touches, latency=max(self._latency, took))

@@ -72,6 +72,8 @@ class CraneNode(Node):
         self.feedback = CraneFeedback(
             self.scenario, self.rate, latency=values['latency'], lockstep=values['lockstep'],
             stop=self.stop) if values['closed_loop'] else None
+        self.crane = (self.feedback.loop.crane if self.feedback else
+                      Crane(self.scenario, self.rate))
         self.solver = ContactSolver(self.scenario.size, self.scenario.stack_size, model='exact')
 
         self._crane_markers = self.create_publisher(MarkerArray, CRANE_MARKERS, CONTACT_QOS)
@@ -91,14 +93,14 @@ class CraneNode(Node):
 
         Matched endpoints alone do not say that the other side has matched too, or spins already.
         """
-        crane, deadline = Crane(self.scenario, self.rate), time.monotonic() + self.wait
+        deadline = time.monotonic() + self.wait
         while not self.log.offers_answered and not self.stop.is_set():
             if time.monotonic() > deadline:
                 unmatched = ', '.join(self.unmatched())
                 what = f'nobody at the other end of {unmatched}' if unmatched else 'no answer'
                 raise TimeoutError(f'{what} within {self.wait:g} s; is a contact_node running?')
             if not self.unmatched():
-                self._publish(crane, offer=True)
+                self._publish(offer=True)
             self.stop.wait(OFFER_PERIOD)
 
     def lower(self) -> None:
@@ -106,7 +108,6 @@ class CraneNode(Node):
 
         A landing ends when all that is judged was seen.
         """
-        crane = Crane(self.scenario, self.rate)
         gc.collect()
         gc.freeze()  # a full collection would hold up the poses for milliseconds
         start = time.perf_counter()
@@ -115,16 +116,16 @@ class CraneNode(Node):
             early = start + tick / self.rate - time.perf_counter() if self.in_real_time else 0.0
             if self.stop.wait(max(0.0, early)):
                 return
-            stamp = self._publish(crane)
+            stamp = self._publish()
             if tick % self._draw_every == 0:
-                self._draw(stamp, crane)
+                self._draw(stamp)
             if self.feedback is None:
-                crane.step()
+                self.crane.step()
             else:
-                self.feedback.step(stamp, crane)
+                self.feedback.step(stamp)
                 if self.feedback.points_alone:
                     self.get_logger().warning(POINTS_ALONE, once=True)
-                if self.feedback.record.watched:
+                if self.feedback.loop.record.ended:
                     break
         deadline = time.monotonic() + DRAIN
         while self.log.outstanding and time.monotonic() < deadline:
@@ -138,28 +139,28 @@ class CraneNode(Node):
 
     def landing(self) -> LandingResult | None:
         """Return how the landing went, None in an open loop."""
-        return self.feedback.record.judge() if self.feedback else None
+        return self.feedback.loop.record.judge() if self.feedback else None
 
-    def _publish(self, crane: Crane, *, offer: bool = False) -> int:
+    def _publish(self, *, offer: bool = False) -> int:
         """Publish both poses under one stamp [ns], the node's clock now; note them beforehand."""
         stamp = self._now()
-        poses = crane.load_pose, crane.stack_pose
+        poses = self.crane.load_pose, self.crane.stack_pose
         if offer:
             self.log.offers.add(stamp)
         else:
             self.log.sent_poses(stamp, *poses)
             if self.feedback:
-                self.feedback.ask(stamp, crane)
+                self.feedback.ask(stamp)
         header = make_header(stamp, self.frame_id)
         for publisher, pose in zip(self._publishers_ab, poses):
             publisher.publish(pose_message(header, pose))
         return stamp
 
-    def _draw(self, stamp: int, crane: Crane) -> None:
+    def _draw(self, stamp: int) -> None:
         """Publish ropes, and the spreader's frame between their lower ends, if anyone looks."""
         if not self._crane_markers.get_subscription_count():
             return
-        header, ropes = make_header(stamp, self.frame_id), crane.ropes
+        header, ropes = make_header(stamp, self.frame_id), self.crane.ropes
         corners = ropes[[0, 1, 3, 2], 1]  # once around
         spreader = np.stack([corners, np.roll(corners, 1, axis=0)], axis=1)
         self._crane_markers.publish(MarkerArray(markers=[
@@ -180,7 +181,7 @@ class CraneNode(Node):
 def receive_while(node: CraneNode, executor: Any, work: Callable[[], None],
                   screen: Screen | None = None) -> None:
     """Receive while `work` runs in a thread of its own; raise what it raises."""
-    progress = Progress(node.feedback.record) if node.report and node.feedback else None
+    progress = Progress(node.feedback.loop.record) if node.report and node.feedback else None
     with ThreadPoolExecutor(max_workers=1) as pool:
         future = pool.submit(work)
         try:

@@ -228,10 +228,11 @@ class LandingRecord:
     """Contact points (3,) by the tick they were asked for; none where there was no contact."""
 
     @property
-    def watched(self) -> bool:
-        """Whether all that is judged has been recorded."""
-        first = next(iter(self.points), len(self.poses))
-        return len(self.forces) - first > WATCHED * self.rate_hz
+    def ended(self) -> bool:
+        """Whether all that is judged has been recorded, or the scenario's time is over."""
+        ticks, first = len(self.forces), next(iter(self.points), len(self.poses))
+        return (ticks - first > WATCHED * self.rate_hz
+                or ticks >= round(self.scenario.duration * self.rate_hz))
 
     def corner_speeds(self, first: int = 0) -> np.ndarray:
         """Return the speed [m/s] of the fastest of the load's eight corners, per tick (n,).
@@ -361,12 +362,13 @@ class ClosedLoop:
     def __init__(self, scenario: CraneScenario, rate_hz: float, *, latency: float = 0.0,
                  law: ForceLaw | None = None) -> None:
         """Take the patch law for this load, rate and latency [s] where `law` is None."""
-        self.record = LandingRecord(scenario, rate_hz)
+        self.crane, self.record = Crane(scenario, rate_hz), LandingRecord(scenario, rate_hz)
         self._law = law or PatchLaw.for_loop(scenario.mass, scenario.inertia, rate_hz, latency)
         self._held = HeldWrench()
 
-    def ask(self, crane: Crane) -> LoopState:
+    def ask(self) -> LoopState:
         """Begin a tick; return the state whose contacts are asked for."""
+        crane = self.crane
         state = LoopState(len(self.record.poses), crane.time, crane.load_pose, crane.mass_pose,
                           crane.load_velocity)
         self.record.poses.append(state.pose)
@@ -383,10 +385,10 @@ class ClosedLoop:
         self._held.answer(self._law.wrench(touches, state.mass_pose, state.velocity),
                           asked=state.time, due=state.time + latency)
 
-    def step(self, crane: Crane) -> None:
+    def step(self) -> None:
         """End the tick: advance the crane under the wrench that is due."""
-        crane.step(self._held.at)
-        self.record.tensions.append(crane.rope_tensions)
+        self.crane.step(self._held.at)
+        self.record.tensions.append(self.crane.rope_tensions)
         self.record.forces.append(self._held.current[:3].copy())
 
 
@@ -430,19 +432,16 @@ def land(scenario: CraneScenario, sources: ContactSource | Sequence[ContactSourc
     """
     each = [sources] if callable(sources) else list(sources)
     boxes = [pose for pose, _ in scenario.stack_boxes]
-    crane = Crane(scenario, rate_hz)
     loop = ClosedLoop(scenario, rate_hz, latency=latency, law=law)
-    for _ in range(round(scenario.duration * rate_hz)):
-        state = loop.ask(crane)
+    while not loop.record.ended:
+        state = loop.ask()
         contacts = [source(state.pose, pose) for source, pose in zip(each, boxes)]
         if None not in contacts:
             try:
                 loop.answer(state, touches_in(contacts), latency=latency)
             except ValueError as error:
                 raise ValueError(f'model {getattr(each[0], "model", "unknown")}: {error}') from None
-        loop.step(crane)
-        if loop.record.watched:
-            break
+        loop.step()
     return loop.record
 
 

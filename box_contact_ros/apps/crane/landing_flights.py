@@ -29,7 +29,7 @@ from .. import processes
 from ..bench.answer_log import first_row, is_stale, touch_in
 from ..ros_client import DEEP_RELIABLE, set_pose, stamp_of
 from .landing import ClosedLoop, LandingRecord
-from .mujoco_crane import Crane, CraneScenario
+from .mujoco_crane import CraneScenario
 
 PATIENCE = 30.0  # for the node to answer [s]
 OFFER_PERIOD = 0.1  # s between the ticks that only ask whether the node answers
@@ -46,36 +46,6 @@ def scene_of(scenarios: Sequence[CraneScenario]) -> Scene:
             boxes[stack] = Box(stack, size, tuple(pose.tolist()))
             pairs.append(Pair(len(pairs), f'{load}_{stack}', load, stack))
     return Scene(boxes, tuple(pairs), pose_array=True)
-
-
-class Flight:
-    """One landing under way."""
-
-    def __init__(self, scenario: CraneScenario, rate_hz: float, latency: float) -> None:
-        self._crane = Crane(scenario, rate_hz)
-        self._loop = ClosedLoop(scenario, rate_hz, latency=latency)
-        self._latency = latency
-        self._ticks = round(scenario.duration * rate_hz)
-
-    @property
-    def record(self) -> LandingRecord:
-        """Return what happened so far."""
-        return self._loop.record
-
-    @property
-    def pose(self) -> np.ndarray:
-        """Return the pose of the load (7,)."""
-        return self._crane.load_pose
-
-    @property
-    def ended(self) -> bool:
-        """Whether all that is judged was seen."""
-        return self.record.watched or len(self.record.forces) == self._ticks
-
-    def step(self, touches: Sequence[Patch]) -> None:
-        """Advance a tick under the contacts of its pose; they act a latency later."""
-        self._loop.answer(self._loop.ask(self._crane), touches, latency=self._latency)
-        self._loop.step(self._crane)
 
 
 class FlightNode(Node):
@@ -148,17 +118,23 @@ def fly_over_dds(model: str, scenarios: Sequence[CraneScenario], latencies: Sequ
     # The discovery range has no other way in; the domain has.
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
     scene = scene_of(scenarios)
-    flights = [Flight(scenario, rate_hz, latency)
+    flights = [ClosedLoop(scenario, rate_hz, latency=latency)
                for scenario, latency in zip(scenarios, latencies)]
+
+    def poses() -> list[np.ndarray]:
+        return [flight.crane.load_pose for flight in flights]
+
     pairs_of = defaultdict(list)
     for pair in scene.pairs:
         pairs_of[scene.moving.index(pair.a)].append(pair.id)
     with answering_node(model, scene, domain), joined(FlightNode, domain=domain) as (
             node, executor):
-        node.await_node(executor, [flight.pose for flight in flights])
-        while not all(flight.ended for flight in flights):
-            found = node.contacts(executor, [flight.pose for flight in flights], PATIENCE)
-            for number, flight in enumerate(flights):
-                if not flight.ended:
-                    flight.step([found[pair] for pair in pairs_of[number] if pair in found])
+        node.await_node(executor, poses())
+        while not all(flight.record.ended for flight in flights):
+            found = node.contacts(executor, poses(), PATIENCE)
+            for number, (flight, latency) in enumerate(zip(flights, latencies)):
+                if not flight.record.ended:
+                    touches = [found[pair] for pair in pairs_of[number] if pair in found]
+                    flight.answer(flight.ask(), touches, latency=latency)
+                    flight.step()
     return [flight.record for flight in flights]

@@ -196,16 +196,14 @@ def own_contact(scenario: CraneScenario, timing: LoopTiming) -> LandingRecord:
     """Run one landing on MuJoCo's own contacts; it ends when all that is judged was seen."""
     crane = Crane(scenario, timing.rate_hz, own_contact=True)
     record = LandingRecord(scenario, timing.rate_hz)
-    for tick in range(round(scenario.duration * timing.rate_hz)):
+    while not record.ended:
         record.poses.append(crane.load_pose)
         record.velocities.append(crane.load_velocity)
         crane.step()
         record.tensions.append(crane.rope_tensions)
         record.forces.append(crane.own_contact_force)
         if record.forces[-1].any():
-            record.points[tick] = np.full(3, math.nan)
-        if record.watched:
-            break
+            record.points[len(record.forces) - 1] = np.full(3, math.nan)
     return record
 
 
