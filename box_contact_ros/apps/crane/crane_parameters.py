@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ...node.parameters import Check, Setting, flag, number, numbers, size, text, whole_number
-from .landing import LANDING_DURATION
+from .landing import LANDING_DURATION, landing_scenario
 from .mujoco_crane import LANDING_OVERLAP, LIMITS, CraneScenario
 
 STANDARD = CraneScenario()
@@ -63,6 +63,5 @@ def scenario_from(values: Mapping[str, Any]) -> CraneScenario:
     """
     given = {field: values[name] for name, field in SCENARIO.items()
              if values[name] != PARAMETERS[name].default}
-    if values['closed_loop']:
-        given = {'land': True, 'overlap': LANDING_OVERLAP, 'duration': LANDING_DURATION} | given
-    return CraneScenario.drawn(values['seed'], **given)
+    make = landing_scenario if values['closed_loop'] else CraneScenario.drawn
+    return make(values['seed'], **given)

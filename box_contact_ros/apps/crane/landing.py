@@ -70,10 +70,10 @@ def with_patch(touch: Patch, pose: np.ndarray, size: Sequence[float]) -> Patch:
                                covariance=(axes * np.square(size) / 12.0) @ axes.T)
 
 
-def landing_scenario(**fields: Any) -> CraneScenario:
-    """Return a scenario that sets the load down; `fields` are those of CraneScenario."""
-    fields = {'land': True, 'overlap': LANDING_OVERLAP, 'duration': LANDING_DURATION} | fields
-    return CraneScenario(**fields)
+def landing_scenario(seed: int = 0, **fields: Any) -> CraneScenario:
+    """Return a scenario that sets the load down: `CraneScenario.drawn` with further fields."""
+    landing = {'land': True, 'overlap': LANDING_OVERLAP, 'duration': LANDING_DURATION}
+    return CraneScenario.drawn(seed, **landing | fields)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -447,9 +447,7 @@ def land(scenario: CraneScenario, sources: ContactSource | Sequence[ContactSourc
 
 def _steps(points: np.ndarray) -> np.ndarray:
     """Return |Δpoint| [m] to the row before (n,), NaN where one of the two is missing."""
-    steps = np.full(len(points), math.nan)
-    steps[1:] = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    return steps
+    return np.linalg.norm(np.diff(points, axis=0, prepend=math.nan), axis=1)
 
 
 def _largest(values: np.ndarray) -> float:

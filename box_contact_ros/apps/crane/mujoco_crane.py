@@ -60,8 +60,8 @@ TRIM_SHARES = (0.40, 0.70)
 """Shares of the duration between which the start tilt is trimmed out. It begins after the first
 touch: the load touches with a corner or an edge, and ends on a face."""
 
-LANDING_SHARES = {'hang': 0.05, 'lower': 0.45}
-"""Phases of the hoist of a landing as shares of the duration, in order; then it stays down."""
+LANDING_SHARES = HOIST_SHARES | {'lower': 0.45, 'stay': math.inf}
+"""The same of a landing, which never lifts."""
 
 LANDING_OVERLAP = 0.8
 """Overlap for a landing, m: how far the ropes are paid out beyond a load at rest on the stack. Half
@@ -156,39 +156,43 @@ class CraneScenario:
         return self.mass / 12.0 * (squares.sum() - squares)
 
     @property
+    def stack_pose(self) -> np.ndarray:
+        """Return the pose of the stack's centre (7,)."""
+        return np.array([*self.drop_position, 0.5 * self.stack_size[2], 0.0, 0.0, 0.0, 1.0])
+
+    @property
     def stack_boxes(self) -> list[tuple[np.ndarray, tuple[float, float, float]]]:
         """Return the boxes that the load may meet: pose (7,) and full extents [m] of each."""
-        top = np.array([*self.drop_position, self.stack_size[2], 0.0, 0.0, 0.0, 1.0])
-        size = CASTING if self.castings else self.stack_size
-        corners = _CORNERS if self.castings else np.zeros((1, 2))
-        inset = 0.5 * (np.array(self.stack_size) - size)
+        if not self.castings:
+            return [(self.stack_pose, self.stack_size)]
+        inset = 0.5 * (np.array(self.stack_size) - CASTING)[:2]
         boxes = []
-        for corner in corners:
-            pose = top.copy()
-            pose[:3] += [*(corner * inset[:2]), -0.5 * size[2]]
-            boxes.append((pose, size))
+        for corner in _CORNERS:
+            pose = self.stack_pose
+            pose[:2] += corner * inset
+            pose[2] = self.stack_size[2] - 0.5 * CASTING[2]
+            boxes.append((pose, CASTING))
         return boxes
 
     @property
-    def lowering_distance(self) -> float:
-        """How far the hoist lowers the load, m; its mean speed is half the top speed."""
-        shares = LANDING_SHARES if self.land else HOIST_SHARES
-        return 0.5 * self.lowering_speed * shares['lower'] * self.duration
+    def _hoist_shares(self) -> dict[str, float]:
+        return LANDING_SHARES if self.land else HOIST_SHARES
+
+    def _travel(self, phase: str) -> float:
+        """Return how far the hoist goes in a phase, m; its mean speed is half the top speed."""
+        return 0.5 * self.lowering_speed * self._hoist_shares[phase] * self.duration
 
     @property
-    def lifting_distance(self) -> float:
-        """How far the hoist lifts the load at the end, m."""
-        return 0.5 * self.lowering_speed * HOIST_SHARES['lift'] * self.duration
+    def lowering_distance(self) -> float:
+        """How far the hoist lowers the load, m."""
+        return self._travel('lower')
 
     def hoist_height(self, time: float) -> float:
         """Return the height [m] of the load, level and at rest, over its lowest place."""
-        if self.land:
-            hang, lower = (share * self.duration for share in LANDING_SHARES.values())
-            return self.lowering_distance * (1.0 - _ramp((time - hang) / lower))
-        hang, lower, stay, lift = (share * self.duration for share in HOIST_SHARES.values())
+        hang, lower, stay, lift = (share * self.duration for share in self._hoist_shares.values())
         down = _ramp((time - hang) / lower)
         up = _ramp((time - hang - lower - stay) / lift)
-        return self.lowering_distance * (1.0 - down) + self.lifting_distance * up
+        return self._travel('lower') * (1.0 - down) + self._travel('lift') * up
 
     def trim(self, time: float) -> float:
         """Return the share of the start tilt that the ropes still hold, 1 down to 0."""
@@ -217,10 +221,7 @@ class Crane:
         self._model.opt.timestep = 1.0 / (rate_hz * self._substeps)
         self._data = mujoco.MjData(self._model)
         self._load = self._model.body('load').id
-        self._stack_pose = _pose(
-            self._model.body('stack').pos.copy(), self._model.body('stack').quat.copy()
-        )
-        self._trims = self._start()
+        self._start()
 
     @property
     def time(self) -> float:
@@ -230,12 +231,12 @@ class Crane:
     @property
     def load_pose(self) -> np.ndarray:
         """Pose of the load's centre in the world frame, float64 (7,): x y z qx qy qz qw."""
-        return _pose(self._data.qpos[:3], self._data.qpos[3:])
+        return self._data.qpos[[0, 1, 2, 4, 5, 6, 3]]  # MuJoCo's quaternions are w x y z
 
     @property
     def stack_pose(self) -> np.ndarray:
         """Pose of the stack's centre in the world frame, float64 (7,): x y z qx qy qz qw."""
-        return self._stack_pose.copy()
+        return self.scenario.stack_pose
 
     @property
     def load_velocity(self) -> np.ndarray:
@@ -301,8 +302,8 @@ class Crane:
         offset = self.scenario.mass_offset
         return rotation_matrix(self.load_pose[3:]) @ offset if any(offset) else np.zeros(3)
 
-    def _start(self) -> np.ndarray:
-        """Put the load at its start and return each rope's extra length (4,) that holds its tilt.
+    def _start(self) -> None:
+        """Put the load at its start, and note each rope's extra length (4,) that holds its tilt.
 
         Ropes whose spacing is `rope_spread` at the trolley turn the load by (1 - rope_spread) of
         the angle they sway by. That rule is exact for spreads 0 and 1 and of first order between;
@@ -321,7 +322,7 @@ class Crane:
         self._put(level, tilt)
         lengths = self._data.ten_length.copy()
         self._put(level, _rotation('z', yaw))
-        trims = lengths - self._data.ten_length
+        self._trims = lengths - self._data.ten_length
 
         # In the frame where x is the heading, the sway is a rotation about -y.
         sway = _rotation('z', heading) @ _rotation('y', -(1.0 - scenario.rope_spread) * angle)
@@ -331,13 +332,11 @@ class Crane:
              -math.cos(angle)]
         )
         centre = trolley + aside - sway @ half_height
-        self._trims = trims
         self._set_ropes(scenario.lowering_distance, 1.0)
         for _ in range(4):  # Newton on a nearly linear function: the rope's slope in z is near 1
             self._put(centre, sway @ tilt)
             centre[2] += np.max(self._data.ten_length - self._model.tendon_range[:, 1])
         self._put(centre, sway @ tilt)
-        return trims
 
     def _put(self, centre: np.ndarray, rotation: np.ndarray) -> None:
         """Place the load at rest, its centre in the world frame, and update all derived values."""
@@ -369,17 +368,12 @@ def _rotation(axis: str, angle: float) -> np.ndarray:
     return rotation
 
 
-def _pose(position: np.ndarray, quaternion_wxyz: np.ndarray) -> np.ndarray:
-    """Return a pose of MuJoCo's position and w x y z quaternion."""
-    return np.concatenate([position, quaternion_wxyz[1:], quaternion_wxyz[:1]])
-
-
 def _build(scenario: CraneScenario, own_contact: bool) -> mujoco.MjModel:
     """Return the scenario as a MuJoCo model: static trolley and stack, free load, four ropes."""
     half, stack_half = np.array(scenario.size) / 2.0, np.array(scenario.stack_size) / 2.0
     contact = {'contype': int(own_contact), 'conaffinity': int(own_contact),
                'friction': FRICTION_OF_OWN_CONTACT, 'type': mujoco.mjtGeom.mjGEOM_BOX}
-    stack_centre = np.array([*scenario.drop_position, stack_half[2]])
+    stack_centre = scenario.stack_pose[:3]
     lowest_top = 2.0 * stack_half[2] - scenario.overlap + 2.0 * half[2]
     above = stack_centre[:2] + scenario.offset
 
