@@ -8,6 +8,7 @@ one: that must not count as a loss. Stamps are nanoseconds; lengths metres, late
 """
 from __future__ import annotations
 
+import math
 import threading
 from collections import OrderedDict, deque
 from dataclasses import dataclass, replace
@@ -26,6 +27,7 @@ from .style import STALE, patch_axes
 WINDOW = 2.0  # figures are those of the answers to the poses of the last so many seconds
 LOST_AFTER = NANOSECONDS
 """A tick without an answer is lost once a tick that is so much newer [ns] has come."""
+ANSWERED = -math.inf  # in place of the number of a tick's poses: however many come, none is lost
 KEPT = 20_000  # answers kept at most, whatever their stamps: `WINDOW` at 10 kHz
 
 
@@ -188,22 +190,18 @@ class ViewLog:
         self.scene = SceneArrays(scene)
         self._tolerance = (round(tolerance * NANOSECONDS) if pairing == 'stamp'
                            else WINDOW * NANOSECONDS)
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()
         self.start_anew()
 
     def start_anew(self) -> None:
         """Forget everything: another run begins."""
         with self._lock:
-            self._forget()
-
-    def _forget(self) -> None:
-        self._tracks: dict[str, deque[tuple[int, np.ndarray]]] = {
-            name: deque() for name in self.scene.moving}
-        self._newest = self._frame_id = None
-        self._counts: OrderedDict[int, int] = OrderedDict()  # poses by stamp, not answered yet
-        self._early: OrderedDict[int, None] = OrderedDict()  # stamps answered before their poses
-        self._answers: deque[AnsweredTick] = deque(maxlen=KEPT)
-        self._answered = self._lost = 0
+            self._tracks: dict[str, deque[tuple[int, np.ndarray]]] = {
+                name: deque() for name in self.scene.moving}
+            self._newest = self._frame_id = None
+            self._counts: OrderedDict[int, float] = OrderedDict()  # poses by stamp, or ANSWERED
+            self._answers: deque[AnsweredTick] = deque(maxlen=KEPT)
+            self._answered = self._lost = 0
 
     def pose(self, box: str, stamp: int, numbers: np.ndarray, frame_id: str = '') -> None:
         """Take where a moving box is: numbers (7,)."""
@@ -212,7 +210,7 @@ class ViewLog:
             if track is None:  # it was of the scene before this one
                 return
             if track and stamp < track[-1][0] - RESET:
-                self._forget()
+                self.start_anew()
                 track = self._tracks[box]
             track.append((stamp, numbers))
             while stamp - track[0][0] > WINDOW * NANOSECONDS:
@@ -220,8 +218,7 @@ class ViewLog:
             if self._newest is None or stamp > self._newest:
                 self._newest, self._frame_id = stamp, frame_id
                 self._give_up(stamp)
-            if stamp not in self._early:
-                self._counts[stamp] = self._counts.get(stamp, 0) + 1
+            self._counts[stamp] = self._counts.get(stamp, 0) + 1
 
     def cloud(self, stamp: int, rows: np.ndarray, received: int, frame_id: str = '') -> None:
         """Take the rows (messages.CLOUD_ROW) of a `contacts` cloud, received at this time [ns].
@@ -236,10 +233,8 @@ class ViewLog:
                                   'has not: not drawn') from error
         stale = np.isnan(rows['depth'])
         with self._lock:
-            if self._answers:
-                self._answers[-1] = self._with_poses(self._answers[-1])
-            if self._counts.pop(stamp, 0) < len(self.scene.moving):
-                self._early[stamp] = None
+            self._last_answer()
+            self._counts[stamp] = ANSWERED
             if not self._answered:
                 self._first = stamp
             self._answered += 1
@@ -247,10 +242,14 @@ class ViewLog:
                 self.scene, stamp, received, frame_id, rows[~stale], pairs[~stale], pairs[stale],
                 *self._poses_at(stamp), self._tolerance))
 
-    def _with_poses(self, answer: AnsweredTick) -> AnsweredTick:
-        """Return an answer with its poses as they are known now: they may come after the cloud."""
+    def _last_answer(self) -> AnsweredTick | None:
+        """Give the last answer its poses as they are known now: they may come after the cloud."""
+        if not self._answers:
+            return None
+        answer = self._answers.pop()
         poses, stamps = self._poses_at(answer.stamp)
-        return replace(answer, poses=poses, stamps=stamps)
+        self._answers.append(replace(answer, poses=poses, stamps=stamps))
+        return self._answers[-1]
 
     def _poses_at(self, stamp: int) -> tuple[np.ndarray, np.ndarray]:
         """Return the last pose (n, 7) of each box up to a stamp, and their stamps (n,)."""
@@ -271,8 +270,6 @@ class ViewLog:
             # Before the first answer nobody need have been there.
             self._lost += bool(count >= len(self.scene.moving) and self._answered
                                and stamp > self._first)
-        while self._early and now - next(iter(self._early)) > LOST_AFTER:
-            self._early.popitem(last=False)
         while self._answers and now - self._answers[0].stamp > WINDOW * NANOSECONDS:
             self._answers.popleft()
 
@@ -282,17 +279,15 @@ class ViewLog:
             if self._newest is None:
                 return None
             newest, frame_id = self._newest, self._frame_id
-            answer = self._answers[-1] if self._answers else None
+            answer = self._last_answer()
             if answer is not None and newest - answer.stamp <= STALE:
-                answer = self._answers[-1] = self._with_poses(answer)
                 return Snapshot(self.scene, answer.stamp, answer.frame_id, answer.poses, answer)
             return Snapshot(self.scene, newest, frame_id, self._poses_at(newest)[0], None)
 
     def figures(self, now: int) -> ViewFigures:
         """Return the figures as things stand at this time [ns], of the clock of `cloud`."""
         with self._lock:
-            if self._answers:
-                self._answers[-1] = self._with_poses(self._answers[-1])
+            self._last_answer()
             answers, answered, lost = list(self._answers), self._answered, self._lost
         median, p99 = percentiles(np.array([answer.latency for answer in answers]), 50, 99)
         errors = np.concatenate([np.zeros(0), *(answer.point_errors for answer in answers)])
