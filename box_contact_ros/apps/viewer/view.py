@@ -21,7 +21,7 @@ import threading
 import time
 import webbrowser
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -188,12 +188,9 @@ def replay(options: argparse.Namespace, stop: Stop) -> None:
     from ..recording.bag_player import BagPlayer  # only here: rosbags is an extra
 
     player = BagPlayer(options.replay)
-    page = Page(options.host, options.port)
-    try:
+    with closing(Page(options.host, options.port)) as page:
         announce(page, options, 'a recording')
         watch(player, page, player, queue.SimpleQueue(), stop)
-    finally:
-        page.close()
 
 
 def announce(page: Page, options: argparse.Namespace, what: str) -> None:
@@ -206,36 +203,25 @@ def announce(page: Page, options: argparse.Namespace, what: str) -> None:
 def serve(options: argparse.Namespace, args: Sequence[str], stop: Stop) -> None:
     """Serve the page until `stop` is set; RuntimeError if a program that was started ends."""
     wishes: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+    started: Programs | None = None
     run = (None if options.attach or options.scene else
            CraneRun(options.seed, options.rate, not options.open_loop))
     scene = read_scene(options.scene) if options.scene else None
-    page: Page | None = None
-    started: Programs | None = None
-
-    def land(wish: CraneRun) -> None:
-        if isinstance(started, Simulation):
-            started.land(wish)
-
-    try:
-        with listening(options.node, scene, args) as node:
-            if run is not None:
-                started = Simulation(options.model, run)
-            elif not options.attach:
-                started = Programs(
-                    contact_node=program('contact_node', model=options.model, scene=options.scene),
-                    scene_driver=['-m', scene_driver.__name__, '--scene', options.scene, '--rate',
-                                  str(options.rate)])
-            page = Page(options.host, options.port, run=run,
-                        on_model=lambda name: wishes.put(partial(node.set_model, name)),
-                        on_land=lambda wish: wishes.put(partial(land, wish)))
-            announce(page, options, 'the domain of this shell' if options.domain is None else
-                     f'ROS_DOMAIN_ID={options.domain} for ros2 and RViz')
-            watch(node, page, started, wishes, stop)
-    finally:
-        if started is not None:
-            started.close()
-        if page is not None:
-            page.close()
+    with ExitStack() as ending, listening(options.node, scene, args) as node:
+        if run is not None:
+            started = ending.enter_context(closing(Simulation(options.model, run)))
+        elif not options.attach:
+            started = ending.enter_context(closing(Programs(
+                contact_node=program('contact_node', model=options.model, scene=options.scene),
+                scene_driver=['-m', scene_driver.__name__, '--scene', options.scene, '--rate',
+                              str(options.rate)])))
+        page = ending.enter_context(closing(Page(
+            options.host, options.port, run=run,
+            on_model=lambda name: wishes.put(partial(node.set_model, name)),
+            on_land=lambda wish: wishes.put(partial(started.land, wish)))))
+        announce(page, options, 'the domain of this shell' if options.domain is None else
+                 f'ROS_DOMAIN_ID={options.domain} for ros2 and RViz')
+        watch(node, page, started, wishes, stop)
 
 
 def _has_display() -> bool:
