@@ -15,7 +15,6 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import nullcontext
 from functools import partial
 from typing import Any
 
@@ -199,13 +198,6 @@ def receive_while(node: CraneNode, executor: Any, work: Callable[[], None],
     future.result()
 
 
-def fly(node: CraneNode, executor: Any, screen: Screen | None = None) -> None:
-    """Run the whole motion, as soon as somebody answers."""
-    receive_while(node, executor, node.await_answers)
-    with screen or nullcontext():
-        receive_while(node, executor, node.lower, screen)
-
-
 def main(args: Sequence[str] | None = None) -> int:
     """Run the crane once; 0 only if contacts came through, none was lost, and the stack carries."""
     answer_help('crane', __doc__, PARAMETERS, args)
@@ -213,7 +205,9 @@ def main(args: Sequence[str] | None = None) -> int:
     try:
         with joined(CraneNode, args, signals=SignalHandlerOptions.ALL) as (node, executor):
             screen = Screen('the crane moves', node.scenario.duration)
-            fly(node, executor, screen)
+            receive_while(node, executor, node.await_answers)
+            with screen:
+                receive_while(node, executor, node.lower, screen)
     except KeyboardInterrupt:
         signalled = 130  # 128 + SIGINT, as shells report it
     except ExternalShutdownException:
