@@ -346,7 +346,7 @@ def test_the_ellipse_of_a_rectangle(turn):
     for found, wanted in zip(semi_axes[0], (longer, shorter), strict=True):
         assert found * np.sign(found @ wanted) == pytest.approx(wanted, abs=1e-12)
     assert patch_areas(semi_axes) == pytest.approx(length * width)
-    line = patch_outlines(semi_axes)[0] @ turned  # in the boxes' frame
+    line = patch_outlines(np.zeros((1, 3)), semi_axes)[0] @ turned  # in the boxes' frame
     assert np.abs(line).max(axis=0) == pytest.approx([width / 2, length / 2, 0.0], abs=1e-12)
     assert (line[:, 0] / width)**2 + (line[:, 1] / length)**2 == pytest.approx(0.25)
     assert line[0] == pytest.approx(line[-1])

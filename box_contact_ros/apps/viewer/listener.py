@@ -38,6 +38,13 @@ OF_SCENE = ASKED[:-1]
 """With another value of one of these, what came before is forgotten."""
 
 
+def named_scene(settings: Mapping[str, Any]) -> Scene:
+    """Return the scene of a node's parameters: that of its file, or of its two sizes."""
+    if settings['scene']:
+        return read_scene(settings['scene'])
+    return two_boxes(settings['size_a'], settings['size_b'])
+
+
 class Listener(Node):
     """Writes what it hears to `log`; what the contact node refuses or another scene sends, drops.
 
@@ -151,13 +158,7 @@ class ViewNode(Listener):
         old, self.settings = self.settings, settings
         if any(str(settings[name]) != str(old.get(name)) for name in OF_SCENE):
             try:
-                self.listen_to(self._scene or self._named_scene(), pairing=settings['pairing'],
+                self.listen_to(self._scene or named_scene(settings), pairing=settings['pairing'],
                                tolerance=float(settings['tolerance']))
             except SceneError as error:
                 self.refusal = f'{error} (--scene names the scene)'
-
-    def _named_scene(self) -> Scene:
-        """Return the scene of the contact node's parameters."""
-        if self.settings['scene']:
-            return read_scene(self.settings['scene'])
-        return two_boxes(self.settings['size_a'], self.settings['size_b'])

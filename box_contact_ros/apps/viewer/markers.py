@@ -19,11 +19,9 @@ from visualization_msgs.msg import Marker, MarkerArray
 from ...node.messages import NANOSECONDS, make_header
 from ...node.parameters import CheckedParameters, Setting, answer_help, number, size, text
 from ...node.runtime import CONTACT_QOS, run_node
-from ...scene.files.scene_file import read_scene
 from ...scene.pose_sets import CONTAINER
-from ...scene.scene_solver import two_boxes
 from ..ros_client import line_marker, make_marker, set_pose
-from .listener import Listener
+from .listener import Listener, named_scene
 from .style import (
     BOX_A,
     BOX_B,
@@ -36,6 +34,7 @@ from .style import (
     TEXT_HEIGHT,
     Colour,
     patch_outlines,
+    sides,
     unit_poses,
 )
 from .view_log import AnsweredTick, Snapshot
@@ -95,12 +94,9 @@ def _contacts(header: Header, answer: AnsweredTick) -> Iterator[Marker]:
             depth.scale.z = TEXT_HEIGHT * float(edges[row])
             depth.text = f'depth {1e3 * answer.contacts["depth"][row]:.2f} mm'
             yield depth
-    outlines = answer.points[:, None] + patch_outlines(answer.semi_axes)
-    outlines = outlines[~np.isnan(outlines[:, 0, 0])]
+    outlines = patch_outlines(answer.points, answer.semi_axes)
     if len(outlines):
-        lines = np.stack([outlines[:, :-1], outlines[:, 1:]], axis=2)
-        yield line_marker(header, 'patches', lines, width=0.5 * radii[0],
-                          colour=CONTACT)
+        yield line_marker(header, 'patches', sides(outlines), width=0.5 * radii[0], colour=CONTACT)
 
 
 def _set(xyz: Any, values: Sequence[float] | np.ndarray) -> Any:
@@ -124,8 +120,7 @@ class MarkersNode(Listener):
 
     def _apply(self, settings: dict[str, Any], names: Collection[str]) -> None:
         if not {'scene', 'size_a', 'size_b'}.isdisjoint(names):
-            self.listen_to(read_scene(settings['scene']) if settings['scene'] else
-                           two_boxes(settings['size_a'], settings['size_b']))
+            self.listen_to(named_scene(settings))
         self._timer.timer_period_ns = round(NANOSECONDS / settings['rate'])
         self._changed = True
 

@@ -51,9 +51,18 @@ def patch_areas(semi_axes: np.ndarray) -> np.ndarray:
     return areas
 
 
-def patch_outlines(semi_axes: np.ndarray) -> np.ndarray:
-    """Return points (k, 49, 3) [m] once around, from the patch's point; the last is the first."""
-    return np.stack([np.cos(_CIRCLE), np.sin(_CIRCLE)], axis=1) @ semi_axes
+def patch_outlines(points: np.ndarray, semi_axes: np.ndarray) -> np.ndarray:
+    """Return points (m, 49, 3) [m] once around each patch; the last is the first.
+
+    points: (k, 3) of the contacts; those without a patch are left out.
+    """
+    outlines = points[:, None] + np.stack([np.cos(_CIRCLE), np.sin(_CIRCLE)], axis=1) @ semi_axes
+    return outlines[~np.isnan(outlines[:, 0, 0])]
+
+
+def sides(outlines: np.ndarray) -> np.ndarray:
+    """Return the ends (n, 2, 3) of the straight lines of outlines."""
+    return np.stack([outlines[:, :-1], outlines[:, 1:]], axis=2).reshape(-1, 2, 3)
 
 
 def unit_poses(poses: np.ndarray) -> np.ndarray:

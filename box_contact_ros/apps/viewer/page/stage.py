@@ -25,6 +25,7 @@ from ..style import (
     ROPE,
     STALE_BOX,
     patch_outlines,
+    sides,
     unit_poses,
 )
 from ..view_log import AnsweredTick, SceneArrays, Snapshot
@@ -173,10 +174,8 @@ class Stage:
         normals = answer.normals
         self._points.points = points
         self._normals.points = np.stack([points, points + self._normal_length * normals], axis=1)
-        outlines = points[:, None] + patch_outlines(answer.semi_axes)
-        outlines = outlines[~np.isnan(outlines[:, 0, 0])]
-        _show(self._outlines, points=np.stack([outlines[:, :-1], outlines[:, 1:]], axis=2).reshape(
-            -1, 2, 3))
+        outlines = patch_outlines(points, answer.semi_axes)
+        _show(self._outlines, points=sides(outlines))
         self._patches.visible = len(outlines) > 0
         if len(outlines):
             self._patches.vertices = outlines.reshape(-1, 3)
