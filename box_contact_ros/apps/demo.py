@@ -34,7 +34,6 @@ DOMAIN_VARIABLE = 'BOX_CONTACT_DEMO_DOMAIN'
 TIME_LIMIT = 60.0 - END_PATIENCE  # s: a demo ends within a minute, whatever happens
 OVERHEAD = 8.0  # s of it for starting, for the last answers and for the summary
 LANDING_LEAST = 22.0  # s: a shorter landing ends before it can be judged
-LANDING_MODEL = 'mlp'  # the closed loop's default: it needs volume and covariance
 
 NEXT = """
 Next:
@@ -57,9 +56,9 @@ def _python() -> str:
 def main(args: Sequence[str] | None = None) -> int:
     """Run the demonstration and return the crane's exit status."""
     options = _options(args)
-    env = os.environ | on_this_host(options.domain)
+    os.environ |= on_this_host(options.domain)
     sizes = {'size_a': CONTAINER, 'size_b': CONTAINER}
-    node = program('contact_node', **sizes, **({'model': options.model} if options.model else {}))
+    node = program('contact_node', **sizes, model=options.model)
     crane = program('crane', **sizes, duration=options.duration, rate=options.rate, report=True,
                     wait=TIME_LIMIT - OVERHEAD - options.duration, closed_loop=options.closed_loop)
     what = ('sets one container down on another' if options.closed_loop
@@ -70,14 +69,13 @@ def main(args: Sequence[str] | None = None) -> int:
           f'their own, in domain {options.domain} on this host.', flush=True)
     deadline = time.monotonic() + TIME_LIMIT
     started: list[subprocess.Popen[bytes]] = []
-    with tempfile.TemporaryFile() as node_output:
-        with asked_to_end() as stop:
-            try:
-                for command, output in ((node, node_output), (crane, None)):
-                    started.append(processes.start(command, output, env))
-                status = _watch(started[0], started[1], deadline, stop)
-            finally:
-                processes.end(started)
+    with tempfile.TemporaryFile() as node_output, asked_to_end() as stop:
+        try:
+            for command, output in ((node, node_output), (crane, None)):
+                started.append(processes.start(command, output))
+            status = _watch(started[0], started[1], deadline, stop)
+        finally:
+            processes.end(started)
         if stop.is_set():
             return stop.status
         if status:
@@ -101,8 +99,8 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
                              'comes to rest')
     parser.add_argument('--open-loop', dest='closed_loop', action='store_false',
                         help='only record the contacts')
-    parser.add_argument('--model', help="the node's model of the contact point (default: closed "
-                                        f"loop {LANDING_MODEL}, open loop the node's own)")
+    parser.add_argument('--model', default='mlp', help="the node's model of the contact point; the "
+                        'closed loop needs one with volume and covariance (default: %(default)s)')
     parser.add_argument('--rate', type=within(1.0, 2000.0), default=200.0, metavar='HZ',
                         help='pairs of poses a second (default: %(default)g)')
     open_loop = CraneScenario().duration
@@ -113,8 +111,6 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
     options = parser.parse_args(args)
     if options.duration is None:
         options.duration = LANDING_DURATION if options.closed_loop else open_loop
-    if options.model is None and options.closed_loop:
-        options.model = LANDING_MODEL
     least = LANDING_LEAST if options.closed_loop else 1.0
     if not least <= options.duration <= 40.0:
         parser.error(f'--duration must lie in {least:g} to 40 s, got {options.duration:g}')

@@ -12,7 +12,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import IO, Any
 
 from ..solver.arguments import within
@@ -52,11 +52,10 @@ def program(name: str, **values: object) -> list[str]:
 
 
 def start(arguments: Sequence[str], output: IO[bytes] | int | None = subprocess.DEVNULL,
-          env: Mapping[str, str] | None = None) -> subprocess.Popen[bytes]:
+          ) -> subprocess.Popen[bytes]:
     """Start Python in a process group of its own; `output` None passes its output on."""
-    return subprocess.Popen([sys.executable, *arguments], env=env, stdin=subprocess.DEVNULL,
-                            stdout=output, stderr=subprocess.STDOUT if output else None,
-                            start_new_session=True)
+    return subprocess.Popen([sys.executable, *arguments], stdin=subprocess.DEVNULL, stdout=output,
+                            stderr=subprocess.STDOUT if output else None, start_new_session=True)
 
 
 def printed(output: IO[bytes]) -> str:

@@ -109,7 +109,7 @@ def interrupted_once() -> Iterator[Callable[[], None]]:
 
 @contextlib.contextmanager
 def joined(make_node: Callable[[Context], NodeKind], args: Sequence[str] | None = None, *,
-           domain: int | None = None, signals: SignalHandlerOptions = SignalHandlerOptions.NO,
+           signals: SignalHandlerOptions = SignalHandlerOptions.NO,
            ) -> Iterator[tuple[NodeKind, Any]]:
     """Give a node and its executor in a context of their own; end all three afterwards.
 
@@ -120,7 +120,7 @@ def joined(make_node: Callable[[Context], NodeKind], args: Sequence[str] | None 
     node = executor = None
     with interrupted_once() as begin_end:
         # Handlers have to be asked for where the context is not the default one.
-        rclpy.init(args=None if args is None else list(args), context=context, domain_id=domain,
+        rclpy.init(args=None if args is None else list(args), context=context,
                    signal_handler_options=signals)
         try:
             node = make_node(context)

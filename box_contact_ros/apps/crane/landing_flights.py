@@ -96,13 +96,12 @@ class FlightNode(Node):
 
 
 @contextmanager
-def answering_node(model: str, scene: Scene, domain: int) -> Iterator[None]:
-    """Run a contact node for a scene in a ROS domain on this host."""
+def answering_node(model: str, scene: Scene) -> Iterator[None]:
+    """Run a contact node for a scene."""
     with tempfile.NamedTemporaryFile('w', suffix='.yaml') as file:
         write_scene(scene, file.name)
         node = processes.start(
-            processes.program('contact_node', model=model, scene=file.name, pair_topics=False),
-            env=os.environ | processes.on_this_host(domain))
+            processes.program('contact_node', model=model, scene=file.name, pair_topics=False))
         try:
             yield
         finally:
@@ -115,8 +114,7 @@ def fly_over_dds(model: str, scenarios: Sequence[CraneScenario], latencies: Sequ
 
     Raises TimeoutError where an answer does not come, RuntimeError where one lacks a pair.
     """
-    # The discovery range has no other way in; the domain has.
-    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+    os.environ |= processes.on_this_host(domain)
     scene = scene_of(scenarios)
     flights = [ClosedLoop(scenario, rate_hz, latency=latency)
                for scenario, latency in zip(scenarios, latencies)]
@@ -127,8 +125,7 @@ def fly_over_dds(model: str, scenarios: Sequence[CraneScenario], latencies: Sequ
     pairs_of = defaultdict(list)
     for pair in scene.pairs:
         pairs_of[scene.moving.index(pair.a)].append(pair.id)
-    with answering_node(model, scene, domain), joined(FlightNode, domain=domain) as (
-            node, executor):
+    with answering_node(model, scene), joined(FlightNode) as (node, executor):
         node.await_node(executor, poses())
         while not all(flight.record.ended for flight in flights):
             found = node.contacts(executor, poses(), PATIENCE)
