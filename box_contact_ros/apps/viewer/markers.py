@@ -21,22 +21,8 @@ from ...node.parameters import CheckedParameters, Setting, answer_help, number, 
 from ...node.runtime import CONTACT_QOS, run_node
 from ...scene.pose_sets import CONTAINER
 from ..ros_client import line_marker, make_marker, set_pose
+from . import style
 from .listener import Listener, named_scene
-from .style import (
-    BOX_A,
-    BOX_B,
-    BOX_OPACITY,
-    CONTACT,
-    LISTED,
-    NORMAL_LENGTH,
-    POINT_RADIUS,
-    STALE_BOX,
-    TEXT_HEIGHT,
-    Colour,
-    patch_outlines,
-    sides,
-    unit_poses,
-)
 from .view_log import AnsweredTick, Snapshot
 
 PARAMETERS = {
@@ -48,7 +34,7 @@ PARAMETERS = {
 }
 NAMESPACES = ('boxes', 'points', 'normals', 'patches', 'depths')
 """RViz shows a tick box for each. Of boxes, normals and depths every marker has its own id."""
-WHITE: Colour = (255, 255, 255)
+WHITE: style.Colour = (255, 255, 255)
 
 
 def scene_markers(snapshot: Snapshot) -> list[Marker]:
@@ -64,39 +50,41 @@ def _boxes(header: Header, snapshot: Snapshot) -> Iterator[Marker]:
     """Yield a translucent cube for each box that has a pose."""
     scene = snapshot.scene
     for row in np.flatnonzero(~np.isnan(snapshot.poses[:, 0])):
-        colour = (STALE_BOX if snapshot.stale_boxes[row] else
-                  BOX_A if scene.is_a[row] else BOX_B)
-        marker = make_marker(header, 'boxes', Marker.CUBE, colour, BOX_OPACITY, number=int(row))
-        set_pose(marker.pose, unit_poses(snapshot.poses[row, None])[0])
+        colour = (style.STALE_BOX if snapshot.stale_boxes[row] else
+                  style.BOX_A if scene.is_a[row] else style.BOX_B)
+        marker = make_marker(header, 'boxes', Marker.CUBE, colour, style.BOX_OPACITY,
+                             number=int(row))
+        set_pose(marker.pose, style.unit_poses(snapshot.poses[row, None])[0])
         _set(marker.scale, scene.sizes[row])
         yield marker
 
 
 def _contacts(header: Header, answer: AnsweredTick) -> Iterator[Marker]:
     """Yield points and patches of all contacts, a normal for each, depths of the deepest."""
-    spheres = make_marker(header, 'points', Marker.SPHERE_LIST, CONTACT)
+    spheres = make_marker(header, 'points', Marker.SPHERE_LIST, style.CONTACT)
     spheres.points = [_set(Point(), point) for point in answer.points]
     edges = answer.scene.edges[answer.pairs]
-    radii, arrows = POINT_RADIUS * edges, NORMAL_LENGTH * edges * answer.normals.T
+    radii, arrows = style.POINT_RADIUS * edges, style.NORMAL_LENGTH * edges * answer.normals.T
     _set(spheres.scale, [2.0 * radii[0]] * 3)
     yield spheres
     for rank, row in enumerate(answer.deepest):
         point, arrow = answer.points[row], arrows[:, row]
-        normal = make_marker(header, 'normals', Marker.ARROW, CONTACT, number=rank)
+        normal = make_marker(header, 'normals', Marker.ARROW, style.CONTACT, number=rank)
         normal.points = [_set(Point(), end) for end in (point, point + arrow)]
         # Of an arrow with two points: diameter of the shaft, diameter and length of the head.
         _set(normal.scale, np.array([0.8, 1.8, 3.0]) * radii[row])
         yield normal
-        if rank < LISTED:
+        if rank < style.LISTED:
             depth = make_marker(header, 'depths', Marker.TEXT_VIEW_FACING, WHITE, number=rank)
             # At the arrow's tail, where neither point nor arrow is.
             _set(depth.pose.position, point - 0.5 * arrow)
-            depth.scale.z = TEXT_HEIGHT * float(edges[row])
+            depth.scale.z = style.TEXT_HEIGHT * float(edges[row])
             depth.text = f'depth {1e3 * answer.contacts["depth"][row]:.2f} mm'
             yield depth
-    outlines = patch_outlines(answer.points, answer.semi_axes)
+    outlines = style.patch_outlines(answer.points, answer.semi_axes)
     if len(outlines):
-        yield line_marker(header, 'patches', sides(outlines), width=0.5 * radii[0], colour=CONTACT)
+        yield line_marker(header, 'patches', style.sides(outlines), width=0.5 * radii[0],
+                          colour=style.CONTACT)
 
 
 def _set(xyz: Any, values: Sequence[float] | np.ndarray) -> Any:

@@ -12,22 +12,7 @@ import numpy as np
 import viser
 
 from ....scene.pose import rotation_matrix
-from ..style import (
-    BOX_A,
-    BOX_B,
-    BOX_OPACITY,
-    CONTACT,
-    EXACT,
-    LISTED,
-    NORMAL_LENGTH,
-    PATCH_OPACITY,
-    POINT_RADIUS,
-    ROPE,
-    STALE_BOX,
-    patch_outlines,
-    sides,
-    unit_poses,
-)
+from .. import style
 from ..view_log import AnsweredTick, SceneArrays, Snapshot
 
 GROUND, LINES, SECTIONS = (236, 238, 241), (206, 211, 217), (176, 183, 191)
@@ -49,7 +34,7 @@ class BoxGroup:
     def __init__(self, server: viser.ViserServer, name: str, scene: SceneArrays,
                  rows: np.ndarray) -> None:
         self._rows, self._sizes = rows, scene.sizes[rows]
-        self._colours = np.where(scene.is_a[rows, None], BOX_A, BOX_B).astype(np.uint8)
+        self._colours = np.where(scene.is_a[rows, None], style.BOX_A, style.BOX_B).astype(np.uint8)
         no_turn, nothing = np.tile([1.0, 0.0, 0.0, 0.0], (len(rows), 1)), np.zeros((len(rows), 3))
 
         def add(path: str, corners: np.ndarray, triangles: np.ndarray, **look: Any) -> Any:
@@ -58,7 +43,7 @@ class BoxGroup:
                 lod='off', cast_shadow=False, receive_shadow=False, **look)
 
         # Flat faces look the same as toons, and cost a browser without a GPU some 10 % less.
-        self._faces = add('boxes', CUBE, CUBE_FACES, opacity=BOX_OPACITY, flat_shading=True,
+        self._faces = add('boxes', CUBE, CUBE_FACES, opacity=style.BOX_OPACITY, flat_shading=True,
                           material='toon5')
         self._edges = add('edges', CUBE_EDGES.reshape(-1, 3), np.arange(36).reshape(12, 3),
                           wireframe=True)
@@ -70,11 +55,11 @@ class BoxGroup:
         """
         poses = snapshot.poses[self._rows]
         known = ~np.isnan(poses[:, :1])
-        poses = unit_poses(np.where(known, poses, [0, 0, 0, 0, 0, 0, 1]))
+        poses = style.unit_poses(np.where(known, poses, [0, 0, 0, 0, 0, 0, 1]))
         poses[:, :3] -= np.where(known, origin, 0.0)
         sizes = np.where(known, self._sizes, 0.0)
         stale = snapshot.stale_boxes[self._rows, None]
-        colours = np.where(stale, STALE_BOX, self._colours).astype(np.uint8)
+        colours = np.where(stale, style.STALE_BOX, self._colours).astype(np.uint8)
         for mesh, shades in ((self._faces, colours), (self._edges, colours // 2)):
             mesh.batched_positions = poses[:, :3]
             mesh.batched_wxyzs = np.roll(poses[:, 3:], 1, axis=1)
@@ -104,22 +89,22 @@ class Stage:
                                       plane_color=GROUND, plane_opacity=1.0, shadow_opacity=0.0,
                                       fade_distance=60.0, visible=False)
         one = np.zeros((1, 2, 3))
-        self._points = scene.add_point_cloud('/contact/points', one[:, 0], CONTACT,
+        self._points = scene.add_point_cloud('/contact/points', one[:, 0], style.CONTACT,
                                              point_shape='circle', precision='float32',
                                              visible=False)
-        self._normals = scene.add_arrows('/contact/normals', one, CONTACT, visible=False)
+        self._normals = scene.add_arrows('/contact/normals', one, style.CONTACT, visible=False)
         self._patches = scene.add_mesh_simple(
-            '/contact/patches', np.zeros((3, 3)), np.array([[0, 1, 2]]), color=CONTACT,
-            opacity=PATCH_OPACITY, side='double', flat_shading=True, cast_shadow=False,
+            '/contact/patches', np.zeros((3, 3)), np.array([[0, 1, 2]]), color=style.CONTACT,
+            opacity=style.PATCH_OPACITY, side='double', flat_shading=True, cast_shadow=False,
             receive_shadow=False, visible=False)
-        self._outlines = scene.add_line_segments('/contact/outlines', one, CONTACT, visible=False,
-                                                 **LINE)
+        self._outlines = scene.add_line_segments('/contact/outlines', one, style.CONTACT,
+                                                 visible=False, **LINE)
         # Crosses, so that they are seen through the points, which are often at the same place.
-        self._exact = scene.add_line_segments('/contact/exact', one, EXACT, thickness=3.0,
+        self._exact = scene.add_line_segments('/contact/exact', one, style.EXACT, thickness=3.0,
                                               thickness_units='screen', visible=False)
-        self._crane = scene.add_line_segments('/crane', one, ROPE, visible=False, **LINE)
+        self._crane = scene.add_line_segments('/crane', one, style.ROPE, visible=False, **LINE)
         self._depths = [scene.add_label(f'/contact/depth_{number}', '', visible=False,
-                                        anchor='bottom-left') for number in range(LISTED)]
+                                        anchor='bottom-left') for number in range(style.LISTED)]
 
     def _light(self) -> None:
         scene = self._server.scene
@@ -153,19 +138,19 @@ class Stage:
         self._groups = [BoxGroup(self._server, name, scene, found)
                         for name, found in rows.items() if len(found)]
         edge = float(np.median(scene.edges))
-        radius = POINT_RADIUS * edge
+        radius = style.POINT_RADIUS * edge
         self._points.point_size = 2.0 * radius
         self._normals.shaft_radius = 0.45 * radius
         self._normals.head_radius = 1.1 * radius
         self._normals.head_length = 2.6 * radius
-        self._normal_length = NORMAL_LENGTH * edge
+        self._normal_length = style.NORMAL_LENGTH * edge
         self._cross = 2.5 * radius * np.stack([-np.eye(3), np.eye(3)], axis=1)
 
     def _draw_contacts(self, answer: AnsweredTick | None) -> None:
         shown = answer is not None and len(answer.pairs) > 0
         for node in (self._points, self._normals, self._patches, self._outlines, self._exact):
             node.visible = shown
-        deepest = answer.deepest[:LISTED] if shown else ()
+        deepest = answer.deepest[:style.LISTED] if shown else ()
         for label in self._depths[len(deepest):]:
             label.visible = False
         if not shown:
@@ -174,8 +159,8 @@ class Stage:
         normals = answer.normals
         self._points.points = points
         self._normals.points = np.stack([points, points + self._normal_length * normals], axis=1)
-        outlines = patch_outlines(points, answer.semi_axes)
-        _show(self._outlines, points=sides(outlines))
+        outlines = style.patch_outlines(points, answer.semi_axes)
+        _show(self._outlines, points=style.sides(outlines))
         self._patches.visible = len(outlines) > 0
         if len(outlines):
             self._patches.vertices = outlines.reshape(-1, 3)
