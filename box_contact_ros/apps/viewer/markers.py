@@ -16,20 +16,17 @@ from rclpy.context import Context
 from std_msgs.msg import Header
 from visualization_msgs.msg import Marker, MarkerArray
 
+from ...node.contact_node import PARAMETERS as CONTACT_PARAMETERS
 from ...node.messages import NANOSECONDS, make_header
-from ...node.parameters import CheckedParameters, Setting, answer_help, number, size, text
+from ...node.parameters import CheckedParameters, Setting, answer_help, number
 from ...node.runtime import CONTACT_QOS, run_node
-from ...scene.pose_sets import CONTAINER
 from ..ros_client import line_marker, make_marker, set_pose
 from . import style
 from .listener import Listener, named_scene
 from .view_log import AnsweredTick, Snapshot
 
-PARAMETERS = {
-    'size_a': Setting(CONTAINER, 'full extents of box A, three numbers > 0 [m]', size),
-    'size_b': Setting(CONTAINER, 'full extents of box B, three numbers > 0 [m]', size),
-    'scene': Setting('', 'scene file, its text, or the bare name of one in config/scenes/; '
-                         'replaces size_a and size_b', text),
+OF_SCENE = ('size_a', 'size_b', 'scene')
+PARAMETERS = {name: CONTACT_PARAMETERS[name] for name in OF_SCENE} | {
     'rate': Setting(30.0, 'most marker arrays published per second [Hz]', number(0.1, 1000)),
 }
 NAMESPACES = ('boxes', 'points', 'normals', 'patches', 'depths')
@@ -107,7 +104,7 @@ class MarkersNode(Listener):
         self.get_logger().info(f'ready: at most {self._settings.values["rate"]:g} Hz')
 
     def _apply(self, settings: dict[str, Any], names: Collection[str]) -> None:
-        if not {'scene', 'size_a', 'size_b'}.isdisjoint(names):
+        if not set(OF_SCENE).isdisjoint(names):
             self.listen_to(named_scene(settings))
         self._timer.timer_period_ns = round(NANOSECONDS / settings['rate'])
         self._changed = True

@@ -72,22 +72,17 @@ def motions(scene: Scene) -> dict[str, Motion]:
 
 def _free_places(fixed: Sequence[Box], size: Sequence[float]) -> np.ndarray:
     """Return the centres (n, 3) of a box on fixed ones, but for those that others cover."""
-    places = np.array([_on_top(box.pose, box.size, size) for box in fixed])
     count = len(fixed)
-    poses = np.repeat(np.hstack([places, np.tile([0.0, 0.0, 0.0, 1.0], (count, 1))]), count, axis=0)
-    sizes = np.tile([box.size for box in fixed], (count, 1))
+    below, sizes = np.array([box.pose for box in fixed]), np.array([box.size for box in fixed])
+    heights = np.sum(np.abs(rotation_matrix(below[:, 3:])[:, 2]) * sizes, axis=1)
+    places = below[:, :3].copy()
+    places[:, 2] += 0.5 * (heights + size[2])
+    level = np.hstack([places, np.tile([0.0, 0.0, 0.0, 1.0], (count, 1))])
     found = ContactSolver(size, size, model='exact').batch(
-        poses, np.tile([box.pose for box in fixed], (count, 1)), size_b=sizes)
+        np.repeat(level, count, axis=0), np.tile(below, (count, 1)),
+        size_b=np.tile(sizes, (count, 1)))
     free = (found.separation > -DEPTH).reshape(count, count).all(axis=1)
     return places[free] if free.any() else places
-
-
-def _on_top(pose: Sequence[float] | None, below: Sequence[float], size: Sequence[float],
-            ) -> np.ndarray:
-    """Return where the centre (3,) of a box is that lies on a fixed one."""
-    assert pose is not None
-    half = 0.5 * float(np.abs(rotation_matrix(np.array(pose[3:]))[2]) @ below)
-    return np.array(pose[:3]) + [0.0, 0.0, half + 0.5 * size[2]]
 
 
 def _standing(x: float, y: float, z: float) -> Motion:
