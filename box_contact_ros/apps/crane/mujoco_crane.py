@@ -6,16 +6,12 @@ limit. Nothing else holds or damps the load, so it sways. The ropes converge tow
 so the load pitches and rolls as it sways. The stack is static. MuJoCo's own contact is switched
 off. Without a wrench from outside, the load sinks a few centimetres into the stack.
 
-The load may have its mass out of its middle, and may meet the stack at corner castings alone. For
-comparison, MuJoCo's own contact can be switched on instead (`own_contact`).
+For comparison, MuJoCo's own contact can be switched on instead (`own_contact`).
 
-The hoist's programme is given as shares of the scenario's duration (`HOIST_SHARES`): hang, lower,
-stay, lift, hang. While it stays, the start tilt is trimmed out rope by rope, as a spreader does.
-A short run therefore meets the same contacts as a long one; the load comes from another height.
-
-With `land` the hoist has another programme (`LANDING_SHARES`): hang, lower until the ropes are
-slack, and stay so; the ropes keep their start trim. It needs the wrench of a contact, without which
-the load hangs in the stack in the end.
+The hoist's programme is given as shares of the scenario's duration (`HOIST_SHARES`). A short run
+therefore meets the same contacts as a long one; the load comes from another height. With `land` it
+lowers until the ropes are slack, and stays so (`LANDING_SHARES`). That needs the wrench of a
+contact, without which the load hangs in the stack in the end.
 
 Conventions: SI units; world frame with z up and the ground at z = 0. A pose is the seven numbers
 `x y z qx qy qz qw` of the body's centre. Angles given to `CraneScenario` are degrees.
@@ -57,8 +53,9 @@ HOIST_SHARES = {'hang': 0.05, 'lower': 0.30, 'stay': 0.45, 'lift': 0.15}
 """Phases of the hoist as shares of the duration, in order; the rest of the time the load hangs."""
 
 TRIM_SHARES = (0.40, 0.70)
-"""Shares of the duration between which the start tilt is trimmed out. It begins after the first
-touch: the load touches with a corner or an edge, and ends on a face."""
+"""Shares of the duration between which the start tilt is trimmed out rope by rope, as a spreader
+does. It begins after the first touch: the load touches with a corner or an edge, and ends on a
+face."""
 
 LANDING_SHARES = HOIST_SHARES | {'lower': 0.45, 'stay': math.inf}
 """The same of a landing, which never lifts."""
@@ -205,7 +202,7 @@ class CraneScenario:
 class Crane:
     """The running simulation: load, stack and ropes, advanced by ticks of 1 / rate_hz seconds."""
 
-    def __init__(self, scenario: CraneScenario | None = None, rate_hz: float = 200.0, *,
+    def __init__(self, scenario: CraneScenario, rate_hz: float = 200.0, *,
                  own_contact: bool = False) -> None:
         """Build the model and put the load at its start; `rate_hz` is ticks per second.
 
@@ -213,7 +210,7 @@ class Crane:
         """
         if not (math.isfinite(rate_hz) and rate_hz > 0.0):
             raise ValueError(f'rate_hz must be positive, got {rate_hz}')
-        self.scenario = scenario = scenario or CraneScenario()
+        self.scenario = scenario
         self._substeps = math.ceil(1.0 / (rate_hz * PHYSICS_STEP))
         self._rate_hz = float(rate_hz)
         self._ticks = 0
@@ -312,10 +309,9 @@ class Crane:
         scenario, trolley = self.scenario, np.array(self._model.body('trolley').pos)
         drop = scenario.rope_length - scenario.lowering_distance
         half_height = np.array([0.0, 0.0, 0.5 * scenario.size[2]])
-        angle, heading, pitch, roll, yaw = np.radians(
-            [scenario.rope_angle, scenario.rope_heading, scenario.pitch, scenario.roll,
-             scenario.yaw]
-        )
+        angle, heading, pitch, roll, yaw = np.radians([
+            scenario.rope_angle, scenario.rope_heading, scenario.pitch, scenario.roll,
+            scenario.yaw])
         tilt = _rotation('z', yaw) @ _rotation('y', pitch) @ _rotation('x', roll)
 
         level = trolley - [0.0, 0.0, drop] - half_height
@@ -327,10 +323,8 @@ class Crane:
         # In the frame where x is the heading, the sway is a rotation about -y.
         sway = _rotation('z', heading) @ _rotation('y', -(1.0 - scenario.rope_spread) * angle)
         sway = sway @ _rotation('z', -heading)
-        aside = drop * np.array(
-            [math.sin(angle) * math.cos(heading), math.sin(angle) * math.sin(heading),
-             -math.cos(angle)]
-        )
+        aside = drop * np.array([math.sin(angle) * math.cos(heading),
+                                 math.sin(angle) * math.sin(heading), -math.cos(angle)])
         centre = trolley + aside - sway @ half_height
         self._set_ropes(scenario.lowering_distance, 1.0)
         for _ in range(4):  # Newton on a nearly linear function: the rope's slope in z is near 1
