@@ -147,30 +147,24 @@ class Stage:
         self._cross = 2.5 * radius * np.stack([-np.eye(3), np.eye(3)], axis=1)
 
     def _draw_contacts(self, answer: AnsweredTick | None) -> None:
-        shown = answer is not None and len(answer.pairs) > 0
-        for node in (self._points, self._normals, self._patches, self._outlines, self._exact):
-            node.visible = shown
-        deepest = answer.deepest[:style.LISTED] if shown else ()
-        for label in self._depths[len(deepest):]:
+        for label in self._depths[len(answer.pairs) if answer else 0:]:
             label.visible = False
-        if not shown:
+        if answer is None:
+            for node in (self._points, self._normals, self._patches, self._outlines, self._exact):
+                node.visible = False
             return
-        points = answer.points - self._origin
-        normals = answer.normals
-        self._points.points = points
-        self._normals.points = np.stack([points, points + self._normal_length * normals], axis=1)
+        points, arrows = answer.points - self._origin, self._normal_length * answer.normals
         outlines = style.patch_outlines(points, answer.semi_axes)
-        _show(self._outlines, points=style.sides(outlines))
-        self._patches.visible = len(outlines) > 0
-        if len(outlines):
-            self._patches.vertices = outlines.reshape(-1, 3)
-            self._patches.faces = _fans(*outlines.shape[:2])
         exact = answer.exact_points - self._origin
-        _show(self._exact, points=(exact[~np.isnan(exact[:, 0]), None, None] + self._cross).reshape(
-            -1, 2, 3))
-        for label, row in zip(self._depths, deepest):
+        exact = exact[~np.isnan(exact[:, 0])]
+        _show(self._points, points=points)
+        _show(self._normals, points=np.stack([points, points + arrows], axis=1))
+        _show(self._patches, vertices=outlines.reshape(-1, 3), faces=_fans(*outlines.shape[:2]))
+        _show(self._outlines, points=style.sides(outlines))
+        _show(self._exact, points=(exact[:, None, None] + self._cross).reshape(-1, 2, 3))
+        for label, row in zip(self._depths, answer.deepest):
             label.text = f'{1e3 * answer.contacts["depth"][row]:.1f} mm'
-            label.position = points[row] - 0.6 * self._normal_length * normals[row]
+            label.position = points[row] - 0.6 * arrows[row]
             label.visible = True
 
     def _look_at(self, snapshot: Snapshot, known: np.ndarray) -> None:
@@ -206,11 +200,11 @@ def _linear(colours: np.ndarray) -> np.ndarray:
     return (255.0 * (colours / 255.0) ** GAMMA).astype(np.uint8)
 
 
-def _show(node: Any, *, points: np.ndarray) -> None:
-    """Give lines their ends (n, 2, 3), or hide them where there are none."""
-    node.visible = len(points) > 0
-    if len(points):
-        node.points = points
+def _show(node: Any, **arrays: np.ndarray) -> None:
+    """Give a node what is drawn, by attribute, or hide it where that is empty."""
+    node.visible = all(map(len, arrays.values()))
+    for name, values in arrays.items() if node.visible else ():
+        setattr(node, name, values)
 
 
 def _fans(count: int, corners: int) -> np.ndarray:
