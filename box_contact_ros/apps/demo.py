@@ -22,7 +22,6 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from ..scene.pose_sets import CONTAINER
 from ..solver.arguments import within
 from . import processes
 from .crane.landing import LANDING_DURATION
@@ -57,9 +56,9 @@ def main(args: Sequence[str] | None = None) -> int:
     """Run the demonstration and return the crane's exit status."""
     options = _options(args)
     os.environ |= on_this_host(options.domain)
-    sizes = {'size_a': CONTAINER, 'size_b': CONTAINER}
-    node = program('contact_node', **sizes, model=options.model)
-    crane = program('crane', **sizes, duration=options.duration, rate=options.rate, report=True,
+    # Both take a container for each box, unless they are told otherwise.
+    node = program('contact_node', model=options.model)
+    crane = program('crane', duration=options.duration, rate=options.rate, report=True,
                     wait=TIME_LIMIT - OVERHEAD - options.duration, closed_loop=options.closed_loop)
     what = ('sets one container down on another' if options.closed_loop
             else 'lowers one container onto another and lifts it')

@@ -30,7 +30,6 @@ from ...node.contact_node import PARAMETERS
 from ...node.parameters import outside_ros_args
 from ...node.runtime import REFUSALS, joined
 from ...scene.files.scene_file import read_scene
-from ...scene.pose_sets import CONTAINER
 from ...scene.scene_solver import Scene
 from ...solver.arguments import model_name, program_parser, within
 from .. import processes
@@ -75,14 +74,13 @@ class Simulation(Programs):
     """A contact node, and a crane that is started again whenever it has ended."""
 
     def __init__(self, model: str, run: CraneRun) -> None:
-        self._sizes = {'size_a': CONTAINER, 'size_b': CONTAINER}
         self.run = run
         self.last_run: tuple[bool, str] | None = None
         """Whether the last run that ended by itself passed, and the crane's report of it."""
         self._crane_output = tempfile.TemporaryFile()
         self._crane: subprocess.Popen[bytes] | None = None
         self._next_at = 0.0
-        super().__init__(contact_node=program('contact_node', model=model, **self._sizes))
+        super().__init__(contact_node=program('contact_node', model=model))
 
     def step(self) -> bool:
         """Start a crane if it is time; return whether one was. RuntimeError if the node ended."""
@@ -98,8 +96,7 @@ class Simulation(Programs):
         self._crane_output.seek(0)
         self._crane_output.truncate()
         self._crane = processes.start(
-            program('crane', wait=WAIT, **self._sizes, **dataclasses.asdict(self.run)),
-            self._crane_output)
+            program('crane', wait=WAIT, **dataclasses.asdict(self.run)), self._crane_output)
         return True
 
     def land(self, run: CraneRun) -> None:
