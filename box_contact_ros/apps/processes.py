@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import json
 import os
 import random
 import signal
@@ -36,14 +37,9 @@ def on_this_host(domain: int) -> dict[str, str]:
 
 
 def parameters(**values: object) -> list[str]:
-    """Return the words `-p NAME:=VALUE` that set ROS parameters."""
-    return [word for name, value in values.items() for word in ('-p', f'{name}:={_yaml(value)}')]
-
-
-def _yaml(value: object) -> str:
-    if isinstance(value, (tuple, list)):
-        return f'[{",".join(map(str, value))}]'
-    return str(value).lower() if isinstance(value, bool) else str(value)
+    """Return the words `-p NAME:=VALUE` that set ROS parameters; YAML reads JSON."""
+    return [word for name, value in values.items()
+            for word in ('-p', f'{name}:={json.dumps(value, ensure_ascii=False)}')]
 
 
 def program(name: str, **values: object) -> list[str]:
