@@ -33,15 +33,14 @@ CONTACT_MESSAGES = ('cloud', 'point', 'normal')  # kinds of message that a conta
 ECHO_MESSAGES = ('echo',)
 WIDTHS = {'cloud': 7, 'point': 3, 'normal': 3, 'echo': 0}
 """Numbers kept of each, the first ones: see `first_row` for the cloud's."""
-CLOUD_COLUMNS = ('x', 'y', 'z', 'normal_x', 'normal_y', 'normal_z', 'depth', 'volume',
-                 'cov_xx', 'cov_xy', 'cov_xz', 'cov_yy', 'cov_yz', 'cov_zz')
 _COVARIANCE = [[8, 9, 10], [9, 11, 12], [10, 12, 13]]
 """Columns of the symmetric (3, 3)."""
 
 
 def first_row(rows: np.ndarray) -> np.ndarray:
-    """Return the numbers of CLOUD_COLUMNS (14,) of a cloud's first row, none (0,) without rows."""
-    return np.array([float(rows[0][name]) for name in CLOUD_COLUMNS] if len(rows) else [])
+    """Return all fields but `pair` (14,) of a cloud's first row, none (0,) without rows."""
+    names = [name for name in rows.dtype.names if name != 'pair']
+    return np.array([rows[0][name] for name in names] if len(rows) else [])
 
 
 def is_stale(values: Sequence[float] | np.ndarray) -> bool:
@@ -62,10 +61,9 @@ def touch_in(values: np.ndarray) -> Patch | None:
 class StreamLog:
     """One stream as it was sent to one node, and what came back to each row of it."""
 
-    def __init__(self, name: str, rows: int, kinds: Sequence[str]) -> None:
+    def __init__(self, name: str, rows: int, kinds: Sequence[str], truth: Contacts | None) -> None:
         """Make room for `rows` pairs, each answered by a message of each of `kinds`."""
-        self.name = name
-        self.truth: Contacts | None = None
+        self.name, self.truth = name, truth
         """The exact contacts of the rows; what it takes for results, but for an echo."""
         self.stamps: list[int] = []
         self.lateness: list[float] = []
@@ -78,18 +76,20 @@ class StreamLog:
         self.duplicates = self.strangers = 0
 
     @property
+    def times(self) -> np.ndarray:
+        """Times of the first messages [ns], 0 for none, (kinds, sent)."""
+        return np.array([times[:len(self.stamps)] for times in self.received.values()])
+
+    @property
     def evaluated(self) -> np.ndarray:
         """Which pairs have their first message (cloud or echo), (sent,)."""
-        return next(iter(self.received.values()))[:len(self.stamps)] > 0
+        return self.times[0] > 0
 
     @property
     def answered(self) -> np.ndarray:
         """Which pairs have all that they can have, (sent,)."""
-        rows = slice(0, len(self.stamps))
-        alone = ~self.touching[rows]
-        came = [times[rows] > 0 for times in list(self.received.values())[1:]]
-        whole: np.ndarray = np.all(came, axis=0) if came else alone
-        return self.evaluated & ~self.refused[rows] & (alone | whole)
+        rows, came = slice(0, len(self.stamps)), self.times > 0
+        return came[0] & ~self.refused[rows] & (~self.touching[rows] | came.all(axis=0))
 
     @property
     def contacts(self) -> np.ndarray:
@@ -99,9 +99,8 @@ class StreamLog:
     @property
     def latencies(self) -> np.ndarray:
         """From the stamp to the end of each answer [s], (answered,)."""
-        rows = slice(0, len(self.stamps))
-        first, *more = (times[rows] for times in self.received.values())
-        finished = np.where(self.touching[rows], np.max(more, axis=0), first) if more else first
+        first, last = self.times[0], self.times[1:].max(axis=0, initial=0)
+        finished = np.where(self.touching[:len(self.stamps)], last, first)
         return (finished - np.array(self.stamps, dtype=np.int64))[self.answered] * 1e-9
 
 
@@ -118,14 +117,12 @@ class AnswerLog:
         """Stamps [ns] of pairs that find out whether anyone answers; they count in no figure."""
         self.offers_answered: set[int] = set()
         self.first_answer = math.nan  # when the first of them was received [ns]
-        self.newest_contact = 0  # stamp [ns] of the newest contact that is complete; 0 without any
         self.messages = self.matched = self.offer_messages = 0
         self._rows: dict[int, tuple[StreamLog, int]] = {}
 
     def open(self, name: str, rows: int, truth: Contacts | None = None) -> StreamLog:
         """Begin a stream; `sent` fills it row by row."""
-        self.streams.append(StreamLog(name, rows, self.kinds))
-        self.streams[-1].truth = truth
+        self.streams.append(StreamLog(name, rows, self.kinds, truth))
         return self.streams[-1]
 
     def sent(self, stamp: int, lateness: float = 0.0) -> None:
@@ -166,8 +163,6 @@ class AnswerLog:
             log.refused[row] = is_stale(values)
             log.touching[row] = len(values) > 0 and not log.refused[row]
         log.received[kind][row] = received
-        if log.touching[row] and all(log.received[kind][row] for kind in self.kinds):
-            self.newest_contact = max(self.newest_contact, stamp)
 
     @property
     def outstanding(self) -> int:
@@ -262,7 +257,7 @@ def _result(node: AnswerLog, log: StreamLog) -> StreamResult:
         cloud, point, normal = (log.values[kind][:sent] for kind in CONTACT_MESSAGES)
         real = log.truth.colliding[:sent]
         wrong = evaluated & ~refused & (touching != real)
-        either = (log.received['point'][:sent] > 0) | (log.received['normal'][:sent] > 0)
+        either = (log.times[1:] > 0).any(axis=0)
         apart = np.any(np.concatenate([point, normal], axis=1) != cloud[:, :6], axis=1)
         contradictory = evaluated & ~touching & either | answered & touching & apart
         measured = answered & touching & real
