@@ -31,7 +31,7 @@ from ...node.messages import make_header, read_cloud
 from ...node.runtime import joined, let_callbacks_finish, spin_for
 from ...output import machine, no_garbage_collection
 from ...scene.files.scene_file import write_scene
-from ...scene.scene_solver import Scene
+from ...scene.scene_solver import POSE_ARRAY, Scene
 from ...solver.contact import Contacts
 from ..processes import Stop, asked_to_end, end, on_this_host, parameters, printed, program, start
 from ..ros_client import ANSWERS, DEEP_RELIABLE, answer_values, pose_message
@@ -51,6 +51,8 @@ PACKAGES = ('numpy', 'rclpy', 'ros-fastrtps')  # whose versions are named
 
 MESSAGES = ANSWERS | {'echo': (Header, 'echo')}
 """Type and topic of each kind of answer; the soup's topics stand under soup/."""
+PAIR_INPUTS = (('box_a/pose', PoseStamped), ('box_b/pose', PoseStamped))
+ARRAY_INPUTS = ((POSE_ARRAY, PoseArray),)
 
 
 @dataclass
@@ -60,6 +62,7 @@ class MeasuredNode:
     log: AnswerLog
     command: list[str]  # arguments of Python; the sizes and the pose topics are added
     poses: str = ''  # prefix of the pose topics that it listens to
+    inputs: Sequence[tuple[str, type]] = PAIR_INPUTS  # those topics with their types
     prefix: str = ''  # of the topics it answers on
     failed: bool = False  # did not answer, or ended; for the group of streams that is under way
     process: subprocess.Popen[bytes] | None = None
@@ -72,8 +75,8 @@ class MeasuredNode:
 
     def start(self, cores: set[int], stream: Stream | None = None) -> None:
         """Start the process on some cores, for the boxes of a stream."""
-        words = [word for box in ('box_a', 'box_b') for word in (
-            '-r', f'{box}/pose:={self.poses}{box}/pose') if self.poses]
+        words = [word for topic, _ in self.inputs for word in (
+            '-r', f'{topic}:={self.poses}{topic}') if self.poses]
         if stream is not None and self.log.kinds != ECHO_MESSAGES:
             words += parameters(size_a=stream.size_a, size_b=stream.size_b)
         self.failed, self.output = False, tempfile.TemporaryFile()
@@ -91,14 +94,14 @@ def solver_node(name: str, model: str, /, *, poses: str, prefix: str = '',
                 **values: object) -> MeasuredNode:
     """Return a contact or soup node that is not started yet; `values` are its parameters."""
     return MeasuredNode(AnswerLog(name, model, CONTACT_MESSAGES),
-                        program(f'{name}_node', **values), poses, prefix)
+                        program(f'{name}_node', **values), poses, prefix=prefix)
 
 
 def echo_node(name: str, *, poses: str, prefix: str = '', bare: bool = False) -> MeasuredNode:
     """Return an echo node that is not started yet."""
     return MeasuredNode(AnswerLog(name, '', ECHO_MESSAGES), [
         '-m', 'box_contact_ros.apps.bench.echo_node', *(['--bare'] if bare else []), '--ros-args',
-        '-r', f'echo:={prefix}echo'], poses, prefix)
+        '-r', f'echo:={prefix}echo'], poses, prefix=prefix)
 
 
 def monotonic_clock() -> Callable[[], int]:
@@ -113,25 +116,22 @@ class BenchNode(Node):
     def __init__(self, context: Context, nodes: Sequence[MeasuredNode],
                  clock: Callable[[], int]) -> None:
         super().__init__('bench', context=context)
+        self._now = clock
         self.arrivals: list[tuple[int, int, str, bytes]] = []
         """(received [ns], number of the node, kind, message)."""
         self.senders = {
-            poses: [self.create_publisher(PoseStamped, f'{poses}{box}/pose', DEEP_RELIABLE).publish
-                    for box in ('box_a', 'box_b')]
-            for poses in dict.fromkeys(node.poses for node in nodes)}
-        """What sends a serialised pose of box A, and of box B, by the topics' prefix."""
+            poses: [self.create_publisher(kind, poses + topic, DEEP_RELIABLE).publish
+                    for topic, kind in inputs]
+            for poses, inputs in {node.poses: node.inputs for node in nodes}.items()}
+        """What sends a serialised message of each input, by the topics' prefix."""
         for number, node in enumerate(nodes):
             for kind in node.log.kinds:
                 message, topic = MESSAGES[kind]
                 self.create_subscription(message, node.prefix + topic,
-                                         self._keep(number, kind, clock), DEEP_RELIABLE, raw=True)
+                                         partial(self._keep, number, kind), DEEP_RELIABLE, raw=True)
 
-    def _keep(self, number: int, kind: str, now: Callable[[], int]) -> Callable[[bytes], None]:
-        arrivals = self.arrivals
-
-        def callback(data: bytes) -> None:
-            arrivals.append((now(), number, kind, data))
-        return callback
+    def _keep(self, number: int, kind: str, data: bytes) -> None:
+        self.arrivals.append((self._now(), number, kind, data))
 
 
 class Bench:
@@ -153,14 +153,12 @@ class Bench:
         for streams in groups:
             if self.stop.is_set():
                 return
-            try:
-                for node in self.nodes:
-                    node.start(self.node_cores, streams[0])
-                self._await_answers(streams[0])
-                for stream in streams:
-                    play(stream)
-            finally:
-                self.end()
+            for node in self.nodes:
+                node.start(self.node_cores, streams[0])
+            self.await_answers(_serialised(streams[0], [0] * WARM_UP), _lengths(streams[0]))
+            for stream in streams:
+                play(stream)
+            self.end()
 
     def turns(self) -> list[list[MeasuredNode]]:
         """Return which nodes are sent a stream together: all that listen to the same topics."""
@@ -170,13 +168,15 @@ class Bench:
                 turns.setdefault(node.poses, []).append(node)
         return list(turns.values())
 
-    def _await_answers(self, stream: Stream) -> None:
-        """Offer pairs until every node has answered one, then some at the rate, to warm up."""
+    def await_answers(self, offers: list[list[bytes]], what: str) -> None:
+        """Offer the first tick until every node has answered it, then all of them, to warm up.
+
+        what: the boxes, for the progress bar.
+        """
         answered_before = {node.name: len(node.log.offers_answered) for node in self.nodes}
         waiting = list(self.nodes)
         deadline = time.monotonic() + START_LIMIT
-        offers = _serialised(stream, [0] * WARM_UP)
-        with _bar(len(waiting), f'start {_lengths(stream)}', 'node') as bar:
+        with _bar(len(waiting), f'start {what}', 'node') as bar:
             while waiting and not self.stop.is_set():
                 for node in list(waiting):
                     if len(node.log.offers_answered) > answered_before[node.name]:
@@ -190,7 +190,7 @@ class Bench:
                         waiting.remove(node)
                 for turn in self.turns():
                     self._offer(turn, offers[:1])
-                self._spin(time.monotonic() + OFFER_PERIOD)
+                spin_for(self.executor, OFFER_PERIOD)
                 self._decode()
         for turn in self.turns():
             last = self._offer(turn, offers)
@@ -223,42 +223,45 @@ class Bench:
         sent: list[tuple[int, float]] = []
         who = ' '.join(node.name for node in turn)
         with _bar(len(pairs), f'{stream.name} ({who})', 'pair') as bar, no_garbage_collection():
-            self._send_and_receive(turn, pairs, sent, lambda: bar.update(len(sent) - bar.n))
+            self.send_and_receive(turn, pairs, sent, lambda: bar.update(len(sent) - bar.n))
         for stamp, lateness in sent:
             for node in turn:
                 node.log.sent(stamp, lateness)
         self._drain(lambda: sum(node.log.outstanding for node in turn))
 
-    def _send_and_receive(self, turn: list[MeasuredNode], pairs: list[list[bytes]],
-                          sent: list[tuple[int, float]],
-                          show: Callable[[], object] = lambda: None) -> None:
-        """Send pairs in a thread, receive meanwhile, and `show` how far it is."""
-        sender = threading.Thread(target=self._send, args=(turn[0].poses, pairs, sent))
+    def send_and_receive(self, turn: list[MeasuredNode], ticks: list[list[bytes]],
+                         sent: list[tuple[int, float]],
+                         show: Callable[[], object] = lambda: None) -> None:
+        """Send the messages of ticks in a thread, receive meanwhile, and `show` how far it is.
+
+        sent: takes the stamp [ns] and the lateness [s] of each tick.
+        """
+        sender = threading.Thread(target=self._send, args=(turn[0].poses, ticks, sent))
         sender.start()
         while sender.is_alive():
-            self._spin(time.monotonic() + SLICE)
+            spin_for(self.executor, SLICE)
             show()
 
-    def _send(self, poses: str, pairs: list[list[bytes]], sent: list[tuple[int, float]]) -> None:
-        """Send pairs at the rate; the schedule is absolute, so lateness is not handed on."""
-        publish_a, publish_b = self.client.senders[poses]
+    def _send(self, poses: str, ticks: list[list[bytes]], sent: list[tuple[int, float]]) -> None:
+        """Send ticks at the rate; the schedule is absolute, so lateness is not handed on."""
+        publishers = self.client.senders[poses]
         period, stopped = 1.0 / self.rate, self.stop.is_set
         start = time.perf_counter() + SLICE
-        for row, (pose_a, pose_b) in enumerate(pairs):
+        for row, messages in enumerate(ticks):
             due = start + row * period
             while (left := due - time.perf_counter()) > 0.0 and not stopped():
                 time.sleep(min(left, SLICE))
             if stopped():
                 return
             stamp = self._stamp()
-            publish_a(with_stamp(pose_a, stamp))
-            publish_b(with_stamp(pose_b, stamp))
+            for publish, message in zip(publishers, messages):
+                publish(with_stamp(message, stamp))
             sent.append((stamp, max(0.0, -left)))
 
-    def _offer(self, turn: list[MeasuredNode], pairs: list[list[bytes]]) -> set[int]:
-        """Send pairs that count in no figure; return their stamps [ns]."""
+    def _offer(self, turn: list[MeasuredNode], ticks: list[list[bytes]]) -> set[int]:
+        """Send ticks that count in no figure; return their stamps [ns]."""
         sent: list[tuple[int, float]] = []
-        self._send_and_receive(turn, pairs, sent)
+        self.send_and_receive(turn, ticks, sent)
         stamps = {stamp for stamp, _ in sent}
         for node in turn:
             node.log.offers |= stamps
@@ -269,12 +272,6 @@ class Bench:
         self._last = max(self.clock(), self._last + 1)
         return self._last
 
-    def _spin(self, until: float) -> None:
-        """Receive until that time."""
-        left = until - time.monotonic()
-        if left > 0.0:
-            spin_for(self.executor, left)
-
     def _drain(self, outstanding: Callable[[], int]) -> None:
         """Wait for the last answers: until nothing is out, or nothing comes any more."""
         quiet = time.monotonic() + DRAIN_SILENCE
@@ -284,9 +281,9 @@ class Bench:
                 quiet = time.monotonic() + DRAIN_SILENCE
             if not outstanding() or time.monotonic() > min(quiet, deadline):
                 break
-            self._spin(time.monotonic() + SLICE)
+            spin_for(self.executor, SLICE)
         # The clouds come last; whatever is still on its way behind them is seen here.
-        self._spin(time.monotonic() + SLICE)
+        spin_for(self.executor, SLICE)
         self._decode()
 
     def _decode(self) -> int:
@@ -344,51 +341,34 @@ class ArrayRun:
 def drive_array(scene: Scene, poses: np.ndarray, args: Sequence[str], *, model: str, rate: float,
                 seconds: float, domain: int) -> ArrayRun:
     """Send poses (ticks, boxes, 7) over and over as arrays to a contact node on one core."""
+    ticks = [[serialize_message(PoseArray(
+        header=make_header(0, 'world'),
+        poses=[pose_message(Header(), pose).pose for pose in tick]))] for tick in poses]
+    sent: list[tuple[int, float]] = []
     with tempfile.NamedTemporaryFile('w', suffix='.yaml') as file:
         write_scene(scene, file.name)
-        node = MeasuredNode(AnswerLog('contact', model, CONTACT_MESSAGES), program(
-            'contact_node', scene=file.name, model=model, pair_topics=False))
-        with open_bench([], args, rate=rate, domain=domain) as bench:
+        node = MeasuredNode(AnswerLog('contact', model, ('cloud',)), program(
+            'contact_node', scene=file.name, model=model, pair_topics=False), inputs=ARRAY_INPUTS)
+        with open_bench([node], args, rate=rate, domain=domain) as bench:
             cores = {min(bench.node_cores)}
-            bench.nodes, found = [node], ArrayRun(about_the_machine(cores))
+            found = ArrayRun(about_the_machine(cores))
             node.start(cores)
-            arrivals: list[tuple[int, bytes]] = []
-            bench.client.create_subscription(
-                PointCloud2, 'contacts', lambda data: arrivals.append((bench.clock(), data)),
-                DEEP_RELIABLE, raw=True)
-            publish = bench.client.create_publisher(PoseArray, 'poses', DEEP_RELIABLE).publish
-            ticks = [bytes(serialize_message(PoseArray(
-                header=make_header(0, 'world'), poses=[pose_message(Header(), pose).pose
-                                                       for pose in tick]))) for tick in poses]
-
-            def send(number: int) -> int:
-                stamp = bench.clock()
-                publish(with_stamp(ticks[number % len(ticks)], stamp))
-                return stamp
-
-            deadline = time.monotonic() + START_LIMIT
-            while not arrivals and not bench.stop.is_set():
-                if node.ended() is not None or time.monotonic() > deadline:
-                    raise ValueError(f'the node does not answer: {printed(node.output)[-500:]}')
-                send(0)
-                spin_for(bench.executor, OFFER_PERIOD)
-            spin_for(bench.executor, DRAIN_SILENCE)
-            arrivals.clear()
-            number_of: dict[int, int] = {}
+            bench.await_answers(ticks[:1] * WARM_UP, f'{len(scene.moving)} boxes')
+            if bench.notes:
+                raise ValueError(bench.notes[0])
             with no_garbage_collection():
                 started, before = time.perf_counter(), _cpu_seconds(node.process.pid)
-                while len(number_of) < rate * seconds and not bench.stop.is_set():
-                    number_of[send(len(number_of))] = len(number_of)
-                    left = started + len(number_of) / rate - time.perf_counter()
-                    spin_for(bench.executor, max(left, 1e-4))
+                bench.send_and_receive(
+                    [node], [ticks[n % len(ticks)] for n in range(round(rate * seconds))], sent)
                 took = time.perf_counter() - started
                 found.cpu_share = (_cpu_seconds(node.process.pid) - before) / took
                 spin_for(bench.executor, DRAIN_SILENCE)
-    found.sent = len(number_of)
-    for received, data in arrivals:
+    found.sent, number_of = len(sent), {stamp: number for number, (stamp, _) in enumerate(sent)}
+    for received, _, _, data in bench.client.arrivals:
         stamp, rows = raw_stamp(data), read_cloud(deserialize_message(data, PointCloud2))
-        found.ids[number_of[stamp]] = set(rows['pair'].tolist())
-        found.latencies.append(1e-9 * (received - stamp))
+        if stamp in number_of:  # else a late answer to an offer
+            found.ids[number_of[stamp]] = set(rows['pair'].tolist())
+            found.latencies.append(1e-9 * (received - stamp))
     return found
 
 
