@@ -59,7 +59,7 @@ def test_answers_of_other_poses_are_found(shift):
             log.answer('point', stamp, stamp + MS, values[:3])
             log.answer('normal', stamp, stamp + MS, values[3:6])
         log.answer('cloud', stamp, stamp + MS, values if answers.colliding[row] else ())
-    found, = mispairs(log)
+    found = mispairs(opened)
     both = int(np.count_nonzero(answers.colliding & truth.colliding))
     assert found == (both if shift else 0) and both > 20
     assert len(without_contact(opened)) == np.count_nonzero(~answers.colliding)

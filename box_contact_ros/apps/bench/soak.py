@@ -106,7 +106,7 @@ def _play(bench: Bench, blocks: list[Stream], truths: Mapping[str, Contacts]) ->
                     block, pose_a=block.pose_a[rows], pose_b=block.pose_b[rows]), None, turn)
 
     bench.run([blocks], play)
-    return memory
+    return memory or [math.nan]
 
 
 def _contact(options: argparse.Namespace) -> MeasuredNode:
@@ -153,9 +153,10 @@ def _report(options: argparse.Namespace, bench: Bench, memory: Sequence[float],
     if not all(results):
         print('\n'.join(['nothing was sent', *bench.notes]))
         return False
-    growth = float(max(memory) - memory[0]) if memory else math.nan
+    growth = max(memory) - memory[0]
     counts = {'lost': sum(r.lost for r in contact),
-              'mispaired or wrong': sum(mispairs(log)) + sum(r.wrong_verdicts for r in contact),
+              'mispaired or wrong': (sum(map(mispairs, log.streams))
+                                     + sum(r.wrong_verdicts for r in contact)),
               'answered twice, or to no pose': sum(r.duplicates + r.strangers for r in contact),
               'contradictions between cloud, point and normal': sum(
                   r.contradictions for r in contact)}
@@ -163,8 +164,8 @@ def _report(options: argparse.Namespace, bench: Bench, memory: Sequence[float],
     lines = [f'sent: {sum(r.sent for r in contact)} to the contact node, '
              f'{sum(r.sent for r in echo)} to each echo node',
              *(f'{name}: {value}' for name, value in counts.items()),
-             f'memory: {memory[0] if memory else math.nan:.1f} MB after the first block, grown by '
-             f'at most {growth:.2f} MB (limit {GROWTH_LIMIT:g})',
+             f'memory: {memory[0]:.1f} MB after the first block, grown by at most {growth:.2f} MB '
+             f'(limit {GROWTH_LIMIT:g})',
              f'start of the contact node to its first answer: {first_answer:.1f} s '
              f'(aim {START_LIMIT:g}, from warm caches)']
     for name, of in (('bare echo', bare), ('echo', echo)):
@@ -220,15 +221,10 @@ def without_contact(stream: StreamLog) -> np.ndarray:
     return stream.latencies[~stream.contacts]
 
 
-def mispairs(log: AnswerLog) -> list[int]:
-    """Count the answers of each stream whose point is not the model's for that stamp's poses."""
-    found = []
-    for stream in log.streams:
-        rows, truth = slice(0, len(stream.stamps)), stream.truth
-        assert truth is not None
-        here = (stream.received['point'][rows] > 0) & truth.colliding[rows]
-        apart = np.linalg.norm(stream.values['point'][rows] - truth.point[rows], axis=1)
-        depth = np.abs(stream.values['cloud'][rows, 6] + truth.separation[rows])
-        found.append(int(np.count_nonzero(
-            here & ~((apart <= SAME_POINT) & (depth <= SAME_POINT)))))
-    return found
+def mispairs(stream: StreamLog) -> int:
+    """Count the answers whose point is not the model's for that stamp's poses."""
+    rows, truth = slice(0, len(stream.stamps)), stream.truth
+    here = (stream.received['point'][rows] > 0) & truth.colliding[rows]
+    apart = np.linalg.norm(stream.values['point'][rows] - truth.point[rows], axis=1)
+    depth = np.abs(stream.values['cloud'][rows, 6] + truth.separation[rows])
+    return np.count_nonzero(here & ~((apart <= SAME_POINT) & (depth <= SAME_POINT)))

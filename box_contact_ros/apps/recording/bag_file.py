@@ -72,7 +72,7 @@ class Recorder:
         (its text), and `model`. Raises RecordingError.
         """
         types = get_typestore(Stores.ROS2_JAZZY)
-        kinds = {topic: POSE if topic in poses else type_of(topic) for topic in topics}
+        self.kinds = {topic: POSE if topic in poses else type_of(topic) for topic in topics}
         self.counts = Counter(dict.fromkeys(topics, 0))
         self.span: tuple[int, int] | None = None  # times of the first and the last message [ns]
         try:
@@ -83,7 +83,7 @@ class Recorder:
             self._writer.open()
             self._connections = {
                 topic: self._writer.add_connection(topic, kind, typestore=types)
-                for topic, kind in kinds.items()}
+                for topic, kind in self.kinds.items()}
         except (WriterError, OSError) as error:
             raise RecordingError(f'cannot record to {folder}: {error}') from error
 

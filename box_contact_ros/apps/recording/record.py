@@ -42,7 +42,7 @@ class RecordNode(Node):
         self.folder, self.recorder = folder, Recorder(folder, list(resolved), about, of_poses)
         self._fault: OSError | None = None
         for name, topic in resolved.items():
-            kind = POSE if name in of_poses else type_of(name)
+            kind = self.recorder.kinds[name]
             # Poses as the contact node takes them, from whatever publisher; contacts without loss.
             self.create_subscription(MESSAGES[kind], topic, self._keep(name),
                                      POSE_QOS if kind == POSE else DEEP_RELIABLE, raw=True)
