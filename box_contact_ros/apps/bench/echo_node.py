@@ -24,28 +24,24 @@ from rclpy.node import Node
 from rclpy.serialization import serialize_message
 from std_msgs.msg import Header
 
+from ...node.message_bytes import ENCAPSULATION
 from ...node.messages import NANOSECONDS
 from ...node.runtime import CONTACT_QOS, POSE_QOS, run_node
 from ...scene.stamp_pairing import WAITING_TICKS
 
-STAMP = slice(4, 12)
-"""CDR: four bytes of encapsulation, the second of them 1 for little endian, then the stamp."""
-
-
-def _order(data: bytes) -> str:
-    return '<iI' if data[1] else '>iI'
+STAMP = struct.Struct('=iI')  # behind the encapsulation; sender and receiver are one machine
 
 
 def raw_stamp(data: bytes) -> int:
     """Return the stamp [ns] of a serialised message that begins with a header."""
-    sec, nanosec = struct.unpack(_order(data), data[STAMP])
+    sec, nanosec = STAMP.unpack_from(data, ENCAPSULATION)
     return sec * NANOSECONDS + nanosec
 
 
 def with_stamp(data: bytes, stamp: int) -> bytes:
     """Return a serialised message that begins with a header, under another stamp [ns]."""
-    packed = struct.pack(_order(data), *divmod(stamp, NANOSECONDS))
-    return data[:STAMP.start] + packed + data[STAMP.stop:]
+    packed = STAMP.pack(*divmod(stamp, NANOSECONDS))
+    return data[:ENCAPSULATION] + packed + data[ENCAPSULATION + STAMP.size:]
 
 
 class EchoNode(Node):
