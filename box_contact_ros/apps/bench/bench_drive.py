@@ -220,27 +220,28 @@ class Bench:
         for node in turn:
             node.log.open(stream.name, len(stream), truth)
         pairs = _serialised(stream, range(len(stream)))
-        sent: list[tuple[int, float]] = []
         who = ' '.join(node.name for node in turn)
         with _bar(len(pairs), f'{stream.name} ({who})', 'pair') as bar, no_garbage_collection():
-            self.send_and_receive(turn, pairs, sent, lambda: bar.update(len(sent) - bar.n))
+            sent = self.send_and_receive(turn, pairs, lambda count: bar.update(count - bar.n))
         for stamp, lateness in sent:
             for node in turn:
                 node.log.sent(stamp, lateness)
         self._drain(lambda: sum(node.log.outstanding for node in turn))
 
     def send_and_receive(self, turn: list[MeasuredNode], ticks: list[list[bytes]],
-                         sent: list[tuple[int, float]],
-                         show: Callable[[], object] = lambda: None) -> None:
-        """Send the messages of ticks in a thread, receive meanwhile, and `show` how far it is.
+                         show: Callable[[int], object] = lambda count: None,
+                         ) -> list[tuple[int, float]]:
+        """Send the messages of ticks in a thread, receive meanwhile, and `show` how many are sent.
 
-        sent: takes the stamp [ns] and the lateness [s] of each tick.
+        Return the stamp [ns] and the lateness [s] of each tick that was sent.
         """
+        sent: list[tuple[int, float]] = []
         sender = threading.Thread(target=self._send, args=(turn[0].poses, ticks, sent))
         sender.start()
         while sender.is_alive():
             spin_for(self.executor, SLICE)
-            show()
+            show(len(sent))
+        return sent
 
     def _send(self, poses: str, ticks: list[list[bytes]], sent: list[tuple[int, float]]) -> None:
         """Send ticks at the rate; the schedule is absolute, so lateness is not handed on."""
@@ -260,9 +261,7 @@ class Bench:
 
     def _offer(self, turn: list[MeasuredNode], ticks: list[list[bytes]]) -> set[int]:
         """Send ticks that count in no figure; return their stamps [ns]."""
-        sent: list[tuple[int, float]] = []
-        self.send_and_receive(turn, ticks, sent)
-        stamps = {stamp for stamp, _ in sent}
+        stamps = {stamp for stamp, _ in self.send_and_receive(turn, ticks)}
         for node in turn:
             node.log.offers |= stamps
         return stamps
@@ -344,7 +343,6 @@ def drive_array(scene: Scene, poses: np.ndarray, args: Sequence[str], *, model: 
     ticks = [[serialize_message(PoseArray(
         header=make_header(0, 'world'),
         poses=[pose_message(Header(), pose).pose for pose in tick]))] for tick in poses]
-    sent: list[tuple[int, float]] = []
     with tempfile.NamedTemporaryFile('w', suffix='.yaml') as file:
         write_scene(scene, file.name)
         node = MeasuredNode(AnswerLog('contact', model, ('cloud',)), program(
@@ -358,8 +356,8 @@ def drive_array(scene: Scene, poses: np.ndarray, args: Sequence[str], *, model: 
                 raise ValueError(bench.notes[0])
             with no_garbage_collection():
                 started, before = time.perf_counter(), _cpu_seconds(node.process.pid)
-                bench.send_and_receive(
-                    [node], [ticks[n % len(ticks)] for n in range(round(rate * seconds))], sent)
+                sent = bench.send_and_receive(
+                    [node], [ticks[n % len(ticks)] for n in range(round(rate * seconds))])
                 took = time.perf_counter() - started
                 found.cpu_share = (_cpu_seconds(node.process.pid) - before) / took
                 spin_for(bench.executor, DRAIN_SILENCE)
