@@ -293,7 +293,7 @@ def test_a_full_disk_ends_the_recording(tmp_path, monkeypatch):
     rclpy.init(context=context)
     node = RecordNode(context, tmp_path / 'run', ['contacts'], {})
     monkeypatch.setattr(node.recorder, 'write', full)
-    node._keep('/contacts')(b'')
+    node._keep('/contacts', b'')
     assert not context.ok()
     with pytest.raises(RecordingError, match='run is not complete: .*No space left'):
         node.destroy_node()

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -44,24 +44,20 @@ class RecordNode(Node):
         for name, topic in resolved.items():
             kind = self.recorder.kinds[name]
             # Poses as the contact node takes them, from whatever publisher; contacts without loss.
-            self.create_subscription(MESSAGES[kind], topic, self._keep(name),
+            self.create_subscription(MESSAGES[kind], topic, partial(self._keep, name),
                                      POSE_QOS if kind == POSE else DEEP_RELIABLE, raw=True)
         if sys.stderr.isatty():
             self.create_timer(PROGRESS_SECONDS, self._show_progress)
         print(f'recording to {folder}: {", ".join(resolved)}', flush=True)
 
-    def _keep(self, topic: str) -> Callable[[bytes], None]:
-        recorder, clock = self.recorder, self.get_clock()
-
-        def callback(data: bytes) -> None:
-            if not recorder.counts[topic]:
-                print(f'receiving {topic}', flush=True)
-            try:
-                recorder.write(topic, clock.now().nanoseconds, data)
-            except OSError as error:  # a full disk
-                self._fault = error
-                self.context.try_shutdown()
-        return callback
+    def _keep(self, topic: str, data: bytes) -> None:
+        if not self.recorder.counts[topic]:
+            print(f'receiving {topic}', flush=True)
+        try:
+            self.recorder.write(topic, self.get_clock().now().nanoseconds, data)
+        except OSError as error:  # a full disk
+            self._fault = error
+            self.context.try_shutdown()
 
     def _show_progress(self) -> None:
         print(f'\r{self.recorder.counts.total()} messages in {self._seconds():.0f} s ', end='',
