@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 import pybullet as bullet
 
-from ...scene.pose_sets import Pairs
-from .engine import APART, Engine, Manifold, per_pair
+from .engine import APART, Engine, Manifold
 
 FILLING = 4
 """Detections of the same pose before the manifold is read: it takes up to four points."""
@@ -23,7 +22,7 @@ def points(persistent: bool) -> Engine:
     place = partial(bullet.resetBasePositionAndOrientation, physicsClientId=client)
     detect = partial(bullet.performCollisionDetection, physicsClientId=client)
 
-    def bodies(p: np.ndarray, q: np.ndarray) -> Callable[..., Any]:
+    def boxes(p: np.ndarray, q: np.ndarray) -> Callable[..., Any]:
         # Bodies of other sizes are in the same world, and not in the way.
         group = 1 << bullet.getNumBodies(physicsClientId=client) // 2 % GROUPS
         found = []
@@ -47,11 +46,8 @@ def points(persistent: bool) -> Engine:
             detect()
         return bullet.getContactPoints(one, two, physicsClientId=client)
 
-    def prepare(pairs: Pairs) -> list[Callable[[], Any]]:
-        # Bodies stay in the world and slow its broad phase down: only those of these pairs.
-        bullet.resetSimulation(physicsClientId=client)
-        return per_pair(bodies, lambda a, b: tuple(
-            map(tuple, (a[:3], b[:3], a[3:], b[3:]))))(pairs)
+    def at(a: np.ndarray, b: np.ndarray) -> tuple[Any, ...]:
+        return tuple(map(tuple, (a[:3], b[:3], a[3:], b[3:])))
 
     def read(contacts: Any) -> Manifold:
         # 5, 6: the points on A and B; 7: the normal on B, towards A; 8: the distance.
@@ -63,16 +59,16 @@ def points(persistent: bool) -> Engine:
                         np.array([-np.array(c[7]) for c in contacts]),
                         np.array([-c[8] for c in contacts]))
 
+    # Bodies stay in the world and slow its broad phase down.
+    engine = partial(Engine, package='pybullet', boxes=boxes, at=at, read=read,
+                     clear=partial(bullet.resetSimulation, physicsClientId=client))
     if persistent:
-        return Engine(name='PyBullet getContactPoints', package='pybullet',
-                      call=f'{FILLING} × performCollisionDetection, getContactPoints',
-                      returns='up to 4 points with depths, normals',
-                      prepare=prepare, read=read,
+        return engine(name='PyBullet getContactPoints', returns='up to 4 points with depths, '
+                      'normals', call=f'{FILLING} × performCollisionDetection, getContactPoints',
                       causes={'invented': 'The axis test adds 1e-5 to every entry of the rotation, '
                               'so gaps of some 1e-5 of the size count as contact.'})
-    return Engine(name='PyBullet getClosestPoints', call='getClosestPoints(a, b, 0.0)',
-                  returns='one point on each box, depth, normal', package='pybullet',
-                  choices=('its point',), prepare=prepare, read=read, causes={
+    return engine(name='PyBullet getClosestPoints', call='getClosestPoints(a, b, 0.0)',
+                  returns='one point on each box, depth, normal', choices=('its point',), causes={
                       'missed': 'The query rounds edges and corners by a margin of 1 mm: a corner '
                       'recedes by up to 0.7 mm. The same boxes 1,000 times as large miss none.'})
 

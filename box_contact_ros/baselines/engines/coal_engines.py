@@ -8,7 +8,7 @@ from typing import Any
 import coal
 import numpy as np
 
-from .engine import APART, MOST_CONTACTS, Engine, Manifold, matrices, one_contact, per_pair
+from .engine import APART, MOST_CONTACTS, Engine, Manifold, matrices, one_contact
 
 
 def collision(patches: bool) -> Engine:
@@ -18,21 +18,22 @@ def collision(patches: bool) -> Engine:
     request.num_max_contacts = MOST_CONTACTS
     patch_request, patch_result = coal.ContactPatchRequest(), coal.ContactPatchResult()
 
-    def ask(one: Any, two: Any, at_one: Any, at_two: Any, a: np.ndarray, b: np.ndarray,
-            matrix_a: np.ndarray, matrix_b: np.ndarray) -> Any:
-        at_one.setTranslation(a)
-        at_one.setRotation(matrix_a)
-        at_two.setTranslation(b)
-        at_two.setRotation(matrix_b)
-        result.clear()
-        coal.collide(one, at_one, two, at_two, request, result)
-        if patches:
-            patch_result.clear()
-            coal.computeContactPatch(one, at_one, two, at_two, result, patch_request, patch_result)
-        return result
-
     def boxes(p: np.ndarray, q: np.ndarray) -> Callable[..., Any]:
-        return partial(ask, coal.Box(*p), coal.Box(*q), coal.Transform3s(), coal.Transform3s())
+        one, two = coal.Box(*p), coal.Box(*q)
+        at_one, at_two = coal.Transform3s(), coal.Transform3s()
+
+        def ask(a: np.ndarray, b: np.ndarray, matrix_a: np.ndarray, matrix_b: np.ndarray) -> None:
+            at_one.setTranslation(a)
+            at_one.setRotation(matrix_a)
+            at_two.setTranslation(b)
+            at_two.setRotation(matrix_b)
+            result.clear()
+            coal.collide(one, at_one, two, at_two, request, result)
+            if patches:
+                patch_result.clear()
+                coal.computeContactPatch(one, at_one, two, at_two, result, patch_request,
+                                         patch_result)
+        return ask
 
     def read(_: Any) -> Manifold:
         if not result.numContacts():
@@ -49,10 +50,10 @@ def collision(patches: bool) -> Engine:
         return Engine(name='Coal collide, contact patch',
                       call='coal.collide, coal.computeContactPatch', returns='polygon, normal',
                       patch='area', package='coal', choices=('mean', 'patch centroid'),
-                      prepare=per_pair(boxes, matrices), read=read)
+                      boxes=boxes, at=matrices, read=read)
     return Engine(name='Coal collide', call='coal.collide, enable_contact',
                   returns='deepest point, depth, normal', package='coal', choices=('its point',),
-                  prepare=per_pair(boxes, matrices), read=read)
+                  boxes=boxes, at=matrices, read=read)
 
 
 ENGINES = [partial(collision, False), partial(collision, True)]

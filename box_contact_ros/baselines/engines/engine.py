@@ -34,11 +34,11 @@ APART = Manifold(np.empty((0, 3)), np.empty((0, 3)), np.empty(0))
 
 
 class EngineAnswer(NamedTuple):
-    """One contact of a pair: normal (3,) from A to B and point (3,), None if apart."""
+    """One contact of a pair: normal (3,) from A to B and point (3,), NaN if apart."""
 
     touching: bool
-    normal: np.ndarray | None
-    point: np.ndarray | None
+    normal: np.ndarray
+    point: np.ndarray
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,8 +52,10 @@ class Engine:
     package: str = ''  # distribution whose version reports name
     choices: tuple[str, ...] = ('deepest', 'mean', 'patch centroid')
     """Ways, of `CHOICES`, in which users make one point of the answer."""
-    prepare: Callable[[Pairs], list[Callable[[], Any]]]
-    """Return a call for each pair, to be timed. ValueError: not for boxes of these sizes."""
+    boxes: Callable[[np.ndarray, np.ndarray], Callable[..., Any]]
+    """Return what answers for boxes of two sizes (3,). ValueError: not for these sizes."""
+    at: Callable[[np.ndarray, np.ndarray], tuple[Any, ...]]
+    """Return two poses (7,) in the engine's own form, the arguments of what answers."""
     read: Callable[[Any], Manifold]
     """Return the answer in what a call returned; to be read before the next call."""
     prepare_batch: Callable[..., Callable[[], Any]] | None = None
@@ -63,6 +65,16 @@ class Engine:
     """Why it is 'missed', 'invented' or 'normal' in a report, where that is known."""
     make: Callable[[], Engine] | None = None
     """Makes the engine again in a subprocess, where another's library may abort."""
+    clear: Callable[[], None] | None = None
+    """Forget the boxes made so far, if they slow others down."""
+
+    def prepare(self, pairs: Pairs) -> list[Callable[[], Any]]:
+        """Return a call for each pair, to be timed. ValueError: not for boxes of these sizes."""
+        if self.clear:
+            self.clear()
+        made = cache(lambda p, q: self.boxes(np.array(p), np.array(q)))
+        return [partial(made(tuple(p), tuple(q)), *self.at(a, b))
+                for a, b, p, q in zip(*map(np.ascontiguousarray, pairs))]
 
 
 def packages_of(engines: Sequence[Engine]) -> list[str]:
@@ -70,17 +82,15 @@ def packages_of(engines: Sequence[Engine]) -> list[str]:
     return list(dict.fromkeys(['numpy', *(one.package for one in engines if one.package)]))
 
 
-def one_contact(points: np.ndarray, depth: float, normal: np.ndarray) -> Manifold:
+def one_contact(point: np.ndarray, depth: float, normal: np.ndarray) -> Manifold:
     """Return an answer of a single point (3,)."""
-    return Manifold(points[None], normal[None], np.array([depth]))
+    return Manifold(point[None], normal[None], np.array([depth]))
 
 
 def ours(model: str, name: str | None = None, weights: str | None = None) -> Engine:
     """Return a model of this package, which reports show as `name`."""
     entry, _ = find_model('model', model)
-
-    def solver(p: np.ndarray, q: np.ndarray) -> ContactSolver:
-        return ContactSolver(p, q, model=model, weights=weights)
+    solver = partial(ContactSolver, model=model, weights=weights)
 
     def prepare_batch(pairs: Pairs, threads: int = 1) -> Callable[[], Any]:
         a, b, size_a, size_b = pairs
@@ -94,8 +104,7 @@ def ours(model: str, name: str | None = None, weights: str | None = None) -> Eng
 
     return Engine(name=name or model, call='ContactSolver(…)(pose_a, pose_b)',
                   returns='one contact', patch='volume, covariance', choices=('its point',),
-                  prepare=per_pair(solver, lambda a, b: (a, b)), read=read,
-                  any_boxes=entry.any_boxes,
+                  boxes=solver, at=lambda a, b: (a, b), read=read, any_boxes=entry.any_boxes,
                   prepare_batch=prepare_batch if entry.native_batch else None)
 
 
@@ -132,7 +141,7 @@ CHOICES: dict[str, Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]] =
 def chosen(manifold: Manifold, choice: str) -> EngineAnswer:
     """Return one contact of an answer: the deepest one's normal, the point by a choice."""
     if not len(manifold.points):
-        return EngineAnswer(False, None, None)
+        return EngineAnswer(False, np.full(3, np.nan), np.full(3, np.nan))
     return EngineAnswer(True, manifold.normals[int(np.argmax(manifold.depths))],
                         CHOICES[choice](*manifold))
 
@@ -180,21 +189,6 @@ def _work_with(work: Callable[..., Any], make: Callable[[], Engine], *arguments:
 
 def _answer_to(pipe: Any, work: Callable[..., Any], *arguments: Any) -> None:
     pipe.send(work(*arguments))
-
-
-def per_pair(make: Callable[[np.ndarray, np.ndarray], Callable[..., Any]],
-             at: Callable[[np.ndarray, np.ndarray], tuple[Any, ...]],
-             ) -> Callable[[Pairs], list[Callable[[], Any]]]:
-    """Return an `Engine.prepare`, whose calls are `make(size_a, size_b)(*at(pose_a, pose_b))`.
-
-    make: called once for each pair of sizes; at: returns the poses in the engine's own form.
-    """
-    def prepare(pairs: Pairs) -> list[Callable[[], Any]]:
-        made = cache(lambda p, q: make(np.array(p), np.array(q)))
-        return [partial(made(tuple(p), tuple(q)), *at(a, b))
-                for a, b, p, q in zip(*map(np.ascontiguousarray, pairs))]
-
-    return prepare
 
 
 def wxyz(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, ...]:

@@ -2,29 +2,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import fcl
 import numpy as np
 
-from .engine import APART, MOST_CONTACTS, Engine, Manifold, per_pair, wxyz
+from .engine import APART, MOST_CONTACTS, Engine, Manifold, wxyz
 
 
 def collision() -> Engine:
     """Return python-fcl's `collide` of two boxes."""
     request = fcl.CollisionRequest(num_max_contacts=MOST_CONTACTS, enable_contact=True)
 
-    def ask(one: Any, two: Any, a: np.ndarray, b: np.ndarray, quat_a: np.ndarray,
-            quat_b: np.ndarray) -> Any:
-        one.setTransform(fcl.Transform(quat_a, a))
-        two.setTransform(fcl.Transform(quat_b, b))
-        result = fcl.CollisionResult()
-        fcl.collide(one, two, request, result)
-        return result
-
     def boxes(p: np.ndarray, q: np.ndarray) -> Callable[..., Any]:
-        return partial(ask, *(fcl.CollisionObject(fcl.Box(*size)) for size in (p, q)))
+        one, two = (fcl.CollisionObject(fcl.Box(*size)) for size in (p, q))
+
+        def ask(a: np.ndarray, b: np.ndarray, quat_a: np.ndarray, quat_b: np.ndarray) -> Any:
+            one.setTransform(fcl.Transform(quat_a, a))
+            two.setTransform(fcl.Transform(quat_b, b))
+            result = fcl.CollisionResult()
+            fcl.collide(one, two, request, result)
+            return result
+        return ask
 
     def read(result: Any) -> Manifold:
         contacts = result.contacts
@@ -36,7 +35,7 @@ def collision() -> Engine:
 
     return Engine(name='python-fcl collide', call='fcl.collide, enable_contact',
                   returns='up to 8 points with depths, normals', package='python-fcl',
-                  prepare=per_pair(boxes, wxyz), read=read)
+                  boxes=boxes, at=wxyz, read=read)
 
 
 ENGINES = [collision]

@@ -13,7 +13,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from .engine import APART, Engine, Manifold, one_contact, per_pair, wxyz
+from .engine import APART, Engine, Manifold, one_contact, wxyz
 
 Shape = Callable[[str, np.ndarray], tuple[str, str]]  # (name, size) -> asset, geom
 _CCD_ENDS = 'The search for the depth ends at 0, on boxes of very unequal sizes.'
@@ -25,17 +25,17 @@ def distance(name: str, flags: str) -> Engine:
     ends = np.zeros(6)
     measure, matrix = mujoco.mj_geomDistance, mujoco.mju_quat2Mat
 
-    def ask(model: Any, data: Any, place_a: Any, place_b: Any, turn_a: Any, turn_b: Any,
-            a: np.ndarray, b: np.ndarray, quat_a: np.ndarray, quat_b: np.ndarray) -> float:
-        place_a[:] = a
-        place_b[:] = b
-        matrix(turn_a, quat_a)
-        matrix(turn_b, quat_b)
-        return measure(model, data, 0, 1, FARTHEST, ends)
-
     def boxes(p: np.ndarray, q: np.ndarray) -> Callable[..., Any]:
-        model, data = _model(_boxes, flags, p, q)
-        return partial(ask, model, data, *data.geom_xpos, *data.geom_xmat)
+        model, data = _model(box_geoms, flags, p, q)
+        place_a, place_b, turn_a, turn_b = *data.geom_xpos, *data.geom_xmat
+
+        def ask(a: np.ndarray, b: np.ndarray, quat_a: np.ndarray, quat_b: np.ndarray) -> float:
+            place_a[:] = a
+            place_b[:] = b
+            matrix(turn_a, quat_a)
+            matrix(turn_b, quat_b)
+            return measure(model, data, 0, 1, FARTHEST, ends)
+        return ask
 
     def read(result: float) -> Manifold:
         if result > 0.0:
@@ -47,26 +47,25 @@ def distance(name: str, flags: str) -> Engine:
 
     return Engine(name=f'MuJoCo mj_geomDistance{name}', call=f'mj_geomDistance(model, data, 0, 1, '
                   f'1.0, fromto){flags and f", {flags}"}', returns='distance, two nearest points',
-                  package='mujoco', choices=('its point',), prepare=per_pair(boxes, wxyz),
-                  read=read,
+                  package='mujoco', choices=('its point',), boxes=boxes, at=wxyz, read=read,
                   causes={'normal': _CCD_ENDS + ' The two nearest points coincide, and give no '
                           'direction.'})
 
 
-def collision(name: str, shape: Shape, flags: str, choices: tuple[str, ...] = (
-        'deepest', 'mean', 'patch centroid'), normal: str = '') -> Engine:
+def collision(name: str, shape: Shape, flags: str, normal: str = '', **about: Any) -> Engine:
     """Return `mj_collision`, after `mj_kinematics`: up to eight contacts."""
     kinematics, collide = mujoco.mj_kinematics, mujoco.mj_collision
 
-    def ask(model: Any, data: Any, places: np.ndarray, poses: np.ndarray) -> Any:
-        places[:] = poses
-        kinematics(model, data)
-        collide(model, data)
-        return data
-
     def boxes(p: np.ndarray, q: np.ndarray) -> Callable[..., Any]:
         model, data = _model(shape, flags, p, q)
-        return partial(ask, model, data, data.qpos)
+        places = data.qpos
+
+        def ask(poses: np.ndarray) -> Any:
+            places[:] = poses
+            kinematics(model, data)
+            collide(model, data)
+            return data
+        return ask
 
     def at(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray]:
         place_a, place_b, quat_a, quat_b = wxyz(a, b)
@@ -81,11 +80,12 @@ def collision(name: str, shape: Shape, flags: str, choices: tuple[str, ...] = (
 
     return Engine(name=f'MuJoCo mj_collision{name}', call=f'mj_kinematics, mj_collision'
                   f'{flags and f", {flags}"}', returns='up to 8 points with depths, normals',
-                  package='mujoco', choices=choices, prepare=per_pair(boxes, at), read=read,
+                  package='mujoco', boxes=boxes, at=at, read=read, **about,
                   causes={'missed': _CCD_ENDS, 'normal': normal})
 
 
-def _boxes(name: str, size: np.ndarray) -> tuple[str, str]:
+def box_geoms(name: str, size: np.ndarray) -> tuple[str, str]:
+    """Return the shape of a box: its assets, none, and its geom."""
     return '', f'<geom type="box" size="{_text(0.5 * size)}"/>'
 
 
@@ -112,10 +112,11 @@ def _model(shape: Shape, flags: str, p: np.ndarray, q: np.ndarray) -> tuple[Any,
 LIBCCD = 'nativeccd="disable"'
 ENGINES = [
     partial(distance, '', ''), partial(distance, ', libccd', LIBCCD),
-    partial(collision, '', _boxes, ''),
+    partial(collision, '', box_geoms, ''),
     partial(collision, ', meshes', _meshes, 'multiccd="enable"', normal='multiccd takes the normal '
             'of a face near the direction of least depth; with one point the normal is right.'),
-    partial(collision, ', meshes, one point', _meshes, 'multiccd="disable"', ('its point',)),
+    partial(collision, ', meshes, one point', _meshes, 'multiccd="disable"',
+            choices=('its point',)),
     partial(collision, ', meshes, libccd', _meshes, f'{LIBCCD} multiccd="enable"',
             normal='libccd ends its search for the depth early, too deep and off in direction.'),
 ]

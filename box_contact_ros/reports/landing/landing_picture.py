@@ -79,8 +79,7 @@ def _contacts(axis: Any, way: str, record: LandingRecord, middle: np.ndarray) ->
     colour = COLOURS['contact']
     stack_pose, stack_size = scenario.stack_boxes[0]
     if way == 'manifold':
-        found = MujocoSource(scenario.size, stack_size, 'mean').all_of(pose, stack_pose)
-        points = np.array(found.pos)
+        points = MujocoSource(scenario.size, stack_size, 'mean').manifold(pose, stack_pose).points
     else:
         first = len(record.poses) - round(LATEST * record.rate_hz)
         points = np.array([point for tick, point in record.points.items() if tick >= first])

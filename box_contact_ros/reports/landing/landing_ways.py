@@ -11,9 +11,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, NamedTuple
 
-import mujoco
 import numpy as np
 
 from ...apps.crane.landing import (
@@ -28,6 +28,7 @@ from ...apps.crane.landing import (
 )
 from ...apps.crane.mujoco_crane import Crane, CraneScenario
 from ...baselines.engines.engine import Manifold, chosen
+from ...baselines.engines.mujoco_engines import box_geoms, collision
 from ...baselines.point_law import PointLaw
 from ...scene.pose_sets import CONTAINER
 from ...solver.contact import Contact
@@ -119,43 +120,27 @@ class LoopTiming(NamedTuple):
 class Way:
     """A law and what gives its contacts."""
 
-    law: str
+    law: str  # 'patch', 'point', or 'MuJoCo', which has the contacts too
     contacts: str
-    fly: Callable[[CraneScenario, LoopTiming], LandingRecord]
+    sources: Callable[[CraneScenario], Sequence[ContactSource]] | None = None
+    """What gives the contacts, for each box of the stack."""
     every: int = 1
     """One of so many landings of the grid is run."""
     added: bool = False
     """Whether the added landings are run too."""
-    timed: bool = True
-    """Whether rate and latency matter."""
 
+    @property
+    def timed(self) -> bool:
+        """Whether rate and latency matter."""
+        return self.sources is not None
 
-def patch_way(model: str) -> Way:
-    """Return the patch law with a model of this package."""
-    def fly(scenario: CraneScenario, timing: LoopTiming) -> LandingRecord:
-        return land(scenario, solvers(scenario, model), **timing._asdict())
-    return Way(law='patch', contacts=model, fly=fly, added=True)
-
-
-def point_way(contacts: str, sources: Callable[[CraneScenario], Sequence[ContactSource]],
-              every: int = 1) -> Way:
-    """Return the point law with a point from anywhere."""
-    def fly(scenario: CraneScenario, timing: LoopTiming) -> LandingRecord:
-        law = PointLaw.for_load(scenario.mass, scenario.size, timing.rate_hz)
-        return land(scenario, sources(scenario), law=law, **timing._asdict())
-    return Way(law='point', contacts=contacts, fly=fly, every=every)
-
-
-def model_point(model: str, every: int = 1) -> Way:
-    """Return the point law with the point of a model."""
-    return point_way(model, lambda scenario: solvers(scenario, model), every)
-
-
-def mujoco_point(choice: str) -> Way:
-    """Return the point law with one point made of MuJoCo's contacts."""
-    def sources(scenario: CraneScenario) -> list[MujocoSource]:
-        return [MujocoSource(scenario.size, size, choice) for _, size in scenario.stack_boxes]
-    return point_way(f'MuJoCo, {choice} point', sources, every=3)
+    def fly(self, scenario: CraneScenario, timing: LoopTiming) -> LandingRecord:
+        """Run one landing."""
+        if self.sources is None:
+            return own_contact(scenario, timing)
+        law = None if self.law == 'patch' else PointLaw.for_load(
+            scenario.mass, scenario.size, timing.rate_hz)
+        return land(scenario, self.sources(scenario), law=law, **timing._asdict())
 
 
 class MujocoSource:
@@ -163,33 +148,25 @@ class MujocoSource:
 
     def __init__(self, size_a: Sequence[float], size_b: Sequence[float], choice: str) -> None:
         """Make the two boxes; `choice` is one of the engines' `CHOICES`."""
-        spec = mujoco.MjSpec()
-        for name, size in (('a', size_a), ('b', size_b)):
-            body = spec.worldbody.add_body(name=name)
-            body.add_freejoint()
-            body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=np.array(size) / 2.0)
-        self._model = spec.compile()
-        self._data = mujoco.MjData(self._model)
+        self._engine = collision('', box_geoms, '')
+        self._ask = self._engine.boxes(np.array(size_a), np.array(size_b))
         self._choice = choice
 
     def __call__(self, pose_a: np.ndarray, pose_b: np.ndarray) -> Contact:
         """Return the contact, without a patch; its depth is the deepest one's."""
-        found = self.all_of(pose_a, pose_b)
-        answer = chosen(Manifold(np.array(found.pos), np.array(found.frame)[:, :3],
-                                 -np.array(found.dist)), self._choice)
-        nothing = np.full(3, math.nan)
-        if answer.normal is None or answer.point is None:
-            return Contact(False, math.nan, nothing, nothing, 0.0, np.full((3, 3), math.nan))
-        return Contact(True, float(np.min(found.dist)), answer.normal, answer.point, math.nan,
-                       np.full((3, 3), math.nan))
+        found = self.manifold(pose_a, pose_b)
+        touching, normal, point = chosen(found, self._choice)
+        return Contact(touching, -float(found.depths.max()) if touching else math.nan, normal,
+                       point, math.nan if touching else 0.0, np.full((3, 3), math.nan))
 
-    def all_of(self, pose_a: np.ndarray, pose_b: np.ndarray) -> Any:
-        """Return MuJoCo's contacts, until the next call."""
-        self._data.qpos[:] = np.concatenate([pose_a[:3], np.roll(pose_a[3:], 1), pose_b[:3],
-                                             np.roll(pose_b[3:], 1)])
-        mujoco.mj_kinematics(self._model, self._data)
-        mujoco.mj_collision(self._model, self._data)
-        return self._data.contact
+    def manifold(self, pose_a: np.ndarray, pose_b: np.ndarray) -> Manifold:
+        """Return all of MuJoCo's contacts."""
+        return self._engine.read(self._ask(*self._engine.at(pose_a, pose_b)))
+
+
+def mujoco_sources(scenario: CraneScenario, choice: str) -> list[MujocoSource]:
+    """Return what makes one point of MuJoCo's contacts, for each box of the stack."""
+    return [MujocoSource(scenario.size, size, choice) for _, size in scenario.stack_boxes]
 
 
 def own_contact(scenario: CraneScenario, timing: LoopTiming) -> LandingRecord:
@@ -208,14 +185,16 @@ def own_contact(scenario: CraneScenario, timing: LoopTiming) -> LandingRecord:
 
 
 WAYS = {
-    'exact': patch_way('exact'),
-    'mlp': patch_way('mlp'),
-    'manifold': Way(law='MuJoCo', contacts='its manifold, in the simulator', fly=own_contact,
-                    added=True, timed=False),
-    'point': model_point('exact'),
-    'mujoco-mean': mujoco_point('mean'),
-    'mujoco-deepest': mujoco_point('deepest'),
-    'fcl': model_point('fcl', every=3),
-    'soup': model_point('soup', every=12),
+    'exact': Way(law='patch', contacts='exact', sources=partial(solvers, model='exact'),
+                 added=True),
+    'mlp': Way(law='patch', contacts='mlp', sources=partial(solvers, model='mlp'), added=True),
+    'manifold': Way(law='MuJoCo', contacts='its manifold, in the simulator', added=True),
+    'point': Way(law='point', contacts='exact', sources=partial(solvers, model='exact')),
+    'mujoco-mean': Way(law='point', contacts='MuJoCo, mean point', every=3,
+                       sources=partial(mujoco_sources, choice='mean')),
+    'mujoco-deepest': Way(law='point', contacts='MuJoCo, deepest point', every=3,
+                          sources=partial(mujoco_sources, choice='deepest')),
+    'fcl': Way(law='point', contacts='fcl', sources=partial(solvers, model='fcl'), every=3),
+    'soup': Way(law='point', contacts='soup', sources=partial(solvers, model='soup'), every=12),
 }
 """By name: the ways that the table has."""

@@ -2,13 +2,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import dartpy as dart
 import numpy as np
 
-from ..engine import APART, MOST_CONTACTS, Engine, Manifold, matrices, per_pair
+from ..engine import APART, MOST_CONTACTS, Engine, Manifold, matrices
 
 
 def collision() -> Engine:
@@ -26,17 +25,16 @@ def collision() -> Engine:
             group.addShapeFrame(frame)
             frames.append(frame)
             groups.append(group)
-        return partial(ask, *frames, *groups)
+        one, two = frames
 
-    def ask(one: Any, two: Any, group: Any, other: Any, a: np.ndarray, b: np.ndarray,
-            matrix_a: np.ndarray, matrix_b: np.ndarray) -> Any:
-        one.setTranslation(a)
-        one.setRotation(matrix_a)
-        two.setTranslation(b)
-        two.setRotation(matrix_b)
-        result.clear()
-        group.collide(other, option, result)
-        return b - a
+        def ask(a: np.ndarray, b: np.ndarray, matrix_a: np.ndarray, matrix_b: np.ndarray) -> None:
+            one.setTranslation(a)
+            one.setRotation(matrix_a)
+            two.setTranslation(b)
+            two.setRotation(matrix_b)
+            result.clear()
+            groups[0].collide(groups[1], option, result)
+        return ask
 
     def read(_: Any) -> Manifold:
         contacts = [result.getContact(k) for k in range(result.getNumContacts())]
@@ -49,7 +47,7 @@ def collision() -> Engine:
 
     return Engine(name='DART collide', call='CollisionGroup.collide', package='dartpy',
                   returns='up to 8 points with depths, normals',
-                  prepare=per_pair(boxes, matrices), read=read)
+                  boxes=boxes, at=matrices, read=read)
 
 
 ENGINES = [collision]

@@ -10,7 +10,7 @@ from pydrake import geometry
 from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RigidTransform
 
-from ..engine import APART, Engine, Manifold, one_contact, per_pair
+from ..engine import APART, Engine, Manifold, one_contact
 
 MODULUS = 1e5  # hydroelastic modulus [Pa]; equal on both boxes, so that it shifts nothing
 
@@ -53,8 +53,9 @@ def _engine(surfaces: bool, read: Callable[[Any], Manifold], **about: Any) -> En
         x, y, z, w = pose[3:] / np.linalg.norm(pose[3:])
         return RigidTransform(Quaternion(w, x, y, z), pose[:3])
 
-    return Engine(package='drake', choices=('its point',), read=read, prepare=per_pair(
-        partial(_DrakeScene, surfaces), lambda a, b: (place(a), place(b))), **about)
+    return Engine(package='drake', choices=('its point',), read=read,
+                  boxes=partial(_DrakeScene, surfaces),
+                  at=lambda a, b: (place(a), place(b)), **about)
 
 
 def point_pair() -> Engine:

@@ -11,7 +11,7 @@ import warp
 
 from ....scene.pose import rotation_matrix
 from ....scene.pose_sets import Pairs
-from ..engine import APART, Engine, Manifold, per_pair
+from ..engine import APART, Engine, Manifold
 
 warp.config.quiet = True
 
@@ -63,8 +63,8 @@ def collision() -> Engine:
 
     return Engine(name='Newton collide', call='CollisionPipeline.collide',
                   returns='up to 5 points with normals; float32', package='newton',
-                  prepare=per_pair(lambda p, q: _NewtonModel(p[None], q[None]),
-                                   lambda a, b: (np.array([a, b], dtype=np.float32),)), read=read,
+                  boxes=lambda p, q: _NewtonModel(p[None], q[None]),
+                  at=lambda a, b: (np.array([a, b], dtype=np.float32),), read=read,
                   prepare_batch=prepare_batch)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import rapier3d as rapier
 
 from ....scene.pose import rotation_matrix
-from ..engine import APART, Engine, Manifold, per_pair
+from ..engine import APART, Engine, Manifold
 
 
 class _RapierWorld:
@@ -60,8 +60,8 @@ def collision() -> Engine:
     return Engine(name='Rapier contact_pair', package='rapier3d',
                   call='CollisionPipeline.step, NarrowPhase.contact_pair',
                   returns='up to 4 points with depths, normals; float32',
-                  prepare=per_pair(_RapierWorld, lambda a, b: (
-                      place(a), place(b), np.array([a, b]))), read=read)
+                  boxes=_RapierWorld, read=read,
+                  at=lambda a, b: (place(a), place(b), np.array([a, b])))
 
 
 ENGINES = [collision]
