@@ -144,19 +144,17 @@ def added_table(results: Sequence[Landed]) -> str:
     ways = [name for name in WAYS if WAYS[name].added
             and any(one.landing.way == name for one in results)]
     shown = {'corner_speed': 1e3, 'static_tilt': 180.0 / math.pi, 'depth': 100.0}
+    added = {one.landing.planned.name: one.landing.planned for one in results
+             if not one.landing.planned.name.startswith('grid')}
     rows = []
-    for planned in dict.fromkeys(one.landing.planned.name for one in results
-                                 if not one.landing.planned.name.startswith('grid')):
-        row: list[str] = []
-        for name in ways:
+    for name, planned in added.items():
+        row = [name, 'falls' if planned.falls else
+               f'rests, tilt ≤ {math.degrees(planned.tilt_limit):.2g}°']
+        for way in ways:
             found = [one for one in results
-                     if (one.landing.way, one.landing.planned.name) == (name, planned)]
-            if not row:
-                plan = found[0].landing.planned
-                row = [planned, 'falls' if plan.falls else
-                       f'rests, tilt ≤ {math.degrees(plan.tilt_limit):.2g}°']
+                     if (one.landing.way, one.landing.planned.name) == (way, name)]
             row.append(f'{sum(one.as_expected for one in found)} of {len(found)}')
-            row.append('' if plan.falls else ' / '.join(
+            row.append('' if planned.falls else ' / '.join(
                 worst([one.result for one in found], *figure) for figure in shown.items()))
         rows.append(row)
     head = [cell for name in ways for cell in (WAYS[name].contacts, 'corner / tilt / depth')]
@@ -231,14 +229,13 @@ def main(args: Sequence[str] | None = None) -> int:
     options, folder = _options(args)
     step = QUICK if options.quick else 1
     of_grid, added = grid(options.seed)[::step], ADDED[::3] if options.quick else ADDED
-    ways = options.ways
     timings = [LoopTiming(rate, latency) for rate in options.rates for latency in options.latency]
     everything = [*of_grid, *added]
     # Leaving the pool ends its workers, and they their contact nodes.
     with left_when_asked(), Pool(options.workers) as pool:
         scenarios = dict(zip([one.name for one in everything], tqdm(
             pool.imap(aimed, everything), total=len(everything), desc='aiming', unit='')))
-        landings = list(landings_of(ways, timings, of_grid, added, scenarios))
+        landings = list(landings_of(options.ways, timings, of_grid, added, scenarios))
         flown = over_dds(pool, landings) if options.dds else pool.imap(run, landings)
         results = list(tqdm(flown, total=len(landings), desc='landings', unit=''))
     name = 'landing_dds' if options.dds else 'landing'
