@@ -10,7 +10,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, astuple, dataclass
 from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Protocol
@@ -83,11 +83,11 @@ def write_csv(path: Path, rows: Iterable[Mapping[str, object]], *, digits: int =
               about: Machine | None = None) -> None:
     """Write rows by column name; the columns are those of all rows, in the order of appearance.
 
-    about: the machine, whose columns every row gets at its end. A float has `digits` significant
-    digits. A missing value, None and NaN are empty cells.
+    about: the machine, whose columns every row gets at its end, but for those that it has itself.
+    A float has `digits` significant digits. A missing value, None and NaN are empty cells.
     """
     here = asdict(about) if about else {}
-    listed = [{**row, **here} for row in rows]
+    listed = [{**row, **here, **row} for row in rows]
     columns = list(dict.fromkeys(name for row in listed for name in row))
     with path.open('w', newline='', encoding='utf-8') as file:
         writer = csv.writer(file, lineterminator='\n')
@@ -155,20 +155,18 @@ def name_points(axis: Axes, points: Sequence[tuple[float, float, str, str]]) -> 
                       va='center', color=colour, annotation_clip=False, arrowprops=line)
 
 
-def spread(wanted: Sequence[float], step: float) -> list[float]:
+def spread(wanted: Sequence[float], step: float) -> np.ndarray:
     """Return places in [0, 1], in the order of those wanted (ascending), at least a step apart."""
-    def pushed(values: Sequence[float]) -> list[float]:
-        found: list[float] = []
-        for value in values:
-            found.append(max(value, found[-1] + step if found else 0.0))
-        return found
+    places, steps = np.array(wanted), step * np.arange(len(wanted))
 
-    def from_above(values: Sequence[float]) -> list[float]:
-        return [1.0 - value for value in pushed([1.0 - value for value in values[::-1]])][::-1]
+    def pushed(values: np.ndarray) -> np.ndarray:
+        return np.maximum.accumulate(np.maximum(values - steps, 0.0)) + steps
+
+    def from_above(values: np.ndarray) -> np.ndarray:
+        return 1.0 - pushed(1.0 - values[::-1])[::-1]
 
     # Pushed up and pushed down: what lies between keeps the steps, too.
-    up, down = from_above(pushed(wanted)), pushed(from_above(wanted))
-    return [0.5 * (one + two) for one, two in zip(up, down)]
+    return 0.5 * (from_above(pushed(places)) + pushed(from_above(places)))
 
 
 def percentiles(values: Sequence[float] | np.ndarray, *percents: float) -> tuple[float, ...]:
@@ -248,15 +246,14 @@ class Machine:
     versions: str  # versions of Python and of packages
 
     def __str__(self) -> str:
-        return ', '.join(filter(None, (self.processor, self.instruction_set, self.compiler,
-                                       self.versions)))
+        return ', '.join(astuple(self))
 
 
-def machine(core: Core | None = None, packages: Sequence[str] = ('numpy',)) -> Machine:
-    """Return this machine's description; without `core`, what does not run the native core."""
-    compiler = core.compiler if core else ''
+def machine(core: Core, packages: Sequence[str] = ('numpy',)) -> Machine:
+    """Return this machine's description."""
+    compiler = core.compiler
     return Machine(
-        processor=processor(), instruction_set=core.instruction_set if core else '',
+        processor=processor(), instruction_set=core.instruction_set,
         compiler=f'GCC {compiler}' if compiler[:1].isdigit() else compiler,
         versions=versions(packages))
 

@@ -53,7 +53,8 @@ def test_a_machine_names_all_that_a_time_depends_on() -> None:
     assert found.instruction_set == native.instruction_set
     assert native.compiler in found.compiler and f'numpy {np.__version__}' in found.versions
     assert all(value and value in str(found) for value in asdict(found).values())
-    assert str(output.machine()) == f'{output.processor()}, {output.versions()}'
+    assert str(output.machine(native)) == (
+        f'{output.processor()}, {found.instruction_set}, {found.compiler}, {output.versions()}')
 
 
 @pytest.mark.parametrize(('vendor', 'family', 'model', 'expected'), [
@@ -69,7 +70,7 @@ def test_labels_are_spread(rng_seed: int = 5) -> None:
     rng = np.random.default_rng(rng_seed)
     for count in (1, 5, 20):
         wanted = np.sort(rng.uniform(size=count) ** 4).tolist()
-        places = np.array(output.spread(wanted, 0.04))
+        places = output.spread(wanted, 0.04)
         assert (np.diff(places) >= 0.04 - 1e-12).all()
         assert places[0] >= -1e-12 and places[-1] <= 1.0 + 1e-12
     assert output.spread([0.1, 0.5, 0.9], 0.04) == pytest.approx([0.1, 0.5, 0.9])
