@@ -8,20 +8,22 @@ follow. The exit status is 1 if a limit is broken.
 from __future__ import annotations
 
 import json
+import math
 import os
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
+from functools import partial
 from operator import itemgetter
 from pathlib import Path
 
 import numpy as np
 
 from ...baselines.engines import installed
-from ...baselines.engines.engine import Engine, ours
+from ...baselines.engines.engine import ours
 from ...core import FORCE, instruction_sets, native
 from ...output import machine, markdown_table, no_garbage_collection, percentiles, write_csv
 from ...output import page as filled_page
@@ -142,11 +144,6 @@ class Timing:
         """
         return float(np.median(np.divide(self.rounds, other.rounds)))
 
-    @property
-    def median(self) -> float:
-        """Return the median over the rounds."""
-        return percentiles(self.rounds, 50)[0]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Stint:
@@ -156,6 +153,14 @@ class Stint:
     kind: str
     count: int  # calls or pairs of a run
     run: Callable[[], object]
+    times: list[float] = field(default_factory=list)  # of a call or pair, by round [ns]
+
+    def clock(self) -> None:
+        """Time a run right after an untimed one."""
+        self.run()
+        began = time.perf_counter_ns()
+        self.run()
+        self.times.append((time.perf_counter_ns() - began) / self.count)
 
 
 def _drawn(name: str, count: int) -> Pairs:
@@ -171,42 +176,27 @@ def single_calls(count: int) -> list[Stint]:
         print(f'left out: {line}', file=sys.stderr)
     # Ours come last: batches follow, and the first one after scalar code is slow for milliseconds.
     engines = [*(one for one in rivals if one.name in UNITS), *map(ours, gated_models())]
-
-    def stint(engine: Engine) -> Stint:
-        calls = engine.prepare(pairs)
-
-        def run() -> None:
-            for call in calls:
-                call()
-        return Stint(name=engine.name, kind='single', count=count, run=run)
-
     pairs = _drawn('random cubes', count)
-    return [stint(engine) for engine in engines]
+    return [Stint(name=engine.name, kind='single', count=count,
+                  run=partial(_call_all, engine.prepare(pairs))) for engine in engines]
+
+
+def _call_all(calls: Sequence[Callable[[], object]]) -> None:
+    for call in calls:
+        call()
 
 
 def batch(model: str, name: str, count: int, kind: str = 'batch', threads: int = 1) -> Stint:
     """Return the contestant for a batch of a model on a set, every row its own sizes."""
-    prepare = ours(model).prepare_batch
-    assert prepare is not None
     return Stint(name=f'{model}: {name}', kind=kind, count=count,
-                 run=prepare(_drawn(name, count), threads=threads))
+                 run=ours(model).prepare_batch(_drawn(name, count), threads=threads))
 
 
 def timed(stints: Sequence[Stint], rounds: int) -> list[Timing]:
-    """Time all in turn, `rounds` times, each right after an untimed run of its own."""
-    times: list[list[float]] = [[] for _ in stints]
-
-    def clocked(one: Stint, found: list[float]) -> Callable[[], None]:
-        def run() -> None:
-            one.run()
-            began = time.perf_counter_ns()
-            one.run()
-            found.append((time.perf_counter_ns() - began) / one.count)
-        return run
-
-    take_turns([clocked(one, found) for one, found in zip(stints, times)], rounds)
+    """Time all in turn, `rounds` times."""
+    take_turns([one.clock for one in stints], rounds)
     return [Timing(name=one.name, kind=one.kind, instruction_set=native.instruction_set,
-                   rounds=found) for one, found in zip(stints, times)]
+                   rounds=one.times) for one in stints]
 
 
 def print_timings(core: int, effort: Effort) -> None:
@@ -239,7 +229,6 @@ def measure_starts(count: int) -> list[float]:
     for _ in range(1 + count):
         began = time.perf_counter()
         with subprocess.Popen([sys.executable, '-c', FIRST_CONTACT], stdout=subprocess.PIPE) as new:
-            assert new.stdout is not None
             answered = bool(new.stdout.readline())
             times.append(time.perf_counter() - began)
             new.stdout.read()
@@ -258,10 +247,8 @@ class Claim:
 
 def unit_of(timings: Sequence[Timing]) -> Timing:
     """Return single calls of UNIT, of NaN where MuJoCo is not installed."""
-    first = timings[0]
     return next((one for one in timings if one.name == UNIT), Timing(
-        name=UNIT, kind='single', instruction_set=first.instruction_set,
-        rounds=[float('nan')] * len(first.rounds)))
+        name=UNIT, kind='single', instruction_set='', rounds=[math.nan]))
 
 
 def claims_of(timings: Sequence[Timing], best: bool) -> list[Claim]:
@@ -285,7 +272,8 @@ def claims_of(timings: Sequence[Timing], best: bool) -> list[Claim]:
         claims.append(_at_most(f'{name}: a pair in a batch of `mlp` takes {{:.3f}} of one of '
                                f'`exact` on {slowest}, the slowest set', ratio, MLP_BY_EXACT))
         for model, limit in SPREAD_LIMITS.items():
-            medians = {key: one.median for key, one in batches[model].items()}
+            medians = {key: percentiles(one.rounds, 50)[0]
+                       for key, one in batches[model].items()}
             slowest, ns = _slowest(medians)
             claims.append(_at_most(
                 f'{name}: {slowest} take `{model}` {{:.2f}} of the median set',
@@ -335,21 +323,18 @@ def table(timings: Sequence[Timing]) -> str:
 def page(runs: Sequence[Sequence[Timing]], claims: Sequence[Claim], command: str,
          effort: Effort) -> str:
     """Return the Markdown page."""
-    here = machine(native, PACKAGES)
     return filled_page(
-        'reports/pages/speed', command=command, processor=here.processor, compiler=here.compiler,
-        versions=here.versions, effort=effort,
+        'reports/pages/speed', command=command, machine=machine(native, PACKAGES), effort=effort,
         claims='\n'.join(f'- {"" if one.holds else "BROKEN: "}{one.text}' for one in claims),
         tables='\n\n'.join(f'## {run[0].instruction_set}\n\n{table(run)}' for run in runs))
 
 
 def write_timings(path: Path, timings: Sequence[Timing]) -> None:
     """Write a row for each contestant and round [ns]."""
-    here = machine(native, PACKAGES)
-    about = {'processor': here.processor, 'compiler': here.compiler, 'versions': here.versions}
     write_csv(path, [{'name': one.name, 'kind': one.kind, 'instruction_set': one.instruction_set,
-                      'round': number, 'ns': f'{value:.1f}', **about}
-                     for one in timings for number, value in enumerate(one.rounds)])
+                      'round': number, 'ns': f'{value:.1f}'}
+                     for one in timings for number, value in enumerate(one.rounds)],
+              about=machine(native, PACKAGES))
 
 
 def write_speed(folder: Path, command: str, *, core: int, quick: bool) -> int:
