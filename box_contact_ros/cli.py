@@ -34,72 +34,69 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Program:
-    """Where a program is found, what it does, and which extras of setup.py it needs."""
+    """Where a program's `main` is, which extras of setup.py it needs, and what it does."""
 
-    target: str  # 'module:function'
-    description: str
+    module: str
     extras: tuple[str, ...]
-
-
-def _program(module: str, extras: str, description: str) -> Program:
-    return Program(f'box_contact_ros.{module}:main', description, tuple(extras.split()))
+    description: str
 
 
 PROGRAMS = {
-    'contact_node': _program(
-        'node.contact_node', 'ros',
+    'contact_node': Program(
+        'box_contact_ros.node.contact_node', ('ros',),
         'the ROS 2 node: two box poses in, contact point and normal out'),
-    'crane': _program(
-        'apps.crane.crane_node', 'ros sim',
+    'crane': Program(
+        'box_contact_ros.apps.crane.crane_node', ('ros', 'sim'),
         'a MuJoCo crane that lowers one container onto another and publishes both poses'),
-    'soup_node': _program(
-        'node.soup_node', 'ros soup',
+    'soup_node': Program(
+        'box_contact_ros.node.soup_node', ('ros', 'soup'),
         'the same node on a polygon soup, under soup/: what the source paper compares with'),
-    'view': _program(
-        'apps.viewer.view', 'ros sim view',
+    'view': Program(
+        'box_contact_ros.apps.viewer.view', ('ros', 'sim', 'view'),
         'a page in the browser: all boxes of a scene, their contacts and figures, live'),
-    'markers': _program(
-        'apps.viewer.markers', 'ros',
+    'markers': Program(
+        'box_contact_ros.apps.viewer.markers', ('ros',),
         'draw boxes and contacts as markers for RViz'),
-    'bench': _program(
-        'apps.bench.bench', 'ros sim soup report',
+    'bench': Program(
+        'box_contact_ros.apps.bench.bench', ('ros', 'sim', 'soup', 'report'),
         'drive contact, soup and echo node with streams of poses: latency, losses, errors'),
-    'record': _program(
-        'apps.recording.record', 'ros bag',
+    'record': Program(
+        'box_contact_ros.apps.recording.record', ('ros', 'bag'),
         'write poses and contacts of running nodes to a bag (MCAP) for Foxglove and ros2 bag'),
-    'soak': _program(
-        'apps.bench.soak', 'ros sim report',
+    'soak': Program(
+        'box_contact_ros.apps.bench.soak', ('ros', 'sim', 'report'),
         'ten minutes at 1 kHz: losses, mispairs, memory, latency next to echo nodes'),
-    'train': _program(
-        'training.train', 'train',
+    'train': Program(
+        'box_contact_ros.training.train', ('train',),
         'make the data sets, fit the networks, write weights/'),
-    'search': _program(
-        'training.experiments.search', 'train report',
+    'search': Program(
+        'box_contact_ros.training.experiments.search', ('train', 'report'),
         'train thousands of networks at once to find the size and settings that they should have'),
-    'accuracy': _program(
-        'reports.accuracy', 'report',
+    'accuracy': Program(
+        'box_contact_ros.reports.accuracy', ('report',),
         'point error of a model against the exact one, per set of poses and contact class'),
-    'frontier': _program(
-        'reports.frontier.frontier', 'report',
+    'frontier': Program(
+        'box_contact_ros.reports.frontier.frontier', ('report',),
         'speed against error of every model and of other engines, as table and picture'),
-    'fuzz': _program(
-        'verification.fuzz', 'report fuzz',
+    'fuzz': Program(
+        'box_contact_ros.verification.fuzz', ('report', 'fuzz'),
         'millions of random pairs, judged by an independent test; gates at zero'),
-    'stability': _program(
-        'reports.hard.stability', 'report soup',
+    'stability': Program(
+        'box_contact_ros.reports.hard.stability', ('report', 'soup'),
         'what each model makes of families of hard poses'),
-    'landing': _program(
-        'reports.landing.landing_report', 'sim soup report',
+    'landing': Program(
+        'box_contact_ros.reports.landing.landing_report', ('sim', 'soup', 'report'),
         'whether a load comes to rest by each way of contact and force, as table and picture'),
-    'paper': _program(
-        'reports.paper.paper_tables', 'report',
+    'paper': Program(
+        'box_contact_ros.reports.paper.paper_tables', ('report',),
         "redo the source paper's tables, with its figures and ours"),
-    'reports': _program(
-        'reports.remake.remake', 'ros sim soup train report fuzz peers',
+    'reports': Program(
+        'box_contact_ros.reports.remake.remake',
+        ('ros', 'sim', 'soup', 'train', 'report', 'fuzz', 'peers'),
         'remake every table and picture of docs/results, with the programs above'),
 }
 
-_CHECK = _program('scene.files.scene_check', '', 'what a scene file means, without ROS')
+_CHECK = Program('box_contact_ros.scene.files.scene_check', (), 'what a scene file means')
 """What `contact_node --check FILE` starts."""
 
 # What each extra brings, by top-level module. A module that is missing and not listed here is a
@@ -128,7 +125,6 @@ def run(name: str, args: Sequence[str]) -> int:
         print(_unknown(name), file=sys.stderr)
         return 2
     program = _CHECK if name == 'contact_node' and '--check' in args else PROGRAMS[name]
-    module, _, function = program.target.partition(':')
     if 'ros' in program.extras and not _shared_memory_has_room():
         return 1
     # argparse takes the program's name from here: the same one in usage lines, however started.
@@ -136,7 +132,7 @@ def run(name: str, args: Sequence[str]) -> int:
     try:
         try:
             with help_without_extras() if {'-h', '--help'} & set(args) else nullcontext():
-                status = getattr(importlib.import_module(module), function)(list(args))
+                status = importlib.import_module(program.module).main(list(args))
         finally:  # --help, too, which leaves by SystemExit
             sys.stdout.flush()
     except ModuleNotFoundError as error:

@@ -109,7 +109,7 @@ def table_of(program: str) -> dict[str, Any]:
     """Return the parameters of a program."""
     if program == 'crane':
         return importlib.import_module('box_contact_ros.apps.crane.crane_parameters').PARAMETERS
-    return importlib.import_module(PROGRAMS[program].target.partition(':')[0]).PARAMETERS
+    return importlib.import_module(PROGRAMS[program].module).PARAMETERS
 
 
 def test_launch_arguments(crane_launch: Any) -> None:

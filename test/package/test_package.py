@@ -124,9 +124,7 @@ def _run(*command: str, **env: str) -> subprocess.CompletedProcess[str]:
 def test_program_table_is_complete(name: str) -> None:
     """Every program has a module that gets installed, a description and known extras."""
     program = cli.PROGRAMS[name]
-    module, _, function = program.target.partition(':')
-    assert function == 'main'
-    path = ROOT.joinpath(*module.split('.')).with_suffix('.py')
+    path = ROOT.joinpath(*program.module.split('.')).with_suffix('.py')
     assert path.is_file()
     assert path.with_name('__init__.py').is_file()  # find_packages leaves out a folder without it
     assert program.description and '\n' not in program.description
@@ -164,7 +162,7 @@ def probe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     )
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setitem(
-        cli.PROGRAMS, 'probe', cli.Program('probe_program:main', 'a test', ())
+        cli.PROGRAMS, 'probe', cli.Program('probe_program', (), 'a test')
     )
 
 
@@ -269,7 +267,7 @@ def test_missing_module_of_our_own_keeps_its_traceback(
 ) -> None:
     """No extra would help: hiding where it happened would only hide the fault."""
     monkeypatch.setitem(
-        cli.PROGRAMS, 'probe', cli.Program('box_contact_ros.no_such:main', 'a test', ())
+        cli.PROGRAMS, 'probe', cli.Program('box_contact_ros.no_such', (), 'a test')
     )
     with pytest.raises(ModuleNotFoundError, match='no_such'):
         cli.run('probe', [])

@@ -16,9 +16,7 @@ FILES = ('fuzz', 'paper')
 
 
 def main_of(name):
-    target = PROGRAMS[name].target if name in PROGRAMS else f'box_contact_ros.reports.{name}:main'
-    module, _, function = target.partition(':')
-    return getattr(importlib.import_module(module), function)
+    return importlib.import_module(PROGRAMS[name].module).main
 
 
 @pytest.mark.parametrize('words', FOLDERS)
