@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pybullet as bullet
 
-from .engine import APART, Engine, Manifold
+from .engine import Engine, Manifold, manifold
 
 FILLING = 4
 """Detections of the same pose before the manifold is read: it takes up to four points."""
@@ -52,12 +52,8 @@ def points(persistent: bool) -> Engine:
     def read(contacts: Any) -> Manifold:
         # 5, 6: the points on A and B; 7: the normal on B, towards A; 8: the distance.
         # The manifold keeps points that are up to its margin apart.
-        contacts = [contact for contact in contacts if contact[8] <= 0.0]
-        if not contacts:
-            return APART
-        return Manifold(np.array([0.5 * (np.array(c[5]) + np.array(c[6])) for c in contacts]),
-                        np.array([-np.array(c[7]) for c in contacts]),
-                        np.array([-c[8] for c in contacts]))
+        return manifold((0.5 * (np.array(c[5]) + np.array(c[6])), -np.array(c[7]), -c[8])
+                        for c in contacts if c[8] <= 0.0)
 
     # Bodies stay in the world and slow its broad phase down.
     engine = partial(Engine, package='pybullet', boxes=boxes, at=at, read=read,

@@ -8,7 +8,7 @@ from typing import Any
 import coal
 import numpy as np
 
-from .engine import APART, MOST_CONTACTS, Engine, Manifold, matrices, one_contact
+from .engine import APART, MOST_CONTACTS, Engine, Manifold, manifold, matrices
 
 
 def collision(patches: bool) -> Engine:
@@ -41,10 +41,9 @@ def collision(patches: bool) -> Engine:
         contact = result.getContact(0)
         normal, depth = np.array(contact.normal), -contact.penetration_depth
         if not patches or not patch_result.numContactPatches():
-            return one_contact(np.array(contact.pos), depth, normal)
+            return manifold([(contact.pos, normal, depth)])
         patch = patch_result.getContactPatch(0)
-        points = np.array([patch.getPoint(k) for k in range(patch.size())])
-        return Manifold(points, np.tile(normal, (len(points), 1)), np.full(len(points), depth))
+        return manifold((patch.getPoint(k), normal, depth) for k in range(patch.size()))
 
     if patches:
         return Engine(name='Coal collide, contact patch',

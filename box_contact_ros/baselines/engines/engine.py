@@ -7,12 +7,13 @@ and is not timed. Setting both poses is timed.
 from __future__ import annotations
 
 import multiprocessing
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ...scene.pose import rotation_matrix
 from ...scene.pose_sets import Pairs
@@ -31,6 +32,12 @@ class Manifold(NamedTuple):
 
 
 APART = Manifold(np.empty((0, 3)), np.empty((0, 3)), np.empty(0))
+
+
+def manifold(contacts: Iterable[tuple[ArrayLike, ArrayLike, float]]) -> Manifold:
+    """Return the answer of contacts, each a point (3,), a normal (3,) and a depth [m]."""
+    columns = list(zip(*contacts))
+    return Manifold(*map(np.array, columns)) if columns else APART
 
 
 class EngineAnswer(NamedTuple):
@@ -82,11 +89,6 @@ def packages_of(engines: Sequence[Engine]) -> list[str]:
     return list(dict.fromkeys(['numpy', *(one.package for one in engines if one.package)]))
 
 
-def one_contact(point: np.ndarray, depth: float, normal: np.ndarray) -> Manifold:
-    """Return an answer of a single point (3,)."""
-    return Manifold(point[None], normal[None], np.array([depth]))
-
-
 def ours(model: str, name: str | None = None, weights: str | None = None) -> Engine:
     """Return a model of this package, which reports show as `name`."""
     entry, _ = find_model('model', model)
@@ -100,7 +102,7 @@ def ours(model: str, name: str | None = None, weights: str | None = None) -> Eng
     def read(contact: Any) -> Manifold:
         if not contact.colliding:
             return APART
-        return one_contact(contact.point, -contact.separation, contact.normal)
+        return manifold([(contact.point, contact.normal, -contact.separation)])
 
     return Engine(name=name or model, call='ContactSolver(…)(pose_a, pose_b)',
                   returns='one contact', patch='volume, covariance', choices=('its point',),

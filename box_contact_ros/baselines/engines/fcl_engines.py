@@ -7,7 +7,7 @@ from typing import Any
 import fcl
 import numpy as np
 
-from .engine import APART, MOST_CONTACTS, Engine, Manifold, wxyz
+from .engine import MOST_CONTACTS, Engine, Manifold, manifold, wxyz
 
 
 def collision() -> Engine:
@@ -26,12 +26,7 @@ def collision() -> Engine:
         return ask
 
     def read(result: Any) -> Manifold:
-        contacts = result.contacts
-        if not contacts:
-            return APART
-        return Manifold(np.array([c.pos for c in contacts]),
-                        np.array([c.normal for c in contacts]),
-                        np.array([c.penetration_depth for c in contacts]))
+        return manifold((c.pos, c.normal, c.penetration_depth) for c in result.contacts)
 
     return Engine(name='python-fcl collide', call='fcl.collide, enable_contact',
                   returns='up to 8 points with depths, normals', package='python-fcl',

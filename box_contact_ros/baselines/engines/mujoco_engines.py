@@ -13,7 +13,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from .engine import APART, Engine, Manifold, one_contact, wxyz
+from .engine import APART, Engine, Manifold, manifold, wxyz
 
 Shape = Callable[[str, np.ndarray], tuple[str, str]]  # (name, size) -> asset, geom
 _CCD_ENDS = 'The search for the depth ends at 0, on boxes of very unequal sizes.'
@@ -27,7 +27,7 @@ def distance(name: str, flags: str) -> Engine:
 
     def boxes(p: np.ndarray, q: np.ndarray) -> Callable[..., Any]:
         model, data = _model(box_geoms, flags, p, q)
-        place_a, place_b, turn_a, turn_b = *data.geom_xpos, *data.geom_xmat
+        (place_a, place_b), (turn_a, turn_b) = data.geom_xpos, data.geom_xmat
 
         def ask(a: np.ndarray, b: np.ndarray, quat_a: np.ndarray, quat_b: np.ndarray) -> float:
             place_a[:] = a
@@ -43,7 +43,7 @@ def distance(name: str, flags: str) -> Engine:
         start, end = ends[:3], ends[3:]
         length = np.linalg.norm(start - end)
         normal = (start - end) / length if length else np.full(3, np.nan)
-        return one_contact(0.5 * (start + end), -result, normal)
+        return manifold([(0.5 * (start + end), normal, -result)])
 
     return Engine(name=f'MuJoCo mj_geomDistance{name}', call=f'mj_geomDistance(model, data, 0, 1, '
                   f'1.0, fromto){flags and f", {flags}"}', returns='distance, two nearest points',
@@ -73,8 +73,6 @@ def collision(name: str, shape: Shape, flags: str, normal: str = '', **about: An
 
     def read(data: Any) -> Manifold:
         found = data.contact
-        if not data.ncon:
-            return APART
         # A frame's first row is the normal, from the geom of lower number to the other.
         return Manifold(np.array(found.pos), np.array(found.frame)[:, :3], -np.array(found.dist))
 

@@ -7,7 +7,7 @@ from typing import Any
 import dartpy as dart
 import numpy as np
 
-from ..engine import APART, MOST_CONTACTS, Engine, Manifold, matrices
+from ..engine import MOST_CONTACTS, Engine, Manifold, manifold, matrices
 
 
 def collision() -> Engine:
@@ -37,13 +37,9 @@ def collision() -> Engine:
         return ask
 
     def read(_: Any) -> Manifold:
-        contacts = [result.getContact(k) for k in range(result.getNumContacts())]
-        if not contacts:
-            return APART
         # DART's normals point from the second object to the first.
-        return Manifold(np.array([c.point for c in contacts]),
-                        np.array([-np.array(c.normal) for c in contacts]),
-                        np.array([c.penetrationDepth for c in contacts]))
+        return manifold((c.point, -np.array(c.normal), c.penetrationDepth)
+                        for c in map(result.getContact, range(result.getNumContacts())))
 
     return Engine(name='DART collide', call='CollisionGroup.collide', package='dartpy',
                   returns='up to 8 points with depths, normals',

@@ -10,7 +10,7 @@ from pydrake import geometry
 from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RigidTransform
 
-from ..engine import APART, Engine, Manifold, one_contact
+from ..engine import APART, Engine, Manifold, manifold
 
 MODULUS = 1e5  # hydroelastic modulus [Pa]; equal on both boxes, so that it shifts nothing
 
@@ -66,8 +66,8 @@ def point_pair() -> Engine:
             return APART
         pair = pairs[0]
         towards = -1.0 if pair.id_A == first else 1.0  # the normal points from B to A
-        return one_contact(0.5 * (np.array(pair.p_WCa) + pair.p_WCb), pair.depth,
-                           towards * np.array(pair.nhat_BA_W))
+        return manifold([(0.5 * (np.array(pair.p_WCa) + pair.p_WCb),
+                          towards * np.array(pair.nhat_BA_W), pair.depth)])
 
     return _engine(False, read, name='Drake point pair', returns='two points, depth, normal',
                    call='QueryObject.ComputePointPairPenetration')
@@ -82,8 +82,8 @@ def surface() -> Engine:
         one = surfaces[0]
         normal = sum(one.area(k) * np.array(one.face_normal(k)) for k in range(one.num_faces()))
         towards = -1.0 if one.id_M() == first else 1.0  # face normals point from N to M
-        return one_contact(np.array(one.centroid()), float('nan'),
-                           towards * normal / np.linalg.norm(normal))
+        return manifold([(one.centroid(), towards * normal / np.linalg.norm(normal),
+                          float('nan'))])
 
     return _engine(True, read, name='Drake hydroelastic', returns='polygons with pressure, normals',
                    call='QueryObject.ComputeContactSurfaces, kPolygon', patch='area, pressure',

@@ -11,7 +11,7 @@ import warp
 
 from ....scene.pose import rotation_matrix
 from ....scene.pose_sets import Pairs
-from ..engine import APART, Engine, Manifold
+from ..engine import Engine, Manifold
 
 warp.config.quiet = True
 
@@ -57,8 +57,6 @@ def collision() -> Engine:
         depths = np.einsum('ni,ni->n', ends[0] - ends[1], normals)
         normals *= np.where(first == 0, 1.0, -1.0)[:, None]
         deep = depths >= 0.0
-        if not deep.any():
-            return APART
         return Manifold(0.5 * (ends[0] + ends[1])[deep], normals[deep], depths[deep])
 
     return Engine(name='Newton collide', call='CollisionPipeline.collide',

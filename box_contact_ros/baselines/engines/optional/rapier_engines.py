@@ -7,7 +7,7 @@ import numpy as np
 import rapier3d as rapier
 
 from ....scene.pose import rotation_matrix
-from ..engine import APART, Engine, Manifold
+from ..engine import Engine, Manifold, manifold
 
 
 class _RapierWorld:
@@ -45,17 +45,15 @@ def collision() -> Engine:
     def read(found: tuple[Any, np.ndarray]) -> Manifold:
         pair, poses = found
         turns = rotation_matrix(poses[:, 3:])
-        points, normals, depths = [], [], []
-        for manifold in pair.manifolds if pair else ():
-            for point in manifold.points:
+        contacts = []
+        for group in pair.manifolds if pair else ():
+            normal = turns[0] @ [group.local_n1.x, group.local_n1.y, group.local_n1.z]
+            for point in group.points:
                 if point.dist <= 0.0:
                     ends = [pose[:3] + turn @ [local.x, local.y, local.z] for pose, turn, local in
                             zip(poses, turns, (point.local_p1, point.local_p2))]
-                    normal = manifold.local_n1
-                    points.append(0.5 * (ends[0] + ends[1]))
-                    normals.append(turns[0] @ [normal.x, normal.y, normal.z])
-                    depths.append(-point.dist)
-        return Manifold(*map(np.array, (points, normals, depths))) if points else APART
+                    contacts.append((0.5 * (ends[0] + ends[1]), normal, -point.dist))
+        return manifold(contacts)
 
     return Engine(name='Rapier contact_pair', package='rapier3d',
                   call='CollisionPipeline.step, NarrowPhase.contact_pair',
