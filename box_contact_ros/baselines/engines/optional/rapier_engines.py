@@ -1,6 +1,7 @@
 """Rapier, whose colliders are Parry's, in float32."""
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -10,33 +11,25 @@ from ....scene.pose import rotation_matrix
 from ..engine import Engine, Manifold, manifold
 
 
-class _RapierWorld:
-    """Two boxes, and what updates the contacts between them."""
-
-    def __init__(self, p: np.ndarray, q: np.ndarray) -> None:
-        self._bodies, self._colliders = rapier.RigidBodySet(), rapier.ColliderSet()
-        self._narrow = rapier.NarrowPhase()
-        self._parts = (rapier.IslandManager(), rapier.BroadPhaseBvh(), self._narrow, self._bodies,
-                       self._colliders)
-        self._detect = rapier.CollisionPipeline()
-        self._handles, shapes = [], []
-        for size in (p, q):
-            builder = rapier.RigidBodyBuilder(rapier.RigidBodyType.DYNAMIC)
-            self._handles.append(self._bodies.insert(builder))
-            shapes.append(self._colliders.insert_with_parent(
-                rapier.Collider.cuboid(*(0.5 * size).tolist()), self._handles[-1],
-                self._bodies))
-        self._shapes = tuple(shapes)
-
-    def __call__(self, at_a: Any, at_b: Any, poses: np.ndarray) -> tuple[Any, np.ndarray]:
-        for handle, at in zip(self._handles, (at_a, at_b)):
-            self._bodies[handle].position = at
-        self._detect.step(0.0, *self._parts)
-        return self._narrow.contact_pair(*self._shapes), poses
-
-
 def collision() -> Engine:
     """Return Rapier's contacts after a step of detection: up to four points."""
+    def boxes(p: np.ndarray, q: np.ndarray) -> Callable[..., Any]:
+        bodies, colliders = rapier.RigidBodySet(), rapier.ColliderSet()
+        narrow, detection = rapier.NarrowPhase(), rapier.CollisionPipeline()
+        parts = (rapier.IslandManager(), rapier.BroadPhaseBvh(), narrow, bodies, colliders)
+        handles, shapes = [], []
+        for size in (p, q):
+            builder = rapier.RigidBodyBuilder(rapier.RigidBodyType.DYNAMIC)
+            handles.append(bodies.insert(builder))
+            shapes.append(colliders.insert_with_parent(
+                rapier.Collider.cuboid(*(0.5 * size).tolist()), handles[-1], bodies))
+
+        def ask(at_a: Any, at_b: Any, poses: np.ndarray) -> tuple[Any, np.ndarray]:
+            for handle, at in zip(handles, (at_a, at_b)):
+                bodies[handle].position = at
+            detection.step(0.0, *parts)
+            return narrow.contact_pair(*shapes), poses
+        return ask
 
     def place(pose: np.ndarray) -> Any:
         x, y, z, w = (pose[3:] / np.linalg.norm(pose[3:])).tolist()
@@ -58,7 +51,7 @@ def collision() -> Engine:
     return Engine(name='Rapier contact_pair', package='rapier3d',
                   call='CollisionPipeline.step, NarrowPhase.contact_pair',
                   returns='up to 4 points with depths, normals; float32',
-                  boxes=_RapierWorld, read=read,
+                  boxes=boxes, read=read,
                   at=lambda a, b: (place(a), place(b), np.array([a, b])))
 
 
