@@ -180,21 +180,21 @@ def _shared_memory_has_room() -> bool:
     return True
 
 
+USAGE = """\
+usage: python -m box_contact_ros PROGRAM [ARGUMENT ...]
+
+programs:
+{programs}
+
+The same programs start as `box_contact_PROGRAM` where this package was installed
+with pip, and as `ros2 run box_contact_ros PROGRAM` where it was built with colcon."""
+
+
 def usage() -> str:
     """Return the help text: how to start a program, and all of them with their descriptions."""
     width = max(map(len, PROGRAMS))
-    lines = [f'  {name:<{width}}  {program.description}' for name, program in PROGRAMS.items()]
-    return '\n'.join(
-        [
-            'usage: python -m box_contact_ros PROGRAM [ARGUMENT ...]',
-            '',
-            'programs:',
-            *lines,
-            '',
-            'The same programs start as `box_contact_PROGRAM` where this package was installed',
-            'with pip, and as `ros2 run box_contact_ros PROGRAM` where it was built with colcon.',
-        ]
-    )
+    return USAGE.format(programs='\n'.join(
+        f'  {name:<{width}}  {program.description}' for name, program in PROGRAMS.items()))
 
 
 def entry_points(prefix: str = '') -> list[str]:
