@@ -33,16 +33,13 @@ def resource_path(*parts: str) -> Path:
     """
     if not parts or Path(parts[0]).is_absolute():
         raise ValueError(f'resource_path: a path below the data folders is needed, got {parts!r}')
-    looked_at = []
-    for root in _roots():
-        path = root.joinpath(*parts)
+    places = list(dict.fromkeys(root.joinpath(*parts) for root in _roots()))
+    for path in places:
         if path.exists():
             return path
-        if path not in looked_at:
-            looked_at.append(path)
     raise FileNotFoundError(
         f'box_contact_ros has no {os.path.join(*parts)}; looked at:'
-        + ''.join(f'\n  {path}' for path in looked_at)
+        + ''.join(f'\n  {path}' for path in places)
     )
 
 
