@@ -173,7 +173,7 @@ def ask(engine: Engine, pairs: Pairs, plan: Plan) -> Answers:
         return Answers(colliding=found.colliding, normals=found.normal,
                        points={engine.choices[0]: found.point})
     pairs = pairs.rows(slice(plan.single_pairs))
-    nothing, asked, exceptions, began = np.full(3, math.nan), [], 0, time.monotonic()
+    asked, exceptions, began = [], 0, time.monotonic()
     step = len(pairs.size) if _one_size(pairs) else FEW_PAIRS
     for first in range(0, len(pairs.size), step):
         for call in engine.prepare(pairs.rows(slice(first, first + step))):
@@ -187,13 +187,9 @@ def ask(engine: Engine, pairs: Pairs, plan: Plan) -> Answers:
             break
     return Answers(
         colliding=np.array([answers[0].touching for answers in asked]),
-        normals=np.array([_or(answers[0].normal, nothing) for answers in asked]),
-        points={choice: np.array([_or(answers[k].point, nothing) for answers in asked])
+        normals=np.array([answers[0].normal for answers in asked]),
+        points={choice: np.array([answers[k].point for answers in asked])
                 for k, choice in enumerate(engine.choices)}, exceptions=exceptions)
-
-
-def _or(value: np.ndarray | None, default: np.ndarray) -> np.ndarray:
-    return default if value is None else value
 
 
 def _one_size(pairs: Pairs) -> bool:
@@ -228,12 +224,12 @@ class Trial:
         self.name, self.set = engine.name, name
         self._engine, self._pairs, self._answers = engine, pairs, answers
         self._seconds = plan.seconds / plan.rounds
-        self._calls: Sequence[Callable[[], object]] = ()
+        self._timed = pairs.rows(slice(0))
         self._ask_all = None
         if isinstance(answers, Answers) and not answers.exceptions:
-            self._calls = engine.prepare(pairs.rows(slice(
-                plan.timed_pairs if _one_size(pairs) else FEW_PAIRS)))
+            self._timed = pairs.rows(slice(plan.timed_pairs if _one_size(pairs) else FEW_PAIRS))
             self._ask_all = engine.prepare_batch and engine.prepare_batch(pairs)
+        self._calls = engine.prepare(self._timed)
         self._singles: list[int] = []
         self.rounds: list[tuple[float, float]] = []
         """Of each round: the median single call, and a pair in a batch [ns]."""
@@ -241,6 +237,8 @@ class Trial:
     def time(self) -> None:
         """Time one round, after a warm-up: all single calls, again and again, then a batch."""
         clock, times, batch = time.perf_counter_ns, list[int](), math.nan
+        if self._engine.clear:  # the boxes of the other sets are in its world
+            self._calls = self._engine.prepare(self._timed)
         for call in self._calls[:WARM_UP]:
             call()
         until = clock() + int(1e9 * self._seconds)
