@@ -111,22 +111,20 @@ def vertex_face_candidates(rng: np.random.Generator, count: int, half: np.ndarra
     # The bits of 0 … 6 are the seven vertices; 7 would be (+, +, +), which is on none of its faces.
     bits = rng.integers(0, 7, count)[:, None] >> np.arange(3) & 1
     vertex = np.where(bits == 1, half, -half)
-    normal = np.zeros((count, 3))
-    normal[rows, face] = 1.0
-    return _placed(rng, half, point, vertex, normal)
+    pose = _placed(rng, point, vertex)
+    return Placements(tuple((2.0 * half).tolist()), pose, point, np.eye(3)[face])
 
 
 def edge_edge_candidates(rng: np.random.Generator, count: int, half: np.ndarray) -> Placements:
     """Put a random point of the second trihedron's edges on one of the first's."""
     point, along_a = _edge_points(rng, count, half)
     on_b, along_b = _edge_points(rng, count, half)
-    placed = _placed(rng, half, point, -on_b, np.zeros((count, 3)))
-    turn = rotation_matrix(placed.pose[:, 3:])
-    direction_b = turn[np.arange(count), :, along_b]
+    pose = _placed(rng, point, -on_b)
+    direction_b = rotation_matrix(pose[:, 3:])[np.arange(count), :, along_b]
     normal = np.cross(np.eye(3)[along_a], direction_b)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    normal *= np.where(np.sum(normal * placed.pose[:, :3], axis=1) < 0.0, -1.0, 1.0)[:, None]
-    return Placements(placed.size, placed.pose, placed.point, normal)
+    normal *= np.where(np.sum(normal * pose[:, :3], axis=1) < 0.0, -1.0, 1.0)[:, None]
+    return Placements(tuple((2.0 * half).tolist()), pose, point, normal)
 
 
 def _edge_points(rng: np.random.Generator, count: int, half: np.ndarray,
@@ -143,14 +141,12 @@ def _edge_points(rng: np.random.Generator, count: int, half: np.ndarray,
     return point * half, axis
 
 
-def _placed(rng: np.random.Generator, half: np.ndarray, point: np.ndarray, on_b: np.ndarray,
-            normal: np.ndarray) -> Placements:
-    """Turn the second box at random and put its point `on_b` on `point`."""
+def _placed(rng: np.random.Generator, point: np.ndarray, on_b: np.ndarray) -> np.ndarray:
+    """Return poses (n, 7) of a second box, turned at random, with its `on_b` (n, 3) on `point`."""
     angles = rng.uniform(-0.5 * np.pi, 0.5 * np.pi, (len(point), 3))
     quaternion = quaternion_from_euler(angles)
     offset = point - np.einsum('nij,nj->ni', rotation_matrix(quaternion), on_b)
-    x, y, z = (2.0 * half).tolist()
-    return Placements((x, y, z), np.concatenate([offset, quaternion], axis=1), point, normal)
+    return np.concatenate([offset, quaternion], axis=1)
 
 
 GENERATORS = (vertex_face_candidates, edge_edge_candidates)
@@ -180,9 +176,8 @@ def mixed(rng: np.random.Generator, count: int, size: Sequence[float], edge_shar
 
 def query(placements: Placements) -> Stages:
     """Return separation, axis, normal, offset_a and rotation of every placement, by SAT."""
-    first = np.zeros_like(placements.pose)
-    first[:, 6] = 1.0
-    size = np.array([placements.size])
+    first = np.tile([0.0, 0, 0, 0, 0, 0, 1], (len(placements), 1))
+    size = [placements.size]
     return stages(first, placements.pose, size, size,
                   names=('separation', 'axis', 'normal', 'offset_a', 'rotation'))
 

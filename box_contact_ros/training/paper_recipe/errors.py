@@ -4,17 +4,13 @@ Networks run as the models run them: by the extension, on float32 weights, witho
 """
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypeVar
+from typing import Any
 
 import numpy as np
 
 from ...baselines.paper import _networks
 from ...solver.weights_file import Network
 
-if TYPE_CHECKING:
-    from torch import Tensor
-
-Angles = TypeVar('Angles', 'np.ndarray', 'Tensor')
 PARTS = {'all': slice(0, 4), 'point': slice(0, 2), 'normal': slice(2, 4)}
 """Outputs that are reported together."""
 
@@ -26,7 +22,7 @@ def predict(network: Network, inputs: np.ndarray) -> np.ndarray:
     return outputs.astype(np.float64)
 
 
-def wrapped(angle: Angles) -> Angles:
+def wrapped(angle: Any) -> Any:
     """Return angles [rad], an array or a tensor, in [−π, π): −π and π are the same direction."""
     return (angle + np.pi) % (2.0 * np.pi) - np.pi
 

@@ -91,10 +91,9 @@ class Fitted:
         for kept, now in zip(self.networks.parameters(), networks.parameters()):
             kept[better] = now[better]
 
-    def export(self, network: int | None = None) -> Layers:
-        """Return the layers of a network for inputs in SI units, of the best one by default."""
-        best = int(self.error.argmin()) if network is None else network
-        return self.scaling.folded(self.networks.layers(best))
+    def export(self) -> Layers:
+        """Return the layers of the best network, for inputs in SI units."""
+        return self.scaling.folded(self.networks.layers(int(self.error.argmin())))
 
     def errors(self, patterns: Patterns) -> Tensor:
         """Return the RMSE (networks,) of the best weights [rad]."""

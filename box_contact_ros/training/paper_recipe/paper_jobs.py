@@ -13,6 +13,13 @@ from . import dataset
 from .errors import errors_of, figures_by_part
 from .fit import PaperSettings, fit
 
+_DRAWN = ('Boxes that just touch, one fixed: impact points uniform by area on its trihedron +x +y '
+          '+z, each of the 7 vertices of the other trihedron −x −y −z placed there; points '
+          'uniform by length on the 9 edges of either trihedron, placed on each other; roll, '
+          'pitch, yaw uniform in [−π/2, π/2]; placements deeper than 1e-12 of the size rejected; '
+          'half of the patterns vertex-face, half edge-edge. ')
+_FOLDED = _DRAWN + 'Folded by the box symmetries: t ≥ 0, angles in [−π/2, π/2].'
+
 
 @dataclass(frozen=True)
 class PaperJob:
@@ -21,21 +28,12 @@ class PaperJob:
     name: str  # of the file, without its ending
     model: str  # the solver's model that it serves
     size: tuple[float, float, float]  # full extents [m] of either box
-    counts: tuple[int, int, int]
-    """Patterns in the training, cross-validation and external set (per subset)."""
     settings: PaperSettings
-    recipe: str  # the data in words, for the model card; `_FOLDED` is added for model `paper`
+    recipe: str = _FOLDED  # the data in words, for the model card
+    counts: tuple[int, int, int] = dataset.PAPER_COUNTS
+    """Patterns in the training, cross-validation and external set (per subset)."""
     folded_in: bool = True  # whether the data are folded into the domain in which the solver asks
 
-
-_DRAWN = ('Boxes that just touch, one fixed: impact points uniform by area on its trihedron +x +y '
-          '+z, each of the 7 vertices of the other trihedron −x −y −z placed there; points '
-          'uniform by length on the 9 edges of either trihedron, placed on each other; roll, '
-          'pitch, yaw uniform in [−π/2, π/2]; placements deeper than 1e-12 of the size rejected; '
-          'half of the patterns vertex-face, half edge-edge. ')
-
-_FOLDED = {False: 'Patterns as drawn.',
-           True: 'Folded by the box symmetries: t ≥ 0, angles in [−π/2, π/2].'}
 
 # Learning rate, initial range, batch and epochs were compared on seed 1, by the cross-validation
 # error. As drawn, the 8,000 patterns are overfitted after 150 to 250 epochs (0.37 rad RMSE in
@@ -45,25 +43,24 @@ _CONTAINERS = PaperSettings((6, 20, 18, 4), networks=48, epochs=400, rate=0.1, i
 _SMOOTH = PaperSettings((6, 20, 17, 4), networks=24, epochs=1000, rate=0.2)
 
 JOBS = {
-    'paper': PaperJob('paper', 'paper', CUBE, dataset.PAPER_COUNTS, _JUMPS, _DRAWN),
-    'paper-as-drawn': PaperJob('paper-as-drawn', 'paper', CUBE, dataset.PAPER_COUNTS,
-                               _JUMPS, _DRAWN, folded_in=False),
+    'paper': PaperJob('paper', 'paper', CUBE, _JUMPS),
+    'paper-as-drawn': PaperJob('paper-as-drawn', 'paper', CUBE, _JUMPS,
+                               _DRAWN + 'Patterns as drawn.', folded_in=False),
     'paper-continuous': PaperJob(
-        'paper-continuous', 'paper-continuous', CUBE, dataset.CONTINUOUS_COUNTS, _SMOOTH,
+        'paper-continuous', 'paper-continuous', CUBE, _SMOOTH,
         _DRAWN + 'Split by the winning axis of SAT (a face of the first box: vertex_face; an edge '
-        'pair: edge_edge), which is also what the features are folded by (cube symmetries).'),
-    'containers': PaperJob('paper-12.192x2.438x2.591', 'paper', CONTAINER,
-                           dataset.PAPER_COUNTS, _CONTAINERS, _DRAWN),
+        'pair: edge_edge), which is also what the features are folded by (cube symmetries).',
+        dataset.CONTINUOUS_COUNTS),
+    'containers': PaperJob('paper-12.192x2.438x2.591', 'paper', CONTAINER, _CONTAINERS),
 }
 
 
 def train_paper(job: PaperJob, *, seed: int, commit: str, folder: Path) -> dict[str, Any]:
     """Make the data, train, write the weights file; return its model card."""
-    recipe = job.recipe + (_FOLDED[job.folded_in] if job.model == 'paper' else '')
     card: dict[str, Any] = {
         'name': job.name, 'model': job.model, 'architecture': list(job.settings.widths),
         'sizes': [list(job.size), list(job.size)],
-        'data': {'recipe': recipe, 'counts': dict(zip(dataset.SETS, job.counts)),
+        'data': {'recipe': job.recipe, 'counts': dict(zip(dataset.SETS, job.counts)),
                  'folded_in': job.folded_in, 'edge_share': 0.5},
         'seed': seed, 'commit': commit,
         **{name: {} for name in ('inputs', 'outputs', 'metrics', 'training')}}
