@@ -143,7 +143,7 @@ def _level(heading: np.ndarray) -> np.ndarray:
     return np.stack([np.cos(heading), np.sin(heading), np.zeros(len(heading))], axis=1)
 
 
-def _onto(place: np.ndarray, turn: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
+def onto(place: np.ndarray, turn: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
           depth: np.ndarray) -> Pairs:
     """Return pairs with A at the origin and B at places (n, 3), orientations (n, 4), to `depth`."""
     a = np.tile([0.0, 0, 0, 0, 0, 0, 1], (len(place), 1))
@@ -165,7 +165,7 @@ def stacked(rng: np.random.Generator, size: tuple[float, float, float], tilt: np
     turn = quaternion_multiply(turns(_level(heading), tilt), turns(Z, yaw))
     place = np.concatenate([spread * rng.uniform(-1, 1, (n, 2)) * sizes[:, :2],
                             0.98 * sizes[:, 2:]], axis=1)
-    return _onto(place, turn, sizes, sizes, depth)
+    return onto(place, turn, sizes, sizes, depth)
 
 
 def laid(rng: np.random.Generator, size_a: np.ndarray, size_b: np.ndarray, tilt: np.ndarray,
@@ -187,7 +187,7 @@ def laid(rng: np.random.Generator, size_a: np.ndarray, size_b: np.ndarray, tilt:
     place = np.concatenate([0.49 * rng.uniform(-2, 2, (n, 2)) * size_a[:, :2] - across,
                             0.5 * (size_a + size_b)[:, 2:]], axis=1)
     place[:, 2] -= 0.01 * np.minimum(size_a[:, 2], size_b[:, 2])
-    return _onto(place, turn, size_a, size_b, depth)
+    return onto(place, turn, size_a, size_b, depth)
 
 
 def cubes(rng: np.random.Generator, n: int) -> Pairs:
@@ -221,7 +221,7 @@ def containers(rng: np.random.Generator, n: int) -> Pairs:
     turn = quaternion_multiply(quaternion_multiply(
         turns(Z, yaw), turns((0.0, 1.0, 0.0), pitch)), turns((1.0, 0.0, 0.0), roll))
     place = 0.95 * rng.uniform(-1, 1, (n, 3)) * sizes
-    return _onto(place, turn, sizes, sizes, 2.438 * log_uniform(rng, 1e-3, 0.1, n))
+    return onto(place, turn, sizes, sizes, 2.438 * log_uniform(rng, 1e-3, 0.1, n))
 
 
 def random_sizes(rng: np.random.Generator, n: int, aspect: float = 20.0, ratio: float = 20.0,

@@ -2,22 +2,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from tqdm import tqdm
 
 from ..core import stages
 from ..scene.files.scene_file import read_scene
 from ..scene.pose import quaternion_multiply, rotation_matrix
 from ..scene.pose_sets import (
     CONTAINER,
+    Generator,
     Pairs,
     any_pose,
-    at_depth,
     laid,
     log_uniform,
+    onto,
     random_sizes,
     stacked,
     turns,
@@ -63,8 +65,7 @@ class MlpSamples:
 
     def each(self, change: Callable[[Any], Any]) -> MlpSamples:
         """Return the samples with a function applied to each array."""
-        return MlpSamples(**{field.name: change(getattr(self, field.name))
-                             for field in fields(self)})
+        return MlpSamples(**{name: change(array) for name, array in vars(self).items()})
 
     def part(self, rows: np.ndarray | slice) -> MlpSamples:
         """Return some of the samples."""
@@ -73,9 +74,8 @@ class MlpSamples:
     @staticmethod
     def joined(parts: Sequence[MlpSamples]) -> MlpSamples:
         """Return the samples of all parts, one part after the other."""
-        return MlpSamples(**{field.name: np.concatenate([getattr(part, field.name)
-                                                         for part in parts], axis=-1)
-                             for field in fields(MlpSamples)})
+        return MlpSamples(**{name: np.concatenate([vars(part)[name] for part in parts], axis=-1)
+                             for name in vars(parts[0])})
 
 
 def describe(pairs: Pairs) -> MlpSamples:
@@ -89,33 +89,26 @@ def describe(pairs: Pairs) -> MlpSamples:
     axes = rotation_matrix(np.where(
         found.frame_b[:, None], pairs.pose_b[:, 3:], pairs.pose_a[:, 3:]))
     covariance = np.swapaxes(axes, 1, 2) @ found.covariance @ axes
-    edge = np.minimum(pairs.size_a.max(axis=1), pairs.size_b.max(axis=1))[:, None]
     trace = np.trace(covariance, axis1=1, axis2=2)[:, None]
     samples = MlpSamples(
         features=found.features, vectors=found.vectors, slant=found.slant, cut=found.cut,
-        offsets=(centroid - found.bounds_middle) / half, scale=half / edge,
+        offsets=(centroid - found.bounds_middle) / half, scale=half / pairs.edge[:, None],
         volume=found.volume / (8.0 * half.prod(axis=1)),
         covariance=covariance[:, ROW, COLUMN] / (half[:, ROW] * half[:, COLUMN]),
         spread=half / np.sqrt(trace))
     return samples.each(lambda array: np.moveaxis(array.astype(np.float32), 0, -1).copy())
 
 
-def draw_samples(make: Callable[[np.random.Generator, int], Pairs], seed: Sequence[int], n: int,
-                 progress: bool = False) -> MlpSamples:
+def draw_samples(make: Generator, seed: Sequence[int], n: int, progress: bool = False,
+                 ) -> MlpSamples:
     """Return the samples of about n pairs of `make(rng, n)`.
 
     Each piece of PIECE pairs has its own seed.
     """
-    from tqdm import tqdm
-
-    parts = []
-    with tqdm(total=n, desc='data', unit='pair', unit_scale=True, mininterval=1.0,
-              disable=not progress) as bar:
-        for start in range(0, n, PIECE):
-            count = min(PIECE, n - start)
-            parts.append(describe(make(np.random.default_rng([*seed, start]), count)))
-            bar.update(count)
-    return MlpSamples.joined(parts)
+    starts = tqdm(range(0, n, PIECE), desc='data', unit='piece', disable=not progress)
+    return MlpSamples.joined([
+        describe(make(np.random.default_rng([*seed, start]), min(PIECE, n - start)))
+        for start in starts])
 
 
 def mixture(rng: np.random.Generator, n: int) -> Pairs:
@@ -128,11 +121,9 @@ def mixture(rng: np.random.Generator, n: int) -> Pairs:
     share = n // 28
     parts = []
     sizes = np.ones((4 * share, 3))
-    parts.append(any_pose(rng, sizes, sizes, log_uniform(rng, 1e-5, 0.1, len(sizes))))
+    parts.append(any_pose(rng, sizes, sizes, depths(rng, sizes, sizes)))
     size_a, size_b = random_sizes(rng, 5 * share)
-    shortest = np.minimum(size_a.min(axis=1), size_b.min(axis=1))
-    parts.append(any_pose(rng, size_a, size_b,
-                          shortest * log_uniform(rng, 1e-5, 0.1, len(size_a))))
+    parts.append(any_pose(rng, size_a, size_b, depths(rng, size_a, size_b)))
     for size, count, yaw in (((1.0, 1.0, 1.0), 3 * share, np.pi), (CONTAINER, 3 * share, 0.2),
                              (CONTAINER, share, np.pi), ((1.0, 0.5, 0.3), 2 * share, np.pi)):
         parts.append(stacked(rng, size, log_uniform(rng, 1e-6, 0.3, count),
@@ -153,6 +144,12 @@ def mixture(rng: np.random.Generator, n: int) -> Pairs:
     return Pairs(*(np.concatenate(columns) for columns in zip(*parts)))
 
 
+def depths(rng: np.random.Generator, size_a: np.ndarray, size_b: np.ndarray) -> np.ndarray:
+    """Draw depths (n,) [m], 1e-5 to 0.1 of each pair's shortest edge."""
+    shortest = np.minimum(size_a.min(axis=1), size_b.min(axis=1))
+    return shortest * log_uniform(rng, 1e-5, 0.1, len(shortest))
+
+
 def along_edges(rng: np.random.Generator, size_a: np.ndarray, size_b: np.ndarray,
                 tilt: np.ndarray) -> Pairs:
     """Draw n pairs with an edge direction of B within about `tilt` (n,) [rad] of one of A's.
@@ -168,10 +165,7 @@ def along_edges(rng: np.random.Generator, size_a: np.ndarray, size_b: np.ndarray
     at_b = rng.uniform(-0.5, 0.5, (n, 3)) * size_b
     place = (rng.uniform(-0.5, 0.5, (n, 3)) * size_a
              - np.einsum('nij,nj->ni', rotation_matrix(turn), at_b))
-    a = np.tile([0.0, 0, 0, 0, 0, 0, 1], (n, 1))
-    shortest = np.minimum(size_a.min(axis=1), size_b.min(axis=1))
-    return at_depth(Pairs(a, np.concatenate([place, turn], axis=1), size_a, size_b),
-                    shortest * log_uniform(rng, 1e-5, 0.1, n))
+    return onto(place, turn, size_a, size_b, depths(rng, size_a, size_b))
 
 
 def scene_sizes(path: Path) -> list[SizePair]:
@@ -181,13 +175,9 @@ def scene_sizes(path: Path) -> list[SizePair]:
     are sorted, longest first. Raises SceneError for a file that is no scene.
     """
     scene = read_scene(path)
-    sizes = {}
-    for name, box in scene.boxes.items():
-        x, y, z = sorted(box.size, reverse=True)
-        sizes[name] = (x, y, z)
+    sizes = {name: tuple(sorted(box.size, reverse=True)) for name, box in scene.boxes.items()}
     return list(dict.fromkeys(
-        (max(sizes[pair.a], sizes[pair.b]), min(sizes[pair.a], sizes[pair.b]))
-        for pair in scene.pairs))
+        tuple(sorted((sizes[pair.a], sizes[pair.b]), reverse=True)) for pair in scene.pairs))
 
 
 def scene_mixture(rng: np.random.Generator, n: int, sizes: Sequence[SizePair]) -> Pairs:
@@ -201,8 +191,7 @@ def scene_mixture(rng: np.random.Generator, n: int, sizes: Sequence[SizePair]) -
     for pair in sizes:
         for one, other in (pair, pair[::-1]):
             size_a, size_b = (np.tile(size, (share, 1)) for size in (one, other))
-            shortest = min(*one, *other)
-            depth = shortest * log_uniform(rng, 1e-5, 0.1, (2, share))
-            parts.append(any_pose(rng, size_a, size_b, depth[0]))
-            parts.append(laid(rng, size_a, size_b, log_uniform(rng, 1e-6, 0.3, share), depth[1]))
+            any_depth, laid_depth = (depths(rng, size_a, size_b) for _ in range(2))
+            parts.append(any_pose(rng, size_a, size_b, any_depth))
+            parts.append(laid(rng, size_a, size_b, log_uniform(rng, 1e-6, 0.3, share), laid_depth))
     return Pairs(*(np.concatenate(columns) for columns in zip(*parts)))
