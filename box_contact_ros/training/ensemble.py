@@ -2,7 +2,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -45,8 +45,7 @@ class Ensemble(torch.nn.Module):
 
     def layers(self, network: int) -> Layers:
         """Return the layers of one network."""
-        own = [value[network].detach().cpu().numpy() for value in self.state().values()]
-        return list(zip(own[::2], own[1::2]))
+        return as_layers(value[network] for value in self.state().values())
 
     def _times(self, value: Tensor, power: int) -> Tensor:
         if self._units is None:
@@ -54,9 +53,10 @@ class Ensemble(torch.nn.Module):
         return value * self._units.view(-1, *[1] * (value.dim() - 1))**power
 
 
-def linear_layers(network: torch.nn.Module) -> list[torch.nn.Linear]:
-    """Return the linear layers of a network, the first one first."""
-    return [part for part in network.modules() if isinstance(part, torch.nn.Linear)]
+def as_layers(parameters: Iterable[Tensor]) -> Layers:
+    """Return the parameters of one network as arrays, layer by layer."""
+    arrays = [value.detach().cpu().numpy() for value in parameters]
+    return list(zip(arrays[::2], arrays[1::2]))
 
 
 @torch.no_grad()
@@ -67,7 +67,7 @@ def drawn(network: Any, generator: torch.Generator, *, reach: float = math.sqrt(
     hidden: units of the hidden layers that are used. The weights of all others are zero, and stay
     so: such a unit's activation is zero, and with it each of its gradients.
     """
-    layers = linear_layers(network)
+    layers = [part for part in network.modules() if isinstance(part, torch.nn.Linear)]
     inputs = [layers[0].in_features, *(hidden or [layer.out_features for layer in layers[:-1]])]
     for layer, count in zip(layers, inputs):
         bound = reach / math.sqrt(count)
@@ -91,8 +91,8 @@ class Scaling:
         """Return the scaling that gives inputs (…, inputs) mean 0 and deviation 1."""
         # Summed in float64: there are tens of millions. An input that never varies stays as it is.
         axes = tuple(range(inputs.ndim - 1))
-        mean, deviation = (np.asarray(of(inputs, axis=axes, dtype=np.float64))
-                           for of in (np.mean, np.std))
+        mean = inputs.mean(axes, dtype=np.float64)
+        deviation = inputs.std(axes, dtype=np.float64)
         return Scaling(mean.astype(np.float32), (deviation + 1e-6).astype(np.float32))
 
     def folded(self, layers: Layers) -> Layers:

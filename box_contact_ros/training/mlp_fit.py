@@ -7,8 +7,9 @@ The contacts are last in all arrays. With the contacts first, a step takes twice
 """
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +17,7 @@ import torch
 from torch import Tensor
 
 from ..core import FEATURES, OUTPUTS
-from .ensemble import Layers, Scaling, drawn, linear_layers
+from .ensemble import Layers, Scaling, as_layers, drawn
 from .samples import COLUMN, ROW, MlpSamples
 
 POINT_WEIGHT, TAIL_WEIGHT = 10.0, 3e3
@@ -54,16 +55,17 @@ class SiteNetwork(torch.nn.Module):
         self.hidden = torch.nn.Linear(FEATURES, hidden)
         self.outputs = torch.nn.Linear(hidden, OUTPUTS)
 
-    def forward(self, features: Tensor, vectors: Tensor, slant: Tensor, cut: Tensor) -> MlpAnswers:
-        """Return the answers for the fields of `MlpSamples`, features normalised."""
-        outputs = at_sites(self.outputs, torch.relu_(at_sites(self.hidden, features)))
+    def forward(self, batch: MlpSamples) -> MlpAnswers:
+        """Return the answers for samples as tensors; see `tensors`."""
+        outputs = at_sites(self.outputs, torch.relu_(at_sites(self.hidden, batch.features)))
         f_q = outputs.unflatten(0, (3, 3)).movedim(2, 0)  # (OUTPUTS, f, q, n)
-        along = vectors.unflatten(0, (3, 3)).movedim(2, 0)
-        slanted = slant.abs() * cut[:, None]
+        along = batch.vectors.unflatten(0, (3, 3)).movedim(2, 0)
+        cut = batch.cut[:, None]
+        slanted = batch.slant.abs() * cut
         log_volume = (slanted * f_q[3]).sum((0, 1)).clamp(max=0.0)
         stretch = (slanted * f_q[4]).sum(0).clamp(0.0, PRECISION_REACH)
-        coupling, pushed = slant * f_q[5], (along[0] * f_q[6]).sum(0)
-        precision = ((cut[:, None] * coupling[:, ROW] * coupling[:, COLUMN]).sum(0)
+        coupling, pushed = batch.slant * f_q[5], (along[0] * f_q[6]).sum(0)
+        precision = ((cut * coupling[:, ROW] * coupling[:, COLUMN]).sum(0)
                      + pushed[ROW] * pushed[COLUMN])
         diagonal = precision[:3] + PRECISION * stretch.exp()
         return MlpAnswers((f_q[:3] * along).sum((0, 1)), log_volume,
@@ -72,14 +74,12 @@ class SiteNetwork(torch.nn.Module):
     @torch.no_grad()
     def load(self, layers: Layers) -> None:
         """Take over the layers of a network of the same shape."""
-        for own, (weight, bias) in zip(linear_layers(self), layers):
-            own.weight.copy_(torch.from_numpy(weight))
-            own.bias.copy_(torch.from_numpy(bias))
+        for own, array in zip(self.parameters(), chain.from_iterable(layers)):
+            own.copy_(torch.from_numpy(array))
 
     def layers(self) -> Layers:
         """Return the layers, for normalised inputs."""
-        return [(own.weight.detach().cpu().numpy(), own.bias.detach().cpu().numpy())
-                for own in linear_layers(self)]
+        return as_layers(self.parameters())
 
 
 def at_sites(layer: torch.nn.Linear, x: Tensor) -> Tensor:
@@ -102,12 +102,6 @@ def started(units: int, generator: torch.Generator, hidden: Sequence[int] = ()) 
     with torch.no_grad():
         network.outputs.bias[3:6] = torch.tensor(START)
     return network
-
-
-def asked(network: torch.nn.Module, batch: MlpSamples) -> MlpAnswers:
-    """Return a network's answers for samples as tensors."""
-    answers: MlpAnswers = network(batch.features, batch.vectors, batch.slant, batch.cut)
-    return answers
 
 
 def tensors(data: MlpSamples, scaling: Scaling, device: str = 'cpu') -> MlpSamples:
@@ -138,20 +132,15 @@ def losses_of(answers: MlpAnswers, batch: MlpSamples) -> Tensor:
     """
     offset = answers.offsets - batch.offsets
     point = (offset * batch.scale).square().sum(-2)
-    volume, covariance = patch_errors(answers, batch)
+    volume = answers.log_volume.exp() / batch.volume - 1.0
     volume = volume.clamp(max=LARGEST_VOLUME_ERROR).square()
-    covariance = covariance.square().sum(-2)
+    covariance = ((answers.covariance - batch.covariance)
+                  * batch.spread[ROW] * batch.spread[COLUMN])
+    # All nine, by the trace: what is beside the diagonal counts twice.
+    covariance = torch.cat([covariance, covariance[..., 3:, :]], -2).square().sum(-2)
     return (offset.square().mean(-2) + POINT_WEIGHT * point + TAIL_WEIGHT * point.square()
             + VOLUME_WEIGHT * (volume + PATCH_TAIL * volume.square())
             + COVARIANCE_WEIGHT * (covariance + PATCH_TAIL * covariance.square()))
-
-
-def patch_errors(answers: MlpAnswers, batch: MlpSamples) -> tuple[Tensor, Tensor]:
-    """Return errors of the volume (…, n), relative, and the covariance (…, 9, n) by its trace."""
-    volume = answers.log_volume.exp() / batch.volume - 1.0
-    covariance = ((answers.covariance - batch.covariance)
-                  * batch.spread[ROW] * batch.spread[COLUMN])
-    return volume, torch.cat([covariance, covariance[..., 3:, :]], -2)
 
 
 def fit(network: torch.nn.Module, batches: Iterable[MlpSamples], *, steps: int, rate: float,
@@ -163,7 +152,7 @@ def fit(network: torch.nn.Module, batches: Iterable[MlpSamples], *, steps: int, 
     optimiser = torch.optim.Adam(network.parameters(), lr=rate, fused=True)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, steps)
     for batch in batches:
-        loss = losses_of(asked(network, batch), batch).mean(-1)
+        loss = losses_of(network(batch), batch).mean(-1)
         optimiser.zero_grad()
         loss.sum().backward()
         optimiser.step()
@@ -172,17 +161,11 @@ def fit(network: torch.nn.Module, batches: Iterable[MlpSamples], *, steps: int, 
 
 
 @torch.no_grad()
-def evaluated(network: torch.nn.Module, data: MlpSamples, scaling: Scaling,
-              measure: Callable[[MlpAnswers, MlpSamples], Tensor]) -> np.ndarray:
-    """Return what `measure` says of a network's answers, some contacts after the other."""
+def point_errors(network: torch.nn.Module, data: MlpSamples, scaling: Scaling) -> np.ndarray:
+    """Return point errors (…, n) in edges of the smaller box, before the solver moves the point."""
     device = next(network.parameters()).device.type
     found = []
     for start in range(0, len(data), CHUNK):
         some = tensors(data.part(slice(start, start + CHUNK)), scaling, device)
-        found.append(measure(asked(network, some), some))
+        found.append(((network(some).offsets - some.offsets) * some.scale).norm(dim=-2))
     return torch.cat(found, -1).cpu().numpy()
-
-
-def point_errors(answers: MlpAnswers, batch: MlpSamples) -> Tensor:
-    """Return point errors (…, n) in edges of the smaller box, before the solver moves the point."""
-    return ((answers.offsets - batch.offsets) * batch.scale).norm(dim=-2)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from inspect import getdoc
@@ -22,12 +22,12 @@ from tqdm import tqdm
 from ..core import ASPECT_MAX, DEPTH_MAX, FEATURES, OUTPUTS, SIZE_RATIO_MAX
 from ..output import percentiles
 from ..resources import resource_path
-from ..scene.pose_sets import SETS, ContactErrors, Pairs, contact_errors
+from ..scene.pose_sets import SETS, ContactErrors, Generator, Pairs, contact_errors
 from ..solver.contact_solver import ContactSolver
 from ..solver.mlp import ACTIVATION, DESCRIPTION, FEATURE_NAMES
 from ..solver.weights_file import load_weights, save_weights
 from .ensemble import Scaling
-from .mlp_fit import SiteNetwork, evaluated, fit, point_errors, random_batches, started
+from .mlp_fit import SiteNetwork, fit, point_errors, random_batches, started
 from .samples import MlpSamples, SizePair, draw_samples, mixture, scene_mixture
 
 HIDDEN = 20
@@ -36,8 +36,6 @@ HARD_ROUNDS, HARD_PART, HARD_SHARE = (0.4, 0.55, 0.7, 0.85), 0.01, 0.2
 """After each of these parts of the steps, a pool of fresh pairs is searched for the hardest part.
 From then on, all that were found so far make up that share of what is learned from."""
 SHOWN_EVERY = 200  # steps between two losses in the progress bar
-
-PairMaker = Callable[[np.random.Generator, int], Pairs]
 
 # Streams of random numbers: data, what is measured on, hard data, weights, places of batches.
 _DATA, _METRICS, _HARD, _WEIGHTS, _PLACES = range(5)
@@ -78,7 +76,7 @@ def train(path: Path, *, seed: int, commit: str, quick: bool = False, hidden: in
     began = time.monotonic()
     recipe = replace(SCENE if sizes else GENERAL, **(QUICK if quick else {}))
     recipe = replace(recipe, steps=steps or recipe.steps)
-    make: PairMaker = partial(scene_mixture, sizes=sizes) if sizes else mixture
+    make: Generator = partial(scene_mixture, sizes=sizes) if sizes else mixture
     data = draw_samples(make, [seed, _DATA], recipe.pairs, progress=True)
     scaling = Scaling.of(data.features.swapaxes(1, 2))
     recipe_card: dict[str, Any] = {'recipe': getdoc(scene_mixture if sizes else mixture)}
@@ -111,7 +109,7 @@ def train(path: Path, *, seed: int, commit: str, quick: bool = False, hidden: in
 
 
 def harder_batches(network: SiteNetwork, data: MlpSamples, scaling: Scaling, recipe: MlpRecipe,
-                   make: PairMaker, seed: int) -> Iterator[MlpSamples]:
+                   make: Generator, seed: int) -> Iterator[MlpSamples]:
     """Yield the batches of a training: after each hard round also what the network is worst at."""
     device = next(network.parameters()).device.type
     rng = np.random.default_rng([seed, _PLACES])
@@ -131,7 +129,7 @@ def harder_batches(network: SiteNetwork, data: MlpSamples, scaling: Scaling, rec
 
 def hardest(network: SiteNetwork, data: MlpSamples, scaling: Scaling) -> MlpSamples:
     """Return the part of the samples in which the network's point errs most."""
-    errors = evaluated(network, data, scaling, point_errors)
+    errors = point_errors(network, data, scaling)
     count = max(1, round(HARD_PART * len(errors)))
     return data.part(np.sort(np.argsort(errors, kind='stable')[-count:]))
 
@@ -179,7 +177,7 @@ def measured(path: Path, sizes: Sequence[SizePair], seed: int, count: int) -> di
         errors = solver_errors(pairs, weights)
         return {name: error_summary(values) for name, values in errors._asdict().items()}
 
-    makers: dict[str, PairMaker] = {text(pair): partial(scene_mixture, sizes=[pair])
+    makers: dict[str, Generator] = {text(pair): partial(scene_mixture, sizes=[pair])
                                     for pair in sizes}
     found: dict[str, Any] = {}
     for number, (name, make) in enumerate((makers or SETS).items()):
@@ -210,13 +208,11 @@ def metrics_table(card: dict[str, Any]) -> str:
              "longest edge, the covariance's by its trace"]
     width = max(map(len, card['metrics']))
     for name, entry in card['metrics'].items():
-        after = entry.get('after', entry)
-        for quantity in after:
-            line = f'{name:<{width}}  {quantity:<10}  '
-            if 'before' not in entry:
-                lines.append(line + shown(after[quantity]))
-                continue
-            old, new = entry['before'][quantity], after[quantity]
-            saved = ' / '.join(f'{100.0 * (1.0 - new[key] / old[key]):.0f} %' for key in old)
-            lines.append(f'{line}general {shown(old)}, this {shown(new)}: saved {saved}')
+        for quantity, new in entry.get('after', entry).items():
+            said = shown(new)
+            if 'before' in entry:
+                old = entry['before'][quantity]
+                saved = ' / '.join(f'{100.0 * (1.0 - new[key] / old[key]):.0f} %' for key in old)
+                said = f'general {shown(old)}, this {said}: saved {saved}'
+            lines.append(f'{name:<{width}}  {quantity:<10}  {said}')
     return '\n'.join(f'  {line}' for line in lines)

@@ -4,6 +4,7 @@ from __future__ import annotations
 import dataclasses
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -113,7 +114,7 @@ def test_loss_is_the_formula(data: MlpSamples, scaling: Scaling) -> None:
     weights = (1.0, mlp_fit.POINT_WEIGHT, mlp_fit.TAIL_WEIGHT, volume, volume * tail, covariance,
                covariance * tail)
     batch = mlp_fit.tensors(some, scaling)
-    found = losses_of(mlp_fit.asked(network, batch), batch).detach().numpy()
+    found = losses_of(network(batch), batch).detach().numpy()
     np.testing.assert_allclose(found, terms @ weights, rtol=1e-3)
 
 
@@ -124,12 +125,12 @@ def test_the_network_is_the_cores() -> None:
     network = Network(module.layers())
     core = stages(*pairs, names=('features', 'vectors', 'slant', 'cut', 'answer', 'answer_volume',
                                  'answer_covariance'), network=core_numbers(network))
-    inputs = [torch.tensor(part).movedim(0, -1) for part in (core.features, core.vectors,
-                                                             core.slant, core.cut)]
+    batch = SimpleNamespace(**{name: torch.tensor(getattr(core, name)).movedim(0, -1)
+                               for name in ('features', 'vectors', 'slant', 'cut')})
     with torch.no_grad():
-        active = (mlp_fit.at_sites(module.hidden, inputs[0]) > 0.0).float().mean()
+        active = (mlp_fit.at_sites(module.hidden, batch.features) > 0.0).float().mean()
         assert 0.2 < float(active) < 0.8
-        found = module(*inputs)
+        found = module(batch)
     np.testing.assert_allclose(found.offsets.T, core.answer, atol=1e-6)
     np.testing.assert_allclose(found.log_volume.exp(), core.answer_volume, atol=1e-6)
     np.testing.assert_allclose(
@@ -182,10 +183,10 @@ def test_networks_of_an_ensemble_learn_as_if_alone(data: MlpSamples, scaling: Sc
         for one, other in zip(alone.layers(), ensemble.layers(number)):
             for a, b in zip(one, other):
                 np.testing.assert_allclose(a, b, atol=0.1 * rate)  # of 5 steps
-    both = mlp_fit.evaluated(ensemble, data, scaling, mlp_fit.point_errors)
+    both = mlp_fit.point_errors(ensemble, data, scaling)
     assert both.shape == (2, len(data))
     np.testing.assert_allclose(
-        both[1], mlp_fit.evaluated(alone, data, scaling, mlp_fit.point_errors), atol=1e-4)
+        both[1], mlp_fit.point_errors(alone, data, scaling), atol=1e-4)
 
 
 def test_units_that_are_not_drawn_stay_away(data: MlpSamples, scaling: Scaling) -> None:
@@ -229,7 +230,7 @@ def test_hard_rounds_bring_what_the_network_errs_in(data: MlpSamples, scaling: S
         assert len(batch) == 8
     assert taken == 40
     assert asked == [16, 22, 28, 34]
-    errors, hard = (mlp_fit.evaluated(network, some, scaling, mlp_fit.point_errors)
+    errors, hard = (mlp_fit.point_errors(network, some, scaling)
                     for some in (data, mlp_recipe.hardest(network, data, scaling)))
     assert len(hard) == round(0.01 * len(data))
     np.testing.assert_allclose(np.sort(hard), np.sort(errors)[-len(hard):], rtol=1e-5)
@@ -246,7 +247,7 @@ def test_errors_while_training_are_the_solvers(data: MlpSamples, scaling: Scalin
     save_weights(path, {'point': scaling.folded(network.layers())},
                  {**card, 'seed': 0, 'commit': 'none', 'sizes': []})
     pairs = size_pairs(np.random.default_rng(3), 500)
-    said = mlp_fit.evaluated(network, samples.describe(pairs), scaling, mlp_fit.point_errors)
+    said = mlp_fit.point_errors(network, samples.describe(pairs), scaling)
     solved = 0.01 * mlp_recipe.solver_errors(pairs, path).point
     # The solver also moves answers into the other box, which seldom harms.
     assert np.mean(np.abs(said - solved) < 1e-4) > 0.3

@@ -36,7 +36,7 @@ from ...solver.arguments import program_parser, within
 from ...solver.mlp import UNITS_MAX
 from .. import mlp_recipe
 from ..ensemble import Ensemble, Scaling
-from ..mlp_fit import evaluated, fit, point_errors, random_batches, started
+from ..mlp_fit import fit, point_errors, random_batches, started
 from ..paper_recipe import dataset
 from ..paper_recipe.fit import PaperSettings
 from ..paper_recipe.fit import fit as fit_paper
@@ -106,8 +106,8 @@ class MlpSearch(Search):
         for _ in fit(networks, batches, steps=rung.effort, rate=1.0):
             pass
         return [{'error': found['p99'], 'mean': found['mean'], 'worst': found['worst']}
-                for found in map(mlp_recipe.error_summary, 100.0 * evaluated(
-                    networks, checking, scaling, point_errors))]
+                for found in map(mlp_recipe.error_summary,
+                                 100.0 * point_errors(networks, checking, scaling))]
 
     def keep(self, ranked: Sequence[Candidate], count: int) -> list[Candidate]:
         """Return the best of every class of cost in turn."""
