@@ -39,12 +39,9 @@ CHUNK = 1024
 class MlpAnswers(NamedTuple):
     """What a network, or each of an ensemble (…), says of n overlaps in their bounds."""
 
-    offsets: Tensor
-    """(…, 3, n): as in `MlpSamples`."""
-    log_volume: Tensor
-    """(…, n): logarithm of the volume by that of the bounds."""
-    covariance: Tensor
-    """(…, 6, n): as in `MlpSamples`."""
+    offsets: Tensor  # (…, 3, n) as in `MlpSamples`
+    log_volume: Tensor  # (…, n) logarithm of the volume by that of the bounds
+    covariance: Tensor  # (…, 6, n) as in `MlpSamples`
 
 
 class SiteNetwork(torch.nn.Module):

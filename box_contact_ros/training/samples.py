@@ -44,20 +44,14 @@ class MlpSamples:
     vectors: Any
     """(SITES, 3, n): the factors of the outputs for the point. The answer along q is the sum of
     the products over these outputs and f."""
-    slant: Any
-    """(3, 3, n): normals of the other box's pairs of faces f, by q."""
-    cut: Any
-    """(3, n): how far both faces f cut into the bounds."""
-    offsets: Any
-    """(3, n): exact centroid from the middle of the bounds [half extents]."""
-    scale: Any
-    """(3, n): half extents [longest edge of the smaller box]."""
-    volume: Any
-    """(n): exact volume by that of the bounds."""
+    slant: Any  # (3, 3, n) normals of the other box's pairs of faces f, by q
+    cut: Any  # (3, n) how far both faces f cut into the bounds
+    offsets: Any  # (3, n) exact centroid from the middle of the bounds [half extents]
+    scale: Any  # (3, n) half extents [longest edge of the smaller box]
+    volume: Any  # (n,) exact volume by that of the bounds
     covariance: Any
-    """(6, n): exact covariance xx, yy, zz, yz, xz, xy, frame of the bounds [half extents]."""
-    spread: Any
-    """(3, n): half extents [root of the covariance's trace]."""
+    """(6, n) exact covariance xx, yy, zz, yz, xz, xy, frame of the bounds [half extents]."""
+    spread: Any  # (3, n) half extents [root of the covariance's trace]
 
     def __len__(self) -> int:
         """Return n."""

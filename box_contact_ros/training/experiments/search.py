@@ -105,9 +105,9 @@ class MlpSearch(Search):
                                  count=rung.effort, device=self.device)
         for _ in fit(networks, batches, steps=rung.effort, rate=1.0):
             pass
+        errors = 100.0 * point_errors(networks, checking, scaling)
         return [{'error': found['p99'], 'mean': found['mean'], 'worst': found['worst']}
-                for found in map(mlp_recipe.error_summary,
-                                 100.0 * point_errors(networks, checking, scaling))]
+                for found in map(mlp_recipe.error_summary, errors)]
 
     def keep(self, ranked: Sequence[Candidate], count: int) -> list[Candidate]:
         """Return the best of every class of cost in turn."""
@@ -143,8 +143,7 @@ class PaperSearch(Search):
     def candidates(self) -> list[Candidate]:
         """Return settings over the ranges in which trainings of this kind are made."""
         s = self.settings
-        rate, momentum, initial = np.array([s.rate, s.momentum, s.initial]).tolist()
-        found = [Candidate(0, s.widths[1:3], rate, momentum, initial, shipped=True)]
+        found = [Candidate(0, s.widths[1:3], s.rate, s.momentum, s.initial, shipped=True)]
         for number in range(1, self.rungs[0].candidates):
             rng = np.random.default_rng([self.seed, _CANDIDATES, number])
             hidden = (int(rng.integers(6, 25)), int(rng.integers(6, 25)))
@@ -284,13 +283,13 @@ def main(args: Sequence[str] | None = None) -> int:
     searches: list[Search] = ([MlpSearch(**common)] if options.what == 'mlp' else
                               [*paper_searches(**common)])
     name = 'search' if options.what == 'mlp' else 'search_paper'
-    results, checkpoints = [], []
-    for number, search in enumerate(searches):
-        checkpoints.append(options.out / f'{name}_{number}.checkpoint')
-        if checkpoints[-1].exists():
-            print(f'going on from {checkpoints[-1]}')
+    checkpoints = [options.out / f'{name}_{k}.checkpoint' for k in range(len(searches))]
+    results = []
+    for search, checkpoint in zip(searches, checkpoints):
+        if checkpoint.exists():
+            print(f'going on from {checkpoint}')
         try:
-            results.append((search, search.run(checkpoints[-1])))
+            results.append((search, search.run(checkpoint)))
         except CheckpointError as error:
             print(f'search: {error}', file=sys.stderr)
             return 1

@@ -90,6 +90,10 @@ class Search(ABC):
         alive = self.candidates()
         saved = time.monotonic()
         for number, rung in enumerate(self.rungs):
+            if number:
+                shipped = [one for one in alive if one.shipped]
+                others = ranking([one for one in alive if not one.shipped], done[number - 1])
+                alive = shipped + self.keep(others, rung.candidates - len(shipped))
             if number == len(done):
                 done.append({})
             for place, group in enumerate(tqdm(
@@ -103,11 +107,6 @@ class Search(ABC):
                 if time.monotonic() - saved > SAVE_EVERY:
                     self._write(checkpoint, done)
                     saved = time.monotonic()
-            if number + 1 < len(self.rungs):
-                shipped = [one for one in alive if one.shipped]
-                others = ranking([one for one in alive if not one.shipped], done[number])
-                alive = shipped + self.keep(others,
-                                            self.rungs[number + 1].candidates - len(shipped))
         self._write(checkpoint, done)
         return done
 
