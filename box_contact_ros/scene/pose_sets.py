@@ -46,6 +46,14 @@ class Pairs(NamedTuple):
         """Return some of the pairs, in contiguous arrays."""
         return Pairs(*(np.ascontiguousarray(part[chosen]) for part in self))
 
+    def beyond(self, points: np.ndarray) -> np.ndarray:
+        """Return how far (n,) points (n, 3) are outside a box, along an axis of the box [m]."""
+        farthest = []
+        for pose, size in ((self.pose_a, self.size_a), (self.pose_b, self.size_b)):
+            local = np.einsum('nji,nj->ni', rotation_matrix(pose[:, 3:]), points - pose[:, :3])
+            farthest.append((np.abs(local) - 0.5 * size).max(axis=1))
+        return np.maximum(*farthest)
+
     def contacts(self, solver: ContactSolver | None = None) -> Contacts:
         """Return the contacts by a solver, without one the exact ones."""
         solver = solver or ContactSolver((1, 1, 1), (1, 1, 1), model='exact')

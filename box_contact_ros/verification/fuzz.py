@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import os
 import time
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import nullcontext
@@ -39,9 +40,6 @@ from .judge import GATES, exact_gap, judge
 
 PAIRS, QUICK_PAIRS = 10_000_000, 60_000
 PIECE = 50_000  # pairs that are drawn and judged at a time
-TOUCH_ULPS = 8.0
-"""Largest gap that is a touch, in units in the last place of the largest coordinate or size. The
-judge has to know this convention of the package."""
 SHOWN = 3  # faults of a class and model that are printed
 
 Sizes = Callable[[np.random.Generator, int], tuple[np.ndarray, np.ndarray]]
@@ -182,22 +180,21 @@ class Tally:
     near_touch: int = 0  # pairs that were judged in 60 digits
     exact_answers: int = 0
     worst_depth: float = 0.0  # largest depth error, by its tolerance
-    faults: dict[str, int] = field(default_factory=lambda: dict.fromkeys(
-        (*GATES.values(), 'exception'), 0))
+    faults: Counter[str] = field(default_factory=lambda: Counter(dict.fromkeys(
+        (*GATES.values(), 'exception'), 0)))
     poses: list[str] = field(default_factory=list)  # the first faults, as code
 
     @property
     def broken(self) -> int:
         """Faults of all kinds."""
-        return sum(self.faults.values())
+        return self.faults.total()
 
     def add(self, other: Tally) -> None:
         """Take in what another piece found."""
         for name in ('pairs', 'contacts', 'near_touch', 'exact_answers'):
             setattr(self, name, getattr(self, name) + getattr(other, name))
         self.worst_depth = max(self.worst_depth, other.worst_depth)
-        for name, count in other.faults.items():
-            self.faults[name] += count
+        self.faults.update(other.faults)
         self.poses = (self.poses + other.poses)[:SHOWN]
 
     def __str__(self) -> str:
@@ -210,7 +207,6 @@ class Tally:
 def examine(pairs: Pairs, name: str, solvers: dict[str, ContactSolver]) -> list[Tally]:
     """Ask each model for the pairs of a class, and judge the answers."""
     gap = cache(lambda row: exact_gap(*(part[row] for part in pairs)))  # once for all models
-    touch = TOUCH_ULPS * last_place(pairs)
     tallies = []
     for model, solver in solvers.items():
         tally = Tally(name, model, pairs=len(pairs.pose_a))
@@ -223,8 +219,7 @@ def examine(pairs: Pairs, name: str, solvers: dict[str, ContactSolver]) -> list[
             tally.poses.append(f'# {model}, exception: {error!r}')
             continue
         verdict = judge(*pairs, found)
-        for row in np.flatnonzero(verdict.doubtful):
-            verdict.settle(row, gap(row), found, touch=touch[row])
+        verdict.settle(found, gap)
         faults = verdict.faults
         tally.contacts = int(found.colliding.sum())
         tally.near_touch = int(verdict.doubtful.sum())
@@ -236,12 +231,6 @@ def examine(pairs: Pairs, name: str, solvers: dict[str, ContactSolver]) -> list[
             words = ', '.join(text for bit, text in GATES.items() if faults[row] & bit)
             tally.poses.append(_pasted(words, model, [part[row] for part in pairs]))
     return tallies
-
-
-def last_place(pairs: Pairs) -> np.ndarray:
-    """Return a unit in the last place (n,) of the largest coordinate or size [m]."""
-    parts = [np.abs(pairs.pose_a[:, :3]), np.abs(pairs.pose_b[:, :3]), pairs.size_a, pairs.size_b]
-    return np.spacing(np.hstack(parts).max(axis=1))
 
 
 def _pasted(words: str, model: str, pair: Sequence[np.ndarray]) -> str:
@@ -265,19 +254,18 @@ def _solver(model: str) -> ContactSolver:
 
 
 def fuzz(total: int, *, seed: int = 1, classes: Sequence[str] = tuple(CLASSES),
-         models: Sequence[str] | None = None, workers: int = 1, progress: bool = True,
-         ) -> dict[tuple[str, str], Tally]:
+         models: Sequence[str] | None = None, workers: int = 1) -> dict[tuple[str, str], Tally]:
     """Return tallies by class and model, of `total` pairs spread evenly over the classes."""
     from tqdm import tqdm
 
-    models, jobs = models or gated_models(), []
-    for name in classes:
-        left = -(-total // len(classes))
-        for number in range(-(-left // PIECE)):
-            jobs.append((name, seed, number, min(PIECE, left - number * PIECE), tuple(models)))
+    models = models or gated_models()
+    each = -(-total // len(classes))
+    counts = [min(PIECE, each - drawn) for drawn in range(0, each, PIECE)]
+    jobs = [(name, seed, number, count, tuple(models))
+            for name in classes for number, count in enumerate(counts)]
     tallies = {(name, model): Tally(name, model) for name in classes for model in models}
     with (tqdm(total=sum(job[3] for job in jobs), desc='fuzz', unit='pair', unit_scale=True,
-               mininterval=1.0, disable=not progress) as bar,
+               mininterval=1.0) as bar,
           ProcessPoolExecutor(workers) if workers > 1 else nullcontext() as pool):
         for found in pool.map(_piece, jobs) if pool else map(_piece, jobs):
             for tally in found:

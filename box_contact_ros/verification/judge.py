@@ -11,6 +11,7 @@ rounding may cost `judge` is the best direction, where edges are almost parallel
 """
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +19,9 @@ import numpy as np
 TOLERANCE = 1e-12  # what separations and depths have to keep, of the size
 COORDINATE_ULPS = 8.0
 """And far from the origin, of the coordinates' last place: poses are known no better."""
+TOUCH_ULPS = 8.0
+"""Largest gap that is a touch, in units in the last place of the largest coordinate or size: a
+convention of the package that the judge has to know."""
 DOUBT = 1e-14  # gap, of the size, up to which its sign is not known in float64
 PRESSED = 3e-9
 """How far a corner moves, of the size, when boxes are pressed in along three axes. Contacts
@@ -37,6 +41,7 @@ GATES = {MISSED: 'missed contact', PHANTOM: 'phantom contact', TOO_DEEP: 'too de
          TOO_SHALLOW: 'too shallow', WRONG_AXIS: 'wrong axis', NOT_UNIT: 'normal not unit',
          OUTSIDE: 'point outside', NOT_FINITE: 'NaN'}
 """Faults by bit; `judge` returns sums of them."""
+BY_GAP = MISSED | PHANTOM | TOO_DEEP | TOO_SHALLOW | WRONG_AXIS  # what the true gap decides
 PIECE = 2048  # pairs that are judged at a time: their corners fit a processor's caches
 _SIGNS = np.array([[0.5 if k >> c & 1 else -0.5 for c in range(3)] for k in range(8)])
 """(8, 3) corners of a box of edge 1."""
@@ -50,26 +55,35 @@ class Verdict(NamedTuple):
     depth_error: np.ndarray
     """(n,) |depth − true depth| by its tolerance, NaN where the solver says apart."""
     tolerance: np.ndarray  # (n,) of depths [m]
+    unsure: np.ndarray  # (n,) gap or depth up to which either verdict is right [m]
     along: np.ndarray  # (n,) gap along the solver's normal [m], NaN where it says apart
 
-    def settle(self, row: int, gap: float, found: tuple[np.ndarray, ...], touch: float) -> None:
-        """Judge a doubtful pair by its exact gap; gaps to `touch` [m] count as contact.
+    def settle(self, found: tuple[np.ndarray, ...], gap_of: Callable[[int], float]) -> None:
+        """Judge the doubtful pairs by their exact gaps; gap_of: returns the one of a row [m]."""
+        rows = np.flatnonzero(self.doubtful)
+        gap = np.array([gap_of(row) for row in rows], dtype=np.float64)
+        colliding, separation, tolerance = found[0][rows], found[1][rows], self.tolerance[rows]
+        self.depth_error[rows] = np.where(colliding, np.abs(separation - gap) / tolerance, np.nan)
+        self.faults[rows] = self.faults[rows] & ~BY_GAP | _faults_by_gap(
+            colliding, separation, self.along[rows], gap, tolerance, self.unsure[rows])
 
-        Between zero and twice `touch`, rounding decides, and either verdict is right.
-        """
-        said, separation = found[0][row], found[1][row]
-        faults = self.faults[row] & ~(MISSED | PHANTOM | TOO_DEEP | TOO_SHALLOW | WRONG_AXIS)
-        if said and gap > 2.0 * touch:
-            faults |= PHANTOM
-        if not said and gap < -2.0 * touch:
-            faults |= MISSED
-        if said:
-            tolerance = self.tolerance[row]
-            self.depth_error[row] = abs(separation - gap) / tolerance
-            faults |= TOO_DEEP if separation < gap - tolerance else 0
-            faults |= TOO_SHALLOW if separation > gap + tolerance else 0
-            faults |= WRONG_AXIS if self.along[row] < gap - tolerance else 0
-        self.faults[row] = faults
+
+def rounding(pose_a: np.ndarray, pose_b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
+             ) -> np.ndarray:
+    """Return what separations and depths may be off (n,) [m]; poses (n, 7), extents (n, 3)."""
+    reach = np.abs(np.hstack([pose_a[:, :3], pose_b[:, :3]])).max(axis=1)
+    size = np.maximum(size_a, size_b).max(axis=1)
+    return TOLERANCE * size + COORDINATE_ULPS * 2.0**-52 * reach
+
+
+def two_touches(pose_a: np.ndarray, pose_b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
+                ) -> np.ndarray:
+    """Return the gap or depth (n,) [m] up to which rounding decides, and either verdict is right.
+
+    Poses (n, 7), extents (n, 3).
+    """
+    lengths = np.abs(np.hstack([pose_a[:, :3], pose_b[:, :3], size_a, size_b]))
+    return 2.0 * TOUCH_ULPS * np.spacing(lengths.max(axis=1))
 
 
 def judge(pose_a: np.ndarray, pose_b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
@@ -90,7 +104,7 @@ def _judge(pose_a: np.ndarray, pose_b: np.ndarray, size_a: np.ndarray, size_b: n
     """Judge one piece."""
     size = np.maximum(size_a, size_b).max(axis=1)
     reach = np.abs(np.hstack([pose_a[:, :3], pose_b[:, :3]])).max(axis=1)
-    tolerance = TOLERANCE * size + COORDINATE_ULPS * 2.0**-52 * reach
+    tolerance = rounding(pose_a, pose_b, size_a, size_b)
     # From here on vectors are (3, n), and A's centre is the origin: loops are over components.
     axes_a, axes_b = _axes(pose_a[:, 3:].T), _axes(pose_b[:, 3:].T)
     corners_a = _corners(axes_a, size_a.T, np.zeros((3, len(size))))
@@ -107,20 +121,29 @@ def _judge(pose_a: np.ndarray, pose_b: np.ndarray, size_a: np.ndarray, size_b: n
         finite = (np.isfinite(separation) & np.isfinite(normal).all(axis=1)
                   & np.isfinite(point).all(axis=1))
         sound = colliding & finite
-        faults = sum(np.where(rows, bit, 0) for bit, rows in (
-            (PHANTOM, colliding & (true > 0.0)),
-            (MISSED, ~colliding & (true < 0.0)),
+        separation_known, along = (np.where(sound, part, np.nan) for part in (separation, along))
+        by_gap = _faults_by_gap(colliding, separation_known, along, true, tolerance, 0.0)
+        faults = by_gap + sum(np.where(rows, bit, 0) for bit, rows in (
             (NOT_FINITE, np.where(colliding, ~finite, ~(separation > 0.0))),
-            (TOO_DEEP, sound & (separation < true - tolerance)),
-            (TOO_SHALLOW, sound & (separation > true + tolerance)),
-            (WRONG_AXIS, sound & (along < true - tolerance)),
             (NOT_UNIT, sound & (np.abs((normal**2).sum(axis=1) - 1.0) > 1e-12)),
             (OUTSIDE, sound & (beyond > slack))))
-        depth_error = np.where(sound, np.abs(separation - true) / tolerance, np.nan)
+        depth_error = np.abs(separation_known - true) / tolerance
     # The offset is rounded once, corners and projections some ten times.
-    unsure = np.abs(true) <= DOUBT * size
-    wrong = faults & (MISSED | PHANTOM | TOO_DEEP | TOO_SHALLOW | WRONG_AXIS) > 0
-    return Verdict(faults, unsure | wrong, depth_error, tolerance, np.where(sound, along, np.nan))
+    doubtful = (np.abs(true) <= DOUBT * size) | (by_gap > 0)
+    return Verdict(faults, doubtful, depth_error, tolerance,
+                   two_touches(pose_a, pose_b, size_a, size_b), along)
+
+
+def _faults_by_gap(colliding: np.ndarray, separation: np.ndarray, along: np.ndarray,
+                   gap: np.ndarray, tolerance: np.ndarray, unsure: np.ndarray | float,
+                   ) -> np.ndarray:
+    """Return sums (n,) of the faults that the true gaps decide; NaN breaks none of them."""
+    return np.asarray(sum(np.where(rows, bit, 0) for bit, rows in (
+        (PHANTOM, colliding & (gap > unsure)),
+        (MISSED, ~colliding & (gap < -unsure)),
+        (TOO_DEEP, colliding & (separation < gap - tolerance)),
+        (TOO_SHALLOW, colliding & (separation > gap + tolerance)),
+        (WRONG_AXIS, colliding & (along < gap - tolerance)))))
 
 
 def _axes(quaternions: np.ndarray) -> np.ndarray:

@@ -13,10 +13,8 @@ import numpy as np
 import yaml
 
 from ..baselines.engines.engine import Engine, Manifold, part_by_part
-from ..scene.pose import rotation_matrix
 from ..scene.pose_sets import Pairs
-from .fuzz import TOUCH_ULPS, last_place
-from .judge import PRESSED
+from .judge import PRESSED, judge, two_touches
 
 FILE = Path(__file__).with_suffix('.yaml')
 SINGLE = 1e-6  # error that float32 costs, of the size
@@ -55,11 +53,6 @@ class NamedFailure:
             self.pose_a, self.pose_b, self.size_a, self.size_b)))
 
     @property
-    def touch(self) -> float:
-        """Return the gap or depth up to which either verdict is right: two touches."""
-        return 2.0 * TOUCH_ULPS * float(last_place(self.pairs)[0])
-
-    @property
     def lenience(self) -> float:
         """Return the error that another engine's depth may have."""
         return max(self.bound, SINGLE * float(self.pairs.size[0]),
@@ -74,7 +67,8 @@ def load() -> dict[str, NamedFailure]:
 
 def fault(one: NamedFailure, found: Manifold, bound: float) -> str:
     """Return what is wrong with an answer, '' if nothing; bound: error of lengths that passes."""
-    unsure = abs(one.separation) <= max(one.touch, min(bound, SINGLE * float(one.pairs.size[0])))
+    pairs, size = one.pairs, float(one.pairs.size[0])
+    unsure = abs(one.separation) <= max(two_touches(*pairs)[0], min(bound, SINGLE * size))
     if not len(found.points):
         return '' if one.separation > 0.0 or unsure else 'missed'
     if one.separation > 0.0 and not unsure:
@@ -83,28 +77,14 @@ def fault(one: NamedFailure, found: Manifold, bound: float) -> str:
     depth = float(found.depths[deepest])  # NaN: none is given
     if abs(depth + one.separation) > bound:
         return f'depth {depth:.3g}'
-    normal = found.normals[deepest]
-    if np.isfinite(normal).all() and not _gap_along(one, normal) >= one.separation - bound:
-        return f'depth {-_gap_along(one, normal):.3g} along the normal'
+    along = judge(*pairs, (np.array([True]), np.array([one.separation]),
+                           found.normals[[deepest]], found.points[[deepest]])).along[0]
+    if along < one.separation - bound:  # NaN: no normal is given
+        return f'depth {-along:.3g} along the normal'
     # Models press boxes that just touch in.
-    reach = bound + max(0.0, -one.separation, depth) + PRESSED * float(one.pairs.size[0])
-    beyond = max(_beyond(point, pose, size) for point in found.points for pose, size in (
-        (one.pose_a, one.size_a), (one.pose_b, one.size_b)))
+    reach = bound + max(0.0, -one.separation, depth) + PRESSED * size
+    beyond = pairs.beyond(found.points).max()
     return '' if beyond <= reach else f'point {beyond:.3g} outside'
-
-
-def _gap_along(one: NamedFailure, normal: np.ndarray) -> float:
-    """Return the gap from A to B along a unit vector, by supports."""
-    a, b = np.array(one.pose_a), np.array(one.pose_b)
-    widths = [0.5 * np.array(size) @ np.abs(rotation_matrix(pose[3:]).T @ normal)
-              for pose, size in ((a, one.size_a), (b, one.size_b))]
-    return float((b[:3] - a[:3]) @ normal - sum(widths))
-
-
-def _beyond(point: np.ndarray, pose: list[float], size: list[float]) -> float:
-    """Return how far a point is outside a box, along an axis of the box."""
-    local = rotation_matrix(np.array(pose[3:])).T @ (point - np.array(pose[:3]))
-    return float((np.abs(local) - 0.5 * np.array(size)).max())
 
 
 def replay(engine: Engine, failures: Mapping[str, NamedFailure], bounds: Mapping[str, float],

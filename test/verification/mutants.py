@@ -438,7 +438,7 @@ MUTANTS = {
         NAMED, 'deepest = int(np.argmax(found.depths))', 'deepest = 0',
         f'{TEST_NAMED} -k every_fault'),
     'a normal across the contact passes': Mutant(
-        NAMED, 'if np.isfinite(normal).all() and not _gap', 'if False and not _gap',
+        NAMED, 'if along < one.separation - bound', 'if False',
         f'{TEST_NAMED} -k every_fault'),
 }
 

@@ -102,7 +102,7 @@ def test_gates(name, model):
     pairs = CASES[name].pairs
     found = solve(model, pairs)
     off = np.abs(found.separation - CASES[name].gap)
-    assert (off <= stability.tolerance(pairs))[found.colliding].all()
+    assert (off <= judge.rounding(*pairs))[found.colliding].all()
     assert np.isfinite(found.separation).all()
     assert np.isnan(found.point[~found.colliding]).all()
     assert np.isnan(found.normal[~found.colliding]).all()
@@ -179,7 +179,7 @@ def test_swap(everything, model):
     np.testing.assert_array_equal(one.colliding, two.colliding)
     np.testing.assert_array_equal(one.separation, two.separation)
     along = judge.judge(*everything, (one.colliding, one.separation, -two.normal, one.point)).along
-    allowed = 2 * stability.tolerance(everything)
+    allowed = 2 * judge.rounding(*everything)
     assert (np.abs(along - one.separation) <= allowed)[one.colliding].all()
 
 
@@ -222,7 +222,7 @@ def test_reflection(everything, model):
     two = solve(model, everything._replace(pose_a=mirrored(everything.pose_a),
                                            pose_b=mirrored(everything.pose_b)))
     np.testing.assert_array_equal(one.colliding, two.colliding)
-    allowed = stability.tolerance(everything)
+    allowed = judge.rounding(*everything)
     assert (np.abs(one.separation - two.separation) <= allowed).all()
 
 
@@ -238,7 +238,7 @@ def test_free_after_moving_by_the_depth(everything, model):
     depth = -one.separation[:, None]
     reach = np.abs(np.hstack([everything.pose_a[:, :3], everything.pose_b[:, :3]])).max(axis=1)
     m = np.maximum(1e-9 * depth[:, 0], 8 * np.spacing(np.maximum(reach, size_of(everything))))
-    m = (m + 2 * stability.tolerance(everything))[:, None]
+    m = (m + 2 * judge.rounding(*everything))[:, None]
 
     def moved(by):
         pose_b = everything.pose_b.copy()
@@ -263,7 +263,7 @@ def test_depth_is_lipschitz(everything):
         pose_b = everything.pose_b.copy()
         pose_b[:, :3] += step
         two = solve('exact', everything._replace(pose_b=pose_b))
-        allowed = scale * size + 2 * stability.tolerance(everything)
+        allowed = scale * size + 2 * judge.rounding(*everything)
         assert (np.abs(two.separation - one.separation) <= allowed).all()
 
 
@@ -272,7 +272,7 @@ def test_boxes_that_grow_are_no_less_deep(everything, model):
     """Growing a box never lowers the depth."""
     one = solve(model, everything)
     two = solve(model, everything._replace(size_b=1.01 * everything.size_b))
-    assert (two.separation <= one.separation + 2 * stability.tolerance(everything)).all()
+    assert (two.separation <= one.separation + 2 * judge.rounding(*everything)).all()
     assert two.colliding[one.colliding].all()
 
 

@@ -10,7 +10,7 @@ from helpers import oracle
 
 from box_contact_ros.baselines.engines.engine import APART, Manifold, ours
 from box_contact_ros.solver.models import gated_models
-from box_contact_ros.verification.judge import COORDINATE_ULPS, TOLERANCE
+from box_contact_ros.verification import judge
 from box_contact_ros.verification.named_failures import NamedFailure, fault, load, replay
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -19,8 +19,7 @@ FAILURES = load()
 
 def rounding(one: NamedFailure) -> float:
     """Return the error that a model may have: 1e-12 of the size, or the coordinates' ulp."""
-    reach = np.abs([one.pose_a[:3], one.pose_b[:3]]).max()
-    return TOLERANCE * float(one.pairs.size[0]) + COORDINATE_ULPS * np.finfo(float).eps * reach
+    return float(judge.rounding(*one.pairs)[0])
 
 
 @pytest.mark.parametrize('one', FAILURES.values(), ids=FAILURES)

@@ -1,22 +1,15 @@
 """The page of public reports, replayed: which model and which other engine passes which."""
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from ... import output
 from ...baselines.engines import installed
-from ...baselines.engines.engine import Engine, ours, packages_of
+from ...baselines.engines.engine import ours, packages_of
 from ...core import native
-from ...solver.models import MODELS, gated_models
+from ...solver.models import gated_models
 from ...verification.named_failures import NamedFailure, load, replay_apart
-
-
-def contestants() -> tuple[list[Engine], list[str]]:
-    """Return every model for boxes of any sizes and every other engine, and what is missing."""
-    rivals, missing = installed()
-    models = [ours(entry.full_name) for entry in MODELS.values() if entry.any_boxes]
-    return [*models, *rivals], missing
 
 
 def reports_table(failures: Mapping[str, NamedFailure]) -> str:
@@ -30,23 +23,26 @@ def reports_table(failures: Mapping[str, NamedFailure]) -> str:
 
 def passes_table(found: Mapping[str, Mapping[str, str]]) -> str:
     """Return a row a contestant: '·' for what it passes, else a letter."""
-    places = [str(place + 1) for place in range(len(next(iter(found.values()))))]
+    places = range(1, 1 + len(next(iter(found.values()))))
     return output.markdown_table(
-        ['', *places, 'passed'],
+        ['', *map(str, places), 'passed'],
         [[name, *('·' if not text else _letter(text) for text in faults.values()),
           f'{sum(not text for text in faults.values())} of {len(faults)}']
          for name, faults in found.items()])
 
 
 def _letter(text: str) -> str:
+    if 'along' in text:
+        return 'N'
     return {'missed': 'M', 'invented': 'I', 'depth': 'D', 'point': 'P', 'raised': 'E'}.get(
-        text.partition(' ')[0], 'A') if 'along' not in text else 'N'
+        text.partition(' ')[0], 'A')
 
 
-def write_named(folder: Path, command: str) -> int:
-    """Replay all, print, write named_failures.md; 1 if a gated model fails one."""
+def write_named(folder: Path, command: str, models: Sequence[str]) -> int:
+    """Replay all for models and every other engine, print, write; 1 if a gated model fails one."""
     failures = load()
-    engines, missing = contestants()
+    rivals, missing = installed()
+    engines = [*map(ours, models), *rivals]
     found = {engine.name: replay_apart(engine, failures) for engine in engines}
     place = {name: number for number, name in enumerate(failures, start=1)}
     text = output.page(

@@ -26,9 +26,8 @@ from ...scene.pose_sets import Pairs
 from ...solver.arguments import add_models, program_parser
 from ...solver.contact_solver import ContactSolver
 from ...solver.models import MODELS, find_model, gated_models
-from ...verification.fuzz import TOUCH_ULPS, last_place
 from ...verification.hard_poses import Cases, load
-from ...verification.judge import COORDINATE_ULPS, NOT_FINITE, NOT_UNIT, OUTSIDE, TOLERANCE, judge
+from ...verification.judge import NOT_FINITE, NOT_UNIT, OUTSIDE, judge
 from .named_report import write_named
 
 PACKAGES = ('numpy', 'python-fcl')  # whose versions are named
@@ -65,29 +64,18 @@ class StabilityRow:
     failure: str = ''  # what ended the model before its answers, if anything
 
 
-def tolerance(pairs: Pairs) -> np.ndarray:
-    """Return the slack (n,) of separations [m]: 1e-12 of the size, or the coordinates' ulp."""
-    reach = np.abs(np.hstack([pairs.pose_a[:, :3], pairs.pose_b[:, :3]])).max(axis=1)
-    return TOLERANCE * pairs.size + COORDINATE_ULPS * np.finfo(float).eps * reach
-
-
-def unsure(pairs: Pairs) -> np.ndarray:
-    """Return the gap or depth (n,) [m] below which either verdict is right: two touches."""
-    return 2.0 * TOUCH_ULPS * last_place(pairs)
-
-
 def examine(model: str, family: str, cases: Cases) -> StabilityRow:
     """Ask a model for the cases of a family."""
     pairs, gap = cases.pairs, cases.gap
     solver = ContactSolver((1, 1, 1), (1, 1, 1), model=model)
     found = pairs.contacts(solver)
     verdict = judge(*pairs, found)
-    touching = found.colliding & (gap <= unsure(pairs))
+    touching = found.colliding & (gap <= verdict.unsure)
     # What the judge settles by its own gap is settled here by the stored one.
     # A contact with NaN counts as that alone.
     wrong = {
-        'verdicts': (found.colliding != (gap <= 0.0)) & (np.abs(gap) > unsure(pairs)),
-        'normals': touching & ((verdict.along < gap - tolerance(pairs))
+        'verdicts': (found.colliding != (gap <= 0.0)) & (np.abs(gap) > verdict.unsure),
+        'normals': touching & ((verdict.along < gap - verdict.tolerance)
                                | (verdict.faults & NOT_UNIT > 0)),
         'outside': touching & (verdict.faults & OUTSIDE > 0),
         'not_finite': touching & (verdict.faults & NOT_FINITE > 0)}
@@ -185,9 +173,10 @@ def main(args: Sequence[str] | None = None) -> int:
                         help='the named public reports instead, as named_failures.md (default '
                              'folder: docs/reference)')
     options = parser.parse_args(args)
+    command = output.command_line('box_contact_ros stability', args)
     if options.named:
         return write_named(output.make_folder(parser, options.out or Path('docs/reference')),
-                           output.command_line('box_contact_ros stability', args))
+                           command, reported)
     whole = set(options.models) >= set(reported) and set(options.families) == set(cases)
     folder = output.make_folder(parser, options.out or (
         output.RESULTS if whole else output.QUICK_RESULTS))
@@ -202,8 +191,7 @@ def main(args: Sequence[str] | None = None) -> int:
                 bar.update()
     output.write_csv(folder / 'stability.csv', map(asdict, rows), digits=4,
                      about=output.machine(native, PACKAGES))
-    (folder / 'stability.md').write_text(
-        page(rows, output.command_line('box_contact_ros stability', args)), encoding='utf-8')
+    (folder / 'stability.md').write_text(page(rows, command), encoding='utf-8')
     for model in options.models:
         print(f'\n{model}\n{table([row for row in rows if row.model == model])}')
     for text in gates(rows):
