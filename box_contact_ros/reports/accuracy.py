@@ -25,7 +25,6 @@ import numpy as np
 from .. import output
 from ..core import CENTROID_REACH, DEPTH_FLOOR, Stages, native, stages
 from ..resources import resource_path
-from ..scene.pose import rotation_matrix
 from ..scene.pose_sets import SETS, ContactErrors, Pairs, contact_errors
 from ..solver.arguments import add_models, model_name, program_parser, within
 from ..solver.contact import Contacts
@@ -133,14 +132,10 @@ def share_corrected(pairs: Pairs, weights: Path | str) -> float:
 
 def outside(pairs: Pairs, found: Contacts) -> float:
     """Return the largest distance of a point from a box, of the size, beyond the pressing."""
-    size = pairs.size
-    farthest = np.full(len(size), -np.inf)
-    for pose, extents in ((pairs.pose_a, pairs.size_a), (pairs.pose_b, pairs.size_b)):
-        local = np.einsum('nji,nj->ni', rotation_matrix(pose[:, 3:]), found.point - pose[:, :3])
-        farthest = np.maximum(farthest, (np.abs(local) - 0.5 * extents).max(axis=1))
-    pressed = np.maximum(0.0, DEPTH_FLOOR + found.separation / size)
+    pressed = np.maximum(0.0, DEPTH_FLOOR + found.separation / pairs.size)
+    beyond = pairs.beyond(found.point) / pairs.size - pressed
     # A point inside is no distance outside; pairs apart have NaN.
-    return float(np.max((farthest / size - pressed)[found.colliding], initial=0.0))
+    return float(np.max(beyond[found.colliding], initial=0.0))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -401,11 +396,15 @@ def csv_rows(rows: Sequence[AccuracyRow]) -> list[dict[str, object]]:
 def page(rows: Sequence[AccuracyRow], errors: dict[str, np.ndarray], drawn: int, command: str,
          seed: int, broken: Sequence[str]) -> str:
     """Return the Markdown page."""
+    if broken:
+        verdict = f'BROKEN: {"; ".join(broken)}.'
+    elif any(row.model == 'mlp' for row in rows):
+        verdict = 'All limits hold.'
+    else:
+        verdict = 'A model of your own has no limits.'
     return output.page(
         'reports/pages/accuracy', command=command, machine=output.machine(native), seed=seed,
-        verdict=f'BROKEN: {"; ".join(broken)}.' if broken else 'All limits hold.' if any(
-            row.model == 'mlp' for row in rows) else 'A model of your own has no limits.',
-        table=table(rows), patch_table=patch_table(rows), mae_limit=MAE_LIMIT,
+        verdict=verdict, table=table(rows), patch_table=patch_table(rows), mae_limit=MAE_LIMIT,
         point_classes=class_table(rows, 'point'), volume_classes=class_table(rows, 'volume'),
         covariance_classes=class_table(rows, 'covariance'), paper_table=paper_table(errors, drawn))
 
