@@ -11,12 +11,11 @@ import pytest
 fcl = pytest.importorskip('fcl')
 pytest.importorskip('matplotlib')
 
-from box_contact_ros import ContactSolver
 from box_contact_ros.baselines import soup
 from box_contact_ros.reports.paper import paper_soup_tables, paper_tables
+from box_contact_ros.scene.pose_sets import at_depth
+from box_contact_ros.solver.weights_file import load_weights
 from box_contact_ros.training.paper_recipe import dataset
-
-EXACT = ContactSolver(poses.CUBE, poses.CUBE, model='exact')
 
 
 @pytest.fixture
@@ -24,7 +23,7 @@ def small(monkeypatch):
     """Two N of the tables and one beside them, on 150 patterns."""
     sets = {'contact': dataset.paper(5, counts=(10, 10, 150)),
             'vertex_face': dataset.paper(5, counts=(10, 10, 150))}
-    monkeypatch.setattr(paper_tables, '_sets_of', lambda _: sets)
+    monkeypatch.setattr(paper_tables, '_loaded', lambda path: (load_weights(path), sets))
     few = {n: paper_soup_tables.PAPER[n] for n in (8, 10)}
     monkeypatch.setattr(paper_soup_tables, 'PAPER', few)
     monkeypatch.setattr(paper_soup_tables, 'ALSO', (2, 32))
@@ -33,8 +32,8 @@ def small(monkeypatch):
 
 def test_coplanar_faces_lie_in_one_plane():
     """Exact touch to the last bit, all in contact; one in ten exactly on top."""
-    a, b = paper_soup_tables.coplanar(np.random.default_rng(1), 200)
-    found = EXACT.batch(a, b)
+    pairs = paper_soup_tables.coplanar(np.random.default_rng(1), 200)
+    found, b = pairs.contacts(), pairs.pose_b
     assert found.colliding.all() and (found.separation == 0.0).all()
     assert (found.normal == [0, 0, 1]).all()
     assert np.sum((b[:, :2] == 0.0).all(axis=1)) == 20
@@ -42,18 +41,17 @@ def test_coplanar_faces_lie_in_one_plane():
 
 
 def test_near_parallel_cubes_are_a_millimetre_deep():
-    a, b = paper_soup_tables.near_parallel(np.random.default_rng(1), 200)
-    assert len(a) == len(b) == 200
-    assert EXACT.batch(a, b).separation == pytest.approx(-1e-3 * np.ones(200), abs=1e-12)
+    pairs = paper_soup_tables.near_parallel(np.random.default_rng(1), 200)
+    assert pairs.contacts().separation == pytest.approx(-1e-3 * np.ones(200), abs=1e-12)
 
 
 def test_touching_poses_are_the_patterns(small):
     """They touch to within rounding, and pressed they are as deep as was asked for."""
-    given = dataset.as_poses(small)
-    assert np.abs(EXACT.batch(*given).separation).max() < 1e-14
-    pressed = paper_soup_tables.pressed(given, 1e-3)
-    assert len(pressed[0]) > 100
-    assert EXACT.batch(*pressed).separation == pytest.approx(-1e-3, abs=1e-12)
+    given = paper_soup_tables.on_cube(dataset.as_poses(small)[1])
+    assert np.abs(given.contacts().separation).max() < 1e-14
+    pressed = at_depth(given, np.full(len(given.size), 1e-3))
+    assert len(pressed.size) > 100
+    assert pressed.contacts().separation == pytest.approx(-1e-3, abs=1e-12)
 
 
 def test_the_search_alone_finds_every_pair():
@@ -84,8 +82,9 @@ def test_crossing_is_on_log_log_paper():
 
 def test_planted_errors_show(small, monkeypatch):
     """A point shifted by 10 mm, a normal turned round, contacts withheld: each is seen."""
-    given = paper_soup_tables.pressed(dataset.as_poses(small[:40]), 1e-3)
-    truth = EXACT.batch(*given)
+    touching = paper_soup_tables.on_cube(dataset.as_poses(small[:40])[1])
+    given = at_depth(touching, np.full(40, 1e-3))
+    truth = given.contacts()
     answer = soup.point_and_normal
 
     def judged(planted):
@@ -97,13 +96,13 @@ def test_planted_errors_show(small, monkeypatch):
 
     right = judged(answer)
     assert right.point.mean() < 0.05 and right.normal.mean() < 20
-    assert len(right.point) == len(given[0])
+    assert len(right.point) == len(given.size)
     assert right.depth.mean() > 0.01
-    perfect = iter(range(len(given[0])))
+    perfect = iter(range(len(given.size)))
 
     def exact(*_):
         row = next(perfect)
-        return truth.point[row] - given[0][row, :3] + [0, 0, 0.01], -truth.normal[row]
+        return truth.point[row] - given.pose_a[row, :3] + [0, 0, 0.01], -truth.normal[row]
 
     wrong = judged(exact)
     assert wrong.point == pytest.approx(0.01) and wrong.normal == pytest.approx(180.0)

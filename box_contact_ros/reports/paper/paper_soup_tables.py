@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import fcl
 import numpy as np
@@ -19,7 +19,6 @@ from tqdm import tqdm
 
 from ... import output
 from ...baselines import soup
-from ...core import native
 from ...scene.pose import degrees_between
 from ...scene.pose_sets import CUBE, Pairs, at_depth, stacks
 from ...solver.contact import Contacts
@@ -54,63 +53,49 @@ QUICK = {'touching': Counts(100, 10, 20), 'near-parallel': Counts(20, 1, 20),
          'coplanar': Counts(10, 2, 10)}
 REGIMES = tuple(FULL)
 
-Poses = tuple[np.ndarray, np.ndarray]  # poses (n, 7) of A and of B, two cubes of edge 2
+Row = dict[str, Any]
+"""A row of paper_soup.csv by column; of an N or a model that is not timed, it has no times."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class SoupTimes:
-    """Soup of N divisions, timed on a regime [ms]."""
-
-    steps: np.ndarray
-    alone: np.ndarray
-    answers: np.ndarray
-    pairs: np.ndarray  # pairs of triangles that meet, per pattern
-    worst_step: float  # step of the pattern with the most pairs
-    worst_alone: float
-    touching: int  # patterns that touch, by SAT
-    misses: int  # of these, those in which no two triangles meet
-
-
-@dataclass(frozen=True, kw_only=True)
-class SoupErrors:
-    """Soup of N divisions, judged on a regime; a row per pattern that the soup answered."""
+class SoupErrors(NamedTuple):
+    """A soup, judged on a regime; a row per pattern that the soup answered."""
 
     point: np.ndarray  # [m]
     normal: np.ndarray  # [deg]
     depth: np.ndarray  # deepest contact minus the true depth [m]
 
 
-@dataclass(frozen=True)
-class Rival:
-    """A network, on the touching patterns that the soup's accuracy is measured on."""
-
-    point: float  # mean error of the point [m]
-    normal: float  # mean error of the normal [deg]
-    milliseconds: float  # mean time of a call
-
-
 @dataclass(frozen=True, kw_only=True)
 class SoupResult:
-    """All that is measured; cells are by regime and N."""
+    """All that is measured."""
 
-    times: Mapping[tuple[str, int], SoupTimes]
-    errors: Mapping[tuple[str, int], SoupErrors]
-    rivals: Mapping[str, Rival]
+    soups: Mapping[tuple[str, int], Row]  # by regime and N
+    networks: Mapping[str, Row]  # on the touching patterns that the soup's accuracy is measured on
     exact: float  # mean time of a call of model `exact` [ms]
     counts: Mapping[str, Counts]
 
-    def ends(self, regime: str) -> tuple[SoupTimes, SoupTimes]:
-        """Return the times of the least N of Table 3, and of the largest."""
-        return self.times[regime, min(PAPER)], self.times[regime, max(PAPER)]
+    @property
+    def rows(self) -> list[Row]:
+        """Return the rows of paper_soup.csv."""
+        return [*self.soups.values(), *self.networks.values()]
+
+    def ends(self, regime: str) -> tuple[Row, Row]:
+        """Return the rows of the least N of Table 3, and of the largest."""
+        return self.soups[regime, min(PAPER)], self.soups[regime, max(PAPER)]
 
 
-def near_parallel(rng: np.random.Generator, n: int) -> Poses:
+def on_cube(pose_b: np.ndarray) -> Pairs:
+    """Return pairs of cubes of edge 2, A at the origin and B at poses (n, 7)."""
+    sizes = np.tile(CUBE, (len(pose_b), 1))
+    return Pairs(np.tile([0.0, 0, 0, 0, 0, 0, 1], (len(pose_b), 1)), pose_b, sizes, sizes)
+
+
+def near_parallel(rng: np.random.Generator, n: int) -> Pairs:
     """Draw one cube on the other, tilted by 1e-6–1e-3 rad, 1 mm deep, any yaw, anywhere on it."""
-    pairs = stacks(rng, 2 * n)  # a few are placed beside the cube and left out
-    return pairs.pose_a[:n], pairs.pose_b[:n]
+    return stacks(rng, 2 * n).rows(slice(n))  # a few are placed beside the cube and left out
 
 
-def coplanar(rng: np.random.Generator, n: int) -> Poses:
+def coplanar(rng: np.random.Generator, n: int) -> Pairs:
     """Draw one cube on the other, faces in one plane to the last bit.
 
     One in ten stands exactly on top; the others anywhere on it, half of them with their sides
@@ -126,22 +111,12 @@ def coplanar(rng: np.random.Generator, n: int) -> Poses:
         b[:, 2] = CUBE[2]
         yaw = largest * rng.uniform(-1.0, 1.0, len(b))
         b[:, 5], b[:, 6] = np.sin(0.5 * yaw), np.cos(0.5 * yaw)
-        parts.append(b[_cubes('exact').batch(_origin(len(b)), b).colliding][:count])
-    return _origin(n), rng.permutation(np.concatenate(parts))
-
-
-def _origin(n: int) -> np.ndarray:
-    return np.tile([0.0, 0, 0, 0, 0, 0, 1], (n, 1))
+        parts.append(b[on_cube(b).contacts().colliding][:count])
+    return on_cube(rng.permutation(np.concatenate(parts)))
 
 
 def _cubes(model: str) -> ContactSolver:
     return ContactSolver(CUBE, CUBE, model=model)
-
-
-def pressed(poses: Poses, depth: float) -> Poses:
-    """Return the pairs that touch, B moved along SAT's normal until they are `depth` [m] deep."""
-    sizes = np.tile(CUBE, (len(poses[0]), 1))
-    return at_depth(Pairs(*poses, sizes, sizes), np.full(len(sizes), depth))[:2]
 
 
 def search(first: fcl.CollisionObject, second: fcl.CollisionObject) -> None:
@@ -162,42 +137,47 @@ def pair_count(contacts: Sequence[fcl.Contact]) -> int:
     return len({(contact.b1, contact.b2) for contact in contacts})
 
 
-def time_soup(divisions: int, poses: Poses, thin: int, bar: tqdm) -> SoupTimes:
-    """Time the soup of N divisions, and count its pairs of triangles."""
-    a, b = poses
+def time_soup(divisions: int, patterns: Pairs, thin: int, bar: tqdm) -> Row:
+    """Return the columns of times of the soup of N divisions, and of its pairs of triangles."""
     boxes, solver = soup.Soup(divisions), _cubes(f'soup-{divisions}')
-    steps, pairs = np.empty(len(a)), np.empty(len(a), dtype=np.int64)
-    alone, answers = [], []
-    for row in range(min(WARM_UP, len(a))):
-        pair = boxes.place(a[row], b[row], CUBE, CUBE)
-        soup.collide(*pair), search(*pair), solver(a[row], b[row])
-    for row in range(len(a)):
-        pair = boxes.place(a[row], b[row], CUBE, CUBE)
+    poses = list(zip(patterns.pose_a, patterns.pose_b))
+    for a, b in poses[:WARM_UP]:
+        pair = boxes.place(a, b, CUBE, CUBE)
+        soup.collide(*pair), search(*pair), solver(a, b)
+    step, pairs, alone, answers = np.empty(len(poses)), np.empty(len(poses), np.int64), [], []
+    for row, (a, b) in enumerate(poses):
+        pair = boxes.place(a, b, CUBE, CUBE)
         started = time.thread_time_ns()
         contacts = soup.collide(*pair)
-        steps[row] = 1e-6 * (time.thread_time_ns() - started)
+        step[row] = 1e-6 * (time.thread_time_ns() - started)
         pairs[row] = pair_count(contacts)
         if row % thin == 0:
             alone.append(milliseconds(search, *pair))
-            answers.append(milliseconds(solver, a[row], b[row]))
-        if row % 100 == 0:
-            bar.update(min(100, len(a) - row))
-    found = _cubes('exact').batch(a, b).colliding
-    most = int(np.argmax(pairs))
-    pair = boxes.place(a[most], b[most], CUBE, CUBE)
-    worst_step, worst_alone = (
-        float(np.median([milliseconds(work, *pair) for _ in range(REPEATS)]))
-        for work in (soup.collide, search))
-    return SoupTimes(steps=steps, pairs=pairs, alone=np.array(alone), answers=np.array(answers),
-                     worst_step=worst_step, worst_alone=worst_alone, touching=int(found.sum()),
-                     misses=int((found & (pairs == 0)).sum()))
+            answers.append(milliseconds(solver, a, b))
+        bar.update()
+    most = boxes.place(*poses[int(np.argmax(pairs))], CUBE, CUBE)
+    most_step, most_alone = (float(np.median([milliseconds(work, *most) for _ in range(REPEATS)]))
+                             for work in (soup.collide, search))
+    touching = patterns.contacts().colliding
+    p50, p99, longest = output.percentiles(step, 50, 99, 100)
+    return {
+        'patterns': len(poses),
+        'touching': int(touching.sum()),  # by SAT
+        'misses': int((touching & (pairs == 0)).sum()),
+        'step_mean_ms': float(step.mean()), 'step_p50_ms': p50, 'step_p99_ms': p99,
+        'step_max_ms': longest,
+        'alone_patterns': len(alone), 'alone_mean_ms': float(np.mean(alone)),
+        'alone_by_step': float(np.mean(alone) / step[::thin].mean()),  # of the same patterns
+        'answer_mean_ms': float(np.mean(answers)),
+        'most_pairs': int(pairs.max()), 'most_pairs_step_ms': most_step,
+        'most_pairs_alone_ms': most_alone}
 
 
-def judge_soup(divisions: int, poses: Poses, exact: Contacts) -> SoupErrors:
+def judge_soup(divisions: int, patterns: Pairs, exact: Contacts) -> SoupErrors:
     """Compare with `exact`; patterns without an answer of the soup are left out."""
     boxes, areas = soup.Soup(divisions), soup.mesh(CUBE, divisions).areas
     rows, points, normals, depths = [], [], [], []
-    for row, (a, b) in enumerate(zip(*poses)):
+    for row, (a, b) in enumerate(zip(patterns.pose_a, patterns.pose_b)):
         contacts = soup.collide(*boxes.place(a, b, CUBE, CUBE))
         answer = soup.point_and_normal(contacts, areas, areas)
         if answer is not None:
@@ -211,23 +191,23 @@ def judge_soup(divisions: int, poses: Poses, exact: Contacts) -> SoupErrors:
         depth=np.array(depths) + exact.separation[rows])
 
 
-def time_calls(solver: ContactSolver, poses: Poses) -> float:
+def time_calls(solver: ContactSolver, patterns: Pairs) -> float:
     """Return the mean time of a call [ms]; calls are too short for a clock each."""
     def calls() -> None:
-        for a, b in zip(*poses):
+        for a, b in zip(patterns.pose_a, patterns.pose_b):
             solver(a, b)
 
     calls()
-    return milliseconds(calls) / len(poses[0])
+    return milliseconds(calls) / len(patterns.pose_a)
 
 
-def judge_rival(model: str, poses: Poses, exact: Contacts) -> Rival:
-    """Return a network's errors and its time."""
+def judge_network(model: str, patterns: Pairs, exact: Contacts) -> Row:
+    """Return a network's row on touching patterns."""
     solver = _cubes(model)
-    found = solver.batch(*poses)
-    return Rival(float(np.linalg.norm(found.point - exact.point, axis=1).mean()),
-                 float(degrees_between(found.normal, exact.normal).mean()),
-                 time_calls(solver, poses))
+    found = patterns.contacts(solver)
+    return {'model': model, 'regime': 'touching', 'answer_mean_ms': time_calls(solver, patterns),
+            'point_error_mean_m': float(np.linalg.norm(found.point - exact.point, axis=1).mean()),
+            'normal_error_mean_deg': float(degrees_between(found.normal, exact.normal).mean())}
 
 
 def crossing(errors: Mapping[int, float], level: float) -> float:
@@ -250,82 +230,95 @@ def measure(inputs: np.ndarray, *, quick: bool = False) -> SoupResult:
     """Time and judge every N on every regime; inputs: the paper's external set (n, 6)."""
     counts = QUICK if quick else FULL
     rng = np.random.default_rng(SEED)
-    poses = {'touching': as_poses(inputs[:counts['touching'].timed]),
-             'near-parallel': near_parallel(rng, counts['near-parallel'].timed),
-             'coplanar': coplanar(rng, counts['coplanar'].timed)}
-    judged = {name: tuple(p[:counts[name].judged] for p in given)
-              for name, given in poses.items()}
+    patterns = {'touching': on_cube(as_poses(inputs[:counts['touching'].timed])[1]),
+                'near-parallel': near_parallel(rng, counts['near-parallel'].timed),
+                'coplanar': coplanar(rng, counts['coplanar'].timed)}
+    judged = {name: pairs.rows(slice(counts[name].judged)) for name, pairs in patterns.items()}
     # At exact touch a few are apart by rounding, and left out.
-    some = tuple(p[:2 * counts['touching'].judged] for p in poses['touching'])
-    judged['touching'] = tuple(p[:counts['touching'].judged] for p in pressed(some, OVERLAP))
-    truth = {name: _cubes('exact').batch(*given) for name, given in judged.items()}
-    times, errors = {}, {}
+    some = patterns['touching'].rows(slice(2 * counts['touching'].judged))
+    judged['touching'] = at_depth(some, np.full(len(some.size), OVERLAP)).rows(
+        slice(counts['touching'].judged))
+    truth = {name: pairs.contacts() for name, pairs in judged.items()}
+    soups: dict[tuple[str, int], Row] = {}
     work = len(PAPER) * sum(c.timed + c.judged for c in counts.values())
     work += len(ALSO) * counts['touching'].judged
     with (pinned({usable_cores()[-1]}), output.no_garbage_collection(),
           tqdm(total=work, unit='pattern', disable=None) as bar):
-        for divisions in sorted([*PAPER, *ALSO]):
+        for divisions in (*PAPER, *ALSO):
             for regime in REGIMES if divisions in PAPER else ['touching']:
                 bar.set_description(f'soup, N = {divisions}, {regime}')
+                row: Row = {'model': 'soup', 'divisions': divisions,
+                            'triangles': 12 * divisions**2, 'regime': regime}
                 if divisions in PAPER:
-                    times[regime, divisions] = time_soup(divisions, poses[regime],
-                                                         counts[regime].thin, bar)
-                errors[regime, divisions] = judge_soup(divisions, judged[regime], truth[regime])
-                bar.update(len(judged[regime][0]))
-        rivals = {model: judge_rival(model, judged['touching'], truth['touching'])
-                  for model in ('paper', 'paper-continuous')}
+                    row |= time_soup(divisions, patterns[regime], counts[regime].thin, bar)
+                errors = judge_soup(divisions, judged[regime], truth[regime])
+                soups[regime, divisions] = row | {
+                    'judged': len(errors.point), 'point_error_mean_m': float(errors.point.mean()),
+                    'point_error_max_m': float(errors.point.max()),
+                    'normal_error_mean_deg': float(errors.normal.mean()),
+                    'depth_error_mean_m': float(errors.depth.mean())}
+                bar.update(len(judged[regime].size))
+        networks = {model: judge_network(model, judged['touching'], truth['touching'])
+                    for model in ('paper', 'paper-continuous')}
         exact = time_calls(_cubes('exact'), judged['touching'])
-    return SoupResult(times=times, errors=errors, rivals=rivals, exact=exact, counts=counts)
+    return SoupResult(soups=soups, networks=networks, exact=exact, counts=counts)
 
 
-def _ms(value: float) -> str:
+def _cell(value: float) -> str:
+    """Return a number of pairs, or a time [ms]."""
+    if isinstance(value, int):
+        return f'{value:,}'
     return f'{value:.3f}' if value < 0.1 else f'{value:.2f}'
 
 
-def _by_regime(head: Sequence[str], titles: Sequence[str], paper: Callable[[int], list[str]],
-               ours: Callable[[SoupTimes], list[str]], result: SoupResult) -> str:
-    """Return a table with a row per N: the paper's figures, then ours for each regime."""
-    columns = [f'{regime}: {titles[0]}' if k == 0 else title
-               for regime in REGIMES for k, title in enumerate(titles)]
-    return output.markdown_table(['N', *head, *columns], [
-        [divisions, *paper(divisions),
-         *(cell for regime in REGIMES for cell in ours(result.times[regime, divisions]))]
-        for divisions in PAPER], words=0)
+def _by_regime(paper: Mapping[str, Callable[[int], str]], ours: Mapping[str, str],
+               result: SoupResult) -> str:
+    """Return a table with a row per N.
+
+    paper: the paper's figures by title, as functions of N; ours: columns of our rows by title.
+    """
+    first = next(iter(ours))
+    titles = [f'{regime}: {title}' if title == first else title
+              for regime in REGIMES for title in ours]
+    return output.markdown_table(['N', *paper, *titles], [
+        [n, *(figure(n) for figure in paper.values()),
+         *(_cell(result.soups[regime, n][column]) for regime in REGIMES
+           for column in ours.values())] for n in PAPER], words=0)
 
 
 def table_of_errors(result: SoupResult) -> str:
     """Return errors by N and regime, then the networks'."""
+    def cell(row: Row, column: str, unit: float, digits: int = 0) -> str:
+        return f'{unit * row[column]:.{digits}f}' if column in row else ''
+
     head = ['N', 'misses at exact touch']
     for regime in REGIMES:
         head += [f'{regime}: point, mean', 'max', 'normal, mean']
-    head += ['depth, touching', 'depth, near-parallel']
-    rows = []
-    for divisions in sorted({divisions for _, divisions in result.errors}):
-        times = result.times.get(('touching', divisions))
-        row = [str(divisions), f'{100 * times.misses / times.touching:.0f} %' if times else '']
-        cells = {regime: result.errors.get((regime, divisions)) for regime in REGIMES}
-        for cell in cells.values():
-            row += [f'{1e3 * cell.point.mean():.1f}', f'{1e3 * cell.point.max():.0f}',
-                    f'{cell.normal.mean():.1f}'] if cell else ['', '', '']
-        row += [f'{1e3 * cell.depth.mean():.0f}' if (cell := cells[regime]) else ''
-                for regime in ('touching', 'near-parallel')]
-        rows.append(row)
-    for name, rival in result.rivals.items():
-        rows.append([f'`{name}`', '', f'{1e3 * rival.point:.1f}', '', f'{rival.normal:.1f}',
-                     *[''] * (len(head) - 5)])
-    return output.markdown_table(head, rows, words=0)
+    found = {str(n): [result.soups.get((regime, n), {}) for regime in REGIMES]
+             for n in sorted({n for _, n in result.soups})}
+    found |= {f'`{name}`': [row, {}, {}] for name, row in result.networks.items()}
+    lines = []
+    for label, (touching, parallel, flat) in found.items():
+        line = [label, f'{100 * touching["misses"] / touching["touching"]:.0f} %'
+                if 'misses' in touching else '']
+        for row in (touching, parallel, flat):
+            line += [cell(row, 'point_error_mean_m', 1e3, 1), cell(row, 'point_error_max_m', 1e3),
+                     cell(row, 'normal_error_mean_deg', 1.0, 1)]
+        lines.append(line + [cell(row, 'depth_error_mean_m', 1e3) for row in (touching, parallel)])
+    return output.markdown_table([*head, 'depth, touching', 'depth, near-parallel'], lines, words=0)
 
 
 def _touching_errors(result: SoupResult) -> dict[int, float]:
     """Return the mean point error on touching cubes [m], by N."""
-    return {n: float(cell.point.mean()) for (regime, n), cell in sorted(result.errors.items())
+    return {n: row['point_error_mean_m'] for (regime, n), row in sorted(result.soups.items())
             if regime == 'touching'}
 
 
 def equal_at(result: SoupResult) -> dict[str, float]:
     """Return, by network, the N at which the soup's mean point error equals its."""
     errors = _touching_errors(result)
-    return {name: crossing(errors, rival.point) for name, rival in result.rivals.items()}
+    return {name: crossing(errors, row['point_error_mean_m'])
+            for name, row in result.networks.items()}
 
 
 def in_words(divisions: float) -> str:
@@ -338,51 +331,42 @@ def in_words(divisions: float) -> str:
 def section_3(result: SoupResult) -> str:
     """Return Table 3, mean times by N and regime, with its notes."""
     table = _by_regime(
-        ['triangles a cube', 'paper: touching'], ['step', 'FCL alone', 'answer'],
-        lambda n: [f'{12 * n**2:,}', f'{PAPER[n][0]:.2f}'],
-        lambda cell: [_ms(float(t.mean())) for t in (cell.steps, cell.alone, cell.answers)],
-        result)
-    counts = result.counts
-    thin = ', '.join(f'{math.ceil(count.timed / count.thin):,} {name}'
-                     for name, count in counts.items())
+        {'triangles a cube': lambda n: f'{12 * n**2:,}',
+         'paper: touching': lambda n: f'{PAPER[n][0]:.2f}'},
+        {'step': 'step_mean_ms', 'FCL alone': 'alone_mean_ms', 'answer': 'answer_mean_ms'}, result)
     _, last = result.ends('coplanar')
-    share = 100 * (1 - last.alone.mean() / last.steps[::counts['coplanar'].thin].mean())
-    network = result.rivals['paper'].milliseconds
-    touching, coplanar = ([cell.steps.mean() / network for cell in result.ends(regime)]
+    network = result.networks['paper']['answer_mean_ms']
+    touching, coplanar = ([row['step_mean_ms'] / network for row in result.ends(regime)]
                           for regime in ('touching', 'coplanar'))
     return output.page(
-        'reports/paper/pages/table_3', counts=counts, table=table, share=share, thin=thin,
-        low=min(PAPER), high=max(PAPER), network=1e3 * network, exact=1e3 * result.exact,
-        touching=touching, coplanar=coplanar)
+        'reports/paper/pages/table_3', counts=result.counts, table=table,
+        share=100 * (1 - last['alone_by_step']), low=min(PAPER), high=max(PAPER),
+        thin=', '.join(f'{result.ends(regime)[0]["alone_patterns"]:,} {regime}'
+                       for regime in REGIMES),
+        network=1e3 * network, exact=1e3 * result.exact, touching=touching, coplanar=coplanar)
 
 
 def section_4(result: SoupResult) -> str:
     """Return Table 4, the patterns with the most pairs and their times, with its notes."""
     table = _by_regime(
-        ['paper: tests', 'paper: ms'], ['pairs', 'step, ms', 'FCL alone, ms'],
-        lambda n: [f'{PAPER[n][1]:,}', f'{PAPER[n][2]:.2f}'],
-        lambda cell: [f'{cell.pairs.max():,}', _ms(cell.worst_step), _ms(cell.worst_alone)],
-        result)
-
-    def growth(regime: str) -> float:
-        first, last = result.ends(regime)
-        return last.worst_step / first.worst_step
-
-    def most(regime: str) -> str:
-        return ' to '.join(f'{cell.pairs.max():,}' for cell in result.ends(regime))
-
+        {'paper: tests': lambda n: f'{PAPER[n][1]:,}', 'paper: ms': lambda n: f'{PAPER[n][2]:.2f}'},
+        {'pairs': 'most_pairs', 'step, ms': 'most_pairs_step_ms',
+         'FCL alone, ms': 'most_pairs_alone_ms'}, result)
+    ends = {regime: result.ends(regime) for regime in REGIMES}
     low, high = min(PAPER), max(PAPER)
     return output.page(
         'reports/paper/pages/table_4', table=table, repeats=REPEATS, low=low, high=high,
-        growth_paper=PAPER[high][2] / PAPER[low][2], growth_coplanar=growth('coplanar'),
-        growth_parallel=growth('near-parallel'), most_coplanar=most('coplanar'),
-        most_parallel=most('near-parallel'),
-        few=max(result.times['touching', n].pairs.max() for n in PAPER))
+        growth_paper=PAPER[high][2] / PAPER[low][2],
+        growth={regime: last['most_pairs_step_ms'] / first['most_pairs_step_ms']
+                for regime, (first, last) in ends.items()},
+        most={regime: f'{first["most_pairs"]:,} to {last["most_pairs"]:,}'
+              for regime, (first, last) in ends.items()},
+        few=max(result.soups['touching', n]['most_pairs'] for n in PAPER))
 
 
 def section_errors(result: SoupResult) -> str:
     """Return the soup's errors, and what differs from the paper."""
-    along = 1e3 * result.errors['near-parallel', max(PAPER)].point.mean()
+    along = 1e3 * result.ends('near-parallel')[1]['point_error_mean_m']
     return output.page('reports/paper/pages/soup_errors', counts=result.counts, along=along,
                        table=table_of_errors(result))
 
@@ -390,7 +374,7 @@ def section_errors(result: SoupResult) -> str:
 def section_figure_10(result: SoupResult) -> str:
     """Return Figure 10's caption."""
     return output.page('reports/paper/pages/figure_10', equal='; '.join(
-        f"`{name}`'s ({1e3 * result.rivals[name].point:.0f} mm) at {in_words(n)}"
+        f"`{name}`'s ({1e3 * result.networks[name]['point_error_mean_m']:.0f} mm) at {in_words(n)}"
         for name, n in equal_at(result).items()))
 
 
@@ -403,7 +387,8 @@ def draw_figure_10(result: SoupResult, path: Path) -> None:
     lower.plot(list(errors), [1e3 * error for error in errors.values()], '-o', color='tab:blue',
                markersize=3.5, label='soup, touching')
     for (name, n), colour in zip(equal_at(result).items(), ('tab:orange', 'tab:purple')):
-        lower.axhline(1e3 * result.rivals[name].point, color=colour, label=f'{name}: {in_words(n)}')
+        lower.axhline(1e3 * result.networks[name]['point_error_mean_m'], color=colour,
+                      label=f'{name}: {in_words(n)}')
         for axes in (upper, lower) if min(PAPER) <= n <= max(PAPER) else (lower,):
             if 0.0 < n < math.inf:
                 axes.axvline(n, color=colour, linestyle='--', label=f'as exact as {name}')
@@ -421,42 +406,14 @@ def draw_figure_10(result: SoupResult, path: Path) -> None:
 def _draw_times(axes: Any, result: SoupResult) -> None:
     divisions = list(PAPER)
     for regime, colour in zip(REGIMES, ('tab:blue', 'tab:green', 'tab:red')):
-        cells = [result.times[regime, n] for n in divisions]
-        axes.plot(divisions, [cell.steps.mean() for cell in cells], '-o', color=colour,
-                  markersize=3.5, label=f'{regime}, mean')
-        axes.plot(divisions, [cell.worst_step for cell in cells], ':s', color=colour,
-                  markersize=3.5, label=f'{regime}, most pairs')
-    axes.axhline(result.rivals['paper'].milliseconds, color='black', label='call of model paper')
+        for column, style, label in (('step_mean_ms', '-o', 'mean'),
+                                     ('most_pairs_step_ms', ':s', 'most pairs')):
+            axes.plot(divisions, [result.soups[regime, n][column] for n in divisions], style,
+                      color=colour, markersize=3.5, label=f'{regime}, {label}')
+    axes.axhline(result.networks['paper']['answer_mean_ms'], color='black',
+                 label='call of model paper')
     for column, style, label in ((0, '-', 'mean'), (2, ':', 'maximum')):
         axes.plot(divisions, [PAPER[n][column] for n in divisions], style, color='0.6',
                   label=f"the paper's soup, {label}")
     axes.axhline(PAPER_NETWORK, color='0.6', linestyle='--', label="the paper's network")
     axes.set(yscale='log', xlabel='divisions N of an edge', ylabel='time [ms]', xticks=divisions)
-
-
-def csv_rows(result: SoupResult) -> Iterator[dict[str, object]]:
-    """Yield a row per model, N and regime."""
-    here = asdict(output.machine(native, ('numpy', 'python-fcl')))
-
-    def mean(values: np.ndarray) -> float:
-        return float(values.mean())
-
-    for (regime, divisions), errors in result.errors.items():
-        row: dict[str, object] = {'model': 'soup', 'divisions': divisions,
-                                  'triangles': 12 * divisions**2, 'regime': regime}
-        columns = ('patterns', 'touching', 'misses', 'step_mean_ms', 'step_p50_ms', 'step_p99_ms',
-                   'step_max_ms', 'alone_patterns', 'alone_mean_ms', 'answer_mean_ms',
-                   'most_pairs', 'most_pairs_step_ms', 'most_pairs_alone_ms')
-        times = result.times.get((regime, divisions))
-        row |= dict(zip(columns, [
-            len(times.steps), times.touching, times.misses, mean(times.steps),
-            *output.percentiles(times.steps, 50, 99, 100), len(times.alone), mean(times.alone),
-            mean(times.answers), int(times.pairs.max()), times.worst_step, times.worst_alone,
-        ] if times else [None] * len(columns)))
-        yield row | {'judged': len(errors.point), 'point_error_mean_m': mean(errors.point),
-                     'point_error_max_m': float(errors.point.max()),
-                     'normal_error_mean_deg': mean(errors.normal),
-                     'depth_error_mean_m': mean(errors.depth), **here}
-    for name, rival in result.rivals.items():
-        yield {'model': name, 'regime': 'touching', 'answer_mean_ms': rival.milliseconds,
-               'point_error_mean_m': rival.point, 'normal_error_mean_deg': rival.normal, **here}

@@ -2,14 +2,13 @@
 
 Tables 1 and 2, Figure 9: the data sets are made again from the seed in each model card. The code
 that the solver uses runs the shipped weights on them. Nothing is copied from the cards, and PyTorch
-is not used. Tables 3 and 4, Figure 10: see `paper_soup_tables`; they need python-fcl.
+is not used. Tables 3 and 4, Figure 10: see `paper_soup_tables`; they need python-fcl. All of them
+are made, unless some are chosen.
 """
 from __future__ import annotations
 
-import argparse
 import functools
 import sys
-import textwrap
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
@@ -18,6 +17,7 @@ import numpy as np
 from ... import output
 from ...core import native
 from ...resources import resource_path
+from ...solver.arguments import program_parser
 from ...solver.weights_file import Weights, WeightsError, load_weights
 from ...training.paper_recipe import dataset
 from ...training.paper_recipe.dataset import SETS, Patterns
@@ -43,25 +43,23 @@ SHOWN = 150  # patterns in Figure 9
 Errors = dict[str, np.ndarray]  # wrapped errors (n, 4) [rad] by set
 
 
-def evaluate(weights: Weights, step: int = 1) -> dict[str, Errors]:
-    """Return errors of a file's networks on the sets of its card, every `step`-th pattern."""
-    return {network: _errors(weights, network, sets, step)
-            for network, sets in _sets_of(weights.path).items()}
+def shipped(name: str) -> tuple[Weights, dict[str, dict[str, Patterns]]]:
+    """Return a shipped weights file, and the sets of its card by network and name."""
+    return _loaded(resource_path('weights', f'{name}.safetensors'))
 
 
 @functools.lru_cache(maxsize=4)  # some tables and figures share them; they take seconds to make
-def _sets_of(weights: Path) -> dict[str, dict[str, Patterns]]:
-    """Return the sets of a file's card, by network."""
-    return dataset.of_card(load_weights(weights).card)
+def _loaded(path: Path) -> tuple[Weights, dict[str, dict[str, Patterns]]]:
+    weights = load_weights(path)
+    return weights, dataset.of_card(weights.card)
 
 
-def _shipped(name: str) -> Weights:
-    return load_weights(resource_path('weights', f'{name}.safetensors'))
-
-
-def _errors(weights: Weights, network: str, sets: Mapping[str, Patterns], step: int) -> Errors:
-    return {name: errors_of(weights.networks[network], p.inputs[::step], p.outputs[::step])
-            for name, p in sets.items()}
+def evaluate(name: str, step: int = 1) -> dict[str, Errors]:
+    """Return errors of a shipped file's networks on its sets, every `step`-th pattern."""
+    weights, sets = shipped(name)
+    return {network: {one: errors_of(weights.networks[network], p.inputs[::step],
+                                     p.outputs[::step]) for one, p in patterns.items()}
+            for network, patterns in sets.items()}
 
 
 def _number(value: float) -> str:
@@ -95,57 +93,26 @@ def by_part(columns: Mapping[str, Errors]) -> str:
         rows)
 
 
-def _external(weights: Weights, network: str) -> Patterns:
-    return _sets_of(weights.path)[network]['external']
-
-
-def filled(page: str) -> str:
-    """Return the page with its paragraphs and list items filled anew."""
-    lines: list[str] = []
-    for line in page.splitlines():
-        text = line.strip()
-        starts = not text or text[0] in '|#!' or line.startswith('- ')
-        if starts or not lines or not lines[-1] or lines[-1][0] in '|#!':
-            lines.append(text)
-        else:
-            lines[-1] += ' ' + text
-    return '\n'.join(line if line[:1] in '|#!' else textwrap.fill(
-        line, 100, subsequent_indent='  ' * line.startswith('- '), break_long_words=False,
-        break_on_hyphens=False) for line in lines) + '\n'
-
-
 def _page(name: str, **values: object) -> str:
     return output.page(f'reports/paper/pages/{name}', **values)
-
-
-def intro(quick: bool) -> str:
-    """Return the head of the page."""
-    note = f' Quick run: every {QUICK}th pattern only, and fewer for the soup.' if quick else ''
-    return f"""# The paper's tables and figures, redone
-
-Made by `python -m box_contact_ros paper --out docs/results/paper_tables.md` on
-{output.machine(native)}, from the shipped weights and the seeds in their model cards.{note}
-Each table and figure can be made by itself: `--table 3`, `--figure 9`. Numbers under "paper" are
-the paper's.
-"""
 
 
 def sections_1_and_2(tables: Collection[int], step: int) -> list[str]:
     """Return Tables 1 and 2, those of them that were chosen, and their notes."""
     sections, detail = [], {}
     if 1 in tables:
-        ours = {title: evaluate(_shipped(name), step)['contact']
+        ours = {title: evaluate(name, step)['contact']
                 for title, name in (('as drawn', 'paper-as-drawn'), ('folded', 'paper'))}
         detail |= {f'paper, {title}': errors for title, errors in ours.items()}
         sections.append(_page('table_1', table=beside_paper(1, ours)))
     if 2 in tables:
-        subsets = evaluate(_shipped('paper-continuous'), step)
+        subsets = evaluate('paper-continuous', step)
         pooled = {name: np.concatenate([errors[name] for errors in subsets.values()])
                   for name in SETS}
         detail |= subsets
         sections.append(_page('table_2', table=beside_paper(2, {'ours, easier': pooled})))
     if 1 in tables:
-        detail['containers'] = evaluate(_shipped('paper-12.192x2.438x2.591'), step)['contact']
+        detail['containers'] = evaluate('paper-12.192x2.438x2.591', step)['contact']
     return [*sections, _page('tables_1_2', by_part=by_part(detail))]
 
 
@@ -154,8 +121,8 @@ def draw_figure_9(path: Path) -> None:
     picture, panels = output.subplots(2, 1, (8.0, 7.6), sharex=True)
     for axes, (name, network) in zip(panels.flat, (('paper', 'contact'),
                                                    ('paper-continuous', 'vertex_face'))):
-        weights = _shipped(name)
-        patterns = _external(weights, network)
+        weights, sets = shipped(name)
+        patterns = sets[network]['external']
         wanted = patterns.outputs[:SHOWN, 0]
         order = np.argsort(wanted, kind='stable')
         said = predict(weights.networks[network], patterns.inputs[:SHOWN])[:, 0]
@@ -172,7 +139,8 @@ def draw_figure_9(path: Path) -> None:
 def report(tables: Collection[int], drawn: Collection[int], *, quick: bool = False,
            folder: Path | None = None) -> str:
     """Return the page with some of the tables and figures; files go to `folder`, if any."""
-    sections = [intro(quick)]
+    note = f' Quick run: every {QUICK}th pattern only, and fewer for the soup.' if quick else ''
+    sections = [output.page('reports/pages/paper', machine=output.machine(native), note=note)]
     if {1, 2} & set(tables):
         sections += sections_1_and_2(tables, QUICK if quick else 1)
     if 9 in drawn:
@@ -182,10 +150,11 @@ def report(tables: Collection[int], drawn: Collection[int], *, quick: bool = Fal
     if {3, 4} & set(tables) or 10 in drawn:
         from . import paper_soup_tables  # only here: python-fcl is an extra
 
-        jumps = _shipped('paper')
-        result = paper_soup_tables.measure(_external(jumps, 'contact').inputs, quick=quick)
+        _, sets = shipped('paper')
+        result = paper_soup_tables.measure(sets['contact']['external'].inputs, quick=quick)
         if folder:
-            output.write_csv(folder / 'paper_soup.csv', paper_soup_tables.csv_rows(result))
+            output.write_csv(folder / 'paper_soup.csv', result.rows,
+                             about=output.machine(native, ('numpy', 'python-fcl')))
         if 3 in tables:
             sections.append(paper_soup_tables.section_3(result))
         if 4 in tables:
@@ -195,14 +164,13 @@ def report(tables: Collection[int], drawn: Collection[int], *, quick: bool = Fal
                 paper_soup_tables.draw_figure_10(result, folder / 'paper_figure_10.png')
             sections.append(paper_soup_tables.section_figure_10(result))
         sections.append(paper_soup_tables.section_errors(result))
-    return filled('\n'.join(sections))
+    return '\n'.join(sections)
 
 
 def main(args: Sequence[str] | None = None) -> int:
     """Print the page, or write it to a file, with pictures in the same folder."""
-    parser = argparse.ArgumentParser(
-        description="The source paper's Tables 1 to 4 and Figures 9 and 10, and ours, as "
-        'Markdown. All of them, unless some are chosen.')
+    parser = program_parser('paper', __doc__, quick=f'look at every {QUICK}th pattern only, and at '
+                            'fewer for the soup')
     parser.add_argument('--table', type=int, action='append', choices=TABLES,
                         help='only this table; may be given several times')
     parser.add_argument('--figure', type=int, action='append', choices=FIGURES,
@@ -210,8 +178,6 @@ def main(args: Sequence[str] | None = None) -> int:
     parser.add_argument('--out', type=Path,
                         help='file to write; pictures and paper_soup.csv go to the same folder '
                         '(default: print; pictures asked for by --figure go to the current folder)')
-    parser.add_argument('--quick', action='store_true',
-                        help=f'look at every {QUICK}th pattern only, and at fewer for the soup')
     options = parser.parse_args(args)
     chosen = options.table or options.figure
     tables = options.table or (() if chosen else TABLES)
