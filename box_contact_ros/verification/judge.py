@@ -105,19 +105,17 @@ def _judge(pose_a: np.ndarray, pose_b: np.ndarray, size_a: np.ndarray, size_b: n
     size = np.maximum(size_a, size_b).max(axis=1)
     reach = np.abs(np.hstack([pose_a[:, :3], pose_b[:, :3]])).max(axis=1)
     tolerance = rounding(pose_a, pose_b, size_a, size_b)
-    # From here on vectors are (3, n), and A's centre is the origin: loops are over components.
-    axes_a, axes_b = _axes(pose_a[:, 3:].T), _axes(pose_b[:, 3:].T)
-    corners_a = _corners(axes_a, size_a.T, np.zeros((3, len(size))))
-    corners_b = _corners(axes_b, size_b.T, (pose_b[:, :3] - pose_a[:, :3]).T)
-    true = np.max([_gap_both_ways(_axis(axes_a, axes_b, number), corners_a, corners_b)[0]
+    # From here on vectors are (3, n): loops are over components.
+    axes, corners = _axes_and_corners(pose_a.T, pose_b.T, size_a.T, size_b.T)
+    true = np.max([_gap_both_ways(_axis(*axes, number), *corners)[0]
                    for number in range(AXES)], axis=0)
     with np.errstate(invalid='ignore'):  # NaN is what some of the answers are
-        along = _gap_along(normal.T, corners_a, corners_b)
+        along = _gap_along(normal.T, *corners)
         # The point of a shallow contact is that of boxes pressed in.
         slack = (INSIDE * (size + reach)
                  + np.where(separation > -0.34 * PRESSED * size, PRESSED * size, 0.0))
-        beyond = np.maximum(_beyond(axes_a, size_a.T, (point - pose_a[:, :3]).T),
-                            _beyond(axes_b, size_b.T, (point - pose_b[:, :3]).T))
+        beyond = np.maximum(_beyond(axes[0], size_a.T, (point - pose_a[:, :3]).T),
+                            _beyond(axes[1], size_b.T, (point - pose_b[:, :3]).T))
         finite = (np.isfinite(separation) & np.isfinite(normal).all(axis=1)
                   & np.isfinite(point).all(axis=1))
         sound = colliding & finite
@@ -228,6 +226,9 @@ Both = tuple[np.ndarray, np.ndarray]
 
 def _axes_and_corners(pose_a: np.ndarray, pose_b: np.ndarray, size_a: np.ndarray,
                       size_b: np.ndarray) -> tuple[Both, Both]:
-    """Return axes and corners of A and of B, for poses (7, n) and extents (3, n)."""
-    axes = _axes(pose_a[3:]), _axes(pose_b[3:])
-    return axes, (_corners(axes[0], size_a, pose_a[:3]), _corners(axes[1], size_b, pose_b[:3]))
+    """Return axes and corners of A and of B, for poses (7, n) and extents (3, n).
+
+    The origin of the corners is A's centre.
+    """
+    axes, offset = (_axes(pose_a[3:]), _axes(pose_b[3:])), pose_b[:3] - pose_a[:3]
+    return axes, (_corners(axes[0], size_a, 0 * offset), _corners(axes[1], size_b, offset))
