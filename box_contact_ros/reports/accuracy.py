@@ -304,7 +304,7 @@ def paper_table(errors: dict[str, np.ndarray], drawn: int) -> str:
              *[f'{PAPER[number][name][2]:.4f}' for name in PAPER[number]], '', '', '']
             for number, title in ((1, 'with'), (2, 'without'))]
     for model, wrong in errors.items():
-        overall, point, normal = (part for part in figures_by_part(wrong).values())
+        overall, point, normal = figures_by_part(wrong).values()
         label = 'our network of Table 1, folded' if model == 'paper' else f'`{model}`'
         rows.append([label, *[f'{overall[name] + 0.0:.3g}' for name in PAPER[1]],
                      f'{point["MAE"]:.3g}', f'{normal["MAE"]:.3g}', f'{len(wrong):,} of {drawn:,}'])
@@ -410,19 +410,23 @@ def page(rows: Sequence[AccuracyRow], errors: dict[str, np.ndarray], drawn: int,
 
 
 def draw(path: Path, rows: Sequence[AccuracyRow]) -> None:
-    """Draw the share of pairs with a larger error, per set, logarithmic; limits marked."""
+    """Draw the share of pairs with a larger error, per set; `mlp` per class too; limits marked."""
     figure, axes = output.subplots(3, 2, (8.0, 8.4))
     lowest = 1.0 / max(len(row.classes) for row in rows)
-    largest: dict[str, float] = {}
-    for row in rows:
-        largest[row.set] = max(largest.get(row.set, 0.0), row.errors.point.max())
+    largest = {name: max(row.errors.point.max() for row in rows if row.set == name)
+               for name in dict.fromkeys(row.set for row in rows)}
     drawn = {name: worst for name, worst in largest.items() if worst >= SHOWN[0]}
     shown: dict[str, Any] = {}
     for axis, name in zip(axes.flat, drawn):
         axis.set(title=name, xlim=SHOWN, ylim=(0.7 * lowest, 1.3))
         axis.grid(color='0.9', linewidth=0.5)
         for k, row in enumerate(row for row in rows if row.set == name):
-            _draw_row(axis, row, f'C{5 + k % 5}')
+            mlp = row.model == 'mlp'
+            _curve(axis, row.errors.point, linewidth=1.6, label=row.model,
+                   color='C0' if mlp else f'C{5 + k % 5}')
+            for place, part in enumerate(CLASSES if mlp else ()):
+                _curve(axis, row.errors.point[row.classes == place], linewidth=0.8,
+                       linestyle='--', color=f'C{1 + place}', label=f'mlp, {part}')
         limit = LIMITS[name]
         for value, height, label in ((limit.p99, 0.01, 'p99'), (limit.worst, lowest, 'worst')):
             axis.plot([value], [height], marker='v', color='black', markersize=6)
@@ -439,17 +443,6 @@ def draw(path: Path, rows: Sequence[AccuracyRow]) -> None:
     figure.supxlabel("point error [% of the smaller box's longest edge]; ▼ limits", fontsize=10)
     figure.supylabel('share of pairs with a larger error', fontsize=10)
     figure.savefig(path)
-
-
-def _draw_row(axis: Any, row: AccuracyRow, colour: str) -> None:
-    """Draw a model's errors; of `mlp` per class too."""
-    _curve(axis, row.errors.point, linewidth=1.6, color='C0' if row.model == 'mlp' else colour,
-           label=row.model)
-    if row.model != 'mlp':
-        return
-    for k, part in enumerate(CLASSES):
-        _curve(axis, row.errors.point[row.classes == k], linewidth=0.8, linestyle='--',
-               color=f'C{1 + k}', label=f'mlp, {part}')
 
 
 def _curve(axis: Any, errors: np.ndarray, **style: Any) -> None:

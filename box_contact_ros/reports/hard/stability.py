@@ -36,7 +36,6 @@ NUDGE = 1e-7
 """By how much poses are moved, of the size, and turned [rad], for the ratio of Δpoint to Δpose."""
 NUDGES = 3  # how often each
 
-
 COUNTS = ('verdicts', 'normals', 'outside', 'not_finite')
 """Faults; models that are gated must have none."""
 WORST = ('depth', 'point_p99', 'point_worst', 'ratio', 'exact_ratio')
