@@ -378,6 +378,10 @@ def section_figure_10(result: SoupResult) -> str:
         for name, n in equal_at(result).items()))
 
 
+SECTIONS = {3: section_3, 4: section_4, 10: section_figure_10}
+"""Sections of the page by the number of the table or figure."""
+
+
 def draw_figure_10(result: SoupResult, path: Path) -> None:
     """Draw times and errors against N."""
     figure, ((upper,), (lower,)) = output.subplots(2, 1, (8.0, 8.4))

@@ -155,14 +155,10 @@ def report(tables: Collection[int], drawn: Collection[int], *, quick: bool = Fal
         if folder:
             output.write_csv(folder / 'paper_soup.csv', result.rows,
                              about=output.machine(native, ('numpy', 'python-fcl')))
-        if 3 in tables:
-            sections.append(paper_soup_tables.section_3(result))
-        if 4 in tables:
-            sections.append(paper_soup_tables.section_4(result))
-        if 10 in drawn:
-            if folder:
+            if 10 in drawn:
                 paper_soup_tables.draw_figure_10(result, folder / 'paper_figure_10.png')
-            sections.append(paper_soup_tables.section_figure_10(result))
+        sections += [section(result) for number, section in paper_soup_tables.SECTIONS.items()
+                     if number in {*tables, *drawn}]
         sections.append(paper_soup_tables.section_errors(result))
     return '\n'.join(sections)
 
