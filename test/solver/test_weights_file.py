@@ -378,7 +378,7 @@ def cells(page: str) -> list[str]:
 def test_tables_in_the_docs_are_the_shipped_weights(tmp_path: Path) -> None:
     """The first tables of docs/results/paper_tables.md, 1 and 2, are the shipped weights'.
 
-    Figures may differ by their rounding. (The other tables hold times: see test_paper_soup.)
+    Figures may differ by their rounding. (The other tables hold times: see test_paper_tables.)
     """
     docs = Path(__file__).parents[2] / 'docs' / 'results' / 'paper_tables.md'
     assert paper_tables.main(['--table', '1', '--table', '2',
