@@ -130,10 +130,11 @@ class Evaluator:
         messages = self._messages
         messages.begin(stamp, frame_id)
         for pair, contact in answer.touching:
-            publishers = self._topics.publishers.get(pair.id)
+            publishers = self._topics.publishers.get(pair)
             if publishers is not None:
-                publishers.point.publish(messages.point(contact))
-                publishers.normal.publish(messages.normal(contact))
+                point, normal = publishers
+                point.publish(messages.point(contact))
+                normal.publish(messages.normal(contact))
         self._topics.contacts.publish(messages.cloud(answer))
         # What nobody waits for comes last.
         stale = len(answer.stale)

@@ -2,7 +2,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -23,8 +23,6 @@ from .runtime import ARRAY_QOS, CONTACT_QOS, POSE_QOS
 
 TOPICS_OF_EVERY_NODE = ('/diagnostics', '/parameter_events', '/rosout', '/clock')
 """Topics of other types than poses."""
-
-
 MOST_PAIRS_WITH_TOPICS = 1000
 """Two publishers a pair take milliseconds and memory, here and in every process that listens."""
 
@@ -32,17 +30,10 @@ MOST_PAIRS_WITH_TOPICS = 1000
 class PoseSource(NamedTuple):
     """How the poses of a box, or of all boxes, are subscribed to."""
 
+    box: str
     topic: str
     raw: bool  # whether the callback gets the bytes of messages
     deadline: float  # longest time [s] between poses that publishers must offer; 0: none
-
-
-class PairPublishers(NamedTuple):
-    """The publishers of a pair's own topics."""
-
-    pair: Pair
-    point: Publisher
-    normal: Publisher
 
 
 class SceneTopics:
@@ -54,11 +45,11 @@ class SceneTopics:
         """Begin without topics; `prefix` stands before the names of contact topics."""
         self._node, self._prefix = node, prefix
         self.events = QosEvents(node, counts)
-        self.publishers: dict[int, PairPublishers] = {}  # by pair's id
-        self._subscriptions: dict[str, tuple[PoseSource, Subscription]] = {}  # by box
+        self.publishers: dict[Pair, tuple[Publisher, Publisher]] = {}  # of point and normal
+        self._subscriptions: dict[PoseSource, Subscription] = {}
         self._callback_of: Callable[[str, str], Callable[[Any], None]] | None = None
         self._is_open = False
-        self._wanted: tuple[Mapping[str, PoseSource], Collection[Pair]] = {}, ()
+        self._wanted: tuple[Collection[PoseSource], Collection[Pair]] = (), ()
         self._pair_of_id: dict[int, Pair] = {}
 
     def check(self, scene: Scene, *, pair_topics: bool) -> None:
@@ -88,7 +79,7 @@ class SceneTopics:
     def set_scene(self, scene: Scene, *, pair_topics: bool, raw: bool, deadline: float) -> None:
         """Replace the topics by those of a scene; on RCLError bring the old ones back."""
         old, was_open = self._wanted, self._is_open
-        sources = {box: PoseSource(topic, raw, deadline) for box, topic in scene.sources.items()}
+        sources = [PoseSource(*source, raw, deadline) for source in scene.sources.items()]
         try:
             self._change(sources, scene.pairs if pair_topics else ())
         except RCLError:
@@ -119,11 +110,11 @@ class SceneTopics:
         if self._is_open:
             self.events.unwatch(self.contacts)
             self._node.destroy_publisher(self.contacts)
-        self._is_open, self._wanted = False, ({}, ())
+        self._is_open, self._wanted = False, ((), ())
 
     def pose_topics(self) -> list[str]:
         """Return the full names of the topics that are subscribed to."""
-        return [subscription.topic_name for _, subscription in self._subscriptions.values()]
+        return [subscription.topic_name for subscription in self._subscriptions.values()]
 
     def _topic_of(self, pair: Pair) -> str:
         return f'{self._prefix}{pair.name}{"/" if pair.name else ""}contact'
@@ -136,45 +127,41 @@ class SceneTopics:
             reason = str(error).partition(', at ')[0]
             raise ValueError(f'scene: {shown(topic)}: {reason}') from error
 
-    def _change(self, sources: Mapping[str, PoseSource], pairs: Collection[Pair]) -> None:
+    def _change(self, sources: Collection[PoseSource], pairs: Collection[Pair]) -> None:
         """Keep the topics that stay, destroy the others, create what is new."""
         self._wanted = sources, pairs
-        self._unsubscribe([box for box, (source, _) in self._subscriptions.items()
-                           if sources.get(box) != source])
+        self._unsubscribe(self._subscriptions.keys() - set(sources))
         if not self._is_open:
             self.contacts = self._node.create_publisher(
                 PointCloud2, f'{self._prefix}contacts', CONTACT_QOS)
             self.events.watch(self.contacts)
             self._is_open = True
-        kept = set(pairs)
-        self._unpublish([key for key, entry in self.publishers.items() if entry.pair not in kept])
+        self._unpublish(self.publishers.keys() - set(pairs))
         for pair in pairs:
-            if pair.id not in self.publishers:
-                self.publishers[pair.id] = self._publish(pair)
-        for box, source in sources.items():
-            if self._callback_of is not None and box not in self._subscriptions:
-                subscription = self._subscribe(box, source, self._callback_of(box, source.topic))
-                self._subscriptions[box] = source, subscription
+            if pair not in self.publishers:
+                self.publishers[pair] = self._publish(pair)
+        for source in sources:
+            if self._callback_of is not None and source not in self._subscriptions:
+                callback = self._callback_of(source.box, source.topic)
+                subscription = self._subscriptions[source] = self._subscribe(source, callback)
                 self.events.watch(subscription)
 
-    def _publish(self, pair: Pair) -> PairPublishers:
+    def _publish(self, pair: Pair) -> tuple[Publisher, Publisher]:
         def publisher(kind: type, topic: str) -> Publisher:
             # No events: too many to serve. A subscriber of another QoS is told by its own node.
             return self._node.create_publisher(
                 kind, f'{self._topic_of(pair)}/{topic}', CONTACT_QOS,
                 event_callbacks=PublisherEventCallbacks(use_default_callbacks=False))
-        return PairPublishers(pair, publisher(PointStamped, 'point'),
-                              publisher(Vector3Stamped, 'normal'))
+        return publisher(PointStamped, 'point'), publisher(Vector3Stamped, 'normal')
 
-    def _unpublish(self, ids: Collection[int]) -> None:
-        for key in ids:
-            _, point, normal = self.publishers.pop(key)
-            self._node.destroy_publisher(point)
-            self._node.destroy_publisher(normal)
+    def _unpublish(self, pairs: Collection[Pair]) -> None:
+        for pair in pairs:
+            for publisher in self.publishers.pop(pair):
+                self._node.destroy_publisher(publisher)
 
-    def _subscribe(self, box: str, source: PoseSource, callback: Callable[[Any], None],
-                   ) -> Subscription:
-        kind, usual = (PoseArray, ARRAY_QOS) if box == ALL_BOXES else (PoseStamped, POSE_QOS)
+    def _subscribe(self, source: PoseSource, callback: Callable[[Any], None]) -> Subscription:
+        kind, usual = ((PoseArray, ARRAY_QOS) if source.box == ALL_BOXES
+                       else (PoseStamped, POSE_QOS))
         qos = QoSProfile(depth=usual.depth, reliability=usual.reliability)
         if source.deadline:
             qos.deadline = Duration(seconds=source.deadline)
@@ -182,13 +169,13 @@ class SceneTopics:
                          raw=source.raw)
         try:
             return create(event_callbacks=self.events.callbacks(
-                box, deadline=bool(source.deadline)))
+                source.box, deadline=bool(source.deadline)))
         except UnsupportedEventTypeError:  # depends on the middleware
             return create()
 
-    def _unsubscribe(self, boxes: Collection[str]) -> None:
-        for box in boxes:
-            _, subscription = self._subscriptions.pop(box)
+    def _unsubscribe(self, sources: Collection[PoseSource]) -> None:
+        for source in sources:
+            subscription = self._subscriptions.pop(source)
             silence(subscription)
             self.events.unwatch(subscription)
             self._node.destroy_subscription(subscription)
