@@ -25,8 +25,9 @@ from rclpy.logging import get_logger
 
 from ..resources import OpenFiles
 from ..scene.files.scene_file import is_inline, read_scene
+from ..scene.pose_sets import CONTAINER
 from ..scene.scene_solver import Scene, SceneSolver, two_boxes
-from ..scene.stamp_pairing import PAIRINGS
+from ..scene.stamp_pairing import PAIRINGS, RESETS
 from ..solver.checks import shown
 from ..solver.models import find_model, model_names
 from .diagnostics import DIAGNOSTICS_SECONDS, Diagnostics
@@ -63,7 +64,6 @@ def scene_source(name: str, value: Any) -> str:
 
 LARGEST_TEXT = 2**18  # characters of a scene as text: some 2,000 pairs, read in a second or two
 NAMED_TOPICS = 3  # how many pose topics the node names when it is ready
-CONTAINER = (12.192, 2.438, 2.591)  # ISO 40 ft [m]
 LONGEST = 1e6  # s, about twelve days
 PARAMETERS = {
     'size_a': Setting(CONTAINER, 'full extents of box A, three numbers > 0 [m]', size),
@@ -285,7 +285,8 @@ class ContactNode(LifecycleNode):
 
     def _clock_jumped(self, _: Any) -> None:
         if self._evaluator is not None:
-            self._evaluator.clock_jumped()
+            self.counts[RESETS] += 1
+            self._evaluator.reset()
 
     def _report(self) -> None:
         """Serve QoS events and publish diagnostics, once a second."""

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..scene.scene_solver import ALL_BOXES, SceneSolver
-from ..scene.stamp_pairing import NEVER, PAIRINGS, RESETS, Pairing, StampedPose, Tick
+from ..scene.stamp_pairing import NEVER, PAIRINGS, Pairing, StampedPose, Tick
 from ..solver.checks import absent_poses, are_poses, pose_fault, shown
 from .diagnostics import UNMATCHED_SECONDS, Diagnostics
 from .message_bytes import RawMessages
@@ -63,11 +63,6 @@ class Evaluator:
 
     def reset(self) -> None:
         """Forget all poses."""
-        self._pairing.reset()
-
-    def clock_jumped(self) -> None:
-        """Forget all poses, as the clock has jumped back or was changed, and count that."""
-        self.counts[RESETS] += 1
         self._pairing.reset()
 
     def pose_callback(self, box: str, topic: str) -> Callable[[Any], None]:

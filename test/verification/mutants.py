@@ -305,7 +305,7 @@ MUTANTS = {
         'scene/stamp_pairing.py', 'if stamp < state.newest - RESET:', 'if False:',
         f'{TEST_PAIRING} -k set_back'),
     'a clock that jumps is not heard': Mutant(
-        EVALUATOR, 'self.counts[RESETS] += 1\n        self._pairing.reset()',
+        NODE, 'self.counts[RESETS] += 1\n            self._evaluator.reset()',
         'pass', 'test/node/test_faults.py -k clock'),
     'a pose of any age': Mutant(
         'scene/stamp_pairing.py',
