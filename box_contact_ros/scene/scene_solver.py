@@ -9,6 +9,7 @@ import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -190,11 +191,12 @@ class SceneSolver:
         pair = scene.pairs[0]
         self._solver = ContactSolver(scene.boxes[pair.a].size, scene.boxes[pair.b].size,
                                      model=model, weights=weights)
-        # A single pair needs no test and no batch. Its sides: which of the poses, or a fixed one.
+        # A single pair needs no test and no batch. Its sides are among the poses, then fixed ones.
         self._only = pair if len(scene.pairs) == 1 else None
-        self._sides = [(scene.moving.index(name), None) if name in scene.moving
-                       else (0, self._poses[numbers[name]]) for name in (pair.a, pair.b)]
         self._in_order = scene.moving == (pair.a, pair.b)
+        names = [*scene.moving, pair.a, pair.b]
+        self._sides = itemgetter(names.index(pair.a), names.index(pair.b))
+        self._fixed = [self._poses[numbers[name]] for name in (pair.a, pair.b)]
         self._warm_up()
 
     @property
@@ -239,25 +241,18 @@ class SceneSolver:
         Only a corner overlaps: where faces coincide, a soup takes seconds. And by little: it is not
         the depth that an MLP was not trained for.
         """
-        size_a, size_b = self._size[self._first], self._size[self._second]
-        kinds, kind = np.unique(self._size, axis=0, return_inverse=True)
-        kind = kind.reshape(-1)  # NumPy 2.0 gave it another shape
-        _, first = np.unique(kind[self._first] * len(kinds) + kind[self._second],
-                             return_index=True)
-        a, b = np.zeros((2, len(first), 7))
+        sizes = {name: tuple(box.size) for name, box in self.scene.boxes.items()}
+        kinds = dict.fromkeys((sizes[pair.a], sizes[pair.b]) for pair in self.scene.pairs)
+        size_a, size_b = np.array(list(kinds), dtype=float).transpose(1, 0, 2)
+        a, b = np.zeros((2, len(kinds), 7))
         a[:, 6] = b[:, 6] = 1.0
-        b[:, :3] = 0.5 * (size_a[first] + size_b[first]) - 0.02 * np.minimum(
-            size_a[first], size_b[first])
-        self._solver.batch(a, b, size_a=size_a[first], size_b=size_b[first])
+        b[:, :3] = 0.5 * (size_a + size_b) - 0.02 * np.minimum(size_a, size_b)
+        self._solver.batch(a, b, size_a=size_a, size_b=size_b)
         self.sizes_answered_exactly = self._solver.exact_answers
         """Pairs of sizes that a `mlp` was not trained for."""
         self._solver(a[0], b[0])
         self([None] * len(self.scene.moving))
         self._warm_up_answers = self._solver.exact_answers
-
-    def _both(self, poses: Sequence[np.ndarray | None]) -> list[np.ndarray | None]:
-        """Return the two poses of the only pair."""
-        return [poses[place] if fixed is None else fixed for place, fixed in self._sides]
 
     def __call__(self, poses: Sequence[np.ndarray | None] | np.ndarray) -> Answer:
         """Return the answer to one tick: a pose (7,) or None for each box of `scene.moving`.
@@ -276,7 +271,7 @@ class SceneSolver:
                 return self._tick()
             poses = [None if gone else pose for pose, gone in zip(rows, absent)]
         if self._only is not None:
-            a, b = poses if self._in_order else self._both(poses)
+            a, b = poses if self._in_order else self._sides((*poses, *self._fixed))
             if a is None or b is None:
                 return Answer([], [self._only], 0)
             contact = self._solver(a, b)
