@@ -6,7 +6,7 @@ bounding boxes come near each other. These go through the solver as one batch.
 from __future__ import annotations
 
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from operator import itemgetter
@@ -74,8 +74,7 @@ class Scene:
     """Whether one message has the poses of all moving boxes; else each box has a topic."""
 
     def __post_init__(self) -> None:
-        for place, reason in faults(self.boxes, self.pairs):
-            raise Fault(place, reason)
+        _check(self.boxes, self.pairs)
 
     @cached_property
     def moving(self) -> tuple[str, ...]:
@@ -116,28 +115,28 @@ class Fault(ValueError):
         self.place, self.reason = place, reason
 
 
-def faults(boxes: Mapping[str, Box], pairs: Sequence[Pair]) -> Iterator[tuple[Place, str]]:
-    """Yield the place and the reason of everything that is wrong with a scene."""
+def _check(boxes: Mapping[str, Box], pairs: Sequence[Pair]) -> None:
+    """Raise Fault for the first thing that is wrong with a scene."""
     for name, box in boxes.items():
         fault = size_fault(box.size)
         if fault:
-            yield ('boxes', name, 'size'), fault
+            raise Fault(('boxes', name, 'size'), fault)
         fault = pose_fault(box.pose) if box.pose else None
         if fault:
-            yield ('boxes', name, 'pose'), fault
+            raise Fault(('boxes', name, 'pose'), fault)
     if not pairs:
-        yield ('pairs',), 'a scene needs at least one pair'
+        raise Fault(('pairs',), 'a scene needs at least one pair')
     for number, pair in enumerate(pairs):
-        place, a, b = ('pairs', number), boxes.get(pair.a), boxes.get(pair.b)
+        place = ('pairs', number)
         if not 0 <= pair.id <= LARGEST_ID:
-            yield (*place, 'id'), f'{pair.id} is outside 0 to {LARGEST_ID}'
+            raise Fault((*place, 'id'), f'{pair.id} is outside 0 to {LARGEST_ID}')
         for side, name in (('a', pair.a), ('b', pair.b)):
             if name not in boxes:
-                yield (*place, side), f'{shown(name)} is none of the boxes'
+                raise Fault((*place, side), f'{shown(name)} is none of the boxes')
         if pair.a == pair.b:
-            yield (*place, 'b'), f'{shown(pair.b)} is the same box as a'
-        elif a and b and a.pose and b.pose:
-            yield place, f'{shown(pair.a)} and {shown(pair.b)} are both fixed'
+            raise Fault((*place, 'b'), f'{shown(pair.b)} is the same box as a')
+        if boxes[pair.a].pose and boxes[pair.b].pose:
+            raise Fault(place, f'{shown(pair.a)} and {shown(pair.b)} are both fixed')
     for what, field, values in (
             ('id', ('id',), [pair.id for pair in pairs]),
             ('name', ('name',), [pair.name for pair in pairs]),
@@ -146,8 +145,8 @@ def faults(boxes: Mapping[str, Box], pairs: Sequence[Pair]) -> Iterator[tuple[Pl
             seen: dict[object, Pair] = {}
             number, first = next((n, first) for n, value in enumerate(values)
                                  if (first := seen.setdefault(value, pairs[n])) is not pairs[n])
-            yield ('pairs', number, *field), (
-                f'the same {what} as that of {shown(first.a)} and {shown(first.b)}')
+            raise Fault(('pairs', number, *field), f'the same {what} as that of {shown(first.a)} '
+                                                   f'and {shown(first.b)}')
 
 
 class Answer(NamedTuple):

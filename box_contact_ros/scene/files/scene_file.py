@@ -106,8 +106,8 @@ def parse_scene(text: str, name: str = 'scene') -> Scene:
         raise refusal(place, error.reason) from None
 
 
-def scene_text(scene: Scene) -> str:
-    """Return a scene as the text of a file, which `read_scene` reads as the same scene.
+def write_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
+    """Write a scene to a file, which `read_scene` reads as the same scene.
 
     Raises ValueError for a scene that a file cannot describe, such as one with a name that no topic
     can have.
@@ -126,12 +126,6 @@ def scene_text(scene: Scene) -> str:
         raise ValueError(f'{len(scene.pairs)} pairs need more than {LARGEST_FILE} bytes')
     if parse_scene(text) != scene:
         raise ValueError('not all fields of this scene can stand in a file')
-    return text
-
-
-def write_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
-    """Write a scene to a file, as `scene_text` has it."""
-    text = scene_text(scene)
     Path(path).write_text(text, 'utf-8')
 
 
