@@ -28,8 +28,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..scene.force.held_wrench import FRICTION, GRAVITY, SLIP_SPEED, Touch
+from ..scene.force.held_wrench import FRICTION, GRAVITY, SLIP_SPEED
 from ..scene.pose import cross, rotation_matrix
+from ..solver.contact import Contact
 
 STATIC_PENETRATION = 5e-3
 """Depth at which k carries the weight [m]: k = m·g / 5 mm, 3.9e7 N/m for 20 t; 0.2 % of a
@@ -93,7 +94,7 @@ class PointLaw:
                    torsion_radius=((length**2 + width**2) / 12.0)**0.5,
                    rocking=(rocking[0], rocking[1]))
 
-    def wrench(self, touches: Sequence[Touch], pose: np.ndarray, velocity: np.ndarray,
+    def wrench(self, touches: Sequence[Contact], pose: np.ndarray, velocity: np.ndarray,
                ) -> np.ndarray:
         """Return force and torque (6,) on the load at `pose` (7,) with `velocity` (6,).
 
@@ -102,13 +103,14 @@ class PointLaw:
         return np.sum([np.zeros(6), *(self._of(touch, pose, velocity) for touch in touches)],
                       axis=0)
 
-    def _of(self, touch: Touch, pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+    def _of(self, touch: Contact, pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:
         """Return the wrench (6,) of one contact."""
         normal, linear, angular = touch.normal, velocity[:3], velocity[3:]
         arm = touch.point - pose[:3]
         at_point = linear + cross(angular, arm)
         closing = float(at_point @ normal)  # −v_n
-        push = max(0.0, self.stiffness * touch.depth + self.damping * closing)
+        depth = max(0.0, -touch.separation)
+        push = max(0.0, self.stiffness * depth + self.damping * closing)
 
         slip = at_point - closing * normal
         grip = FRICTION * push

@@ -80,7 +80,7 @@ def test_the_patch_of_a_flat_load_is_that_of_the_whole_load():
     load, stack = (12.0, 2.0, 3.0), (20.0, 20.0, 1.0)
     pose = np.array([1.0, 2.0, 1.98, *turn])
     exact, = touches_in([ContactSolver(load, stack, model='exact')(pose, (0, 0, 0, 0, 0, 0, 1))])
-    alone = dataclasses.replace(exact, volume=math.nan, covariance=np.full((3, 3), math.nan))
+    alone = exact._replace(volume=math.nan, covariance=np.full((3, 3), math.nan))
     assumed = with_patch(alone, pose, load)
     assert with_patch(exact, pose, load) is exact
     assert assumed.volume == pytest.approx(exact.volume) == pytest.approx(12.0 * 2.0 * 0.02)

@@ -210,7 +210,7 @@ def test_an_empty_cloud_has_no_rows():
 
 
 def test_a_row_is_the_contact_again():
-    """First row to `Patch`: every number to the bit, the covariance symmetric again."""
+    """First row to `Contact`: every number to the bit, the covariance symmetric again."""
     wanted = ContactSolver((2, 3, 1), (1, 2, 2), model='exact')(
         (0, 0, 0, 0, 0, 0, 1), (0.3, 0.4, 1.2, 0.1, 0.2, 0.3, 0.9))
     for messages in (RawMessages(), TypedMessages()):
@@ -219,7 +219,7 @@ def test_a_row_is_the_contact_again():
         if messages.raw:
             cloud = deserialize_message(cloud, PointCloud2)
         found = touch_in(first_row(read_cloud(cloud)))
-        assert (found.depth, found.volume) == (-wanted.separation, wanted.volume)
+        assert (found.separation, found.volume) == (wanted.separation, wanted.volume)
         for name in ('point', 'normal', 'covariance'):
             assert np.array_equal(getattr(found, name), getattr(wanted, name))
 

@@ -10,8 +10,9 @@ import pytest
 from box_contact_ros import ContactSolver
 from box_contact_ros.scene.force import patch_law
 from box_contact_ros.scene.force.held_wrench import GRAVITY
-from box_contact_ros.scene.force.patch_law import Patch, PatchLaw
+from box_contact_ros.scene.force.patch_law import PatchLaw
 from box_contact_ros.scene.pose import rotation_matrix
+from box_contact_ros.solver.contact import Contact
 
 MASS = 20_000.0
 WEIGHT = MASS * GRAVITY
@@ -37,7 +38,8 @@ def moving(*, linear=(0, 0, 0), angular=(0, 0, 0)):
 def slab(length=12.0, width=2.4, depth=1e-3, centre=(1.0, 2.0, 1.7), normal=DOWN):
     """Return a rectangular patch under the load, of one thickness."""
     covariance = np.diag([length**2, width**2, depth**2]) / 12.0
-    return Patch(np.array(centre), np.array(normal), depth, length * width * depth, covariance)
+    return Contact(True, -depth, np.array(normal), np.array(centre), length * width * depth,
+                   covariance)
 
 
 def wedge_columns(length=6.0, width=2.0, low=1e-4, high=5e-3, count=200):
@@ -54,7 +56,7 @@ def patch_of_columns(places, areas, thickness):
     centroid = weights @ places / weights.sum()
     arms = places - centroid
     covariance = np.einsum('n,ni,nj->ij', weights, arms, arms) / weights.sum()
-    return Patch(centroid, DOWN, float(thickness.max()), float(weights.sum()), covariance)
+    return Contact(True, -float(thickness.max()), DOWN, centroid, float(weights.sum()), covariance)
 
 
 def test_no_contact_is_no_wrench():
@@ -76,7 +78,7 @@ def test_a_contact_of_a_solver_is_taken_as_it_is():
                                                 (math.inf, 1.0)])
 def test_a_point_alone_is_refused(volume, covariance):
     """A model that gives no patch must not end in a force of NaN."""
-    bare = Patch(LEVEL[:3], DOWN, 1e-3, volume, np.full((3, 3), covariance))
+    bare = Contact(True, -1e-3, DOWN, LEVEL[:3], volume, np.full((3, 3), covariance))
     with pytest.raises(ValueError, match='needs volume and covariance'):
         fresh().wrench([slab(), bare], LEVEL, STILL)
 
@@ -118,7 +120,7 @@ def test_an_edge_that_only_just_touches_gives_a_finite_force(depth):
     """Rounding spoils the area of a patch 12 m long and a nanometre wide."""
     turn = rotation_matrix(np.array([0, 0, math.sin(0.2), math.cos(0.2)]))
     covariance = turn @ np.diag([144.0, 1e-18, 1e-20]) @ turn.T
-    needle = Patch(np.array([1.0, 2.0, 1.7]), DOWN, depth, 12e-9 * depth, covariance)
+    needle = Contact(True, -depth, DOWN, np.array([1.0, 2.0, 1.7]), 12e-9 * depth, covariance)
     force = fresh().wrench([needle], LEVEL, STILL)[2]
     assert 0.0 <= force <= WEIGHT * depth / SUNK
 
@@ -127,8 +129,7 @@ def test_the_push_is_against_the_normal_and_turns_about_the_centre():
     normal = np.array([0.6, 0.0, -0.8])
     frame = np.array([[0.8, 0.0, 0.6], [0.0, 1.0, 0.0], -normal]).T
     patch = slab(1e-3, 1e-3, centre=(5.0, 1.0, 1.7))
-    patch = Patch(patch.point, normal, patch.depth, patch.volume,
-                  frame @ patch.covariance @ frame.T)
+    patch = patch._replace(normal=normal, covariance=frame @ patch.covariance @ frame.T)
     wrench = fresh().wrench([patch], LEVEL, STILL)
     lever = np.cross(patch.point - LEVEL[:3], normal)
     felt = 1.0 / (1.0 / MASS + (np.square(lever) / INERTIA).sum())
@@ -275,8 +276,8 @@ def test_no_constant_knows_the_size(scale):
     patch = patch_of_columns(*columns)
     larger = PatchLaw.for_loop(scale**3 * MASS, scale**5 * INERTIA, 1000.0)
     pose = np.concatenate([scale * LEVEL[:3], LEVEL[3:]])
-    grown = Patch(scale * patch.point, DOWN, patch.depth, scale**2 * patch.volume,
-                  patch.covariance * scale**2)
+    grown = patch._replace(point=scale * patch.point, volume=scale**2 * patch.volume,
+                           covariance=patch.covariance * scale**2)
     small, large = fresh().wrench([patch], LEVEL, STILL), larger.wrench([grown], pose, STILL)
     assert large[:3] == pytest.approx(scale**3 * small[:3], rel=1e-9)
     assert large[3:] == pytest.approx(scale**4 * small[3:], rel=1e-9, abs=1e-9)

@@ -427,8 +427,8 @@ MUTANTS = {
         PATCH_LAW, '        damping *= min(1.0, self.mass * GRAVITY / elastic)\n', '',
         f'{TEST_PATCH_LAW} -k beyond_the_weight'),
     'the point law pulls': Mutant(
-        'baselines/point_law.py', 'push = max(0.0, self.stiffness * touch.depth',
-        'push = (self.stiffness * touch.depth',
+        'baselines/point_law.py', 'push = max(0.0, self.stiffness * depth',
+        'push = (self.stiffness * depth',
         'test/baselines/test_point_law.py -k damping_acts'),
     'room in shared memory not asked for': Mutant(
         'cli.py', 'room < LEAST_ROOM', 'False', 'test/node/test_faults.py -k memory_is_full'),

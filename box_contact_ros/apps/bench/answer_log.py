@@ -25,9 +25,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...output import percentiles
-from ...scene.force.patch_law import Patch
 from ...scene.pose import degrees_between
-from ...solver.contact import Contacts
+from ...solver.contact import Contact, Contacts
 
 CONTACT_MESSAGES = ('cloud', 'point', 'normal')  # kinds of message that a contact node answers with
 ECHO_MESSAGES = ('echo',)
@@ -48,14 +47,15 @@ def is_stale(values: Sequence[float] | np.ndarray) -> bool:
     return bool(np.isnan(values[:7]).any())
 
 
-def touch_in(values: np.ndarray) -> Patch | None:
+def touch_in(values: np.ndarray) -> Contact | None:
     """Return the contact of a `first_row`; None without one, or if it could not be evaluated.
 
     Volume and covariance are NaN from models that give the point alone.
     """
     if not len(values) or is_stale(values):
         return None
-    return Patch(values[:3], values[3:6], float(values[6]), float(values[7]), values[_COVARIANCE])
+    return Contact(True, -float(values[6]), values[3:6], values[:3], float(values[7]),
+                   values[_COVARIANCE])
 
 
 class StreamLog:

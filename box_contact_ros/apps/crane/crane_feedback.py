@@ -17,7 +17,7 @@ from queue import Empty, SimpleQueue
 
 import numpy as np
 
-from ...scene.force.patch_law import Patch
+from ...solver.contact import Contact
 from ..bench.answer_log import is_stale, touch_in
 from .landing import ClosedLoop, LoopState, with_patch
 from .mujoco_crane import CraneScenario
@@ -46,7 +46,7 @@ class CraneFeedback:
         self._size, self._stop = scenario.size, stop
         self.points_alone = 0  # contacts whose model gave no patch
         self._asked: dict[int, LoopState] = {}
-        self._arrived: SimpleQueue[tuple[int, Patch | None, int]] = SimpleQueue()
+        self._arrived: SimpleQueue[tuple[int, Contact | None, int]] = SimpleQueue()
         self._lost_in_a_row = 0
 
     def ask(self, stamp: int) -> None:
@@ -81,7 +81,7 @@ class CraneFeedback:
                                f'for {LOCKSTEP_PATIENCE:g} s')
         self.loop.step()
 
-    def _apply(self, stamp: int, touch: Patch | None, received: int) -> None:
+    def _apply(self, stamp: int, touch: Contact | None, received: int) -> None:
         """Turn an answer into a wrench."""
         state = self._asked.pop(stamp, None)
         if state is None:  # an offer's answer, or one that came twice

@@ -22,7 +22,7 @@ import numpy as np
 
 from ...output import percentiles
 from ...scene.force.held_wrench import GRAVITY, HeldWrench
-from ...scene.force.patch_law import Patch, PatchLaw
+from ...scene.force.patch_law import PatchLaw
 from ...scene.pose import rotation_matrix
 from ...solver.contact import Contact
 from ...solver.contact_solver import ContactSolver
@@ -49,13 +49,12 @@ ContactSource = Callable[[np.ndarray, np.ndarray], Contact | None]
 """From pose_a and pose_b (7,) to their contact; None stands for an answer that was lost."""
 
 
-def touches_in(contacts: Iterable[Contact | None]) -> list[Patch]:
-    """Return the part that a law needs of those contacts in which the boxes touch."""
-    return [Patch(one.point, one.normal, max(0.0, -one.separation), one.volume, one.covariance)
-            for one in contacts if one is not None and one.colliding]
+def touches_in(contacts: Iterable[Contact | None]) -> list[Contact]:
+    """Return those contacts in which the boxes touch."""
+    return [one for one in contacts if one is not None and one.colliding]
 
 
-def with_patch(touch: Patch, pose: np.ndarray, size: Sequence[float]) -> Patch:
+def with_patch(touch: Contact, pose: np.ndarray, size: Sequence[float]) -> Contact:
     """Return a contact with a patch: that of the whole load where its model gives the point alone.
 
     pose, size: of the load, (7,) and full extents [m]. Volume = depth · V / h with the load's
@@ -66,8 +65,8 @@ def with_patch(touch: Patch, pose: np.ndarray, size: Sequence[float]) -> Patch:
         return touch
     axes = rotation_matrix(pose[3:])
     along = float(np.abs(touch.normal @ axes) @ size)
-    return dataclasses.replace(touch, volume=touch.depth * float(np.prod(size)) / along,
-                               covariance=(axes * np.square(size) / 12.0) @ axes.T)
+    return touch._replace(volume=-touch.separation * float(np.prod(size)) / along,
+                          covariance=(axes * np.square(size) / 12.0) @ axes.T)
 
 
 def landing_scenario(seed: int = 0, **fields: Any) -> CraneScenario:
@@ -339,10 +338,11 @@ def _exact(scenario: CraneScenario, poses: np.ndarray) -> tuple[np.ndarray, ...]
 class ForceLaw(Protocol):
     """From contacts to the force and the torque on the load."""
 
-    def wrench(self, touches: Sequence[Any], pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+    def wrench(self, touches: Sequence[Contact], pose: np.ndarray, velocity: np.ndarray,
+               ) -> np.ndarray:
         """Return force and torque (6,) on the load at `pose` (7,) with `velocity` (6,).
 
-        touches: what the law needs of contacts, `Touch` or `Patch`; empty without contact.
+        touches: the contacts in which the boxes touch.
         """
 
 
@@ -375,7 +375,7 @@ class ClosedLoop:
         self.record.velocities.append(state.velocity)
         return state
 
-    def answer(self, state: LoopState, touches: Sequence[Patch], *, latency: float) -> None:
+    def answer(self, state: LoopState, touches: Sequence[Contact], *, latency: float) -> None:
         """Take the contacts of a state; they act `latency` [s] after they were asked for.
 
         ValueError: the law needs what a contact's model does not give.

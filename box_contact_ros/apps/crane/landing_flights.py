@@ -23,8 +23,8 @@ from sensor_msgs.msg import PointCloud2
 from ...node.messages import make_header, read_cloud
 from ...node.runtime import joined
 from ...scene.files.scene_file import write_scene
-from ...scene.force.patch_law import Patch
 from ...scene.scene_solver import POSE_ARRAY, Box, Pair, Scene
+from ...solver.contact import Contact
 from .. import processes
 from ..bench.answer_log import first_row, is_stale, touch_in
 from ..ros_client import DEEP_RELIABLE, set_pose, stamp_of
@@ -61,7 +61,7 @@ class FlightNode(Node):
         self._clouds[stamp_of(message.header)] = read_cloud(message)
 
     def contacts(self, executor: Any, poses: Sequence[np.ndarray], patience: float,
-                 ) -> dict[int, Patch]:
+                 ) -> dict[int, Contact]:
         """Return the contacts of poses (7,), by the id of their pair.
 
         TimeoutError: none came within `patience` [s]. RuntimeError: a pair was not evaluated.

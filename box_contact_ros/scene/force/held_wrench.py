@@ -1,4 +1,4 @@
-"""What every law from contacts to forces shares: a contact, gravity, friction, and a held wrench.
+"""What every law from contacts to forces shares: gravity, friction, and a held wrench.
 
 A wrench belongs to the time at which its contact was asked for. `HeldWrench` holds it between
 ticks, and over ticks whose answer was lost.
@@ -8,11 +8,8 @@ SI units; a wrench (6,) is a force [N], then a torque [N m].
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass
 
 import numpy as np
-
-__all__ = ['HeldWrench', 'Touch']
 
 GRAVITY = 9.81
 """Gravitational acceleration [m/s²]: what the static penetration is reckoned with."""
@@ -23,15 +20,6 @@ FRICTION = 0.5
 SLIP_SPEED = 0.1
 """v_s [m/s]: friction grows in proportion to the slip up to here, or its sign would switch at rest.
 The price: a load at rest on a slope s creeps at v_s·s/μ."""
-
-
-@dataclass(frozen=True)
-class Touch:
-    """One contact: point (3,) [m], unit normal (3,) from the load to the stack, depth ≥ 0 [m]."""
-
-    point: np.ndarray
-    normal: np.ndarray
-    depth: float
 
 
 TIME_ROUNDING = 1e-9

@@ -43,9 +43,7 @@ import numpy as np
 
 from ...solver.contact import Contact
 from ..pose import cross, rotation_matrix
-from .held_wrench import FRICTION, GRAVITY, SLIP_SPEED, Touch
-
-__all__ = ['Patch', 'PatchLaw']
+from .held_wrench import FRICTION, GRAVITY, SLIP_SPEED
 
 LEAST_PENETRATION = 5e-4
 """Least depth at which the foundation carries the weight [m]: Ω² ≤ g / 0.5 mm. A stiffer one stops
@@ -72,21 +70,6 @@ static penetration 2 % deeper."""
 LEAST_ASPECT = 1e-7
 """Width of a patch by its length, at least [1]: e₁·e₂ is a difference of products, which rounding
 spoils by 1e-16 of e₁². So much area keeps κ finite where an edge only just touches."""
-
-
-@dataclass(frozen=True)
-class Patch(Touch):
-    """One contact with its patch: volume [m³] and covariance (3, 3) [m²] of the overlap.
-
-    The point is the centroid, in the common frame.
-    """
-
-    volume: float
-    covariance: np.ndarray
-
-
-Overlap = Patch | Contact
-"""What the law reads of a contact: its own type, or that of a solver."""
 
 
 @dataclass(kw_only=True)
@@ -125,7 +108,7 @@ class PatchLaw:
                    damping=2.0 * DAMPING_RATIO * frequency / GRAVITY,
                    rise=min(1.0, 1.0 / (RISE_TIME * rate_hz)))
 
-    def wrench(self, overlaps: Sequence[Overlap], pose: np.ndarray, velocity: np.ndarray,
+    def wrench(self, overlaps: Sequence[Contact], pose: np.ndarray, velocity: np.ndarray,
                ) -> np.ndarray:
         """Return force and torque (6,) on the load of contacts that act at the same time.
 
@@ -150,7 +133,7 @@ class PatchLaw:
                                 velocity)
                        for overlap, covariance in zip(touching, covariances)], axis=0)
 
-    def fastest(self, overlaps: Sequence[Overlap], covariances: Sequence[np.ndarray],
+    def fastest(self, overlaps: Sequence[Contact], covariances: Sequence[np.ndarray],
                 areas: Sequence[float], pose: np.ndarray) -> float:
         """Return the largest eigenvalue of M⁻¹K: ω² of the fastest oscillation, on a modulus of 1.
 
@@ -170,7 +153,7 @@ class PatchLaw:
             stiffness[3:, 3:] += area * (turn @ covariance @ turn.T)
         return float(np.linalg.eigvalsh(stiffness)[-1])
 
-    def _of(self, overlap: Overlap, covariance: np.ndarray, elastic: float, damping: float,
+    def _of(self, overlap: Contact, covariance: np.ndarray, elastic: float, damping: float,
             pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:
         """Return the wrench (6,) of one contact with the force `elastic` = κ·V at rest."""
         normal, linear, angular = overlap.normal, velocity[:3], velocity[3:]
@@ -204,7 +187,7 @@ def _rocking(slope: np.ndarray, normal: np.ndarray, covariance: np.ndarray,
     return -cross(spread, normal) * min(1.0, share / at_rim if at_rim > 0.0 else 1.0)
 
 
-def _has_volume(overlap: Overlap) -> bool:
+def _has_volume(overlap: Contact) -> bool:
     """Return whether there is a contact; ValueError for one that has no patch."""
     # Without contact a solver's covariance is NaN and its volume 0.
     if overlap.volume == 0.0:
@@ -215,7 +198,7 @@ def _has_volume(overlap: Overlap) -> bool:
     return True
 
 
-def _tangential(overlap: Overlap) -> np.ndarray:
+def _tangential(overlap: Contact) -> np.ndarray:
     """Return the covariance (3, 3) within the tangent plane."""
     tangent = np.eye(3) - overlap.normal[:, None] * overlap.normal
     covariance: np.ndarray = tangent @ overlap.covariance @ tangent
