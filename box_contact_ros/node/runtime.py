@@ -161,18 +161,19 @@ def spin(node: Node, executor: Any) -> None:
                                     throttle_duration_sec=LOG_SECONDS)
 
 
-def refusals_end(main: Callable[[Sequence[str] | None], int]) -> Callable[..., int]:
+def refusals_end(main: Callable[..., int]) -> Callable[..., int]:
     """Decorate a program: REFUSALS end it with one line and status 1."""
     @functools.wraps(main)
-    def run(args: Sequence[str] | None = None) -> int:
+    def run(*args: Any, **options: Any) -> int:
         try:
-            return main(args)
+            return main(*args, **options)
         except REFUSALS as error:
             print(f'error: {error}', file=sys.stderr)
             return 1
     return run
 
 
+@refusals_end
 def run_node(make_node: Callable[[Context], Node], args: Sequence[str] | None, *,
              undisturbed: bool = True) -> int:
     """Start a node and `spin`; return 0 after a clean end, 1 (and print why) if it cannot start.
@@ -184,9 +185,6 @@ def run_node(make_node: Callable[[Context], Node], args: Sequence[str] | None, *
             if undisturbed:
                 let_callbacks_finish()
             spin(node, executor)
-    except REFUSALS as error:
-        print(f'error: {error}', file=sys.stderr)
-        return 1
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     return 0
