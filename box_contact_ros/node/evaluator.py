@@ -35,7 +35,6 @@ class Evaluator:
         self._topics, self._diagnostics, self._logger = topics, diagnostics, logger
         self.counts = counts
         self._settings: Mapping[str, Any] = {}
-        self.solver = solver
         self.set_solver(solver, settings)
 
     def set_solver(self, solver: SceneSolver, settings: Mapping[str, Any]) -> None:
@@ -67,12 +66,12 @@ class Evaluator:
 
     def pose_callback(self, box: str, topic: str) -> Callable[[Any], None]:
         """Return the callback for the poses of a box, or of all; it raises nothing at all."""
-        read = self._read_all if box == ALL_BOXES else self._read_one
-
         def callback(message: Any) -> None:
             self.counts['poses'] += 1
             try:
-                ticks = self._pairing.add(box, read(message))
+                pose = (self._read_all(message) if box == ALL_BOXES
+                        else self._messages.read_pose(message))
+                ticks = self._pairing.add(box, pose)
             except Exception as error:
                 self._refuse(error, topic)
                 return
@@ -82,9 +81,6 @@ class Evaluator:
                 except Exception as error:  # one tick that is refused keeps back no other
                     self._refuse(error, topic)
         return callback
-
-    def _read_one(self, message: Any) -> StampedPose:
-        return self._messages.read_pose(message)
 
     def _read_all(self, message: Any) -> StampedPose:
         """Return the poses of all moving boxes; a bad one is counted, and its box absent."""
