@@ -9,7 +9,7 @@ import fnmatch
 import itertools
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from decimal import Decimal
 from typing import Any
 
@@ -176,9 +176,11 @@ def _sides(entries: Sequence[Mapping[str, Any]], boxes: Mapping[str, Box],
         if (side, pattern) not in matches:
             if (len(matches) + 1) * len(boxes) > MOST_COMPARISONS:
                 raise Fault(place, f'more than {MOST_COMPARISONS} names to compare with patterns')
-            matches[side, pattern] = [
-                name for name in _alike(pattern, boxes)
-                if side not in ('moving', 'fixed') or (side == 'fixed') == bool(boxes[name].pose)]
+            names: Iterable[str] = boxes if _WILDCARDS & set(pattern) else [pattern]
+            # fnmatch's expressions take time in proportion to the name, whatever the pattern.
+            is_alike = re.compile(fnmatch.translate(pattern)).match
+            matches[side, pattern] = [name for name in names if is_alike(name) and (
+                side not in ('moving', 'fixed') or (side == 'fixed') == bool(boxes[name].pose))]
         if not matches[side, pattern]:
             raise Fault(place, f'{shown(text)} is the name of no {"" if side in "ab" else side} '
                                'box'.replace('  ', ' '))
@@ -195,14 +197,3 @@ def _sides(entries: Sequence[Mapping[str, Any]], boxes: Mapping[str, Box],
                 raise Fault(('pairs', number, field), f'a pattern of pairs has no {field}')
         sides.append((matching(number, one, entry[one]), matching(number, other, entry[other])))
     return sides
-
-
-def _alike(pattern: str, boxes: Mapping[str, Box]) -> Sequence[str]:
-    """Return the names that a pattern stands for: * for any characters, ? for one, [..] for some.
-
-    fnmatch's expressions take time in proportion to the name, whatever the pattern.
-    """
-    if not _WILDCARDS & set(pattern):
-        return [pattern]
-    is_alike = re.compile(fnmatch.translate(pattern)).match
-    return [name for name in boxes if is_alike(name)]
