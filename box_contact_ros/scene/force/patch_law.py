@@ -56,13 +56,11 @@ docs/decisions/patch-law.md measures."""
 
 DAMPING_RATIO = 1.2
 """λ = 2·1.2·Ω / g: of the critical damping of the heaving load at its static penetration. A load
-that overhangs until its patch lifts off on one side rocks with a small part of that. With 2.8 a
-touch-down overshoots at 200 Hz and 2 ms."""
+that overhangs until its patch lifts off on one side rocks with a small part of that."""
 
 RISE_TIME = 1.0
 """κ falls at once to what the loop bears, which takes energy away, and rises with this time
-constant [s]. A κ that rose at once with the patch would feed energy into rocking: a load that
-overhangs by 40 % of its length fluttered."""
+constant [s]. A κ that rose at once with the patch would feed energy into rocking."""
 STEADY_SHARE = 0.98
 """Share of what the loop bears up to which κ rises [1]: at rest it is a constant. The price is a
 static penetration 2 % deeper."""
