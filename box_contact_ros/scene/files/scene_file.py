@@ -72,14 +72,9 @@ def is_inline(source: str) -> bool:
 def parse_scene(text: str, name: str = 'scene') -> Scene:
     """Return the scene that a text describes; `name` is how errors call it."""
     lines: dict[Place, int] = {}
-
-    def refusal(path: Place, reason: str) -> SceneError:
-        line = next((lines[path[:n]] for n in range(len(path), -1, -1) if path[:n] in lines), 1)
-        return SceneError(f'{name}:{line}: {dotted(path)}{": " if path else ""}{reason}')
-
     try:
         text.encode('utf-8')
-        data = _plain(text, lines, refusal)
+        return _scene_of(_plain(text, lines), lines)
     except UnicodeEncodeError as error:
         raise SceneError(f'{name}: not UTF-8 at character {error.start}') from error
     except yaml.YAMLError as error:
@@ -87,23 +82,25 @@ def parse_scene(text: str, name: str = 'scene') -> Scene:
         reason = getattr(error, 'problem', None) or str(error).replace('\n', ' ')
         line = mark.line + 1 if mark else 1
         raise SceneError(f'{name}:{line}: not YAML: {reason}') from error
-    fault = _first_fault(data, lines)
-    if fault:
-        raise refusal(*fault)
-    try:
-        boxes, key_of = expand_boxes(data)
-        pairs, entry_of = expand_pairs(data['pairs'], boxes)
     except Fault as error:
-        raise refusal(error.place, error.reason) from None
+        place = error.place
+        line = next((lines[place[:n]] for n in range(len(place), -1, -1) if place[:n] in lines), 1)
+        where = f'{dotted(place)}: ' if place else ''
+        raise SceneError(f'{name}:{line}: {where}{error.reason}') from None
+
+
+def _scene_of(data: Any, lines: dict[Place, int]) -> Scene:
+    """Return the scene that data means, or raise Fault with a place in the data."""
+    _check_schema(data, lines)
+    boxes, key_of = expand_boxes(data)
+    pairs, entry_of = expand_pairs(data['pairs'], boxes)
     try:
         return Scene(boxes, pairs, data.get('frame_id', ''), data.get('poses') == 'array')
     except Fault as error:
-        place = error.place
-        if place[0] == 'boxes' and len(place) > 1:
-            place = ('boxes', key_of[str(place[1])], *place[2:])
-        elif len(place) > 1:
-            place = ('pairs', entry_of[int(place[1])], *place[2:])
-        raise refusal(place, error.reason) from None
+        kind, *rest = error.place
+        if rest:
+            rest[0] = key_of[str(rest[0])] if kind == 'boxes' else entry_of[int(rest[0])]
+        raise Fault((kind, *rest), error.reason) from None
 
 
 def write_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
@@ -129,7 +126,7 @@ def write_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
     Path(path).write_text(text, 'utf-8')
 
 
-def _plain(text: str, lines: dict[Place, int], refusal: Any) -> Any:
+def _plain(text: str, lines: dict[Place, int]) -> Any:
     """Return the data of a YAML text; the line of each of its values goes to `lines`."""
     depth = 0
     for event in yaml.parse(text, Loader=_Loader):
@@ -144,7 +141,7 @@ def _plain(text: str, lines: dict[Place, int], refusal: Any) -> Any:
             reason = 'nested too deeply'
         if reason:
             lines[()] = event.start_mark.line + 1 if event.start_mark else 1
-            raise refusal((), reason)
+            raise Fault((), reason)
     loader = _Loader(text)
     try:
         root = loader.get_single_node()
@@ -155,38 +152,37 @@ def _plain(text: str, lines: dict[Place, int], refusal: Any) -> Any:
                 try:
                     return loader.construct_object(node)
                 except ValueError as error:  # such as a date with month 13
-                    raise refusal(path, f'{shown(node.value)}: {error}') from error
+                    raise Fault(path, f'{shown(node.value)}: {error}') from error
             if isinstance(node, yaml.SequenceNode):
                 return [value(item, (*path, n)) for n, item in enumerate(node.value)]
             found: dict[str, Any] = {}
             for key_node, item in node.value:
                 key = key_node.value if isinstance(key_node, yaml.ScalarNode) else None
                 if not isinstance(key, str):
-                    raise refusal(path, 'a key must be a name')
+                    raise Fault(path, 'a key must be a name')
                 lines[(*path, key)] = key_node.start_mark.line + 1
                 if key in found:
-                    raise refusal((*path, key), 'is there twice')
+                    raise Fault((*path, key), 'is there twice')
                 found[key] = value(item, (*path, key))
             return found
 
         if root is None:
-            raise refusal((), 'is empty')
+            raise Fault((), 'is empty')
         return value(root, ())
     finally:
         loader.dispose()
 
 
-def _first_fault(data: Any, lines: dict[Place, int]) -> tuple[Place, str] | None:
-    """Return the first thing, by line, in which the data differs from the schema."""
+def _check_schema(data: Any, lines: dict[Place, int]) -> None:
+    """Raise Fault for the first thing, by line, in which the data differs from the schema."""
     from jsonschema import Draft202012Validator  # only here: it takes 0.1 s
 
     schema = json.loads(resource_path('msg_schemas', 'scene.json').read_text('utf-8'))
     found = [(tuple(error.absolute_path), error) for error in islice(
         Draft202012Validator(schema).iter_errors(data), MOST_FAULTS)]
-    if not found:
-        return None
-    path, error = min(found, key=lambda entry: (lines.get(entry[0], 0), entry[0] == ()))
-    return path, _words(error)
+    if found:
+        path, error = min(found, key=lambda entry: (lines.get(entry[0], 0), entry[0] == ()))
+        raise Fault(path, _words(error))
 
 
 def _words(error: Any) -> str:
