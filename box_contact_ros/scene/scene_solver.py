@@ -141,12 +141,13 @@ def _check(boxes: Mapping[str, Box], pairs: Sequence[Pair]) -> None:
             ('id', ('id',), [pair.id for pair in pairs]),
             ('name', ('name',), [pair.name for pair in pairs]),
             ('pair of boxes', (), [tuple(sorted(pair[2:])) for pair in pairs])):
-        if len(set(values)) < len(values):
-            seen: dict[object, Pair] = {}
-            number, first = next((n, first) for n, value in enumerate(values)
-                                 if (first := seen.setdefault(value, pairs[n])) is not pairs[n])
-            raise Fault(('pairs', number, *field), f'the same {what} as that of {shown(first.a)} '
-                                                   f'and {shown(first.b)}')
+        first_of: dict[object, int] = {}
+        for number, value in enumerate(values):
+            first = first_of.setdefault(value, number)
+            if first != number:
+                a, b = pairs[first][2:]
+                raise Fault(('pairs', number, *field),
+                            f'the same {what} as that of {shown(a)} and {shown(b)}')
 
 
 class Answer(NamedTuple):

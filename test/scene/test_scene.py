@@ -184,6 +184,12 @@ def test_as_many_poses_as_boxes_that_move(pairs):
             solver([poses.IDENTITY] * count)
 
 
+def test_a_pair_that_is_listed_twice_is_refused():
+    pair = Pair.between('a', 'b')
+    with pytest.raises(ValueError, match=r"pairs\[1\].id: the same id as that of 'a' and 'b'"):
+        Scene({name: Box(name, (1, 1, 1)) for name in 'ab'}, (pair, pair))
+
+
 def test_two_boxes_is_the_solver():
     rng = np.random.default_rng(2)
     solver = SceneSolver(two_boxes(poses.CUBE, poses.CONTAINER))
