@@ -232,14 +232,11 @@ def containers(rng: np.random.Generator, n: int) -> Pairs:
     return onto(place, turn, sizes, sizes, 2.438 * log_uniform(rng, 1e-3, 0.1, n))
 
 
-def random_sizes(rng: np.random.Generator, n: int, aspect: float = 20.0, ratio: float = 20.0,
-                 ) -> tuple[np.ndarray, np.ndarray]:
-    """Sizes (n, 3) of two boxes: each of aspect to 1:`aspect`, longest edges to 1:`ratio`."""
-    sizes = []
-    for _ in range(2):
-        extents = np.exp(rng.uniform(0.0, np.log(aspect), (n, 3)))
-        sizes.append(extents / extents.max(axis=1, keepdims=True))
-    return sizes[0], sizes[1] * log_uniform(rng, 1.0 / ratio, ratio, n)[:, None]
+def random_sizes(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray]:
+    """Sizes (n, 3) of two boxes: each of aspect to 1:20, longest edges to 1:20."""
+    sizes = log_uniform(rng, 1.0, 20.0, (2, n, 3))
+    size_a, size_b = sizes / sizes.max(axis=2, keepdims=True)
+    return size_a, size_b * log_uniform(rng, 1.0 / 20.0, 20.0, n)[:, None]
 
 
 def size_pairs(rng: np.random.Generator, n: int) -> Pairs:
