@@ -38,8 +38,8 @@ else:
                           + ', '.join(instruction_sets()))
     native = import_module(f'._{_forced or instruction_sets()[-1]}', __name__)
 
-from .stages import Stages as Stages  # noqa: E402  (needs `native`)
-from .stages import stages as stages  # noqa: E402
+from .stages import Stages as Stages  # noqa: E402, F401  (needs `native`)
+from .stages import stages as stages  # noqa: E402, F401
 
 LENGTH_MIN, LENGTH_MAX = native.LENGTH_MIN, native.LENGTH_MAX
 """Least extent, and largest extent or coordinate, that are accepted [m]."""

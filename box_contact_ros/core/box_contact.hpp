@@ -73,8 +73,8 @@ class Solver {
     check_size("size_b", size_b);
   }
 
-  // Model `mlp`, with its own copy of a network. mlp_weights.hpp reads one. Throws std::invalid_argument also for weights
-  // that are not finite or beyond ±1e4.
+  // Model `mlp`, with its own copy of a network. mlp_weights.hpp reads one. Throws
+  // std::invalid_argument also for weights that are not finite or beyond ±1e4.
   Solver(const Size& size_a, const Size& size_b, Network network) : Solver(size_a, size_b) {
     for (const Network::Unit& unit : network.units) {
       check_weights(&unit.bias, 1);

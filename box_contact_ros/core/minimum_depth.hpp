@@ -13,7 +13,8 @@ namespace box_contact {
 // Least depth [of the size]: the heights of the overlap still have seven good digits there.
 constexpr double depth_floor = 1e-9;
 
-// Most moves of `enforce_on_further_axes`: three axes at a corner, and more because they are not at right angles.
+// Most moves of `enforce_on_further_axes`: three axes at a corner, and more because they are not at
+// right angles.
 constexpr int most_presses = 8;
 
 // Enforce the minimum depth along the normal. Returns where B had to be moved.
@@ -53,9 +54,9 @@ inline Gap largest_gap(const Pair<double>& pair) {
   return best;
 }
 
-// Go on where `enforce_minimum_depth` has left a pair with less than half of the minimum depth. Where a corner
-// touches a corner or an edge, several axes have gap zero: B is moved along each in turn. Returns
-// whether B was moved.
+// Go on where `enforce_minimum_depth` has left a pair with less than half of the minimum depth.
+// Where a corner touches a corner or an edge, several axes have gap zero: B is moved along each in
+// turn. Returns whether B was moved.
 inline bool enforce_on_further_axes(Pair<double>& pair) {
   double floor = depth_floor * pair.size;
   bool moved = false;
@@ -68,8 +69,8 @@ inline bool enforce_on_further_axes(Pair<double>& pair) {
   return moved;
 }
 
-// Whether `enforce_on_further_axes` has work to do, for all lanes at once. The widths of edge axes are those of
-// the vectors as rounded, as in the separating-axis test.
+// Whether `enforce_on_further_axes` has work to do, for all lanes at once. The widths of edge axes
+// are those of the vectors as rounded, as in the separating-axis test.
 template <class T>
 inline Mask<T> has_too_little_depth(const Pair<T>& pair) {
   BestAxis<T> best = best_face_axis(pair);

@@ -82,8 +82,9 @@ struct SiteFeatures {
   // another axis · cut.
   Triple<F> of_site[3][4];
 };
-// What the outputs of site (f, q) for the point multiply: the push of the faces f along their normal; the push of
-// the others along these faces, times their cut; what the others' normals have of this push.
+// What the outputs of site (f, q) for the point multiply: the push of the faces f along their normal;
+// the push of the others along these faces, times their cut; what the others' normals have of this
+// push.
 template <class F>
 struct SiteVectors {
   Triple<F> along[3][point_outputs];  // [q], by f

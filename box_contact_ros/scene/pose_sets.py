@@ -152,7 +152,7 @@ def _level(heading: np.ndarray) -> np.ndarray:
 
 
 def onto(place: np.ndarray, turn: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
-          depth: np.ndarray) -> Pairs:
+         depth: np.ndarray) -> Pairs:
     """Return pairs with A at the origin and B at places (n, 3), orientations (n, 4), to `depth`."""
     a = np.tile([0.0, 0, 0, 0, 0, 0, 1], (len(place), 1))
     return at_depth(Pairs(a, np.concatenate([place, turn], axis=1), size_a, size_b), depth)

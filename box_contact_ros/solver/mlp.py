@@ -115,7 +115,7 @@ class Mlp:
 def load_mlp(weights: str | None = None) -> Weights:
     """Read the weights of an MLP, the shipped ones for None; raises `WeightsError`."""
     found = weights_for('mlp', weights, shipped='mlp')
-    bounds = found.card['inputs'].get('description')
+    bounds = str(found.card['inputs'].get('description'))  # a card may say anything
     outputs = POINT_OUTPUTS if BOUNDS.get(bounds) == 'edges' else OUTPUTS
     network = found.network('point', FEATURES, outputs, model='mlp')
     if len(network.widths) != 3 or network.widths[1] > UNITS_MAX:

@@ -1,1 +1,1 @@
-"""Data sets, fitting and the program `train`. Only `fit` and `train` need PyTorch."""
+"""Data sets, fitting and the program `train`. Drawing and folding samples needs no PyTorch."""

@@ -139,7 +139,7 @@ def mixture(rng: np.random.Generator, n: int) -> Pairs:
 
 
 def depths(rng: np.random.Generator, size_a: np.ndarray, size_b: np.ndarray) -> np.ndarray:
-    """Draw depths (n,) [m], 1e-5 to 0.1 of each pair's shortest edge."""
+    """Draw a depth [m] for each of n pairs, 1e-5 to 0.1 of its shortest edge."""
     shortest = np.minimum(size_a.min(axis=1), size_b.min(axis=1))
     return shortest * log_uniform(rng, 1e-5, 0.1, len(shortest))
 

@@ -36,7 +36,7 @@ def _parser() -> argparse.ArgumentParser:
         "  paper-as-drawn    the same, not folded into the solver's domain  2 minutes\n"
         '  paper-continuous  without discontinuities, one network a subset 8 minutes\n'
         '  containers        two boxes of 12.192 x 2.438 x 2.591 m         2 minutes\n'
-        '  mlp               any two boxes                                 5 minutes\n'
+        '  mlp               any two boxes                                 8 minutes\n'
         '  --scene FILE      the boxes of one scene, from the general mlp  2 minutes', seed=1,
         quick='small sets and few epochs, to try it out; needs --out')
     add = parser.add_argument

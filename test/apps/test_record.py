@@ -372,6 +372,16 @@ def test_a_recording_without_its_scene_is_not_played(tmp_path):
                                      size_a=CONTAINER, size_b=CONTAINER))
 
 
+def test_notes_of_other_programs_do_not_matter(tmp_path):
+    """A bag's custom data are anybody's: text that is no JSON is not ours."""
+    bag = written(tmp_path / 'bag', [1], [1], size_a=CONTAINER, size_b=CONTAINER, operator='me')
+    file = bag / 'metadata.yaml'
+    text = file.read_text()
+    assert '\'"me"\'' in text
+    file.write_text(text.replace('\'"me"\'', 'me, at noon'))
+    assert read_recording(bag).about['size_a'] == list(CONTAINER)
+
+
 # --- replay ---------------------------------------------------------------------------------------
 
 

@@ -585,6 +585,7 @@ def test_layers_that_the_core_does_not_have_are_refused(tmp_path, hidden):
 
 @pytest.mark.parametrize('change, words', [
     ({'inputs': {'description': 'something else'}}, 'for other inputs than this version has'),
+    ({'inputs': {'description': ['a list']}}, 'for other inputs than this version has'),
     ({'activation': 'softsign'}, "units are 'relu', not 'softsign'"),
     ({'activation': None}, "units are 'relu', not None")])
 def test_weights_with_another_meaning_are_refused(tmp_path, change, words):

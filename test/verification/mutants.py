@@ -126,7 +126,7 @@ MUTANTS = {
         f'{EXACT} -k through_each_other'),
     "middles for the edges' pieces": Mutant(
         'core/overlap/face_sums.hpp',
-        'w_x[n] * middle + (1.0 / 12.0) * ((w[n] * length) * length);', 'w_x[n] * middle;',
+        '+ (1.0 / 12.0) * by_sigma<T>(w_ll).sum();', ';',
         f'{LAWS} -k of_the_parts'),
     "middles for the lines' pieces": Mutant(
         'core/overlap/face_sums.hpp', 'T square = (1.0 / 12.0) *', 'T square = 0.0 *',
@@ -135,7 +135,7 @@ MUTANTS = {
         'core/overlap/face_sums.hpp', ' - squared(from_origin);', ' + T{} * squared(from_origin);',
         f'{LAWS} -k of_the_parts'),
     'second moments not divided by the volume': Mutant(
-        'core/overlap/face_sums.hpp', '(0.2 / volume) *', '(T{} + 0.2) *',
+        'core/overlap/face_sums.hpp', '(0.05 * by_volume) *', '(T{} + 0.05) *',
         f'{LAWS} -k powers_of_two'),
     "covariance left in A's frame": Mutant(
         'core/overlap/face_sums.hpp', 'rotated(pair.axes_a, covariance)};', 'covariance};',

@@ -77,7 +77,7 @@ class StreamLog:
 
     @property
     def times(self) -> np.ndarray:
-        """Times of the first messages [ns], 0 for none, (kinds, sent)."""
+        """Return the times of the first messages [ns], 0 for none, (kinds, sent)."""
         return np.array([times[:len(self.stamps)] for times in self.received.values()])
 
     @property

@@ -46,16 +46,14 @@ def columns(result: StreamResult) -> dict[str, object]:
 
 def latency_table(results: Sequence[StreamResult]) -> str:
     """Return counts and latencies [ms], Markdown; in the words of `ros2 topic delay`."""
-    floor = {result.stream: result.latency['p50'] for result in results if result.node == 'echo'}
     head = ['stream', 'node', 'sent', 'answered', 'lost', 'dupl.', 'wrong', 'mean', 'min', 'max',
-            'std dev', 'window', 'p50', 'p99', 'p99.9', 'p50 / echo']
+            'std dev', 'window', 'p50', 'p99', 'p99.9']
     rows = []
     for r in results:
         *spread, p50, p99, p999 = (_cell(1e3 * value, '.3f') for value in r.latency.values())
-        ratio = r.latency['p50'] / floor.get(r.stream, math.nan)
         wrong = '' if r.node == 'echo' else r.wrong_verdicts
         rows.append([r.stream, r.node, r.sent, r.answered, r.lost, r.duplicates, wrong, *spread,
-                     len(r.latencies), p50, p99, p999, _cell(ratio, '.2f')])
+                     len(r.latencies), p50, p99, p999])
     return markdown_table(head, rows, words=2, padded=True)
 
 

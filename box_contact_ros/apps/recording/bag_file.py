@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -112,8 +113,10 @@ def read_recording(path: Path) -> Recording:
     """Return a bag that says its scene, or the sizes of its two boxes. Raises RecordingError."""
     try:
         with Reader(path) as reader:
-            known = {name: json.loads(value)
-                     for name, value in (reader.storage.metadata.custom or {}).items()}
+            known = {}
+            for name, value in (reader.storage.metadata.custom or {}).items():
+                with suppress(ValueError):  # another program's entry need not be JSON
+                    known[name] = json.loads(value)
             messages = [(at, connection.topic.lstrip('/'), data)
                         for connection, at, data in reader.messages()]
     except Exception as error:  # rosbags lets through whatever reading garbage ends in

@@ -188,7 +188,8 @@ def page(rows: Sequence[FrontierRow], found: Sequence[Engine], missing: Sequence
         skipped=''.join(f'\n\nLeft out: {line}.' for line in missing),
         in_short=in_short(rows, odd), odd='\n'.join(
             f'{place}. {line}' for place, line in enumerate(odd.values(), start=1)) or 'None.',
-        honesty=honesty(rows), verdict=VERDICT, few_pairs=FEW_PAIRS, calls=calls_table(found),
+        honesty=honesty(rows), verdict=VERDICT, few_pairs=FEW_PAIRS,
+        timed_pairs=FULL.timed_pairs, calls=calls_table(found),
         sets='\n\n'.join(
             f'### {name.capitalize()}\n\n{getdoc(ALL_SETS[name])}\n\n{set_table(rows, name)}'
             for name in ALL_SETS))

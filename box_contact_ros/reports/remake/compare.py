@@ -40,9 +40,6 @@ PRINTED = (
            by=SHARED[:1], times=('ns',)),
     Ratios(files='frontier.csv', within=('set', 'instruction_set'), of=('contestant',),
            by=('exact',), ratios=('call_by_exact', 'batch_by_exact')),
-    # Also the page of latencies, whose ratios are of the bench's p50.
-    Ratios(files='bench/*-in-turn/bench.csv', rows={'node': ('contact', 'echo')}, of=('node',),
-           by=('echo',), times=_LATENCIES[:1]),
     Ratios(files='soak.csv', of=('node',), by=('echo',), times=_LATENCIES),
     Ratios(files='soak.csv', of=('node',), by=('bare echo',), times=_LATENCIES),
 )
@@ -64,17 +61,17 @@ def ratios_of(folder: Path) -> dict[str, float]:
                 for key, mine in values.items():
                     unit = values.get((*key[:len(printed.within)], *printed.by))
                     if unit and key[len(printed.within):] != printed.by:
-                        words = [str(path.relative_to(folder)), *key, column]
-                        found[f'{", ".join(words)}, by {printed.by[0]}'] = _ratio(
-                            mine, unit if column in printed.times else [1.0] * len(mine))
+                        words = ', '.join([str(path.relative_to(folder)), *key, column])
+                        found[f'{words}, by {printed.by[0]}'] = float(
+                            np.median(mine) if column in printed.ratios else _ratio(mine, unit))
     return found
 
 
 def _ratio(times: list[float], units: list[float]) -> float:
     """Return the median ratio of times that belong together; of others, that of their medians."""
     if len(times) == len(units):
-        return float(np.median(np.divide(times, units)))
-    return float(np.median(times) / np.median(units))
+        return np.median(np.divide(times, units))
+    return np.median(times) / np.median(units)
 
 
 def compare(first: Path, second: Path) -> int:

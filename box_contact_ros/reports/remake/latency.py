@@ -9,8 +9,7 @@ import numpy as np
 
 from ... import output
 
-ALONE = 'node alone'
-RUNS = {f'{ALONE}, 1 kHz': '1000-in-turn', 'beside others, 200 Hz': '200-side-by-side',
+RUNS = {'node alone, 1 kHz': '1000-in-turn', 'beside others, 200 Hz': '200-side-by-side',
         'beside others, 1 kHz': '1000-side-by-side'}
 """Folders of the bench by load."""
 NODES = {'contact': 'contact node', 'soup': 'soup node', 'echo': 'echo node'}
@@ -27,20 +26,17 @@ def solver_rows(rows: list[dict[str, str]]) -> Iterator[Row]:
             times[row['instruction_set'], row['name']].append(1e-3 * float(row['ns']))
     for (instruction_set, name), found in times.items():
         yield [f'solver, `{name}`', instruction_set, '', '',
-               *(output.number(value) for value in output.percentiles(found, 50, 99)), '']
+               *(output.number(value) for value in output.percentiles(found, 50, 99))]
 
 
 def node_rows(load: str, rows: list[dict[str, str]]) -> Iterator[Row]:
     """Yield a row for each node of a run of the bench."""
-    rows_of = {node: [row for row in rows if row['node'] == node] for node in NODES}
-    alone = load.startswith(ALONE)
-    floor = _median(rows_of['echo'], 'latency_p50 [s]')
-    for node, mine in rows_of.items():
+    for node, name in NODES.items():
+        mine = [row for row in rows if row['node'] == node]
         if mine:
-            p50, lost = _median(mine, 'latency_p50 [s]'), sum(int(row['lost']) for row in mine)
-            yield [NODES[node], load, f'{sum(int(row["sent"]) for row in mine):,}', f'{lost:,}',
-                   output.number(p50), output.number(_median(mine, 'latency_p99 [s]')),
-                   output.number(p50 / floor) if alone and not lost else '–']
+            sums = (sum(int(row[count]) for row in mine) for count in ('sent', 'lost'))
+            medians = (_median(mine, f'latency_{part} [s]') for part in ('p50', 'p99'))
+            yield [name, load, *(f'{count:,}' for count in sums), *map(output.number, medians)]
 
 
 def _median(rows: list[dict[str, str]], column: str) -> float:
@@ -60,8 +56,7 @@ def page(folder: Path) -> str:
             run = output.read_csv(path)
             machine = run[0]['machine']
             rows += node_rows(load, run)
-    head = ['what', 'load, or instruction set', 'sent', 'lost', 'p50 [µs]', 'p99 [µs]',
-            'p50 by echo']
+    head = ['what', 'load, or instruction set', 'sent', 'lost', 'p50 [µs]', 'p99 [µs]']
     return output.page('reports/remake/latency', machine=machine,
                        table=output.markdown_table(head, rows, words=2))
 

@@ -49,7 +49,7 @@ REPORTS = (
            arguments=('search', 'paper', '--out', OUT)),
     Report(name='accuracy', minutes=0.5, alone=False, arguments=('accuracy', '--out', OUT)),
     Report(name='stability', minutes=0.6, alone=False, arguments=('stability', '--out', OUT),
-           quick=('--families', 'A')),
+           quick=('--families', 'a1_tilted_faces')),
     Report(name='named', minutes=0.4, alone=False, arguments=('stability', '--named'), quick=(
         '--out', OUT)),
     Report(name='fuzz', minutes=4.0, arguments=('fuzz', '--out', f'{OUT}/fuzz.csv')),

@@ -252,8 +252,8 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
     parser = program_parser(
         'search', 'Train thousands of networks at once, keep the best, train those longer.\n\n'
         'Measured on one core, without a GPU:\n'
-        '  mlp        size and learning rate of the MLP                    5 minutes\n'
-        "  paper      the paper's search for its two networks              5 minutes\n\n"
+        '  mlp        size and learning rate of the MLP                    8 minutes\n'
+        "  paper      the paper's search for its two networks              8 minutes\n\n"
         'Stopped, it goes on from its checkpoint file when it is started again with the same\n'
         'options, and ends with the same result.', seed=1,
         quick='little data and two short rungs, to try it out in seconds')
