@@ -13,6 +13,8 @@ from .messages import make_header
 
 DIAGNOSTICS_SECONDS = 1.0
 UNMATCHED_SECONDS = 1.0  # poses without an answer for this long are worth a warning
+KEPT_TIMES = 4096
+"""Evaluations whose computing times are kept for a report: more a second than any node makes."""
 
 
 class Diagnostics:
@@ -21,13 +23,15 @@ class Diagnostics:
     def __init__(self, node: Node) -> None:
         self._node = node
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
-        self._times: list[float] = []  # of the evaluations since the last report [us]
+        self._times = np.zeros(KEPT_TIMES)  # [us], a ring
+        self._evaluations = 0
         self._answered_at = time.monotonic()
         self._reported: Counter[str] = Counter()
 
     def computed(self, nanoseconds: int, *, evaluated: bool) -> None:
         """Note a tick, its time in the solver, and whether any pair of it could be evaluated."""
-        self._times.append(1e-3 * nanoseconds)
+        self._times[self._evaluations % KEPT_TIMES] = 1e-3 * nanoseconds
+        self._evaluations += 1
         if evaluated:
             self._answered_at = time.monotonic()
 
@@ -40,12 +44,15 @@ class Diagnostics:
         new = Counter(counts)
         new.subtract(self._reported)
         self._reported = Counter(counts)
-        times, self._times = self._times, []
-        values: dict[str, object] = {**counts, 'pairs': pairs, 'stale boxes': ' '.join(stale),
-                                     'rate [1/s]': len(times)}
-        if times:
+        ticks, self._evaluations = self._evaluations, 0
+        values: dict[str, object] = dict(counts)
+        values['pairs'] = pairs
+        values['stale boxes'] = ' '.join(stale)
+        values['rate [1/s]'] = ticks
+        if ticks:
             values |= {f'compute {name} [us]': f'{value:.1f}' for name, value in zip(
-                ('p50', 'p99', 'max'), np.percentile(times, (50, 99, 100)))}
+                ('p50', 'p99', 'max'),
+                np.percentile(self._times[:min(ticks, KEPT_TIMES)], (50, 99, 100)))}
         refused = any(new[name] > 0 for name in new if name.startswith('refused'))
         unanswered = time.monotonic() - self._answered_at if new['poses'] and not refused else 0.0
         level, message = DiagnosticStatus.WARN, 'poses refused'
@@ -55,7 +62,7 @@ class Diagnostics:
             elif stale:
                 message = 'stale boxes'
             else:
-                level, message = DiagnosticStatus.OK, 'answering' if times else 'no poses'
+                level, message = DiagnosticStatus.OK, 'answering' if ticks else 'no poses'
         status = DiagnosticStatus(
             level=level, name=f'{self._node.get_fully_qualified_name()}: contacts',
             message=message, hardware_id='none',
