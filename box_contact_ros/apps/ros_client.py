@@ -12,6 +12,9 @@ from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
 from ..node.messages import NANOSECONDS, read_cloud
+from ..resources import find_file
+from ..scene.files.scene_file import read_scene
+from ..scene.scene_solver import Scene
 from .bench.answer_log import first_row
 
 ANSWERS: dict[str, tuple[type, str]] = {
@@ -33,6 +36,13 @@ def answer_values(kind: str, message: Any) -> Sequence[float] | np.ndarray:
         return first_row(read_cloud(message))
     vector = message.point if kind == 'point' else message.vector
     return vector.x, vector.y, vector.z
+
+
+def read_scene_text(source: str) -> tuple[str, Scene]:
+    """Return the text of a scene that is a file, or a text itself, and the scene; SceneError."""
+    scene = read_scene(source)
+    path = find_file(source)
+    return path.read_text('utf-8') if path.is_file() else source, scene
 
 
 def make_marker(header: Header, name: str, kind: int, colour: tuple[int, int, int],

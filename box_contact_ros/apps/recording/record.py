@@ -21,10 +21,9 @@ from visualization_msgs.msg import MarkerArray
 
 from ...node.parameters import outside_ros_args
 from ...node.runtime import POSE_QOS, refusals_end, run_node
-from ...scene.files.scene_file import read_scene, scene_text
 from ...solver.arguments import program_parser
 from ...solver.checks import as_size
-from ..ros_client import DEEP_RELIABLE
+from ..ros_client import DEEP_RELIABLE, read_scene_text
 from .bag_file import DRAWN, NANOSECONDS, POSE, TOPICS, TYPES, Recorder, RecordingError, type_of
 
 MESSAGES = dict(zip(TYPES.values(), (PoseStamped, PointStamped, Vector3Stamped, PointCloud2,
@@ -92,8 +91,7 @@ def main(args: Sequence[str] | None = None) -> int:
              if (value := getattr(options, name)) is not None}
     topics, poses = options.topics, []
     if options.scene is not None:
-        scene = read_scene(options.scene)
-        about['scene'] = scene_text(scene)
+        about['scene'], scene = read_scene_text(options.scene)
         poses = [scene.boxes[box].pose_topic for box in scene.moving]
         topics = topics or [*poses, 'contacts', *DRAWN]
     return run_node(partial(RecordNode, folder=options.out, about=about, poses=poses,
