@@ -87,6 +87,7 @@ def write_csv(path: Path, rows: Iterable[Mapping[str, object]], *, digits: int =
     A float has `digits` significant digits. A missing value, None and NaN are empty cells.
     """
     here = asdict(about) if about else {}
+    # A row stands first for the order of the columns, and last as its own values count.
     listed = [{**row, **here, **row} for row in rows]
     columns = list(dict.fromkeys(name for row in listed for name in row))
     with path.open('w', newline='', encoding='utf-8') as file:

@@ -162,7 +162,7 @@ def spin(node: Node, executor: Any) -> None:
 
 
 def refusals_end(main: Callable[..., int]) -> Callable[..., int]:
-    """Decorate a program: REFUSALS end it with one line and status 1."""
+    """Decorate what returns an exit status: REFUSALS end it with one line and status 1."""
     @functools.wraps(main)
     def run(*args: Any, **options: Any) -> int:
         try:

@@ -37,7 +37,10 @@ _COVARIANCE = [[8, 9, 10], [9, 11, 12], [10, 12, 13]]
 
 
 def first_row(rows: np.ndarray) -> np.ndarray:
-    """Return all fields but `pair` (14,) of a cloud's first row, none (0,) without rows."""
+    """Return the fields of a cloud's first row, none without rows: CLOUD_ROW's but `pair`.
+
+    Point and normal are columns 0 to 5, the depth 6, the volume 7, the covariance 8 to 13.
+    """
     names = [name for name in rows.dtype.names if name != 'pair']
     return np.array([rows[0][name] for name in names] if len(rows) else [])
 
@@ -99,7 +102,8 @@ class StreamLog:
     @property
     def latencies(self) -> np.ndarray:
         """From the stamp to the end of each answer [s], (answered,)."""
-        first, last = self.times[0], self.times[1:].max(axis=0, initial=0)
+        first, *others = self.times
+        last = np.max(others, axis=0) if others else first
         finished = np.where(self.touching[:len(self.stamps)], last, first)
         return (finished - np.array(self.stamps, dtype=np.int64))[self.answered] * 1e-9
 

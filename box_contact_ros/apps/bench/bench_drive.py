@@ -355,11 +355,11 @@ def drive_array(scene: Scene, poses: np.ndarray, args: Sequence[str], *, model: 
             if bench.notes:
                 raise ValueError(bench.notes[0])
             with no_garbage_collection():
-                started, before = time.perf_counter(), _cpu_seconds(node.process.pid)
+                before = _cpu_seconds(node.process.pid)
                 sent = bench.send_and_receive(
                     [node], [ticks[n % len(ticks)] for n in range(round(rate * seconds))])
-                took = time.perf_counter() - started
-                found.cpu_share = (_cpu_seconds(node.process.pid) - before) / took
+                spent = _cpu_seconds(node.process.pid) - before
+                found.cpu_share = spent * rate / max(len(sent), 1)
                 spin_for(bench.executor, DRAIN_SILENCE)
     found.sent, number_of = len(sent), {stamp: number for number, (stamp, _) in enumerate(sent)}
     for received, _, _, data in bench.client.arrivals:

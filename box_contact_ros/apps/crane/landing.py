@@ -65,7 +65,8 @@ def with_patch(touch: Contact, pose: np.ndarray, size: Sequence[float]) -> Conta
         return touch
     axes = rotation_matrix(pose[3:])
     along = float(np.abs(touch.normal @ axes) @ size)
-    return touch._replace(volume=-touch.separation * float(np.prod(size)) / along,
+    depth = max(0.0, -touch.separation)  # at exact touch the separation may be above zero
+    return touch._replace(volume=depth * float(np.prod(size)) / along,
                           covariance=(axes * np.square(size) / 12.0) @ axes.T)
 
 

@@ -112,6 +112,7 @@ def fly_over_dds(model: str, scenarios: Sequence[CraneScenario], latencies: Sequ
                  rate_hz: float, domain: int) -> list[LandingRecord]:
     """Run landings together, each with its latency [s]; return their records.
 
+    This process is in the ROS domain from then on, and heard on this host alone.
     Raises TimeoutError where an answer does not come, RuntimeError where one lacks a pair.
     """
     os.environ |= processes.on_this_host(domain)

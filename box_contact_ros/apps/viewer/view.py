@@ -204,7 +204,12 @@ def serve(options: argparse.Namespace, args: Sequence[str], stop: Stop) -> None:
     run = (None if options.attach or options.scene else
            CraneRun(options.seed, options.rate, not options.open_loop))
     scene = read_scene(options.scene) if options.scene else None
-    with ExitStack() as ending, listening(options.node, scene, args) as node:
+    with listening(options.node, scene, args) as node, ExitStack() as ending:
+        page = ending.enter_context(closing(Page(
+            options.host, options.port, run=run,
+            on_model=lambda name: wishes.put(partial(node.set_model, name)),
+            on_land=lambda wish: wishes.put(lambda: started.land(wish)))))
+        # Programs end before the page: they must not outlive a page that hangs.
         if run is not None:
             started = ending.enter_context(closing(Simulation(options.model, run)))
         elif not options.attach:
@@ -212,10 +217,6 @@ def serve(options: argparse.Namespace, args: Sequence[str], stop: Stop) -> None:
                 contact_node=program('contact_node', model=options.model, scene=options.scene),
                 scene_driver=['-m', scene_driver.__name__, '--scene', options.scene, '--rate',
                               str(options.rate)])))
-        page = ending.enter_context(closing(Page(
-            options.host, options.port, run=run,
-            on_model=lambda name: wishes.put(partial(node.set_model, name)),
-            on_land=lambda wish: wishes.put(partial(started.land, wish)))))
         announce(page, options, 'the domain of this shell' if options.domain is None else
                  f'ROS_DOMAIN_ID={options.domain} for ros2 and RViz')
         watch(node, page, started, wishes, stop)

@@ -233,8 +233,9 @@ class ViewLog:
                                   'has not: not drawn') from error
         stale = np.isnan(rows['depth'])
         with self._lock:
-            self._last_answer()
-            self._counts[stamp] = ANSWERED
+            self._refreshed_answer()
+            if self._newest is None or stamp <= self._newest + LOST_AFTER:  # of the poses' clock
+                self._counts[stamp] = ANSWERED
             if not self._answered:
                 self._first = stamp
             self._answered += 1
@@ -242,7 +243,7 @@ class ViewLog:
                 self.scene, stamp, received, frame_id, rows[~stale], pairs[~stale], pairs[stale],
                 *self._poses_at(stamp), self._tolerance))
 
-    def _last_answer(self) -> AnsweredTick | None:
+    def _refreshed_answer(self) -> AnsweredTick | None:
         """Give the last answer its poses as they are known now: they may come after the cloud."""
         if not self._answers:
             return None
@@ -279,7 +280,7 @@ class ViewLog:
             if self._newest is None:
                 return None
             newest, frame_id = self._newest, self._frame_id
-            answer = self._last_answer()
+            answer = self._refreshed_answer()
             if answer is not None and newest - answer.stamp <= STALE:
                 return Snapshot(self.scene, answer.stamp, answer.frame_id, answer.poses, answer)
             return Snapshot(self.scene, newest, frame_id, self._poses_at(newest)[0], None)
@@ -287,7 +288,7 @@ class ViewLog:
     def figures(self, now: int) -> ViewFigures:
         """Return the figures as things stand at this time [ns], of the clock of `cloud`."""
         with self._lock:
-            self._last_answer()
+            self._refreshed_answer()
             answers, answered, lost = list(self._answers), self._answered, self._lost
         median, p99 = percentiles(np.array([answer.latency for answer in answers]), 50, 99)
         errors = np.concatenate([np.zeros(0), *(answer.point_errors for answer in answers)])

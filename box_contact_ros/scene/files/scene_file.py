@@ -104,14 +104,9 @@ def _scene_of(data: Any, lines: dict[Place, int]) -> Scene:
 
 
 def write_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
-    """Write `scene_text` to a file."""
-    Path(path).write_text(scene_text(scene), 'utf-8')
+    """Write a scene to a file, which `read_scene` reads as the same scene.
 
-
-def scene_text(scene: Scene) -> str:
-    """Return a text that `read_scene` reads as the same scene.
-
-    Raises ValueError for a scene that no text can describe, such as one with a name that no topic
+    Raises ValueError for a scene that a file cannot describe, such as one with a name that no topic
     can have.
     """
     lines = ['frame_id: ' + json.dumps(scene.frame_id)] if scene.frame_id else []
@@ -128,7 +123,7 @@ def scene_text(scene: Scene) -> str:
         raise ValueError(f'{len(scene.pairs)} pairs need more than {LARGEST_FILE} bytes')
     if parse_scene(text) != scene:
         raise ValueError('not all fields of this scene can stand in a file')
-    return text
+    Path(path).write_text(text, 'utf-8')
 
 
 def _plain(text: str, lines: dict[Place, int]) -> Any:

@@ -21,7 +21,6 @@ SLIP_SPEED = 0.1
 """v_s [m/s]: friction grows in proportion to the slip up to here, or its sign would switch at rest.
 The price: a load at rest on a slope s creeps at v_s·s/μ."""
 
-
 TIME_ROUNDING = 1e-9
 """Times [s] that differ by less are the same: sums of ticks and latencies are rounded, and a
 nanosecond is far below every physics step."""
