@@ -20,6 +20,7 @@ from ..solver.models import Exact
 
 Size = tuple[float, ...]  # three full extents [m], as a key of what is kept
 
+KEPT_SIZES = 64  # of which a solver keeps what it has made; a scene has few
 MOST_CONTACTS = 16
 """FCL's box-box makes at most eight contacts (two rectangles cut each other in an octagon)."""
 
@@ -32,9 +33,8 @@ class FclModel:
 
     def __init__(self, make: Callable[[Size], fcl.CollisionObject]) -> None:
         self._exact = Exact()
-        # A scene has few sizes. Each solver keeps objects of its own, one for A and one for B,
-        # because placing moves them.
-        self._object = functools.lru_cache(maxsize=64)(lambda size, box: make(size))
+        # Each solver keeps objects of its own, one for A and one for B: placing moves them.
+        self._object = functools.lru_cache(maxsize=KEPT_SIZES)(lambda size, box: make(size))
 
     def place(self, a: np.ndarray, b: np.ndarray, size_a: Size, size_b: Size,
               ) -> tuple[fcl.CollisionObject, fcl.CollisionObject]:

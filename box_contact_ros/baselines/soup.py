@@ -25,7 +25,7 @@ from typing import NamedTuple
 import fcl
 import numpy as np
 
-from .fcl_box import FclModel, Size
+from .fcl_box import KEPT_SIZES, FclModel, Size
 
 FIRST_CONTACTS = 1 << 16
 """Contacts asked for at first: two cubes exactly on top of each other make 27,400 with N = 22."""
@@ -67,7 +67,7 @@ def triangles(size: Sequence[float] | np.ndarray, divisions: int) -> np.ndarray:
     return np.concatenate(faces)
 
 
-@functools.lru_cache(maxsize=64)
+@functools.lru_cache(maxsize=KEPT_SIZES)
 def mesh(size: Size, divisions: int) -> Mesh:
     """Return the soup of a box; kept, as a scene has few sizes."""
     corners = triangles(size, divisions)
@@ -120,14 +120,15 @@ class Soup(FclModel):
 
     def __init__(self, divisions: int) -> None:
         super().__init__(lambda size: fcl.CollisionObject(mesh(size, divisions).model))
-        self.divisions = divisions
+        # Not from `mesh` at every answer: other solvers' meshes may have displaced it there.
+        self._areas = functools.lru_cache(maxsize=KEPT_SIZES)(
+            lambda size: mesh(size, divisions).areas)
         self.exact_answers = 0
 
     def ask(self, first: fcl.CollisionObject, second: fcl.CollisionObject, size_a: Size,
             size_b: Size) -> tuple[np.ndarray, np.ndarray, float | None] | None:
         """Return the weighted mean of the contacts; the depth is SAT's."""
-        answer = point_and_normal(collide(first, second), *(
-            mesh(size, self.divisions).areas for size in (size_a, size_b)))
+        answer = point_and_normal(collide(first, second), self._areas(size_a), self._areas(size_b))
         if answer is None:
             self.exact_answers += 1
             return None

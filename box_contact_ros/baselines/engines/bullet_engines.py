@@ -1,6 +1,7 @@
 """Bullet (PyBullet): closest points of a query, and the persistent manifold of its world."""
 from __future__ import annotations
 
+import weakref
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -13,38 +14,32 @@ from .engine import Engine, Manifold, manifold
 FILLING = 4
 """Detections of the same pose before the manifold is read: it takes up to four points."""
 FAR = (1e6, 0.0, 0.0)
-GROUPS = 30  # pairs of sizes that one world keeps apart, a bit of the filter for each
 
 
 def points(persistent: bool) -> Engine:
     """Return `getClosestPoints` at distance 0, or `getContactPoints` of the filled manifold."""
-    client = bullet.connect(bullet.DIRECT)
-    place = partial(bullet.resetBasePositionAndOrientation, physicsClientId=client)
-    detect = partial(bullet.performCollisionDetection, physicsClientId=client)
-
     def boxes(p: np.ndarray, q: np.ndarray) -> Callable[..., Any]:
-        # Bodies of other sizes are in the same world, and not in the way.
-        group = 1 << bullet.getNumBodies(physicsClientId=client) // 2 % GROUPS
-        found = []
-        for size in (p, q):
-            shape = bullet.createCollisionShape(
-                bullet.GEOM_BOX, halfExtents=list(0.5 * size), physicsClientId=client)
-            body = bullet.createMultiBody(1.0, shape, physicsClientId=client)
-            bullet.setCollisionFilterGroupMask(body, -1, group, group, physicsClientId=client)
-            found.append(body)
-        return partial(ask, *found)
+        client = bullet.connect(bullet.DIRECT)  # other boxes in its world would slow it down
+        place = partial(bullet.resetBasePositionAndOrientation, physicsClientId=client)
+        detect = partial(bullet.performCollisionDetection, physicsClientId=client)
+        one, two = (bullet.createMultiBody(1.0, bullet.createCollisionShape(
+            bullet.GEOM_BOX, halfExtents=list(0.5 * size), physicsClientId=client),
+            physicsClientId=client) for size in (p, q))
 
-    def ask(one: int, two: int, a: Any, b: Any, quat_a: Any, quat_b: Any) -> Any:
-        place(one, a, quat_a)
-        if persistent:  # the manifold would keep points of the pair before
-            place(two, FAR, quat_b)
-            detect()
-        place(two, b, quat_b)
-        if not persistent:
-            return bullet.getClosestPoints(one, two, 0.0, physicsClientId=client)
-        for _ in range(FILLING):
-            detect()
-        return bullet.getContactPoints(one, two, physicsClientId=client)
+        def ask(a: Any, b: Any, quat_a: Any, quat_b: Any) -> Any:
+            place(one, a, quat_a)
+            if persistent:  # the manifold would keep points of the pair before
+                place(two, FAR, quat_b)
+                detect()
+            place(two, b, quat_b)
+            if not persistent:
+                return bullet.getClosestPoints(one, two, 0.0, physicsClientId=client)
+            for _ in range(FILLING):
+                detect()
+            return bullet.getContactPoints(one, two, physicsClientId=client)
+
+        weakref.finalize(ask, bullet.disconnect, client).atexit = False
+        return ask
 
     def at(a: np.ndarray, b: np.ndarray) -> tuple[Any, ...]:
         return tuple(map(tuple, (a[:3], b[:3], a[3:], b[3:])))
@@ -55,9 +50,7 @@ def points(persistent: bool) -> Engine:
         return manifold((0.5 * (np.array(c[5]) + np.array(c[6])), -np.array(c[7]), -c[8])
                         for c in contacts if c[8] <= 0.0)
 
-    # Bodies stay in the world and slow its broad phase down.
-    engine = partial(Engine, package='pybullet', boxes=boxes, at=at, read=read,
-                     clear=partial(bullet.resetSimulation, physicsClientId=client))
+    engine = partial(Engine, package='pybullet', boxes=boxes, at=at, read=read)
     if persistent:
         return engine(name='PyBullet getContactPoints', returns='up to 4 points with depths, '
                       'normals', call=f'{FILLING} × performCollisionDetection, getContactPoints',

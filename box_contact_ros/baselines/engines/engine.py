@@ -72,13 +72,9 @@ class Engine:
     """Why it is 'missed', 'invented' or 'normal' in a report, where that is known."""
     make: Callable[[], Engine] | None = None
     """Makes the engine again in a subprocess, where another's library may abort."""
-    clear: Callable[[], None] | None = None
-    """Forget the boxes made so far, if they slow others down."""
 
     def prepare(self, pairs: Pairs) -> list[Callable[[], Any]]:
         """Return a call for each pair, to be timed. ValueError: not for boxes of these sizes."""
-        if self.clear:
-            self.clear()
         made = cache(lambda p, q: self.boxes(np.array(p), np.array(q)))
         return [partial(made(tuple(p), tuple(q)), *self.at(a, b))
                 for a, b, p, q in zip(*map(np.ascontiguousarray, pairs))]

@@ -1,8 +1,8 @@
 """Program `frontier`: speed against error of every model and of other engines.
 
 `python -m box_contact_ros frontier` writes frontier.csv, .md and .png. One run, one pinned core,
-garbage collection off. Each contestant is warmed up and timed call by call, the contestants in turn
-on every set. The models with native batches run once more with each other instruction set of the
+garbage collection off. Each contestant is warmed up and timed call by call. All of them on all sets
+take turns. The models with native batches run once more with each other instruction set of the
 machine, in a subprocess. Times are read as ratios within a run; the machine is named.
 
 Errors are against the exact model. Those of points are in % of the smaller box's longest edge, per
@@ -41,6 +41,7 @@ from .trials import (
     QUICK,
     VERDICT,
     FrontierRow,
+    Plan,
     measure_all,
     measure_with,
 )
@@ -179,7 +180,7 @@ def honesty(rows: Sequence[FrontierRow]) -> str:
 
 
 def page(rows: Sequence[FrontierRow], found: Sequence[Engine], missing: Sequence[str],
-         command: str) -> str:
+         command: str, plan: Plan) -> str:
     """Return the Markdown page."""
     odd = odd_cells(rows, found)
     return output.page(
@@ -189,7 +190,7 @@ def page(rows: Sequence[FrontierRow], found: Sequence[Engine], missing: Sequence
         in_short=in_short(rows, odd), odd='\n'.join(
             f'{place}. {line}' for place, line in enumerate(odd.values(), start=1)) or 'None.',
         honesty=honesty(rows), verdict=VERDICT, few_pairs=FEW_PAIRS,
-        timed_pairs=FULL.timed_pairs, calls=calls_table(found),
+        timed_pairs=plan.timed_pairs, calls=calls_table(found),
         sets='\n\n'.join(
             f'### {name.capitalize()}\n\n{getdoc(ALL_SETS[name])}\n\n{set_table(rows, name)}'
             for name in ALL_SETS))
@@ -244,7 +245,8 @@ def main(args: Sequence[str] | None = None) -> int:
         for name in [one for one in reversed(instruction_sets()) if one != here]:
             rows += measure_with(name, native_contestants, seed=options.seed, plan=plan)
     output.write_csv(folder / 'frontier.csv', csv_rows(rows, found))
-    (folder / 'frontier.md').write_text(page(rows, found, missing, command), encoding='utf-8')
+    (folder / 'frontier.md').write_text(page(rows, found, missing, command, plan),
+                                        encoding='utf-8')
     draw(folder / 'frontier.png', rows)
     print(in_short(rows, odd_cells(rows, found)), honesty(rows), sep='\n\n')
     return 0

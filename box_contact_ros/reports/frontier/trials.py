@@ -43,7 +43,7 @@ class Plan:
     """Pairs that every round times call by call, whatever they take. Some cost fifty times as much
     as others, so the median of a round that ends by the clock depends on how many it reached."""
     seconds: float
-    """Time that a contestant has to be asked on a set, once for answers and once for timing."""
+    """Time that a contestant has on a set to be asked, and then to be timed; rounds are whole."""
     rounds: int
     members: int  # models of a family, at most
     subprocesses: bool
@@ -54,8 +54,7 @@ FULL = Plan(batch_pairs=20_000, single_pairs=1_000, timed_pairs=200, seconds=1.0
             members=99, subprocesses=True)
 QUICK = Plan(batch_pairs=1_000, single_pairs=40, timed_pairs=10, seconds=0.05, rounds=2, members=1,
              subprocesses=False)
-FEW_PAIRS = 16
-"""Pairs of sizes that are prepared at once where each row has others."""
+FEW_PAIRS = 16  # pairs that are prepared at once where more pairs of sizes than that are among them
 LEAST_PAIRS = 10  # pairs judged, whatever they take
 WARM_UP = 3  # calls before a round
 PATIENCE = 120.0  # for an engine's answers in a subprocess [s]
@@ -75,7 +74,8 @@ def apart(rng: np.random.Generator, n: int) -> Pairs:
     parts = []
     for pairs in (cubes, yard):
         parts.append(at_depth(pairs, -log_uniform(rng, 1e-6, 0.1, len(pairs.pose_a))))
-    return Pairs(*(np.concatenate(columns) for columns in zip(*parts)))
+    both = Pairs(*(np.concatenate(columns) for columns in zip(*parts)))
+    return both.rows(rng.permutation(len(both.size)))  # the first ones are of both kinds
 
 
 ALL_SETS: dict[str, Generator] = {**SETS, 'just apart': apart}
@@ -174,7 +174,7 @@ def ask(engine: Engine, pairs: Pairs, plan: Plan) -> Answers:
                        points={engine.choices[0]: found.point})
     pairs = pairs.rows(slice(plan.single_pairs))
     asked, exceptions, began = [], 0, time.monotonic()
-    step = len(pairs.size) if _one_size(pairs) else FEW_PAIRS
+    step = _at_once(pairs)
     for first in range(0, len(pairs.size), step):
         for call in engine.prepare(pairs.rows(slice(first, first + step))):
             try:
@@ -192,8 +192,10 @@ def ask(engine: Engine, pairs: Pairs, plan: Plan) -> Answers:
                 for k, choice in enumerate(engine.choices)}, exceptions=exceptions)
 
 
-def _one_size(pairs: Pairs) -> bool:
-    return all((sizes == sizes[0]).all() for sizes in (pairs.size_a, pairs.size_b))
+def _at_once(pairs: Pairs) -> int:
+    """Return how many pairs are prepared together: all, or FEW_PAIRS if they have more sizes."""
+    sizes = np.unique(np.hstack([pairs.size_a, pairs.size_b]), axis=0)
+    return FEW_PAIRS if len(sizes) > FEW_PAIRS else len(pairs.size)
 
 
 def answers_of(engine: Engine, sets: Mapping[str, Pairs], plan: Plan) -> dict[str, Answers | str]:
@@ -224,21 +226,21 @@ class Trial:
         self.name, self.set = engine.name, name
         self._engine, self._pairs, self._answers = engine, pairs, answers
         self._seconds = plan.seconds / plan.rounds
-        self._timed = pairs.rows(slice(0))
+        self._calls: Sequence[Callable[[], object]] = ()
         self._ask_all = None
         if isinstance(answers, Answers) and not answers.exceptions:
-            self._timed = pairs.rows(slice(plan.timed_pairs if _one_size(pairs) else FEW_PAIRS))
+            timed = pairs.rows(slice(plan.timed_pairs))
+            self._calls = engine.prepare(timed.rows(slice(_at_once(timed))))
             self._ask_all = engine.prepare_batch and engine.prepare_batch(pairs)
-        self._calls = engine.prepare(self._timed)
-        self._singles: list[int] = []
+        for call in self._calls:  # what is made at a pair's first call is not timed
+            call()
+        self._singles: list[np.ndarray] = []
         self.rounds: list[tuple[float, float]] = []
         """Of each round: the median single call, and a pair in a batch [ns]."""
 
     def time(self) -> None:
         """Time one round, after a warm-up: all single calls, again and again, then a batch."""
         clock, times, batch = time.perf_counter_ns, list[int](), math.nan
-        if self._engine.clear:  # the boxes of the other sets are in its world
-            self._calls = self._engine.prepare(self._timed)
         for call in self._calls[:WARM_UP]:
             call()
         until = clock() + int(1e9 * self._seconds)
@@ -252,7 +254,7 @@ class Trial:
             began = clock()
             self._ask_all()
             batch = (clock() - began) / len(self._pairs.size)
-        self._singles += times
+        self._singles.append(np.array(times, np.int64))
         self.rounds.append((percentiles(times, 50)[0], batch))
 
     def row(self, exact: Trial) -> FrontierRow:
@@ -262,12 +264,13 @@ class Trial:
             answers, failure = Answers(
                 colliding=np.zeros(0, bool), normals=np.zeros((0, 3)),
                 points={choice: np.zeros((0, 3)) for choice in self._engine.choices}), answers
+        singles = np.concatenate(self._singles)
         choices = answers.judged(self._pairs)
         odd = {kind: row for errors in choices.values() for kind, row in errors.odd.items()}
         return FrontierRow(
             name=self.name, set=self.set, instruction_set=native.instruction_set,
-            judged=len(answers.colliding), calls=len(self._singles),
-            single=percentiles(self._singles, 50, 99, 100),
+            judged=len(answers.colliding), calls=len(singles),
+            single=percentiles(singles, 50, 99, 100),
             batch=float(np.median([batch for _, batch in self.rounds])), choices=choices,
             by_exact=np.median(np.divide(self.rounds, exact.rounds), axis=0).tolist(),
             exceptions=answers.exceptions, failure=failure,
