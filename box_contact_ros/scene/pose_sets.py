@@ -47,7 +47,10 @@ class Pairs(NamedTuple):
         return Pairs(*(np.ascontiguousarray(part[chosen]) for part in self))
 
     def beyond(self, points: np.ndarray) -> np.ndarray:
-        """Return how far (n,) points (n, 3) are outside a box, along an axis of the box [m]."""
+        """Return how far points (n, 3) are outside either box, along its axes [m], (n,).
+
+        A single pair takes any number of points.
+        """
         farthest = []
         for pose, size in ((self.pose_a, self.size_a), (self.pose_b, self.size_b)):
             local = np.einsum('nji,nj->ni', rotation_matrix(pose[:, 3:]), points - pose[:, :3])

@@ -170,9 +170,11 @@ def _checked(tensors: dict[str, np.ndarray], metadata: dict[str, Any],
              ) -> tuple[dict[str, Network], dict[str, Any]]:
     """Return the networks and the card of a file; raises ValueError where they do not fit."""
     try:
-        card = dict(json.loads(metadata['card']))
-    except (LookupError, TypeError, ValueError, RecursionError) as error:
-        raise ValueError('it has no readable model card') from error
+        card = json.loads(metadata['card'])
+    except (LookupError, TypeError, ValueError, RecursionError):
+        card = None
+    if not isinstance(card, dict):
+        raise ValueError('it has no readable model card')
     _check_complete(card)
     if not isinstance(card['inputs'], dict):
         raise ValueError('inputs of the model card is no object')

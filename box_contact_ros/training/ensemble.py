@@ -35,7 +35,7 @@ class Ensemble(torch.nn.Module):
         self._stacked = torch.nn.ParameterList(
             torch.nn.Parameter(self._times(value.detach(), -1)) for value in stacked.values())
 
-    def forward(self, *inputs: Tensor) -> Tensor:
+    def forward(self, *inputs: Any) -> Tensor:
         """Return the answers (networks, …) of all networks to the same inputs."""
         return vmap(lambda state: functional_call(self._shape[0], state, inputs))(self.state())
 

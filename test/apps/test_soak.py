@@ -4,6 +4,7 @@ from __future__ import annotations
 import csv
 import os
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ pytest.importorskip('mujoco')
 from box_contact_ros import ContactSolver
 from box_contact_ros.apps.bench.answer_log import AnswerLog
 from box_contact_ros.apps.bench.pose_streams import make_stream
-from box_contact_ros.apps.bench.soak import mispairs, without_contact
+from box_contact_ros.apps.bench.soak import by_block, mispairs, without_contact
 from box_contact_ros.core import native
 
 MS = 1_000_000  # ns
@@ -63,3 +64,11 @@ def test_answers_of_other_poses_are_found(shift):
     both = int(np.count_nonzero(answers.colliding & truth.colliding))
     assert found == (both if shift else 0) and both > 20
     assert len(without_contact(opened)) == np.count_nonzero(~answers.colliding)
+
+
+def test_ratios_are_those_of_blocks():
+    """A block at twice, thrice and five times its echo: the median, not the ratio of all."""
+    ours, theirs = ([SimpleNamespace(latencies=np.full(10, latency)) for latency in latencies]
+                    for latencies in ((2.0, 9.0, 5.0), (1.0, 3.0, 1.0)))
+    assert by_block(ours, theirs) == ['3.00', '3.00']
+    assert by_block(ours, theirs[:1]) == ['2.00', '2.00']

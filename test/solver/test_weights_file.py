@@ -174,8 +174,8 @@ def test_sizes_that_are_none(tmp_path: Path, sizes: object) -> None:
         ContactSolver((2, 2, 2), (2, 2, 2), model='paper', weights=str(tmp_path / 'x'))
 
 
-@pytest.mark.parametrize('text', [None, '', '{', '3', '"name"', json.dumps(CARD_FIELDS),
-                                  '[' * 200_000])
+@pytest.mark.parametrize('text', [None, '', '{', '3', '"name"', json.dumps(CARD_FIELDS), '[]',
+                                  '[["name", "a pair"]]', '[' * 200_000])
 def test_no_card(tmp_path: Path, text: str | None) -> None:
     metadata = {} if text is None else {'card': text}
     save_file(tensors(), tmp_path / 'x', metadata=metadata)

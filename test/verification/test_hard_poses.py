@@ -19,8 +19,8 @@ CASES = hard_poses.load()
 MODELS = ('exact', 'mlp')
 EPS = np.finfo(float).eps
 STATED = 4.0
-"""Error of the MLP's point [% of the smaller box's longest edge] that nothing here exceeds;
-In docs/results/accuracy.md one of 600,000 pairs drawn at random does: 6.5."""
+"""Error of the MLP's point [% of the smaller box's longest edge] that no pair here exceeds. Of the
+600,000 in docs/results/accuracy.md one does: 6.5."""
 
 
 def solve(model, pairs):

@@ -201,13 +201,13 @@ def _latency_table(log: AnswerLog, contact: Sequence[StreamResult], bare: Sequen
     rows = [[name, *(f'{1e3 * percentiles(of, share)[0]:.3f}' for of in whole)]
             for name, share in (('p50', 50), ('p99', 99), ('p99.9', 99.9), ('worst', 100))]
     # Ratios of what is rare would say nothing.
-    for row, aim, by_echo, by_bare in zip(rows, (P50_LIMIT, P99_LIMIT), _by_block(contact, echo),
-                                          _by_block(contact, bare)):
+    for row, aim, by_echo, by_bare in zip(rows, (P50_LIMIT, P99_LIMIT), by_block(contact, echo),
+                                          by_block(contact, bare)):
         row += [by_echo, f'{aim:g}', by_bare]
     return markdown_table(head, [row + [''] * (len(head) - len(row)) for row in rows], padded=True)
 
 
-def _by_block(ours: Sequence[StreamResult], theirs: Sequence[StreamResult]) -> list[str]:
+def by_block(ours: Sequence[StreamResult], theirs: Sequence[StreamResult]) -> list[str]:
     """Return medians of the ratios of p50 and p99, of blocks sent one after the other."""
     mine, other = (np.array([percentiles(r.latencies, 50, 99) for r in of])
                    for of in (ours, theirs))

@@ -136,12 +136,11 @@ CHOICES: dict[str, Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]] =
 """One point of n > 0 points (n, 3), with their normals (n, 3) and depths (n,)."""
 
 
-def chosen(manifold: Manifold, choice: str) -> EngineAnswer:
+def chosen(found: Manifold, choice: str) -> EngineAnswer:
     """Return one contact of an answer: the deepest one's normal, the point by a choice."""
-    if not len(manifold.points):
+    if not len(found.points):
         return EngineAnswer(False, np.full(3, np.nan), np.full(3, np.nan))
-    return EngineAnswer(True, manifold.normals[int(np.argmax(manifold.depths))],
-                        CHOICES[choice](*manifold))
+    return EngineAnswer(True, found.normals[int(np.argmax(found.depths))], CHOICES[choice](*found))
 
 
 def in_subprocess(work: Callable[..., Any], *arguments: Any, patience: float) -> Any:

@@ -1,7 +1,7 @@
 """Ratios of times in two folders of results: whether a second run agrees with the first.
 
 Only ratios within a run are compared: absolute times depend on the machine and on its hour. Each
-is the median over the rounds, streams or blocks of a CSV file of their own ratios.
+is the median over the rounds or blocks of a CSV file of their own ratios.
 """
 from __future__ import annotations
 
