@@ -207,7 +207,7 @@ struct SiteOutputs {
 };
 
 // Units whose shared sums are kept at a time: they stay in the first cache.
-constexpr int units_at_once = 16;
+constexpr int units_at_once = 32;
 // Outputs that are summed at a time: three lanes of each stay in sixteen registers.
 constexpr int outputs_at_once = 4;
 
@@ -215,9 +215,12 @@ constexpr int outputs_at_once = 4;
 template <int first, int last, class Three>
 [[gnu::always_inline]] inline void add_outputs(const Network::Unit* unit, int units,
                                                const Three* hidden, Three* outputs) {
+  Three sums[last - first];  // not in `outputs`: for all the compiler knows, the weights are there
+  for (int k = first; k < last; ++k) sums[k - first] = outputs[k];
   for (int n = 0; n < units; ++n)
     for (int k = first; k < last; ++k)
-      outputs[k] = multiply_add(unit[n].to_outputs[k], hidden[n], outputs[k]);
+      sums[k - first] = multiply_add(unit[n].to_outputs[k], hidden[n], sums[k - first]);
+  for (int k = first; k < last; ++k) outputs[k] = sums[k - first];
 }
 
 // The first `count` outputs at all sites. What sites share is summed once. The sites of one axis
