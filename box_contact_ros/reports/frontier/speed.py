@@ -1,7 +1,7 @@
 """How contestants are timed, and the speed gates: limits on ratios of times.
 
 `python -m box_contact_ros frontier --speed` writes speed.md and speed.csv. Each instruction set of
-the machine is measured in a subprocess of its own, on one pinned core. The contestants take turns,
+the machine is measured in subprocesses of its own, on one pinned core. The contestants take turns,
 so a disturbance hits all of them: the claims are ratios. Two threads and the start of a new process
 follow. The exit status is 1 if a limit is broken.
 """
@@ -15,7 +15,7 @@ import sys
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from operator import itemgetter
 from pathlib import Path
@@ -63,12 +63,15 @@ class Effort:
     batch: int  # pairs of a batch
     shared_batch: int
     """Pairs of a batch that threads share: at 20,000, waking a second core takes a tenth."""
-    rounds: int
+    passes: int
+    """Processes of every instruction set, in turn: a neighbour may slow the machine for a minute,
+    and where a process has its memory counts too."""
+    rounds: int  # of a process
     starts: int  # new processes
 
 
-FULL = Effort(calls=2_000, batch=20_000, shared_batch=100_000, rounds=120, starts=20)
-QUICK = Effort(calls=200, batch=1_000, shared_batch=1_000, rounds=3, starts=2)
+FULL = Effort(calls=2_000, batch=20_000, shared_batch=100_000, passes=5, rounds=24, starts=20)
+QUICK = Effort(calls=200, batch=1_000, shared_batch=1_000, passes=2, rounds=2, starts=2)
 
 
 @contextmanager
@@ -223,6 +226,16 @@ def measure_threads(cores: Sequence[int], effort: Effort) -> list[Timing]:
                      effort.rounds)
 
 
+def measure_in_passes(core: int, cores: Sequence[int], effort: Effort) -> list[list[Timing]]:
+    """Return the timings of each instruction set, the best first, and of threads on two cores."""
+    measures = [partial(measure_with, name, core) for name in reversed(instruction_sets())]
+    if len(cores) > 1:
+        measures.append(partial(measure_threads, cores[-2:]))
+    passes = [[measure(effort) for measure in measures] for _ in range(effort.passes)]
+    return [[replace(parts[0], rounds=[time for part in parts for time in part.rounds])
+             for parts in zip(*runs)] for runs in zip(*passes)]
+
+
 def measure_starts(count: int) -> list[float]:
     """Return times from the start of a process to its first contact [s], after one warm-up."""
     times = []
@@ -340,12 +353,11 @@ def write_timings(path: Path, timings: Sequence[Timing]) -> None:
 def write_speed(folder: Path, command: str, *, core: int, quick: bool) -> int:
     """Measure, print, write speed.md and speed.csv; 1 if a limit is broken."""
     effort, cores = QUICK if quick else FULL, usable_cores()
-    runs = [measure_with(name, core, effort) for name in reversed(instruction_sets())]
+    found = measure_in_passes(core, cores, effort)
+    runs, threads = found[:len(instruction_sets())], found[len(instruction_sets()):]
     claims = [claim for number, run in enumerate(runs) for claim in claims_of(run, number == 0)]
-    threads = []
-    if len(cores) > 1:
-        threads = measure_threads(cores[-2:], effort)
-        claims += thread_claims(threads)
+    if threads:
+        claims += thread_claims(*threads)
     else:
         print('two threads are left out: there is one core', file=sys.stderr)
     starts = measure_starts(effort.starts)
@@ -354,7 +366,7 @@ def write_speed(folder: Path, command: str, *, core: int, quick: bool) -> int:
     print(text)
     (folder / 'speed.md').write_text(text, encoding='utf-8')
     write_timings(folder / 'speed.csv', [
-        *(one for run in (*runs, threads) for one in run),
+        *(one for run in found for one in run),
         Timing(name='first contact', kind='new process', instruction_set=native.instruction_set,
                rounds=[1e9 * seconds for seconds in starts])])
     broken = [claim for claim in claims if not claim.holds]

@@ -54,7 +54,9 @@ FULL = Plan(batch_pairs=20_000, single_pairs=1_000, timed_pairs=200, seconds=1.0
             members=99, subprocesses=True)
 QUICK = Plan(batch_pairs=1_000, single_pairs=40, timed_pairs=10, seconds=0.05, rounds=2, members=1,
              subprocesses=False)
-FEW_PAIRS = 16  # pairs that are prepared at once where more pairs of sizes than that are among them
+FEW_PAIRS = 17
+"""Pairs that are prepared at once where more pairs of sizes than that are among them. Odd, so that
+a median is the time of one pair, not between two that may differ tenfold."""
 LEAST_PAIRS = 10  # pairs judged, whatever they take
 WARM_UP = 3  # calls before a round
 PATIENCE = 120.0  # for an engine's answers in a subprocess [s]
