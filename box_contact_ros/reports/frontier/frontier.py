@@ -33,7 +33,7 @@ from ...solver.models import MODELS, gated_models
 from ...solver.weights_file import load_weights
 from ..accuracy import CLASSES
 from .frontier_picture import draw
-from .speed import pinned, usable_cores, write_speed
+from .speed import pinned, usable_cores, with_instruction_set, write_speed
 from .trials import (
     ALL_SETS,
     FEW_PAIRS,
@@ -43,7 +43,6 @@ from .trials import (
     FrontierRow,
     Plan,
     measure_all,
-    measure_with,
 )
 
 IN_SHORT = ('exact', 'mlp', 'paper', 'fcl', 'soup-8', 'soup-22')
@@ -70,9 +69,9 @@ def contestants(members: int = FULL.members) -> tuple[list[Engine], list[str]]:
     return [*found, *rivals], missing
 
 
-def native_contestants() -> list[Engine]:
-    """Return what is measured with every instruction set."""
-    return [ours(model) for model in gated_models()]
+def measure_native(seed: int, plan: Plan) -> list[FrontierRow]:
+    """Measure the models with native batches, which every instruction set is asked for."""
+    return measure_all([ours(model) for model in gated_models()], seed=seed, plan=plan)
 
 
 def _errors(values: Sequence[float]) -> str:
@@ -243,7 +242,7 @@ def main(args: Sequence[str] | None = None) -> int:
         rows = measure_all(found, seed=options.seed, plan=plan)
         here = os.environ.get(FORCE, instruction_sets()[-1])
         for name in [one for one in reversed(instruction_sets()) if one != here]:
-            rows += measure_with(name, native_contestants, seed=options.seed, plan=plan)
+            rows += with_instruction_set(name, measure_native, options.seed, plan)
     output.write_csv(folder / 'frontier.csv', csv_rows(rows, found))
     (folder / 'frontier.md').write_text(page(rows, found, missing, command, plan),
                                         encoding='utf-8')

@@ -7,7 +7,6 @@ follow. The exit status is 1 if a limit is broken.
 """
 from __future__ import annotations
 
-import json
 import math
 import os
 import subprocess
@@ -15,15 +14,16 @@ import sys
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from operator import itemgetter
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ...baselines.engines import installed
-from ...baselines.engines.engine import ours
+from ...baselines.engines.engine import in_subprocess, ours
 from ...core import FORCE, instruction_sets, native
 from ...output import machine, markdown_table, no_garbage_collection, percentiles, write_csv
 from ...output import page as filled_page
@@ -45,6 +45,7 @@ SPREAD_LIMITS = {'mlp': 1.05, 'exact': 1.20}
 MLP_BY_EXACT = 0.60
 """Pair of `mlp` in a batch, on every set of poses, for the instruction sets above [of `exact`]."""
 THREADS_LIMIT = 1.8  # least gain of two threads on two cores, batch of `exact`
+LONGEST_RUN = 3600.0  # of another instruction set [s]
 START_LIMIT = 0.15  # from the start of a process to its first contact, without ROS [s]
 
 FIRST_CONTACT = """\
@@ -202,20 +203,24 @@ def timed(stints: Sequence[Stint], rounds: int) -> list[Timing]:
                    rounds=one.times) for one in stints]
 
 
-def print_timings(core: int, effort: Effort) -> None:
-    """Print times of single calls and batches on one core as JSON, for `measure_with`."""
+def with_instruction_set(name: str, work: Callable[..., list[Any]], *arguments: Any) -> list[Any]:
+    """Return what `work` returns in a subprocess that is made to use an instruction set."""
+    before = os.environ.get(FORCE)
+    os.environ[FORCE] = name
+    try:
+        return in_subprocess(work, *arguments, patience=LONGEST_RUN)
+    finally:
+        if before is None:
+            del os.environ[FORCE]
+        else:
+            os.environ[FORCE] = before
+
+
+def measure_on(core: int, effort: Effort) -> list[Timing]:
+    """Measure single calls and batches on one core."""
     batches = [batch(model, name, effort.batch) for model in gated_models() for name in BATCH_SETS]
     with pinned({core}):
-        found = timed([*single_calls(effort.calls), *batches], effort.rounds)
-    print(json.dumps([asdict(one) for one in found]))
-
-
-def measure_with(instruction_set: str, core: int, effort: Effort) -> list[Timing]:
-    """Measure in a subprocess that is made to use an instruction set."""
-    code = f'from {__name__} import Effort, print_timings; print_timings({core}, {effort})'
-    done = subprocess.run([sys.executable, '-c', code], stdout=subprocess.PIPE, text=True,
-                          check=True, env={**os.environ, FORCE: instruction_set})
-    return [Timing(**fields) for fields in json.loads(done.stdout)]
+        return timed([*single_calls(effort.calls), *batches], effort.rounds)
 
 
 def measure_threads(cores: Sequence[int], effort: Effort) -> list[Timing]:
@@ -228,10 +233,11 @@ def measure_threads(cores: Sequence[int], effort: Effort) -> list[Timing]:
 
 def measure_in_passes(core: int, cores: Sequence[int], effort: Effort) -> list[list[Timing]]:
     """Return the timings of each instruction set, the best first, and of threads on two cores."""
-    measures = [partial(measure_with, name, core) for name in reversed(instruction_sets())]
+    measures = [partial(with_instruction_set, name, measure_on, core, effort)
+                for name in reversed(instruction_sets())]
     if len(cores) > 1:
-        measures.append(partial(measure_threads, cores[-2:]))
-    passes = [[measure(effort) for measure in measures] for _ in range(effort.passes)]
+        measures.append(partial(measure_threads, cores[-2:], effort))
+    passes = [[measure() for measure in measures] for _ in range(effort.passes)]
     return [[replace(parts[0], rounds=[time for part in parts for time in part.rounds])
              for parts in zip(*runs)] for runs in zip(*passes)]
 

@@ -2,7 +2,6 @@
 from __future__ import annotations
 
 import math
-import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -13,10 +12,9 @@ from ...baselines.engines.engine import (
     APART,
     Engine,
     chosen,
-    in_subprocess,
     part_by_part,
 )
-from ...core import FORCE, native
+from ...core import native
 from ...output import percentiles
 from ...scene.pose import degrees_between
 from ...scene.pose_sets import (
@@ -60,7 +58,6 @@ a median is the time of one pair, not between two that may differ tenfold."""
 LEAST_PAIRS = 10  # pairs judged, whatever they take
 WARM_UP = 3  # calls before a round
 PATIENCE = 120.0  # for an engine's answers in a subprocess [s]
-LONGEST_RUN = 3600.0  # of another instruction set [s]
 VERDICT = 1e-9
 """Least gap or depth, of the size, at which verdicts and normals are judged. At exact touch both
 verdicts are right, and a normal may be any that keeps the boxes apart."""
@@ -303,22 +300,3 @@ def measure_all(found: Sequence[Engine], *, seed: int = 3, plan: Plan = FULL) ->
         take_turns([trial.time for trial in trials], plan.rounds, bar.update)
     exact = {trial.set: trial for trial in trials if trial.name == 'exact'}
     return [trial.row(exact[trial.set]) for trial in trials]
-
-
-def measure_with(instruction_set: str, make: Callable[[], Sequence[Engine]], *, seed: int,
-                 plan: Plan) -> list[FrontierRow]:
-    """Measure what `make` returns in a subprocess that is made to use an instruction set."""
-    before = os.environ.get(FORCE)
-    os.environ[FORCE] = instruction_set
-    try:
-        return in_subprocess(_measure_made, make, seed, plan, patience=LONGEST_RUN)
-    finally:
-        if before is None:
-            del os.environ[FORCE]
-        else:
-            os.environ[FORCE] = before
-
-
-def _measure_made(make: Callable[[], Sequence[Engine]], seed: int, plan: Plan,
-                  ) -> list[FrontierRow]:
-    return measure_all(make(), seed=seed, plan=plan)
