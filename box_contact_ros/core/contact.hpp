@@ -149,6 +149,11 @@ struct ExactModel {
   }
 };
 
+// The exact overlap of a single pair for those who need it now and then: compiled once.
+[[gnu::noinline]] inline Moments<double> exact_overlap(const Query<double>& q, Counts& counts) {
+  return ExactModel{}.solve(q, counts);
+}
+
 // The one place that decides what a contact says of moments that its model does not give: NaN.
 template <class T>
 [[gnu::always_inline]] inline Moments<T> moments(const Moments<T>& found) {
@@ -205,7 +210,7 @@ template <class T>
     for (int k = 0; k < 3; ++k) sizes[k][i] = rows.sizes_a[rows.size_step_a * row + k];
     for (int k = 0; k < 3; ++k) sizes[3 + k][i] = rows.sizes_b[rows.size_step_b * row + k];
   }
-  auto lanes_of = [](const double(&numbers)[width<T>]) {
+  auto lanes_of = [](const double (&numbers)[width<T>]) {
     T x;
     std::memcpy(&x, numbers, sizeof(T));
     return x;

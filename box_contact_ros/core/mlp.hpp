@@ -566,7 +566,7 @@ struct MlpModelBy {
           if (!lane(fallback, i)) continue;
           ++counts.exact;
           Counts unused;
-          set_lane(one, i, ExactModel{}.solve(lane(q, i), unused));
+          set_lane(one, i, exact_overlap(lane(q, i), unused));
         }
       }
       if constexpr (gives_patch) {

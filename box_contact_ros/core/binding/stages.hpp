@@ -107,7 +107,7 @@ bool fill_stages(const Rows& rows, long row, const Network* network, const Stage
   put(arrays.offset_b, row, q.pair.offset_b);
   if (arrays.centroid || arrays.volume || arrays.covariance || arrays.certain) {
     Counts counts;
-    Moments<double> exact = ExactModel{}.solve(q, counts);
+    Moments<double> exact = exact_overlap(q, counts);
     put(arrays.centroid, row, exact.centroid);
     put(arrays.volume, row, exact.volume);
     put(arrays.covariance, row, matrix(exact.covariance));
