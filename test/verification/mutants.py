@@ -157,9 +157,8 @@ MUTANTS = {
         'core/overlap/moments.hpp', '{s(1, 0), s(1, 1)', '{-s(1, 0), s(1, 1)',
         f'{LAWS} -k positive'),
     'volume of the unpressed overlap': Mutant(
-        'core/contact.hpp', 'Mask<T> pressed = enforce_minimum_depth(pair, q.axis) & q.touching;',
-        'Pair<T> moved = pair; '
-        'Mask<T> pressed = enforce_minimum_depth(moved, q.axis) & q.touching;',
+        'core/minimum_depth.hpp',
+        'T distance = max(depth_floor * pair.size + axis.separation, T{});', 'T distance{};',
         f'{EXACT} -k pressed_volume'),
     'volume by its magnitude of the wrong part': Mutant(
         'core/contact.hpp', 'select<T>(q.touching, overlap.volume, T{})',

@@ -11,6 +11,7 @@ import pytest
 from gmpy2 import mpfr
 
 from box_contact_ros import ContactSolver
+from box_contact_ros.core import stages
 from box_contact_ros.reports.hard import stability
 from box_contact_ros.scene.pose_sets import Pairs
 from box_contact_ros.verification import hard_poses, judge
@@ -364,3 +365,7 @@ def test_thin_plates_that_cross_have_a_point_in_both(pose_a, pose_b, size_a, siz
         found = solve(model, pairs)
         assert found.colliding.all()
         assert not (judge.judge(*pairs, found).faults & judge.OUTSIDE).any()
+    # Face sums are certain of these overlaps. Clipping has to agree with them.
+    by = stages(*pairs, names=['centroid', 'clipped_centroid', 'certain', 'size'])
+    assert by.certain.all()
+    assert np.linalg.norm(by.centroid - by.clipped_centroid) < 1e-4 * by.size
