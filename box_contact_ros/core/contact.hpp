@@ -210,7 +210,7 @@ template <class T>
     for (int k = 0; k < 3; ++k) sizes[k][i] = rows.sizes_a[rows.size_step_a * row + k];
     for (int k = 0; k < 3; ++k) sizes[3 + k][i] = rows.sizes_b[rows.size_step_b * row + k];
   }
-  auto lanes_of = [](const double (&numbers)[width<T>]) {
+  auto lanes_of = [](const double(&numbers)[width<T>]) {
     T x;
     std::memcpy(&x, numbers, sizeof(T));
     return x;
