@@ -272,7 +272,7 @@ MUTANTS = {
         'if True]', f'{TEST_BYTES} -k before_the_patch'),
     'a contact without patch taken for stale': Mutant(
         'apps/bench/answer_log.py', 'np.isnan(values[:7]).any()', 'np.isnan(values).any()',
-        'test/apps/test_landing_ros.py -k say_nothing'),
+        'test/apps/test_landing_ros.py -k point_alone_pushes'),
     'an ellipse of NaN': Mutant(
         'apps/viewer/style.py', 'return np.where(known[:, None, None], semi_axes, math.nan)',
         'return semi_axes', 'test/apps/test_markers.py -k without_patch'),
