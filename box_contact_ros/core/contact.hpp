@@ -149,7 +149,7 @@ struct ExactModel {
   }
 };
 
-// The exact overlap of a single pair for those who need it now and then: compiled once.
+// The exact overlap of a single pair, not inlined: fallbacks and stages share one copy.
 [[gnu::noinline]] inline Moments<double> exact_overlap(const Query<double>& q, Counts& counts) {
   return ExactModel{}.solve(q, counts);
 }

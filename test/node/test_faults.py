@@ -260,15 +260,16 @@ rclpy.spin(node)
 
 
 def test_a_subscriber_that_never_reads(start, client):
-    """A program that has heard a contact is stopped in its tracks (SIGSTOP).
+    """A program is stopped in its tracks (SIGSTOP) after it has heard a contact.
 
     Everybody else is answered as before, and the node's memory does not grow.
     """
-    node = start()
+    node, deadline = start(), time.monotonic() + PATIENCE
     with subprocess.Popen([sys.executable, '-c', READER], stdout=subprocess.PIPE) as reader:
         try:
             os.set_blocking(reader.stdout.fileno(), False)
-            while not reader.stdout.read():  # stopped before the node knows it, it would not count
+            while not reader.stdout.read():  # before discovery it would be no subscriber
+                assert reader.poll() is None and time.monotonic() < deadline
                 client.ask(ORIGIN, TOUCHING)
             reader.send_signal(signal.SIGSTOP)
             before = memory(node)

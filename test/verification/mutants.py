@@ -126,7 +126,7 @@ MUTANTS = {
         f'{EXACT} -k through_each_other'),
     "middles for the edges' pieces": Mutant(
         'core/overlap/face_sums.hpp',
-        '+ (1.0 / 12.0) * by_sign<T>(w_ll).sum();', ';',
+        '+ (1.0 / 12.0) * by_sign<T, Side::sigma>(w_ll).sum();', ';',
         f'{LAWS} -k of_the_parts'),
     "middles for the lines' pieces": Mutant(
         'core/overlap/face_sums.hpp', 'T square = (1.0 / 12.0) *', 'T square = 0.0 *',

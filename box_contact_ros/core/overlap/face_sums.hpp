@@ -121,7 +121,7 @@ struct BySign {
 
   [[gnu::always_inline]] T sum() const { return low + high; }
 };
-template <class T, Side side = Side::sigma>
+template <class T, Side side>
 [[gnu::always_inline]] inline BySign<T> by_sign(const Four<T> (&terms)[steps<T>]) {
   constexpr int other = side == Side::sigma ? 2 : 1;  // where the other side's sign is + instead
   if constexpr (is_scalar<T>) {
@@ -162,14 +162,16 @@ template <class T, Side side>
   }
   T f_low = -half[a] - origin[a], f_high = half[a] - origin[a];
   T g_low = -half[b] - origin[b], g_high = half[b] - origin[b];
-  BySign<T> w_f = by_sign<T>(w), w_t = by_sign<T, Side::tau>(w), g_f = by_sign<T>(w_g);
-  BySign<T> x_f = by_sign<T>(w_x), x_t = by_sign<T, Side::tau>(w_x);
+  BySign<T> w_f = by_sign<T, Side::sigma>(w), w_t = by_sign<T, Side::tau>(w),
+            g_f = by_sign<T, Side::sigma>(w_g);
+  BySign<T> x_f = by_sign<T, Side::sigma>(w_x), x_t = by_sign<T, Side::tau>(w_x);
   squares(a, a) += (f_low * f_low) * w_f.low + (f_high * f_high) * w_f.high;
   squares(b, b) += (g_low * g_low) * w_t.low + (g_high * g_high) * w_t.high;
   squares(a, b) += f_low * g_f.low + f_high * g_f.high;
   squares(a, j) += f_low * x_f.low + f_high * x_f.high;
   squares(b, j) += g_low * x_t.low + g_high * x_t.high;
-  squares(j, j) += by_sign<T>(w_xx).sum() + (1.0 / 12.0) * by_sign<T>(w_ll).sum();
+  squares(j, j) +=
+      by_sign<T, Side::sigma>(w_xx).sum() + (1.0 / 12.0) * by_sign<T, Side::sigma>(w_ll).sum();
 }
 
 template <class T, Side side>
@@ -276,20 +278,21 @@ template <class T>
       along[n] = w * (span * span);
     }
     // Along d, whose coordinates are 0, −r_zj and r_yj.
-    T square = (1.0 / 12.0) * by_sign<T>(along).sum();
+    T square = (1.0 / 12.0) * by_sign<T, Side::sigma>(along).sum();
     T by_y = square * r[y][j], by_z = square * r[z][j];
     squares(y, y) += by_z * r[z][j];
     squares(y, z) -= by_y * r[z][j];
     squares(z, z) += by_y * r[y][j];
   }
   T f_low = -pair.half_a[i] - origin_a[i], f_high = pair.half_a[i] - origin_a[i];
-  BySign<T> all_f = by_sign<T>(w_all), y_f = by_sign<T>(w_y), z_f = by_sign<T>(w_z);
+  BySign<T> all_f = by_sign<T, Side::sigma>(w_all), y_f = by_sign<T, Side::sigma>(w_y),
+            z_f = by_sign<T, Side::sigma>(w_z);
   squares(i, i) += (f_low * f_low) * all_f.low + (f_high * f_high) * all_f.high;
   squares(i, y) += f_low * y_f.low + f_high * y_f.high;
   squares(i, z) += f_low * z_f.low + f_high * z_f.high;
-  squares(y, y) += by_sign<T>(w_yy).sum();
-  squares(y, z) += by_sign<T>(w_yz).sum();
-  squares(z, z) += by_sign<T>(w_zz).sum();
+  squares(y, y) += by_sign<T, Side::sigma>(w_yy).sum();
+  squares(y, z) += by_sign<T, Side::sigma>(w_yz).sum();
+  squares(z, z) += by_sign<T, Side::sigma>(w_zz).sum();
 }
 
 template <class T>

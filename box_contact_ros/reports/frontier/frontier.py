@@ -70,7 +70,7 @@ def contestants(members: int = FULL.members) -> tuple[list[Engine], list[str]]:
 
 
 def measure_native(seed: int, plan: Plan) -> list[FrontierRow]:
-    """Measure the models with native batches, which every instruction set is asked for."""
+    """Measure the models with native batches, by the instruction set of this process."""
     return measure_all([ours(model) for model in gated_models()], seed=seed, plan=plan)
 
 
