@@ -11,7 +11,7 @@
 // - The point lies in both boxes, to 2⁻⁴⁶ of the size. `place` ends with a clamp to the box of the
 //   bounds' frame, and then tests the point against the other box.
 // - The volume is positive, and at most that of the bounds. The covariance is positive definite, but
-//   for rounding: it is the inverse of a matrix that is (`ask`).
+//   for rounding: it is the inverse of a matrix that is (`ask_for_patch`).
 //
 // Where the point fails its test, or volume or covariance is NaN, all three are the exact ones, and
 // the contact is counted. With trained weights none of 600,000 points of the pose sets fails.
@@ -37,8 +37,8 @@ constexpr double range_slack = 1.0 + 1e-9;
 constexpr double flat = 0.25 * depth_floor;
 
 // Farthest that an answer is from the middle of the bounds, in half extents. The centroid of a convex
-// body lies in the middle half of its exact bounding box (Bonnesen and Fenchel 1934, §34), and so
-// within 0.5; bounds by the slab may be larger on one side.
+// body is within 0.5 of the middle of its exact bounding box (Bonnesen and Fenchel 1934, §34). Bounds
+// by the slab may be larger on one side.
 constexpr double centroid_reach = 0.75;
 
 // The point of `place` may lie outside the other box by this fraction of the size.
@@ -47,15 +47,19 @@ constexpr double place_tolerance = 0x1p-46;
 // --- Features ---
 //
 // Scaled to its bounding box, A∩B is the cube [−1, 1]³ cut by the six faces of the other box. Two
-// opposite faces f share their unit normal in these coordinates (`slant`, unit in the sum of the
-// absolute components), cut into the cube by so much (`cut`), and push the centroid along the
-// normal by the difference of the two (`push`). Sizes, units and the depth have gone.
+// opposite faces f have in these coordinates:
+//
+//   slant: their normal, whose absolute components add up to 1
+//   cut: how far both cut into the cube
+//   push: how much further the lower one cuts, which moves the centroid along the normal
+//
+// Sizes, units and the depth have gone.
 //
 // The network is asked at nine sites, a pair of faces f by an axis q of the cube. A site has twelve
 // features: four of its own, four of its faces, four of its axis. All are invariant under the
 // cube's 48 symmetries, which only take one site to another. Its outputs for the point multiply the
-// components q of three vectors that turn along (Villar et al., Scalars are universal, 2021). What
-// the four others do, `ask` says.
+// components q of three vectors that turn along (Villar et al., Scalars are universal, 2021).
+// `ask_for_patch` says what the four others do.
 
 constexpr int site_count = 9, site_features = 12, point_outputs = 3;
 // Places of the other outputs.
@@ -82,9 +86,11 @@ struct SiteFeatures {
   // another axis · cut.
   Triple<F> of_site[3][4];
 };
-// What the outputs of site (f, q) for the point multiply: the push of the faces f along their normal;
-// the push of the others along these faces, times their cut; what the others' normals have of this
-// push.
+// What the three outputs of site (f, q) for the point multiply:
+//
+//   the push of the faces f along their normal
+//   the push of the others along these faces, times their cut
+//   what the others' normals have of this push
 template <class F>
 struct SiteVectors {
   Triple<F> along[3][point_outputs];  // [q], by f

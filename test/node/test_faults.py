@@ -1,9 +1,8 @@
 """What breaks around a contact node, and that nothing is lost, wrong or leaked by it.
 
-The node runs as a process of its own. Killed and restarted nodes and clients are in
-test_contact_node.py, weights and requests that cannot be read in test_hygiene_ros.py, scenes that
-are replaced by garbage in test_scene_node.py. `test/verification/mutants.py` has a node without
-each guard.
+The node runs as a process of its own. `test/verification/mutants.py` has a node without each guard.
+Elsewhere: killed and restarted nodes and clients (test_contact_node.py), weights and requests that
+cannot be read (test_hygiene_ros.py), scenes replaced by garbage (test_scene_node.py).
 """
 from __future__ import annotations
 
@@ -259,7 +258,7 @@ rclpy.spin(node)
 """
 
 
-def test_a_subscriber_that_never_reads(start, client):
+def test_a_subscriber_that_stops_reading(start, client):
     """A program is stopped in its tracks (SIGSTOP) after it has heard a contact.
 
     Everybody else is answered as before, and the node's memory does not grow.

@@ -387,7 +387,7 @@ MUTANTS = {
         EVALUATOR, 'poses.numbers[bad] = np.nan', 'pass', f'{TEST_SCENE_NODE} -k bad_pose'),
     'answers kept for whoever does not read': Mutant(
         'node/runtime.py', 'CONTACT_QOS = QoSProfile(depth=10,',
-        'CONTACT_QOS = QoSProfile(history=2,', 'test/node/test_faults.py -k never_reads'),
+        'CONTACT_QOS = QoSProfile(history=2,', 'test/node/test_faults.py -k stops_reading'),
     'events of poses served': Mutant(
         TOPICS, 'self.events.watch(subscription)', 'pass', 'test/node/test_faults.py -k deadlines'),
     'events of contacts served': Mutant(

@@ -1,11 +1,11 @@
 // The exact moments of the overlap A∩B without a branch, and a certificate that they are right.
 //
 // The overlap is bounded by parts of the twelve faces of both boxes. By the divergence theorem its
-// volume and first moments are sums over these parts of their areas and first moments; by Stokes'
-// theorem, applied once more, those are sums over the parts' edges. Every edge of the overlap is a
-// piece of one of the 24 edges of the boxes, or of one of the 36 lines in which a face of A meets a
-// face of B. Each piece is what slabs leave of a line (Kay and Kajiya 1986), a fixed sequence of
-// multiplications and comparisons. The cost is the same for every pair.
+// volume and first moments are sums over these parts of their areas and first moments. By Stokes'
+// theorem those are sums over the parts' edges. An edge of the overlap is a piece of one of the boxes'
+// 24 edges, or of one of the 36 lines in which a face of A meets a face of B. Each piece is what
+// slabs leave of a line (Kay and Kajiya 1986), a fixed sequence of multiplications and comparisons.
+// The cost is the same for every pair.
 //
 // Rounding may decide twice, and differently, which face an edge meets first. Then a part of a face
 // counts twice or not at all. Four steps make the sums sound:
@@ -37,8 +37,8 @@ namespace face_sums {
 // Squared sine below which two faces meet in no line.
 constexpr double least_sine2 = 1e-26;
 
-// `unflush`: faces within the rounding of their places count as in one plane, if that is this small
-// a part of the boxes' thickness there (needles broke a limit by the size).
+// `unflush`: faces within the rounding of their places count as in one plane, if that rounding is
+// this small a part of the boxes' thickness there. Needles broke a limit by the size.
 constexpr double place_rounding = 0x1p-47, flush_limit = 4e-10;
 // Faces that cross at less than this share of the accuracy are left to clipping.
 constexpr double mirrored_rounding = 1e-15;
@@ -75,8 +75,8 @@ constexpr EdgeWeights weights_a{0.058, 0.078, 0.043}, weights_b{0.023, 0.043, 0.
 
 enum class Side { sigma, tau };
 
-// Sums over the edges of the parts of a box's six faces, by the axis across the face: twice the
-// area, and three times the first moments along the two axes that follow. `side` is the sign that
+// Sums over the edges of the parts of a box's six faces, by the axis across the face. They are twice
+// the area, and three times the first moments along the two axes that follow. `side` is the sign that
 // tells a face from the opposite one. Terms of the other sign are added last, in the same order for
 // one pair and for W.
 template <class T, Side side>
