@@ -11,7 +11,7 @@ from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
-from ..node.messages import NANOSECONDS, read_cloud
+from ..node.messages import NANOSECONDS, ContactsMessage, read_contacts
 from ..resources import find_file
 from ..scene.files.scene_file import read_scene
 from ..scene.scene_solver import Scene
@@ -20,7 +20,8 @@ from .bench.answer_log import first_row
 ANSWERS: dict[str, tuple[type, str]] = {
     'point': (PointStamped, 'contact/point'),
     'normal': (Vector3Stamped, 'contact/normal'),
-    'cloud': (PointCloud2, 'contacts'),
+    'cloud': ((PointCloud2, 'contacts_cloud') if ContactsMessage is None else
+              (ContactsMessage, 'contacts')),
 }
 """Type and topic of what a contact node answers with, by the kinds of an `AnswerLog`."""
 CRANE_MARKERS = 'crane/markers'
@@ -31,9 +32,9 @@ DEEP_RELIABLE = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
 
 
 def answer_values(kind: str, message: Any) -> Sequence[float] | np.ndarray:
-    """Return the numbers of an answer of two boxes; of a cloud those of its `first_row`."""
+    """Return the numbers of an answer of two boxes; of contacts those of their `first_row`."""
     if kind == 'cloud':
-        return first_row(read_cloud(message))
+        return first_row(read_contacts(message))
     vector = message.point if kind == 'point' else message.vector
     return vector.x, vector.y, vector.z
 

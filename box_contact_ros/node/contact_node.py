@@ -2,7 +2,8 @@
 
 Subscribes box_a/pose and box_b/pose (geometry_msgs/PoseStamped). Publishes contact/point
 (PointStamped) and contact/normal (Vector3Stamped, from A to B) while the boxes touch, then
-contacts (sensor_msgs/PointCloud2, one row per contact) on every evaluation, and /diagnostics.
+contacts (box_contact_msgs/Contacts) on every evaluation, and /diagnostics. Where box_contact_msgs
+is not installed, contacts_cloud (sensor_msgs/PointCloud2) takes the place of contacts.
 
 With a scene file: <box>/pose of every moving box, and <pair>/contact/point, <pair>/contact/normal.
 It is a lifecycle node that configures and activates itself, unless autostart is false.
@@ -23,6 +24,7 @@ from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.logging import get_logger
 
+from ..core import LENGTH_MAX
 from ..resources import OpenFiles
 from ..scene.files.scene_file import is_inline, read_scene
 from ..scene.pose_sets import CONTAINER
@@ -32,6 +34,7 @@ from ..solver.checks import shown
 from ..solver.models import find_model, model_names
 from .diagnostics import DIAGNOSTICS_SECONDS, Diagnostics
 from .evaluator import SERIALIZATIONS, Evaluator
+from .messages import ContactsMessage
 from .parameters import (
     CheckedParameters,
     Setting,
@@ -82,7 +85,11 @@ PARAMETERS = {
                             'period; 0: never [s]', number(0.0, LONGEST)),
     'deadline': Setting(0.0, 'quality of service that pose publishers must offer: longest time '
                              'between poses; 0: none [s]', number(0.0, LONGEST)),
-    'pair_topics': Setting(True, 'whether pairs have topics of their own next to the cloud', flag),
+    'margin': Setting(0.0, 'pairs apart are listed in contacts too, up to this separation [m]; '
+                           'their depth is negative', number(0.0, LENGTH_MAX)),
+    'pair_topics': Setting(True, 'whether pairs have topics of their own next to contacts', flag),
+    'contacts_cloud': Setting(False, 'whether contacts are published as a point cloud as well; '
+                                     'always where box_contact_msgs is not installed', flag),
     'serialization': Setting('raw', 'raw: read and write the bytes of messages; typed: message '
                                     'objects, slower, the reference', one_of(SERIALIZATIONS)),
     'autostart': Setting(True, 'whether the node configures and activates itself', flag,
@@ -146,7 +153,8 @@ class ContactNode(LifecycleNode):
     @staticmethod
     def make_solver(settings: Mapping[str, Any], scene: Scene) -> SceneSolver:
         """Return the solver that checked parameters ask for, or raise ValueError."""
-        return SceneSolver(scene, model=settings['model'], weights=settings['weights'] or None)
+        return SceneSolver(scene, model=settings['model'], weights=settings['weights'] or None,
+                           margin=settings['margin'])
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Read the scene, load the weights, create the publishers.
@@ -252,6 +260,7 @@ class ContactNode(LifecycleNode):
         self._topics.check(scene, pair_topics=settings['pair_topics'])
         solver = self.make_solver(settings, scene)
         self._topics.set_scene(scene, pair_topics=settings['pair_topics'],
+                               cloud=settings['contacts_cloud'] or ContactsMessage is None,
                                raw=SERIALIZATIONS[settings['serialization']].raw,
                                deadline=settings['deadline'])
         if self._evaluator is None:

@@ -50,8 +50,7 @@ class Evaluator:
         else:
             self._pairing = PAIRINGS[settings['pairing']](
                 solver.scene, tolerance=tolerance, max_age=max_age, counts=self.counts)
-        if settings['serialization'] != old.get('serialization'):
-            self._messages = SERIALIZATIONS[settings['serialization']]()
+        self._messages = SERIALIZATIONS[settings['serialization']]()  # it knows names of pairs
         self.solver, self._settings = solver, settings
         self._absent = np.zeros(0, dtype=bool)  # which boxes the last array had no pose of
         self._silent_until = 0.0  # by the monotonic clock: when a refusal is logged again [s]
@@ -126,7 +125,10 @@ class Evaluator:
                 point, normal = publishers
                 point.publish(messages.point(contact))
                 normal.publish(messages.normal(contact))
-        self._topics.contacts.publish(messages.cloud(answer))
+        if self._topics.contacts is not None:
+            self._topics.contacts.publish(messages.contacts(answer))
+        if self._topics.cloud is not None:
+            self._topics.cloud.publish(messages.cloud(answer))
         # What nobody waits for comes last.
         stale = len(answer.stale)
         self._diagnostics.computed(took, evaluated=stale < len(self.solver.scene.pairs))

@@ -14,9 +14,9 @@ import numpy as np
 from rclpy.serialization import serialize_message
 
 from ..core import LENGTH_MAX, QUATERNION_MAX, QUATERNION_MIN
-from ..scene.scene_solver import Answer
+from ..scene.scene_solver import Answer, Pair
 from ..scene.stamp_pairing import StampedPose
-from ..solver.contact import Contact
+from ..solver.contact import Contact, patch_area
 from .messages import CLOUD_ROW, NANOSECONDS, Refused, TypedMessages, checked_pose, headed
 
 ENCAPSULATION = 4
@@ -27,7 +27,9 @@ _POSE = struct.Struct('<7d')
 _LAYOUT = '<2s2xiI{}s{}x7d'
 """Of a whole little-endian pose, by the sizes of frame_id, its length included, and of what aligns
 the numbers."""
-_DEPTH_PAIR_VOLUME = struct.Struct('<dId')
+_COUNT = struct.Struct('<I')
+_DEPTH_VOLUME = struct.Struct('<2d')
+_DEPTH_VOLUME_AREA = struct.Struct('<3d')
 _SIZES = struct.Struct('<II')
 FRAME_AT = ENCAPSULATION + _STAMP.size + 4
 """Where frame_id's characters are: behind stamp and length."""
@@ -35,7 +37,7 @@ KEPT_FRAMES = 64
 """Frames whose layouts are kept; whoever sends more than these costs time, not memory."""
 _LEAST, _MOST = 2.0 * QUATERNION_MIN, 0.5 * QUATERNION_MAX
 """Norms of quaternions that are certainly good, whatever the rounding."""
-_NAN_7 = np.full(7, np.nan).tobytes()
+_NAN_3, _NAN_14 = np.full(3, np.nan, '<f4').tobytes(), np.full(14, np.nan).tobytes()
 _array = np.array
 _new_tuple = tuple.__new__  # a named tuple's own constructor is Python code
 _NOTHING = Contact(False, 0.0, np.zeros(3), np.zeros(3), 0.0, np.zeros((3, 3)))
@@ -47,6 +49,8 @@ class _FrameBytes(NamedTuple):
     head: bytes
     point: bytes
     normal: bytes
+    contacts_header: bytes
+    contacts_at: int  # where the first contact begins, by its distance from a multiple of 8
     cloud_header: bytes
     cloud_fields: bytes
 
@@ -108,6 +112,7 @@ class RawMessages:
         self._frame_id = ''
         self._unpack = struct.Struct(_LAYOUT.format(0, 0)).unpack
         self._bytes_of: dict[str, _FrameBytes] = {}
+        self._names_of: dict[tuple[Pair, int], bytes] = {}
 
     def read_pose(self, data: bytes) -> StampedPose:
         """Return the pose of a serialised message, or raise Refused."""
@@ -158,18 +163,52 @@ class RawMessages:
         """Make `contact/normal`."""
         return self._stamp + self._in_frame.normal + contact.normal.tobytes()
 
-    def cloud(self, answer: Answer) -> bytes:
+    def contacts(self, answer: Answer) -> bytes:
         """Make `contacts`."""
-        rows = b''.join([c.point.tobytes() + c.normal.tobytes()
-                         + _DEPTH_PAIR_VOLUME.pack(-c.separation, p.id, c.volume)
-                         + _upper(c.covariance.tobytes()) for p, c in answer.touching])
+        frame, names_of = self._in_frame, self._names_of
+        at, listed = frame.contacts_at, answer.listed
+        parts = [self._stamp, frame.contacts_header, _COUNT.pack(len(listed))]
+        for pair, c in listed:
+            names = names_of.get((pair, at)) or names_of.setdefault((pair, at), _names(pair, at))
+            parts.append(
+                names + c.point.tobytes() + c.normal.tobytes()
+                + _DEPTH_VOLUME_AREA.pack(-c.separation, c.volume, patch_area(c))
+                + _upper(c.covariance.tobytes()))
+            at = 0  # doubles end each contact, so the next one begins at a multiple of 8
+        parts.append(_COUNT.pack(len(answer.stale)))
+        parts.append(b''.join([_string(pair.label) for pair in answer.stale]))
+        return b''.join(parts)
+
+    def cloud(self, answer: Answer) -> bytes:
+        """Make `contacts_cloud`."""
+        with np.errstate(over='ignore'):  # what float32 cannot hold is infinite there
+            rows = b''.join([
+                c.point.astype('<f4').tobytes() + _COUNT.pack(p.id) + c.point.tobytes()
+                + c.normal.tobytes() + _DEPTH_VOLUME.pack(-c.separation, c.volume)
+                + _upper(c.covariance.tobytes()) for p, c in answer.listed])
         if answer.stale:
-            rows += b''.join([_NAN_7 + p.id.to_bytes(4, 'little') + _NAN_7 for p in answer.stale])
+            rows += b''.join([_NAN_3 + _COUNT.pack(p.id) + _NAN_14 for p in answer.stale])
         frame = self._in_frame
         size = len(rows)
         return b''.join((self._stamp, frame.cloud_header,
-                         (size // CLOUD_ROW.itemsize).to_bytes(4, 'little'), frame.cloud_fields,
-                         _SIZES.pack(size, size), rows, b'\0' if answer.stale else b'\1'))
+                         _COUNT.pack(size // CLOUD_ROW.itemsize), frame.cloud_fields,
+                         _SIZES.pack(size, size), rows,
+                         b'\0' if answer.stale or answer.close else b'\1'))
+
+
+def _string(text: str) -> bytes:
+    """Return a string with its length before it, and padded to a multiple of 4 behind it."""
+    data = text.encode() + b'\0'
+    return _COUNT.pack(len(data)) + data + b'\0' * (-len(data) % 4)
+
+
+def _names(pair: Pair, at: int) -> bytes:
+    """Return the names that a contact begins with, padded so that doubles may follow.
+
+    at: where they begin, by the distance from a multiple of 8: 0 or 4.
+    """
+    names = b''.join(map(_string, (pair.label, pair.a, pair.b)))
+    return names + b'\0' * (-(at + len(names)) % 8)
 
 
 def _upper(square: bytes) -> bytes:
@@ -187,7 +226,9 @@ def _in_frame(frame_id: str) -> _FrameBytes:
         raise RuntimeError('rclpy does not serialise little-endian here: use serialization:=typed')
     body = FRAME_AT - 4  # behind the stamp
     frame_end = FRAME_AT + len(frame_id.encode()) + 1
-    width_at = -(-frame_end // 4) * 4 + 4  # height, width: aligned to 4, as the encapsulation is
-    # A cloud without rows ends with row_step, the number of bytes of data, and is_dense.
+    aligned = -(-frame_end // 4) * 4  # as the encapsulation is, too
+    # A cloud has height and width behind its frame; without rows it ends with row_step, the number
+    # of bytes of data, and is_dense. Contacts have their number there.
     return _FrameBytes(point[:ENCAPSULATION], point[body:-24], normal[body:-24],
-                       cloud[body:width_at], cloud[width_at + 4:-9])
+                       cloud[body:aligned], (aligned + 4 - ENCAPSULATION) % 8,
+                       cloud[body:aligned + 4], cloud[aligned + 8:-9])

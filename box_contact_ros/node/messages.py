@@ -1,12 +1,16 @@
-"""Between messages and numbers: poses in; point, normal and the contacts cloud out.
+"""Between messages and numbers: poses in; point, normal and contacts out.
 
 `TypedMessages` uses rclpy's message objects. `message_bytes.RawMessages` does the same with bytes,
 faster. Tests compare the two.
+
+All contacts of a tick are one message: `Contacts` where box_contact_msgs is installed, and a
+PointCloud2 for tools that know no other. Both are read as rows of CLOUD_ROW.
 """
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from builtin_interfaces.msg import Time
@@ -14,26 +18,43 @@ from geometry_msgs.msg import Point, PointStamped, PoseArray, PoseStamped, Vecto
 from sensor_msgs.msg import PointCloud2, PointField
 from std_msgs.msg import Header
 
-from ..scene.scene_solver import Answer
+from ..scene.scene_solver import Answer, id_of
 from ..scene.stamp_pairing import StampedPose
 from ..solver.checks import pose_fault, shown
-from ..solver.contact import Contact
+from ..solver.contact import Contact, patch_area
+
+try:
+    from box_contact_msgs import msg as _contact_messages
+except ImportError:  # a package of its own, which need not be here
+    _contact_messages = None
+ContactMessage: Any = getattr(_contact_messages, 'Contact', None)
+ContactsMessage: Any = getattr(_contact_messages, 'Contacts', None)
+"""Type of `contacts`; None where box_contact_msgs is not installed."""
 
 NANOSECONDS = 1_000_000_000
 
 PATCH_FIELDS = ('volume', 'cov_xx', 'cov_xy', 'cov_xz', 'cov_yy', 'cov_yz', 'cov_zz')
 """Volume [m³] and covariance [m²] of the overlap; NaN from models that give the point alone."""
+_ROUNDED = ('x', 'y', 'z')
+_POINT = ('point_x', 'point_y', 'point_z')
+_NORMAL = ('normal_x', 'normal_y', 'normal_z')
 CLOUD_ROW = np.dtype([
-    *((name, '<f8') for name in ('x', 'y', 'z', 'normal_x', 'normal_y', 'normal_z', 'depth')),
-    ('pair', '<u4'), *((name, '<f8') for name in PATCH_FIELDS)])
-"""One row of the `contacts` cloud: a pair in contact. Of a pair that could not be evaluated all is
-NaN but its id. float64, because float32 loses half a metre in UTM coordinates. Depth [m] is
-−separation. New fields come last, so that older ones keep their places."""
-_DATATYPES = {'<f8': PointField.FLOAT64, '<u4': PointField.UINT32}
+    *((name, '<f4') for name in _ROUNDED), ('pair', '<u4'),
+    *((name, '<f8') for name in (*_POINT, *_NORMAL, 'depth', *PATCH_FIELDS))])
+"""One row of the `contacts_cloud`: a pair in contact, or one that is closer than `margin`. All of a
+pair that could not be evaluated is NaN but its id. Depth [m] is −separation. Tools that draw clouds
+take x y z as float32. Float32 loses half a metre in UTM coordinates, so the point follows in
+float64. New fields come last, so that older ones keep their places."""
+_READ = tuple(name for name in CLOUD_ROW.names or () if name not in _ROUNDED)
+_OLD_NAMES = dict(zip(_POINT, _ROUNDED))
+"""Recordings of before have the point under these names alone, in float64."""
+_DATATYPES = {'<f4': PointField.FLOAT32, '<f8': PointField.FLOAT64, '<u4': PointField.UINT32}
 _FIELDS = [PointField(name=name, offset=entry[1], datatype=_DATATYPES[entry[0].str], count=1)
            for name, entry in (CLOUD_ROW.fields or {}).items()]
 _UPPER = np.triu_indices(3)  # in the order of the fields cov_xx to cov_zz
-_NAN = (float('nan'),) * 7
+_BLANK = np.zeros(1, CLOUD_ROW)  # the row of a pair that could not be evaluated
+for _name in {*(CLOUD_ROW.names or ())} - {'pair'}:
+    _BLANK[_name] = np.nan
 
 
 class Refused(ValueError):
@@ -69,19 +90,70 @@ def make_header(stamp: int, frame_id: str) -> Header:
 
 
 def make_cloud(header: Header, answer: Answer) -> PointCloud2:
-    """Make `contacts`: a row for each pair in contact, a row of NaN for each stale pair."""
-    rows = [(*c.point, *c.normal, -c.separation, pair.id, c.volume, *c.covariance[_UPPER])
-            for pair, c in answer.touching]
-    rows += [(*_NAN, pair.id, *_NAN) for pair in answer.stale]
+    """Make `contacts_cloud`: a row for each pair in contact or close, NaN for each stale pair."""
+    rows = np.repeat(_BLANK, len(answer.listed) + len(answer.stale))
+    for row, (pair, c) in zip(rows, answer.listed):
+        _fill(row, pair.id, c.point, c.normal, -c.separation, c.volume, c.covariance[_UPPER])
+    rows['pair'][len(answer.listed):] = [pair.id for pair in answer.stale]
+    _round(rows)
     return PointCloud2(header=header, height=1, width=len(rows), fields=_FIELDS,
                        is_bigendian=False, point_step=CLOUD_ROW.itemsize,
-                       row_step=CLOUD_ROW.itemsize * len(rows),
-                       data=np.array(rows, dtype=CLOUD_ROW).tobytes(),
-                       is_dense=not answer.stale)
+                       row_step=CLOUD_ROW.itemsize * len(rows), data=rows.tobytes(),
+                       is_dense=not answer.stale and not answer.close)
+
+
+def make_contacts(header: Header, answer: Answer) -> Any:
+    """Make `contacts` (box_contact_msgs/Contacts): pairs in contact, then close ones, by name."""
+    contacts = []
+    for pair, c in answer.listed:
+        x, y, z = map(float, c.point)
+        nx, ny, nz = map(float, c.normal)
+        contacts.append(ContactMessage(
+            pair=pair.label, box_a=pair.a, box_b=pair.b, point=Point(x=x, y=y, z=z),
+            normal=Vector3(x=nx, y=ny, z=nz), depth=-float(c.separation), volume=float(c.volume),
+            area=patch_area(c), covariance=c.covariance[_UPPER]))
+    return ContactsMessage(header=header, contacts=contacts,
+                           stale=[pair.label for pair in answer.stale])
+
+
+def _fill(row: Any, pair: int, point: Any, normal: Any, depth: float, volume: float,
+          upper: Any) -> None:
+    """Write the numbers of one contact to a row of CLOUD_ROW, but for `_round`."""
+    row['pair'], row['depth'], row['volume'] = pair, depth, volume
+    for names, values in ((_POINT, point), (_NORMAL, normal), (PATCH_FIELDS[1:], upper)):
+        for name, value in zip(names, values):
+            row[name] = value
+
+
+def _round(rows: np.ndarray) -> None:
+    """Write the points of rows as float32, too; what that cannot hold is infinite there."""
+    with np.errstate(over='ignore'):
+        for rounded, name in zip(_ROUNDED, _POINT):
+            rows[rounded] = rows[name]
+
+
+def read_contacts(message: Any, ids: Mapping[str, int] | None = None) -> np.ndarray:
+    """Return a message of contacts as rows (n,) of CLOUD_ROW: `Contacts`, or a PointCloud2.
+
+    ids: id of each pair by its name, `Scene.ids`; that of a pair that is not among them is
+    `id_of` its name. Stale pairs are rows of NaN. Raises Refused, as `read_cloud`.
+    """
+    if isinstance(message, PointCloud2):
+        return read_cloud(message)
+    known = ids or {}
+    rows = np.repeat(_BLANK, len(message.contacts) + len(message.stale))
+    for row, c in zip(rows, message.contacts):
+        point, normal = c.point, c.normal
+        _fill(row, known.get(c.pair, id_of(c.pair)), (point.x, point.y, point.z),
+              (normal.x, normal.y, normal.z), c.depth, c.volume, c.covariance)
+    rows['pair'][len(message.contacts):] = [
+        known.get(name, id_of(name)) for name in message.stale]
+    _round(rows)
+    return rows
 
 
 def read_cloud(message: PointCloud2) -> np.ndarray:
-    """Return the rows of a `contacts` cloud as an array (n,) of CLOUD_ROW.
+    """Return the rows of a `contacts_cloud` as an array (n,) of CLOUD_ROW.
 
     Fields are found by name, whatever their order, padding and byte order; others are ignored. A
     cloud without any of PATCH_FIELDS, from an older recording, has NaN there. Raises Refused, with
@@ -96,11 +168,10 @@ def read_cloud(message: PointCloud2) -> np.ndarray:
         raise Refused('bad cloud', f'{count} rows of {message.point_step} bytes are more than the '
                                    f'{len(data)} bytes of data')
     read = np.frombuffer(data, layout, count=count)
-    if layout == CLOUD_ROW:
-        return read
     rows = np.empty(count, dtype=CLOUD_ROW)
-    for name in CLOUD_ROW.names or ():
+    for name in _READ:
         rows[name] = read[name] if name in (layout.names or ()) else np.nan
+    _round(rows)
     return rows
 
 
@@ -108,7 +179,9 @@ def read_cloud(message: PointCloud2) -> np.ndarray:
 def _cloud_layout(fields: tuple[tuple[str, int, int, int], ...], step: int, big: bool) -> np.dtype:
     """Return where those of CLOUD_ROW's fields are that a cloud has, or raise Refused."""
     found = {name: rest for name, *rest in fields}
-    names = [name for name in CLOUD_ROW.names or ()
+    if found.keys().isdisjoint(_POINT):
+        found |= {name: found.pop(old) for name, old in _OLD_NAMES.items() if old in found}
+    names = [name for name in _READ
              if name not in PATCH_FIELDS or not found.keys().isdisjoint(PATCH_FIELDS)]
     for name in names:
         kind = CLOUD_ROW[name]
@@ -158,6 +231,10 @@ class TypedMessages:
         x, y, z = map(float, contact.normal)
         return Vector3Stamped(header=self._header, vector=Vector3(x=x, y=y, z=z))
 
-    def cloud(self, answer: Answer) -> PointCloud2:
+    def contacts(self, answer: Answer) -> Any:
         """Make `contacts`."""
+        return make_contacts(self._header, answer)
+
+    def cloud(self, answer: Answer) -> PointCloud2:
+        """Make `contacts_cloud`."""
         return make_cloud(self._header, answer)

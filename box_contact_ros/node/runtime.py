@@ -15,7 +15,7 @@ import rclpy
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
@@ -33,6 +33,9 @@ scene of a thousand pairs can be read."""
 ARRAY_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
 """Pose arrays, as pose inputs: a second at 100 Hz; 1,000 poses are 56 kB."""
 CONTACT_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)  # contact outputs
+LATCHED_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE,
+                         durability=DurabilityPolicy.TRANSIENT_LOCAL)
+"""For what changes rarely: whoever subscribes later gets the last message."""
 SPIN_SECONDS = 10.0
 """EventsExecutor hangs when it spins without a timeout, so it is spun in slices. Each leaves some
 32 bytes behind in rclpy (7.1): of slices this long, 0.3 MB a day."""

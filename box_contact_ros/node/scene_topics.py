@@ -1,4 +1,9 @@
-"""Topics of a scene: pose subscriptions of its moving boxes, contact publishers of its pairs."""
+"""Topics of a scene: pose subscriptions of its moving boxes, contact publishers of its pairs.
+
+All contacts of a tick go to `contacts` as box_contact_msgs/Contacts, where that package is
+installed, and to `contacts_cloud` as a PointCloud2, where it is asked for. `~/scene` is latched and
+has the scene as YAML, so that a reader far away, or of a recording, knows boxes and pairs.
+"""
 from __future__ import annotations
 
 from collections import Counter
@@ -14,17 +19,24 @@ from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import PointCloud2
+from std_msgs.msg import String
 
+from ..scene.files.scene_file import scene_text
 from ..scene.scene_solver import ALL_BOXES, Pair, Scene
 from ..solver.checks import shown
+from .messages import ContactsMessage
 from .qos_events import QosEvents
 from .rclpy_workarounds import RCLError, silence
-from .runtime import ARRAY_QOS, CONTACT_QOS, POSE_QOS
+from .runtime import ARRAY_QOS, CONTACT_QOS, LATCHED_QOS, POSE_QOS
 
 TOPICS_OF_EVERY_NODE = ('/diagnostics', '/parameter_events', '/rosout', '/clock')
 """Topics of other types than poses."""
 MOST_PAIRS_WITH_TOPICS = 1000
 """Two publishers a pair take milliseconds and memory, here and in every process that listens."""
+
+
+LARGEST_SCENE_TEXT = 2**20
+"""Bytes that `~/scene` has at most: some 10,000 pairs. Whoever joins later is sent all of them."""
 
 
 class PoseSource(NamedTuple):
@@ -36,10 +48,20 @@ class PoseSource(NamedTuple):
     deadline: float  # longest time [s] between poses that publishers must offer; 0: none
 
 
-class SceneTopics:
-    """Creates and destroys a node's topics, so that they are those of the current scene."""
+class Wanted(NamedTuple):
+    """Which topics a scene has, next to those of all contacts."""
 
-    contacts: Publisher  # the cloud of all pairs, there from the first `set_scene` to `close`
+    sources: Collection[PoseSource] = ()
+    pairs: Collection[Pair] = ()
+    cloud: bool = False
+
+
+class SceneTopics:
+    """Creates and destroys a node's topics, so that they are those of the current scene.
+
+    contacts, cloud: publishers of all contacts, from the first `set_scene` to `close`; None where
+    that message is not published.
+    """
 
     def __init__(self, node: Node, prefix: str, counts: Counter[str]) -> None:
         """Begin without topics; `prefix` stands before the names of contact topics."""
@@ -48,8 +70,10 @@ class SceneTopics:
         self.publishers: dict[Pair, tuple[Publisher, Publisher]] = {}  # of point and normal
         self._subscriptions: dict[PoseSource, Subscription] = {}
         self._callback_of: Callable[[str, str], Callable[[Any], None]] | None = None
-        self._is_open = False
-        self._wanted: tuple[Collection[PoseSource], Collection[Pair]] = (), ()
+        self.contacts: Publisher | None = None
+        self.cloud: Publisher | None = None
+        self._scene: Publisher | None = None
+        self._wanted = Wanted()
         self._pair_of_id: dict[int, Pair] = {}
 
     def check(self, scene: Scene, *, pair_topics: bool) -> None:
@@ -66,7 +90,8 @@ class SceneTopics:
         if pair_topics and len(scene.pairs) > MOST_PAIRS_WITH_TOPICS:
             raise ValueError(f'scene: {len(scene.pairs)} pairs are too many for topics of their '
                              f'own (at most {MOST_PAIRS_WITH_TOPICS}): set pair_topics to false')
-        own = [f'{self._prefix}contacts', '~/transition_event', *TOPICS_OF_EVERY_NODE]
+        own = [f'{self._prefix}contacts', f'{self._prefix}contacts_cloud', '~/scene',
+               '~/transition_event', *TOPICS_OF_EVERY_NODE]
         if pair_topics:
             own += [f'{self._topic_of(pair)}/{kind}' for pair in scene.pairs
                     for kind in ('point', 'normal')]
@@ -76,25 +101,30 @@ class SceneTopics:
                 raise ValueError(f'scene: pose_topic {shown(topic)} of box {box} is a topic of '
                                  'this node that carries no poses')
 
-    def set_scene(self, scene: Scene, *, pair_topics: bool, raw: bool, deadline: float) -> None:
+    def set_scene(self, scene: Scene, *, pair_topics: bool, cloud: bool, raw: bool,
+                  deadline: float) -> None:
         """Replace the topics by those of a scene; on RCLError bring the old ones back."""
-        old, was_open = self._wanted, self._is_open
+        old, was_open = self._wanted, self._scene is not None
         sources = [PoseSource(*source, raw, deadline) for source in scene.sources.items()]
         try:
-            self._change(sources, scene.pairs if pair_topics else ())
+            self._change(Wanted(sources, scene.pairs if pair_topics else (), cloud))
         except RCLError:
             if was_open:
-                self._change(*old)
+                self._change(old)
             else:
                 self.close()
             raise
         self._pair_of_id |= {pair.id: pair for pair in scene.pairs if pair.name}
+        assert self._scene is not None
+        text = scene_text(scene)
+        self._scene.publish(String(data=text if len(text.encode()) <= LARGEST_SCENE_TEXT else (
+            f'# {len(scene.pairs)} pairs: more than {LARGEST_SCENE_TEXT} bytes\n')))
 
     def activate(self, callback_of: Callable[[str, str], Callable[[Any], None]]) -> None:
         """Subscribe to all poses, with the callback for a box and its topic; or raise RCLError."""
         self._callback_of = callback_of
         try:
-            self._change(*self._wanted)
+            self._change(self._wanted)
         except RCLError:
             self.deactivate()
             raise
@@ -107,10 +137,10 @@ class SceneTopics:
     def close(self) -> None:
         """Destroy all publishers."""
         self._unpublish(list(self.publishers))
-        if self._is_open:
-            self.events.unwatch(self.contacts)
-            self._node.destroy_publisher(self.contacts)
-        self._is_open, self._wanted = False, ((), ())
+        for publisher in (self.contacts, self.cloud, self._scene):
+            self._end(publisher)
+        self.contacts = self.cloud = self._scene = None
+        self._wanted = Wanted()
 
     def pose_topics(self) -> list[str]:
         """Return the full names of the topics that are subscribed to."""
@@ -127,24 +157,39 @@ class SceneTopics:
             reason = str(error).partition(', at ')[0]
             raise ValueError(f'scene: {shown(topic)}: {reason}') from error
 
-    def _change(self, sources: Collection[PoseSource], pairs: Collection[Pair]) -> None:
+    def _change(self, wanted: Wanted) -> None:
         """Keep the topics that stay, destroy the others, create what is new."""
-        self._wanted = sources, pairs
-        self._unsubscribe(self._subscriptions.keys() - set(sources))
-        if not self._is_open:
-            self.contacts = self._node.create_publisher(
-                PointCloud2, f'{self._prefix}contacts', CONTACT_QOS)
-            self.events.watch(self.contacts)
-            self._is_open = True
-        self._unpublish(self.publishers.keys() - set(pairs))
-        for pair in pairs:
+        self._wanted = wanted
+        self._unsubscribe(self._subscriptions.keys() - set(wanted.sources))
+        if self._scene is None:
+            self._scene = self._create(String, '~/scene', LATCHED_QOS)
+        if self.contacts is None and ContactsMessage is not None:
+            self.contacts = self._create(ContactsMessage, f'{self._prefix}contacts')
+        if self.cloud is None and wanted.cloud:
+            self.cloud = self._create(PointCloud2, f'{self._prefix}contacts_cloud')
+        elif not wanted.cloud:
+            self._end(self.cloud)
+            self.cloud = None
+        self._unpublish(self.publishers.keys() - set(wanted.pairs))
+        for pair in wanted.pairs:
             if pair not in self.publishers:
                 self.publishers[pair] = self._publish(pair)
-        for source in sources:
+        for source in wanted.sources:
             if self._callback_of is not None and source not in self._subscriptions:
                 callback = self._callback_of(source.box, source.topic)
                 subscription = self._subscriptions[source] = self._subscribe(source, callback)
                 self.events.watch(subscription)
+
+    def _create(self, kind: type, topic: str, qos: QoSProfile = CONTACT_QOS) -> Publisher:
+        """Return a new publisher whose events are served."""
+        publisher = self._node.create_publisher(kind, topic, qos)
+        self.events.watch(publisher)
+        return publisher
+
+    def _end(self, publisher: Publisher | None) -> None:
+        if publisher is not None:
+            self.events.unwatch(publisher)
+            self._node.destroy_publisher(publisher)
 
     def _publish(self, pair: Pair) -> tuple[Publisher, Publisher]:
         def publisher(kind: type, topic: str) -> Publisher:

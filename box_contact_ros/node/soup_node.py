@@ -34,7 +34,8 @@ class SoupNode(ContactNode):
     @staticmethod
     def make_solver(settings: Mapping[str, Any], scene: Scene) -> SceneSolver:
         """Return the solver for a soup of so many divisions."""
-        return SceneSolver(scene, model=f'soup-{settings["divisions"]}')
+        return SceneSolver(scene, model=f'soup-{settings["divisions"]}',
+                           margin=settings['margin'])
 
 
 def main(args: Sequence[str] | None = None) -> int:

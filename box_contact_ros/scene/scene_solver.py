@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core import native
+from ..core import LENGTH_MAX, native
 from ..solver.checks import absent_poses, as_floats, pose_fault, shown, size_fault
 from ..solver.contact import Contact
 from ..solver.contact_solver import ContactSolver
@@ -51,6 +51,11 @@ class Pair(NamedTuple):
     a: str
     b: str
 
+    @property
+    def label(self) -> str:
+        """Return what messages call the pair: its name, or `a_b` where it has none."""
+        return self.name or f'{self.a}_{self.b}'
+
     @classmethod
     def between(cls, a: str, b: str) -> Pair:
         """Return the pair of two boxes, with the name and id that a scene file gives it."""
@@ -82,6 +87,11 @@ class Scene:
         listed = {name for pair in self.pairs for name in (pair.a, pair.b)}
         return tuple(name for name, box in self.boxes.items()
                      if box.pose is None and (self.pose_array or name in listed))
+
+    @cached_property
+    def ids(self) -> Mapping[str, int]:
+        """Ids of the pairs by what messages call them."""
+        return {pair.label: pair.id for pair in self.pairs}
 
     @cached_property
     def sources(self) -> Mapping[str, str]:
@@ -157,6 +167,13 @@ class Answer(NamedTuple):
     stale: list[Pair]
     """The pairs that could not be evaluated, because a box has no pose that is recent enough."""
     near: int  # how many pairs the broad phase left to the solver
+    close: Sequence[tuple[Pair, Contact]] = ()
+    """The pairs apart whose separation is at most `margin`; their contacts are not colliding."""
+
+    @property
+    def listed(self) -> list[tuple[Pair, Contact]]:
+        """Return the pairs that messages list: those in contact, then the close ones."""
+        return [*self.touching, *self.close] if self.close else self.touching
 
 
 class SceneSolver:
@@ -167,12 +184,18 @@ class SceneSolver:
     """
 
     def __init__(self, scene: Scene, *, model: str = 'mlp', weights: str | None = None,
-                 ) -> None:
+                 margin: float = 0.0) -> None:
+        """Begin without poses; `margin` [m] is up to which separation pairs apart are listed."""
+        if not 0.0 <= margin <= LENGTH_MAX:
+            raise ValueError(f'margin must lie within 0 and {LENGTH_MAX:g} m, not {margin:g}')
         self.scene = scene
         self.model = model
+        self.margin = margin
         numbers = {name: number for number, name in enumerate(scene.boxes)}
         boxes = list(scene.boxes.values())
         self._size = np.array([box.size for box in boxes], dtype=float)
+        self._bounded = np.minimum(self._size + margin, LENGTH_MAX)
+        """Extents that bounding boxes are made of: those of two close boxes meet."""
         self._first = np.array([numbers[pair.a] for pair in scene.pairs])
         self._second = np.array([numbers[pair.b] for pair in scene.pairs])
         self._moving = np.array([numbers[name] for name in scene.moving])
@@ -211,8 +234,9 @@ class SceneSolver:
         number of a box whose pose is not valid.
         """
         pairs = slice(None) if listed else slice(0)
-        return native.near_pairs(self._poses, self._size, moved, self._low, self._high, self._known,
-                                 self._first[pairs], self._second[pairs], self._near, self._unknown)
+        return native.near_pairs(
+            self._poses, self._bounded, moved, self._low, self._high, self._known,
+            self._first[pairs], self._second[pairs], self._near, self._unknown)
 
     def _key(self, one: np.ndarray, other: np.ndarray) -> np.ndarray:
         """Return a number for every two boxes, the same for both orders."""
@@ -275,8 +299,11 @@ class SceneSolver:
             if a is None or b is None:
                 return Answer([], [self._only], 0)
             contact = self._solver(a, b)
+            found = [(self._only, contact)]
+            if contact.colliding:
+                return _new_tuple(Answer, (found, [], 1, ()))
             return _new_tuple(
-                Answer, ([(self._only, contact)] if contact.colliding else [], [], 1))
+                Answer, ([], [], 1, found if contact.separation <= self.margin else ()))
         for number, pose in zip(self._moving, poses, strict=True):
             self._known[number] = pose is not None
             if pose is not None:
@@ -291,13 +318,16 @@ class SceneSolver:
         near, unknown = self._broad_phase()
         pairs = self.scene.pairs
         stale = [pairs[i] for i in unknown]
-        touching = []
+        touching: list[tuple[Pair, Contact]] = []
+        close: list[tuple[Pair, Contact]] = []
         if len(near):
             first, second = self._first[near], self._second[near]
             found = self._solver.batch(self._poses[first], self._poses[second],
                                        size_a=self._size[first], size_b=self._size[second])
-            for row in np.flatnonzero(found.colliding):
-                touching.append((pairs[near[row]], Contact(
-                    True, float(found.separation[row]), found.normal[row], found.point[row],
+            for row in np.flatnonzero(found.separation <= self.margin if self.margin
+                                      else found.colliding):
+                colliding = bool(found.colliding[row])
+                (touching if colliding else close).append((pairs[near[row]], Contact(
+                    colliding, float(found.separation[row]), found.normal[row], found.point[row],
                     float(found.volume[row]), found.covariance[row])))
-        return Answer(touching, stale, len(near))
+        return Answer(touching, stale, len(near), close)

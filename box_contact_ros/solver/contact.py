@@ -1,6 +1,7 @@
 """What a solver returns: one contact, or the contacts of many pairs as arrays."""
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -26,6 +27,21 @@ class Contact(NamedTuple):
 
     Volume and covariance are those of the overlap whose centroid is `point`, pressed in or not.
     """
+
+
+def patch_area(contact: Contact) -> float:
+    """Return the area of a contact's patch [m²]: 12·√(e₁·e₂), NaN where there is no covariance.
+
+    e₁ and e₂ are the eigenvalues of the covariance across the normal. Their product is
+    n·adj(C)·n. The area is exact where the overlap is a cuboid along the normal.
+    """
+    xx, xy, xz, _, yy, yz, _, _, zz = contact.covariance.ravel().tolist()
+    x, y, z = contact.normal.tolist()
+    product = (x * x * (yy * zz - yz * yz) + y * y * (xx * zz - xz * xz)
+               + z * z * (xx * yy - xy * xy) + 2.0 * (
+                   x * y * (xz * yz - xy * zz) + x * z * (xy * yz - xz * yy)
+                   + y * z * (xy * xz - xx * yz)))
+    return 12.0 * math.sqrt(max(product, 0.0))  # rounding may leave a line's product below zero
 
 
 class Contacts(NamedTuple):

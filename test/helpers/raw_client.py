@@ -9,8 +9,6 @@ from geometry_msgs.msg import PoseStamped
 from rclpy.qos import QoSProfile
 from ros_client import PATIENCE, Client
 
-from box_contact_ros.node.messages import read_cloud
-
 ORIGIN = poses.IDENTITY
 TOUCHING = np.array([0.5, 0.25, 1.875, 0, 0, 0, 1])  # 0.125 m deep
 APART = np.array([0.5, 0.25, 2.5, 0, 0, 0, 1])
@@ -67,7 +65,7 @@ class RawClient(Client):
             assert len(sent) < 6, 'no answer'
             sent.append(self.send(ORIGIN, TOUCHING))
             self.spin(lambda: sent[-1] in self.clouds, PATIENCE / 6)
-        row, = read_cloud(next(self.clouds[stamp] for stamp in sent if stamp in self.clouds))
+        row, = self.rows(next(stamp for stamp in sent if stamp in self.clouds))
         assert row['depth'] == 0.125
         assert (row['normal_x'], row['normal_y'], row['normal_z']) == (0, 0, 1)
         point = np.array([row['x'], row['y'], row['z']])

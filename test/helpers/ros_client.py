@@ -3,7 +3,7 @@ from __future__ import annotations
 
 import gc
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import contextmanager
 from queue import SimpleQueue
@@ -17,9 +17,9 @@ from geometry_msgs.msg import PointStamped, PoseStamped, Vector3Stamped
 from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
-from sensor_msgs.msg import PointCloud2
 
-from box_contact_ros.node.messages import NANOSECONDS, make_header
+from box_contact_ros.apps.ros_client import ANSWERS
+from box_contact_ros.node.messages import NANOSECONDS, make_header, read_contacts
 from box_contact_ros.node.rclpy_workarounds import ends_within
 from box_contact_ros.node.runtime import make_executor
 from box_contact_ros.solver.contact import Contact
@@ -38,19 +38,20 @@ def stamp_of(message: Any) -> int:
 
 
 def row_of(contact: Contact) -> tuple[float, ...]:
-    """Return the row of pair 0 in a `contacts` cloud that says all of a contact."""
-    return (*contact.point, *contact.normal, -contact.separation, 0, contact.volume,
-            *contact.covariance[np.triu_indices(3)])
+    """Return the row of pair 0 that says all of a contact; the first three are float32."""
+    return (*contact.point.astype('<f4'), 0, *contact.point, *contact.normal, -contact.separation,
+            contact.volume, *contact.covariance[np.triu_indices(3)])
 
 
 class Client:
     """Talks to a contact node under `namespace` (like '' or '/yard').
 
     A node that answers with a cloud has matched the points and normals too, those of `pairs`
-    included: readers are made known in the order in which they are made, and clouds come last.
+    included: readers are made known in the order in which they are made, and contacts come last.
     """
 
     pairs: tuple[str, ...] = ()
+    ids: Mapping[str, int] = {'box_a_box_b': 0}  # of the pairs of the scene, by name
 
     def __init__(self, namespace: str = '') -> None:
         self.context = Context()
@@ -60,7 +61,7 @@ class Client:
         self.executor.add_node(self.node)
         self.points: dict[int, PointStamped] = {}
         self.normals: dict[int, Vector3Stamped] = {}
-        self.clouds: dict[int, PointCloud2] = {}
+        self.clouds: dict[int, Any] = {}  # contacts of all pairs, one message for each evaluation
         self.of_pair: dict[str, dict[int, PointStamped]] = {pair: {} for pair in self.pairs}
         self.order: list[tuple[str, int]] = []
         self.diagnostics: list[DiagnosticArray] = []
@@ -71,7 +72,7 @@ class Client:
                     for pair, kept in self.of_pair.items())
         for kind, topic, kept in (*of_pairs, (PointStamped, 'contact/point', self.points),
                                   (Vector3Stamped, 'contact/normal', self.normals),
-                                  (PointCloud2, 'contacts', self.clouds)):
+                                  (*ANSWERS['cloud'], self.clouds)):
             self.node.create_subscription(kind, topic, self._keep(topic, kept), deep)
         self.node.create_subscription(DiagnosticArray, '/diagnostics',
                                       self.diagnostics.append, 10)
@@ -82,6 +83,10 @@ class Client:
             kept[stamp_of(message)] = message
             self.order.append((topic, stamp_of(message)))
         return callback
+
+    def rows(self, stamp: int) -> np.ndarray:
+        """Return the contacts of an evaluation, as rows of CLOUD_ROW."""
+        return read_contacts(self.clouds[stamp], self.ids)
 
     def next_stamp(self) -> int:
         """Return a stamp [ns] later than any before."""

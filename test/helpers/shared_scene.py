@@ -9,15 +9,17 @@ from __future__ import annotations
 import sys
 import time
 from collections import defaultdict
+from typing import Any
 
 import numpy as np
 import rclpy
 from geometry_msgs.msg import PoseStamped
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
-from sensor_msgs.msg import PointCloud2
 
-from box_contact_ros.node.messages import make_header, read_cloud
+from box_contact_ros.apps.bench.answer_log import first_row
+from box_contact_ros.apps.ros_client import ANSWERS
+from box_contact_ros.node.messages import make_header, read_contacts
 from box_contact_ros.node.runtime import make_executor
 from box_contact_ros.scene.files.scene_file import read_scene
 from box_contact_ros.scene.scene_solver import SceneSolver
@@ -30,7 +32,8 @@ SAME = 1e-9
 
 def main(path: str, nodes: int, ticks: int) -> int:
     """Play, listen, compare."""
-    solver = SceneSolver(read_scene(path))
+    scene = read_scene(path)
+    solver = SceneSolver(scene)
     context = rclpy.Context()
     rclpy.init(context=context)
     node = Node('listener', context=context)
@@ -38,11 +41,11 @@ def main(path: str, nodes: int, ticks: int) -> int:
     executor.add_node(node)
     clouds: dict[int, list[np.ndarray]] = defaultdict(list)
 
-    def keep(message: PointCloud2) -> None:
+    def keep(message: Any) -> None:
         stamp = message.header.stamp
-        clouds[stamp.sec * 10**9 + stamp.nanosec].append(read_cloud(message))
+        clouds[stamp.sec * 10**9 + stamp.nanosec].append(read_contacts(message, scene.ids))
 
-    node.create_subscription(PointCloud2, 'contacts', keep, QoSProfile(depth=1000))
+    node.create_subscription(*ANSWERS['cloud'], keep, QoSProfile(depth=1000))
     publisher = node.create_publisher(PoseStamped, 'load/pose', QoSProfile(depth=1000))
 
     def send(pose: np.ndarray) -> int:
@@ -74,11 +77,12 @@ def main(path: str, nodes: int, ticks: int) -> int:
     lost = sum(len(clouds[stamp]) < nodes for stamp, _ in sent)
     wrong = contacts = most = 0
     for stamp, pose in sent:
-        found = {int(row['pair']): row for rows in clouds[stamp] for row in rows}
+        found = {int(rows[n]['pair']): first_row(rows[n:])
+                 for rows in clouds[stamp] for n in range(len(rows))}
         wanted = {pair.id: contact for pair, contact in solver([pose]).touching}
         contacts, most = contacts + len(wanted), max(most, len(wanted))
         wrong += found.keys() != wanted.keys() or any(
-            not np.allclose(list(found[key])[:7], [*c.point, *c.normal, -c.separation], rtol=0,
+            not np.allclose(found[key][:7], [*c.point, *c.normal, -c.separation], rtol=0,
                             atol=SAME) for key, c in wanted.items())
     print(f'{ticks} ticks, {lost} lost, {wrong} wrong, {contacts} contacts, up to {most} at a time')
     return 0 if not lost and not wrong and most >= 4 else 1

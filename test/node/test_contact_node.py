@@ -15,8 +15,8 @@ from rclpy.parameter import Parameter
 from ros_client import PATIENCE, Client, row_of, serving
 
 from box_contact_ros import ContactSolver
+from box_contact_ros.apps.ros_client import ANSWERS
 from box_contact_ros.node.contact_node import PARAMETERS, ContactNode
-from box_contact_ros.node.messages import read_cloud
 
 ORIGIN = poses.IDENTITY
 TOUCHING = np.array([0.5, 0.25, 1.875, 0, 0, 0, 1])
@@ -56,17 +56,17 @@ def test_answers_with_point_normal_and_cloud(node, client):
     assert point.header.frame_id == 'yard'
     assert (point.point.x, point.point.y, point.point.z) == tuple(wanted.point)
     assert (normal.vector.x, normal.vector.y, normal.vector.z) == tuple(wanted.normal)
-    row, = read_cloud(cloud)
+    row, = client.rows(stamp)
     assert tuple(row) == row_of(wanted)
     # The cloud comes last, so a reader of it knows that point and normal are out.
     assert [topic for topic, at in client.order if at == stamp] == [
-        'contact/point', 'contact/normal', 'contacts']
+        'contact/point', 'contact/normal', ANSWERS['cloud'][1]]
 
 
 def test_no_contact_is_an_empty_cloud(node, client):
     client.offer_until_answered(ORIGIN, APART)
     stamp = client.ask(ORIGIN, APART)
-    assert client.clouds[stamp].width == 0 and len(client.clouds[stamp].data) == 0
+    assert len(client.rows(stamp)) == 0
     assert stamp not in client.points and stamp not in client.normals
 
 
@@ -81,7 +81,7 @@ def test_poses_pair_by_stamp_in_any_order(node, client):
         client.send(ORIGIN, None, stamps=(stamp, 0))
     assert client.spin(lambda: all(stamp in client.clouds for stamp in stamps))
     for stamp in stamps:
-        row, = read_cloud(client.clouds[stamp])
+        row, = client.rows(stamp)
         assert row['depth'] == pytest.approx(2 - heights[stamp], abs=1e-14)
 
 
@@ -167,7 +167,7 @@ def test_parameters_are_checked_before_they_are_applied(node, client):
     client.offer_until_answered(ORIGIN, APART)
     result, = node.set_parameters([Parameter('size_a', value=[2, 2, 3])])
     assert result.successful
-    row, = read_cloud(client.clouds[client.ask(ORIGIN, APART)])
+    row, = client.rows(client.ask(ORIGIN, APART))
     assert row['depth'] == 0.0
     assert list(node.get_parameter('size_b').value) == [2.0, 2.0, 2.0]
 

@@ -28,9 +28,9 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from ros_client import PATIENCE, stamp_of
 from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import PointCloud2
 
-from box_contact_ros.node.messages import make_header, read_cloud
+from box_contact_ros.apps.ros_client import ANSWERS
+from box_contact_ros.node.messages import make_header
 
 CUBES = ('--ros-args', '-p', 'size_a:=[2.0, 2.0, 2.0]', '-p', 'size_b:=[2.0, 2.0, 2.0]')
 LEAK = 8.0
@@ -118,8 +118,8 @@ def test_100_000_messages_that_are_none(start, client):
     # Three of four kinds are almost never a PoseStamped, the fourth varies.
     assert counts['refused: not a PoseStamped'] > 0.7 * counts['poses']
     assert 'refused: internal error' not in counts
-    for cloud in client.clouds.values():
-        for row in read_cloud(cloud):
+    for stamp in client.clouds:
+        for row in client.rows(stamp):
             assert math.isnan(row['depth']) or np.isfinite(list(row)[:8]).all()  # but the patch
 
 
@@ -145,7 +145,7 @@ def test_half_of_the_poses_are_none(start, client, serialization):
     assert client.spin(lambda: all(stamp in client.clouds for stamp in good)), sum(
         stamp not in client.clouds for stamp in good)
     for stamp, height in good.items():
-        rows = read_cloud(client.clouds[stamp])
+        rows = client.rows(stamp)
         assert len(rows) == (height <= 2.0)
         assert all(row['depth'] == pytest.approx(2.0 - height, abs=1e-14) for row in rows)
     assert not any(stamp in client.clouds for stamp in refused)
@@ -241,19 +241,19 @@ def test_a_storm_of_parameters(start, client):
     success = [future.result().results[0].successful for future in futures]
     assert success == [number % 4 < 2 for number in range(len(futures))]
     depths = {round(float(row['depth']), 9) for stamp in stamps
-              for row in read_cloud(client.clouds[stamp])}
+              for row in client.rows(stamp)}
     assert depths == {0.05}
     change(0)  # the first of the four
     assert client.spin(futures[-1].done)
-    assert client.clouds[client.ask(ORIGIN, (0, 0, 2.05, 0, 0, 0, 1))].width == 0
+    assert not len(client.rows(client.ask(ORIGIN, (0, 0, 2.05, 0, 0, 0, 1))))
 
 
 READER = """
 import rclpy
-from sensor_msgs.msg import PointCloud2
+from box_contact_ros.apps.ros_client import ANSWERS
 rclpy.init()
 node = rclpy.create_node('reader')
-node.create_subscription(PointCloud2, 'contacts', lambda _: print('heard', flush=True), 10)
+node.create_subscription(*ANSWERS['cloud'], lambda _: print('heard', flush=True), 10)
 rclpy.spin(node)
 """
 
@@ -324,7 +324,8 @@ def test_topics_go_while_others_ask_for_what_they_do_not_offer(start, client):
     scenes = [f'{{boxes: {{{boxes}}}, pairs: [' + ', '.join(
         f'{{id: {100 * n + k}, name: p{n}_{k}, a: b{k}, b: b{k + 1}}}' for k in range(11)) + ']}'
         for n in (1, 2)]
-    topics = ['contacts'] + [f'p{n}_{k}/contact/point' for n in (1, 2) for k in range(11)]
+    kind, contacts = ANSWERS['cloud']
+    topics = [contacts] + [f'p{n}_{k}/contact/point' for n in (1, 2) for k in range(11)]
     late = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     others = Node('others', context=client.context)
     stop = Event()
@@ -332,7 +333,7 @@ def test_topics_go_while_others_ask_for_what_they_do_not_offer(start, client):
     def come_and_go():
         while not stop.is_set():
             subscriptions = [others.create_subscription(
-                PointCloud2 if topic == 'contacts' else PointStamped, topic, print, late)
+                kind if topic == contacts else PointStamped, topic, print, late)
                 for topic in topics]
             time.sleep(0.02)
             for subscription in subscriptions:

@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import struct
+from itertools import product
 
 import numpy as np
 import pytest
@@ -17,10 +18,12 @@ from box_contact_ros.node.message_bytes import KEPT_FRAMES, RawMessages
 from box_contact_ros.node.messages import (
     CLOUD_ROW,
     PATCH_FIELDS,
+    ContactsMessage,
     Refused,
     TypedMessages,
     make_header,
     read_cloud,
+    read_contacts,
 )
 from box_contact_ros.scene.scene_solver import Answer, Pair
 from box_contact_ros.solver.contact import Contact
@@ -28,6 +31,7 @@ from box_contact_ros.solver.contact import Contact
 STAMPS = st.integers(-2**31 * 10**9, 2**31 * 10**9 - 1)
 FRAMES = st.text(st.characters(exclude_characters='\0\N{REPLACEMENT CHARACTER}',
                                exclude_categories=['Cs']), max_size=30)
+NAMES = st.text(st.characters(exclude_characters='\0', exclude_categories=['Cs']), max_size=12)
 FLOATS = st.floats(width=64)
 BOUNDED = st.floats(-1e50, 1e50)
 
@@ -63,23 +67,33 @@ def test_poses_are_read_alike(poses):
             typed.read_pose, one)
 
 
+APART = Contact(False, 0.5, np.full(3, np.nan), np.full(3, np.nan), 0.0, np.full((3, 3), np.nan))
+
+
 def contact(draw):
     three = st.tuples(*[BOUNDED] * 3)
     return Contact(True, draw(BOUNDED), np.array(draw(three)), np.array(draw(three)),
                    draw(FLOATS), np.array(draw(st.tuples(three, three, three))))
 
 
-@given(st.data(), STAMPS, FRAMES, st.integers(0, 4), st.integers(0, 3))
-def test_answers_are_written_alike(data, stamp, frame_id, touching, stale):
+@given(st.data(), STAMPS, FRAMES, st.integers(0, 4), st.integers(0, 2), st.integers(0, 3))
+def test_answers_are_written_alike(data, stamp, frame_id, touching, close, stale):
     """Decoded, the bytes are the objects.
 
-    Any number of rows, any frame (its length moves all that follows), rows of NaN for stale pairs.
+    Any number of rows, any frame and names (their lengths move all that follows), pairs that are
+    close, pairs that are stale.
     """
-    pairs = [Pair(n * 10**9 % 2**32, 'p', 'a', 'b') for n in range(touching + stale)]
-    answer = Answer([(pair, contact(data.draw)) for pair in pairs[:touching]], pairs[touching:], 0)
+    pairs = [Pair(n * 10**9 % 2**32, *data.draw(st.tuples(*[NAMES] * 3)))
+             for n in range(touching + close + stale)]
+    close_pairs = pairs[touching:touching + close]
+    answer = Answer([(pair, contact(data.draw)) for pair in pairs[:touching]],
+                    pairs[touching + close:], 0, [(pair, APART) for pair in close_pairs])
     raw, typed = RawMessages(), TypedMessages()
     for messages in (raw, typed):
         messages.begin(stamp, frame_id)
+    if ContactsMessage is not None:
+        found = deserialize_message(raw.contacts(answer), ContactsMessage)
+        assert str(found) == str(typed.contacts(answer))  # as text, where NaN is NaN
     cloud = deserialize_message(raw.cloud(answer), PointCloud2)
     wanted = typed.cloud(answer)
     assert bytes(cloud.data) == bytes(wanted.data)
@@ -149,11 +163,16 @@ def as_message(rows, *, only=None, **changes):
     return PointCloud2(**given | changes)
 
 
+FLOAT64S = [name for name in CLOUD_ROW.names if CLOUD_ROW[name] == np.float64]
+
+
 def some_rows(layout=CLOUD_ROW):
-    """Two rows, each number another one; float32 would lose x."""
+    """Two rows, each float64 another one; float32 would lose point_x."""
     rows = np.zeros(2, dtype=layout)
-    for place, name in enumerate(CLOUD_ROW.names):
+    for place, name in enumerate(FLOAT64S):
         rows[name] = 4_000_000.123456789 + place, place
+    for name in 'xyz':
+        rows[name] = rows[f'point_{name}']
     rows['pair'] = 7, 2**32 - 1
     return rows
 
@@ -163,26 +182,27 @@ def test_a_cloud_is_read_by_its_field_names(order):
     """Fields may come in any order, with padding and others between, in either byte order."""
     names = [*reversed(CLOUD_ROW.names), 'colour']
     layout = np.dtype({
-        'names': names, 'offsets': [4 + 12 * place for place in range(len(names))], 'itemsize': 200,
-        'formats': [f'{order}u4' if name in ('pair', 'colour') else f'{order}f8'
+        'names': names, 'offsets': [4 + 12 * place for place in range(len(names))], 'itemsize': 224,
+        'formats': [f'{order}u4' if name == 'colour' else CLOUD_ROW[name].newbyteorder(order)
                     for name in names]})
     assert np.array_equal(read_cloud(as_message(some_rows(layout))), some_rows())
 
 
-def test_a_cloud_of_before_the_patch_has_none():
-    """Recordings without volume and covariance are read; what they do not say is NaN."""
-    old = np.dtype([(name, CLOUD_ROW[name]) for name in CLOUD_ROW.names
-                    if name not in PATCH_FIELDS])
-    assert old.itemsize == 60
+@pytest.mark.parametrize('patch', [(), PATCH_FIELDS])
+def test_an_older_cloud_is_read(patch):
+    """Recordings have the point as x y z in float64, some neither volume nor covariance."""
+    names = ('x', 'y', 'z', 'normal_x', 'normal_y', 'normal_z', 'depth', 'pair', *patch)
+    old = np.dtype([(name, '<u4' if name == 'pair' else '<f8') for name in names])
     rows = np.zeros(2, old)
-    rows['depth'], rows['pair'] = (0.1, 0.2), (3, 5)
+    rows['x'], rows['depth'], rows['pair'] = 4_000_000.123456789, (0.1, 0.2), (3, 5)
     read = read_cloud(as_message(rows))
     assert read['depth'].tolist() == [0.1, 0.2] and read['pair'].tolist() == [3, 5]
-    assert all(np.isnan(read[name]).all() for name in PATCH_FIELDS)
-    assert np.isnan(touch_in(first_row(read)).covariance).all()
+    assert read['point_x'].tolist() == [4_000_000.123456789] * 2
+    assert all(np.isnan(read[name]).all() != bool(patch) for name in PATCH_FIELDS)
+    assert np.isnan(touch_in(first_row(read)).covariance).all() != bool(patch)
 
 
-@pytest.mark.parametrize('name', CLOUD_ROW.names)
+@pytest.mark.parametrize('name', ['pair', *FLOAT64S])
 def test_a_wrong_field_is_refused_by_its_name(name):
     """Missing; of another type; more than one number; outside its row."""
     rows = some_rows()
@@ -190,7 +210,7 @@ def test_a_wrong_field_is_refused_by_its_name(name):
     with pytest.raises(Refused, match=f"field '{name}' is missing"):
         read_cloud(as_message(rows, only=others))
     for change, words in (({'datatype': PointField.FLOAT32}, 'datatype 7'), ({'count': 2}, '2 of'),
-                          ({'offset': 113}, 'outside its row')):
+                          ({'offset': 125}, 'outside its row')):
         cloud = as_message(rows)
         field, = (field for field in cloud.fields if field.name == name)
         for attribute, value in change.items():
@@ -200,7 +220,7 @@ def test_a_wrong_field_is_refused_by_its_name(name):
 
 
 def test_a_cloud_that_is_cut_short_is_refused():
-    with pytest.raises(Refused, match='2 rows of 116 bytes are more than the 231 bytes'):
+    with pytest.raises(Refused, match='2 rows of 128 bytes are more than the 255 bytes'):
         read_cloud(as_message(some_rows(), data=some_rows().tobytes()[:-1]))
 
 
@@ -213,12 +233,14 @@ def test_a_row_is_the_contact_again():
     """First row to `Contact`: every number to the bit, the covariance symmetric again."""
     wanted = ContactSolver((2, 3, 1), (1, 2, 2), model='exact')(
         (0, 0, 0, 0, 0, 0, 1), (0.3, 0.4, 1.2, 0.1, 0.2, 0.3, 0.9))
-    for messages in (RawMessages(), TypedMessages()):
+    answer = Answer([(Pair(0, 'p', 'a', 'b'), wanted)], [], 1)
+    kinds = {'cloud': PointCloud2} | ({'contacts': ContactsMessage} if ContactsMessage else {})
+    for messages, name in product((RawMessages(), TypedMessages()), kinds):
         messages.begin(0, 'map')
-        cloud = messages.cloud(Answer([(Pair(0, 'p', 'a', 'b'), wanted)], [], 1))
+        message = getattr(messages, name)(answer)
         if messages.raw:
-            cloud = deserialize_message(cloud, PointCloud2)
-        found = touch_in(first_row(read_cloud(cloud)))
+            message = deserialize_message(message, kinds[name])
+        found = touch_in(first_row(read_contacts(message)))
         assert (found.separation, found.volume) == (wanted.separation, wanted.volume)
         for name in ('point', 'normal', 'covariance'):
             assert np.array_equal(getattr(found, name), getattr(wanted, name))

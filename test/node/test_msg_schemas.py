@@ -26,20 +26,25 @@ from rclpy.qos import (
     QoSProfile,
     ReliabilityPolicy,
 )
-from ros_client import Client, serving
-from sensor_msgs.msg import PointField
+from ros_client import Client, serving, stamp_of
+from sensor_msgs.msg import PointCloud2, PointField
+from std_msgs.msg import String
 
 from box_contact_ros.core import LENGTH_MAX, QUATERNION_MAX
 from box_contact_ros.node.contact_node import PARAMETERS, ContactNode
 from box_contact_ros.node.messages import (
     CLOUD_ROW,
     PATCH_FIELDS,
+    ContactsMessage,
     make_cloud,
+    make_contacts,
     make_header,
     read_cloud,
 )
+from box_contact_ros.node.runtime import LATCHED_QOS
 from box_contact_ros.resources import resource_path
 from box_contact_ros.scene.scene_solver import Answer, Pair
+from box_contact_ros.solver.contact import Contact
 
 ROOT = Path(__file__).resolve().parents[2]
 FOLDER = resource_path('msg_schemas')
@@ -278,7 +283,8 @@ def test_shared_definitions_agree():
 
 @pytest.fixture(scope='module')
 def node():
-    settings = {'size_a': [2.0, 2.0, 2.0], 'size_b': [2.0, 2.0, 2.0], 'model': 'exact'}
+    settings = {'size_a': [2.0, 2.0, 2.0], 'size_b': [2.0, 2.0, 2.0], 'model': 'exact',
+                'contacts_cloud': True}
     with serving(lambda context: ContactNode(context, parameter_overrides=[
             Parameter(name, value=value) for name, value in settings.items()])) as node:
         yield node
@@ -319,7 +325,7 @@ def live_arrays(array_node) -> list[PoseArray]:
                 message.header = make_header(stamp, 'map')
                 publisher.publish(message)
                 client.spin(partial(client.clouds.__contains__, stamp), 0.1)
-            found = read_cloud(client.clouds[stamp])
+            found = client.rows(stamp)
             assert np.isnan(found['depth']).sum() == 2 * math.isnan(gone)
         return sent[:1] + sent[-1:]
     finally:
@@ -344,6 +350,10 @@ def live(node, client) -> dict[str, list[Any]]:
         address: [] for address in ADDRESSES.values() if address != 'poses'}
     for topic in ('box_a/pose', 'box_b/pose'):
         client.node.create_subscription(PoseStamped, topic, got[topic].append, 100)
+    client.node.create_subscription(PointCloud2, 'contacts_cloud',
+                                    got['contacts_cloud'].append, 100)
+    client.node.create_subscription(String, 'contact_node/scene', got['contact_node/scene'].append,
+                                    LATCHED_QOS)
     got['/diagnostics'] = client.diagnostics
     assert client.spin(lambda: len(client.diagnostics) > 1)  # before the first pose
     client.offer_until_answered(ORIGIN, APART)
@@ -356,9 +366,14 @@ def live(node, client) -> dict[str, list[Any]]:
     client.send(ORIGIN, TOUCHING, frames=('map', 'odom'))
     client.ask(ORIGIN, TOUCHING)
     assert client.diagnostic('refused: bad pose') == '1'
+    assert node.set_parameters([Parameter('scene', value='')])[0].successful  # sent again
+    assert client.spin(lambda: len(got['contact_node/scene']) == 2)
+    assert client.spin(lambda: stamp_of(got['contacts_cloud'][-1]) in client.clouds)
     for topic, messages in (('contact/point', client.points), ('contact/normal', client.normals),
                             ('contacts', client.clouds)):
         got[topic] = list(messages.values())
+    if ContactsMessage is None:
+        del got['contacts']
     return got
 
 
@@ -372,7 +387,7 @@ def test_live_messages_validate(everything):
         assert len(messages) > 1
     texts = {message.status[0].message for message in everything['/diagnostics']}
     assert {'no poses', 'poses refused'} <= texts
-    assert {len(cloud.data) for cloud in everything['contacts']} == {0, ROW}
+    assert {len(cloud.data) for cloud in everything['contacts_cloud']} == {0, ROW}
 
 
 def rows(cloud):
@@ -382,20 +397,27 @@ def rows(cloud):
 
 def test_live_rows_validate(live):
     """Rows decoded; the fields as declared are how they were decoded."""
-    schema = SCHEMAS['contacts.json']
+    schema = SCHEMAS['contacts_cloud.json']
     check = validator(schema, 'row')
-    found = [row for cloud in live['contacts'] for row in rows(cloud)]
+    found = [row for cloud in live['contacts_cloud'] for row in rows(cloud)]
     assert len(found) == 4
     for row in found:
         assert [error.message for error in check.iter_errors(row)] == []
-    for cloud in live['contacts']:
+    for cloud in live['contacts_cloud']:
         assert len(cloud.data) == cloud.row_step == ROW * cloud.width
-    declared = np.dtype([(field['name'], {PointField.FLOAT64: '<f8', PointField.UINT32: '<u4'}[
-        field['datatype']]) for field in schema['properties']['fields']['const']])
+    kinds = {PointField.FLOAT32: '<f4', PointField.FLOAT64: '<f8', PointField.UINT32: '<u4'}
+    declared = np.dtype([(field['name'], kinds[field['datatype']])
+                         for field in schema['properties']['fields']['const']])
     assert declared.itemsize == schema['properties']['point_step']['const']
     assert list(schema['$defs']['row']['properties']) == list(declared.names)
-    assert np.array_equal(np.frombuffer(bytes(live['contacts'][-1].data), declared),
-                          read_cloud(live['contacts'][-1]))
+    assert np.array_equal(np.frombuffer(bytes(live['contacts_cloud'][-1].data), declared),
+                          read_cloud(live['contacts_cloud'][-1]))
+
+
+def needs_messages(address: str) -> None:
+    """Skip what is about `contacts` where its type is not installed."""
+    if address == 'contacts' and ContactsMessage is None:
+        pytest.skip('box_contact_msgs is not installed')
 
 
 def set_in(path: str, value: Any):
@@ -414,13 +436,15 @@ WRONG_MESSAGES = {
     'NaN in the point': ('contact/point', set_in('point.z', math.nan)),
     'infinite point': ('contact/point', set_in('point.x', math.inf)),
     'nanoseconds of a second': ('contact/point', set_in('header.stamp.nanosec', 10**9)),
-    'depth as FLOAT32': ('contacts', set_in('fields.6.datatype', PointField.FLOAT32)),
-    'a field of another name': ('contacts', set_in('fields.6.name', 'separation')),
-    'a padded row': ('contacts', set_in('point_step', ROW + 4)),
-    'rows of before the patch': ('contacts', set_in('point_step', 60)),
-    'no covariance': ('contacts', lambda message: message.fields.pop()),
-    'big-endian': ('contacts', set_in('is_bigendian', True)),
-    'half a row': ('contacts', set_in('row_step', 30)),
+    'depth as FLOAT32': ('contacts_cloud', set_in('fields.10.datatype', PointField.FLOAT32)),
+    'a field of another name': ('contacts_cloud', set_in('fields.10.name', 'separation')),
+    'a padded row': ('contacts_cloud', set_in('point_step', ROW + 4)),
+    'rows of before the patch': ('contacts_cloud', set_in('point_step', 60)),
+    'no covariance': ('contacts_cloud', lambda message: message.fields.pop()),
+    'big-endian': ('contacts_cloud', set_in('is_bigendian', True)),
+    'half a row': ('contacts_cloud', set_in('row_step', 30)),
+    'a contact without a normal': ('contacts', set_in('contacts.0.normal.x', math.nan)),
+    'a contact without a depth': ('contacts', set_in('contacts.0.depth', math.nan)),
     'pose at 1e51 m': ('box_a/pose', set_in('pose.position.x', 1e51)),
     'half a pose in an array': ('poses', set_in('poses.0.position.x', math.nan)),
     'half an absent pose': ('poses', set_in('poses.0.orientation.w', math.nan)),
@@ -435,8 +459,9 @@ WRONG_MESSAGES = {
 def test_wrong_messages_do_not_validate(everything, name):
     """Each is a live message, which is valid, with one thing made wrong."""
     address, change = WRONG_MESSAGES[name]
+    needs_messages(address)
     check = validator(schema_at(address))
-    message = copy.deepcopy(everything[address][0])
+    message = copy.deepcopy(everything[address][-1 if address == 'contacts' else 0])
     assert check.is_valid(plain(message))
     change(message)
     assert not check.is_valid(plain(message))
@@ -444,6 +469,7 @@ def test_wrong_messages_do_not_validate(everything, name):
 
 @pytest.mark.parametrize('address', ADDRESSES.values())
 def test_missing_and_extra_fields_do_not_validate(everything, address):
+    needs_messages(address)
     check = validator(schema_at(address))
     message = plain(everything[address][0])
     assert check.is_valid(message)
@@ -452,28 +478,45 @@ def test_missing_and_extra_fields_do_not_validate(everything, address):
     assert not check.is_valid(message | {'extra': 1})
 
 
+def test_pairs_that_are_close_validate():
+    """Apart by no more than margin: in both messages."""
+    nan = np.full(3, np.nan)
+    answer = Answer([], [], 0, [(Pair(7, 'p', 'a', 'b'), Contact(
+        False, 0.5, nan, nan, 0.0, np.full((3, 3), np.nan)))])
+    cloud = make_cloud(make_header(0, 'map'), answer)
+    row, = rows(cloud)
+    check = validator(SCHEMAS['contacts_cloud.json'], 'close_row')
+    assert check.is_valid(row) and not check.is_valid(row | {'depth': 0.5}) and not cloud.is_dense
+    needs_messages('contacts')
+    check = validator(SCHEMAS['contacts.json'])
+    message = plain(make_contacts(make_header(0, 'map'), answer))
+    assert check.is_valid(message)
+    message['contacts'][0]['depth'] = 0.5
+    assert not check.is_valid(message)
+
+
 def test_stale_rows_validate():
     """All NaN but the id, or no stale row."""
-    check = validator(SCHEMAS['contacts.json'], 'stale_row')
+    check = validator(SCHEMAS['contacts_cloud.json'], 'stale_row')
     answer = Answer([], [Pair(7, 'p', 'a', 'b')], 0)
     cloud = make_cloud(make_header(0, 'map'), answer)
     row, = rows(cloud)
     assert check.is_valid(row) and not cloud.is_dense
-    assert validator(SCHEMAS['contacts.json']).is_valid(plain(cloud))
+    assert validator(SCHEMAS['contacts_cloud.json']).is_valid(plain(cloud))
     assert not check.is_valid(row | {'depth': 0.0})
-    assert not validator(SCHEMAS['contacts.json'], 'row').is_valid(row)
+    assert not validator(SCHEMAS['contacts_cloud.json'], 'row').is_valid(row)
 
 
 def test_wrong_rows_do_not_validate(live):
-    check = validator(SCHEMAS['contacts.json'], 'row')
-    row = rows(live['contacts'][-1])[0]
+    check = validator(SCHEMAS['contacts_cloud.json'], 'row')
+    row = rows(live['contacts_cloud'][-1])[0]
     assert check.is_valid(row)
     assert all(isinstance(row[name], float) for name in PATCH_FIELDS)
     assert check.is_valid(row | dict.fromkeys(PATCH_FIELDS))  # a model that gives none
     for name in PATCH_FIELDS:  # half a patch
         assert not check.is_valid(row | {name: None}), name
     for change in ({'volume': -1e-9}, {'normal_x': None}, {'normal_y': 1.5}, {'depth': None},
-                   {'pair': -1}, {'pair': 0.5}, {'extra': 0}):
+                   {'point_x': None}, {'pair': -1}, {'pair': 0.5}, {'extra': 0}):
         assert not check.is_valid(row | change), change
 
 
@@ -506,6 +549,8 @@ def test_qos_is_the_documents(node, client, array_node, name):
             else client.node.get_subscriptions_info_by_topic)
     if address == 'poses':
         node, address = array_node, '/many/poses'
+
+    needs_messages(address)
 
     def of_the_node():
         # The graph knows an endpoint before it knows the name of its node.

@@ -20,8 +20,9 @@ from rclpy.qos import QoSProfile
 from ros_client import PATIENCE, Client, serving
 
 from box_contact_ros import ContactSolver
+from box_contact_ros.apps.ros_client import ANSWERS
 from box_contact_ros.node.contact_node import ContactNode
-from box_contact_ros.node.messages import PATCH_FIELDS, make_header, read_cloud
+from box_contact_ros.node.messages import PATCH_FIELDS, make_header, read_contacts
 from box_contact_ros.node.rclpy_workarounds import RCLError
 
 MS = 1_000_000  # ns
@@ -39,12 +40,14 @@ WITH_CRATE = SCENE.replace('pairs:\n', '  crate: {size: [2, 2, 2]}\npairs:\n') +
 ON_FLOOR = (0, 0, 0.9, 0, 0, 0, 1)    # 0.1 m deep
 ON_LORRY = (0, 0, 2.8, 0, 0, 0, 1)    # 0.2 m deep in a lorry on the floor
 LORRY = (0.5, 0, 1.0, 0, 0, 0, 1)     # touches nothing that is asked for but the load
+CONTACTS = f'/{ANSWERS["cloud"][1]}'
+IDS = {'load_floor': 3, 'load_lorry': 5, 'load_crate': 8}  # of all pairs of these scenes
 
 
 class SceneClient(Client):
     """Publishes poses of boxes by name."""
 
-    pairs = ('load_floor', 'load_lorry', 'load_crate')
+    pairs, ids = tuple(IDS), IDS
 
     def __init__(self):
         super().__init__()
@@ -76,7 +79,7 @@ class SceneClient(Client):
 
     def rows(self, stamp):
         assert self.answered(stamp), 'no answer'
-        return {int(row['pair']): row for row in read_cloud(self.clouds[stamp])}
+        return {int(row['pair']): row for row in read_contacts(self.clouds[stamp], self.ids)}
 
 
 @pytest.fixture
@@ -105,8 +108,8 @@ def set_scene(node, text):
 
 
 @pytest.mark.parametrize('serialization', ['raw', 'typed'])
-def test_all_pairs_in_one_cloud(client, serialization):
-    """Every tick is one cloud with a row per contact; each pair has topics of its own.
+def test_all_pairs_in_one_message(client, serialization):
+    """Every tick is one message with a row per contact; each pair has topics of its own.
 
     Only what the pairs need is subscribed to.
     """
@@ -123,7 +126,7 @@ def test_all_pairs_in_one_cloud(client, serialization):
         cubes = ContactSolver(poses.CUBE, poses.CUBE, model='exact')
         wanted = cubes(np.array(LORRY), np.array([0.5, 0, 0.9, 0, 0, 0, 1]))
         assert rows[5]['depth'] == -wanted.separation
-        assert [rows[5][name] for name in 'xyz'] == pytest.approx(wanted.point)
+        assert [rows[5][f'point_{name}'] for name in 'xyz'] == pytest.approx(wanted.point)
         assert [rows[5][name] for name in PATCH_FIELDS] == [
             wanted.volume, *wanted.covariance[np.triu_indices(3)]]
         assert rows[3]['depth'] == pytest.approx(0.1) and rows[3]['normal_z'] == 1
@@ -215,8 +218,8 @@ def test_a_stale_box_is_nan_and_never_an_old_contact(client):
         for stamp in stamps:
             rows = client.rows(stamp)
             assert set(rows) == {3, 5} and rows[3]['depth'] == pytest.approx(0.1)
-            assert all(math.isnan(rows[5][name]) for name in ('x', 'normal_x', 'depth', 'cov_zz'))
-            assert not client.clouds[stamp].is_dense
+            assert all(math.isnan(rows[5][name])
+                       for name in ('point_x', 'normal_x', 'depth', 'cov_zz'))
             assert stamp not in client.of_pair['load_lorry']
         client.tick(load=ON_FLOOR)
         assert client.diagnostic('stale boxes') == 'lorry'
@@ -233,6 +236,8 @@ GONE = (math.nan,) * 7
 
 class ArrayClient(Client):
     """Publishes poses of all boxes as one message."""
+
+    ids = IDS
 
     def __init__(self):
         super().__init__()
@@ -252,7 +257,7 @@ class ArrayClient(Client):
         """Return what is answered to a tick, by the pair's id."""
         stamp = self.tick(*rows, **options)
         assert self.spin(lambda: stamp in self.clouds), 'no answer'
-        return {int(row['pair']): row for row in read_cloud(self.clouds[stamp])}
+        return {int(row['pair']): row for row in read_contacts(self.clouds[stamp], self.ids)}
 
     def is_answered(self, stamp, timeout=PATIENCE):
         return self.spin(lambda: stamp in self.clouds, timeout)
@@ -424,7 +429,7 @@ def test_publishers_that_come_and_go_between_two_looks_are_counted(node):
 def test_no_executor_serves_events_of_topics_that_may_go(node):
     """An event in an executor's queue ends the process if its topic goes; it need not be hit."""
     going = [entity for entity in (*node.publishers, *node.subscriptions)
-             if entity.topic_name in ('/contacts', '/load/pose', '/traffic/lorry')
+             if entity.topic_name in (CONTACTS, '/load/pose', '/traffic/lorry')
              or '/contact/' in entity.topic_name]
     assert len(going) == 1 + 2 + 2 * 2
     assert not any(entity.event_handlers for entity in going)
@@ -444,7 +449,8 @@ def test_a_refused_tick_keeps_back_no_other(client):
 
 
 @pytest.mark.parametrize('topic', [
-    'contacts', '/load_floor/contact/point', '/rosout', '/contact_node/transition_event'])
+    'contacts', 'contacts_cloud', '/contact_node/scene', '/load_floor/contact/point', '/rosout',
+    '/contact_node/transition_event'])
 def test_a_topic_of_the_node_is_no_pose_topic(node, client, topic):
     """Of another type, it cannot be subscribed to: the scene went half, and the node was deaf."""
     refused = set_scene(node, SCENE.replace('/traffic/lorry', topic))
@@ -495,11 +501,11 @@ def test_a_destroyed_node_leaves_the_network(client):
     node = ContactNode(context, parameter_overrides=[Parameter('scene', value=SCENE)])
     counted = client.node.count_publishers, client.node.count_subscribers
     try:
-        assert client.spin(lambda: counted[0]('/contacts') == 1)
+        assert client.spin(lambda: counted[0](CONTACTS) == 1)
         assert client.spin(lambda: counted[1]('/traffic/lorry') == 1)
     finally:
         node.destroy_node()
-    assert client.spin(lambda: counted[0]('/contacts') == 0)
+    assert client.spin(lambda: counted[0](CONTACTS) == 0)
     assert client.spin(lambda: counted[1]('/traffic/lorry') == 0)
     context.try_shutdown()
     gc.unfreeze()

@@ -12,14 +12,14 @@ from geometry_msgs.msg import PointStamped, Vector3Stamped
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from ros_client import Client, serving, stamp_of
-from sensor_msgs.msg import PointCloud2
 
 pytest.importorskip('fcl')
 
 from box_contact_ros import ContactSolver
+from box_contact_ros.apps.ros_client import ANSWERS
 from box_contact_ros.node.contact_node import PARAMETERS as CONTACT_PARAMETERS
 from box_contact_ros.node.contact_node import ContactNode
-from box_contact_ros.node.messages import PATCH_FIELDS, read_cloud
+from box_contact_ros.node.messages import PATCH_FIELDS, read_contacts
 from box_contact_ros.node.soup_node import PARAMETERS, SoupNode
 from box_contact_ros.resources import resource_path
 
@@ -36,8 +36,8 @@ class BothClient(Client):
         super().__init__()
         self.soup = {'point': {}, 'normal': {}, 'contacts': {}}
         for kind, topic in ((PointStamped, 'contact/point'), (Vector3Stamped, 'contact/normal'),
-                            (PointCloud2, 'contacts')):
-            kept = self.soup[topic.rpartition('/')[2]]
+                            ANSWERS['cloud']):
+            kept = self.soup[topic.rpartition('/')[2].removesuffix('_cloud')]
             self.node.create_subscription(
                 kind, f'soup/{topic}', self._keep_soup(f'soup/{topic}', kept),
                 QoSProfile(depth=10_000))
@@ -87,18 +87,18 @@ def test_both_nodes_answer_one_input(client):
     assert point.header.frame_id == 'yard'
     assert (point.point.x, point.point.y, point.point.z) == tuple(wanted.point)
     assert (normal.vector.x, normal.vector.y, normal.vector.z) == tuple(wanted.normal)
-    row, = read_cloud(cloud)
-    assert tuple(row)[:8] == (*wanted.point, *wanted.normal, -wanted.separation, 0)
+    row, = read_contacts(cloud, client.ids)
+    assert tuple(row)[3:11] == (0, *wanted.point, *wanted.normal, -wanted.separation)
     assert all(math.isnan(row[name]) for name in PATCH_FIELDS)  # a soup gives the point alone
     assert [topic for topic, at in client.order if at == stamp and topic.startswith('soup/')] == [
-        'soup/contact/point', 'soup/contact/normal', 'soup/contacts']
-    exact, = read_cloud(client.clouds[stamp])
-    assert row['depth'] == exact['depth'] and row['x'] != exact['x']
+        'soup/contact/point', 'soup/contact/normal', f'soup/{ANSWERS["cloud"][1]}']
+    exact, = client.rows(stamp)
+    assert row['depth'] == exact['depth'] and row['point_x'] != exact['point_x']
 
 
 def test_no_contact_is_an_empty_cloud(client):
     stamp = client.ask_both(ORIGIN, APART)
-    assert client.soup['contacts'][stamp].width == 0
+    assert len(read_contacts(client.soup['contacts'][stamp])) == 0
     assert stamp not in client.soup['point'] and stamp not in client.soup['normal']
 
 
@@ -115,7 +115,7 @@ def test_a_contained_box_is_answered(client, soup_node):
     """The soup's surfaces may not meet: an answer with finite numbers all the same."""
     result, = soup_node.set_parameters([Parameter('size_b', value=[0.5, 0.5, 0.5])])
     assert result.successful
-    row, = read_cloud(client.soup['contacts'][client.ask_both(ORIGIN, (0.2, 0, 0, 0, 0, 0, 1))])
+    row, = read_contacts(client.soup['contacts'][client.ask_both(ORIGIN, (0.2, 0, 0, 0, 0, 0, 1))])
     assert all(math.isfinite(row[name]) for name in row.dtype.names if name not in PATCH_FIELDS)
     result, = soup_node.set_parameters([Parameter('size_b', value=[2.0, 2.0, 2.0])])
     assert result.successful
@@ -124,14 +124,15 @@ def test_a_contained_box_is_answered(client, soup_node):
 def test_its_topics_are_the_documents(client, soup_node):
     """Those of the contact node, with soup/ before what is sent; the same types and QoS."""
     document = yaml.safe_load(resource_path('msg_schemas', 'asyncapi.yaml').read_text('utf-8'))
-    addresses = {channel['address'] for channel in document['channels'].values()} - {'poses'}
+    addresses = {channel['address'] for channel in document['channels'].values()} - {
+        'poses', 'contact_node/scene', *({'contacts', 'contacts_cloud'} - {ANSWERS['cloud'][1]})}
     inputs = {'box_a/pose', 'box_b/pose', '/diagnostics'}
     expected = {f'/{name.lstrip("/")}' if name in inputs else f'/soup/{name}'
                 for name in addresses}
-    own = {'/parameter_events', '/rosout'}
+    own = {'/parameter_events', '/rosout', '/soup_node/scene'}
     assert {entity.topic_name for entity in (*soup_node.publishers, *soup_node.subscriptions)
             } - own == expected
-    for name in ('contact/point', 'contact/normal', 'contacts'):
+    for name in ('contact/point', 'contact/normal', ANSWERS['cloud'][1]):
         def publishers(topic=name):
             return [client.node.get_publishers_info_by_topic(prefix + topic)
                     for prefix in ('', 'soup/')]

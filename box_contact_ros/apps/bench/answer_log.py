@@ -37,25 +37,26 @@ _COVARIANCE = [[8, 9, 10], [9, 11, 12], [10, 12, 13]]
 
 
 def first_row(rows: np.ndarray) -> np.ndarray:
-    """Return the fields of a cloud's first row, none without rows: CLOUD_ROW's but `pair`.
+    """Return the numbers of the first row (messages.CLOUD_ROW); none without rows.
 
     Point and normal are columns 0 to 5, the depth 6, the volume 7, the covariance 8 to 13.
     """
-    names = [name for name in rows.dtype.names if name != 'pair']
-    return np.array([rows[0][name] for name in names] if len(rows) else [])
+    names = rows.dtype.names or ()
+    of_float64 = names[names.index('pair') + 1:]
+    return np.array([rows[0][name] for name in of_float64] if len(rows) else [])
 
 
 def is_stale(values: Sequence[float] | np.ndarray) -> bool:
     """Whether a `first_row` says that its pair could not be evaluated."""
-    return bool(np.isnan(values[:7]).any())
+    return len(values) > 0 and bool(np.isnan(values[6]))
 
 
 def touch_in(values: np.ndarray) -> Contact | None:
-    """Return the contact of a `first_row`; None without one, or if it could not be evaluated.
+    """Return the contact of a `first_row`; None without one, apart, or if it was not evaluated.
 
     Volume and covariance are NaN from models that give the point alone.
     """
-    if not len(values) or is_stale(values):
+    if not len(values) or np.isnan(values[0]):
         return None
     return Contact(True, -float(values[6]), values[3:6], values[:3], float(values[7]),
                    values[_COVARIANCE])
@@ -165,7 +166,7 @@ class AnswerLog:
             log.values[kind][row] = values[:WIDTHS[kind]]
         if kind == 'cloud':
             log.refused[row] = is_stale(values)
-            log.touching[row] = len(values) > 0 and not log.refused[row]
+            log.touching[row] = len(values) > 0 and not np.isnan(values[0])
         log.received[kind][row] = received
 
     @property

@@ -109,6 +109,16 @@ def write_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
     Raises ValueError for a scene that a file cannot describe, such as one with a name that no topic
     can have.
     """
+    text = scene_text(scene)
+    if len(text.encode()) > LARGEST_FILE:
+        raise ValueError(f'{len(scene.pairs)} pairs need more than {LARGEST_FILE} bytes')
+    if parse_scene(text) != scene:
+        raise ValueError('not all fields of this scene can stand in a file')
+    Path(path).write_text(text, 'utf-8')
+
+
+def scene_text(scene: Scene) -> str:
+    """Return a scene as YAML, every box and pair by its name and without short forms."""
     lines = ['frame_id: ' + json.dumps(scene.frame_id)] if scene.frame_id else []
     lines += ['poses: array'] if scene.pose_array else []
     lines.append('boxes:')
@@ -117,13 +127,8 @@ def write_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
             {'pose_topic': box.pose_topic} if box.pose_topic else {})
         lines.append(f'  {json.dumps(name)}: {json.dumps(fields)}')
     lines.append('pairs:')
-    lines += [f'  - {json.dumps(pair._asdict())}' for pair in scene.pairs]
-    text = '\n'.join([*lines, ''])
-    if len(text.encode()) > LARGEST_FILE:
-        raise ValueError(f'{len(scene.pairs)} pairs need more than {LARGEST_FILE} bytes')
-    if parse_scene(text) != scene:
-        raise ValueError('not all fields of this scene can stand in a file')
-    Path(path).write_text(text, 'utf-8')
+    lines += [f'  - {json.dumps(pair._asdict() | {"name": pair.label})}' for pair in scene.pairs]
+    return '\n'.join([*lines, ''])
 
 
 def _plain(text: str, lines: dict[Place, int]) -> Any:
