@@ -24,10 +24,10 @@ ENCAPSULATION = 4
 """Bytes before the body: two name its kind, two are options, which say nothing about a pose."""
 LITTLE = b'\0\1'
 _ORDERS = {b'\0\0': '>', LITTLE: '<'}
-"""Byte order by kind: CDR_BE and CDR_LE, the kinds that ROS middlewares write. The others are lists
-of parameters (PL_CDR), XML, or XCDR2, which aligns numbers to 4 and puts sizes before sequences."""
+"""Byte order by kind: CDR_BE and CDR_LE, which every ROS middleware writes. Others are laid out in
+another way: docs/decisions/contact-node.md."""
 _PADDING = 3
-"""Most bytes behind the body, of any value: RTPS pads a message to a multiple of four."""
+"""Most bytes after the body, of any value: RTPS pads a message to a multiple of four."""
 _STAMP = struct.Struct('<iI')
 _POSE = struct.Struct('<7d')
 _LAYOUT = '<2s2xiI{}s{}x7d'

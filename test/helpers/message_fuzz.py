@@ -1,13 +1,15 @@
-"""Does the parser of bytes read mutated poses as rclpy does? `RawMessages` against the typed reader.
+"""Compare the node's parser of bytes with rclpy on mutated poses.
 
     python test/helpers/message_fuzz.py [--messages N] [--seed N]
 
-A message is written by one of the ways that CDR leaves open, then up to three times damaged. Both
-readers have to give the same numbers to the bit, the same frame and stamp, or the same refusal:
-where rclpy cannot deserialise, the bytes are refused as `not a …`; where it can, the reason is that
-of `TypedMessages`. Two readers of bytes are asked: a new one, and one that has just read the
-undamaged message. `STRICTER` lists all exceptions. Prints the outcomes of each type; rclpy adds a
-line for each count that is too large. The exit status is 1 if one answer differs.
+A message is written in one of the ways that CDR leaves open, then damaged up to three times.
+`RawMessages` and rclpy must give the same numbers to the bit, the same frame and stamp, or the same
+refusal. What rclpy cannot deserialise must be refused as `not a …`. For the rest, the reason must
+be that of `TypedMessages`. `STRICTER` lists all exceptions.
+
+Two readers of bytes are asked: a new one, and one that has just read the undamaged message. The
+program prints how often each outcome came; rclpy adds a line for each count that is too large. The
+exit status is 1 if an answer differs.
 """
 from __future__ import annotations
 
@@ -69,7 +71,7 @@ class Written(NamedTuple):
 
 
 def written(rng: random.Random, message_type: type) -> Written:
-    """Draw a message; most are good, each part is now and then not."""
+    """Draw a message. Most are well-formed; any part may be bad."""
     rows = 1 if message_type is PoseStamped else rng.choice((0, 1, 2, 3, 40))
     kind = bytes([0, rng.randrange(14)]) if rng.random() < 0.1 else bytes([0, rng.random() < 0.7])
     return Written(
@@ -81,7 +83,7 @@ def written(rng: random.Random, message_type: type) -> Written:
 
 
 def _frame(rng: random.Random) -> bytes:
-    """Draw a frame_id of any length modulo 8, as bytes with their NUL, mostly."""
+    """Draw the bytes of a frame_id, of any length modulo 8. Most end with their NUL."""
     way = rng.random()
     text = (rng.choice(FRAMES).encode() if way < 0.3 else
             rng.choice(NOT_UTF8) if way < 0.35 else b'f' * rng.randrange(20))
@@ -104,10 +106,10 @@ def _row(rng: random.Random) -> tuple[float, ...]:
 
 
 def damaged(rng: random.Random, data: bytes) -> bytes:
-    """Return a message with one thing wrong with it, at least mostly."""
-    changed = bytearray(data)
-    if not changed:
+    """Return a message with some bytes changed, cut off or appended."""
+    if not data:
         return data
+    changed = bytearray(data)
     place = rng.randrange(min(len(changed), 100))  # headers and counts are in front
     match rng.randrange(6):
         case 0:
@@ -128,19 +130,19 @@ def damaged(rng: random.Random, data: bytes) -> bytes:
 
 
 def _is_other_kind(data: bytes, _: type) -> bool:
-    """Whether the encapsulation is none of plain CDR. rclpy takes all of them for plain CDR.
+    """Whether the encapsulation is neither CDR_BE nor CDR_LE. rclpy reads others as if they were.
 
-    No ROS middleware writes them. rclpy reads right ones wrong: it takes no parameter for what it
-    is, and expects no size before XCDR2's sequences.
+    No ROS middleware writes others. rclpy reads well-formed ones wrongly. It takes the headers of
+    PL_CDR's parameters for numbers, and does not know the size before a sequence in XCDR2.
     """
     return data[:2] not in (b'\0\0', b'\0\1')
 
 
 def _is_no_string(data: bytes, _: type) -> bool:
-    """Whether frame_id lacks its NUL, or has one inside. rclpy ends the text at the first one.
+    """Whether frame_id lacks its NUL, or has one inside. rclpy ends the text at the first NUL.
 
-    CDR has every string end with a NUL, and none inside. Two names that differ must not be taken
-    for one frame.
+    A string in CDR ends with a NUL, and has none inside. Two frame_ids that differ must not be
+    taken for the same frame.
     """
     order = 'little' if data[1] else 'big'
     frame = data[16:16 + int.from_bytes(data[12:16], order)]
@@ -148,9 +150,9 @@ def _is_no_string(data: bytes, _: type) -> bool:
 
 
 def _is_longer(data: bytes, message_type: type) -> bool:
-    """Whether the message could do without its last four bytes. rclpy ignores what follows.
+    """Whether rclpy reads the message without its last four bytes too: it ignores what follows.
 
-    Padding is three bytes at most. A longer message is of another type that begins alike.
+    Padding is at most three bytes. A longer message is of another type that begins alike.
     """
     try:
         deserialize_message(data[:-4], message_type)
@@ -221,8 +223,8 @@ def main() -> int:
     for message_type in READERS:
         tally, differences = fuzz(message_type, options.messages, seed=options.seed)
         total += len(differences)
-        print(message_type.__name__, *(f'{count:>9,} {word}' for word, count in tally.most_common()),
-              *differences[:SHOWN], sep='\n', flush=True)
+        counts = [f'{count:>9,} {word}' for word, count in tally.most_common()]
+        print(message_type.__name__, *counts, *differences[:SHOWN], sep='\n', flush=True)
     print(f'{total} differences')
     return 1 if total else 0
 
