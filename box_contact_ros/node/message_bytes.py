@@ -1,7 +1,8 @@
 """Messages as the bytes that are sent (CDR), without message objects: `RawMessages`.
 
-A pose has a strict layout. All other bytes are refused. Answers are put together from what rclpy
-serialises once for each frame_id: nothing here knows the layout of a cloud's constant parts.
+Poses are read by what CDR promises, whichever middleware wrote them. All other bytes are refused.
+Answers are put together from what rclpy serialises once for each frame_id: nothing here knows the
+layout of a cloud's constant parts.
 Bytes are kept because they halve the latency: docs/decisions/contact-node.md.
 """
 from __future__ import annotations
@@ -20,8 +21,13 @@ from ..solver.contact import Contact, patch_area
 from .messages import CLOUD_ROW, NANOSECONDS, Refused, TypedMessages, checked_pose, headed
 
 ENCAPSULATION = 4
-"""Bytes before the body: 0, then 1 for little endian or 0 for big, then two that say nothing."""
+"""Bytes before the body: two name its kind, two are options, which say nothing about a pose."""
 LITTLE = b'\0\1'
+_ORDERS = {b'\0\0': '>', LITTLE: '<'}
+"""Byte order by kind: CDR_BE and CDR_LE, which every ROS middleware writes. Others are laid out in
+another way: docs/decisions/contact-node.md."""
+_PADDING = 3
+"""Most bytes after the body, of any value: RTPS pads a message to a multiple of four."""
 _STAMP = struct.Struct('<iI')
 _POSE = struct.Struct('<7d')
 _LAYOUT = '<2s2xiI{}s{}x7d'
@@ -64,7 +70,7 @@ def parse_pose(data: bytes) -> tuple[tuple[float, ...], str, int, int]:
     """Return numbers, frame_id, seconds and nanoseconds of a PoseStamped, or raise Refused."""
     order, sec, nanosec, length = _parse_head(data, 'PoseStamped')
     at = numbers_at(length)
-    if len(data) != at + _POSE.size:
+    if not 0 <= len(data) - (at + _POSE.size) <= _PADDING:
         raise Refused('not a PoseStamped',
                       f'{len(data)} bytes, where a frame_id of {length} needs {at + _POSE.size}')
     frame_id = _parse_frame(data, length, 'PoseStamped')
@@ -77,7 +83,7 @@ def parse_poses(data: bytes) -> tuple[np.ndarray, str, int, int]:
     count_at = -(-(FRAME_AT + length) // 4) * 4
     count = struct.unpack_from(f'{order}I', data, count_at)[0] if count_at + 4 <= len(data) else 0
     at = ENCAPSULATION + -(-count_at // 8) * 8 if count else count_at + 4
-    if len(data) != at + count * _POSE.size:
+    if not 0 <= len(data) - (at + count * _POSE.size) <= _PADDING:
         raise Refused('not a PoseArray', f'{len(data)} bytes, where {count} poses with a frame_id '
                                          f'of {length} need {at + count * _POSE.size}')
     numbers = np.frombuffer(data, f'{order}f8', 7 * count, at).reshape(count, 7).astype(np.float64)
@@ -86,9 +92,12 @@ def parse_poses(data: bytes) -> tuple[np.ndarray, str, int, int]:
 
 def _parse_head(data: bytes, kind: str) -> tuple[str, int, int, int]:
     """Return the order of bytes, seconds, nanoseconds, and the length of frame_id."""
-    if len(data) < FRAME_AT or data[0] != 0 or data[1] > 1:
-        raise Refused(f'not a {kind}', f'{len(data)} bytes that are no plain CDR message')
-    order = '<' if data[1] else '>'
+    if len(data) < FRAME_AT:
+        raise Refused(f'not a {kind}', f'{len(data)} bytes, where a header needs {FRAME_AT}')
+    order = _ORDERS.get(data[:2])
+    if order is None:
+        raise Refused(f'not a {kind}', f'encapsulation 0x{data[:2].hex()} is neither CDR_BE '
+                                       '(0x0000) nor CDR_LE (0x0001): let its sender use XCDR1')
     return (order, *struct.unpack_from(f'{order}iII', data, ENCAPSULATION))
 
 
@@ -133,12 +142,11 @@ class RawMessages:
         numbers, frame_id, sec, nanosec = parse_pose(data)
         pose = checked_pose(numbers, frame_id, sec, nanosec)
         if data[:2] == LITTLE:
-            length = len(frame_id.encode()) + 1
-            if struct.unpack_from('<I', data, FRAME_AT - 4)[0] == length:  # not an empty one's 0
-                start, end = FRAME_AT - 4, FRAME_AT + length
-                self._frame, self._frame_id = data[start:end], frame_id
-                self._unpack = struct.Struct(
-                    _LAYOUT.format(end - start, numbers_at(length) - end)).unpack
+            length = int.from_bytes(data[FRAME_AT - 4:FRAME_AT], 'little')  # 0 or 1 of an empty one
+            start, end = FRAME_AT - 4, FRAME_AT + length
+            self._frame, self._frame_id = data[start:end], frame_id
+            self._unpack = struct.Struct(
+                _LAYOUT.format(end - start, numbers_at(length) - end)).unpack
         return pose
 
     def read_poses(self, data: bytes) -> StampedPose:

@@ -180,7 +180,7 @@ def sourced(words: list[str], **_) -> None:
 
 
 def example(words: list[str], **_) -> None:
-    """Leave the program to test_examples.py, which runs it."""
+    """Leave the program to the tests that run it."""
     assert (ROOT / words[1]).is_file()
 
 
@@ -223,7 +223,7 @@ COMMANDS = {
     r'ros2 topic echo \S+': topic,
     r'ros2 param set \S+ \S+ \S+': parameter,
     r'ros2 launch \S+ \S+( .*)?': launch,
-    r'python docs/examples/\w+\.py': example,
+    r'python (docs/examples|test/helpers)/\w+\.py': example,
     r'rviz2 -d .+': rviz,
     r'pip install .+': pip,
     r'sudo apt install .+': apt,
