@@ -45,7 +45,7 @@ GENERATORS: dict[str, tuple[str, ...]] = {
 """Generators of code, with their options."""
 
 
-# --- the package --------------------------------------------------------------------------------
+# --- the package ----------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ def with_their_depends(packages: Iterable[str]) -> list[str]:
     return found
 
 
-# --- the machine --------------------------------------------------------------------------------
+# --- the machine ----------------------------------------------------------------------------------
 
 
 def wheel_of(package: str) -> str:
@@ -141,7 +141,7 @@ def run_all(commands: Iterable[tuple[str | Path, ...]]) -> None:
         list(pool.map(lambda words: run(*words), commands))
 
 
-# --- from definitions to code -------------------------------------------------------------------
+# --- from definitions to code ---------------------------------------------------------------------
 
 
 def generate(package: Package, work: Path) -> None:
@@ -229,7 +229,8 @@ def compile_all(built: list[Library], work: Path) -> None:
     numpy = run(*PYTHON, '-c', 'import numpy; print(numpy.get_include())').strip()
     folders = [*(work / generator for generator in GENERATORS), PREFIX / 'include',
                *sorted((PREFIX / 'include').iterdir()), sysconfig.get_path('include'), numpy]
-    flags = ['-w', '-O2', '-g0', '-fPIC', f'-ffile-prefix-map={work}=.',
+    # Asserts would abort the process where the wheels' own messages do not, and quote paths.
+    flags = ['-w', '-O2', '-g0', '-DNDEBUG', '-fPIC', f'-ffile-prefix-map={work}=.',
              f'-ffile-prefix-map={PREFIX}=.', *(f'-I{folder}' for folder in folders)]
     language = {'.c': ('-x', 'c'), '.cpp': ('-x', 'c++', '-std=c++17')}
     run_all((*compiler(), *language[source.suffix], *flags, '-c', source, '-o',
