@@ -220,7 +220,8 @@ def libraries(package: Package, work: Path) -> list[Library]:
         libraries.append(Library(
             f'{name}_s__{support}{sysconfig.get_config_var("EXT_SUFFIX")}',
             sources(PY, f'_{name}_s.ep.{support}.c'),
-            [own, f'{name}__{PY}', f'{name}__{support}', 'rosidl_runtime_c']))
+            [own, f'{name}__{PY}', f'{name}__{DISPATCH}', f'{name}__{support}',
+             'rosidl_runtime_c']))
     return libraries
 
 
@@ -310,6 +311,7 @@ def prepare_metadata_for_build_wheel(
         metadata_directory: str, config_settings: dict[str, str] | None = None) -> str:
     """Write the wheel's metadata into a folder and return the name of the folder in it."""
     package = read_package(HERE)
+    check_machine(package)  # before pip looks for what the wheel requires
     folder = Path(metadata_directory, package.dist_info)
     folder.mkdir()
     (folder / 'METADATA').write_text(metadata(package), 'utf-8')
@@ -332,3 +334,9 @@ def build_wheel(wheel_directory: str, config_settings: dict[str, str] | None = N
             link(library, work / 'lib')
         write_wheel(file, package, contents(package, work, built))
     return file.name
+
+
+def build_editable(*_: object) -> str:
+    """Refuse: the modules are generated."""
+    raise SystemExit(f'error: the modules of {HERE.name} are generated, so a change of its messages '
+                     f'needs a build: pip install without -e')
