@@ -338,5 +338,5 @@ def build_wheel(wheel_directory: str, config_settings: dict[str, str] | None = N
 
 def build_editable(*_: object) -> str:
     """Refuse: the modules are generated."""
-    raise SystemExit(f'error: the modules of {HERE.name} are generated, so a change of its messages '
-                     f'needs a build: pip install without -e')
+    raise SystemExit(f'error: the modules of {HERE.name} are generated, so they are not editable: '
+                     f'pip install without -e')

@@ -76,7 +76,7 @@ def test_colcon_builds_every_definition() -> None:
 
 
 def test_the_manifest_is_valid() -> None:
-    """colcon takes what catkin_pkg rejects for a package of another kind."""
+    """What catkin_pkg rejects, colcon takes for a package of another kind."""
     catkin = pytest.importorskip('catkin_pkg.package', reason='catkin-pkg is not installed')
     package = catkin.parse_package(str(SOURCES / 'package.xml'))
     package.validate()
@@ -298,14 +298,16 @@ def test_errors_of_the_compiler_are_shown_and_warnings_are_not(
     pytest.importorskip('rclpy', reason='the ROS wheels are not installed')
     source = tmp_path / 'source.c'
     library = backend.Library('lib.so', [source], [])
-    source.write_text('#warning "never mind"\nint f(void) {}\n')
+    warning = '#warning "never mind"\n'
+    source.write_text(warning + 'int f(void) { return 0; }\n')
     backend.compile_all([library], tmp_path)
-    source.write_text('int f(void) { return missing; }\n')
-    with pytest.raises(SystemExit, match='missing'):
+    source.write_text(warning + 'int f(void) { return missing; }\n')
+    with pytest.raises(SystemExit) as failed:
         backend.compile_all([library], tmp_path)
+    assert 'missing' in str(failed.value) and 'never mind' not in str(failed.value)
 
 
 def test_an_editable_installation_is_refused(backend: ModuleType) -> None:
-    """pip would fall back to setuptools, which finds no package here."""
+    """Otherwise pip would fall back to setuptools, which finds no package here."""
     with pytest.raises(SystemExit, match='without -e'):
         backend.build_editable('', {}, None)
