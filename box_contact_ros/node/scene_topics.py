@@ -27,6 +27,11 @@ MOST_PAIRS_WITH_TOPICS = 1000
 """Two publishers a pair take milliseconds and memory, here and in every process that listens."""
 
 
+def pose_input(source: str) -> tuple[type, QoSProfile]:
+    """Return the type and quality of service of a scene's source of poses: a box, or ALL_BOXES."""
+    return (PoseArray, ARRAY_QOS) if source == ALL_BOXES else (PoseStamped, POSE_QOS)
+
+
 class PoseSource(NamedTuple):
     """How the poses of a box, or of all boxes, are subscribed to."""
 
@@ -160,8 +165,7 @@ class SceneTopics:
                 self._node.destroy_publisher(publisher)
 
     def _subscribe(self, source: PoseSource, callback: Callable[[Any], None]) -> Subscription:
-        kind, usual = ((PoseArray, ARRAY_QOS) if source.box == ALL_BOXES
-                       else (PoseStamped, POSE_QOS))
+        kind, usual = pose_input(source.box)
         qos = QoSProfile(depth=usual.depth, reliability=usual.reliability)
         if source.deadline:
             qos.deadline = Duration(seconds=source.deadline)

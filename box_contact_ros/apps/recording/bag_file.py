@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
@@ -34,8 +35,10 @@ from ..bench.pose_streams import Replay, Size
 BAG_VERSION: Final = 9  # of rosbag2's metadata: what Jazzy writes and reads
 NANOSECONDS = 1_000_000_000
 POSE = 'geometry_msgs/msg/PoseStamped'
+POSE_ARRAY_TYPE = 'geometry_msgs/msg/PoseArray'
 TYPES = {
     'pose': POSE,
+    'poses': POSE_ARRAY_TYPE,
     'contact/point': 'geometry_msgs/msg/PointStamped',
     'contact/normal': 'geometry_msgs/msg/Vector3Stamped',
     'contacts': 'sensor_msgs/msg/PointCloud2',
@@ -65,15 +68,15 @@ class Recorder:
     """Writes a recording, message by message; a recording that is not closed has no index."""
 
     def __init__(self, folder: Path, topics: Sequence[str], about: Mapping[str, Any],
-                 poses: Collection[str] = ()) -> None:
+                 kinds: Mapping[str, str] = MappingProxyType({})) -> None:
         """Begin a recording in a folder that does not exist yet.
 
-        topics: absolute names; `poses` are those that carry poses, whatever their names. about:
-        what is kept with the messages, as JSON: `size_a`, `size_b` (full extents [m]), or `scene`
-        (its text), and `model`. Raises RecordingError.
+        topics: absolute names; `kinds` are the types of those whose names do not tell. about: what
+        is kept with the messages, as JSON: `size_a`, `size_b` (full extents [m]), or `scene` (its
+        text), and `model`. Raises RecordingError.
         """
         types = get_typestore(Stores.ROS2_JAZZY)
-        self.kinds = {topic: POSE if topic in poses else type_of(topic) for topic in topics}
+        self.kinds = {topic: kinds.get(topic) or type_of(topic) for topic in topics}
         self.counts = Counter(dict.fromkeys(topics, 0))
         self.span: tuple[int, int] | None = None  # times of the first and the last message [ns]
         try:
