@@ -43,7 +43,8 @@ class RecordNode(GuardedNode):
         super().__init__('record', context=context)
         resolved = {self.resolve_topic_name(topic): topic for topic in topics}
         kinds = {name: kinds[topic] for name, topic in resolved.items() if topic in kinds}
-        self.folder, self.recorder = folder, Recorder(folder, list(resolved), about, kinds)
+        self.folder, self.recorder = folder, Recorder(
+            folder, list(resolved), {**about, 'topics': resolved}, kinds)
         self._fault: Exception | None = None
         for name, topic in resolved.items():
             message = MESSAGES[self.recorder.kinds[name]]
