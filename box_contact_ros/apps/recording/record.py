@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
@@ -90,7 +90,12 @@ class RecordNode(GuardedNode):
 def main(args: Sequence[str] | None = None) -> int:
     """Record until SIGINT or SIGTERM."""
     args = list(args or ())
-    options = _options(outside_ros_args(args))
+    return run_node(node_of(outside_ros_args(args)), args)
+
+
+def node_of(args: Sequence[str]) -> Callable[[Context], RecordNode]:
+    """Return what makes the node that the program's arguments ask for."""
+    options = _options(args)
     about = {name: value for name in ('size_a', 'size_b', 'model')
              if (value := getattr(options, name)) is not None}
     topics, kinds = options.topics, {}
@@ -98,8 +103,8 @@ def main(args: Sequence[str] | None = None) -> int:
         about['scene'], scene = read_scene_text(options.scene)
         kinds = {topic.name: TYPE_OF[topic.kind] for topic in pose_topics(scene)}
         topics = topics or [*kinds, 'contacts', *DRAWN]
-    return run_node(partial(RecordNode, folder=options.out, about=about, kinds=kinds,
-                            topics=topics or [*TOPICS, *DRAWN]), args)
+    return partial(RecordNode, folder=options.out, about=about, kinds=kinds,
+                   topics=topics or [*TOPICS, *DRAWN])
 
 
 def _options(args: Sequence[str]) -> argparse.Namespace:
