@@ -1,20 +1,24 @@
-"""What clients of the contact node need of rclpy: messages as numbers."""
+"""What clients of the contact node need of rclpy: topics of a scene, messages as numbers."""
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
-from geometry_msgs.msg import Point, PointStamped, PoseStamped, Vector3Stamped
+from geometry_msgs.msg import Point, PointStamped, PoseArray, PoseStamped, Vector3Stamped
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
-from ..node.messages import NANOSECONDS, ContactsMessage, read_contacts
+from ..node.message_bytes import RawMessages
+from ..node.messages import NANOSECONDS, ContactsMessage, Refused, read_contacts
+from ..node.scene_topics import pose_input
 from ..resources import find_file
 from ..scene.files.scene_file import read_scene
-from ..scene.scene_solver import Scene
+from ..scene.scene_solver import ALL_BOXES, Scene
+from ..scene.stamp_pairing import StampedPose
+from ..solver.checks import are_poses
 from .bench.answer_log import first_row
 
 ANSWERS: dict[str, tuple[type, str]] = {
@@ -29,6 +33,36 @@ CRANE_MARKERS = 'crane/markers'
 
 DEEP_RELIABLE = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
 """What the DDS layer delivers while Python is busy must not push out the rest."""
+
+
+class PoseTopic(NamedTuple):
+    """A topic that a scene's poses come on."""
+
+    name: str
+    kind: type  # of its messages
+    qos: QoSProfile
+    read: Callable[[bytes], dict[str, StampedPose]]
+    """Return the poses of a serialised message by box; NaN for a box that is not there. Refused."""
+
+
+def pose_topics(scene: Scene) -> list[PoseTopic]:
+    """Return how the poses of all moving boxes come, in the scene's order."""
+    def read(box: str) -> Callable[[bytes], dict[str, StampedPose]]:
+        messages = RawMessages()  # each with the frame of its topic
+        if box == ALL_BOXES:
+            return lambda data: _by_box(scene, messages.read_poses(data))
+        return lambda data: {box: messages.read_pose(data)}
+    return [PoseTopic(topic, *pose_input(box), read(box)) for box, topic in scene.sources.items()]
+
+
+def _by_box(scene: Scene, poses: StampedPose) -> dict[str, StampedPose]:
+    """Return the poses of an array by box. A bad pose is NaN: the contact node reports it."""
+    numbers, moving = poses.numbers, scene.moving
+    if len(numbers) != len(moving):
+        raise Refused('wrong number of poses',
+                      f'{len(numbers)} poses, but {len(moving)} boxes of the scene move')
+    numbers[~are_poses(numbers)] = np.nan
+    return {box: poses._replace(numbers=row) for box, row in zip(moving, numbers)}
 
 
 def answer_values(kind: str, message: Any) -> Sequence[float] | np.ndarray:
@@ -80,6 +114,11 @@ def pose_message(header: Header, pose: np.ndarray) -> PoseStamped:
     message = PoseStamped(header=header)
     set_pose(message.pose, pose)
     return message
+
+
+def array_message(header: Header, poses: Sequence[np.ndarray]) -> PoseArray:
+    """Return the message of many poses `x y z qx qy qz qw`."""
+    return PoseArray(header=header, poses=[pose_message(header, pose).pose for pose in poses])
 
 
 def set_pose(pose: Any, numbers: np.ndarray) -> None:

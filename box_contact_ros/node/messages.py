@@ -9,7 +9,9 @@ PointCloud2 for tools that know no other. Both are read as rows of CLOUD_ROW.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from functools import lru_cache
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -23,10 +25,10 @@ from ..scene.stamp_pairing import StampedPose
 from ..solver.checks import pose_fault, shown
 from ..solver.contact import Contact, patch_area
 
-try:
-    from box_contact_msgs import msg as _contact_messages
-except ImportError:  # a package of its own, which need not be here
-    _contact_messages = None
+_contact_messages: Any = None
+with suppress(ImportError):  # a package of its own, which need not be here
+    _contact_messages = import_module('box_contact_msgs.msg')
+# In a checkout a folder of this name is found, which has no messages.
 ContactMessage: Any = getattr(_contact_messages, 'Contact', None)
 ContactsMessage: Any = getattr(_contact_messages, 'Contacts', None)
 """Type of `contacts`; None where box_contact_msgs is not installed."""

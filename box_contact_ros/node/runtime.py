@@ -1,4 +1,8 @@
-"""What every node here needs from rclpy: an executor that keeps up, and a clean end."""
+"""What every node here needs from rclpy: an executor that keeps up, and a clean end.
+
+No callback ends a process: `GuardedNode` catches what those of topics, timers and futures raise;
+`spin_for` and `spin_once` catch what those of rclpy's own services raise.
+"""
 from __future__ import annotations
 
 import atexit
@@ -8,6 +12,8 @@ import os
 import signal
 import sys
 import threading
+import time
+import traceback
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, TypeVar
 
@@ -17,8 +23,11 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
+from rclpy.subscription import Subscription
 from rclpy.task import Future
+from rclpy.timer import Timer
 
+from .parameters import reason_of
 from .rclpy_workarounds import RCLError, ends_within, keep_for_ever
 
 EventsExecutor: Any = None
@@ -44,6 +53,57 @@ NodeKind = TypeVar('NodeKind', bound=Node)
 LOG_SECONDS = 1.0  # the same complaint is logged at most this often
 
 
+class GuardedNode(Node):
+    """A node whose callbacks raise nothing: what one raises is logged, and the node goes on.
+
+    EventsExecutor ends the process with SIGSEGV where the callback of a future raises. It raises
+    what other callbacks raise, under two unthrottled lines that name no topic.
+    """
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        """Begin as rclpy's node does."""
+        self._silent_until: dict[str, float] = {}  # monotonic time [s], by kind of error
+        super().__init__(*args, **options)
+
+    def create_subscription(self, msg_type: Any, topic: str, callback: Callable[..., None],
+                            *args: Any, **options: Any) -> Subscription:
+        """Subscribe; what the callback raises is logged under the topic."""
+        return super().create_subscription(
+            msg_type, topic, self.guarded(callback, topic), *args, **options)
+
+    def create_timer(self, timer_period_sec: float, callback: Callable[[], None], *args: Any,
+                     **options: Any) -> Timer:
+        """Start a timer; what the callback raises is logged under the callback's name."""
+        return super().create_timer(
+            timer_period_sec, self.guarded(callback, getattr(callback, '__name__', 'timer')),
+            *args, **options)
+
+    def guarded(self, callback: Callable[..., None], what: str) -> Callable[..., None]:
+        """Return a callback that raises nothing; `what` it serves stands before the logged cause.
+
+        Each kind of error is logged once per LOG_SECONDS, with its traceback at level debug.
+        """
+        @functools.wraps(callback)
+        def guarded(*args: Any) -> None:
+            try:
+                callback(*args)
+            except Exception as error:
+                # A signal shuts the context down under whatever runs.
+                if self.context.ok():
+                    self._complain(what, error)
+        return guarded
+
+    def _complain(self, what: str, error: Exception) -> None:
+        kind, now = getattr(error, 'reason', type(error).__name__), time.monotonic()
+        if now >= self._silent_until.get(kind, 0.0):
+            self._silent_until[kind] = now + LOG_SECONDS
+            # What is refused is a ValueError; anything else is a fault of the program's own.
+            log = self.get_logger()
+            (log.warning if isinstance(error, ValueError) else log.error)(
+                f'{what}: {reason_of(error)}; ignored')
+            log.debug(''.join(traceback.format_exception(error)))
+
+
 def make_executor(context: Context) -> Any:
     """Return the executor that loses nothing at 1 kHz where rclpy has it, else the default one."""
     if EventsExecutor is None:
@@ -51,14 +111,38 @@ def make_executor(context: Context) -> Any:
     return EventsExecutor(context=context)
 
 
-def spin_for(executor: Any, seconds: float) -> None:
-    """Serve callbacks for so long, or until the executor's context is shut down.
+def spin_for(node: Node, executor: Any, seconds: float) -> None:
+    """Serve callbacks for so long, or until the node's context is shut down.
 
     It stays in the executor from one callback to the next: 5 µs less than `spin_once` for a tick of
-    two poses. An exception of a callback is raised here.
+    two poses. It returns early where a callback of rclpy's own raises.
     """
-    # A new one each time: the executor leaves a callback with it.
-    executor.spin_until_future_complete(Future(), seconds)
+    with _complaints_of(node):
+        # A new one each time: the executor leaves a callback with it.
+        executor.spin_until_future_complete(Future(), seconds)
+
+
+def spin_once(node: Node, executor: Any, seconds: float) -> None:
+    """Serve one callback, or none if none is due within so long."""
+    with _complaints_of(node):
+        executor.spin_once(timeout_sec=seconds)
+
+
+@contextlib.contextmanager
+def _complaints_of(node: Node) -> Iterator[None]:
+    """Log what a callback raises that is not the node's own, and go on.
+
+    rclpy's own services are callbacks too, and raise on requests that they cannot read, such as a
+    parameter of an unknown type.
+    """
+    try:
+        yield
+    except ExternalShutdownException:
+        raise
+    except Exception as error:
+        if node.context.ok():  # it may fail at anything once a signal has ended it
+            node.get_logger().error(f'a request failed: {type(error).__name__}: {error}',
+                                    throttle_duration_sec=LOG_SECONDS)
 
 
 def let_callbacks_finish() -> None:
@@ -146,22 +230,9 @@ def joined(make_node: Callable[[Context], NodeKind], args: Sequence[str] | None 
 
 
 def spin(node: Node, executor: Any) -> None:
-    """Serve a node until its context is shut down (SIGINT, SIGTERM, or `context.shutdown()`).
-
-    An exception of a callback is logged and ends nothing.
-    """
+    """Serve a node until its context is shut down (SIGINT, SIGTERM, or `context.shutdown()`)."""
     while node.context.ok():
-        try:
-            spin_for(executor, SPIN_SECONDS)
-        except ExternalShutdownException:
-            raise
-        except Exception as error:
-            if not node.context.ok():  # it may fail at anything once a signal has ended it
-                break
-            # rclpy's own services are callbacks too, and raise on requests that they cannot read,
-            # such as a parameter of an unknown type.
-            node.get_logger().error(f'a request failed: {type(error).__name__}: {error}',
-                                    throttle_duration_sec=LOG_SECONDS)
+        spin_for(node, executor, SPIN_SECONDS)
 
 
 def refusals_end(main: Callable[..., int]) -> Callable[..., int]:

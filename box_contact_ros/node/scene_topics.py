@@ -33,10 +33,13 @@ TOPICS_OF_EVERY_NODE = ('/diagnostics', '/parameter_events', '/rosout', '/clock'
 """Topics of other types than poses."""
 MOST_PAIRS_WITH_TOPICS = 1000
 """Two publishers a pair take milliseconds and memory, here and in every process that listens."""
-
-
 LARGEST_SCENE_TEXT = 2**20
 """Bytes that `~/scene` has at most: some 10,000 pairs. Whoever joins later is sent all of them."""
+
+
+def pose_input(source: str) -> tuple[type, QoSProfile]:
+    """Return the type and quality of service of a scene's source of poses: a box, or ALL_BOXES."""
+    return (PoseArray, ARRAY_QOS) if source == ALL_BOXES else (PoseStamped, POSE_QOS)
 
 
 class PoseSource(NamedTuple):
@@ -205,8 +208,7 @@ class SceneTopics:
                 self._node.destroy_publisher(publisher)
 
     def _subscribe(self, source: PoseSource, callback: Callable[[Any], None]) -> Subscription:
-        kind, usual = ((PoseArray, ARRAY_QOS) if source.box == ALL_BOXES
-                       else (PoseStamped, POSE_QOS))
+        kind, usual = pose_input(source.box)
         qos = QoSProfile(depth=usual.depth, reliability=usual.reliability)
         if source.deadline:
             qos.deadline = Duration(seconds=source.deadline)

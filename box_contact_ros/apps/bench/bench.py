@@ -99,6 +99,8 @@ def _options(args: Sequence[str]) -> argparse.Namespace:
     if options.replay is None:
         if options.size_a or options.size_b:
             parser.error('--size-a and --size-b are of a --replay: streams have their sizes')
+        if options.pair:
+            parser.error('--pair is of a --replay')
         if options.duration is None:
             options.duration = SECONDS
     options.streams = [name for name in STREAMS if name in options.streams and not options.replay]
@@ -118,10 +120,12 @@ def _add_source(parser: argparse.ArgumentParser) -> None:
     source.add_argument('--replay', type=Path, metavar='BAG',
                         help='a recording instead of the streams: the folder of a rosbag2 bag, or '
                              'an .mcap file')
+    parser.add_argument('--pair', default='', metavar='NAME',
+                        help='of the replay: a pair of the recorded scene (default: its first)')
     for box in 'ab':
-        parser.add_argument(f'--topic-{box}', default=f'box_{box}/pose', metavar='NAME',
-                            help=f'of the replay: poses of box {box.upper()} '
-                                 '(default: %(default)s)')
+        parser.add_argument(f'--topic-{box}', default='', metavar='NAME',
+                            help=f'of the replay: poses of box {box.upper()} (default: those of '
+                                 f'the pair, or box_{box}/pose where no scene was recorded)')
         parser.add_argument(f'--size-{box}', type=float, nargs=3, metavar=('X', 'Y', 'Z'),
                             help=f'of the replay: full extents of box {box.upper()} [m] '
                                  '(default: as the recording says)')
@@ -147,7 +151,7 @@ def _streams(options: argparse.Namespace) -> list[Stream]:
         from ..recording.bag_file import read_replay  # only here: rosbags is an extra
 
         replay = read_replay(options.replay, options.topic_a, options.topic_b,
-                             size_a=options.size_a, size_b=options.size_b)
+                             pair=options.pair, size_a=options.size_a, size_b=options.size_b)
         return [replay.thinned(count)]
     return [make_stream(name, count, options.seed)
             for name in tqdm(options.streams, desc='make streams', disable=None, leave=False)]

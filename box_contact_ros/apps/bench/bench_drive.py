@@ -20,7 +20,6 @@ from typing import IO, Any
 import numpy as np
 from geometry_msgs.msg import PoseArray, PoseStamped
 from rclpy.context import Context
-from rclpy.node import Node
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header
@@ -28,13 +27,13 @@ from tqdm import tqdm
 
 from ...core import native
 from ...node.messages import make_header, read_cloud
-from ...node.runtime import joined, let_callbacks_finish, spin_for
+from ...node.runtime import GuardedNode, joined, let_callbacks_finish, spin_for
 from ...output import machine, no_garbage_collection
 from ...scene.files.scene_file import write_scene
 from ...scene.scene_solver import POSE_ARRAY, Scene
 from ...solver.contact import Contacts
 from ..processes import Stop, asked_to_end, end, on_this_host, parameters, printed, program, start
-from ..ros_client import ANSWERS, DEEP_RELIABLE, answer_values, pose_message
+from ..ros_client import ANSWERS, DEEP_RELIABLE, answer_values, array_message, pose_message
 from .answer_log import CONTACT_MESSAGES, ECHO_MESSAGES, AnswerLog
 from .echo_node import raw_stamp, with_stamp
 from .pose_streams import Stream
@@ -110,7 +109,7 @@ def monotonic_clock() -> Callable[[], int]:
     return lambda: start + time.perf_counter_ns()
 
 
-class BenchNode(Node):
+class BenchNode(GuardedNode):
     """Publishes poses that were serialised before, keeps the bytes of what comes back."""
 
     def __init__(self, context: Context, nodes: Sequence[MeasuredNode],
@@ -190,7 +189,7 @@ class Bench:
                         waiting.remove(node)
                 for turn in self.turns():
                     self._offer(turn, offers[:1])
-                spin_for(self.executor, OFFER_PERIOD)
+                spin_for(self.client, self.executor, OFFER_PERIOD)
                 self._decode()
         for turn in self.turns():
             last = self._offer(turn, offers)
@@ -239,7 +238,7 @@ class Bench:
         sender = threading.Thread(target=self._send, args=(turn[0].poses, ticks, sent))
         sender.start()
         while sender.is_alive():
-            spin_for(self.executor, SLICE)
+            spin_for(self.client, self.executor, SLICE)
             show(len(sent))
         return sent
 
@@ -280,9 +279,9 @@ class Bench:
                 quiet = time.monotonic() + DRAIN_SILENCE
             if not outstanding() or time.monotonic() > min(quiet, deadline):
                 break
-            spin_for(self.executor, SLICE)
+            spin_for(self.client, self.executor, SLICE)
         # The clouds come last; whatever is still on its way behind them is seen here.
-        spin_for(self.executor, SLICE)
+        spin_for(self.client, self.executor, SLICE)
         self._decode()
 
     def _decode(self) -> int:
@@ -340,9 +339,7 @@ class ArrayRun:
 def drive_array(scene: Scene, poses: np.ndarray, args: Sequence[str], *, model: str, rate: float,
                 seconds: float, domain: int) -> ArrayRun:
     """Send poses (ticks, boxes, 7) over and over as arrays to a contact node on one core."""
-    ticks = [[serialize_message(PoseArray(
-        header=make_header(0, 'world'),
-        poses=[pose_message(Header(), pose).pose for pose in tick]))] for tick in poses]
+    ticks = [[serialize_message(array_message(make_header(0, 'world'), tick))] for tick in poses]
     with tempfile.NamedTemporaryFile('w', suffix='.yaml') as file:
         write_scene(scene, file.name)
         node = MeasuredNode(AnswerLog('contact', model, ('cloud',)), program(
@@ -360,7 +357,7 @@ def drive_array(scene: Scene, poses: np.ndarray, args: Sequence[str], *, model: 
                     [node], [ticks[n % len(ticks)] for n in range(round(rate * seconds))])
                 spent = _cpu_seconds(node.process.pid) - before
                 found.cpu_share = spent * rate / max(len(sent), 1)
-                spin_for(bench.executor, DRAIN_SILENCE)
+                spin_for(bench.client, bench.executor, DRAIN_SILENCE)
     found.sent, number_of = len(sent), {stamp: number for number, (stamp, _) in enumerate(sent)}
     for received, _, _, data in bench.client.arrivals:
         stamp, rows = raw_stamp(data), read_cloud(deserialize_message(data, PointCloud2))

@@ -20,13 +20,12 @@ from typing import Any
 
 from geometry_msgs.msg import PoseStamped
 from rclpy.context import Context
-from rclpy.node import Node
 from rclpy.serialization import serialize_message
 from std_msgs.msg import Header
 
 from ...node.message_bytes import ENCAPSULATION
 from ...node.messages import NANOSECONDS
-from ...node.runtime import CONTACT_QOS, POSE_QOS, run_node
+from ...node.runtime import CONTACT_QOS, POSE_QOS, GuardedNode, run_node
 from ...scene.stamp_pairing import WAITING_TICKS
 
 STAMP = struct.Struct('=iI')  # behind the encapsulation; sender and receiver are one machine
@@ -44,7 +43,7 @@ def with_stamp(data: bytes, stamp: int) -> bytes:
     return data[:ENCAPSULATION] + packed + data[ENCAPSULATION + STAMP.size:]
 
 
-class EchoNode(Node):
+class EchoNode(GuardedNode):
     """Answers each pair of stamps once."""
 
     def __init__(self, context: Context, **options: Any) -> None:

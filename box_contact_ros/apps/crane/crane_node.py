@@ -22,13 +22,12 @@ import numpy as np
 from geometry_msgs.msg import PoseStamped
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException
-from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from visualization_msgs.msg import MarkerArray
 
 from ...node.messages import make_header
 from ...node.parameters import answer_help, declare
-from ...node.runtime import CONTACT_QOS, REFUSALS, joined
+from ...node.runtime import CONTACT_QOS, REFUSALS, GuardedNode, joined, spin_once
 from ...solver.contact_solver import ContactSolver
 from ..ros_client import (
     ANSWERS,
@@ -53,7 +52,7 @@ DRAW_RATE = 30.0  # Hz at most
 DRAIN = 1.0  # s of patience for the last answers
 
 
-class CraneNode(Node):
+class CraneNode(GuardedNode):
     """Publishes the crane's poses and gathers the answers in a `CraneLog`."""
 
     def __init__(self, context: Context, **options: Any) -> None:
@@ -185,7 +184,7 @@ def receive_while(node: CraneNode, executor: Any, work: Callable[[], None],
         future = pool.submit(work)
         try:
             while not future.done():
-                executor.spin_once(timeout_sec=0.05)
+                spin_once(node, executor, 0.05)
                 if not node.context.ok():  # SIGTERM; the executor may return without a word
                     raise ExternalShutdownException
                 if screen:

@@ -15,19 +15,18 @@ from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
-from geometry_msgs.msg import Pose, PoseArray
+from geometry_msgs.msg import PoseArray
 from rclpy.context import Context
-from rclpy.node import Node
 from sensor_msgs.msg import PointCloud2
 
 from ...node.messages import make_header, read_cloud
-from ...node.runtime import joined
+from ...node.runtime import GuardedNode, joined, spin_once
 from ...scene.files.scene_file import write_scene
 from ...scene.scene_solver import POSE_ARRAY, Box, Pair, Scene
 from ...solver.contact import Contact
 from .. import processes
 from ..bench.answer_log import first_row, is_stale, touch_in
-from ..ros_client import DEEP_RELIABLE, set_pose, stamp_of
+from ..ros_client import DEEP_RELIABLE, array_message, stamp_of
 from .landing import ClosedLoop, LandingRecord
 from .mujoco_crane import CraneScenario
 
@@ -48,7 +47,7 @@ def scene_of(scenarios: Sequence[CraneScenario]) -> Scene:
     return Scene(boxes, tuple(pairs), pose_array=True)
 
 
-class FlightNode(Node):
+class FlightNode(GuardedNode):
     """Sends the poses of all loads, and awaits their contacts."""
 
     def __init__(self, context: Context) -> None:
@@ -66,17 +65,14 @@ class FlightNode(Node):
 
         TimeoutError: none came within `patience` [s]. RuntimeError: a pair was not evaluated.
         """
-        message = PoseArray(header=make_header(self.get_clock().now().nanoseconds, 'world'))
-        message.poses = [Pose() for _ in poses]
-        for one, pose in zip(message.poses, poses):
-            set_pose(one, pose)
+        message = array_message(make_header(self.get_clock().now().nanoseconds, 'world'), poses)
         self._poses.publish(message)
         stamp, deadline = stamp_of(message.header), time.monotonic() + patience
         while stamp not in self._clouds:
             left = deadline - time.monotonic()
             if left <= 0.0:
                 raise TimeoutError(f'the contact node gave no answer within {patience:g} s')
-            executor.spin_once(timeout_sec=left)
+            spin_once(self, executor, left)
         rows = self._clouds.pop(stamp)
         found = {int(rows[n]['pair']): first_row(rows[n:]) for n in range(len(rows))}
         if any(map(is_stale, found.values())):

@@ -8,14 +8,18 @@ the sizes of two boxes: they are in the bag's custom data, where they were known
 from __future__ import annotations
 
 import json
+import math
 from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from difflib import get_close_matches
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
+from rosbags.interfaces import Connection
 from rosbags.rosbag2 import (
     CompressionFormat,
     CompressionMode,
@@ -26,16 +30,18 @@ from rosbags.rosbag2 import (
 )
 from rosbags.typesys import Stores, get_typestore
 
-from ...scene.files.scene_file import parse_scene
-from ...scene.scene_solver import Scene, two_boxes
+from ...scene.files.scene_file import SceneError, parse_scene
+from ...scene.scene_solver import POSE_ARRAY, Scene, two_boxes
 from ...solver.checks import as_size, shown
 from ..bench.pose_streams import Replay, Size
 
 BAG_VERSION: Final = 9  # of rosbag2's metadata: what Jazzy writes and reads
 NANOSECONDS = 1_000_000_000
 POSE = 'geometry_msgs/msg/PoseStamped'
+POSES = 'geometry_msgs/msg/PoseArray'
 TYPES = {
     'pose': POSE,
+    'poses': POSES,
     'contact/point': 'geometry_msgs/msg/PointStamped',
     'contact/normal': 'geometry_msgs/msg/Vector3Stamped',
     'contacts': 'sensor_msgs/msg/PointCloud2',
@@ -65,15 +71,15 @@ class Recorder:
     """Writes a recording, message by message; a recording that is not closed has no index."""
 
     def __init__(self, folder: Path, topics: Sequence[str], about: Mapping[str, Any],
-                 poses: Collection[str] = ()) -> None:
+                 kinds: Mapping[str, str] = MappingProxyType({})) -> None:
         """Begin a recording in a folder that does not exist yet.
 
-        topics: absolute names; `poses` are those that carry poses, whatever their names. about:
-        what is kept with the messages, as JSON: `size_a`, `size_b` (full extents [m]), or `scene`
-        (its text), and `model`. Raises RecordingError.
+        topics: absolute names; `kinds` are the types of those whose names do not tell. about: what
+        is kept with the messages, as JSON: `size_a`, `size_b` (full extents [m]), or `scene` (its
+        text), and `model`. Raises RecordingError.
         """
         types = get_typestore(Stores.ROS2_JAZZY)
-        self.kinds = {topic: POSE if topic in poses else type_of(topic) for topic in topics}
+        self.kinds = {topic: kinds.get(topic) or type_of(topic) for topic in topics}
         self.counts = Counter(dict.fromkeys(topics, 0))
         self.span: tuple[int, int] | None = None  # times of the first and the last message [ns]
         try:
@@ -106,73 +112,134 @@ class Recording:
     scene: Scene
     about: Mapping[str, Any]  # what was kept with the messages
     messages: Sequence[tuple[int, str, bytes]]
-    """Time of receipt [ns], topic without its leading slash, bytes; in order of time."""
+    """Time of receipt [ns], topic, bytes; in order of time.
+
+    Topics have the names that the scene gives them, without a leading slash.
+    """
 
 
 def read_recording(path: Path) -> Recording:
     """Return a bag that says its scene, or the sizes of its two boxes. Raises RecordingError."""
+    with _opened(path) as reader:
+        about = _about(reader)
+        messages = [(at, _name_of(connection, about), data)
+                    for connection, at, data in reader.messages()]
     try:
-        with Reader(path) as reader:
-            known = {}
-            for name, value in (reader.storage.metadata.custom or {}).items():
-                with suppress(ValueError):  # another program's entry need not be JSON
-                    known[name] = json.loads(value)
-            messages = [(at, connection.topic.lstrip('/'), data)
-                        for connection, at, data in reader.messages()]
-    except Exception as error:  # rosbags lets through whatever reading garbage ends in
-        raise RecordingError(f'{path} cannot be read as a bag: {error}') from error
-    try:
-        scene = (parse_scene(known['scene'], str(path)) if 'scene' in known else
-                 two_boxes(known['size_a'], known['size_b']))
+        scene = (parse_scene(about['scene'], str(path)) if 'scene' in about else
+                 two_boxes(about['size_a'], about['size_b']))
     except KeyError:
         raise RecordingError(f'{path} says neither its scene nor the sizes of two boxes: record '
                              'with --scene, or with --size-a and --size-b') from None
-    return Recording(scene, known, messages)
+    return Recording(scene, about, messages)
 
 
-def read_replay(path: Path, topic_a: str = TOPICS[0], topic_b: str = TOPICS[1], *,
-                size_a: Size | None = None, size_b: Size | None = None) -> Replay:
-    """Return the pairs of poses in a bag: a folder, or an .mcap file alone.
-
-    Sizes that are not given are those that the recording says. Raises RecordingError for what is no
-    bag, lacks a topic, has no pairs, or says no sizes where none are given.
-    """
+@contextmanager
+def _opened(path: Path) -> Iterator[Reader]:
+    """Give the reader of a bag: a folder, or an .mcap file alone; or raise RecordingError."""
     try:
         with Reader(path) as reader:
-            one, other = (_poses(reader, path, topic) for topic in (topic_a, topic_b))
-            known = reader.storage.metadata.custom or {}
-    except RecordingError:
+            yield reader
+    except (RecordingError, SceneError):
         raise
     except Exception as error:  # rosbags lets through whatever reading garbage ends in
         raise RecordingError(f'{path} cannot be read as a bag: {error}') from error
-    stamps = sorted(one.keys() & other.keys())
+
+
+def _about(reader: Reader) -> dict[str, Any]:
+    """Return what was kept with the messages."""
+    about = {}
+    for name, value in (reader.storage.metadata.custom or {}).items():
+        with suppress(ValueError):  # another program's entry need not be JSON
+            about[name] = json.loads(value)
+    return about
+
+
+def _name_of(connection: Connection, about: Mapping[str, Any]) -> str:
+    """Return what a topic is called before remapping and namespaces, without a leading slash."""
+    return str(about.get('topics', {}).get(connection.topic, connection.topic)).lstrip('/')
+
+
+@dataclass(frozen=True)
+class _Side:
+    """Where the poses of one box of a replay are."""
+
+    name: str  # of the box
+    topic: str
+    size: Sequence[float] | None  # full extents [m], where they are known
+    pose: tuple[float, ...] | None = None  # of a fixed box
+    array: tuple[str, ...] = ()  # the boxes of each message, where it is a PoseArray
+
+
+def read_replay(path: Path, topic_a: str = '', topic_b: str = '', *, pair: str = '',
+                size_a: Size | None = None, size_b: Size | None = None) -> Replay:
+    """Return the pairs of poses in a bag: a folder, or an .mcap file alone.
+
+    They are those of a pair of the recorded scene (default: the first), or those on two topics
+    (default: box_a/pose, box_b/pose). Sizes that are not given are those that the recording says.
+    Raises RecordingError for what is no bag, lacks a topic or the pair, has no two poses of equal
+    stamp, or says no sizes where none are given.
+    """
+    with _opened(path) as reader:
+        about = _about(reader)
+        if pair or ('scene' in about and not topic_a and not topic_b):
+            sides = _of_pair(path, about, pair)
+        else:
+            sides = [_Side(f'box_{box}', topic or f'box_{box}/pose', about.get(f'size_{box}'))
+                     for box, topic in (('a', topic_a), ('b', topic_b))]
+        found = [{} if side.pose else _poses(reader, path, about, side) for side in sides]
+    for side, other, poses in zip(sides, found[::-1], found):
+        poses |= dict.fromkeys(other, side.pose) if side.pose else {}
+    stamps = sorted(found[0].keys() & found[1].keys())
     if not stamps:
-        raise RecordingError(f'{path} has no two poses of equal stamp: {len(one)} stamps on '
-                             f'{topic_a}, {len(other)} on {topic_b}')
+        raise RecordingError(f'{path} has no two poses of equal stamp: ' + ', '.join(
+            f'{len(poses)} stamps on {side.topic}' for side, poses in zip(sides, found)))
     sizes = []
-    for name, given in (('size_a', size_a), ('size_b', size_b)):
-        if given is None and name not in known:
-            option = name.replace('_', '-')
-            raise RecordingError(f'{path} does not say the size of box_{name[-1]}: give --{option}')
-        size = json.loads(known[name]) if given is None else given
-        x, y, z = map(float, as_size(size, name).ravel())
+    for box, side, given in (('a', sides[0], size_a), ('b', sides[1], size_b)):
+        size = side.size if given is None else given
+        if size is None:
+            raise RecordingError(f'{path} does not say the size of box_{box}: give --size-{box}')
+        x, y, z = map(float, as_size(size, f'size_{box}').ravel())
         sizes.append((x, y, z))
-    pose_a, pose_b = (np.array([poses[stamp] for stamp in stamps]) for poses in (one, other))
+    pose_a, pose_b = (np.array([poses[stamp] for stamp in stamps]) for poses in found)
     return Replay(path.stem, sizes[0], sizes[1], pose_a, pose_b, np.array(stamps))
 
 
-def _poses(reader: Reader, path: Path, topic: str) -> dict[int, tuple[float, ...]]:
-    """Return poses `x y z qx qy qz qw` on a topic by stamp [ns]."""
-    found = [c for c in reader.connections if c.topic.lstrip('/') == topic.lstrip('/')]
+def _of_pair(path: Path, about: Mapping[str, Any], name: str) -> list[_Side]:
+    """Return the boxes of a pair of the recorded scene; the first pair, where `name` is empty."""
+    if 'scene' not in about:
+        raise RecordingError(f'{path} does not say its scene, and so no pair {shown(name)}: record '
+                             'with --scene, or give --topic-a and --topic-b')
+    scene = parse_scene(about['scene'], str(path))
+    pairs = {pair.name: pair for pair in scene.pairs}
+    if name and name not in pairs:
+        near = ' or '.join(get_close_matches(name, pairs))
+        raise RecordingError(f'the scene of {path} has no pair {shown(name)}'
+                             + (f' (did you mean {near}?)' if near else ''))
+    pair = pairs[name] if name else scene.pairs[0]
+    return [_Side(box, scene.sources.get(box, POSE_ARRAY), scene.boxes[box].size,
+                  scene.boxes[box].pose, scene.moving if scene.pose_array else ())
+            for box in (pair.a, pair.b)]
+
+
+def _poses(reader: Reader, path: Path, about: Mapping[str, Any], side: _Side,
+           ) -> dict[int, tuple[float, ...]]:
+    """Return poses `x y z qx qy qz qw` of a box by stamp [ns], without those where it is absent."""
+    found = [c for c in reader.connections
+             if side.topic.lstrip('/') in (c.topic.lstrip('/'), _name_of(c, about))]
     if not found:
-        raise RecordingError(f'{path} has no topic {shown(topic)}; it has: '
+        raise RecordingError(f'{path} has no topic {shown(side.topic)}; it has: '
                              f'{", ".join(sorted(c.topic for c in reader.connections)) or "none"}')
-    if any(c.msgtype != POSE for c in found):
-        raise RecordingError(f'{path}: {topic} is {found[0].msgtype}, not {POSE}')
+    kind = POSES if side.array else POSE
+    if any(c.msgtype != kind for c in found):
+        raise RecordingError(f'{path}: {side.topic} is {found[0].msgtype}, not {kind}')
     types = get_typestore(Stores.ROS2_JAZZY)
     poses: dict[int, tuple[float, ...]] = {}
     for _, _, data in reader.messages(found):
-        message: Any = types.deserialize_cdr(data, POSE)
-        stamp, p, q = message.header.stamp, message.pose.position, message.pose.orientation
-        poses[stamp.sec * NANOSECONDS + stamp.nanosec] = (p.x, p.y, p.z, q.x, q.y, q.z, q.w)
+        message: Any = types.deserialize_cdr(data, kind)
+        if side.array and len(message.poses) != len(side.array):
+            continue  # the contact node refuses it
+        pose = message.poses[side.array.index(side.name)] if side.array else message.pose
+        stamp, p, q = message.header.stamp, pose.position, pose.orientation
+        if not math.isnan(p.x):
+            poses[stamp.sec * NANOSECONDS + stamp.nanosec] = (p.x, p.y, p.z, q.x, q.y, q.z, q.w)
     return poses

@@ -4,6 +4,7 @@ from __future__ import annotations
 import contextlib
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +12,8 @@ from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import MarkerArray
 
-from ...node.message_bytes import RawMessages
 from ...node.messages import Refused, read_cloud
-from ..ros_client import CRANE_MARKERS, lines_of, stamp_of
+from ..ros_client import CRANE_MARKERS, PoseTopic, lines_of, pose_topics, stamp_of
 from ..viewer.view_log import OtherSceneError, ViewLog
 from .bag_file import NANOSECONDS, RecordingError, read_recording
 
@@ -34,8 +34,8 @@ class BagPlayer:
         self.lines = np.zeros((0, 2, 3))
         self._take: dict[str, Callable[[int, bytes], None]] = {
             'contacts': self._on_cloud, CRANE_MARKERS: self._on_crane}
-        self._take |= {recording.scene.boxes[box].pose_topic.lstrip('/'): self._on_pose(box)
-                       for box in recording.scene.moving}
+        self._take |= {topic.name.lstrip('/'): partial(self._on_poses, topic)
+                       for topic in pose_topics(recording.scene)}
         self._messages = [message for message in recording.messages if message[1] in self._take]
         if not self._messages:
             raise RecordingError(f'{path} has none of the topics of its scene')
@@ -68,13 +68,9 @@ class BagPlayer:
             while time.monotonic() < end:
                 yield False
 
-    def _on_pose(self, box: str) -> Callable[[int, bytes], None]:
-        read = RawMessages().read_pose
-
-        def callback(_: int, data: bytes) -> None:
-            pose = read(data)
+    def _on_poses(self, topic: PoseTopic, _: int, data: bytes) -> None:
+        for box, pose in topic.read(data).items():
             self.log.pose(box, pose.stamp, pose.numbers, pose.frame_id)
-        return callback
 
     def _on_cloud(self, at: int, data: bytes) -> None:
         message = deserialize_message(data, PointCloud2)

@@ -8,44 +8,48 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
-from geometry_msgs.msg import PointStamped, PoseStamped, Vector3Stamped
+from geometry_msgs.msg import PointStamped, PoseArray, PoseStamped, Vector3Stamped
 from rclpy.context import Context
-from rclpy.node import Node
 from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import MarkerArray
 
 from ...node.parameters import outside_ros_args
-from ...node.runtime import POSE_QOS, refusals_end, run_node
+from ...node.runtime import ARRAY_QOS, POSE_QOS, GuardedNode, refusals_end, run_node
 from ...solver.arguments import program_parser
 from ...solver.checks import as_size
-from ..ros_client import DEEP_RELIABLE, read_scene_text
-from .bag_file import DRAWN, NANOSECONDS, POSE, TOPICS, TYPES, Recorder, RecordingError, type_of
+from ..ros_client import DEEP_RELIABLE, pose_topics, read_scene_text
+from .bag_file import DRAWN, NANOSECONDS, TOPICS, TYPES, Recorder, RecordingError, type_of
 
-MESSAGES = dict(zip(TYPES.values(), (PoseStamped, PointStamped, Vector3Stamped, PointCloud2,
-                                     MarkerArray)))
+MESSAGES = dict(zip(TYPES.values(), (PoseStamped, PoseArray, PointStamped, Vector3Stamped,
+                                     PointCloud2, MarkerArray)))
+TYPE_OF = {message: kind for kind, message in MESSAGES.items()}
+QOS = {PoseStamped: POSE_QOS, PoseArray: ARRAY_QOS}
+"""Poses as the contact node takes them, from whatever publisher; all others without loss."""
 PROGRESS_SECONDS = 1.0
 
 
-class RecordNode(Node):
+class RecordNode(GuardedNode):
     """Hands every message of its topics to a `Recorder`; ends where that cannot write any more."""
 
     def __init__(self, context: Context, folder: Path, topics: Sequence[str],
-                 about: Mapping[str, Any], poses: Collection[str] = ()) -> None:
+                 about: Mapping[str, Any],
+                 kinds: Mapping[str, str] = MappingProxyType({})) -> None:
         super().__init__('record', context=context)
         resolved = {self.resolve_topic_name(topic): topic for topic in topics}
-        of_poses = [name for name, topic in resolved.items() if topic in poses]
-        self.folder, self.recorder = folder, Recorder(folder, list(resolved), about, of_poses)
-        self._fault: OSError | None = None
+        kinds = {name: kinds[topic] for name, topic in resolved.items() if topic in kinds}
+        self.folder, self.recorder = folder, Recorder(
+            folder, list(resolved), {**about, 'topics': resolved}, kinds)
+        self._fault: Exception | None = None
         for name, topic in resolved.items():
-            kind = self.recorder.kinds[name]
-            # Poses as the contact node takes them, from whatever publisher; contacts without loss.
-            self.create_subscription(MESSAGES[kind], topic, partial(self._keep, name),
-                                     POSE_QOS if kind == POSE else DEEP_RELIABLE, raw=True)
+            message = MESSAGES[self.recorder.kinds[name]]
+            self.create_subscription(message, topic, partial(self._keep, name),
+                                     QOS.get(message, DEEP_RELIABLE), raw=True)
         if sys.stderr.isatty():
             self.create_timer(PROGRESS_SECONDS, self._show_progress)
         print(f'recording to {folder}: {", ".join(resolved)}', flush=True)
@@ -55,7 +59,7 @@ class RecordNode(Node):
             print(f'receiving {topic}', flush=True)
         try:
             self.recorder.write(topic, self.get_clock().now().nanoseconds, data)
-        except OSError as error:  # a full disk
+        except Exception as error:  # a full disk: what follows cannot be kept either
             self._fault = error
             self.context.try_shutdown()
 
@@ -74,7 +78,7 @@ class RecordNode(Node):
             if self._fault is not None:
                 raise self._fault
             self.recorder.close()
-        except OSError as error:
+        except Exception as error:
             raise RecordingError(f'the recording {self.folder} is not complete: {error}') from error
         print(f'\nrecorded {self.folder}: {self.recorder.counts.total()} messages in '
               f'{self._seconds():.2f} s')
@@ -86,16 +90,21 @@ class RecordNode(Node):
 def main(args: Sequence[str] | None = None) -> int:
     """Record until SIGINT or SIGTERM."""
     args = list(args or ())
-    options = _options(outside_ros_args(args))
+    return run_node(node_of(outside_ros_args(args)), args)
+
+
+def node_of(args: Sequence[str]) -> Callable[[Context], RecordNode]:
+    """Return what makes the node that the program's arguments ask for."""
+    options = _options(args)
     about = {name: value for name in ('size_a', 'size_b', 'model')
              if (value := getattr(options, name)) is not None}
-    topics, poses = options.topics, []
+    topics, kinds = options.topics, {}
     if options.scene is not None:
         about['scene'], scene = read_scene_text(options.scene)
-        poses = [scene.boxes[box].pose_topic for box in scene.moving]
-        topics = topics or [*poses, 'contacts', *DRAWN]
-    return run_node(partial(RecordNode, folder=options.out, about=about, poses=poses,
-                            topics=topics or [*TOPICS, *DRAWN]), args)
+        kinds = {topic.name: TYPE_OF[topic.kind] for topic in pose_topics(scene)}
+        topics = topics or [*kinds, 'contacts', *DRAWN]
+    return partial(RecordNode, folder=options.out, about=about, kinds=kinds,
+                   topics=topics or [*TOPICS, *DRAWN])
 
 
 def _options(args: Sequence[str]) -> argparse.Namespace:

@@ -4,15 +4,12 @@
 """
 from __future__ import annotations
 
-import contextlib
 import time
 from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-from geometry_msgs.msg import PoseStamped
 from rclpy.context import Context
-from rclpy.node import Node
 from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.qos import QoSProfile
@@ -21,13 +18,12 @@ from rclpy.task import Future
 from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import MarkerArray
 
-from ...node.message_bytes import RawMessages
-from ...node.messages import Refused, read_cloud
-from ...node.runtime import LOG_SECONDS, POSE_QOS
+from ...node.messages import read_cloud
+from ...node.runtime import POSE_QOS, GuardedNode
 from ...scene.files.scene_file import SceneError, read_scene
 from ...scene.scene_solver import Scene, two_boxes
-from ..ros_client import CRANE_MARKERS, lines_of, stamp_of
-from .view_log import OtherSceneError, ViewLog
+from ..ros_client import CRANE_MARKERS, PoseTopic, lines_of, pose_topics, stamp_of
+from .view_log import ViewLog
 
 ASK_PERIOD = 0.5
 """Time [s] between looks at the contact node's parameters: somebody else may change them too."""
@@ -45,7 +41,7 @@ def named_scene(settings: Mapping[str, Any]) -> Scene:
     return two_boxes(settings['size_a'], settings['size_b'])
 
 
-class Listener(Node):
+class Listener(GuardedNode):
     """Writes what it hears to `log`; what the contact node refuses or another scene sends, drops.
 
     log: of the scene that is listened to; None before the first.
@@ -63,36 +59,28 @@ class Listener(Node):
         for subscription in self._poses_of:
             self.destroy_subscription(subscription)
         self.log = log = ViewLog(scene, **options)
-        # The only place that knows how poses come.
         self._poses_of = [
-            self.create_subscription(PoseStamped, scene.boxes[box].pose_topic,
-                                     self._pose_callback(log, box), POSE_QOS, raw=True)
-            for box in scene.moving]
+            self.create_subscription(topic.kind, topic.name, self._pose_callback(log, topic),
+                                     topic.qos, raw=True)
+            for topic in pose_topics(scene)]
 
     def heard(self) -> None:
         """Do what is to be done when something was written to `log`."""
 
-    def _pose_callback(self, log: ViewLog, box: str) -> Callable[[bytes], None]:
-        read = RawMessages().read_pose
-
+    def _pose_callback(self, log: ViewLog, topic: PoseTopic) -> Callable[[bytes], None]:
         def callback(data: bytes) -> None:
-            with contextlib.suppress(Refused):  # the contact node counts and reports it
-                pose = read(data)
+            for box, pose in topic.read(data).items():
                 log.pose(box, pose.stamp, pose.numbers, pose.frame_id)
-                self.heard()
+            self.heard()
         return callback
 
     def _on_cloud(self, message: PointCloud2) -> None:
         if self.log is None:
             return
         header = message.header
-        try:
-            self.log.cloud(stamp_of(header), read_cloud(message),
-                           self.get_clock().now().nanoseconds, header.frame_id)
-        except (Refused, OtherSceneError) as error:
-            self.get_logger().warning(str(error), throttle_duration_sec=LOG_SECONDS)
-        else:
-            self.heard()
+        self.log.cloud(stamp_of(header), read_cloud(message),
+                       self.get_clock().now().nanoseconds, header.frame_id)
+        self.heard()
 
 
 class ViewNode(Listener):
@@ -139,7 +127,7 @@ class ViewNode(Listener):
                 self.wish, self.refusal = '', '' if result.successful else result.reason
             if result.successful:
                 self.settings = {**self.settings, 'model': name}
-        future.add_done_callback(done)
+        future.add_done_callback(self.guarded(done, f'model {name}'))
 
     def _on_crane(self, message: MarkerArray) -> None:
         self.lines = lines_of(message)
@@ -150,7 +138,8 @@ class ViewNode(Listener):
             self.wish = '' if self._answered else self.wish
         if self._question is None and self._target.services_are_ready():
             self._question = self._target.get_parameters(list(ASKED))
-            self._question.add_done_callback(self._on_parameters)
+            self._question.add_done_callback(
+                self.guarded(self._on_parameters, 'parameters of the contact node'))
 
     def _on_parameters(self, future: Future) -> None:
         self._question, self._answered = None, time.monotonic()

@@ -11,19 +11,17 @@ import sys
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from geometry_msgs.msg import PoseStamped
 from rclpy.context import Context
-from rclpy.node import Node
 
 from ...node.messages import make_header
 from ...node.parameters import outside_ros_args
-from ...node.runtime import CONTACT_QOS, refusals_end, run_node
+from ...node.runtime import CONTACT_QOS, GuardedNode, refusals_end, run_node
 from ...scene.files.scene_file import read_scene
 from ...scene.pose import quaternion_multiply, rotation_matrix
 from ...scene.scene_solver import Box, Scene
 from ...solver.arguments import program_parser, within
 from ...solver.contact_solver import ContactSolver
-from ..ros_client import pose_message
+from ..ros_client import array_message, pose_message, pose_topics
 
 VISIT = 8.0  # time [s] from one partner to the next
 DOWN, UP = (0.30, 0.45), (0.75, 0.90)
@@ -124,24 +122,27 @@ def _ramp(share: float) -> float:
     return share * share * (3.0 - 2.0 * share)
 
 
-class SceneDriver(Node):
-    """Publishes a pose of every moving box, all under one stamp, at a rate."""
+class SceneDriver(GuardedNode):
+    """Publishes a pose of every moving box at a rate: under one stamp, or as one message."""
 
     def __init__(self, context: Context, scene: Scene, rate: float) -> None:
         super().__init__('scene_driver', context=context)
         self._scene, self._motions = scene, motions(scene)
-        self._topics = {name: self.create_publisher(
-            PoseStamped, scene.boxes[name].pose_topic, CONTACT_QOS) for name in scene.moving}
+        self._publishers = [self.create_publisher(topic.kind, topic.name, CONTACT_QOS)
+                            for topic in pose_topics(scene)]
         self._start = self.get_clock().now().nanoseconds
         self.create_timer(1.0 / rate, self._publish)
-        self.get_logger().info(f'ready: {len(self._topics)} boxes at {rate:g} Hz')
+        self.get_logger().info(f'ready: {len(scene.moving)} boxes at {rate:g} Hz')
 
     def _publish(self) -> None:
         stamp = self.get_clock().now().nanoseconds
         header = make_header(stamp, self._scene.frame_id or 'world')
         time = 1e-9 * (stamp - self._start)
-        for name, publisher in self._topics.items():
-            publisher.publish(pose_message(header, self._motions[name](time)))
+        poses = [self._motions[name](time) for name in self._scene.moving]
+        messages = ([array_message(header, poses)] if self._scene.pose_array else
+                    [pose_message(header, pose) for pose in poses])
+        for publisher, message in zip(self._publishers, messages, strict=True):
+            publisher.publish(message)
 
 
 @refusals_end

@@ -28,7 +28,8 @@ from typing import TYPE_CHECKING
 
 from ...node.contact_node import PARAMETERS
 from ...node.parameters import outside_ros_args
-from ...node.runtime import REFUSALS, joined
+from ...node.runtime import REFUSALS, joined, spin_once
+from ...node.scene_topics import MOST_PAIRS_WITH_TOPICS
 from ...scene.files.scene_file import read_scene
 from ...scene.scene_solver import Scene
 from ...solver.arguments import model_name, program_parser, within
@@ -121,11 +122,7 @@ def listening(target: str, scene: Scene | None, args: Sequence[str]) -> Iterator
 
         def serve() -> None:
             while not stop.is_set():
-                try:
-                    executor.spin_once(timeout_sec=0.1)
-                except Exception as error:  # one bad message does not end the view
-                    node.get_logger().error(f'{type(error).__name__}: {error}',
-                                            throttle_duration_sec=1.0)
+                spin_once(node, executor, 0.1)
 
         thread = threading.Thread(target=serve, name='ROS')
         thread.start()
@@ -214,7 +211,9 @@ def serve(options: argparse.Namespace, args: Sequence[str], stop: Stop) -> None:
             started = ending.enter_context(closing(Simulation(options.model, run)))
         elif not options.attach:
             started = ending.enter_context(closing(Programs(
-                contact_node=program('contact_node', model=options.model, scene=options.scene),
+                contact_node=program(
+                    'contact_node', model=options.model, scene=options.scene,
+                    pair_topics=len(scene.pairs) <= MOST_PAIRS_WITH_TOPICS),
                 scene_driver=['-m', scene_driver.__name__, '--scene', options.scene, '--rate',
                               str(options.rate)])))
         announce(page, options, 'the domain of this shell' if options.domain is None else

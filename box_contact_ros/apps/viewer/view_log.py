@@ -204,7 +204,7 @@ class ViewLog:
             self._answered = self._lost = 0
 
     def pose(self, box: str, stamp: int, numbers: np.ndarray, frame_id: str = '') -> None:
-        """Take where a moving box is: numbers (7,)."""
+        """Take where a moving box is: numbers (7,), or NaN for a box that is not there."""
         with self._lock:
             track = self._tracks.get(box)
             if track is None:  # it was of the scene before this one
@@ -212,9 +212,10 @@ class ViewLog:
             if track and stamp < track[-1][0] - RESET:
                 self.start_anew()
                 track = self._tracks[box]
-            track.append((stamp, numbers))
-            while stamp - track[0][0] > WINDOW * NANOSECONDS:
-                track.popleft()
+            if numbers[0] == numbers[0]:  # not NaN
+                track.append((stamp, numbers))
+                while stamp - track[0][0] > WINDOW * NANOSECONDS:
+                    track.popleft()
             if self._newest is None or stamp > self._newest:
                 self._newest, self._frame_id = stamp, frame_id
                 self._give_up(stamp)
