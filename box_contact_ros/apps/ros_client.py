@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from geometry_msgs.msg import Point, PointStamped, PoseArray, PoseStamped, Vector3Stamped
+from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import ColorRGBA, Header
@@ -28,6 +29,9 @@ ANSWERS: dict[str, tuple[type, str]] = {
               (ContactsMessage, 'contacts')),
 }
 """Type and topic of what a contact node answers with, by the kinds of an `AnswerLog`."""
+CONTACT_TYPES: dict[str, type] = {'sensor_msgs/msg/PointCloud2': PointCloud2} | (
+    {} if ContactsMessage is None else {'box_contact_msgs/msg/Contacts': ContactsMessage})
+"""Messages of all contacts that can be read here, by the names of their types."""
 CRANE_MARKERS = 'crane/markers'
 """Where the crane publishes its ropes and its spreader, as lines."""
 
@@ -63,6 +67,27 @@ def _by_box(scene: Scene, poses: StampedPose) -> dict[str, StampedPose]:
                       f'{len(numbers)} poses, but {len(moving)} boxes of the scene move')
     numbers[~are_poses(numbers)] = np.nan
     return {box: poses._replace(numbers=row) for box, row in zip(moving, numbers)}
+
+
+def subscribe_contacts(node: Node, callback: Callable[[Any], None], qos: QoSProfile) -> None:
+    """Subscribe to all contacts, `Contacts` or the point cloud: whichever the contact node sends.
+
+    Where it sends both, `callback` gets `Contacts` alone.
+    """
+    named = False
+
+    def on_contacts(message: Any) -> None:
+        nonlocal named
+        named = True
+        callback(message)
+
+    def on_cloud(message: PointCloud2) -> None:
+        if not named:
+            callback(message)
+
+    if ContactsMessage is not None:
+        node.create_subscription(ContactsMessage, 'contacts', on_contacts, qos)
+    node.create_subscription(PointCloud2, 'contacts_cloud', on_cloud, qos)
 
 
 def answer_values(kind: str, message: Any) -> Sequence[float] | np.ndarray:

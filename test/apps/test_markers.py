@@ -16,7 +16,7 @@ from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import Marker, MarkerArray
 
 from box_contact_ros import ContactSolver
-from box_contact_ros.apps.ros_client import CRANE_MARKERS
+from box_contact_ros.apps.ros_client import ANSWERS, CRANE_MARKERS
 from box_contact_ros.apps.viewer.markers import (
     NAMESPACES,
     PARAMETERS,
@@ -26,7 +26,7 @@ from box_contact_ros.apps.viewer.markers import (
 from box_contact_ros.apps.viewer.style import LISTED
 from box_contact_ros.apps.viewer.view_log import ViewLog
 from box_contact_ros.node.contact_node import ContactNode
-from box_contact_ros.node.messages import make_cloud, make_header, read_cloud
+from box_contact_ros.node.messages import make_cloud, make_contacts, make_header, read_cloud
 from box_contact_ros.resources import resource_path
 from box_contact_ros.scene.scene_solver import Answer, Box, Pair, Scene
 from box_contact_ros.solver.contact import Contact
@@ -55,7 +55,7 @@ def drawing(touching=(), stale=(), scene=YARD):
     for box in scene.moving:
         log.pose(box, STAMP, np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 2.0]), 'yard')
     cloud = make_cloud(HEADER, Answer(list(touching), list(stale), 1))
-    log.cloud(STAMP, read_cloud(cloud), STAMP, 'yard')
+    log.contacts(STAMP, read_cloud(cloud), STAMP, 'yard')
     markers = scene_markers(log.snapshot())
     return markers, {name: [m for m in markers if m.ns == name] for name in NAMESPACES}
 
@@ -254,12 +254,14 @@ def test_nobody_answers_any_more(client, node):
 def test_contacts_of_another_scene_are_not_drawn(client, node, capfd):
     """A row of a pair that the scene has not: said, and no point put anywhere."""
     offer_until_drawn(client, 2)
-    publisher = client.node.create_publisher(PointCloud2, 'contacts', 10)
+    kind, topic = ANSWERS['cloud']
+    make = make_cloud if kind is PointCloud2 else make_contacts
+    publisher = client.node.create_publisher(kind, topic, 10)
     assert client.spin(lambda: publisher.get_subscription_count() > 1)  # ours, and markers'
     said, deadline = '', time.monotonic() + PATIENCE
     for pairs in ([Pair(3, 'p', 'a', 'b')], [Pair(0, 'p', 'a', 'b'), Pair(1, 'q', 'a', 'c')]):
         while True:
-            publisher.publish(make_cloud(make_header(client.next_stamp(), 'map'), Answer(
+            publisher.publish(make(make_header(client.next_stamp(), 'map'), Answer(
                 [(pair, CONTACT) for pair in pairs], [], len(pairs))))
             client.spin(lambda: False, 0.2)
             if 'which the scene that is drawn has not' in (said := said + capfd.readouterr().err):

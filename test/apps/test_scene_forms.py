@@ -20,7 +20,6 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from ros_client import Client, stamp_of
-from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import Marker, MarkerArray
 
 pytest.importorskip('rosbags')
@@ -30,13 +29,13 @@ from rosbags.rosbag2 import Reader
 from box_contact_ros.apps.recording import bag_player
 from box_contact_ros.apps.recording.bag_file import POSE, POSES, read_recording, read_replay
 from box_contact_ros.apps.recording.record import node_of
+from box_contact_ros.apps.ros_client import ANSWERS
 from box_contact_ros.apps.viewer import scene_driver
 from box_contact_ros.apps.viewer.listener import ViewNode
 from box_contact_ros.apps.viewer.markers import MarkersNode
 from box_contact_ros.apps.viewer.scene_driver import SceneDriver
 from box_contact_ros.apps.viewer.view_log import Snapshot
 from box_contact_ros.node.contact_node import ContactNode
-from box_contact_ros.node.messages import read_cloud
 from box_contact_ros.scene.files.scene_file import read_scene
 from box_contact_ros.scene.scene_solver import Scene, SceneSolver, two_boxes
 
@@ -79,7 +78,7 @@ class Played:
     form: str
     scene: Scene
     driver: SceneDriver
-    clouds: dict[int, PointCloud2]  # of the contact node, by stamp
+    clouds: dict[int, np.ndarray]  # contacts of the contact node, by stamp
     drawn: MarkerArray  # the first of `markers` with a contact
     seen: Snapshot  # of `view`, with a contact
     bag: Path  # of `record`
@@ -153,10 +152,10 @@ def is_whole(seen: Snapshot | None) -> bool:
             and bool((seen.answer.stamps == seen.stamp).all()))
 
 
-def whole(clouds: dict[int, PointCloud2], start: int) -> dict[int, PointCloud2]:
-    """Return the clouds from a stamp [ns] on in which no pair is stale: all boxes have matched."""
-    return {stamp: cloud for stamp, cloud in clouds.items()
-            if stamp >= start and not np.isnan(read_cloud(cloud)['depth']).any()}
+def whole(client: Client, start: int) -> dict[int, np.ndarray]:
+    """Return the contacts from a stamp [ns] on of which no pair is stale: all boxes have matched."""
+    found = {stamp: client.rows(stamp) for stamp in client.clouds if stamp >= start}
+    return {stamp: rows for stamp, rows in found.items() if not np.isnan(rows['depth']).any()}
 
 
 @pytest.fixture(scope='module', params=FORMS)
@@ -174,6 +173,7 @@ def played(request: pytest.FixtureRequest, nodes: tuple,
         assert result.successful, result.reason
     client.drawn.clear()
     client.clouds.clear()
+    client.ids = scene.ids
     told = (['--scene', source] if source else
             [word for option, size in (('--size-a', SIZE_A), ('--size-b', SIZE_B))
              for word in (option, *map(str, size))])
@@ -181,7 +181,7 @@ def played(request: pytest.FixtureRequest, nodes: tuple,
           served(client, SceneDriver(client.context, scene, RATE)) as driver):
         counts = record.recorder.counts
         wanted = [record.resolve_topic_name(topic)
-                  for topic in (*scene.sources.values(), 'contacts')]
+                  for topic in (*scene.sources.values(), ANSWERS['cloud'][1])]
         seen: list[Snapshot] = []
 
         def met() -> bool:
@@ -190,14 +190,14 @@ def played(request: pytest.FixtureRequest, nodes: tuple,
                 now = view.log.snapshot()
                 if is_whole(now) and now.stamp >= start and len(now.answer.pairs):
                     seen.append(now)
-            clouds = whole(client.clouds, start)
+            clouds = whole(client, start)
             return (bool(seen) and with_contact(client.drawn, clouds, boxes) is not None
                     and len(clouds) > TICKS and all(counts[topic] > TICKS for topic in wanted))
 
         start = driver._start
         boxes = len(scene.moving) + sum(box.pose is not None for box in scene.boxes.values())
         assert client.spin(met), (seen, client.drawn[-1:], counts)
-    clouds = whole(client.clouds, start)
+    clouds = whole(client, start)
     return Played(form, scene, driver, clouds, with_contact(client.drawn, clouds, boxes), seen[0],
                   folder / 'run')
 
@@ -205,8 +205,9 @@ def played(request: pytest.FixtureRequest, nodes: tuple,
 def test_contact_node(played):
     """Every tick of the driver has the contacts that its poses give."""
     met = 0
-    for stamp, cloud in played.clouds.items():
-        found = {int(row['pair']): (row['x'], row['y'], row['z']) for row in read_cloud(cloud)}
+    for stamp, rows in played.clouds.items():
+        found = {int(row['pair']): (row['point_x'], row['point_y'], row['point_z'])
+                 for row in rows}
         wanted = played.answer(stamp)
         assert found.keys() == wanted.keys()
         assert all(found[pair] == tuple(wanted[pair]) for pair in found)

@@ -16,7 +16,7 @@ import numpy as np
 import poses
 import pytest
 from rclpy.parameter import Parameter
-from ros_client import PATIENCE, Client, serving
+from ros_client import PATIENCE, Client, row_of, serving
 from visualization_msgs.msg import MarkerArray
 
 pytest.importorskip('viser')
@@ -62,17 +62,15 @@ APART = np.array([0.5, 0.25, 2.5, 0, 0, 0, 1])
 CUBE = (2.0, 2.0, 2.0)
 EXACT = ContactSolver(CUBE, CUBE, model='exact')(ORIGIN, TOUCHING)
 NO_ROWS = np.zeros(0, CLOUD_ROW)
-NOT_EVALUATED = np.array([(*[math.nan] * 7, 0, *[math.nan] * 7)], CLOUD_ROW)
+NOT_EVALUATED = np.array([(*[math.nan] * 3, 0, *[math.nan] * 14)], CLOUD_ROW)
 BOTH = two_boxes(CUBE, CUBE)
 START = 1_000 * NANOSECONDS
 MS = 1_000_000
 
 
 def rows(shift=0.0):
-    """Return a cloud's row: the exact contact, its point moved by `shift` [m]."""
-    x, y, z = EXACT.point
-    return np.array([(x + shift, y, z, *EXACT.normal, -EXACT.separation, 0, EXACT.volume,
-                      *EXACT.covariance[np.triu_indices(3)])], CLOUD_ROW)
+    """Return the row of the exact contact, its point moved by `shift` [m]."""
+    return np.array([row_of(EXACT._replace(point=EXACT.point + (shift, 0, 0)))], CLOUD_ROW)
 
 
 @pytest.fixture
@@ -92,7 +90,7 @@ def send(log, stamp, b=TOUCHING):
 def test_an_answer_belongs_to_the_poses_of_its_stamp(log, cloud_at):
     """Whichever of the three messages comes first; latency is from the stamp to the cloud."""
     news = [lambda: log.pose('box_a', START, ORIGIN), lambda: log.pose('box_b', START, TOUCHING)]
-    news.insert(cloud_at, lambda: log.cloud(START, rows(), START + 3 * MS))
+    news.insert(cloud_at, lambda: log.contacts(START, rows(), START + 3 * MS))
     for one in news:
         one()
     seen, figures = log.snapshot(), log.figures(START + 4 * MS)
@@ -110,7 +108,7 @@ def test_point_errors_are_distances_from_the_exact_point(log):
     for i in range(100):
         stamp = START + 5 * MS * i
         send(log, stamp)
-        log.cloud(stamp, rows(0.040 if i == 50 else 0.003), stamp + MS)
+        log.contacts(stamp, rows(0.040 if i == 50 else 0.003), stamp + MS)
     figures = log.figures(stamp + MS)
     assert figures.point_error_median == pytest.approx(3e-3)
     assert 3.1e-3 < figures.point_error_p99 < 40e-3
@@ -121,7 +119,7 @@ def test_point_errors_are_distances_from_the_exact_point(log):
 def test_the_rate_ends_with_the_answers(log):
     """What came more than a second ago is not counted."""
     send(log, START)
-    log.cloud(START, rows(), START + MS)
+    log.contacts(START, rows(), START + MS)
     assert log.figures(START + 2 * MS).rate == 1
     assert log.figures(START + NANOSECONDS + 2 * MS).rate == 0
 
@@ -130,7 +128,7 @@ def test_the_rate_ends_with_the_answers(log):
 def test_no_contact_has_no_point_and_no_error(log, cloud):
     """No row, or a row of NaN for what could not be evaluated."""
     send(log, START, APART)
-    log.cloud(START, cloud, START + MS)
+    log.contacts(START, cloud, START + MS)
     seen, figures = log.snapshot(), log.figures(START)
     assert not len(seen.answer.pairs) and seen.separation == pytest.approx(0.5)
     assert math.isnan(figures.point_error_median) and figures.answered == 1
@@ -142,7 +140,7 @@ def test_a_pair_without_an_answer_is_lost_in_the_end(log):
         stamp = START + 10 * MS * i
         send(log, stamp)
         if i != 2:
-            log.cloud(stamp, rows(), stamp + MS)
+            log.contacts(stamp, rows(), stamp + MS)
     assert log.figures(stamp).lost == 0
     send(log, START + 20 * MS + LOST_AFTER + 1)
     assert (log.figures(stamp).answered, log.figures(stamp).lost) == (4, 1)
@@ -154,19 +152,19 @@ def test_nothing_is_lost_before_the_first_answer_nor_on_the_way_to_the_view(log)
         send(log, START + 10 * MS * i)
     stamp = START + 30 * MS
     send(log, stamp)
-    log.cloud(stamp, rows(), stamp + MS)
-    log.cloud(stamp + 10 * MS, rows(), stamp + 11 * MS)
+    log.contacts(stamp, rows(), stamp + MS)
+    log.contacts(stamp + 10 * MS, rows(), stamp + 11 * MS)
     for i in range(3):
         later = stamp + (i + 1) * 2 * LOST_AFTER
         send(log, later)
-        log.cloud(later, rows(), later)
+        log.contacts(later, rows(), later)
     assert log.figures(later).lost == 0
 
 
 def test_boxes_move_on_when_nobody_answers(log):
     """The last answer is drawn for half a second, then the poses without a contact."""
     send(log, START)
-    log.cloud(START, rows(), START + MS)
+    log.contacts(START, rows(), START + MS)
     send(log, START + STALE, APART)
     assert np.array_equal(log.snapshot().poses[1], TOUCHING)
     send(log, START + STALE + 1, APART)
@@ -176,7 +174,7 @@ def test_boxes_move_on_when_nobody_answers(log):
 
 def test_a_run_starts_anew(log):
     send(log, START)
-    log.cloud(START, rows(), START + MS)
+    log.contacts(START, rows(), START + MS)
     log.start_anew()
     assert log.snapshot() is None and log.figures(START).answered == 0
 
@@ -187,7 +185,7 @@ def test_latest_pairing_answers_with_the_newer_stamp():
         log = ViewLog(BOTH, pairing=pairing)
         log.pose('box_b', START, TOUCHING)
         log.pose('box_a', START + 10 * MS, ORIGIN)
-        log.cloud(START + 10 * MS, rows(), START + 11 * MS)
+        log.contacts(START + 10 * MS, rows(), START + 11 * MS)
         seen = log.snapshot()
         assert np.array_equal(seen.poses, (ORIGIN, TOUCHING))
         assert len(seen.answer.point_errors) == errors
@@ -229,7 +227,7 @@ def test_contacts_of_many_pairs_against_the_solver():
     log = ViewLog(scene)
     for name, pose in zip(scene.moving, loads(20, depths)):
         log.pose(name, START, pose, 'yard')
-    log.cloud(START, cloud_of(answer)[::-1], START + MS, 'yard')
+    log.contacts(START, cloud_of(answer)[::-1], START + MS, 'yard')
     seen = log.snapshot()
     assert not np.isnan(seen.poses).any() and seen.frame_id == 'yard'
     touching = [(pair.name, contact) for pair, contact in reversed(answer.touching)]
@@ -256,11 +254,11 @@ def test_a_silent_box_is_grey_and_stays_where_it_was():
     placed = loads(3, [0.01, 0.01, 0.01])
     for name, pose in zip(scene.moving, placed):
         log.pose(name, START, pose)
-    log.cloud(START, cloud_of(solver(placed)), START)
+    log.contacts(START, cloud_of(solver(placed)), START)
     assert not log.snapshot().stale_boxes.any()
     log.pose('load_0', START + MS, placed[0])
     log.pose('load_2', START + MS, placed[2])
-    log.cloud(START + MS, cloud_of(solver([placed[0], None, placed[2]])), START + MS)
+    log.contacts(START + MS, cloud_of(solver([placed[0], None, placed[2]])), START + MS)
     seen = log.snapshot()
     assert [name for name, stale in zip(scene.boxes, seen.stale_boxes) if stale] == ['load_1']
     assert np.array_equal(seen.poses[1], placed[1])
@@ -270,27 +268,27 @@ def test_a_silent_box_is_grey_and_stays_where_it_was():
 
 def test_of_two_moving_boxes_the_older_is_grey(log):
     send(log, START)
-    log.cloud(START, rows(), START)
+    log.contacts(START, rows(), START)
     log.pose('box_a', START + MS, ORIGIN)
-    log.cloud(START + MS, NOT_EVALUATED, START + MS)
+    log.contacts(START + MS, NOT_EVALUATED, START + MS)
     assert log.snapshot().stale_boxes.tolist() == [False, True]
 
 
 def test_a_pair_that_the_scene_has_not_is_refused(log):
     """And what was drawn stays."""
     send(log, START)
-    log.cloud(START, rows(), START)
+    log.contacts(START, rows(), START)
     other = rows()
     other['pair'] = 7
     with pytest.raises(OtherSceneError, match='pair 7'):
-        log.cloud(START + MS, other, START + MS)
+        log.contacts(START + MS, other, START + MS)
     assert log.snapshot().answer.stamp == START
 
 
 def test_time_that_is_set_back_begins_anew(log):
     """A simulation that starts again from zero is drawn from its first pose."""
     send(log, START)
-    log.cloud(START, rows(), START)
+    log.contacts(START, rows(), START)
     send(log, 0, APART)
     assert log.snapshot().stamp == 0 and log.figures(0).answered == 0
 
@@ -305,7 +303,7 @@ def shown(text, name):
 def test_read_out_says_lengths_in_mm_and_shares_of_the_edge(log):
     """3 mm of an edge of 2 m are 0.15 %."""
     send(log, START)
-    log.cloud(START, rows(0.003), START + 2 * MS)
+    log.contacts(START, rows(0.003), START + 2 * MS)
     text = read_out(log.snapshot(), log.figures(START + 3 * MS), 'soup')
     assert shown(text, 'verdict') == 'contact'
     assert shown(text, 'separation') == '-125.00 mm'
@@ -323,7 +321,7 @@ def test_read_out_without_contact_answer_or_poses(log):
     send(log, START, APART)
     text = read_out(log.snapshot(), log.figures(START), 'exact')
     assert (shown(text, 'verdict'), shown(text, 'error')) == ('no answer', '–')
-    log.cloud(START, NO_ROWS, START)
+    log.contacts(START, NO_ROWS, START)
     text = read_out(log.snapshot(), log.figures(START), 'exact')
     assert (shown(text, 'verdict'), shown(text, 'error')) == ('no contact', '–')
     assert deepest_contacts(None) == '' and '</td></tr></table>' in deepest_contacts(log.snapshot())
@@ -611,7 +609,7 @@ def test_two_hundred_boxes_in_a_browser():
     log = ViewLog(scene)
     for name, pose in zip(scene.moving, loads(100, depths)):
         log.pose(name, START - (name == 'load_0'), pose, 'yard')
-    log.cloud(START, cloud_of(answer), START + MS, 'yard')
+    log.contacts(START, cloud_of(answer), START + MS, 'yard')
     page = Page('127.0.0.1', 8400)
     try:
         page.draw(log.snapshot(), np.zeros((0, 2, 3)))

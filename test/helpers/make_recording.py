@@ -2,7 +2,8 @@
 
 A 40 ft container is set down on another one in closed loop, one contact per tick at 200 Hz; from
 half a second before the first touch to three and a half after it. No ROS graph: the messages are
-those that `contact_node` makes, and the stamps are simulated time from START on.
+those that `contact_node` makes, and the stamps are simulated time from START on. All contacts are a
+point cloud, which every tool can read.
 """
 from __future__ import annotations
 
@@ -15,11 +16,13 @@ from rclpy.serialization import serialize_message
 from box_contact_ros import ContactSolver
 from box_contact_ros.apps.crane.landing import LandingCase, land, scenario_of
 from box_contact_ros.apps.crane.mujoco_crane import Crane
-from box_contact_ros.apps.recording.bag_file import TOPICS, Recorder
+from box_contact_ros.apps.recording.bag_file import TOPICS as OF_TWO_BOXES
+from box_contact_ros.apps.recording.bag_file import Recorder
 from box_contact_ros.apps.ros_client import pose_message
 from box_contact_ros.node.messages import NANOSECONDS, TypedMessages, make_header
 from box_contact_ros.scene.scene_solver import Answer, two_boxes
 
+TOPICS = (*OF_TWO_BOXES[:4], 'contacts_cloud')
 FOLDER = Path(__file__).resolve().parents[2] / 'recordings' / 'crane_landing'
 CASE = LandingCase(rope_angle=1.25, rope_heading=35.0, tilt=1.5, tilt_heading=120.0, overhang=0.3,
                    overhang_heading=-60.0, yaw=0.6)

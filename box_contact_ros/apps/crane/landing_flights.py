@@ -12,21 +12,21 @@ import time
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import PoseArray
 from rclpy.context import Context
-from sensor_msgs.msg import PointCloud2
 
-from ...node.messages import make_header, read_cloud
+from ...node.messages import make_header, read_contacts
 from ...node.runtime import GuardedNode, joined, spin_once
 from ...scene.files.scene_file import write_scene
 from ...scene.scene_solver import POSE_ARRAY, Box, Pair, Scene
 from ...solver.contact import Contact
 from .. import processes
 from ..bench.answer_log import first_row, is_stale, touch_in
-from ..ros_client import DEEP_RELIABLE, array_message, stamp_of
+from ..ros_client import DEEP_RELIABLE, array_message, stamp_of, subscribe_contacts
 from .landing import ClosedLoop, LandingRecord
 from .mujoco_crane import CraneScenario
 
@@ -50,14 +50,15 @@ def scene_of(scenarios: Sequence[CraneScenario]) -> Scene:
 class FlightNode(GuardedNode):
     """Sends the poses of all loads, and awaits their contacts."""
 
-    def __init__(self, context: Context) -> None:
+    def __init__(self, context: Context, scene: Scene) -> None:
         super().__init__('flights', context=context)
         self._poses = self.create_publisher(PoseArray, POSE_ARRAY, DEEP_RELIABLE)
-        self.create_subscription(PointCloud2, 'contacts', self._on_cloud, DEEP_RELIABLE)
-        self._clouds: dict[int, np.ndarray] = {}
+        subscribe_contacts(self, self._on_contacts, DEEP_RELIABLE)
+        self._ids = scene.ids
+        self._contacts: dict[int, np.ndarray] = {}
 
-    def _on_cloud(self, message: PointCloud2) -> None:
-        self._clouds[stamp_of(message.header)] = read_cloud(message)
+    def _on_contacts(self, message: Any) -> None:
+        self._contacts[stamp_of(message.header)] = read_contacts(message, self._ids)
 
     def contacts(self, executor: Any, poses: Sequence[np.ndarray], patience: float,
                  ) -> dict[int, Contact]:
@@ -68,12 +69,12 @@ class FlightNode(GuardedNode):
         message = array_message(make_header(self.get_clock().now().nanoseconds, 'world'), poses)
         self._poses.publish(message)
         stamp, deadline = stamp_of(message.header), time.monotonic() + patience
-        while stamp not in self._clouds:
+        while stamp not in self._contacts:
             left = deadline - time.monotonic()
             if left <= 0.0:
                 raise TimeoutError(f'the contact node gave no answer within {patience:g} s')
             spin_once(self, executor, left)
-        rows = self._clouds.pop(stamp)
+        rows = self._contacts.pop(stamp)
         found = {int(rows[n]['pair']): first_row(rows[n:]) for n in range(len(rows))}
         if any(map(is_stale, found.values())):
             raise RuntimeError('the contact node did not evaluate all pairs')
@@ -122,7 +123,8 @@ def fly_over_dds(model: str, scenarios: Sequence[CraneScenario], latencies: Sequ
     pairs_of = defaultdict(list)
     for pair in scene.pairs:
         pairs_of[scene.moving.index(pair.a)].append(pair.id)
-    with answering_node(model, scene), joined(FlightNode) as (node, executor):
+    make_node = partial(FlightNode, scene=scene)
+    with answering_node(model, scene), joined(make_node) as (node, executor):
         node.await_node(executor, poses())
         while not all(flight.record.ended for flight in flights):
             found = node.contacts(executor, poses(), PATIENCE)

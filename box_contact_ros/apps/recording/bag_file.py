@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import json
 import math
+import os
+import sys
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -28,7 +30,8 @@ from rosbags.rosbag2 import (
     Writer,
     WriterError,
 )
-from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.typesys.store import Typestore
 
 from ...scene.files.scene_file import SceneError, parse_scene
 from ...scene.scene_solver import POSE_ARRAY, Scene, two_boxes
@@ -39,16 +42,20 @@ BAG_VERSION: Final = 9  # of rosbag2's metadata: what Jazzy writes and reads
 NANOSECONDS = 1_000_000_000
 POSE = 'geometry_msgs/msg/PoseStamped'
 POSES = 'geometry_msgs/msg/PoseArray'
+CONTACTS = 'box_contact_msgs/msg/Contacts'
+ALL_CONTACTS = ('contacts', 'contacts_cloud')
+"""Topics of all contacts: the contact node publishes one of them, or both."""
 TYPES = {
     'pose': POSE,
     'poses': POSES,
     'contact/point': 'geometry_msgs/msg/PointStamped',
     'contact/normal': 'geometry_msgs/msg/Vector3Stamped',
-    'contacts': 'sensor_msgs/msg/PointCloud2',
+    'contacts': CONTACTS,
+    'contacts_cloud': 'sensor_msgs/msg/PointCloud2',
     'markers': 'visualization_msgs/msg/MarkerArray',
 }
 """Type of a topic by the end of its name."""
-TOPICS = ('box_a/pose', 'box_b/pose', 'contact/point', 'contact/normal', 'contacts')
+TOPICS = ('box_a/pose', 'box_b/pose', 'contact/point', 'contact/normal', *ALL_CONTACTS)
 """What the contact node hears and says of two boxes."""
 DRAWN = ('markers', 'crane/markers')
 """What Foxglove draws: see `markers`, and the crane."""
@@ -67,6 +74,19 @@ def type_of(topic: str) -> str:
                          f'{", ".join(TYPES)}')
 
 
+def _types() -> Typestore:
+    """Return the types that are recorded; those of contacts where their package is installed."""
+    types = get_typestore(Stores.ROS2_JAZZY)
+    for prefix in (*os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep), sys.prefix):
+        folder = Path(prefix or '.', 'share', 'box_contact_msgs', 'msg')
+        if prefix and folder.is_dir():
+            for file in sorted(folder.glob('*.msg')):
+                types.register(get_types_from_msg(
+                    file.read_text('utf-8'), f'box_contact_msgs/msg/{file.stem}'))
+            break
+    return types
+
+
 class Recorder:
     """Writes a recording, message by message; a recording that is not closed has no index."""
 
@@ -78,7 +98,7 @@ class Recorder:
         is kept with the messages, as JSON: `size_a`, `size_b` (full extents [m]), or `scene` (its
         text), and `model`. Raises RecordingError.
         """
-        types = get_typestore(Stores.ROS2_JAZZY)
+        types = _types()
         self.kinds = {topic: kinds.get(topic) or type_of(topic) for topic in topics}
         self.counts = Counter(dict.fromkeys(topics, 0))
         self.span: tuple[int, int] | None = None  # times of the first and the last message [ns]
@@ -111,6 +131,7 @@ class Recording:
 
     scene: Scene
     about: Mapping[str, Any]  # what was kept with the messages
+    kinds: Mapping[str, str]  # type of each topic
     messages: Sequence[tuple[int, str, bytes]]
     """Time of receipt [ns], topic, bytes; in order of time.
 
@@ -122,6 +143,8 @@ def read_recording(path: Path) -> Recording:
     """Return a bag that says its scene, or the sizes of its two boxes. Raises RecordingError."""
     with _opened(path) as reader:
         about = _about(reader)
+        kinds = {_name_of(connection, about): connection.msgtype
+                 for connection in reader.connections}
         messages = [(at, _name_of(connection, about), data)
                     for connection, at, data in reader.messages()]
     try:
@@ -130,7 +153,7 @@ def read_recording(path: Path) -> Recording:
     except KeyError:
         raise RecordingError(f'{path} says neither its scene nor the sizes of two boxes: record '
                              'with --scene, or with --size-a and --size-b') from None
-    return Recording(scene, about, messages)
+    return Recording(scene, about, kinds, messages)
 
 
 @contextmanager

@@ -9,11 +9,10 @@ from pathlib import Path
 
 import numpy as np
 from rclpy.serialization import deserialize_message
-from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import MarkerArray
 
-from ...node.messages import Refused, read_cloud
-from ..ros_client import CRANE_MARKERS, PoseTopic, lines_of, pose_topics, stamp_of
+from ...node.messages import Refused, read_contacts
+from ..ros_client import CONTACT_TYPES, CRANE_MARKERS, PoseTopic, lines_of, pose_topics, stamp_of
 from ..viewer.view_log import OtherSceneError, ViewLog
 from .bag_file import NANOSECONDS, RecordingError, read_recording
 
@@ -30,10 +29,17 @@ class BagPlayer:
         """Read a recording that says its scene, or both sizes. Raises RecordingError."""
         recording = read_recording(path)
         self.model = recording.about.get('model', 'the recording')
-        self.log = ViewLog(recording.scene)
+        self.log, self._ids = ViewLog(recording.scene), recording.scene.ids
         self.lines = np.zeros((0, 2, 3))
         self._take: dict[str, Callable[[int, bytes], None]] = {
-            'contacts': self._on_cloud, CRANE_MARKERS: self._on_crane}
+            CRANE_MARKERS: self._on_crane}
+        for topic in ('contacts_cloud', 'contacts'):  # one of them; the latter has names
+            kind = recording.kinds.get(topic)
+            if kind in CONTACT_TYPES:
+                self._take.pop('contacts_cloud', None)
+                self._take[topic] = partial(self._on_contacts, CONTACT_TYPES[kind])
+            elif kind is not None:
+                raise RecordingError(f'{path}: {topic} is {kind}, whose package is not installed')
         self._take |= {topic.name.lstrip('/'): partial(self._on_poses, topic)
                        for topic in pose_topics(recording.scene)}
         self._messages = [message for message in recording.messages if message[1] in self._take]
@@ -72,9 +78,10 @@ class BagPlayer:
         for box, pose in topic.read(data).items():
             self.log.pose(box, pose.stamp, pose.numbers, pose.frame_id)
 
-    def _on_cloud(self, at: int, data: bytes) -> None:
-        message = deserialize_message(data, PointCloud2)
-        self.log.cloud(stamp_of(message.header), read_cloud(message), at, message.header.frame_id)
+    def _on_contacts(self, kind: type, at: int, data: bytes) -> None:
+        message = deserialize_message(data, kind)
+        self.log.contacts(stamp_of(message.header), read_contacts(message, self._ids), at,
+                          message.header.frame_id)
 
     def _on_crane(self, _: int, data: bytes) -> None:
         self.lines = lines_of(deserialize_message(data, MarkerArray))

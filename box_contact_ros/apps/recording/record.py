@@ -19,15 +19,26 @@ from rclpy.context import Context
 from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import MarkerArray
 
+from ...node.messages import ContactsMessage
 from ...node.parameters import outside_ros_args
 from ...node.runtime import ARRAY_QOS, POSE_QOS, GuardedNode, refusals_end, run_node
 from ...solver.arguments import program_parser
 from ...solver.checks import as_size
 from ..ros_client import DEEP_RELIABLE, pose_topics, read_scene_text
-from .bag_file import DRAWN, NANOSECONDS, TOPICS, TYPES, Recorder, RecordingError, type_of
+from .bag_file import (
+    ALL_CONTACTS,
+    CONTACTS,
+    DRAWN,
+    NANOSECONDS,
+    TOPICS,
+    TYPES,
+    Recorder,
+    RecordingError,
+    type_of,
+)
 
 MESSAGES = dict(zip(TYPES.values(), (PoseStamped, PoseArray, PointStamped, Vector3Stamped,
-                                     PointCloud2, MarkerArray)))
+                                     ContactsMessage, PointCloud2, MarkerArray)))
 TYPE_OF = {message: kind for kind, message in MESSAGES.items()}
 QOS = {PoseStamped: POSE_QOS, PoseArray: ARRAY_QOS}
 """Poses as the contact node takes them, from whatever publisher; all others without loss."""
@@ -102,9 +113,14 @@ def node_of(args: Sequence[str]) -> Callable[[Context], RecordNode]:
     if options.scene is not None:
         about['scene'], scene = read_scene_text(options.scene)
         kinds = {topic.name: TYPE_OF[topic.kind] for topic in pose_topics(scene)}
-        topics = topics or [*kinds, 'contacts', *DRAWN]
-    return partial(RecordNode, folder=options.out, about=about, kinds=kinds,
-                   topics=topics or [*TOPICS, *DRAWN])
+        topics = topics or [*kinds, *ALL_CONTACTS, *DRAWN]
+    topics = topics or [*TOPICS, *DRAWN]
+    if ContactsMessage is None:
+        if 'contacts' in options.topics:
+            raise RecordingError(f'contacts is {CONTACTS}, whose package is not installed here: '
+                                 'record contacts_cloud')
+        topics = [topic for topic in topics if topic != 'contacts']
+    return partial(RecordNode, folder=options.out, about=about, kinds=kinds, topics=topics)
 
 
 def _options(args: Sequence[str]) -> argparse.Namespace:

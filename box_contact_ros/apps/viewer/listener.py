@@ -15,14 +15,20 @@ from rclpy.parameter_client import AsyncParameterClient
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 from rclpy.task import Future
-from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import MarkerArray
 
-from ...node.messages import read_cloud
+from ...node.messages import read_contacts
 from ...node.runtime import POSE_QOS, GuardedNode
 from ...scene.files.scene_file import SceneError, read_scene
 from ...scene.scene_solver import Scene, two_boxes
-from ..ros_client import CRANE_MARKERS, PoseTopic, lines_of, pose_topics, stamp_of
+from ..ros_client import (
+    CRANE_MARKERS,
+    PoseTopic,
+    lines_of,
+    pose_topics,
+    stamp_of,
+    subscribe_contacts,
+)
 from .view_log import ViewLog
 
 ASK_PERIOD = 0.5
@@ -52,7 +58,7 @@ class Listener(GuardedNode):
         super().__init__(name, context=context, **options)
         self.log: ViewLog | None = None
         self._poses_of: list[Subscription] = []
-        self.create_subscription(PointCloud2, 'contacts', self._on_cloud, contacts_qos)
+        subscribe_contacts(self, self._on_contacts, contacts_qos)
 
     def listen_to(self, scene: Scene, **options: Any) -> None:
         """Replace the scene; options go to `ViewLog`."""
@@ -74,12 +80,12 @@ class Listener(GuardedNode):
             self.heard()
         return callback
 
-    def _on_cloud(self, message: PointCloud2) -> None:
+    def _on_contacts(self, message: Any) -> None:
         if self.log is None:
             return
         header = message.header
-        self.log.cloud(stamp_of(header), read_cloud(message),
-                       self.get_clock().now().nanoseconds, header.frame_id)
+        self.log.contacts(stamp_of(header), read_contacts(message, self.log.scene.scene.ids),
+                          self.get_clock().now().nanoseconds, header.frame_id)
         self.heard()
 
 

@@ -1,7 +1,7 @@
 """What is drawn of a scene, and the figures shown of it, whether ROS or a recording fills it.
 
-A `ViewLog` takes poses by box and clouds of contacts. Its `snapshot` is the one model of what is
-drawn. Page and markers read it. A cloud's poses are the last of each box up to its stamp.
+A `ViewLog` takes poses by box and the contacts of each tick. Its `snapshot` is the one model of
+what is drawn. Page and markers read it. A tick's poses are the last of each box up to its stamp.
 
 The view listens in from outside. Messages may come in any order, and only the view may have missed
 one: that must not count as a loss. Stamps are nanoseconds; lengths metres, latencies seconds.
@@ -68,7 +68,7 @@ class SceneArrays:
 
 @dataclass(frozen=True, eq=False)
 class AnsweredTick:
-    """A cloud, and the poses that it answers."""
+    """The contacts of a tick, and the poses that they answer."""
 
     scene: SceneArrays
     stamp: int
@@ -83,13 +83,13 @@ class AnsweredTick:
 
     @property
     def latency(self) -> float:
-        """Time from the poses' stamp to the cloud."""
+        """Time from the poses' stamp to the contacts."""
         return (self.received - self.stamp) * 1e-9
 
     @property
     def points(self) -> np.ndarray:
         """Return where the contacts are, (k, 3)."""
-        return _columns(self.contacts, 'x', 'y', 'z')
+        return _columns(self.contacts, 'point_x', 'point_y', 'point_z')
 
     @property
     def normals(self) -> np.ndarray:
@@ -179,7 +179,7 @@ class ViewFigures:
 
 
 class OtherSceneError(ValueError):
-    """A cloud with a pair that the scene does not have."""
+    """Contacts of a pair that the scene does not have."""
 
 
 class ViewLog:
@@ -221,11 +221,13 @@ class ViewLog:
                 self._give_up(stamp)
             self._counts[stamp] = self._counts.get(stamp, 0) + 1
 
-    def cloud(self, stamp: int, rows: np.ndarray, received: int, frame_id: str = '') -> None:
-        """Take the rows (messages.CLOUD_ROW) of a `contacts` cloud, received at this time [ns].
+    def contacts(self, stamp: int, rows: np.ndarray, received: int, frame_id: str = '') -> None:
+        """Take the contacts (rows of messages.CLOUD_ROW) of a tick, received at this time [ns].
 
-        A row of NaN says that its pair could not be evaluated. Raises OtherSceneError.
+        A row of NaN says that its pair could not be evaluated. Pairs that are close, without a
+        point, are left out. Raises OtherSceneError.
         """
+        rows = rows[~np.isnan(rows['point_x']) | np.isnan(rows['depth'])]
         try:
             pairs = np.array([self.scene.row_of_id[number] for number in rows['pair'].tolist()],
                              dtype=int)
@@ -245,7 +247,7 @@ class ViewLog:
                 *self._poses_at(stamp), self._tolerance))
 
     def _refreshed_answer(self) -> AnsweredTick | None:
-        """Give the last answer its poses as they are known now: they may come after the cloud."""
+        """Give the last answer its poses as they are known now: some may come after it."""
         if not self._answers:
             return None
         answer = self._answers.pop()
@@ -287,7 +289,7 @@ class ViewLog:
             return Snapshot(self.scene, newest, frame_id, self._poses_at(newest)[0], None)
 
     def figures(self, now: int) -> ViewFigures:
-        """Return the figures as things stand at this time [ns], of the clock of `cloud`."""
+        """Return the figures as things stand at this time [ns], of the clock of `contacts`."""
         with self._lock:
             self._refreshed_answer()
             answers, answered, lost = list(self._answers), self._answered, self._lost
