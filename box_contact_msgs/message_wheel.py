@@ -226,7 +226,7 @@ def libraries(package: Package, work: Path) -> list[Library]:
 
 
 def compile_all(built: list[Library], work: Path) -> None:
-    """Compile all sources into objects beside them; warnings about generated code are dropped."""
+    """Compile each source into an object next to it; drop warnings about generated code."""
     numpy = run(*PYTHON, '-c', 'import numpy; print(numpy.get_include())').strip()
     folders = [*(work / generator for generator in GENERATORS), PREFIX / 'include',
                *sorted((PREFIX / 'include').iterdir()), sysconfig.get_path('include'), numpy]
@@ -280,7 +280,7 @@ def metadata(package: Package) -> str:
 
 
 def wheel_tag() -> str:
-    """Return for which Python and platform the wheel is."""
+    """Return the part of the wheel's name that tells Python and platform."""
     python = f'cp{sys.version_info[0]}{sys.version_info[1]}'
     platform = sysconfig.get_platform().replace('-', '_').replace('.', '_')
     return f'{python}-{python}{sys.abiflags}-{platform}'
