@@ -201,11 +201,14 @@ def libraries(package: Package, work: Path) -> list[Library]:
     name, depends = package.name, with_their_depends(package.depends)
 
     def sources(generator: str, pattern: str) -> list[Path]:
-        return sorted((work / generator / name).glob(pattern))
+        found = sorted((work / generator / name).glob(pattern))
+        if not found:  # the linker would make an empty library of nothing
+            raise SystemExit(f'error: {generator} generated no {pattern}')
+        return found
 
-    def library(part: str, pattern: str, *links: str, like: str | None = None) -> Library:
+    def library(part: str, pattern: str, *links: str) -> Library:
         return Library(f'lib{name}__{part}.so', sources(part, pattern), [
-            *links, *(f'{one}__{like or part}' for one in depends)])
+            *links, *(f'{one}__{part}' for one in depends)])
 
     own = f'{name}__{C}'
     libraries = [
