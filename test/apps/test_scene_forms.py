@@ -24,6 +24,7 @@ from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import Marker, MarkerArray
 
 pytest.importorskip('rosbags')
+pytest.importorskip('fcl')
 
 from rosbags.rosbag2 import Reader
 
@@ -37,6 +38,8 @@ from box_contact_ros.apps.viewer.scene_driver import SceneDriver
 from box_contact_ros.apps.viewer.view_log import Snapshot
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import read_cloud
+from box_contact_ros.node.soup_node import SoupNode
+from box_contact_ros.scene.files.scene_check import meaning
 from box_contact_ros.scene.files.scene_file import read_scene
 from box_contact_ros.scene.scene_solver import Scene, SceneSolver, two_boxes
 
@@ -80,6 +83,7 @@ class Played:
     scene: Scene
     driver: SceneDriver
     clouds: dict[int, PointCloud2]  # of the contact node, by stamp
+    soups: dict[int, PointCloud2]  # of the soup node
     drawn: MarkerArray  # the first of `markers` with a contact
     seen: Snapshot  # of `view`, with a contact
     bag: Path  # of `record`
@@ -107,19 +111,23 @@ def quick_driver() -> Iterator[None]:
 
 @pytest.fixture(scope='module')
 def nodes(tmp_path_factory: pytest.TempPathFactory,
-          ) -> Iterator[tuple[ContactNode, ViewNode, MarkersNode, Client]]:
-    """Contact node, view and markers of two boxes; a client that keeps what they publish."""
+          ) -> Iterator[tuple[ContactNode, SoupNode, ViewNode, MarkersNode, Client]]:
+    """Give nodes, view and markers of two boxes; a client that keeps what they publish."""
     sizes = [Parameter('size_a', value=SIZE_A), Parameter('size_b', value=SIZE_B)]
     client = Client()
-    client.drawn = []
+    client.drawn, client.soups = [], {}
+    client.node.create_subscription(
+        PointCloud2, 'soup/contacts', lambda soup: client.soups.update({stamp_of(soup): soup}), 10)
     client.node.create_subscription(MarkerArray, 'markers', client.drawn.append,
                                     QoSProfile(depth=1000))
     folder = Parameter('files_from', value=str(tmp_path_factory.getbasetemp()))
     with (served(client, ContactNode(client.context, parameter_overrides=[
               *sizes, folder, Parameter('model', value='exact')])) as contact,
+          served(client, SoupNode(client.context, parameter_overrides=[
+              *sizes, folder, Parameter('divisions', value=1)])) as soup,
           served(client, ViewNode(client.context, 'contact_node')) as view,
           served(client, MarkersNode(client.context, parameter_overrides=sizes)) as markers):
-        yield contact, view, markers, client
+        yield contact, soup, view, markers, client
     client.close()
     gc.unfreeze()  # what the contact node keeps from being collected
 
@@ -163,17 +171,18 @@ def whole(clouds: dict[int, PointCloud2], start: int) -> dict[int, PointCloud2]:
 def played(request: pytest.FixtureRequest, nodes: tuple,
            tmp_path_factory: pytest.TempPathFactory) -> Played:
     """Switch the programs to a form, move its boxes until all have met a contact, end `record`."""
-    contact, view, markers, client = nodes
+    contact, soup, view, markers, client = nodes
     form, source, folder = request.param, FORMS[request.param], tmp_path_factory.mktemp('scene')
     if '\n' in source and form != 'inline array':
         (folder / 'scene.yaml').write_text(source)
         source = str(folder / 'scene.yaml')
     scene = read_scene(source) if source else two_boxes(SIZE_A, SIZE_B)
-    for node in (contact, markers):
+    for node in (contact, soup, markers):
         result, = node.set_parameters([Parameter('scene', value=source)])
         assert result.successful, result.reason
     client.drawn.clear()
     client.clouds.clear()
+    client.soups.clear()
     told = (['--scene', source] if source else
             [word for option, size in (('--size-a', SIZE_A), ('--size-b', SIZE_B))
              for word in (option, *map(str, size))])
@@ -192,14 +201,15 @@ def played(request: pytest.FixtureRequest, nodes: tuple,
                     seen.append(now)
             clouds = whole(client.clouds, start)
             return (bool(seen) and with_contact(client.drawn, clouds, boxes) is not None
-                    and len(clouds) > TICKS and all(counts[topic] > TICKS for topic in wanted))
+                    and len(clouds) > TICKS and bool(whole(client.soups, start))
+                    and all(counts[topic] > TICKS for topic in wanted))
 
         start = driver._start
         boxes = len(scene.moving) + sum(box.pose is not None for box in scene.boxes.values())
         assert client.spin(met), (seen, client.drawn[-1:], counts)
     clouds = whole(client.clouds, start)
-    return Played(form, scene, driver, clouds, with_contact(client.drawn, clouds, boxes), seen[0],
-                  folder / 'run')
+    return Played(form, scene, driver, clouds, whole(client.soups, start),
+                  with_contact(client.drawn, clouds, boxes), seen[0], folder / 'run')
 
 
 def test_contact_node(played):
@@ -212,6 +222,20 @@ def test_contact_node(played):
         assert all(found[pair] == tuple(wanted[pair]) for pair in found)
         met += len(found)
     assert met
+
+
+def test_soup_node(played):
+    """Its triangles meet where the boxes do."""
+    for stamp, cloud in played.soups.items():
+        assert set(read_cloud(cloud)['pair'].tolist()) == set(played.answer(stamp))
+
+
+def test_check(played):
+    """`contact_node --check` tells every box, pair and topic."""
+    lines = '\n'.join(meaning(played.scene))
+    for name in (*played.scene.boxes, *(pair.name for pair in played.scene.pairs)):
+        assert f' {name}:' in lines
+    assert f'topics in: {len(played.scene.sources)} (' in lines
 
 
 def test_view(played):
