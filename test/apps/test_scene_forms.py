@@ -8,7 +8,10 @@ to be discovered, and an exception of a callback fails the test.
 from __future__ import annotations
 
 import gc
+import os
 import re
+import signal
+import time
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -19,6 +22,7 @@ import pytest
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
+from rclpy.serialization import deserialize_message
 from ros_client import Client, stamp_of
 from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import Marker, MarkerArray
@@ -27,7 +31,9 @@ pytest.importorskip('rosbags')
 pytest.importorskip('fcl')
 
 from rosbags.rosbag2 import Reader
+from test_bench import bench, rows_of
 
+from box_contact_ros.apps.processes import parameters
 from box_contact_ros.apps.recording import bag_player
 from box_contact_ros.apps.recording.bag_file import POSE, POSES, read_recording, read_replay
 from box_contact_ros.apps.recording.record import node_of
@@ -304,3 +310,43 @@ def test_bench_replay(played):
             poses = played.poses(stamp)
             assert np.array_equal((pose_a, pose_b), (poses[pair.a], poses[pair.b]))
         assert len(replay) > TICKS / 2
+
+
+# --- the programs themselves ----------------------------------------------------------------------
+
+
+def test_the_programs_with_an_array(program, tmp_path):
+    """All at once, with the scene as text: nobody dies, all is drawn. Then both replays of that.
+
+    `view --scene` starts contact node and driver.
+    """
+    pytest.importorskip('viser')
+    text, out = FORMS['inline array'], tmp_path / 'run'
+    domain = ('--no-browser', '--domain', os.environ['ROS_DOMAIN_ID'])
+    running = [program('view', *domain, '--port', '8310', '--scene', text),
+               program('view', *domain, '--port', '8320', '--attach'),
+               program('markers', '--ros-args', *parameters(scene=text)),
+               program('record', '--out', str(out), '--scene', text)]
+    record = running[-1]
+    for topic in ('poses', 'contacts', 'markers'):
+        record.wait_for_output(f'receiving /{topic}\n', 60)
+    time.sleep(1.0)
+    for one in reversed(running):
+        assert one.process.poll() is None, one.output
+        one.process.send_signal(signal.SIGINT)
+    for one in running:
+        assert one.wait() == 0 and 'Traceback' not in one.output, one.output
+    recording = read_recording(out)
+    drawn = [deserialize_message(data, MarkerArray)
+             for _, topic, data in recording.messages if topic == 'markers'][-1]
+    assert len(added(drawn, 'boxes')) == len(recording.scene.boxes) and added(drawn, 'points')
+
+    replay = program('view', '--no-browser', '--port', '8330', '--replay', str(out))
+    replay.wait_for_output('Ctrl-C', 60)
+    running = bench(program, tmp_path,
+                    f'--duration 0.2 --nodes contact --replay {out} --pair crate01_floor')
+    assert running.wait(240) == 0, running.output
+    row, = rows_of(tmp_path).values()
+    assert row['sent'] == row['answered'] != '0' and row['wrong_verdicts'] == '0'
+    replay.process.send_signal(signal.SIGINT)
+    assert replay.wait() == 0 and 'Traceback' not in replay.output, replay.output
