@@ -97,11 +97,13 @@ class GuardedNode(Node):
         kind, now = getattr(error, 'reason', type(error).__name__), time.monotonic()
         if now >= self._silent_until.get(kind, 0.0):
             self._silent_until[kind] = now + LOG_SECONDS
-            # What is refused is a ValueError; anything else is a fault of the program's own.
-            log = self.get_logger()
-            (log.warning if isinstance(error, ValueError) else log.error)(
-                f'{what}: {reason_of(error)}; ignored')
-            log.debug(''.join(traceback.format_exception(error)))
+            logger, line = self.get_logger(), f'{what}: {reason_of(error)}; ignored'
+            # Two lines of code: rclpy refuses another severity from the same one.
+            if isinstance(error, ValueError):  # a refusal
+                logger.warning(line)
+            else:
+                logger.error(line)
+            logger.debug(''.join(traceback.format_exception(error)))
 
 
 def make_executor(context: Context) -> Any:

@@ -12,7 +12,8 @@ from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from ros_client import Client, serving
-from sensor_msgs.msg import PointCloud2
+
+from box_contact_ros.apps.ros_client import ANSWERS
 
 DEEP = QoSProfile(depth=1000)
 PATIENCE = 240.0  # s
@@ -73,7 +74,7 @@ class FaultyRelay(Node):
         super().__init__('faulty_relay', context=context)
         self._counts: dict[str, int] = {}
         for kind, topic in ((PointStamped, 'contact/point'), (Vector3Stamped, 'contact/normal'),
-                            (PointCloud2, 'contacts')):
+                            ANSWERS['cloud']):
             publisher = self.create_publisher(kind, f'relayed/{topic}', DEEP)
             self.create_subscription(kind, topic, self._pass_on(topic, publisher), DEEP)
 
@@ -89,7 +90,7 @@ class FaultyRelay(Node):
                 vector = message.vector
                 vector.x, vector.y, vector.z = -vector.x, -vector.y, -vector.z
             publisher.publish(message)
-            if fault == ('contacts', 330):
+            if fault == (ANSWERS['cloud'][1], 330):
                 publisher.publish(message)
         return callback
 
@@ -99,12 +100,12 @@ def test_planted_faults_show_up(program, tmp_path):
 
     One point is dropped, one shifted by 1 cm, one normal flipped, one cloud sent twice.
     """
-    out = tmp_path / 'results'
+    out, contacts = tmp_path / 'results', ANSWERS['cloud'][1]
     with serving(FaultyRelay):
         running = bench(
             program, out, '--duration 2 --nodes contact --model exact --streams random --ros-args '
             '-r contact/point:=relayed/contact/point -r contact/normal:=relayed/contact/normal '
-            '-r contacts:=relayed/contacts')
+            f'-r {contacts}:=relayed/{contacts}')
         assert running.wait(PATIENCE) == 1, running.output
     row = rows_of(out)['random', 'contact']
     counts = {name: int(row[name]) for name in (

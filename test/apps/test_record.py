@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import errno
+import math
 import signal
 import time
 from itertools import count
@@ -36,7 +37,7 @@ from box_contact_ros.apps.recording.bag_file import (
     type_of,
 )
 from box_contact_ros.apps.recording.record import RecordNode
-from box_contact_ros.apps.ros_client import ANSWERS, line_marker, pose_message
+from box_contact_ros.apps.ros_client import ANSWERS, array_message, line_marker, pose_message
 from box_contact_ros.node.messages import make_cloud, make_header, read_cloud
 from box_contact_ros.reports.accuracy import LIMITS
 from box_contact_ros.resources import resource_path
@@ -231,8 +232,9 @@ def publish_poses(running, namespace, topic, frame_id):
 def test_remapped_topics_and_sigterm(program, tmp_path):
     """One topic under another name; SIGTERM completes the bag too."""
     out = tmp_path / 'run'
-    running = recording(program, out, '--topics', 'box_a/pose', '--ros-args', '-r',
-                        'box_a/pose:=/yard/load/pose')
+    size = list(map(str, CONTAINER))
+    running = recording(program, out, '--topics', 'box_a/pose', '--size-a', *size, '--size-b',
+                        *size, '--ros-args', '-r', 'box_a/pose:=/yard/load/pose')
     sent = publish_poses(running, '/yard', '/yard/load/pose', 'yard')
     running.signal(signal.SIGTERM)
     assert running.wait() == 0, running.output
@@ -241,6 +243,8 @@ def test_remapped_topics_and_sigterm(program, tmp_path):
     heard = list(found['/yard/load/pose'])
     assert len(heard) >= 5 and heard == sent[-len(heard):]
     assert f'  /yard/load/pose {len(heard)}\n' in running.output
+    # A replay knows it by the name that it had before.
+    assert {topic for _, topic, _ in read_recording(out).messages} == {'box_a/pose'}
 
 
 def test_a_scene_is_recorded_with_itself(program, tmp_path):
@@ -472,7 +476,27 @@ def test_bench_replays_it(program, tmp_path):
     assert row['wrong_verdicts'] == '0' and 80 < int(row['contacts']) < 95
 
 
+def test_a_replay_leaves_out_ticks_without_a_box(tmp_path):
+    """In an array: rows of NaN, and arrays for another number of boxes. A fixed box is anywhere."""
+    text = ('{poses: array, boxes: {a: {size: [1, 1, 1]}, b: {size: [1, 1, 2]}, floor: {size: '
+            '[9, 9, 1], pose: [0, 0, -0.5, 0, 0, 0, 1]}}, pairs: [{a: a, b: b}, {a: b, b: floor}]}')
+    recorder = Recorder(tmp_path / 'run', ['/poses'], {'scene': text})
+    here, absent = np.array(STACK), np.full(7, math.nan)
+    for stamp, poses in enumerate([[here, here], [absent, here], [here], [here, absent], []], 1):
+        recorder.write('/poses', stamp, serialize_message(
+            array_message(make_header(stamp, 'world'), poses)))
+    recorder.close()
+    first, floor = read_replay(tmp_path / 'run'), read_replay(tmp_path / 'run', pair='b_floor')
+    assert first.stamps.tolist() == [1] and first.sizes == ((1, 1, 1), (1, 1, 2))
+    assert floor.stamps.tolist() == [1, 2] and floor.pose_b[:, 2].tolist() == [-0.5, -0.5]
+    with pytest.raises(RecordingError, match=r"no pair 'b_flor' \(did you mean b_floor\?\)"):
+        read_replay(tmp_path / 'run', pair='b_flor')
+    with pytest.raises(RecordingError, match='does not say its scene'):
+        read_replay(SHIPPED, pair='a_b')
+
+
 @pytest.mark.parametrize('arguments, status, words', [
+    ('--pair a_b', 2, '--pair is of a --replay'),
     ('--replay /no/such/bag', 1, 'error: /no/such/bag cannot be read as a bag'),
     ('--replay x --streams crane', 2, 'not allowed with'),
     ('--size-a 1 1 1', 2, 'are of a --replay'),

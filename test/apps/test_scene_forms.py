@@ -8,24 +8,32 @@ to be discovered, and an exception of a callback fails the test.
 from __future__ import annotations
 
 import gc
+import os
 import re
+import signal
+import time
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
+from rclpy.serialization import deserialize_message
 from ros_client import Client, stamp_of
 from visualization_msgs.msg import Marker, MarkerArray
 
 pytest.importorskip('rosbags')
+pytest.importorskip('fcl')
 
 from rosbags.rosbag2 import Reader
+from test_bench import bench, rows_of
 
+from box_contact_ros.apps.processes import parameters
 from box_contact_ros.apps.recording import bag_player
 from box_contact_ros.apps.recording.bag_file import POSE, POSES, read_recording, read_replay
 from box_contact_ros.apps.recording.record import node_of
@@ -36,6 +44,9 @@ from box_contact_ros.apps.viewer.markers import MarkersNode
 from box_contact_ros.apps.viewer.scene_driver import SceneDriver
 from box_contact_ros.apps.viewer.view_log import Snapshot
 from box_contact_ros.node.contact_node import ContactNode
+from box_contact_ros.node.messages import read_contacts
+from box_contact_ros.node.soup_node import SoupNode
+from box_contact_ros.scene.files.scene_check import meaning
 from box_contact_ros.scene.files.scene_file import read_scene
 from box_contact_ros.scene.scene_solver import Scene, SceneSolver, two_boxes
 
@@ -79,6 +90,7 @@ class Played:
     scene: Scene
     driver: SceneDriver
     clouds: dict[int, np.ndarray]  # contacts of the contact node, by stamp
+    soups: dict[int, np.ndarray]  # of the soup node
     drawn: MarkerArray  # the first of `markers` with a contact
     seen: Snapshot  # of `view`, with a contact
     bag: Path  # of `record`
@@ -106,19 +118,24 @@ def quick_driver() -> Iterator[None]:
 
 @pytest.fixture(scope='module')
 def nodes(tmp_path_factory: pytest.TempPathFactory,
-          ) -> Iterator[tuple[ContactNode, ViewNode, MarkersNode, Client]]:
-    """Contact node, view and markers of two boxes; a client that keeps what they publish."""
+          ) -> Iterator[tuple[ContactNode, SoupNode, ViewNode, MarkersNode, Client]]:
+    """Give nodes, view and markers of two boxes; a client that keeps what they publish."""
     sizes = [Parameter('size_a', value=SIZE_A), Parameter('size_b', value=SIZE_B)]
     client = Client()
-    client.drawn = []
+    client.drawn, client.soups = [], {}
+    client.node.create_subscription(
+        ANSWERS['cloud'][0], f'soup/{ANSWERS["cloud"][1]}',
+        lambda soup: client.soups.update({stamp_of(soup): soup}), 10)
     client.node.create_subscription(MarkerArray, 'markers', client.drawn.append,
                                     QoSProfile(depth=1000))
     folder = Parameter('files_from', value=str(tmp_path_factory.getbasetemp()))
     with (served(client, ContactNode(client.context, parameter_overrides=[
               *sizes, folder, Parameter('model', value='exact')])) as contact,
+          served(client, SoupNode(client.context, parameter_overrides=[
+              *sizes, folder, Parameter('divisions', value=1)])) as soup,
           served(client, ViewNode(client.context, 'contact_node')) as view,
           served(client, MarkersNode(client.context, parameter_overrides=sizes)) as markers):
-        yield contact, view, markers, client
+        yield contact, soup, view, markers, client
     client.close()
     gc.unfreeze()  # what the contact node keeps from being collected
 
@@ -152,9 +169,10 @@ def is_whole(seen: Snapshot | None) -> bool:
             and bool((seen.answer.stamps == seen.stamp).all()))
 
 
-def whole(client: Client, start: int) -> dict[int, np.ndarray]:
-    """Return the contacts from a stamp [ns] on of which no pair is stale: all boxes have matched."""
-    found = {stamp: client.rows(stamp) for stamp in client.clouds if stamp >= start}
+def whole(messages: dict[int, Any], start: int, scene: Scene) -> dict[int, np.ndarray]:
+    """Return contacts from a stamp [ns] on of which no pair is stale: all boxes have matched."""
+    found = {stamp: read_contacts(message, scene.ids)
+             for stamp, message in messages.items() if stamp >= start}
     return {stamp: rows for stamp, rows in found.items() if not np.isnan(rows['depth']).any()}
 
 
@@ -162,17 +180,18 @@ def whole(client: Client, start: int) -> dict[int, np.ndarray]:
 def played(request: pytest.FixtureRequest, nodes: tuple,
            tmp_path_factory: pytest.TempPathFactory) -> Played:
     """Switch the programs to a form, move its boxes until all have met a contact, end `record`."""
-    contact, view, markers, client = nodes
+    contact, soup, view, markers, client = nodes
     form, source, folder = request.param, FORMS[request.param], tmp_path_factory.mktemp('scene')
     if '\n' in source and form != 'inline array':
         (folder / 'scene.yaml').write_text(source)
         source = str(folder / 'scene.yaml')
     scene = read_scene(source) if source else two_boxes(SIZE_A, SIZE_B)
-    for node in (contact, markers):
+    for node in (contact, soup, markers):
         result, = node.set_parameters([Parameter('scene', value=source)])
         assert result.successful, result.reason
     client.drawn.clear()
     client.clouds.clear()
+    client.soups.clear()
     client.ids = scene.ids
     told = (['--scene', source] if source else
             [word for option, size in (('--size-a', SIZE_A), ('--size-b', SIZE_B))
@@ -190,16 +209,17 @@ def played(request: pytest.FixtureRequest, nodes: tuple,
                 now = view.log.snapshot()
                 if is_whole(now) and now.stamp >= start and len(now.answer.pairs):
                     seen.append(now)
-            clouds = whole(client, start)
+            clouds = whole(client.clouds, start, scene)
             return (bool(seen) and with_contact(client.drawn, clouds, boxes) is not None
-                    and len(clouds) > TICKS and all(counts[topic] > TICKS for topic in wanted))
+                    and len(clouds) > TICKS and bool(whole(client.soups, start, scene))
+                    and all(counts[topic] > TICKS for topic in wanted))
 
         start = driver._start
         boxes = len(scene.moving) + sum(box.pose is not None for box in scene.boxes.values())
         assert client.spin(met), (seen, client.drawn[-1:], counts)
-    clouds = whole(client, start)
-    return Played(form, scene, driver, clouds, with_contact(client.drawn, clouds, boxes), seen[0],
-                  folder / 'run')
+    clouds = whole(client.clouds, start, scene)
+    return Played(form, scene, driver, clouds, whole(client.soups, start, scene),
+                  with_contact(client.drawn, clouds, boxes), seen[0], folder / 'run')
 
 
 def test_contact_node(played):
@@ -213,6 +233,20 @@ def test_contact_node(played):
         assert all(found[pair] == tuple(wanted[pair]) for pair in found)
         met += len(found)
     assert met
+
+
+def test_soup_node(played):
+    """Its triangles meet where the boxes do."""
+    for stamp, rows in played.soups.items():
+        assert set(rows['pair'].tolist()) == set(played.answer(stamp))
+
+
+def test_check(played):
+    """`contact_node --check` tells every box, pair and topic."""
+    lines = '\n'.join(meaning(played.scene))
+    for name in (*played.scene.boxes, *(pair.name for pair in played.scene.pairs)):
+        assert f' {name}:' in lines
+    assert f'topics in: {len(played.scene.sources)} (' in lines
 
 
 def test_view(played):
@@ -281,3 +315,43 @@ def test_bench_replay(played):
             poses = played.poses(stamp)
             assert np.array_equal((pose_a, pose_b), (poses[pair.a], poses[pair.b]))
         assert len(replay) > TICKS / 2
+
+
+# --- the programs themselves ----------------------------------------------------------------------
+
+
+def test_the_programs_with_an_array(program, tmp_path):
+    """All at once, with the scene as text: nobody dies, all is drawn. Then both replays of that.
+
+    `view --scene` starts contact node and driver.
+    """
+    pytest.importorskip('viser')
+    text, out = FORMS['inline array'], tmp_path / 'run'
+    domain = ('--no-browser', '--domain', os.environ['ROS_DOMAIN_ID'])
+    running = [program('view', *domain, '--port', '8310', '--scene', text),
+               program('view', *domain, '--port', '8320', '--attach'),
+               program('markers', '--ros-args', *parameters(scene=text)),
+               program('record', '--out', str(out), '--scene', text)]
+    record = running[-1]
+    for topic in ('poses', 'contacts', 'markers'):
+        record.wait_for_output(f'receiving /{topic}\n', 60)
+    time.sleep(1.0)
+    for one in reversed(running):
+        assert one.process.poll() is None, one.output
+        one.process.send_signal(signal.SIGINT)
+    for one in running:
+        assert one.wait() == 0 and 'Traceback' not in one.output, one.output
+    recording = read_recording(out)
+    drawn = [deserialize_message(data, MarkerArray)
+             for _, topic, data in recording.messages if topic == 'markers'][-1]
+    assert len(added(drawn, 'boxes')) == len(recording.scene.boxes) and added(drawn, 'points')
+
+    replay = program('view', '--no-browser', '--port', '8330', '--replay', str(out))
+    replay.wait_for_output('Ctrl-C', 60)
+    running = bench(program, tmp_path,
+                    f'--duration 0.2 --nodes contact --replay {out} --pair crate01_floor')
+    assert running.wait(240) == 0, running.output
+    row, = rows_of(tmp_path).values()
+    assert row['sent'] == row['answered'] != '0' and row['wrong_verdicts'] == '0'
+    replay.process.send_signal(signal.SIGINT)
+    assert replay.wait() == 0 and 'Traceback' not in replay.output, replay.output

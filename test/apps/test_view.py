@@ -16,6 +16,7 @@ import numpy as np
 import poses
 import pytest
 from rclpy.parameter import Parameter
+from rclpy.serialization import serialize_message
 from ros_client import PATIENCE, Client, row_of, serving
 from visualization_msgs.msg import MarkerArray
 
@@ -26,7 +27,12 @@ from browser import chromium, open_page
 from PIL import Image
 
 from box_contact_ros import ContactSolver
-from box_contact_ros.apps.ros_client import CRANE_MARKERS, line_marker
+from box_contact_ros.apps.ros_client import (
+    CRANE_MARKERS,
+    array_message,
+    line_marker,
+    pose_topics,
+)
 from box_contact_ros.apps.viewer.listener import ViewNode
 from box_contact_ros.apps.viewer.page.read_outs import deepest_contacts, legend, read_out
 from box_contact_ros.apps.viewer.page.stage import CUBE_EDGES
@@ -48,6 +54,7 @@ from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import (
     CLOUD_ROW,
     NANOSECONDS,
+    Refused,
     make_cloud,
     make_header,
     read_cloud,
@@ -264,6 +271,42 @@ def test_a_silent_box_is_grey_and_stays_where_it_was():
     assert np.array_equal(seen.poses[1], placed[1])
     assert [scene.pairs[row].name for row in seen.answer.pairs] == ['load_0_s0', 'load_2_s2']
     assert 'stale: load_1_s1, near_1' in deepest_contacts(seen)
+
+
+def array_of(*poses):
+    """Return the bytes of a PoseArray at START."""
+    return serialize_message(array_message(make_header(START, 'yard'), poses))
+
+
+def test_boxes_that_an_array_lacks_are_not_there():
+    """A row of NaN, and a quaternion of length zero; they stay where they were, in grey."""
+    boxes = {name: Box(name, CUBE) for name in ('a', 'b', 'c', 'd')}
+    scene = Scene(boxes, (Pair.between('a', 'b'), Pair.between('c', 'd')), pose_array=True)
+    topic, = pose_topics(scene)
+    log, solver = ViewLog(scene), SceneSolver(scene, model='exact')
+    for box in scene.moving:
+        log.pose(box, START - MS, ORIGIN)
+    found = topic.read(array_of(ORIGIN, TOUCHING, [math.nan] * 7, [0.0] * 7))
+    assert list(found) == list(scene.moving)
+    assert {(pose.stamp, pose.frame_id) for pose in found.values()} == {(START, 'yard')}
+    for box, pose in found.items():
+        log.pose(box, pose.stamp, pose.numbers, pose.frame_id)
+    log.contacts(START, cloud_of(solver([ORIGIN, TOUCHING, None, None])), START)
+    seen = log.snapshot()
+    assert seen.stale_boxes.tolist() == [False, False, True, True]
+    assert np.array_equal(seen.poses, [ORIGIN, TOUCHING, ORIGIN, ORIGIN])
+    for late in (1, LOST_AFTER + 2):  # a tick without its absent boxes is a tick, and can be lost
+        for box, pose in found.items():
+            log.pose(box, START + late, pose.numbers)
+    assert log.figures(START).lost == 1
+
+
+@pytest.mark.parametrize('count', [0, 1, 3])
+def test_an_array_for_another_number_of_boxes_is_refused(count):
+    topic, = pose_topics(Scene({name: Box(name, CUBE) for name in 'ab'},
+                               (Pair.between('a', 'b'),), pose_array=True))
+    with pytest.raises(Refused, match=f'{count} poses, but 2 boxes'):
+        topic.read(array_of(*[ORIGIN] * count))
 
 
 def test_of_two_moving_boxes_the_older_is_grey(log):

@@ -297,6 +297,22 @@ MUTANTS = {
     'errors by the poses of another tick': Mutant(
         'apps/viewer/view_log.py', '> self.tolerance', '> 10**12',
         'test/apps/test_view.py -k latest_pairing'),
+    'a program ends with its callback': Mutant(
+        'node/runtime.py', 'except Exception as error:\n                # A signal shuts',
+        'except ZeroDivisionError as error:\n                # A signal shuts',
+        'test/apps/test_callbacks.py -k raises'),
+    'programs read an array for any number of boxes': Mutant(
+        'apps/ros_client.py', 'if len(numbers) != len(moving):', 'if False:',
+        'test/apps/test_view.py -k another_number'),
+    'a bad pose of an array is drawn': Mutant(
+        'apps/ros_client.py', 'numbers[~are_poses(numbers)] = np.nan', 'pass',
+        'test/apps/test_view.py -k an_array_lacks'),
+    'a box that is not there is drawn': Mutant(
+        'apps/viewer/view_log.py', 'if numbers[0] == numbers[0]:', 'if True:',
+        'test/apps/test_view.py -k an_array_lacks'),
+    'a replay of other names': Mutant(
+        'apps/recording/bag_file.py', "about.get('topics', {}).get(connection.topic, "
+        'connection.topic)', 'connection.topic', 'test/apps/test_record.py -k remapped'),
     'two boxes ride on one': Mutant(
         'apps/viewer/scene_driver.py', 'tier_of.pop(below)', 'tier_of[below]',
         'test/apps/test_view.py -k riders'),

@@ -21,12 +21,11 @@ import numpy as np
 from geometry_msgs.msg import PoseArray, PoseStamped
 from rclpy.context import Context
 from rclpy.serialization import deserialize_message, serialize_message
-from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header
 from tqdm import tqdm
 
 from ...core import native
-from ...node.messages import make_header, read_cloud
+from ...node.messages import make_header, read_contacts
 from ...node.runtime import GuardedNode, joined, let_callbacks_finish, spin_for
 from ...output import machine, no_garbage_collection
 from ...scene.files.scene_file import write_scene
@@ -360,7 +359,8 @@ def drive_array(scene: Scene, poses: np.ndarray, args: Sequence[str], *, model: 
                 spin_for(bench.client, bench.executor, DRAIN_SILENCE)
     found.sent, number_of = len(sent), {stamp: number for number, (stamp, _) in enumerate(sent)}
     for received, _, _, data in bench.client.arrivals:
-        stamp, rows = raw_stamp(data), read_cloud(deserialize_message(data, PointCloud2))
+        rows = read_contacts(deserialize_message(data, MESSAGES['cloud'][0]), scene.ids)
+        stamp = raw_stamp(data)
         if stamp in number_of:  # else a late answer to an offer
             found.ids[number_of[stamp]] = set(rows['pair'].tolist())
             found.latencies.append(1e-9 * (received - stamp))
