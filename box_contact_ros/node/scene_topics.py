@@ -11,7 +11,7 @@ from rclpy.duration import Duration
 from rclpy.event_handler import PublisherEventCallbacks, UnsupportedEventTypeError
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from rclpy.qos import QoSProfile
+from rclpy.qos import QoSCompatibility, QoSProfile, qos_check_compatible
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import PointCloud2
 
@@ -25,6 +25,11 @@ TOPICS_OF_EVERY_NODE = ('/diagnostics', '/parameter_events', '/rosout', '/clock'
 """Topics of other types than poses."""
 MOST_PAIRS_WITH_TOPICS = 1000
 """Two publishers a pair take milliseconds and memory, here and in every process that listens."""
+
+
+def _type_of(box: str) -> Any:
+    """Return the type of the messages with the poses of a box, or of all."""
+    return PoseArray if box == ALL_BOXES else PoseStamped
 
 
 class PoseSource(NamedTuple):
@@ -116,6 +121,23 @@ class SceneTopics:
         """Return the full names of the topics that are subscribed to."""
         return [subscription.topic_name for subscription in self._subscriptions.values()]
 
+    def why_silent(self, box: str) -> str:
+        """Return who publishes on the topic of a box that has given no pose."""
+        source = next(source for source in self._subscriptions if source.box == box)
+        subscription = self._subscriptions[source]
+        topic, wanted = subscription.topic_name, _type_of(source.box)
+        offers = self._node.get_publishers_info_by_topic(topic)
+        if not offers:
+            return f'nobody publishes {topic}'
+        for offer in offers:
+            if offer.topic_type != f'geometry_msgs/msg/{wanted.__name__}':
+                return (f'{topic} is published as {shown(offer.topic_type)}, not as '
+                        f'geometry_msgs/msg/{wanted.__name__}')
+            fits, reason = qos_check_compatible(offer.qos_profile, subscription.qos_profile)
+            if fits == QoSCompatibility.ERROR:
+                return f'{topic} is published with another quality of service: {reason}'
+        return f'{topic} has {len(offers)} of {wanted.__name__}, silent so far'
+
     def _topic_of(self, pair: Pair) -> str:
         return f'{self._prefix}{pair.name}{"/" if pair.name else ""}contact'
 
@@ -160,8 +182,8 @@ class SceneTopics:
                 self._node.destroy_publisher(publisher)
 
     def _subscribe(self, source: PoseSource, callback: Callable[[Any], None]) -> Subscription:
-        kind, usual = ((PoseArray, ARRAY_QOS) if source.box == ALL_BOXES
-                       else (PoseStamped, POSE_QOS))
+        kind = _type_of(source.box)
+        usual = ARRAY_QOS if kind is PoseArray else POSE_QOS
         qos = QoSProfile(depth=usual.depth, reliability=usual.reliability)
         if source.deadline:
             qos.deadline = Duration(seconds=source.deadline)

@@ -299,11 +299,11 @@ class StampPairing(Pairing):
     def mismatch(self, pairs: Iterable[tuple[str, str]]) -> Mismatch | None:
         """Return the first of the pairs of boxes whose stamps keep them apart, if there is one."""
         for pair in pairs:
-            boxes = [box for box in pair if box in self._boxes and self._boxes[box].taken]
-            if len(boxes) == 2:
-                found = _compare(*(np.array(self._boxes[box].taken) for box in boxes))
-                if found[0] > self.tolerance:
-                    return Mismatch(*boxes, *found)
+            one, other = (self._boxes.get(box, BoxState()).taken for box in pair)
+            if one and other:
+                difference, tolerance = _compare(np.array(one), np.array(other))
+                if difference > self.tolerance:
+                    return Mismatch(*pair, difference, tolerance)
         return None
 
     def _fault(self, state: BoxState, stamp: int) -> str | None:
@@ -419,8 +419,9 @@ def _period(stamps: np.ndarray) -> float:
 def _to_nearest(stamps: np.ndarray, others: np.ndarray) -> np.ndarray:
     """Return how far each stamp is from the nearest of others, in their order."""
     after = np.searchsorted(others, stamps)
-    return np.minimum(np.abs(stamps - others[np.minimum(after, len(others) - 1)]),
-                      np.abs(stamps - others[np.maximum(after - 1, 0)]))
+    before, after = np.maximum(after - 1, 0), np.minimum(after, len(others) - 1)
+    nearest: np.ndarray = np.minimum(abs(stamps - others[before]), abs(stamps - others[after]))
+    return nearest
 
 
 class LatestPairing(Pairing):
