@@ -160,7 +160,7 @@ class Evaluator:
         notes, self._pairing.notes = self._pairing.notes, {}
         for line in (*refusals.values(), *(note_line(*note) for note in notes.items())):
             self._logger.warning(line)
-        counts = +self.counts
+        counts = self.counts - self._pairing.held()
         counts[OUTSIDE] += self.solver.exact_answers
         scene = self.solver.scene
         look = self._diagnostics.look(counts, self._settings['max_age'])
@@ -209,9 +209,11 @@ class Evaluator:
             return Finding('apart', message, 'none could be answered, as no tick had all its boxes')
         message += (f': stamps of {found.one} and {found.other} differ by '
                     f'{1e-9 * found.difference:.3g} s')
-        return Finding('apart', message, 'none could be answered; ' + (
-            f'set tolerance:={rounded_up(1e-9 * found.tolerance):g}, or pairing:=latest'
-            if found.tolerance else 'stamp both by one clock (use_sim_time for all, or for none)'))
+        if not found.tolerance:
+            return Finding('clocks', message, 'none could be answered; stamp both by one clock '
+                                              '(use_sim_time for all, or for none)')
+        return Finding('apart', message, 'none could be answered; set tolerance:='
+                       f'{rounded_up(1e-9 * found.tolerance):g}, or pairing:=latest')
 
     def _answer(self, tick: Tick) -> None:
         stamp, frame_id = self._header_of(tick)

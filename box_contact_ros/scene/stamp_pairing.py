@@ -26,15 +26,16 @@ missing  max_age passes after that tick            stale     waiting ticks are l
 missing  all boxes pause longer than max_age       current
 missing  pose of a new stamp                       current
 stale    pose of a new stamp                       current
-any      pose of a stamp that was taken            same      REPEATED
-any      stamp older than all remembered ones      same      OLD
+any      pose of its newest stamp                  same      REPEATED
+any      older stamp that was taken                same      held back, else REPEATED
+any      stamp older than all remembered ones      same      held back, else OLD
 any      stamp RESET before its newest             unseen    RESETS, for all boxes
-any      the last of AGAIN stamps taken before     unseen    RESETS, for all boxes
+any      AGAIN stamps are held back                unseen    RESETS, for all boxes
 ```
-A recording that is played in a loop repeats its stamps. AGAIN poses of one box count, whose stamps
-were taken before and advance, while no box has a newer one. All poses refused since then are added
-again after the reset, so the new time lacks none. A stream that sends each stamp once never resets
-this way, in whatever order it arrives.
+A recording that is played in a loop repeats its stamps. Poses whose stamps were taken before are
+held back, as long as they advance and no box has a newer stamp. The last of AGAIN of one box begins
+a new time, with all poses that were held back. Else they are refused. A stream that sends each
+stamp once never begins anew this way, in whatever order it arrives.
 
 Policy `latest` makes a tick of every pose that is not OLD. A box is stale by its newest stamp.
 Why no library does this: docs/decisions/contact-node.md.
@@ -60,9 +61,10 @@ REMEMBERED_STAMPS = 1024
 RESET = 1_000_000_000
 """Time has been set back if a stamp lies this far [ns] before an earlier one of its box."""
 AGAIN = 5
-"""Time has been set back if a box goes through so many of its stamps again."""
+"""Time has been set back if a box goes through so many of its stamps again, in their order."""
 MARGIN = 1.1
-"""Tolerances that are proposed are so much larger than those measured, as periods vary."""
+"""A tolerance that is proposed is so much larger than half the period, as periods vary."""
+FEWEST_STAMPS = 3  # of a box, before its period is known
 NO_PARTNER = 'dropped: no partner'
 TOO_LATE = 'dropped: tick answered before'
 NEVER = -2**63  # before any stamp [ns]
@@ -143,15 +145,15 @@ class Pairing(ABC):
         self.notes: dict[str, Note] = {}
         """The last pose of each kind that is counted. Whoever logs them clears them."""
         self._now = NEVER  # newest stamp of all boxes
-        self._again: dict[str, list[StampedPose]] = {}
-        """Poses by box whose stamps were taken before, since any box had a newer one."""
+        self._held: dict[str, list[tuple[str, StampedPose]]] = {}
+        """Poses by box whose stamps were taken before, and what they are counted as so far."""
         self._boxes: dict[str, BoxState] = {}
         self.set_scene(scene)
 
     def set_scene(self, scene: Scene) -> None:
         """Replace the scene; boxes that stay keep their state and their poses."""
         self._boxes = {box: self._boxes.get(box) or BoxState() for box in scene.sources}
-        self._again.clear()
+        self._held.clear()
         self._partners = {tuple({pair.a, pair.b} & self._boxes.keys()) for pair in scene.pairs}
 
     def reset(self) -> None:
@@ -159,7 +161,7 @@ class Pairing(ABC):
         self._boxes = {box: BoxState(came=state.came or state.newest != NEVER)
                        for box, state in self._boxes.items()}
         self._now = NEVER
-        self._again.clear()
+        self._held.clear()
 
     @abstractmethod
     def add(self, box: str, pose: StampedPose) -> list[Tick]:
@@ -174,6 +176,10 @@ class Pairing(ABC):
         """Return the boxes that have never given a pose."""
         return [box for box, state in self._boxes.items()
                 if state.newest == NEVER and not state.came]
+
+    def held(self) -> Counter[str]:
+        """Return how many of the refused poses are held back, and may yet be answered."""
+        return Counter(kind for held in self._held.values() for kind, _ in held)
 
     def behind(self, box: str) -> int:
         """Return how far [ns] the newest stamp of a box is behind that of all."""
@@ -203,21 +209,33 @@ class Pairing(ABC):
     def _count(self, kind: str, box: str, stamp: int) -> None:
         """Count a pose, and note it for the log."""
         self.counts[kind] += 1
+        self._note(kind, box, stamp)
+
+    def _note(self, kind: str, box: str, stamp: int) -> None:
         self.notes[kind] = Note(box, stamp, self._boxes[box].newest)
 
-    def _refuse(self, kind: str, box: str, pose: StampedPose) -> list[Tick]:
-        """Refuse a pose whose stamp was taken before; if time was set back, answer it after all."""
-        self._count(kind, box, pose.stamp)
-        again = self._again.setdefault(box, [])
-        if again and pose.stamp <= again[-1].stamp:
-            again.clear()
-        again.append(pose)
-        if len(again) < AGAIN:
+    def _hold(self, kind: str, box: str, pose: StampedPose) -> list[Tick]:
+        """Hold back a pose whose stamp was taken before; answer those held if a loop is sure."""
+        held = self._held.setdefault(box, [])
+        if held and pose.stamp <= held[-1][1].stamp:
+            self._refuse_held()
+            held = self._held.setdefault(box, [])
+        held.append((kind, pose))
+        self.counts[kind] += 1
+        if len(held) < AGAIN:
             return []
-        poses = sorted(((pose.stamp, box, pose) for box, poses in self._again.items()
-                        for pose in poses), key=itemgetter(0))
+        poses = sorted(((pose.stamp, box, pose) for box, held in self._held.items()
+                        for _, pose in held), key=itemgetter(0))
+        self.counts.subtract(self.held())
         self._set_back(box, poses[0][0])
         return [tick for _, box, pose in poses for tick in self.add(box, pose)]
+
+    def _refuse_held(self) -> None:
+        """Note the poses that are held back as refused: time goes on."""
+        for box, held in self._held.items():
+            for kind, pose in held:
+                self._note(kind, box, pose.stamp)
+        self._held.clear()
 
     def _is_evaluable(self, present: Container[str]) -> bool:
         """Return whether some pair has a pose of each of its moving boxes."""
@@ -268,10 +286,13 @@ class StampPairing(Pairing):
         state = self._state_at(box, stamp)
         if stamp > state.newest:
             state.newest = stamp
-            if self._again:
-                self._again.clear()
+            if self._held:
+                self._refuse_held()
+        elif stamp == state.newest:
+            self._count(REPEATED, box, stamp)
+            return []
         elif kind := self._fault(state, stamp):
-            return self._refuse(kind, box, pose)
+            return self._hold(kind, box, pose)
         state.taken.append(stamp)
         state.missing_since = None
         if stamp > self._now:
@@ -400,20 +421,22 @@ class StampPairing(Pairing):
 def _compare(one: np.ndarray, other: np.ndarray) -> tuple[int, int]:
     """Return the difference of the stamps [ns] of two boxes, and the tolerance that joins them.
 
-    Half a period of the faster box joins each pose of the slower one, wherever it falls.
+    Half a period of the faster box joins each pose of the slower one, wherever it falls. The
+    tolerance is 0 where none would do. Both are 0 while there are too few stamps to tell.
     """
     slow, fast = sorted((np.sort(one), np.sort(other)), key=_period, reverse=True)
-    met = slow[(slow >= fast[0]) & (slow <= fast[-1])]
-    apart = _to_nearest(met if len(met) else slow, fast)
-    difference = int(np.median(apart))
-    if len(met) < 2:
-        return difference, 0
-    return difference, int(max(0.5 * _period(fast), apart.max()) * MARGIN)
+    if len(fast) < FEWEST_STAMPS:
+        return 0, 0
+    period = _period(fast)
+    met = slow[(slow > fast[0] - period) & (slow < fast[-1] + period)]
+    if not len(met):
+        return int(_to_nearest(slow, fast).min()), 0
+    return int(np.median(_to_nearest(met, fast))), int(0.5 * MARGIN * period)
 
 
 def _period(stamps: np.ndarray) -> float:
-    """Return the median time between stamps, in their order; 0 of a single one."""
-    return float(np.median(np.diff(stamps))) if len(stamps) > 1 else 0.0
+    """Return the time between stamps [ns], given in their order, that nearly all keep to."""
+    return float(np.percentile(np.diff(stamps), 95)) if len(stamps) > 1 else np.inf
 
 
 def _to_nearest(stamps: np.ndarray, others: np.ndarray) -> np.ndarray:
@@ -437,13 +460,13 @@ class LatestPairing(Pairing):
         state = self._state_at(box, stamp)
         if stamp < state.newest:
             if stamp in state.taken:
-                return self._refuse(OLD, box, pose)
+                return self._hold(OLD, box, pose)
             self._count(OLD, box, stamp)
             return []
         if stamp > state.newest:
             state.taken.append(stamp)
-            if self._again:
-                self._again.clear()
+            if self._held:
+                self._refuse_held()
         state.newest, state.last = stamp, pose
         self._now = max(self._now, stamp)
         if not self._is_evaluable({box for box, state in self._boxes.items() if state.last}):
