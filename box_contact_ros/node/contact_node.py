@@ -288,7 +288,7 @@ class ContactNode(LifecycleNode):
         if self._evaluator is not None:
             self.counts[RESETS] += 1
             self._evaluator.reset()
-            self.get_logger().warning('time went back: /clock was set back; it begins anew')
+            self.get_logger().warning('time went back: /clock was set back; a new time begins')
 
     def _report(self) -> None:
         """Serve QoS events and publish diagnostics, once a second."""

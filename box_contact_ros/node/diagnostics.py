@@ -8,6 +8,7 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from math import ceil, floor, log10
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,6 +16,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 
 from ..scene.scene_solver import Pair
+from ..scene.stamp_pairing import AGAIN, OLD, REPEATED, RESETS, TOO_LATE, Note
 from .messages import make_header
 
 DIAGNOSTICS_SECONDS = 1.0
@@ -27,6 +29,52 @@ KEPT_TIMES = 4096
 NAMED = 3  # boxes or pairs that a message names
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 ACTIVE = 'active'
+
+
+REMEDIES = {
+    'has zero length': 'set orientation.w to 1.0',
+    'is not finite': 'send finite numbers',
+    'exceeds': 'send metres',
+}
+"""What a sender can do, by words of a refusal. Each is a kind of its own in the log."""
+
+
+def kind_and_remedy(reason: str, text: str) -> tuple[str, str]:
+    """Return the kind of a refusal in the log, and what stands behind it there."""
+    words = next((words for words in REMEDIES if words in text), '')
+    return reason + words, f': {REMEDIES[words]}' if words else ''
+
+
+def note_line(kind: str, note: Note) -> str:
+    """Return the log line, with its remedy, of what the pairing did to a pose."""
+    stamp, newest = (f'{1e-9 * value:.12g} s' for value in (note.stamp, note.newest))
+    if kind == RESETS:
+        return (f'time went back: {note.box} has stamp {stamp} after {newest}; a new time begins '
+                '(a loop, a restart, or a second publisher)')
+    if kind == TOO_LATE:
+        return (f'{note.box}: the tick of stamp {stamp} was answered without this pose; dropped: '
+                'set a longer max_age')
+    if kind == OLD:
+        return (f'{note.box}: stamp {stamp} is older than {newest}; refused: publish in the order '
+                'of the stamps, from one publisher')
+    assert kind == REPEATED
+    if note.stamp == note.newest:
+        return (f'{note.box}: stamp {stamp} does not advance; refused: set header.stamp (`ros2 '
+                'topic pub` does for `stamp: now`), or pairing:=latest')
+    return (f'{note.box}: stamp {stamp} has come before; refused: send each stamp once (a loop of '
+            f'more than {AGAIN} ticks begins anew), or pairing:=latest')
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return the first names, and how many there are besides."""
+    more = len(names) - NAMED
+    return ', '.join(names[:NAMED]) + (f' and {more} more' if more > 0 else '')
+
+
+def rounded_up(value: float) -> float:
+    """Return a positive number rounded up to two digits."""
+    unit = 10.0 ** (floor(log10(value)) - 1)
+    return ceil(value / unit) * unit
 
 
 class Finding(NamedTuple):
@@ -46,12 +94,6 @@ class Look(NamedTuple):
     unanswered: list[Pair]  # pairs unanswered for UNANSWERED_SECONDS, or max_age
     quiet: float  # time [s] since the last pose, or since the start
     has_heard: bool  # whether any pose came since the start
-
-
-def listed(names: Sequence[str]) -> str:
-    """Return the first names, and how many there are besides."""
-    more = len(names) - NAMED
-    return ', '.join(names[:NAMED]) + (f' and {more} more' if more > 0 else '')
 
 
 class Progress:

@@ -5,25 +5,12 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from itertools import islice
-from math import ceil, floor, log10
 from typing import Any
 
 import numpy as np
 
 from ..scene.scene_solver import ALL_BOXES, SceneSolver
-from ..scene.stamp_pairing import (
-    AGAIN,
-    NEVER,
-    OLD,
-    PAIRINGS,
-    REPEATED,
-    RESETS,
-    TOO_LATE,
-    Note,
-    Pairing,
-    StampedPose,
-    Tick,
-)
+from ..scene.stamp_pairing import NEVER, PAIRINGS, Pairing, StampedPose, Tick
 from ..solver.checks import absent_poses, are_poses, pose_fault, shown
 from .diagnostics import (
     ACTIVE,
@@ -33,7 +20,10 @@ from .diagnostics import (
     Diagnostics,
     Finding,
     Look,
+    kind_and_remedy,
     listed,
+    note_line,
+    rounded_up,
 )
 from .message_bytes import RawMessages
 from .messages import NANOSECONDS, Refused, TypedMessages
@@ -43,38 +33,7 @@ SERIALIZATIONS: dict[str, type[RawMessages] | type[TypedMessages]] = {
     'raw': RawMessages, 'typed': TypedMessages}
 """Values of the node parameter `serialization`."""
 OUTSIDE = 'outside the trained range'
-REMEDIES = {
-    'has zero length': 'set orientation.w to 1.0',
-    'is not finite': 'send finite numbers',
-    'exceeds': 'send metres',
-}
-"""What a sender can do, by words of a refusal. Each is a kind of its own in the log."""
 COMPARED = 16  # pairs at most whose stamps are compared for a report
-
-
-def rounded_up(value: float) -> float:
-    """Return a positive number rounded up to two digits."""
-    unit = 10.0 ** (floor(log10(value)) - 1)
-    return ceil(value / unit) * unit
-
-
-def note_line(kind: str, note: Note) -> str:
-    """Return the log line, with its remedy, of what the pairing did to a pose."""
-    stamp, newest = (f'{1e-9 * value:.12g} s' for value in (note.stamp, note.newest))
-    if kind == RESETS:
-        return f'time went back: {note.box} has stamp {stamp} after {newest}; it begins anew'
-    if kind == TOO_LATE:
-        return (f'{note.box}: the tick of stamp {stamp} was answered without this pose; dropped: '
-                'set a longer max_age')
-    if kind == OLD:
-        return (f'{note.box}: stamp {stamp} is older than {newest}; refused: publish in the order '
-                'of the stamps, from one publisher')
-    assert kind == REPEATED
-    if note.stamp == note.newest:
-        return (f'{note.box}: stamp {stamp} does not advance; refused: set header.stamp (`ros2 '
-                'topic pub` does for `stamp: now`), or pairing:=latest')
-    return (f'{note.box}: stamp {stamp} has come before; refused: send each stamp once (a loop of '
-            f'more than {AGAIN} ticks begins anew), or pairing:=latest')
 
 
 class Evaluator:
@@ -271,7 +230,6 @@ class Evaluator:
         else:
             reason, text = 'internal error', f'{type(error).__name__}: {error}'
         self.counts[f'refused: {reason}'] += 1
-        words = next((words for words in REMEDIES if words in text), '')
-        if reason + words not in self._refusals:
-            remedy = f': {REMEDIES[words]}' if words else ''
-            self._refusals[reason + words] = f'{text}; refused{remedy}'
+        kind, remedy = kind_and_remedy(reason, text)
+        if kind not in self._refusals:
+            self._refusals[kind] = f'{text}; refused{remedy}'
