@@ -211,7 +211,7 @@ class ContactNode(LifecycleNode):
         # What start-up made stays for good. No full collection (10 ms) has to look at it.
         gc.collect()
         gc.freeze()
-        self._diagnostics.progress.restart()
+        self._diagnostics.watch.restart()
         self._topics.activate(self._configured.pose_callback)
 
     def _change(self, settings: dict[str, Any], names: Collection[str]) -> None:

@@ -96,7 +96,7 @@ class Look(NamedTuple):
     has_heard: bool  # whether any pose came since the start
 
 
-class Progress:
+class Watch:
     """Which pairs are answered and when poses came, by the steady clock [s]."""
 
     def __init__(self) -> None:
@@ -148,13 +148,13 @@ class Diagnostics:
         self._evaluations = 0
         self._reported: Counter[str] = Counter()
         self._logged: dict[str, float] = {}  # when a kind of finding was logged [s]
-        self.progress = Progress()
+        self.watch = Watch()
 
     def computed(self, nanoseconds: int, stale: list[Pair]) -> None:
         """Note a tick, its time in the solver, and the pairs that could not be evaluated."""
         self._times[self._evaluations % KEPT_TIMES] = 1e-3 * nanoseconds
         self._evaluations += 1
-        self.progress.evaluated(stale)
+        self.watch.evaluated(stale)
 
     def look(self, counts: Counter[str], max_age: float) -> Look:
         """Return what happened since the last look."""
@@ -163,7 +163,7 @@ class Diagnostics:
         self._reported = Counter(counts)
         refused = [name.partition(': ')[2] for name in new
                    if new[name] > 0 and name.startswith('refused')]
-        return self.progress.look(refused, came=new['poses'] > 0, max_age=max_age)
+        return self.watch.look(refused, came=new['poses'] > 0, max_age=max_age)
 
     def log(self, findings: Sequence[Finding]) -> None:
         """Log each kind of finding when it comes up, and again while it stays."""

@@ -69,7 +69,7 @@ class Evaluator:
             self._messages = SERIALIZATIONS[settings['serialization']]()
         self.solver, self._settings = solver, settings
         self._absent = np.zeros(0, dtype=bool)  # which boxes the last array had no pose of
-        self._diagnostics.progress.set_pairs(solver.scene.pairs)
+        self._diagnostics.watch.set_pairs(solver.scene.pairs)
 
     def close(self) -> None:
         """Keep the count of a solver that goes."""
