@@ -101,7 +101,7 @@ class Watch:
 
     def __init__(self) -> None:
         self._pairs: Sequence[Pair] = ()
-        self._open: list[Pair] = []  # not answered since the last look
+        self._open: list[Pair] | None = None  # not answered since the last look; None: no tick
         self._since: dict[Pair, float] = {}  # when a look first found a pair unanswered
         self._heard: float | None = None  # when poses last came
         self.restart()
@@ -113,11 +113,13 @@ class Watch:
 
     def set_pairs(self, pairs: Sequence[Pair]) -> None:
         """Replace the pairs that are asked for."""
-        self._pairs, self._open = pairs, list(pairs)
+        self._pairs, self._open = pairs, None
 
     def evaluated(self, stale: list[Pair]) -> None:
         """Note a tick that answered all pairs but those."""
-        if self._open and self._open != stale:
+        if self._open is None:
+            self._open = stale
+        elif self._open and self._open != stale:
             still = set(stale)
             self._open = [pair for pair in self._open if pair in still]
 
@@ -130,8 +132,9 @@ class Watch:
         quiet = now - (self._began if self._heard is None else self._heard)
         # Without poses nothing is asked. A simulation may pause.
         asked = has_heard and quiet <= max(max_age, UNMATCHED_SECONDS)
-        self._since = {pair: self._since.get(pair, now) for pair in self._open} if asked else {}
-        self._open = list(self._pairs)
+        missed = self._pairs if self._open is None else self._open
+        self._since = {pair: self._since.get(pair, now) for pair in missed} if asked else {}
+        self._open = None
         unmatched, unanswered = (
             [pair for pair, since in self._since.items() if now - since >= max(seconds, max_age)]
             for seconds in (UNMATCHED_SECONDS, UNANSWERED_SECONDS))

@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import random
+from collections import Counter
 
 import numpy as np
 import pytest
@@ -130,6 +131,14 @@ def test_a_loop_shorter_than_a_second_is_answered_each_time(policy, ticks):
         assert answered == {stamp * step for stamp in range(ticks)}
         assert pairing.counts[RESETS] == number
     assert pairing.counts[REPEATED] == pairing.counts[OLD] == 0
+
+
+def test_a_loop_of_stamps_that_only_nearly_agree():
+    pairing = StampPairing(TWO, tolerance=4 * MS)
+    for number in range(4):
+        answered = sum(len(pairing.add(box, pose((10 * stamp + 3 * k) * MS)))
+                       for stamp in range(50) for k, box in enumerate(TWO.moving))
+        assert answered == 50 and pairing.counts == Counter({RESETS: number} if number else {})
 
 
 def test_a_loop_begins_before_the_last_poses_of_the_old_one_are_in():
