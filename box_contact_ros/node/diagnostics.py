@@ -20,6 +20,7 @@ from ..scene.stamp_pairing import AGAIN, OLD, REPEATED, RESETS, TOO_LATE, Note
 from .messages import make_header
 
 DIAGNOSTICS_SECONDS = 1.0
+LOOK_JITTER = 0.1  # looks may be this much less than DIAGNOSTICS_SECONDS apart [s]
 UNMATCHED_SECONDS = 1.0  # a pair unanswered for this long is worth a warning
 UNANSWERED_SECONDS = 5.0
 """A pair unanswered for this long is an error; so long nobody has to publish after a start."""
@@ -90,7 +91,8 @@ class Look(NamedTuple):
     """What happened since the last look, a second ago."""
 
     refused: list[str]  # reasons of refusals
-    unmatched: list[Pair]  # pairs unanswered for UNMATCHED_SECONDS, or max_age if that is longer
+    unmatched: list[Pair]
+    """Pairs unanswered for UNMATCHED_SECONDS, or max_age if that is longer, while poses come."""
     unanswered: list[Pair]  # pairs unanswered for UNANSWERED_SECONDS, or max_age
     quiet: float  # time [s] since the last pose, or since the start
     has_heard: bool  # whether any pose came since the start
@@ -136,9 +138,10 @@ class Watch:
         self._since = {pair: self._since.get(pair, now) for pair in missed} if asked else {}
         self._open = None
         unmatched, unanswered = (
-            [pair for pair, since in self._since.items() if now - since >= max(seconds, max_age)]
+            [pair for pair, since in self._since.items()
+             if now - since + LOOK_JITTER >= max(seconds, max_age)]
             for seconds in (UNMATCHED_SECONDS, UNANSWERED_SECONDS))
-        return Look(refused, unmatched, unanswered, quiet, has_heard)
+        return Look(refused, unmatched if came else [], unanswered, quiet, has_heard)
 
 
 class Diagnostics:
@@ -171,8 +174,9 @@ class Diagnostics:
     def log(self, findings: Sequence[Finding]) -> None:
         """Log each kind of finding when it comes up, and again while it stays."""
         now = time.monotonic()
+        stay = {finding.kind for finding in findings}
         self._logged = {kind: at for kind, at in self._logged.items()
-                        if now < at + REMINDER_SECONDS}
+                        if kind in stay and now < at + REMINDER_SECONDS}
         for finding in findings:
             if finding.remedy and finding.kind not in self._logged:
                 self._logged[finding.kind] = now

@@ -165,7 +165,7 @@ class Evaluator:
         found = self._pairing.mismatch((pair.a, pair.b) for pair in islice(
             look.unmatched, COMPARED))
         if found is None:
-            return Finding('apart', message, 'none could be answered, as no tick had all its boxes')
+            return Finding('alone', message, 'none could be answered, as no tick had all its boxes')
         message += (f': stamps of {found.one} and {found.other} differ by '
                     f'{1e-9 * found.difference:.3g} s')
         if not found.tolerance:

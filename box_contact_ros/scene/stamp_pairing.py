@@ -62,9 +62,9 @@ RESET = 1_000_000_000
 """Time has been set back if a stamp lies this far [ns] before an earlier one of its box."""
 AGAIN = 5
 """Time has been set back if a box goes through so many of its stamps again, in their order."""
-MARGIN = 1.1
+MARGIN = 1.2
 """A tolerance that is proposed is so much larger than half the period, as periods vary."""
-FEWEST_STAMPS = 3  # of a box, before its period is known
+FEWEST_STAMPS = 5  # of a box, before its period is known, even if there is a gap among them
 NO_PARTNER = 'dropped: no partner'
 TOO_LATE = 'dropped: tick answered before'
 NEVER = -2**63  # before any stamp [ns]
@@ -435,8 +435,8 @@ def _compare(one: np.ndarray, other: np.ndarray) -> tuple[int, int]:
 
 
 def _period(stamps: np.ndarray) -> float:
-    """Return the time between stamps [ns], given in their order, that nearly all keep to."""
-    return float(np.percentile(np.diff(stamps), 95)) if len(stamps) > 1 else np.inf
+    """Return the median time between stamps [ns], given in their order."""
+    return float(np.median(np.diff(stamps))) if len(stamps) > 1 else np.inf
 
 
 def _to_nearest(stamps: np.ndarray, others: np.ndarray) -> np.ndarray:

@@ -188,6 +188,21 @@ def test_the_proposed_tolerance_joins_stamps_that_never_agree(periods, offset):
     assert pairing.mismatch([TWO.moving]) is None
 
 
+def test_a_tolerance_is_proposed_only_when_the_period_is_known():
+    """One box begins later, both had a stamp of zero before: no proposal is wild, at no time."""
+    pairing, proposed = StampPairing(TWO), []
+    for box in TWO.moving:
+        pairing.add(box, pose(0))
+    for n in range(100):
+        pairing.add('box_a', pose(10**18 + n * 100 * MS))
+        if n > 20:
+            pairing.add('box_b', pose(10**18 + (n * 100 + 30) * MS))
+        found = pairing.mismatch([TWO.moving])
+        if n > 20 and found:
+            proposed.append(found.tolerance)
+    assert len(proposed) > 60 and {round(each / MS) for each in proposed} == {60}
+
+
 def test_no_tolerance_joins_two_clocks():
     """One box in simulated time, one in the host's."""
     pairing = StampPairing(TWO)
