@@ -46,7 +46,7 @@ from .parameters import (
     size,
     text,
 )
-from .rclpy_workarounds import refuse_transitions
+from .rclpy_workarounds import lifecycle_state, refuse_transitions
 from .runtime import LOG_SECONDS, run_node
 from .scene_topics import SceneTopics
 
@@ -219,6 +219,7 @@ class ContactNode(LifecycleNode):
         # What start-up made stays for good. No full collection (10 ms) has to look at it.
         gc.collect()
         gc.freeze()
+        self._diagnostics.watch.restart()
         self._topics.activate(self._configured.pose_callback)
 
     def _change(self, settings: dict[str, Any], names: Collection[str]) -> None:
@@ -296,14 +297,16 @@ class ContactNode(LifecycleNode):
         if self._evaluator is not None:
             self.counts[RESETS] += 1
             self._evaluator.reset()
+            self.get_logger().warning('time went back: /clock was set back; a new time begins')
 
     def _report(self) -> None:
         """Serve QoS events and publish diagnostics, once a second."""
         self._topics.events.serve()
+        state = lifecycle_state(self)
         if self._evaluator is None:
-            self._diagnostics.publish(self.counts, 0, ())
+            self._diagnostics.publish(self.counts, state=state, pairs=0)
         else:
-            self._evaluator.report()
+            self._evaluator.report(state)
 
 
 def main(args: Sequence[str] | None = None) -> int:

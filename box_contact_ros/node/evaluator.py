@@ -3,7 +3,8 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -11,16 +12,28 @@ import numpy as np
 from ..scene.scene_solver import ALL_BOXES, SceneSolver
 from ..scene.stamp_pairing import NEVER, PAIRINGS, Pairing, StampedPose, Tick
 from ..solver.checks import absent_poses, are_poses, pose_fault, shown
-from .diagnostics import UNMATCHED_SECONDS, Diagnostics
+from .diagnostics import (
+    ACTIVE,
+    ERROR,
+    NAMED,
+    UNANSWERED_SECONDS,
+    Diagnostics,
+    Finding,
+    Look,
+    kind_and_remedy,
+    listed,
+    note_line,
+    rounded_up,
+)
 from .message_bytes import RawMessages
 from .messages import NANOSECONDS, Refused, TypedMessages
-from .runtime import LOG_SECONDS
 from .scene_topics import SceneTopics
 
 SERIALIZATIONS: dict[str, type[RawMessages] | type[TypedMessages]] = {
     'raw': RawMessages, 'typed': TypedMessages}
 """Values of the node parameter `serialization`."""
 OUTSIDE = 'outside the trained range'
+COMPARED = 16  # pairs at most whose stamps are compared for a report
 
 
 class Evaluator:
@@ -35,6 +48,8 @@ class Evaluator:
         self._topics, self._diagnostics, self._logger = topics, diagnostics, logger
         self.counts = counts
         self._settings: Mapping[str, Any] = {}
+        self._refusals: dict[str, str] = {}  # log lines of the next report, by their kind
+        self._refused_boxes: set[str] = set()  # boxes of which a message was refused
         self.set_solver(solver, settings)
 
     def set_solver(self, solver: SceneSolver, settings: Mapping[str, Any]) -> None:
@@ -53,7 +68,7 @@ class Evaluator:
         self._messages = SERIALIZATIONS[settings['serialization']]()  # it knows names of pairs
         self.solver, self._settings = solver, settings
         self._absent = np.zeros(0, dtype=bool)  # which boxes the last array had no pose of
-        self._silent_until = 0.0  # by the monotonic clock: when a refusal is logged again [s]
+        self._diagnostics.watch.set_pairs(solver.scene.pairs)
 
     def close(self) -> None:
         """Keep the count of a solver that goes."""
@@ -72,6 +87,7 @@ class Evaluator:
                         else self._messages.read_pose(message))
                 ticks = self._pairing.add(box, pose)
             except Exception as error:
+                self._refused_boxes.add(box)
                 self._refuse(error, topic)
                 return
             for tick in ticks:
@@ -96,20 +112,66 @@ class Evaluator:
         self._absent = absent_poses(poses.numbers)
         return poses
 
-    def report(self) -> None:
-        """Publish the diagnostics; warn of poses that come and cannot be answered."""
-        counts = +self.counts
+    def report(self, state: str) -> None:
+        """Log what was refused and why pairs are not answered; publish the diagnostics."""
+        refusals, self._refusals = self._refusals, {}
+        notes, self._pairing.notes = self._pairing.notes, {}
+        for line in (*refusals.values(), *(note_line(*note) for note in notes.items())):
+            self._logger.warning(line)
+        counts = self.counts - self._pairing.held()
         counts[OUTSIDE] += self.solver.exact_answers
         scene = self.solver.scene
-        stale = self._pairing.stale()
-        if scene.pose_array:
-            stale = [box for box, absent in zip(scene.moving, self._absent) if absent]
-        unanswered = self._diagnostics.publish(counts, len(scene.pairs), stale)
-        if unanswered > UNMATCHED_SECONDS:
-            self._logger.warning(
-                f'poses arrive, but none could be answered for {UNMATCHED_SECONDS:g} s (pairing '
-                f'{self._settings["pairing"]!r}: do the stamps of all boxes agree?)',
-                throttle_duration_sec=LOG_SECONDS)
+        look = self._diagnostics.look(counts, self._settings['max_age'])
+        unseen = [box for box in self._pairing.unseen() if box not in self._refused_boxes]
+        stale = ([box for box, absent in zip(scene.moving, self._absent) if absent]
+                 if scene.pose_array
+                 else [box for box in self._pairing.stale() if box not in unseen])
+        findings = list(self._findings(look, unseen, stale)) if state == ACTIVE else []
+        self._diagnostics.log(findings)
+        self._diagnostics.publish(
+            counts, findings, state=state, pairs=len(scene.pairs), stale_boxes=' '.join(stale),
+            boxes_that_never_came=' '.join(unseen), unanswered_pairs=len(look.unanswered))
+
+    def _findings(self, look: Look, unseen: list[str], stale: list[str]) -> Iterator[Finding]:
+        """Yield why pairs are not answered, as far as it can be told."""
+        max_age = self._settings['max_age']
+        if look.unanswered:
+            pairs = [pair.name or f'{pair.a}_{pair.b}' for pair in look.unanswered]
+            yield Finding('unanswered', f'unanswered for {UNANSWERED_SECONDS:g} s: {listed(pairs)}',
+                          level=ERROR)
+        if look.refused:
+            yield Finding('refused', f'poses refused: {", ".join(look.refused)}')
+        if unseen and (look.unmatched or (
+                not look.has_heard and look.quiet >= UNANSWERED_SECONDS)):
+            yield Finding('unseen', f'no pose ever came: {listed(unseen)}',
+                          '; '.join(map(self._topics.why_silent, unseen[:NAMED])))
+        if stale:
+            yield Finding('stale', f'stale boxes: {listed(stale)}', '' if (
+                self.solver.scene.pose_array or not look.unmatched) else self._why_stale(stale[0]))
+        if look.has_heard and 0 < max_age <= look.quiet:
+            yield Finding('stopped', f'poses have stopped: none for {look.quiet:.0f} s')
+        elif look.unmatched and not (look.refused or unseen or stale):
+            yield self._without_partner(look)
+
+    def _why_stale(self, box: str) -> str:
+        behind, max_age = 1e-9 * self._pairing.behind(box), self._settings['max_age']
+        return (f'the newest stamp of {box} is {behind:.3g} s behind, max_age is {max_age:g} s; '
+                'does its publisher live, and stamp by the same clock?')
+
+    def _without_partner(self, look: Look) -> Finding:
+        """Return by how much the stamps of a pair differ, and the tolerance that would do."""
+        message = 'poses without a partner'
+        found = self._pairing.mismatch((pair.a, pair.b) for pair in islice(
+            look.unmatched, COMPARED))
+        if found is None:
+            return Finding('alone', message, 'none could be answered, as no tick had all its boxes')
+        message += (f': stamps of {found.one} and {found.other} differ by '
+                    f'{1e-9 * found.difference:.3g} s')
+        if not found.tolerance:
+            return Finding('clocks', message, 'none could be answered; stamp both by one clock '
+                                              '(use_sim_time for all, or for none)')
+        return Finding('apart', message, 'none could be answered; set tolerance:='
+                       f'{rounded_up(1e-9 * found.tolerance):g}, or pairing:=latest')
 
     def _answer(self, tick: Tick) -> None:
         stamp, frame_id = self._header_of(tick)
@@ -131,7 +193,8 @@ class Evaluator:
             self._topics.cloud.publish(messages.cloud(answer))
         # What nobody waits for comes last.
         stale = len(answer.stale)
-        self._diagnostics.computed(took, evaluated=stale < len(self.solver.scene.pairs))
+        # A box that an array leaves out is not there: nobody asks for its pairs.
+        self._diagnostics.computed(took, [] if self.solver.scene.pose_array else answer.stale)
         counts = self.counts
         counts['contacts'] += len(answer.touching)
         counts['evaluations'] += 1
@@ -157,16 +220,18 @@ class Evaluator:
         one, frame = ('the scene', scene.frame_id) if scene.frame_id else (
             known[0][0], known[0][1].frame_id)
         box = next(box for box, pose in known if pose is odd)
-        return f'{one} is in frame {shown(frame)}, {box} in {shown(odd.frame_id)}'
+        advice = ('the leading slash is the difference'
+                  if frame.lstrip('/') == odd.frame_id.lstrip('/')
+                  else 'publish both in one frame, as the node transforms nothing')
+        return f'{one} is in frame {shown(frame)}, {box} in {shown(odd.frame_id)}: {advice}'
 
     def _refuse(self, error: Exception, topic: str) -> None:
-        """Count what was refused; log it, unless there was another a moment ago."""
+        """Count what was refused; keep the first line of its kind for the next report."""
         if isinstance(error, Refused):
             reason, text = error.reason, f'{topic}: {error}'
         else:
             reason, text = 'internal error', f'{type(error).__name__}: {error}'
         self.counts[f'refused: {reason}'] += 1
-        now = time.monotonic()
-        if now >= self._silent_until:  # rclpy's own throttle takes 0.2 ms for what it leaves out
-            self._silent_until = now + LOG_SECONDS
-            self._logger.warning(f'{text}; refused')
+        kind, remedy = kind_and_remedy(reason, text)
+        if kind not in self._refusals:
+            self._refusals[kind] = f'{text}; refused{remedy}'

@@ -67,6 +67,15 @@ def silence(subscription: Subscription) -> None:
     subscription.callback = lambda _: None
 
 
+def lifecycle_state(node: LifecycleNode) -> str:
+    """Return the label of a node's state: unconfigured, inactive, active or finalized.
+
+    Symptom: a lifecycle node tells its state by a service alone.
+    Test: test_first_run.py::test_the_state_is_told.
+    """
+    return str(node._state_machine.current_state[1])
+
+
 def refuse_transitions(node: LifecycleNode) -> None:
     """Answer every request for a transition with a refusal.
 

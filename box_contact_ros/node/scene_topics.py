@@ -16,7 +16,7 @@ from rclpy.duration import Duration
 from rclpy.event_handler import PublisherEventCallbacks, UnsupportedEventTypeError
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from rclpy.qos import QoSProfile
+from rclpy.qos import QoSCompatibility, QoSProfile, qos_check_compatible
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import String
@@ -148,6 +148,23 @@ class SceneTopics:
     def pose_topics(self) -> list[str]:
         """Return the full names of the topics that are subscribed to."""
         return [subscription.topic_name for subscription in self._subscriptions.values()]
+
+    def why_silent(self, box: str) -> str:
+        """Return who publishes on the topic of a box that has given no pose."""
+        source = next(source for source in self._subscriptions if source.box == box)
+        subscription = self._subscriptions[source]
+        topic, (wanted, _) = subscription.topic_name, pose_input(source.box)
+        offers = self._node.get_publishers_info_by_topic(topic)
+        if not offers:
+            return f'nobody publishes {topic}'
+        for offer in offers:
+            if offer.topic_type != f'geometry_msgs/msg/{wanted.__name__}':
+                return (f'{topic} is published as {shown(offer.topic_type)}, not as '
+                        f'geometry_msgs/msg/{wanted.__name__}')
+            fits, reason = qos_check_compatible(offer.qos_profile, subscription.qos_profile)
+            if fits == QoSCompatibility.ERROR:
+                return f'{topic} is published with another quality of service: {reason}'
+        return f'{topic} has {len(offers)} of {wanted.__name__}, silent so far'
 
     def _topic_of(self, pair: Pair) -> str:
         return f'{self._prefix}{pair.name}{"/" if pair.name else ""}contact'

@@ -26,10 +26,17 @@ missing  max_age passes after that tick            stale     waiting ticks are l
 missing  all boxes pause longer than max_age       current
 missing  pose of a new stamp                       current
 stale    pose of a new stamp                       current
-any      pose of a stamp that was taken            same      REPEATED
-any      stamp older than all remembered ones      same      OLD
+any      pose of its newest stamp                  same      REPEATED
+any      older stamp that was taken                same      held back, else REPEATED
+any      stamp older than all remembered ones      same      held back, else OLD
 any      stamp RESET before its newest             unseen    RESETS, for all boxes
+any      AGAIN stamps are held back                unseen    RESETS, for all boxes
 ```
+A recording that is played in a loop repeats its stamps. Poses whose stamps were taken before are
+held back, as long as they advance and no box has a newer stamp. The last of AGAIN of one box begins
+a new time, with all poses that were held back. Else they are refused. A stream that sends each
+stamp once never begins anew this way, in whatever order it arrives.
+
 Policy `latest` makes a tick of every pose that is not OLD. A box is stale by its newest stamp.
 Why no library does this: docs/decisions/contact-node.md.
 """
@@ -37,8 +44,9 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections import Counter, deque
-from collections.abc import Container
+from collections.abc import Container, Iterable
 from dataclasses import dataclass, field
+from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -52,6 +60,11 @@ REMEMBERED_STAMPS = 1024
 """Stamps per box that are known to have been taken, so that none is answered twice."""
 RESET = 1_000_000_000
 """Time has been set back if a stamp lies this far [ns] before an earlier one of its box."""
+AGAIN = 5
+"""Time has been set back if a box goes through so many of its stamps again, in their order."""
+MARGIN = 1.2
+"""A tolerance that is proposed is so much larger than half the period, as periods vary."""
+FEWEST_STAMPS = 5  # of a box, before its period is known, even if there is a gap among them
 NO_PARTNER = 'dropped: no partner'
 TOO_LATE = 'dropped: tick answered before'
 NEVER = -2**63  # before any stamp [ns]
@@ -66,6 +79,23 @@ class StampedPose(NamedTuple):
     numbers: np.ndarray  # (7,) `x y z qx qy qz qw`
     frame_id: str
     stamp: int  # [ns]
+
+
+class Note(NamedTuple):
+    """The last pose that was refused, dropped or begins a new time, for the log."""
+
+    box: str
+    stamp: int   # [ns]
+    newest: int  # newest stamp of the box so far [ns]
+
+
+class Mismatch(NamedTuple):
+    """Two boxes whose stamps do not agree."""
+
+    one: str
+    other: str
+    difference: int  # between a stamp of one and the nearest of the other [ns], the median
+    tolerance: int   # that would join them [ns]; 0: none would, their clocks differ
 
 
 Tick = list['StampedPose | None']
@@ -88,6 +118,7 @@ class BoxState:
     missed: deque[int] = field(default_factory=_remembered)
     """Ticks that were answered without the box."""
     last: StampedPose | None = None  # its last pose, for policy `latest`
+    came: bool = False  # whether it gave a pose before time was set back
 
 
 @dataclass(slots=True)
@@ -111,19 +142,26 @@ class Pairing(ABC):
         """
         self.tolerance, self.max_age = tolerance, max_age
         self.counts: Counter[str] = Counter() if counts is None else counts
+        self.notes: dict[str, Note] = {}
+        """The last pose of each kind that is counted. Whoever logs them clears them."""
         self._now = NEVER  # newest stamp of all boxes
+        self._held: dict[str, list[tuple[str, StampedPose]]] = {}
+        """Poses by box whose stamps were taken before, and what they are counted as so far."""
         self._boxes: dict[str, BoxState] = {}
         self.set_scene(scene)
 
     def set_scene(self, scene: Scene) -> None:
         """Replace the scene; boxes that stay keep their state and their poses."""
         self._boxes = {box: self._boxes.get(box) or BoxState() for box in scene.sources}
+        self._held.clear()
         self._partners = {tuple({pair.a, pair.b} & self._boxes.keys()) for pair in scene.pairs}
 
     def reset(self) -> None:
         """Forget all poses and stamps, as when time is set back."""
-        self._boxes = {box: BoxState() for box in self._boxes}
+        self._boxes = {box: BoxState(came=state.came or state.newest != NEVER)
+                       for box, state in self._boxes.items()}
         self._now = NEVER
+        self._held.clear()
 
     @abstractmethod
     def add(self, box: str, pose: StampedPose) -> list[Tick]:
@@ -134,6 +172,23 @@ class Pairing(ABC):
         return [] if self._now == NEVER else [
             box for box, state in self._boxes.items() if self._is_stale(state, self._now)]
 
+    def unseen(self) -> list[str]:
+        """Return the boxes that have never given a pose."""
+        return [box for box, state in self._boxes.items()
+                if state.newest == NEVER and not state.came]
+
+    def held(self) -> Counter[str]:
+        """Return how many of the refused poses are held back, and may yet be answered."""
+        return Counter(kind for held in self._held.values() for kind, _ in held)
+
+    def behind(self, box: str) -> int:
+        """Return how far [ns] the newest stamp of a box is behind that of all."""
+        return self._now - self._boxes[box].newest
+
+    def mismatch(self, pairs: Iterable[tuple[str, str]]) -> Mismatch | None:
+        """Return the first of the pairs of boxes whose stamps keep them apart, if there is one."""
+        return None
+
     @abstractmethod
     def _is_stale(self, state: BoxState, now: int) -> bool:
         """Return whether a box has no pose that is recent enough."""
@@ -142,10 +197,45 @@ class Pairing(ABC):
         """Return the state of a box, after a reset if its stamp shows that time was set back."""
         state = self._boxes[box]
         if stamp < state.newest - RESET:
-            self.counts[RESETS] += 1
-            self.reset()
+            self._set_back(box, stamp)
             return self._boxes[box]
         return state
+
+    def _set_back(self, box: str, stamp: int) -> None:
+        """Begin a new time, and count it."""
+        self._count(RESETS, box, stamp)
+        self.reset()
+
+    def _count(self, kind: str, box: str, stamp: int) -> None:
+        """Count a pose, and note it for the log."""
+        self.counts[kind] += 1
+        self._note(kind, box, stamp)
+
+    def _note(self, kind: str, box: str, stamp: int) -> None:
+        self.notes[kind] = Note(box, stamp, self._boxes[box].newest)
+
+    def _hold(self, kind: str, box: str, pose: StampedPose) -> list[Tick]:
+        """Hold back a pose whose stamp was taken before; answer those held if a loop is sure."""
+        held = self._held.setdefault(box, [])
+        if held and pose.stamp <= held[-1][1].stamp:
+            self._refuse_held()
+            held = self._held.setdefault(box, [])
+        held.append((kind, pose))
+        self.counts[kind] += 1
+        if len(held) < AGAIN:
+            return []
+        poses = sorted(((pose.stamp, box, pose) for box, held in self._held.items()
+                        for _, pose in held), key=itemgetter(0))
+        self.counts.subtract(self.held())
+        self._set_back(box, poses[0][0])
+        return [tick for _, box, pose in poses for tick in self.add(box, pose)]
+
+    def _refuse_held(self) -> None:
+        """Note the poses that are held back as refused: time goes on."""
+        for box, held in self._held.items():
+            for kind, pose in held:
+                self._note(kind, box, pose.stamp)
+        self._held.clear()
 
     def _is_evaluable(self, present: Container[str]) -> bool:
         """Return whether some pair has a pose of each of its moving boxes."""
@@ -196,8 +286,13 @@ class StampPairing(Pairing):
         state = self._state_at(box, stamp)
         if stamp > state.newest:
             state.newest = stamp
-        elif self._refuses(state, stamp):
+            if self._held:
+                self._refuse_held()
+        elif stamp == state.newest:
+            self._count(REPEATED, box, stamp)
             return []
+        elif kind := self._fault(state, stamp):
+            return self._hold(kind, box, pose)
         state.taken.append(stamp)
         state.missing_since = None
         if stamp > self._now:
@@ -207,7 +302,7 @@ class StampPairing(Pairing):
         tick = waiting.get(key)
         if tick is None:
             if self._is_too_late(state, stamp):
-                self.counts[TOO_LATE] += 1
+                self._count(TOO_LATE, box, stamp)
                 return []
             tick = waiting[key] = WaitingTick(self._begun)
             self._begun += 1
@@ -222,16 +317,24 @@ class StampPairing(Pairing):
                 self._has_answered = self._awaits_less = True
         return ticks
 
-    def _refuses(self, state: BoxState, stamp: int) -> bool:
-        """Refuse and count a stamp that was taken before, or is too old to tell."""
+    def mismatch(self, pairs: Iterable[tuple[str, str]]) -> Mismatch | None:
+        """Return the first of the pairs of boxes whose stamps keep them apart, if there is one."""
+        for pair in pairs:
+            one, other = (self._boxes.get(box, BoxState()).taken for box in pair)
+            if one and other:
+                difference, tolerance = _compare(np.array(one), np.array(other))
+                if difference > self.tolerance:
+                    return Mismatch(*pair, difference, tolerance)
+        return None
+
+    def _fault(self, state: BoxState, stamp: int) -> str | None:
+        """Return why a stamp is refused: it was taken before, or is too old to tell."""
         taken = state.taken
         if len(taken) == REMEMBERED_STAMPS and stamp < taken[0]:
-            self.counts[OLD] += 1
-            return True
+            return OLD
         if stamp in taken:
-            self.counts[REPEATED] += 1
-            return True
-        return False
+            return REPEATED
+        return None
 
     def _advance(self, stamp: int) -> None:
         """Take a stamp that is newer than all before as the time, and look who is stale."""
@@ -315,6 +418,35 @@ class StampPairing(Pairing):
         return [poses.get(box) for box in self._boxes]
 
 
+def _compare(one: np.ndarray, other: np.ndarray) -> tuple[int, int]:
+    """Return the difference of the stamps [ns] of two boxes, and the tolerance that joins them.
+
+    Half a period of the faster box joins each pose of the slower one, wherever it falls. The
+    tolerance is 0 where none would do. Both are 0 while there are too few stamps to tell.
+    """
+    slow, fast = sorted((np.sort(one), np.sort(other)), key=_period, reverse=True)
+    if len(fast) < FEWEST_STAMPS:
+        return 0, 0
+    period = _period(fast)
+    met = slow[(slow > fast[0] - period) & (slow < fast[-1] + period)]
+    if not len(met):
+        return int(_to_nearest(slow, fast).min()), 0
+    return int(np.median(_to_nearest(met, fast))), int(0.5 * MARGIN * period)
+
+
+def _period(stamps: np.ndarray) -> float:
+    """Return the median time between stamps [ns], given in their order."""
+    return float(np.median(np.diff(stamps))) if len(stamps) > 1 else np.inf
+
+
+def _to_nearest(stamps: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """Return how far each stamp is from the nearest of others, in their order."""
+    after = np.searchsorted(others, stamps)
+    before, after = np.maximum(after - 1, 0), np.minimum(after, len(others) - 1)
+    nearest: np.ndarray = np.minimum(abs(stamps - others[before]), abs(stamps - others[after]))
+    return nearest
+
+
 class LatestPairing(Pairing):
     """Policy `latest`: every pose that arrives makes a tick, with the last pose of each other box.
 
@@ -327,8 +459,14 @@ class LatestPairing(Pairing):
         stamp = pose.stamp
         state = self._state_at(box, stamp)
         if stamp < state.newest:
-            self.counts[OLD] += 1
+            if stamp in state.taken:
+                return self._hold(OLD, box, pose)
+            self._count(OLD, box, stamp)
             return []
+        if stamp > state.newest:
+            state.taken.append(stamp)
+            if self._held:
+                self._refuse_held()
         state.newest, state.last = stamp, pose
         self._now = max(self._now, stamp)
         if not self._is_evaluable({box for box, state in self._boxes.items() if state.last}):

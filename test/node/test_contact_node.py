@@ -142,7 +142,7 @@ def test_unmatched_poses_are_warned_of(node, client):
         stamp = client.next_stamp()
         client.send(ORIGIN, TOUCHING, stamps=(stamp, stamp - 1_000_000_000))
         client.spin(lambda: False, 0.1)
-        if client.diagnostics[-1:] and client.diagnostics[-1].status[0].message == (
+        if client.diagnostics[-1:] and client.diagnostics[-1].status[0].message.startswith(
                 'poses without a partner'):
             break
     else:

@@ -386,7 +386,7 @@ def test_live_messages_validate(everything):
         assert len(wrong) == (address == 'box_b/pose'), (address, wrong)
         assert len(messages) > 1
     texts = {message.status[0].message for message in everything['/diagnostics']}
-    assert {'no poses', 'poses refused'} <= texts
+    assert {'no poses', 'poses refused: bad pose'} <= {text.split(',')[0] for text in texts}
     assert {len(cloud.data) for cloud in everything['contacts_cloud']} == {0, ROW}
 
 
@@ -450,7 +450,7 @@ WRONG_MESSAGES = {
     'half an absent pose': ('poses', set_in('poses.0.orientation.w', math.nan)),
     'NaN in the quaternion': ('box_a/pose', set_in('pose.orientation.w', math.nan)),
     'quaternion of zero length': ('box_a/pose', set_in('pose.orientation.w', 0.0)),
-    'unknown level': ('/diagnostics', set_in('status.0.level', b'\x02')),
+    'unknown level': ('/diagnostics', set_in('status.0.level', b'\x03')),
     'unknown count': ('/diagnostics', set_in('status.0.values.0.key', 'guesses')),
     'a count that is no number': ('/diagnostics', set_in('status.0.values.0.value', 'many'))}
 

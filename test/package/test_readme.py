@@ -22,6 +22,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from geometry_msgs.msg import PoseStamped
 
 from box_contact_ros.cli import PROGRAMS
 from box_contact_ros.node.contact_node import PARAMETERS
@@ -123,6 +124,18 @@ def topic(words: list[str], **_) -> None:
     assert words[3].removeprefix('/') in addresses
 
 
+def published(words: list[str], **_) -> None:
+    """Check that the topic takes poses, and that the message is one."""
+    topic(['', '', '', words[5]])
+    pose, header = PoseStamped(), {'stamp': 'now', 'frame_id': 'map'}
+    given = yaml.safe_load(words[7])
+    assert words[6] == 'geometry_msgs/msg/PoseStamped' and given.pop('header') == header
+    for part, values in given.pop('pose').items():
+        for name, value in values.items():
+            setattr(getattr(pose.pose, part), name, value)
+    assert not given and pose.pose.orientation.w == 1.0
+
+
 def parameter(words: list[str], **_) -> None:
     """`ros2 param set NODE NAME VALUE`: the node has it, and takes the value."""
     node, name, value = words[3:]
@@ -221,6 +234,7 @@ COMMANDS = {
     r'(ros2 run|python -m) box_contact_ros \w+( .*)?': start,
     r'box_contact_\w+( .*)?': start,
     r'ros2 topic echo \S+': topic,
+    r'ros2 topic pub -r 10 .+': published,
     r'ros2 param set \S+ \S+ \S+': parameter,
     r'ros2 launch \S+ \S+( .*)?': launch,
     r'python (docs/examples|test/helpers)/\w+\.py': example,

@@ -2,14 +2,17 @@
 from __future__ import annotations
 
 import random
+from collections import Counter
 
 import numpy as np
 import pytest
 
 from box_contact_ros.scene.scene_solver import Box, Pair, Scene, two_boxes
 from box_contact_ros.scene.stamp_pairing import (
+    AGAIN,
     NO_PARTNER,
     OLD,
+    PAIRINGS,
     REMEMBERED_STAMPS,
     REPEATED,
     RESET,
@@ -17,6 +20,7 @@ from box_contact_ros.scene.stamp_pairing import (
     TOO_LATE,
     WAITING_TICKS,
     LatestPairing,
+    Note,
     StampedPose,
     StampPairing,
 )
@@ -69,18 +73,152 @@ def test_poses_without_partner_are_dropped_and_counted():
 
 
 def test_no_stamp_is_answered_twice():
-    """Repeated messages, at once or long after, of one box or of both: one answer, and a count."""
+    """Each message comes several times, at once or up to 100 ticks later: one answer, and a count.
+
+    The copies come between newer poses, so they are no loop.
+    """
     pairing = StampPairing(TWO)
     answers = 0
     for stamp in range(3 * REMEMBERED_STAMPS):
         for box in ('box_a', 'box_b'):
-            answers += len(pairing.add(box, pose(stamp)))
-    for stamp in range(3 * REMEMBERED_STAMPS):
-        for box in ('box_a', 'box_b'):
-            assert not pairing.add(box, pose(stamp))
+            for copy in (stamp, stamp, stamp - 100):
+                if copy >= 0:
+                    answers += len(pairing.add(box, pose(copy)))
     assert answers == 3 * REMEMBERED_STAMPS
-    assert pairing.counts[REPEATED] == 2 * REMEMBERED_STAMPS
-    assert pairing.counts[OLD] == 4 * REMEMBERED_STAMPS
+    assert pairing.counts == {REPEATED: 2 * (6 * REMEMBERED_STAMPS - 100)}
+
+
+def undisturbed(rng, boxes):
+    """Ticks at 1 kHz, late by up to 128, some poses lost; each stamp of a box comes once.
+
+    Executors deliver a box's poses in a row, so all poses of a tick share some of the lateness.
+    """
+    events = []
+    for stamp in range(2000):
+        late = rng.choice((0, rng.uniform(0, 64)))
+        events += [(stamp + late + rng.choice((0, rng.uniform(0, 63))), box, stamp * MS)
+                   for box in boxes if rng.random() > 0.01]
+    return [event[1:] for event in sorted(events)]
+
+
+@pytest.mark.parametrize('seed', range(5))
+@pytest.mark.parametrize('policy', PAIRINGS)
+def test_no_stamp_of_an_undisturbed_stream_is_answered_twice(policy, seed):
+    """Whatever the order in which its poses arrive: time is never taken for set back."""
+    rng = random.Random(seed)
+    pairing = PAIRINGS[policy](scene(), max_age=1000 * MS)
+    answered = []
+    for box, stamp in undisturbed(rng, 'abc'):
+        for tick in pairing.add(box, pose(stamp)):
+            answered.append(tuple(entry and entry.stamp for entry in tick))
+    assert len(answered) == len(set(answered))
+    if policy == 'stamp':
+        newest = [max(filter(None, tick), default=0) for tick in answered]
+        assert len(newest) == len(set(newest)) and len(newest) > 1900
+    assert pairing.counts[RESETS] == pairing.counts[REPEATED] == 0
+
+
+@pytest.mark.parametrize('policy, ticks', [
+    ('stamp', AGAIN + 1), ('stamp', 10), ('stamp', 900), ('stamp', 2 * REMEMBERED_STAMPS),
+    ('latest', AGAIN + 1), ('latest', 10), ('latest', 900)])
+def test_a_loop_shorter_than_a_second_is_answered_each_time(policy, ticks):
+    """A recording played in a loop: all its ticks, from the first loop to the last."""
+    pairing = PAIRINGS[policy](TWO)
+    step = 999 * MS // ticks
+    for number in range(4):
+        answered = {max(stamps([tick])) for stamp in range(ticks) for box in TWO.moving
+                    for tick in pairing.add(box, pose(stamp * step)) if None not in tick}
+        assert answered == {stamp * step for stamp in range(ticks)}
+        assert pairing.counts[RESETS] == number
+    assert pairing.counts[REPEATED] == pairing.counts[OLD] == 0
+
+
+def test_a_loop_of_stamps_that_only_nearly_agree():
+    pairing = StampPairing(TWO, tolerance=4 * MS)
+    for number in range(4):
+        answered = sum(len(pairing.add(box, pose((10 * stamp + 3 * k) * MS)))
+                       for stamp in range(50) for k, box in enumerate(TWO.moving))
+        assert answered == 50 and pairing.counts == Counter({RESETS: number} if number else {})
+
+
+def test_a_loop_begins_before_the_last_poses_of_the_old_one_are_in():
+    """Box b is behind by three poses at each turn: a few ticks of a loop are lost, no more."""
+    pairing = StampPairing(TWO)
+    a, b = ([(box, stamp) for _ in range(10) for stamp in range(100)] for box in TWO.moving)
+    answered = 0
+    for one, other in zip([*a, *[None] * 3], [*[None] * 3, *b]):
+        for event in filter(None, (one, other)):
+            answered += len(pairing.add(event[0], pose(event[1] * MS)))
+    assert pairing.counts[RESETS] == 9 and answered >= 10 * 95
+
+
+def test_stamps_that_stand_still_are_no_loop():
+    """Zero for ever, or the same few stamps: refused and noted, with what the log needs."""
+    pairing = StampPairing(TWO)
+    for number in range(1000):
+        for box in TWO.moving:
+            assert len(pairing.add(box, pose(0))) == (number == 0 and box == 'box_b')
+    assert pairing.counts == {REPEATED: 1998}
+    assert pairing.notes == {REPEATED: Note('box_b', 0, 0)}
+    for number in range(1000):
+        for box in TWO.moving:
+            pairing.add(box, pose(number % AGAIN * MS))
+    assert RESETS not in pairing.counts
+
+
+@pytest.mark.parametrize('periods, offset', [
+    ((100, 100), 31), ((100, 100), 50), ((100, 10), 4), ((10, 100), 47), ((100, 100), 1e-6)])
+def test_the_proposed_tolerance_joins_stamps_that_never_agree(periods, offset):
+    """Publishers that know nothing of each other; with that tolerance the slower one is answered.
+
+    Each period varies by a per cent, as those of timers do.
+    """
+    rng = random.Random(1)
+    events = sorted((round((n * period + offset * k + rng.uniform(-0.01, 0.01) * period) * MS), box)
+                    for k, (box, period) in enumerate(zip(TWO.moving, periods))
+                    for n in range(4000 // period))
+    pairing = StampPairing(TWO)
+    assert not any(pairing.add(box, pose(stamp)) for stamp, box in events)
+    found = pairing.mismatch([TWO.moving])
+    assert {found.one, found.other} == set(TWO.moving)
+    assert 0 < found.difference <= found.tolerance <= 0.7 * min(periods) * MS
+    pairing = StampPairing(TWO, tolerance=found.tolerance)
+    answered = sum(len(pairing.add(box, pose(stamp))) for stamp, box in events)
+    assert answered >= 4000 / max(periods) - 2
+    assert pairing.mismatch([TWO.moving]) is None
+
+
+def test_a_tolerance_is_proposed_only_when_the_period_is_known():
+    """One box begins later, both had a stamp of zero before: no proposal is wild, at no time."""
+    pairing, proposed = StampPairing(TWO), []
+    for box in TWO.moving:
+        pairing.add(box, pose(0))
+    for n in range(100):
+        pairing.add('box_a', pose(10**18 + n * 100 * MS))
+        if n > 20:
+            pairing.add('box_b', pose(10**18 + (n * 100 + 30) * MS))
+        found = pairing.mismatch([TWO.moving])
+        if n > 20 and found:
+            proposed.append(found.tolerance)
+    assert len(proposed) > 60 and {round(each / MS) for each in proposed} == {60}
+
+
+def test_no_tolerance_joins_two_clocks():
+    """One box in simulated time, one in the host's."""
+    pairing = StampPairing(TWO)
+    for n in range(20):
+        pairing.add('box_a', pose(n * 100 * MS))
+        pairing.add('box_b', pose(n * 100 * MS + 10**18))
+    assert pairing.mismatch([TWO.moving])[2:] == (pytest.approx(10**18, rel=1e-8), 0)
+
+
+def test_boxes_that_never_came_are_told_from_those_that_did():
+    for policy in PAIRINGS.values():
+        pairing = policy(TWO)
+        assert pairing.unseen() == ['box_a', 'box_b']
+        pairing.add('box_a', pose(MS))
+        pairing.reset()
+        assert pairing.unseen() == ['box_b']
 
 
 def test_tolerance_joins_the_nearest_stamps():

@@ -46,6 +46,7 @@ STRANGERS = 'test/node/test_strangers.py'
 TEST_BYTES = 'test/node/test_message_bytes.py'
 TOPICS = 'node/scene_topics.py'
 TEST_PAIRING = 'test/scene/test_stamp_pairing.py'
+FIRST_RUN = 'test/node/test_first_run.py'
 TEST_SCENE_NODE = 'test/node/test_scene_node.py'
 TEST_CORE = 'test/core/test_core.py'
 EXACT = 'test/core/test_exact.py'
@@ -327,7 +328,43 @@ MUTANTS = {
         'test/node/test_contact_node.py -k frames_must'),
     'a stamp answered again': Mutant(
         'scene/stamp_pairing.py', 'if stamp in taken:', 'if False:',
-        f'{TEST_SCENE_NODE} -k repeated_and_late'),
+        f'{TEST_PAIRING} -k answered_twice'),
+    'the newest stamp held back': Mutant(
+        'scene/stamp_pairing.py', 'elif stamp == state.newest:', 'elif False:',
+        f'{TEST_PAIRING} -k stand_still'),
+    'a short loop is refused for ever': Mutant(
+        'scene/stamp_pairing.py', 'if len(held) < AGAIN:', 'if True:',
+        f'{TEST_PAIRING} -k loop_shorter'),
+    'a loop loses its first ticks': Mutant(
+        'scene/stamp_pairing.py', 'for _, box, pose in poses for tick', 'for _, box, pose in '
+        'poses[-1:] for tick', f'{TEST_PAIRING} -k loop_shorter'),
+    'late poses taken for a loop': Mutant(
+        'scene/stamp_pairing.py', 'if stamp in state.taken:', 'if True:',
+        f'{TEST_PAIRING} -k undisturbed'),
+    'copies among newer poses taken for a loop': Mutant(
+        'scene/stamp_pairing.py', '                self._refuse_held()\n        elif',
+        '                pass\n        elif', f'{TEST_PAIRING} -k is_answered_twice'),
+    'a tolerance of a whole period proposed': Mutant(
+        'scene/stamp_pairing.py', 'int(0.5 * MARGIN * period)', 'int(MARGIN * period)',
+        f'{TEST_PAIRING} -k proposed'),
+    'one refusal hides another': Mutant(
+        EVALUATOR, 'if kind not in self._refusals:', 'if not self._refusals:',
+        f'{FIRST_RUN} -k hides_no_other'),
+    'a slash in front ignored': Mutant(
+        EVALUATOR, "if frame.lstrip('/') == odd.frame_id.lstrip('/')", 'if False',
+        f'{FIRST_RUN} -k frames'),
+    'a pair without answers is no error': Mutant(
+        EVALUATOR, 'level=ERROR)', ')', f'{FIRST_RUN} -k zero'),
+    'a box that never came is stale': Mutant(
+        EVALUATOR, 'if box not in unseen]', ']', f'{FIRST_RUN} -k never_came'),
+    'poses of another type are none': Mutant(
+        TOPICS, "if offer.topic_type != f'geometry_msgs/msg/{wanted.__name__}':", 'if False:',
+        f'{FIRST_RUN} -k never_came'),
+    'nobody minds that poses have stopped': Mutant(
+        EVALUATOR, 'if look.has_heard and 0 < max_age <= look.quiet:', 'if False:',
+        f'{FIRST_RUN} -k stop'),
+    'an inactive node is well': Mutant(
+        'node/diagnostics.py', 'if state != ACTIVE:', 'if False:', f'{FIRST_RUN} -k state'),
     'time that goes back is late': Mutant(
         'scene/stamp_pairing.py', 'if stamp < state.newest - RESET:', 'if False:',
         f'{TEST_PAIRING} -k set_back'),

@@ -1,0 +1,292 @@
+"""What a node says of everything that a first run gets wrong, over DDS by plain rclpy.
+
+All nodes run at once in one process, each in a namespace of its own, with one fault each. Then the
+remedy that its log names is followed.
+"""
+from __future__ import annotations
+
+import gc
+import math
+import re
+import time
+from collections import defaultdict
+
+import pytest
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import Point, PointStamped, Pose, PoseStamped, Quaternion
+from rcl_interfaces.msg import Log
+from rclpy.context import Context
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.qos import QoSProfile
+from ros_client import PATIENCE
+
+from box_contact_ros.node.contact_node import ContactNode
+from box_contact_ros.node.messages import make_header
+from box_contact_ros.node.runtime import make_executor, spin_for
+
+SECOND = 10**9
+RATE = 20  # Hz
+WATCHED = 9.0  # s: five for an error, and the reports around it
+CUBES = {'size_a': [2.0, 2.0, 2.0], 'size_b': [2.0, 2.0, 2.0], 'model': 'exact'}
+HEIGHTS = {'box_a': 0.0, 'box_b': 1.9}
+THREE = ('{boxes: {a: {size: [2, 2, 2]}, b: {size: [2, 2, 2]}, c: {size: [2, 2, 2]}}, '
+         'pairs: [{a: a, b: b}, {a: b, b: c}]}')
+PARAMETERS = {'latest_clocks': {'pairing': 'latest'}, 'three': {'scene': THREE},
+              'deadline': {'deadline': 0.2},
+              'unconfigured': {'autostart': False}, 'inactive': {'autostart': False}}
+
+
+def pose_of(box, stamp, frame='map', w=1.0, z=None):
+    """Make a PoseStamped of a box that touches the other one."""
+    height = HEIGHTS.get(box, 0.0) if z is None else z
+    return PoseStamped(header=make_header(stamp, frame), pose=Pose(
+        position=Point(z=height), orientation=Quaternion(w=w)))
+
+
+def poses(case, number, now):
+    """Return the messages by box that a case publishes at one tick; `now` [ns]."""
+    both = {box: pose_of(box, now) for box in HEIGHTS}
+    return {
+        'good': lambda: both,
+        'zero': lambda: {box: pose_of(box, 0) for box in HEIGHTS},
+        'apart': lambda: {'box_a': both['box_a'], 'box_b': pose_of('box_b', now - SECOND // 64)},
+        'clocks': lambda: {'box_a': both['box_a'], 'box_b': pose_of('box_b', now - 9**10)},
+        'latest_clocks': lambda: {'box_a': both['box_a'],
+                                  'box_b': pose_of('box_b', now - 5 * SECOND)},
+        'alone': lambda: {'box_a': both['box_a']},
+        'mistyped': lambda: {'box_a': both['box_a'], 'box_b': Pose()},
+        'deadline': lambda: both,
+        'slash': lambda: {'box_a': both['box_a'], 'box_b': pose_of('box_b', now, '/map')},
+        'bad': lambda: {'box_a': pose_of('box_a', now, w=0.0),
+                        'box_b': pose_of('box_b', now, z=math.nan)},
+        'loop': lambda: {box: pose_of(box, number % 10 * SECOND // RATE) for box in HEIGHTS},
+        'stopped': lambda: both if number < 2 * RATE else {},
+        'stale': lambda: both if number < 2 * RATE else {'box_a': both['box_a']},
+        'three': lambda: {box: pose_of(box, now) for box in 'ab'},
+    }.get(case, dict)()
+
+
+CASES = ('good', 'zero', 'apart', 'clocks', 'latest_clocks', 'alone', 'mistyped', 'deadline',
+         'slash', 'bad', 'loop', 'stopped', 'stale', 'three', 'silent', 'unconfigured', 'inactive')
+
+
+class FirstRuns:
+    """All cases: their nodes, and who publishes to them and listens."""
+
+    def __init__(self):
+        # Of one participant, a topic has one type.
+        self.contexts = Context(), Context()
+        for context in self.contexts:
+            rclpy.init(context=context)
+        self.nodes = {case: ContactNode(self.contexts[0], namespace=case, parameter_overrides=[
+            Parameter(name, value=value)
+            for name, value in (CUBES | PARAMETERS.get(case, {})).items()]) for case in CASES}
+        self.nodes['inactive'].trigger_configure()
+        self.client = Node('client', context=self.contexts[1])
+        self.executors = [make_executor(context) for context in self.contexts]
+        for node in (*self.nodes.values(), self.client):
+            self.executors[node is self.client].add_node(node)
+        self.lines = defaultdict(list)
+        self.diagnostics = defaultdict(list)
+        self.points = defaultdict(set)
+        deep = QoSProfile(depth=1000)
+        self.publishers = {(case, box): self.client.create_publisher(
+            type(message), f'/{case}/{box}/pose', deep)
+            for case in CASES for box, message in poses(case, 0, 0).items()}
+        self.client.create_subscription(Log, '/rosout', self._hear, deep)
+        self.client.create_subscription(DiagnosticArray, '/diagnostics', self._look, deep)
+        for case in CASES:
+            self.client.create_subscription(
+                PointStamped, f'/{case}/contact/point',
+                lambda message, case=case: self.points[case].add(
+                    message.header.stamp.sec * SECOND + message.header.stamp.nanosec), deep)
+
+    def _hear(self, log):
+        case, _, name = log.name.partition('.')
+        if name == 'contact_node' and log.level >= 30:  # a warning
+            self.lines[case].append(log.msg)
+
+    def _look(self, message):
+        status = message.status[0]
+        values = {entry.key: entry.value for entry in status.values}
+        self.diagnostics[status.name.split('/')[1]].append(
+            (status.level[0], status.message, values))
+
+    def spin(self):
+        for executor in self.executors:
+            spin_for(executor, 0.005)
+
+    def match(self):
+        """Wait until all nodes hear their poses, and are heard."""
+        deadline = time.monotonic() + PATIENCE
+        while not (self.diagnostics.keys() >= set(CASES) and all(
+                publisher.get_subscription_count() for publisher in self.publishers.values()
+                if publisher.msg_type is PoseStamped and 'deadline' not in publisher.topic)):
+            assert time.monotonic() < deadline
+            self.spin()
+
+    def play(self, cases, seconds):
+        """Publish the poses of cases at RATE."""
+        began = time.monotonic()
+        for number in range(int(seconds * RATE)):
+            for case in cases:
+                for box, message in poses(case, number, time.time_ns()).items():
+                    self.publishers[case, box].publish(message)
+            while time.monotonic() < began + (number + 1) / RATE:
+                self.spin()
+
+    def play_until(self, case, done):
+        deadline = time.monotonic() + PATIENCE
+        while not done():
+            assert time.monotonic() < deadline, (self.lines[case][-3:], self.diagnostics[case][-1:])
+            self.play([case], 0.5)
+
+    def follow(self, case, **parameters):
+        """Set parameters of the node of a case, as its log says; wait for its contacts."""
+        self.points[case].clear()
+        result, = self.nodes[case].set_parameters([
+            Parameter(name, value=value) for name, value in parameters.items()])
+        assert result.successful
+        self.play_until(case, lambda: len(self.points[case]) > RATE
+                        and self.diagnostics[case][-1][:2] == (0, 'answering'))
+
+    def close(self):
+        for executor in self.executors:
+            executor.shutdown()
+        for node in (*self.nodes.values(), self.client):
+            node.destroy_node()
+        for context in self.contexts:
+            context.try_shutdown()
+        gc.unfreeze()
+
+
+@pytest.fixture(scope='module')
+def runs():
+    runs = FirstRuns()
+    runs.match()
+    runs.play(CASES, WATCHED)
+    runs.found = {case: seen[-1] for case, seen in runs.diagnostics.items()}
+    yield runs
+    runs.close()
+
+
+def told(runs, case, pattern):
+    """Return what the log of a case says, once a second at most."""
+    found = [match for line in runs.lines[case] if (match := re.search(pattern, line))]
+    assert found, runs.lines[case]
+    assert len(found) <= WATCHED + 1
+    return found[0]
+
+
+def test_a_good_run_is_told_nothing(runs):
+    assert not runs.lines['good']
+    assert runs.found['good'][:2] == (0, 'answering')
+    assert all(level == 0 for level, *_ in runs.diagnostics['good'])
+
+
+def test_stamps_of_zero(runs):
+    """`ros2 topic pub` without a stamp, twice: the first pair is answered, and no other."""
+    told(runs, 'zero', r'stamp 0 s does not advance; refused: set header\.stamp.*pairing:=latest')
+    assert runs.found['zero'][:2] == (
+        2, 'unanswered for 5 s: box_a_box_b; poses refused: repeated stamp')
+    assert runs.points['zero'] == {0}
+    result, = runs.nodes['zero'].set_parameters([Parameter('pairing', value='latest')])
+    assert result.successful
+    runs.play_until('zero', lambda: runs.diagnostics['zero'][-1][:2] == (0, 'answering'))
+
+
+def test_stamps_that_never_agree(runs):
+    """Two publishers that know nothing of each other: the log says a tolerance that does."""
+    line = told(runs, 'apart', r'stamps of box_a and box_b differ by ([\d.]+) s: none could be '
+                               r'answered; set tolerance:=([\d.]+), or pairing:=latest')
+    assert float(line[1]) == pytest.approx(1 / 64, abs=2e-3)
+    level, message, _ = runs.found['apart']
+    assert level == 2 and 'poses without a partner: stamps of box_a and box_b' in message
+    assert not runs.points['apart']
+    runs.follow('apart', tolerance=float(line[2]))
+
+
+def test_two_clocks(runs):
+    told(runs, 'clocks', r'differ by \d.* s: .*stamp both by one clock \(use_sim_time')
+    told(runs, 'latest_clocks', r'stale boxes: box_b: .* is 5(\.\d+)? s behind, max_age is 1 s')
+    assert runs.found['latest_clocks'][:2] == (
+        2, 'unanswered for 5 s: box_a_box_b; stale boxes: box_b')
+
+
+def test_a_box_that_never_came(runs):
+    """By name and topic, also if its poses have another type or QoS; it is not called stale."""
+    told(runs, 'alone', r'no pose ever came: box_b: nobody publishes /alone/box_b/pose')
+    told(runs, 'mistyped', r"no pose ever came: box_b: /mistyped/box_b/pose is published as "
+                           r"'geometry_msgs/msg/Pose', not as geometry_msgs/msg/PoseStamped")
+    told(runs, 'deadline', 'no pose ever came: box_a, box_b: /deadline/box_a/pose is published '
+                           'with another quality of service: .*[Dd]eadline')
+    for case in ('alone', 'mistyped'):
+        level, message, values = runs.found[case]
+        assert (level, message) == (
+            2, 'unanswered for 5 s: box_a_box_b; no pose ever came: box_b')
+        assert values['boxes that never came'] == 'box_b' and values['stale boxes'] == ''
+        assert values['unanswered pairs'] == '1'
+    # One pair of three boxes is answered, the other is not.
+    level, message, _ = runs.found['three']
+    assert (level, message) == (2, 'unanswered for 5 s: b_c; no pose ever came: c')
+
+
+def test_frames_that_differ(runs):
+    told(runs, 'slash', r"box_a is in frame 'map', box_b in '/map': the leading slash is the "
+                        r'difference; refused')
+    assert runs.found['slash'][1].endswith('poses refused: frame_id differs')
+    assert not runs.points['slash']
+
+
+def test_one_kind_of_refusal_hides_no_other(runs):
+    """A quaternion of zeros and NaN at the same rate: both are logged, with their remedies."""
+    told(runs, 'bad', r'w=0\) has zero length; refused: set orientation\.w to 1\.0')
+    told(runs, 'bad', r'position \(0, 0, nan\) is not finite; refused: send finite numbers')
+    level, message, values = runs.found['bad']
+    assert level == 2 and message.endswith('poses refused: bad pose')
+    assert values['boxes that never came'] == ''
+
+
+def test_a_bag_in_a_loop(runs):
+    """Half a second, again and again: its stamps are answered each time, counted and logged."""
+    told(runs, 'loop', r'time went back: box_[ab] has stamp [\d.]+ s after 0\.45 s')
+    *_, values = runs.found['loop']
+    assert int(values['time went back']) >= 2 * WATCHED - 3
+    assert int(values['evaluations']) >= 0.9 * RATE * (WATCHED - 2)
+    assert runs.found['loop'][:2] == (0, 'answering')
+    assert not any('refused' in line for line in runs.lines['loop'])
+
+
+def test_poses_that_stop(runs):
+    """Publishers that have gone: by the steady clock, whatever the stamps."""
+    level, message, _ = runs.found['stopped']
+    assert level == 1 and re.fullmatch(r'poses have stopped: none for [5-7] s', message)
+
+
+def test_a_box_that_falls_silent(runs):
+    levels = [message for _, message, _ in runs.diagnostics['stale']]
+    assert 'stale boxes: box_b' in levels
+    told(runs, 'stale', r'stale boxes: box_b: the newest stamp of box_b is \S+ s behind')
+    assert not any('without a partner' in message for message in levels)
+
+
+def test_nobody_publishes(runs):
+    """Five seconds after the start."""
+    assert runs.found['silent'][:2] == (1, 'no pose ever came: box_a, box_b')
+    told(runs, 'silent', 'nobody publishes /silent/box_a/pose; nobody publishes /silent/box_b/pose')
+
+
+def test_the_state_is_told(runs):
+    for state in ('unconfigured', 'inactive'):
+        assert {(level, message, values['lifecycle state'])
+                for level, message, values in runs.diagnostics[state]} == {
+            (1, f'{state}: no pose is answered', state)}
+    assert runs.found['good'][2]['lifecycle state'] == 'active'
+    node = runs.nodes['inactive']
+    node.trigger_activate()
+    heard = len(runs.diagnostics['inactive'])
+    runs.play_until('inactive', lambda: len(runs.diagnostics['inactive']) > heard + 1)
+    level, message, values = runs.diagnostics['inactive'][-1]
+    assert (level, message, values['lifecycle state']) == (0, 'no poses', 'active')
