@@ -20,11 +20,12 @@ from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
+from rclpy.task import Future
 from ros_client import PATIENCE
 
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import make_header
-from box_contact_ros.node.runtime import make_executor, spin_for
+from box_contact_ros.node.runtime import make_executor
 
 SECOND = 10**9
 RATE = 20  # Hz
@@ -116,7 +117,7 @@ class FirstRuns:
 
     def spin(self):
         for executor in self.executors:
-            spin_for(executor, 0.005)
+            executor.spin_until_future_complete(Future(), 0.005)
 
     def match(self):
         """Wait until all nodes hear their poses, and are heard."""
