@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -45,28 +46,36 @@ class PoseTopic(NamedTuple):
     name: str
     kind: type  # of its messages
     qos: QoSProfile
-    read: Callable[[bytes], dict[str, StampedPose]]
-    """Return the poses of a serialised message by box; NaN for a box that is not there. Refused."""
+    boxes: Sequence[str]
+    read: Callable[[bytes], StampedPose]
+    """Return the poses (n, 7) of these boxes, NaN for one that is not there; or raise Refused."""
 
 
 def pose_topics(scene: Scene) -> list[PoseTopic]:
     """Return how the poses of all moving boxes come, in the scene's order."""
-    def read(box: str) -> Callable[[bytes], dict[str, StampedPose]]:
-        messages = RawMessages()  # each with the frame of its topic
-        if box == ALL_BOXES:
-            return lambda data: _by_box(scene, messages.read_poses(data))
-        return lambda data: {box: messages.read_pose(data)}
-    return [PoseTopic(topic, *pose_input(box), read(box)) for box, topic in scene.sources.items()]
+    found = []
+    for source, topic in scene.sources.items():
+        is_array = source == ALL_BOXES
+        boxes, read = (scene.moving, _read_array) if is_array else ((source,), _read_one)
+        # Each topic has a reader of its own, which knows the topic's frame.
+        found.append(PoseTopic(topic, *pose_input(source), boxes,
+                               partial(read, RawMessages(), len(boxes))))
+    return found
 
 
-def _by_box(scene: Scene, poses: StampedPose) -> dict[str, StampedPose]:
-    """Return the poses of an array by box. A bad pose is NaN: the contact node reports it."""
-    numbers, moving = poses.numbers, scene.moving
-    if len(numbers) != len(moving):
+def _read_one(messages: RawMessages, _: int, data: bytes) -> StampedPose:
+    pose = messages.read_pose(data)
+    return pose._replace(numbers=pose.numbers[None])
+
+
+def _read_array(messages: RawMessages, count: int, data: bytes) -> StampedPose:
+    """Return the poses of so many boxes. A bad pose becomes NaN: the contact node reports it."""
+    poses = messages.read_poses(data)
+    if len(poses.numbers) != count:
         raise Refused('wrong number of poses',
-                      f'{len(numbers)} poses, but {len(moving)} boxes of the scene move')
-    numbers[~are_poses(numbers)] = np.nan
-    return {box: poses._replace(numbers=row) for box, row in zip(moving, numbers)}
+                      f'{len(poses.numbers)} poses, but {count} boxes of the scene move')
+    poses.numbers[~are_poses(poses.numbers)] = np.nan
+    return poses
 
 
 def subscribe_contacts(node: Node, callback: Callable[[Any], None], qos: QoSProfile) -> None:

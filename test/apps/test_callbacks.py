@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from box_contact_ros.apps.ros_client import ANSWERS
 from box_contact_ros.node.runtime import LOG_SECONDS
 
 pytest.importorskip('rosbags')
@@ -21,13 +22,13 @@ from pathlib import Path
 from types import SimpleNamespace
 from geometry_msgs.msg import PointStamped, PoseStamped
 from rclpy.parameter import Parameter
-from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header
 from box_contact_ros.apps.bench.bench_drive import BenchNode, echo_node
 from box_contact_ros.apps.bench.echo_node import EchoNode
 from box_contact_ros.apps.crane.crane_node import CraneNode
 from box_contact_ros.apps.crane.landing_flights import FlightNode
 from box_contact_ros.apps.recording.record import RecordNode
+from box_contact_ros.apps.ros_client import ANSWERS
 from box_contact_ros.apps.viewer.listener import ViewNode
 from box_contact_ros.apps.viewer.markers import MarkersNode
 from box_contact_ros.apps.viewer.scene_driver import SceneDriver
@@ -36,10 +37,12 @@ from box_contact_ros.node.evaluator import Evaluator
 from box_contact_ros.node.runtime import CONTACT_QOS, GuardedNode, joined, spin_for
 from box_contact_ros.scene.scene_solver import two_boxes
 
+TWO = two_boxes((1, 1, 1), (1, 1, 1))
+
 def fails(*_, **__):
     raise KeyError('planted')
 
-for kind, name in ((BenchNode, '_keep'), (CraneNode, '_on_answer'), (FlightNode, '_on_cloud'),
+for kind, name in ((BenchNode, '_keep'), (CraneNode, '_on_answer'), (FlightNode, '_on_contacts'),
                    (RecordNode, '_keep'), (ViewNode, 'listen_to'),
                    (MarkersNode, 'heard'), (SceneDriver, '_publish'), (Evaluator, '_answer')):
     setattr(kind, name, fails)
@@ -49,7 +52,7 @@ class Source(GuardedNode):
         super().__init__('source', context=context)
         self.out = [self.create_publisher(kind, topic, CONTACT_QOS) for kind, topic in (
             (PoseStamped, 'box_a/pose'), (PoseStamped, 'box_b/pose'), (PointStamped,
-            'contact/point'), (PointCloud2, 'contacts'), (Header, 'echo'))]
+            'contact/point'), ANSWERS['cloud'], (Header, 'echo'))]
         self.create_timer(0.02, self.publish)
 
     def publish(self):
@@ -63,10 +66,10 @@ class Source(GuardedNode):
 def nodes(context):
     echo = echo_node('echo', poses='for_echo/')
     return [Source(context), BenchNode(context, [echo], time.time_ns),
-            CraneNode(context), EchoNode(context), FlightNode(context),
+            CraneNode(context), EchoNode(context), FlightNode(context, TWO),
             RecordNode(context, Path(sys.argv[1]), ['box_a/pose'], {{}}),
             ContactNode(context), ViewNode(context, 'contact_node'), MarkersNode(context),
-            SceneDriver(context, two_boxes((1, 1, 1), (1, 1, 1)), 50.0)]
+            SceneDriver(context, TWO, 50.0)]
 
 with joined(Source) as (source, executor):
     others = nodes(source.context)
@@ -93,7 +96,7 @@ def printed(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 @pytest.mark.parametrize('node, what', [
     ('bench', 'echo'), ('crane', 'contact/point'), ('echo_node', 'box_b/pose'),
-    ('flights', 'contacts'), ('record', 'box_a/pose'), ('markers', 'box_a/pose'),
+    ('flights', ANSWERS['cloud'][1]), ('record', 'box_a/pose'), ('markers', 'box_a/pose'),
     ('view', 'parameters of the contact node'), ('scene_driver', 'fails'),
     ('contact_node', '')])
 def test_a_callback_that_raises(printed, node, what):

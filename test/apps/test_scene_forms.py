@@ -45,6 +45,7 @@ from box_contact_ros.apps.viewer.scene_driver import SceneDriver
 from box_contact_ros.apps.viewer.view_log import Snapshot
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import read_contacts
+from box_contact_ros.node.runtime import spin_for
 from box_contact_ros.node.soup_node import SoupNode
 from box_contact_ros.scene.files.scene_check import meaning
 from box_contact_ros.scene.files.scene_file import read_scene
@@ -146,7 +147,7 @@ def served(client: Client, node: Node) -> Iterator[Node]:
     client.executor.add_node(node)
     yield node
     client.executor.remove_node(node)
-    client.spin(lambda: False, 0.05)  # what it was given before
+    spin_for(node, client.executor, 0.05)  # what it was given before, or asked
     node.destroy_node()
 
 

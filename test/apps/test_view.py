@@ -287,17 +287,14 @@ def test_boxes_that_an_array_lacks_are_not_there():
     for box in scene.moving:
         log.pose(box, START - MS, ORIGIN)
     found = topic.read(array_of(ORIGIN, TOUCHING, [math.nan] * 7, [0.0] * 7))
-    assert list(found) == list(scene.moving)
-    assert {(pose.stamp, pose.frame_id) for pose in found.values()} == {(START, 'yard')}
-    for box, pose in found.items():
-        log.pose(box, pose.stamp, pose.numbers, pose.frame_id)
+    assert (topic.boxes, found.stamp, found.frame_id) == (scene.moving, START, 'yard')
+    log.poses(topic.boxes, found.stamp, found.numbers, found.frame_id)
     log.contacts(START, cloud_of(solver([ORIGIN, TOUCHING, None, None])), START)
     seen = log.snapshot()
     assert seen.stale_boxes.tolist() == [False, False, True, True]
     assert np.array_equal(seen.poses, [ORIGIN, TOUCHING, ORIGIN, ORIGIN])
     for late in (1, LOST_AFTER + 2):  # a tick without its absent boxes is a tick, and can be lost
-        for box, pose in found.items():
-            log.pose(box, START + late, pose.numbers)
+        log.poses(topic.boxes, START + late, found.numbers)
     assert log.figures(START).lost == 1
 
 

@@ -303,13 +303,13 @@ MUTANTS = {
         'except ZeroDivisionError as error:\n                # A signal shuts',
         'test/apps/test_callbacks.py -k raises'),
     'programs read an array for any number of boxes': Mutant(
-        'apps/ros_client.py', 'if len(numbers) != len(moving):', 'if False:',
+        'apps/ros_client.py', 'if len(poses.numbers) != count:', 'if False:',
         'test/apps/test_view.py -k another_number'),
     'a bad pose of an array is drawn': Mutant(
-        'apps/ros_client.py', 'numbers[~are_poses(numbers)] = np.nan', 'pass',
+        'apps/ros_client.py', 'poses.numbers[~are_poses(poses.numbers)] = np.nan', 'pass',
         'test/apps/test_view.py -k an_array_lacks'),
     'a box that is not there is drawn': Mutant(
-        'apps/viewer/view_log.py', 'if numbers[0] == numbers[0]:', 'if True:',
+        'apps/viewer/view_log.py', 'if not absent:', 'if True:',
         'test/apps/test_view.py -k an_array_lacks'),
     'a replay of other names': Mutant(
         'apps/recording/bag_file.py', "about.get('topics', {}).get(connection.topic, "

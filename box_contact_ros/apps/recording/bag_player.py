@@ -75,8 +75,8 @@ class BagPlayer:
                 yield False
 
     def _on_poses(self, topic: PoseTopic, _: int, data: bytes) -> None:
-        for box, pose in topic.read(data).items():
-            self.log.pose(box, pose.stamp, pose.numbers, pose.frame_id)
+        poses = topic.read(data)
+        self.log.poses(topic.boxes, poses.stamp, poses.numbers, poses.frame_id)
 
     def _on_contacts(self, kind: type, at: int, data: bytes) -> None:
         message = deserialize_message(data, kind)

@@ -75,8 +75,8 @@ class Listener(GuardedNode):
 
     def _pose_callback(self, log: ViewLog, topic: PoseTopic) -> Callable[[bytes], None]:
         def callback(data: bytes) -> None:
-            for box, pose in topic.read(data).items():
-                log.pose(box, pose.stamp, pose.numbers, pose.frame_id)
+            poses = topic.read(data)
+            log.poses(topic.boxes, poses.stamp, poses.numbers, poses.frame_id)
             self.heard()
         return callback
 

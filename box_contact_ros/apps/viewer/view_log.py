@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 import threading
 from collections import OrderedDict, deque
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -204,22 +205,26 @@ class ViewLog:
             self._answered = self._lost = 0
 
     def pose(self, box: str, stamp: int, numbers: np.ndarray, frame_id: str = '') -> None:
-        """Take where a moving box is: numbers (7,), or NaN for a box that is not there."""
+        """Take where a moving box is: numbers (7,)."""
+        self.poses((box,), stamp, numbers[None], frame_id)
+
+    def poses(self, boxes: Sequence[str], stamp: int, numbers: np.ndarray, frame_id: str = '',
+              ) -> None:
+        """Take where moving boxes are: numbers (n, 7), NaN for a box that is not there."""
         with self._lock:
-            track = self._tracks.get(box)
-            if track is None:  # it was of the scene before this one
-                return
-            if track and stamp < track[-1][0] - RESET:
+            if any(track and stamp < track[-1][0] - RESET
+                   for track in map(self._tracks.__getitem__, boxes)):
                 self.start_anew()
-                track = self._tracks[box]
-            if numbers[0] == numbers[0]:  # not NaN
-                track.append((stamp, numbers))
-                while stamp - track[0][0] > WINDOW * NANOSECONDS:
-                    track.popleft()
+            for box, row, absent in zip(boxes, numbers, np.isnan(numbers[:, 0]).tolist()):
+                if not absent:
+                    track = self._tracks[box]
+                    track.append((stamp, row))
+                    while stamp - track[0][0] > WINDOW * NANOSECONDS:
+                        track.popleft()
             if self._newest is None or stamp > self._newest:
                 self._newest, self._frame_id = stamp, frame_id
                 self._give_up(stamp)
-            self._counts[stamp] = self._counts.get(stamp, 0) + 1
+            self._counts[stamp] = self._counts.get(stamp, 0) + len(boxes)
 
     def contacts(self, stamp: int, rows: np.ndarray, received: int, frame_id: str = '') -> None:
         """Take the contacts (rows of messages.CLOUD_ROW) of a tick, received at this time [ns].
