@@ -19,7 +19,7 @@ from rcl_interfaces.msg import Log
 from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.qos import QoSProfile
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.task import Future
 from ros_client import PATIENCE
 
@@ -96,7 +96,8 @@ class FirstRuns:
         self.publishers = {(case, box): self.client.create_publisher(
             type(message), f'/{case}/{box}/pose', deep)
             for case in CASES for box, message in poses(case, 0, 0).items()}
-        self.client.create_subscription(Log, '/rosout', self._hear, deep)
+        self.client.create_subscription(Log, '/rosout', self._hear, QoSProfile(
+            depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL))  # what was said before, too
         self.client.create_subscription(DiagnosticArray, '/diagnostics', self._look, deep)
         for case in CASES:
             self.client.create_subscription(
