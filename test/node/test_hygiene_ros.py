@@ -260,7 +260,7 @@ def test_a_parameter_that_there_is_not(program):
     running = program('contact_node', '--ros-args', '-p', 'sizea:=[1.0, 1.0, 1.0]', '-p',
                       'qos_overrides./contacts.publisher.depth:=5', '-p', 'use_sim_time:=false')
     printed = running.wait_for_output('ready', 120)
-    assert "unknown parameter 'sizea' is ignored (did you mean size_a" in printed
+    assert "unknown parameter 'sizea'; the nearest name is size_a" in printed
     assert printed.count('unknown parameter') == 1
     assert 'poses from /box_a/pose, /box_b/pose' in running.output
 
