@@ -35,6 +35,7 @@ def contact_node(context: LaunchContext) -> list[Node]:
     files = [given['params_file']] if 'params_file' in given else []
     return [Node(
         package='box_contact_ros', executable='contact_node', output='screen',
+        arguments=['--shared-parameters'],  # SetParameter is for all nodes
         name=given.get('name'), namespace=given.get('namespace'),
         ros_arguments=[*shipped, *level, '--disable-external-lib-logs'],
         parameters=[*files, *([{name: ParameterValue(value, value_type=str)

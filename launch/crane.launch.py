@@ -32,18 +32,20 @@ def programs(context: LaunchContext) -> list[Node]:
     """Return what runs beside the contact node."""
     given = given_values(context, ARGUMENTS | LAUNCH_ARGUMENTS)
 
-    def node(program: str, *names: str, before: tuple[str, ...] = (), **options: object) -> Node:
+    def node(program: str, *names: str, before: tuple[str, ...] = (),
+             argument: str = '--shared-parameters', **options: object) -> Node:
         values = {name: given[name] for name in ('use_sim_time', *names) if name in given}
         level = ['--log-level', given['log_level']] if 'log_level' in given else []
         return Node(package='box_contact_ros', executable=program, output='screen',
-                    namespace=given.get('namespace'), parameters=[values] if values else [],
-                    ros_arguments=[*before, *level], **options)
+                    namespace=given.get('namespace'), arguments=[argument],
+                    parameters=[values] if values else [], ros_arguments=[*before, *level],
+                    **options)
 
     return [
         node('crane', *OF_CRANE, before=('-p', f'wait:={PATIENCE}'), emulate_tty=True,
              on_exit=Shutdown(reason='the crane has ended')),
         *([node('soup_node')] if given.get('soup') else []),
-        *([node('view', arguments=['--attach'])] if given.get('view') else []),
+        *([node('view', argument='--attach')] if given.get('view') else []),
     ]
 
 

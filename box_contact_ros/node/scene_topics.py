@@ -11,20 +11,30 @@ from rclpy.duration import Duration
 from rclpy.event_handler import PublisherEventCallbacks, UnsupportedEventTypeError
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from rclpy.qos import QoSProfile
+from rclpy.qos import QoSPolicyKind, QoSProfile
+from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import PointCloud2
 
 from ..scene.scene_solver import ALL_BOXES, Pair, Scene
 from ..solver.checks import shown
+from .parameters import QOS_OVERRIDES, one_of, unknown_name, whole_number
 from .qos_events import QosEvents
-from .rclpy_workarounds import RCLError, silence
+from .rclpy_workarounds import RCLError, parameter_overrides, silence
 from .runtime import ARRAY_QOS, CONTACT_QOS, POSE_QOS
 
 TOPICS_OF_EVERY_NODE = ('/diagnostics', '/parameter_events', '/rosout', '/clock')
 """Topics of other types than poses."""
 MOST_PAIRS_WITH_TOPICS = 1000
 """Two publishers a pair take milliseconds and memory, here and in every process that listens."""
+DEEPEST = 100_000  # messages of a queue
+POLICIES = {
+    'depth': whole_number(1, DEEPEST),
+    'durability': one_of(('volatile', 'transient_local', 'system_default', 'best_available')),
+    'history': one_of(('keep_last', 'keep_all', 'system_default')),
+    'reliability': one_of(('best_effort', 'reliable', 'system_default', 'best_available')),
+}
+"""What may be overridden of a topic's quality of service, and by which values."""
 
 
 class PoseSource(NamedTuple):
@@ -42,8 +52,18 @@ class SceneTopics:
     contacts: Publisher  # the cloud of all pairs, there from the first `set_scene` to `close`
 
     def __init__(self, node: Node, prefix: str, counts: Counter[str]) -> None:
-        """Begin without topics; `prefix` stands before the names of contact topics."""
+        """Begin without topics; `prefix` stands before the names of contact topics.
+
+        Raise ValueError for a quality of service that no topic here can be given.
+        """
         self._node, self._prefix = node, prefix
+        self._qos_overrides = {name: value for name, value in parameter_overrides(node).items()
+                               if name.startswith(QOS_OVERRIDES)}
+        for name, value in self._qos_overrides.items():
+            policy = name.rpartition('.')[2]
+            if policy not in POLICIES:
+                raise ValueError(f'{name}: {unknown_name("policy", policy, POLICIES)}')
+            POLICIES[policy](name, value)
         self.events = QosEvents(node, counts)
         self.publishers: dict[Pair, tuple[Publisher, Publisher]] = {}  # of point and normal
         self._subscriptions: dict[PoseSource, Subscription] = {}
@@ -112,6 +132,14 @@ class SceneTopics:
             self._node.destroy_publisher(self.contacts)
         self._is_open, self._wanted = False, ((), ())
 
+    def warn_of_unused_qos(self) -> None:
+        """Warn of qualities of service for topics that there are not, unless the node is idle."""
+        for name in self._qos_overrides if self._subscriptions else ():
+            if not self._node.has_parameter(name):
+                self._node.get_logger().warning(
+                    f'{name}: the node has no such topic now; the form is {QOS_OVERRIDES}/TOPIC.'
+                    f'publisher.POLICY, or .subscription., with POLICY {", ".join(POLICIES)}')
+
     def pose_topics(self) -> list[str]:
         """Return the full names of the topics that are subscribed to."""
         return [subscription.topic_name for subscription in self._subscriptions.values()]
@@ -127,13 +155,26 @@ class SceneTopics:
             reason = str(error).partition(', at ')[0]
             raise ValueError(f'scene: {shown(topic)}: {reason}') from error
 
+    def _overriding(self, topic: str, kind: str) -> QoSOverridingOptions:
+        """Return what rclpy applies to a topic: parameters are declared only if one was given."""
+        begin = f'{QOS_OVERRIDES}{self._resolved(topic)}.{kind}.'
+        given = any(name.startswith(begin) for name in self._qos_overrides)
+        return QoSOverridingOptions(
+            [QoSPolicyKind[policy.upper()] for policy in POLICIES] if given else [])
+
+    def _publisher(self, kind: type, topic: str, **options: Any) -> Publisher:
+        # rclpy writes overrides into the profile that it gets.
+        qos = QoSProfile(depth=CONTACT_QOS.depth, reliability=CONTACT_QOS.reliability)
+        return self._node.create_publisher(
+            kind, topic, qos, qos_overriding_options=self._overriding(topic, 'publisher'),
+            **options)
+
     def _change(self, sources: Collection[PoseSource], pairs: Collection[Pair]) -> None:
         """Keep the topics that stay, destroy the others, create what is new."""
         self._wanted = sources, pairs
         self._unsubscribe(self._subscriptions.keys() - set(sources))
         if not self._is_open:
-            self.contacts = self._node.create_publisher(
-                PointCloud2, f'{self._prefix}contacts', CONTACT_QOS)
+            self.contacts = self._publisher(PointCloud2, f'{self._prefix}contacts')
             self.events.watch(self.contacts)
             self._is_open = True
         self._unpublish(self.publishers.keys() - set(pairs))
@@ -149,8 +190,8 @@ class SceneTopics:
     def _publish(self, pair: Pair) -> tuple[Publisher, Publisher]:
         def publisher(kind: type, topic: str) -> Publisher:
             # No events: too many to serve. A subscriber of another QoS is told by its own node.
-            return self._node.create_publisher(
-                kind, f'{self._topic_of(pair)}/{topic}', CONTACT_QOS,
+            return self._publisher(
+                kind, f'{self._topic_of(pair)}/{topic}',
                 event_callbacks=PublisherEventCallbacks(use_default_callbacks=False))
         return publisher(PointStamped, 'point'), publisher(Vector3Stamped, 'normal')
 
@@ -166,7 +207,8 @@ class SceneTopics:
         if source.deadline:
             qos.deadline = Duration(seconds=source.deadline)
         create = partial(self._node.create_subscription, kind, source.topic, callback, qos,
-                         raw=source.raw)
+                         raw=source.raw, qos_overriding_options=self._overriding(
+                             source.topic, 'subscription'))
         try:
             return create(event_callbacks=self.events.callbacks(
                 source.box, deadline=bool(source.deadline)))

@@ -154,6 +154,7 @@ def test_an_including_launch_file_keeps_its_parameters_and_its_own_arguments(pre
     given = node['parameters']
     assert (given['max_age'], given['use_sim_time'], given['model']) == (0.25, True, 'exact')
     assert node['name'] == '/bay/judge'
+    assert node['arguments'] == ['--shared-parameters']  # SetParameter may be of other nodes' names
     parent = parent_of(prefix, {'max_age': '2'})
     assert starts(prefix, parent)['contact_node']['parameters']['max_age'] == 2.0
     status, told = output(prefix, parent_of(prefix, {'modle': 'exact'}))

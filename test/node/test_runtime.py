@@ -181,7 +181,7 @@ def test_options_outside_ros_args_are_refused(program, capsys):
     for name in program.PARAMETERS:
         assert f'\n  {name} ' in printed.out
     assert '[12.192,2.438,2.591]' in printed.out and 'default: none' in printed.out
-    answer_help('contact_node', '', program.PARAMETERS, ['--ros-args', '-p', 'model:=exact'])
+    answer_help('contact_node', '', program.PARAMETERS, ['--ros-args', '-p', 'pairing:=stamp'])
 
 
 @pytest.mark.parametrize('program', [contact_node, soup_node])
