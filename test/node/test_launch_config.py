@@ -105,8 +105,12 @@ def start(prefix: Path, file: str | Path, *arguments: str) -> subprocess.Popen[s
 
 def output(prefix: Path, file: str | Path, *arguments: str) -> tuple[int, str]:
     """Return exit status and output of a launch file that ends by itself."""
-    launch = start(prefix, file, *arguments)
-    told, _ = launch.communicate(timeout=60)
+    with start(prefix, file, *arguments) as launch:
+        try:
+            told, _ = launch.communicate(timeout=60)
+        finally:
+            if launch.poll() is None:
+                os.killpg(launch.pid, signal.SIGKILL)
     return launch.returncode, told
 
 
