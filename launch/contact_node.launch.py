@@ -6,47 +6,49 @@ All arguments: ros2 launch box_contact_ros contact_node.launch.py --show-args
 
 Made for containers: the log goes to stdout alone, a line a message, and to no file of the node's.
 """
-import json
-
-from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument
-from launch.substitutions import LaunchConfiguration
+from launch import LaunchContext, LaunchDescription
+from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
-from box_contact_ros.node.contact_node import PARAMETERS
+from box_contact_ros.node.contact_node import LAUNCH_ARGUMENTS, PARAMETERS
+from box_contact_ros.node.parameters import descriptions, given_values
+from box_contact_ros.resources import resource_path
 
-OTHERS = {
-    'name': ('contact_node', 'name of the node'),
-    'namespace': ('', 'namespace of the node and of all of its topics'),
-    'log_level': ('info', 'least severity that is logged: debug, info, warn, error, fatal'),
-}
-"""Arguments that are no parameters: default, description."""
+RESPAWN_SECONDS = 2.0
+SHIPPED = str(resource_path('config', 'contact_node.yaml'))
 
 
-def as_text(default: object) -> str:
-    """Return a default as it is typed in a shell."""
-    return default if isinstance(default, str) else json.dumps(default)
-
-
-def parameter(name: str) -> ParameterValue:
-    """Return the launch argument of a parameter's name, in the parameter's type."""
-    default = PARAMETERS[name].default
-    kind = list[float] if isinstance(default, tuple) else type(default)
-    return ParameterValue(LaunchConfiguration(name), value_type=kind)
+def contact_node(context: LaunchContext) -> list[Node]:
+    """Return the node with what was given, and nothing else."""
+    given = given_values(context, LAUNCH_ARGUMENTS)
+    values = {name: given[name] for name in ('use_sim_time', *PARAMETERS) if name in given}
+    if given.get('use_lifecycle_manager'):
+        if given.get('autostart'):
+            raise ValueError('use_lifecycle_manager: the manager starts the node, so leave '
+                             'autostart out')
+        values['autostart'] = False
+    # The order of precedence, lowest first: the shipped file, SetParameter of a launch file that
+    # includes this one, params_file, arguments.
+    shipped = [] if 'params_file' in given else ['--params-file', SHIPPED]
+    level = ['--log-level', given['log_level']] if 'log_level' in given else []
+    files = [given['params_file']] if 'params_file' in given else []
+    return [Node(
+        package='box_contact_ros', executable='contact_node', output='screen',
+        arguments=['--shared-parameters'],  # SetParameter is for all nodes
+        name=given.get('name'), namespace=given.get('namespace'),
+        ros_arguments=[*shipped, *level, '--disable-external-lib-logs'],
+        parameters=[*files, *([{name: ParameterValue(value, value_type=str)
+                                if isinstance(value, str) else value
+                                for name, value in values.items()}] if values else [])],
+        respawn=given.get('respawn', False), respawn_delay=RESPAWN_SECONDS,
+        additional_env={'RCUTILS_LOGGING_USE_STDOUT': '1', 'PYTHONUNBUFFERED': '1'})]
 
 
 def generate_launch_description() -> LaunchDescription:
     """Return what `ros2 launch` asks for."""
-    arguments = OTHERS | {name: (as_text(setting.default), setting.description)
-                          for name, setting in PARAMETERS.items()}
     return LaunchDescription([
-        *(DeclareLaunchArgument(name, default_value=default, description=description)
-          for name, (default, description) in arguments.items()),
-        Node(package='box_contact_ros', executable='contact_node', output='screen',
-             name=LaunchConfiguration('name'), namespace=LaunchConfiguration('namespace'),
-             parameters=[{name: parameter(name) for name in PARAMETERS}],
-             ros_arguments=['--log-level', LaunchConfiguration('log_level'),
-                            '--disable-external-lib-logs'],
-             additional_env={'RCUTILS_LOGGING_USE_STDOUT': '1', 'PYTHONUNBUFFERED': '1'}),
+        *(DeclareLaunchArgument(name, default_value='', description=description)
+          for name, description in descriptions(LAUNCH_ARGUMENTS).items()),
+        OpaqueFunction(function=contact_node),
     ])

@@ -2,47 +2,58 @@
 
     ros2 launch box_contact_ros crane.launch.py model:=exact rate:=500 soup:=true
 
-Ends with the crane. All arguments: ros2 launch box_contact_ros crane.launch.py --show-args
+Takes the arguments of contact_node.launch.py too, which starts the contact node. Ends with the
+crane. All arguments: ros2 launch box_contact_ros crane.launch.py --show-args
 """
-from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument, Shutdown
-from launch.conditions import IfCondition
-from launch.substitutions import LaunchConfiguration
+from launch import LaunchContext, LaunchDescription
+from launch.actions import (
+    DeclareLaunchArgument,
+    IncludeLaunchDescription,
+    OpaqueFunction,
+    Shutdown,
+)
 from launch_ros.actions import Node
-from launch_ros.parameter_descriptions import ParameterValue
 
-PACKAGE = 'box_contact_ros'
-# Name: type, default, description.
-ARGUMENTS = {
-    'model': (str, 'mlp', 'how the contact node finds the contact point'),
-    'rate': (float, '200.0', 'pairs of poses that the crane publishes per second [Hz]'),
-    'seed': (int, '0', '0: the standard motion; n > 0: offset and angles drawn at random'),
-    'closed_loop': (bool, 'false', 'true: the contacts carry the load, and the crane lands it'),
-    'soup': (bool, 'false', 'true: a soup node answers the same poses under soup/'),
-    'view': (bool, 'false', 'true: show boxes and contacts in the browser'),
+from box_contact_ros.apps.crane.crane_parameters import PARAMETERS
+from box_contact_ros.node.contact_node import LAUNCH_ARGUMENTS
+from box_contact_ros.node.parameters import Setting, descriptions, flag, given_values
+from box_contact_ros.resources import resource_path
+
+OF_CRANE = {name: PARAMETERS[name] for name in ('rate', 'seed', 'closed_loop')}
+ARGUMENTS = OF_CRANE | {
+    'soup': Setting(False, 'whether a soup node answers the same poses under soup/', flag),
+    'view': Setting(False, 'whether boxes and contacts are shown in the browser', flag),
 }
 PATIENCE = 30.0
 """How long the crane waits for the contact node [s]: a busy machine starts nodes slowly."""
 
 
-def parameters(*names: str, **fixed: float) -> list[dict]:
-    """Launch arguments as parameters of the same names, and of the types that are meant."""
-    return [fixed | {name: ParameterValue(LaunchConfiguration(name), value_type=ARGUMENTS[name][0])
-                     for name in names}]
+def programs(context: LaunchContext) -> list[Node]:
+    """Return what runs beside the contact node."""
+    given = given_values(context, ARGUMENTS | LAUNCH_ARGUMENTS)
+
+    def node(program: str, *names: str, before: tuple[str, ...] = (),
+             argument: str = '--shared-parameters', **options: object) -> Node:
+        values = {name: given[name] for name in ('use_sim_time', *names) if name in given}
+        level = ['--log-level', given['log_level']] if 'log_level' in given else []
+        return Node(package='box_contact_ros', executable=program, output='screen',
+                    namespace=given.get('namespace'), arguments=[argument],
+                    parameters=[values] if values else [], ros_arguments=[*before, *level],
+                    **options)
+
+    return [
+        node('crane', *OF_CRANE, before=('-p', f'wait:={PATIENCE}'), emulate_tty=True,
+             on_exit=Shutdown(reason='the crane has ended')),
+        *([node('soup_node')] if given.get('soup') else []),
+        *([node('view', argument='--attach')] if given.get('view') else []),
+    ]
 
 
 def generate_launch_description() -> LaunchDescription:
     """Return what `ros2 launch` asks for."""
     return LaunchDescription([
-        *(DeclareLaunchArgument(name, default_value=default, description=description)
-          for name, (_, default, description) in ARGUMENTS.items()),
-        Node(package=PACKAGE, executable='contact_node', output='screen',
-             parameters=parameters('model')),
-        Node(package=PACKAGE, executable='soup_node', output='screen',
-             condition=IfCondition(LaunchConfiguration('soup'))),
-        Node(package=PACKAGE, executable='view', output='screen', arguments=['--attach'],
-             condition=IfCondition(LaunchConfiguration('view'))),
-        Node(package=PACKAGE, executable='crane', output='screen', emulate_tty=True,
-             parameters=parameters('rate', 'seed', 'closed_loop', wait=PATIENCE),
-             on_exit=Shutdown(reason='the crane has ended')),
+        *(DeclareLaunchArgument(name, default_value='', description=description)
+          for name, description in descriptions(ARGUMENTS).items()),
+        OpaqueFunction(function=programs),  # first: it refuses what the include would ignore
+        IncludeLaunchDescription(str(resource_path('launch', 'contact_node.launch.py'))),
     ])

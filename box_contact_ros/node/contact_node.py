@@ -36,9 +36,12 @@ from .diagnostics import DIAGNOSTICS_SECONDS, Diagnostics
 from .evaluator import SERIALIZATIONS, Evaluator
 from .messages import ContactsMessage
 from .parameters import (
+    EVERY_LAUNCH,
     CheckedParameters,
+    Limits,
     Setting,
     answer_help,
+    existing_file,
     flag,
     number,
     one_of,
@@ -74,7 +77,8 @@ PARAMETERS = {
     'scene': Setting('', 'scene file, its text, or the bare name of one in config/scenes/; '
                          'replaces size_a and size_b; setting it again reads it again',
                      scene_source),
-    'model': Setting('mlp', f'how the contact point is found: {model_names()}', model),
+    'model': Setting('mlp', f'how the contact point is found: {model_names()}',
+                     Limits(model, f'one of: {model_names()}')),
     'weights': Setting('', 'weights file to use instead of the shipped one', text),
     'pairing': Setting('stamp', 'stamp: answer once, when poses of equal stamp are in; latest: '
                                 "answer every pose with the other boxes' last", one_of(PAIRINGS)),
@@ -100,12 +104,33 @@ PARAMETERS = {
     'locked': Setting(False, 'whether all parameters and states stay as they are after the start',
                       flag, fixed=True),
 }
+LAUNCH_ARGUMENTS = EVERY_LAUNCH | {
+    'params_file': Setting('the shipped config/contact_node.yaml',
+                           'file of parameters; arguments override it', existing_file),
+    'name': Setting('contact_node', 'name of the node', text),
+    'respawn': Setting(False, 'whether the node is started anew, 2 s after it has ended', flag),
+    'use_lifecycle_manager': Setting(
+        False, 'whether a lifecycle manager configures and activates the node: autostart is '
+        'false; the node has no bond, so bond_timeout of the manager must be 0.0', flag),
+} | PARAMETERS
+"""Arguments of contact_node.launch.py: the parameters of the node, and what is not a parameter."""
 
 
 def _files(settings: Mapping[str, Any]) -> dict[str, str]:
     """Return the files that `scene` and `weights` name, as far as they do."""
     return {name: settings[name] for name in ('scene', 'weights') if settings.get(name)
             and not (name == 'scene' and is_inline(settings[name]))}
+
+
+def _refuse_sizes(settings: Mapping[str, Any], before: Mapping[str, Any]) -> None:
+    """Raise ValueError for sizes that change although a scene replaces them.
+
+    A size may be given again as it is: files of all parameters do so.
+    """
+    for name in ('size_a', 'size_b'):
+        if settings['scene'] and settings[name] != before[name]:
+            raise ValueError(f'{name} {shown(settings[name])} has no effect while scene is set: '
+                             "write sizes into the scene file, or set scene to ''")
 
 
 class ContactNode(LifecycleNode):
@@ -126,6 +151,7 @@ class ContactNode(LifecycleNode):
         self._evaluator: Evaluator | None = None  # from configure to cleanup
         self._settings = CheckedParameters(self, self.parameters, self._change)
         values = self._settings.values
+        _refuse_sizes(values, {name: one.default for name, one in self.parameters.items()})
         if values['locked'] and not values['autostart']:
             raise ValueError('locked: a node that does not start itself could never be started')
         self._open_files = OpenFiles(values['files_from'].split(os.pathsep),
@@ -147,6 +173,7 @@ class ContactNode(LifecycleNode):
         self._raises_faults = False
         if values['locked']:
             refuse_transitions(self)
+        self._topics.warn_of_unused_qos()
         # Last: a program that waits for this line may end the node at once.
         self._log_scene('ready', values)
 
@@ -224,6 +251,7 @@ class ContactNode(LifecycleNode):
 
     def _change(self, settings: dict[str, Any], names: Collection[str]) -> None:
         """Apply parameters if one differs. A scene that is set again may differ in its file."""
+        _refuse_sizes(settings, self._settings.values)
         if self._evaluator is not None and (
                 settings != self._settings.values or 'scene' in names):
             self._apply(settings)

@@ -1,17 +1,26 @@
-"""Node parameters as one table per node: declared, checked, and listed by `--help` from it.
+"""Node parameters as one table per node: declared, checked, listed by `--help`, launch arguments.
 
-Parameters are declared with dynamic typing, because a plain declaration refuses `rate:=200` where
-200.0 is meant; the check of each setting says what is accepted instead.
+Parameters are declared with dynamic typing, so that the check of each setting refuses a value of
+another type, and not rclpy. What the check returns is stored: 200 becomes 200.0 where a double is
+meant. rclpy itself enforces the ranges in the descriptors.
 """
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+import os
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any
 
-from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+import yaml
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    IntegerRange,
+    ParameterDescriptor,
+    SetParametersResult,
+)
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
@@ -23,8 +32,23 @@ Check = Callable[[str, Any], Any]
 """From a parameter's name and value to the value as the node uses it; ValueError if it is wrong."""
 
 
+OF_RCLPY = ('use_sim_time', 'start_type_description_service')  # every node has them
+QOS_OVERRIDES = 'qos_overrides.'  # begins the names of those that are declared with a topic
 LONGEST_REASON = 1000  # characters: it may quote what a stranger sent
 LOCKED = 'the node is locked: nothing can be changed after its start'
+
+
+@dataclass(frozen=True)
+class Limits:
+    """A check whose limits a parameter's descriptor shows: a range, or words."""
+
+    check: Check
+    words: str = ''
+    range: tuple[float, float] | tuple[int, int] | None = None
+
+    def __call__(self, name: str, value: Any) -> Any:
+        """Return the value as the node uses it, or raise ValueError."""
+        return self.check(name, value)
 
 
 @dataclass(frozen=True)
@@ -35,6 +59,21 @@ class Setting:
     description: str
     check: Check
     fixed: bool = False  # whether it is for the start only
+
+    def descriptor(self, *, read_only: bool) -> ParameterDescriptor:
+        """Return what tools show of the parameter."""
+        limits = self.check if isinstance(self.check, Limits) else Limits(self.check)
+        descriptor = ParameterDescriptor(
+            description=self.description, dynamic_typing=True, read_only=read_only,
+            additional_constraints=limits.words)
+        if limits.range:
+            low, high = limits.range
+            if isinstance(self.default, int):
+                descriptor.integer_range = [IntegerRange(from_value=low, to_value=high)]
+            else:
+                descriptor.floating_point_range = [
+                    FloatingPointRange(from_value=float(low), to_value=float(high))]
+        return descriptor
 
 
 def _is_number(value: Any) -> bool:
@@ -49,7 +88,7 @@ def number(low: float, high: float) -> Check:
         if not low <= value <= high:
             raise ValueError(f'{name} must lie within {low:g} and {high:g}, not {value:g}')
         return float(value)
-    return check
+    return Limits(check, range=(low, high))
 
 
 def whole_number(low: int, high: int) -> Check:
@@ -59,7 +98,7 @@ def whole_number(low: int, high: int) -> Check:
             raise ValueError(f'{name} must be a whole number from {low} to {high}, '
                              f'not {shown(value)}')
         return value
-    return check
+    return Limits(check, range=(low, high))
 
 
 def numbers(count: int) -> Check:
@@ -70,7 +109,7 @@ def numbers(count: int) -> Check:
                 map(math.isfinite, found)):
             raise ValueError(f'{name} must be {count} finite numbers, not {shown(value)}')
         return tuple(map(float, found))
-    return check
+    return Limits(check, f'{count} finite numbers')
 
 
 def size(name: str, value: Any) -> tuple[float, ...]:
@@ -96,7 +135,7 @@ def one_of(choices: Iterable[str]) -> Check:
         if choice not in choices:
             raise ValueError(f'{name} {shown(value)} is not one of: {", ".join(choices)}')
         return choice
-    return check
+    return Limits(check, f'one of: {", ".join(choices)}')
 
 
 def flag(name: str, value: Any) -> bool:
@@ -109,24 +148,35 @@ def flag(name: str, value: Any) -> bool:
 def declare(node: Node, settings: Mapping[str, Setting], *, fixed: bool = False,
             ) -> dict[str, Any]:
     """Declare and check a node's parameters; `fixed`: none can be changed while it runs."""
-    values = {}
+    given = parameter_overrides(node)
+    values = checked(settings, {name: given.get(name, setting.default)
+                                for name, setting in settings.items()})
     for name, setting in settings.items():
-        default = list(setting.default) if isinstance(setting.default, tuple) else setting.default
-        values[name] = node.declare_parameter(name, default, ParameterDescriptor(
-            description=setting.description, dynamic_typing=True,
-            read_only=fixed or setting.fixed)).value
+        node.declare_parameter(
+            name, _stored(values[name]), setting.descriptor(
+                read_only=fixed or setting.fixed or values.get('locked', False)),
+            ignore_override=True)  # the checked value holds the override
     _say_unknown(node, settings)
-    return checked(settings, values)
+    return values
+
+
+def _stored(value: Any) -> Any:
+    """Return a checked value as rclpy takes it."""
+    return list(value) if isinstance(value, tuple) else value
 
 
 def _say_unknown(node: Node, settings: Mapping[str, Setting]) -> None:
     """Warn of names without a parameter; a file of parameters may be meant for several nodes."""
     for name in parameter_overrides(node):
         # Those of topics are declared with the topics.
-        if not node.has_parameter(name) and not name.startswith('qos_overrides.'):
-            near = ' or '.join(get_close_matches(name, settings))
-            node.get_logger().warning(f'unknown parameter {shown(name)} is ignored'
-                                      + (f' (did you mean {near}?)' if near else ''))
+        if not node.has_parameter(name) and not name.startswith(QOS_OVERRIDES):
+            node.get_logger().warning(f'{unknown_name("parameter", name, settings)}; it is ignored')
+
+
+def unknown_name(kind: str, name: str, known: Iterable[str]) -> str:
+    """Return the refusal of a name that there is not, with the nearest name that there is."""
+    nearest = get_close_matches(name, known, n=1, cutoff=0.0)[0]
+    return f'unknown {kind} {shown(name)}; the nearest name is {nearest}'
 
 
 def checked(settings: Mapping[str, Setting], values: Mapping[str, Any]) -> dict[str, Any]:
@@ -142,7 +192,18 @@ class CheckedParameters:
         """Declare and check; `apply` gets new values and the names that were set, or refuses."""
         self._settings, self._apply = settings, apply
         self.values = declare(node, settings)
+        node.add_pre_set_parameters_callback(self._as_checked)
         node.add_on_set_parameters_callback(self._on_set)
+
+    def _as_checked(self, parameters: list[Parameter]) -> list[Parameter]:
+        """Return parameters with the values that are stored, bad ones as they came."""
+        found = []
+        for parameter in parameters:
+            with suppress(Exception):  # `_on_set` refuses what is bad
+                value = self._settings[parameter.name].check(parameter.name, parameter.value)
+                parameter = Parameter(parameter.name, value=_stored(value))
+            found.append(parameter)
+        return found
 
     def _on_set(self, parameters: list[Parameter]) -> SetParametersResult:
         if self.values.get('locked'):  # other nodes' parameters, such as use_sim_time, too
@@ -165,17 +226,28 @@ def reason_of(error: Exception) -> str:
 
 def answer_help(program: str, doc: str | None, settings: Mapping[str, Setting],
                 args: Sequence[str] | None) -> None:
-    """Serve `--help`, and refuse whatever stands outside `--ros-args` (exit status 2)."""
+    """Serve `--help`, and refuse arguments and parameters that there are not (exit status 2).
+
+    A parameter after `-p` is meant for this node. One from a file may be meant for another node.
+    """
     width = max(map(len, settings))
-    lines = [f'  {name:<{width}}  {setting.description} (default: {_show(setting.default)})'
+    lines = [f'  {name:<{width}}  {setting.description} (default: {default_text(setting.default)})'
              for name, setting in settings.items()]
     parser = program_parser(
         program, doc, usage=f'{program} [-h] [--ros-args -p NAME:=VALUE ... -r FROM:=TO ...]',
         epilog='parameters (--ros-args -p NAME:=VALUE):\n' + '\n'.join(lines))
-    _, unknown = parser.parse_known_args(outside_ros_args(args or ()))
+    parser.add_argument('--shared-parameters', action='store_true',
+                        help='parameters after -p are for several nodes, as those of SetParameter '
+                        'in a launch file: log unknown ones, and start')
+    options, unknown = parser.parse_known_args(outside_ros_args(args or ()))
     if unknown:
         hint = ' (parameters stand after --ros-args)' if '-p' in unknown else ''
         parser.error(f'unrecognized arguments: {" ".join(unknown)}{hint}')
+    for name in parameters_after_p(args or ()):
+        if not (name in settings or name in OF_RCLPY or name.startswith(QOS_OVERRIDES)
+                or options.shared_parameters):
+            parser.error(f'{unknown_name("parameter", name, settings)} (for parameters that '
+                         'several nodes share: --params-file, or --shared-parameters)')
 
 
 def outside_ros_args(args: Sequence[str]) -> list[str]:
@@ -189,7 +261,92 @@ def outside_ros_args(args: Sequence[str]) -> list[str]:
     return found
 
 
-def _show(default: Any) -> str:
+def parameters_after_p(args: Sequence[str]) -> list[str]:
+    """Return the names NAME of all `-p NAME:=VALUE` and `-p NODE:NAME:=VALUE`."""
+    return [rule.partition(':=')[0].rpartition(':')[2]
+            for flag, rule in zip(args, args[1:]) if flag in ('-p', '--param') and ':=' in rule]
+
+
+def default_text(default: Any) -> str:
+    """Return a default as it is typed in a shell."""
     if isinstance(default, tuple):
         return '[' + ','.join(map(str, default)) + ']'
     return str(default).lower() if isinstance(default, bool) else str(default) or 'none'
+
+
+# --- launch arguments -----------------------------------------------------------------------------
+# Objects of ROS's `launch` are used here, and nothing of it is imported.
+
+
+def existing_file(name: str, value: Any) -> str:
+    """Check the path of a file. launch_ros only warns of one that is not there."""
+    if not os.path.isfile(text(name, value)):
+        raise ValueError(f'{name}: there is no file {shown(value)}')
+    return str(value)
+
+
+EVERY_LAUNCH = {
+    'use_sim_time': Setting(False, 'whether time comes from /clock', flag),
+    'namespace': Setting('', 'namespace of all nodes and topics', text),
+    'log_level': Setting('info', 'least severity that is logged: debug, info, warn, error, fatal',
+                         one_of(('debug', 'info', 'warn', 'error', 'fatal'))),
+}
+"""Arguments that are for all nodes of a launch file."""
+OF_LAUNCH = ('launch-prefix', 'launch-prefix-filter')  # what `ros2 launch` itself adds
+
+
+def descriptions(arguments: Mapping[str, Setting]) -> dict[str, str]:
+    """Return the argument's names and what `--show-args` shows of them."""
+    return {name: f'{setting.description}; if left out: {default_text(setting.default)}'
+            for name, setting in arguments.items()}
+
+
+def given_values(context: Any, arguments: Mapping[str, Setting]) -> dict[str, Any]:
+    """Return the checked values of the arguments that were given to a launch file.
+
+    An argument whose text is empty was not given. A launch file that includes this one may have
+    arguments of other names, and they reach this one too: the context does not tell whose they are.
+    So names are looked up in the include itself. Raise ValueError for a name that there is not, or
+    a bad value.
+    """
+    for name in names_passed(context):
+        if name not in arguments and name not in OF_LAUNCH:
+            raise ValueError(unknown_name('launch argument', name, arguments))
+    texts = {name: context.launch_configurations.get(name, '') for name in arguments}
+    return {name: value_of(name, given, arguments[name]) for name, given in texts.items() if given}
+
+
+def value_of(name: str, given: str, setting: Setting) -> Any:
+    """Return the checked value of an argument's text, or raise ValueError."""
+    if isinstance(setting.default, str):
+        return setting.check(name, given)
+    try:
+        return setting.check(name, yaml.safe_load(given))
+    except yaml.YAMLError:
+        return setting.check(name, given)
+
+
+def names_passed(context: Any) -> list[str]:
+    """Return the names of the arguments that the current launch file's include passes on to it.
+
+    `ros2 launch` is such an include, too. An include that an event or a function brings is not
+    found: it may pass any name.
+    """
+    local = context.get_locals_as_dict()
+    root = getattr(local.get('event'), 'launch_description', None)
+    file = local.get('current_launch_file_path')
+    return [name if isinstance(name, str) else ''.join(part.perform(context) for part in name)
+            for include in _includes([root] if root else [], file)
+            for name, _ in include.launch_arguments]
+
+
+def _includes(entities: Iterable[Any], file: str) -> Iterator[Any]:
+    """Yield the actions below some entities of a launch description that include a file."""
+    for entity in entities:
+        source = getattr(entity, 'launch_description_source', None)
+        if source is not None and os.path.abspath(source.location) == file:
+            yield entity
+            continue
+        yield from _includes(entity.describe_sub_entities(), file)
+        for _, more in entity.describe_conditional_sub_entities():
+            yield from _includes(more, file)

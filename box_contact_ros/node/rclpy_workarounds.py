@@ -23,13 +23,14 @@ CHANGES = ('total_count_change', 'current_count_change', 'not_alive_count_change
 """What events count since they were last taken; each kind has some of these."""
 
 
-def parameter_overrides(node: Node) -> list[str]:
-    """Return the names of the parameters that were given at the start.
+def parameter_overrides(node: Node) -> dict[str, Any]:
+    """Return the parameters that were given at the start, by name.
 
     Symptom: rclpy silently ignores names that are never declared, and has no public list of them.
-    Test: test_hygiene_ros.py::test_a_parameter_that_there_is_not.
+    Test: test_hygiene_ros.py::test_parameters_from_a_file.
     """
-    return list(getattr(node, '_parameter_overrides', {}))
+    return {name: parameter.value
+            for name, parameter in getattr(node, '_parameter_overrides', {}).items()}
 
 
 def withhold_events(node: Node, entity: Any) -> list[EventHandler]:

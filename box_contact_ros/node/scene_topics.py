@@ -16,7 +16,8 @@ from rclpy.duration import Duration
 from rclpy.event_handler import PublisherEventCallbacks, UnsupportedEventTypeError
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from rclpy.qos import QoSCompatibility, QoSProfile, qos_check_compatible
+from rclpy.qos import QoSCompatibility, QoSPolicyKind, QoSProfile, qos_check_compatible
+from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import String
@@ -25,8 +26,9 @@ from ..scene.files.scene_file import scene_text
 from ..scene.scene_solver import ALL_BOXES, Pair, Scene
 from ..solver.checks import shown
 from .messages import ContactsMessage
+from .parameters import QOS_OVERRIDES, one_of, unknown_name, whole_number
 from .qos_events import QosEvents
-from .rclpy_workarounds import RCLError, silence
+from .rclpy_workarounds import RCLError, parameter_overrides, silence
 from .runtime import ARRAY_QOS, CONTACT_QOS, LATCHED_QOS, POSE_QOS
 
 TOPICS_OF_EVERY_NODE = ('/diagnostics', '/parameter_events', '/rosout', '/clock')
@@ -35,6 +37,14 @@ MOST_PAIRS_WITH_TOPICS = 1000
 """Two publishers a pair take milliseconds and memory, here and in every process that listens."""
 LARGEST_SCENE_TEXT = 2**20
 """Bytes that `~/scene` has at most: some 10,000 pairs. Whoever joins later is sent all of them."""
+DEEPEST = 100_000  # messages of a queue
+POLICIES = {
+    'depth': whole_number(1, DEEPEST),
+    'durability': one_of(('volatile', 'transient_local', 'system_default', 'best_available')),
+    'history': one_of(('keep_last', 'keep_all', 'system_default')),
+    'reliability': one_of(('best_effort', 'reliable', 'system_default', 'best_available')),
+}
+"""What may be overridden of a topic's quality of service, and by which values."""
 
 
 def pose_input(source: str) -> tuple[type, QoSProfile]:
@@ -67,8 +77,18 @@ class SceneTopics:
     """
 
     def __init__(self, node: Node, prefix: str, counts: Counter[str]) -> None:
-        """Begin without topics; `prefix` stands before the names of contact topics."""
+        """Begin without topics; `prefix` stands before the names of contact topics.
+
+        Raise ValueError for a quality of service that no topic here can be given.
+        """
         self._node, self._prefix = node, prefix
+        self._qos_overrides = {name: value for name, value in parameter_overrides(node).items()
+                               if name.startswith(QOS_OVERRIDES)}
+        for name, value in self._qos_overrides.items():
+            policy = name.rpartition('.')[2]
+            if policy not in POLICIES:
+                raise ValueError(f'{name}: {unknown_name("policy", policy, POLICIES)}')
+            POLICIES[policy](name, value)
         self.events = QosEvents(node, counts)
         self.publishers: dict[Pair, tuple[Publisher, Publisher]] = {}  # of point and normal
         self._subscriptions: dict[PoseSource, Subscription] = {}
@@ -145,6 +165,14 @@ class SceneTopics:
         self.contacts = self.cloud = self._scene = None
         self._wanted = Wanted()
 
+    def warn_of_unused_qos(self) -> None:
+        """Warn of qualities of service for topics that there are not, unless the node is idle."""
+        for name in self._qos_overrides if self._subscriptions else ():
+            if not self._node.has_parameter(name):
+                self._node.get_logger().warning(
+                    f'{name}: the node has no such topic now; the form is {QOS_OVERRIDES}/TOPIC.'
+                    f'publisher.POLICY, or .subscription., with POLICY {", ".join(POLICIES)}')
+
     def pose_topics(self) -> list[str]:
         """Return the full names of the topics that are subscribed to."""
         return [subscription.topic_name for subscription in self._subscriptions.values()]
@@ -177,6 +205,22 @@ class SceneTopics:
             reason = str(error).partition(', at ')[0]
             raise ValueError(f'scene: {shown(topic)}: {reason}') from error
 
+    def _overriding(self, topic: str, kind: str) -> QoSOverridingOptions:
+        """Return what rclpy applies to a topic: parameters are declared only if one was given."""
+        begin = f'{QOS_OVERRIDES}{self._resolved(topic)}.{kind}.'
+        given = any(name.startswith(begin) for name in self._qos_overrides)
+        return QoSOverridingOptions(
+            [QoSPolicyKind[policy.upper()] for policy in POLICIES] if given else [])
+
+    def _publisher(self, kind: type, topic: str, qos: QoSProfile = CONTACT_QOS,
+                   **options: Any) -> Publisher:
+        # rclpy writes overrides into the profile that it gets.
+        profile = QoSProfile(depth=qos.depth, reliability=qos.reliability,
+                             durability=qos.durability)
+        return self._node.create_publisher(
+            kind, topic, profile, qos_overriding_options=self._overriding(topic, 'publisher'),
+            **options)
+
     def _change(self, wanted: Wanted) -> None:
         """Keep the topics that stay, destroy the others, create what is new."""
         self._wanted = wanted
@@ -202,7 +246,7 @@ class SceneTopics:
 
     def _create(self, kind: type, topic: str, qos: QoSProfile = CONTACT_QOS) -> Publisher:
         """Return a new publisher whose events are served."""
-        publisher = self._node.create_publisher(kind, topic, qos)
+        publisher = self._publisher(kind, topic, qos)
         self.events.watch(publisher)
         return publisher
 
@@ -214,8 +258,8 @@ class SceneTopics:
     def _publish(self, pair: Pair) -> tuple[Publisher, Publisher]:
         def publisher(kind: type, topic: str) -> Publisher:
             # No events: too many to serve. A subscriber of another QoS is told by its own node.
-            return self._node.create_publisher(
-                kind, f'{self._topic_of(pair)}/{topic}', CONTACT_QOS,
+            return self._publisher(
+                kind, f'{self._topic_of(pair)}/{topic}',
                 event_callbacks=PublisherEventCallbacks(use_default_callbacks=False))
         return publisher(PointStamped, 'point'), publisher(Vector3Stamped, 'normal')
 
@@ -230,7 +274,8 @@ class SceneTopics:
         if source.deadline:
             qos.deadline = Duration(seconds=source.deadline)
         create = partial(self._node.create_subscription, kind, source.topic, callback, qos,
-                         raw=source.raw)
+                         raw=source.raw, qos_overriding_options=self._overriding(
+                             source.topic, 'subscription'))
         try:
             return create(event_callbacks=self.events.callbacks(
                 source.box, deadline=bool(source.deadline)))

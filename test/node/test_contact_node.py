@@ -227,6 +227,71 @@ def test_weights_that_nobody_reads_are_said(capfd):
         assert 'the weights are not for: 1' in capfd.readouterr().err
 
 
+def test_parameters_explain_themselves():
+    """Integers come back as doubles, and sizes that a scene replaces are refused."""
+    def set_to(node, **values):
+        return node.set_parameters_atomically(
+            [Parameter(name, value=value) for name, value in values.items()])
+
+    with serving(lambda context: ContactNode(context, parameter_overrides=overrides(
+            max_age=2, size_a=[2, 2, 2]))) as node:
+        for value in (2, 3):
+            assert set_to(node, max_age=value, size_b=[2, value, 2]).successful
+            for name, wanted in (('max_age', value), ('size_b', [2, value, 2]),
+                                 ('size_a', [2, 2, 2])):
+                found = node.get_parameter(name)
+                assert found.type_.name.startswith('DOUBLE')
+                assert np.array_equal(found.value, wanted)
+        assert node.describe_parameter('max_age').type == Parameter.Type.DOUBLE.value
+        assert node.describe_parameter('max_age').floating_point_range[0].to_value == 1e6
+        assert 'stamp, latest' in node.describe_parameter('pairing').additional_constraints
+        assert 'mlp' in node.describe_parameter('model').additional_constraints
+        for value in (-1, -1.0):
+            assert not set_to(node, max_age=value).successful
+        # A scene may replace sizes that were given; then they cannot be set.
+        assert set_to(node, scene='two_boxes', size_a=[2.0, 2.0, 2.0]).successful
+        refusal = set_to(node, size_a=[1.0, 1.0, 1.0])
+        assert not refusal.successful
+        assert 'size_a (1.0, 1.0, 1.0) has no effect while scene is set' in refusal.reason
+        assert node.get_parameter('size_a').value == [2.0, 2.0, 2.0]
+        assert set_to(node, scene='', size_a=[1.0, 1.0, 1.0]).successful
+
+
+def test_a_size_beside_a_scene_does_not_start():
+    with pytest.raises(ValueError, match='size_a .* has no effect while scene is set'), serving(
+            lambda context: ContactNode(context, parameter_overrides=overrides(scene='two_boxes'))):
+        pass
+
+
+@pytest.mark.parametrize('serialization', ['raw', 'typed'])
+def test_quality_of_service_can_be_overridden(client, serialization):
+    """Of the topics named; all others keep theirs, and the node answers."""
+    given = overrides(serialization=serialization, **{
+        'qos_overrides./box_a/pose.subscription.reliability': 'reliable',
+        'qos_overrides./contacts.publisher.durability': 'transient_local',
+        'qos_overrides./contacts.publisher.depth': 3})
+    with serving(lambda context: ContactNode(context, parameter_overrides=given)) as node:
+        client.offer_until_answered(ORIGIN, TOUCHING)
+        (a, b), (cloud, point) = (
+            [info.qos_profile for topic in topics for info in listed(topic)
+             if info.node_name == 'contact_node'] for listed, topics in (
+                (node.get_subscriptions_info_by_topic, ('/box_a/pose', '/box_b/pose')),
+                (node.get_publishers_info_by_topic, ('/contacts', '/contact/point'))))
+        assert (a.reliability.name, b.reliability.name) == ('RELIABLE', 'BEST_EFFORT')
+        assert (cloud.durability.name, point.durability.name) == ('TRANSIENT_LOCAL', 'VOLATILE')
+        assert node.get_parameter('qos_overrides./contacts.publisher.depth').value == 3
+
+
+@pytest.mark.parametrize('name, value, words', [
+    ('/contacts.publisher.depth', 0, 'must be a whole number from 1 to 100000, not 0'),
+    ('/contacts.publisher.reliability', 'maybe', "'maybe' is not one of: best_effort, reliable"),
+    ('/contacts.publisher.dept', 5, "unknown policy 'dept'; the nearest name is depth")])
+def test_a_quality_of_service_that_there_is_not(name, value, words):
+    with pytest.raises(ValueError, match=words), serving(lambda context: ContactNode(
+            context, parameter_overrides=overrides(**{f'qos_overrides.{name}': value}))):
+        pass
+
+
 def test_messages_are_checked_in_tests(client):
     """ROS_PYTHON_CHECK_FIELDS is on: an np.float32 in a message would fail, not turn to garbage."""
     with pytest.raises(AssertionError):

@@ -257,13 +257,18 @@ def test_parameters_while_it_runs(node, client):
     client.assert_answered()
 
 
-def test_a_parameter_that_there_is_not(program):
-    """Misspelt at the start it is said, with what may have been meant; not that of a topic."""
-    running = program('contact_node', '--ros-args', '-p', 'sizea:=[1.0, 1.0, 1.0]', '-p',
-                      'qos_overrides./contacts.publisher.depth:=5', '-p', 'use_sim_time:=false')
+def test_parameters_from_a_file(program, tmp_path):
+    """Unknown ones are logged with the nearest name, and so is the QoS of a topic that is not."""
+    file = tmp_path / 'shared.yaml'
+    file.write_text("/**: {ros__parameters: {sizea: 1.0, use_sim_time: false, "
+                    "'qos_overrides./contacts.publisher.depth': 5, "
+                    "'qos_overrides./contact.publisher.depth': 5}}")
+    running = program('contact_node', '--ros-args', '--params-file', str(file))
     printed = running.wait_for_output('ready', 120)
-    assert "unknown parameter 'sizea' is ignored (did you mean size_a" in printed
+    assert "unknown parameter 'sizea'; the nearest name is size_a" in printed
     assert printed.count('unknown parameter') == 1
+    assert 'qos_overrides./contact.publisher.depth: the node has no such topic' in printed
+    assert printed.count('no such topic') == 1
     assert 'poses from /box_a/pose, /box_b/pose' in running.output
 
 

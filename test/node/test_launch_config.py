@@ -1,155 +1,222 @@
 """launch/ and config/ name what exists: programs, parameters, boxes.
 
-PyPI has neither `launch` nor `launch_ros` (its `launch` is another project). So launch files are
-loaded with stand-ins that only note what they are called with. Where ROS's own packages are, these
-load the files, too. Where they are not, that test is skipped, and says so.
+PyPI has neither `launch` nor `launch_ros` (its `launch` is another project). Where ROS's own
+packages are, launch files run in them, as `ros2 launch` runs them. Elsewhere those tests skip.
 """
 from __future__ import annotations
 
-import importlib
-import runpy
+import importlib.util
+import json
+import os
+import shlex
+import signal
+import subprocess
 import sys
 from pathlib import Path
-from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 import yaml
 
+from box_contact_ros.apps.crane.crane_parameters import PARAMETERS as CRANE_PARAMETERS
 from box_contact_ros.cli import PROGRAMS
-from box_contact_ros.node.contact_node import PARAMETERS
+from box_contact_ros.node.contact_node import LAUNCH_ARGUMENTS, PARAMETERS
+from box_contact_ros.node.parameters import descriptions, value_of
 from box_contact_ros.scene.files.scene_file import read_scene
 from box_contact_ros.scene.scene_solver import Pair, Scene
 
 ROOT = Path(__file__).resolve().parents[2]
 
-# --- launch ---------------------------------------------------------------------------------------
-
-STAND_INS = {
-    'launch': ('LaunchDescription',),
-    'launch.actions': ('DeclareLaunchArgument', 'Shutdown'),
-    'launch.conditions': ('IfCondition',),
-    'launch.substitutions': ('LaunchConfiguration',),
-    'launch_ros': (),
-    'launch_ros.actions': ('Node',),
-    'launch_ros.parameter_descriptions': ('ParameterValue',),
-}
+# --- launch arguments -----------------------------------------------------------------------------
 
 
-def noting(kind: str) -> Any:
-    """Return a stand-in for a class: an object of it is what it was called with."""
-    return lambda *args, **options: SimpleNamespace(kind=kind, args=args, **options)
+@pytest.mark.parametrize('name, text, value', [
+    ('max_age', '2', 2.0), ('size_a', '[1,2,3.5]', (1.0, 2.0, 3.5)), ('respawn', 'True', True),
+    ('model', 'exact', 'exact'), ('namespace', '7', '7'), ('use_sim_time', 'false', False)])
+def test_an_argument_s_text_is_read_as_its_type(name: str, text: str, value: Any) -> None:
+    found = value_of(name, text, LAUNCH_ARGUMENTS[name])
+    assert found == value and type(found) is type(value)
 
 
-def launched(file: str, monkeypatch: pytest.MonkeyPatch,
-             ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Arguments by name and nodes by executable of a launch file, from stand-ins."""
-    for name, classes in STAND_INS.items():
-        module = ModuleType(name)
-        vars(module).update({kind: noting(kind) for kind in classes})
-        monkeypatch.setitem(sys.modules, name, module)
-    description = runpy.run_path(str(ROOT / 'launch' / file))[
-        'generate_launch_description']()
-    entities = description.args[0]
-    assert {entity.kind for entity in entities} == {'DeclareLaunchArgument', 'Node'}
-    return ({entity.args[0]: entity for entity in entities if entity.kind != 'Node'},
-            {entity.executable: entity for entity in entities if entity.kind == 'Node'})
+@pytest.mark.parametrize('name, text, words', [
+    ('max_age', 'fast', "max_age must be a number, not 'fast'"),
+    ('size_a', '[1,', 'size_a must be 3 finite numbers'),
+    ('respawn', '2', 'respawn must be true or false, not 2'),
+    ('log_level', 'loud', "log_level 'loud' is not one of: debug, info, warn"),
+    ('params_file', '/no/such.yaml', "params_file: there is no file '/no/such.yaml'"),
+    ('model', 'exakt', 'exakt')])
+def test_a_bad_argument_is_refused_by_name_and_value(name: str, text: str, words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        value_of(name, text, LAUNCH_ARGUMENTS[name])
+
+
+def test_arguments_tell_what_holds_if_they_are_left_out() -> None:
+    assert set(descriptions(LAUNCH_ARGUMENTS)) > set(PARAMETERS)
+    assert descriptions(LAUNCH_ARGUMENTS)['model'].endswith('; if left out: mlp')
+
+
+# --- launch files, by ROS's own launch ------------------------------------------------------------
+
+needs_launch = pytest.mark.skipif(
+    importlib.util.find_spec('ros2launch') is None,
+    reason='no ros2launch here: PyPI has no wheels of ROS launch')
+RUN = 'import sys; from ros2launch.api import launch_a_launch_file as launch; ' \
+      'sys.exit(launch(launch_file_path=sys.argv[1], launch_file_arguments=sys.argv[2:]))'
+SHOWN_START = shlex.join([sys.executable, str(ROOT / 'test' / 'helpers' / 'shown_start.py')])
+PARENT = """
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument, GroupAction, IncludeLaunchDescription
+from launch_ros.actions import PushRosNamespace, SetParameter
+
+def generate_launch_description():
+    return LaunchDescription([
+        DeclareLaunchArgument('robot', default_value='mule'),
+        GroupAction([
+            PushRosNamespace('bay'),
+            SetParameter('max_age', 0.25),
+            SetParameter('use_sim_time', True),
+            IncludeLaunchDescription(FILE, launch_arguments=ARGUMENTS.items())])])
+"""
 
 
 @pytest.fixture
-def crane_launch(monkeypatch: pytest.MonkeyPatch) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Arguments by name, nodes by executable."""
-    return launched('crane.launch.py', monkeypatch)
+def prefix(tmp_path: Path) -> Path:
+    """Make a package prefix whose programs run this package."""
+    (tmp_path / 'share/ament_index/resource_index/packages').mkdir(parents=True)
+    (tmp_path / 'share/ament_index/resource_index/packages/box_contact_ros').touch()
+    (tmp_path / 'lib/box_contact_ros').mkdir(parents=True)
+    for program in PROGRAMS:
+        file = tmp_path / 'lib/box_contact_ros' / program
+        file.write_text(f'#!/bin/sh\nexec {sys.executable} -m box_contact_ros {program} "$@"\n')
+        file.chmod(0o755)
+    return tmp_path
 
 
-def test_the_contact_node_s_arguments_are_its_parameters(monkeypatch: pytest.MonkeyPatch) -> None:
-    """All of them, with the defaults and in the types of the table, and name and namespace."""
-    arguments, nodes = launched('contact_node.launch.py', monkeypatch)
-    node, = nodes.values()
-    given, = node.parameters
-    assert set(given) == set(PARAMETERS)
-    assert set(arguments) == set(PARAMETERS) | {'name', 'namespace', 'log_level'}
-    for name, value in given.items():
-        setting = PARAMETERS[name]
-        assert value.args[0].args == (name,)
-        assert arguments[name].description == setting.description
-        default = arguments[name].default_value
-        if value.value_type is not str:
-            default = yaml.safe_load(default)
-        assert isinstance(default, getattr(value.value_type, '__origin__', value.value_type))
-        assert setting.check(name, default) == setting.default
-    assert node.name.args == ('name',) and node.namespace.args == ('namespace',)
+def start(prefix: Path, file: str | Path, *arguments: str) -> subprocess.Popen[str]:
+    """Start what `ros2 launch FILE ARGUMENTS` starts, in a process group of its own."""
+    paths = [str(prefix), *filter(None, os.environ.get('AMENT_PREFIX_PATH', '').split(':'))]
+    return subprocess.Popen(
+        [sys.executable, '-c', RUN, str(ROOT / 'launch' / file), *arguments], text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True,
+        env=os.environ | {'AMENT_PREFIX_PATH': ':'.join(paths), 'ROS_LOG_DIR': str(prefix),
+                          'PYTHONUNBUFFERED': '1'})
 
 
-@pytest.mark.parametrize('file', sorted(path.name for path in (ROOT / 'launch').glob('*.py')))
-def test_ros_own_launch_takes_the_files(file: str) -> None:
-    """Its arguments are found, and each node's parameters evaluate to what the node accepts."""
-    pytest.importorskip('launch_ros', reason='no ROS `launch` here (wheels have none): tested with '
-                                             'stand-ins only')
-    import launch
-    from launch_ros.actions import Node
-    from launch_ros.utilities import evaluate_parameters
-
-    checked = set()
-    description = runpy.run_path(str(ROOT / 'launch' / file))['generate_launch_description']()
-    context = launch.LaunchContext()
-    for argument in description.get_launch_arguments():
-        argument.visit(context)
-    for entity in description.entities:
-        if isinstance(entity, Node):
-            for values in evaluate_parameters(context, entity._Node__parameters):
-                for name, value in values.items():
-                    table_of(entity.node_executable)[name].check(name, value)
-                    checked.add(name)
-    assert 'model' in checked
+def output(prefix: Path, file: str | Path, *arguments: str) -> tuple[int, str]:
+    """Return exit status and output of a launch file that ends by itself."""
+    with start(prefix, file, *arguments) as launch:
+        try:
+            told, _ = launch.communicate(timeout=60)
+        finally:
+            if launch.poll() is None:
+                os.killpg(launch.pid, signal.SIGKILL)
+    return launch.returncode, told
 
 
-def table_of(program: str) -> dict[str, Any]:
-    """Return the parameters of a program."""
-    if program == 'crane':
-        return importlib.import_module('box_contact_ros.apps.crane.crane_parameters').PARAMETERS
-    return importlib.import_module(PROGRAMS[program].module).PARAMETERS
+def starts(prefix: Path, file: str | Path, *arguments: str) -> dict[str, Any]:
+    """Return what each program of a launch file would start with."""
+    _, told = output(prefix, file, f'launch-prefix:={SHOWN_START}', *arguments)
+    found = [json.loads(line[line.index('{'):]) for line in told.splitlines() if '{"prog' in line]
+    assert found, told
+    return {one['program']: one for one in found}
 
 
-def test_launch_arguments(crane_launch: Any) -> None:
-    """They are these, and each says what it is for."""
-    arguments, _ = crane_launch
-    assert set(arguments) == {'model', 'rate', 'seed', 'closed_loop', 'soup', 'view'}
-    assert all(argument.description for argument in arguments.values())
+def parent_of(prefix: Path, arguments: dict[str, str]) -> Path:
+    """Write a launch file that includes the contact node's with some arguments."""
+    file = str(ROOT / 'launch' / 'contact_node.launch.py')
+    path = prefix / 'parent.launch.py'
+    path.write_text(f'FILE = {file!r}\nARGUMENTS = {arguments}\n{PARENT}', 'utf-8')
+    return path
 
 
-def test_launched_programs_exist(crane_launch: Any) -> None:
-    """Two always, two on request; the crane's end is everybody's."""
-    _, nodes = crane_launch
+@needs_launch
+def test_the_shipped_file_holds_where_nothing_is_given(prefix: Path) -> None:
+    node = starts(prefix, 'contact_node.launch.py')['contact_node']
+    shipped = yaml.safe_load((ROOT / 'config' / 'contact_node.yaml').read_text('utf-8'))
+    assert node['parameters'] == shipped['/**']['ros__parameters']
+    assert node['name'] == '/contact_node' and node['levels'] == []
+
+
+@needs_launch
+def test_arguments_override_the_params_file_and_nothing_else_does(prefix: Path) -> None:
+    file = prefix / 'mine.yaml'
+    file.write_text('/yard/contact_node: {ros__parameters: {model: exact, max_age: 0.5}}')
+    node = starts(prefix, 'contact_node.launch.py', f'params_file:={file}', 'model:=fcl',
+                  'use_sim_time:=true', 'tolerance:=1', 'namespace:=yard', 'log_level:=warn',
+                  'use_lifecycle_manager:=true', 'scene:=12')['contact_node']
+    assert node['parameters'] == {'model': 'fcl', 'max_age': 0.5, 'use_sim_time': True,
+                                  'tolerance': 1.0, 'autostart': False, 'scene': '12'}
+    assert node['name'] == '/yard/contact_node' and node['levels'] == ['warn']
+
+
+@needs_launch
+def test_an_including_launch_file_keeps_its_parameters_and_its_own_arguments(prefix: Path) -> None:
+    """Its SetParameter is overridden by a given argument alone; its arguments are its own."""
+    parent = parent_of(prefix, {'model': 'exact', 'name': 'judge'})
+    node = starts(prefix, parent, 'robot:=horse')['contact_node']
+    given = node['parameters']
+    assert (given['max_age'], given['use_sim_time'], given['model']) == (0.25, True, 'exact')
+    assert node['name'] == '/bay/judge'
+    assert node['arguments'] == ['--shared-parameters']  # SetParameter may be of other nodes' names
+    parent = parent_of(prefix, {'max_age': '2'})
+    assert starts(prefix, parent)['contact_node']['parameters']['max_age'] == 2.0
+    status, told = output(prefix, parent_of(prefix, {'modle': 'exact'}))
+    assert status == 1
+    assert "unknown launch argument 'modle'; the nearest name is model" in told
+
+
+@needs_launch
+@pytest.mark.parametrize('file, argument, words', [
+    ('contact_node', 'modle:=exact', "unknown launch argument 'modle'; the nearest name is model"),
+    ('contact_node', 'max_age:=fast', "max_age must be a number, not 'fast'"),
+    ('contact_node', 'use_lifecycle_manager:=true autostart:=true', 'so leave autostart out'),
+    ('crane', 'modle:=exact', "unknown launch argument 'modle'; the nearest name is model")])
+def test_a_wrong_argument_starts_nothing(
+        prefix: Path, file: str, argument: str, words: str) -> None:
+    status, told = output(prefix, f'{file}.launch.py', *argument.split())
+    assert status == 1 and words in told and 'process started' not in told
+
+
+@needs_launch
+def test_the_crane_is_launched_with_what_was_given(prefix: Path) -> None:
+    """Alone with a contact node, or with all four; every program gets what is its own."""
+    nodes = starts(prefix, 'crane.launch.py')
+    assert set(nodes) == {'contact_node', 'crane'}
+    assert nodes['crane']['parameters'] == {'wait': 30.0}
+    nodes = starts(prefix, 'crane.launch.py', 'soup:=true', 'view:=true', 'model:=exact',
+                   'rate:=500', 'seed:=3', 'closed_loop:=true', 'namespace:=/yard')
     assert set(nodes) == {'contact_node', 'crane', 'soup_node', 'view'} <= set(PROGRAMS)
-    assert {node.package for node in nodes.values()} == {'box_contact_ros'}
-    conditions = {name: node.condition.args[0].args[0] for name, node in nodes.items()
-                  if hasattr(node, 'condition')}
-    assert conditions == {'soup_node': 'soup', 'view': 'view'}
-    assert nodes['crane'].on_exit.kind == 'Shutdown'
-    assert nodes['view'].arguments == ['--attach']  # else it starts a scene of its own
+    assert {node['name'].rpartition('/')[0] for node in nodes.values()} == {'/yard'}
+    assert nodes['contact_node']['parameters']['model'] == 'exact'
+    given = nodes['crane']['parameters']
+    assert given == {'wait': 30.0, 'rate': 500.0, 'seed': 3, 'closed_loop': True}
+    assert {name: CRANE_PARAMETERS[name].check(name, value) for name, value in given.items()
+            } == given
+    assert nodes['view']['arguments'] == ['--attach']  # else it starts a scene of its own
 
 
-def test_launched_parameters_are_declared_with_the_same_defaults(crane_launch: Any) -> None:
-    """An argument left alone changes nothing, and one that is given is taken, in its type."""
-    arguments, nodes = crane_launch
-    given: set[str] = set()
-    for program in ('contact_node', 'crane'):
-        table = table_of(program)
-        for name, value in nodes[program].parameters[0].items():
-            setting = table[name]
-            if name == 'wait':
-                assert setting.check(name, value) == value
-                continue
-            given.add(name)
-            assert value.args[0].args == (name,)
-            default = arguments[name].default_value
-            if value.value_type is not str:
-                default = yaml.safe_load(default)
-            assert default == setting.default
-            assert isinstance(default, value.value_type)
-    assert given == set(arguments) - {'soup', 'view'}
+@needs_launch
+def test_a_killed_node_is_started_anew_and_one_ctrl_c_ends_all(prefix: Path) -> None:
+    """By `respawn`; the second process is another one."""
+    pids: list[int] = []
+    told = ''
+    with start(prefix, 'contact_node.launch.py', 'respawn:=true') as launch:
+        try:
+            for line in launch.stdout or ():
+                told += line
+                if 'process started with pid' in line:
+                    pids.append(int(line.partition('pid [')[2].partition(']')[0]))
+                if 'ready' in line and len(pids) == 1:
+                    os.kill(pids[0], signal.SIGKILL)
+                elif 'ready' in line:
+                    launch.send_signal(signal.SIGINT)
+            launch.wait(20)
+        finally:
+            if launch.poll() is None:
+                os.killpg(launch.pid, signal.SIGKILL)
+    assert len(set(pids)) == 2 and told.count('process has finished cleanly') == 1, told
+    assert not any(Path(f'/proc/{pid}').exists() for pid in pids)
 
 
 # --- parameters -----------------------------------------------------------------------------------
@@ -210,7 +277,7 @@ def test_two_boxes_are_the_node_s_default() -> None:
     assert {name: (box.size, box.pose_topic) for name, box in boxes.items()} == {
         f'box_{letter}': (PARAMETERS[f'size_{letter}'].default, f'box_{letter}/pose')
         for letter in 'ab'}
-    assert scene('two_boxes').frame_id == table_of('crane')['frame_id'].default
+    assert scene('two_boxes').frame_id == CRANE_PARAMETERS['frame_id'].default
 
 
 def test_a_shipped_scene_is_short() -> None:

@@ -32,6 +32,36 @@ def test_integers_are_as_good_as_floats():
     assert parameters.numbers(2)('p', [1, 2.5]) == (1.0, 2.5)
 
 
+def test_a_descriptor_shows_range_choices_and_what_is_for_the_start():
+    """Doubles and whole numbers have ranges of their own; choices and counts are words."""
+    def described(default, check, fixed=False):
+        return parameters.Setting(default, 'a test', check).descriptor(read_only=fixed)
+    one, = described(0.5, parameters.number(0, 3)).floating_point_range
+    assert (one.from_value, one.to_value) == (0.0, 3.0)
+    one, = described(5, parameters.whole_number(1, 9)).integer_range
+    assert (one.from_value, one.to_value) == (1, 9)
+    found = described('a', parameters.one_of(['a', 'b']), fixed=True)
+    assert found.additional_constraints == 'one of: a, b' and found.read_only
+    assert described((1.0, 2.0), parameters.numbers(2)).additional_constraints == '2 finite numbers'
+    assert not described('a', parameters.text).floating_point_range
+
+
+@pytest.mark.parametrize('args, refused', [
+    (['-p', 'modle:=exact'], 'modle'), (['--param', 'contact:modle:=exact'], 'modle'),
+    (['-p', 'model:=a:=b', '-p', 'use_sim_time:=true'], ''),
+    (['-p', 'qos_overrides./a.publisher.depth:=5'], ''),
+    (['-p', 'modle:=exact', '--', '--shared-parameters'], ''),
+    (['--params-file', 'modle:=exact'], '')])
+def test_an_unknown_parameter_after_p_ends_the_program(args, refused, capsys):
+    """With status 2 and the nearest name, unless the caller shares its parameters among nodes."""
+    settings = {'model': parameters.Setting('mlp', 'a test', parameters.text)}
+    if not refused:
+        return parameters.answer_help('node', 'Test.', settings, ['--ros-args', *args])
+    with pytest.raises(SystemExit, match='2'):
+        parameters.answer_help('node', 'Test.', settings, ['--ros-args', *args])
+    assert f"unknown parameter '{refused}'; the nearest name is model" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize('change, lost', [(2, 2), (0, 0), (-1, 0)])
 def test_publishers_that_show_no_life_are_counted(change, lost):
     """Publishers that came back are none that are lost."""

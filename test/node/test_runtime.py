@@ -181,7 +181,7 @@ def test_options_outside_ros_args_are_refused(program, capsys):
     for name in program.PARAMETERS:
         assert f'\n  {name} ' in printed.out
     assert '[12.192,2.438,2.591]' in printed.out and 'default: none' in printed.out
-    answer_help('contact_node', '', program.PARAMETERS, ['--ros-args', '-p', 'model:=exact'])
+    answer_help('contact_node', '', program.PARAMETERS, ['--ros-args', '-p', 'pairing:=stamp'])
 
 
 @pytest.mark.parametrize('program', [contact_node, soup_node])
@@ -243,7 +243,7 @@ def test_a_node_is_told_of_its_clock_and_of_names_that_are_none(client, capfd):
     with serving(lambda context: ContactNode(context, parameter_overrides=[
             Parameter(name, value=value) for name, value in given.items()])) as node:
         assert "unknown parameter 'modle'" in (told := capfd.readouterr().err)
-        assert 'did you mean model' in told
+        assert 'the nearest name is model' in told
         result, = node.set_parameters([Parameter('pair_topics', value='yes')])
         assert result.reason == "pair_topics must be true or false, not 'yes'"
         node.set_parameters([Parameter('use_sim_time', value=True)])

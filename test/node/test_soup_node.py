@@ -153,8 +153,8 @@ def test_diagnostics_name_the_node(client):
 
 
 def test_parameters_are_checked_before_they_are_applied(soup_node):
-    for name, value, words in (('divisions', 0, 'a whole number from 1 to 64'),
-                               ('divisions', 65, 'a whole number from 1 to 64'),
+    for name, value, words in (('divisions', 0, 'divisions out of range. Min: 1, Max: 64'),
+                               ('divisions', 65, 'divisions out of range. Min: 1, Max: 64'),
                                ('divisions', 8.5, 'a whole number from 1 to 64'),
                                ('size_a', [0.0, 2.0, 2.0], 'size_a (0, 2, 2) is not positive'),
                                ('pairing', 'first', "pairing 'first' is not one of")):

@@ -78,7 +78,8 @@ def start(program, stranger, monkeypatch, tmp_path):
     def start(*parameters, within=()):
         monkeypatch.chdir(home)
         words = [word for parameter in parameters for word in ('-p', parameter)]
-        running = program('contact_node', '--ros-args', *CUBES, *words, within=within,
+        boxes = [] if any(one.startswith('scene:=') for one in parameters) else CUBES
+        running = program('contact_node', '--ros-args', *boxes, *words, within=within,
                           env={'PYTHONPATH': str(Path(__file__).resolve().parents[2])})
         running.home = home
         return running
@@ -219,6 +220,10 @@ def test_a_locked_node_takes_no_changes(start, stranger):
     result, = stranger.call(SetParameters, 'set_parameters', parameters=[
         Parameter(name='model', value=ParameterValue(type=ParameterType.PARAMETER_STRING,
                                                      string_value='exact'))]).results
+    assert result.reason == 'Trying to set a read-only parameter: model.'  # as its descriptor says
+    result, = stranger.call(SetParameters, 'set_parameters', parameters=[
+        Parameter(name='use_sim_time', value=ParameterValue(type=ParameterType.PARAMETER_BOOL,
+                                                            bool_value=True))]).results
     assert result.reason == 'the node is locked: nothing can be changed after its start'
     for transition in (Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP,
                        Transition.TRANSITION_ACTIVE_SHUTDOWN):
