@@ -92,7 +92,7 @@ coverage:
 	$(PY) -m coverage run -m pytest test/solver test/scene test/node \
 	    test/baselines/test_paper_models.py test/package/test_package.py $(ARGS)
 	$(PY) -m coverage combine -q
-	$(PY) -m coverage report
+	$(PY) -m coverage report --fail-under 95
 
 # The tools of the extra `docs`; .venv may have them already.
 DOCS_TOOLS := myst-parser sphinx sphinx-rtd-theme

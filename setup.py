@@ -186,7 +186,6 @@ setup(
             'distributed',
             'pydocstyle',
             'pytest',
-            'pytest-cov',
             'pytest-timeout',
             'pytest-xdist',
             'ros-jazzy-ament-flake8',
