@@ -7,6 +7,7 @@ first test module imports it. Every process that a test starts inherits it.
 from __future__ import annotations
 
 import contextlib
+import importlib.util
 import os
 import runpy
 import signal
@@ -78,7 +79,7 @@ if not sys.flags.safe_path and os.getcwd() in sys.path:
     sys.path.remove(os.getcwd())
 os.environ['PYTHONSAFEPATH'] = '1'
 
-from box_contact_ros.cli import MODULES_OF_EXTRA
+from box_contact_ros.cli import MODULES_OF_EXTRA, PROGRAMS
 
 EXTRAS = {**MODULES_OF_EXTRA, 'test': ('catkin_pkg', 'gmpy2', 'hypothesis', 'mcap', 'mcap_ros2')}
 """The modules of each extra of setup.py that tests import."""
@@ -97,7 +98,8 @@ class TestFile(pytest.Module):
         try:
             return super().collect()
         except self.CollectError as error:
-            skip_without_extra(error.__cause__)
+            if isinstance(error.__cause__, ModuleNotFoundError):
+                skip_without_extra(error.__cause__.name)
             raise
 
 
@@ -112,13 +114,12 @@ def pytest_runtest_call() -> Iterator[None]:
     try:
         return (yield)
     except ModuleNotFoundError as error:
-        skip_without_extra(error)
+        skip_without_extra(error.name)
         raise
 
 
-def skip_without_extra(error: BaseException | None) -> None:
-    """Skip what could not import a module of an extra, by the module's name."""
-    missing = error.name if isinstance(error, ModuleNotFoundError) else None
+def skip_without_extra(missing: str | None) -> None:
+    """Skip what cannot import a module, if that is one of an extra."""
     for extra, modules in EXTRAS.items():
         if missing in modules:
             pytest.skip(f'{missing} is not installed: pip install .[{extra}]',
@@ -247,11 +248,16 @@ def program(tmp_path: Path) -> Iterator[Callable[..., RunningProgram]]:
 
     `program('crane', '--ros-args', '-p', 'rate:=200.0', env={...})`: `env` is added to this
     process's environment, `within` stands before the command, such as `ip netns exec NAME`.
+    The test is skipped where the program's extras are not installed.
     """
     started: list[RunningProgram] = []
 
     def start(*args: str, env: dict[str, str] | None = None,
               within: Sequence[str] = ()) -> RunningProgram:
+        extras = PROGRAMS[args[0]].extras if args[0] in PROGRAMS else ()
+        for module in chain(*(MODULES_OF_EXTRA[extra] for extra in extras)):
+            if importlib.util.find_spec(module) is None:
+                skip_without_extra(module)
         log = tmp_path / f'program_{len(started)}.log'
         with log.open('wb') as out:
             process = subprocess.Popen(

@@ -78,8 +78,7 @@ def start(program, stranger, monkeypatch, tmp_path):
     def start(*parameters, within=()):
         monkeypatch.chdir(home)
         words = [word for parameter in parameters for word in ('-p', parameter)]
-        running = program('contact_node', '--ros-args', *CUBES, *words, within=within,
-                          env={'PYTHONPATH': str(Path(__file__).resolve().parents[2])})
+        running = program('contact_node', '--ros-args', *CUBES, *words, within=within)
         running.home = home
         return running
     return start
