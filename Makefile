@@ -122,4 +122,4 @@ clean:
 	rm -rf build dist install log box_contact_ros.egg-info
 	find box_contact_ros -name '*.so' -delete
 	rm -rf .pytest_cache .ruff_cache .mypy_cache .hypothesis
-	find box_contact_ros test launch -name __pycache__ -type d -prune -exec rm -rf {} + || true
+	find box_contact_msgs box_contact_ros test launch -name __pycache__ -type d -prune -exec rm -rf {} + || true

@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-SOURCES = [str(ROOT / name) for name in ('box_contact_ros', 'launch', 'setup.py', 'test')]
+SOURCES = [str(ROOT / name) for name in
+           ('box_contact_msgs', 'box_contact_ros', 'launch', 'setup.py', 'test')]
 
 CONFIG = str(Path(__file__).with_name('flake8.ini'))
 NOT_FOLLOWED = ['D213']

@@ -39,7 +39,8 @@ def checkout(tmp_path: Path) -> Path:
     """Return a folder with the files that the set-up looks at, and no Python on its PATH."""
     folder = tmp_path / 'checkout'
     for name in ('.ci/setup', 'Makefile', 'setup.py', 'setup.cfg', 'pyproject.toml',
-                 'constraints.txt', 'box_contact_ros/cli.py', 'box_contact_ros/core/contact.hpp'):
+                 'constraints.txt', 'box_contact_ros/cli.py', 'box_contact_ros/core/contact.hpp',
+                 'box_contact_msgs/package.xml', 'box_contact_msgs/msg/Contact.msg'):
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / name, folder / name)
     (tmp_path / 'bin').mkdir()
@@ -68,12 +69,18 @@ def set_up(checkout: Path, target: str = 'demo', python: str | Path = '',
                           stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
 
 
-def installed(checkout: Path) -> list[str]:
-    """Return the extras of each installation since the last call."""
+def called(checkout: Path) -> list[str]:
+    """Return how the stand-in was called since the last look."""
     calls = checkout / 'calls'
     lines = calls.read_text().splitlines() if calls.is_file() else []
     calls.unlink(missing_ok=True)
-    return [line.partition('.[')[2].rstrip(']') for line in lines if '-e' in line.split()]
+    return lines
+
+
+def installed(checkout: Path) -> list[str]:
+    """Return the extras of each installation since the last look."""
+    return [line.partition('.[')[2].rstrip(']') for line in called(checkout)
+            if '-e' in line.split()]
 
 
 def test_a_target_is_installed_once(checkout: Path, offer: Callable) -> None:
@@ -101,6 +108,45 @@ def test_a_change_installs_again(checkout: Path, offer: Callable, changed: str) 
     later = (checkout / '.venv' / '.installed-demo').stat().st_mtime + 1.0
     os.utime(checkout / changed, (later, later))
     assert 'making' not in set_up(checkout).stdout
+    assert installed(checkout) == ['ros,sim']
+
+
+@pytest.mark.parametrize('changed, built', [
+    ('box_contact_msgs/package.xml', 1), ('box_contact_msgs/msg/Contact.msg', 1),
+    ('constraints.txt', 1), ('setup.py', 0)])
+def test_the_messages_are_built_when_they_change(
+        checkout: Path, offer: Callable, changed: str, built: int) -> None:
+    """Once for all targets with ROS, which come first; `make dist` has no ROS to build with."""
+    offer('python3.12', PYTHON)
+
+    def messages() -> int:
+        lines = [line.split()[-1] for line in called(checkout) if line.startswith('-m pip')]
+        if './box_contact_msgs' in lines:
+            assert '.venv/requirements.txt' in lines[:lines.index('./box_contact_msgs')]
+        return lines.count('./box_contact_msgs')
+
+    assert [(set_up(checkout, target).returncode, messages())
+            for target in ('dist', 'demo', 'test')] == [(0, 0), (0, 1), (0, 0)]
+    later = (checkout / '.venv' / '.installed-test').stat().st_mtime + 1.0
+    os.utime(checkout / changed, (later, later))
+    set_up(checkout, 'test')
+    assert messages() == built
+
+
+def test_messages_that_do_not_build_end_the_set_up(checkout: Path, offer: Callable) -> None:
+    """The next call takes them up, and makes nothing again."""
+    offer('python3.12', PYTHON.replace("'-m pip') ", """'-m pip')
+        case "$*" in *./box_contact_msgs)
+            if [ -e unbuilt ]; then echo 'no wheel'; exit 1; fi ;;
+        esac
+        """, 1))
+    (checkout / 'unbuilt').touch()
+    failed = set_up(checkout)
+    assert failed.returncode == 1 and 'no wheel' in failed.stdout
+    assert installed(checkout) == []
+    (checkout / 'unbuilt').unlink()
+    again = set_up(checkout)
+    assert again.returncode == 0 and 'making' not in again.stdout
     assert installed(checkout) == ['ros,sim']
 
 
