@@ -201,11 +201,14 @@ def libraries(package: Package, work: Path) -> list[Library]:
     name, depends = package.name, with_their_depends(package.depends)
 
     def sources(generator: str, pattern: str) -> list[Path]:
-        return sorted((work / generator / name).glob(pattern))
+        found = sorted((work / generator / name).glob(pattern))
+        if not found:  # the linker would make an empty library of nothing
+            raise SystemExit(f'error: {generator} generated no {pattern}')
+        return found
 
-    def library(part: str, pattern: str, *links: str, like: str | None = None) -> Library:
+    def library(part: str, pattern: str, *links: str) -> Library:
         return Library(f'lib{name}__{part}.so', sources(part, pattern), [
-            *links, *(f'{one}__{like or part}' for one in depends)])
+            *links, *(f'{one}__{part}' for one in depends)])
 
     own = f'{name}__{C}'
     libraries = [
@@ -226,7 +229,7 @@ def libraries(package: Package, work: Path) -> list[Library]:
 
 
 def compile_all(built: list[Library], work: Path) -> None:
-    """Compile all sources into objects beside them; warnings about generated code are dropped."""
+    """Compile each source into an object next to it; drop warnings about generated code."""
     numpy = run(*PYTHON, '-c', 'import numpy; print(numpy.get_include())').strip()
     folders = [*(work / generator for generator in GENERATORS), PREFIX / 'include',
                *sorted((PREFIX / 'include').iterdir()), sysconfig.get_path('include'), numpy]
@@ -280,7 +283,7 @@ def metadata(package: Package) -> str:
 
 
 def wheel_tag() -> str:
-    """Return for which Python and platform the wheel is."""
+    """Return the part of the wheel's name that tells Python and platform."""
     python = f'cp{sys.version_info[0]}{sys.version_info[1]}'
     platform = sysconfig.get_platform().replace('-', '_').replace('.', '_')
     return f'{python}-{python}{sys.abiflags}-{platform}'

@@ -34,7 +34,8 @@ wait for each other. The files of a chain run one after the other, and go before
 LONGEST_FIRST = (
     'test_core_cpp.py', 'test_install.py', 'test_series.py', 'test_core.py', 'test_exact.py',
     'test_landing.py', 'test_search.py', 'test_training_mlp.py', 'test_crane.py',
-    'test_readme.py', 'test_ament.py', 'test_frontier.py', 'test_training.py')
+    'test_readme.py', 'test_message_package.py', 'test_ament.py', 'test_frontier.py',
+    'test_training.py')
 """Of the others, those that take more than five seconds. Begun late, one leaves workers idle."""
 NICE = 10
 """Niceness of the others: a share of a tenth where a program of a chain wants the processor."""

@@ -293,6 +293,11 @@ def test_a_bad_definition_is_refused(backend: ModuleType, tmp_path: Path) -> Non
         backend.generate(backend.read_package(tmp_path), tmp_path / 'work')
 
 
+def test_a_generator_that_generates_nothing_is_named(backend: ModuleType, tmp_path: Path) -> None:
+    with pytest.raises(SystemExit, match='rosidl_generator_c generated no msg/'):
+        backend.libraries(backend.read_package(SOURCES), tmp_path)
+
+
 def test_errors_of_the_compiler_are_shown_and_warnings_are_not(
         backend: ModuleType, tmp_path: Path) -> None:
     pytest.importorskip('rclpy', reason='the ROS wheels are not installed')
