@@ -37,12 +37,11 @@ git -c safe.directory='*' ls-files -z --cached --others --exclude-standard |
     while IFS= read -r -d '' file; do if [ -e "$file" ]; then printf '%s\0' "$file"; fi; done |
     xargs -0 cp --parents --target-directory "$sources"
 
-# colcon does not look for packages inside a package, so the messages need a path of their own.
-paths=(src)
+messages=
 if [ -d "$work/venv/share/ament_cmake" ]; then
-    paths+=(src/box_contact_ros/box_contact_msgs)
+    messages=colcon
 else
-    echo 'box_contact_msgs is built with pip, as there is no ament_cmake among the wheels'
+    echo 'box_contact_msgs is built with pip, as no wheel has ament_cmake'
     install --no-build-isolation "$sources/box_contact_msgs"
 fi
 
@@ -51,8 +50,9 @@ workspace() {
     mkdir -p "$work/$1/src"
     cp -r "$sources" "$work/$1/src/"
     cd "$work/$1"
-    colcon build --base-paths "${paths[@]}" "${@:2}"
-    colcon test --base-paths "${paths[@]}" --pytest-args "${arguments[@]}"
+    if [ "$messages" ]; then ln -s box_contact_ros/box_contact_msgs src/box_contact_msgs; fi
+    colcon build "${@:2}"
+    colcon test --packages-select box_contact_ros --pytest-args "${arguments[@]}"
     colcon test-result --verbose
 }
 
