@@ -243,6 +243,12 @@ def test_command(command, program, setup_arguments):
     matching[0](shlex.split(command), program=program, setup_arguments=setup_arguments)
 
 
+def test_programs_are_shown_as_pip_installs_them():
+    """The tested installation has no `ros2`; two pages say how a workspace starts a program."""
+    assert {page.name for page, _, text in blocks('bash', 'console')
+            if 'ros2 run' in text} == {'install.md', 'programs.md'}
+
+
 def test_first_commands_are_clone_and_demo():
     """What a newcomer types first stands first."""
     assert commands()[:2] == ['git clone REPOSITORY box_contact_ros',
