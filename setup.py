@@ -105,11 +105,11 @@ def extensions() -> list[Extension]:
 
 
 def data_files() -> list[tuple[str, list[str]]]:
-    """Return what goes to share/: the ament index marker, package.xml, the data folders."""
+    """Return what goes to share/: the ament index marker, manifest, licence, data folders."""
     share = f'share/{NAME}'
     files = {
         'share/ament_index/resource_index/packages': [f'resource/{NAME}'],
-        share: ['package.xml'],
+        share: ['LICENSE', 'package.xml'],
     }
     for folder in ('weights', 'msg_schemas', 'launch', 'config', 'recordings'):
         for path in sorted(Path(folder).rglob('*')):
@@ -186,7 +186,6 @@ setup(
             'distributed',
             'pydocstyle',
             'pytest',
-            'pytest-cov',
             'pytest-timeout',
             'pytest-xdist',
             'ros-jazzy-ament-flake8',

@@ -1,4 +1,4 @@
-"""What all tests share: a ROS domain of their own, and programs as processes.
+"""What all tests share: the installed package, a ROS domain of their own, programs as processes.
 
 This file sets the environment while it is imported: rclpy reads the environment once, when the
 first test module imports it. Every process that a test starts inherits it.
@@ -7,6 +7,7 @@ first test module imports it. Every process that a test starts inherits it.
 from __future__ import annotations
 
 import contextlib
+import importlib.util
 import os
 import runpy
 import signal
@@ -15,7 +16,7 @@ import subprocess
 import sys
 import time
 import zlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain, count
 from pathlib import Path
@@ -74,12 +75,57 @@ os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'
 # PyTorch's and BLAS's threads wait for each other in busy loops. One is what `train` takes, too.
 os.environ['OMP_NUM_THREADS'] = '1'
+# `python -m pytest` puts the checkout first, where it hides the package that colcon installed. This
+# process and all that tests start import the installed one; in make's .venv that is the checkout.
+if not sys.flags.safe_path and os.getcwd() in sys.path:
+    sys.path.remove(os.getcwd())
+os.environ['PYTHONSAFEPATH'] = '1'
+
+from box_contact_ros.cli import MODULES_OF_EXTRA, PROGRAMS
+
+EXTRAS = {**MODULES_OF_EXTRA, 'test': ('catkin_pkg', 'gmpy2', 'hypothesis', 'mcap', 'mcap_ros2')}
+"""The modules of each extra of setup.py that tests import."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Put the chains first, then the longest files."""
     rank = {name: number for number, name in enumerate((*chain(*CHAINS), *LONGEST_FIRST))}
     items.sort(key=lambda item: rank.get(item.path.name, len(rank)))
+
+
+class TestFile(pytest.Module):
+    """A file of tests, skipped where it imports a module of an extra that is not installed."""
+
+    def collect(self) -> Iterable[pytest.Item | pytest.Collector]:
+        try:
+            return super().collect()
+        except self.CollectError as error:
+            if isinstance(error.__cause__, ModuleNotFoundError):
+                skip_without_extra(error.__cause__.name)
+            raise
+
+
+def pytest_pycollect_makemodule(module_path: Path, parent: pytest.Collector) -> TestFile:
+    """Read each file of tests as a TestFile."""
+    return TestFile.from_parent(parent, path=module_path)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call() -> Iterator[None]:
+    """Skip a test that comes to a module of an extra that is not installed."""
+    try:
+        return (yield)
+    except ModuleNotFoundError as error:
+        skip_without_extra(error.name)
+        raise
+
+
+def skip_without_extra(missing: str | None) -> None:
+    """Skip what cannot import a module, if that is one of an extra."""
+    for extra, modules in EXTRAS.items():
+        if missing in modules:
+            pytest.skip(f'{missing} is not installed: pip install .[{extra}]',
+                        allow_module_level=True)
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -204,11 +250,16 @@ def program(tmp_path: Path) -> Iterator[Callable[..., RunningProgram]]:
 
     `program('crane', '--ros-args', '-p', 'rate:=200.0', env={...})`: `env` is added to this
     process's environment, `within` stands before the command, such as `ip netns exec NAME`.
+    The test is skipped where the program's extras are not installed.
     """
     started: list[RunningProgram] = []
 
     def start(*args: str, env: dict[str, str] | None = None,
               within: Sequence[str] = ()) -> RunningProgram:
+        extras = PROGRAMS[args[0]].extras if args[0] in PROGRAMS else ()
+        for module in chain(*(MODULES_OF_EXTRA[extra] for extra in extras)):
+            if importlib.util.find_spec(module) is None:
+                skip_without_extra(module)
         log = tmp_path / f'program_{len(started)}.log'
         with log.open('wb') as out:
             process = subprocess.Popen(

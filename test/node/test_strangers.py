@@ -79,8 +79,7 @@ def start(program, stranger, monkeypatch, tmp_path):
         monkeypatch.chdir(home)
         words = [word for parameter in parameters for word in ('-p', parameter)]
         boxes = [] if any(one.startswith('scene:=') for one in parameters) else CUBES
-        running = program('contact_node', '--ros-args', *boxes, *words, within=within,
-                          env={'PYTHONPATH': str(Path(__file__).resolve().parents[2])})
+        running = program('contact_node', '--ros-args', *boxes, *words, within=within)
         running.home = home
         return running
     return start

@@ -40,7 +40,7 @@ def test_example(name: str, program, tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, *command], cwd=tmp_path, capture_output=True, text=True, timeout=120,
         env=os.environ | {'PYTHONPATH': os.pathsep.join(
-            [str(EXAMPLES), str(ROOT), os.environ.get('PYTHONPATH', '')])})
+            [str(EXAMPLES), os.environ.get('PYTHONPATH', '')])})
     assert done.returncode == 0, done.stderr
     printed, expected = done.stdout.splitlines(), shown(name)
     if name in QUICK:

@@ -263,6 +263,7 @@ print(json.dumps({'prefix': get_package_prefix('box_contact_ros'),
     folder = prefix / 'lib' / NAME
     assert {path.name for path in folder.iterdir() if os.access(path, os.X_OK)} == set(PROGRAMS)
     assert all((prefix / 'share' / NAME / data).is_dir() for data in DATA)
+    assert (prefix / 'share' / NAME / 'LICENSE').is_file()
 
 
 @under_colcon

@@ -99,6 +99,7 @@ def test_limits_of_threads_and_starts_break() -> None:
 
 def test_quick_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Rows of every instruction set; the page names all figures, whether or not they hold."""
+    pytest.importorskip('mujoco')
     assert frontier.main(['--speed', '--quick', '--out', str(tmp_path)]) in (0, 1)
     with (tmp_path / 'speed.csv').open(encoding='utf-8') as file:
         rows = list(csv.DictReader(file))

@@ -1,0 +1,76 @@
+#!/usr/bin/env bash
+# Build this checkout with colcon in a new workspace, plain and with --symlink-install, and run its
+# tests there as `colcon test` does. The environment has what package.xml needs, as wheels, and no
+# extra: tests of extras are skipped by name.
+#
+# usage: colcon.sh [PYTHON [ARGUMENT OF PYTEST...]]     (default: .venv/bin/python, the quick tests)
+set -euo pipefail
+
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
+python=$(realpath -s "${1:-$root/.venv/bin/python}")
+# All files are read. Left out are slow tests, and long files that no installation changes.
+long='core|faults|hygiene_ros|laws|markers|readme|scene_node|series|strangers'
+quick=(-m 'not slow' -k "not (test_${long//|/ or test_})")
+arguments=("${@:2}")
+if [ $# -lt 2 ]; then arguments=("${quick[@]}"); fi
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+unset PYTHONPATH
+export PIP_DISABLE_PIP_VERSION_CHECK=1 BOX_CONTACT_BUILD=best
+
+# pip's output is shown where pip fails.
+install() {
+    pip install "$@" >"$work/pip.log" 2>&1 || { tail -n 20 "$work/pip.log" >&2; exit 1; }
+}
+
+"$python" -m venv "$work/venv"
+PATH=$work/venv/bin:$PATH
+install --constraint "$root/constraints.txt" pip setuptools wheel \
+    colcon-common-extensions jsonschema numpy pytest pyyaml \
+    ros-jazzy-common-interfaces ros-jazzy-rclpy ros-jazzy-rmw-fastrtps-cpp
+
+# The working tree: all that git tracks, and what is about to be added.
+sources=$work/box_contact_ros
+mkdir "$sources"
+cd "$root"
+git -c safe.directory='*' ls-files -z --cached --others --exclude-standard |
+    while IFS= read -r -d '' file; do if [ -e "$file" ]; then printf '%s\0' "$file"; fi; done |
+    xargs -0 cp --parents --target-directory "$sources"
+
+messages=
+if [ -d "$work/venv/share/ament_cmake" ]; then
+    messages=colcon
+else
+    echo 'box_contact_msgs is built with pip, as no wheel has ament_cmake'
+    install --no-build-isolation "$sources/box_contact_msgs"
+fi
+
+# Build and test in a workspace; $1 is its name, the others are options of the build.
+workspace() {
+    mkdir -p "$work/$1/src"
+    cp -r "$sources" "$work/$1/src/"
+    cd "$work/$1"
+    if [ "$messages" ]; then ln -s box_contact_ros/box_contact_msgs src/box_contact_msgs; fi
+    colcon build "${@:2}"
+    colcon test --packages-select box_contact_ros --pytest-args "${arguments[@]}"
+    colcon test-result --verbose
+}
+
+# Side by side, as nodes mostly wait.
+modes=(plain symlink)
+workspace plain >"$work/plain.log" 2>&1 &
+plain=$!
+workspace symlink --symlink-install >"$work/symlink.log" 2>&1 &
+symlink=$!
+failed=
+for mode in "${modes[@]}"; do
+    if wait "${!mode}" && result=$(grep '^Summary: [1-9].* tests' "$work/$mode.log"); then
+        echo "colcon, $mode: $result"
+    else
+        failed=1
+        echo "colcon, $mode: failed; the end of its output:" >&2
+        tail -n 100 "$work/$mode.log" >&2
+    fi
+done
+if [ "$failed" ]; then exit 1; fi
+echo 'colcon builds and tests the package, plain and with --symlink-install'
