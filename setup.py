@@ -118,7 +118,7 @@ def data_files() -> list[tuple[str, list[str]]]:
                 files.setdefault(f'{share}/{path.parent.as_posix()}', []).append(path.as_posix())
     for folder in ('', 'overlap'):
         files[f'include/box_contact/{folder}'.rstrip('/')] = sorted(
-            path.as_posix() for path in Path(CORE, folder).glob('*.hpp'))
+            path.as_posix() for path in Path(CORE, 'src', folder).glob('*.hpp'))
     return list(files.items())
 
 

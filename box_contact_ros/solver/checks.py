@@ -1,6 +1,6 @@
 """What is accepted as a pose and as a size, and the words in which the rest is refused.
 
-The limits are those of the core (core/poses.hpp). Every refusal names the field and the value.
+The limits are those of the core (core/src/poses.hpp). Every refusal names the field and the value.
 """
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """Model `mlp`: SAT decides and gives normal and depth; a network gives point, volume, covariance.
 
-The algorithm is that of core/mlp.hpp. Here its weights are read and checked. Outside the range that
-the network was trained for, the answer is the exact one, and counted. So it is for boxes that the
-card of the weights does not list, if it lists any: those of a scene (`train --scene`).
+The algorithm is that of core/src/mlp.hpp. Here its weights are read and checked. Outside the range
+that the network was trained for, the answer is the exact one, and counted. So it is for boxes that
+the card of the weights does not list, if it lists any: those of a scene (`train --scene`).
 """
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ FEATURE_NAMES = (
     'larger slant · cut of all faces along another', '|push of all faces| along all axes')
 """Features at a site: four of its own, four that all sites of its faces have, four of its axis."""
 DESCRIPTION = 'cuts of the bounds by the slab, at nine sites'
-"""What the features of shipped weights mean; see core/overlap/bounds.hpp."""
+"""What the features of shipped weights mean; see core/src/overlap/bounds.hpp."""
 BOUNDS = {DESCRIPTION: 'slab', 'cuts of the unit cube, at nine sites': 'edges'}
 """Method of the bounds by the description in a card; weights made for another one are refused.
 Those for 'edges' give the point alone."""

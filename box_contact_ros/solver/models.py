@@ -35,7 +35,7 @@ class Model(Protocol):
 
 
 class Exact:
-    """Model `exact`: the centroid of the overlap in float64; see core/contact.hpp."""
+    """Model `exact`: the centroid of the overlap in float64; see core/src/contact.hpp."""
 
     single = 'exact', None  # the native model of single calls, and its network
 

@@ -18,7 +18,7 @@ done
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 mkdir "$work/include"
-ln -s "$root/box_contact_ros/core" "$work/include/box_contact"
+ln -s "$root/box_contact_ros/core/src" "$work/include/box_contact"
 PYTHONPATH=$root/test/core:$root/test/helpers "$python" -c 'import pathlib, sys, test_core_cpp
 test_core_cpp.write_families(pathlib.Path(sys.argv[1]))' "$work/families.txt"
 

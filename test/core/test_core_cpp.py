@@ -78,8 +78,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder laid out as an installation: include/box_contact; and the hard poses."""
     folder = tmp_path_factory.mktemp('core')
     (folder / 'include').mkdir()
-    shutil.copytree(ROOT / 'box_contact_ros' / 'core', folder / 'include' / 'box_contact',
-                    ignore=shutil.ignore_patterns('*.so', '__pycache__'))
+    shutil.copytree(ROOT / 'box_contact_ros' / 'core' / 'src',
+                    folder / 'include' / 'box_contact')
     write_families(folder / 'families.txt')
     return folder
 

@@ -23,8 +23,8 @@ EVERYBODYS = ('output', 'resources')
 ROOT_MODULES = ('__init__', '__main__', 'cli', *EVERYBODYS)
 ROOT_ENTRIES = {*FOLDERS, *(f'{name}.py' for name in ROOT_MODULES), 'py.typed'}
 ENTRIES_MAX = 8
-ENTRIES_MAX_OF = {'node': 12, 'core/*.hpp': 12}
-"""Larger limits. The core's headers are counted apart from the core's other entries."""
+ENTRIES_MAX_OF = {'node': 12, 'core/src': 12}
+"""Larger limits."""
 FUNCTION_LINES_MAX = 60
 
 
@@ -154,8 +154,7 @@ def entry_faults(house: House) -> Iterator[str]:
         parts = file.relative_to(house.package).parts
         for depth, part in enumerate(parts):
             folder = '/'.join(parts[:depth])
-            headers = '/*.hpp' if folder == 'core' and part.endswith('.hpp') else ''
-            entries[folder + headers].add(part)
+            entries[folder].add(part)
     root = entries.pop('')
     for verb, names in (('has', root - ROOT_ENTRIES), ('lacks', ROOT_ENTRIES - root)):
         if names:
@@ -177,7 +176,7 @@ def function_faults(house: House) -> Iterator[str]:
 RULES = {
     f'A folder imports only folders above it: {", ".join(FOLDERS)}.': import_faults,
     'No two modules share a basename.': basename_faults,
-    f'A folder has at most {ENTRIES_MAX} entries (headers of the core, node: 12).': entry_faults,
+    f'A folder has at most {ENTRIES_MAX} entries (core/src, node: 12).': entry_faults,
     'No two classes share a name.': class_faults,
     f'A function has at most {FUNCTION_LINES_MAX} lines.': function_faults,
 }
@@ -283,8 +282,8 @@ OTHERS = [
      'apps/a has 9 entries, and may have 8'),
     (entry_faults, {f'node/{n}.py': '' for n in range(12)},
      'node has 13 entries, and may have 12'),
-    (entry_faults, {f'core/{n}.hpp': '' for n in range(13)},
-     'core/*.hpp has 13 entries, and may have 12'),
+    (entry_faults, {f'core/src/{n}.hpp': '' for n in range(13)},
+     'core/src has 13 entries, and may have 12'),
     (entry_faults, {'tools.py': '', 'more/one.py': ''}, 'the root has more, tools.py'),
     (function_faults, {'scene/a.py': 'def f():' + '\n  1' * 60}, 'scene/a.py:1 f has 61 lines'),
     (function_faults, {'scene/a.py': 'class A:\n  async def f():' + '\n    1' * 60},
@@ -308,6 +307,6 @@ def test_a_missing_folder_is_found(tmp_path: Path, sound: dict[str, str]) -> Non
 def test_as_much_as_may_be(tmp_path: Path, sound: dict[str, str]) -> None:
     """Limits themselves are no faults."""
     limits = {f'scene/{n}.txt': '' for n in range(7)} | {f'node/{n}.txt': '' for n in range(11)}
-    limits |= {f'core/{n}.hpp': '' for n in range(12)}
+    limits |= {f'core/src/{n}.hpp': '' for n in range(12)}
     limits['apps/a.py'] = 'def f():' + '\n  1' * 59
     assert report(planted(tmp_path, sound | limits)) == ''

@@ -207,10 +207,9 @@ print(json.dumps({'sets': core.instruction_sets(), 'file': core.native.__file__}
 def test_headers_are_there_and_compile(installed: Installation, tmp_path: Path) -> None:
     """A C++ user includes them from include/box_contact."""
     (include,) = (path.parent for path in installed.folder.rglob('include/box_contact'))
-    folder, core = include / 'box_contact', ROOT / NAME / 'core'
+    folder, core = include / 'box_contact', ROOT / NAME / 'core' / 'src'
     names = {path.relative_to(folder).as_posix() for path in folder.rglob('*.hpp')}
-    assert names == {path.relative_to(core).as_posix() for path in core.rglob('*.hpp')
-                     if 'binding' not in path.parts}
+    assert names == {path.relative_to(core).as_posix() for path in core.rglob('*.hpp')}
     compiler = shutil.which(os.environ.get('CXX', 'g++').split()[0])
     if not compiler:
         pytest.skip('no C++ compiler is installed')

@@ -350,7 +350,7 @@ def test_cpp_examples(tmp_path):
                + '  return 0;\n}' for name, text in zip(names, texts)]
     calls = ' '.join(f'{name}();' for name in names)
     (tmp_path / 'examples.cpp').write_text('\n'.join([*program, f'int main() {{ {calls} }}']))
-    (tmp_path / 'box_contact').symlink_to(ROOT / 'box_contact_ros' / 'core')
+    (tmp_path / 'box_contact').symlink_to(ROOT / 'box_contact_ros' / 'core' / 'src')
     run('g++', '-std=c++17', '-ffp-contract=off', '-Wno-psabi', f'-I{tmp_path}',
         str(tmp_path / 'examples.cpp'), '-o', str(tmp_path / 'examples'))
     assert run(str(tmp_path / 'examples')).splitlines() == [

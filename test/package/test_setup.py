@@ -39,7 +39,8 @@ def checkout(tmp_path: Path) -> Path:
     """Return a folder with the files that the set-up looks at, and no Python on its PATH."""
     folder = tmp_path / 'checkout'
     for name in ('.ci/setup', 'Makefile', 'setup.py', 'setup.cfg', 'pyproject.toml',
-                 'constraints.txt', 'box_contact_ros/cli.py', 'box_contact_ros/core/contact.hpp'):
+                 'constraints.txt', 'box_contact_ros/cli.py',
+                 'box_contact_ros/core/src/contact.hpp'):
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / name, folder / name)
     (tmp_path / 'bin').mkdir()
@@ -93,7 +94,7 @@ def test_a_target_is_installed_once(checkout: Path, offer: Callable) -> None:
 
 
 @pytest.mark.parametrize('changed', ['setup.py', 'constraints.txt', 'box_contact_ros/cli.py',
-                                     'box_contact_ros/core/contact.hpp'])
+                                     'box_contact_ros/core/src/contact.hpp'])
 def test_a_change_installs_again(checkout: Path, offer: Callable, changed: str) -> None:
     offer('python3.12', PYTHON)
     set_up(checkout)

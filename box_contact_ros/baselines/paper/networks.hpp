@@ -16,7 +16,7 @@
 
 #include <vector>
 
-#include "../../core/contact.hpp"
+#include "../../core/src/contact.hpp"
 #include "symmetry.hpp"
 
 namespace box_contact::paper {

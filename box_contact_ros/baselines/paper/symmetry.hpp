@@ -12,7 +12,7 @@
 
 #include <algorithm>
 
-#include "../../core/lanes.hpp"
+#include "../../core/src/lanes.hpp"
 
 namespace box_contact::paper {
 

@@ -11,7 +11,7 @@
 #include <memory>
 #include <type_traits>
 
-#include "../lanes.hpp"
+#include "../src/lanes.hpp"
 
 namespace box_contact::binding {
 

@@ -11,7 +11,7 @@
 #include <system_error>
 #include <thread>
 
-#include "../mlp.hpp"
+#include "../src/mlp.hpp"
 #include "arrays.hpp"  // first, as Python.h wants
 #include "bounding_boxes.hpp"
 #include "stages.hpp"

@@ -1,7 +1,7 @@
 // What every stage of a pair computes, as named arrays: for training, reports and tests.
 #pragma once
 
-#include "../mlp.hpp"
+#include "../src/mlp.hpp"
 
 namespace box_contact {
 
