@@ -41,5 +41,5 @@ def solve_with_choices(network: Network, pairs: Pairs) -> tuple[Contacts, Choice
     numbers = core_numbers(network)
     found = stages(*pairs, names=('in_range', 'frame_b'))
     solver = native.PairSolver('mlp', _UNIT, _UNIT, numbers)
-    *contacts, _ = solver.solve(*map(np.ascontiguousarray, pairs), 1)
+    contacts, _ = solver.solve(*map(np.ascontiguousarray, pairs), 1)
     return Contacts(*contacts), Choices(found.in_range, found.frame_b)

@@ -224,7 +224,7 @@ def test_weights_that_are_no_numbers_are_answered_exactly(output):
     numbers[output] = np.nan
     pairs = SETS['stacks'](np.random.default_rng(31), 1000)
     solver = native.PairSolver('mlp', UNIT, UNIT, numbers)
-    *found, _ = solver.solve(*pairs, 1)
+    found, _ = solver.solve(*pairs, 1)
     assert solver.answered_exactly == len(pairs.pose_a)
     for mine, theirs in zip(found, solve(EXACT, pairs)):
         assert np.array_equal(mine, theirs, equal_nan=True)

@@ -20,6 +20,7 @@ import sysconfig
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 from unittest import mock
 
@@ -76,7 +77,7 @@ MUTANTS = {
         '(t[2] * 0x20000001p0 - t[2]);', f'{FAMILIES} -k gates'),
     'frame of A for all edge axes': Mutant(
         'core/src/separating_axis.hpp',
-        'inline SeparatingAxis<T> separating_axis(const Pair<T>& pair) {',
+        'BC_INLINE SeparatingAxis<T> separating_axis(const Pair<T>& pair) {',
         'inline SeparatingAxis<T> separating_axis(Pair<T> pair) { pair.a_first = T{} == T{};',
         f'{FAMILIES} -k swap'),
     'near-parallel edges left as they are': Mutant(
@@ -141,7 +142,7 @@ MUTANTS = {
         'core/src/overlap/face_sums.hpp', '(0.05 * by_volume) *', '(T{} + 0.05) *',
         f'{LAWS} -k powers_of_two'),
     "covariance left in A's frame": Mutant(
-        'core/src/overlap/face_sums.hpp', 'rotated(pair.axes_a, covariance)};', 'covariance};',
+        'core/src/overlap/face_sums.hpp', 'rotated(pair.axes_a, covariance);', 'covariance;',
         f'{LAWS} -k rigid_motion'),
     "covariance left in the first box's frame": Mutant(
         'core/src/contact.hpp', 'select(a_first, pair.axes_a, pair.axes_b);', 'pair.axes_a;',
@@ -171,7 +172,7 @@ MUTANTS = {
         'core/src/contact.hpp', 'select<T>(q.touching, overlap.volume, T{})',
         'select<T>(q.touching, 1.0 / overlap.volume, T{})', f'{LAWS} -k grows_with_the_depth'),
     'patch of a model that gives none': Mutant(
-        'core/src/contact.hpp', 'T unknown = splat<T>(std::numeric_limits<double>::quiet_NaN());',
+        'core/src/contact.hpp', 'T unknown = splat<T>(not_a_number);',
         'T unknown{};', f'{TEST_CORE} -k point_alone'),
     'faces not moved out of each other': Mutant(
         'core/src/overlap/face_sums.hpp', 'Mask<T> risky = unflush(pair, depth);',
@@ -180,8 +181,8 @@ MUTANTS = {
         'core/src/overlap/face_sums.hpp', 'found.certain &= risky == 0;', '',
         f'{EXACT} -k almost_aligned'),
     'face sums in the order of the names': Mutant(
-        'core/src/contact.hpp', 'CertifiedOverlap<T> overlap = overlap_by_face_sums(',
-        'pair.a_first = T{} == T{}; CertifiedOverlap<T> overlap = overlap_by_face_sums(',
+        'core/src/contact.hpp', 'CertifiedOverlap<Found<T>, T> overlap =',
+        'pair.a_first = T{} == T{}; CertifiedOverlap<Found<T>, T> overlap =',
         f'{LAWS} -k roundings'),
     'a piece of an edge of length below zero': Mutant(
         'core/src/overlap/face_sums.hpp',
@@ -229,15 +230,15 @@ MUTANTS = {
         'excess = max(excess, 0.0 * -separation / (2.0 * depth_max',
         f'{MLP} -k limits_belong'),
     'threads overlap': Mutant(
-        'core/binding/module.cpp', 'long begin = chunk * rows_per_chunk,',
-        'long begin = std::max(0L, chunk * rows_per_chunk - lanes),',
+        'core/src/library/solver.hpp', 'long begin = chunk * rows_per_chunk,',
+        'long begin = std::max(0L, chunk * rows_per_chunk - 8),',
         f'{TEST_CORE} -k threads'),
     'threads leave a block out': Mutant(
-        'core/binding/module.cpp', 'for (long chunk = next++; chunk < chunks;',
+        'core/src/library/solver.hpp', 'for (long chunk = next++; chunk < chunks;',
         'for (long chunk = next++; chunk < chunks - (threads > 1);',
         f'{TEST_CORE} -k threads'),
     'any refused row is named': Mutant(
-        'core/binding/module.cpp', 'std::min(refused_of[thread], refused);', 'refused;',
+        'core/src/library/solver.hpp', 'std::min(refused_of[thread], refused);', 'refused;',
         f'{TEST_CORE} -k threads'),
     'lanes that repeat the last row are counted': Mutant(
         'core/src/contact.hpp', 'set_lane(queries[g].touching, int(i), 0);', ';',
@@ -245,7 +246,7 @@ MUTANTS = {
     'a reference to the type is kept': Mutant(
         'core/binding/module.cpp', '  Py_DECREF(type);', '  ', f'{TEST_CORE} -k references'),
     'the forced instruction set is ignored': Mutant(
-        'core/__init__.py', '_forced or instruction_sets()[-1]', 'instruction_sets()[-1]',
+        'core/src/library/library.cpp', 'if (!forced || !*forced) return', 'return',
         f'{TEST_CORE} -k forced'),
     # Guards of the nodes against faults.
     'weights taken as they are': Mutant(
@@ -455,27 +456,30 @@ def copied(folder: Path) -> Path:
 
 
 @functools.cache
-def baseline_extension() -> Any:
-    """Return what setup.py says of the core's extension for the baseline instruction set."""
+def setup() -> SimpleNamespace:
+    """Return what setup.py says of the core: flags, and the extension."""
     given: dict[str, Any] = {}
     with mock.patch('setuptools.setup', given.update):
-        runpy.run_path(str(ROOT / 'setup.py'))
-    return next(each for each in given['ext_modules'] if each.name.endswith('._baseline'))
+        names = runpy.run_path(str(ROOT / 'setup.py'))
+    extension, = (one for one in given['ext_modules'] if one.name == names['CORE_EXTENSION'])
+    return SimpleNamespace(flags=names['FLAGS'], library=f'{names["CORE"]}/src/library',
+                           extension=extension)
 
 
 def build(checkout: Path) -> None:
-    """Compile the core of a copy, for the baseline instruction set, and remove all others."""
-    extension = baseline_extension()
+    """Compile the core of a copy, for the baseline instruction set alone."""
+    core = setup()
     folder = checkout / 'box_contact_ros' / 'core'
     for built in folder.glob('*.so'):
         built.unlink()
-    macros = [f'-D{name}={value}' for name, value in extension.define_macros]
-    folders = [f'-I{path}' for path in (sysconfig.get_path('include'), *extension.include_dirs)]
+    folders = [f'-I{path}' for path in (sysconfig.get_path('include'),
+                                        *core.extension.include_dirs)]
+    sources = [*core.extension.sources, f'{core.library}/kernel.cpp', f'{core.library}/library.cpp']
     # Half as long to compile with -O1. The bits are the same.
     subprocess.run(
-        [*os.environ.get('CXX', 'g++').split(), '-shared', '-fPIC', *macros, *folders,
-         *extension.extra_compile_args, '-O1', '-w', *extension.sources,
-         '-o', folder / f'_baseline{sysconfig.get_config_var("EXT_SUFFIX")}'],
+        [*os.environ.get('CXX', 'g++').split(), '-shared', '-fPIC', '-DBOX_CONTACT_VERSION=""',
+         *folders, *core.flags, '-O1', '-w', *sources,
+         '-o', folder / f'_native{sysconfig.get_config_var("EXT_SUFFIX")}'],
         cwd=checkout, check=True)
 
 
@@ -516,7 +520,7 @@ def main() -> int:
     parser.add_argument('--jobs', type=int, default=1, help='mutants at a time (default: 1)')
     given = parser.parse_args()
     names = given.names or list(MUTANTS)
-    baseline_extension()  # once, before there are threads
+    setup()  # once, before there are threads
     survivors = []
     with ThreadPoolExecutor(given.jobs) as pool:
         for name, killer in zip(names, pool.map(killer_of, names), strict=True):

@@ -9,17 +9,20 @@
 // All stages are templates over the lanes T, so a row of a batch has the bits of a single call.
 #pragma once
 
-#include <algorithm>
-
 #include "minimum_depth.hpp"
 #include "near_parallel_edges.hpp"
 #include "overlap/clipping.hpp"
 #include "overlap/face_sums.hpp"
+#include "rows.hpp"
 
-namespace box_contact {
+namespace box_contact::BOX_CONTACT_SET {
 
-// One pair: frame of the poses. Without contact, normal, point and covariance are NaN, and the
-// volume is zero.
+using detail::Counts;
+using detail::Results;
+using detail::Rows;
+
+// One pair: frame of the poses. Without contact, point and covariance are NaN, and the volume is
+// zero. The normal is NaN where the separation exceeds the margin.
 struct Contact {
   bool colliding;          // separation ≤ 8 ulp of the largest coordinate or size
   double separation;       // [m]; negative: depth along the normal; positive: largest SAT gap
@@ -27,18 +30,7 @@ struct Contact {
   Vec<double> point;       // centroid of A∩B [m]
   double volume;           // of A∩B [m³]; NaN from a model that gives the point alone
   Mat<double> covariance;  // second central moments of A∩B by its volume [m²]; NaN likewise
-};
-
-// How many contacts took another way than most.
-struct Counts {
-  long clipped = 0;  // by model `exact`: clipped, because the certificate did not hold
-  long exact = 0;    // by model `mlp`: answered by `exact`: outside the trained range, or a box
-
-  Counts& operator+=(const Counts& other) {
-    clipped += other.clipped;
-    exact += other.exact;
-    return *this;
-  }
+  int axis;                // the winning axis: 0–2 faces of A, 3–5 of B, 6 + 3 i + j for a_i × b_j
 };
 
 // Pairs whose axis has been found.
@@ -50,8 +42,8 @@ struct Query {
 };
 
 template <class T>
-[[gnu::always_inline]] inline Query<T> query(const Pose<T>& a, const Pose<T>& b,
-                                             const Vec<T>& half_a, const Vec<T>& half_b) {
+BC_INLINE Query<T> query(const Pose<T>& a, const Pose<T>& b, const Vec<T>& half_a,
+                         const Vec<T>& half_b) {
   Query<T> q;
   q.pair = prepare(a, b, half_a, half_b);
   q.axis = separating_axis(q.pair);
@@ -77,7 +69,7 @@ template <class T>
 }
 
 template <class T>
-[[gnu::always_inline]] inline Query<double> lane(const Query<T>& q, int i) {
+BC_INLINE Query<double> lane(const Query<T>& q, int i) {
   return {lane(q.pair, i),
           {lane(q.axis.separation, i), lane(q.axis.axis, i), lane(q.axis.face, i),
            lane(q.axis.normal, i), lane(q.axis.doubtful, i) != 0},
@@ -86,7 +78,7 @@ template <class T>
 
 // The same pair with the box that comes first in the order of the data as A.
 template <class T>
-[[gnu::always_inline]] inline Pair<T> first_as_a(const Pair<T>& pair) {
+BC_INLINE Pair<T> first_as_a(const Pair<T>& pair) {
   Mask<T> a_first = pair.a_first;
   Pair<T> ordered = pair;
   ordered.half_a = select(a_first, pair.half_a, pair.half_b);
@@ -113,27 +105,28 @@ inline Moments<double> clipped_overlap(Pair<double> pair, int face, bool pressed
 // And `solve(queries, found, counts)` fills `found` for the pairs that touch, points in A's frame.
 
 // Model `exact`: the moments of A∩B by face sums, or by clipping where these are not certain.
-struct ExactModel {
+// `FoundOf`: Moments, or PointAndVolume.
+template <template <class> class FoundOf>
+struct ExactModelOf {
   template <class T>
-  using Found = Moments<T>;
+  using Found = FoundOf<T>;
   template <class T>
   static constexpr int group = 1;
 
   template <class T>
-  [[gnu::always_inline]] void solve(const Query<T> (&queries)[1], Moments<T> (&found)[1],
-                                    Counts& counts) const {
+  BC_INLINE void solve(const Query<T> (&queries)[1], Found<T> (&found)[1], Counts& counts) const {
     found[0] = solve(queries[0], counts);
   }
 
   template <class T>
-  [[gnu::always_inline]] Moments<T> solve(const Query<T>& q, Counts& counts) const {
+  BC_INLINE Found<T> solve(const Query<T>& q, Counts& counts) const {
     Pair<T> pair = q.pair;
     Mask<T> pressed = enforce_minimum_depth(pair, q.axis) & q.touching;
     Mask<T> fallback = pressed;
     if (any(pressed)) fallback &= has_too_little_depth(pair);
     T depth = max(-q.axis.separation, depth_floor * pair.size);
-    CertifiedOverlap<T> overlap = overlap_by_face_sums(first_as_a(pair), depth);
-    Moments<T> found = overlap.moments;
+    CertifiedOverlap<Found<T>, T> overlap = overlap_by_face_sums<Found<T>>(first_as_a(pair), depth);
+    Found<T> found = overlap.moments;
     found.centroid =
         select(pair.a_first, found.centroid, pair.offset_a + pair.rotation * found.centroid);
     fallback |= (overlap.certain == 0) & q.touching;
@@ -149,6 +142,9 @@ struct ExactModel {
   }
 };
 
+using ExactModel = ExactModelOf<Moments>;
+using ExactPointModel = ExactModelOf<PointAndVolume>;
+
 // The exact overlap of a single pair, not inlined: fallbacks and stages share one copy.
 [[gnu::noinline]] inline Moments<double> exact_overlap(const Query<double>& q, Counts& counts) {
   return ExactModel{}.solve(q, counts);
@@ -156,12 +152,17 @@ struct ExactModel {
 
 // The one place that decides what a contact says of moments that its model does not give: NaN.
 template <class T>
-[[gnu::always_inline]] inline Moments<T> moments(const Moments<T>& found) {
+BC_INLINE Moments<T> moments(const Moments<T>& found) {
   return found;
 }
 template <class T>
-[[gnu::always_inline]] inline Moments<T> moments(const Vec<T>& centroid) {
-  T unknown = splat<T>(std::numeric_limits<double>::quiet_NaN());
+BC_INLINE Moments<T> moments(const PointAndVolume<T>& found) {
+  T unknown = splat<T>(not_a_number);
+  return {found.volume, found.centroid, {{unknown, unknown, unknown, unknown, unknown, unknown}}};
+}
+template <class T>
+BC_INLINE Moments<T> moments(const Vec<T>& centroid) {
+  T unknown = splat<T>(not_a_number);
   return {unknown, centroid, {{unknown, unknown, unknown, unknown, unknown, unknown}}};
 }
 
@@ -173,44 +174,32 @@ struct Answer {
 };
 
 template <class T, class Found>
-[[gnu::always_inline]] inline Answer<T> answer(const Query<T>& q, const Found& found) {
-  T nothing = splat<T>(std::numeric_limits<double>::quiet_NaN());
+BC_INLINE Answer<T> answer(const Query<T>& q, const Found& found, double margin) {
+  T nothing = splat<T>(not_a_number);
   Vec<T> none{nothing, nothing, nothing};
   Moments<T> overlap = moments(found);
-  return {select(q.touching, direction_in_common_frame(q.pair, q.axis.normal), none),
+  Mask<T> near = q.touching | ((q.axis.separation <= margin) & q.pair.valid);
+  return {select(near, direction_in_common_frame(q.pair, q.axis.normal), none),
           {select<T>(q.touching, overlap.volume, T{}),
            select(q.touching, point_in_common_frame(q.pair, overlap.centroid), none),
            select(q.touching, overlap.covariance,
                   Sym<T>{{nothing, nothing, nothing, nothing, nothing, nothing}})}};
 }
 
-// Rows of pairs in memory. A step of 0 gives all rows the same sizes, one of 3 each row its own.
-struct Rows {
-  const double *poses_a, *poses_b;  // 7 numbers a row: x y z qx qy qz qw
-  const double *sizes_a, *sizes_b;  // full extents [m]
-  long size_step_a, size_step_b;
-};
-
-// Where results go: one row a pair. Normals and points have three numbers a row, covariances nine.
-// `volume` and `covariance` may be nullptr.
-struct Results {
-  bool* colliding;
-  double *separation, *normal, *point;
-  double *volume = nullptr, *covariance = nullptr;
-};
-
 // Rows `first` to `last` side by side. Lanes beyond them repeat the last one.
 template <class T>
-[[gnu::always_inline]] inline Query<T> query_rows(const Rows& rows, long first, long last) {
+BC_INLINE Query<T> query_rows(const Rows& rows, long first, long last) {
   alignas(sizeof(T)) double a[7][width<T>], b[7][width<T>], sizes[6][width<T>];
   for (int i = 0; i < width<T>; ++i) {
-    long row = std::min(first + i, last - 1);
-    for (int k = 0; k < 7; ++k) a[k][i] = rows.poses_a[7 * row + k];
-    for (int k = 0; k < 7; ++k) b[k][i] = rows.poses_b[7 * row + k];
-    for (int k = 0; k < 3; ++k) sizes[k][i] = rows.sizes_a[rows.size_step_a * row + k];
-    for (int k = 0; k < 3; ++k) sizes[3 + k][i] = rows.sizes_b[rows.size_step_b * row + k];
+    long row = min(first + i, last - 1);
+    long of_a = rows.pairs ? long(rows.pairs[2 * row]) : row;
+    long of_b = rows.pairs ? long(rows.pairs[2 * row + 1]) : row;
+    for (int k = 0; k < 7; ++k) a[k][i] = rows.poses_a[7 * of_a + k];
+    for (int k = 0; k < 7; ++k) b[k][i] = rows.poses_b[7 * of_b + k];
+    for (int k = 0; k < 3; ++k) sizes[k][i] = rows.sizes_a[rows.size_step_a * of_a + k];
+    for (int k = 0; k < 3; ++k) sizes[3 + k][i] = rows.sizes_b[rows.size_step_b * of_b + k];
   }
-  auto lanes_of = [](const double(&numbers)[width<T>]) {
+  auto lanes_of = [](const double (&numbers)[width<T>]) {
     T x;
     std::memcpy(&x, numbers, sizeof(T));
     return x;
@@ -232,23 +221,27 @@ template <class T>
 
 // Write `count` solved rows from `first` on. Returns the first that is refused, or −1.
 template <class T, class Found>
-[[gnu::always_inline]] inline long write_rows(const Query<T>& q, const Found& found, long first,
-                                              long count, const Results& results) {
-  Answer<T> rows = answer(q, found);
+BC_INLINE long write_rows(const Query<T>& q, const Found& found, long first, long count,
+                          const Results& results, Counts& counts) {
+  Answer<T> rows = answer(q, found, results.margin);
   Mat<T> covariance = matrix(rows.overlap.covariance);
   long refused = -1;
   for (int i = 0; i < count && i < width<T>; ++i) {
     long row = first + i;
-    results.colliding[row] = lane(q.touching, i) != 0;
-    results.separation[row] = lane(q.axis.separation, i);
-    for (int k = 0; k < 3; ++k) results.normal[3 * row + k] = lane(rows.normal[k], i);
-    for (int k = 0; k < 3; ++k) results.point[3 * row + k] = lane(rows.overlap.centroid[k], i);
+    counts.contacts += lane(q.touching, i) != 0;
+    if (results.colliding) results.colliding[row] = lane(q.touching, i) != 0;
+    if (results.separation) results.separation[row] = lane(q.axis.separation, i);
+    if (results.axis) results.axis[row] = int32_t(lane(q.axis.axis, i));
+    for (int k = 0; results.normal && k < 3; ++k)
+      results.normal[3 * row + k] = lane(rows.normal[k], i);
+    for (int k = 0; results.point && k < 3; ++k)
+      results.point[3 * row + k] = lane(rows.overlap.centroid[k], i);
     if (results.volume) results.volume[row] = lane(rows.overlap.volume, i);
     if (results.covariance)
       for (int k = 0; k < 9; ++k)
         results.covariance[9 * row + k] = lane(covariance[k / 3][k % 3], i);
     if (!lane(q.pair.valid, i)) {
-      results.separation[row] = std::numeric_limits<double>::quiet_NaN();
+      if (results.separation) results.separation[row] = not_a_number;
       if (refused < 0) refused = row;
     }
   }
@@ -258,60 +251,66 @@ template <class T, class Found>
 // Ask for the memory that rows will be written to, so that it is in the cache when they are solved.
 inline void fetch_rows(const Results& results, long first, long last) {
   constexpr long line = 64 / sizeof(double);
-  for (double* place : {results.normal, results.point})
-    for (long k = 3 * first; k < 3 * last; k += line) __builtin_prefetch(place + k, 1);
-  for (long k = 9 * first; results.covariance && k < 9 * last; k += line)
-    __builtin_prefetch(results.covariance + k, 1);
+  auto fetch = [&](const double* place, long numbers) {
+    for (long k = numbers * first; place && k < numbers * last; k += line)
+      __builtin_prefetch(place + k, 1);
+  };
+  fetch(results.normal, 3);
+  fetch(results.point, 3);
+  fetch(results.covariance, 9);
 }
 
-// Solve rows `begin` to `end`. Returns the first row whose poses or sizes are refused, or −1. Such
-// rows get `colliding` false and `separation` NaN.
+// Solve rows `first` to `last`, at most one group of blocks. Returns the first row whose poses or
+// sizes are refused, or −1.
 template <class T, class Model>
-long solve_rows(const Model& model, const Rows& rows, long begin, long end, const Results& results,
-                Counts& counts) {
+BC_INLINE long solve_group(const Model& model, const Rows& rows, long first, long last,
+                           const Results& results, Counts& counts) {
   constexpr int group = Model::template group<T>;
+  Query<T> queries[group];
+  typename Model::template Found<T> found[group]{};
+  bool touching = false;
+  for (int g = 0; g < group; ++g) {
+    long start = first + g * width<T>;
+    queries[g] = query_rows<T>(rows, min(start, last - 1), last);
+    // Lanes that repeat the last row are not counted.
+    for (long i = max(0L, last - start); i < width<T>; ++i)
+      set_lane(queries[g].touching, int(i), 0);
+    touching |= any(queries[g].touching);
+  }
+  if constexpr (!is_scalar<T>) fetch_rows(results, first, min(first + group * width<T>, last));
+  if (touching) model.solve(queries, found, counts);
   long refused = -1;
-  for (long first = begin; first < end; first += group * width<T>) {
-    Query<T> queries[group];
-    typename Model::template Found<T> found[group]{};
-    bool touching = false;
-    for (int g = 0; g < group; ++g) {
-      long start = first + g * width<T>;
-      queries[g] = query_rows<T>(rows, std::min(start, end - 1), end);
-      // Lanes that repeat the last row are not counted.
-      for (long i = std::max(0L, end - start); i < width<T>; ++i)
-        set_lane(queries[g].touching, int(i), 0);
-      touching |= any(queries[g].touching);
-    }
-    fetch_rows(results, first, std::min(first + group * width<T>, end));
-    if (touching) model.solve(queries, found, counts);
-    for (int g = 0; g < group; ++g) {
-      long start = first + g * width<T>;
-      long row = write_rows(queries[g], found[g], start, end - start, results);
-      if (refused < 0) refused = row;
-    }
+  for (int g = 0; g < group; ++g) {
+    long start = first + g * width<T>;
+    long row = write_rows(queries[g], found[g], start, last - start, results, counts);
+    if (refused < 0) refused = row;
   }
   return refused;
 }
 
-// Solve one pair; `half_a`, `half_b` are half extents. Returns false if poses or sizes are refused.
+// One row alone, not inlined into the rows: the registers of the two would mix.
 template <class Model>
-[[gnu::always_inline]] inline bool solve_one(const Model& model, const double* pose_a,
-                                             const double* pose_b, const Vec<double>& half_a,
-                                             const Vec<double>& half_b, Contact& contact,
-                                             Counts& counts) {
-  Pose<double> a{{pose_a[0], pose_a[1], pose_a[2]}, {pose_a[3], pose_a[4], pose_a[5], pose_a[6]}};
-  Pose<double> b{{pose_b[0], pose_b[1], pose_b[2]}, {pose_b[3], pose_b[4], pose_b[5], pose_b[6]}};
-  Query<double> queries[1] = {query(a, b, half_a, half_b)};
-  const Query<double>& q = queries[0];
-  if (!q.pair.valid) return false;
-  typename Model::template Found<double> found[1]{};
-  if (q.touching) model.solve(queries, found, counts);
-  Answer<double> one = answer(q, found[0]);
-  const Moments<double>& overlap = one.overlap;
-  contact = {q.touching,       q.axis.separation, one.normal,
-             overlap.centroid, overlap.volume,    matrix(overlap.covariance)};
-  return true;
+[[gnu::noinline]] inline long solve_row(const Model& model, const Rows& rows, long row,
+                                        const Results& results, Counts& counts) {
+  return solve_group<double>(model, rows, row, row + 1, results, counts);
 }
 
-}  // namespace box_contact
+// Solve rows `begin` to `end`. Returns the first row whose poses or sizes are refused, or −1. Such
+// rows get `colliding` false and `separation` NaN.
+//
+// A few rows that are left are solved one by one, which is faster than a group with idle lanes. Of
+// two lanes none is idle: a single pair leaves a machine's register of two half empty anyway.
+template <class T, class Model>
+[[gnu::noinline]] inline long solve_rows(const Model& model, const Rows& rows, long begin, long end,
+                                         const Results& results, Counts& counts) {
+  constexpr int group = Model::template group<T>;
+  constexpr long few = is_scalar<T> || width<T> <= 2 ? 0 : group;
+  long refused = -1, first = begin;
+  auto note = [&](long row) { refused = refused < 0 ? row : refused; };
+  for (; end - first > few; first += group * width<T>)
+    note(solve_group<T>(model, rows, first, end, results, counts));
+  for (; first < end; ++first) note(solve_row(model, rows, first, results, counts));
+  return refused;
+}
+
+}  // namespace box_contact::BOX_CONTACT_SET

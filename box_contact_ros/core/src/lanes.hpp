@@ -14,14 +14,18 @@
 #include <immintrin.h>
 #endif
 
+#include "target.hpp"
+
 // Vectors wider than the machine's registers are passed between inlined functions only.
 #pragma GCC diagnostic ignored "-Wpsabi"
 #if defined(__clang__)
 // Masks are bool or vectors, and the operators & and | combine both.
 #pragma clang diagnostic ignored "-Wbool-operation"
+// Headers name the inline namespace of target.hpp in full.
+#pragma clang diagnostic ignored "-Winline-namespace-reopened-noninline"
 #endif
 
-namespace box_contact {
+namespace box_contact::BOX_CONTACT_SET {
 
 template <class Number, int width>
 struct LanesOf {
@@ -55,19 +59,19 @@ using Mask = decltype(T() < T());
 
 // The same number in every lane.
 template <class T>
-[[gnu::always_inline]] inline T splat(Number<T> x) {
+BC_INLINE T splat(Number<T> x) {
   return T{} + x;
 }
 
 template <class T>
-[[gnu::always_inline]] inline T select(Mask<T> mask, T if_true, T if_false) {
+BC_INLINE T select(Mask<T> mask, T if_true, T if_false) {
   return mask ? if_true : if_false;
 }
 
 // Of two equal numbers, or with a NaN in `a` or `b`, min and max return b. The instructions are named
 // because g++ takes two for the comparison of a vector with a constant.
 template <class T>
-[[gnu::always_inline]] inline T min(T a, T b) {
+BC_INLINE T min(T a, T b) {
 #if defined(__AVX512F__)
   if constexpr (std::is_same_v<T, Lanes<double, 8>>)
     return (T)_mm512_maskz_min_pd(0xff, (__m512d)a, (__m512d)b);
@@ -86,7 +90,7 @@ template <class T>
   return a < b ? a : b;
 }
 template <class T>
-[[gnu::always_inline]] inline T max(T a, T b) {
+BC_INLINE T max(T a, T b) {
 #if defined(__AVX512F__)
   if constexpr (std::is_same_v<T, Lanes<double, 8>>)
     return (T)_mm512_maskz_max_pd(0xff, (__m512d)a, (__m512d)b);
@@ -106,7 +110,7 @@ template <class T>
 }
 
 template <class T>
-[[gnu::always_inline]] inline T abs(T x) {
+BC_INLINE T abs(T x) {
   if constexpr (is_scalar<T>) {
     return std::fabs(x);
   } else {
@@ -117,7 +121,7 @@ template <class T>
 }
 
 template <class T>
-[[gnu::always_inline]] inline T sqrt(T x) {
+BC_INLINE T sqrt(T x) {
   if constexpr (is_scalar<T>) {
     return std::sqrt(x);
 #if defined(__AVX512F__)
@@ -140,7 +144,7 @@ template <class T>
 }
 
 template <class T>
-[[gnu::always_inline]] inline auto lane(const T& x, int i) {
+BC_INLINE auto lane(const T& x, int i) {
   if constexpr (is_scalar<T>) {
     return x;
   } else {
@@ -148,7 +152,7 @@ template <class T>
   }
 }
 template <class T, class N>
-[[gnu::always_inline]] inline void set_lane(T& x, int i, N value) {
+BC_INLINE void set_lane(T& x, int i, N value) {
   if constexpr (is_scalar<T>) {
     x = value;
   } else {
@@ -157,7 +161,7 @@ template <class T, class N>
 }
 
 template <class M>
-[[gnu::always_inline]] inline bool any(M mask) {
+BC_INLINE bool any(M mask) {
   if constexpr (is_scalar<M>) {
     return mask;
   } else {
@@ -171,73 +175,73 @@ template <class T>
 struct Vec {
   T v[3];
 
-  [[gnu::always_inline]] T& operator[](int k) { return v[k]; }
-  [[gnu::always_inline]] const T& operator[](int k) const { return v[k]; }
+  BC_INLINE T& operator[](int k) { return v[k]; }
+  BC_INLINE const T& operator[](int k) const { return v[k]; }
 };
 
 template <class T>
-[[gnu::always_inline]] inline Vec<T> operator+(const Vec<T>& a, const Vec<T>& b) {
+BC_INLINE Vec<T> operator+(const Vec<T>& a, const Vec<T>& b) {
   return {a[0] + b[0], a[1] + b[1], a[2] + b[2]};
 }
 template <class T>
-[[gnu::always_inline]] inline Vec<T> operator-(const Vec<T>& a, const Vec<T>& b) {
+BC_INLINE Vec<T> operator-(const Vec<T>& a, const Vec<T>& b) {
   return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
 }
 template <class T>
-[[gnu::always_inline]] inline Vec<T> operator-(const Vec<T>& a) {
+BC_INLINE Vec<T> operator-(const Vec<T>& a) {
   return {-a[0], -a[1], -a[2]};
 }
 template <class T>
-[[gnu::always_inline]] inline Vec<T> operator*(T factor, const Vec<T>& a) {
+BC_INLINE Vec<T> operator*(T factor, const Vec<T>& a) {
   return {factor * a[0], factor * a[1], factor * a[2]};
 }
 template <class T, class = std::enable_if_t<!is_scalar<T>>>
-[[gnu::always_inline]] inline Vec<T> operator*(Number<T> factor, const Vec<T>& a) {
+BC_INLINE Vec<T> operator*(Number<T> factor, const Vec<T>& a) {
   return splat<T>(factor) * a;
 }
 // By components, and with the same number for each.
 template <class T>
-[[gnu::always_inline]] inline Vec<T> operator*(const Vec<T>& a, const Vec<T>& b) {
+BC_INLINE Vec<T> operator*(const Vec<T>& a, const Vec<T>& b) {
   return {a[0] * b[0], a[1] * b[1], a[2] * b[2]};
 }
 template <class T>
-[[gnu::always_inline]] inline Vec<T> operator/(const Vec<T>& a, const Vec<T>& b) {
+BC_INLINE Vec<T> operator/(const Vec<T>& a, const Vec<T>& b) {
   return {a[0] / b[0], a[1] / b[1], a[2] / b[2]};
 }
 template <class T>
-[[gnu::always_inline]] inline Vec<T> operator+(const Vec<T>& a, T b) {
+BC_INLINE Vec<T> operator+(const Vec<T>& a, T b) {
   return {a[0] + b, a[1] + b, a[2] + b};
 }
 template <class T>
-[[gnu::always_inline]] inline Vec<T> operator-(T a, const Vec<T>& b) {
+BC_INLINE Vec<T> operator-(T a, const Vec<T>& b) {
   return {a - b[0], a - b[1], a - b[2]};
 }
 template <class T>
-[[gnu::always_inline]] inline T dot(const Vec<T>& a, const Vec<T>& b) {
+BC_INLINE T dot(const Vec<T>& a, const Vec<T>& b) {
   return (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2];
 }
 template <class T>
-[[gnu::always_inline]] inline Vec<T> abs(const Vec<T>& a) {
+BC_INLINE Vec<T> abs(const Vec<T>& a) {
   return {abs(a[0]), abs(a[1]), abs(a[2])};
 }
 template <class T>
-[[gnu::always_inline]] inline Vec<T> min(const Vec<T>& a, const Vec<T>& b) {
+BC_INLINE Vec<T> min(const Vec<T>& a, const Vec<T>& b) {
   return {min(a[0], b[0]), min(a[1], b[1]), min(a[2], b[2])};
 }
 template <class T>
-[[gnu::always_inline]] inline Vec<T> max(const Vec<T>& a, const Vec<T>& b) {
+BC_INLINE Vec<T> max(const Vec<T>& a, const Vec<T>& b) {
   return {max(a[0], b[0]), max(a[1], b[1]), max(a[2], b[2])};
 }
 template <class T>
-[[gnu::always_inline]] inline T largest(const Vec<T>& a) {
+BC_INLINE T largest(const Vec<T>& a) {
   return max(max(a[0], a[1]), a[2]);
 }
 template <class T>
-[[gnu::always_inline]] inline T smallest(const Vec<T>& a) {
+BC_INLINE T smallest(const Vec<T>& a) {
   return min(min(a[0], a[1]), a[2]);
 }
 template <class T>
-[[gnu::always_inline]] inline Vec<T> select(Mask<T> mask, const Vec<T>& a, const Vec<T>& b) {
+BC_INLINE Vec<T> select(Mask<T> mask, const Vec<T>& a, const Vec<T>& b) {
   return {select<T>(mask, a[0], b[0]), select<T>(mask, a[1], b[1]), select<T>(mask, a[2], b[2])};
 }
 
@@ -246,33 +250,33 @@ template <class T>
 struct Mat {
   T m[3][3];
 
-  [[gnu::always_inline]] T* operator[](int i) { return m[i]; }
-  [[gnu::always_inline]] const T* operator[](int i) const { return m[i]; }
+  BC_INLINE T* operator[](int i) { return m[i]; }
+  BC_INLINE const T* operator[](int i) const { return m[i]; }
 };
 
 template <class T>
-[[gnu::always_inline]] inline Vec<T> row(const Mat<T>& m, int i) {
+BC_INLINE Vec<T> row(const Mat<T>& m, int i) {
   return {m[i][0], m[i][1], m[i][2]};
 }
 template <class T>
-[[gnu::always_inline]] inline Vec<T> column(const Mat<T>& m, int j) {
+BC_INLINE Vec<T> column(const Mat<T>& m, int j) {
   return {m[0][j], m[1][j], m[2][j]};
 }
 template <class T>
-[[gnu::always_inline]] inline Mat<T> transpose(const Mat<T>& m) {
+BC_INLINE Mat<T> transpose(const Mat<T>& m) {
   return {{{m[0][0], m[1][0], m[2][0]}, {m[0][1], m[1][1], m[2][1]}, {m[0][2], m[1][2], m[2][2]}}};
 }
 template <class T>
-[[gnu::always_inline]] inline Vec<T> operator*(const Mat<T>& m, const Vec<T>& a) {
+BC_INLINE Vec<T> operator*(const Mat<T>& m, const Vec<T>& a) {
   return {dot(row(m, 0), a), dot(row(m, 1), a), dot(row(m, 2), a)};
 }
 // mᵀ · a.
 template <class T>
-[[gnu::always_inline]] inline Vec<T> transposed_times(const Mat<T>& m, const Vec<T>& a) {
+BC_INLINE Vec<T> transposed_times(const Mat<T>& m, const Vec<T>& a) {
   return {dot(column(m, 0), a), dot(column(m, 1), a), dot(column(m, 2), a)};
 }
 template <class T>
-[[gnu::always_inline]] inline Mat<T> select(Mask<T> mask, const Mat<T>& a, const Mat<T>& b) {
+BC_INLINE Mat<T> select(Mask<T> mask, const Mat<T>& a, const Mat<T>& b) {
   Mat<T> m;
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) m[i][j] = select<T>(mask, a[i][j], b[i][j]);
@@ -280,18 +284,18 @@ template <class T>
 }
 
 template <class T>
-[[gnu::always_inline]] inline Vec<Number<T>> lane(const Vec<T>& a, int i) {
+BC_INLINE Vec<Number<T>> lane(const Vec<T>& a, int i) {
   return {lane(a[0], i), lane(a[1], i), lane(a[2], i)};
 }
 template <class T>
-[[gnu::always_inline]] inline Mat<Number<T>> lane(const Mat<T>& m, int i) {
+BC_INLINE Mat<Number<T>> lane(const Mat<T>& m, int i) {
   Mat<Number<T>> found;
   for (int r = 0; r < 3; ++r)
     for (int c = 0; c < 3; ++c) found[r][c] = lane(m[r][c], i);
   return found;
 }
 template <class T, class N>
-[[gnu::always_inline]] inline void set_lane(Vec<T>& a, int i, const Vec<N>& value) {
+BC_INLINE void set_lane(Vec<T>& a, int i, const Vec<N>& value) {
   for (int k = 0; k < 3; ++k) set_lane(a[k], i, value[k]);
 }
 
@@ -328,7 +332,7 @@ using Triple = typename TripleOf<T>::type;
 // Functions below take a `Vec<T>`, or a vector of the machine, `Packed`.
 
 template <class T>
-[[gnu::always_inline]] inline Triple<T> triple(const Vec<T>& a) {
+BC_INLINE Triple<T> triple(const Vec<T>& a) {
   if constexpr (packed<T>) {
     return Triple<T>{a[0], a[1], a[2], a[2]};
   } else {
@@ -337,31 +341,31 @@ template <class T>
 }
 // The same number three times.
 template <class T>
-[[gnu::always_inline]] inline Triple<T> uniform(T x) {
+BC_INLINE Triple<T> uniform(T x) {
   return triple(Vec<T>{x, x, x});
 }
 template <class T>
-[[gnu::always_inline]] inline Vec<T> components(const Triple<T>& a) {
+BC_INLINE Vec<T> components(const Triple<T>& a) {
   return {a[0], a[1], a[2]};
 }
 
 // A formula of single numbers, for each number of triples.
 template <class Formula, class T, class... More>
-[[gnu::always_inline]] inline Vec<T> each(Formula formula, const Vec<T>& a, const More&... more) {
+BC_INLINE Vec<T> each(Formula formula, const Vec<T>& a, const More&... more) {
   return {formula(a[0], more[0]...), formula(a[1], more[1]...), formula(a[2], more[2]...)};
 }
 template <class Formula, class Packed, class... More>
-[[gnu::always_inline]] inline Packed each(Formula formula, Packed a, More... more) {
+BC_INLINE Packed each(Formula formula, Packed a, More... more) {
   return formula(a, more...);
 }
 
 // Component k as a factor or a summand of triples.
 template <class T>
-[[gnu::always_inline]] inline T spread(const Vec<T>& a, int k) {
+BC_INLINE T spread(const Vec<T>& a, int k) {
   return a[k];
 }
 template <class Packed>
-[[gnu::always_inline]] inline Packed spread(Packed a, int k) {
+BC_INLINE Packed spread(Packed a, int k) {
   return k == 0   ? __builtin_shufflevector(a, a, 0, 0, 0, 0)
          : k == 1 ? __builtin_shufflevector(a, a, 1, 1, 1, 1)
                   : __builtin_shufflevector(a, a, 2, 2, 2, 2);
@@ -369,33 +373,33 @@ template <class Packed>
 
 // The sum of the components, three times.
 template <class T>
-[[gnu::always_inline]] inline Vec<T> total(const Vec<T>& a) {
+BC_INLINE Vec<T> total(const Vec<T>& a) {
   return uniform((a[0] + a[1]) + a[2]);
 }
 template <class Packed>
-[[gnu::always_inline]] inline Packed total(Packed a) {
+BC_INLINE Packed total(Packed a) {
   return (spread(a, 0) + spread(a, 1)) + spread(a, 2);
 }
 
 // The components y z x.
 template <class T>
-[[gnu::always_inline]] inline Vec<T> rotated(const Vec<T>& a) {
+BC_INLINE Vec<T> rotated(const Vec<T>& a) {
   return {a[1], a[2], a[0]};
 }
 template <class Packed>
-[[gnu::always_inline]] inline Packed rotated(Packed a) {
+BC_INLINE Packed rotated(Packed a) {
   return __builtin_shufflevector(a, a, 1, 2, 0, 0);
 }
 
 // One choice for all three numbers of a single pair, without a branch.
 template <class Packed, class = std::enable_if_t<!is_scalar<Packed> && !std::is_class_v<Packed>>>
-[[gnu::always_inline]] inline Packed select(bool mask, Packed a, Packed b) {
+BC_INLINE Packed select(bool mask, Packed a, Packed b) {
   return (Mask<Packed>{} - Number<Mask<Packed>>(mask)) ? a : b;
 }
 
 // The nearest point of the box of half extents `half` about the origin.
 template <class Three>
-[[gnu::always_inline]] inline Three clamp(const Three& x, const Three& half) {
+BC_INLINE Three clamp(const Three& x, const Three& half) {
   return min(half, max(-half, x));
 }
 
@@ -404,20 +408,20 @@ template <class T>
 struct Columns {
   Triple<T> c[3];
 
-  [[gnu::always_inline]] Triple<T>& operator[](int j) { return c[j]; }
-  [[gnu::always_inline]] const Triple<T>& operator[](int j) const { return c[j]; }
+  BC_INLINE Triple<T>& operator[](int j) { return c[j]; }
+  BC_INLINE const Triple<T>& operator[](int j) const { return c[j]; }
 };
 
 template <class T>
-[[gnu::always_inline]] inline Columns<T> columns(const Mat<T>& m) {
+BC_INLINE Columns<T> columns(const Mat<T>& m) {
   return {{triple(column(m, 0)), triple(column(m, 1)), triple(column(m, 2))}};
 }
 template <class T>
-[[gnu::always_inline]] inline Mat<T> matrix(const Columns<T>& m) {
+BC_INLINE Mat<T> matrix(const Columns<T>& m) {
   return {{{m[0][0], m[1][0], m[2][0]}, {m[0][1], m[1][1], m[2][1]}, {m[0][2], m[1][2], m[2][2]}}};
 }
 template <class T>
-[[gnu::always_inline]] inline Columns<T> transpose(const Columns<T>& m) {
+BC_INLINE Columns<T> transpose(const Columns<T>& m) {
   if constexpr (packed<T>) {
     auto even = __builtin_shufflevector(m[0], m[1], 0, 4, 2, 6);
     auto odd = __builtin_shufflevector(m[0], m[1], 1, 5, 3, 7);
@@ -431,17 +435,16 @@ template <class T>
   }
 }
 template <class T>
-[[gnu::always_inline]] inline Columns<T> abs(const Columns<T>& m) {
+BC_INLINE Columns<T> abs(const Columns<T>& m) {
   return {{abs(m[0]), abs(m[1]), abs(m[2])}};
 }
 template <class T>
-[[gnu::always_inline]] inline Columns<T> select(Mask<T> mask, const Columns<T>& a,
-                                                const Columns<T>& b) {
+BC_INLINE Columns<T> select(Mask<T> mask, const Columns<T>& a, const Columns<T>& b) {
   return {{select(mask, a[0], b[0]), select(mask, a[1], b[1]), select(mask, a[2], b[2])}};
 }
 template <class T>
-[[gnu::always_inline]] inline Triple<T> operator*(const Columns<T>& m, const Triple<T>& a) {
+BC_INLINE Triple<T> operator*(const Columns<T>& m, const Triple<T>& a) {
   return (spread(a, 0) * m[0] + spread(a, 1) * m[1]) + spread(a, 2) * m[2];
 }
 
-}  // namespace box_contact
+}  // namespace box_contact::BOX_CONTACT_SET

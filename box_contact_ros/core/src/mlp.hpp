@@ -19,14 +19,13 @@
 // Outside the range that the network was trained for the answer is the exact one, too.
 #pragma once
 
-#include <algorithm>
 #include <initializer_list>
 #include <vector>
 
 #include "contact.hpp"
 #include "overlap/bounds.hpp"
 
-namespace box_contact {
+namespace box_contact::BOX_CONTACT_SET {
 
 // The range: longest by shortest edge of either box, longest edge of one box by the other's, depth
 // by the shortest edge of both. The limits belong to it, rounding included.
@@ -101,7 +100,7 @@ struct SiteVectors {
 constexpr double least_slant = 1e-9;
 
 template <class T>
-[[gnu::always_inline]] inline T shortened(T x) {
+BC_INLINE T shortened(T x) {
   T length = max(abs(x) - least_slant, T{});
   return select<T>(x >= 0.0, length, -length);
 }
@@ -109,7 +108,7 @@ template <class T>
 // The cut cube in float64. Faces are as wide as the bounds took them: one in a plane with the
 // cube's face cuts nothing.
 template <class T>
-[[gnu::always_inline]] inline CutCube<T> cut_cube(const OverlapBounds<T>& bounds, T size) {
+BC_INLINE CutCube<T> cut_cube(const OverlapBounds<T>& bounds, T size) {
   Columns<T> normals;
   for (int k = 0; k < 3; ++k) normals[k] = spread(bounds.half, k) * bounds.other_axes[k];
   Triple<T> one = uniform(splat<T>(1.0));
@@ -129,8 +128,8 @@ template <class T>
 }
 
 template <class F>
-[[gnu::always_inline]] inline void describe(const CutCube<F>& cube, SiteFeatures<F>& features,
-                                            SiteVectors<F>& vectors) {
+BC_INLINE void describe(const CutCube<F>& cube, SiteFeatures<F>& features,
+                        SiteVectors<F>& vectors) {
   const Columns<F>& slant = cube.slant;
   const Triple<F>&cut = cube.cut, &push = cube.push;
   // The numbers of the next pair of faces or axis, and of the one after it.
@@ -179,9 +178,19 @@ struct Network {
   std::vector<Unit> units;
 };
 
+// The numbers of a network in memory.
+struct NetworkView {
+  const float* output_bias;
+  const Network::Unit* units;
+  long count;
+};
+inline NetworkView view(const Network& network) {
+  return {network.output_bias, network.units.data(), long(network.units.size())};
+}
+
 // w · x + y, rounded once where the machine can: networks alone may do so.
 template <class F>
-[[gnu::always_inline]] inline F multiply_add(float w, F x, F y) {
+BC_INLINE F multiply_add(float w, F x, F y) {
 #if defined(__AVX512F__)
   if constexpr (std::is_same_v<F, Lanes<float, 16>>)
     return (F)_mm512_fmadd_ps(_mm512_set1_ps(w), (__m512)x, (__m512)y);
@@ -196,13 +205,12 @@ template <class F>
 }
 
 template <class F>
-[[gnu::always_inline]] inline Vec<F> multiply_add(float w, const Vec<F>& x, const Vec<F>& y) {
+BC_INLINE Vec<F> multiply_add(float w, const Vec<F>& x, const Vec<F>& y) {
   return {multiply_add(w, x[0], y[0]), multiply_add(w, x[1], y[1]), multiply_add(w, x[2], y[2])};
 }
 
 template <class Three>
-[[gnu::always_inline]] inline Three weighted_sum(Three start, const float (&weights)[4],
-                                                 const Three (&features)[4]) {
+BC_INLINE Three weighted_sum(Three start, const float (&weights)[4], const Three (&features)[4]) {
   for (int k = 0; k < 4; ++k) start = multiply_add(weights[k], features[k], start);
   return start;
 }
@@ -219,8 +227,8 @@ constexpr int outputs_at_once = 4;
 
 // Add what hidden units give to the outputs from `first` to before `last`, at the sites of one axis.
 template <int first, int last, class Three>
-[[gnu::always_inline]] inline void add_outputs(const Network::Unit* unit, int units,
-                                               const Three* hidden, Three* outputs) {
+BC_INLINE void add_outputs(const Network::Unit* unit, int units, const Three* hidden,
+                           Three* outputs) {
   Three sums[last - first];  // not in `outputs`: for all the compiler knows, the weights are there
   for (int k = first; k < last; ++k) sums[k - first] = outputs[k];
   for (int n = 0; n < units; ++n)
@@ -232,14 +240,14 @@ template <int first, int last, class Three>
 // The first `count` outputs at all sites. What sites share is summed once. The sites of one axis
 // come one after the other, so that the sums of their outputs stay in registers.
 template <int count, class F>
-inline void forward(const Network& network, const SiteFeatures<F>& features,
+inline void forward(const NetworkView& network, const SiteFeatures<F>& features,
                     SiteOutputs<F>& outputs) {
   for (auto& axis : outputs.at)
     for (int k = 0; k < count; ++k) axis[k] = uniform(splat<F>(network.output_bias[k]));
-  const Network::Unit *unit = network.units.data(), *end = unit + network.units.size();
+  const Network::Unit *unit = network.units, *end = unit + network.count;
   for (; unit < end; unit += units_at_once) {
     Triple<F> of_faces[units_at_once], of_axis[units_at_once];
-    int units = int(std::min<long>(units_at_once, end - unit));
+    int units = end - unit < units_at_once ? int(end - unit) : units_at_once;
     for (int n = 0; n < units; ++n) {
       of_faces[n] =
           weighted_sum(uniform(splat<F>(unit[n].bias)), unit[n].of_faces, features.of_faces);
@@ -252,7 +260,7 @@ inline void forward(const Network& network, const SiteFeatures<F>& features,
         Triple<F> shared = of_faces[n] + spread(of_axis[n], q);
         hidden[n] = max(weighted_sum(shared, unit[n].of_site, features.of_site[q]), Triple<F>{});
       }
-      constexpr int middle = std::min(count, outputs_at_once);
+      constexpr int middle = count < outputs_at_once ? count : outputs_at_once;
       add_outputs<0, middle>(unit, units, hidden, outputs.at[q]);
       add_outputs<middle, count>(unit, units, hidden, outputs.at[q]);
     }
@@ -265,7 +273,7 @@ using Narrow =
     typename std::conditional_t<is_scalar<T>, NumberOf<float>, LanesOf<float, 2 * width<T>>>::type;
 
 template <class T>
-[[gnu::always_inline]] inline Narrow<T> narrow(const T& low, const T& high) {
+BC_INLINE Narrow<T> narrow(const T& low, const T& high) {
   using Half = Lanes<float, width<T>>;
   Half halves[2] = {__builtin_convertvector(low, Half), __builtin_convertvector(high, Half)};
   Narrow<T> joined;
@@ -273,7 +281,7 @@ template <class T>
   return joined;
 }
 template <class T>
-[[gnu::always_inline]] inline T half_of(const Narrow<T>& x, int half) {
+BC_INLINE T half_of(const Narrow<T>& x, int half) {
   using Half = Lanes<float, width<T>>;
   Half halves[2];
   std::memcpy(halves, &x, sizeof(x));
@@ -282,12 +290,12 @@ template <class T>
 
 // Triples of a group as one of float32, and back.
 template <class T>
-[[gnu::always_inline]] inline Vec<Narrow<T>> narrow(const Vec<T> (&group)[2]) {
+BC_INLINE Vec<Narrow<T>> narrow(const Vec<T> (&group)[2]) {
   return {narrow(group[0][0], group[1][0]), narrow(group[0][1], group[1][1]),
           narrow(group[0][2], group[1][2])};
 }
 template <class T>
-[[gnu::always_inline]] inline Triple<float> narrow(const Triple<T> (&group)[1]) {
+BC_INLINE Triple<float> narrow(const Triple<T> (&group)[1]) {
   const Triple<T>& x = group[0];
   if constexpr (packed<T>) {
     return __builtin_convertvector(x, Triple<float>);
@@ -296,7 +304,7 @@ template <class T>
   }
 }
 template <class T>
-[[gnu::always_inline]] inline Triple<T> widen(const Triple<Narrow<T>>& x, int half) {
+BC_INLINE Triple<T> widen(const Triple<Narrow<T>>& x, int half) {
   if constexpr (packed<T>) {
     return __builtin_convertvector(x, Triple<T>);
   } else if constexpr (is_scalar<T>) {
@@ -307,7 +315,7 @@ template <class T>
 }
 
 template <class T, int group>
-[[gnu::always_inline]] inline CutCube<Narrow<T>> narrow(const CutCube<T> (&cubes)[group]) {
+BC_INLINE CutCube<Narrow<T>> narrow(const CutCube<T> (&cubes)[group]) {
   auto joined = [&](auto part) {
     Triple<T> parts[group];
     for (int g = 0; g < group; ++g) parts[g] = part(cubes[g]);
@@ -325,7 +333,7 @@ template <class T, int group>
 
 // eˣ for x from −80 to 80, to 2 ulp; NaN for NaN. For lanes F of float32.
 template <class F>
-[[gnu::always_inline]] inline F exp(F x) {
+BC_INLINE F exp(F x) {
   using Bits = std::conditional_t<is_scalar<F>, uint32_t, Mask<F>>;
   constexpr float rounder = 0x1.8p23F;  // added, it leaves a whole number in the low bits
   F shifted = x * 0x1.715476p0F + rounder, whole = shifted - rounder;
@@ -364,14 +372,14 @@ struct CubeMoments {
 
 // The sums over the faces f of three numbers by f: [q] becomes q.
 template <class F>
-[[gnu::always_inline]] inline Triple<F> over_faces(const Columns<F>& parts) {
+BC_INLINE Triple<F> over_faces(const Columns<F>& parts) {
   Columns<F> by_axis = transpose(parts);
   return (by_axis[0] + by_axis[1]) + by_axis[2];
 }
 
 // The inverse of the matrix P of a diagonal xx, yy, zz and the rest yz, xz, xy, by its cofactors.
 template <class F>
-[[gnu::always_inline]] inline void invert(Triple<F>& diagonal, Triple<F>& rest) {
+BC_INLINE void invert(Triple<F>& diagonal, Triple<F>& rest) {
   auto next = [](const Triple<F>& x) { return rotated(x); };
   auto last = [](const Triple<F>& x) { return rotated(rotated(x)); };
   Triple<F> cofactors = next(diagonal) * last(diagonal) - rest * rest;
@@ -393,11 +401,9 @@ template <class F>
 // P. It is positive definite, as k ≥ 0 and D > 0. An uncut cube is exact. A sign change of the faces
 // f turns s_f and p_f, one of the axis q turns b(q) and v(q): the covariance turns along.
 template <class F>
-[[gnu::always_inline]] inline void ask_for_patch(const CutCube<F>& cube,
-                                                 const SiteFeatures<F>& features,
-                                                 const SiteVectors<F>& vectors,
-                                                 const SiteOutputs<F>& outputs,
-                                                 CubeMoments<F>& said) {
+BC_INLINE void ask_for_patch(const CutCube<F>& cube, const SiteFeatures<F>& features,
+                             const SiteVectors<F>& vectors, const SiteOutputs<F>& outputs,
+                             CubeMoments<F>& said) {
   Triple<F> reach = uniform(splat<F>(coupling_reach));
   Columns<F> volumes, stretches, couplings, pushes, squares, products;
   for (int q = 0; q < 3; ++q) {
@@ -426,8 +432,8 @@ template <class F>
 
 // What the network says of a group of cubes, by its first `asked` outputs.
 template <int asked, class T, int group>
-[[gnu::always_inline]] inline void ask(const Network& network, const CutCube<T> (&cubes)[group],
-                                       CubeMoments<T> (&answers)[group]) {
+BC_INLINE void ask(const NetworkView& network, const CutCube<T> (&cubes)[group],
+                   CubeMoments<T> (&answers)[group]) {
   using F = Narrow<T>;
   CutCube<F> cube = narrow(cubes);
   SiteFeatures<F> features;
@@ -451,8 +457,7 @@ template <int asked, class T, int group>
 
 // The answer [m] from the middle of the bounding box, cut to where a centroid can be.
 template <class T>
-[[gnu::always_inline]] inline Triple<T> within_reach(const OverlapBounds<T>& bounds,
-                                                     const Triple<T>& answer) {
+BC_INLINE Triple<T> within_reach(const OverlapBounds<T>& bounds, const Triple<T>& answer) {
   return bounds.half * clamp(answer, uniform(splat<T>(centroid_reach)));
 }
 
@@ -466,8 +471,7 @@ struct Placed {
 // Move the network's answer into both boxes: twice to the nearest point of the other box, and back
 // to the nearest point of the box whose frame it is.
 template <class T>
-[[gnu::always_inline]] inline Placed<T> place(const OverlapBounds<T>& bounds,
-                                              const Triple<T>& answer, T size) {
+BC_INLINE Placed<T> place(const OverlapBounds<T>& bounds, const Triple<T>& answer, T size) {
   Columns<T> to_other = bounds.other_axes, from_other = transpose(to_other);
   auto in_other = [&](const Triple<T>& point) -> Triple<T> {
     return bounds.other_offset + to_other * (point - bounds.middle);
@@ -489,8 +493,7 @@ template <class T>
 // Whether the network may be asked: the pair is of the kind that it was trained for, and the
 // overlap has a volume.
 template <class T>
-[[gnu::always_inline]] inline Mask<T> in_range(const Pair<T>& pair, T separation,
-                                               const OverlapBounds<T>& bounds) {
+BC_INLINE Mask<T> in_range(const Pair<T>& pair, T separation, const OverlapBounds<T>& bounds) {
   T long_a = largest(pair.half_a), short_a = smallest(pair.half_a);
   T long_b = largest(pair.half_b), short_b = smallest(pair.half_b);
   // Each quantity by its limit: 1 at the border of the range.
@@ -502,8 +505,8 @@ template <class T>
 
 // Volume and covariance of the overlap, bounds' frame.
 template <class T>
-[[gnu::always_inline]] inline void scale_patch(const OverlapBounds<T>& bounds,
-                                               const CubeMoments<T>& said, Moments<T>& found) {
+BC_INLINE void scale_patch(const OverlapBounds<T>& bounds, const CubeMoments<T>& said,
+                           Moments<T>& found) {
   Vec<T> half = components<T>(bounds.half);
   found.volume = (8.0 * said.volume[0]) * (half[0] * half[1] * half[2]);
   for (int k = 0; k < 3; ++k) {
@@ -513,13 +516,13 @@ template <class T>
   }
 }
 
-// The model for bounds of one method.
-template <Network::Bounds method>
+// The model for bounds of one method. With `asks_patch` it gives all moments, else the centroid alone.
+// By the edges it gives the centroid alone, as it did formerly.
+template <Network::Bounds method, bool asks_patch = true>
 struct MlpModelBy {
-  const Network& network;
+  NetworkView network;
 
-  // By the slab the network gives all moments; by the edges, as it did formerly, the centroid alone.
-  static constexpr bool gives_patch = method == Network::Bounds::slab;
+  static constexpr bool gives_patch = asks_patch && method == Network::Bounds::slab;
   template <class T>
   using Found = std::conditional_t<gives_patch, Moments<T>, Vec<T>>;
   // How many queries of T it takes at once: float32 lanes are twice as many.
@@ -528,8 +531,7 @@ struct MlpModelBy {
 
   // The bounds of a pressed pair.
   template <class T>
-  [[gnu::always_inline]] static OverlapBounds<T> bounds_of(const Pair<T>& pair,
-                                                           const SeparatingAxis<T>& axis) {
+  BC_INLINE static OverlapBounds<T> bounds_of(const Pair<T>& pair, const SeparatingAxis<T>& axis) {
     if constexpr (method == Network::Bounds::edges) {
       return bounds_by_edges(pair);
     } else {
@@ -539,8 +541,8 @@ struct MlpModelBy {
 
   // What it finds, for the pairs that touch.
   template <class T, int count>
-  [[gnu::always_inline]] void solve(const Query<T> (&queries)[count], Found<T> (&found)[count],
-                                    Counts& counts) const {
+  BC_INLINE void solve(const Query<T> (&queries)[count], Found<T> (&found)[count],
+                       Counts& counts) const {
     OverlapBounds<T> bounds[count];
     CutCube<T> cubes[count];
     CubeMoments<T> answers[count];
@@ -585,5 +587,6 @@ struct MlpModelBy {
 };
 // The model that is shipped. Bounds by the edges are kept as a measured baseline.
 using MlpModel = MlpModelBy<Network::Bounds::slab>;
+using MlpPointModel = MlpModelBy<Network::Bounds::slab, false>;
 
-}  // namespace box_contact
+}  // namespace box_contact::BOX_CONTACT_SET
