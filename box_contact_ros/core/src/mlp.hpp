@@ -19,7 +19,6 @@
 // Outside the range that the network was trained for the answer is the exact one, too.
 #pragma once
 
-#include <initializer_list>
 #include <vector>
 
 #include "contact.hpp"
@@ -339,7 +338,8 @@ BC_INLINE F exp(F x) {
   F shifted = x * 0x1.715476p0F + rounder, whole = shifted - rounder;
   F rest = (x - whole * 0x1.62ep-1F) - whole * 0x1.0bfbe8p-15F;  // x − whole · ln 2
   F series = splat<F>(1.0F / 720.0F);
-  for (float factor : {1.0F / 120.0F, 1.0F / 24.0F, 1.0F / 6.0F, 0.5F, 1.0F, 1.0F})
+  constexpr float factors[] = {1.0F / 120.0F, 1.0F / 24.0F, 1.0F / 6.0F, 0.5F, 1.0F, 1.0F};
+  for (float factor : factors)
     series = series * rest + factor;
   Bits power;
   std::memcpy(&power, &shifted, sizeof power);
