@@ -186,35 +186,55 @@ BC_INLINE Answer<T> answer(const Query<T>& q, const Found& found, double margin)
                   Sym<T>{{nothing, nothing, nothing, nothing, nothing, nothing}})}};
 }
 
+// The numbers of row `row`: places of the poses and sizes of its boxes.
+struct RowPlaces {
+  const double *pose_a, *pose_b, *size_a, *size_b;
+
+  BC_INLINE RowPlaces(const Rows& rows, long row) {
+    long of_a = row, of_b = row;
+    if (rows.pairs) of_a = long(rows.pairs[2 * row]), of_b = long(rows.pairs[2 * row + 1]);
+    pose_a = rows.poses_a + 7 * of_a;
+    pose_b = rows.poses_b + 7 * of_b;
+    size_a = rows.sizes_a + rows.size_step_a * of_a;
+    size_b = rows.sizes_b + rows.size_step_b * of_b;
+  }
+};
+
 // Rows `first` to `last` side by side. Lanes beyond them repeat the last one.
 template <class T>
 BC_INLINE Query<T> query_rows(const Rows& rows, long first, long last) {
-  alignas(sizeof(T)) double a[7][width<T>], b[7][width<T>], sizes[6][width<T>];
-  for (int i = 0; i < width<T>; ++i) {
-    long row = min(first + i, last - 1);
-    long of_a = rows.pairs ? long(rows.pairs[2 * row]) : row;
-    long of_b = rows.pairs ? long(rows.pairs[2 * row + 1]) : row;
-    for (int k = 0; k < 7; ++k) a[k][i] = rows.poses_a[7 * of_a + k];
-    for (int k = 0; k < 7; ++k) b[k][i] = rows.poses_b[7 * of_b + k];
-    for (int k = 0; k < 3; ++k) sizes[k][i] = rows.sizes_a[rows.size_step_a * of_a + k];
-    for (int k = 0; k < 3; ++k) sizes[3 + k][i] = rows.sizes_b[rows.size_step_b * of_b + k];
-  }
-  auto lanes_of = [](const double (&numbers)[width<T>]) {
-    T x;
-    std::memcpy(&x, numbers, sizeof(T));
-    return x;
-  };
   Pose<T> pose_a, pose_b;
   Vec<T> half_a, half_b;
-  for (int k = 0; k < 3; ++k) {
-    pose_a.position[k] = lanes_of(a[k]);
-    pose_b.position[k] = lanes_of(b[k]);
-    half_a[k] = 0.5 * lanes_of(sizes[k]);
-    half_b[k] = 0.5 * lanes_of(sizes[3 + k]);
-  }
-  for (int k = 0; k < 4; ++k) {
-    pose_a.quaternion[k] = lanes_of(a[3 + k]);
-    pose_b.quaternion[k] = lanes_of(b[3 + k]);
+  if constexpr (is_scalar<T>) {
+    RowPlaces at(rows, first);
+    for (int k = 0; k < 3; ++k) {
+      pose_a.position[k] = at.pose_a[k], pose_b.position[k] = at.pose_b[k];
+      half_a[k] = 0.5 * at.size_a[k], half_b[k] = 0.5 * at.size_b[k];
+    }
+    for (int k = 0; k < 4; ++k) {
+      pose_a.quaternion[k] = at.pose_a[3 + k];
+      pose_b.quaternion[k] = at.pose_b[3 + k];
+    }
+  } else {
+    alignas(sizeof(T)) double a[7][width<T>], b[7][width<T>], sizes[6][width<T>];
+    for (int i = 0; i < width<T>; ++i) {
+      RowPlaces at(rows, min(first + i, last - 1));
+      for (int k = 0; k < 7; ++k) a[k][i] = at.pose_a[k], b[k][i] = at.pose_b[k];
+      for (int k = 0; k < 3; ++k) sizes[k][i] = at.size_a[k], sizes[3 + k][i] = at.size_b[k];
+    }
+    auto lanes_of = [](const double (&numbers)[width<T>]) {
+      T x;
+      std::memcpy(&x, numbers, sizeof(T));
+      return x;
+    };
+    for (int k = 0; k < 3; ++k) {
+      pose_a.position[k] = lanes_of(a[k]), pose_b.position[k] = lanes_of(b[k]);
+      half_a[k] = 0.5 * lanes_of(sizes[k]), half_b[k] = 0.5 * lanes_of(sizes[3 + k]);
+    }
+    for (int k = 0; k < 4; ++k) {
+      pose_a.quaternion[k] = lanes_of(a[3 + k]);
+      pose_b.quaternion[k] = lanes_of(b[3 + k]);
+    }
   }
   return query(pose_a, pose_b, half_a, half_b);
 }
@@ -298,13 +318,13 @@ template <class Model>
 // Solve rows `begin` to `end`. Returns the first row whose poses or sizes are refused, or −1. Such
 // rows get `colliding` false and `separation` NaN.
 //
-// A few rows that are left are solved one by one, which is faster than a group with idle lanes. Of
-// two lanes none is idle: a single pair leaves a machine's register of two half empty anyway.
+// A few rows that are left are solved one by one, which is faster than a group with idle lanes. With
+// registers of two a pair alone is slower than a block of two, of which one lane is idle.
 template <class T, class Model>
 [[gnu::noinline]] inline long solve_rows(const Model& model, const Rows& rows, long begin, long end,
                                          const Results& results, Counts& counts) {
   constexpr int group = Model::template group<T>;
-  constexpr long few = is_scalar<T> || width<T> <= 2 ? 0 : group;
+  constexpr long few = is_scalar<T> ? 0 : width<T> <= 2 ? group - 1 : group;
   long refused = -1, first = begin;
   auto note = [&](long row) { refused = refused < 0 ? row : refused; };
   for (; end - first > few; first += group * width<T>)

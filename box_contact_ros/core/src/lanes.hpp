@@ -164,6 +164,10 @@ template <class M>
 BC_INLINE bool any(M mask) {
   if constexpr (is_scalar<M>) {
     return mask;
+#if defined(__AVX__)
+  } else if constexpr (sizeof(M) == 32 && sizeof(Number<M>) == 8) {
+    return _mm256_movemask_pd((__m256d)mask) != 0;
+#endif
   } else {
     Number<M> found = 0;
     for (int i = 0; i < width<M>; ++i) found |= mask[i];

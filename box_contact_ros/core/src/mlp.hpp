@@ -339,8 +339,7 @@ BC_INLINE F exp(F x) {
   F rest = (x - whole * 0x1.62ep-1F) - whole * 0x1.0bfbe8p-15F;  // x − whole · ln 2
   F series = splat<F>(1.0F / 720.0F);
   constexpr float factors[] = {1.0F / 120.0F, 1.0F / 24.0F, 1.0F / 6.0F, 0.5F, 1.0F, 1.0F};
-  for (float factor : factors)
-    series = series * rest + factor;
+  for (float factor : factors) series = series * rest + factor;
   Bits power;
   std::memcpy(&power, &shifted, sizeof power);
   power = (power << 23) + 0x3f800000;  // the bits of 2 to the power of the whole number

@@ -147,6 +147,17 @@ struct NoSquares {
   BC_INLINE void operator-=(const T&) const {}
 };
 
+// Whether no piece of the four lines of a single pair is left. Their zeros change no sum. Of W pairs
+// some piece is left almost always.
+template <class T>
+BC_INLINE bool adds_nothing(const Four<T>& lengths) {
+  if constexpr (is_scalar<T>) {
+    return !any(lengths != Four<T>{});
+  } else {
+    return false;
+  }
+}
+
 // Add the pieces of a box's edges along its axis j. `origin`: in the box's frame.
 template <class T, Side side, class Squares>
 BC_INLINE void add_edges_along(int j, const EdgePieces<T>& pieces, const Vec<T>& half,
@@ -158,6 +169,7 @@ BC_INLINE void add_edges_along(int j, const EdgePieces<T>& pieces, const Vec<T>&
     Four<T> f = sigma<T>(n) * half[a] - origin[a], g = tau<T>(n) * half[b] - origin[b];
     Four<T> s = pieces.s[j][n], t = pieces.t[j][n];
     Four<T> length = max(t - s, Four<T>{}), middle = 0.5 * (s + t) - origin[j];
+    if (adds_nothing<T>(length)) return;
     Four<T> by_f = length * f, by_g = length * g;
     faces.template add<Side::sigma>(a, n, tau<T>(n) * by_g, g, middle);
     faces.template add<Side::tau>(b, n, sigma<T>(n) * by_f, middle, f);
@@ -262,6 +274,10 @@ BC_INLINE void add_lines_of(int i, T& least, const Pair<T>& pair, const Mat<T>& 
   for (int j = 0; j < 3; ++j) {
     Lines<T> lines(pair, inverse, origin_a, origin_b, i, j);
     least = min(least, lines.sine2_or_one);
+    if constexpr (is_scalar<T>) {
+      LinePiece<T> line = lines.piece(0);
+      if (adds_nothing<T>(max(line.to - line.from, Four<T>{}))) continue;
+    }
     int k = (j + 1) % 3, l = (j + 2) % 3;
     Four<T> along[steps<T>];
 #pragma GCC unroll 4
