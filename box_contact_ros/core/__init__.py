@@ -44,5 +44,8 @@ ASPECT_MAX, SIZE_RATIO_MAX, DEPTH_MAX = (
 """The range of the MLP: edge ratio of a box, size ratio of both, depth by the shortest edge."""
 CENTROID_REACH = native.CENTROID_REACH
 """Farthest that a centroid is from the middle of its bounding box [half extents]."""
-SITES, FEATURES, OUTPUTS, POINT_OUTPUTS = 9, 12, 7, 3
+NETWORK_FORMAT = native.NETWORK_FORMAT
+"""Format of the network's file that the core reads: what its numbers mean."""
+SITES, FEATURES = native.SITES, native.FEATURES
+OUTPUTS, POINT_OUTPUTS = native.OUTPUTS, native.POINT_OUTPUTS
 """Sites at which the MLP is asked, features and outputs of each, those for the point: mlp.hpp."""

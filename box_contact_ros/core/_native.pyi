@@ -16,6 +16,12 @@ SIZE_RATIO_MAX: float
 DEPTH_MAX: float
 CENTROID_REACH: float
 
+NETWORK_FORMAT: int
+SITES: int
+FEATURES: int
+OUTPUTS: int
+POINT_OUTPUTS: int
+
 kernel: str
 instruction_set: str
 lanes: int

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..core import FEATURES, OUTPUTS, POINT_OUTPUTS
+from ..core import FEATURES, NETWORK_FORMAT, OUTPUTS, POINT_OUTPUTS
+from .checks import shown
 from .models import NativeModel
 from .weights_file import Network, Weights, WeightsError, weights_for
 
@@ -20,11 +21,11 @@ FEATURE_NAMES = (
     'slant · cut of all faces along this axis', '|push of all faces| along it',
     'larger slant · cut of all faces along another', '|push of all faces| along all axes')
 """Features at a site: four of its own, four that all sites of its faces have, four of its axis."""
-DESCRIPTION = 'cuts of the bounds by the slab, at nine sites'
-"""What the features of shipped weights mean; see core/src/overlap/bounds.hpp."""
-BOUNDS = {DESCRIPTION: 'slab', 'cuts of the unit cube, at nine sites': 'edges'}
-"""Method of the bounds by the description in a card; weights made for another one are refused.
-Those for 'edges' give the point alone."""
+FORMAT, DESCRIPTION = NETWORK_FORMAT, 'cuts of the bounds by the slab, at nine sites'
+"""Of new weights: what their numbers mean, for programs and for people."""
+BOUNDS = {FORMAT: 'slab', 1: 'edges'}
+"""Method of the bounds by a card's format (core/src/overlap/bounds.hpp). Weights of another format
+are refused. Those of format 1 give the point alone."""
 _NATIVE = {'slab': 'mlp', 'edges': 'mlp-edges'}  # names that the core has for the models
 ACTIVATION = 'relu'  # activation of the hidden units; weights made for another one are refused
 UNITS_MAX = 64  # most hidden units: as far as the search for their number goes
@@ -58,14 +59,16 @@ def mlp(weights: str | None = None) -> NativeModel:
 def load_mlp(weights: str | None = None) -> Weights:
     """Read the weights of an MLP, the shipped ones for None; raises `WeightsError`."""
     found = weights_for('mlp', weights, shipped='mlp')
-    bounds = str(found.card['inputs'].get('description'))  # a card may say anything
-    outputs = POINT_OUTPUTS if BOUNDS.get(bounds) == 'edges' else OUTPUTS
+    number = found.card.get('format')  # a card may say anything
+    bounds = BOUNDS.get(number) if type(number) is int else None
+    outputs = POINT_OUTPUTS if bounds == 'edges' else OUTPUTS
     network = found.network('point', FEATURES, outputs, model='mlp')
     if len(network.widths) != 3 or network.widths[1] > UNITS_MAX:
         raise WeightsError(f"weights file {found.path}: network 'point' must have one hidden "
                            f'layer, of at most {UNITS_MAX} units')
-    if bounds not in BOUNDS:
-        raise WeightsError(f'weights file {found.path} is for other inputs than this version has')
+    if bounds is None:
+        raise WeightsError(f'weights file {found.path} has format {shown(number)}; this version '
+                           f'reads {FORMAT} and 1')
     if found.card.get('activation') != ACTIVATION:
         raise WeightsError(f"weights file {found.path}: this version's units are {ACTIVATION!r}, "
                            f"not {found.card.get('activation')!r}")
@@ -74,7 +77,7 @@ def load_mlp(weights: str | None = None) -> Weights:
 
 def bounds_of(weights: Weights) -> str:
     """Return the method of the bounds that the weights were made for: 'slab' or 'edges'."""
-    return BOUNDS[weights.card['inputs']['description']]
+    return BOUNDS[weights.card['format']]
 
 
 def _listed_sizes(weights: Weights) -> np.ndarray | None:

@@ -136,9 +136,8 @@ bool read_network(PyObject* object, std::vector<float>& network) {
   if (object == Py_None) return true;
   Array<float> array;
   if (!read(object, "network", {any_length}, array)) return false;
-  constexpr npy_intp biases = 7, per_unit = 20;
-  npy_intp of_units = array.length(0) - biases;
-  if (of_units < 0 || of_units % per_unit != 0)
+  npy_intp of_units = array.length(0) - detail::site_outputs;
+  if (of_units < 0 || of_units % detail::unit_numbers != 0)
     return fail(PyExc_ValueError, "a network has 7 + 20 · units numbers");
   network.assign(array.numbers, array.numbers + array.length(0));
   return true;
@@ -505,7 +504,7 @@ PyObject* stages(PyObject*, PyObject* const* args, Py_ssize_t count) {
   });
   if (!filled) return nullptr;
   detail::NetworkNumbers numbers{network.empty() ? nullptr : network.data(),
-                                 long(network.size()) / 20};
+                                 long(network.size()) / detail::unit_numbers};
   long refused = -1;
   Py_BEGIN_ALLOW_THREADS;
   for (long row = 0; row < pairs.count && refused < 0; ++row)
@@ -606,6 +605,15 @@ PyMethodDef module_methods[] = {
      "low, high (boxes, 3): bounding boxes as near_pairs leaves them."},
     {nullptr, nullptr, 0, nullptr}};
 
+struct Whole {
+  const char* name;
+  long value;
+};
+constexpr Whole wholes[] = {{"NETWORK_FORMAT", detail::network_format},
+                            {"SITES", detail::site_count},
+                            {"FEATURES", detail::site_features},
+                            {"OUTPUTS", detail::site_outputs},
+                            {"POINT_OUTPUTS", detail::point_outputs}};
 struct Constant {
   const char* name;
   double value;
@@ -650,6 +658,8 @@ PyMODINIT_FUNC PyInit__native() {
       add(module.get(), "lanes", PyLong_FromLong(kernel ? kernel->lanes : 0)) &&
       add(module.get(), "compiler", PyUnicode_FromString(__VERSION__)) &&
       add(module.get(), "PairSolver", PyType_FromSpec(&solver_spec));
+  for (const Whole& whole : wholes)
+    added = added && add(module.get(), whole.name, PyLong_FromLong(whole.value));
   for (const Constant& constant : constants)
     added = added && add(module.get(), constant.name, PyFloat_FromDouble(constant.value));
   return added ? module.release() : nullptr;

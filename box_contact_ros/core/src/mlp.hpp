@@ -59,9 +59,12 @@ constexpr double place_tolerance = 0x1p-46;
 // components q of three vectors that turn along (Villar et al., Scalars are universal, 2021).
 // `ask_for_patch` says what the four others do.
 
-constexpr int site_count = 9, site_features = 12, point_outputs = 3;
+using detail::point_outputs;
+using detail::site_count;
+using detail::site_features;
+using detail::site_outputs;
 // Places of the other outputs.
-constexpr int to_volume = 3, to_precision = 4, to_coupling = 5, to_push = 6, site_outputs = 7;
+constexpr int to_volume = 3, to_precision = 4, to_coupling = 5, to_push = 6;
 
 // The cut cube, for lanes F of either precision. Rows of `slant` are the normals of the pairs of
 // faces. So its columns, like the other triples, have one number for each pair of faces f.

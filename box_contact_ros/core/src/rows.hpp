@@ -6,6 +6,13 @@
 
 namespace box_contact::detail {
 
+// The network of model `mlp`: sites at which it is asked, features and outputs of each, and those of
+// the outputs that give the point. `network_format` counts changes of what the numbers mean.
+constexpr int network_format = 2;
+constexpr int site_count = 9, site_features = 12, site_outputs = 7, point_outputs = 3;
+// Numbers of a unit: its bias, its weights for the features, and its weights to the outputs.
+constexpr int unit_numbers = 1 + site_features + site_outputs;
+
 // A step of 0 gives all rows the same sizes, one of 3 each row its own.
 struct Rows {
   const double *poses_a, *poses_b;  // 7 numbers a row: x y z qx qy qz qw

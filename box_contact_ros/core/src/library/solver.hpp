@@ -42,8 +42,7 @@ class Solver {
 
   const Setup& setup() const { return setup_; }
   const NetworkNumbers network() const {
-    constexpr long biases = 7, numbers_of_unit = 20;
-    return {setup_.network.data(), (long(setup_.network.size()) - biases) / numbers_of_unit};
+    return {setup_.network.data(), (long(setup_.network.size()) - site_outputs) / unit_numbers};
   }
 
   // Solve one pair. Sizes nullptr: the solver's. Returns false, and leaves `contact`, if poses or

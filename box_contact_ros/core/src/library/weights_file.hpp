@@ -16,6 +16,8 @@
 #include <string>
 #include <vector>
 
+#include "../rows.hpp"
+
 namespace box_contact::detail {
 
 class WeightsFile {
@@ -39,11 +41,11 @@ class WeightsFile {
     // The model card lists no sizes: the network is for boxes of any size.
     if (header_.find(R"(\"sizes\":[])") == std::string::npos)
       refuse("is for boxes of some sizes only, or has no model card");
-    // White space has gone from the header, from texts too.
-    if (header_.find(R"(\"description\":\"cutsoftheboundsbytheslab,atninesites\")") ==
-        std::string::npos)
-      refuse("is for another description of the overlap");
-    constexpr size_t features = 12, outputs = 7;
+    // White space has gone from the header.
+    const std::string format = std::to_string(network_format);
+    if (header_.find(R"(\"format\":)" + format + ",") == std::string::npos)
+      refuse("is not of format " + format);
+    constexpr size_t features = site_features, outputs = site_outputs;
     size_t units = number(entry("point.0.bias"), R"("shape":[)");
     std::vector<float> bias = tensor("point.0.bias", {units});
     std::vector<float> first = tensor("point.0.weight", {units, features});
