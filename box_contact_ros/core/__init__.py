@@ -48,4 +48,4 @@ NETWORK_FORMAT = native.NETWORK_FORMAT
 """Format of the network's file that the core reads: what its numbers mean."""
 SITES, FEATURES = native.SITES, native.FEATURES
 OUTPUTS, POINT_OUTPUTS = native.OUTPUTS, native.POINT_OUTPUTS
-"""Sites at which the MLP is asked, features and outputs of each, those for the point: mlp.hpp."""
+"""Sites at which the MLP is asked, features and outputs of each, those for the point."""

@@ -1,6 +1,6 @@
 """Model `mlp`: SAT decides and gives normal and depth; a network gives point, volume, covariance.
 
-The algorithm is that of core/src/mlp.hpp. Here its weights are read and checked. Outside the range
+The algorithm is that of core/src/mlp/. Here its weights are read and checked. Outside the range
 that the network was trained for, the answer is the exact one, and counted. So it is for boxes that
 the card of the weights does not list, if it lists any: those of a scene (`train --scene`).
 """

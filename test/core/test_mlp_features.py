@@ -99,7 +99,7 @@ def reference(network: Network, normal: np.ndarray, upper: np.ndarray, lower: np
               ) -> tuple[np.ndarray, float, np.ndarray]:
     """Return centroid (3,), volume and covariance (3, 3) of one overlap in its bounds.
 
-    By the words of core/src/mlp.hpp, in float64.
+    By the words of core/src/mlp/cut_cube.hpp, in float64.
     """
     (first, bias), (last, last_bias) = ([part.astype(float) for part in layer]
                                         for layer in network.layers)

@@ -2,8 +2,8 @@
 
 Comparisons choose two things. One chooses the frame, of A or of B, in which the network sees the
 overlap (core/src/overlap/bounds.hpp). The other chooses between network and exact method
-(core/src/mlp.hpp). Where a comparison changes its result, the point steps by up to the network's
-error. Everywhere else the point is a continuous function of the poses.
+(core/src/mlp/mlp_model.hpp). Where a comparison changes its result, the point steps by up to the
+network's error. Everywhere else the point is a continuous function of the poses.
 """
 from __future__ import annotations
 

@@ -190,31 +190,35 @@ MUTANTS = {
         'Four<T> length = t - s, middle = 0.5 * (s + t) - origin[j];',
         f'{TEST_CORE} -k certain'),
     'point left outside': Mutant(
-        'core/src/mlp.hpp', ' & placed.inside;', ';', f'{MLP} -k contacts_are_sound'),
+        'core/src/mlp/mlp_model.hpp', ' & placed.inside;', ';', f'{MLP} -k contacts_are_sound'),
     'patch that is no number': Mutant(
-        'core/src/mlp.hpp', 'answered &= (one.volume > 0.0) & (trace(one.covariance) > 0.0);', '',
+        'core/src/mlp/mlp_model.hpp',
+        'answered &= (one.volume > 0.0) & (trace(one.covariance) > 0.0);', '',
         f'{MLP} -k no_numbers'),
     'volume larger than its bounds': Mutant(
-        'core/src/mlp.hpp', 'exp(min(F{}, max(', 'exp(min(splat<F>(9.0F), max(',
+        'core/src/mlp/cube_moments.hpp', 'exp(min(F{}, max(', 'exp(min(splat<F>(9.0F), max(',
         f'{MLP} -k fit_the_bounds'),
     'volume by one half extent': Mutant(
-        'core/src/mlp.hpp', '(half[0] * half[1] * half[2])', '(half[0] * half[0] * half[0])',
+        'core/src/mlp/mlp_model.hpp',
+        '(half[0] * half[1] * half[2])', '(half[0] * half[0] * half[0])',
         f'{MLP} -k box_symmetries'),
     'precision without what cuts add': Mutant(
-        'core/src/mlp.hpp', 'said.variance = (own + over_faces(squares)) + push * push;',
+        'core/src/mlp/cube_moments.hpp',
+        'said.variance = (own + over_faces(squares)) + push * push;',
         'said.variance = own;', f'{MLP} -k fit_the_bounds'),
     'coupling of any sign': Mutant(
-        'core/src/mlp.hpp', 'clamp(cube.slant[q] * out[to_coupling], reach)',
+        'core/src/mlp/cube_moments.hpp', 'clamp(cube.slant[q] * out[to_coupling], reach)',
         'clamp(abs(cube.slant[q]) * out[to_coupling], reach)', f'{MLP} -k box_symmetries'),
     'covariance by one half extent': Mutant(
-        'core/src/mlp.hpp', 'said.variance[k] * (half[k] * half[k])', 'said.variance[k] * half[k]',
+        'core/src/mlp/mlp_model.hpp',
+        'said.variance[k] * (half[k] * half[k])', 'said.variance[k] * half[k]',
         f'{MLP} -k scale_by_powers'),
     'covariance left in the frame of the bounds': Mutant(
-        'core/src/mlp.hpp',
+        'core/src/mlp/mlp_model.hpp',
         'select(bounds[g].in_b, q.pair.axes_b, q.pair.axes_a);', 'q.pair.axes_a;',
         f'{MLP} -k swap'),
     'exponential in steps': Mutant(
-        'core/src/mlp.hpp', 'whole * 0x1.62ep-1F', 'whole * 0.69F',
+        'core/src/mlp/cube_moments.hpp', 'whole * 0x1.62ep-1F', 'whole * 0.69F',
         'test/scene/test_series.py -k patches_are_continuous'),
     'smaller bounding box, always': Mutant(
         'core/src/overlap/bounds.hpp', 'clearly_smaller = 0.8;', 'clearly_smaller = 1.0 - 1e-6;',
@@ -223,10 +227,11 @@ MUTANTS = {
         'core/src/overlap/bounds.hpp', 'constexpr double flush = 0x1p-46;',
         'constexpr double flush = 0.0;', 'test/core/test_overlap_bounds.py -k whole_patch'),
     'side of a pair of faces taken as it comes': Mutant(
-        'core/src/mlp.hpp', 'features.of_faces[1] = abs(push);', 'features.of_faces[1] = push;',
+        'core/src/mlp/cut_cube.hpp',
+        'features.of_faces[1] = abs(push);', 'features.of_faces[1] = push;',
         f'{MLP} -k box_symmetries'),
     'range without its depth': Mutant(
-        'core/src/mlp.hpp', 'excess = max(excess, -separation / (2.0 * depth_max',
+        'core/src/mlp/mlp_model.hpp', 'excess = max(excess, -separation / (2.0 * depth_max',
         'excess = max(excess, 0.0 * -separation / (2.0 * depth_max',
         f'{MLP} -k limits_belong'),
     'threads overlap': Mutant(

@@ -12,7 +12,7 @@
 #include <memory>
 #include <type_traits>
 
-#include "../src/lanes.hpp"
+#include "../src/lanes/vectors.hpp"
 
 namespace box_contact::binding {
 

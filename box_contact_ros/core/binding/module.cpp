@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "../src/library/solver.hpp"
-#include "../src/mlp.hpp"
+#include "../src/mlp/mlp_model.hpp"
 #include "arrays.hpp"  // first, as Python.h wants
 #include "bounding_boxes.hpp"
 

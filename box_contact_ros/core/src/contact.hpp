@@ -4,7 +4,7 @@
 // 2. `separating_axis`: verdict, separation and normal (separating_axis.hpp), again with 32 digits
 //    where rounding could decide (near_parallel_edges.hpp).
 // 3. `enforce_minimum_depth`: pairs at exact touch get their least depth (minimum_depth.hpp).
-// 4. The overlap, by a model: `ExactModel` here, or `MlpModel` (mlp.hpp).
+// 4. The overlap, by a model: `ExactModel` here, or `MlpModel` (mlp/mlp_model.hpp).
 //
 // All stages are templates over the lanes T, so a row of a batch has the bits of a single call.
 #pragma once

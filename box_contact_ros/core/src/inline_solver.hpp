@@ -1,7 +1,7 @@
 // The solver of box_contact/inline.hpp.
 #pragma once
 
-#include "mlp.hpp"
+#include "mlp/mlp_model.hpp"
 
 namespace box_contact::BOX_CONTACT_SET {
 

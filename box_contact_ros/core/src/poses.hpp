@@ -8,7 +8,7 @@
 // transpose and the offsets change sign, bit for bit. The verdict relies on that.
 #pragma once
 
-#include "lanes.hpp"
+#include "lanes/triples.hpp"
 
 namespace box_contact::BOX_CONTACT_SET {
 

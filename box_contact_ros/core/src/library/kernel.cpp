@@ -1,7 +1,7 @@
 // One kernel. It is compiled once for each instruction set, which names it.
 #include "kernel.hpp"
 
-#include "../mlp.hpp"
+#include "../mlp/mlp_model.hpp"
 #include "stages.hpp"
 
 namespace box_contact::BOX_CONTACT_SET {

@@ -1,7 +1,7 @@
 // Fill the arrays of what every stage of a pair computes.
 #pragma once
 
-#include "../mlp.hpp"
+#include "../mlp/mlp_model.hpp"
 #include "stage_arrays.hpp"
 
 namespace box_contact::BOX_CONTACT_SET {

@@ -1,7 +1,7 @@
 // The moments of the overlap A∩B that a model finds: volume, centroid, covariance.
 #pragma once
 
-#include "../lanes.hpp"
+#include "../lanes/vectors.hpp"
 
 namespace box_contact::BOX_CONTACT_SET {
 
