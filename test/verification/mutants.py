@@ -252,7 +252,7 @@ MUTANTS = {
         'core/binding/module.cpp', '  Py_DECREF(type);', '  ', f'{TEST_CORE} -k references'),
     'the forced instruction set is ignored': Mutant(
         'core/src/library/library.cpp', 'if (!forced || !*forced) return', 'return',
-        f'{TEST_CORE} -k forced'),
+        f'{TEST_CORE} -k instruction_set_is'),
     # Guards of the nodes against faults.
     'weights taken as they are': Mutant(
         'solver/weights_file.py', "if tensors_digest(tensors) != card['sha256']:", 'if False:',
