@@ -248,6 +248,9 @@ MUTANTS = {
     'lanes that repeat the last row are counted': Mutant(
         'core/src/contact.hpp', 'set_lane(queries[g].touching, int(i), 0);', ';',
         f'{TEST_CORE} -k threads_change'),
+    'rows that wait are forgotten': Mutant(
+        'core/src/contact.hpp', 'i < waiting.count; ++i)', 'i < 0; ++i)',
+        f'{TEST_CORE} -k single_calls'),
     'a reference to the type is kept': Mutant(
         'core/binding/module.cpp', '  Py_DECREF(type);', '  ', f'{TEST_CORE} -k references'),
     'the forced instruction set is ignored': Mutant(
