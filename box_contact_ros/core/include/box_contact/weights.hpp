@@ -8,7 +8,8 @@
 #include "../../src/library/weights_file.hpp"
 #endif
 
-namespace box_contact::BOX_CONTACT_SET {
+namespace box_contact {
+inline namespace BOX_CONTACT_SET {
 
 // Read the weights of model `mlp`: weights/mlp.safetensors. Throws std::runtime_error with path and
 // cause.
@@ -22,4 +23,5 @@ inline Network read_network(const std::string& path) {
   return network;
 }
 
-}  // namespace box_contact::BOX_CONTACT_SET
+}  // namespace BOX_CONTACT_SET
+}  // namespace box_contact
