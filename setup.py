@@ -7,6 +7,7 @@ import runpy
 import shutil
 import sys
 import sysconfig
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from setuptools import Distribution, Extension, find_packages, setup
@@ -14,12 +15,14 @@ from setuptools.command.build_ext import build_ext
 
 NAME = 'box_contact_ros'
 CORE = f'{NAME}/core'
+CORE_EXTENSION = f'{NAME}.core._native'
+LIBRARY = 'libbox_contact.so'
 
 # No fused multiply-add in float64 and no fast-math: a pair has the same bits with every instruction
 # set. GCC's SLP vectoriser makes fused instructions in spite of -ffp-contract=off.
 FLAGS = ['-std=c++17', '-O3', '-g0', '-fvisibility=hidden', '-ffp-contract=off',
          '-fno-tree-slp-vectorize', '-Wall', '-Wextra', '-Wno-psabi']
-# One extension of the core for each; core/__init__.py chooses when it is imported.
+# The core is compiled once for each; library.cpp chooses when it is loaded.
 INSTRUCTION_SETS = {'baseline': []}
 if platform.machine() in ('x86_64', 'AMD64'):
     INSTRUCTION_SETS |= {'avx2': ['-march=x86-64-v3'],
@@ -77,31 +80,67 @@ class BuildCore(build_ext):
     def build_extension(self, ext):
         # An editable install takes over what `build_ext --inplace` has made of the same sources.
         here, inputs = Path(self.get_ext_filename(ext.name)), [__file__, *ext.sources, *ext.depends]
-        if getattr(self, 'editable_mode', False) and here.is_file() and all(
-                Path(one).stat().st_mtime < here.stat().st_mtime for one in inputs):
-            path = self.get_ext_fullpath(ext.name)
-            self.mkpath(os.path.dirname(path))
-            self.copy_file(str(here), path)
+        products = [here, here.with_name(LIBRARY)] if ext.name == CORE_EXTENSION else [here]
+        if getattr(self, 'editable_mode', False) and all(
+                product.is_file() and Path(one).stat().st_mtime < product.stat().st_mtime
+                for product in products for one in inputs):
+            path = Path(self.get_ext_fullpath(ext.name))
+            self.mkpath(str(path.parent))
+            for product in products:
+                self.copy_file(str(product), str(path.with_name(product.name)))
             return
-        # The extensions of the core are made from one source: each gets objects of its own.
-        builder = copy.copy(self)
-        builder.build_temp = os.path.join(self.build_temp, ext.name)
-        build_ext.build_extension(builder, ext)
+        if ext.name == CORE_EXTENSION:
+            ext.extra_objects = self.build_library(ext)
+        super().build_extension(ext)
+
+    def build_library(self, ext) -> list[str]:
+        """Build libbox_contact beside the extension `ext`; return its objects."""
+        compiler, folder = copy.copy(self.compiler), Path(self.build_temp, 'library')
+
+        def compiled(name: str, source: str, flags: list[str]) -> list[str]:
+            # A file that is compiled several times has objects in folders of their own.
+            macros = [('BOX_CONTACT_VERSION', f'"{self.distribution.get_version()}"')]
+            macros += [(f'BOX_CONTACT_{one.upper()}', '1') for one in INSTRUCTION_SETS]
+            return compiler.compile([f'{CORE}/src/library/{source}'], str(folder / name), macros,
+                                    extra_postargs=[*FLAGS, *flags], depends=ext.depends)
+
+        jobs = {name: ('kernel.cpp', flags) for name, flags in INSTRUCTION_SETS.items()}
+        jobs['library'] = 'library.cpp', []
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            # The longest first.
+            running = [pool.submit(compiled, name, *job) for name, job in reversed(jobs.items())]
+            objects = [one for job in running for one in job.result()]
+        path = Path(self.get_ext_fullpath(ext.name)).with_name(LIBRARY)
+        self.mkpath(str(path.parent))
+        linker = [] if sys.platform == 'darwin' else [
+            f'-Wl,--version-script={CORE}/src/library/exports.map', f'-Wl,-soname,{LIBRARY}']
+        compiler.link_shared_object(objects, str(path), extra_postargs=['-pthread', *linker],
+                                    target_lang='c++')
+        return objects
+
+    def copy_extensions_to_source(self):
+        super().copy_extensions_to_source()
+        built = Path(self.build_lib, CORE, LIBRARY)
+        self.copy_file(str(built), str(Path(CORE, LIBRARY)))
+
+    def get_outputs(self):
+        # Of `develop` and of installations that list their files.
+        extension = self.get_ext_fullpath(CORE_EXTENSION)
+        return [*super().get_outputs(), str(Path(extension).with_name(LIBRARY))]
 
 
 def extensions() -> list[Extension]:
-    """Return the native modules: the core for every instruction set, and the paper's networks."""
+    """Return the native modules: the core, and the paper's networks."""
     import numpy
 
-    headers = [path.as_posix() for path in sorted(Path(NAME).rglob('*.hpp'))]
-    settings = {'depends': headers, 'include_dirs': [numpy.get_include()], 'language': 'c++'}
-    found = [Extension(f'{NAME}.core._{name}', [f'{CORE}/binding/module.cpp'],
-                       define_macros=[('BOX_CONTACT_MODULE', f'_{name}')],
-                       extra_compile_args=FLAGS + flags, **settings)
-             for name, flags in INSTRUCTION_SETS.items()]
-    paper = f'{NAME}/baselines/paper'
-    return [*found, Extension(f'{NAME}.baselines.paper._networks', [f'{paper}/networks.cpp'],
-                              extra_compile_args=FLAGS, **settings)]
+    depends = [path.as_posix() for pattern in ('*.hpp', '*.h', 'library/*.cpp', '*.map')
+               for path in sorted(Path(NAME).rglob(pattern))]
+    settings = {'depends': depends, 'include_dirs': [numpy.get_include()], 'language': 'c++',
+                'extra_compile_args': FLAGS}
+    return [Extension(CORE_EXTENSION, [f'{CORE}/binding/module.cpp'],
+                      extra_link_args=['-pthread'], **settings),
+            Extension(f'{NAME}.baselines.paper._networks', [f'{NAME}/baselines/paper/networks.cpp'],
+                      **settings)]
 
 
 def data_files() -> list[tuple[str, list[str]]]:
@@ -116,9 +155,9 @@ def data_files() -> list[tuple[str, list[str]]]:
             # is_file() also drops links that colcon --symlink-install left to deleted files.
             if path.is_file() and '__pycache__' not in path.parts:
                 files.setdefault(f'{share}/{path.parent.as_posix()}', []).append(path.as_posix())
-    for folder in ('', 'overlap'):
-        files[f'include/box_contact/{folder}'.rstrip('/')] = sorted(
-            path.as_posix() for path in Path(CORE, folder).glob('*.hpp'))
+    # Where find_package looks below a prefix, such as colcon's. The package has the rest.
+    files[f'{share}/cmake'] = sorted(
+        path.as_posix() for path in Path(CORE, 'cmake').glob('*.cmake'))
     return list(files.items())
 
 
@@ -135,7 +174,8 @@ setup(
     maintainer_email='maintainers@box-contact-ros.org',
     license='Apache-2.0',
     packages=find_packages(include=[NAME, f'{NAME}.*']),
-    package_data={NAME: ['py.typed', '**/*.pyi', 'verification/*.npz', '**/*.md', '**/*.yaml']},
+    package_data={NAME: ['py.typed', '**/*.pyi', 'verification/*.npz', '**/*.md', '**/*.yaml',
+                         'core/cmake/*', 'core/include/**/*.h*', 'core/src/**/*.hpp']},
     ext_modules=extensions(),
     data_files=data_files(),
     entry_points={'console_scripts': cli['entry_points']('box_contact_' if BY_PIP else '')},

@@ -1,11 +1,19 @@
-"""`python -m box_contact_ros PROGRAM [ARGUMENT ...]`: start one of the package's programs."""
+"""`python -m box_contact_ros PROGRAM [ARGUMENT ...]`: start one of the package's programs.
+
+`--cmakedir` and `--includes` print where C and C++ programs find the library.
+"""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 from .cli import reader_is_gone, run, usage
+
+_CORE = Path(__file__).resolve().parent / 'core'
+PLACES = {'--cmakedir': str(_CORE / 'cmake'), '--includes': f'-I{_CORE / "include"}'}
+"""What the options print: the folder for `box_contact_ros_DIR`, and the compiler's option."""
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -16,6 +24,9 @@ def main(args: Sequence[str] | None = None) -> int:
             print(usage(), flush=True)
         except BrokenPipeError:
             return reader_is_gone()
+        return 0
+    if args[0] in PLACES:
+        print(PLACES[args[0]])
         return 0
     return run(args[0], args[1:])
 

@@ -182,6 +182,7 @@ def _shared_memory_has_room() -> bool:
 
 USAGE = """\
 usage: python -m box_contact_ros PROGRAM [ARGUMENT ...]
+       python -m box_contact_ros --cmakedir | --includes   (where C and C++ find the library)
 
 programs:
 {programs}

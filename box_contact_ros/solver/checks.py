@@ -1,6 +1,6 @@
 """What is accepted as a pose and as a size, and the words in which the rest is refused.
 
-The limits are those of the core (core/poses.hpp). Every refusal names the field and the value.
+The limits are those of the core (core/src/poses.hpp). Every refusal names the field and the value.
 """
 from __future__ import annotations
 
@@ -99,6 +99,25 @@ def as_floats(value: ArrayLike, name: str, shapes: str, *accepted: tuple[int | N
                 want is None or want == have for want, have in zip(shape, array.shape)):
             return array
     raise ValueError(f'{name} must be {shapes}, not an array of shape {array.shape}')
+
+
+def as_places(value: ArrayLike, name: str, count: int) -> np.ndarray:
+    """Return pairs of places (n, 2) among `count` rows as a contiguous int64 array."""
+    try:
+        array = np.asarray(value)
+    except (TypeError, ValueError, OverflowError):
+        array = np.empty(0, dtype=object)
+    if array.dtype.kind not in 'iu' and not (array.size == 0 and array.ndim == 2):
+        raise ValueError(f'{name} must be whole numbers (n, 2), not {shown(value)}')
+    if array.ndim != 2 or array.shape[1] != 2:
+        raise ValueError(f'{name} must be whole numbers (n, 2), not an array of shape '
+                         f'{array.shape}')
+    outside = ((array < 0) | (array >= count)).any(axis=1)
+    if outside.any():
+        row = int(np.argmax(outside))
+        raise ValueError(f'{name}[{row}] is {tuple(array[row].tolist())}, but there are {count} '
+                         'poses')
+    return np.require(array, np.int64, ('C', 'A'))
 
 
 def _holds_numbers(array: np.ndarray) -> bool:

@@ -65,10 +65,10 @@ def without_patch(colliding: np.ndarray, separation: np.ndarray, normal: np.ndar
                   point: np.ndarray) -> Contacts:
     """Return contacts of a model that gives the point alone: arrays with a row a pair.
 
-    Volume and covariance of those in contact are NaN, as in C++ (core/contact.hpp).
+    Volume and covariance of those in contact are NaN, as of the core with `patch=False`.
     """
     return Contacts(colliding, separation, normal, point, np.where(colliding, np.nan, 0.0),
                     np.full((len(colliding), 3, 3), np.nan))
 
 
-native.use_contact_type(Contact)
+native.use_contact_types(Contact, Contacts)

@@ -9,9 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core import native
-from .checks import as_floats, as_size, pose_fault, shown, size_fault
-from .contact import Contact, Contacts
-from .models import build_model
+from .checks import as_floats, as_places, as_size, pose_fault, shown, size_fault
+from .contact import Contact, Contacts, without_patch
+from .models import Model, NativeModel, build_model
+
+Names = tuple[str, str, str, str]  # of poses and sizes of A and B, in a refusal
+_SINGLE: Names = ('pose_a', 'pose_b', 'size_a', 'size_b')
+_MANY: Names = ('poses_a', 'poses_b', 'size_a', 'size_b')
+_BY_PLACE: Names = ('poses', 'poses', 'sizes', 'sizes')
 
 
 class ContactSolver(native.PairSolver):
@@ -29,36 +34,44 @@ class ContactSolver(native.PairSolver):
 
     model: a name of the registry, `models.MODELS`.
     weights: a file to use instead of the shipped weights.
+    margin: separation up to which pairs apart have a normal too [m]; infinity: all.
     """
 
     def __init__(self, size_a: ArrayLike, size_b: ArrayLike, *, model: str = 'mlp',
-                 weights: str | None = None) -> None:
-        self._size_a = as_size(size_a, 'size_a')
-        self._size_b = as_size(size_b, 'size_b')
+                 weights: str | None = None, margin: float = 0.0) -> None:
+        one, other = as_size(size_a, 'size_a'), as_size(size_b, 'size_b')
+        margin = as_floats(margin, 'margin', 'a number', ()).item()
+        built = build_model(model, one, other, weights)
+        core = built if isinstance(built, NativeModel) else NativeModel(name=None)
+        if np.isnan(margin) or (margin and core.name is None):
+            raise ValueError(f'margin {margin:g} is not a distance that model {model!r} knows')
+        # Calls are answered in C++, which calls `converted` and `converted_batch` for the rest.
+        super().__init__(core.name, tuple(one[0]), tuple(other[0]), core.network, core.listed,
+                         margin)
         self.model = model
-        self._weights = weights
-        self._solver = build_model(model, self._size_a, self._size_b, weights)
-        single, network = getattr(self._solver, 'single', (None, None))
-        # Single calls are made by the base class, in C++; it calls `converted` for the rest.
-        super().__init__(single, tuple(self._size_a[0]), tuple(self._size_b[0]), network)
+        self._size_a, self._size_b, self._weights, self._margin = one, other, weights, margin
+        self._model: Model | None = None if isinstance(built, NativeModel) else built
 
     if TYPE_CHECKING:  # the core, which does it, knows no type of ours
         def __call__(self, pose_a: ArrayLike, pose_b: ArrayLike) -> Contact: ...  # noqa: D102
 
+        def batch(self, poses_a: ArrayLike, poses_b: ArrayLike | None = None, *,  # noqa: D102
+                  size_a: ArrayLike | None = None, size_b: ArrayLike | None = None,
+                  sizes: ArrayLike | None = None, pairs: ArrayLike | None = None,
+                  threads: int = 1, patch: bool = True) -> Contacts: ...
+    else:
+        batch = native.PairSolver.batch
+
     def __reduce__(self) -> tuple[Callable[..., ContactSolver], tuple[Any, ...]]:
         """Pickle the arguments."""
-        return (partial(ContactSolver, model=self.model, weights=self._weights),
+        return (partial(ContactSolver, model=self.model, weights=self._weights,
+                        margin=self._margin),
                 (self._size_a[0], self._size_b[0]))
 
     @property
     def exact_answers(self) -> int:
         """Contacts so far that the model handed to `exact`: see `mlp`."""
-        return self.answered_exactly + int(getattr(self._solver, 'exact_answers', 0))
-
-    @property
-    def clipped(self) -> int:
-        """Contacts so far that model `exact` clipped, because its certificate did not hold."""
-        return super().clipped + int(getattr(self._solver, 'clipped', 0))
+        return self.answered_exactly + int(getattr(self._model, 'exact_answers', 0))
 
     def converted(self, pose_a: ArrayLike, pose_b: ArrayLike) -> Contact:
         """Return the contact of one pair whose poses (7,) are of any kind of numbers.
@@ -67,49 +80,80 @@ class ContactSolver(native.PairSolver):
         """
         a = as_floats(pose_a, 'pose_a', 'a pose (7,)', (7,)).reshape(1, 7)
         b = as_floats(pose_b, 'pose_b', 'a pose (7,)', (7,)).reshape(1, 7)
-        found = self._solve(a, b, self._size_a, self._size_b, ('pose_a', 'pose_b'))
+        found = self._solve(a, b, self._size_a, self._size_b, _SINGLE)
         return Contact(bool(found.colliding[0]), float(found.separation[0]), found.normal[0],
                        found.point[0], float(found.volume[0]), found.covariance[0])
 
-    def batch(self, poses_a: ArrayLike, poses_b: ArrayLike, *, size_a: ArrayLike | None = None,
-              size_b: ArrayLike | None = None, threads: int = 1) -> Contacts:
-        """Return the contacts of n pairs: row i is what a single call gives for row i.
+    def converted_batch(self, poses_a: ArrayLike, poses_b: ArrayLike | None = None, *,
+                        size_a: ArrayLike | None = None, size_b: ArrayLike | None = None,
+                        sizes: ArrayLike | None = None, pairs: ArrayLike | None = None,
+                        threads: int = 1, patch: bool = True) -> Contacts:
+        """Return what `batch` does, for arguments of any kind of numbers.
 
-        poses_a, poses_b are (n, 7); size_a, size_b replace the solver's sizes, (3,) for all rows
-        or (n, 3) for every row its own. `threads` share the rows; no bit depends on their number.
+        Raises ValueError, with field and value, for what is refused.
         """
+        if isinstance(threads, bool) or not isinstance(threads, (int, np.integer)) or threads < 1:
+            raise ValueError(f'threads must be a whole number from 1 on, not {shown(threads)}')
+        if pairs is not None:
+            if poses_b is not None or size_a is not None or size_b is not None:
+                raise ValueError('pairs are places in poses and sizes: batch(poses, sizes=…, '
+                                 'pairs=…) has neither poses_b nor size_a nor size_b')
+            poses = as_floats(poses_a, 'poses', 'poses (m, 7)', (None, 7))
+            one = self._sizes(sizes, 'sizes', self._size_a, len(poses))
+            other = self._size_b if sizes is None else one
+            places = as_places(pairs, 'pairs', len(poses))
+            return self._solve(poses, poses, one, other, _BY_PLACE, threads, patch, places)
+        if sizes is not None or poses_b is None:
+            raise ValueError('batch takes (poses_a, poses_b), or (poses, sizes=…, pairs=…)')
         a = as_floats(poses_a, 'poses_a', 'poses (n, 7)', (None, 7))
         b = as_floats(poses_b, 'poses_b', 'poses (n, 7)', (None, 7))
         if len(a) != len(b):
             raise ValueError(f'poses_a and poses_b must be equally many, not {len(a)} and {len(b)}')
-        if isinstance(threads, bool) or not isinstance(threads, (int, np.integer)) or threads < 1:
-            raise ValueError(f'threads must be a whole number from 1 on, not {shown(threads)}')
-        sizes = []
-        for size, name, default in ((size_a, 'size_a', self._size_a),
-                                    (size_b, 'size_b', self._size_b)):
-            if size is None:
-                sizes.append(default)
-                continue
-            array = as_floats(size, name, f'full extents (3,) or ({len(a)}, 3)', (3,), (len(a), 3))
-            sizes.append(as_size(array, name) if array.ndim == 1 else array)
-        return self._solve(a, b, sizes[0], sizes[1], ('poses_a', 'poses_b'),
-                           min(int(threads), 1 + len(a)))
+        return self._solve(a, b, self._sizes(size_a, 'size_a', self._size_a, len(a)),
+                           self._sizes(size_b, 'size_b', self._size_b, len(a)), _MANY, threads,
+                           patch)
+
+    @staticmethod
+    def _sizes(size: ArrayLike | None, name: str, default: np.ndarray, count: int) -> np.ndarray:
+        """Return sizes (1, 3) or (count, 3)."""
+        if size is None:
+            return default
+        array = as_floats(size, name, f'full extents (3,) or ({count}, 3)', (3,), (count, 3))
+        return as_size(array, name) if array.ndim == 1 else array
 
     def _solve(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
-               names: tuple[str, str], threads: int = 1) -> Contacts:
-        found, refused = self._solver.solve(a, b, size_a, size_b, threads)
+               names: Names, threads: int = 1, patch: bool = True,
+               places: np.ndarray | None = None) -> Contacts:
+        threads = min(int(threads), 1 + len(a if places is None else places))
+        if self._model is None:
+            rows, refused = self.solve(a, b, size_a, size_b, threads, bool(patch), places)
+            found = Contacts(*rows)
+        else:
+            if places is not None:
+                first, second = places.T
+                size_a = size_a if len(size_a) == 1 else size_a[first]
+                size_b = size_b if len(size_b) == 1 else size_b[second]
+                a, b, places = a[first], b[second], None
+            found, refused = self._model.solve(a, b, size_a, size_b, threads)
+            found = found if patch else without_patch(*found[:4])
         if refused >= 0:
-            raise ValueError(_refusal(a, b, size_a, size_b, refused, names))
+            at = (refused, refused) if places is None else tuple(places[refused])
+            raise ValueError(_refusal(a, b, size_a, size_b, at, names))
         return found
 
 
-def _refusal(a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray, row: int,
-             names: tuple[str, str]) -> str:
-    """Return why a row is refused: the first of its poses and sizes that has a fault."""
-    for values, name, fault_of in ((a, names[0], pose_fault), (b, names[1], pose_fault),
-                                   (size_a, 'size_a', size_fault), (size_b, 'size_b', size_fault)):
+def _refusal(a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
+             at: tuple[int, int], names: Names) -> str:
+    """Return why a pair is refused: the first of its poses and sizes that has a fault.
+
+    at: places of A and of B.
+    """
+    for values, name, fault_of, row in ((a, names[0], pose_fault, at[0]),
+                                        (b, names[1], pose_fault, at[1]),
+                                        (size_a, names[2], size_fault, at[0]),
+                                        (size_b, names[3], size_fault, at[1])):
         fault = fault_of(values[0 if len(values) == 1 else row])
         if fault:
             numbered = name.startswith('poses') or len(a) > 1
             return f'{name}[{row}] {fault}' if numbered else f'{name} {fault}'
-    raise AssertionError(f'row {row} was refused without a fault')
+    raise AssertionError(f'row {at} was refused without a fault')

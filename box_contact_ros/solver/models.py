@@ -17,13 +17,13 @@ import numpy as np
 from ..core import native
 from .checks import shown
 from .contact import Contacts
+from .weights_file import Weights
 
 
 class Model(Protocol):
-    """A model behind `ContactSolver`.
+    """A model in Python behind `ContactSolver`.
 
-    It may have `single`, the core's model of single calls with its network. It may have
-    `exact_answers`, the contacts that it handed to `exact`.
+    It may have `exact_answers`, the contacts that it handed to `exact`.
     """
 
     def solve(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
@@ -34,23 +34,31 @@ class Model(Protocol):
         """
 
 
-class Exact:
-    """Model `exact`: the centroid of the overlap in float64; see core/contact.hpp."""
+@dataclass(frozen=True, kw_only=True)
+class NativeModel:
+    """A model of the core: what `PairSolver` takes beside the sizes."""
 
-    single = 'exact', None  # the native model of single calls, and its network
+    name: str | None  # as the core has it; None: a model in Python answers
+    weights: Weights | None = None
+    network: np.ndarray | None = None
+    listed: np.ndarray | None = None
+
+
+def exact() -> NativeModel:
+    """Return model `exact`: the moments of the overlap in float64; see core/src/contact.hpp."""
+    return NativeModel(name='exact')
+
+
+class Exact:
+    """The answers of `exact`, for models in Python."""
 
     def __init__(self) -> None:
         self._pairs = native.PairSolver('exact', (1.0, 1.0, 1.0), (1.0, 1.0, 1.0))
 
-    @property
-    def clipped(self) -> int:
-        """Contacts of batches so far that were clipped, because the certificate did not hold."""
-        return self._pairs.clipped
-
     def solve(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
               threads: int = 1) -> tuple[Contacts, int]:
         """Return contacts for poses (n, 7), sizes (n or 1, 3), and the first refused row or −1."""
-        *found, refused = self._pairs.solve(a, b, size_a, size_b, threads)
+        found, refused = self._pairs.solve(a, b, size_a, size_b, threads)
         return Contacts(*found), refused
 
 
@@ -71,13 +79,11 @@ class ModelEntry:
     name: str
     line: str  # how it finds the point, in a line
     builder: str
-    """'module:function' that returns the `Model`; its module is imported when one is built."""
+    """'module:function' that returns the `Model` or `NativeModel`; imported when one is built."""
     takes: tuple[str, ...] = ()
     """The builder's keyword arguments: of size_a, size_b (1, 3), weights, and the family's."""
     boxes: str = 'any'  # the boxes that it answers
     extra: str = ''  # extra of setup.py that brings its library
-    native_single: bool = False
-    """Whether single calls are answered in C++, without a conversion in Python."""
     native_batch: bool = False  # whether the rows of a batch are answered in C++
     gated: bool = False  # whether fuzz, stability and the speed report hold it to their limits
     family: Family | None = None
@@ -103,7 +109,7 @@ class ModelEntry:
         return tuple(f'{self.name}-{n}' for n in self.family.reported) if self.family else (
             self.name,)
 
-    def load(self) -> Callable[..., Model]:
+    def load(self) -> Callable[..., Model | NativeModel]:
         """Return the builder; ModuleNotFoundError, which names the extra, where it is missing."""
         module, _, function = self.builder.partition(':')
         try:
@@ -138,12 +144,12 @@ _NEEDS = ('size_a', 'size_b', 'weights')
 _ENTRIES = (
     ModelEntry(
         name='mlp', line='SAT, and a network for point and patch; constant cost; the default',
-        builder='box_contact_ros.solver.mlp:Mlp', takes=_NEEDS,
-        native_single=True, native_batch=True, gated=True),
+        builder='box_contact_ros.solver.mlp:mlp', takes=('weights',),
+        native_batch=True, gated=True),
     ModelEntry(
         name='exact', line='SAT and the exact centroid of the overlap; the reference',
-        builder='box_contact_ros.solver.models:Exact',
-        native_single=True, native_batch=True, gated=True),
+        builder='box_contact_ros.solver.models:exact',
+        native_batch=True, gated=True),
     ModelEntry(
         name='paper', line="the paper's network 6-20-18-4",
         builder='box_contact_ros.baselines.paper.paper_models:Paper', takes=_NEEDS,
@@ -187,7 +193,8 @@ def find_model(where: str, name: object) -> tuple[ModelEntry, dict[str, int]]:
     raise ValueError(f'{where} {shown(name)} is not one of: {model_names()}')
 
 
-def build_model(name: str, size_a: np.ndarray, size_b: np.ndarray, weights: str | None) -> Model:
+def build_model(name: str, size_a: np.ndarray, size_b: np.ndarray, weights: str | None,
+                ) -> Model | NativeModel:
     """Return the model of that name for boxes of full extents (1, 3) [m].
 
     weights: the path of a file, or None for the shipped one.

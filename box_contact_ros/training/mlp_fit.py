@@ -1,7 +1,7 @@
 """Fit the network of model `mlp`: the module, the loss and the training loop.
 
 A contact is SITES patterns for the network. The outputs, times the contact's vectors, add up to the
-centroid, the volume and the covariance of the overlap in its bounds (core/mlp.hpp).
+centroid, the volume and the covariance of the overlap in its bounds (core/src/mlp/).
 
 The contacts are last in all arrays. With the contacts first, a step takes twice as long.
 """
@@ -45,7 +45,7 @@ class MlpAnswers(NamedTuple):
 
 
 class SiteNetwork(torch.nn.Module):
-    """The network of core/mlp.hpp: one hidden layer of rectified units, asked at each site."""
+    """The network of core/src/mlp/: one hidden layer of rectified units, asked at each site."""
 
     def __init__(self, hidden: int) -> None:
         super().__init__()

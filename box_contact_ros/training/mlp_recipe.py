@@ -24,7 +24,7 @@ from ..output import percentiles
 from ..resources import resource_path
 from ..scene.pose_sets import SETS, ContactErrors, Generator, Pairs, contact_errors
 from ..solver.contact_solver import ContactSolver
-from ..solver.mlp import ACTIVATION, DESCRIPTION, FEATURE_NAMES
+from ..solver.mlp import ACTIVATION, DESCRIPTION, FEATURE_NAMES, FORMAT
 from ..solver.weights_file import load_weights, save_weights
 from .ensemble import Scaling
 from .mlp_fit import SiteNetwork, fit, point_errors, random_batches, started
@@ -142,7 +142,8 @@ def model_card(path: Path, network: SiteNetwork, recipe: MlpRecipe, data: dict[s
     """Return the card of a network before anything is measured."""
     parameter = next(network.parameters())
     return {
-        'name': path.stem, 'model': 'mlp', 'architecture': [FEATURES, len(parameter), OUTPUTS],
+        'name': path.stem, 'model': 'mlp', 'format': FORMAT,
+        'architecture': [FEATURES, len(parameter), OUTPUTS],
         'activation': ACTIVATION,
         'inputs': {'description': DESCRIPTION, 'names': FEATURE_NAMES,
                    'range': {'aspect': ASPECT_MAX, 'size ratio': SIZE_RATIO_MAX,

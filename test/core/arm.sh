@@ -17,13 +17,11 @@ done
 
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-mkdir "$work/include"
-ln -s "$root/box_contact_ros/core" "$work/include/box_contact"
 PYTHONPATH=$root/test/core:$root/test/helpers "$python" -c 'import pathlib, sys, test_core_cpp
 test_core_cpp.write_families(pathlib.Path(sys.argv[1]))' "$work/families.txt"
 
-flags=(-std=c++17 -O2 -Wall -Wextra -Werror -ffp-contract=off -fno-tree-slp-vectorize
-    "-I$work/include" "$root/test/core/contact_test.cpp")
+flags=(-std=c++17 -O2 -Wall -Wextra -Werror
+    "-I$root/box_contact_ros/core/include" "$root/test/core/contact_test.cpp")
 g++ -Wno-psabi "${flags[@]}" -o "$work/here" &
 here=$!
 aarch64-linux-gnu-g++ "${flags[@]}" -o "$work/arm"

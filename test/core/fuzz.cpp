@@ -14,7 +14,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "box_contact/box_contact.hpp"
+#include "box_contact/inline.hpp"
 
 namespace {
 

@@ -13,8 +13,8 @@
 #include <string>
 #include <vector>
 
-#include "box_contact/box_contact.hpp"
-#include "box_contact/mlp_weights.hpp"
+#include "box_contact/inline.hpp"
+#include "box_contact/weights.hpp"
 
 // What these include is above: nothing but their own text comes into the namespaces.
 namespace test {
@@ -24,4 +24,6 @@ namespace fuzz {
 #include "fuzz.cpp"
 }
 
-int main(int argc, char** argv) { return argc > 2 ? test::main(argc, argv) : fuzz::main(argc, argv); }
+int main(int argc, char** argv) {
+  return argc > 2 ? test::main(argc, argv) : fuzz::main(argc, argv);
+}

@@ -99,7 +99,7 @@ def reference(network: Network, normal: np.ndarray, upper: np.ndarray, lower: np
               ) -> tuple[np.ndarray, float, np.ndarray]:
     """Return centroid (3,), volume and covariance (3, 3) of one overlap in its bounds.
 
-    By the words of core/mlp.hpp, in float64.
+    By the words of core/src/mlp/cut_cube.hpp, in float64.
     """
     (first, bias), (last, last_bias) = ([part.astype(float) for part in layer]
                                         for layer in network.layers)
@@ -174,7 +174,8 @@ def test_points_are_the_references(pairs: Pairs, network: Network) -> None:
     numbers = core_numbers(network)
     found = stages(*pairs, names=NAMES, network=numbers)
     assert found.in_range.all()
-    colliding, _, _, points, *_ = native.PairSolver('mlp', UNIT, UNIT, numbers).solve(*pairs, 1)
+    answers, _ = native.PairSolver('mlp', UNIT, UNIT, numbers).solve(*pairs, 1)
+    colliding, _, _, points, *_ = answers
     assert colliding.all()
     by_network = 0
     for row, cuts in enumerate(zip(*cuts_of(found))):
@@ -276,7 +277,7 @@ def test_stages_are_those_of_a_batch(pairs: Pairs) -> None:
     b = np.concatenate([poses.rotate(turn, pairs.pose_b[:, :3] - pairs.pose_a[:, :3]),
                         poses.multiply(turn, pairs.pose_b[:, 3:])], axis=1)
     again = stages(at_origin, b, *pairs[2:], names=NAMES)
-    colliding, separation, normal, point, *_ = one.solve(at_origin, b, *pairs[2:], 1)
+    (colliding, separation, normal, point, *_), _ = one.solve(at_origin, b, *pairs[2:], 1)
     assert np.array_equal(again.colliding, colliding)
     assert np.array_equal(again.separation, separation)
     assert np.array_equal(again.normal, normal)

@@ -1,9 +1,9 @@
 """What model `mlp` chose on its way to a point: where its answer may step.
 
 Comparisons choose two things. One chooses the frame, of A or of B, in which the network sees the
-overlap (core/overlap/bounds.hpp). The other chooses between network and exact method
-(core/mlp.hpp). Where a comparison changes its result, the point steps by up to the network's error.
-Everywhere else the point is a continuous function of the poses.
+overlap (core/src/overlap/bounds.hpp). The other chooses between network and exact method
+(core/src/mlp/mlp_model.hpp). Where a comparison changes its result, the point steps by up to the
+network's error. Everywhere else the point is a continuous function of the poses.
 """
 from __future__ import annotations
 
@@ -41,5 +41,5 @@ def solve_with_choices(network: Network, pairs: Pairs) -> tuple[Contacts, Choice
     numbers = core_numbers(network)
     found = stages(*pairs, names=('in_range', 'frame_b'))
     solver = native.PairSolver('mlp', _UNIT, _UNIT, numbers)
-    *contacts, _ = solver.solve(*map(np.ascontiguousarray, pairs), 1)
+    contacts, _ = solver.solve(*map(np.ascontiguousarray, pairs), 1)
     return Contacts(*contacts), Choices(found.in_range, found.frame_b)

@@ -142,7 +142,6 @@ def installed(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathF
 
 
 all_kinds = pytest.mark.parametrize('installed', INSTALL, indirect=True)
-all_but_editable = pytest.mark.parametrize('installed', ['pip', 'colcon'], indirect=True)
 under_colcon = pytest.mark.parametrize('installed', [kind for kind in INSTALL if 'colcon' in kind],
                                        indirect=True)
 
@@ -203,20 +202,26 @@ print(json.dumps({'sets': core.instruction_sets(), 'file': core.native.__file__}
     assert Path(found['file']).is_relative_to(installed.folder)
 
 
-@all_but_editable
-def test_headers_are_there_and_compile(installed: Installation, tmp_path: Path) -> None:
-    """A C++ user includes them from include/box_contact."""
-    (include,) = (path.parent for path in installed.folder.rglob('include/box_contact'))
-    folder, core = include / 'box_contact', ROOT / NAME / 'core'
-    names = {path.relative_to(folder).as_posix() for path in folder.rglob('*.hpp')}
-    assert names == {path.relative_to(core).as_posix() for path in core.rglob('*.hpp')
-                     if 'binding' not in path.parts}
-    compiler = shutil.which(os.environ.get('CXX', 'g++').split()[0])
-    if not compiler:
-        pytest.skip('no C++ compiler is installed')
-    source = tmp_path / 'user.cpp'
-    source.write_text(''.join(f'#include <box_contact/{name}>\n' for name in sorted(names)))
-    run(compiler, '-std=c++17', '-fsyntax-only', '-Wno-psabi', '-I', include, source, cwd=tmp_path)
+@all_kinds
+def test_cmake_finds_the_library(installed: Installation, tmp_path: Path) -> None:
+    """After colcon by the workspace's environment, after pip by `--cmakedir`; the example runs.
+
+    So do the headers alone, by `--includes`.
+    """
+    for name in ('cmake', 'g++'):
+        if not shutil.which(name):
+            pytest.skip(f'{name} is not installed')
+    enter, ask = installed.enter, (*installed.enter, installed.python, '-m', NAME)
+    folder = run(*ask, '--cmakedir', cwd=tmp_path).strip()
+    assert Path(folder).is_relative_to(installed.folder)
+    told = () if enter else (f'-D{NAME}_DIR={folder}',)
+    run(*enter, 'cmake', '-S', ROOT / 'docs' / 'examples' / 'cpp', '-B', tmp_path, *told,
+        cwd=tmp_path)
+    run('cmake', '--build', tmp_path, cwd=tmp_path)
+    assert 'batch: 1 0, volumes 0.030 0.000 m3' in run(tmp_path / 'first_contact', cwd=tmp_path)
+    (tmp_path / 'user.cpp').write_text('#include <box_contact/weights.hpp>\n')
+    run('g++', '-std=c++17', '-fsyntax-only', run(*ask, '--includes', cwd=tmp_path).strip(),
+        tmp_path / 'user.cpp', cwd=tmp_path)
 
 
 @pytest.mark.parametrize('installed', ['pip', 'pip -e'], indirect=True)

@@ -5,6 +5,7 @@ Stand-ins for Python make no environment and install nothing; they note how they
 from __future__ import annotations
 
 import os
+import runpy
 import shutil
 import subprocess
 import sys
@@ -39,8 +40,9 @@ def checkout(tmp_path: Path) -> Path:
     """Return a folder with the files that the set-up looks at, and no Python on its PATH."""
     folder = tmp_path / 'checkout'
     for name in ('.ci/setup', 'Makefile', 'setup.py', 'setup.cfg', 'pyproject.toml',
-                 'constraints.txt', 'box_contact_ros/cli.py', 'box_contact_ros/core/contact.hpp',
-                 'box_contact_msgs/package.xml', 'box_contact_msgs/msg/Contact.msg'):
+                 'constraints.txt', 'box_contact_ros/cli.py',
+                 'box_contact_ros/core/src/contact.hpp', 'box_contact_msgs/package.xml',
+                 'box_contact_msgs/msg/Contact.msg'):
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / name, folder / name)
     (tmp_path / 'bin').mkdir()
@@ -100,7 +102,7 @@ def test_a_target_is_installed_once(checkout: Path, offer: Callable) -> None:
 
 
 @pytest.mark.parametrize('changed', ['setup.py', 'constraints.txt', 'box_contact_ros/cli.py',
-                                     'box_contact_ros/core/contact.hpp'])
+                                     'box_contact_ros/core/src/contact.hpp'])
 def test_a_change_installs_again(checkout: Path, offer: Callable, changed: str) -> None:
     offer('python3.12', PYTHON)
     set_up(checkout)
@@ -166,13 +168,13 @@ def test_the_core_is_compiled_beside(checkout: Path, offer: Callable) -> None:
     assert 'setup.py -q build_ext --inplace all' in (checkout / 'calls').read_text()
 
 
-def test_the_demo_builds_the_best_instruction_set_alone(
-        monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> None:
-    """And the baseline, which tells what the machine can run."""
+def test_the_demo_builds_the_best_instruction_set_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """And the baseline, which every machine can run."""
     monkeypatch.setenv('BOX_CONTACT_BUILD', 'best')
-    built = [one.name.rpartition('._')[2]
-             for one in request.getfixturevalue('setup_arguments')['ext_modules']]
-    assert built == [*dict.fromkeys(['baseline', instruction_sets()[-1]]), 'networks']
+    monkeypatch.setattr('setuptools.setup', lambda **given: None)
+    monkeypatch.chdir(ROOT)
+    built = list(runpy.run_path('setup.py')['INSTRUCTION_SETS'])
+    assert built == [*dict.fromkeys(['baseline', instruction_sets()[-1]])]
 
 
 def test_a_failed_installation_is_taken_up(checkout: Path, offer: Callable) -> None:

@@ -29,7 +29,7 @@ from box_contact_ros.scene.pose_sets import (
     quaternion_multiply,
     turns,
 )
-from box_contact_ros.solver.mlp import ACTIVATION, DESCRIPTION, UNITS_MAX, core_numbers
+from box_contact_ros.solver.mlp import ACTIVATION, DESCRIPTION, FORMAT, UNITS_MAX, core_numbers
 from box_contact_ros.solver.weights_file import WeightsError, load_weights, save_weights
 
 N = 10_000
@@ -173,9 +173,10 @@ def garbage(rng, kind):
 
 def card_of(widths: tuple[int, ...]) -> dict[str, Any]:
     """Return a model card that the MLP takes."""
-    return {'name': 'other', 'model': 'mlp', 'inputs': {'description': DESCRIPTION},
-            'activation': ACTIVATION, 'outputs': [], 'sizes': [], 'architecture': list(widths),
-            'data': {}, 'seed': 0, 'commit': '', 'metrics': {}}
+    return {'name': 'other', 'model': 'mlp', 'format': FORMAT,
+            'inputs': {'description': DESCRIPTION}, 'activation': ACTIVATION, 'outputs': [],
+            'sizes': [], 'architecture': list(widths), 'data': {},
+            'seed': 0, 'commit': '', 'metrics': {}}
 
 
 def written(path, layers):
@@ -224,7 +225,7 @@ def test_weights_that_are_no_numbers_are_answered_exactly(output):
     numbers[output] = np.nan
     pairs = SETS['stacks'](np.random.default_rng(31), 1000)
     solver = native.PairSolver('mlp', UNIT, UNIT, numbers)
-    *found, _ = solver.solve(*pairs, 1)
+    found, _ = solver.solve(*pairs, 1)
     assert solver.answered_exactly == len(pairs.pose_a)
     for mine, theirs in zip(found, solve(EXACT, pairs)):
         assert np.array_equal(mine, theirs, equal_nan=True)
@@ -584,8 +585,9 @@ def test_layers_that_the_core_does_not_have_are_refused(tmp_path, hidden):
 
 
 @pytest.mark.parametrize('change, words', [
-    ({'inputs': {'description': 'something else'}}, 'for other inputs than this version has'),
-    ({'inputs': {'description': ['a list']}}, 'for other inputs than this version has'),
+    ({'format': 3}, 'has format 3; this version reads 2 and 1'),
+    ({'format': '2'}, "has format '2'"), ({'format': True}, 'has format True'),
+    ({'format': None}, 'has format None'),
     ({'activation': 'softsign'}, "units are 'relu', not 'softsign'"),
     ({'activation': None}, "units are 'relu', not None")])
 def test_weights_with_another_meaning_are_refused(tmp_path, change, words):

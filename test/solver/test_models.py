@@ -16,7 +16,15 @@ import yaml
 import box_contact_ros
 from box_contact_ros import MODELS, ContactSolver
 from box_contact_ros.solver.arguments import model_name, seed_number
-from box_contact_ros.solver.models import Exact, Family, ModelEntry, find_model, model_names
+from box_contact_ros.solver.models import (
+    Exact,
+    Family,
+    ModelEntry,
+    NativeModel,
+    build_model,
+    find_model,
+    model_names,
+)
 
 ROOT = Path(__file__).resolve().parents[2]
 HIGHER = np.array([0.5, 0.25, 1.875, 0, 0, 0, 1])
@@ -24,8 +32,6 @@ HIGHER = np.array([0.5, 0.25, 1.875, 0, 0, 0, 1])
 
 class Lifted(Exact):
     """The exact point, moved up by N mm: a model of this test's own."""
-
-    single = None, None  # what is inherited would answer single calls in C++
 
     def __init__(self, millimetres):
         super().__init__()
@@ -77,13 +83,15 @@ def test_an_added_model_is_named_where_another_is_refused(lifted):
 
 @pytest.mark.parametrize('name', MODELS)
 def test_entries_say_what_their_models_do(name):
-    """Single calls are native where the entry says so; weights are read where it says so."""
+    """Weights are read where the entry says so; the core answers for its own models."""
     if MODELS[name].extra:
         pytest.importorskip('fcl')
-    made = ContactSolver(poses.CUBE, poses.CUBE, model=name)._solver
+    size = np.array([poses.CUBE])
+    made = build_model(name, size, size, None)
     assert MODELS[name].name == name and find_model('model', name)[0] is MODELS[name]
-    assert (getattr(made, 'single', (None, None))[0] is not None) == MODELS[name].native_single
-    assert hasattr(made, 'weights') == ('weights' in MODELS[name].takes)
+    assert isinstance(made, NativeModel) is (name in ('mlp', 'exact'))
+    has_weights = getattr(made, 'weights', None) is not None
+    assert has_weights == ('weights' in MODELS[name].takes)
 
 
 def test_a_missing_library_is_named_with_its_extra(monkeypatch):

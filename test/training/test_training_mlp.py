@@ -119,7 +119,7 @@ def test_loss_is_the_formula(data: MlpSamples, scaling: Scaling) -> None:
 
 
 def test_the_network_is_the_cores() -> None:
-    """What is trained beside core/mlp.hpp, with hidden units on both sides of zero."""
+    """What is trained beside core/src/mlp/, with hidden units on both sides of zero."""
     pairs = size_pairs(np.random.default_rng(6), 1000)
     module = network_of(8)
     network = Network(module.layers())

@@ -20,6 +20,7 @@ import sysconfig
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 from unittest import mock
 
@@ -56,195 +57,207 @@ NAMED = 'verification/named_failures.py'
 TEST_NAMED = 'test/verification/test_named_failures.py'
 MUTANTS = {
     'normal flipped': Mutant(
-        'core/separating_axis.hpp', 'select<T>(along >= 0.0, splat<T>(1.0), splat<T>(-1.0));',
+        'core/src/separating_axis.hpp', 'select<T>(along >= 0.0, splat<T>(1.0), splat<T>(-1.0));',
         'select<T>(along >= 0.0, splat<T>(-1.0), splat<T>(1.0));', f'{FAMILIES} -k gates'),
     'axis dropped': Mutant(
-        'core/separating_axis.hpp', 'best.offer(select<T>(used, overlap * inverse, none)',
+        'core/src/separating_axis.hpp', 'best.offer(select<T>(used, overlap * inverse, none)',
         'if (i + j < 4) best.offer(select<T>(used, overlap * inverse, none)',
         f'{FAMILIES} -k gates'),
     'cross product not normalised': Mutant(
-        'core/separating_axis.hpp', 'T inverse = 1.0 / sqrt(length2);',
+        'core/src/separating_axis.hpp', 'T inverse = 1.0 / sqrt(length2);',
         'T inverse = splat<T>(1.0);', f'{FAMILIES} -k gates'),
     "constant added to R's entries": Mutant(
-        'core/separating_axis.hpp', '(frame.half[y] * abs(uz) + frame.half[z] * abs(uy))',
+        'core/src/separating_axis.hpp', '(frame.half[y] * abs(uz) + frame.half[z] * abs(uy))',
         '(frame.half[y] * (abs(uz) + 1e-6) + frame.half[z] * (abs(uy) + 1e-6))',
         f'{FAMILIES} -k gates'),
     'largest gap taken for that of the axis': Mutant(
-        'core/separating_axis.hpp', 'largest_gap = max(largest_gap, candidate_gap);',
+        'core/src/separating_axis.hpp', 'largest_gap = max(largest_gap, candidate_gap);',
         'largest_gap = gap;', f'{LAWS} -k swap'),
     'float32 too early': Mutant(
-        'core/poses.hpp', 'Vec<T> t = b.position - a.position;',
+        'core/src/poses.hpp', 'Vec<T> t = b.position - a.position;',
         'Vec<T> t = b.position - a.position; t[2] = t[2] * 0x20000001p0 - '
         '(t[2] * 0x20000001p0 - t[2]);', f'{FAMILIES} -k gates'),
     'frame of A for all edge axes': Mutant(
-        'core/separating_axis.hpp',
-        'inline SeparatingAxis<T> separating_axis(const Pair<T>& pair) {',
+        'core/src/separating_axis.hpp',
+        'BC_INLINE SeparatingAxis<T> separating_axis(const Pair<T>& pair) {',
         'inline SeparatingAxis<T> separating_axis(Pair<T> pair) { pair.a_first = T{} == T{};',
         f'{FAMILIES} -k swap'),
     'near-parallel edges left as they are': Mutant(
-        'core/contact.hpp', '  if (any(doubtful)) {', '  if (false) {',
+        'core/src/contact.hpp', '  if (any(doubtful)) {', '  if (false) {',
         f'{FAMILIES} -k edges_along_each_other'),
     'frame of A for near-parallel edges': Mutant(
-        'core/contact.hpp', 'refine(lane(q.pair, i), one_a, one_b, one);',
+        'core/src/contact.hpp', 'refine(lane(q.pair, i), one_a, one_b, one);',
         'Pair<double> it = lane(q.pair, i); it.a_first = true; refine(it, one_a, one_b, one);',
         f'{LAWS} -k swap_of_grazing'),
     'sums of two doubles not exact': Mutant(
-        'core/near_parallel_edges.hpp', 'return {s, (a - (s - c)) + (b - c)};', 'return {s, 0.0};',
+        'core/src/near_parallel_edges.hpp',
+        'return {s, (a - (s - c)) + (b - c)};', 'return {s, 0.0};',
         f'{FAMILIES} -k gates'),
     'quaternions not scaled for 32 digits': Mutant(
-        'core/near_parallel_edges.hpp', 'q[k] = std::ldexp(q[k], -exponent);',
+        'core/src/near_parallel_edges.hpp', 'q[k] = std::ldexp(q[k], -exponent);',
         'q[k] = std::ldexp(q[k], 0);', f'{LAWS} -k any_length'),
     'quaternion taken for a unit one': Mutant(
-        'core/poses.hpp', 'T s = 2.0 / (', 'T s = 2.0 + 0.0 * (',
+        'core/src/poses.hpp', 'T s = 2.0 / (', 'T s = 2.0 + 0.0 * (',
         'test/verification/test_fuzz.py -k gates_are'),
     'the first of concentric boxes is A': Mutant(
-        'core/poses.hpp', '  if (any(concentric)) {', '  if (false) {', f'{LAWS} -k concentric'),
+        'core/src/poses.hpp',
+        '  if (any(concentric)) {', '  if (false) {', f'{LAWS} -k concentric'),
     'corners pressed along one axis': Mutant(
-        'core/contact.hpp', 'if (pressed) enforce_on_further_axes(pair);',
+        'core/src/contact.hpp', 'if (pressed) enforce_on_further_axes(pair);',
         'if (false) enforce_on_further_axes(pair);',
         f'{EXACT} -k in_a_point'),
     'absolute tolerance': Mutant(
-        'core/minimum_depth.hpp', 'max(depth_floor * pair.size + axis.separation, T{});',
+        'core/src/minimum_depth.hpp', 'max(depth_floor * pair.size + axis.separation, T{});',
         'max(depth_floor + axis.separation, T{});', f'{FAMILIES} -k scale'),
     'one face for every centroid': Mutant(
-        'core/overlap/clipping.hpp', '  if (kept < cancelled) {', '  if (false) {',
+        'core/src/overlap/clipping.hpp', '  if (kept < cancelled) {', '  if (false) {',
         f'{FAMILIES} -k thin_plates'),
     'contact plane not clipped': Mutant(
-        'core/overlap/clipping.hpp', 'double bounds[5] = {0.0,', 'double bounds[5] = {1e300,',
+        'core/src/overlap/clipping.hpp', 'double bounds[5] = {0.0,', 'double bounds[5] = {1e300,',
         f'{FAMILIES} -k exact_point'),
     'a face in the far face counts twice': Mutant(
-        'core/overlap/clipping.hpp', '    if (high > floor) visit(', '    if (true) visit(',
+        'core/src/overlap/clipping.hpp', '    if (high > floor) visit(', '    if (true) visit(',
         f'{EXACT} -k clipping'),
     'no certificate': Mutant(
-        'core/overlap/face_sums.hpp',
+        'core/src/overlap/face_sums.hpp',
         'certificate(x_n, normal, area, length, volume, radius, wedge, pair.size, depth)',
         '(volume == volume)', f'{EXACT} -k "thin and sharing"'),
     'pieces far outside the overlap trusted': Mutant(
-        'core/overlap/face_sums.hpp', '(farthest2 <= reach * reach) | (wedge == 0);',
+        'core/src/overlap/face_sums.hpp', '(farthest2 <= reach * reach) | (wedge == 0);',
         '(farthest2 == farthest2) | (wedge == 0);',
         f'{EXACT} -k far_outside'),
     'second moments from A alone': Mutant(
-        'core/overlap/face_sums.hpp', '(of_a.second + rotated(r, of_b.second))', 'of_a.second',
+        'core/src/overlap/face_sums.hpp', '(of_a.second + rotated(r, of_b.second))', 'of_a.second',
         f'{EXACT} -k through_each_other'),
     "middles for the edges' pieces": Mutant(
-        'core/overlap/face_sums.hpp',
+        'core/src/overlap/face_sums.hpp',
         '+ (1.0 / 12.0) * by_sign<T, Side::sigma>(w_ll).sum();', ';',
         f'{LAWS} -k of_the_parts'),
     "middles for the lines' pieces": Mutant(
-        'core/overlap/face_sums.hpp', 'T square = (1.0 / 12.0) *', 'T square = 0.0 *',
+        'core/src/overlap/face_sums.hpp', 'T square = (1.0 / 12.0) *', 'T square = 0.0 *',
         f'{LAWS} -k of_the_parts'),
     'second moments about the origin of the sums': Mutant(
-        'core/overlap/face_sums.hpp', ' - squared(from_origin);', ' + T{} * squared(from_origin);',
+        'core/src/overlap/face_sums.hpp',
+        ' - squared(from_origin);', ' + T{} * squared(from_origin);',
         f'{LAWS} -k of_the_parts'),
     'second moments not divided by the volume': Mutant(
-        'core/overlap/face_sums.hpp', '(0.05 * by_volume) *', '(T{} + 0.05) *',
+        'core/src/overlap/face_sums.hpp', '(0.05 * by_volume) *', '(T{} + 0.05) *',
         f'{LAWS} -k powers_of_two'),
     "covariance left in A's frame": Mutant(
-        'core/overlap/face_sums.hpp', 'rotated(pair.axes_a, covariance)};', 'covariance};',
+        'core/src/overlap/face_sums.hpp', 'rotated(pair.axes_a, covariance);', 'covariance;',
         f'{LAWS} -k rigid_motion'),
     "covariance left in the first box's frame": Mutant(
-        'core/contact.hpp', 'select(a_first, pair.axes_a, pair.axes_b);', 'pair.axes_a;',
+        'core/src/contact.hpp', 'select(a_first, pair.axes_a, pair.axes_b);', 'pair.axes_a;',
         f'{LAWS} -k test_swap'),
     "clipped covariance left in the reference box's frame": Mutant(
-        'core/overlap/clipping.hpp', 'rotated(pair.axes_b, covariance)}', 'covariance}',
+        'core/src/overlap/clipping.hpp', 'rotated(pair.axes_b, covariance)}', 'covariance}',
         f'{EXACT} -k clipping_is'),
     'clipped squares about the plane': Mutant(
-        'core/overlap/clipping.hpp', 'Vec<double> middle = 0.5 * w - Vec<double>{',
+        'core/src/overlap/clipping.hpp', 'Vec<double> middle = 0.5 * w - Vec<double>{',
         'Vec<double> middle = 0.5 * w - 0.0 * Vec<double>{', f'{EXACT} -k clipping_is'),
     'covariance of the other sign': Mutant(
-        'core/contact.hpp', 'select(q.touching, overlap.covariance,',
+        'core/src/contact.hpp', 'select(q.touching, overlap.covariance,',
         'select(q.touching, splat<T>(-1.0) * overlap.covariance,',
         f'{LAWS} -k positive'),
     'covariance not symmetric': Mutant(
-        'core/overlap/moments.hpp', '{s(1, 0), s(1, 1)', '{-s(1, 0), s(1, 1)',
+        'core/src/overlap/moments.hpp', '{s(1, 0), s(1, 1)', '{-s(1, 0), s(1, 1)',
         f'{LAWS} -k positive'),
     'volume of the unpressed overlap': Mutant(
-        'core/minimum_depth.hpp',
+        'core/src/minimum_depth.hpp',
         'T distance = max(depth_floor * pair.size + axis.separation, T{});', 'T distance{};',
         f'{EXACT} -k pressed_volume'),
     'volume by its magnitude of the wrong part': Mutant(
-        'core/contact.hpp', 'select<T>(q.touching, overlap.volume, T{})',
+        'core/src/contact.hpp', 'select<T>(q.touching, overlap.volume, T{})',
         'select<T>(q.touching, overlap.volume * (1.0 + 0.1 * q.axis.separation), T{})',
         f'{LAWS} -k of_the_parts'),
     'volume that shrinks with the depth': Mutant(
-        'core/contact.hpp', 'select<T>(q.touching, overlap.volume, T{})',
+        'core/src/contact.hpp', 'select<T>(q.touching, overlap.volume, T{})',
         'select<T>(q.touching, 1.0 / overlap.volume, T{})', f'{LAWS} -k grows_with_the_depth'),
     'patch of a model that gives none': Mutant(
-        'core/contact.hpp', 'T unknown = splat<T>(std::numeric_limits<double>::quiet_NaN());',
+        'core/src/contact.hpp', 'T unknown = splat<T>(not_a_number);',
         'T unknown{};', f'{TEST_CORE} -k point_alone'),
     'faces not moved out of each other': Mutant(
-        'core/overlap/face_sums.hpp', 'Mask<T> risky = unflush(pair, depth);',
+        'core/src/overlap/face_sums.hpp', 'Mask<T> risky = unflush(pair, depth);',
         'Mask<T> risky = depth != depth;', f'{TEST_CORE} -k flush'),
     'mirrored rounding trusted': Mutant(
-        'core/overlap/face_sums.hpp', 'found.certain &= risky == 0;', '',
+        'core/src/overlap/face_sums.hpp', 'found.certain &= risky == 0;', '',
         f'{EXACT} -k almost_aligned'),
     'face sums in the order of the names': Mutant(
-        'core/contact.hpp', 'CertifiedOverlap<T> overlap = overlap_by_face_sums(',
-        'pair.a_first = T{} == T{}; CertifiedOverlap<T> overlap = overlap_by_face_sums(',
+        'core/src/contact.hpp', 'CertifiedOverlap<Found<T>, T> overlap =',
+        'pair.a_first = T{} == T{}; CertifiedOverlap<Found<T>, T> overlap =',
         f'{LAWS} -k roundings'),
     'a piece of an edge of length below zero': Mutant(
-        'core/overlap/face_sums.hpp',
+        'core/src/overlap/face_sums.hpp',
         'Four<T> length = max(t - s, Four<T>{}), middle = 0.5 * (s + t) - origin[j];',
         'Four<T> length = t - s, middle = 0.5 * (s + t) - origin[j];',
         f'{TEST_CORE} -k certain'),
     'point left outside': Mutant(
-        'core/mlp.hpp', ' & placed.inside;', ';', f'{MLP} -k contacts_are_sound'),
+        'core/src/mlp/mlp_model.hpp', ' & placed.inside;', ';', f'{MLP} -k contacts_are_sound'),
     'patch that is no number': Mutant(
-        'core/mlp.hpp', 'answered &= (one.volume > 0.0) & (trace(one.covariance) > 0.0);', '',
+        'core/src/mlp/mlp_model.hpp',
+        'answered &= (one.volume > 0.0) & (trace(one.covariance) > 0.0);', '',
         f'{MLP} -k no_numbers'),
     'volume larger than its bounds': Mutant(
-        'core/mlp.hpp', 'exp(min(F{}, max(', 'exp(min(splat<F>(9.0F), max(',
+        'core/src/mlp/cube_moments.hpp', 'exp(min(F{}, max(', 'exp(min(splat<F>(9.0F), max(',
         f'{MLP} -k fit_the_bounds'),
     'volume by one half extent': Mutant(
-        'core/mlp.hpp', '(half[0] * half[1] * half[2])', '(half[0] * half[0] * half[0])',
+        'core/src/mlp/mlp_model.hpp',
+        '(half[0] * half[1] * half[2])', '(half[0] * half[0] * half[0])',
         f'{MLP} -k box_symmetries'),
     'precision without what cuts add': Mutant(
-        'core/mlp.hpp', 'said.variance = (own + over_faces(squares)) + push * push;',
+        'core/src/mlp/cube_moments.hpp',
+        'said.variance = (own + over_faces(squares)) + push * push;',
         'said.variance = own;', f'{MLP} -k fit_the_bounds'),
     'coupling of any sign': Mutant(
-        'core/mlp.hpp', 'clamp(cube.slant[q] * out[to_coupling], reach)',
+        'core/src/mlp/cube_moments.hpp', 'clamp(cube.slant[q] * out[to_coupling], reach)',
         'clamp(abs(cube.slant[q]) * out[to_coupling], reach)', f'{MLP} -k box_symmetries'),
     'covariance by one half extent': Mutant(
-        'core/mlp.hpp', 'said.variance[k] * (half[k] * half[k])', 'said.variance[k] * half[k]',
+        'core/src/mlp/mlp_model.hpp',
+        'said.variance[k] * (half[k] * half[k])', 'said.variance[k] * half[k]',
         f'{MLP} -k scale_by_powers'),
     'covariance left in the frame of the bounds': Mutant(
-        'core/mlp.hpp', 'select(bounds[g].in_b, q.pair.axes_b, q.pair.axes_a);', 'q.pair.axes_a;',
+        'core/src/mlp/mlp_model.hpp',
+        'select(bounds[g].in_b, q.pair.axes_b, q.pair.axes_a);', 'q.pair.axes_a;',
         f'{MLP} -k swap'),
     'exponential in steps': Mutant(
-        'core/mlp.hpp', 'whole * 0x1.62ep-1F', 'whole * 0.69F',
+        'core/src/mlp/cube_moments.hpp', 'whole * 0x1.62ep-1F', 'whole * 0.69F',
         'test/scene/test_series.py -k patches_are_continuous'),
     'smaller bounding box, always': Mutant(
-        'core/overlap/bounds.hpp', 'clearly_smaller = 0.8;', 'clearly_smaller = 1.0 - 1e-6;',
+        'core/src/overlap/bounds.hpp', 'clearly_smaller = 0.8;', 'clearly_smaller = 1.0 - 1e-6;',
         'test/core/test_overlap_bounds.py -k keep_their_frame'),
     'slabs not widened': Mutant(
-        'core/overlap/bounds.hpp', 'constexpr double flush = 0x1p-46;',
+        'core/src/overlap/bounds.hpp', 'constexpr double flush = 0x1p-46;',
         'constexpr double flush = 0.0;', 'test/core/test_overlap_bounds.py -k whole_patch'),
     'side of a pair of faces taken as it comes': Mutant(
-        'core/mlp.hpp', 'features.of_faces[1] = abs(push);', 'features.of_faces[1] = push;',
+        'core/src/mlp/cut_cube.hpp',
+        'features.of_faces[1] = abs(push);', 'features.of_faces[1] = push;',
         f'{MLP} -k box_symmetries'),
     'range without its depth': Mutant(
-        'core/mlp.hpp', 'excess = max(excess, -separation / (2.0 * depth_max',
+        'core/src/mlp/mlp_model.hpp', 'excess = max(excess, -separation / (2.0 * depth_max',
         'excess = max(excess, 0.0 * -separation / (2.0 * depth_max',
         f'{MLP} -k limits_belong'),
     'threads overlap': Mutant(
-        'core/binding/module.cpp', 'long begin = chunk * rows_per_chunk,',
-        'long begin = std::max(0L, chunk * rows_per_chunk - lanes),',
+        'core/src/library/solver.hpp', 'long begin = chunk * rows_per_chunk,',
+        'long begin = std::max(0L, chunk * rows_per_chunk - 8),',
         f'{TEST_CORE} -k threads'),
     'threads leave a block out': Mutant(
-        'core/binding/module.cpp', 'for (long chunk = next++; chunk < chunks;',
+        'core/src/library/solver.hpp', 'for (long chunk = next++; chunk < chunks;',
         'for (long chunk = next++; chunk < chunks - (threads > 1);',
         f'{TEST_CORE} -k threads'),
     'any refused row is named': Mutant(
-        'core/binding/module.cpp', 'std::min(refused_of[thread], refused);', 'refused;',
+        'core/src/library/solver.hpp', 'std::min(refused_of[thread], refused);', 'refused;',
         f'{TEST_CORE} -k threads'),
     'lanes that repeat the last row are counted': Mutant(
-        'core/contact.hpp', 'set_lane(queries[g].touching, int(i), 0);', ';',
+        'core/src/contact.hpp', 'set_lane(queries[g].touching, int(i), 0);', ';',
         f'{TEST_CORE} -k threads_change'),
+    'rows that wait are forgotten': Mutant(
+        'core/src/contact.hpp', 'i < waiting.count; ++i)', 'i < 0; ++i)',
+        f'{TEST_CORE} -k single_calls'),
     'a reference to the type is kept': Mutant(
         'core/binding/module.cpp', '  Py_DECREF(type);', '  ', f'{TEST_CORE} -k references'),
     'the forced instruction set is ignored': Mutant(
-        'core/__init__.py', '_forced or instruction_sets()[-1]', 'instruction_sets()[-1]',
-        f'{TEST_CORE} -k forced'),
+        'core/src/library/library.cpp', 'if (!forced || !*forced) return', 'return',
+        f'{TEST_CORE} -k instruction_set_is'),
     # Guards of the nodes against faults.
     'weights taken as they are': Mutant(
         'solver/weights_file.py', "if tensors_digest(tensors) != card['sha256']:", 'if False:',
@@ -526,27 +539,30 @@ def copied(folder: Path) -> Path:
 
 
 @functools.cache
-def baseline_extension() -> Any:
-    """Return what setup.py says of the core's extension for the baseline instruction set."""
+def setup() -> SimpleNamespace:
+    """Return what setup.py says of the core: flags, and the extension."""
     given: dict[str, Any] = {}
     with mock.patch('setuptools.setup', given.update):
-        runpy.run_path(str(ROOT / 'setup.py'))
-    return next(each for each in given['ext_modules'] if each.name.endswith('._baseline'))
+        names = runpy.run_path(str(ROOT / 'setup.py'))
+    extension, = (one for one in given['ext_modules'] if one.name == names['CORE_EXTENSION'])
+    return SimpleNamespace(flags=names['FLAGS'], library=f'{names["CORE"]}/src/library',
+                           extension=extension)
 
 
 def build(checkout: Path) -> None:
-    """Compile the core of a copy, for the baseline instruction set, and remove all others."""
-    extension = baseline_extension()
+    """Compile the core of a copy, for the baseline instruction set alone."""
+    core = setup()
     folder = checkout / 'box_contact_ros' / 'core'
     for built in folder.glob('*.so'):
         built.unlink()
-    macros = [f'-D{name}={value}' for name, value in extension.define_macros]
-    folders = [f'-I{path}' for path in (sysconfig.get_path('include'), *extension.include_dirs)]
+    folders = [f'-I{path}' for path in (sysconfig.get_path('include'),
+                                        *core.extension.include_dirs)]
+    sources = [*core.extension.sources, f'{core.library}/kernel.cpp', f'{core.library}/library.cpp']
     # Half as long to compile with -O1. The bits are the same.
     subprocess.run(
-        [*os.environ.get('CXX', 'g++').split(), '-shared', '-fPIC', *macros, *folders,
-         *extension.extra_compile_args, '-O1', '-w', *extension.sources,
-         '-o', folder / f'_baseline{sysconfig.get_config_var("EXT_SUFFIX")}'],
+        [*os.environ.get('CXX', 'g++').split(), '-shared', '-fPIC', '-DBOX_CONTACT_VERSION=""',
+         *folders, *core.flags, '-O1', '-w', *sources,
+         '-o', folder / f'_native{sysconfig.get_config_var("EXT_SUFFIX")}'],
         cwd=checkout, check=True)
 
 
@@ -587,7 +603,7 @@ def main() -> int:
     parser.add_argument('--jobs', type=int, default=1, help='mutants at a time (default: 1)')
     given = parser.parse_args()
     names = given.names or list(MUTANTS)
-    baseline_extension()  # once, before there are threads
+    setup()  # once, before there are threads
     survivors = []
     with ThreadPoolExecutor(given.jobs) as pool:
         for name, killer in zip(names, pool.map(killer_of, names), strict=True):

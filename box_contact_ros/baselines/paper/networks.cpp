@@ -2,10 +2,11 @@
 //
 // Arrays are checked here for kind and shape only. Words about refused poses and sizes are made in
 // Python, which is told the row.
+#include "networks.hpp"
+
 #include <string>
 
 #include "../../core/binding/arrays.hpp"
-#include "networks.hpp"
 
 namespace {
 
@@ -86,7 +87,8 @@ PyObject* solve_pairs(PyObject*, PyObject* const* args, Py_ssize_t given) {
   long refused;
   Py_BEGIN_ALLOW_THREADS;
   refused = solve(networks, rows, count,
-                  {colliding.numbers, separation.numbers, normal.numbers, point.numbers});
+                  {colliding.numbers, separation.numbers, normal.numbers, point.numbers, nullptr,
+                   nullptr, nullptr, 0.0});
   Py_END_ALLOW_THREADS;
   return Py_BuildValue("(NNNNl)", colliding.object.release(), separation.object.release(),
                        normal.object.release(), point.object.release(), refused);

@@ -12,7 +12,7 @@
 
 #include <algorithm>
 
-#include "../../core/lanes.hpp"
+#include "../../core/src/lanes/vectors.hpp"
 
 namespace box_contact::paper {
 

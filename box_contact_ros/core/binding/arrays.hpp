@@ -7,11 +7,12 @@
 #include <numpy/arrayobject.h>
 
 #include <cstdint>
+#include <cstring>
 #include <initializer_list>
 #include <memory>
 #include <type_traits>
 
-#include "../lanes.hpp"
+#include "../src/lanes/vectors.hpp"
 
 namespace box_contact::binding {
 

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "../poses.hpp"
+#include "../src/poses.hpp"
 
 namespace box_contact {
 

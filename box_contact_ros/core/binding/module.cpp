@@ -1,123 +1,165 @@
-// The core as a Python extension. It is compiled once for each instruction set, under the name
-// BOX_CONTACT_MODULE; core/__init__.py imports the best one that the machine can run.
+// The library as a Python extension: arrays, tuples and lists become rows, and contacts become tuples.
 //
-// Arrays are checked here for kind and shape only. Words about refused values are made in Python,
-// which is told the row.
+// Arguments are checked here for kind and shape only. What is no plain number goes to Python, which
+// converts it or says what is wrong with it.
 #include <algorithm>
-#include <atomic>
 #include <cstddef>
+#include <limits>
 #include <memory>
 #include <string>
-#include <system_error>
-#include <thread>
+#include <vector>
 
-#include "../mlp.hpp"
+#include "../src/library/solver.hpp"
+#include "../src/mlp/mlp_model.hpp"
 #include "arrays.hpp"  // first, as Python.h wants
 #include "bounding_boxes.hpp"
-#include "stages.hpp"
 
 namespace {
 
 using namespace box_contact;
 using namespace box_contact::binding;
+using detail::Counts;
+using detail::Kernel;
+using detail::Model;
+using detail::Results;
+using detail::Rows;
+using detail::Solver;
+using detail::StageArrays;
 
-#if defined(__AVX512F__)
-constexpr int lanes = 8;
-constexpr const char* instruction_set = "AVX-512";
-#elif defined(__AVX2__)
-constexpr int lanes = 4;
-constexpr const char* instruction_set = "AVX2";
-#else
-constexpr int lanes = 2;
-#if defined(__aarch64__)
-constexpr const char* instruction_set = "NEON";
-#else
-constexpr const char* instruction_set = "baseline";
-#endif
-#endif
-using Block = Lanes<double, lanes>;
+const Kernel* kernel = nullptr;        // of this process
+PyTypeObject* contact_type = nullptr;  // the named tuples that `use_contact_types` was given
+PyTypeObject* contacts_type = nullptr;
+PyObject* name_converted = nullptr;  // of the methods for what is no plain array
+PyObject* name_converted_batch = nullptr;
 
-// Rows that a thread takes at a time: some 100 µs of work, and whole blocks.
-constexpr long rows_per_chunk = 512;
-static_assert(rows_per_chunk % (2 * lanes) == 0, "rows share vectors as in one thread");
+// --- Numbers ------------------------------------------------------------------------------------
 
-PyTypeObject* contact_type = nullptr;  // the NamedTuple that `use_contact_type` was given
-PyObject* name_converted = nullptr;    // of the method for poses that are no plain arrays
+// An array (n,) of float32 or float64 in any order of memory. Returns nullptr for another kind.
+const double* numbers_of_array(PyArrayObject* array, int n, double* copy) {
+  if (PyArray_NDIM(array) != 1 || PyArray_DIM(array, 0) != n || !PyArray_ISNOTSWAPPED(array))
+    return nullptr;
+  int type = PyArray_TYPE(array);
+  if (type == NPY_DOUBLE && PyArray_ISCARRAY_RO(array))
+    return static_cast<const double*>(PyArray_DATA(array));
+  if (type != NPY_DOUBLE && type != NPY_FLOAT) return nullptr;
+  const char* place = PyArray_BYTES(array);
+  npy_intp step = PyArray_STRIDE(array, 0);
+  for (int k = 0; k < n; ++k, place += step) {
+    if (type == NPY_DOUBLE) {
+      std::memcpy(copy + k, place, sizeof(double));
+    } else {
+      float number;
+      std::memcpy(&number, place, sizeof number);
+      copy[k] = number;
+    }
+  }
+  return copy;
+}
 
-// The numbers of a float64 array (n,) that lies in order, or nullptr.
-const double* plain_numbers(PyObject* object, npy_intp n) {
+// `n` numbers: an array, or a tuple or list of Python's own floats and integers. Others return
+// nullptr, without an error.
+const double* numbers_of(PyObject* object, int n, double* copy) {
+  if (PyArray_Check(object))
+    return numbers_of_array(reinterpret_cast<PyArrayObject*>(object), n, copy);
+  bool is_tuple = PyTuple_Check(object);
+  if ((!is_tuple && !PyList_Check(object)) || Py_SIZE(object) != n) return nullptr;
+  for (int k = 0; k < n; ++k) {
+    PyObject* item = is_tuple ? PyTuple_GET_ITEM(object, k) : PyList_GET_ITEM(object, k);
+    if (PyFloat_Check(item)) {
+      copy[k] = PyFloat_AS_DOUBLE(item);
+    } else if (PyLong_CheckExact(item)) {
+      copy[k] = PyLong_AsDouble(item);
+      if (copy[k] == -1.0 && PyErr_Occurred()) return PyErr_Clear(), nullptr;
+    } else {
+      return nullptr;
+    }
+  }
+  return copy;
+}
+
+// Rows (count, columns) of a float64 array that lies in order, or nullptr. `count` −1: any.
+const double* plain_rows(PyObject* object, npy_intp& count, npy_intp columns) {
   if (!PyArray_Check(object)) return nullptr;
   auto* array = reinterpret_cast<PyArrayObject*>(object);
-  bool plain = PyArray_TYPE(array) == NPY_DOUBLE && PyArray_NDIM(array) == 1 &&
-               PyArray_DIM(array, 0) == n && PyArray_ISCARRAY_RO(array);
-  return plain ? static_cast<const double*>(PyArray_DATA(array)) : nullptr;
+  bool plain = PyArray_TYPE(array) == NPY_DOUBLE && PyArray_NDIM(array) == 2 &&
+               PyArray_DIM(array, 1) == columns && PyArray_ISCARRAY_RO(array) &&
+               (count < 0 || PyArray_DIM(array, 0) == count);
+  if (!plain) return nullptr;
+  count = PyArray_DIM(array, 0);
+  return static_cast<const double*>(PyArray_DATA(array));
 }
 
 // Rows of pairs, as arrays that stay alive.
 struct PairArrays {
   Array<double> poses_a, poses_b, sizes_a, sizes_b;
+  Array<int64_t> places;
   npy_intp count = 0;
   Rows rows{};
 };
 
-bool read_pairs(PyObject* const* args, PairArrays& pairs) {
+// Read (poses_a, poses_b, sizes_a, sizes_b); `places` None, or the pairs (n, 2).
+bool read_pairs(PyObject* const* args, PyObject* places, PairArrays& pairs) {
   if (!read(args[0], "poses_a", {any_length, 7}, pairs.poses_a)) return false;
-  pairs.count = pairs.poses_a.length(0);
-  if (!read(args[1], "poses_b", {pairs.count, 7}, pairs.poses_b) ||
+  npy_intp poses = pairs.poses_a.length(0);
+  if (!read(args[1], "poses_b", {poses, 7}, pairs.poses_b) ||
       !read(args[2], "sizes_a", {any_length, 3}, pairs.sizes_a) ||
       !read(args[3], "sizes_b", {any_length, 3}, pairs.sizes_b))
     return false;
   for (const Array<double>* sizes : {&pairs.sizes_a, &pairs.sizes_b})
-    if (sizes->length(0) != 1 && sizes->length(0) != pairs.count)
+    if (sizes->length(0) != 1 && sizes->length(0) != poses)
       return fail(PyExc_ValueError, "sizes must be as many as poses, or one");
   auto step = [](const Array<double>& sizes) { return sizes.length(0) == 1 ? 0L : 3L; };
-  pairs.rows = {pairs.poses_a.numbers, pairs.poses_b.numbers, pairs.sizes_a.numbers,
-                pairs.sizes_b.numbers, step(pairs.sizes_a),   step(pairs.sizes_b)};
+  pairs.rows = {pairs.poses_a.numbers,
+                pairs.poses_b.numbers,
+                pairs.sizes_a.numbers,
+                pairs.sizes_b.numbers,
+                step(pairs.sizes_a),
+                step(pairs.sizes_b),
+                nullptr};
+  pairs.count = poses;
+  if (places == Py_None) return true;
+  if (!read(places, "pairs", {any_length, 2}, pairs.places)) return false;
+  pairs.count = pairs.places.length(0);
+  pairs.rows.pairs = pairs.places.numbers;
+  for (npy_intp k = 0; k < 2 * pairs.count; ++k)
+    if (pairs.places.numbers[k] < 0 || pairs.places.numbers[k] >= poses) {
+      PyErr_Format(PyExc_ValueError, "pairs[%zd] has the place %lld, which no pose has", k / 2,
+                   (long long)pairs.places.numbers[k]);
+      return false;
+    }
   return true;
 }
 
 // A network from a float32 array: the outputs' biases, then the numbers of each unit. Leaves
 // `network` empty for None.
-bool read_network(PyObject* object, std::unique_ptr<Network>& network) {
+bool read_network(PyObject* object, std::vector<float>& network) {
   if (object == Py_None) return true;
   Array<float> array;
   if (!read(object, "network", {any_length}, array)) return false;
-  constexpr npy_intp per_unit = sizeof(Network::Unit) / sizeof(float);
-  npy_intp of_units = array.length(0) - site_outputs;
-  if (of_units < 0 || of_units % per_unit != 0)
+  npy_intp of_units = array.length(0) - detail::site_outputs;
+  if (of_units < 0 || of_units % detail::unit_numbers != 0)
     return fail(PyExc_ValueError, "a network has 7 + 20 · units numbers");
-  network = std::make_unique<Network>();
-  network->units.resize(of_units / per_unit);
-  std::memcpy(network->output_bias, array.numbers, sizeof(network->output_bias));
-  std::memcpy(network->units.data(), array.numbers + site_outputs, of_units * sizeof(float));
+  network.assign(array.numbers, array.numbers + array.length(0));
   return true;
 }
 
-// --- PairSolver ---------------------------------------------------------------------------------
+// --- Contacts -----------------------------------------------------------------------------------
 
-enum class Model { none, exact, mlp, mlp_by_edges };
-
-struct PairSolver {
-  PyObject_HEAD Model model;
-  Vec<double> half_a, half_b;  // of single calls
-  Network* network;
-  std::atomic<long> clipped, exact;
-};
-
-// Call `run` with the solver's model, which is not `none`.
-template <class Run>
-auto with_model(const PairSolver& solver, Run run) {
-  switch (solver.model) {
-    case Model::mlp:
-      return run(MlpModel{*solver.network});
-    case Model::mlp_by_edges:
-      return run(MlpModelBy<Network::Bounds::edges>{*solver.network});
-    default:
-      return run(ExactModel{});
+// A new tuple of a type; takes over the fields, of which some may be nullptr.
+template <Py_ssize_t count>
+PyObject* new_tuple(PyTypeObject* type, PyObject* const (&fields)[count]) {
+  bool complete = true;
+  for (PyObject* field : fields) complete &= field != nullptr;
+  PyObject* tuple = complete ? type->tp_alloc(type, count) : nullptr;
+  for (Py_ssize_t k = 0; k < count; ++k) {
+    if (tuple) {
+      PyTuple_SET_ITEM(tuple, k, fields[k]);
+    } else {
+      Py_XDECREF(fields[k]);
+    }
   }
+  return tuple;
 }
-
-PairSolver* solver_of(PyObject* object) { return reinterpret_cast<PairSolver*>(object); }
 
 // A new array of 3, or of 3 × 3 numbers.
 PyObject* new_array(const double* numbers, int dimensions) {
@@ -129,151 +171,266 @@ PyObject* new_array(const double* numbers, int dimensions) {
   return array;
 }
 
-PyObject* new_contact(const Contact& contact) {
-  PyObject* fields[] = {PyBool_FromLong(contact.colliding), PyFloat_FromDouble(contact.separation),
-                        new_array(contact.normal.v, 1),     new_array(contact.point.v, 1),
-                        PyFloat_FromDouble(contact.volume), new_array(contact.covariance[0], 2)};
-  constexpr Py_ssize_t count = sizeof(fields) / sizeof(fields[0]);
-  PyObject* tuple = contact_type->tp_alloc(contact_type, count);
-  for (Py_ssize_t k = 0; k < count; ++k) {
-    if (!tuple || !fields[k]) {
-      for (Py_ssize_t rest = k; rest < count; ++rest) Py_XDECREF(fields[rest]);
-      Py_XDECREF(tuple);
-      return nullptr;
-    }
-    PyTuple_SET_ITEM(tuple, k, fields[k]);
-  }
-  return tuple;
+PyObject* new_contact(const bc_contact& contact) {
+  PyObject* const fields[] = {
+      PyBool_FromLong(contact.colliding), PyFloat_FromDouble(contact.separation),
+      new_array(contact.normal, 1),       new_array(contact.point, 1),
+      PyFloat_FromDouble(contact.volume), new_array(contact.covariance[0], 2)};
+  return new_tuple(contact_type, fields);
 }
 
-PyObject* solver_call(PyObject* self, PyObject* args, PyObject* keywords) {
-  auto* solver = solver_of(self);
-  if (solver->model != Model::none && !keywords && PyTuple_GET_SIZE(args) == 2) {
-    const double* a = plain_numbers(PyTuple_GET_ITEM(args, 0), 7);
-    const double* b = plain_numbers(PyTuple_GET_ITEM(args, 1), 7);
-    if (a && b) {
-      Contact contact;
-      Counts counts;
-      bool solved = with_model(*solver, [&](const auto& model) {
-        return solve_one(model, a, b, solver->half_a, solver->half_b, contact, counts);
-      });
-      if (counts.clipped) solver->clipped += counts.clipped;
-      if (counts.exact) solver->exact += counts.exact;
-      if (solved) return new_contact(contact);
-    }
+// Arrays of a row for each pair.
+struct ContactArrays {
+  Array<bool> colliding;
+  Array<double> separation, normal, point, volume, covariance;
+
+  bool make_for(npy_intp count, bool patch) {
+    return make({count}, colliding) && make({count}, separation) && make({count, 3}, normal) &&
+           make({count, 3}, point) && make({count}, volume) &&
+           (patch ? make({count, 3, 3}, covariance) : make_unknown(count));
   }
-  Owned method(PyObject_GetAttr(self, name_converted));
+  Results results(bool patch) const {
+    return {colliding.numbers,
+            separation.numbers,
+            normal.numbers,
+            point.numbers,
+            patch ? volume.numbers : nullptr,
+            patch ? covariance.numbers : nullptr,
+            nullptr,
+            0.0};
+  }
+  // Without a patch, the volume of pairs in contact is unknown.
+  void fill_volumes(npy_intp count) {
+    for (npy_intp row = 0; row < count; ++row)
+      volume.numbers[row] = colliding.numbers[row] ? unknown : 0.0;
+  }
+  PyObject* release(PyTypeObject* type) {
+    PyObject* const fields[] = {colliding.object.release(), separation.object.release(),
+                                normal.object.release(),    point.object.release(),
+                                volume.object.release(),    covariance.object.release()};
+    return new_tuple(type, fields);
+  }
+
+ private:
+  static constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+
+  // One NaN, seen in all places: read-only.
+  bool make_unknown(npy_intp count) {
+    npy_intp shape[] = {count, 3, 3}, steps[] = {0, 0, 0};
+    covariance.take(PyArray_New(&PyArray_Type, 3, shape, NPY_DOUBLE, steps,
+                                const_cast<double*>(&unknown), 0, NPY_ARRAY_ALIGNED, nullptr));
+    return bool(covariance.object);
+  }
+};
+
+// --- PairSolver ---------------------------------------------------------------------------------
+
+struct PairSolver {
+  PyObject_HEAD std::shared_ptr<Solver> solver;  // none: Python answers
+};
+
+PairSolver* self_of(PyObject* object) { return reinterpret_cast<PairSolver*>(object); }
+
+PyObject* call_method(PyObject* self, PyObject* name, PyObject* args, PyObject* keywords) {
+  Owned method(PyObject_GetAttr(self, name));
   return method ? PyObject_Call(method.get(), args, keywords) : nullptr;
 }
 
+PyObject* solver_call(PyObject* self, PyObject* args, PyObject* keywords) {
+  Solver* solver = self_of(self)->solver.get();
+  if (solver && !keywords && PyTuple_GET_SIZE(args) == 2) {
+    double copy_a[7], copy_b[7];
+    const double* a = numbers_of(PyTuple_GET_ITEM(args, 0), 7, copy_a);
+    const double* b = a ? numbers_of(PyTuple_GET_ITEM(args, 1), 7, copy_b) : nullptr;
+    bc_contact contact;
+    if (b && solver->solve(a, b, nullptr, nullptr, BC_COVARIANCE, contact))
+      return new_contact(contact);
+  }
+  return call_method(self, name_converted, args, keywords);
+}
+
+// Solve rows without Python's lock. Returns the first row that is refused, or −1; −2 with an error.
+long solve(const std::shared_ptr<Solver>& solver, const Rows& rows, npy_intp count,
+           const Results& results, long threads) {
+  long refused = -2;
+  Py_BEGIN_ALLOW_THREADS;
+  try {
+    refused = solver->solve(rows, long(count), results, threads);
+  } catch (const std::bad_alloc&) {
+    // The rows need none: the threads' counts do.
+  }
+  Py_END_ALLOW_THREADS;
+  if (refused == -2) PyErr_NoMemory();
+  return refused;
+}
+
+// What a call of `batch` asks for, if it is all plain.
+struct PlainBatch {
+  Rows rows{};
+  npy_intp count = -1;
+  long threads = 1;
+  bool patch = true;
+
+  // Returns false for what Python has to convert or to refuse.
+  bool read(PyObject* args, PyObject* keywords, const Solver& solver) {
+    if (PyTuple_GET_SIZE(args) != 2) return false;
+    rows = {plain_rows(PyTuple_GET_ITEM(args, 0), count, 7),
+            nullptr,
+            solver.setup().size_a.data(),
+            solver.setup().size_b.data(),
+            0,
+            0,
+            nullptr};
+    if (rows.poses_a) rows.poses_b = plain_rows(PyTuple_GET_ITEM(args, 1), count, 7);
+    if (!rows.poses_b) return false;
+    PyObject *key, *value;
+    for (Py_ssize_t place = 0; keywords && PyDict_Next(keywords, &place, &key, &value);)
+      if (!read_keyword(key, value)) return false;
+    return true;
+  }
+
+ private:
+  bool read_keyword(PyObject* key, PyObject* value) {
+    auto is = [key](const char* name) { return PyUnicode_CompareWithASCIIString(key, name) == 0; };
+    if (is("size_a")) return read_sizes(value, rows.sizes_a, rows.size_step_a);
+    if (is("size_b")) return read_sizes(value, rows.sizes_b, rows.size_step_b);
+    if (is("patch") && PyBool_Check(value)) return patch = value == Py_True, true;
+    if (!is("threads") || !PyLong_CheckExact(value)) return false;
+    int overflow;
+    threads = PyLong_AsLongAndOverflow(value, &overflow);
+    return !overflow && threads >= 1;
+  }
+  bool read_sizes(PyObject* value, const double*& sizes, long& step) {
+    if (value == Py_None) return true;
+    sizes = plain_rows(value, count, 3);
+    step = 3;
+    return sizes != nullptr;
+  }
+};
+
+PyObject* solver_batch(PyObject* self, PyObject* args, PyObject* keywords) {
+  std::shared_ptr<Solver> solver = self_of(self)->solver;
+  PlainBatch plain;
+  if (solver && plain.read(args, keywords, *solver)) {
+    ContactArrays found;
+    if (!found.make_for(plain.count, plain.patch)) return nullptr;
+    long refused =
+        solve(solver, plain.rows, plain.count, found.results(plain.patch), plain.threads);
+    if (refused == -2) return nullptr;
+    if (!plain.patch) found.fill_volumes(plain.count);
+    if (refused < 0) return found.release(contacts_type);
+  }
+  return call_method(self, name_converted_batch, args, keywords);
+}
+
+// Sizes, model, network and the sizes that the network is for, as `PairSolver` takes them.
+bool read_setup(PyObject* args, PyObject* keywords, Solver::Setup& setup, bool& has_model) {
+  const char* name;
+  PyObject *weights = Py_None, *listed = Py_None;
+  double *a = setup.size_a.data(), *b = setup.size_b.data();
+  static const char* names[] = {"model",  "size_a", "size_b", "network",
+                                "listed", "margin", nullptr};
+  if (!PyArg_ParseTupleAndKeywords(args, keywords, "z(ddd)(ddd)|OOd", const_cast<char**>(names),
+                                   &name, a, a + 1, a + 2, b, b + 1, b + 2, &weights, &listed,
+                                   &setup.margin) ||
+      !read_network(weights, setup.network))
+    return false;
+  std::string model = name ? name : "";
+  has_model = name != nullptr;
+  setup.model = model == "mlp"         ? Model::mlp
+                : model == "mlp-edges" ? Model::mlp_by_edges
+                                       : Model::exact;
+  bool known = !has_model || model == "exact" || setup.model != Model::exact;
+  if (!known || setup.network.empty() != (setup.model == Model::exact))
+    return fail(PyExc_ValueError, "model is 'exact', 'mlp' or 'mlp-edges' with a network, or None");
+  Array<double> sizes;
+  if (listed != Py_None && !read(listed, "listed", {any_length, 2, 3}, sizes)) return false;
+  for (npy_intp pair = 0; listed != Py_None && pair < sizes.length(0); ++pair) {
+    const double* n = sizes.numbers + 6 * pair;
+    setup.listed.push_back({{{n[0], n[1], n[2]}, {n[3], n[4], n[5]}}});
+  }
+  setup.kernel = kernel;
+  return true;
+}
+
 int solver_init(PyObject* self, PyObject* args, PyObject* keywords) {
-  const char* model;
-  double a[3], b[3];
-  PyObject* weights = Py_None;
-  static const char* names[] = {"model", "size_a", "size_b", "network", nullptr};
-  if (!PyArg_ParseTupleAndKeywords(args, keywords, "z(ddd)(ddd)|O", const_cast<char**>(names),
-                                   &model, a, a + 1, a + 2, b, b + 1, b + 2, &weights))
-    return -1;
-  std::unique_ptr<Network> network;
-  if (!read_network(weights, network)) return -1;
-  std::string name = model ? model : "";
-  Model chosen = name == "exact"       ? Model::exact
-                 : name == "mlp"       ? Model::mlp
-                 : name == "mlp-edges" ? Model::mlp_by_edges
-                                       : Model::none;
-  bool known = name.empty() || chosen != Model::none;
-  if (!known || bool(network) != (chosen == Model::mlp || chosen == Model::mlp_by_edges)) {
-    fail(PyExc_ValueError, "model is 'exact', 'mlp' or 'mlp-edges' with a network, or None");
+  try {
+    Solver::Setup setup{};
+    bool has_model;
+    if (!read_setup(args, keywords, setup, has_model)) return -1;
+    self_of(self)->solver = has_model ? std::make_shared<Solver>(std::move(setup)) : nullptr;
+    return 0;
+  } catch (const std::bad_alloc&) {
+    PyErr_NoMemory();
     return -1;
   }
-  auto* solver = solver_of(self);
-  solver->model = chosen;
-  for (int k = 0; k < 3; ++k) solver->half_a[k] = 0.5 * a[k], solver->half_b[k] = 0.5 * b[k];
-  delete solver->network;
-  solver->network = network.release();
-  solver->clipped = solver->exact = 0;
-  return 0;
+}
+
+PyObject* solver_new(PyTypeObject* type, PyObject*, PyObject*) {
+  PyObject* self = type->tp_alloc(type, 0);
+  if (self) new (&self_of(self)->solver) std::shared_ptr<Solver>();
+  return self;
 }
 
 void solver_dealloc(PyObject* self) {
   PyTypeObject* type = Py_TYPE(self);
-  delete solver_of(self)->network;
+  self_of(self)->solver.~shared_ptr();
   type->tp_free(self);
   Py_DECREF(type);  // an object of a heap type keeps its type alive
 }
 
-// Solve all rows, in as many threads as are asked for and worth it. Each takes the next chunk until
-// none is left: a thread that starts late costs little. Rows are independent, so no bit depends on
-// the number of threads. Returns the first row that is refused, or −1.
-template <class M>
-long solve_in_threads(const M& model, const PairArrays& pairs, const Results& results, long threads,
-                      Counts& counts) {
-  long chunks = (pairs.count + rows_per_chunk - 1) / rows_per_chunk;
-  threads = std::max(1L, std::min(threads, chunks));
-  std::vector<Counts> counts_of(threads);
-  std::vector<long> refused_of(threads, pairs.count);
-  std::atomic<long> next{0};
-  auto work = [&](long thread) {
-    for (long chunk = next++; chunk < chunks; chunk = next++) {
-      long begin = chunk * rows_per_chunk,
-           end = std::min(begin + rows_per_chunk, long(pairs.count));
-      long refused = solve_rows<Block>(model, pairs.rows, begin, end, results, counts_of[thread]);
-      if (refused >= 0) refused_of[thread] = std::min(refused_of[thread], refused);
-    }
-  };
-  std::vector<std::thread> others;
-  try {
-    for (long thread = 1; thread < threads; ++thread) others.emplace_back(work, thread);
-  } catch (const std::system_error&) {
-    // No more threads are to be had: those that run take all chunks.
-  }
-  work(0);
-  for (std::thread& other : others) other.join();
-  for (const Counts& part : counts_of) counts += part;
-  long refused = *std::min_element(refused_of.begin(), refused_of.end());
-  return refused < pairs.count ? refused : -1;
-}
-
 PyObject* solver_solve(PyObject* self, PyObject* const* args, Py_ssize_t count) {
-  auto* solver = solver_of(self);
-  if (count != 5 || solver->model == Model::none) {
-    return fail(PyExc_TypeError, "solve(poses_a, poses_b, sizes_a, sizes_b, threads)");
-  }
+  std::shared_ptr<Solver> solver = self_of(self)->solver;
+  if (count < 5 || count > 7 || !solver)
+    return fail(PyExc_TypeError,
+                "solve(poses_a, poses_b, sizes_a, sizes_b, threads, patch=True, pairs=None)");
   PairArrays pairs;
   long threads = PyLong_AsLong(args[4]);
-  if ((threads == -1 && PyErr_Occurred()) || !read_pairs(args, pairs)) return nullptr;
-  Array<bool> colliding;
-  Array<double> separation, normal, point, volume, covariance;
-  if (!make({pairs.count}, colliding) || !make({pairs.count}, separation) ||
-      !make({pairs.count, 3}, normal) || !make({pairs.count, 3}, point) ||
-      !make({pairs.count}, volume) || !make({pairs.count, 3, 3}, covariance))
+  int patch = count > 5 ? PyObject_IsTrue(args[5]) : 1;
+  if ((threads == -1 && PyErr_Occurred()) || patch < 0 ||
+      !read_pairs(args, count > 6 ? args[6] : Py_None, pairs))
     return nullptr;
-  Results results{colliding.numbers, separation.numbers, normal.numbers,
-                  point.numbers,     volume.numbers,     covariance.numbers};
-  Counts counts;
-  long refused;
-  Py_BEGIN_ALLOW_THREADS;
-  refused = with_model(*solver, [&](const auto& model) {
-    return solve_in_threads(model, pairs, results, threads, counts);
-  });
-  Py_END_ALLOW_THREADS;
-  if (refused < 0) solver->clipped += counts.clipped, solver->exact += counts.exact;
-  return Py_BuildValue("(NNNNNNl)", colliding.object.release(), separation.object.release(),
-                       normal.object.release(), point.object.release(), volume.object.release(),
-                       covariance.object.release(), refused);
+  ContactArrays found;
+  if (!found.make_for(pairs.count, patch)) return nullptr;
+  long refused = solve(solver, pairs.rows, pairs.count, found.results(patch), threads);
+  if (refused == -2) return nullptr;
+  if (!patch) found.fill_volumes(pairs.count);
+  Owned contacts(found.release(&PyTuple_Type));
+  return contacts ? Py_BuildValue("(Ol)", contacts.get(), refused) : nullptr;
 }
 
 PyObject* solver_clipped(PyObject* self, void*) {
-  return PyLong_FromLong(solver_of(self)->clipped);
+  const auto& solver = self_of(self)->solver;
+  return PyLong_FromLongLong(solver ? solver->counts().clipped : 0);
 }
-PyObject* solver_exact(PyObject* self, void*) { return PyLong_FromLong(solver_of(self)->exact); }
+PyObject* solver_exact(PyObject* self, void*) {
+  const auto& solver = self_of(self)->solver;
+  return PyLong_FromLongLong(solver ? solver->counts().exact : 0);
+}
+
+PyCFunction with_keywords(PyCFunctionWithKeywords function) {
+  return reinterpret_cast<PyCFunction>(reinterpret_cast<void (*)()>(function));
+}
 
 PyMethodDef solver_methods[] = {
     {"solve", fastcall(solver_solve), METH_FASTCALL,
-     "solve(poses_a, poses_b, sizes_a, sizes_b, threads)\n--\n\n"
-     "Return colliding, separation, normal, point, volume, covariance, and the first refused row "
+     "solve(poses_a, poses_b, sizes_a, sizes_b, threads, patch=True, pairs=None)\n--\n\n"
+     "Return (colliding, separation, normal, point, volume, covariance), and the first refused row "
      "or -1.\n\n"
-     "poses (n, 7), sizes (n, 3) or (1, 3) full extents [m]; frame: that of the poses."},
+     "poses (m, 7), sizes (m, 3) or (1, 3) full extents [m]; frame: that of the poses. pairs (n, "
+     "2): "
+     "places of the boxes of each row."},
+    {"batch", with_keywords(solver_batch), METH_VARARGS | METH_KEYWORDS,
+     "batch($self, poses_a, poses_b=None, *, size_a=None, size_b=None, sizes=None, pairs=None, "
+     "threads=1, patch=True)\n--\n\n"
+     "Return the contacts of n pairs: row i is what a single call gives for row i.\n\n"
+     "poses_a, poses_b are (n, 7); size_a, size_b replace the solver's sizes, (3,) for all rows\n"
+     "or (n, 3) for every row its own. Or poses are (m, 7), sizes (3,) or (m, 3), and the rows of\n"
+     "pairs (n, 2) are the places of their boxes A and B. `threads` share the rows; no bit "
+     "depends\n"
+     "on their number. Without `patch` volume and covariance are not computed, and are NaN; "
+     "points\n"
+     "then have the same error bounds, not always the same bits."},
     {nullptr, nullptr, 0, nullptr}};
 PyGetSetDef solver_attributes[] = {
     {"clipped", solver_clipped, nullptr, "Contacts of model exact that were clipped.", nullptr},
@@ -282,12 +439,16 @@ PyGetSetDef solver_attributes[] = {
     {nullptr, nullptr, nullptr, nullptr, nullptr}};
 
 PyType_Slot solver_slots[] = {
-    {Py_tp_doc, const_cast<char*>(
-                    "PairSolver(model, size_a, size_b, network=None)\n--\n\n"
-                    "Solve pairs of boxes by model 'exact' or 'mlp'; None leaves all to Python.\n\n"
-                    "A call with two poses, float64 (7,), returns a Contact. For other poses, and "
-                    "for those that are refused, it returns self.converted(pose_a, pose_b).")},
-    {Py_tp_new, reinterpret_cast<void*>(PyType_GenericNew)},
+    {Py_tp_doc,
+     const_cast<char*>(
+         "PairSolver(model, size_a, size_b, network=None, listed=None, margin=0.0)\n--\n\n"
+         "Solve pairs of boxes by model 'exact' or 'mlp'; None leaves all to Python.\n\n"
+         "listed: the pairs of sizes (n, 2, 3) that the network is for, extents sorted; None: "
+         "any.\n\n"
+         "A call with two poses (7,) returns a Contact, and batch(poses_a, poses_b) returns "
+         "Contacts. What is no plain array, tuple or list of numbers, and what is refused, goes to "
+         "self.converted(pose_a, pose_b) and self.converted_batch(...).")},
+    {Py_tp_new, reinterpret_cast<void*>(solver_new)},
     {Py_tp_init, reinterpret_cast<void*>(solver_init)},
     {Py_tp_dealloc, reinterpret_cast<void*>(solver_dealloc)},
     {Py_tp_call, reinterpret_cast<void*>(solver_call)},
@@ -295,16 +456,19 @@ PyType_Slot solver_slots[] = {
     {Py_tp_getset, solver_attributes},
     {0, nullptr}};
 
-// --- functions ----------------------------------------------------------------------------------
+// --- Functions ----------------------------------------------------------------------------------
 
-PyObject* use_contact_type(PyObject*, PyObject* type) {
-  if (!PyType_Check(type) ||
-      !PyType_IsSubtype(reinterpret_cast<PyTypeObject*>(type), &PyTuple_Type)) {
-    return fail(PyExc_TypeError, "a named tuple type is needed");
+PyObject* use_contact_types(PyObject*, PyObject* const* args, Py_ssize_t count) {
+  bool tuples = count == 2;
+  for (Py_ssize_t k = 0; tuples && k < count; ++k)
+    tuples = PyType_Check(args[k]) &&
+             PyType_IsSubtype(reinterpret_cast<PyTypeObject*>(args[k]), &PyTuple_Type);
+  if (!tuples) return fail(PyExc_TypeError, "two named tuple types are needed");
+  for (auto [place, type] : {std::pair{&contact_type, args[0]}, {&contacts_type, args[1]}}) {
+    Py_INCREF(type);
+    Py_XDECREF(reinterpret_cast<PyObject*>(*place));
+    *place = reinterpret_cast<PyTypeObject*>(type);
   }
-  Py_INCREF(type);
-  Py_XDECREF(reinterpret_cast<PyObject*>(contact_type));
-  contact_type = reinterpret_cast<PyTypeObject*>(type);
   Py_RETURN_NONE;
 }
 
@@ -314,9 +478,10 @@ PyObject* stages(PyObject*, PyObject* const* args, Py_ssize_t count) {
                 "stages(poses_a, poses_b, sizes_a, sizes_b, network, names, by_edges)");
   }
   PairArrays pairs;
-  std::unique_ptr<Network> network;
+  std::vector<float> network;
   int by_edges = PyObject_IsTrue(args[6]);
-  if (by_edges < 0 || !read_pairs(args, pairs) || !read_network(args[4], network)) return nullptr;
+  if (by_edges < 0 || !read_pairs(args, Py_None, pairs) || !read_network(args[4], network))
+    return nullptr;
   Owned found(PyDict_New());
   if (!found) return nullptr;
   StageArrays arrays;
@@ -338,14 +503,12 @@ PyObject* stages(PyObject*, PyObject* const* args, Py_ssize_t count) {
     if (filled) place = array.numbers;
   });
   if (!filled) return nullptr;
+  detail::NetworkNumbers numbers{network.empty() ? nullptr : network.data(),
+                                 long(network.size()) / detail::unit_numbers};
   long refused = -1;
   Py_BEGIN_ALLOW_THREADS;
-  for (long row = 0; row < pairs.count && refused < 0; ++row) {
-    bool filled_row =
-        by_edges ? fill_stages<Network::Bounds::edges>(pairs.rows, row, network.get(), arrays)
-                 : fill_stages<Network::Bounds::slab>(pairs.rows, row, network.get(), arrays);
-    if (!filled_row) refused = row;
-  }
+  for (long row = 0; row < pairs.count && refused < 0; ++row)
+    if (!kernel->fill_stages(numbers, by_edges, pairs.rows, row, arrays)) refused = row;
   Py_END_ALLOW_THREADS;
   return Py_BuildValue("(Nl)", found.release(), refused);
 }
@@ -413,23 +576,23 @@ PyObject* near_boxes(PyObject*, PyObject* const* args, Py_ssize_t count) {
   return pairs.object.release();
 }
 
-// Names of the modules that this machine can run, best last.
-PyObject* supported(PyObject*, PyObject*) {
-#if defined(__x86_64__)
-  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
-      __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512bw"))
-    return Py_BuildValue("(sss)", "baseline", "avx2", "avx512");
-  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
-    return Py_BuildValue("(ss)", "baseline", "avx2");
-#endif
-  return Py_BuildValue("(s)", "baseline");
+PyObject* instruction_sets(PyObject*, PyObject*) {
+  const auto& kernels = detail::kernels();
+  Owned names(PyTuple_New(Py_ssize_t(kernels.size())));
+  for (size_t k = 0; names && k < kernels.size(); ++k) {
+    PyObject* name = PyUnicode_FromString(kernels[k]->name);
+    if (!name) return nullptr;
+    PyTuple_SET_ITEM(names.get(), Py_ssize_t(k), name);
+  }
+  return names.release();
 }
 
 PyMethodDef module_methods[] = {
-    {"supported", supported, METH_NOARGS,
-     "supported()\n--\n\nReturn the instruction sets that this machine can run, best last."},
-    {"use_contact_type", use_contact_type, METH_O,
-     "use_contact_type(type)\n--\n\nSet the named tuple that single calls return."},
+    {"instruction_sets", instruction_sets, METH_NOARGS,
+     "instruction_sets()\n--\n\n"
+     "Return the instruction sets that were built and that this machine can run, best last."},
+    {"use_contact_types", fastcall(use_contact_types), METH_FASTCALL,
+     "use_contact_types(single, many)\n--\n\nSet the named tuples that calls and batches return."},
     {"stages", fastcall(stages), METH_FASTCALL, "See core.stages."},
     {"near_pairs", fastcall(near_pairs), METH_FASTCALL,
      "near_pairs(poses, sizes, moved, low, high, known, first, second, near, unknown)\n--\n\n"
@@ -437,10 +600,20 @@ PyMethodDef module_methods[] = {
      "Boxes `moved` are bounded anew in low, high (boxes, 3). Returns -1 and the box for no pose."},
     {"near_boxes", fastcall(near_boxes), METH_FASTCALL,
      "near_boxes(low, high, known, moves)\n--\n\n"
-     "Return the pairs (n, 2) of known boxes that may touch and of which one moves, in no order.\n\n"
+     "Return the pairs (n, 2) of known boxes that may touch and of which one moves, in no "
+     "order.\n\n"
      "low, high (boxes, 3): bounding boxes as near_pairs leaves them."},
     {nullptr, nullptr, 0, nullptr}};
 
+struct Whole {
+  const char* name;
+  long value;
+};
+constexpr Whole wholes[] = {{"NETWORK_FORMAT", detail::network_format},
+                            {"SITES", detail::site_count},
+                            {"FEATURES", detail::site_features},
+                            {"OUTPUTS", detail::site_outputs},
+                            {"POINT_OUTPUTS", detail::point_outputs}};
 struct Constant {
   const char* name;
   double value;
@@ -457,17 +630,11 @@ bool add(PyObject* module, const char* name, PyObject* value) {
   return value && PyModule_AddObjectRef(module, name, value) == 0;
 }
 
-#define STRING_OF(name) #name
-#define STRING(name) STRING_OF(name)
-#define JOIN_OF(one, other) one##other
-#define JOIN(one, other) JOIN_OF(one, other)
-
-PyType_Spec solver_spec = {"box_contact_ros.core." STRING(BOX_CONTACT_MODULE) ".PairSolver",
-                           sizeof(PairSolver), 0, Py_TPFLAGS_DEFAULT | Py_TPFLAGS_BASETYPE,
-                           solver_slots};
+PyType_Spec solver_spec = {"box_contact_ros.core._native.PairSolver", sizeof(PairSolver), 0,
+                           Py_TPFLAGS_DEFAULT | Py_TPFLAGS_BASETYPE, solver_slots};
 PyModuleDef module_definition = {PyModuleDef_HEAD_INIT,
-                                 STRING(BOX_CONTACT_MODULE),
-                                 "The native core for one instruction set.",
+                                 "_native",
+                                 "The native core.",
                                  -1,
                                  module_methods,
                                  nullptr,
@@ -477,15 +644,22 @@ PyModuleDef module_definition = {PyModuleDef_HEAD_INIT,
 
 }  // namespace
 
-PyMODINIT_FUNC JOIN(PyInit_, BOX_CONTACT_MODULE)() {
+PyMODINIT_FUNC PyInit__native() {
   import_array();
+  kernel = detail::chosen_kernel();
   name_converted = PyUnicode_InternFromString("converted");
+  name_converted_batch = PyUnicode_InternFromString("converted_batch");
   Owned module(PyModule_Create(&module_definition));
-  if (!name_converted || !module) return nullptr;
-  bool added = add(module.get(), "PairSolver", PyType_FromSpec(&solver_spec)) &&
-               add(module.get(), "instruction_set", PyUnicode_FromString(instruction_set)) &&
-               add(module.get(), "lanes", PyLong_FromLong(lanes)) &&
-               add(module.get(), "compiler", PyUnicode_FromString(__VERSION__));
+  if (!name_converted || !name_converted_batch || !module) return nullptr;
+  // Where the environment names an unknown instruction set, core/__init__.py refuses to go on.
+  bool added =
+      add(module.get(), "kernel", PyUnicode_FromString(kernel ? kernel->name : "")) &&
+      add(module.get(), "instruction_set", PyUnicode_FromString(kernel ? kernel->title : "")) &&
+      add(module.get(), "lanes", PyLong_FromLong(kernel ? kernel->lanes : 0)) &&
+      add(module.get(), "compiler", PyUnicode_FromString(__VERSION__)) &&
+      add(module.get(), "PairSolver", PyType_FromSpec(&solver_spec));
+  for (const Whole& whole : wholes)
+    added = added && add(module.get(), whole.name, PyLong_FromLong(whole.value));
   for (const Constant& constant : constants)
     added = added && add(module.get(), constant.name, PyFloat_FromDouble(constant.value));
   return added ? module.release() : nullptr;

@@ -6,12 +6,12 @@
 
 int main() {
   // Two 40 ft containers: full extents along x, y, z [m].
-  const box_contact::Solver::Size container{12.192, 2.438, 2.591};
+  const box_contact::Size container{12.192, 2.438, 2.591};
   const box_contact::Solver solver(container, container);
 
   // A stands at the origin. B comes down on it, turned by 2 · asin(0.02) about the vertical axis.
-  const box_contact::Solver::Pose a{{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 1.0}};
-  box_contact::Solver::Pose b{{0.5, 0.1, 2.6}, {0.0, 0.0, 0.02, 0.9998}};
+  const box_contact::Pose a{{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 1.0}};
+  box_contact::Pose b{{0.5, 0.1, 2.6}, {0.0, 0.0, 0.02, 0.9998}};
   for (double height : {2.6, 2.59}) {
     b.position[2] = height;
     const box_contact::Contact contact = solver(a, b);
@@ -26,16 +26,17 @@ int main() {
         contact.point[0], contact.point[1], contact.point[2]);
   }
 
-  // Rows of poses, x y z qx qy qz qw, are solved some at a time, into your arrays.
-  const double poses_a[2][7] = {{0, 0, 0, 0, 0, 0, 1}, {0, 0, 0, 0, 0, 0, 1}};
-  const double poses_b[2][7] = {{0, 0, 2.59, 0, 0, 0, 1}, {0, 2.5, 0, 0, 0, 0, 1}};
+  // Rows of poses are solved some at a time, into your arrays. What has no array is not computed.
+  const box_contact::Pose poses_a[2] = {a, a};
+  const box_contact::Pose poses_b[2] = {{{0, 0, 2.59}, {0, 0, 0, 1}}, {{0, 2.5, 0}, {0, 0, 0, 1}}};
   bool colliding[2];
-  double separation[2], normal[6], point[6], volume[2], covariance[18];
-  const long refused =
-      solver.batch(poses_a[0], poses_b[0], 2,
-                   {colliding, separation, normal, point, volume, covariance});
-  std::printf("batch: %d %d, volumes %.3f %.3f m3, first refused row %ld\n", colliding[0],
-              colliding[1], volume[0], volume[1], refused);
+  double volume[2];
+  box_contact::Results results;
+  results.colliding = colliding;
+  results.volume = volume;
+  const std::int64_t refused = solver.batch(poses_a, poses_b, results);
+  std::printf("batch: %d %d, volumes %.3f %.3f m3, first refused row %d\n", colliding[0],
+              colliding[1], volume[0], volume[1], int(refused));
 
   try {
     b.quaternion[2] = b.quaternion[3] = 0.0;

@@ -11,11 +11,9 @@
 //   the bounds are exact.
 #pragma once
 
-#include <limits>
-
 #include "edge_pieces.hpp"
 
-namespace box_contact {
+namespace box_contact::BOX_CONTACT_SET {
 
 // Slabs are wider by this fraction of the size: where faces of both boxes lie in one plane,
 // rounding may put either box's edges outside the other, and nothing would be left.
@@ -53,12 +51,11 @@ struct FrameBox {
 };
 
 template <class T>
-[[gnu::always_inline]] inline FrameBox<T> choose(Mask<T> mask, const FrameBox<T>& a,
-                                                 const FrameBox<T>& b) {
+BC_INLINE FrameBox<T> choose(Mask<T> mask, const FrameBox<T>& a, const FrameBox<T>& b) {
   return {select(mask, a.middle, b.middle), select(mask, a.half, b.half)};
 }
 template <class T>
-[[gnu::always_inline]] inline T volume(const FrameBox<T>& box) {
+BC_INLINE T volume(const FrameBox<T>& box) {
   return box.half[0] * box.half[1] * box.half[2];
 }
 
@@ -69,24 +66,22 @@ struct Facing {
   Triple<T> offset;
 };
 template <class T>
-[[gnu::always_inline]] inline Facing<T> b_from_a(const Pair<T>& pair) {
+BC_INLINE Facing<T> b_from_a(const Pair<T>& pair) {
   return {columns(transpose(pair.rotation)), triple(-pair.offset_b)};
 }
 template <class T>
-[[gnu::always_inline]] inline Facing<T> a_from_b(const Pair<T>& pair) {
+BC_INLINE Facing<T> a_from_b(const Pair<T>& pair) {
   return {columns(pair.rotation), triple(pair.offset_a)};
 }
 template <class T>
-[[gnu::always_inline]] inline Facing<T> choose(Mask<T> mask, const Facing<T>& a,
-                                               const Facing<T>& b) {
+BC_INLINE Facing<T> choose(Mask<T> mask, const Facing<T>& a, const Facing<T>& b) {
   return {select(mask, a.axes, b.axes), select(mask, a.offset, b.offset)};
 }
 
 // The bounds in the frame of B where `in_b`, else of A. `facing`: the other box from there.
 template <class T>
-[[gnu::always_inline]] inline OverlapBounds<T> chosen(const Pair<T>& pair, Mask<T> in_b,
-                                                      const FrameBox<T>& box,
-                                                      const Facing<T>& facing) {
+BC_INLINE OverlapBounds<T> chosen(const Pair<T>& pair, Mask<T> in_b, const FrameBox<T>& box,
+                                  const Facing<T>& facing) {
   OverlapBounds<T> found;
   found.in_b = in_b;
   found.middle = box.middle;
@@ -100,7 +95,7 @@ template <class T>
 }
 
 template <class T>
-[[gnu::always_inline]] inline T smallest_of(const Four<T>& x) {
+BC_INLINE T smallest_of(const Four<T>& x) {
   if constexpr (is_scalar<T>) {
     return min(min(x[0], x[1]), min(x[2], x[3]));
   } else {
@@ -110,17 +105,16 @@ template <class T>
 
 // Widen by coordinates of pieces that are there; NaN comes in by no comparison.
 template <class T>
-[[gnu::always_inline]] inline void widen(Interval<T>& interval, Four<T> p) {
+BC_INLINE void widen(Interval<T>& interval, Four<T> p) {
   interval.low = min(p, interval.low);
   interval.high = max(p, interval.high);
 }
 
 // Widen the bounding boxes in X's own frame and in Y's by the pieces of X's edges.
 template <class T>
-[[gnu::always_inline]] inline void widen_by_edges(const EdgePieces<T>& pieces, const Mat<T>& axes,
-                                                  const Vec<T>& centre, const Vec<T>& half,
-                                                  Interval<T> (&own)[3], Interval<T> (&other)[3]) {
-  Four<T> nowhere = Four<T>{} + std::numeric_limits<double>::quiet_NaN();
+BC_INLINE void widen_by_edges(const EdgePieces<T>& pieces, const Mat<T>& axes, const Vec<T>& centre,
+                              const Vec<T>& half, Interval<T> (&own)[3], Interval<T> (&other)[3]) {
+  Four<T> nowhere = Four<T>{} + not_a_number;
 #pragma GCC unroll 3
   for (int j = 0; j < 3; ++j) {
     int a = (j + 1) % 3, b = (j + 2) % 3;
@@ -144,7 +138,7 @@ template <class T>
 }
 
 template <class T>
-[[gnu::always_inline]] inline FrameBox<T> joined(const Interval<T> (&intervals)[3]) {
+BC_INLINE FrameBox<T> joined(const Interval<T> (&intervals)[3]) {
   Vec<T> middle, half;
   for (int k = 0; k < 3; ++k) {
     T low = smallest_of<T>(intervals[k].low), high = -smallest_of<T>(-intervals[k].high);
@@ -156,8 +150,7 @@ template <class T>
 
 // The part of a box that lies within `depth` of its extreme plane along `direction`, bounded.
 template <class T>
-[[gnu::always_inline]] inline FrameBox<T> part_in_slab(const Triple<T>& half,
-                                                       const Triple<T>& direction, T depth) {
+BC_INLINE FrameBox<T> part_in_slab(const Triple<T>& half, const Triple<T>& direction, T depth) {
   auto towards = [](auto direction, auto x) { return select(direction >= 0.0, x, -x); };
   FrameBox<T> part;
   part.half = min(half, uniform(0.5 * depth) / abs(direction));
@@ -168,9 +161,8 @@ template <class T>
 // Cut X's box by Y's: along each axis of X, each pair of Y's faces leaves an interval at most.
 // `inverse[k]`: the reciprocals of Y's axis k.
 template <class T>
-[[gnu::always_inline]] inline FrameBox<T> tighten(const FrameBox<T>& x, const FrameBox<T>& y,
-                                                  const Facing<T>& y_from_x,
-                                                  const Columns<T>& inverse, T slack) {
+BC_INLINE FrameBox<T> tighten(const FrameBox<T>& x, const FrameBox<T>& y, const Facing<T>& y_from_x,
+                              const Columns<T>& inverse, T slack) {
   Triple<T> at = y_from_x.axes * x.middle + y_from_x.offset - y.middle;
   Triple<T> reach = (y.half + slack) + abs(y_from_x.axes) * x.half;
   Triple<T> high = 2.0 * x.half, low = high;  // from the opposite end of X's interval
@@ -192,8 +184,7 @@ template <class T>
 // The overlap lies in the slab between the boxes' extreme planes along SAT's winning axis, as thick
 // as the depth. `normal`: that axis as a unit vector from A to B, in A's frame.
 template <class T>
-[[gnu::always_inline]] inline OverlapBounds<T> bounds_by_slab(const Pair<T>& pair,
-                                                              const Vec<T>& normal, T depth) {
+BC_INLINE OverlapBounds<T> bounds_by_slab(const Pair<T>& pair, const Vec<T>& normal, T depth) {
   using namespace bounds;
   T slack = flush * pair.size;
   Facing<T> b_to_a = b_from_a(pair), a_to_b = a_from_b(pair);
@@ -223,7 +214,7 @@ inline OverlapBounds<T> bounds_by_edges(const Pair<T>& pair) {
     wide_a[k] = pair.half_a[k] + slack, wide_b[k] = pair.half_b[k] + slack;
   EdgePieces<T> edges_a = cut_edges(back, transpose(inverse), a_in_b, pair.half_a, wide_b, {});
   EdgePieces<T> edges_b = cut_edges(r, inverse, pair.offset_a, pair.half_b, wide_a, {});
-  Four<T> far = Four<T>{} + std::numeric_limits<double>::max();
+  Four<T> far = Four<T>{} + largest_number;
   Interval<T> in_a[3], in_b[3];
   for (int k = 0; k < 3; ++k) in_a[k] = in_b[k] = {far, -far};
   widen_by_edges(edges_a, back, a_in_b, pair.half_a, in_a, in_b);
@@ -234,4 +225,4 @@ inline OverlapBounds<T> bounds_by_edges(const Pair<T>& pair) {
                 choose(in_second, a_from_b(pair), b_from_a(pair)));
 }
 
-}  // namespace box_contact
+}  // namespace box_contact::BOX_CONTACT_SET

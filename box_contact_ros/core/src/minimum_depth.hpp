@@ -4,11 +4,9 @@
 // in against the normal, to a depth of `depth_floor` of the size. The separation stays as it was.
 #pragma once
 
-#include <limits>
-
 #include "separating_axis.hpp"
 
-namespace box_contact {
+namespace box_contact::BOX_CONTACT_SET {
 
 // Least depth [of the size]: the heights of the overlap still have seven good digits there.
 constexpr double depth_floor = 1e-9;
@@ -19,8 +17,7 @@ constexpr int most_presses = 8;
 
 // Enforce the minimum depth along the normal. Returns where B had to be moved.
 template <class T>
-[[gnu::always_inline]] inline Mask<T> enforce_minimum_depth(Pair<T>& pair,
-                                                            const SeparatingAxis<T>& axis) {
+BC_INLINE Mask<T> enforce_minimum_depth(Pair<T>& pair, const SeparatingAxis<T>& axis) {
   T distance = max(depth_floor * pair.size + axis.separation, T{});
   move_against(pair, distance, axis.normal);
   return distance > 0.0;
@@ -33,7 +30,7 @@ struct Gap {
 
 // The largest gap over the fifteen axes, as the pair stands.
 inline Gap largest_gap(const Pair<double>& pair) {
-  Gap best{-std::numeric_limits<double>::infinity(), {}};
+  Gap best{-infinity, {}};
   auto offer = [&](const Vec<double>& n) {
     double half_width =
         dot(abs(n), pair.half_a) + dot(abs(transposed_times(pair.rotation, n)), pair.half_b);
@@ -79,4 +76,4 @@ inline Mask<T> has_too_little_depth(const Pair<T>& pair) {
   return best.largest_gap > -0.5 * depth_floor * pair.size;
 }
 
-}  // namespace box_contact
+}  // namespace box_contact::BOX_CONTACT_SET

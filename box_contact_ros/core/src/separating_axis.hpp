@@ -17,11 +17,9 @@
 // edge gaps are evaluated in the frame of the box that comes first in an order of the data.
 #pragma once
 
-#include <limits>
-
 #include "poses.hpp"
 
-namespace box_contact {
+namespace box_contact::BOX_CONTACT_SET {
 
 // Gaps closer than this fraction of the size count as equal: the rounding error of a gap is below
 // 12 · 2⁻⁵³ of the size, and twice that must not decide.
@@ -62,7 +60,7 @@ template <class T>
 struct BestAxis {
   T gap, axis, largest_gap;
 
-  [[gnu::always_inline]] void offer(T candidate_gap, T candidate, T tolerance) {
+  BC_INLINE void offer(T candidate_gap, T candidate, T tolerance) {
     Mask<T> wins = candidate_gap > gap + tolerance;
     gap = select<T>(wins, candidate_gap, gap);
     axis = select<T>(wins, candidate, axis);
@@ -73,8 +71,7 @@ struct BestAxis {
 // The gap on a face axis of a box: `offset` along the axis, `half` its half extent there, and
 // `entries` the other box's axes along it.
 template <class T>
-[[gnu::always_inline]] inline T face_gap(T offset, T half, const Vec<T>& other_half,
-                                         const Vec<T>& entries) {
+BC_INLINE T face_gap(T offset, T half, const Vec<T>& other_half, const Vec<T>& entries) {
   return abs(offset) - (half + dot(other_half, abs(entries)));
 }
 
@@ -85,7 +82,7 @@ struct FirstFrame {
   Vec<T> half, offset, other_half;
   Mat<T> edges;
 
-  [[gnu::always_inline]] explicit FirstFrame(const Pair<T>& pair)
+  BC_INLINE explicit FirstFrame(const Pair<T>& pair)
       : half(select(pair.a_first, pair.half_a, pair.half_b)),
         offset(select(pair.a_first, pair.offset_a, pair.offset_b)),
         other_half(select(pair.a_first, pair.half_b, pair.half_a)),
@@ -95,10 +92,10 @@ struct FirstFrame {
 // The nine edge axes e_i × u_j. In this frame e_i × u_j is (−u_z, u_y) in the components y and z
 // that follow i.
 template <class T>
-[[gnu::always_inline]] inline void offer_edge_axes(const Pair<T>& pair, const FirstFrame<T>& frame,
-                                                   BestAxis<T>& best, Mask<T>& doubtful) {
+BC_INLINE void offer_edge_axes(const Pair<T>& pair, const FirstFrame<T>& frame, BestAxis<T>& best,
+                               Mask<T>& doubtful) {
   T tolerance = tie * pair.size, error = edge_gap_error * pair.size;
-  T none = splat<T>(-std::numeric_limits<double>::infinity());
+  T none = splat<T>(-infinity);
   T largest_possible = none, longest_skipped2 = T{};
 #pragma GCC unroll 3
   for (int i = 0; i < 3; ++i) {
@@ -132,8 +129,7 @@ template <class T>
 
 // The winning axis as a unit vector from A to B, in A's frame.
 template <class T>
-[[gnu::always_inline]] inline Vec<T> axis_normal(const Pair<T>& pair, const FirstFrame<T>& frame,
-                                                 T axis) {
+BC_INLINE Vec<T> axis_normal(const Pair<T>& pair, const FirstFrame<T>& frame, T axis) {
   // A face of A or of B: a unit vector, or a column of R.
   Vec<T> face{};
   T face_offset{};
@@ -166,7 +162,7 @@ template <class T>
 
 // The best of the six face axes.
 template <class T>
-[[gnu::always_inline]] inline BestAxis<T> best_face_axis(const Pair<T>& pair) {
+BC_INLINE BestAxis<T> best_face_axis(const Pair<T>& pair) {
   T tolerance = tie * pair.size;
   T gap = face_gap(pair.offset_a[0], pair.half_a[0], pair.half_b, row(pair.rotation, 0));
   BestAxis<T> best{gap, T{}, gap};
@@ -180,7 +176,7 @@ template <class T>
 }
 
 template <class T>
-[[gnu::always_inline]] inline SeparatingAxis<T> separating_axis(const Pair<T>& pair) {
+BC_INLINE SeparatingAxis<T> separating_axis(const Pair<T>& pair) {
   BestAxis<T> best = best_face_axis(pair);
   SeparatingAxis<T> found;
   found.face = best.axis;
@@ -192,4 +188,4 @@ template <class T>
   return found;
 }
 
-}  // namespace box_contact
+}  // namespace box_contact::BOX_CONTACT_SET

@@ -6,7 +6,7 @@
 
 #include "../poses.hpp"
 
-namespace box_contact {
+namespace box_contact::BOX_CONTACT_SET {
 
 // Least magnitude of an entry of R that is inverted: an edge exactly along a slab must not give
 // 0 · ∞, and three of them multiplied must not underflow.
@@ -14,7 +14,7 @@ constexpr double least_entry = 1e-90;
 
 // Reciprocals of the entries of R, given by its columns. Three need one division.
 template <class T>
-[[gnu::always_inline]] inline Columns<T> reciprocals(const Columns<T>& r) {
+BC_INLINE Columns<T> reciprocals(const Columns<T>& r) {
   auto away_from_zero = [](auto entry) {
     return select(abs(entry) > least_entry, entry, splat<decltype(entry)>(least_entry));
   };
@@ -24,7 +24,7 @@ template <class T>
   return {{product * (x[1] * x[2]), product * (x[0] * x[2]), product * (x[0] * x[1])}};
 }
 template <class T>
-[[gnu::always_inline]] inline Mat<T> reciprocals(const Mat<T>& r) {
+BC_INLINE Mat<T> reciprocals(const Mat<T>& r) {
   return matrix(reciprocals(columns(r)));
 }
 
@@ -36,7 +36,7 @@ template <class T>
 constexpr int steps = is_scalar<T> ? 1 : 4;
 
 template <class T>
-[[gnu::always_inline]] inline auto sigma(int n) {
+BC_INLINE auto sigma(int n) {
   if constexpr (is_scalar<T>) {
     return Lanes<double, 4>{-1.0, 1.0, -1.0, 1.0};
   } else {
@@ -44,7 +44,7 @@ template <class T>
   }
 }
 template <class T>
-[[gnu::always_inline]] inline auto tau(int n) {
+BC_INLINE auto tau(int n) {
   if constexpr (is_scalar<T>) {
     return Lanes<double, 4>{-1.0, -1.0, 1.0, 1.0};
   } else {
@@ -53,7 +53,7 @@ template <class T>
 }
 // The sum over all signs, in the same order for one pair and for W.
 template <class T>
-[[gnu::always_inline]] inline T sum_of(const Four<T> (&terms)[steps<T>]) {
+BC_INLINE T sum_of(const Four<T> (&terms)[steps<T>]) {
   if constexpr (is_scalar<T>) {
     return (terms[0][0] + terms[0][1]) + (terms[0][2] + terms[0][3]);
   } else {
@@ -77,10 +77,9 @@ struct EdgeWeights {
 
 // `axes`: X's axes as columns in Y's frame; `inverse`: their reciprocals; `centre`: X's centre there.
 template <class T>
-[[gnu::always_inline]] inline EdgePieces<T> cut_edges(const Mat<T>& axes, const Mat<T>& inverse,
-                                                      const Vec<T>& centre, const Vec<T>& half_x,
-                                                      const Vec<T>& half_y,
-                                                      const EdgeWeights& weights) {
+BC_INLINE EdgePieces<T> cut_edges(const Mat<T>& axes, const Mat<T>& inverse, const Vec<T>& centre,
+                                  const Vec<T>& half_x, const Vec<T>& half_y,
+                                  const EdgeWeights& weights) {
   EdgePieces<T> pieces;
   Four<T> lengths[steps<T>]{}, means[3][steps<T>]{};
 #pragma GCC unroll 3
@@ -116,4 +115,4 @@ template <class T>
   return pieces;
 }
 
-}  // namespace box_contact
+}  // namespace box_contact::BOX_CONTACT_SET

@@ -1,4 +1,4 @@
-# What every extension of the core offers; see binding/module.cpp.
+# The library as a Python extension; see binding/module.cpp.
 from collections.abc import Sequence
 from typing import Any
 
@@ -16,25 +16,36 @@ SIZE_RATIO_MAX: float
 DEPTH_MAX: float
 CENTROID_REACH: float
 
+NETWORK_FORMAT: int
+SITES: int
+FEATURES: int
+OUTPUTS: int
+POINT_OUTPUTS: int
+
+kernel: str
 instruction_set: str
 lanes: int
 compiler: str
 
 class PairSolver:
     def __init__(self, model: str | None, size_a: tuple[float, float, float],
-                 size_b: tuple[float, float, float], network: np.ndarray | None = None) -> None: ...
+                 size_b: tuple[float, float, float], network: np.ndarray | None = None,
+                 listed: np.ndarray | None = None, margin: float = 0.0) -> None: ...
     def __call__(self, pose_a: ArrayLike, pose_b: ArrayLike) -> Any: ...
+    def batch(self, *args: Any, **keywords: Any) -> Any: ...
     def solve(self, poses_a: np.ndarray, poses_b: np.ndarray, sizes_a: np.ndarray,
-              sizes_b: np.ndarray, threads: int, /,
-              ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray,
-                         int]: ...
+              sizes_b: np.ndarray, threads: int, patch: bool = True,
+              pairs: np.ndarray | None = None, /,
+              ) -> tuple[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray,
+                               np.ndarray], int]: ...
     @property
     def clipped(self) -> int: ...
     @property
     def answered_exactly(self) -> int: ...
 
-def supported() -> tuple[str, ...]: ...
-def use_contact_type(type: type[tuple[object, ...]], /) -> None: ...
+def instruction_sets() -> tuple[str, ...]: ...
+def use_contact_types(single: type[tuple[object, ...]], many: type[tuple[object, ...]], /,
+                      ) -> None: ...
 def stages(poses_a: np.ndarray, poses_b: np.ndarray, sizes_a: np.ndarray, sizes_b: np.ndarray,
            network: np.ndarray | None, names: Sequence[str], by_edges: bool, /,
            ) -> tuple[dict[str, np.ndarray], int]: ...

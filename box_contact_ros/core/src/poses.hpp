@@ -8,9 +8,9 @@
 // transpose and the offsets change sign, bit for bit. The verdict relies on that.
 #pragma once
 
-#include "lanes.hpp"
+#include "lanes/triples.hpp"
 
-namespace box_contact {
+namespace box_contact::BOX_CONTACT_SET {
 
 // Boxes touch up to a separation of 8 ulp of the pair's largest coordinate or size. Exactly
 // touching poses that were moved rigidly are off by at most 4 ulp; a gap of 1e-14 m between two
@@ -47,7 +47,7 @@ struct Pair {
 // The matrix of a quaternion of any length. Dividing by the squared norm needs no square root, and
 // q and −q give the same bits.
 template <class T>
-[[gnu::always_inline]] inline Mat<T> rotation_matrix(const T q[4]) {
+BC_INLINE Mat<T> rotation_matrix(const T q[4]) {
   T x = q[0], y = q[1], z = q[2], w = q[3];
   T s = 2.0 / ((x * x + y * y) + (z * z + w * w));
   return {{{1.0 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y)},
@@ -57,7 +57,7 @@ template <class T>
 
 // Comparisons are written so that NaN fails them. An overflown square is infinite and fails too.
 template <class T>
-[[gnu::always_inline]] inline Mask<T> pose_valid(const Pose<T>& pose) {
+BC_INLINE Mask<T> pose_valid(const Pose<T>& pose) {
   const T* q = pose.quaternion;
   T norm2 = (q[0] * q[0] + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3]);
   Vec<T> reach = abs(pose.position);
@@ -65,7 +65,7 @@ template <class T>
          (norm2 >= quaternion_min * quaternion_min) & (norm2 <= quaternion_max * quaternion_max);
 }
 template <class T>
-[[gnu::always_inline]] inline Mask<T> size_valid(const Vec<T>& half) {
+BC_INLINE Mask<T> size_valid(const Vec<T>& half) {
   return (2.0 * half[0] >= length_min) & (2.0 * half[1] >= length_min) &
          (2.0 * half[2] >= length_min) & (2.0 * half[0] <= length_max) &
          (2.0 * half[1] <= length_max) & (2.0 * half[2] <= length_max);
@@ -74,7 +74,7 @@ template <class T>
 // Distance from a positive number to the next larger one: 0.75 · 2⁻⁵² · x lies between 0.75 and
 // 1.5 ulp, so the sum is rounded to the next number.
 template <class T>
-[[gnu::always_inline]] inline T ulp(T x) {
+BC_INLINE T ulp(T x) {
   return (x + x * (0.75 * 0x1p-52)) - x;
 }
 
@@ -90,8 +90,8 @@ Mask<T> a_first_of_concentric(const Vec<T>& half_a, const Vec<T>& half_b, const 
 }
 
 template <class T>
-[[gnu::always_inline]] inline Pair<T> prepare(const Pose<T>& a, const Pose<T>& b,
-                                              const Vec<T>& half_a, const Vec<T>& half_b) {
+BC_INLINE Pair<T> prepare(const Pose<T>& a, const Pose<T>& b, const Vec<T>& half_a,
+                          const Vec<T>& half_b) {
   Mat<T> axes_a = rotation_matrix(a.quaternion), axes_b = rotation_matrix(b.quaternion);
   Vec<T> t = b.position - a.position;
   Pair<T> pair;
@@ -120,26 +120,23 @@ template <class T>
 
 // Move B by `distance` [m] against a direction given in A's frame.
 template <class T>
-[[gnu::always_inline]] inline void move_against(Pair<T>& pair, T distance,
-                                                const Vec<T>& direction) {
+BC_INLINE void move_against(Pair<T>& pair, T distance, const Vec<T>& direction) {
   pair.offset_a = pair.offset_a - distance * direction;
   pair.offset_b = pair.offset_b - distance * transposed_times(pair.rotation, direction);
 }
 
 // Bring a point [m] or a direction from A's frame to the common frame.
 template <class T>
-[[gnu::always_inline]] inline Vec<T> point_in_common_frame(const Pair<T>& pair,
-                                                           const Vec<T>& point) {
+BC_INLINE Vec<T> point_in_common_frame(const Pair<T>& pair, const Vec<T>& point) {
   return pair.origin_a + pair.axes_a * point;
 }
 template <class T>
-[[gnu::always_inline]] inline Vec<T> direction_in_common_frame(const Pair<T>& pair,
-                                                               const Vec<T>& direction) {
+BC_INLINE Vec<T> direction_in_common_frame(const Pair<T>& pair, const Vec<T>& direction) {
   return pair.axes_a * direction;
 }
 
 template <class T>
-[[gnu::always_inline]] inline Pair<double> lane(const Pair<T>& pair, int i) {
+BC_INLINE Pair<double> lane(const Pair<T>& pair, int i) {
   Pair<double> one;
   one.half_a = lane(pair.half_a, i);
   one.half_b = lane(pair.half_b, i);
@@ -156,4 +153,4 @@ template <class T>
   return one;
 }
 
-}  // namespace box_contact
+}  // namespace box_contact::BOX_CONTACT_SET

@@ -6,12 +6,11 @@
 // pairs. Without this, some have depths wrong by up to 1e-8 of the size.
 #pragma once
 
-#include <algorithm>
 #include <cmath>
 
 #include "separating_axis.hpp"
 
-namespace box_contact {
+namespace box_contact::BOX_CONTACT_SET {
 
 // A number as the unevaluated sum of two doubles (Dekker 1971; Knuth, The Art of Computer
 // Programming 2, section 4.2.2). Compile without fused multiply-add.
@@ -80,7 +79,7 @@ struct PrecisePair {
 // Scale a quaternion by a power of two: fourth powers of its components must not overflow.
 inline void scale_to_unit(double q[4]) {
   double largest = 0.0;
-  for (int k = 0; k < 4; ++k) largest = std::max(largest, std::fabs(q[k]));
+  for (int k = 0; k < 4; ++k) largest = max(std::fabs(q[k]), largest);
   int exponent;
   std::frexp(largest, &exponent);
   for (int k = 0; k < 4; ++k) q[k] = std::ldexp(q[k], -exponent);
@@ -165,7 +164,7 @@ inline double precise_gap(const PrecisePair& pair, int axis) {
   int k1 = (k + 1) % 3, k2 = (k + 2) % 3, j1 = (j + 1) % 3, j2 = (j + 2) % 3;
   DoubleDouble u = pair.rotation[k1][j], v = pair.rotation[k2][j];
   DoubleDouble length = sqrt(u * u + v * v);
-  if (!(length.high > cross_product_min)) return -std::numeric_limits<double>::infinity();
+  if (!(length.high > cross_product_min)) return -infinity;
   DoubleDouble gap = abs(pair.offset[k2] * u - pair.offset[k1] * v);
   gap = gap + abs(v) * DoubleDouble(-pair.half[k1]);
   gap = gap + abs(u) * DoubleDouble(-pair.half[k2]);
@@ -208,19 +207,19 @@ inline Vec<double> precise_normal(const PrecisePair& pair, bool a_first, int axi
 inline void refine(const Pair<double>& pair, const Pose<double>& a, const Pose<double>& b,
                    SeparatingAxis<double>& found) {
   PrecisePair precise = precise_pair(pair, a, b);
-  double best = -std::numeric_limits<double>::infinity(), largest = best;
+  double best = -infinity, largest = best;
   double tolerance = tie * pair.size;
   int axis = 0;
   for (int number = 0; number < 15; ++number) {
     double gap = precise_gap(precise, pair.a_first ? number : swapped_axis(number));
-    largest = std::max(largest, gap);
+    largest = max(gap, largest);
     if (gap > best + tolerance) best = gap, axis = number;
   }
   // Lengths beyond what can be split in two: what the test found in float64 stands.
-  if (!std::isfinite(largest)) return;
+  if (!__builtin_isfinite(largest)) return;
   found.separation = largest;
   found.axis = axis;
   found.normal = precise_normal(precise, pair.a_first, axis);
 }
 
-}  // namespace box_contact
+}  // namespace box_contact::BOX_CONTACT_SET

@@ -25,7 +25,7 @@
 #include "clipping.hpp"
 #include "edge_pieces.hpp"
 
-namespace box_contact {
+namespace box_contact::BOX_CONTACT_SET {
 
 // What is asked of the centroid: an error of size · max(1e-9, 1e-14 · size / depth).
 constexpr double least_centroid_error = 1e-9, centroid_rounding = 1e-14;
@@ -85,7 +85,7 @@ struct FaceSums {
 
   // Add a piece at step n, where the face's side is the sign `given`.
   template <Side given>
-  [[gnu::always_inline]] void add(int face, int n, Four<T> twice_area, Four<T> y, Four<T> z) {
+  BC_INLINE void add(int face, int n, Four<T> twice_area, Four<T> y, Four<T> z) {
     Four<T> terms[3] = {twice_area, twice_area * y, twice_area * z};
     int place = n;
     if constexpr (given != side) {  // σ and τ change places: steps or lanes 1 and 2
@@ -98,7 +98,7 @@ struct FaceSums {
     for (int k = 0; k < 3; ++k) sums[face][k][place] += terms[k];
   }
   // The total of face −, sign 0, or +, sign 1, across an axis.
-  [[gnu::always_inline]] T operator()(int face, int sign, int what) const {
+  BC_INLINE T operator()(int face, int sign, int what) const {
     auto term = [&](int n) -> T {
       if constexpr (is_scalar<T>) {
         return sums[face][what][0][n];
@@ -119,10 +119,10 @@ template <class T>
 struct BySign {
   T low, high;
 
-  [[gnu::always_inline]] T sum() const { return low + high; }
+  BC_INLINE T sum() const { return low + high; }
 };
 template <class T, Side side>
-[[gnu::always_inline]] inline BySign<T> by_sign(const Four<T> (&terms)[steps<T>]) {
+BC_INLINE BySign<T> by_sign(const Four<T> (&terms)[steps<T>]) {
   constexpr int other = side == Side::sigma ? 2 : 1;  // where the other side's sign is + instead
   if constexpr (is_scalar<T>) {
     return {terms[0][0] - terms[0][other], terms[0][3] - terms[0][3 - other]};
@@ -138,11 +138,30 @@ template <class T, Side side>
 // `squares` is Σ c ∫ x xᵀ dl over all edges. With w = c · length, a piece of an edge has
 // w · (middle · middleᵀ + length² / 12 · direction · directionᵀ) of it.
 
+// Who wants no second moments passes these as `squares`: all that is only added here is not computed.
+struct NoSquares {
+  BC_INLINE NoSquares operator()(int, int) const { return {}; }
+  template <class T>
+  BC_INLINE void operator+=(const T&) const {}
+  template <class T>
+  BC_INLINE void operator-=(const T&) const {}
+};
+
+// Whether no piece of the four lines of a single pair is left. Their zeros change no sum. Of W pairs
+// some piece is left almost always.
+template <class T>
+BC_INLINE bool adds_nothing(const Four<T>& lengths) {
+  if constexpr (is_scalar<T>) {
+    return !any(lengths != Four<T>{});
+  } else {
+    return false;
+  }
+}
+
 // Add the pieces of a box's edges along its axis j. `origin`: in the box's frame.
-template <class T, Side side>
-[[gnu::always_inline]] inline void add_edges_along(int j, const EdgePieces<T>& pieces,
-                                                   const Vec<T>& half, const Vec<T>& origin,
-                                                   FaceSums<T, side>& faces, Sym<T>& squares) {
+template <class T, Side side, class Squares>
+BC_INLINE void add_edges_along(int j, const EdgePieces<T>& pieces, const Vec<T>& half,
+                               const Vec<T>& origin, FaceSums<T, side>& faces, Squares& squares) {
   int a = (j + 1) % 3, b = (j + 2) % 3;
   Four<T> w[steps<T>], w_g[steps<T>], w_x[steps<T>], w_xx[steps<T>], w_ll[steps<T>];
 #pragma GCC unroll 4
@@ -150,6 +169,7 @@ template <class T, Side side>
     Four<T> f = sigma<T>(n) * half[a] - origin[a], g = tau<T>(n) * half[b] - origin[b];
     Four<T> s = pieces.s[j][n], t = pieces.t[j][n];
     Four<T> length = max(t - s, Four<T>{}), middle = 0.5 * (s + t) - origin[j];
+    if (adds_nothing<T>(length)) return;
     Four<T> by_f = length * f, by_g = length * g;
     faces.template add<Side::sigma>(a, n, tau<T>(n) * by_g, g, middle);
     faces.template add<Side::tau>(b, n, sigma<T>(n) * by_f, middle, f);
@@ -174,10 +194,9 @@ template <class T, Side side>
       by_sign<T, Side::sigma>(w_xx).sum() + (1.0 / 12.0) * by_sign<T, Side::sigma>(w_ll).sum();
 }
 
-template <class T, Side side>
-[[gnu::always_inline]] inline void add_edges(const EdgePieces<T>& pieces, const Vec<T>& half,
-                                             const Vec<T>& origin, FaceSums<T, side>& faces,
-                                             Sym<T>& squares) {
+template <class T, Side side, class Squares>
+BC_INLINE void add_edges(const EdgePieces<T>& pieces, const Vec<T>& half, const Vec<T>& origin,
+                         FaceSums<T, side>& faces, Squares& squares) {
 #pragma GCC unroll 3
   for (int j = 0; j < 3; ++j) add_edges_along(j, pieces, half, origin, faces, squares);
 }
@@ -200,8 +219,8 @@ struct Lines {
   T along_y, along_z, along_k, along_l, slab_y, slab_z, slab_k, slab_l;
 
   // `origin_a`, `origin_b`: the origin in A's frame and in B's.
-  [[gnu::always_inline]] Lines(const Pair<T>& pair, const Mat<T>& inverse, const Vec<T>& origin_a,
-                               const Vec<T>& origin_b, int i, int j)
+  BC_INLINE Lines(const Pair<T>& pair, const Mat<T>& inverse, const Vec<T>& origin_a,
+                  const Vec<T>& origin_b, int i, int j)
       : pair(pair),
         origin_a(origin_a),
         origin_b(origin_b),
@@ -224,7 +243,7 @@ struct Lines {
     slab_y = pair.half_a[y] * abs(along_y), slab_z = pair.half_a[z] * abs(along_z);
     slab_k = pair.half_b[k] * abs(along_k), slab_l = pair.half_b[l] * abs(along_l);
   }
-  [[gnu::always_inline]] LinePiece<T> piece(int n) const {
+  BC_INLINE LinePiece<T> piece(int n) const {
     const Mat<T>& r = pair.rotation;
     LinePiece<T> line;
     line.f = sigma<T>(n) * pair.half_a[i] - origin_a[i];
@@ -242,12 +261,11 @@ struct Lines {
 
 // Add the pieces of the lines in which faces of A across axis i meet faces of B. `squares` is in A's
 // frame. `least`: the least squared sine of faces that meet.
-template <class T>
-[[gnu::always_inline]] inline void add_lines_of(int i, T& least, const Pair<T>& pair,
-                                                const Mat<T>& inverse, const Vec<T>& origin_a,
-                                                const Vec<T>& origin_b,
-                                                FaceSums<T, Side::sigma>& faces_a,
-                                                FaceSums<T, Side::tau>& faces_b, Sym<T>& squares) {
+template <class T, class Squares>
+BC_INLINE void add_lines_of(int i, T& least, const Pair<T>& pair, const Mat<T>& inverse,
+                            const Vec<T>& origin_a, const Vec<T>& origin_b,
+                            FaceSums<T, Side::sigma>& faces_a, FaceSums<T, Side::tau>& faces_b,
+                            Squares& squares) {
   const Mat<T>& r = pair.rotation;
   int y = (i + 1) % 3, z = (i + 2) % 3;
   Four<T> w_all[steps<T>]{}, w_y[steps<T>]{}, w_z[steps<T>]{};
@@ -256,6 +274,10 @@ template <class T>
   for (int j = 0; j < 3; ++j) {
     Lines<T> lines(pair, inverse, origin_a, origin_b, i, j);
     least = min(least, lines.sine2_or_one);
+    if constexpr (is_scalar<T>) {
+      LinePiece<T> line = lines.piece(0);
+      if (adds_nothing<T>(max(line.to - line.from, Four<T>{}))) continue;
+    }
     int k = (j + 1) % 3, l = (j + 2) % 3;
     Four<T> along[steps<T>];
 #pragma GCC unroll 4
@@ -295,11 +317,10 @@ template <class T>
   squares(z, z) += by_sign<T, Side::sigma>(w_zz).sum();
 }
 
-template <class T>
-[[gnu::always_inline]] inline T add_lines(const Pair<T>& pair, const Mat<T>& inverse,
-                                          const Vec<T>& origin_a, const Vec<T>& origin_b,
-                                          FaceSums<T, Side::sigma>& faces_a,
-                                          FaceSums<T, Side::tau>& faces_b, Sym<T>& squares) {
+template <class T, class Squares>
+BC_INLINE T add_lines(const Pair<T>& pair, const Mat<T>& inverse, const Vec<T>& origin_a,
+                      const Vec<T>& origin_b, FaceSums<T, Side::sigma>& faces_a,
+                      FaceSums<T, Side::tau>& faces_b, Squares& squares) {
   T least = splat<T>(1.0);
   if constexpr (is_scalar<T>) {
     add_lines_of(0, least, pair, inverse, origin_a, origin_b, faces_a, faces_b, squares);
@@ -338,23 +359,22 @@ template <class T>
 }
 
 // Over a box's six faces, in its own frame and about the origin.
-template <class T>
+template <class T, class Squares>
 struct SurfaceIntegrals {
-  Mat<T> x_n;     // ∫ x nᵀ dA; rows are components of x
-  Vec<T> first;   // Σ distance of the face · ∫ x dA
-  Sym<T> second;  // four times Σ distance of the face · ∫ x xᵀ dA
-  Vec<T> normal;  // 2 ∫ n dA
-  Vec<T> area;    // of both faces across each axis, signed sums: about their area
+  Mat<T> x_n;      // ∫ x nᵀ dA; rows are components of x
+  Vec<T> first;    // Σ distance of the face · ∫ x dA
+  Squares second;  // four times Σ distance of the face · ∫ x xᵀ dA
+  Vec<T> normal;   // 2 ∫ n dA
+  Vec<T> area;     // of both faces across each axis, signed sums: about their area
 };
 
 // `squares` has a face's ∫ x xᵀ dA four times in the face's plane, three times where one x is across
 // it, and twice where both are.
-template <class T, Side side>
-[[gnu::always_inline]] inline SurfaceIntegrals<T> integrate(const FaceSums<T, side>& faces,
-                                                            const Sym<T>& squares,
-                                                            const Vec<T>& half,
-                                                            const Vec<T>& origin) {
-  SurfaceIntegrals<T> sum;
+template <class T, Side side, class Squares>
+BC_INLINE SurfaceIntegrals<T, Squares> integrate(const FaceSums<T, side>& faces,
+                                                 const Squares& squares, const Vec<T>& half,
+                                                 const Vec<T>& origin) {
+  SurfaceIntegrals<T, Squares> sum;
   sum.first = {};
   sum.second = squares;
   for (int i = 0; i < 3; ++i) {
@@ -383,7 +403,7 @@ template <class T, Side side>
 // Move faces of B that may lie in the plane of a face of A, and look the same way, inwards until
 // they are clear of it. Returns where rounding may be mirrored instead.
 template <class T>
-[[gnu::always_inline]] inline Mask<T> unflush(Pair<T>& pair, T depth) {
+BC_INLINE Mask<T> unflush(Pair<T>& pair, T depth) {
   T rounding = place_rounding * pair.size;
   T mirrored = mirrored_rounding *
                min(pair.size * (1.0 / least_centroid_error), (1.0 / centroid_rounding) * depth);
@@ -421,9 +441,8 @@ template <class T>
 // frame; `length`: of all edges; `radius`: √trace of the covariance; `wedge`: faces that are almost
 // parallel meet.
 template <class T>
-[[gnu::always_inline]] inline Mask<T> certificate(const Mat<T>& x_n, const Vec<T>& normal,
-                                                  const Vec<T>& area, T length, T volume, T radius,
-                                                  Mask<T> wedge, T size, T depth) {
+BC_INLINE Mask<T> certificate(const Mat<T>& x_n, const Vec<T>& normal, const Vec<T>& area, T length,
+                              T volume, T radius, Mask<T> wedge, T size, T depth) {
   T rounding = centroid_rounding * size / depth;
   T error = size * max(splat<T>(least_centroid_error), rounding);
   T covariance_error = max(splat<T>(least_covariance_error), rounding);
@@ -459,17 +478,20 @@ inline Mask<T> move_inside(const Pair<T>& pair, Vec<T>& point) {
 
 }  // namespace face_sums
 
-template <class T>
+// What is found, and where the certificate holds.
+template <class Found, class T>
 struct CertifiedOverlap {
-  Moments<T> moments;
-  Mask<T> certain;  // the certificate holds
+  Found moments;
+  Mask<T> certain;
 };
 
-// The overlap of a pair that has been pressed in to `depth` [m].
-template <class T>
-[[gnu::always_inline]] inline CertifiedOverlap<T> overlap_by_face_sums(const Pair<T>& given,
-                                                                       T depth) {
+// The overlap of a pair that has been pressed in to `depth` [m]: Moments<T>, or for PointAndVolume<T>
+// without the second moments. Then the equations are those that the centroid needs.
+template <class Found, class T>
+BC_INLINE CertifiedOverlap<Found, T> overlap_by_face_sums(const Pair<T>& given, T depth) {
   using namespace face_sums;
+  constexpr bool all_moments = std::is_same_v<Found, Moments<T>>;
+  using Squares = std::conditional_t<all_moments, Sym<T>, NoSquares>;
   Pair<T> pair = given;
   Mask<T> risky = unflush(pair, depth);
   const Mat<T>& r = pair.rotation;
@@ -483,36 +505,43 @@ template <class T>
   Vec<T> origin_b = transposed_times(r, origin_a) - pair.offset_b;
   FaceSums<T, Side::sigma> faces_a;
   FaceSums<T, Side::tau> faces_b;
-  Sym<T> squares_a{}, squares_b{};
+  Squares squares_a{}, squares_b{};
   add_edges(edges_a, pair.half_a, origin_a, faces_a, squares_a);
   add_edges(edges_b, pair.half_b, origin_b, faces_b, squares_b);
   T least_sine2_here = add_lines(pair, inverse, origin_a, origin_b, faces_a, faces_b, squares_a);
-  SurfaceIntegrals<T> of_a = integrate(faces_a, squares_a, pair.half_a, origin_a);
-  SurfaceIntegrals<T> of_b = integrate(faces_b, squares_b, pair.half_b, origin_b);
+  auto of_a = integrate(faces_a, squares_a, pair.half_a, origin_a);
+  auto of_b = integrate(faces_b, squares_b, pair.half_b, origin_b);
 
   Mat<T> turned, x_n;
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) turned[i][j] = dot(row(r, i), column(of_b.x_n, j));
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) x_n[i][j] = of_a.x_n[i][j] + dot(row(turned, i), row(r, j));
-  CertifiedOverlap<T> found;
+  CertifiedOverlap<Found, T> found;
   T volume = (x_n[0][0] + x_n[1][1] + x_n[2][2]) * (1.0 / 3.0);
   T by_volume = 1.0 / volume;
   Vec<T> from_origin = (0.25 * by_volume) * (of_a.first + r * of_b.first);
   Vec<T> centroid = origin_a + from_origin;
-  // Little cancels: the origin is a point of the overlap.
-  Sym<T> covariance =
-      (0.05 * by_volume) * (of_a.second + rotated(r, of_b.second)) - squared(from_origin);
   Vec<T> area, normal = of_a.normal + r * of_b.normal;
   for (int i = 0; i < 3; ++i) area[i] = of_a.area[i] + dot(abs(row(r, i)), of_b.area);
   T length = edges_a.length + edges_b.length;
-  T radius = sqrt(max(trace(covariance), T{}));
-  Mask<T> wedge = least_sine2_here < far_sine2;
-  found.certain = certificate(x_n, normal, area, length, volume, radius, wedge, pair.size, depth);
-  if (any(wedge)) {
-    T farthest2 = farthest_piece2(pair, inverse, origin_a, origin_b);
-    T reach = farthest_reach * radius + sqrt(dot(from_origin, from_origin));
-    found.certain &= (farthest2 <= reach * reach) | (wedge == 0);
+  if constexpr (all_moments) {
+    // Little cancels: the origin is a point of the overlap.
+    Sym<T> covariance =
+        (0.05 * by_volume) * (of_a.second + rotated(r, of_b.second)) - squared(from_origin);
+    T radius = sqrt(max(trace(covariance), T{}));
+    Mask<T> wedge = least_sine2_here < far_sine2;
+    found.certain = certificate(x_n, normal, area, length, volume, radius, wedge, pair.size, depth);
+    if (any(wedge)) {
+      T farthest2 = farthest_piece2(pair, inverse, origin_a, origin_b);
+      T reach = farthest_reach * radius + sqrt(dot(from_origin, from_origin));
+      found.certain &= (farthest2 <= reach * reach) | (wedge == 0);
+    }
+    found.moments.covariance = rotated(pair.axes_a, covariance);
+  } else {
+    T any_radius = splat<T>(infinity);
+    found.certain = certificate(x_n, normal, area, length, volume, any_radius, depth != depth,
+                                pair.size, depth);
   }
   found.certain &= risky == 0;
   Mask<T> shallow = depth < safely_inside * pair.size;
@@ -522,8 +551,9 @@ template <class T>
     centroid = select(shallow, moved, centroid);
     found.certain &= inside | (shallow == 0);
   }
-  found.moments = {volume, centroid, rotated(pair.axes_a, covariance)};
+  found.moments.volume = volume;
+  found.moments.centroid = centroid;
   return found;
 }
 
-}  // namespace box_contact
+}  // namespace box_contact::BOX_CONTACT_SET

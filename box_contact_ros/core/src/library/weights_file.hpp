@@ -1,4 +1,4 @@
-// The network of model `mlp` from a safetensors file.
+// The numbers of the network of model `mlp` from a safetensors file.
 //
 // The file begins with 8 bytes, the little-endian length of a JSON header. The header gives dtype,
 // shape and place of each tensor, and the tensors follow. The reader finds four tensors by name and
@@ -6,20 +6,23 @@
 #pragma once
 
 #include <cctype>
+#include <cstdint>
 #include <cstdlib>
+#include <cstring>
 #include <fstream>
 #include <initializer_list>
 #include <iterator>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
-#include "mlp.hpp"
+#include "../rows.hpp"
 
-namespace box_contact {
+namespace box_contact::detail {
 
 class WeightsFile {
  public:
-  // Throws std::runtime_error with path and cause, as `network` does.
+  // Throws std::runtime_error with path and cause, as `numbers` does.
   explicit WeightsFile(const std::string& path) : path_(path) {
     std::ifstream file(path, std::ios::binary);
     if (!file) refuse("cannot be opened");
@@ -32,33 +35,32 @@ class WeightsFile {
     data_ = bytes.substr(8 + length);
   }
 
-  Network network() const {
+  // The biases of the outputs; then for each unit its bias, its weights for features of faces, axis
+  // and site, and its weights to the outputs.
+  std::vector<float> numbers() const {
     // The model card lists no sizes: the network is for boxes of any size.
     if (header_.find(R"(\"sizes\":[])") == std::string::npos)
       refuse("is for boxes of some sizes only, or has no model card");
-    // White space has gone from the header, from texts too.
-    if (header_.find(R"(\"description\":\"cutsoftheboundsbytheslab,atninesites\")") ==
-        std::string::npos)
-      refuse("is for another description of the overlap");
+    // White space has gone from the header.
+    const std::string format = std::to_string(network_format);
+    if (header_.find(R"(\"format\":)" + format + ",") == std::string::npos)
+      refuse("is not of format " + format);
+    constexpr size_t features = site_features, outputs = site_outputs;
     size_t units = number(entry("point.0.bias"), R"("shape":[)");
     std::vector<float> bias = tensor("point.0.bias", {units});
-    std::vector<float> first = tensor("point.0.weight", {units, site_features});
-    std::vector<float> last = tensor("point.1.weight", {site_outputs, units});
-    std::vector<float> last_bias = tensor("point.1.bias", {site_outputs});
-    Network network;
-    network.units.resize(units);
+    std::vector<float> first = tensor("point.0.weight", {units, features});
+    std::vector<float> last = tensor("point.1.weight", {outputs, units});
+    std::vector<float> found = tensor("point.1.bias", {outputs});
     for (size_t u = 0; u < units; ++u) {
-      Network::Unit& unit = network.units[u];
-      unit.bias = bias[u];
-      for (size_t k = 0; k < 4; ++k) {
-        unit.of_site[k] = first[site_features * u + k];
-        unit.of_faces[k] = first[site_features * u + 4 + k];
-        unit.of_axis[k] = first[site_features * u + 8 + k];
-      }
-      for (size_t k = 0; k < site_outputs; ++k) unit.to_outputs[k] = last[units * k + u];
+      found.push_back(bias[u]);
+      for (size_t k : {4, 5, 6, 7, 8, 9, 10, 11, 0, 1, 2, 3})
+        found.push_back(first[features * u + k]);
+      for (size_t k = 0; k < outputs; ++k) found.push_back(last[units * k + u]);
     }
-    for (size_t k = 0; k < site_outputs; ++k) network.output_bias[k] = last_bias[k];
-    return network;
+    for (float weight : found)
+      if (!(weight >= -1e4F && weight <= 1e4F))
+        refuse("has a weight " + std::to_string(weight) + ", which is not within -1e4 to 1e4");
+    return found;
   }
 
  private:
@@ -99,6 +101,8 @@ class WeightsFile {
 };
 
 // Read the weights of model `mlp`: weights/mlp.safetensors.
-inline Network read_network(const std::string& path) { return WeightsFile(path).network(); }
+inline std::vector<float> read_numbers(const std::string& path) {
+  return WeightsFile(path).numbers();
+}
 
-}  // namespace box_contact
+}  // namespace box_contact::detail

@@ -21,14 +21,12 @@
 // 1e-16 · size / depth of the size. A∩B holds a ball of radius depth / (2√3).
 #pragma once
 
-#include <algorithm>
 #include <cmath>
-#include <utility>
 
 #include "../poses.hpp"
 #include "moments.hpp"
 
-namespace box_contact {
+namespace box_contact::BOX_CONTACT_SET {
 
 // Part of the volume's integrals that has to be left in their sum. Of thin plates through each
 // other's edges less is left; then the other five faces are tried as the reference.
@@ -101,9 +99,8 @@ template <class Visit>
 inline void lifted(const Polygon& polygon, double floor, Visit visit) {
   for (int i = 1; i + 1 < polygon.count; ++i) {
     Polygon triangle{3, {polygon.corners[0], polygon.corners[i], polygon.corners[i + 1]}};
-    double low = std::min({triangle.corners[0][2], triangle.corners[1][2], triangle.corners[2][2]});
-    double high =
-        std::max({triangle.corners[0][2], triangle.corners[1][2], triangle.corners[2][2]});
+    Vec<double> heights{triangle.corners[0][2], triangle.corners[1][2], triangle.corners[2][2]};
+    double low = smallest(heights), high = largest(heights);
     // A triangle in the plane, to the last bit, is a part below it and none above.
     if (high > floor) visit(clip(triangle, 2, -1.0, -floor));
     if (low < floor || !(high > floor)) {
@@ -180,8 +177,8 @@ inline Moments<double> overlap_from(const Pair<double>& pair, int face, double& 
   for (int d = 0; d < 2; ++d) {
     Vec<double> reach = abs(row(edges, d));
     double radius = reach[0] + reach[1] + reach[2];
-    low[d] = std::max(-half[d], centre[d] - radius);
-    high[d] = std::min(half[d], centre[d] + radius);
+    low[d] = max(centre[d] - radius, -half[d]);
+    high[d] = min(centre[d] + radius, half[d]);
     middle[d] = 0.5 * (low[d] + high[d]);
   }
 
@@ -197,7 +194,7 @@ inline Moments<double> overlap_from(const Pair<double>& pair, int face, double& 
   for (int c = 0; c < 8; ++c) {
     Vec<double> signs{c & 1 ? 1.0 : -1.0, c & 2 ? 1.0 : -1.0, c & 4 ? 1.0 : -1.0};
     corners[c] = start + edges * signs;
-    lowest = std::min(lowest, corners[c][2]);
+    lowest = min(corners[c][2], lowest);
     outside[c] = 0;
     for (int k = 0; k < 5; ++k)
       outside[c] |= unsigned(bound_signs[k] * corners[c][bound_axes[k]] > bounds[k]) << k;
@@ -230,11 +227,11 @@ inline Moments<double> overlap_from(const Pair<double>& pair, int face, double& 
   // The sign of the volume is that of the frame's handedness, and cancels in the ratios. Boxes
   // thinner than the rounding of their sizes have no volume.
   Vec<double> found{};
-  double least = std::max(lowest, floor);
+  double least = max(floor, lowest);
   if (sum.volume != 0.0) {
-    found[0] = std::min(std::max(sum.u / sum.volume, low[0] - middle[0]), high[0] - middle[0]);
-    found[1] = std::min(std::max(sum.v / sum.volume, low[1] - middle[1]), high[1] - middle[1]);
-    found[2] = std::min(std::max(sum.w / sum.volume, least), 0.0);
+    found[0] = min(high[0] - middle[0], max(low[0] - middle[0], sum.u / sum.volume));
+    found[1] = min(high[1] - middle[1], max(low[1] - middle[1], sum.v / sum.volume));
+    found[2] = min(0.0, max(least, sum.w / sum.volume));
   } else {
     found[2] = 0.5 * least;
   }
@@ -280,4 +277,4 @@ inline Moments<double> overlap_by_clipping(const Pair<double>& pair, int face) {
   return best;
 }
 
-}  // namespace box_contact
+}  // namespace box_contact::BOX_CONTACT_SET

@@ -1,60 +1,12 @@
-// What every stage of a pair computes, as named arrays: for training, reports and tests.
+// Fill the arrays of what every stage of a pair computes.
 #pragma once
 
-#include "../mlp.hpp"
+#include "../mlp/mlp_model.hpp"
+#include "stage_arrays.hpp"
 
-namespace box_contact {
+namespace box_contact::BOX_CONTACT_SET {
 
-// Arrays with a row for each pair, nullptr where one is not wanted. core/stages.py documents them.
-struct StageArrays {
-  bool *colliding{}, *frame_b{}, *in_range{}, *certain{};
-  int64_t *axis{}, *face{};
-  double *separation{}, *touch{}, *size{}, *normal{}, *rotation{}, *offset_a{}, *offset_b{};
-  double *pressed_offset_a{}, *pressed_offset_b{}, *centroid{}, *clipped_centroid{};
-  double *volume{}, *clipped_volume{}, *covariance{}, *clipped_covariance{};
-  double *bounds_middle{}, *bounds_half{};
-  double *other_axes{}, *other_offset{}, *other_half{}, *answer{}, *answer_volume{},
-      *answer_covariance{};
-  float *features{}, *vectors{}, *slant{}, *cut{};
-
-  // Call visit(name, pointer, shape of a row) for each array.
-  template <class Visit>
-  void each(Visit visit) {
-    visit("colliding", colliding, {});
-    visit("frame_b", frame_b, {});
-    visit("in_range", in_range, {});
-    visit("certain", certain, {});
-    visit("axis", axis, {});
-    visit("face", face, {});
-    visit("separation", separation, {});
-    visit("touch", touch, {});
-    visit("size", size, {});
-    visit("normal", normal, {3});
-    visit("rotation", rotation, {3, 3});
-    visit("offset_a", offset_a, {3});
-    visit("offset_b", offset_b, {3});
-    visit("pressed_offset_a", pressed_offset_a, {3});
-    visit("pressed_offset_b", pressed_offset_b, {3});
-    visit("centroid", centroid, {3});
-    visit("clipped_centroid", clipped_centroid, {3});
-    visit("volume", volume, {});
-    visit("clipped_volume", clipped_volume, {});
-    visit("covariance", covariance, {3, 3});
-    visit("clipped_covariance", clipped_covariance, {3, 3});
-    visit("bounds_middle", bounds_middle, {3});
-    visit("bounds_half", bounds_half, {3});
-    visit("other_axes", other_axes, {3, 3});
-    visit("other_offset", other_offset, {3});
-    visit("other_half", other_half, {3});
-    visit("answer", answer, {3});
-    visit("answer_volume", answer_volume, {});
-    visit("answer_covariance", answer_covariance, {3, 3});
-    visit("features", features, {site_count, site_features});
-    visit("vectors", vectors, {site_count, point_outputs});
-    visit("slant", slant, {3, 3});
-    visit("cut", cut, {3});
-  }
-};
+using detail::StageArrays;
 
 template <class Number, class Value>
 inline void put(Number* array, long row, Value value) {
@@ -92,8 +44,9 @@ inline void put_features(const StageArrays& arrays, long row, const CutCube<doub
 
 // Fill one row. Returns false if its poses or sizes are refused. `network` may be nullptr.
 template <Network::Bounds method>
-bool fill_stages(const Rows& rows, long row, const Network* network, const StageArrays& arrays) {
-  Query<double> q = query_rows<double>(rows, row, row + 1);
+bool fill_stages(const Rows& rows, long row, const NetworkView* network,
+                 const StageArrays& arrays) {
+  Query<double> q = query_rows<double>(rows, &row, 1);
   if (!q.pair.valid) return false;
   put(arrays.colliding, row, q.touching);
   put(arrays.axis, row, q.axis.axis);
@@ -106,7 +59,7 @@ bool fill_stages(const Rows& rows, long row, const Network* network, const Stage
   put(arrays.offset_a, row, q.pair.offset_a);
   put(arrays.offset_b, row, q.pair.offset_b);
   if (arrays.centroid || arrays.volume || arrays.covariance || arrays.certain) {
-    Counts counts;
+    Counts counts{};
     Moments<double> exact = exact_overlap(q, counts);
     put(arrays.centroid, row, exact.centroid);
     put(arrays.volume, row, exact.volume);
@@ -146,4 +99,4 @@ bool fill_stages(const Rows& rows, long row, const Network* network, const Stage
   return true;
 }
 
-}  // namespace box_contact
+}  // namespace box_contact::BOX_CONTACT_SET

@@ -1,0 +1,159 @@
+/* The C interface of libbox_contact: whether two boxes touch, where, and along which direction.
+ *
+ *   bc_size cube = {{1.0, 1.0, 1.0}};                                 full extents [m]
+ *   bc_pose a = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 1.0}};              position, quaternion x y z w
+ *   bc_pose b = {{0.0, 0.0, 0.99}, {0.0, 0.0, 0.0, 1.0}};
+ *   bc_solver* solver;
+ *   bc_contact contact;
+ *   if (bc_solver_create(&cube, &cube, NULL, &solver) != BC_OK) puts(bc_error_text());
+ *   bc_solve(solver, &a, &b, NULL, NULL, BC_COVARIANCE, &contact);
+ *   bc_solver_destroy(solver);
+ *
+ * Units are SI, frames are right-handed. A pose places a box's centre and axes in a frame common to
+ * both boxes. Answers are in the same frame.
+ *
+ * Functions return BC_OK or what is wrong; `bc_error_text` says it in words. No function throws, and
+ * none but `bc_solver_create` allocates memory on the way to an answer by one thread. Threads may
+ * share a solver. A program needs no compiler flag.
+ */
+#ifndef BOX_CONTACT_H
+#define BOX_CONTACT_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#if defined(_WIN32)
+#define BC_API
+#else
+#define BC_API __attribute__((visibility("default")))
+#endif
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Raised by a change that a compiled program cannot follow. `bc_abi` is that of the library. */
+#define BC_ABI 1
+
+typedef enum bc_status {
+  BC_OK = 0,
+  BC_BAD_ARGUMENT = 1,    /* a null pointer, a count below zero, an unknown model */
+  BC_BAD_SIZE = 2,        /* extents outside 1e-50 to 1e50 m */
+  BC_BAD_POSE = 3,        /* numbers that are not finite, or a quaternion without a length */
+  BC_BAD_ROWS = 4,        /* some rows of a batch are refused: bad poses, sizes or places */
+  BC_BAD_WEIGHTS = 5,     /* a weights file that is missing, damaged, or made for something else */
+  BC_NO_MEMORY = 6,
+  BC_BAD_ENVIRONMENT = 7, /* BOX_CONTACT_INSTRUCTION_SET names none that this machine has */
+  BC_BAD_ABI = 8          /* the program was compiled for another version of this header */
+} bc_status;
+
+typedef enum bc_model {
+  BC_EXACT = 0, /* the exact moments of the overlap */
+  BC_MLP = 1    /* a network between proven bounds; needs weights */
+} bc_model;
+
+/* What is computed of the overlap, beside its centroid. */
+typedef enum bc_patch {
+  BC_NO_PATCH = 0,
+  BC_VOLUME = 1,
+  BC_COVARIANCE = 2 /* and the volume */
+} bc_patch;
+
+typedef struct bc_size {
+  double extent[3]; /* full extents along the box's own axes [m] */
+} bc_size;
+
+typedef struct bc_pose {
+  double position[3];   /* of the box's centre [m] */
+  double quaternion[4]; /* x y z w, of any length */
+} bc_pose;
+
+typedef struct bc_contact {
+  double separation;       /* [m]; negative: depth along the normal; positive: largest SAT gap */
+  double normal[3];        /* unit vector from A to B; NaN where separation exceeds the margin */
+  double point[3];         /* centroid of the overlap [m]; NaN without contact */
+  double volume;           /* of the overlap [m³]; 0 without contact; NaN where not asked for */
+  double covariance[3][3]; /* second central moments by the volume [m²]; NaN likewise, or apart */
+  int32_t axis;            /* winning axis: 0–2 faces of A, 3–5 of B, 6 + 3 i + j for a_i × b_j */
+  bool colliding;          /* touching counts, to 8 ulp of the largest coordinate or size */
+} bc_contact;
+
+/* How many contacts took another way than most, since the solver was made. */
+typedef struct bc_counts {
+  int64_t clipped; /* by model exact: clipped, as the certificate of the face sums did not hold */
+  int64_t exact;   /* by model mlp: answered by model exact */
+} bc_counts;
+
+typedef struct bc_options {
+  size_t size;         /* sizeof(bc_options) */
+  bc_model model;
+  const char* weights; /* path of the weights file of model mlp */
+  double margin;       /* [m]; normals are given up to this separation */
+} bc_options;
+
+#define BC_DEFAULT_OPTIONS {sizeof(bc_options), BC_EXACT, NULL, 0.0}
+
+/* Rows of pairs. Row i is (poses_a[i], poses_b[i]), or with `pairs` (poses_a[p], poses_b[q]) for
+ * p = pairs[2 i], q = pairs[2 i + 1]; `poses_a` and `poses_b` may then be one array. */
+typedef struct bc_rows {
+  size_t size; /* sizeof(bc_rows) */
+  int64_t count;
+  const bc_pose* poses_a;
+  const bc_pose* poses_b;
+  const bc_size* sizes_a; /* one for each pose, or NULL: the solver's */
+  const bc_size* sizes_b;
+  const int64_t* pairs; /* (count, 2) or NULL */
+  int64_t pose_count;   /* of either array; read with `pairs` alone */
+} bc_rows;
+
+/* Arrays of a row for each pair, or NULL for what is not wanted. What is not wanted is not computed:
+ * the second moments without `covariance`, the volume without both. */
+typedef struct bc_results {
+  size_t size; /* sizeof(bc_results) */
+  bool* colliding;
+  double* separation;
+  double* normal; /* (count, 3) */
+  double* point;  /* (count, 3) */
+  double* volume;
+  double* covariance; /* (count, 3, 3) */
+  int32_t* axis;
+} bc_results;
+
+typedef struct bc_solver bc_solver;
+
+BC_API int bc_abi(void);
+BC_API const char* bc_version(void);
+
+/* The instruction set of this process: "baseline", "avx2" or "avx512"; NULL where the environment
+ * variable BOX_CONTACT_INSTRUCTION_SET asks for one that there is not. */
+BC_API const char* bc_instruction_set(void);
+
+/* Why the last call of this thread did not return BC_OK. Valid until the thread's next one. */
+BC_API const char* bc_error_text(void);
+
+/* Make a solver for boxes of these sizes. `options` NULL: BC_DEFAULT_OPTIONS. On failure *solver is
+ * NULL. */
+BC_API bc_status bc_solver_create(const bc_size* size_a, const bc_size* size_b,
+                                  const bc_options* options, bc_solver** solver);
+BC_API void bc_solver_destroy(bc_solver* solver);
+
+/* Solve one pair. Sizes NULL: the solver's. On failure *contact is as it was. */
+BC_API bc_status bc_solve(bc_solver* solver, const bc_pose* pose_a, const bc_pose* pose_b,
+                          const bc_size* size_a, const bc_size* size_b, bc_patch patch,
+                          bc_contact* contact);
+
+/* Solve many pairs, by `threads` threads. Bit for bit the answers of single calls with the same
+ * `patch`, for any number of threads. Each refused row gets `colliding` false and `separation` NaN,
+ * and the rest of it has no meaning; all other rows are solved, and *refused is the first refused
+ * row, or −1. `refused` may be NULL. */
+BC_API bc_status bc_solve_rows(bc_solver* solver, const bc_rows* rows, const bc_results* results,
+                               int threads, int64_t* refused);
+
+BC_API bc_counts bc_solver_counts(const bc_solver* solver);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

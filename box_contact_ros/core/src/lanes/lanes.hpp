@@ -1,0 +1,178 @@
+// Lanes: the numbers of one pair of boxes, or of W pairs side by side.
+//
+// Every algorithm of the core is one template over T. T is `double` for a single pair, or
+// `Lanes<double, W>`, a vector of the compiler, with one pair in each of its W lanes. All functions
+// here work on each lane alone, so a pair has the same bits in every lane of every width.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <type_traits>
+#include <utility>
+#if defined(__SSE2__)
+#include <immintrin.h>
+#endif
+
+#include "target.hpp"
+
+// Vectors wider than the machine's registers are passed between inlined functions only.
+#pragma GCC diagnostic ignored "-Wpsabi"
+#if defined(__clang__)
+// Masks are bool or vectors, and the operators & and | combine both.
+#pragma clang diagnostic ignored "-Wbool-operation"
+// Headers name the inline namespace of target.hpp in full.
+#pragma clang diagnostic ignored "-Winline-namespace-reopened-noninline"
+#endif
+
+namespace box_contact::BOX_CONTACT_SET {
+
+template <class Number, int width>
+struct LanesOf {
+  static_assert(width > 1, "one lane is a plain number");
+  typedef Number type __attribute__((vector_size(width * sizeof(Number))));
+};
+template <class Number, int width>
+using Lanes = typename LanesOf<Number, width>::type;
+
+template <class T>
+constexpr bool is_scalar = std::is_arithmetic_v<T>;
+
+template <class T, bool = is_scalar<T>>
+struct NumberOf {
+  using type = T;
+};
+template <class T>
+struct NumberOf<T, false> {
+  using type = std::decay_t<decltype(std::declval<T&>()[0])>;
+};
+// The type of one lane of T.
+template <class T>
+using Number = typename NumberOf<T>::type;
+
+template <class T>
+constexpr int width = sizeof(T) / sizeof(Number<T>);
+
+// What a comparison of T gives: bool, or a vector of integers, 0 or −1.
+template <class T>
+using Mask = decltype(T() < T());
+
+// The same number in every lane.
+template <class T>
+BC_INLINE T splat(Number<T> x) {
+  return T{} + x;
+}
+
+template <class T>
+BC_INLINE T select(Mask<T> mask, T if_true, T if_false) {
+  return mask ? if_true : if_false;
+}
+
+// Of two equal numbers, or with a NaN in `a` or `b`, min and max return b. The instructions are named
+// because g++ takes two for the comparison of a vector with a constant.
+template <class T>
+BC_INLINE T min(T a, T b) {
+#if defined(__AVX512F__)
+  if constexpr (std::is_same_v<T, Lanes<double, 8>>)
+    return (T)_mm512_maskz_min_pd(0xff, (__m512d)a, (__m512d)b);
+  if constexpr (std::is_same_v<T, Lanes<float, 16>>)
+    return (T)_mm512_maskz_min_ps(0xffff, (__m512)a, (__m512)b);
+#endif
+#if defined(__AVX__)
+  if constexpr (std::is_same_v<T, Lanes<double, 4>>)
+    return (T)_mm256_min_pd((__m256d)a, (__m256d)b);
+  if constexpr (std::is_same_v<T, Lanes<float, 8>>) return (T)_mm256_min_ps((__m256)a, (__m256)b);
+#endif
+#if defined(__SSE2__)
+  if constexpr (std::is_same_v<T, Lanes<double, 2>>) return (T)_mm_min_pd((__m128d)a, (__m128d)b);
+  if constexpr (std::is_same_v<T, Lanes<float, 4>>) return (T)_mm_min_ps((__m128)a, (__m128)b);
+#endif
+  return a < b ? a : b;
+}
+template <class T>
+BC_INLINE T max(T a, T b) {
+#if defined(__AVX512F__)
+  if constexpr (std::is_same_v<T, Lanes<double, 8>>)
+    return (T)_mm512_maskz_max_pd(0xff, (__m512d)a, (__m512d)b);
+  if constexpr (std::is_same_v<T, Lanes<float, 16>>)
+    return (T)_mm512_maskz_max_ps(0xffff, (__m512)a, (__m512)b);
+#endif
+#if defined(__AVX__)
+  if constexpr (std::is_same_v<T, Lanes<double, 4>>)
+    return (T)_mm256_max_pd((__m256d)a, (__m256d)b);
+  if constexpr (std::is_same_v<T, Lanes<float, 8>>) return (T)_mm256_max_ps((__m256)a, (__m256)b);
+#endif
+#if defined(__SSE2__)
+  if constexpr (std::is_same_v<T, Lanes<double, 2>>) return (T)_mm_max_pd((__m128d)a, (__m128d)b);
+  if constexpr (std::is_same_v<T, Lanes<float, 4>>) return (T)_mm_max_ps((__m128)a, (__m128)b);
+#endif
+  return a > b ? a : b;
+}
+
+template <class T>
+BC_INLINE T abs(T x) {
+  if constexpr (is_scalar<T>) {
+    return std::fabs(x);
+  } else {
+    using Bits = Mask<T>;
+    constexpr auto sign = Number<Bits>(1) << (8 * sizeof(Number<Bits>) - 1);
+    return (T)((Bits)x & ~sign);
+  }
+}
+
+template <class T>
+BC_INLINE T sqrt(T x) {
+  if constexpr (is_scalar<T>) {
+    return std::sqrt(x);
+#if defined(__AVX512F__)
+  } else if constexpr (std::is_same_v<T, Lanes<double, 8>>) {
+    return (T)_mm512_mask_sqrt_pd((__m512d)x, 0xff, (__m512d)x);
+#endif
+#if defined(__AVX__)
+  } else if constexpr (std::is_same_v<T, Lanes<double, 4>>) {
+    return (T)_mm256_sqrt_pd((__m256d)x);
+#endif
+#if defined(__SSE2__)
+  } else if constexpr (std::is_same_v<T, Lanes<double, 2>>) {
+    return (T)_mm_sqrt_pd((__m128d)x);
+#endif
+  } else {
+    T root{};
+    for (int i = 0; i < width<T>; ++i) root[i] = std::sqrt(x[i]);
+    return root;
+  }
+}
+
+template <class T>
+BC_INLINE auto lane(const T& x, int i) {
+  if constexpr (is_scalar<T>) {
+    return x;
+  } else {
+    return x[i];
+  }
+}
+template <class T, class N>
+BC_INLINE void set_lane(T& x, int i, N value) {
+  if constexpr (is_scalar<T>) {
+    x = value;
+  } else {
+    x[i] = value;
+  }
+}
+
+template <class M>
+BC_INLINE bool any(M mask) {
+  if constexpr (is_scalar<M>) {
+    return mask;
+#if defined(__AVX__)
+  } else if constexpr (sizeof(M) == 32 && sizeof(Number<M>) == 8) {
+    return _mm256_movemask_pd((__m256d)mask) != 0;
+#endif
+  } else {
+    Number<M> found = 0;
+    for (int i = 0; i < width<M>; ++i) found |= mask[i];
+    return found != 0;
+  }
+}
+
+}  // namespace box_contact::BOX_CONTACT_SET

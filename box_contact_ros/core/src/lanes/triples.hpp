@@ -1,0 +1,152 @@
+// A triple is three numbers that one formula treats alike: the components of a vector, or one number
+// for each pair of opposite faces. W pairs have it as a `Vec`. A single pair has it side by side in
+// one vector of the machine, where the machine has one of four such numbers. The fourth lane then
+// repeats the third, so it traps or slows down where that one does.
+//
+// Either way each number takes the same operations in the same order, and has the same bits.
+#pragma once
+
+#include "vectors.hpp"
+
+namespace box_contact::BOX_CONTACT_SET {
+
+#if defined(__AVX__)
+constexpr int machine_bytes = 32;
+#else
+constexpr int machine_bytes = 16;
+#endif
+
+// Whether triples of T are vectors of the machine.
+template <class T>
+constexpr bool packed = is_scalar<T> && 4 * sizeof(T) <= machine_bytes;
+
+template <class T, bool = packed<T>>
+struct TripleOf {
+  using type = Vec<T>;
+};
+template <class T>
+struct TripleOf<T, true> {
+  using type = Lanes<T, 4>;
+};
+template <class T>
+using Triple = typename TripleOf<T>::type;
+
+// Functions below take a `Vec<T>`, or a vector of the machine, `Packed`.
+
+template <class T>
+BC_INLINE Triple<T> triple(const Vec<T>& a) {
+  if constexpr (packed<T>) {
+    return Triple<T>{a[0], a[1], a[2], a[2]};
+  } else {
+    return a;
+  }
+}
+// The same number three times.
+template <class T>
+BC_INLINE Triple<T> uniform(T x) {
+  return triple(Vec<T>{x, x, x});
+}
+template <class T>
+BC_INLINE Vec<T> components(const Triple<T>& a) {
+  return {a[0], a[1], a[2]};
+}
+
+// A formula of single numbers, for each number of triples.
+template <class Formula, class T, class... More>
+BC_INLINE Vec<T> each(Formula formula, const Vec<T>& a, const More&... more) {
+  return {formula(a[0], more[0]...), formula(a[1], more[1]...), formula(a[2], more[2]...)};
+}
+template <class Formula, class Packed, class... More>
+BC_INLINE Packed each(Formula formula, Packed a, More... more) {
+  return formula(a, more...);
+}
+
+// Component k as a factor or a summand of triples.
+template <class T>
+BC_INLINE T spread(const Vec<T>& a, int k) {
+  return a[k];
+}
+template <class Packed>
+BC_INLINE Packed spread(Packed a, int k) {
+  return k == 0   ? __builtin_shufflevector(a, a, 0, 0, 0, 0)
+         : k == 1 ? __builtin_shufflevector(a, a, 1, 1, 1, 1)
+                  : __builtin_shufflevector(a, a, 2, 2, 2, 2);
+}
+
+// The sum of the components, three times.
+template <class T>
+BC_INLINE Vec<T> total(const Vec<T>& a) {
+  return uniform((a[0] + a[1]) + a[2]);
+}
+template <class Packed>
+BC_INLINE Packed total(Packed a) {
+  return (spread(a, 0) + spread(a, 1)) + spread(a, 2);
+}
+
+// The components y z x.
+template <class T>
+BC_INLINE Vec<T> rotated(const Vec<T>& a) {
+  return {a[1], a[2], a[0]};
+}
+template <class Packed>
+BC_INLINE Packed rotated(Packed a) {
+  return __builtin_shufflevector(a, a, 1, 2, 0, 0);
+}
+
+// One choice for all three numbers of a single pair, without a branch.
+template <class Packed, class = std::enable_if_t<!is_scalar<Packed> && !std::is_class_v<Packed>>>
+BC_INLINE Packed select(bool mask, Packed a, Packed b) {
+  return (Mask<Packed>{} - Number<Mask<Packed>>(mask)) ? a : b;
+}
+
+// The nearest point of the box of half extents `half` about the origin.
+template <class Three>
+BC_INLINE Three clamp(const Three& x, const Three& half) {
+  return min(half, max(-half, x));
+}
+
+// A 3 × 3 matrix as triples: its columns.
+template <class T>
+struct Columns {
+  Triple<T> c[3];
+
+  BC_INLINE Triple<T>& operator[](int j) { return c[j]; }
+  BC_INLINE const Triple<T>& operator[](int j) const { return c[j]; }
+};
+
+template <class T>
+BC_INLINE Columns<T> columns(const Mat<T>& m) {
+  return {{triple(column(m, 0)), triple(column(m, 1)), triple(column(m, 2))}};
+}
+template <class T>
+BC_INLINE Mat<T> matrix(const Columns<T>& m) {
+  return {{{m[0][0], m[1][0], m[2][0]}, {m[0][1], m[1][1], m[2][1]}, {m[0][2], m[1][2], m[2][2]}}};
+}
+template <class T>
+BC_INLINE Columns<T> transpose(const Columns<T>& m) {
+  if constexpr (packed<T>) {
+    auto even = __builtin_shufflevector(m[0], m[1], 0, 4, 2, 6);
+    auto odd = __builtin_shufflevector(m[0], m[1], 1, 5, 3, 7);
+    auto last_even = __builtin_shufflevector(m[2], m[2], 0, 0, 2, 2);
+    auto last_odd = __builtin_shufflevector(m[2], m[2], 1, 1, 3, 3);
+    return {{__builtin_shufflevector(even, last_even, 0, 1, 4, 5),
+             __builtin_shufflevector(odd, last_odd, 0, 1, 4, 5),
+             __builtin_shufflevector(even, last_even, 2, 3, 6, 7)}};
+  } else {
+    return columns(transpose(matrix(m)));
+  }
+}
+template <class T>
+BC_INLINE Columns<T> abs(const Columns<T>& m) {
+  return {{abs(m[0]), abs(m[1]), abs(m[2])}};
+}
+template <class T>
+BC_INLINE Columns<T> select(Mask<T> mask, const Columns<T>& a, const Columns<T>& b) {
+  return {{select(mask, a[0], b[0]), select(mask, a[1], b[1]), select(mask, a[2], b[2])}};
+}
+template <class T>
+BC_INLINE Triple<T> operator*(const Columns<T>& m, const Triple<T>& a) {
+  return (spread(a, 0) * m[0] + spread(a, 1) * m[1]) + spread(a, 2) * m[2];
+}
+
+}  // namespace box_contact::BOX_CONTACT_SET

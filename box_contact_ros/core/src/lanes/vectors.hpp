@@ -1,0 +1,136 @@
+// Vectors and matrices of lanes.
+#pragma once
+
+#include "lanes.hpp"
+
+namespace box_contact::BOX_CONTACT_SET {
+
+template <class T>
+struct Vec {
+  T v[3];
+
+  BC_INLINE T& operator[](int k) { return v[k]; }
+  BC_INLINE const T& operator[](int k) const { return v[k]; }
+};
+
+template <class T>
+BC_INLINE Vec<T> operator+(const Vec<T>& a, const Vec<T>& b) {
+  return {a[0] + b[0], a[1] + b[1], a[2] + b[2]};
+}
+template <class T>
+BC_INLINE Vec<T> operator-(const Vec<T>& a, const Vec<T>& b) {
+  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+}
+template <class T>
+BC_INLINE Vec<T> operator-(const Vec<T>& a) {
+  return {-a[0], -a[1], -a[2]};
+}
+template <class T>
+BC_INLINE Vec<T> operator*(T factor, const Vec<T>& a) {
+  return {factor * a[0], factor * a[1], factor * a[2]};
+}
+template <class T, class = std::enable_if_t<!is_scalar<T>>>
+BC_INLINE Vec<T> operator*(Number<T> factor, const Vec<T>& a) {
+  return splat<T>(factor) * a;
+}
+// By components, and with the same number for each.
+template <class T>
+BC_INLINE Vec<T> operator*(const Vec<T>& a, const Vec<T>& b) {
+  return {a[0] * b[0], a[1] * b[1], a[2] * b[2]};
+}
+template <class T>
+BC_INLINE Vec<T> operator/(const Vec<T>& a, const Vec<T>& b) {
+  return {a[0] / b[0], a[1] / b[1], a[2] / b[2]};
+}
+template <class T>
+BC_INLINE Vec<T> operator+(const Vec<T>& a, T b) {
+  return {a[0] + b, a[1] + b, a[2] + b};
+}
+template <class T>
+BC_INLINE Vec<T> operator-(T a, const Vec<T>& b) {
+  return {a - b[0], a - b[1], a - b[2]};
+}
+template <class T>
+BC_INLINE T dot(const Vec<T>& a, const Vec<T>& b) {
+  return (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2];
+}
+template <class T>
+BC_INLINE Vec<T> abs(const Vec<T>& a) {
+  return {abs(a[0]), abs(a[1]), abs(a[2])};
+}
+template <class T>
+BC_INLINE Vec<T> min(const Vec<T>& a, const Vec<T>& b) {
+  return {min(a[0], b[0]), min(a[1], b[1]), min(a[2], b[2])};
+}
+template <class T>
+BC_INLINE Vec<T> max(const Vec<T>& a, const Vec<T>& b) {
+  return {max(a[0], b[0]), max(a[1], b[1]), max(a[2], b[2])};
+}
+template <class T>
+BC_INLINE T largest(const Vec<T>& a) {
+  return max(max(a[0], a[1]), a[2]);
+}
+template <class T>
+BC_INLINE T smallest(const Vec<T>& a) {
+  return min(min(a[0], a[1]), a[2]);
+}
+template <class T>
+BC_INLINE Vec<T> select(Mask<T> mask, const Vec<T>& a, const Vec<T>& b) {
+  return {select<T>(mask, a[0], b[0]), select<T>(mask, a[1], b[1]), select<T>(mask, a[2], b[2])};
+}
+
+// A 3 × 3 matrix, row by row: m[i][j].
+template <class T>
+struct Mat {
+  T m[3][3];
+
+  BC_INLINE T* operator[](int i) { return m[i]; }
+  BC_INLINE const T* operator[](int i) const { return m[i]; }
+};
+
+template <class T>
+BC_INLINE Vec<T> row(const Mat<T>& m, int i) {
+  return {m[i][0], m[i][1], m[i][2]};
+}
+template <class T>
+BC_INLINE Vec<T> column(const Mat<T>& m, int j) {
+  return {m[0][j], m[1][j], m[2][j]};
+}
+template <class T>
+BC_INLINE Mat<T> transpose(const Mat<T>& m) {
+  return {{{m[0][0], m[1][0], m[2][0]}, {m[0][1], m[1][1], m[2][1]}, {m[0][2], m[1][2], m[2][2]}}};
+}
+template <class T>
+BC_INLINE Vec<T> operator*(const Mat<T>& m, const Vec<T>& a) {
+  return {dot(row(m, 0), a), dot(row(m, 1), a), dot(row(m, 2), a)};
+}
+// mᵀ · a.
+template <class T>
+BC_INLINE Vec<T> transposed_times(const Mat<T>& m, const Vec<T>& a) {
+  return {dot(column(m, 0), a), dot(column(m, 1), a), dot(column(m, 2), a)};
+}
+template <class T>
+BC_INLINE Mat<T> select(Mask<T> mask, const Mat<T>& a, const Mat<T>& b) {
+  Mat<T> m;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) m[i][j] = select<T>(mask, a[i][j], b[i][j]);
+  return m;
+}
+
+template <class T>
+BC_INLINE Vec<Number<T>> lane(const Vec<T>& a, int i) {
+  return {lane(a[0], i), lane(a[1], i), lane(a[2], i)};
+}
+template <class T>
+BC_INLINE Mat<Number<T>> lane(const Mat<T>& m, int i) {
+  Mat<Number<T>> found;
+  for (int r = 0; r < 3; ++r)
+    for (int c = 0; c < 3; ++c) found[r][c] = lane(m[r][c], i);
+  return found;
+}
+template <class T, class N>
+BC_INLINE void set_lane(Vec<T>& a, int i, const Vec<N>& value) {
+  for (int k = 0; k < 3; ++k) set_lane(a[k], i, value[k]);
+}
+
+}  // namespace box_contact::BOX_CONTACT_SET

@@ -1,0 +1,250 @@
+// The C interface, and the choice of the instruction set.
+#include <cstdarg>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <exception>
+#include <memory>
+#include <new>
+#include <string>
+
+#include "../poses.hpp"
+#include "solver.hpp"
+#include "weights_file.hpp"
+
+namespace box_contact::detail {
+
+const std::vector<const Kernel*>& kernels() {
+  static const std::vector<const Kernel*> found = [] {
+    std::vector<const Kernel*> names{&kernel_baseline};
+#if defined(BOX_CONTACT_AVX2)
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
+        __builtin_cpu_supports("bmi2"))
+      names.push_back(&kernel_avx2);
+#endif
+#if defined(BOX_CONTACT_AVX512)
+    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
+        __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512bw"))
+      names.push_back(&kernel_avx512);
+#endif
+    return names;
+  }();
+  return found;
+}
+
+const Kernel* chosen_kernel() {
+  static const Kernel* const chosen = []() -> const Kernel* {
+    const char* forced = std::getenv("BOX_CONTACT_INSTRUCTION_SET");
+    if (!forced || !*forced) return kernels().back();
+    for (const Kernel* kernel : kernels())
+      if (!std::strcmp(forced, kernel->name)) return kernel;
+    return nullptr;
+  }();
+  return chosen;
+}
+
+namespace {
+
+thread_local char error_text[512];
+
+[[gnu::format(printf, 2, 3)]] bc_status fail(bc_status status, const char* format, ...) {
+  va_list arguments;
+  va_start(arguments, format);
+  std::vsnprintf(error_text, sizeof error_text, format, arguments);
+  va_end(arguments);
+  return status;
+}
+
+// Call `work`; nothing that it throws leaves the library.
+template <class Work>
+bc_status guarded(Work work) noexcept {
+  try {
+    return work();
+  } catch (const std::bad_alloc&) {
+    return fail(BC_NO_MEMORY, "no memory is left");
+  } catch (const std::exception& error) {
+    return fail(BC_BAD_ARGUMENT, "%s", error.what());
+  }
+}
+
+bc_status refuse_size(const char* field, const double* size) {
+  return fail(BC_BAD_SIZE, "%s (%g, %g, %g) is not within 1e-50 to 1e50 m", field, size[0], size[1],
+              size[2]);
+}
+
+bool size_is_valid(const double* size) {
+  return size_valid(Vec<double>{0.5 * size[0], 0.5 * size[1], 0.5 * size[2]});
+}
+bool pose_is_valid(const double* p) {
+  return pose_valid(Pose<double>{{p[0], p[1], p[2]}, {p[3], p[4], p[5], p[6]}});
+}
+
+bc_status refuse_pose(const char* field, const double* p) {
+  for (int k = 0; k < 3; ++k)
+    if (!(std::fabs(p[k]) <= length_max))
+      return fail(BC_BAD_POSE, "%s position (%g, %g, %g) is not finite, or exceeds 1e50 m", field,
+                  p[0], p[1], p[2]);
+  return fail(BC_BAD_POSE, "%s quaternion (%g, %g, %g, %g) has no length within 1e-100 to 1e100",
+              field, p[3], p[4], p[5], p[6]);
+}
+
+// Why a pair is refused.
+bc_status refuse_pair(const double* pose_a, const double* pose_b, const double* size_a,
+                      const double* size_b) {
+  if (!pose_is_valid(pose_a)) return refuse_pose("pose_a", pose_a);
+  if (!pose_is_valid(pose_b)) return refuse_pose("pose_b", pose_b);
+  return size_is_valid(size_a) ? refuse_size("size_b", size_b) : refuse_size("size_a", size_a);
+}
+
+bc_status refuse_null(const char* name) {
+  return fail(BC_BAD_ARGUMENT, "%s is a null pointer", name);
+}
+
+// A copy of a struct that the program may have compiled by an older header, which had less fields.
+template <class Struct>
+bool read(const Struct* given, Struct& copy) {
+  if (given->size == 0 || given->size > sizeof(Struct)) return false;
+  std::memcpy(static_cast<void*>(&copy), given, given->size);
+  return true;
+}
+
+bc_status make(const bc_size* size_a, const bc_size* size_b, const bc_options& options,
+               bc_solver** solver) {
+  if (!size_is_valid(size_a->extent)) return refuse_size("size_a", size_a->extent);
+  if (!size_is_valid(size_b->extent)) return refuse_size("size_b", size_b->extent);
+  Solver::Setup setup;
+  setup.kernel = chosen_kernel();
+  if (!setup.kernel) {
+    std::string names;
+    for (const Kernel* kernel : kernels())
+      names += (names.empty() ? "" : ", ") + std::string(kernel->name);
+    return fail(BC_BAD_ENVIRONMENT, "BOX_CONTACT_INSTRUCTION_SET is none of: %s", names.c_str());
+  }
+  std::copy_n(size_a->extent, 3, setup.size_a.begin());
+  std::copy_n(size_b->extent, 3, setup.size_b.begin());
+  setup.margin = options.margin;
+  if (std::isnan(options.margin)) return fail(BC_BAD_ARGUMENT, "margin is not a number");
+  if (options.model == BC_MLP) {
+    if (!options.weights) return fail(BC_BAD_WEIGHTS, "model mlp needs a weights file");
+    setup.model = Model::mlp;
+    try {
+      setup.network = read_numbers(options.weights);
+    } catch (const std::runtime_error& error) {
+      return fail(BC_BAD_WEIGHTS, "%s", error.what());
+    }
+  } else if (options.model != BC_EXACT) {
+    return fail(BC_BAD_ARGUMENT, "model %d is unknown", int(options.model));
+  }
+  *solver = reinterpret_cast<bc_solver*>(new Solver(std::move(setup)));
+  return BC_OK;
+}
+
+Solver& solver_of(bc_solver* solver) { return *reinterpret_cast<Solver*>(solver); }
+
+// Whether all places of boxes are within the poses. `first`: the first row where they are not.
+bool places_are_valid(const bc_rows& rows, int64_t& first) {
+  for (int64_t place = 0; rows.pairs && place < 2 * rows.count; ++place)
+    if (rows.pairs[place] < 0 || rows.pairs[place] >= rows.pose_count) {
+      first = place / 2;
+      return false;
+    }
+  return true;
+}
+
+const double* numbers(const bc_pose* poses) { return reinterpret_cast<const double*>(poses); }
+const double* numbers(const bc_size* sizes) { return reinterpret_cast<const double*>(sizes); }
+
+bc_status solve_rows(Solver& solver, const bc_rows& given, const bc_results& wanted, int threads,
+                     int64_t& refused) {
+  if (given.count < 0) return fail(BC_BAD_ARGUMENT, "count is below zero");
+  if (threads < 1) return fail(BC_BAD_ARGUMENT, "threads must be 1 or more, not %d", threads);
+  if (given.count == 0) return BC_OK;
+  if (!given.poses_a || !given.poses_b) return refuse_null(given.poses_a ? "poses_b" : "poses_a");
+  if (!places_are_valid(given, refused))
+    return fail(BC_BAD_ROWS, "pairs[%lld] has no pose at one of its places", (long long)refused);
+  Rows rows{numbers(given.poses_a),
+            numbers(given.poses_b),
+            given.sizes_a ? numbers(given.sizes_a) : solver.setup().size_a.data(),
+            given.sizes_b ? numbers(given.sizes_b) : solver.setup().size_b.data(),
+            given.sizes_a ? 3 : 0,
+            given.sizes_b ? 3 : 0,
+            given.pairs};
+  Results results{wanted.colliding, wanted.separation, wanted.normal, wanted.point,
+                  wanted.volume,    wanted.covariance, wanted.axis,   0.0};
+  refused = solver.solve(rows, long(given.count), results, threads);
+  if (refused < 0) return BC_OK;
+  int64_t of_a = given.pairs ? given.pairs[2 * refused] : refused;
+  int64_t of_b = given.pairs ? given.pairs[2 * refused + 1] : refused;
+  refuse_pair(rows.poses_a + 7 * of_a, rows.poses_b + 7 * of_b,
+              rows.sizes_a + rows.size_step_a * of_a, rows.sizes_b + rows.size_step_b * of_b);
+  char why[sizeof error_text];
+  std::memcpy(why, error_text, sizeof why);
+  return fail(BC_BAD_ROWS, "row %lld: %.480s", (long long)refused, why);
+}
+
+}  // namespace
+}  // namespace box_contact::detail
+
+using namespace box_contact::detail;
+
+extern "C" {
+
+int bc_abi(void) { return BC_ABI; }
+
+const char* bc_version(void) { return BOX_CONTACT_VERSION; }
+
+const char* bc_instruction_set(void) {
+  const Kernel* kernel = chosen_kernel();
+  return kernel ? kernel->name : nullptr;
+}
+
+const char* bc_error_text(void) { return error_text; }
+
+bc_status bc_solver_create(const bc_size* size_a, const bc_size* size_b, const bc_options* options,
+                           bc_solver** solver) {
+  return guarded([&] {
+    if (!solver) return refuse_null("solver");
+    *solver = nullptr;
+    if (!size_a || !size_b) return refuse_null(size_a ? "size_b" : "size_a");
+    bc_options all = BC_DEFAULT_OPTIONS;
+    if (options && !read(options, all)) return fail(BC_BAD_ABI, "options.size is unknown");
+    return make(size_a, size_b, all, solver);
+  });
+}
+
+void bc_solver_destroy(bc_solver* solver) { delete reinterpret_cast<Solver*>(solver); }
+
+bc_status bc_solve(bc_solver* solver, const bc_pose* pose_a, const bc_pose* pose_b,
+                   const bc_size* size_a, const bc_size* size_b, bc_patch patch,
+                   bc_contact* contact) {
+  if (!solver || !pose_a || !pose_b || !contact)
+    return refuse_null(!solver ? "solver" : !pose_a ? "pose_a" : !pose_b ? "pose_b" : "contact");
+  const double *a = numbers(pose_a), *b = numbers(pose_b);
+  const double *extents_a = numbers(size_a), *extents_b = numbers(size_b);
+  Solver& self = solver_of(solver);
+  if (self.solve(a, b, extents_a, extents_b, patch, *contact)) return BC_OK;
+  return refuse_pair(a, b, extents_a ? extents_a : self.setup().size_a.data(),
+                     extents_b ? extents_b : self.setup().size_b.data());
+}
+
+bc_status bc_solve_rows(bc_solver* solver, const bc_rows* rows, const bc_results* results,
+                        int threads, int64_t* refused) {
+  int64_t first = -1;
+  bc_status status = guarded([&] {
+    if (!solver || !rows || !results)
+      return refuse_null(!solver ? "solver" : !rows ? "rows" : "results");
+    bc_rows all_rows{};
+    bc_results all_results{};
+    if (!read(rows, all_rows)) return fail(BC_BAD_ABI, "rows.size is unknown");
+    if (!read(results, all_results)) return fail(BC_BAD_ABI, "results.size is unknown");
+    return solve_rows(solver_of(solver), all_rows, all_results, threads, first);
+  });
+  if (refused) *refused = first;
+  return status;
+}
+
+bc_counts bc_solver_counts(const bc_solver* solver) {
+  return solver ? reinterpret_cast<const Solver*>(solver)->counts() : bc_counts{};
+}
+
+}  // extern "C"

@@ -1,0 +1,420 @@
+"""libbox_contact for C, C++ and others: its interface, and each way in which programs find it.
+
+ament_cmake is not installed here: a plain CMake project stands in for one of an ament package,
+which finds the library by the same `find_package`.
+"""
+from __future__ import annotations
+
+import ctypes
+import os
+import platform
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from ctypes import POINTER, byref, c_bool, c_char_p, c_double, c_int, c_int32, c_int64, c_size_t
+from pathlib import Path
+
+import numpy as np
+import poses
+import pytest
+
+from box_contact_ros import ContactSolver
+from box_contact_ros.__main__ import PLACES
+from box_contact_ros.core import FORCE, instruction_sets, native
+from box_contact_ros.resources import resource_path
+from box_contact_ros.scene.pose_sets import SETS, Pairs
+from box_contact_ros.solver.contact import Contacts
+from box_contact_ros.verification import fuzz
+
+ROOT = Path(__file__).resolve().parents[2]
+CORE = Path(native.__file__).parent
+LIBRARY = CORE / 'libbox_contact.so'
+EXAMPLE = ROOT / 'docs' / 'examples' / 'cpp'
+WEIGHTS = resource_path('weights', 'mlp.safetensors')
+STRICT = ('-Wall', '-Wextra', '-Werror', '-pedantic')
+EXAMPLE_SAYS = [
+    'height 2.600 m: no contact, gap 0.009 m',
+    'height 2.590 m: contact, depth 0.001 m, normal (0.000, 0.000, 1.000), '
+    'point (0.142, 0.044, 1.295) m',
+    'batch: 1 0, volumes 0.030 0.000 m3, first refused row -1',
+    'refused: pose_b quaternion (0, 0, 0, 0) has no length within 1e-100 to 1e100']
+
+
+def run(*words: object, **environment: str) -> str:
+    done = subprocess.run([str(word) for word in words], env={**os.environ, **environment},
+                          stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=280)
+    assert done.returncode == 0, done.stdout[-4000:]
+    return done.stdout
+
+
+def tool(name: str) -> str:
+    """Return the path of a program, or skip."""
+    path = shutil.which(name)
+    if not path:
+        pytest.skip(f'{name} is not installed')
+    return path
+
+
+# --- C, and a language that calls C ---------------------------------------------------------------
+
+
+def test_a_c_program(tmp_path: Path) -> None:
+    """Contacts, rows, refusals; by every instruction set."""
+    program = tmp_path / 'library_test'
+    run(tool('gcc'), '-std=c11', *STRICT, PLACES['--includes'], ROOT / 'test/core/library_test.c',
+        LIBRARY, f'-Wl,-rpath,{CORE}', '-lm', '-o', program)
+    for name in instruction_sets():
+        assert run(program, WEIGHTS, **{FORCE: name}).endswith(f', {name}: 0 failures\n')
+    assert subprocess.run([program, WEIGHTS], env={FORCE: 'none'}).returncode == 1
+
+
+class Size(ctypes.Structure):
+    """`bc_size`."""
+
+    _fields_ = [('extent', c_double * 3)]
+
+
+class Options(ctypes.Structure):
+    """`bc_options`."""
+
+    _fields_ = [('size', c_size_t), ('model', c_int), ('weights', c_char_p), ('margin', c_double)]
+
+
+class Rows(ctypes.Structure):
+    """`bc_rows`."""
+
+    _fields_ = [('size', c_size_t), ('count', c_int64), ('poses_a', POINTER(c_double)),
+                ('poses_b', POINTER(c_double)), ('sizes_a', POINTER(c_double)),
+                ('sizes_b', POINTER(c_double)), ('pairs', POINTER(c_int64)),
+                ('pose_count', c_int64)]
+
+
+class Results(ctypes.Structure):
+    """`bc_results`."""
+
+    _fields_ = [('size', c_size_t), ('colliding', POINTER(c_bool)),
+                *((name, POINTER(c_double)) for name in (
+                    'separation', 'normal', 'point', 'volume', 'covariance')),
+                ('axis', POINTER(c_int32))]
+
+
+@pytest.fixture(scope='module')
+def library() -> ctypes.CDLL:
+    return ctypes.CDLL(str(LIBRARY))
+
+
+def by_ctypes(library: ctypes.CDLL, model: str, pairs: Pairs, threads: int = 1,
+              places: np.ndarray | None = None) -> Contacts:
+    """Return what the library says of rows with sizes of their own."""
+    options = Options(ctypes.sizeof(Options), model == 'mlp', os.fsencode(WEIGHTS), 0.0)
+    solver = ctypes.c_void_p()
+    unit = Size((c_double * 3)(1, 1, 1))
+    assert library.bc_solver_create(byref(unit), byref(unit), byref(options), byref(solver)) == 0
+
+    def at(array: np.ndarray, kind: type) -> object:
+        return array.ctypes.data_as(POINTER(kind))
+
+    count = len(pairs.pose_a if places is None else places)
+    found = Contacts(np.empty(count, bool), np.empty(count), np.empty((count, 3)),
+                     np.empty((count, 3)), np.empty(count), np.empty((count, 3, 3)))
+    rows = Rows(ctypes.sizeof(Rows), count, *(at(part, c_double) for part in pairs),
+                None if places is None else at(places, c_int64), len(pairs.pose_a))
+    results = Results(ctypes.sizeof(Results), at(found.colliding, c_bool),
+                      *(at(field, c_double) for field in found[1:]), None)
+    assert library.bc_solve_rows(solver, byref(rows), byref(results), threads, None) == 0
+    library.bc_solver_destroy(solver)
+    return found
+
+
+def some_pairs() -> Pairs:
+    parts = [fuzz.draw(name, np.random.default_rng([6, number]), 400)
+             for number, name in enumerate(fuzz.CLASSES)]
+    parts += [make(np.random.default_rng(44), 300) for make in SETS.values()]
+    return Pairs(*(np.ascontiguousarray(np.concatenate(part)) for part in zip(*parts)))
+
+
+@pytest.mark.parametrize('model', ['exact', 'mlp'])
+def test_other_languages_get_the_bits_of_python(library: ctypes.CDLL, model: str) -> None:
+    """By ctypes; in one thread and in three, row by row and by place."""
+    pairs = some_pairs()
+    solver = ContactSolver((1, 1, 1), (1, 1, 1), model=model)
+    wanted = solver.batch(*pairs[:2], size_a=pairs.size_a, size_b=pairs.size_b)
+    assert 0.3 < wanted.colliding.mean() < 0.9
+    for threads in (1, 3):
+        found = by_ctypes(library, model, pairs, threads)
+        for field, one, other in zip(Contacts._fields, found, wanted):
+            assert np.array_equal(one, other, equal_nan=True), field
+    n = len(pairs.pose_a)
+    all_poses = Pairs(*2 * (np.concatenate(pairs[:2]),), *2 * (np.concatenate(pairs[2:]),))
+    places = np.random.default_rng(8).permutation(np.column_stack([np.arange(n), n + np.arange(n)]))
+    found = by_ctypes(library, model, all_poses, 2, places)
+    for field, one, other in zip(Contacts._fields, found, wanted):
+        assert np.array_equal(one, other[places[:, 0]], equal_nan=True), field
+
+
+def test_the_interface_alone_is_exported() -> None:
+    """Nothing of the library meets a program's own names."""
+    names = {line.split()[-1] for line in run(
+        tool('nm'), '-D', '--defined-only', LIBRARY).splitlines()}
+    assert 'bc_solve' in names and all(name.startswith('bc_') for name in names)
+
+
+# --- how programs find it -------------------------------------------------------------------------
+
+
+def example(program: Path) -> list[str]:
+    return run(program).splitlines()
+
+
+def test_by_the_compiler_alone(tmp_path: Path) -> None:
+    """`--includes`; without a warning, and with C++20."""
+    for standard in ('c++17', 'c++20'):
+        run(tool('g++'), f'-std={standard}', *STRICT, PLACES['--includes'],
+            EXAMPLE / 'first_contact.cpp', LIBRARY, f'-Wl,-rpath,{CORE}', '-o', tmp_path / standard)
+        assert example(tmp_path / standard) == EXAMPLE_SAYS
+
+
+def test_without_exceptions(tmp_path: Path) -> None:
+    """The header compiles; what would be thrown ends the program."""
+    source, program = tmp_path / 'one.cpp', tmp_path / 'one'
+    source.write_text('#include "box_contact/box_contact.hpp"\n'
+                      'int main(int argc, char**) {\n'
+                      '  return box_contact::Solver({1, 1, 1}, {1, 1, 2.0 - argc})'
+                      '({{0, 0, 0}, {0, 0, 0, 1}}, {{0, 0, 1}, {0, 0, 0, 1}}).colliding - 1;\n}\n')
+    run(tool('g++'), '-std=c++17', *STRICT, '-fno-exceptions', '-fno-rtti', PLACES['--includes'],
+        source, LIBRARY, f'-Wl,-rpath,{CORE}', '-o', program)
+    assert run(program) == ''
+    assert subprocess.run([program, 'flat']).returncode < 0
+
+
+def configure(source: Path, folder: Path, *options: str, **environment: str) -> None:
+    run(tool('cmake'), '-S', source, '-B', folder, *options, **environment)
+    run('cmake', '--build', folder, '--parallel', **environment)
+
+
+def test_by_find_package_of_pip(tmp_path: Path) -> None:
+    """`--cmakedir`, as CMake is told by hand; and a version that there is not."""
+    places = run(sys.executable, '-m', 'box_contact_ros', '--cmakedir').strip()
+    assert places == PLACES['--cmakedir']
+    configure(EXAMPLE, tmp_path, f'-Dbox_contact_ros_DIR={places}')
+    assert example(tmp_path / 'first_contact') == EXAMPLE_SAYS
+    (tmp_path / 'CMakeLists.txt').write_text(
+        'cmake_minimum_required(VERSION 3.18)\nproject(one LANGUAGES CXX)\n'
+        'find_package(box_contact_ros 0.1 REQUIRED)\n'
+        'find_package(box_contact_ros 0.1.0 EXACT REQUIRED)\n'
+        'find_package(box_contact_ros 99 QUIET)\n'
+        'if(box_contact_ros_FOUND)\n  message(FATAL_ERROR found)\nendif()\n')
+    run('cmake', '-S', tmp_path, '-B', tmp_path / 'versions', f'-DCMAKE_PREFIX_PATH={places}')
+
+
+def test_versions_agree(setup_arguments: dict) -> None:
+    version = setup_arguments['version']
+    for name in ('box_contact_rosConfigVersion.cmake', 'box_contact.pc'):
+        assert version in (CORE / 'cmake' / name).read_text()
+    assert f'VERSION {version} ' in (ROOT / 'CMakeLists.txt').read_text()
+
+
+def test_by_pkg_config(tmp_path: Path) -> None:
+    found = run(tool('pkg-config'), '--cflags', '--libs', 'box_contact',
+                PKG_CONFIG_PATH=PLACES['--cmakedir'])
+    run(tool('g++'), '-std=c++17', EXAMPLE / 'first_contact.cpp', *found.split(), '-o',
+        tmp_path / 'one')
+    assert example(tmp_path / 'one') == EXAMPLE_SAYS
+
+
+FORMS = """
+cmake_minimum_required(VERSION 3.18)
+project(forms LANGUAGES CXX)
+{take_in}
+add_executable(first_contact {example}/first_contact.cpp)
+target_link_libraries(first_contact PRIVATE box_contact_ros::box_contact)
+"""
+TAKE_IN = {
+    'add_subdirectory': f'add_subdirectory({ROOT} core)',
+    'FetchContent': 'include(FetchContent)\n'
+                    f'FetchContent_Declare(box_contact_ros SOURCE_DIR {ROOT})\n'
+                    'FetchContent_MakeAvailable(box_contact_ros)'}
+LAUNCHER = """#!/bin/sh
+# Compile, or copy what the first project has compiled: sources and flags are the same.
+for last; do source=$last; done
+kept=$(dirname "$0")/$(basename "$source").o
+while [ "$1" != -o ]; do
+    case $1 in *DBOX_CONTACT_*) kept=$kept-library ;; esac
+    words="$words $1"; shift
+done
+if [ ! -e "$kept" ]; then $words -O0 -o "$kept" -c "$source" || exit 1; fi
+cp "$kept" "$2"
+"""
+
+
+@pytest.fixture(scope='module')
+def from_source(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, ...]]:
+    """Return options of CMake: the baseline alone, without optimisation, compiled once."""
+    tool('cmake')
+    launcher = tmp_path_factory.mktemp('launcher') / 'launcher'
+    launcher.write_text(LAUNCHER)
+    launcher.chmod(0o755)
+    return (f'-DCMAKE_CXX_COMPILER_LAUNCHER={launcher}', '-DBOX_CONTACT_INSTRUCTION_SETS=',
+            f'-DCMAKE_CXX_COMPILER={tool("g++")}')
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('form', TAKE_IN)
+def test_from_source(tmp_path: Path, from_source: tuple[str, ...], form: str) -> None:
+    """Without Python."""
+    (tmp_path / 'CMakeLists.txt').write_text(FORMS.format(take_in=TAKE_IN[form], example=EXAMPLE))
+    configure(tmp_path, tmp_path / 'build', *from_source)
+    assert example(tmp_path / 'build' / 'first_contact') == EXAMPLE_SAYS
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('kind', ['ON', 'OFF'])
+def test_a_plain_installation(tmp_path: Path, from_source: tuple[str, ...], kind: str) -> None:
+    """Shared and static: find_package below a prefix, and pkg-config."""
+    prefix = tmp_path / 'prefix'
+    configure(ROOT, tmp_path / 'library', *from_source, f'-DBUILD_SHARED_LIBS={kind}',
+              '-DCMAKE_INSTALL_LIBDIR=lib')
+    run('cmake', '--install', tmp_path / 'library', '--prefix', prefix)
+    configure(EXAMPLE, tmp_path / 'example', f'-DCMAKE_PREFIX_PATH={prefix}')
+    assert example(tmp_path / 'example' / 'first_contact') == EXAMPLE_SAYS
+    found = run(tool('pkg-config'), '--cflags', '--libs', 'box_contact',
+                PKG_CONFIG_PATH=str(prefix / 'lib' / 'pkgconfig'))
+    run('g++', '-std=c++17', EXAMPLE / 'first_contact.cpp', *found.split(), '-o', tmp_path / 'one')
+    assert run(tmp_path / 'one', LD_LIBRARY_PATH=str(prefix / 'lib')).splitlines() == EXAMPLE_SAYS
+
+
+# --- machines -------------------------------------------------------------------------------------
+
+INLINE = """
+#include "box_contact/inline.hpp"
+
+extern "C" bool MACHINE(double height, double* answer) {
+  box_contact::Solver solver({2, 2, 2}, {1, 2, 3});
+  box_contact::Contact contact =
+      solver({{0, 0, 0}, {0.1, 0.02, 0.3, 1}}, {{0.1, 0.2, height}, {0, 0.1, 0, 1}});
+  answer[0] = contact.separation, answer[1] = contact.normal[0], answer[2] = contact.point[1];
+  answer[3] = contact.volume, answer[4] = contact.covariance[0][1];
+  double poses[2][14] = {{0, 0, 0, 0, 0, 0, 1}, {0, 0, height, 0, 0, 0.1, 1}};
+  bool colliding;
+  solver.batch(poses[0], poses[1], 1, {&colliding, answer + 5, answer + 6, answer + 9});
+  try {
+    solver({{0, 0, 0}, {0, 0, 0, 0}}, {{0, 0, 0}, {0, 0, 0, 1}});
+  } catch (const std::invalid_argument&) {
+    return true;
+  }
+  return false;
+}
+"""
+MAIN = """
+#include <cstdio>
+#include <cstring>
+#include <initializer_list>
+extern "C" bool baseline(double, double*), avx2(double, double*), avx512(double, double*);
+
+// With an argument, compare all machines' answers; without, ask for the baseline's alone.
+int main(int argc, char**) {
+  int different = 0;
+  for (int i = 0; i < 2000; ++i) {
+    double one[12] = {}, other[12] = {};
+    different += !baseline(-3.0 + 0.003 * i, one);
+    for (auto machine : {avx2, avx512}) {
+      if (argc > 1)
+        different += !machine(-3.0 + 0.003 * i, other) || std::memcmp(one, other, sizeof one);
+    }
+  }
+  std::printf("%d different\\n", different);
+}
+"""
+MACHINES = {'baseline': 'x86-64', 'avx2': 'x86-64-v3', 'avx512': 'x86-64-v4'}
+
+
+@pytest.mark.slow
+def test_files_for_different_machines(tmp_path: Path) -> None:
+    """Header-only files with different -march share no symbol, whatever comes first in the link.
+
+    Every machine runs the code that was compiled for it: also one without AVX, under qemu. Without
+    optimisation, functions that are inlined otherwise are symbols.
+    """
+    if platform.machine() not in ('x86_64', 'AMD64'):
+        pytest.skip('the machines are those of x86-64')
+    (tmp_path / 'inline.cpp').write_text(INLINE)
+    (tmp_path / 'main.cpp').write_text(MAIN)
+    words = (tool('g++'), '-std=c++17', '-O0', *STRICT, PLACES['--includes'], '-c',
+             tmp_path / 'inline.cpp')
+    with ThreadPoolExecutor(2) as pool:
+        list(pool.map(lambda name: run(*words, f'-march={MACHINES[name]}', f'-DMACHINE={name}',
+                                       '-o', tmp_path / f'{name}.o'), MACHINES))
+    symbols = {name: {line.split(maxsplit=2)[2] for line in run(
+        'nm', '--defined-only', '-g', tmp_path / f'{name}.o').splitlines()} for name in MACHINES}
+    for one, other in (('baseline', 'avx2'), ('baseline', 'avx512'), ('avx2', 'avx512')):
+        # Pointers that exceptions need; no code.
+        shared = {name for name in symbols[one] & symbols[other] if not name.startswith('DW.ref.')}
+        assert not shared
+    for order in (list(MACHINES), list(reversed(MACHINES))):
+        program = tmp_path / order[0]
+        run('g++', '-std=c++17', tmp_path / 'main.cpp', *(tmp_path / f'{name}.o' for name in order),
+            '-static', '-o', program)
+        if instruction_sets()[-1] == 'avx512':
+            assert run(program, 'all') == '0 different\n'
+        if shutil.which('qemu-x86_64'):
+            assert run('qemu-x86_64', '-cpu', 'Nehalem', program) == '0 different\n'
+
+
+def test_a_machine_without_avx_takes_the_baseline(tmp_path: Path) -> None:
+    """One library runs on each: it asks the processor. A set that this one lacks is refused."""
+    program = tmp_path / 'library_test'
+    emulator = tool('qemu-x86_64')
+    run(tool('gcc'), '-std=c11', PLACES['--includes'], ROOT / 'test/core/library_test.c', LIBRARY,
+        f'-Wl,-rpath,{CORE}', '-lm', '-o', program)
+    assert run(emulator, '-cpu', 'Nehalem', program, WEIGHTS).endswith(', baseline: 0 failures\n')
+    done = subprocess.run([emulator, '-cpu', 'Nehalem', program, WEIGHTS], text=True,
+                          env=os.environ | {FORCE: 'avx2'}, capture_output=True)
+    assert 'BOX_CONTACT_INSTRUCTION_SET is none of: baseline' in done.stdout
+
+
+def test_points_without_the_patch() -> None:
+    """Verdict, separation and normal have the same bits; points are within both error bounds."""
+    pairs = some_pairs()
+    for model in ('exact', 'mlp'):
+        solver = ContactSolver((1, 1, 1), (1, 1, 1), model=model)
+        sizes = {'size_a': pairs.size_a, 'size_b': pairs.size_b}
+        whole = solver.batch(*pairs[:2], **sizes)
+        point = solver.batch(*pairs[:2], **sizes, patch=False)
+        for one, other in zip(whole[:3], point):
+            assert np.array_equal(one, other, equal_nan=True)
+        touching = whole.colliding
+        size = np.maximum(pairs.size_a.max(axis=1), pairs.size_b.max(axis=1))
+        depth = np.maximum(-whole.separation, 1e-9 * size)
+        reach = np.abs(np.hstack(pairs[:2])).max(axis=1)
+        bound = 2.0 * np.maximum(1e-9, 1e-14 * size / depth) * size + 1e-14 * reach
+        off = np.linalg.norm(whole.point - point.point, axis=1)
+        assert np.all(off[touching] <= bound[touching])
+        assert np.isnan(point.volume[touching]).all() and not point.volume[~touching].any()
+        assert point.covariance.shape == (len(touching), 3, 3)
+        assert np.isnan(point.covariance).all()
+
+
+def test_normals_within_the_margin() -> None:
+    """Those of pairs apart point from A to B along the axis of their gap."""
+    pairs = some_pairs()
+    sizes = {'size_a': pairs.size_a, 'size_b': pairs.size_b}
+    plain = ContactSolver((1, 1, 1), (1, 1, 1), model='exact').batch(*pairs[:2], **sizes)
+    for margin in (0.1, np.inf):
+        solver = ContactSolver((1, 1, 1), (1, 1, 1), model='exact', margin=margin)
+        found = solver.batch(*pairs[:2], **sizes)
+        near = plain.colliding | (plain.separation <= margin)
+        assert np.array_equal(np.isfinite(found.normal).all(axis=1), near)
+        assert np.array_equal(found.normal[plain.colliding], plain.normal[plain.colliding])
+        assert np.allclose(np.linalg.norm(found.normal[near], axis=1), 1.0, rtol=0.0, atol=1e-12)
+        for name in ('colliding', 'separation', 'point', 'volume', 'covariance'):
+            assert np.array_equal(getattr(found, name), getattr(plain, name), equal_nan=True)
+    apart = np.array([0.0, 0, 3.5, 0, 0, 0, 1])
+    near = ContactSolver(poses.CUBE, poses.CUBE, margin=1.5)(poses.IDENTITY, apart)
+    assert not near.colliding and near.normal.tolist() == [0.0, 0.0, 1.0]
+    for bad in (np.nan, 'far', [1.0]):
+        with pytest.raises(ValueError, match='^margin '):
+            ContactSolver(poses.CUBE, poses.CUBE, margin=bad)
+    with pytest.raises(ValueError, match="^margin 1 is not a distance that model 'paper' knows"):
+        ContactSolver(poses.CUBE, poses.CUBE, model='paper', margin=1.0)
