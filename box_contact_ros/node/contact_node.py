@@ -52,6 +52,7 @@ from .parameters import (
 from .rclpy_workarounds import lifecycle_state, refuse_transitions
 from .runtime import LOG_SECONDS, run_node
 from .scene_topics import SceneTopics
+from .tf_poses import check_frames
 
 
 def model(name: str, value: Any) -> str:
@@ -284,7 +285,7 @@ class ContactNode(LifecycleNode):
 
         Boxes that stay keep their subscriptions and the poses that wait.
         """
-        scene = (read_scene(settings['scene']) if settings['scene']
+        scene = (read_scene(settings['scene'], check=check_frames) if settings['scene']
                  else two_boxes(settings['size_a'], settings['size_b']))
         self._topics.check(scene, pair_topics=settings['pair_topics'])
         solver = self.make_solver(settings, scene)
@@ -298,6 +299,7 @@ class ContactNode(LifecycleNode):
                 diagnostics=self._diagnostics, logger=self.get_logger())
         else:
             self._evaluator.set_solver(solver, settings)
+            self._topics.tf.look_up()
 
     def _log_scene(self, what: str, settings: Mapping[str, Any]) -> None:
         """Log what the node works on, and warn of weights that do not serve it."""
