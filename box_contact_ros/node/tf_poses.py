@@ -120,7 +120,7 @@ class TfPoses:
     def why_silent(self, box: str) -> str:
         """Return why a box has given no pose, and what to do."""
         frame = self._frames[box]
-        if not self._newest and not self._unstamped:
+        if not self._newest:
             there = sum(map(self._node.count_publishers, (TF, TF_STATIC)))
             return (f'{TF} and {TF_STATIC} have {there} publishers, silent so far' if there else
                     f'nobody publishes {TF} or {TF_STATIC}')
@@ -131,9 +131,12 @@ class TfPoses:
         for name in self._unstamped - self._newest.keys():
             return (f'transforms of {shown(name)} on {TF} have stamp 0: set header.stamp, or use '
                     f'{TF_STATIC}')
-        if isinstance(self._faults.get(box), self._tf2.ExtrapolationException):
+        fault = self._faults.get(box)
+        if isinstance(fault, self._tf2.ExtrapolationException):
             return (f'the transforms between frame {shown(frame)} and {shown(self._frame_id)} have '
                     'no time in common: do their broadcasters stamp by the same clock?')
+        if not isinstance(fault, self._tf2.TransformException):
+            return f'the lookup of frame {shown(frame)} failed: {fault!r}'
         return (f'frame {shown(frame)} is not connected to {shown(self._frame_id)}: publish the '
                 'transforms between them')
 
@@ -146,7 +149,7 @@ class TfPoses:
                 if stamp == self._given.get(box):
                     continue
                 found = self._buffer.lookup_transform_core(self._frame_id, frame, time).transform
-            except self._tf2.TransformException as error:
+            except Exception as error:  # of tf2, as a rule; no callback may let one out
                 self._faults[box] = error
                 self._counts[LOOKUPS] += 1
                 continue
@@ -169,6 +172,7 @@ class TfPoses:
             at = stamp.sec * NANOSECONDS + stamp.nanosec
             if not at:  # tf2 would keep the first one for ever, as if it were static
                 self._unstamped.add(name)
+                self._newest.setdefault(_name(transform.header.frame_id), NEVER)
                 self._counts[UNSTAMPED] += 1
                 continue
             if at < self._newest.get(name, NEVER) - RESET:

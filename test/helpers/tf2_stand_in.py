@@ -33,8 +33,9 @@ class BufferCore:
 
     def set_transform(self, transform: Any, _: str) -> None:
         child, numbers, stamp = self._taken(transform)
-        self.static.pop(child, None)
-        self.moving.setdefault(child, {}).setdefault(stamp, numbers)
+        if numbers @ numbers > 0.0:  # as tf2, which logs NaN and zeros
+            self.static.pop(child, None)
+            self.moving.setdefault(child, {}).setdefault(stamp, numbers)
 
     def set_transform_static(self, transform: Any, _: str) -> None:
         child, numbers, _stamp = self._taken(transform)
