@@ -213,7 +213,8 @@ class Pairing(ABC):
 
     def _state_at(self, box: str, stamp: int) -> BoxState:
         """Return the state of a box, after a reset if its stamp shows that time was set back."""
-        if self._fixed and self._fixed.pop(box, None):
+        if box in self._fixed:
+            del self._fixed[box]
             self.set_scene(self._scene)
         state = self._boxes[box]
         if stamp < state.newest - RESET:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import importlib
 import itertools
+import time
 from types import SimpleNamespace
 
 import numpy as np
@@ -24,8 +25,11 @@ from rcl_interfaces.msg import Log
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from ros_client import Client, stamp_of
+from visualization_msgs.msg import MarkerArray
 
 from box_contact_ros.apps.ros_client import ANSWERS, pose_message
+from box_contact_ros.apps.viewer.markers import MarkersNode
+from box_contact_ros.apps.viewer.scene_driver import SceneDriver
 from box_contact_ros.node import tf_poses
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import CLOUD_ROW, make_header, read_contacts
@@ -83,31 +87,35 @@ class TfClient(Client):
             self.tf = {static: self.node.create_publisher(kind, topic, qos) for static, topic, qos
                        in ((True, '/tf_static', latched), (False, '/tf', deep))}
 
-    def start(self, scene=SCENE, namespace='yard', **parameters):
-        """Start a contact node; return it."""
-        given = {'scene': scene, 'model': 'exact'} | parameters
-        node = ContactNode(self.context, namespace=namespace, parameter_overrides=[
+    def start(self, scene=SCENE, namespace='yard', kind=ContactNode, **parameters):
+        """Start a node; return it."""
+        given = {'scene': scene} | ({'model': 'exact'} if kind is ContactNode else {}) | parameters
+        node = kind(self.context, namespace=namespace, parameter_overrides=[
             Parameter(name, value=value) for name, value in given.items()])
         self.executor.add_node(node)
         self.nodes.append(node)
         publishers = [*self.poses.values(), *(self.tf.values() if self.real else ())]
         heard = [publisher for publisher in publishers
-                 if publisher.topic_name in node._topics.pose_topics()]
+                 if publisher.topic_name in {
+                     subscription.topic_name for subscription in node.subscriptions}]
         assert self.spin(lambda: all(one.get_subscription_count() for one in heard))
         return node
 
     def move(self, *transforms, static=False):
         """Bring transforms to the first node, as one message."""
-        tf = self.nodes[0]._topics.tf
+        listeners = [self.nodes[0]._topics.tf, *(
+            node._tf for node in self.nodes if isinstance(node, MarkersNode))]
         if self.real:
-            heard, look_up = [], tf.look_up
-            tf.look_up = lambda: heard.append(look_up())
+            heard = []
+            for tf in listeners:
+                tf.look_up = lambda usual=tf.look_up: heard.append(usual())
             self.tf[static].publish(tf_poses.tf_message()(transforms=transforms))
-            assert self.spin(lambda: heard)
-            del tf.look_up
-        else:
-            message = SimpleNamespace(transforms=transforms)
-            (tf._on_static if static else tf._on_moving)(message)
+            assert self.spin(lambda: len(heard) == len(listeners))
+            for tf in listeners:
+                del tf.look_up
+            return
+        for tf in listeners:
+            (tf._on_static if static else tf._on_moving)(SimpleNamespace(transforms=transforms))
 
     def pose(self, topic, pose, stamp, frame='map'):
         self.poses[topic].publish(pose_message(make_header(stamp, frame), pose))
@@ -171,8 +179,8 @@ def test_the_same_contacts_as_from_topics(client, pairing):
         client.move(transform('map', 'crane', crane, stamp))
         client.move(transform('crane', 'hook', hook, stamp))
         # Of two evaluations with `latest`, the second has both.
-        came = (ANSWERS['cloud'][1], stamp)
-        assert client.spin(lambda: client.order.count(came) == 1 + (pairing == 'latest'))
+        assert client.spin(lambda came=(ANSWERS['cloud'][1], stamp):
+                           client.order.count(came) == 1 + (pairing == 'latest'))
         found, wanted = by_pair(client.clouds[stamp]), by_pair(client.of_topics[stamp])
         assert found.keys() == wanted.keys()
         for pair, row in found.items():
@@ -230,18 +238,17 @@ def test_frames_that_are_not_there_are_named_with_the_remedy(client):
     def logged(words):
         client.lines.clear()
 
-        def heard():
+        deadline = time.monotonic() + 15.0
+        while not client.spin(lambda: any(words in line for line in client.lines), 0.05):
+            assert time.monotonic() < deadline, client.lines
             client.pose('/yard/lorry/pose', LORRY, next(stamps))
-            return any(words in line for line in client.lines)
-        assert client.spin(heard, 15.0), client.lines
         assert words.rpartition('load: ')[2] in why('load')
 
     client.move(transform('map', 'crane', LOAD, START))
     logged("no pose ever came: load: frame 'hook' is in no transform")
     assert node.counts[tf_poses.LOOKUPS] > 0
-    diagnostic = client.diagnostic('boxes that never came')
-    assert diagnostic == 'load'
     assert client.counts()[tf_poses.LOOKUPS] == node.counts[tf_poses.LOOKUPS]
+    assert 'no pose ever came: load' in client.diagnostics[-1].status[0].message
     node._diagnostics._logged.clear()  # else the next line of the kind comes after ten seconds
     client.move(transform('elsewhere', 'hook', LOAD, START))
     logged("frame 'hook' is not connected to 'map'")
@@ -332,3 +339,86 @@ def test_without_tf2_the_scene_is_refused_with_its_line(client, monkeypatch):
     client.pose('/plain/load/pose', LOAD, START)
     client.pose('/plain/post/pose', POST, START)
     assert client.spin(lambda: START in client.of_topics)
+
+
+def drawn(message):
+    """Return the boxes of a message of markers, and how many contacts."""
+    names = list(read_scene(SCENE).boxes)
+    return ({names[marker.id]: marker.pose.position.z for marker in message.markers
+             if marker.ns == 'boxes' and not marker.action},
+            sum(marker.ns == 'normals' and not marker.action for marker in message.markers))
+
+
+def test_markers_draw_frames(client):
+    """Moving and static ones with their contacts; after a change, where they are then."""
+    client.start()
+    client.start(kind=MarkersNode, rate=100.0)
+    arrays = []
+    client.node.create_subscription(MarkerArray, 'markers', arrays.append, 10)
+    client.move(transform('map', 'post', POST), static=True)
+    for number, height in enumerate((0.9, 0.95)):
+        stamp = START + number * MS
+        load = [*LOAD[:2], height, *LOAD[3:]]
+        client.move(transform('map', 'hook', load, stamp))
+        client.pose('/yard/lorry/pose', LORRY, stamp)
+        assert client.spin(lambda z=height: arrays and drawn(arrays[-1]) == (
+            {'load': z, 'lorry': 1.0, 'post': 2.0, 'floor': -0.5}, 4), 10.0)
+
+
+def test_clients_without_tf2_draw_and_record_what_they_can(client, monkeypatch, tmp_path, capsys):
+    def missing(name):
+        raise ModuleNotFoundError(name)
+    client.start()
+    client.move(transform('map', 'post', POST), transform('map', 'hook', LOAD), static=True)
+    monkeypatch.setattr(tf_poses, 'import_module', missing)
+    markers = client.start(kind=MarkersNode, rate=100.0)
+    arrays = []
+    client.node.create_subscription(MarkerArray, 'markers', arrays.append, 10)
+    assert not any('/tf' in entity.topic_name for entity in markers.subscriptions)
+    for stamp in range(START, START + 200 * MS, MS):
+        client.pose('/yard/lorry/pose', LORRY, stamp)
+        if client.spin(lambda: arrays and drawn(arrays[-1]) == (
+                {'lorry': 1.0, 'floor': -0.5}, 4), 0.05):
+            break
+    else:
+        pytest.fail(f'drawn: {arrays[-1:]}')
+    record = pytest.importorskip('box_contact_ros.apps.recording.record')
+    (tmp_path / 'scene.yaml').write_text(SCENE)
+    recorder = record.node_of(['--out', str(tmp_path / 'run'), '--scene',
+                               str(tmp_path / 'scene.yaml')])(client.context)
+    assert '/tf' not in recorder.recorder.kinds and '/lorry/pose' in recorder.recorder.kinds
+    recorder.destroy_node()
+    assert 'not recorded, as tf2_msgs is not installed here: /tf, /tf_static' in (
+        capsys.readouterr().err)
+
+
+def test_a_recording_keeps_the_transforms(client, tmp_path):
+    """As they came; /tf_static as what `ros2 bag play` is to latch."""
+    if not client.real:
+        pytest.skip('needs tf2_msgs')
+    record = pytest.importorskip('box_contact_ros.apps.recording.record')
+    from rosbags.rosbag2 import Reader
+
+    from box_contact_ros.apps.recording.bag_file import LATCHED, RecordingError, read_replay
+    client.start()
+    (tmp_path / 'scene.yaml').write_text(SCENE)
+    recorder = record.node_of(['--out', str(tmp_path / 'run'), '--scene',
+                               str(tmp_path / 'scene.yaml')])(client.context)
+    client.executor.add_node(recorder)
+    assert client.spin(lambda: client.tf[False].get_subscription_count() == 2)
+    client.move(transform('map', 'post', POST), static=True)
+    client.move(transform('map', 'hook', LOAD, START))
+    counts = recorder.recorder.counts
+    assert client.spin(lambda: counts['/tf'] and counts['/tf_static'])
+    client.executor.remove_node(recorder)
+    recorder.destroy_node()
+    with Reader(tmp_path / 'run') as reader:
+        offered = {c.topic: c.ext.offered_qos_profiles for c in reader.connections}
+    assert offered['/tf_static'] == [LATCHED] and not offered['/tf']
+    with pytest.raises(RecordingError, match="load is frame 'hook' in /tf: pairs are replayed"):
+        read_replay(tmp_path / 'run')
+
+
+def test_frames_cannot_be_driven(client):
+    with pytest.raises(ValueError, match='boxes with a frame cannot be driven: load, post'):
+        SceneDriver(client.context, read_scene(SCENE), 10.0)
