@@ -451,7 +451,7 @@ def test_a_fixed_box_is_in_every_tick(policy):
     assert answered > 100 and 'b' not in pairing.stale() + pairing.unseen()
 
 
-def test_a_fixed_box_frees_the_ticks_that_wait_for_it_and_waits_again_when_it_moves():
+def test_a_box_that_is_fixed_and_moves_again():
     pairing = StampPairing(scene('ab', ['ab']))
     always = pose(NEVER)
     assert pairing.add('a', pose(1)) == []
