@@ -170,7 +170,7 @@ class TfPoses:
         for transform in message.transforms:
             stamp, name = transform.header.stamp, _name(transform.child_frame_id)
             at = stamp.sec * NANOSECONDS + stamp.nanosec
-            if not at:  # tf2 would keep the first one for ever, as if it were static
+            if not at:  # its common time would say that the chain is static
                 self._unstamped.add(name)
                 self._newest.setdefault(_name(transform.header.frame_id), NEVER)
                 self._counts[UNSTAMPED] += 1

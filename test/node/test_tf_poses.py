@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import importlib
 import itertools
+import re
 import time
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -27,6 +29,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from ros_client import Client, stamp_of
 from visualization_msgs.msg import MarkerArray
 
+from box_contact_ros import ContactSolver
 from box_contact_ros.apps.ros_client import ANSWERS, pose_message
 from box_contact_ros.apps.viewer.markers import MarkersNode
 from box_contact_ros.apps.viewer.scene_driver import SceneDriver
@@ -55,6 +58,7 @@ IN_TOPICS = SCENE.replace(', frame: hook', '').replace(', frame: post', '')
 LORRY = np.array([0.5, 0, 1.0, 0, 0, 0, 1])
 POST = np.array([1.2, 0, 2.0, 0, 0, 0, 1])
 LOAD = np.array([0.1, 0.2, 0.9, 0, 0, 0, 1])
+CUBE = (2.0, 2.0, 2.0)
 HAVE_TF2 = tf_poses.has_tf2()
 
 
@@ -80,7 +84,8 @@ class TfClient(Client):
             kind, f'/plain/{topic}',
             lambda message: self.of_topics.update({stamp_of(message): message}), deep)
         self.poses = {topic: self.node.create_publisher(PoseStamped, topic, deep) for topic in (
-            '/yard/lorry/pose', '/plain/lorry/pose', '/plain/load/pose', '/plain/post/pose')}
+            '/yard/lorry/pose', '/yard/truck/pose', '/plain/lorry/pose', '/plain/load/pose',
+            '/plain/post/pose')}
         if real:
             kind = tf_poses.tf_message()
             latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -422,6 +427,20 @@ def test_a_recording_keeps_the_transforms(client, tmp_path):
     assert offered['/tf_static'] == [LATCHED] and not offered['/tf']
     with pytest.raises(RecordingError, match="load is frame 'hook' in /tf: pairs are replayed"):
         read_replay(tmp_path / 'run')
+
+
+def test_the_scene_on_the_page(client):
+    """It is answered as the page says."""
+    page = (Path(__file__).resolve().parents[2] / 'docs/reference/scenes.md').read_text('utf-8')
+    text, = (block for block in re.findall(r'```yaml\n(.*?)```', page, re.DOTALL)
+             if 'frame:' in block)
+    client.start(text)
+    client.pose('/yard/truck/pose', LORRY, START)
+    client.move(transform('map', 'crane_hook', LOAD, START))
+    assert client.spin(lambda: START in client.clouds)
+    row, = read_contacts(client.clouds[START], read_scene(text).ids)
+    wanted = ContactSolver(CUBE, CUBE, model='exact')(LOAD, LORRY)
+    assert row['depth'] == pytest.approx(-wanted.separation)
 
 
 def test_frames_cannot_be_driven(client):

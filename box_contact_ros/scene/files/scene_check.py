@@ -46,8 +46,8 @@ def meaning(scene: Scene) -> Iterator[str]:
         yield f'size {_size(size)}: {count}'
     topics = list(scene.sources.values())
     yield f'frame: {scene.frame_id or "any, the same for all poses"}'
-    more = ', ...' if len(topics) > 3 else ''
-    yield f'topics in: {len(topics)} ({", ".join(topics[:3])}{more})'
+    named = f' ({", ".join(topics[:3])}{", ..." if len(topics) > 3 else ""})' if topics else ''
+    yield f'topics in: {len(topics)}{named}'
     if scene.frames:
         yield f'frames in /tf: {len(scene.frames)}, which need tf2_ros'
     yield f'topics out: contacts, and <pair>/contact/point and /normal of {len(scene.pairs)} pairs'
