@@ -51,8 +51,8 @@ from .parameters import (
 )
 from .rclpy_workarounds import lifecycle_state, refuse_transitions
 from .runtime import LOG_SECONDS, run_node
-from .scene_topics import SceneTopics
-from .tf_poses import check_frames
+from .topics.scene_topics import SceneTopics
+from .topics.tf_poses import check_frames
 
 
 def model(name: str, value: Any) -> str:

@@ -27,7 +27,7 @@ from .diagnostics import (
 )
 from .message_bytes import RawMessages
 from .messages import NANOSECONDS, Refused, TypedMessages
-from .scene_topics import SceneTopics
+from .topics.scene_topics import SceneTopics
 
 SERIALIZATIONS: dict[str, type[RawMessages] | type[TypedMessages]] = {
     'raw': RawMessages, 'typed': TypedMessages}

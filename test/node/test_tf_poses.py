@@ -33,9 +33,9 @@ from box_contact_ros import ContactSolver
 from box_contact_ros.apps.ros_client import ANSWERS, pose_message
 from box_contact_ros.apps.viewer.markers import MarkersNode
 from box_contact_ros.apps.viewer.scene_driver import SceneDriver
-from box_contact_ros.node import tf_poses
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import CLOUD_ROW, make_header, read_contacts
+from box_contact_ros.node.topics import tf_poses
 from box_contact_ros.scene.files.scene_file import SceneError, read_scene
 from box_contact_ros.scene.pose import quaternion_multiply, rotation_matrix
 

@@ -44,11 +44,11 @@ MESSAGES = 'node/messages.py'
 NODE = 'node/contact_node.py'
 STRANGERS = 'test/node/test_strangers.py'
 TEST_BYTES = 'test/node/test_message_bytes.py'
-TOPICS = 'node/scene_topics.py'
+TOPICS = 'node/topics/scene_topics.py'
 TEST_PAIRING = 'test/scene/test_stamp_pairing.py'
 FIRST_RUN = 'test/node/test_first_run.py'
 TEST_SCENE_NODE = 'test/node/test_scene_node.py'
-TF = 'node/tf_poses.py'
+TF = 'node/topics/tf_poses.py'
 TEST_TF = 'test/node/test_tf_poses.py'
 TEST_CORE = 'test/core/test_core.py'
 EXACT = 'test/core/test_exact.py'
@@ -479,7 +479,7 @@ MUTANTS = {
         TOPICS, 'PublisherEventCallbacks(use_default_callbacks=False)',
         'PublisherEventCallbacks()', 'test/node/test_faults.py -k topics_go'),
     'publishers gone by what is left': Mutant(
-        'node/qos_events.py', 'event.total_count_change - event.current_count_change',
+        'node/topics/qos_events.py', 'event.total_count_change - event.current_count_change',
         'max(0, -event.current_count_change)', f'{TEST_SCENE_NODE} -k come_and_go_between'),
     'the modulus rises at once': Mutant(
         PATCH_LAW, 'self._modulus = min(self._modulus + self.rise * lacking, borne)',

@@ -22,7 +22,7 @@ from visualization_msgs.msg import MarkerArray
 from ...node.messages import ContactsMessage
 from ...node.parameters import outside_ros_args
 from ...node.runtime import ARRAY_QOS, POSE_QOS, GuardedNode, refusals_end, run_node
-from ...node.tf_poses import STATIC_QOS, TF, TF_STATIC, tf_message
+from ...node.topics.tf_poses import STATIC_QOS, TF, TF_STATIC, tf_message
 from ...solver.arguments import program_parser
 from ...solver.checks import as_size
 from ..ros_client import DEEP_RELIABLE, pose_topics, read_scene_text

@@ -21,7 +21,7 @@ from visualization_msgs.msg import MarkerArray
 
 from ...node.messages import read_contacts
 from ...node.runtime import POSE_QOS, GuardedNode
-from ...node.tf_poses import TfPoses, has_tf2
+from ...node.topics.tf_poses import TfPoses, has_tf2
 from ...scene.files.scene_file import SceneError, read_scene
 from ...scene.scene_solver import Scene, two_boxes
 from ...scene.stamp_pairing import NEVER, StampedPose

@@ -24,14 +24,14 @@ from rclpy.subscription import Subscription
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import String
 
-from ..scene.files.scene_file import scene_text
-from ..scene.scene_solver import ALL_BOXES, Pair, Scene
-from ..solver.checks import shown
-from .messages import ContactsMessage
-from .parameters import QOS_OVERRIDES, one_of, unknown_name, whole_number
+from ...scene.files.scene_file import scene_text
+from ...scene.scene_solver import ALL_BOXES, Pair, Scene
+from ...solver.checks import shown
+from ..messages import ContactsMessage
+from ..parameters import QOS_OVERRIDES, one_of, unknown_name, whole_number
+from ..rclpy_workarounds import RCLError, parameter_overrides, silence
+from ..runtime import ARRAY_QOS, CONTACT_QOS, LATCHED_QOS, POSE_QOS
 from .qos_events import QosEvents
-from .rclpy_workarounds import RCLError, parameter_overrides, silence
-from .runtime import ARRAY_QOS, CONTACT_QOS, LATCHED_QOS, POSE_QOS
 from .tf_poses import TF, TF_STATIC, TfPoses
 
 TOPICS_OF_EVERY_NODE = ('/diagnostics', '/parameter_events', '/rosout', '/clock', TF, TF_STATIC)

@@ -15,12 +15,12 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 
-from ..scene.scene_solver import Fault, Scene
-from ..scene.stamp_pairing import NEVER, RESET, StampedPose
-from ..solver.checks import shown
-from .messages import NANOSECONDS
-from .rclpy_workarounds import silence
-from .runtime import LOG_SECONDS, POSE_QOS
+from ...scene.scene_solver import Fault, Scene
+from ...scene.stamp_pairing import NEVER, RESET, StampedPose
+from ...solver.checks import shown
+from ..messages import NANOSECONDS
+from ..rclpy_workarounds import silence
+from ..runtime import LOG_SECONDS, POSE_QOS
 
 TF, TF_STATIC = '/tf', '/tf_static'
 STATIC_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE,
