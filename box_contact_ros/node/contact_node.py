@@ -326,7 +326,7 @@ class ContactNode(LifecycleNode):
     def _clock_jumped(self, _: Any) -> None:
         if self._evaluator is not None:
             self.counts[RESETS] += 1
-            self._evaluator.reset()
+            self._evaluator.reset(time_only=True)
             self.get_logger().warning('time went back: /clock was set back; a new time begins')
 
     def _report(self) -> None:

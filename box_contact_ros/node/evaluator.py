@@ -74,9 +74,11 @@ class Evaluator:
         """Keep the count of a solver that goes."""
         self.counts[OUTSIDE] += self.solver.exact_answers
 
-    def reset(self) -> None:
-        """Forget all poses."""
+    def reset(self, *, time_only: bool = False) -> None:
+        """Forget all poses; with `time_only` all but those that hold at all stamps."""
         self._pairing.reset()
+        if not time_only:
+            self._pairing.release()
 
     def pose_callback(self, box: str, topic: str) -> Callable[[Any], None]:
         """Return the callback for the poses of a box, or of all; it raises nothing at all.

@@ -174,8 +174,13 @@ class Pairing(ABC):
             self.set_scene(self._scene)
         return [] if self._boxes else [self._tick({})]
 
+    def release(self) -> None:
+        """Forget the poses that hold at all stamps."""
+        self._fixed.clear()
+        self.set_scene(self._scene)
+
     def reset(self) -> None:
-        """Forget all poses and stamps, as when time is set back."""
+        """Forget all poses and stamps but of fixed boxes, as when time is set back."""
         self._boxes = {box: BoxState(came=state.came or state.newest != NEVER)
                        for box, state in self._boxes.items()}
         self._now = NEVER
@@ -298,7 +303,7 @@ class StampPairing(Pairing):
         self._awaits_less = True
 
     def reset(self) -> None:
-        """Forget all poses and stamps; poses that wait are dropped and counted."""
+        """Forget as Pairing does; poses that wait are dropped and counted."""
         super().reset()
         self.counts[NO_PARTNER] += sum(len(tick.poses) for tick in self._waiting.values())
         self._waiting.clear()

@@ -327,6 +327,11 @@ def test_scene_and_state_change(client):
     if client.real:
         assert client.spin(lambda: client.tf[False].get_subscription_count() == 1)
         assert client.spin(lambda: 'post' in node._topics.tf._newest)  # latched
+    else:
+        client.move(transform('map', 'hook', LOAD, START + 9 * MS))
+        client.pose('/yard/lorry/pose', LORRY, START + 9 * MS)
+        # The first tick waits for all boxes: what was static before is forgotten.
+        assert not client.spin(lambda: START + 9 * MS in client.clouds, 0.3)
     client.move(transform('map', 'post', POST), static=True)
     assert None not in tick(START + SECOND).values()
 

@@ -379,6 +379,8 @@ MUTANTS = {
     'a static frame is looked up once': Mutant(
         TF, '# What was static may have another value now.\n        self._given', '_',
         f'{TEST_TF} -k always_current'),
+    'an inactive node remembers static frames': Mutant(
+        EVALUATOR, 'if not time_only:', 'if False:', f'{TEST_TF} -k state_change'),
     'a frame is kept when the scene has another': Mutant(
         'scene/stamp_pairing.py', 'and scene.frames.get(box) == self._scene.frames.get(box)', '',
         f'{TEST_TF} -k state_change'),
@@ -387,7 +389,7 @@ MUTANTS = {
     'a box that moves again stays fixed': Mutant(
         'scene/stamp_pairing.py', 'del self._fixed[box]', 'pass', f'{TEST_PAIRING} -k again'),
     'a clock that jumps is not heard': Mutant(
-        NODE, 'self.counts[RESETS] += 1\n            self._evaluator.reset()',
+        NODE, 'self.counts[RESETS] += 1\n            self._evaluator.reset(time_only=True)',
         'pass', 'test/node/test_faults.py -k clock'),
     'a pose of any age': Mutant(
         'scene/stamp_pairing.py',

@@ -75,7 +75,7 @@ class Listener(GuardedNode):
                                      topic.qos, raw=True)
             for topic in pose_topics(scene)]
         self._tf.close()
-        if has_tf2():
+        if scene.frames and has_tf2():
             self._tf.listen(scene.frame_id, scene.frames, partial(self._frame_callback, log))
         elif scene.frames:
             self.get_logger().warning(f'not drawn, as tf2_ros is not installed here: '
