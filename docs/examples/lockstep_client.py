@@ -1,17 +1,16 @@
 """Ask a contact node in lockstep: `python docs/examples/lockstep_client.py`.
 
 Start `contact_node` first. A simulator that waits for each answer loses none, however fast or slow
-it runs. It sends both poses with one stamp, and waits for the cloud of that stamp. The stamps are
-the simulator's own time.
+it runs. It sends both poses with one stamp, and waits for the contacts of that stamp. The stamps
+are the simulator's own time.
 """
 import numpy as np
 import rclpy
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseStamped
 from rclpy.node import Node
-from sensor_msgs.msg import PointCloud2
 
-from box_contact_ros.node.messages import read_cloud
+from box_contact_msgs.msg import Contact, Contacts
 
 
 class LockstepClient(Node):
@@ -20,12 +19,12 @@ class LockstepClient(Node):
     def __init__(self) -> None:
         super().__init__('lockstep_client')
         self.poses = [self.create_publisher(PoseStamped, f'box_{name}/pose', 10) for name in 'ab']
-        self.create_subscription(PointCloud2, 'contacts', self.receive, 10)
-        self.cloud: PointCloud2 | None = None
+        self.create_subscription(Contacts, 'contacts', self.receive, 10)
+        self.answer: Contacts | None = None
 
-    def receive(self, cloud: PointCloud2) -> None:
+    def receive(self, answer: Contacts) -> None:
         """Keep the newest answer."""
-        self.cloud = cloud
+        self.answer = answer
 
     def wait_for_node(self) -> None:
         """Wait until the node listens to both poses and this client hears its answers."""
@@ -33,17 +32,17 @@ class LockstepClient(Node):
                    and self.count_publishers('contacts')):
             rclpy.spin_once(self, timeout_sec=0.05)
 
-    def ask(self, time_ns: int, *poses: np.ndarray, patience: float = 0.5) -> np.ndarray:
-        """Return the rows of `contacts` for two poses at a time; lost poses are sent again."""
+    def ask(self, time_ns: int, *poses: np.ndarray, patience: float = 0.5) -> list[Contact]:
+        """Return the contacts of two poses at a time; lost poses are sent again."""
         stamp = Time(sec=time_ns // 10**9, nanosec=time_ns % 10**9)
-        while self.cloud is None or self.cloud.header.stamp != stamp:
+        while self.answer is None or self.answer.header.stamp != stamp:
             for publisher, pose in zip(self.poses, poses):
                 publisher.publish(message(stamp, pose))
             until = self.get_clock().now().nanoseconds + patience * 1e9
-            while ((self.cloud is None or self.cloud.header.stamp != stamp)
+            while ((self.answer is None or self.answer.header.stamp != stamp)
                    and self.get_clock().now().nanoseconds < until):
                 rclpy.spin_once(self, timeout_sec=0.01)
-        return read_cloud(self.cloud)
+        return self.answer.contacts
 
 
 def message(stamp: Time, pose: np.ndarray) -> PoseStamped:
@@ -63,9 +62,9 @@ def main() -> None:
     stack = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
     load = np.array([0.0, 0.0, 2.5925, 0.0, 0.0, 0.0, 1.0])
     for tick in range(1, 6):
-        rows = client.ask(tick * 5_000_000, load, stack)  # 5 ms of simulated time a step
-        depth = 1e3 * rows['depth'][0] if len(rows) else 0.0
-        print(f'{5 * tick} ms: {"contact" if len(rows) else "no contact"}, {depth:.1f} mm deep')
+        contacts = client.ask(tick * 5_000_000, load, stack)  # 5 ms of simulated time per step
+        depth = 1e3 * contacts[0].depth if contacts else 0.0
+        print(f'{5 * tick} ms: {"contact" if contacts else "no contact"}, {depth:.1f} mm deep')
         load[2] -= 1e-3
     rclpy.shutdown()
 

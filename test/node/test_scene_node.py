@@ -18,12 +18,15 @@ from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from ros_client import PATIENCE, Client, serving
+from std_msgs.msg import String
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.apps.ros_client import ANSWERS
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import PATCH_FIELDS, make_header, read_contacts
 from box_contact_ros.node.rclpy_workarounds import RCLError
+from box_contact_ros.node.runtime import LATCHED_QOS
+from box_contact_ros.scene.files.scene_file import parse_scene
 
 MS = 1_000_000  # ns
 SCENE = """\
@@ -230,6 +233,45 @@ def test_a_stale_box_is_nan_and_never_an_old_contact(client):
         assert rows[5]['depth'] == pytest.approx(0.2)
 
 
+@pytest.mark.parametrize('serialization', ['raw', 'typed'])
+def test_close_pairs_are_listed_within_the_margin(client, serialization):
+    """Before the touch, without a point and without topics of their own; set while it runs."""
+    lorry = (7.0, 0, 1.0, 0, 0, 0, 1)
+    with scene_node(serialization=serialization) as node:
+        client.offer(load=ON_FLOOR, lorry=lorry)
+        above = (0, 0, 1.25, 0, 0, 0, 1)  # 0.25 m above the floor
+        assert client.rows(client.tick(load=above, lorry=lorry)) == {}
+        result, = node.set_parameters([Parameter('margin', value=0.3)])
+        assert result.successful
+        stamp = client.tick(load=above, lorry=lorry)
+        rows = client.rows(stamp)
+        assert set(rows) == {3} and rows[3]['depth'] == -0.25 and rows[3]['volume'] == 0.0
+        assert math.isnan(rows[3]['point_x']) and math.isnan(rows[3]['x'])
+        rows = client.rows(client.tick(load=(0, 0, 0.9, 0, 0, 0, 1), lorry=lorry))
+        assert rows[3]['depth'] == pytest.approx(0.1) and not math.isnan(rows[3]['point_x'])
+        assert stamp not in client.of_pair['load_floor']
+        result, = node.set_parameters([Parameter('margin', value=-1.0)])
+        assert not result.successful
+
+
+def test_the_scene_is_latched(client):
+    """Whoever subscribes later reads all boxes and pairs, and a change is sent."""
+    found = []
+    with scene_node() as node:
+        client.node.create_subscription(
+            String, 'contact_node/scene', lambda text: found.append(parse_scene(text.data)),
+            LATCHED_QOS)
+        assert client.spin(lambda: found)
+        assert found[0] == parse_scene(SCENE)
+        assert set_scene(node, WITH_CRATE).successful
+        assert client.spin(lambda: len(found) > 1) and found[1] == parse_scene(WITH_CRATE)
+        sizes = [Parameter('scene', value=''), Parameter('size_b', value=[1.0, 2.0, 3.0])]
+        assert node.set_parameters_atomically(sizes).successful
+        assert client.spin(lambda: len(found) > 2)
+        assert found[2].boxes['box_b'].size == (1.0, 2.0, 3.0)
+        assert found[2].ids == {'box_a_box_b': 0}
+
+
 ARRAY = SCENE.replace('boxes:', 'poses: array\nboxes:').replace(', pose_topic: /traffic/lorry', '')
 GONE = (math.nan,) * 7
 
@@ -295,7 +337,7 @@ def test_a_box_that_is_not_there_is_nan(array_node, array_client):
     """In this tick alone, whatever the pairing; diagnostics name it."""
     rows = array_client.rows(ON_FLOOR, GONE)
     assert set(rows) == {3, 5} and rows[3]['depth'] == pytest.approx(0.1)
-    assert all(math.isnan(rows[5][name]) for name in ('x', 'normal_x', 'depth', 'volume'))
+    assert all(math.isnan(rows[5][name]) for name in ('point_x', 'normal_x', 'depth', 'volume'))
     assert array_client.diagnostic('stale boxes') == 'lorry'
     assert not math.isnan(array_client.rows(ON_LORRY, LORRY)[5]['depth'])
     assert set(array_client.rows(GONE, GONE)) == {3, 5}

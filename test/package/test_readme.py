@@ -151,6 +151,8 @@ def pip(words: list[str], setup_arguments, **_) -> None:
         elif expected == 'constraints':
             assert (ROOT / word).is_file()
             expected = 'file'
+        elif word.startswith('./'):
+            assert (ROOT / word / 'pyproject.toml').is_file()
         elif word.startswith('.'):
             extras = re.fullmatch(r'\.(?:\[([\w,]+)\])?', word).group(1)
             assert set(extras.split(',') if extras else ()) <= set(

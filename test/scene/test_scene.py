@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.core import native
+from box_contact_ros.scene import scene_solver
 from box_contact_ros.scene.files import scene_file
 from box_contact_ros.scene.files.scene_file import SceneError, parse_scene, read_scene
 from box_contact_ros.scene.scene_solver import Box, Pair, Scene, SceneSolver, two_boxes
@@ -85,6 +86,46 @@ def test_a_tick_is_every_pair_alone(model, origin):
         stale += len(answer.stale)
         left_out += len(pairs) - len(answer.stale) - answer.near
     assert contacts > 50 and stale > 30 and left_out > 50
+
+
+@pytest.mark.parametrize('swept_from', [0, 64])
+@pytest.mark.parametrize('origin', [0.0, 5e6])
+def test_close_pairs_are_those_within_the_margin(swept_from, origin, monkeypatch):
+    """Of every pair alone: apart, and by at most the margin. Pairs in contact stay as they are."""
+    monkeypatch.setattr(scene_solver, 'SWEPT_FROM', swept_from)
+    rng = np.random.default_rng(5)
+    close = 0
+    for margin in (0.1, 0.5, 1.0):
+        n = 40
+        sizes = np.exp(rng.uniform(-1, 1, (n, 3)))
+        where = np.hstack((origin + rng.uniform(-6, 6, (n, 3)), poses.unit_quaternions(rng, n)))
+        boxes = {f'b{i}': Box(f'b{i}', tuple(sizes[i]), pose_topic=f'b{i}/pose') for i in range(n)}
+        pairs = tuple(Pair.between(f'b{i}', f'b{j}') for i in range(n) for j in range(i))
+        solver = SceneSolver(Scene(boxes, pairs), model='exact', margin=margin)
+        answer, plain = solver(where), SceneSolver(Scene(boxes, pairs), model='exact')(where)
+        assert [pair for pair, _ in answer.touching] == [pair for pair, _ in plain.touching]
+        found = {pair.name: contact.separation for pair, contact in answer.close}
+        wanted = {}
+        for pair in pairs:
+            a, b = int(pair.a[1:]), int(pair.b[1:])
+            contact = ContactSolver(sizes[a], sizes[b], model='exact')(where[a], where[b])
+            if not contact.colliding and contact.separation <= margin:
+                wanted[pair.name] = contact.separation
+        assert found.keys() == wanted.keys()
+        assert found == pytest.approx(wanted, rel=1e-9, abs=1e-8 if origin else 1e-15)
+        close += len(found)
+    assert close > 20 and not plain.close
+
+
+def test_the_only_pair_is_close_up_to_the_margin():
+    """To the bit of the margin; a scene of one pair has a shorter way."""
+    scene = two_boxes(poses.CUBE, poses.CUBE)
+    for gap, listed in ((0.25, 1), (np.nextafter(2.25, 3) - 2.0, 0), (0.0, 0)):
+        answer = SceneSolver(scene, model='exact', margin=0.25)(
+            [poses.IDENTITY, np.array([2.0 + gap, 0, 0, 0, 0, 0, 1])])
+        assert len(answer.close) == listed and len(answer.touching) == (gap == 0.0)
+    with pytest.raises(ValueError, match='margin must lie within 0 and 1e.50 m, not -1'):
+        SceneSolver(scene, margin=-1.0)
 
 
 def test_no_touching_pair_is_left_out():

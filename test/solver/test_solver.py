@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from box_contact_ros import Contact, ContactSolver
 from box_contact_ros.solver.checks import pose_fault
+from box_contact_ros.solver.contact import patch_area
 from box_contact_ros.solver.models import MODELS
 
 SOLVER = ContactSolver(poses.CUBE, poses.CUBE, model='exact')
@@ -29,6 +30,20 @@ def test_result_is_plain():
     apart = SOLVER(poses.IDENTITY, [0, 0, 2.5, 0, 0, 0, 1])
     assert apart.colliding is False and apart.separation == 0.5
     assert np.isnan(apart.normal).all() and np.isnan(apart.point).all()
+
+
+def test_area_of_a_patch():
+    """Closed form: the rectangle that two faces share, turned and shifted; NaN without a patch."""
+    rng = np.random.default_rng(3)
+    pair = np.array([poses.IDENTITY, [1.2, -1.6, 0.995, 0, 0, 0, 1]])
+    wanted = (1.0 + 0.5 - 1.2) * (1.5 + 1.0 - 1.6)  # half extents less the distance, by axis
+    solver = ContactSolver((2, 3, 1), (1, 2, 1), model='exact')
+    for _ in range(20):
+        contact = solver(*poses.moved(pair, rng.uniform(-5, 5, 3),
+                                      poses.unit_quaternions(rng, 1)))
+        assert patch_area(contact) == pytest.approx(wanted, rel=1e-9)
+    nothing = contact._replace(covariance=np.full((3, 3), np.nan))
+    assert math.isnan(patch_area(nothing))
 
 
 def test_results_are_not_shared():

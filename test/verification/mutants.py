@@ -271,6 +271,16 @@ MUTANTS = {
     'the wrong triangle of the covariance sent': Mutant(
         'node/message_bytes.py', 'square[32:48]', 'square[24:40]',
         f'{TEST_BYTES} -k written_alike'),
+    'contacts after the first are aligned as the first': Mutant(
+        BYTES, 'at = 0  #', 'pass  #', f'{TEST_BYTES} -k written_alike'),
+    'names are not aligned': Mutant(
+        BYTES, '(-(at + len(names)) % 8)', '(-len(names) % 8)', f'{TEST_BYTES} -k written_alike'),
+    'bounding boxes of before the margin': Mutant(
+        'scene/scene_solver.py', 'np.minimum(self._size + margin, LENGTH_MAX)', 'self._size',
+        'test/scene/test_scene.py -k close_pairs'),
+    'the point in float32 alone': Mutant(
+        MESSAGES, 'if found.keys().isdisjoint(_POINT):', 'if False:',
+        f'{TEST_BYTES} -k older_cloud'),
     'no matter whether a cloud has the field': Mutant(
         MESSAGES, 'if name not in found:', 'if False:', f'{TEST_BYTES} -k wrong_field'),
     "types of a cloud's fields not compared": Mutant(
@@ -284,9 +294,9 @@ MUTANTS = {
         f'{TEST_BYTES} -k cut_short'),
     'recordings of before the patch refused': Mutant(
         MESSAGES, 'if name not in PATCH_FIELDS or not found.keys().isdisjoint(PATCH_FIELDS)]',
-        'if True]', f'{TEST_BYTES} -k before_the_patch'),
+        'if True]', f'{TEST_BYTES} -k older_cloud'),
     'a contact without patch taken for stale': Mutant(
-        'apps/bench/answer_log.py', 'np.isnan(values[:7]).any()', 'np.isnan(values).any()',
+        'apps/bench/answer_log.py', 'np.isnan(values[6])', 'np.isnan(values).any()',
         'test/apps/test_landing_ros.py -k point_alone_pushes'),
     'an ellipse of NaN': Mutant(
         'apps/viewer/style.py', 'return np.where(known[:, None, None], semi_axes, math.nan)',
@@ -409,7 +419,7 @@ MUTANTS = {
         'return any(',
         f'{TEST_PAIRING} -k joins'),
     'a scene that fails half way stays': Mutant(
-        TOPICS, 'self._change(*old)', 'pass',
+        TOPICS, 'self._change(old)', 'pass',
         f'{TEST_SCENE_NODE} -k half_way'),
     "poses looked for on the node's own topics": Mutant(
         TOPICS, 'if self._resolved(topic) in taken:', 'if False:',
@@ -476,7 +486,7 @@ MUTANTS = {
     'events of poses served': Mutant(
         TOPICS, 'self.events.watch(subscription)', 'pass', 'test/node/test_faults.py -k deadlines'),
     'events of contacts served': Mutant(
-        TOPICS, 'self.events.watch(self.contacts)', 'pass', f'{TEST_SCENE_NODE} -k no_executor'),
+        TOPICS, 'self.events.watch(publisher)', 'pass', f'{TEST_SCENE_NODE} -k no_executor'),
     "events of pairs' contacts served": Mutant(
         TOPICS, 'PublisherEventCallbacks(use_default_callbacks=False)',
         'PublisherEventCallbacks()', 'test/node/test_faults.py -k topics_go'),
