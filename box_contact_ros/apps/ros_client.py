@@ -15,7 +15,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from ..node.message_bytes import RawMessages
 from ..node.messages import NANOSECONDS, ContactsMessage, Refused, read_contacts
-from ..node.scene_topics import pose_input
+from ..node.topics.scene_topics import pose_input
 from ..resources import find_file
 from ..scene.files.scene_file import read_scene
 from ..scene.scene_solver import ALL_BOXES, Scene

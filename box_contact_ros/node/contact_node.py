@@ -49,7 +49,8 @@ from .parameters import (
 )
 from .rclpy_workarounds import lifecycle_state, refuse_transitions
 from .runtime import LOG_SECONDS, run_node
-from .scene_topics import SceneTopics
+from .topics.scene_topics import SceneTopics
+from .topics.tf_poses import check_frames
 
 
 def model(name: str, value: Any) -> str:
@@ -272,7 +273,7 @@ class ContactNode(LifecycleNode):
 
         Boxes that stay keep their subscriptions and the poses that wait.
         """
-        scene = (read_scene(settings['scene']) if settings['scene']
+        scene = (read_scene(settings['scene'], check=check_frames) if settings['scene']
                  else two_boxes(settings['size_a'], settings['size_b']))
         self._topics.check(scene, pair_topics=settings['pair_topics'])
         solver = self.make_solver(settings, scene)
@@ -286,6 +287,7 @@ class ContactNode(LifecycleNode):
                 diagnostics=self._diagnostics, logger=self.get_logger())
         else:
             self._evaluator.set_solver(solver, settings)
+            self._topics.tf.look_up()
 
     def _log_scene(self, what: str, settings: Mapping[str, Any]) -> None:
         """Log what the node works on, and warn of weights that do not serve it."""
@@ -312,7 +314,7 @@ class ContactNode(LifecycleNode):
     def _clock_jumped(self, _: Any) -> None:
         if self._evaluator is not None:
             self.counts[RESETS] += 1
-            self._evaluator.reset()
+            self._evaluator.reset(time_only=True)
             self.get_logger().warning('time went back: /clock was set back; a new time begins')
 
     def _report(self) -> None:

@@ -27,7 +27,7 @@ from .diagnostics import (
 )
 from .message_bytes import RawMessages
 from .messages import NANOSECONDS, Refused, TypedMessages
-from .scene_topics import SceneTopics
+from .topics.scene_topics import SceneTopics
 
 SERIALIZATIONS: dict[str, type[RawMessages] | type[TypedMessages]] = {
     'raw': RawMessages, 'typed': TypedMessages}
@@ -74,18 +74,25 @@ class Evaluator:
         """Keep the count of a solver that goes."""
         self.counts[OUTSIDE] += self.solver.exact_answers
 
-    def reset(self) -> None:
-        """Forget all poses."""
+    def reset(self, *, time_only: bool = False) -> None:
+        """Forget all poses; with `time_only` all but those that hold at all stamps."""
         self._pairing.reset()
+        if not time_only:
+            self._pairing.release()
 
     def pose_callback(self, box: str, topic: str) -> Callable[[Any], None]:
-        """Return the callback for the poses of a box, or of all; it raises nothing at all."""
+        """Return the callback for the poses of a box, or of all; it raises nothing at all.
+
+        It takes messages, or a StampedPose that is known already.
+        """
         def callback(message: Any) -> None:
             self.counts['poses'] += 1
             try:
                 pose = (self._read_all(message) if box == ALL_BOXES
+                        else _checked(message) if type(message) is StampedPose
                         else self._messages.read_pose(message))
-                ticks = self._pairing.add(box, pose)
+                ticks = (self._pairing.add(box, pose) if pose.stamp != NEVER
+                         else self._pairing.fix(box, pose))
             except Exception as error:
                 self._refused_boxes.add(box)
                 self._refuse(error, topic)
@@ -211,12 +218,12 @@ class Evaluator:
                     raise Refused('frame_id differs', self._frames(tick, pose))
                 if pose.stamp > stamp:
                     stamp = pose.stamp
-        return stamp, frame_id or ''
+        return max(stamp, 0), frame_id or ''  # 0 where all boxes are fixed
 
     def _frames(self, tick: Tick, odd: StampedPose) -> str:
         """Describe the frame of a tick, by the scene or the first box, and that of a pose."""
         scene = self.solver.scene
-        known = [(box, pose) for box, pose in zip(scene.sources, tick) if pose is not None]
+        known = [(box, pose) for box, pose in zip(scene.streams, tick) if pose is not None]
         one, frame = ('the scene', scene.frame_id) if scene.frame_id else (
             known[0][0], known[0][1].frame_id)
         box = next(box for box, pose in known if pose is odd)
@@ -235,3 +242,11 @@ class Evaluator:
         kind, remedy = kind_and_remedy(reason, text)
         if kind not in self._refusals:
             self._refusals[kind] = f'{text}; refused{remedy}'
+
+
+def _checked(pose: StampedPose) -> StampedPose:
+    """Return a pose that can be answered, or raise Refused."""
+    fault = pose_fault(pose.numbers)
+    if fault:
+        raise Refused('bad pose', fault)
+    return pose

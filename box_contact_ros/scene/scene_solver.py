@@ -41,6 +41,7 @@ class Box:
     size: tuple[float, ...]  # three full extents [m]
     pose: tuple[float, ...] | None = None  # `x y z qx qy qz qw` in the common frame, of a fixed box
     pose_topic: str = ''  # where a moving box's poses come from
+    frame: str = ''  # or the frame in /tf that is the box: at its centre, along its edges
 
 
 class Pair(NamedTuple):
@@ -80,6 +81,7 @@ class Scene:
 
     def __post_init__(self) -> None:
         _check(self.boxes, self.pairs)
+        _check_frames(self.boxes, self.frame_id, self.pose_array)
 
     @cached_property
     def moving(self) -> tuple[str, ...]:
@@ -94,11 +96,22 @@ class Scene:
         return {pair.label: pair.id for pair in self.pairs}
 
     @cached_property
+    def streams(self) -> tuple[str, ...]:
+        """Names of the streams of poses: each box of `moving`, or ALL_BOXES in their place."""
+        return (ALL_BOXES,) if self.pose_array else self.moving
+
+    @cached_property
     def sources(self) -> Mapping[str, str]:
-        """Topics of poses by source: each box of `moving`, or ALL_BOXES in its place."""
+        """Topics of poses, by stream; a box with a frame has none."""
         if self.pose_array:
             return {ALL_BOXES: POSE_ARRAY}
-        return {name: self.boxes[name].pose_topic for name in self.moving}
+        return {name: self.boxes[name].pose_topic for name in self.moving
+                if not self.boxes[name].frame}
+
+    @cached_property
+    def frames(self) -> Mapping[str, str]:
+        """Frames in /tf, by box of `moving`."""
+        return {name: self.boxes[name].frame for name in self.moving if self.boxes[name].frame}
 
 
 def two_boxes(size_a: Sequence[float], size_b: Sequence[float]) -> Scene:
@@ -158,6 +171,24 @@ def _check(boxes: Mapping[str, Box], pairs: Sequence[Pair]) -> None:
                 a, b = pairs[first][2:]
                 raise Fault(('pairs', number, *field),
                             f'the same {what} as that of {shown(a)} and {shown(b)}')
+
+
+def _check_frames(boxes: Mapping[str, Box], frame_id: str, pose_array: bool) -> None:
+    """Raise Fault for a frame in /tf that can give no pose."""
+    for name, box in boxes.items():
+        place = ('boxes', name, 'frame')
+        if not box.frame:
+            continue
+        if pose_array:
+            raise Fault(place, 'with poses: array, all poses come on one topic')
+        if not frame_id:
+            raise Fault(place, 'the scene needs a frame_id, the frame that /tf is to give poses in')
+        if box.frame == frame_id:
+            raise Fault(place, f'{shown(box.frame)} is the frame_id of the scene: give the box a '
+                               'pose')
+        for where, frame in ((place, box.frame), (('frame_id',), frame_id)):
+            if frame.startswith('/'):
+                raise Fault(where, f'{shown(frame)}: names of frames in /tf begin with no slash')
 
 
 class Answer(NamedTuple):

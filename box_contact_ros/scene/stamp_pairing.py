@@ -44,7 +44,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections import Counter, deque
-from collections.abc import Container, Iterable
+from collections.abc import Container, Iterable, Mapping
 from dataclasses import dataclass, field
 from operator import itemgetter
 from typing import NamedTuple
@@ -148,16 +148,39 @@ class Pairing(ABC):
         self._held: dict[str, list[tuple[str, StampedPose]]] = {}
         """Poses by box whose stamps were taken before, and what they are counted as so far."""
         self._boxes: dict[str, BoxState] = {}
+        self._fixed: dict[str, StampedPose] = {}  # of boxes that no tick waits for
+        self._scene = scene
         self.set_scene(scene)
 
     def set_scene(self, scene: Scene) -> None:
         """Replace the scene; boxes that stay keep their state and their poses."""
-        self._boxes = {box: self._boxes.get(box) or BoxState() for box in scene.sources}
+        self._fixed = {box: pose for box, pose in self._fixed.items()
+                       if scene.frame_id == self._scene.frame_id
+                       and scene.frames.get(box) == self._scene.frames.get(box)}
+        self._scene = scene
+        self._boxes = {box: self._boxes.get(box) or BoxState() for box in scene.streams
+                       if box not in self._fixed}
         self._held.clear()
         self._partners = {tuple({pair.a, pair.b} & self._boxes.keys()) for pair in scene.pairs}
 
+    def fix(self, box: str, pose: StampedPose) -> list[Tick]:
+        """Take a pose that holds at all stamps, until `add` brings another one of its box.
+
+        It is part of each tick. Returns a tick where all boxes are fixed: nothing else makes one.
+        """
+        is_new = box not in self._fixed
+        self._fixed[box] = pose
+        if is_new:
+            self.set_scene(self._scene)
+        return [] if self._boxes else [self._tick({})]
+
+    def release(self) -> None:
+        """Forget the poses that hold at all stamps."""
+        self._fixed.clear()
+        self.set_scene(self._scene)
+
     def reset(self) -> None:
-        """Forget all poses and stamps, as when time is set back."""
+        """Forget all poses and stamps but of fixed boxes, as when time is set back."""
         self._boxes = {box: BoxState(came=state.came or state.newest != NEVER)
                        for box, state in self._boxes.items()}
         self._now = NEVER
@@ -195,6 +218,9 @@ class Pairing(ABC):
 
     def _state_at(self, box: str, stamp: int) -> BoxState:
         """Return the state of a box, after a reset if its stamp shows that time was set back."""
+        if box in self._fixed:
+            del self._fixed[box]
+            self.set_scene(self._scene)
         state = self._boxes[box]
         if stamp < state.newest - RESET:
             self._set_back(box, stamp)
@@ -237,6 +263,10 @@ class Pairing(ABC):
                 self._note(kind, box, pose.stamp)
         self._held.clear()
 
+    def _tick(self, poses: Mapping[str, StampedPose | None]) -> Tick:
+        """Return the tick of poses by box, and of those that are fixed."""
+        return [poses.get(box) or self._fixed.get(box) for box in self._scene.streams]
+
     def _is_evaluable(self, present: Container[str]) -> bool:
         """Return whether some pair has a pose of each of its moving boxes."""
         return any(all(box in present for box in boxes) for boxes in self._partners)
@@ -273,7 +303,7 @@ class StampPairing(Pairing):
         self._awaits_less = True
 
     def reset(self) -> None:
-        """Forget all poses and stamps; poses that wait are dropped and counted."""
+        """Forget as Pairing does; poses that wait are dropped and counted."""
         super().reset()
         self.counts[NO_PARTNER] += sum(len(tick.poses) for tick in self._waiting.values())
         self._waiting.clear()
@@ -415,7 +445,7 @@ class StampPairing(Pairing):
             for box, state in self._boxes.items():
                 if box not in poses:
                     state.missed.append(key)
-        return [poses.get(box) for box in self._boxes]
+        return self._tick(poses)
 
 
 def _compare(one: np.ndarray, other: np.ndarray) -> tuple[int, int]:
@@ -471,8 +501,8 @@ class LatestPairing(Pairing):
         self._now = max(self._now, stamp)
         if not self._is_evaluable({box for box, state in self._boxes.items() if state.last}):
             return []
-        return [[None if self._is_stale(other, stamp) else other.last
-                 for other in self._boxes.values()]]
+        return [self._tick({box: None if self._is_stale(other, stamp) else other.last
+                            for box, other in self._boxes.items()})]
 
     def _is_stale(self, state: BoxState, now: int) -> bool:
         return state.last is None or 0 < self.max_age < abs(now - state.newest)

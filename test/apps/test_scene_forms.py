@@ -68,7 +68,7 @@ def shown_forms() -> dict[str, str]:
     for old, new in SHORTER.items():
         assert any(old in block for block in blocks), f'{old!r} is shown no more'
         blocks = [block.replace(old, new) for block in blocks]
-    listed, short, array = blocks
+    listed, short, _, array = blocks  # frames in /tf are in test_tf_poses.py
     return {'listed': listed, 'short': short, 'array': array, 'inline': inline,
             'inline array': array, 'bare name': 'spreader_container_stack', 'two sizes': ''}
 

@@ -9,7 +9,7 @@ import pytest
 pytest.importorskip('rclpy')
 
 from box_contact_ros.node import parameters
-from box_contact_ros.node.qos_events import QosEvents
+from box_contact_ros.node.topics.qos_events import QosEvents
 
 
 @pytest.mark.parametrize('check, value, words', [

@@ -21,7 +21,7 @@ from ros_client import Client, serving
 from box_contact_ros.node import contact_node, runtime, soup_node
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.parameters import answer_help
-from box_contact_ros.node.qos_events import QosEvents
+from box_contact_ros.node.topics.qos_events import QosEvents
 from box_contact_ros.scene.stamp_pairing import RESETS
 
 CUBES = {'size_a': [2.0, 2.0, 2.0], 'size_b': [2.0, 2.0, 2.0], 'model': 'exact'}

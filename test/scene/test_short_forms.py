@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from box_contact_ros.scene.files import short_forms
+from box_contact_ros.scene.files.scene_check import meaning
 from box_contact_ros.scene.files.scene_file import (
     SceneError,
     parse_scene,
@@ -137,12 +138,44 @@ def test_names_of_one_checksum_get_two_ids(monkeypatch):
     ('fixed: all', 'fixed: all, id: 7', ':7: pairs[0].id: a pattern of pairs has no id'),
     ('boxes:', 'poses: list\nboxes:', ":2: poses: 'list' is not one of"),
     ('boxes:\n  crane: {', 'poses: array\nboxes:\n  crane: {pose_topic: a, ',
-     ':4: boxes.crane.pose_topic: with poses: array')])
+     ':4: boxes.crane.pose_topic: with poses: array'),
+    ('boxes:\n  crane: {', 'poses: array\nboxes:\n  crane: {frame: a, ',
+     ':4: boxes.crane.frame: with poses: array'),
+    ('crane: {', 'crane: {frame: hook, ', ':3: boxes.crane.frame: the scene needs a frame_id'),
+    ('boxes:\n  crane: {', 'frame_id: a\nboxes:\n  crane: {frame: a, ',
+     ":4: boxes.crane.frame: 'a' is the frame_id of the scene: give the box a pose"),
+    ('boxes:\n  crane: {', 'frame_id: a\nboxes:\n  crane: {frame: /b, ',
+     ":4: boxes.crane.frame: '/b': names of frames in /tf begin with no slash"),
+    ('boxes:\n  crane: {', 'frame_id: /a\nboxes:\n  crane: {frame: b, ',
+     ":2: frame_id: '/a': names of frames in /tf begin with no slash"),
+    ('crane: {', "crane: {frame: '', ", ":3: boxes.crane.frame: ''"),
+    ('type: crate, count: 3', 'type: crate, count: 3, frame: a',
+     ':4: boxes.m: has both frame and count'),
+    ('crane: {', 'crane: {frame: a, pose_topic: a, ',
+     ':3: boxes.crane: has both frame and pose_topic'),
+    ('crane: {', 'crane: {frame: a, pose: [0, 0, 0, 0, 0, 0, 1], ',
+     ':3: boxes.crane: has both frame and pose'),
+    ('s: {stack', 's: {frame: a, stack', ':5: boxes.s: has both stack and frame')])
 def test_a_refusal_of_a_short_form_names_line_and_field(old, new, words):
     assert old in FLEET
     with pytest.raises(SceneError) as refused:
         parse_scene(FLEET.replace(old, new, 1))
     assert str(refused.value).startswith(f'scene{words}')
+
+
+def test_a_frame_in_tf(tmp_path):
+    """Its box moves, has no topic, and is written and told as it was read."""
+    scene = parse_scene('{frame_id: map, boxes: {a: {size: [1, 1, 1], frame: crane/hook}, '
+                        'b: {size: [1, 1, 1]}, c: {size: [1, 1, 1], frame: unused}}, '
+                        'pairs: [{a: a, b: b}]}')
+    assert scene.moving == scene.streams == ('a', 'b')
+    assert (scene.frames, scene.sources) == ({'a': 'crane/hook'}, {'b': 'b/pose'})
+    write_scene(scene, tmp_path / 'scene.yaml')
+    assert read_scene(tmp_path / 'scene.yaml') == scene
+    told = list(meaning(scene))
+    assert 'box a: 1 x 1 x 1 m, moves: frame crane/hook in /tf' in told
+    assert 'topics in: 1 (b/pose)' in told
+    assert 'frames in /tf: 1, which need tf2_ros' in told
 
 
 def test_pairs_whose_names_run_together_are_refused():

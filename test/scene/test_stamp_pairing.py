@@ -10,6 +10,7 @@ import pytest
 from box_contact_ros.scene.scene_solver import Box, Pair, Scene, two_boxes
 from box_contact_ros.scene.stamp_pairing import (
     AGAIN,
+    NEVER,
     NO_PARTNER,
     OLD,
     PAIRINGS,
@@ -424,3 +425,47 @@ def test_latest_never_answers_with_an_old_pose(late):
 def test_fixed_boxes_are_not_waited_for():
     pairing = StampPairing(scene('a', ['aF']))
     assert stamps(pairing.add('a', pose(5))) == [5]
+
+
+@pytest.mark.parametrize('policy', [StampPairing, LatestPairing])
+def test_a_fixed_box_is_in_every_tick(policy):
+    """LAW: the ticks are those of a scene without it, with its pose added, at any stamps."""
+    three, two = scene(), scene('ac', ['ac'])
+    rng = random.Random(5)
+    pairing, plain = policy(three, max_age=20, tolerance=1), policy(two, max_age=20, tolerance=1)
+    always = pose(NEVER)
+    assert pairing.fix('b', always) == []
+    events = [(box, stamp) for stamp in range(200) for box in 'ac' if rng.random() < 0.8]
+    events.sort(key=lambda event: event[1] + rng.uniform(0, 3))
+    answered = 0
+    for box, stamp in events:
+        one = pose(stamp)
+        wanted = plain.add(box, one)
+        found = pairing.add(box, one)
+        assert all(tick[1] is always for tick in found)
+        # With a fixed partner a box alone is worth a tick: b takes part in both pairs.
+        whole = [[a, c] for a, _, c in found if policy is StampPairing or (a and c)]
+        assert [tick for tick in whole if None not in tick] == [
+            tick for tick in wanted if None not in tick]
+        answered += len(wanted)
+    assert answered > 100 and 'b' not in pairing.stale() + pairing.unseen()
+
+
+def test_a_box_that_is_fixed_and_moves_again():
+    pairing = StampPairing(scene('ab', ['ab']))
+    always = pose(NEVER)
+    assert pairing.add('a', pose(1)) == []
+    assert pairing.fix('b', always) == []
+    assert [tick[0].stamp for tick in pairing.add('a', pose(2))] == [1, 2]
+    assert pairing.fix('b', always) == []
+    pairing.reset()
+    assert stamps(pairing.add('a', pose(3))) == [3, NEVER]
+    assert pairing.add('b', pose(4)) == []
+    assert stamps(pairing.add('a', pose(4))) == [4, 4]
+    assert pairing.unseen() == []
+
+
+def test_fixed_boxes_alone_make_a_tick_when_they_come():
+    pairing = StampPairing(scene('ab', ['ab']))
+    assert pairing.fix('a', pose(NEVER)) == []
+    assert len(pairing.fix('b', pose(NEVER))) == len(pairing.fix('a', pose(NEVER))) == 1

@@ -45,10 +45,12 @@ MESSAGES = 'node/messages.py'
 NODE = 'node/contact_node.py'
 STRANGERS = 'test/node/test_strangers.py'
 TEST_BYTES = 'test/node/test_message_bytes.py'
-TOPICS = 'node/scene_topics.py'
+TOPICS = 'node/topics/scene_topics.py'
 TEST_PAIRING = 'test/scene/test_stamp_pairing.py'
 FIRST_RUN = 'test/node/test_first_run.py'
 TEST_SCENE_NODE = 'test/node/test_scene_node.py'
+TF = 'node/topics/tf_poses.py'
+TEST_TF = 'test/node/test_tf_poses.py'
 TEST_CORE = 'test/core/test_core.py'
 EXACT = 'test/core/test_exact.py'
 PATCH_LAW = 'scene/force/patch_law.py'
@@ -391,8 +393,26 @@ MUTANTS = {
     'time that goes back is late': Mutant(
         'scene/stamp_pairing.py', 'if stamp < state.newest - RESET:', 'if False:',
         f'{TEST_PAIRING} -k set_back'),
+    'a transform without a stamp is taken': Mutant(
+        TF, 'if not at:', 'if False:', f'{TEST_TF} -k that_are_none'),
+    'transforms of the time before are kept': Mutant(
+        TF, 'self._buffer.clear()', 'pass', f'{TEST_TF} -k goes_back'),
+    'a pose from /tf comes again': Mutant(
+        TF, 'if stamp == self._given.get(box):', 'if False:', f'{TEST_TF} -k same_contacts'),
+    'a static frame is looked up once': Mutant(
+        TF, '# What was static may have another value now.\n        self._given', '_',
+        f'{TEST_TF} -k always_current'),
+    'an inactive node remembers static frames': Mutant(
+        EVALUATOR, 'if not time_only:', 'if False:', f'{TEST_TF} -k state_change'),
+    'a frame is kept when the scene has another': Mutant(
+        'scene/stamp_pairing.py', 'and scene.frames.get(box) == self._scene.frames.get(box)', '',
+        f'{TEST_TF} -k state_change'),
+    'ticks wait for a fixed box': Mutant(
+        'scene/stamp_pairing.py', 'if box not in self._fixed}', '}', f'{TEST_PAIRING} -k fixed'),
+    'a box that moves again stays fixed': Mutant(
+        'scene/stamp_pairing.py', 'del self._fixed[box]', 'pass', f'{TEST_PAIRING} -k again'),
     'a clock that jumps is not heard': Mutant(
-        NODE, 'self.counts[RESETS] += 1\n            self._evaluator.reset()',
+        NODE, 'self.counts[RESETS] += 1\n            self._evaluator.reset(time_only=True)',
         'pass', 'test/node/test_faults.py -k clock'),
     'a pose of any age': Mutant(
         'scene/stamp_pairing.py',
@@ -484,7 +504,7 @@ MUTANTS = {
         TOPICS, 'PublisherEventCallbacks(use_default_callbacks=False)',
         'PublisherEventCallbacks()', 'test/node/test_faults.py -k topics_go'),
     'publishers gone by what is left': Mutant(
-        'node/qos_events.py', 'event.total_count_change - event.current_count_change',
+        'node/topics/qos_events.py', 'event.total_count_change - event.current_count_change',
         'max(0, -event.current_count_change)', f'{TEST_SCENE_NODE} -k come_and_go_between'),
     'the modulus rises at once': Mutant(
         PATCH_LAW, 'self._modulus = min(self._modulus + self.rise * lacking, borne)',

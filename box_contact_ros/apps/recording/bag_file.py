@@ -21,7 +21,15 @@ from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
-from rosbags.interfaces import Connection
+from rosbags.interfaces import (
+    Connection,
+    Qos,
+    QosDurability,
+    QosHistory,
+    QosLiveliness,
+    QosReliability,
+    QosTime,
+)
 from rosbags.rosbag2 import (
     CompressionFormat,
     CompressionMode,
@@ -43,6 +51,7 @@ NANOSECONDS = 1_000_000_000
 POSE = 'geometry_msgs/msg/PoseStamped'
 POSES = 'geometry_msgs/msg/PoseArray'
 CONTACTS = 'box_contact_msgs/msg/Contacts'
+TRANSFORMS = 'tf2_msgs/msg/TFMessage'
 ALL_CONTACTS = ('contacts', 'contacts_cloud')
 """Topics of all contacts: the contact node publishes one of them, or both."""
 TYPES = {
@@ -59,6 +68,10 @@ TOPICS = ('box_a/pose', 'box_b/pose', 'contact/point', 'contact/normal', *ALL_CO
 """What the contact node hears and says of two boxes."""
 DRAWN = ('markers', 'crane/markers')
 """What Foxglove draws: see `markers`, and the crane."""
+FOR_EVER = QosTime(9223372036, 854775807)
+LATCHED = Qos(QosHistory.KEEP_LAST, 100, QosReliability.RELIABLE, QosDurability.TRANSIENT_LOCAL,
+              FOR_EVER, FOR_EVER, QosLiveliness.AUTOMATIC, FOR_EVER, False)
+"""Of /tf_static: `ros2 bag play` offers what the bag says, and listeners ask for this."""
 
 
 class RecordingError(ValueError):
@@ -109,7 +122,9 @@ class Recorder:
                 self._writer.set_custom_data(name, json.dumps(value))
             self._writer.open()
             self._connections = {
-                topic: self._writer.add_connection(topic, kind, typestore=types)
+                topic: self._writer.add_connection(
+                    topic, kind, typestore=types,
+                    offered_qos_profiles=[LATCHED] if topic.endswith('/tf_static') else [])
                 for topic, kind in self.kinds.items()}
         except (WriterError, OSError) as error:
             raise RecordingError(f'cannot record to {folder}: {error}') from error
@@ -239,6 +254,10 @@ def _of_pair(path: Path, about: Mapping[str, Any], name: str) -> list[_Side]:
         raise RecordingError(f'the scene of {path} has no pair {shown(name)}'
                              + (f' (did you mean {near}?)' if near else ''))
     pair = pairs[name] if name else scene.pairs[0]
+    for box in (pair.a, pair.b):
+        if box in scene.frames:
+            raise RecordingError(f'{path}: {box} is frame {shown(scene.frames[box])} in /tf: pairs '
+                                 'are replayed from pose topics alone')
     return [_Side(box, scene.sources.get(box, POSE_ARRAY), scene.boxes[box].size,
                   scene.boxes[box].pose, scene.moving if scene.pose_array else ())
             for box in (pair.a, pair.b)]

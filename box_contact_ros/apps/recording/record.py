@@ -22,6 +22,7 @@ from visualization_msgs.msg import MarkerArray
 from ...node.messages import ContactsMessage
 from ...node.parameters import outside_ros_args
 from ...node.runtime import ARRAY_QOS, POSE_QOS, GuardedNode, refusals_end, run_node
+from ...node.topics.tf_poses import STATIC_QOS, TF, TF_STATIC, tf_message
 from ...solver.arguments import program_parser
 from ...solver.checks import as_size
 from ..ros_client import DEEP_RELIABLE, pose_topics, read_scene_text
@@ -31,6 +32,7 @@ from .bag_file import (
     DRAWN,
     NANOSECONDS,
     TOPICS,
+    TRANSFORMS,
     TYPES,
     Recorder,
     RecordingError,
@@ -42,6 +44,8 @@ MESSAGES = dict(zip(TYPES.values(), (PoseStamped, PoseArray, PointStamped, Vecto
 TYPE_OF = {message: kind for kind, message in MESSAGES.items()}
 QOS = {PoseStamped: POSE_QOS, PoseArray: ARRAY_QOS}
 """Poses as the contact node takes them, from whatever publisher; all others without loss."""
+OF_FRAMES = {TF: POSE_QOS, TF_STATIC: STATIC_QOS}
+"""What is recorded of a scene that has boxes with frames."""
 PROGRESS_SECONDS = 1.0
 
 
@@ -58,9 +62,11 @@ class RecordNode(GuardedNode):
             folder, list(resolved), {**about, 'topics': resolved}, kinds)
         self._fault: Exception | None = None
         for name, topic in resolved.items():
-            message = MESSAGES[self.recorder.kinds[name]]
-            self.create_subscription(message, topic, partial(self._keep, name),
-                                     QOS.get(message, DEEP_RELIABLE), raw=True)
+            kind = self.recorder.kinds[name]
+            message = tf_message() if kind == TRANSFORMS else MESSAGES[kind]
+            self.create_subscription(
+                message, topic, partial(self._keep, name),
+                OF_FRAMES.get(topic) or QOS.get(message, DEEP_RELIABLE), raw=True)
         if sys.stderr.isatty():
             self.create_timer(PROGRESS_SECONDS, self._show_progress)
         print(f'recording to {folder}: {", ".join(resolved)}', flush=True)
@@ -113,6 +119,11 @@ def node_of(args: Sequence[str]) -> Callable[[Context], RecordNode]:
     if options.scene is not None:
         about['scene'], scene = read_scene_text(options.scene)
         kinds = {topic.name: TYPE_OF[topic.kind] for topic in pose_topics(scene)}
+        if scene.frames and tf_message() is not None:
+            kinds |= dict.fromkeys(OF_FRAMES, TRANSFORMS)
+        elif scene.frames:
+            print(f'not recorded, as tf2_msgs is not installed here: {", ".join(OF_FRAMES)}',
+                  file=sys.stderr)
         topics = topics or [*kinds, *ALL_CONTACTS, *DRAWN]
     topics = topics or [*TOPICS, *DRAWN]
     if ContactsMessage is None:

@@ -5,7 +5,9 @@
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,8 +21,10 @@ from visualization_msgs.msg import MarkerArray
 
 from ...node.messages import read_contacts
 from ...node.runtime import POSE_QOS, GuardedNode
+from ...node.topics.tf_poses import TfPoses, has_tf2
 from ...scene.files.scene_file import SceneError, read_scene
 from ...scene.scene_solver import Scene, two_boxes
+from ...scene.stamp_pairing import NEVER, StampedPose
 from ..ros_client import (
     CRANE_MARKERS,
     PoseTopic,
@@ -58,6 +62,7 @@ class Listener(GuardedNode):
         super().__init__(name, context=context, **options)
         self.log: ViewLog | None = None
         self._poses_of: list[Subscription] = []
+        self._tf = TfPoses(self, Counter())
         subscribe_contacts(self, self._on_contacts, contacts_qos)
 
     def listen_to(self, scene: Scene, **options: Any) -> None:
@@ -69,6 +74,12 @@ class Listener(GuardedNode):
             self.create_subscription(topic.kind, topic.name, self._pose_callback(log, topic),
                                      topic.qos, raw=True)
             for topic in pose_topics(scene)]
+        self._tf.close()
+        if scene.frames and has_tf2():
+            self._tf.listen(scene.frame_id, scene.frames, partial(self._frame_callback, log))
+        elif scene.frames:
+            self.get_logger().warning(f'not drawn, as tf2_ros is not installed here: '
+                                      f'{", ".join(scene.frames)}')
 
     def heard(self) -> None:
         """Do what is to be done when something was written to `log`."""
@@ -77,6 +88,15 @@ class Listener(GuardedNode):
         def callback(data: bytes) -> None:
             poses = topic.read(data)
             log.poses(topic.boxes, poses.stamp, poses.numbers, poses.frame_id)
+            self.heard()
+        return callback
+
+    def _frame_callback(self, log: ViewLog, box: str, _: str) -> Callable[[StampedPose], None]:
+        def callback(pose: StampedPose) -> None:
+            if pose.stamp == NEVER:
+                log.fix(box, pose.numbers)
+            else:
+                log.pose(box, pose.stamp, pose.numbers, pose.frame_id)
             self.heard()
         return callback
 

@@ -127,6 +127,8 @@ class SceneDriver(GuardedNode):
 
     def __init__(self, context: Context, scene: Scene, rate: float) -> None:
         super().__init__('scene_driver', context=context)
+        if scene.frames:
+            raise ValueError(f'boxes with a frame cannot be driven: {", ".join(scene.frames)}')
         self._scene, self._motions = scene, motions(scene)
         self._publishers = [self.create_publisher(topic.kind, topic.name, CONTACT_QOS)
                             for topic in pose_topics(scene)]

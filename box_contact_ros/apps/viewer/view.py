@@ -29,7 +29,7 @@ from typing import TYPE_CHECKING
 from ...node.contact_node import PARAMETERS
 from ...node.parameters import outside_ros_args
 from ...node.runtime import REFUSALS, joined, spin_once
-from ...node.scene_topics import MOST_PAIRS_WITH_TOPICS
+from ...node.topics.scene_topics import MOST_PAIRS_WITH_TOPICS
 from ...scene.files.scene_file import read_scene
 from ...scene.scene_solver import Scene
 from ...solver.arguments import model_name, program_parser, within

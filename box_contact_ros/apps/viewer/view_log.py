@@ -41,7 +41,7 @@ class SceneArrays:
         numbers = {name: number for number, name in enumerate(self.names)}
         self.sizes = np.array([box.size for box in scene.boxes.values()], dtype=float)
         self.fixed = np.array([box.pose or [np.nan] * 7 for box in scene.boxes.values()])
-        """Poses (n, 7), NaN for boxes that move."""
+        """Poses (n, 7), NaN for boxes that move and are not fixed by `ViewLog.fix`."""
         self.moves = np.isnan(self.fixed[:, 0])
         self.moving = {name: numbers[name] for name in scene.moving}
         self.first = np.array([numbers[pair.a] for pair in scene.pairs])
@@ -198,7 +198,8 @@ class ViewLog:
         """Forget everything: another run begins."""
         with self._lock:
             self._tracks: dict[str, deque[tuple[int, np.ndarray]]] = {
-                name: deque() for name in self.scene.moving}
+                name: deque() for name, number in self.scene.moving.items()
+                if np.isnan(self.scene.fixed[number, 0])}
             self._newest = self._frame_id = None
             self._counts: OrderedDict[int, float] = OrderedDict()  # poses by stamp, or ANSWERED
             self._answers: deque[AnsweredTick] = deque(maxlen=KEPT)
@@ -208,10 +209,20 @@ class ViewLog:
         """Take where a moving box is: numbers (7,)."""
         self.poses((box,), stamp, numbers[None], frame_id)
 
+    def fix(self, box: str, numbers: np.ndarray) -> None:
+        """Take where a moving box is at all stamps: numbers (7,)."""
+        with self._lock:
+            self._tracks.pop(box, None)
+            self.scene.fixed[self.scene.moving[box]] = numbers
+
     def poses(self, boxes: Sequence[str], stamp: int, numbers: np.ndarray, frame_id: str = '',
               ) -> None:
         """Take where moving boxes are: numbers (n, 7), NaN for a box that is not there."""
         with self._lock:
+            for box in boxes:
+                if box not in self._tracks:  # fixed so far
+                    self._tracks[box] = deque()
+                    self.scene.fixed[self.scene.moving[box]] = np.nan
             if any(track and stamp < track[-1][0] - RESET
                    for track in map(self._tracks.__getitem__, boxes)):
                 self.start_anew()
@@ -264,9 +275,10 @@ class ViewLog:
         """Return the last pose (n, 7) of each box up to a stamp, and their stamps (n,)."""
         poses = self.scene.fixed.copy()
         stamps = np.full(len(poses), stamp)
-        for name, number in self.scene.moving.items():
+        for name, track in self._tracks.items():
+            number = self.scene.moving[name]
             stamps[number] = 0
-            for at, numbers in reversed(self._tracks[name]):
+            for at, numbers in reversed(track):
                 stamps[number], poses[number] = at, numbers
                 if at <= stamp:
                     break
@@ -277,7 +289,7 @@ class ViewLog:
         while self._counts and now - next(iter(self._counts)) > LOST_AFTER:
             stamp, count = self._counts.popitem(last=False)
             # Before the first answer nobody need have been there.
-            self._lost += bool(count >= len(self.scene.moving) and self._answered
+            self._lost += bool(count >= len(self._tracks) and self._answered
                                and stamp > self._first)
         while self._answers and now - self._answers[0].stamp > WINDOW * NANOSECONDS:
             self._answers.popleft()

@@ -31,7 +31,8 @@ def main(args: Sequence[str] | None = None) -> int:
 
 def meaning(scene: Scene) -> Iterator[str]:
     """Yield what a scene means, line by line."""
-    source_of = dict(scene.sources)
+    source_of = dict(scene.sources) | {
+        name: f'frame {frame} in /tf' for name, frame in scene.frames.items()}
     if scene.pose_array:
         source_of = {name: f'{POSE_ARRAY}[{number}]' for number, name in enumerate(scene.moving)}
     for name, box in scene.boxes.items():
@@ -45,8 +46,10 @@ def meaning(scene: Scene) -> Iterator[str]:
         yield f'size {_size(size)}: {count}'
     topics = list(scene.sources.values())
     yield f'frame: {scene.frame_id or "any, the same for all poses"}'
-    more = ', ...' if len(topics) > 3 else ''
-    yield f'topics in: {len(topics)} ({", ".join(topics[:3])}{more})'
+    named = f' ({", ".join(topics[:3])}{", ..." if len(topics) > 3 else ""})' if topics else ''
+    yield f'topics in: {len(topics)}{named}'
+    if scene.frames:
+        yield f'frames in /tf: {len(scene.frames)}, which need tf2_ros'
     yield f'topics out: contacts, and <pair>/contact/point and /normal of {len(scene.pairs)} pairs'
     moving = sum(box.pose is None for box in scene.boxes.values())
     yield f'{len(scene.boxes)} boxes, {moving} of them moving; {len(scene.pairs)} pairs'

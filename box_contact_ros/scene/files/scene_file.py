@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import os
 import re
+from collections.abc import Callable
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -36,17 +37,18 @@ class SceneError(ValueError):
     """A scene that is refused: where, and why."""
 
 
-def read_scene(source: str | os.PathLike[str]) -> Scene:
+def read_scene(source: str | os.PathLike[str], *,
+               check: Callable[[Scene], None] = lambda _: None) -> Scene:
     """Return the scene of a file, or of a text that begins with `{` or has more than one line.
 
     A path that leads to no file from here may be one of the package's own: config/scenes/…, or the
     bare name of a scene there, such as `yard_bay`.
-    Raises SceneError, whose words name file, line and field.
+    Raises SceneError, whose words name file, line and field. `check` may raise Fault.
     """
     if not isinstance(source, str):
         source = os.fspath(source)
     elif is_inline(source):
-        return parse_scene(source, 'scene')
+        return parse_scene(source, check=check)
     try:
         path = find_file(source)
         if path.exists() and not path.is_file() and not path.is_dir():
@@ -61,7 +63,7 @@ def read_scene(source: str | os.PathLike[str]) -> Scene:
         raise SceneError(f'scene {shown(source)} cannot be read: {reason}') from error
     if len(data) > LARGEST_FILE:
         raise SceneError(f'{source}: larger than {LARGEST_FILE} bytes')
-    return parse_scene(text, source)
+    return parse_scene(text, source, check=check)
 
 
 def is_inline(source: str) -> bool:
@@ -69,12 +71,16 @@ def is_inline(source: str) -> bool:
     return source.lstrip().startswith('{') or '\n' in source
 
 
-def parse_scene(text: str, name: str = 'scene') -> Scene:
-    """Return the scene that a text describes; `name` is how errors call it."""
+def parse_scene(text: str, name: str = 'scene', *,
+                check: Callable[[Scene], None] = lambda _: None) -> Scene:
+    """Return the scene that a text describes; `name` is how errors call it.
+
+    check: Whether the scene can be computed here; it raises Fault.
+    """
     lines: dict[Place, int] = {}
     try:
         text.encode('utf-8')
-        return _scene_of(_plain(text, lines), lines)
+        return _scene_of(_plain(text, lines), lines, check)
     except UnicodeEncodeError as error:
         raise SceneError(f'{name}: not UTF-8 at character {error.start}') from error
     except yaml.YAMLError as error:
@@ -89,18 +95,20 @@ def parse_scene(text: str, name: str = 'scene') -> Scene:
         raise SceneError(f'{name}:{line}: {where}{error.reason}') from None
 
 
-def _scene_of(data: Any, lines: dict[Place, int]) -> Scene:
+def _scene_of(data: Any, lines: dict[Place, int], check: Callable[[Scene], None]) -> Scene:
     """Return the scene that data means, or raise Fault with a place in the data."""
     _check_schema(data, lines)
     boxes, key_of = expand_boxes(data)
     pairs, entry_of = expand_pairs(data['pairs'], boxes)
     try:
-        return Scene(boxes, pairs, data.get('frame_id', ''), data.get('poses') == 'array')
+        scene = Scene(boxes, pairs, data.get('frame_id', ''), data.get('poses') == 'array')
+        check(scene)
     except Fault as error:
         kind, *rest = error.place
         if rest:
             rest[0] = key_of[str(rest[0])] if kind == 'boxes' else entry_of[int(rest[0])]
         raise Fault((kind, *rest), error.reason) from None
+    return scene
 
 
 def write_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
@@ -124,7 +132,8 @@ def scene_text(scene: Scene) -> str:
     lines.append('boxes:')
     for name, box in scene.boxes.items():
         fields = {'size': box.size} | ({'pose': box.pose} if box.pose else {}) | (
-            {'pose_topic': box.pose_topic} if box.pose_topic else {})
+            {'pose_topic': box.pose_topic} if box.pose_topic else {}) | (
+            {'frame': box.frame} if box.frame else {})
         lines.append(f'  {json.dumps(name)}: {json.dumps(fields)}')
     lines.append('pairs:')
     lines += [f'  - {json.dumps(pair._asdict() | {"name": pair.label})}' for pair in scene.pairs]

@@ -1,14 +1,16 @@
 """Topics of a scene: pose subscriptions of its moving boxes, contact publishers of its pairs.
 
 All contacts of a tick go to `contacts` as box_contact_msgs/Contacts, where that package is
-installed, and to `contacts_cloud` as a PointCloud2, where it is asked for. `~/scene` is latched and
+installed, and to `contacts_cloud` as a PointCloud2, where it is asked for. Boxes that are frames
+take their poses from /tf, by `TfPoses`. `~/scene` is latched and
 has the scene as YAML, so that a reader far away, or of a recording, knows boxes and pairs.
 """
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from functools import partial
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from geometry_msgs.msg import PointStamped, PoseArray, PoseStamped, Vector3Stamped
@@ -22,16 +24,17 @@ from rclpy.subscription import Subscription
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import String
 
-from ..scene.files.scene_file import scene_text
-from ..scene.scene_solver import ALL_BOXES, Pair, Scene
-from ..solver.checks import shown
-from .messages import ContactsMessage
-from .parameters import QOS_OVERRIDES, one_of, unknown_name, whole_number
+from ...scene.files.scene_file import scene_text
+from ...scene.scene_solver import ALL_BOXES, Pair, Scene
+from ...solver.checks import shown
+from ..messages import ContactsMessage
+from ..parameters import QOS_OVERRIDES, one_of, unknown_name, whole_number
+from ..rclpy_workarounds import RCLError, parameter_overrides, silence
+from ..runtime import ARRAY_QOS, CONTACT_QOS, LATCHED_QOS, POSE_QOS
 from .qos_events import QosEvents
-from .rclpy_workarounds import RCLError, parameter_overrides, silence
-from .runtime import ARRAY_QOS, CONTACT_QOS, LATCHED_QOS, POSE_QOS
+from .tf_poses import TF, TF_STATIC, TfPoses
 
-TOPICS_OF_EVERY_NODE = ('/diagnostics', '/parameter_events', '/rosout', '/clock')
+TOPICS_OF_EVERY_NODE = ('/diagnostics', '/parameter_events', '/rosout', '/clock', TF, TF_STATIC)
 """Topics of other types than poses."""
 MOST_PAIRS_WITH_TOPICS = 1000
 """Two publishers a pair take milliseconds and memory, here and in every process that listens."""
@@ -67,6 +70,8 @@ class Wanted(NamedTuple):
     sources: Collection[PoseSource] = ()
     pairs: Collection[Pair] = ()
     cloud: bool = False
+    frame_id: str = ''
+    frames: Mapping[str, str] = MappingProxyType({})  # in /tf, by box
 
 
 class SceneTopics:
@@ -90,6 +95,7 @@ class SceneTopics:
                 raise ValueError(f'{name}: {unknown_name("policy", policy, POLICIES)}')
             POLICIES[policy](name, value)
         self.events = QosEvents(node, counts)
+        self.tf = TfPoses(node, counts)
         self.publishers: dict[Pair, tuple[Publisher, Publisher]] = {}  # of point and normal
         self._subscriptions: dict[PoseSource, Subscription] = {}
         self._callback_of: Callable[[str, str], Callable[[Any], None]] | None = None
@@ -130,7 +136,8 @@ class SceneTopics:
         old, was_open = self._wanted, self._scene is not None
         sources = [PoseSource(*source, raw, deadline) for source in scene.sources.items()]
         try:
-            self._change(Wanted(sources, scene.pairs if pair_topics else (), cloud))
+            self._change(Wanted(sources, scene.pairs if pair_topics else (), cloud,
+                                scene.frame_id, scene.frames))
         except RCLError:
             if was_open:
                 self._change(old)
@@ -156,6 +163,7 @@ class SceneTopics:
         """Subscribe to no poses."""
         self._callback_of = None
         self._unsubscribe(list(self._subscriptions))
+        self.tf.close()
 
     def close(self) -> None:
         """Destroy all publishers."""
@@ -175,10 +183,13 @@ class SceneTopics:
 
     def pose_topics(self) -> list[str]:
         """Return the full names of the topics that are subscribed to."""
-        return [subscription.topic_name for subscription in self._subscriptions.values()]
+        return [*(subscription.topic_name for subscription in self._subscriptions.values()),
+                *self.tf.topics()]
 
     def why_silent(self, box: str) -> str:
         """Return who publishes on the topic of a box that has given no pose."""
+        if box in self._wanted.frames:
+            return self.tf.why_silent(box)
         source = next(source for source in self._subscriptions if source.box == box)
         subscription = self._subscriptions[source]
         topic, (wanted, _) = subscription.topic_name, pose_input(source.box)
@@ -243,6 +254,8 @@ class SceneTopics:
                 callback = self._callback_of(source.box, source.topic)
                 subscription = self._subscriptions[source] = self._subscribe(source, callback)
                 self.events.watch(subscription)
+        if self._callback_of is not None:
+            self.tf.listen(wanted.frame_id, wanted.frames, self._callback_of)
 
     def _create(self, kind: type, topic: str, qos: QoSProfile = CONTACT_QOS) -> Publisher:
         """Return a new publisher whose events are served."""

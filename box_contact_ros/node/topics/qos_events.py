@@ -10,8 +10,8 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.subscription import Subscription
 
-from .rclpy_workarounds import serve_event, withhold_events
-from .runtime import LOG_SECONDS
+from ..rclpy_workarounds import serve_event, withhold_events
+from ..runtime import LOG_SECONDS
 
 
 class QosEvents:
