@@ -184,6 +184,14 @@ def test_options_outside_ros_args_are_refused(program, capsys):
     answer_help('contact_node', '', program.PARAMETERS, ['--ros-args', '-p', 'pairing:=stamp'])
 
 
+def test_a_word_that_ros_does_not_know_ends_the_program(capsys):
+    """With one line and status 1: -p is easily forgotten."""
+    assert contact_node.main(['--ros-args', 'model:=exact']) == 1
+    assert capsys.readouterr().err == (
+        "error: after --ros-args, ROS does not know ['model:=exact']: a parameter is "
+        '-p NAME:=VALUE, a name is remapped by -r FROM:=TO\n')
+
+
 @pytest.mark.parametrize('program', [contact_node, soup_node])
 def test_main_serves_its_node(program, monkeypatch):
     """With the arguments that it was given."""
