@@ -18,7 +18,7 @@ from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 from ros_client import Client, serving
 
-from box_contact_ros.node import contact_node, runtime, soup_node
+from box_contact_ros.node import contact_node, runtime, scene_topics, soup_node
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.parameters import answer_help
 from box_contact_ros.node.qos_events import QosEvents
@@ -243,6 +243,17 @@ def test_a_middleware_without_events_is_answered(client):
     with serving(lambda context: WithoutEvents(context, parameter_overrides=[
             Parameter(name, value=value) for name, value in CUBES.items()])):
         client.offer_until_answered(poses.IDENTITY, TOUCHING)
+
+
+def test_a_node_without_the_messages_of_contacts(monkeypatch, capfd):
+    """The log tells where contacts are instead, as `ros2 topic echo /contacts` would wait."""
+    for module in (contact_node, scene_topics):
+        monkeypatch.setattr(module, 'ContactsMessage', None)
+    with serving(lambda context: ContactNode(context, parameter_overrides=[
+            Parameter(name, value=value) for name, value in CUBES.items()])) as node:
+        assert 'contacts are published as contacts_cloud alone' in capfd.readouterr().err
+        topics = {publisher.topic_name for publisher in node.publishers}
+        assert '/contacts_cloud' in topics and '/contacts' not in topics
 
 
 def test_a_node_is_told_of_its_clock_and_of_names_that_are_none(client, capfd):
