@@ -17,7 +17,7 @@ from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any, ClassVar
 
-from rclpy.clock import Clock, JumpThreshold
+from rclpy.clock import Clock, ClockChange, JumpThreshold, TimeJump
 from rclpy.clock_type import ClockType
 from rclpy.context import Context
 from rclpy.duration import Duration
@@ -336,11 +336,13 @@ class ContactNode(LifecycleNode):
                     f'{pairs} {"pair" if pairs == 1 else "pairs"}; poses{frame} from '
                     f'{named}{f" and {more} more" if more > 0 else ""}')
 
-    def _clock_jumped(self, _: Any) -> None:
+    def _clock_jumped(self, jump: TimeJump) -> None:
         if self._evaluator is not None:
             self.counts[RESETS] += 1
             self._evaluator.reset()
-            self.get_logger().warning('time went back: /clock was set back; a new time begins')
+            cause = ('/clock was set back' if jump.clock_change == ClockChange.ROS_TIME_NO_CHANGE
+                     else 'use_sim_time was changed')
+            self.get_logger().warning(f'time went back: {cause}; a new time begins')
 
     def _report(self) -> None:
         """Serve QoS events and publish diagnostics, once a second."""

@@ -267,5 +267,6 @@ def test_a_node_is_told_of_its_clock_and_of_names_that_are_none(client, capfd):
         assert result.reason == "pair_topics must be true or false, not 'yes'"
         node.set_parameters([Parameter('use_sim_time', value=True)])
         assert client.spin(lambda: node.counts[RESETS] == 1)
+        assert 'use_sim_time was changed' in capfd.readouterr().err
         node.trigger_shutdown()
         assert not any('pose' in entity.topic_name for entity in node.subscriptions)
