@@ -11,8 +11,8 @@ from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
-from box_contact_ros.node.contact_node import LAUNCH_ARGUMENTS, PARAMETERS
-from box_contact_ros.node.parameters import descriptions, given_values
+from box_contact_ros.node.contact_node import PARAMETERS
+from box_contact_ros.node.launch_arguments import CONTACT_NODE, descriptions, given_values
 from box_contact_ros.resources import resource_path
 
 RESPAWN_SECONDS = 2.0
@@ -21,7 +21,7 @@ SHIPPED = str(resource_path('config', 'contact_node.yaml'))
 
 def contact_node(context: LaunchContext) -> list[Node]:
     """Return the node with what was given, and nothing else."""
-    given = given_values(context, LAUNCH_ARGUMENTS)
+    given = given_values(context, CONTACT_NODE)
     values = {name: given[name] for name in ('use_sim_time', *PARAMETERS) if name in given}
     if given.get('use_lifecycle_manager'):
         if given.get('autostart'):
@@ -49,6 +49,6 @@ def generate_launch_description() -> LaunchDescription:
     """Return what `ros2 launch` asks for."""
     return LaunchDescription([
         *(DeclareLaunchArgument(name, default_value='', description=description)
-          for name, description in descriptions(LAUNCH_ARGUMENTS).items()),
+          for name, description in descriptions(CONTACT_NODE).items()),
         OpaqueFunction(function=contact_node),
     ])

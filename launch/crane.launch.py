@@ -15,8 +15,8 @@ from launch.actions import (
 from launch_ros.actions import Node
 
 from box_contact_ros.apps.crane.crane_parameters import PARAMETERS
-from box_contact_ros.node.contact_node import LAUNCH_ARGUMENTS
-from box_contact_ros.node.parameters import Setting, descriptions, flag, given_values
+from box_contact_ros.node.launch_arguments import CONTACT_NODE, descriptions, given_values
+from box_contact_ros.node.parameters import Setting, flag
 from box_contact_ros.resources import resource_path
 
 OF_CRANE = {name: PARAMETERS[name] for name in ('rate', 'seed', 'closed_loop')}
@@ -30,7 +30,7 @@ PATIENCE = 30.0
 
 def programs(context: LaunchContext) -> list[Node]:
     """Return what runs beside the contact node."""
-    given = given_values(context, ARGUMENTS | LAUNCH_ARGUMENTS)
+    given = given_values(context, ARGUMENTS | CONTACT_NODE)
 
     def node(program: str, *names: str, before: tuple[str, ...] = (),
              argument: str = '--shared-parameters', **options: object) -> Node:

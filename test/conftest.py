@@ -42,6 +42,8 @@ NICE = 10
 """Niceness of the others: a share of a tenth where a program of a chain wants the processor."""
 
 _modules = count()
+_claims: list[int] = []
+"""The open socket whose name claims this module's domain, as other runs on this host can see."""
 
 
 def _domain_id() -> int:
@@ -51,6 +53,8 @@ def _domain_id() -> int:
     worker = int(os.environ.get('PYTEST_XDIST_WORKER', 'gw0').removeprefix('gw'))
     workers = int(os.environ.get('PYTEST_XDIST_WORKER_COUNT', '1'))
     each = max(1, 101 // workers)
+    while _claims:
+        os.close(_claims.pop())
     for _ in range(each):
         number = (zlib.crc32(run.encode()) + next(_modules)) % each
         domain = 1 + (number * workers + worker) % 101
@@ -60,12 +64,17 @@ def _domain_id() -> int:
 
 
 def _is_free(domain: int) -> bool:
-    """Whether no participant of this host is in a domain: the first one takes this port."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
-        try:
-            taken.bind(('', 7400 + 250 * domain + 10))
-        except OSError:
-            return False
+    """Claim a domain, unless a run of these tests has claimed it or a participant is in it."""
+    claim = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+    try:
+        claim.bind(f'\0box_contact_ros domain {domain}')
+        # The first participant of a domain on this host takes this port.
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as port:
+            port.bind(('', 7400 + 250 * domain + 10))
+    except OSError:
+        claim.close()
+        return False
+    _claims.append(claim.detach())
     return True
 
 
@@ -80,6 +89,9 @@ os.environ['OMP_NUM_THREADS'] = '1'
 if not sys.flags.safe_path and os.getcwd() in sys.path:
     sys.path.remove(os.getcwd())
 os.environ['PYTHONSAFEPATH'] = '1'
+# Options that colcon gives to this run, such as the file of results, are not for runs that tests
+# start.
+os.environ.pop('PYTEST_ADDOPTS', None)
 
 from box_contact_ros.cli import MODULES_OF_EXTRA, PROGRAMS
 

@@ -36,12 +36,10 @@ from .diagnostics import DIAGNOSTICS_SECONDS, Diagnostics
 from .evaluator import SERIALIZATIONS, Evaluator
 from .messages import ContactsMessage
 from .parameters import (
-    EVERY_LAUNCH,
     CheckedParameters,
     Limits,
     Setting,
     answer_help,
-    existing_file,
     flag,
     number,
     one_of,
@@ -104,16 +102,6 @@ PARAMETERS = {
     'locked': Setting(False, 'whether all parameters and states stay as they are after the start',
                       flag, fixed=True),
 }
-LAUNCH_ARGUMENTS = EVERY_LAUNCH | {
-    'params_file': Setting('the shipped config/contact_node.yaml',
-                           'file of parameters; arguments override it', existing_file),
-    'name': Setting('contact_node', 'name of the node', text),
-    'respawn': Setting(False, 'whether the node is started anew, 2 s after it has ended', flag),
-    'use_lifecycle_manager': Setting(
-        False, 'whether a lifecycle manager configures and activates the node: autostart is '
-        'false; the node has no bond, so bond_timeout of the manager must be 0.0', flag),
-} | PARAMETERS
-"""Arguments of contact_node.launch.py: the parameters of the node, and what is not a parameter."""
 
 
 def _files(settings: Mapping[str, Any]) -> dict[str, str]:

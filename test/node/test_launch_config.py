@@ -21,8 +21,8 @@ import yaml
 
 from box_contact_ros.apps.crane.crane_parameters import PARAMETERS as CRANE_PARAMETERS
 from box_contact_ros.cli import PROGRAMS
-from box_contact_ros.node.contact_node import LAUNCH_ARGUMENTS, PARAMETERS
-from box_contact_ros.node.parameters import descriptions, value_of
+from box_contact_ros.node.contact_node import PARAMETERS
+from box_contact_ros.node.launch_arguments import CONTACT_NODE, descriptions, value_of
 from box_contact_ros.scene.files.scene_file import read_scene
 from box_contact_ros.scene.scene_solver import Pair, Scene
 
@@ -35,7 +35,7 @@ ROOT = Path(__file__).resolve().parents[2]
     ('max_age', '2', 2.0), ('size_a', '[1,2,3.5]', (1.0, 2.0, 3.5)), ('respawn', 'True', True),
     ('model', 'exact', 'exact'), ('namespace', '7', '7'), ('use_sim_time', 'false', False)])
 def test_an_argument_s_text_is_read_as_its_type(name: str, text: str, value: Any) -> None:
-    found = value_of(name, text, LAUNCH_ARGUMENTS[name])
+    found = value_of(name, text, CONTACT_NODE[name])
     assert found == value and type(found) is type(value)
 
 
@@ -48,12 +48,12 @@ def test_an_argument_s_text_is_read_as_its_type(name: str, text: str, value: Any
     ('model', 'exakt', 'exakt')])
 def test_a_bad_argument_is_refused_by_name_and_value(name: str, text: str, words: str) -> None:
     with pytest.raises(ValueError, match=words):
-        value_of(name, text, LAUNCH_ARGUMENTS[name])
+        value_of(name, text, CONTACT_NODE[name])
 
 
 def test_arguments_tell_what_holds_if_they_are_left_out() -> None:
-    assert set(descriptions(LAUNCH_ARGUMENTS)) > set(PARAMETERS)
-    assert descriptions(LAUNCH_ARGUMENTS)['model'].endswith('; if left out: mlp')
+    assert set(descriptions(CONTACT_NODE)) > set(PARAMETERS)
+    assert descriptions(CONTACT_NODE)['model'].endswith('; if left out: mlp')
 
 
 # --- launch files, by ROS's own launch ------------------------------------------------------------

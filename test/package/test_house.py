@@ -1,4 +1,4 @@
-"""The house of the package: order of imports, names, sizes of folders and functions.
+"""The house of the package: order of imports, what the root holds, length of functions.
 
 DESIGN's list of folders is `FOLDERS`: a folder imports only folders that stand above it.
 """
@@ -6,9 +6,7 @@ from __future__ import annotations
 
 import ast
 import subprocess
-from collections import defaultdict
 from collections.abc import Iterator
-from itertools import chain
 from pathlib import Path
 
 import pytest
@@ -22,9 +20,6 @@ EVERYBODYS = ('output', 'resources')
 """Root modules that every folder may import, and that import none of the folders."""
 ROOT_MODULES = ('__init__', '__main__', 'cli', *EVERYBODYS)
 ROOT_ENTRIES = {*FOLDERS, *(f'{name}.py' for name in ROOT_MODULES), 'py.typed'}
-ENTRIES_MAX = 8
-ENTRIES_MAX_OF = {'node': 12, 'core/*.hpp': 12}
-"""Larger limits. The core's headers are counted apart from the core's other entries."""
 FUNCTION_LINES_MAX = 60
 
 
@@ -118,52 +113,15 @@ def may_import(own: str, part: str) -> bool:
     return part in ROOT_MODULES
 
 
-# --- names ----------------------------------------------------------------------------------------
+# --- contents ------------------------------------------------------------------------------------
 
 
-def twice(places: Iterator[tuple[str, str]]) -> Iterator[str]:
-    """Yield the names that stand in several places."""
-    found = defaultdict(list)
-    for name, place in places:
-        found[name].append(place)
-    for name, where in sorted(found.items()):
-        if len(where) > 1:
-            yield f'{name}: {", ".join(where)}'
-
-
-def basename_faults(house: House) -> Iterator[str]:
-    """Yield basenames that several modules share; a stub belongs to its module."""
-    modules = {file.with_suffix('') for file in house.trees if file.stem != '__init__'}
-    headers = [file for file in house.files if file.suffix in ('.hpp', '.cpp')]
-    yield from twice((file.name, house.name(file)) for file in chain(sorted(modules), headers))
-
-
-def class_faults(house: House) -> Iterator[str]:
-    """Yield names that several classes share."""
-    yield from twice((node.name, f'{house.name(file)}:{node.lineno}')
-                     for file, node in house.definitions(ast.ClassDef))
-
-
-# --- sizes ----------------------------------------------------------------------------------------
-
-
-def entry_faults(house: House) -> Iterator[str]:
-    """Yield folders with too many entries, and what does not belong into the root."""
-    entries = defaultdict(set)
-    for file in house.files:
-        parts = file.relative_to(house.package).parts
-        for depth, part in enumerate(parts):
-            folder = '/'.join(parts[:depth])
-            headers = '/*.hpp' if folder == 'core' and part.endswith('.hpp') else ''
-            entries[folder + headers].add(part)
-    root = entries.pop('')
+def root_faults(house: House) -> Iterator[str]:
+    """Yield what does not belong into the root, and what it lacks."""
+    root = {file.relative_to(house.package).parts[0] for file in house.files}
     for verb, names in (('has', root - ROOT_ENTRIES), ('lacks', ROOT_ENTRIES - root)):
         if names:
             yield f'the root {verb} {", ".join(sorted(names))}'
-    for folder, names in sorted(entries.items()):
-        most = ENTRIES_MAX_OF.get(folder, ENTRIES_MAX)
-        if len(names) > most:
-            yield f'{folder} has {len(names)} entries, and may have {most}'
 
 
 def function_faults(house: House) -> Iterator[str]:
@@ -176,9 +134,7 @@ def function_faults(house: House) -> Iterator[str]:
 
 RULES = {
     f'A folder imports only folders above it: {", ".join(FOLDERS)}.': import_faults,
-    'No two modules share a basename.': basename_faults,
-    f'A folder has at most {ENTRIES_MAX} entries (headers of the core, node: 12).': entry_faults,
-    'No two classes share a name.': class_faults,
+    'The root holds these folders and a few modules.': root_faults,
     f'A function has at most {FUNCTION_LINES_MAX} lines.': function_faults,
 }
 
@@ -240,10 +196,9 @@ def test_what_is_ignored_is_not_counted(tmp_path: Path, sound: dict[str, str], g
     if git:
         subprocess.run(['git', 'init', '-q', tmp_path], check=True)
         (tmp_path / '.gitignore').write_text('*.so\n__pycache__/\n')
-    built = {f'scene/{number}.so': '' for number in range(9)}
+    built = {'more.so': ''}
     assert report(planted(tmp_path, sound | built)) == ''
-    assert 'scene has 9 entries' in report(planted(
-        tmp_path, sound | {f'scene/{number}.txt': '' for number in range(8)}))
+    assert 'the root has more.txt' in report(planted(tmp_path, sound | {'more.txt': ''}))
 
 
 IMPORTS = [
@@ -273,19 +228,7 @@ def test_an_import_against_the_order_is_found(tmp_path: Path, sound: dict[str, s
 
 
 OTHERS = [
-    (basename_faults, {'node/ask.py': ''}, 'ask: node/ask, solver/ask'),
-    (basename_faults, {'apps/_native.pyi': ''}, '_native: apps/_native, core/_native'),
-    (basename_faults, {'core/a.hpp': '', 'core/b/a.hpp': ''}, 'a.hpp: core/a.hpp, core/b/a.hpp'),
-    (class_faults, {'node/a.py': '\nclass One: ...', 'apps/b.py': 'def f():\n  class One: ...'},
-     'One: apps/b.py:2, node/a.py:2'),
-    (class_faults, {'node/a.py': 'class Pair: ...'}, 'Pair: core/_native.pyi:1, node/a.py:1'),
-    (entry_faults, {f'apps/a/{n}.py': '' for n in range(9)},
-     'apps/a has 9 entries, and may have 8'),
-    (entry_faults, {f'node/{n}.py': '' for n in range(12)},
-     'node has 13 entries, and may have 12'),
-    (entry_faults, {f'core/{n}.hpp': '' for n in range(13)},
-     'core/*.hpp has 13 entries, and may have 12'),
-    (entry_faults, {'tools.py': '', 'more/one.py': ''}, 'the root has more, tools.py'),
+    (root_faults, {'tools.py': '', 'more/one.py': ''}, 'the root has more, tools.py'),
     (function_faults, {'scene/a.py': 'def f():' + '\n  1' * 60}, 'scene/a.py:1 f has 61 lines'),
     (function_faults, {'scene/a.py': 'class A:\n  async def f():' + '\n    1' * 60},
      'scene/a.py:2 f has 61 lines'),
@@ -302,12 +245,9 @@ def test_another_fault_is_found(tmp_path: Path, sound: dict[str, str], rule: obj
 
 def test_a_missing_folder_is_found(tmp_path: Path, sound: dict[str, str]) -> None:
     del sound['apps/__init__.py']
-    assert list(entry_faults(planted(tmp_path, sound))) == ['the root lacks apps']
+    assert list(root_faults(planted(tmp_path, sound))) == ['the root lacks apps']
 
 
 def test_as_much_as_may_be(tmp_path: Path, sound: dict[str, str]) -> None:
-    """Limits themselves are no faults."""
-    limits = {f'scene/{n}.txt': '' for n in range(7)} | {f'node/{n}.txt': '' for n in range(11)}
-    limits |= {f'core/{n}.hpp': '' for n in range(12)}
-    limits['apps/a.py'] = 'def f():' + '\n  1' * 59
-    assert report(planted(tmp_path, sound | limits)) == ''
+    """The limit itself is no fault."""
+    assert report(planted(tmp_path, sound | {'apps/a.py': 'def f():' + '\n  1' * 59})) == ''

@@ -227,7 +227,7 @@ class ViewLog:
             self._counts[stamp] = self._counts.get(stamp, 0) + len(boxes)
 
     def contacts(self, stamp: int, rows: np.ndarray, received: int, frame_id: str = '') -> None:
-        """Take the contacts (rows of messages.CLOUD_ROW) of a tick, received at this time [ns].
+        """Take what a tick found: rows of messages.CLOUD_ROW, received at this time [ns].
 
         A row of NaN says that its pair could not be evaluated. Pairs that are close, without a
         point, are left out. Raises OtherSceneError.
