@@ -334,7 +334,8 @@ class ContactNode(LifecycleNode):
 
     def _report(self) -> None:
         """Serve QoS events and publish diagnostics, once a second."""
-        self._topics.events.serve()
+        if self._topics.serve_events() and self._evaluator is not None:
+            self._evaluator.desert()
         state = lifecycle_state(self)
         if self._evaluator is None:
             self._diagnostics.publish(self.counts, state=state, pairs=0)

@@ -78,6 +78,10 @@ class Evaluator:
         """Forget all poses."""
         self._pairing.reset()
 
+    def desert(self) -> None:
+        """Note that publishers of all boxes have gone: others may begin a new time."""
+        self._pairing.desert()
+
     def pose_callback(self, box: str, topic: str) -> Callable[[Any], None]:
         """Return the callback for the poses of a box, or of all; it raises nothing at all."""
         def callback(message: Any) -> None:

@@ -31,7 +31,10 @@ any      older stamp that was taken                same      held back, else REP
 any      stamp older than all remembered ones      same      held back, else OLD
 any      stamp RESET before its newest             unseen    RESETS, for all boxes
 any      AGAIN stamps are held back                unseen    RESETS, for all boxes
+any      newest or older stamp, deserted           unseen    RESETS, for all boxes
 ```
+Deserted: publishers of all boxes have gone, and no box has had a newer stamp since.
+
 A recording that is played in a loop repeats its stamps. Poses whose stamps were taken before are
 held back, as long as they advance and no box has a newer stamp. The last of AGAIN of one box begins
 a new time, with all poses that were held back. Else they are refused. A stream that sends each
@@ -145,6 +148,7 @@ class Pairing(ABC):
         self.notes: dict[str, Note] = {}
         """The last pose of each kind that is counted. Whoever logs them clears them."""
         self._now = NEVER  # newest stamp of all boxes
+        self._deserted = False
         self._held: dict[str, list[tuple[str, StampedPose]]] = {}
         """Poses by box whose stamps were taken before, and what they are counted as so far."""
         self._boxes: dict[str, BoxState] = {}
@@ -161,7 +165,12 @@ class Pairing(ABC):
         self._boxes = {box: BoxState(came=state.came or state.newest != NEVER)
                        for box, state in self._boxes.items()}
         self._now = NEVER
+        self._deserted = False
         self._held.clear()
+
+    def desert(self) -> None:
+        """Note that publishers of all boxes have gone: others may begin a new time."""
+        self._deserted = True
 
     @abstractmethod
     def add(self, box: str, pose: StampedPose) -> list[Tick]:
@@ -196,9 +205,11 @@ class Pairing(ABC):
     def _state_at(self, box: str, stamp: int) -> BoxState:
         """Return the state of a box, after a reset if its stamp shows that time was set back."""
         state = self._boxes[box]
-        if stamp < state.newest - RESET:
+        if stamp < state.newest - (0 if self._deserted else RESET):
             self._set_back(box, stamp)
             return self._boxes[box]
+        if stamp > state.newest != NEVER:
+            self._deserted = False
         return state
 
     def _set_back(self, box: str, stamp: int) -> None:
@@ -289,6 +300,9 @@ class StampPairing(Pairing):
             if self._held:
                 self._refuse_held()
         elif stamp == state.newest:
+            if self._deserted:
+                self._set_back(box, stamp)
+                return self.add(box, pose)
             self._count(REPEATED, box, stamp)
             return []
         elif kind := self._fault(state, stamp):
