@@ -34,9 +34,11 @@ CUBES = {'size_a': [2.0, 2.0, 2.0], 'size_b': [2.0, 2.0, 2.0], 'model': 'exact'}
 HEIGHTS = {'box_a': 0.0, 'box_b': 1.9}
 THREE = ('{boxes: {a: {size: [2, 2, 2]}, b: {size: [2, 2, 2]}, c: {size: [2, 2, 2]}}, '
          'pairs: [{a: a, b: b}, {a: b, b: c}]}')
-PARAMETERS = {'latest_clocks': {'pairing': 'latest'}, 'three': {'scene': THREE},
-              'deadline': {'deadline': 0.2},
-              'unconfigured': {'autostart': False}, 'inactive': {'autostart': False}}
+PARAMETERS = {case: CUBES | values for case, values in {
+    'latest_clocks': {'pairing': 'latest'},
+    'deadline': {'deadline': 0.2},
+    'unconfigured': {'autostart': False}, 'inactive': {'autostart': False}}.items()}
+PARAMETERS['three'] = {'scene': THREE, 'model': 'exact'}
 
 
 def pose_of(box, stamp, frame='map', w=1.0, z=None):
@@ -83,7 +85,7 @@ class FirstRuns:
             rclpy.init(context=context)
         self.nodes = {case: ContactNode(self.contexts[0], namespace=case, parameter_overrides=[
             Parameter(name, value=value)
-            for name, value in (CUBES | PARAMETERS.get(case, {})).items()]) for case in CASES}
+            for name, value in PARAMETERS.get(case, CUBES).items()]) for case in CASES}
         self.nodes['inactive'].trigger_configure()
         self.client = Node('client', context=self.contexts[1])
         self.executors = [make_executor(context) for context in self.contexts]
