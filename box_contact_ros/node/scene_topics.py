@@ -191,8 +191,13 @@ class SceneTopics:
         """Return the full names of the topics that are subscribed to."""
         return [subscription.topic_name for subscription in self._subscriptions.values()]
 
+    def is_heard(self, box: str) -> bool:
+        """Return whether somebody publishes poses of a box that the node hears."""
+        return any(source.box == box and subscription.get_publisher_count()
+                   for source, subscription in self._subscriptions.items())
+
     def why_silent(self, box: str) -> str:
-        """Return who publishes on the topic of a box that has given no pose."""
+        """Return who publishes on the topic of a box that gives no pose."""
         source = next(source for source in self._subscriptions if source.box == box)
         subscription = self._subscriptions[source]
         topic, (wanted, _) = subscription.topic_name, pose_input(source.box)

@@ -190,9 +190,10 @@ class Pairing(ABC):
         """Return how many of the refused poses are held back, and may yet be answered."""
         return Counter(kind for held in self._held.values() for kind, _ in held)
 
-    def behind(self, box: str) -> int:
-        """Return how far [ns] the newest stamp of a box is behind that of all."""
-        return self._now - self._boxes[box].newest
+    def behind(self, box: str) -> int | None:
+        """Return how far [ns] the newest stamp of a box is behind that of all; None: none came."""
+        newest = self._boxes[box].newest
+        return None if newest == NEVER else self._now - newest
 
     def mismatch(self, pairs: Iterable[tuple[str, str]]) -> Mismatch | None:
         """Return the first of the pairs of boxes whose stamps keep them apart, if there is one."""
