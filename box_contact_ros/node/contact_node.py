@@ -17,7 +17,7 @@ from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any, ClassVar
 
-from rclpy.clock import Clock, JumpThreshold
+from rclpy.clock import Clock, ClockChange, JumpThreshold, TimeJump
 from rclpy.clock_type import ClockType
 from rclpy.context import Context
 from rclpy.duration import Duration
@@ -162,9 +162,11 @@ class ContactNode(LifecycleNode):
         self._raises_faults = False
         if values['locked']:
             refuse_transitions(self)
-        self._topics.warn_of_unused_qos()
+        if ContactsMessage is None:
+            self.get_logger().warning('box_contact_msgs is not installed: contacts are published '
+                                      'as contacts_cloud alone')
         # Last: a program that waits for this line may end the node at once.
-        self._log_scene('ready', values)
+        self._log_state('ready' if values['autostart'] else 'unconfigured')
 
     @staticmethod
     def make_solver(settings: Mapping[str, Any], scene: Scene) -> SceneSolver:
@@ -179,6 +181,7 @@ class ContactNode(LifecycleNode):
         """
         if not self._attempt(lambda: self._apply(self._settings.values)):
             return TransitionCallbackReturn.FAILURE
+        self._log_state('configured')
         return super().on_configure(state)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -188,12 +191,14 @@ class ContactNode(LifecycleNode):
         """
         if not self._attempt(self._activate):
             return TransitionCallbackReturn.FAILURE
+        self._log_state('ready')
         return super().on_activate(state)
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Unsubscribe, and forget the poses that wait. SUCCESS: inactive."""
         self._topics.deactivate()
         self._configured.reset()
+        self._log_state('inactive')
         return super().on_deactivate(state)
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -201,11 +206,13 @@ class ContactNode(LifecycleNode):
         self._configured.close()
         self._evaluator = None
         self._topics.close()
+        self._log_state('unconfigured')
         return super().on_cleanup(state)
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Unsubscribe; `destroy_node` does the rest. SUCCESS: finalized."""
         self._topics.deactivate()
+        self._log_state('finalized')
         return super().on_shutdown(state)
 
     def destroy_node(self) -> None:
@@ -289,12 +296,20 @@ class ContactNode(LifecycleNode):
             self._evaluator.set_solver(solver, settings)
             self._topics.tf.look_up()
 
+    def _log_state(self, what: str) -> None:
+        """Log a state that a transition has brought; the start itself logs its last one alone."""
+        if self._raises_faults:
+            return
+        if what in ('configured', 'ready'):
+            self._topics.warn_of_unused_qos()
+            self._log_scene(what, self._settings.values)
+        else:
+            self.get_logger().info(f'{what}: no pose is answered')
+
     def _log_scene(self, what: str, settings: Mapping[str, Any]) -> None:
         """Log what the node works on, and warn of weights that do not serve it."""
+        assert self._evaluator is not None
         logger = self.get_logger()
-        if self._evaluator is None:
-            logger.info('unconfigured: autostart is false')
-            return
         solver, scene = self._evaluator.solver, self._evaluator.solver.scene
         entry, _ = find_model('model', solver.model)
         if settings.get('weights') and 'weights' not in entry.takes:
@@ -311,15 +326,18 @@ class ContactNode(LifecycleNode):
                     f'{pairs} {"pair" if pairs == 1 else "pairs"}; poses{frame} from '
                     f'{named}{f" and {more} more" if more > 0 else ""}')
 
-    def _clock_jumped(self, _: Any) -> None:
+    def _clock_jumped(self, jump: TimeJump) -> None:
         if self._evaluator is not None:
             self.counts[RESETS] += 1
             self._evaluator.reset(time_only=True)
-            self.get_logger().warning('time went back: /clock was set back; a new time begins')
+            cause = ('/clock was set back' if jump.clock_change == ClockChange.ROS_TIME_NO_CHANGE
+                     else 'use_sim_time was changed')
+            self.get_logger().warning(f'time went back: {cause}; a new time begins')
 
     def _report(self) -> None:
         """Serve QoS events and publish diagnostics, once a second."""
-        self._topics.events.serve()
+        if self._topics.serve_events() and self._evaluator is not None:
+            self._evaluator.desert()
         state = lifecycle_state(self)
         if self._evaluator is None:
             self._diagnostics.publish(self.counts, state=state, pairs=0)

@@ -80,6 +80,10 @@ class Evaluator:
         if not time_only:
             self._pairing.release()
 
+    def desert(self) -> None:
+        """Note that publishers of all boxes have gone: others may begin a new time."""
+        self._pairing.desert()
+
     def pose_callback(self, box: str, topic: str) -> Callable[[Any], None]:
         """Return the callback for the poses of a box, or of all; it raises nothing at all.
 
@@ -129,10 +133,11 @@ class Evaluator:
         counts[OUTSIDE] += self.solver.exact_answers
         scene = self.solver.scene
         look = self._diagnostics.look(counts, self._settings['max_age'])
-        unseen = [box for box in self._pairing.unseen() if box not in self._refused_boxes]
+        never = self._pairing.unseen()
+        unseen = [box for box in never if box not in self._refused_boxes]
         stale = ([box for box, absent in zip(scene.moving, self._absent) if absent]
                  if scene.pose_array
-                 else [box for box in self._pairing.stale() if box not in unseen])
+                 else [box for box in self._pairing.stale() if box not in never])
         findings = list(self._findings(look, unseen, stale)) if state == ACTIVE else []
         self._diagnostics.log(findings)
         self._diagnostics.publish(
@@ -161,9 +166,11 @@ class Evaluator:
             yield self._without_partner(look)
 
     def _why_stale(self, box: str) -> str:
-        behind, max_age = 1e-9 * self._pairing.behind(box), self._settings['max_age']
-        return (f'the newest stamp of {box} is {behind:.3g} s behind, max_age is {max_age:g} s; '
-                'does its publisher live, and stamp by the same clock?')
+        behind, max_age = self._pairing.behind(box), self._settings['max_age']
+        if behind is None or not self._topics.is_heard(box):
+            return self._topics.why_silent(box)
+        return (f'the newest stamp of {box} is {1e-9 * behind:.3g} s behind, max_age is '
+                f'{max_age:g} s; does its publisher live, and stamp by the same clock?')
 
     def _without_partner(self, look: Look) -> Finding:
         """Return by how much the stamps of a pair differ, and the tolerance that would do."""

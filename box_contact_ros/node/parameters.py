@@ -172,9 +172,9 @@ def _say_unknown(node: Node, settings: Mapping[str, Setting]) -> None:
 
 
 def unknown_name(kind: str, name: str, known: Iterable[str]) -> str:
-    """Return the refusal of a name that there is not, with the nearest name that there is."""
-    nearest = get_close_matches(name, known, n=1, cutoff=0.0)[0]
-    return f'unknown {kind} {shown(name)}; the nearest name is {nearest}'
+    """Return the refusal of a name that there is not, with the nearest name if one is near."""
+    nearest = ''.join(get_close_matches(name, known, n=1))
+    return f'unknown {kind} {shown(name)}' + (nearest and f'; the nearest name is {nearest}')
 
 
 def checked(settings: Mapping[str, Setting], values: Mapping[str, Any]) -> dict[str, Any]:

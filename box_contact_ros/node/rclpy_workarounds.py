@@ -19,6 +19,9 @@ from rclpy.subscription import Subscription
 RCLError = rclpy_implementation.RCLError
 """Symptom: what the middleware refuses raises a type without a public name.
 Test: test_scene_node.py::test_a_scene_that_fails_half_way_is_taken_back."""
+UnknownROSArgsError = rclpy_implementation.UnknownROSArgsError
+"""Symptom: so does a word after --ros-args that is no option, and rclpy raises a RuntimeError.
+Test: test_runtime.py::test_a_word_that_ros_does_not_know_ends_the_program."""
 CHANGES = ('total_count_change', 'current_count_change', 'not_alive_count_change')
 """What events count since they were last taken; each kind has some of these."""
 

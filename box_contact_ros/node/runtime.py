@@ -28,7 +28,7 @@ from rclpy.task import Future
 from rclpy.timer import Timer
 
 from .parameters import reason_of
-from .rclpy_workarounds import RCLError, ends_within, keep_for_ever
+from .rclpy_workarounds import RCLError, UnknownROSArgsError, ends_within, keep_for_ever
 
 EventsExecutor: Any = None
 with contextlib.suppress(ImportError):  # rclpy before 7.1.4
@@ -209,8 +209,12 @@ def joined(make_node: Callable[[Context], NodeKind], args: Sequence[str] | None 
     node = executor = None
     with interrupted_once() as begin_end:
         # Handlers have to be asked for where the context is not the default one.
-        rclpy.init(args=None if args is None else list(args), context=context,
-                   signal_handler_options=signals)
+        try:
+            rclpy.init(args=None if args is None else list(args), context=context,
+                       signal_handler_options=signals)
+        except UnknownROSArgsError as error:
+            raise ValueError(f'after --ros-args, ROS does not know {error}: a parameter is '
+                             '-p NAME:=VALUE, a name is remapped by -r FROM:=TO') from error
         try:
             node = make_node(context)
             executor = make_executor(context)

@@ -31,7 +31,10 @@ any      older stamp that was taken                same      held back, else REP
 any      stamp older than all remembered ones      same      held back, else OLD
 any      stamp RESET before its newest             unseen    RESETS, for all boxes
 any      AGAIN stamps are held back                unseen    RESETS, for all boxes
+any      newest or older stamp, deserted           unseen    RESETS, for all boxes
 ```
+Deserted: publishers of all boxes have gone, and no box has had a newer stamp since.
+
 A recording that is played in a loop repeats its stamps. Poses whose stamps were taken before are
 held back, as long as they advance and no box has a newer stamp. The last of AGAIN of one box begins
 a new time, with all poses that were held back. Else they are refused. A stream that sends each
@@ -145,6 +148,7 @@ class Pairing(ABC):
         self.notes: dict[str, Note] = {}
         """The last pose of each kind that is counted. Whoever logs them clears them."""
         self._now = NEVER  # newest stamp of all boxes
+        self._deserted = False
         self._held: dict[str, list[tuple[str, StampedPose]]] = {}
         """Poses by box whose stamps were taken before, and what they are counted as so far."""
         self._boxes: dict[str, BoxState] = {}
@@ -184,7 +188,12 @@ class Pairing(ABC):
         self._boxes = {box: BoxState(came=state.came or state.newest != NEVER)
                        for box, state in self._boxes.items()}
         self._now = NEVER
+        self._deserted = False
         self._held.clear()
+
+    def desert(self) -> None:
+        """Note that publishers of all boxes have gone: others may begin a new time."""
+        self._deserted = True
 
     @abstractmethod
     def add(self, box: str, pose: StampedPose) -> list[Tick]:
@@ -204,9 +213,10 @@ class Pairing(ABC):
         """Return how many of the refused poses are held back, and may yet be answered."""
         return Counter(kind for held in self._held.values() for kind, _ in held)
 
-    def behind(self, box: str) -> int:
-        """Return how far [ns] the newest stamp of a box is behind that of all."""
-        return self._now - self._boxes[box].newest
+    def behind(self, box: str) -> int | None:
+        """Return how far [ns] the newest stamp of a box is behind that of all; None: none came."""
+        newest = self._boxes[box].newest
+        return None if newest == NEVER else self._now - newest
 
     def mismatch(self, pairs: Iterable[tuple[str, str]]) -> Mismatch | None:
         """Return the first of the pairs of boxes whose stamps keep them apart, if there is one."""
@@ -222,9 +232,11 @@ class Pairing(ABC):
             del self._fixed[box]
             self.set_scene(self._scene)
         state = self._boxes[box]
-        if stamp < state.newest - RESET:
+        if stamp < state.newest - (0 if self._deserted else RESET):
             self._set_back(box, stamp)
             return self._boxes[box]
+        if stamp > state.newest != NEVER:
+            self._deserted = False
         return state
 
     def _set_back(self, box: str, stamp: int) -> None:
@@ -319,6 +331,9 @@ class StampPairing(Pairing):
             if self._held:
                 self._refuse_held()
         elif stamp == state.newest:
+            if self._deserted:
+                self._set_back(box, stamp)
+                return self.add(box, pose)
             self._count(REPEATED, box, stamp)
             return []
         elif kind := self._fault(state, stamp):

@@ -180,7 +180,7 @@ def test_a_clock_that_jumps_back(start, client):
 
     What was known of the old time is dropped, and the new time is answered from its first tick.
     """
-    start('use_sim_time:=true')
+    running = start('use_sim_time:=true')
     clock = client.node.create_publisher(Clock, '/clock', 10)
 
     def set_clock(stamp):
@@ -210,6 +210,7 @@ def test_a_clock_that_jumps_back(start, client):
         tick(stamp)
     assert client.spin(lambda: all(stamp in client.clouds for stamp in few)), len(client.clouds)
     assert client.counts()['time went back'] >= 1
+    assert 'time went back: /clock was set back' in running.output
 
 
 def test_a_storm_of_parameters(start, client):

@@ -34,9 +34,11 @@ CUBES = {'size_a': [2.0, 2.0, 2.0], 'size_b': [2.0, 2.0, 2.0], 'model': 'exact'}
 HEIGHTS = {'box_a': 0.0, 'box_b': 1.9}
 THREE = ('{boxes: {a: {size: [2, 2, 2]}, b: {size: [2, 2, 2]}, c: {size: [2, 2, 2]}}, '
          'pairs: [{a: a, b: b}, {a: b, b: c}]}')
-PARAMETERS = {'latest_clocks': {'pairing': 'latest'}, 'three': {'scene': THREE},
-              'deadline': {'deadline': 0.2},
-              'unconfigured': {'autostart': False}, 'inactive': {'autostart': False}}
+PARAMETERS = {case: CUBES | values for case, values in {
+    'latest_clocks': {'pairing': 'latest'}, 'latest_bad': {'pairing': 'latest'},
+    'deadline': {'deadline': 0.2},
+    'unconfigured': {'autostart': False}, 'inactive': {'autostart': False}}.items()}
+PARAMETERS['three'] = {'scene': THREE, 'model': 'exact'}
 
 
 def pose_of(box, stamp, frame='map', w=1.0, z=None):
@@ -60,6 +62,7 @@ def poses(case, number, now):
         'mistyped': lambda: {'box_a': both['box_a'], 'box_b': Pose()},
         'deadline': lambda: both,
         'slash': lambda: {'box_a': both['box_a'], 'box_b': pose_of('box_b', now, '/map')},
+        'latest_bad': lambda: {'box_a': both['box_a'], 'box_b': pose_of('box_b', now, w=0.0)},
         'bad': lambda: {'box_a': pose_of('box_a', now, w=0.0),
                         'box_b': pose_of('box_b', now, z=math.nan)},
         'loop': lambda: {box: pose_of(box, number % 10 * SECOND // RATE) for box in HEIGHTS},
@@ -70,7 +73,8 @@ def poses(case, number, now):
 
 
 CASES = ('good', 'zero', 'apart', 'clocks', 'latest_clocks', 'alone', 'mistyped', 'deadline',
-         'slash', 'bad', 'loop', 'stopped', 'stale', 'three', 'silent', 'unconfigured', 'inactive')
+         'slash', 'bad', 'latest_bad', 'loop', 'stopped', 'stale', 'three', 'silent',
+         'unconfigured', 'inactive')
 
 
 class FirstRuns:
@@ -83,7 +87,7 @@ class FirstRuns:
             rclpy.init(context=context)
         self.nodes = {case: ContactNode(self.contexts[0], namespace=case, parameter_overrides=[
             Parameter(name, value=value)
-            for name, value in (CUBES | PARAMETERS.get(case, {})).items()]) for case in CASES}
+            for name, value in PARAMETERS.get(case, CUBES).items()]) for case in CASES}
         self.nodes['inactive'].trigger_configure()
         self.client = Node('client', context=self.contexts[1])
         self.executors = [make_executor(context) for context in self.contexts]
@@ -251,6 +255,12 @@ def test_one_kind_of_refusal_hides_no_other(runs):
     assert values['boxes that never came'] == ''
 
 
+def test_a_box_of_which_each_pose_is_refused_is_not_called_stale(runs):
+    told(runs, 'latest_bad', r'w=0\) has zero length; refused')
+    assert runs.found['latest_bad'][2]['stale boxes'] == ''
+    assert not any('behind' in line for line in runs.lines['latest_bad'])
+
+
 def test_a_bag_in_a_loop(runs):
     """Half a second, again and again: its stamps are answered each time, counted and logged."""
     told(runs, 'loop', r'time went back: box_[ab] has stamp [\d.]+ s after 0\.45 s')
@@ -272,6 +282,13 @@ def test_a_box_that_falls_silent(runs):
     assert 'stale boxes: box_b' in levels
     told(runs, 'stale', r'stale boxes: box_b: the newest stamp of box_b is \S+ s behind')
     assert not any('without a partner' in message for message in levels)
+    runs.client.destroy_publisher(runs.publishers.pop(('stale', 'box_b')))
+    deadline = time.monotonic() + PATIENCE
+    while not any('nobody publishes /stale/box_b/pose' in line for line in runs.lines['stale']):
+        assert time.monotonic() < deadline
+        stamp = pose_of('box_a', time.time_ns())
+        runs.publishers['stale', 'box_a'].publish(stamp)
+        runs.play([], 0.1)
 
 
 def test_nobody_publishes(runs):

@@ -27,6 +27,14 @@ def test_a_refusal_names_the_parameter_and_the_value(check, value, words):
         check('p', value)
 
 
+def test_only_a_near_name_is_proposed():
+    """A file for several nodes has names that are none of this one's."""
+    known = ('size_a', 'serialization', 'files_from')
+    assert parameters.unknown_name('parameter', 'sizea', known).endswith('nearest name is size_a')
+    for name in ('robot_description', 'robot', ''):
+        assert parameters.unknown_name('parameter', name, known) == f'unknown parameter {name!r}'
+
+
 def test_integers_are_as_good_as_floats():
     assert parameters.number(0.0, 3.0)('p', 2) == 2.0
     assert parameters.numbers(2)('p', [1, 2.5]) == (1.0, 2.5)

@@ -18,7 +18,7 @@ from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 from ros_client import Client, serving
 
-from box_contact_ros.node import contact_node, runtime, soup_node
+from box_contact_ros.node import contact_node, runtime, scene_topics, soup_node
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.parameters import answer_help
 from box_contact_ros.node.topics.qos_events import QosEvents
@@ -184,6 +184,14 @@ def test_options_outside_ros_args_are_refused(program, capsys):
     answer_help('contact_node', '', program.PARAMETERS, ['--ros-args', '-p', 'pairing:=stamp'])
 
 
+def test_a_word_that_ros_does_not_know_ends_the_program(capsys):
+    """With one line and status 1: -p is easily forgotten."""
+    assert contact_node.main(['--ros-args', 'model:=exact']) == 1
+    assert capsys.readouterr().err == (
+        "error: after --ros-args, ROS does not know ['model:=exact']: a parameter is "
+        '-p NAME:=VALUE, a name is remapped by -r FROM:=TO\n')
+
+
 @pytest.mark.parametrize('program', [contact_node, soup_node])
 def test_main_serves_its_node(program, monkeypatch):
     """With the arguments that it was given."""
@@ -237,6 +245,17 @@ def test_a_middleware_without_events_is_answered(client):
         client.offer_until_answered(poses.IDENTITY, TOUCHING)
 
 
+def test_a_node_without_the_messages_of_contacts(monkeypatch, capfd):
+    """The log tells where contacts are instead, as `ros2 topic echo /contacts` would wait."""
+    for module in (contact_node, scene_topics):
+        monkeypatch.setattr(module, 'ContactsMessage', None)
+    with serving(lambda context: ContactNode(context, parameter_overrides=[
+            Parameter(name, value=value) for name, value in CUBES.items()])) as node:
+        assert 'contacts are published as contacts_cloud alone' in capfd.readouterr().err
+        topics = {publisher.topic_name for publisher in node.publishers}
+        assert '/contacts_cloud' in topics and '/contacts' not in topics
+
+
 def test_a_node_is_told_of_its_clock_and_of_names_that_are_none(client, capfd):
     """A misspelt parameter is named at the start, a clock that changes is counted; then it ends."""
     given = CUBES | {'modle': 'mlp', 'autostart': True}
@@ -248,5 +267,6 @@ def test_a_node_is_told_of_its_clock_and_of_names_that_are_none(client, capfd):
         assert result.reason == "pair_topics must be true or false, not 'yes'"
         node.set_parameters([Parameter('use_sim_time', value=True)])
         assert client.spin(lambda: node.counts[RESETS] == 1)
+        assert 'use_sim_time was changed' in capfd.readouterr().err
         node.trigger_shutdown()
         assert not any('pose' in entity.topic_name for entity in node.subscriptions)

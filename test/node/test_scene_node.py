@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import gc
 import math
+import re
 import time
 from types import SimpleNamespace
 
@@ -589,8 +590,11 @@ def test_counts_outlive_cleanup(node, client, capfd):
     assert client.counts()['refused: repeated stamp'] == 2
 
 
-def test_lifecycle(client):
-    """Without autostart: configure checks, activate answers, deactivate stops, all by service."""
+def test_lifecycle(client, capfd):
+    """Without autostart: configure checks, activate answers, deactivate stops, all by service.
+
+    The log has a line for each state.
+    """
     with scene_node(autostart=False, scene=SCENE.replace('[20, 20, 1]', '[20, 20]')) as node:
         change = client.client_of(ChangeState, '/contact_node/change_state')
         state = client.service(GetState, '/contact_node/get_state')
@@ -632,3 +636,7 @@ def test_lifecycle(client):
         assert transition('deactivate') and transition('cleanup') and now() == 'unconfigured'
         assert transition('configure') and transition('activate')
         client.offer(load=ON_FLOOR, lorry=LORRY)
+    told = re.findall(r'(configured|ready|inactive|unconfigured): (?:model|no pose)',
+                      capfd.readouterr().err)
+    assert told == ['unconfigured', 'configured', 'ready', 'inactive', 'ready', 'inactive',
+                    'unconfigured', 'configured', 'ready']

@@ -13,7 +13,7 @@ ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / 'docs' / 'examples'
 PAGE = (EXAMPLES / 'README.md').read_text('utf-8')
 NEEDS = {'mujoco_loop.py': 'mujoco', 'recorded_landing.py': 'rosbags',
-         'dask_pairs.py': 'distributed', 'lockstep_client.py': 'rclpy'}
+         'dask_pairs.py': 'distributed', 'lockstep_client.py': 'box_contact_msgs.msg'}
 QUICK = {'vectorised_env.py': 'main(100)', 'dask_pairs.py': 'main(40_000, 10_000)'}
 """Shorter runs, whose figures are not those of the page."""
 
@@ -37,11 +37,13 @@ def test_example(name: str, program, tmp_path: Path) -> None:
     if name in QUICK:
         module = name.removesuffix('.py')
         command = ['-c', f'import {module}\nif __name__ == "__main__": {module}.{QUICK[name]}']
-    done = subprocess.run(
-        [sys.executable, *command], cwd=tmp_path, capture_output=True, text=True, timeout=120,
-        env=os.environ | {'PYTHONPATH': os.pathsep.join(
-            [str(EXAMPLES), os.environ.get('PYTHONPATH', '')])})
-    assert done.returncode == 0, done.stderr
+    # A simulator that is started anew repeats the stamps of its last run.
+    for _ in range(2 if name == 'lockstep_client.py' else 1):
+        done = subprocess.run(
+            [sys.executable, *command], cwd=tmp_path, capture_output=True, text=True, timeout=120,
+            env=os.environ | {'PYTHONPATH': os.pathsep.join(
+                [str(EXAMPLES), os.environ.get('PYTHONPATH', '')])})
+        assert done.returncode == 0, done.stderr
     printed, expected = done.stdout.splitlines(), shown(name)
     if name in QUICK:
         printed, expected = ([re.sub(r'[-\d.,]+', '#', line) for line in lines]

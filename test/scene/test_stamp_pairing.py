@@ -153,6 +153,31 @@ def test_a_loop_begins_before_the_last_poses_of_the_old_one_are_in():
     assert pairing.counts[RESETS] == 9 and answered >= 10 * 95
 
 
+@pytest.mark.parametrize('policy', PAIRINGS)
+@pytest.mark.parametrize('first', [1, 4])
+def test_a_simulator_that_is_started_anew_is_answered(policy, first):
+    """It waits for the answer of its first tick, which has a stamp of the run before.
+
+    The pose that came before its publishers were known to have gone may be refused.
+    """
+    counts = Counter()
+    pairing = PAIRINGS[policy](TWO, counts=counts)
+
+    def tick(number):
+        return [ticks for box in ('box_a', 'box_b')
+                for ticks in pairing.add(box, pose(number * 5 * MS))]
+
+    assert all(tick(number) for number in (1, 2, 3))
+    pairing.desert()
+    assert tick(4) and counts[RESETS] == 0  # it goes on where it was
+    takes_it = policy == 'latest' and first == 4  # it answers its newest stamp again
+    assert bool(tick(first)) == takes_it
+    pairing.desert()
+    for number in range(first, 7):
+        assert [one.stamp for one in tick(number)[-1]] == 2 * [number * 5 * MS]
+    assert counts[RESETS] == (not takes_it)
+
+
 def test_stamps_that_stand_still_are_no_loop():
     """Zero for ever, or the same few stamps: refused and noted, with what the log needs."""
     pairing = StampPairing(TWO)

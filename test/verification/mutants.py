@@ -381,7 +381,7 @@ MUTANTS = {
     'a pair without answers is no error': Mutant(
         EVALUATOR, 'level=ERROR)', ')', f'{FIRST_RUN} -k zero'),
     'a box that never came is stale': Mutant(
-        EVALUATOR, 'if box not in unseen]', ']', f'{FIRST_RUN} -k never_came'),
+        EVALUATOR, 'if box not in never]', ']', f'{FIRST_RUN} -k never_came'),
     'poses of another type are none': Mutant(
         TOPICS, "if offer.topic_type != f'geometry_msgs/msg/{wanted.__name__}':", 'if False:',
         f'{FIRST_RUN} -k never_came'),
@@ -391,8 +391,17 @@ MUTANTS = {
     'an inactive node is well': Mutant(
         'node/diagnostics.py', 'if state != ACTIVE:', 'if False:', f'{FIRST_RUN} -k state'),
     'time that goes back is late': Mutant(
-        'scene/stamp_pairing.py', 'if stamp < state.newest - RESET:', 'if False:',
-        f'{TEST_PAIRING} -k set_back'),
+        'scene/stamp_pairing.py', '(0 if self._deserted else RESET)',
+        '(0 if self._deserted else 2**62)', f'{TEST_PAIRING} -k set_back'),
+    'a restarted simulator is refused for ever': Mutant(
+        'scene/stamp_pairing.py', '(0 if self._deserted else RESET)', 'RESET',
+        f'{TEST_PAIRING} -k started_anew'),
+    'publishers that went before are gone for ever': Mutant(
+        'scene/stamp_pairing.py', 'if stamp > state.newest != NEVER:', 'if False:',
+        f'{TEST_PAIRING} -k started_anew'),
+    'a box whose publisher has gone has another clock': Mutant(
+        EVALUATOR, 'if behind is None or not self._topics.is_heard(box):', 'if False:',
+        f'{FIRST_RUN} -k falls_silent'),
     'a transform without a stamp is taken': Mutant(
         TF, 'if not at:', 'if False:', f'{TEST_TF} -k that_are_none'),
     'transforms of the time before are kept': Mutant(

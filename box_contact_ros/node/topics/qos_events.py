@@ -20,6 +20,8 @@ class QosEvents:
     def __init__(self, node: Node, counts: Counter[str]) -> None:
         self._node, self._counts = node, counts
         self._handlers_of: dict[Publisher | Subscription, list[EventHandler]] = {}
+        self.left: set[str] = set()
+        """Boxes of which a publisher has gone. Whoever asks clears it."""
 
     def callbacks(self, box: str, *, deadline: bool) -> SubscriptionEventCallbacks:
         """Return the callbacks for events of the poses of a box."""
@@ -59,6 +61,7 @@ class QosEvents:
         if gone:
             self._node.get_logger().info(f'{box}: a publisher of its poses is gone, '
                                          f'{event.current_count} left')
+            self.left.add(box)
 
     def _on_deadline(self, box: str, event: Any) -> None:
         self._counts['deadlines missed'] += event.total_count_change

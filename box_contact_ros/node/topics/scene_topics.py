@@ -104,6 +104,7 @@ class SceneTopics:
         self._scene: Publisher | None = None
         self._wanted = Wanted()
         self._pair_of_id: dict[int, Pair] = {}
+        self._left: set[str] = set()
 
     def check(self, scene: Scene, *, pair_topics: bool) -> None:
         """Raise ValueError for a scene that reuses an id, or whose names can be no topics here.
@@ -173,6 +174,19 @@ class SceneTopics:
         self.contacts = self.cloud = self._scene = None
         self._wanted = Wanted()
 
+    def serve_events(self) -> bool:
+        """Serve QoS events; return whether publishers of all boxes have just gone.
+
+        Others may be there: a simulator is started anew at once, but one that was killed stays on
+        the network for some time.
+        """
+        self.events.serve()
+        # The two boxes of a simulator that ends may be seen by two calls.
+        left, self._left, self.events.left = self.events.left | self._left, self.events.left, set()
+        return bool(self._left) and all(
+            source.box in left or not subscription.get_publisher_count()
+            for source, subscription in self._subscriptions.items())
+
     def warn_of_unused_qos(self) -> None:
         """Warn of qualities of service for topics that there are not, unless the node is idle."""
         for name in self._qos_overrides if self._subscriptions else ():
@@ -186,8 +200,14 @@ class SceneTopics:
         return [*(subscription.topic_name for subscription in self._subscriptions.values()),
                 *self.tf.topics()]
 
+    def is_heard(self, box: str) -> bool:
+        """Return whether somebody publishes poses of a box; True for a frame in /tf."""
+        return box in self._wanted.frames or any(
+            source.box == box and subscription.get_publisher_count()
+            for source, subscription in self._subscriptions.items())
+
     def why_silent(self, box: str) -> str:
-        """Return who publishes on the topic of a box that has given no pose."""
+        """Return who publishes on the topic of a box that gives no pose."""
         if box in self._wanted.frames:
             return self.tf.why_silent(box)
         source = next(source for source in self._subscriptions if source.box == box)
