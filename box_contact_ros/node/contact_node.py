@@ -251,7 +251,7 @@ class ContactNode(LifecycleNode):
         if self._evaluator is not None and (
                 settings != self._settings.values or 'scene' in names):
             self._apply(settings)
-            self._log_scene('changed', settings)
+            self._log_scene(f'changed {", ".join(sorted(names))}', settings)
 
     def _apply(self, settings: dict[str, Any]) -> None:
         """Apply parameters as a whole, or raise ValueError or RCLError and keep the old.

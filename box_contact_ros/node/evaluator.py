@@ -236,7 +236,8 @@ class Evaluator:
         box = next(box for box, pose in known if pose is odd)
         advice = ('the leading slash is the difference'
                   if frame.lstrip('/') == odd.frame_id.lstrip('/')
-                  else 'publish both in one frame, as the node transforms nothing')
+                  else 'set header.frame_id' if not (frame and odd.frame_id)
+                  else 'publish both in one frame, or give the box a frame in the scene file')
         return f'{one} is in frame {shown(frame)}, {box} in {shown(odd.frame_id)}: {advice}'
 
     def _refuse(self, error: Exception, topic: str) -> None:

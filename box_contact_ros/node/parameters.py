@@ -105,7 +105,8 @@ def numbers(count: int) -> Check:
         found = value if isinstance(value, Sequence) else ()
         if len(found) != count or not all(map(_is_number, found)) or not all(
                 map(math.isfinite, found)):
-            raise ValueError(f'{name} must be {count} finite numbers, not {shown(value)}')
+            raise ValueError(f'{name} must be {count} finite numbers, not '
+                             f'{shown(list(found) if len(found) else value)}')
         return tuple(map(float, found))
     return Limits(check, f'{count} finite numbers')
 

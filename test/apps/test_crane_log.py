@@ -71,7 +71,7 @@ def test_a_faultless_run_passes():
     assert summary.passed
     assert (summary.result.sent, summary.result.contacts, summary.lost) == (150, 100, 0)
     assert summary.wrong_verdicts == 0
-    assert '150 clouds' in str(summary)
+    assert '150 answers' in str(summary)
     assert summary.latencies == pytest.approx(np.full(100, 1e-3), abs=1e-12)
     assert summary.result.point_error['p99'] == summary.result.normal_error['p99'] == 0.0
 
@@ -157,7 +157,7 @@ def test_a_row_of_nan_is_no_answer():
     play(log, lost=((100, 'cloud'), (100, 'point'), (100, 'normal')))
     log.answer('cloud', START + 5 * MS * 100, START + 501 * MS, [math.nan] * 7)
     summary = log.summary(FloorSolver(), EDGE)
-    assert (summary.result.not_evaluated, summary.lost) == (1, 0) and '149 clouds' in str(summary)
+    assert (summary.result.not_evaluated, summary.lost) == (1, 0) and '149 answers' in str(summary)
     assert summary.wrong_verdicts == 0
     assert log.outstanding == 0
     assert not summary.passed

@@ -123,6 +123,11 @@ def topic(words: list[str], **_) -> None:
     assert words[3].removeprefix('/') in addresses
 
 
+def echoed(words: list[str], **_) -> None:
+    """Check the topic, which comes last."""
+    topic(['', '', '', words[-1]])
+
+
 def published(words: list[str], **_) -> None:
     """Check that the topic takes poses, and that the message is one."""
     topic(['', '', '', words[5]])
@@ -236,7 +241,7 @@ COMMANDS = {
     r'(cd box_contact_ros && )?make [\w-]+( .*)?': make,
     r'(ros2 run|python -m) box_contact_ros \w+( .*)?': start,
     r'box_contact_\w+( .*)?': start,
-    r'ros2 topic echo \S+': topic,
+    r'ros2 topic echo (--\S+ (data )?)*/\S+': echoed,
     r'ros2 topic pub -r 10 .+': published,
     r'ros2 param set \S+ \S+ \S+': parameter,
     r'ros2 launch \S+ \S+( .*)?': launch,

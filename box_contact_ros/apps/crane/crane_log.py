@@ -130,7 +130,7 @@ class CraneSummary:
         r = self.result
         rows = [
             ('poses sent', f'{r.sent} pairs'),
-            ('evaluations received', f'{r.sent - r.lost_evaluations - r.not_evaluated} clouds'),
+            ('evaluations received', f'{r.sent - r.lost_evaluations - r.not_evaluated} answers'),
             ('contacts received', f'{r.contacts} points with normals'),
             ('messages lost', f'{self.lost} ({r.lost_evaluations} evaluations, '
                               f'{r.lost_contacts} contacts)'),
