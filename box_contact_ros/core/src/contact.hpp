@@ -200,13 +200,13 @@ struct RowPlaces {
   }
 };
 
-// Rows by their numbers, side by side. Lanes beyond `count` repeat the last one.
+// Rows `first` to `last` side by side. Lanes beyond them repeat the last one.
 template <class T>
-BC_INLINE Query<T> query_rows(const Rows& rows, const long* numbers, long count) {
+BC_INLINE Query<T> query_rows(const Rows& rows, long first, long last) {
   Pose<T> pose_a, pose_b;
   Vec<T> half_a, half_b;
   if constexpr (is_scalar<T>) {
-    RowPlaces at(rows, numbers[0]);
+    RowPlaces at(rows, first);
     for (int k = 0; k < 3; ++k) {
       pose_a.position[k] = at.pose_a[k], pose_b.position[k] = at.pose_b[k];
       half_a[k] = 0.5 * at.size_a[k], half_b[k] = 0.5 * at.size_b[k];
@@ -218,7 +218,7 @@ BC_INLINE Query<T> query_rows(const Rows& rows, const long* numbers, long count)
   } else {
     alignas(sizeof(T)) double a[7][width<T>], b[7][width<T>], sizes[6][width<T>];
     for (int i = 0; i < width<T>; ++i) {
-      RowPlaces at(rows, numbers[min(long(i), count - 1)]);
+      RowPlaces at(rows, min(first + i, last - 1));
       for (int k = 0; k < 7; ++k) a[k][i] = at.pose_a[k], b[k][i] = at.pose_b[k];
       for (int k = 0; k < 3; ++k) sizes[k][i] = at.size_a[k], sizes[3 + k][i] = at.size_b[k];
     }
@@ -239,15 +239,15 @@ BC_INLINE Query<T> query_rows(const Rows& rows, const long* numbers, long count)
   return query(pose_a, pose_b, half_a, half_b);
 }
 
-// Write solved rows. Returns the first that is refused, or −1.
+// Write `count` solved rows from `first` on. Returns the first that is refused, or −1.
 template <class T, class Found>
-BC_INLINE long write_rows(const Query<T>& q, const Found& found, const long* numbers, long count,
+BC_INLINE long write_rows(const Query<T>& q, const Found& found, long first, long count,
                           const Results& results, Counts& counts) {
   Answer<T> rows = answer(q, found, results.margin);
   Mat<T> covariance = matrix(rows.overlap.covariance);
   long refused = -1;
   for (int i = 0; i < count && i < width<T>; ++i) {
-    long row = numbers[i];
+    long row = first + i;
     counts.contacts += lane(q.touching, i) != 0;
     if (results.colliding) results.colliding[row] = lane(q.touching, i) != 0;
     if (results.separation) results.separation[row] = lane(q.axis.separation, i);
@@ -280,54 +280,29 @@ inline void fetch_rows(const Results& results, long first, long last) {
   fetch(results.covariance, 9);
 }
 
-// Numbers of rows that touch, of groups in which few do. They wait until they fill a group.
-template <int size>
-struct Waiting {
-  long numbers[2 * size];
-  long count;
-
-  // Lanes of a group up to which they wait. Who waits is tested again, a fifth of the whole work.
-  static constexpr int most = 5 * size / 8;
-
-  // Take up to `size` of them.
-  BC_INLINE long take(long (&taken)[size]) {
-    long from = max(0L, count - size), found = count - from;
-    for (long i = 0; i < found; ++i) taken[i] = numbers[from + i];
-    count = from;
-    return found;
-  }
-};
-
-// Solve rows by their numbers, at most one group of blocks. With `waiting`, rows that touch may be
-// left for later. Returns the first row whose poses or sizes are refused, or −1.
-template <class T, class Model, int size>
-BC_INLINE long solve_group(const Model& model, const Rows& rows, const long* numbers, long count,
-                           Waiting<size>* waiting, const Results& results, Counts& counts) {
+// Solve rows `first` to `last`, at most one group of blocks. Returns the first row whose poses or
+// sizes are refused, or −1.
+template <class T, class Model>
+BC_INLINE long solve_group(const Model& model, const Rows& rows, long first, long last,
+                           const Results& results, Counts& counts) {
   constexpr int group = Model::template group<T>;
   Query<T> queries[group];
   typename Model::template Found<T> found[group]{};
-  int touching = 0;
+  bool touching = false;
   for (int g = 0; g < group; ++g) {
-    long start = g * width<T>;
-    queries[g] = query_rows<T>(rows, numbers + min(start, count - 1), max(1L, count - start));
+    long start = first + g * width<T>;
+    queries[g] = query_rows<T>(rows, min(start, last - 1), last);
     // Lanes that repeat the last row are not counted.
-    for (long i = max(0L, count - start); i < width<T>; ++i)
+    for (long i = max(0L, last - start); i < width<T>; ++i)
       set_lane(queries[g].touching, int(i), 0);
-    for (int i = 0; i < width<T>; ++i) touching += lane(queries[g].touching, i) != 0;
+    touching |= any(queries[g].touching);
   }
-  if (waiting && touching <= Waiting<size>::most) {
-    for (long i = 0; touching > 0 && i < count; ++i)
-      if (lane(queries[i / width<T>].touching, int(i % width<T>))) {
-        waiting->numbers[waiting->count++] = numbers[i];
-        --touching;
-      }
-    for (Query<T>& q : queries) q.touching = q.touching != q.touching;
-  }
-  if (touching > 0) model.solve(queries, found, counts);
+  if constexpr (!is_scalar<T>) fetch_rows(results, first, min(first + group * width<T>, last));
+  if (touching) model.solve(queries, found, counts);
   long refused = -1;
   for (int g = 0; g < group; ++g) {
-    long start = g * width<T>;
-    long row = write_rows(queries[g], found[g], numbers + start, count - start, results, counts);
+    long start = first + g * width<T>;
+    long row = write_rows(queries[g], found[g], start, last - start, results, counts);
     if (refused < 0) refused = row;
   }
   return refused;
@@ -337,7 +312,7 @@ BC_INLINE long solve_group(const Model& model, const Rows& rows, const long* num
 template <class Model>
 [[gnu::noinline]] inline long solve_row(const Model& model, const Rows& rows, long row,
                                         const Results& results, Counts& counts) {
-  return solve_group<double, Model, 1>(model, rows, &row, 1, nullptr, results, counts);
+  return solve_group<double>(model, rows, row, row + 1, results, counts);
 }
 
 // Solve rows `begin` to `end`. Returns the first row whose poses or sizes are refused, or −1. Such
@@ -348,33 +323,13 @@ template <class Model>
 template <class T, class Model>
 [[gnu::noinline]] inline long solve_rows(const Model& model, const Rows& rows, long begin, long end,
                                          const Results& results, Counts& counts) {
-  constexpr int size = Model::template group<T> * width<T>;
-  constexpr long few = is_scalar<T> ? 0 : width<T> <= 2 ? size / 2 - 1 : size / width<T>;
-  Waiting<size> waiting;
-  waiting.count = 0;
+  constexpr int group = Model::template group<T>;
+  constexpr long few = is_scalar<T> ? 0 : width<T> <= 2 ? group - 1 : group;
   long refused = -1, first = begin;
-  for (;;) {
-    long numbers[size];
-    bool is_over = end - first <= few, is_late = waiting.count >= (is_over ? few + 1 : size);
-    if (is_over && !is_late) break;
-    long count = min(long(size), end - first);
-    if (is_late) {
-      count = waiting.take(numbers);
-    } else {
-      for (long i = 0; i < size; ++i) numbers[i] = first + i;
-      fetch_rows(results, first, first + count);
-      first += count;
-    }
-    long row =
-        solve_group<T>(model, rows, numbers, count, is_late ? nullptr : &waiting, results, counts);
-    refused = refused < 0 ? row : refused;
-  }
-  for (; first < end; ++first) {
-    long row = solve_row(model, rows, first, results, counts);
-    refused = refused < 0 ? row : refused;
-  }
-  for (long i = 0; i < waiting.count; ++i)
-    solve_row(model, rows, waiting.numbers[i], results, counts);
+  auto note = [&](long row) { refused = refused < 0 ? row : refused; };
+  for (; end - first > few; first += group * width<T>)
+    note(solve_group<T>(model, rows, first, end, results, counts));
+  for (; first < end; ++first) note(solve_row(model, rows, first, results, counts));
   return refused;
 }
 
