@@ -43,10 +43,9 @@ struct Query {
 };
 
 template <class T>
-BC_INLINE Query<T> query(const Pose<T>& a, const Pose<T>& b, const Vec<T>& half_a,
-                         const Vec<T>& half_b) {
-  Query<T> q;
-  q.pair = prepare(a, b, half_a, half_b);
+BC_INLINE void query(const Pose<T>& a, const Pose<T>& b, const Vec<T>& half_a,
+                     const Vec<T>& half_b, Query<T>& q) {
+  prepare(a, b, half_a, half_b, q.pair);
   q.axis = separating_axis(q.pair);
   Mask<T> doubtful = q.axis.doubtful & q.pair.valid;
   if (any(doubtful)) {
@@ -66,7 +65,6 @@ BC_INLINE Query<T> query(const Pose<T>& a, const Pose<T>& b, const Vec<T>& half_
     }
   }
   q.touching = (q.axis.separation <= q.pair.touch) & q.pair.valid;
-  return q;
 }
 
 template <class T>
@@ -79,9 +77,13 @@ BC_INLINE Query<double> lane(const Query<T>& q, int i) {
 
 // The same pair with the box that comes first in the order of the data as A.
 template <class T>
-BC_INLINE Pair<T> first_as_a(const Pair<T>& pair) {
+BC_INLINE void put_first_as_a(const Pair<T>& pair, Pair<T>& ordered) {
   Mask<T> a_first = pair.a_first;
-  Pair<T> ordered = pair;
+  ordered.origin_a = pair.origin_a;
+  ordered.size = pair.size;
+  ordered.touch = pair.touch;
+  ordered.a_first = a_first;
+  ordered.valid = pair.valid;
   ordered.half_a = select(a_first, pair.half_a, pair.half_b);
   ordered.half_b = select(a_first, pair.half_b, pair.half_a);
   ordered.offset_a = select(a_first, pair.offset_a, -pair.offset_b);
@@ -89,7 +91,6 @@ BC_INLINE Pair<T> first_as_a(const Pair<T>& pair) {
   ordered.rotation = select(a_first, pair.rotation, transpose(pair.rotation));
   ordered.axes_a = select(a_first, pair.axes_a, pair.axes_b);
   ordered.axes_b = select(a_first, pair.axes_b, pair.axes_a);
-  return ordered;
 }
 
 // The exact overlap of a single pair that `enforce_minimum_depth` has moved.
@@ -103,7 +104,8 @@ inline Moments<double> clipped_overlap(Pair<double> pair, int face, bool pressed
 //   Found<T>: what it finds of an overlap. `Moments<T>`, or `Vec<T>` for the centroid alone.
 //   group<T>: how many queries it takes at once.
 //
-// And `solve(queries, found, counts)` fills `found` for the pairs that touch, points in A's frame.
+// And `solve(queries, found, counts)` fills `found` for the pairs that touch, points in A's frame. It may
+// move the boxes of the queries.
 
 // Model `exact`: the moments of A∩B by face sums, or by clipping where these are not certain.
 // `FoundOf`: Moments, or PointAndVolume.
@@ -115,19 +117,22 @@ struct ExactModelOf {
   static constexpr int group = 1;
 
   template <class T>
-  BC_INLINE void solve(const Query<T> (&queries)[1], Found<T> (&found)[1], Counts& counts) const {
+  BC_INLINE void solve(Query<T> (&queries)[1], Found<T> (&found)[1], Counts& counts) const {
     found[0] = solve(queries[0], counts);
   }
 
-  // Not inlined: single calls, fallbacks and stages share one copy.
+  // Not inlined: single calls, fallbacks and stages share one copy. It presses the very pair, because
+  // a copy of so many lanes would cost some per cent of the time.
   template <class T>
-  [[gnu::noinline]] Found<T> solve(const Query<T>& q, Counts& counts) const {
-    Pair<T> pair = q.pair;
+  [[gnu::noinline]] Found<T> solve(Query<T>& q, Counts& counts) const {
+    Pair<T>& pair = q.pair;
     Mask<T> pressed = enforce_minimum_depth(pair, q.axis) & q.touching;
     Mask<T> fallback = pressed;
     if (any(pressed)) fallback &= has_too_little_depth(pair);
     T depth = max(-q.axis.separation, depth_floor * pair.size);
-    CertifiedOverlap<Found<T>, T> overlap = overlap_by_face_sums<Found<T>>(first_as_a(pair), depth);
+    Pair<T> ordered;
+    put_first_as_a(pair, ordered);
+    CertifiedOverlap<Found<T>, T> overlap = overlap_by_face_sums<Found<T>>(ordered, depth);
     Found<T> found = overlap.moments;
     found.centroid =
         select(pair.a_first, found.centroid, pair.offset_a + pair.rotation * found.centroid);
@@ -148,7 +153,7 @@ using ExactModel = ExactModelOf<Moments>;
 using ExactPointModel = ExactModelOf<PointAndVolume>;
 
 // The exact overlap of a single pair.
-inline Moments<double> exact_overlap(const Query<double>& q, Counts& counts) {
+inline Moments<double> exact_overlap(Query<double> q, Counts& counts) {
   return ExactModel{}.solve(q, counts);
 }
 
@@ -203,7 +208,7 @@ template <class T>
   load_rows(sizes_a, size_a.v);
   load_rows(sizes_b, size_b.v);
   T half = splat<T>(0.5);
-  q = query(pose_a, pose_b, half * size_a, half * size_b);
+  query(pose_a, pose_b, half * size_a, half * size_b, q);
   for (long i = max(0L, last - first); i < width<T>; ++i) set_lane(q.touching, int(i), 0);
 }
 
@@ -288,7 +293,7 @@ struct Group {
   long rows[blocks][width<T>];
 
   // Solve the lanes that touch.
-  BC_INLINE void solve(const Model& model, const Results& results, Counts& counts) const {
+  BC_INLINE void solve(const Model& model, const Results& results, Counts& counts) {
     typename Model::template Found<T> found[blocks];
     model.solve(queries, found, counts);
     for (int g = 0; g < blocks; ++g) write_overlaps(queries[g], found[g], rows[g], results);

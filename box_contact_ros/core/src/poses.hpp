@@ -90,11 +90,10 @@ Mask<T> a_first_of_concentric(const Vec<T>& half_a, const Vec<T>& half_b, const 
 }
 
 template <class T>
-BC_INLINE Pair<T> prepare(const Pose<T>& a, const Pose<T>& b, const Vec<T>& half_a,
-                          const Vec<T>& half_b) {
+BC_INLINE void prepare(const Pose<T>& a, const Pose<T>& b, const Vec<T>& half_a,
+                       const Vec<T>& half_b, Pair<T>& pair) {
   Mat<T> axes_a = rotation_matrix(a.quaternion), axes_b = rotation_matrix(b.quaternion);
   Vec<T> t = b.position - a.position;
-  Pair<T> pair;
   pair.half_a = half_a;
   pair.half_b = half_b;
   pair.origin_a = a.position;
@@ -115,7 +114,6 @@ BC_INLINE Pair<T> prepare(const Pose<T>& a, const Pose<T>& b, const Vec<T>& half
     pair.a_first = (pair.a_first & (concentric == 0)) | (ordered & concentric);
   }
   pair.valid = pose_valid(a) & pose_valid(b) & size_valid(half_a) & size_valid(half_b);
-  return pair;
 }
 
 // Move B by `distance` [m] against a direction given in A's frame.

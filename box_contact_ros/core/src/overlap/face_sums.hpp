@@ -485,14 +485,14 @@ struct CertifiedOverlap {
   Mask<T> certain;
 };
 
-// The overlap of a pair that has been pressed in to `depth` [m]: Moments<T>, or for PointAndVolume<T>
+// The overlap of a pair that has been pressed in to `depth` [m], and that may be changed: Moments<T>, or for PointAndVolume<T>
 // without the second moments. Then the equations are those that the centroid needs.
 template <class Found, class T>
-BC_INLINE CertifiedOverlap<Found, T> overlap_by_face_sums(const Pair<T>& given, T depth) {
+BC_INLINE CertifiedOverlap<Found, T> overlap_by_face_sums(Pair<T>& pair, T depth) {
   using namespace face_sums;
   constexpr bool all_moments = std::is_same_v<Found, Moments<T>>;
   using Squares = std::conditional_t<all_moments, Sym<T>, NoSquares>;
-  Pair<T> pair = given;
+  Vec<T> given_half_b = pair.half_b, given_offset_b = pair.offset_b;
   Mask<T> risky = unflush(pair, depth);
   const Mat<T>& r = pair.rotation;
   Mat<T> inverse = reciprocals(r);
@@ -547,7 +547,9 @@ BC_INLINE CertifiedOverlap<Found, T> overlap_by_face_sums(const Pair<T>& given, 
   Mask<T> shallow = depth < safely_inside * pair.size;
   if (any(shallow)) {
     Vec<T> moved = centroid;
-    Mask<T> inside = move_inside(given, moved);
+    pair.half_b = given_half_b;
+    pair.offset_b = given_offset_b;
+    Mask<T> inside = move_inside(pair, moved);
     centroid = select(shallow, moved, centroid);
     found.certain &= inside | (shallow == 0);
   }
