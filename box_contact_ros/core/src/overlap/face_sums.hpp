@@ -276,7 +276,7 @@ BC_INLINE void add_lines_of(int i, T& least, const Pair<T>& pair, const Mat<T>& 
     least = min(least, lines.sine2_or_one);
     if constexpr (is_scalar<T>) {
       LinePiece<T> line = lines.piece(0);
-      if (adds_nothing<T>(max(line.to - line.from, Four<T>{}))) continue;
+      if (adds_nothing<T>(lines.sine2 * max(line.to - line.from, Four<T>{}))) continue;
     }
     int k = (j + 1) % 3, l = (j + 2) % 3;
     Four<T> along[steps<T>];
