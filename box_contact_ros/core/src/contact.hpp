@@ -294,7 +294,7 @@ struct Group {
 
   // Solve the lanes that touch.
   BC_INLINE void solve(const Model& model, const Results& results, Counts& counts) {
-    typename Model::template Found<T> found[blocks];
+    typename Model::template Found<T> found[blocks]{};
     model.solve(queries, found, counts);
     for (int g = 0; g < blocks; ++g) write_overlaps(queries[g], found[g], rows[g], results);
   }
