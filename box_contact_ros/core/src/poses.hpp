@@ -97,8 +97,8 @@ BC_INLINE void prepare(const Pose<T>& a, const Pose<T>& b, const Vec<T>& half_a,
   pair.half_a = half_a;
   pair.half_b = half_b;
   pair.origin_a = a.position;
-  pair.axes_a = axes_a;
-  pair.axes_b = axes_b;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) pair.axes_a[i][j] = axes_a[i][j], pair.axes_b[i][j] = axes_b[i][j];
   pair.offset_a = transposed_times(axes_a, t);
   pair.offset_b = transposed_times(axes_b, t);
   for (int i = 0; i < 3; ++i) {
