@@ -62,12 +62,12 @@ MUTANTS = {
         'core/src/separating_axis.hpp', 'select<T>(along >= 0.0, splat<T>(1.0), splat<T>(-1.0));',
         'select<T>(along >= 0.0, splat<T>(-1.0), splat<T>(1.0));', f'{FAMILIES} -k gates'),
     'axis dropped': Mutant(
-        'core/src/separating_axis.hpp', 'best.offer(select<T>(used, overlap * inverse, none)',
-        'if (i + j < 4) best.offer(select<T>(used, overlap * inverse, none)',
+        'core/src/separating_axis.hpp', 'best.offer(select<T>(used, gaps[j], none)',
+        'if (i + j < 4) best.offer(select<T>(used, gaps[j], none)',
         f'{FAMILIES} -k gates'),
     'cross product not normalised': Mutant(
-        'core/src/separating_axis.hpp', 'T inverse = 1.0 / sqrt(length2);',
-        'T inverse = splat<T>(1.0);', f'{FAMILIES} -k gates'),
+        'core/src/separating_axis.hpp', 'return 1.0 / sqrt(x);',
+        'return 1.0 + 0.0 * x;', f'{FAMILIES} -k gates'),
     "constant added to R's entries": Mutant(
         'core/src/separating_axis.hpp', '(frame.half[y] * abs(uz) + frame.half[z] * abs(uy))',
         '(frame.half[y] * (abs(uz) + 1e-6) + frame.half[z] * (abs(uy) + 1e-6))',
@@ -149,8 +149,8 @@ MUTANTS = {
         'core/src/overlap/face_sums.hpp', 'rotated(pair.axes_a, covariance);', 'covariance;',
         f'{LAWS} -k rigid_motion'),
     "covariance left in the first box's frame": Mutant(
-        'core/src/contact.hpp', 'select(a_first, pair.axes_a, pair.axes_b);', 'pair.axes_a;',
-        f'{LAWS} -k test_swap'),
+        'core/src/contact.hpp', 'select<T>(a_first, pair.axes_a[i][j], pair.axes_b[i][j]);',
+        'pair.axes_a[i][j];', f'{LAWS} -k test_swap'),
     "clipped covariance left in the reference box's frame": Mutant(
         'core/src/overlap/clipping.hpp', 'rotated(pair.axes_b, covariance)}', 'covariance}',
         f'{EXACT} -k clipping_is'),
@@ -158,8 +158,8 @@ MUTANTS = {
         'core/src/overlap/clipping.hpp', 'Vec<double> middle = 0.5 * w - Vec<double>{',
         'Vec<double> middle = 0.5 * w - 0.0 * Vec<double>{', f'{EXACT} -k clipping_is'),
     'covariance of the other sign': Mutant(
-        'core/src/contact.hpp', 'select(q.touching, overlap.covariance,',
-        'select(q.touching, splat<T>(-1.0) * overlap.covariance,',
+        'core/src/contact.hpp', 'c = overlap.covariance;',
+        'c = splat<T>(-1.0) * overlap.covariance;',
         f'{LAWS} -k positive'),
     'covariance not symmetric': Mutant(
         'core/src/overlap/moments.hpp', '{s(1, 0), s(1, 1)', '{-s(1, 0), s(1, 1)',
@@ -169,12 +169,12 @@ MUTANTS = {
         'T distance = max(depth_floor * pair.size + axis.separation, T{});', 'T distance{};',
         f'{EXACT} -k pressed_volume'),
     'volume by its magnitude of the wrong part': Mutant(
-        'core/src/contact.hpp', 'select<T>(q.touching, overlap.volume, T{})',
-        'select<T>(q.touching, overlap.volume * (1.0 + 0.1 * q.axis.separation), T{})',
+        'core/src/contact.hpp', 'volume[1] = {overlap.volume};',
+        'volume[1] = {overlap.volume * (1.0 + 0.1 * q.axis.separation)};',
         f'{LAWS} -k of_the_parts'),
     'volume that shrinks with the depth': Mutant(
-        'core/src/contact.hpp', 'select<T>(q.touching, overlap.volume, T{})',
-        'select<T>(q.touching, 1.0 / overlap.volume, T{})', f'{LAWS} -k grows_with_the_depth'),
+        'core/src/contact.hpp', 'volume[1] = {overlap.volume};',
+        'volume[1] = {1.0 / overlap.volume};', f'{LAWS} -k grows_with_the_depth'),
     'patch of a model that gives none': Mutant(
         'core/src/contact.hpp', 'T unknown = splat<T>(not_a_number);',
         'T unknown{};', f'{TEST_CORE} -k point_alone'),
@@ -250,10 +250,10 @@ MUTANTS = {
         'core/src/library/solver.hpp', 'std::min(refused_of[thread], refused);', 'refused;',
         f'{TEST_CORE} -k threads'),
     'lanes that repeat the last row are counted': Mutant(
-        'core/src/contact.hpp', 'set_lane(queries[g].touching, int(i), 0);', ';',
+        'core/src/contact.hpp', 'set_lane(q.touching, int(i), 0);', ';',
         f'{TEST_CORE} -k threads_change'),
     'rows that wait are forgotten': Mutant(
-        'core/src/contact.hpp', 'i < waiting.count; ++i)', 'i < 0; ++i)',
+        'core/src/contact.hpp', 'if (!count) return;', 'return;',
         f'{TEST_CORE} -k single_calls'),
     'a reference to the type is kept': Mutant(
         'core/binding/module.cpp', '  Py_DECREF(type);', '  ', f'{TEST_CORE} -k references'),

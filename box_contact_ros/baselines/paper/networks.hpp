@@ -152,7 +152,8 @@ inline long solve(const Networks& networks, const Rows& rows, long count, const 
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   long refused = -1;
   for (long row = 0; row < count; ++row) {
-    Query<double> q = query_rows<double>(rows, &row, 1);
+    Query<double> q;
+    query_rows(rows, row, row + 1, q);
     if (!q.pair.valid && refused < 0) refused = row;
     PointAndNormal contact{{nan, nan, nan}, {nan, nan, nan}};
     if (q.touching) {

@@ -9,6 +9,7 @@
 // All stages are templates over the lanes T, so a row of a batch has the bits of a single call.
 #pragma once
 
+#include "lanes/row_lanes.hpp"
 #include "minimum_depth.hpp"
 #include "near_parallel_edges.hpp"
 #include "overlap/clipping.hpp"
@@ -42,10 +43,9 @@ struct Query {
 };
 
 template <class T>
-BC_INLINE Query<T> query(const Pose<T>& a, const Pose<T>& b, const Vec<T>& half_a,
-                         const Vec<T>& half_b) {
-  Query<T> q;
-  q.pair = prepare(a, b, half_a, half_b);
+BC_INLINE void query(const Pose<T>& a, const Pose<T>& b, const Vec<T>& half_a,
+                     const Vec<T>& half_b, Query<T>& q) {
+  prepare(a, b, half_a, half_b, q.pair);
   q.axis = separating_axis(q.pair);
   Mask<T> doubtful = q.axis.doubtful & q.pair.valid;
   if (any(doubtful)) {
@@ -65,7 +65,6 @@ BC_INLINE Query<T> query(const Pose<T>& a, const Pose<T>& b, const Vec<T>& half_
     }
   }
   q.touching = (q.axis.separation <= q.pair.touch) & q.pair.valid;
-  return q;
 }
 
 template <class T>
@@ -78,17 +77,24 @@ BC_INLINE Query<double> lane(const Query<T>& q, int i) {
 
 // The same pair with the box that comes first in the order of the data as A.
 template <class T>
-BC_INLINE Pair<T> first_as_a(const Pair<T>& pair) {
+BC_INLINE void put_first_as_a(const Pair<T>& pair, Pair<T>& ordered) {
   Mask<T> a_first = pair.a_first;
-  Pair<T> ordered = pair;
+  ordered.origin_a = pair.origin_a;
+  ordered.size = pair.size;
+  ordered.touch = pair.touch;
+  ordered.a_first = a_first;
+  ordered.valid = pair.valid;
   ordered.half_a = select(a_first, pair.half_a, pair.half_b);
   ordered.half_b = select(a_first, pair.half_b, pair.half_a);
   ordered.offset_a = select(a_first, pair.offset_a, -pair.offset_b);
   ordered.offset_b = select(a_first, pair.offset_b, -pair.offset_a);
-  ordered.rotation = select(a_first, pair.rotation, transpose(pair.rotation));
-  ordered.axes_a = select(a_first, pair.axes_a, pair.axes_b);
-  ordered.axes_b = select(a_first, pair.axes_b, pair.axes_a);
-  return ordered;
+  // Number by number: g++ copies whole matrices by string instructions, which take some per cent.
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) {
+      ordered.rotation[i][j] = select<T>(a_first, pair.rotation[i][j], pair.rotation[j][i]);
+      ordered.axes_a[i][j] = select<T>(a_first, pair.axes_a[i][j], pair.axes_b[i][j]);
+      ordered.axes_b[i][j] = select<T>(a_first, pair.axes_b[i][j], pair.axes_a[i][j]);
+    }
 }
 
 // The exact overlap of a single pair that `enforce_minimum_depth` has moved.
@@ -102,7 +108,8 @@ inline Moments<double> clipped_overlap(Pair<double> pair, int face, bool pressed
 //   Found<T>: what it finds of an overlap. `Moments<T>`, or `Vec<T>` for the centroid alone.
 //   group<T>: how many queries it takes at once.
 //
-// And `solve(queries, found, counts)` fills `found` for the pairs that touch, points in A's frame.
+// And `solve(queries, found, counts)` fills `found` for the pairs that touch, points in A's frame. It may
+// move the boxes of the queries.
 
 // Model `exact`: the moments of A∩B by face sums, or by clipping where these are not certain.
 // `FoundOf`: Moments, or PointAndVolume.
@@ -114,18 +121,22 @@ struct ExactModelOf {
   static constexpr int group = 1;
 
   template <class T>
-  BC_INLINE void solve(const Query<T> (&queries)[1], Found<T> (&found)[1], Counts& counts) const {
+  BC_INLINE void solve(Query<T> (&queries)[1], Found<T> (&found)[1], Counts& counts) const {
     found[0] = solve(queries[0], counts);
   }
 
+  // Not inlined: single calls, fallbacks and stages share one copy. It presses the very pair, because
+  // a copy of so many lanes would cost some per cent of the time.
   template <class T>
-  BC_INLINE Found<T> solve(const Query<T>& q, Counts& counts) const {
-    Pair<T> pair = q.pair;
+  [[gnu::noinline]] Found<T> solve(Query<T>& q, Counts& counts) const {
+    Pair<T>& pair = q.pair;
     Mask<T> pressed = enforce_minimum_depth(pair, q.axis) & q.touching;
     Mask<T> fallback = pressed;
     if (any(pressed)) fallback &= has_too_little_depth(pair);
     T depth = max(-q.axis.separation, depth_floor * pair.size);
-    CertifiedOverlap<Found<T>, T> overlap = overlap_by_face_sums<Found<T>>(first_as_a(pair), depth);
+    Pair<T> ordered;
+    put_first_as_a(pair, ordered);
+    CertifiedOverlap<Found<T>, T> overlap = overlap_by_face_sums<Found<T>>(ordered, depth);
     Found<T> found = overlap.moments;
     found.centroid =
         select(pair.a_first, found.centroid, pair.offset_a + pair.rotation * found.centroid);
@@ -145,8 +156,8 @@ struct ExactModelOf {
 using ExactModel = ExactModelOf<Moments>;
 using ExactPointModel = ExactModelOf<PointAndVolume>;
 
-// The exact overlap of a single pair, not inlined: fallbacks and stages share one copy.
-[[gnu::noinline]] inline Moments<double> exact_overlap(const Query<double>& q, Counts& counts) {
+// The exact overlap of a single pair.
+inline Moments<double> exact_overlap(Query<double> q, Counts& counts) {
   return ExactModel{}.solve(q, counts);
 }
 
@@ -166,26 +177,6 @@ BC_INLINE Moments<T> moments(const Vec<T>& centroid) {
   return {unknown, centroid, {{unknown, unknown, unknown, unknown, unknown, unknown}}};
 }
 
-// The answers for pairs, in the frame of the poses.
-template <class T>
-struct Answer {
-  Vec<T> normal;
-  Moments<T> overlap;
-};
-
-template <class T, class Found>
-BC_INLINE Answer<T> answer(const Query<T>& q, const Found& found, double margin) {
-  T nothing = splat<T>(not_a_number);
-  Vec<T> none{nothing, nothing, nothing};
-  Moments<T> overlap = moments(found);
-  Mask<T> near = q.touching | ((q.axis.separation <= margin) & q.pair.valid);
-  return {select(near, direction_in_common_frame(q.pair, q.axis.normal), none),
-          {select<T>(q.touching, overlap.volume, T{}),
-           select(q.touching, point_in_common_frame(q.pair, overlap.centroid), none),
-           select(q.touching, overlap.covariance,
-                  Sym<T>{{nothing, nothing, nothing, nothing, nothing, nothing}})}};
-}
-
 // The numbers of row `row`: places of the poses and sizes of its boxes.
 struct RowPlaces {
   const double *pose_a, *pose_b, *size_a, *size_b;
@@ -200,72 +191,90 @@ struct RowPlaces {
   }
 };
 
-// Rows by their numbers, side by side. Lanes beyond `count` repeat the last one.
+// Find the axes of rows `first` to `last` side by side. Lanes beyond them repeat the last one, and do
+// not touch. Not inlined: all models share it.
 template <class T>
-BC_INLINE Query<T> query_rows(const Rows& rows, const long* numbers, long count) {
-  Pose<T> pose_a, pose_b;
-  Vec<T> half_a, half_b;
-  if constexpr (is_scalar<T>) {
-    RowPlaces at(rows, numbers[0]);
-    for (int k = 0; k < 3; ++k) {
-      pose_a.position[k] = at.pose_a[k], pose_b.position[k] = at.pose_b[k];
-      half_a[k] = 0.5 * at.size_a[k], half_b[k] = 0.5 * at.size_b[k];
-    }
-    for (int k = 0; k < 4; ++k) {
-      pose_a.quaternion[k] = at.pose_a[3 + k];
-      pose_b.quaternion[k] = at.pose_b[3 + k];
-    }
-  } else {
-    alignas(sizeof(T)) double a[7][width<T>], b[7][width<T>], sizes[6][width<T>];
-    for (int i = 0; i < width<T>; ++i) {
-      RowPlaces at(rows, numbers[min(long(i), count - 1)]);
-      for (int k = 0; k < 7; ++k) a[k][i] = at.pose_a[k], b[k][i] = at.pose_b[k];
-      for (int k = 0; k < 3; ++k) sizes[k][i] = at.size_a[k], sizes[3 + k][i] = at.size_b[k];
-    }
-    auto lanes_of = [](const double (&numbers)[width<T>]) {
-      T x;
-      std::memcpy(&x, numbers, sizeof(T));
-      return x;
-    };
-    for (int k = 0; k < 3; ++k) {
-      pose_a.position[k] = lanes_of(a[k]), pose_b.position[k] = lanes_of(b[k]);
-      half_a[k] = 0.5 * lanes_of(sizes[k]), half_b[k] = 0.5 * lanes_of(sizes[3 + k]);
-    }
-    for (int k = 0; k < 4; ++k) {
-      pose_a.quaternion[k] = lanes_of(a[3 + k]);
-      pose_b.quaternion[k] = lanes_of(b[3 + k]);
-    }
+[[gnu::noinline]] inline void query_rows(const Rows& rows, long first, long last, Query<T>& q) {
+  const double *poses_a[width<T>], *poses_b[width<T>], *turns_a[width<T>], *turns_b[width<T>];
+  const double *sizes_a[width<T>], *sizes_b[width<T>];
+  for (int i = 0; i < width<T>; ++i) {
+    RowPlaces at(rows, min(first + i, last - 1));
+    poses_a[i] = at.pose_a, poses_b[i] = at.pose_b;
+    turns_a[i] = at.pose_a + 3, turns_b[i] = at.pose_b + 3;
+    sizes_a[i] = at.size_a, sizes_b[i] = at.size_b;
   }
-  return query(pose_a, pose_b, half_a, half_b);
+  Pose<T> pose_a, pose_b;
+  Vec<T> size_a, size_b;
+  load_rows(poses_a, pose_a.position.v);
+  load_rows(turns_a, pose_a.quaternion);
+  load_rows(poses_b, pose_b.position.v);
+  load_rows(turns_b, pose_b.quaternion);
+  load_rows(sizes_a, size_a.v);
+  load_rows(sizes_b, size_b.v);
+  T half = splat<T>(0.5);
+  query(pose_a, pose_b, half * size_a, half * size_b, q);
+  for (long i = max(0L, last - first); i < width<T>; ++i) set_lane(q.touching, int(i), 0);
 }
 
-// Write solved rows. Returns the first that is refused, or −1.
-template <class T, class Found>
-BC_INLINE long write_rows(const Query<T>& q, const Found& found, const long* numbers, long count,
-                          const Results& results, Counts& counts) {
-  Answer<T> rows = answer(q, found, results.margin);
-  Mat<T> covariance = matrix(rows.overlap.covariance);
-  long refused = -1;
-  for (int i = 0; i < count && i < width<T>; ++i) {
-    long row = numbers[i];
-    counts.contacts += lane(q.touching, i) != 0;
-    if (results.colliding) results.colliding[row] = lane(q.touching, i) != 0;
-    if (results.separation) results.separation[row] = lane(q.axis.separation, i);
-    if (results.axis) results.axis[row] = int32_t(lane(q.axis.axis, i));
-    for (int k = 0; results.normal && k < 3; ++k)
-      results.normal[3 * row + k] = lane(rows.normal[k], i);
-    for (int k = 0; results.point && k < 3; ++k)
-      results.point[3 * row + k] = lane(rows.overlap.centroid[k], i);
-    if (results.volume) results.volume[row] = lane(rows.overlap.volume, i);
-    if (results.covariance)
-      for (int k = 0; k < 9; ++k)
-        results.covariance[9 * row + k] = lane(covariance[k / 3][k % 3], i);
-    if (!lane(q.pair.valid, i)) {
-      if (results.separation) results.separation[row] = not_a_number;
-      if (refused < 0) refused = row;
-    }
+// Write what a query says of rows `first` to before `last`, and the answers of those that do not
+// touch. Returns the first that is refused, or −1.
+template <class T>
+[[gnu::noinline]] inline long write_query(const Query<T>& q, long first, long last,
+                                          const Results& results, Counts& counts) {
+  T nothing = splat<T>(not_a_number);
+  unsigned touching = bits(q.touching), valid = bits(q.pair.valid), all = ~0U >> (32 - width<T>);
+  Mask<T> near = q.touching | ((q.axis.separation <= results.margin) & q.pair.valid);
+  Vec<T> none{nothing, nothing, nothing};
+  Vec<T> normal = select(near, direction_in_common_frame(q.pair, q.axis.normal), none);
+  T separation = select<T>(q.pair.valid, q.axis.separation, nothing);
+  long count = min(last - first, long(width<T>));
+  unsigned here = all >> (width<T> - count);
+  if (results.normal) {
+    double* places[width<T>];
+    for (int i = 0; i < width<T>; ++i) places[i] = results.normal + 3 * (first + i);
+    store_rows(places, here, normal.v);
   }
-  return refused;
+  for (int i = 0; i < count; ++i) {
+    long row = first + i;
+    bool touches = touching >> i & 1;
+    if (results.colliding) results.colliding[row] = touches;
+    if (results.separation) results.separation[row] = lane(separation, i);
+    if (results.axis) results.axis[row] = int32_t(lane(q.axis.axis, i));
+    counts.contacts += touches;
+    if (touches) continue;
+    for (int k = 0; results.point && k < 3; ++k) results.point[3 * row + k] = not_a_number;
+    if (results.volume) results.volume[row] = 0.0;
+    for (int k = 0; results.covariance && k < 9; ++k) results.covariance[9 * row + k] = not_a_number;
+  }
+  unsigned refused = here & ~valid;
+  return refused ? first + __builtin_ctz(refused) : -1;
+}
+
+// Write the overlaps of the lanes that touch to their rows.
+template <class T, class Found>
+[[gnu::noinline]] inline void write_overlaps(const Query<T>& q, const Found& found,
+                                             const long (&rows)[width<T>], const Results& results) {
+  unsigned touching = bits(q.touching);
+  Moments<T> overlap = moments(found);
+  double* places[width<T>];
+  auto store = [&](double* array, int numbers, int from, const auto& x) {
+    for (int i = 0; i < width<T>; ++i) places[i] = array + (numbers * rows[i] + from);
+    store_rows(places, touching, x);
+  };
+  if (results.point)
+    store(results.point, 3, 0, point_in_common_frame(q.pair, overlap.centroid).v);
+  if (results.volume) {
+    T volume[1] = {overlap.volume};
+    store(results.volume, 1, 0, volume);
+  }
+  if (results.covariance) {
+    const auto& c = overlap.covariance;
+    T first[4] = {c(0, 0), c(0, 1), c(0, 2), c(1, 0)}, middle[4] = {c(1, 1), c(1, 2), c(2, 0), c(2, 1)};
+    T last[1] = {c(2, 2)};
+    store(results.covariance, 9, 0, first);
+    store(results.covariance, 9, 4, middle);
+    store(results.covariance, 9, 8, last);
+  }
 }
 
 // Ask for the memory that rows will be written to, so that it is in the cache when they are solved.
@@ -280,64 +289,57 @@ inline void fetch_rows(const Results& results, long first, long last) {
   fetch(results.covariance, 9);
 }
 
-// Numbers of rows that touch, of groups in which few do. They wait until they fill a group.
-template <int size>
-struct Waiting {
-  long numbers[2 * size];
-  long count;
+// A group of blocks: what a model takes at once.
+template <class T, class Model>
+struct Group {
+  static constexpr int blocks = Model::template group<T>, lanes = blocks * width<T>;
+  Query<T> queries[blocks];
+  long rows[blocks][width<T>];
 
-  // Lanes of a group up to which they wait. Who waits is tested again, a fifth of the whole work.
-  static constexpr int most = 5 * size / 8;
-
-  // Take up to `size` of them.
-  BC_INLINE long take(long (&taken)[size]) {
-    long from = max(0L, count - size), found = count - from;
-    for (long i = 0; i < found; ++i) taken[i] = numbers[from + i];
-    count = from;
-    return found;
+  // Solve the lanes that touch.
+  BC_INLINE void solve(const Model& model, const Results& results, Counts& counts) {
+    typename Model::template Found<T> found[blocks]{};
+    model.solve(queries, found, counts);
+    for (int g = 0; g < blocks; ++g) write_overlaps(queries[g], found[g], rows[g], results);
   }
 };
 
-// Solve rows by their numbers, at most one group of blocks. With `waiting`, rows that touch may be
-// left for later. Returns the first row whose poses or sizes are refused, or −1.
-template <class T, class Model, int size>
-BC_INLINE long solve_group(const Model& model, const Rows& rows, const long* numbers, long count,
-                           Waiting<size>* waiting, const Results& results, Counts& counts) {
-  constexpr int group = Model::template group<T>;
-  Query<T> queries[group];
-  typename Model::template Found<T> found[group]{};
-  int touching = 0;
-  for (int g = 0; g < group; ++g) {
-    long start = g * width<T>;
-    queries[g] = query_rows<T>(rows, numbers + min(start, count - 1), max(1L, count - start));
-    // Lanes that repeat the last row are not counted.
-    for (long i = max(0L, count - start); i < width<T>; ++i)
-      set_lane(queries[g].touching, int(i), 0);
-    for (int i = 0; i < width<T>; ++i) touching += lane(queries[g].touching, i) != 0;
-  }
-  if (waiting && touching <= Waiting<size>::most) {
-    for (long i = 0; touching > 0 && i < count; ++i)
-      if (lane(queries[i / width<T>].touching, int(i % width<T>))) {
-        waiting->numbers[waiting->count++] = numbers[i];
-        --touching;
-      }
-    for (Query<T>& q : queries) q.touching = q.touching != q.touching;
-  }
-  if (touching > 0) model.solve(queries, found, counts);
-  long refused = -1;
-  for (int g = 0; g < group; ++g) {
-    long start = g * width<T>;
-    long row = write_rows(queries[g], found[g], numbers + start, count - start, results, counts);
-    if (refused < 0) refused = row;
-  }
-  return refused;
-}
+// Rows that touch, from blocks in which others do not: they wait until they fill a group.
+template <class T, class Model>
+struct Waiting {
+  Group<T, Model> group;
+  int count = 0;
 
-// One row alone, not inlined into the rows: the registers of the two would mix.
+  // Put lane i of `q` at place `at`.
+  BC_INLINE void put(const Query<T>& q, int i, long row, int at) {
+    static_assert(sizeof(Query<T>) % sizeof(T) == 0, "all that a query has are lanes");
+    constexpr size_t one = sizeof(Number<T>);
+    auto* from = reinterpret_cast<const char*>(&q) + one * i;
+    auto* to = reinterpret_cast<char*>(&group.queries[at / width<T>]) + one * (at % width<T>);
+    for (size_t k = 0; k < sizeof q; k += sizeof(T)) std::memcpy(to + k, from + k, one);
+    group.rows[at / width<T>][at % width<T>] = row;
+  }
+  // Solve what waits. Idle lanes repeat the first one.
+  BC_INLINE void solve(const Model& model, const Results& results, Counts& counts) {
+    if (!count) return;
+    for (int at = count; at < group.lanes; ++at) {
+      put(group.queries[0], 0, 0, at);
+      set_lane(group.queries[at / width<T>].touching, at % width<T>, 0);
+    }
+    group.solve(model, results, counts);
+    count = 0;
+  }
+};
+
+// One row alone.
 template <class Model>
 [[gnu::noinline]] inline long solve_row(const Model& model, const Rows& rows, long row,
                                         const Results& results, Counts& counts) {
-  return solve_group<double, Model, 1>(model, rows, &row, 1, nullptr, results, counts);
+  Group<double, Model> one;
+  query_rows(rows, row, row + 1, one.queries[0]);
+  one.rows[0][0] = row;
+  if (one.queries[0].touching) one.solve(model, results, counts);
+  return write_query(one.queries[0], row, row + 1, results, counts);
 }
 
 // Solve rows `begin` to `end`. Returns the first row whose poses or sizes are refused, or −1. Such
@@ -348,33 +350,39 @@ template <class Model>
 template <class T, class Model>
 [[gnu::noinline]] inline long solve_rows(const Model& model, const Rows& rows, long begin, long end,
                                          const Results& results, Counts& counts) {
-  constexpr int size = Model::template group<T> * width<T>;
-  constexpr long few = is_scalar<T> ? 0 : width<T> <= 2 ? size / 2 - 1 : size / width<T>;
-  Waiting<size> waiting;
-  waiting.count = 0;
   long refused = -1, first = begin;
-  for (;;) {
-    long numbers[size];
-    bool is_over = end - first <= few, is_late = waiting.count >= (is_over ? few + 1 : size);
-    if (is_over && !is_late) break;
-    long count = min(long(size), end - first);
-    if (is_late) {
-      count = waiting.take(numbers);
-    } else {
-      for (long i = 0; i < size; ++i) numbers[i] = first + i;
-      fetch_rows(results, first, first + count);
-      first += count;
+  auto note = [&](long row) { refused = refused < 0 ? row : refused; };
+  if constexpr (!is_scalar<T>) {
+    Group<T, Model> group;
+    Waiting<T, Model> waiting;
+    constexpr int blocks = group.blocks, lanes = group.lanes;
+    constexpr long few = width<T> <= 2 ? blocks - 1 : blocks;
+    for (; end - first > few; first += lanes) {
+      long last = min(first + lanes, end);
+      fetch_rows(results, first, last);
+      int touching = 0;
+      for (int g = 0; g < blocks; ++g) {
+        long start = first + g * width<T>;
+        query_rows(rows, min(start, last - 1), last, group.queries[g]);
+        if (start >= last) group.queries[g].touching = Mask<T>{};
+        else note(write_query(group.queries[g], start, last, results, counts));
+        for (int i = 0; i < width<T>; ++i) group.rows[g][i] = start + i;
+        touching += __builtin_popcount(bits(group.queries[g].touching));
+      }
+      if (touching == lanes || (touching && first == begin && last == end)) {
+        group.solve(model, results, counts);
+      } else if (touching) {
+        for (int g = 0; g < blocks; ++g)
+          for (unsigned left = bits(group.queries[g].touching); left; left &= left - 1) {
+            int i = __builtin_ctz(left);
+            waiting.put(group.queries[g], i, group.rows[g][i], waiting.count);
+            if (++waiting.count == lanes) waiting.solve(model, results, counts);
+          }
+      }
     }
-    long row =
-        solve_group<T>(model, rows, numbers, count, is_late ? nullptr : &waiting, results, counts);
-    refused = refused < 0 ? row : refused;
+    waiting.solve(model, results, counts);
   }
-  for (; first < end; ++first) {
-    long row = solve_row(model, rows, first, results, counts);
-    refused = refused < 0 ? row : refused;
-  }
-  for (long i = 0; i < waiting.count; ++i)
-    solve_row(model, rows, waiting.numbers[i], results, counts);
+  for (; first < end; ++first) note(solve_row(model, rows, first, results, counts));
   return refused;
 }
 

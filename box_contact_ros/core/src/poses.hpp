@@ -90,20 +90,22 @@ Mask<T> a_first_of_concentric(const Vec<T>& half_a, const Vec<T>& half_b, const 
 }
 
 template <class T>
-BC_INLINE Pair<T> prepare(const Pose<T>& a, const Pose<T>& b, const Vec<T>& half_a,
-                          const Vec<T>& half_b) {
+BC_INLINE void prepare(const Pose<T>& a, const Pose<T>& b, const Vec<T>& half_a,
+                       const Vec<T>& half_b, Pair<T>& pair) {
   Mat<T> axes_a = rotation_matrix(a.quaternion), axes_b = rotation_matrix(b.quaternion);
   Vec<T> t = b.position - a.position;
-  Pair<T> pair;
   pair.half_a = half_a;
   pair.half_b = half_b;
   pair.origin_a = a.position;
-  pair.axes_a = axes_a;
-  pair.axes_b = axes_b;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) pair.axes_a[i][j] = axes_a[i][j], pair.axes_b[i][j] = axes_b[i][j];
   pair.offset_a = transposed_times(axes_a, t);
   pair.offset_b = transposed_times(axes_b, t);
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) pair.rotation[i][j] = dot(column(axes_a, i), column(axes_b, j));
+  for (int i = 0; i < 3; ++i) {
+    Triple<T> by_b = (axes_a[0][i] * triple(row(axes_b, 0)) + axes_a[1][i] * triple(row(axes_b, 1))) +
+                     axes_a[2][i] * triple(row(axes_b, 2));
+    for (int j = 0; j < 3; ++j) pair.rotation[i][j] = by_b[j];
+  }
   pair.size = 2.0 * max(largest(half_a), largest(half_b));
   T reach = max(largest(abs(a.position)), largest(abs(b.position)));
   pair.touch = contact_ulps * ulp(max(reach, pair.size));
@@ -115,7 +117,6 @@ BC_INLINE Pair<T> prepare(const Pose<T>& a, const Pose<T>& b, const Vec<T>& half
     pair.a_first = (pair.a_first & (concentric == 0)) | (ordered & concentric);
   }
   pair.valid = pose_valid(a) & pose_valid(b) & size_valid(half_a) & size_valid(half_b);
-  return pair;
 }
 
 // Move B by `distance` [m] against a direction given in A's frame.

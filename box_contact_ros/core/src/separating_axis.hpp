@@ -97,28 +97,29 @@ BC_INLINE void offer_edge_axes(const Pair<T>& pair, const FirstFrame<T>& frame, 
   T tolerance = tie * pair.size, error = edge_gap_error * pair.size;
   T none = splat<T>(-infinity);
   T largest_possible = none, longest_skipped2 = T{};
+  Triple<T> half_k = rotated(triple(frame.other_half)), half_l = rotated(half_k);
 #pragma GCC unroll 3
   for (int i = 0; i < 3; ++i) {
     int y = (i + 1) % 3, z = (i + 2) % 3;
+    // By j, and the other box's axes k and l that follow it.
+    Triple<T> uy = triple(row(frame.edges, y)), uz = triple(row(frame.edges, z));
+    Triple<T> ky = rotated(uy), kz = rotated(uz), ly = rotated(ky), lz = rotated(kz);
+    Triple<T> length2 = uy * uy + uz * uz;
+    Triple<T> width = (frame.half[y] * abs(uz) + frame.half[z] * abs(uy)) +
+                      (half_k * abs(kz * uy - ky * uz) + half_l * abs(lz * uy - ly * uz));
+    Triple<T> overlap = abs(frame.offset[z] * uy - frame.offset[y] * uz) - width;
+    Triple<T> inverse = each([](auto x) { return 1.0 / sqrt(x); }, length2);
+    Triple<T> gaps = overlap * inverse, highest_gaps = (overlap + error) * inverse;
 #pragma GCC unroll 3
     for (int j = 0; j < 3; ++j) {
-      int k = (j + 1) % 3, l = (j + 2) % 3;
-      T uy = frame.edges[y][j], uz = frame.edges[z][j];
-      T length2 = uy * uy + uz * uz;
-      T width = (frame.half[y] * abs(uz) + frame.half[z] * abs(uy)) +
-                (frame.other_half[k] * abs(frame.edges[z][k] * uy - frame.edges[y][k] * uz) +
-                 frame.other_half[l] * abs(frame.edges[z][l] * uy - frame.edges[y][l] * uz));
-      T overlap = abs(frame.offset[z] * uy - frame.offset[y] * uz) - width;
-      T inverse = 1.0 / sqrt(length2);
-      Mask<T> used = length2 >= parallel * parallel;
-      Mask<T> inaccurate = used & (length2 < almost_parallel * almost_parallel);
-      largest_possible =
-          max(largest_possible, select<T>(inaccurate, (overlap + error) * inverse, none));
-      longest_skipped2 = max(longest_skipped2, select<T>(used, T{}, length2));
+      Mask<T> used = length2[j] >= parallel * parallel;
+      Mask<T> inaccurate = used & (length2[j] < almost_parallel * almost_parallel);
+      largest_possible = max(largest_possible, select<T>(inaccurate, highest_gaps[j], none));
+      longest_skipped2 = max(longest_skipped2, select<T>(used, T{}, length2[j]));
       T number = i == j ? splat<T>(first_edge_axis + 4 * i)
                         : select<T>(pair.a_first, splat<T>(first_edge_axis + 3 * i + j),
                                     splat<T>(first_edge_axis + 3 * j + i));
-      best.offer(select<T>(used, overlap * inverse, none), number, tolerance);
+      best.offer(select<T>(used, gaps[j], none), number, tolerance);
     }
   }
   T gap = best.largest_gap, reach = skipped_gain * pair.size;

@@ -160,19 +160,32 @@ BC_INLINE void set_lane(T& x, int i, N value) {
   }
 }
 
+// A bit for each lane of a mask.
 template <class M>
-BC_INLINE bool any(M mask) {
+BC_INLINE unsigned bits(M mask) {
   if constexpr (is_scalar<M>) {
     return mask;
+#if defined(__AVX512F__)
+  } else if constexpr (sizeof(M) == 64 && width<M> == 8) {
+    return _mm512_test_epi64_mask((__m512i)mask, (__m512i)mask);
+#endif
 #if defined(__AVX__)
-  } else if constexpr (sizeof(M) == 32 && sizeof(Number<M>) == 8) {
-    return _mm256_movemask_pd((__m256d)mask) != 0;
+  } else if constexpr (sizeof(M) == 32 && width<M> == 4) {
+    return _mm256_movemask_pd((__m256d)mask);
+#endif
+#if defined(__SSE2__)
+  } else if constexpr (sizeof(M) == 16 && width<M> == 2) {
+    return _mm_movemask_pd((__m128d)mask);
 #endif
   } else {
-    Number<M> found = 0;
-    for (int i = 0; i < width<M>; ++i) found |= mask[i];
-    return found != 0;
+    unsigned found = 0;
+    for (int i = 0; i < width<M>; ++i) found |= unsigned(mask[i] & 1) << i;
+    return found;
   }
+}
+template <class M>
+BC_INLINE bool any(M mask) {
+  return bits(mask) != 0;
 }
 
 }  // namespace box_contact::BOX_CONTACT_SET

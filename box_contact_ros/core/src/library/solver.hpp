@@ -84,7 +84,7 @@ class Solver {
     long chunks = (count + rows_per_chunk - 1) / rows_per_chunk;
     threads = std::min(threads, chunks);
     Counts counts{};
-    long refused = threads <= 1 ? solve_chunks(rows, count, results, counts)
+    long refused = threads <= 1 ? solve_chunk(rows, 0, count, results, counts)
                                 : solve_in_threads(rows, count, results, threads, counts);
     if (refused < 0) add(counts);
     return refused;
@@ -96,15 +96,6 @@ class Solver {
   void add(const Counts& counts) {
     if (counts.clipped) clipped_ += counts.clipped;
     if (counts.exact) exact_ += counts.exact;
-  }
-
-  long solve_chunks(const Rows& rows, long count, const Results& results, Counts& counts) const {
-    long refused = -1;
-    for (long begin = 0; begin < count; begin += rows_per_chunk) {
-      long row = solve_chunk(rows, begin, std::min(begin + rows_per_chunk, count), results, counts);
-      if (refused < 0) refused = row;
-    }
-    return refused;
   }
 
   long solve_in_threads(const Rows& rows, long count, const Results& results, long threads,

@@ -46,7 +46,8 @@ inline void put_features(const StageArrays& arrays, long row, const CutCube<doub
 template <Network::Bounds method>
 bool fill_stages(const Rows& rows, long row, const NetworkView* network,
                  const StageArrays& arrays) {
-  Query<double> q = query_rows<double>(rows, &row, 1);
+  Query<double> q;
+  query_rows(rows, row, row + 1, q);
   if (!q.pair.valid) return false;
   put(arrays.colliding, row, q.touching);
   put(arrays.axis, row, q.axis.axis);

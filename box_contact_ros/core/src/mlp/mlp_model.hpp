@@ -126,8 +126,8 @@ struct MlpModelBy {
 
   // What it finds, for the pairs that touch.
   template <class T, int count>
-  BC_INLINE void solve(const Query<T> (&queries)[count], Found<T> (&found)[count],
-                       Counts& counts) const {
+  [[gnu::noinline]] void solve(const Query<T> (&queries)[count], Found<T> (&found)[count],
+                               Counts& counts) const {
     OverlapBounds<T> bounds[count];
     CutCube<T> cubes[count];
     CubeMoments<T> answers[count];

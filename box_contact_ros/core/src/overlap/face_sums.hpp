@@ -114,18 +114,35 @@ struct FaceSums {
   }
 };
 
-// Terms of the four signs, those with σ ≠ τ negative, summed for each sign of one side.
-template <class T>
-struct BySign {
+// Two numbers, for the signs − and + of one side: of a single pair side by side.
+template <class T, bool = is_scalar<T>>
+struct BothOf {
   T low, high;
 
   BC_INLINE T sum() const { return low + high; }
+  BC_INLINE BothOf operator*(const BothOf& other) const {
+    return {low * other.low, high * other.high};
+  }
 };
+template <class T>
+struct BothOf<T, true> {
+  Lanes<T, 2> both;
+
+  BC_INLINE BothOf(Lanes<T, 2> both) : both(both) {}
+  BC_INLINE BothOf(T low, T high) : both{low, high} {}
+  BC_INLINE T sum() const { return both[0] + both[1]; }
+  BC_INLINE BothOf operator*(const BothOf& other) const { return both * other.both; }
+};
+template <class T>
+using Both = BothOf<T>;
+
+// Terms of the four signs, those with σ ≠ τ negative, summed for each sign of one side.
 template <class T, Side side>
-BC_INLINE BySign<T> by_sign(const Four<T> (&terms)[steps<T>]) {
+BC_INLINE Both<T> by_sign(const Four<T> (&terms)[steps<T>]) {
   constexpr int other = side == Side::sigma ? 2 : 1;  // where the other side's sign is + instead
   if constexpr (is_scalar<T>) {
-    return {terms[0][0] - terms[0][other], terms[0][3] - terms[0][3 - other]};
+    return __builtin_shufflevector(terms[0], terms[0], 0, 3) -
+           __builtin_shufflevector(terms[0], terms[0], other, 3 - other);
   } else {
     return {terms[0] - terms[other], terms[3] - terms[3 - other]};
   }
@@ -180,16 +197,13 @@ BC_INLINE void add_edges_along(int j, const EdgePieces<T>& pieces, const Vec<T>&
     w_xx[n] = w_x[n] * middle;
     w_ll[n] = (w[n] * length) * length;
   }
-  T f_low = -half[a] - origin[a], f_high = half[a] - origin[a];
-  T g_low = -half[b] - origin[b], g_high = half[b] - origin[b];
-  BySign<T> w_f = by_sign<T, Side::sigma>(w), w_t = by_sign<T, Side::tau>(w),
-            g_f = by_sign<T, Side::sigma>(w_g);
-  BySign<T> x_f = by_sign<T, Side::sigma>(w_x), x_t = by_sign<T, Side::tau>(w_x);
-  squares(a, a) += (f_low * f_low) * w_f.low + (f_high * f_high) * w_f.high;
-  squares(b, b) += (g_low * g_low) * w_t.low + (g_high * g_high) * w_t.high;
-  squares(a, b) += f_low * g_f.low + f_high * g_f.high;
-  squares(a, j) += f_low * x_f.low + f_high * x_f.high;
-  squares(b, j) += g_low * x_t.low + g_high * x_t.high;
+  Both<T> f{-half[a] - origin[a], half[a] - origin[a]};
+  Both<T> g{-half[b] - origin[b], half[b] - origin[b]};
+  squares(a, a) += (f * f * by_sign<T, Side::sigma>(w)).sum();
+  squares(b, b) += (g * g * by_sign<T, Side::tau>(w)).sum();
+  squares(a, b) += (f * by_sign<T, Side::sigma>(w_g)).sum();
+  squares(a, j) += (f * by_sign<T, Side::sigma>(w_x)).sum();
+  squares(b, j) += (g * by_sign<T, Side::tau>(w_x)).sum();
   squares(j, j) +=
       by_sign<T, Side::sigma>(w_xx).sum() + (1.0 / 12.0) * by_sign<T, Side::sigma>(w_ll).sum();
 }
@@ -276,7 +290,7 @@ BC_INLINE void add_lines_of(int i, T& least, const Pair<T>& pair, const Mat<T>& 
     least = min(least, lines.sine2_or_one);
     if constexpr (is_scalar<T>) {
       LinePiece<T> line = lines.piece(0);
-      if (adds_nothing<T>(max(line.to - line.from, Four<T>{}))) continue;
+      if (adds_nothing<T>(lines.sine2 * max(line.to - line.from, Four<T>{}))) continue;
     }
     int k = (j + 1) % 3, l = (j + 2) % 3;
     Four<T> along[steps<T>];
@@ -306,12 +320,10 @@ BC_INLINE void add_lines_of(int i, T& least, const Pair<T>& pair, const Mat<T>& 
     squares(y, z) -= by_y * r[z][j];
     squares(z, z) += by_y * r[y][j];
   }
-  T f_low = -pair.half_a[i] - origin_a[i], f_high = pair.half_a[i] - origin_a[i];
-  BySign<T> all_f = by_sign<T, Side::sigma>(w_all), y_f = by_sign<T, Side::sigma>(w_y),
-            z_f = by_sign<T, Side::sigma>(w_z);
-  squares(i, i) += (f_low * f_low) * all_f.low + (f_high * f_high) * all_f.high;
-  squares(i, y) += f_low * y_f.low + f_high * y_f.high;
-  squares(i, z) += f_low * z_f.low + f_high * z_f.high;
+  Both<T> f{-pair.half_a[i] - origin_a[i], pair.half_a[i] - origin_a[i]};
+  squares(i, i) += (f * f * by_sign<T, Side::sigma>(w_all)).sum();
+  squares(i, y) += (f * by_sign<T, Side::sigma>(w_y)).sum();
+  squares(i, z) += (f * by_sign<T, Side::sigma>(w_z)).sum();
   squares(y, y) += by_sign<T, Side::sigma>(w_yy).sum();
   squares(y, z) += by_sign<T, Side::sigma>(w_yz).sum();
   squares(z, z) += by_sign<T, Side::sigma>(w_zz).sum();
@@ -485,14 +497,14 @@ struct CertifiedOverlap {
   Mask<T> certain;
 };
 
-// The overlap of a pair that has been pressed in to `depth` [m]: Moments<T>, or for PointAndVolume<T>
+// The overlap of a pair that has been pressed in to `depth` [m], and that may be changed: Moments<T>, or for PointAndVolume<T>
 // without the second moments. Then the equations are those that the centroid needs.
 template <class Found, class T>
-BC_INLINE CertifiedOverlap<Found, T> overlap_by_face_sums(const Pair<T>& given, T depth) {
+BC_INLINE CertifiedOverlap<Found, T> overlap_by_face_sums(Pair<T>& pair, T depth) {
   using namespace face_sums;
   constexpr bool all_moments = std::is_same_v<Found, Moments<T>>;
   using Squares = std::conditional_t<all_moments, Sym<T>, NoSquares>;
-  Pair<T> pair = given;
+  Vec<T> given_half_b = pair.half_b, given_offset_b = pair.offset_b;
   Mask<T> risky = unflush(pair, depth);
   const Mat<T>& r = pair.rotation;
   Mat<T> inverse = reciprocals(r);
@@ -512,11 +524,12 @@ BC_INLINE CertifiedOverlap<Found, T> overlap_by_face_sums(const Pair<T>& given, 
   auto of_a = integrate(faces_a, squares_a, pair.half_a, origin_a);
   auto of_b = integrate(faces_b, squares_b, pair.half_b, origin_b);
 
-  Mat<T> turned, x_n;
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) turned[i][j] = dot(row(r, i), column(of_b.x_n, j));
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) x_n[i][j] = of_a.x_n[i][j] + dot(row(turned, i), row(r, j));
+  Columns<T> axes_b = columns(r), rows_b = columns(transpose(of_b.x_n));
+  Mat<T> x_n;
+  for (int i = 0; i < 3; ++i) {
+    Triple<T> from_b = axes_b * (rows_b * triple(row(r, i)));
+    for (int j = 0; j < 3; ++j) x_n[i][j] = of_a.x_n[i][j] + from_b[j];
+  }
   CertifiedOverlap<Found, T> found;
   T volume = (x_n[0][0] + x_n[1][1] + x_n[2][2]) * (1.0 / 3.0);
   T by_volume = 1.0 / volume;
@@ -547,7 +560,9 @@ BC_INLINE CertifiedOverlap<Found, T> overlap_by_face_sums(const Pair<T>& given, 
   Mask<T> shallow = depth < safely_inside * pair.size;
   if (any(shallow)) {
     Vec<T> moved = centroid;
-    Mask<T> inside = move_inside(given, moved);
+    pair.half_b = given_half_b;
+    pair.offset_b = given_offset_b;
+    Mask<T> inside = move_inside(pair, moved);
     centroid = select(shallow, moved, centroid);
     found.certain &= inside | (shallow == 0);
   }

@@ -44,12 +44,13 @@ BC_INLINE Sym<T> squared(const Vec<T>& a) {
 // R · S · Rᵀ: a tensor of one frame in another, where R's columns are the axes of the first.
 template <class T>
 BC_INLINE Sym<T> rotated(const Mat<T>& r, const Sym<T>& s) {
-  Mat<T> turned;
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) turned[i][j] = dot(row(r, i), Vec<T>{s(0, j), s(1, j), s(2, j)});
+  Columns<T> rows, axes = columns(r);
+  for (int i = 0; i < 3; ++i) rows[i] = triple(Vec<T>{s(i, 0), s(i, 1), s(i, 2)});
   Sym<T> found;
-  for (int i = 0; i < 3; ++i)
-    for (int j = i; j < 3; ++j) found(i, j) = dot(row(turned, i), row(r, j));
+  for (int i = 0; i < 3; ++i) {
+    Triple<T> turned = axes * (rows * triple(row(r, i)));
+    for (int j = i; j < 3; ++j) found(i, j) = turned[j];
+  }
   return found;
 }
 template <class T>
