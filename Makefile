@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 # On a machine with git, a C++ compiler and Python 3.11 to 3.14, each target makes what it needs in
 # .venv (.ci/setup), then does the work. A second call starts at once.
 

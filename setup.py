@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Build and installation, for colcon (ROS 2 workspaces) and for pip alike."""
 
 import copy

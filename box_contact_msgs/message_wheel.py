@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Build backend for pip: a wheel of ROS messages, made with the generators in the ROS wheels.
 
 It needs the ROS wheels, a C++ compiler and Python's headers, but neither colcon nor ament_cmake.

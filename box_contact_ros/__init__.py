@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Box-box contact for simulators: whether two boxes touch, where, and which way they push.
 
 Names that are exported here are the stable Python API. Those of scenes and forces are loaded when

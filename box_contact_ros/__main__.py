@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """`python -m box_contact_ros PROGRAM [ARGUMENT ...]`: start one of the package's programs.
 
 `--cmakedir` and `--includes` print where C and C++ programs find the library.

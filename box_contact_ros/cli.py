@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The programs of this package, and the one way in which all of them are started.
 
 A program starts in three ways, which all end in `run`:

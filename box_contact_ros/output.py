@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """What every report is written with: folders, tables, CSV files, percentiles, the machine."""
 from __future__ import annotations
 

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Where the data files are: weights/, msg_schemas/, recordings/, launch/, config/.
 
 These folders stand at the top level of the repository, beside the Python package and not inside

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """How Sphinx builds the pages: `make docs`. The pages are also plain Markdown for a forge.
 
 A folder's README.md is its index. Its table of contents is made from its links, in their order, and

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Fill the tables of the README and of docs/ with the figures of docs/results/*.csv.
 
 `python docs/tables.py` rewrites each page that has a table between `<!-- table NAME -->` and

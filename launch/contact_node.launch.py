@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """A contact node with all of its parameters as arguments, to start or to include.
 
     ros2 launch box_contact_ros contact_node.launch.py scene:=config/scenes/yard_bay.yaml

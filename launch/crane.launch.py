@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The crane beside a contact node; on request a soup node and a view of the scene.
 
     ros2 launch box_contact_ros crane.launch.py model:=exact rate:=500 soup:=true

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """What all tests share: the installed package, a ROS domain of their own, programs as processes.
 
 This file sets the environment while it is imported: rclpy reads the environment once, when the

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The demonstration: a contact node and a crane, two processes that talk over DDS.
 
 `python -m box_contact_ros.apps.demo` starts both, shows the crane's live contacts and its summary,

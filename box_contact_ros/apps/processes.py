@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Programs of this package as subprocesses, in a ROS domain of their own on this host.
 
 Imports no rclpy: the demonstration starts and ends both its processes from outside.

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """What clients of the contact node need of rclpy: topics of a scene, messages as numbers."""
 from __future__ import annotations
 

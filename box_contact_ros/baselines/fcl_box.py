@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Model `fcl`: FCL's own box-box primitive, and of its contacts the deepest, as engines give it.
 
 Where two faces meet, FCL returns up to four corners of the patch with a depth each. The deepest

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """From a contact's point and depth to a wrench: a spring and a damper at the point, a baseline.
 
 It is what a simulator does with an engine that gives one point. The load's footprint has to be

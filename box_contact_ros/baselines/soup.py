@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Model `soup`: polygon soup, the method that the source paper compares itself with (section 5).
 
 Each face is split in N × N rectangles of two triangles: 12 N² triangles a box, the paper's column

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The native core: contacts of pairs of boxes in C++, by the best instruction set of the machine.
 
 `include/` has the public headers of libbox_contact, and `src/` compiles into the library, once for

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 # The library as a Python extension; see binding/module.cpp.
 from collections.abc import Sequence
 from typing import Any

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """What every stage of a pair computes, as named arrays: for training, reports and tests."""
 from __future__ import annotations
 

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The contact node: box poses in, contact points and normals out.
 
 Subscribes box_a/pose and box_b/pose (geometry_msgs/PoseStamped). Publishes contact/point

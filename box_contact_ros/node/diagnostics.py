@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """What a contact node reports once a second, on /diagnostics and in its log.
 
 A finding is one cause. Its message goes to /diagnostics, and with its remedy to the log.

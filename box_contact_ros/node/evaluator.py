@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Evaluation of ticks: poses are read, paired, handed to the solver; contacts are published."""
 from __future__ import annotations
 

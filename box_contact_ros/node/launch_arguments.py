@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Arguments of the launch files: what was given, checked by the settings of node parameters.
 
 Objects of ROS's `launch` are used here, and nothing of it is imported: the wheels do not have it.

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Messages as the bytes that are sent (CDR), without message objects: `RawMessages`.
 
 Poses are read by what CDR promises, whichever middleware wrote them. All other bytes are refused.

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Between messages and numbers: poses in; point, normal and contacts out.
 
 `TypedMessages` uses rclpy's message objects. `message_bytes.RawMessages` does the same with bytes,

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Node parameters as one table per node: declared, checked, and listed by `--help`.
 
 Parameters are declared with dynamic typing, so that the check of each setting refuses a value of

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Workarounds for rclpy: every use of its private attributes, and of its objects' memory.
 
 All were seen with rclpy 7.1 (Jazzy). Each names the symptom, and the test that guards it.

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """What every node here needs from rclpy: an executor that keeps up, and a clean end.
 
 No callback ends a process: `GuardedNode` catches what those of topics, timers and futures raise;

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The soup node: the contact node's work done by a polygon soup, the source paper's rival.
 
 Subscribes box_a/pose and box_b/pose like the contact node. Publishes the same messages under

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Program `accuracy`: how far a model's contacts are from the exact ones, per set and class.
 
 Measured are the point, the volume and the covariance. Every set of `pose_sets` is drawn anew from

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Quaternions and rotation matrices of poses, for arrays of them.
 
 Conventions (docs/reference/conventions.md has them for users)

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Named sets of posed pairs of boxes: what accuracy, speed and training are measured and made on.
 
 A set is a function (rng, n) -> Pairs with about n pairs: a few draws miss and are left out. The

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """A scene: boxes, fixed or moving, the pairs of them that matter, and what one tick computes.
 
 Nothing outside the listed pairs is answered. A broad phase leaves the pairs whose axis-aligned

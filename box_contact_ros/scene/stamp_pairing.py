@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Pairing: joins the streams of stamped poses of several boxes to ticks.
 
 Time is what the stamps say. No clock is asked. A recording, a paused simulation and a simulation at

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """What is accepted as a pose and as a size, and the words in which the rest is refused.
 
 The limits are those of the core (core/src/poses.hpp). Every refusal names the field and the value.

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """What a solver returns: one contact, or the contacts of many pairs as arrays."""
 from __future__ import annotations
 

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The registry of models: what each is called, what it is for, and how it is built.
 
 A new model is a module with its class and an entry of `MODELS`. Solver, node, programs and tests

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Networks in PyTorch: their layers, what they start from, and many trained at once."""
 from __future__ import annotations
 

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Fit the network of model `mlp`: the module, the loss and the training loop.
 
 A contact is SITES patterns for the network. The outputs, times the contact's vectors, add up to the

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Train the network of model `mlp`, for all boxes or for the boxes of one scene.
 
 The general network learns from `samples.mixture` and serves any two boxes. A scene's network starts

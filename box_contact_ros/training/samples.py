@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Training samples of model `mlp`: contacts of all kinds, as the network is asked about them."""
 from __future__ import annotations
 

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Program `train`: make the data, fit the networks, write weights/ with model cards.
 
 What is trained, and with which settings, stands in `paper_recipe.paper_jobs` for the paper's

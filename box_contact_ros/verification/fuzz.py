@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Program `fuzz`: millions of random pairs, judged by code that shares nothing with the solver.
 
 `python -m box_contact_ros fuzz` draws pairs of boxes by class of size, in poses of the kinds that

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The hard poses as stored, by family: parallel, touching, deep, tied, thin, far.
 
 Tests and reports read them from `hard_poses.npz` and do not draw them anew. At 1e-12 the rounding

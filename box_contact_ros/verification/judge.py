@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """A judge of contacts that shares no code with the core: corners projected on 15 axes.
 
 `judge` does it in float64, by its own quaternions, corners and axes. Whatever is within its own

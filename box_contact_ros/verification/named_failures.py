@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Public reports about pairs of boxes, replayed: the poses are in `named_failures.yaml`.
 
 Model answers have to be right to rounding. Other engines' have the bound of their report, or what

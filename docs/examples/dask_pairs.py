@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Ten million pairs on many machines, with Dask: `python docs/examples/dask_pairs.py [SCHEDULER]`.
 
 SCHEDULER is the address of a Dask scheduler, such as tcp://10.0.0.5:8786 (`dask scheduler` starts

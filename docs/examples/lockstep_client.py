@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Ask a contact node in lockstep: `python docs/examples/lockstep_client.py`.
 
 Start `contact_node` first. A simulator that waits for each answer loses none, however fast or slow

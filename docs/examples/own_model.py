@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """A model of your own, measured like ours: `accuracy --model own_model:Middle`.
 
 The class is called with the full extents (1, 3) [m] of both boxes, and needs one method, `solve`.

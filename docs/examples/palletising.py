@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Does a carton stand? Point, volume and covariance tell: `python docs/examples/palletising.py`.
 
 Each carton is lowered by a millimetre into what it stands on. The overlap's covariance gives the

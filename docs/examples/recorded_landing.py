@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Analyse a recorded landing: `python docs/examples/recorded_landing.py [BAG]`.
 
 Reads the two boxes' poses from a bag, solves all of them again in one batch, and prints when the

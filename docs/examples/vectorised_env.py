@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Step 10,000 pairs at once: `python docs/examples/vectorised_env.py`.
 
 A vectorised environment in the style of Gymnasium: each row is a load above a stack of its own

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Draw which folder of the package imports which: `python docs/figures/make_architecture.py`.
 
 Reads the imports of every module with `ast`, and writes `architecture.svg` next to this file, or

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Figures of the docs: `python docs/figures/make_figures.py [--out FOLDER]`."""
 from __future__ import annotations
 

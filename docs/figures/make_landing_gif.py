@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Make docs/figures/landing.gif: one landing from the side, with contact point, patch and forces.
 
 Run as `python docs/figures/make_landing_gif.py [--out FILE]`. The crane lands by the exact contact,

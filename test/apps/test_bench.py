@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The bench as a whole: real processes, short runs, and faults planted between node and bench."""
 from __future__ import annotations
 

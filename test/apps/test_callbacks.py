@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Callbacks that raise, in every program: logged with topic and cause, and the program goes on."""
 from __future__ import annotations
 

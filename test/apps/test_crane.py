@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The crane without ROS, held against closed forms of mechanics."""
 
 from __future__ import annotations

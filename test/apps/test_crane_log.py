@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The crane's book-keeping, without ROS: every planted fault shows up in the summary."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Landings without ROS: the exact point brings the load to rest, the deepest point does not."""
 from __future__ import annotations
 

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Landings over DDS: the crane client closes the loop with a contact node in another process."""
 from __future__ import annotations
 

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Markers: what is drawn of poses and contacts, at what rate, and that it is taken away again."""
 from __future__ import annotations
 

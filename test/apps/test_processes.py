@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Being asked to end: a flag, whenever the signal comes; and children that do not listen."""
 from __future__ import annotations
 

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Recordings: what is written can be read by others, and drives the nodes again."""
 from __future__ import annotations
 

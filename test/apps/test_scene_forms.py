@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Every program with every form of a scene: what it draws, records, replays and answers is right.
 
 The forms are those of docs/reference/scenes.md, as a file, by bare name or as text. One contact

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The soak: a short one, and that it would find what it is there to find."""
 from __future__ import annotations
 

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The view: its figures by hand, its ears over DDS, the program, the page in a real browser."""
 from __future__ import annotations
 

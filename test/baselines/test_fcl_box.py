@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Model `fcl`: FCL's conventions, and what stays SAT's."""
 from __future__ import annotations
 

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Models `paper` and `paper-continuous` on whole boxes, in any pose."""
 from __future__ import annotations
 

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Model `soup`: the triangles, what is made of FCL's contacts, and what stays SAT's."""
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
 #!/usr/bin/env bash
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 # Compile the C++ test for aarch64, run it under qemu, and compare its answers with those of this
 # machine: the same bits of verdict, separation and normal.
 #

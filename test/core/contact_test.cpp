@@ -1,3 +1,6 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
 // Hard poses against their 60-digit truth, and laws, for the C++ core.
 //
 // usage: contact_test FAMILIES WEIGHTS [ANSWERS]

@@ -1,3 +1,6 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
 // Adversarial and random poses through both models: no crash, and every contact holds its promises.
 //
 // usage: fuzz ROUNDS [SEED]

@@ -1,3 +1,6 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
 /* The C interface as a C program uses it: contacts, rows, refusals. The exit status is 1 if a check
  * failed.
  *

@@ -1,3 +1,6 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
 // The test and the fuzz as one program, so that sanitizers instrument the core once: with three
 // arguments it is the test, with one the fuzz.
 #include <algorithm>

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The native core gives the same bits in every instruction set, thread, call and kind of array."""
 from __future__ import annotations
 

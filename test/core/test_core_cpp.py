@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The header-only form of the core: its test and a short fuzz, compiled and run without flags.
 
 The test runs for every instruction set of the machine, by g++ and by clang++, and with sanitizers.

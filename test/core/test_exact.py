@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Model `exact` against the 60-digit oracle.
 
 10,000 random and near-parallel pairs, and 5,000 of slivers, rods, sides flush to some ulps, edges

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Laws that a right answer obeys, over random and near-parallel pairs."""
 from __future__ import annotations
 

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """libbox_contact for C, C++ and others: its interface, and each way in which programs find it.
 
 ament_cmake is not installed here: a plain CMake project stands in for one of an ament package,

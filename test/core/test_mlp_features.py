@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The MLP from the overlap's bounds on: features, forward pass and point, by a slow reference."""
 from __future__ import annotations
 

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The bounds of A∩B (a bounding box, a point inside) against the corners of A∩B in 60 digits.
 
 The oracle clips faces; the core cuts edges. They share no code and no idea.

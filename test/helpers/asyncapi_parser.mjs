@@ -1,3 +1,6 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
 // What AsyncAPI's own parser says of a document: a line a complaint, then the channels it found.
 import { Parser, fromFile } from '@asyncapi/parser';
 

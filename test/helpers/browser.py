@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """A headless Chromium for tests, by the DevTools protocol: opens a page, evaluates, takes pictures.
 
 Rendering is by SwiftShader, in software, so WebGL works without a display and without a GPU.

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """A network cable that loses frames and takes its time, for kernels without tc's netem.
 
 `python cable.py TAP_A TAP_B LOSS DELAY`: makes two network devices, says so, and carries Ethernet

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Recipes of the hard poses, by what makes them hard: parallel, touching, deep, tied, thin, far.
 
 Each family is a generator of pairs in a plain frame; `variants` then turns them, swaps the boxes,

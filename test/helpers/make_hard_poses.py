@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Write box_contact_ros/verification/hard_poses.npz: the hard poses, with their truth in 60 digits.
 
     python test/helpers/make_hard_poses.py [FAMILY ...]

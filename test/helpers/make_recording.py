@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Make recordings/crane_landing: `python test/helpers/make_recording.py`.
 
 A 40 ft container is set down on another one in closed loop, one contact per tick at 200 Hz; from

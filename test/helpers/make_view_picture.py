@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Take docs/figures/view.png: the page of `view`, in a headless Chromium, while the load settles.
 
 Run as `python test/helpers/make_view_picture.py [--out FILE]`.

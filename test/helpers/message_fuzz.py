@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Compare the node's parser of bytes with rclpy on mutated poses.
 
     python test/helpers/message_fuzz.py [--messages N] [--seed N]

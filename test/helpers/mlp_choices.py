@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """What model `mlp` chose on its way to a point: where its answer may step.
 
 Comparisons choose two things. One chooses the frame, of A or of B, in which the network sees the

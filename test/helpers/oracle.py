@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Slow, obvious truth for two boxes, in 60-digit arithmetic. Shares no code with the package.
 
 Inputs are the very doubles a solver gets; everything after them is MPFR: quaternions are

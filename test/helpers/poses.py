@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Families of poses that many tests draw from. Every one is seeded and stored as doubles."""
 from __future__ import annotations
 

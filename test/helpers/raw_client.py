@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """A client that sends CDR byte by byte: nothing on this side repairs it. And a pair of cubes."""
 from __future__ import annotations
 

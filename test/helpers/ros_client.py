@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """A client for tests: publishes pose pairs, keeps every message that comes back, by stamp."""
 from __future__ import annotations
 

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """A load over a yard, answered by several nodes, each with its share of the pairs.
 
 `python shared_scene.py SCENE NODES TICKS`: plays the load's poses at 200 Hz, and holds the rows of

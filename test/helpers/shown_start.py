@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Stand before a node's command line, as `launch-prefix`, and print what the node would start with.
 
 One line of JSON: program, full name, log levels, parameters as rclpy reads them.

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The part of tf2_ros that the contact node uses, slow and obvious: no interpolation, no limits."""
 from __future__ import annotations
 

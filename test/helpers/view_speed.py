@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Measure how many frames a second the page draws: `python test/helpers/view_speed.py`.
 
 The page of `view --scene` runs in a headless Chromium, which renders in software: every pixel and

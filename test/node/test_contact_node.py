@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The contact node over DDS: in this process and as a process of its own."""
 from __future__ import annotations
 

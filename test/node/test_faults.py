@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """What breaks around a contact node, and that nothing is lost, wrong or leaked by it.
 
 The node runs as a process of its own. `test/verification/mutants.py` has a node without each guard.

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """What a node says of everything that a first run gets wrong, over DDS by plain rclpy.
 
 All nodes run at once in one process, each in a namespace of its own, with one fault each. Then the

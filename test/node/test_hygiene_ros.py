@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Bad input at the contact node's doors: raw bytes and poses on topics, requests to services.
 
 The policy: docs/reference/conventions.md, "Bad input". The node runs as a process of its own,

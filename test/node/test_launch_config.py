@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """launch/ and config/ name what exists: programs, parameters, boxes.
 
 PyPI has neither `launch` nor `launch_ros` (its `launch` is another project). Where ROS's own

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Messages as bytes: read and written as rclpy's own objects are, and nothing else is taken."""
 from __future__ import annotations
 

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """msg_schemas/: sound documents, and what a real contact node sends and offers is what they say."""
 from __future__ import annotations
 

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """What is accepted as a parameter's value, without a node."""
 from __future__ import annotations
 

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """How a node starts, is served and ends; its QoS events and its options: all in this process."""
 from __future__ import annotations
 

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """A contact node with a scene over DDS: many boxes, changes while it runs, stale boxes, time."""
 from __future__ import annotations
 

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The soup node: beside the contact node on one input, and as a process of its own."""
 from __future__ import annotations
 

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Strangers on the network attack a contact node, with its own services and nothing else.
 
 DDS without security lets anybody on the network set parameters and ask for transitions. What they

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Boxes that are frames in /tf: the same contacts as from pose topics, refusals, time, changes.
 
 Everything runs against a stand-in for tf2_ros, whose messages are handed over directly. Where the

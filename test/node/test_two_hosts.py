@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Two hosts, as network namespaces joined by a cable: simulator on one, contact node on the other.
 
 ROS 2's own distribution (DDS) does all of it; this shows that nothing here stands in its way.

@@ -1,4 +1,7 @@
 #!/usr/bin/env bash
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 # Build this checkout with colcon in a new workspace, plain and with --symlink-install, and run its
 # tests there as `colcon test` does. The environment has what package.xml needs, as wheels, and no
 # extra: tests of extras are skipped by name.

@@ -1,4 +1,7 @@
 #!/usr/bin/env bash
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 # Do what a newcomer does on a fresh Debian: install what the README names, clone, and type its first
 # two commands. The last commit is what is cloned.
 #

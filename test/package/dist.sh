@@ -1,4 +1,7 @@
 #!/usr/bin/env bash
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 # Build the source distribution and the wheel into dist/, and use both as a stranger would: the wheel
 # without a compiler. The wheel is for this Python, and for Linux as old as auditwheel finds.
 #

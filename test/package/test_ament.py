@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """ament's linters, as a ROS package runs them: skipped where they are not installed."""
 from __future__ import annotations
 

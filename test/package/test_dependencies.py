@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """What setup.py asks for is enough: nothing that only the tests' environment has is used."""
 from __future__ import annotations
 

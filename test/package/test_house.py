@@ -1,4 +1,7 @@
-"""The house of the package: order of imports, what the root holds, length of functions.
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""The house of the package: order of imports, the root, length of functions, headers.
 
 DESIGN's list of folders is `FOLDERS`: a folder imports only folders that stand above it.
 """
@@ -7,6 +10,7 @@ from __future__ import annotations
 import ast
 import subprocess
 from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
 
 import pytest
@@ -21,6 +25,10 @@ EVERYBODYS = ('output', 'resources')
 ROOT_MODULES = ('__init__', '__main__', 'cli', *EVERYBODYS)
 ROOT_ENTRIES = {*FOLDERS, *(f'{name}.py' for name in ROOT_MODULES), 'py.typed'}
 FUNCTION_LINES_MAX = 60
+HEADER = ('Copyright 2026 The box_contact_ros maintainers', 'SPDX-License-Identifier: Apache-2.0')
+"""What the first lines of each source file say, after a shebang."""
+SOURCES = ('.c', '.cmake', '.cpp', '.h', '.hpp', '.mjs', '.py', '.pyi', '.sh')
+SOURCES_BY_NAME = ('CMakeLists.txt', 'Makefile', 'run', 'setup')
 
 
 class House:
@@ -251,3 +259,33 @@ def test_a_missing_folder_is_found(tmp_path: Path, sound: dict[str, str]) -> Non
 def test_as_much_as_may_be(tmp_path: Path, sound: dict[str, str]) -> None:
     """The limit itself is no fault."""
     assert report(planted(tmp_path, sound | {'apps/a.py': 'def f():' + '\n  1' * 59})) == ''
+
+
+# --- the header of each file ----------------------------------------------------------------------
+
+
+def without_header(files: list[Path]) -> list[Path]:
+    """Return the source files that do not name copyright and licence."""
+    sources = [file for file in files
+               if file.suffix in SOURCES or file.name in SOURCES_BY_NAME]
+    return [file for file in sources
+            if not all(line in '\n'.join(file.read_text('utf-8').splitlines()[:3])
+                       for line in HEADER)]
+
+
+def test_every_source_file_has_a_header() -> None:
+    folders = ('.ci', 'box_contact_msgs', NAME, 'docs', 'launch', 'test')
+    files = [ROOT / 'Makefile', ROOT / 'setup.py',
+             *chain(*(listed(ROOT / folder) for folder in folders))]
+    assert without_header(files) == []
+
+
+@pytest.mark.parametrize('text, found', [
+    ('', True), ('import os\n', True), (f'# {HEADER[0]}\n', True), (f'# {HEADER[1]}\n', True),
+    ('\n\n' + ''.join(f'# {line}\n' for line in HEADER), True),
+    ('#!/bin/sh\n' + ''.join(f'# {line}\n' for line in HEADER), False)])
+@pytest.mark.parametrize('name', ['a.py', 'a.hpp', 'CMakeLists.txt'])
+def test_a_file_without_header_is_found(tmp_path: Path, name: str, text: str, found: bool) -> None:
+    file = tmp_path / name
+    file.write_text(text)
+    assert without_header([file, tmp_path / 'a.csv']) == [file] * found

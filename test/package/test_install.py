@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The four kinds of installation: pip, pip -e, colcon build, colcon build --symlink-install.
 
 Each is made once, from a copy of the tracked files, in a temporary folder, without the network.

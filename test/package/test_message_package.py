@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """box_contact_msgs: its definitions, and the wheel that pip builds of it from the ROS wheels."""
 from __future__ import annotations
 

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The output module: tables, CSV files, percentiles, and the machine's description."""
 from __future__ import annotations
 

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The package as a thing to install: data files, programs, metadata, what an import costs."""
 
 from __future__ import annotations

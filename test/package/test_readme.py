@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The README and docs/: every command in them works, every example prints what it says.
 
 Commands are the lines of fenced `bash` blocks, and those after `$ ` in `console` blocks. Each must

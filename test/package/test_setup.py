@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The set-up behind make's targets: which Python it takes, when it installs, what it reports.
 
 Stand-ins for Python make no environment and install nothing; they note how they are called.

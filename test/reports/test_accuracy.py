@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The report `accuracy`: contact classes by the definition, and points that had to be moved in."""
 from __future__ import annotations
 

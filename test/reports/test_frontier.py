@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The report `frontier`: its judge finds planted errors, its contestants keep one convention."""
 from __future__ import annotations
 

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The landing report: a short run, what is counted, and what ends it."""
 from __future__ import annotations
 

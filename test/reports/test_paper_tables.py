@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Tables 3 and 4 and Figures 9 and 10: regimes, clocks, errors, and what the program writes."""
 from __future__ import annotations
 

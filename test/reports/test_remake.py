@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """All reports at once: what runs, what failed, and the page of latencies."""
 from __future__ import annotations
 

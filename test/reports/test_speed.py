@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The speed gates: flush stacks are flush, limits break, and a quick run writes all."""
 from __future__ import annotations
 

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The broad phase of scenes with many pairs: a sweep finds what a test of every pair finds."""
 from __future__ import annotations
 

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The patch law against closed forms and quadrature."""
 from __future__ import annotations
 

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Sets of poses: each keeps the depth, tilt and sizes that its docstring states."""
 from __future__ import annotations
 

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Scenes: what a tick computes against every pair by itself, and files that are refused."""
 from __future__ import annotations
 

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """`contact_node --check FILE`: what a scene file means, without ROS."""
 from __future__ import annotations
 

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Motion, frame by frame: one contact per approach, no chatter, and a point that does not jump.
 
 What a simulator feels is not the error of a point but its steps. The series are runs of the crane

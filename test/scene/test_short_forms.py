@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Short forms of scene files: what they mean, what is refused, and scenes written to files."""
 from __future__ import annotations
 

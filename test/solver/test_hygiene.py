@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Bad input at the doors without ROS: the Python API, weights and scene files.
 
 The policy: docs/reference/conventions.md, "Bad input". test_hygiene_ros.py has the node's.

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Model `mlp`: what it promises whatever its network says, and how good its network is."""
 from __future__ import annotations
 

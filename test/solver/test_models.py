@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The registry of models: one entry makes a model, and what is listed elsewhere is what it has."""
 from __future__ import annotations
 

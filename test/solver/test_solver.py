@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """ContactSolver at the door: what is accepted, what is refused and in which words."""
 from __future__ import annotations
 

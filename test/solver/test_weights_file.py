@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Weights files: what is shipped is what its card says, and anything damaged is refused."""
 from __future__ import annotations
 

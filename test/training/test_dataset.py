@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The paper's data: boxes that just touch where the label says, folded without changing that."""
 from __future__ import annotations
 

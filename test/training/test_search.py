@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The search: successive halving, its checkpoint, and the program `search`."""
 from __future__ import annotations
 

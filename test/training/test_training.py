@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Backpropagation with momentum for many networks at once, and the program `train`."""
 from __future__ import annotations
 

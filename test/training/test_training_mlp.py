@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Training of the MLP for all boxes, and for a scene's; how a solver uses the latter."""
 from __future__ import annotations
 

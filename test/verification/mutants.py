@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Do the laws bite? Each mutant is one wrong line; a test has to fail for it.
 
     python test/verification/mutants.py [NAME ...]

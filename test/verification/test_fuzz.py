@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The fuzz, a short run of it; and its judge, which finds every fault that is planted."""
 from __future__ import annotations
 

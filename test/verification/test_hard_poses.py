@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Gates at zero on the stored families of hard poses, for `exact` and `mlp`."""
 from __future__ import annotations
 

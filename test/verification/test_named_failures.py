@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Public reports about pairs of boxes: the stored truth, the models, and the judge's own faults."""
 from __future__ import annotations
 

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The oracle itself, against closed forms and against sampling."""
 from __future__ import annotations
 

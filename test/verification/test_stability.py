@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The report on hard poses: it finds planted faults, survives a child's end, and is complete."""
 from __future__ import annotations
 

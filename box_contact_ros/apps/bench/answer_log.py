@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """What a client sent to one node, what the node answered, and how good it was. No ROS.
 
 An `AnswerLog` matches messages to poses by their stamp. Its results compare them with the exact

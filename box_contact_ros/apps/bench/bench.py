@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The bench: drives the nodes with named streams of poses at a set rate, and measures the answers.
 
 Contact node, soup node and an echo node run as processes of their own, in a ROS domain of their

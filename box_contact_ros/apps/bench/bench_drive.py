@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """What runs the bench: starts the nodes, sends the streams, receives the answers.
 
 One thread sends, on an absolute schedule, poses that were serialised before. The executor receives

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The echo node: answers every pair of poses with its stamp, and computes nothing.
 
 It is the floor of the bench: what transport and executor alone cost. It subscribes box_a/pose and

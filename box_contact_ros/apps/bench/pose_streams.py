@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Streams of pose pairs for the bench: named, seeded, each with the box sizes it is meant for.
 
 All poses of a stream are made before it is played, so that playing one costs nothing but sending.

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The soak: a contact node at 1 kHz for ten minutes, with echo nodes in between.
 
 There are two, which compute nothing: a bare one, and one served as the contact node is, with the

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The closed loop of the crane client: contacts that come back become the wrench on the load.
 
 Plain Python, no ROS. One thread asks and simulates (`ask`, `step`), another hands the answers in

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """What the crane sent, what came back, and how good it was, for people to read. No ROS."""
 from __future__ import annotations
 

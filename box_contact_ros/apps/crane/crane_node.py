@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The crane client: publishes both poses in real time and measures the contacts that come back.
 
 `box_a` is the load on the ropes, `box_b` the stack. Open loop, contacts are recorded, not fed back;

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """A container set down by its contacts, one per box of the stack and tick. No ROS.
 
 A `ClosedLoop` steps a crane under a `ForceLaw`, wherever the contacts come from, and records what

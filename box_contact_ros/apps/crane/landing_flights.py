@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Landings over DDS, in lockstep: many cranes here, one contact node in a process of its own.
 
 What `landing --dds` runs. Landings of one model and rate share a scene: each has its load, a

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """A crane that sets a container onto a stack: the simulator side, MuJoCo only, no ROS.
 
 A trolley stands still high above the stack. Four ropes run from it to the four top corners of the

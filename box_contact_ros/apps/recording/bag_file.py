@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Recordings: rosbag2 bags with MCAP storage, written and read without a ROS installation.
 
 A recording is a folder RUN with metadata.yaml and RUN.mcap. `ros2 bag` takes the folder, Foxglove

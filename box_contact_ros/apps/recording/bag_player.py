@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """A recording that is played into a `ViewLog`, again and again: no ROS graph, no contact node."""
 from __future__ import annotations
 

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Records poses and contacts of running nodes, as a rosbag2 bag with MCAP storage.
 
 `--out RUN` is a new folder with metadata.yaml and RUN.mcap: `view --replay RUN` and `ros2 bag play

@@ -1,1 +1,4 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """What shows a scene: the page in the browser, and markers for RViz."""

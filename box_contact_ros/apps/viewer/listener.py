@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Nodes that hear what is drawn: poses of all boxes of a scene, and contacts.
 
 `ViewNode` learns the scene from the contact node's parameters, and sets its model.

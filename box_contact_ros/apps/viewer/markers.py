@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Markers for RViz and Foxglove: all boxes of a scene; point, normal, patch, depth of contacts.
 
 Subscribes the poses of all moving boxes, and the contact node's contacts. Publishes markers

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Moves all boxes of a scene, so that there is something to see: no physics, no contacts.
 
 `python -m box_contact_ros.apps.viewer.scene_driver --scene yard_bay` publishes their poses. A box

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """How boxes and contacts look, in RViz and in the browser alike."""
 from __future__ import annotations
 

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """A page in the browser: all boxes of a scene, their contacts and figures, live.
 
 It starts a contact node and, again and again, a crane, in a ROS domain of their own. With --scene

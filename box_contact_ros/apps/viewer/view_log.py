@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """What is drawn of a scene, and the figures shown of it, whether ROS or a recording fills it.
 
 A `ViewLog` takes poses by box and the contacts of each tick. Its `snapshot` is the one model of

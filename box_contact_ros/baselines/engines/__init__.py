@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """What answers for a pair of boxes: this package's models and the engines that users would take.
 
 Each `*_engines.py` imports one library and lists its `ENGINES`, functions that make them.

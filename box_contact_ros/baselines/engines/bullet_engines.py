@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Bullet (PyBullet): closest points of a query, and the persistent manifold of its world."""
 from __future__ import annotations
 

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Coal, which grew out of FCL: its deepest point, and its contact patches."""
 from __future__ import annotations
 

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """What an engine is, what it answers, and the ways to make one point of its answer.
 
 All contestants are an `Engine`, so reports ask and time them alike. A call goes from two poses, in

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """MuJoCo: signed distance and collision, by each of its colliders of convex shapes.
 
 `mj_collision` takes two boxes by a collider of their own, whatever the flags say. Boxes as meshes

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 # What the extension offers; see networks.cpp. Stubs of functions have no bodies but docstrings.
 from typing import Final
 

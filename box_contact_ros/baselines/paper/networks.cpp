@@ -1,3 +1,6 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
 // The paper's networks as a Python extension; _networks.pyi documents it.
 //
 // Arrays are checked here for kind and shape only. Words about refused poses and sizes are made in

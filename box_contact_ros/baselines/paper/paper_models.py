@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Models `paper` and `paper-continuous`: contact point and normal from the source's networks.
 
 The separating-axis test decides whether the boxes collide and gives the separation. A network gives

@@ -1,3 +1,6 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
 // Box symmetries: they bring any touching pair into the networks' domain, and the answer back.
 //
 // A box stays the same when an axis changes its sign. A cube also stays the same when two axes

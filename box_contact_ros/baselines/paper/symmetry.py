@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Box symmetries, which bring touching pairs into the domain of the paper's networks.
 
 baselines/paper/symmetry.hpp has the formulas and the ways into a domain: NO_FOLD, OCTANT, FEATURES.

@@ -1,3 +1,6 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
 // Axis-aligned bounding boxes of posed boxes: which pairs can touch at all.
 #pragma once
 

@@ -1,3 +1,6 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
 // The library as a Python extension: arrays, tuples and lists become rows, and contacts become tuples.
 //
 // Arguments are checked here for kind and shape only. What is no plain number goes to Python, which

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 # find_package(box_contact_ros) for what pip and colcon install: box_contact_ros::box_contact.
 #
 # This file is in the Python package beside the library, and again in PREFIX/share/box_contact_ros,

@@ -1,3 +1,6 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
 // From poses to contacts: the stages of a pair, and of rows of pairs.
 //
 // 1. `prepare`: poses and sizes become offsets and a rotation (poses.hpp).

@@ -1,3 +1,6 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
 // Pressing: the least depth at which the overlap of two boxes has a volume.
 //
 // At exact touch A∩B has no volume. The contact point is then that of the boxes after B was pressed

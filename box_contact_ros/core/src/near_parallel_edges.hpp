@@ -1,3 +1,6 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
 // The separating-axis test with 32 digits, for edges that are almost parallel.
 //
 // Where two edges almost along each other meet, their cross product is what is left of a

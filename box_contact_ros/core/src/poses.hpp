@@ -1,3 +1,6 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
 // Poses: what two boxes become before any axis is tested.
 //
 // Conventions: SI units, right-handed frames. A pose is `x y z qx qy qz qw` in a frame common to

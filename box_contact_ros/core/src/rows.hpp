@@ -1,3 +1,6 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
 // Rows of pairs in memory, and where their answers go: plain data without code, which files compiled
 // for different instruction sets may share.
 #pragma once

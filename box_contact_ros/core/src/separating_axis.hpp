@@ -1,3 +1,6 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
 // The separating-axis test (SAT): which of 15 axes separates two boxes, or is the shallowest.
 //
 // Two boxes are disjoint exactly if one of 15 axes separates their projections: the three face

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """QoS events of the node's topics: counted, and logged where a user should know."""
 from __future__ import annotations
 

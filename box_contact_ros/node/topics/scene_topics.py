@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Topics of a scene: pose subscriptions of its moving boxes, contact publishers of its pairs.
 
 All contacts of a tick go to `contacts` as box_contact_msgs/Contacts, where that package is

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Poses of boxes that are frames in /tf and /tf_static.
 
 The only module that knows tf2. It is imported when a scene has such a box, and may be missing.

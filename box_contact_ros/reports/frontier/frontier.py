@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Program `frontier`: speed against error of every model and of other engines.
 
 `python -m box_contact_ros frontier` writes frontier.csv, .md and .png. One run, one pinned core,

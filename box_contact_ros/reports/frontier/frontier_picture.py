@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The picture of `frontier`: point error over time of single calls, of batches, and the paper's."""
 from __future__ import annotations
 

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """How contestants are timed, and the speed gates: limits on ratios of times.
 
 `python -m box_contact_ros frontier --speed` writes speed.md and speed.csv. Each instruction set of

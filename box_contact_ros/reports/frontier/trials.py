@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Contestants on sets of poses: their answers against the exact ones, and their times."""
 from __future__ import annotations
 

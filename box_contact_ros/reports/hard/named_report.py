@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The page of public reports, replayed: which model and which other engine passes which."""
 from __future__ import annotations
 

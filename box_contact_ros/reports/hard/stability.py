@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Program `stability`: what each model makes of the families of hard poses.
 
 `python -m box_contact_ros stability` asks every model for every stored case (`hard_poses`) and

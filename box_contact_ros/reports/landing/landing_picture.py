@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """One landing by four ways, at a glance: the load from its end, and how fast its corners move.
 
 Above: load and stack at the end, the tilt exaggerated, and where the contact pushes in the last

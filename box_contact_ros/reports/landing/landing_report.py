@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Landings by the way of contact and force: whether the container comes to rest, and how flat.
 
 It runs a grid of 36 landings for every way, rate and latency, and landings of other loads and

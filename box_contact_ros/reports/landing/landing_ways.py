@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Which landings are run, and by which ways of contact and force.
 
 A `Way` is a law and what gives its contacts. The patch law asks this package's models. Engines give

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Tables 3 and 4 and Figure 10 of the source paper: what a polygon soup costs, and its errors.
 
 Times are CPU times of one thread on one pinned core, after a warm-up, with garbage collection off.

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Program `paper`: the source paper's Tables 1 to 4 and Figures 9 and 10, redone, as Markdown.
 
 Tables 1 and 2, Figure 9: the data sets are made again from the seed in each model card. The code

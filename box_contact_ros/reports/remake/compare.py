@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Ratios of times in two folders of results: whether a second run agrees with the first.
 
 Only ratios within a run are compared: absolute times depend on the machine and on its hour. Each

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The page of latencies: solver, nodes and transport, from the CSVs of three other reports."""
 from __future__ import annotations
 

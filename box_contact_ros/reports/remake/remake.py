@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Program `reports`: remake every table and picture of docs/results.
 
 Each report is a program of its own, and runs as a subprocess. Programs that measure time run alone;

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """`contact_node --check FILE`: tells what a scene file means, or where it is wrong, without ROS.
 
 Prints a line for each box and for each pair, then sizes, topics and counts. The exit status is 1

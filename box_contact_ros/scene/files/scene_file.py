@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Scene files: YAML (or JSON, which is YAML) to a `Scene`; every refusal names line and field.
 
 The format is msg_schemas/scene.json. A file is data and nothing else: no tags, no anchors (a few

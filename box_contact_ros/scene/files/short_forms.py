@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Short forms of a scene file: types, counts, stacks and patterns become boxes and pairs.
 
 What a file asks for is counted before it is built: three lines may ask for 10^9 boxes. Raises

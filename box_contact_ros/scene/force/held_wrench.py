@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """What every law from contacts to forces shares: gravity, friction, and a held wrench.
 
 A wrench belongs to the time at which its contact was asked for. `HeldWrench` holds it between

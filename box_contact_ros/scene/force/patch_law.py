@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """From contacts to a wrench: an elastic foundation over the whole patch.
 
 A contact query says where two boxes touch, in which direction they push, and how they overlap.

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Program `search`: which size and settings a network should have, by training thousands at once.
 
 - `search mlp`: hidden units and learning rate of the MLP, and the frontier of cost against error.

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Successive halving: train thousands of networks a little, keep the best, train those longer.
 
 All candidates are in the first rung. After every rung the better part goes on to a rung of more

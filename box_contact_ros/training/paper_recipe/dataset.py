@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The data of the paper's section 3: pairs of boxes that just touch, and where they do.
 
 1. Placements. The first box stays at the origin. Its trihedron is its faces +x, +y, +z. The second

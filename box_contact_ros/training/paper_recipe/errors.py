@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """How far a network's angles are off: the paper's figures ME, MAE and RMSE.
 
 Networks run as the models run them: by the extension, on float32 weights, without PyTorch.

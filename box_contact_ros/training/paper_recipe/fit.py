@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Backpropagation with momentum, for many of the paper's networks at once.
 
 1. Inputs are normalised to mean 0 and deviation 1; `export` folds that into the first layer.

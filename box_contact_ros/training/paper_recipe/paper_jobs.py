@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The paper's networks that are trained, with which data and settings; their weights files."""
 from __future__ import annotations
 

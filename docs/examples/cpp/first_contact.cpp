@@ -1,3 +1,6 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
 // Lower a container on another one, and print the contact.
 #include <cstdio>
 #include <stdexcept>

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """What the page has to read: figures, the deepest contacts, the legend, as HTML. No ROS."""
 from __future__ import annotations
 

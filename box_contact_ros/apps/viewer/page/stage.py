@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The drawing on the page: boxes, contacts, ropes, as objects of viser. No ROS.
 
 Boxes are instances of one cube's faces and edges: a tick moves all of them together. The origin of

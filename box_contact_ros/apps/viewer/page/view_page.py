@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """The page: drawing, read-outs and controls, served by viser. No ROS."""
 from __future__ import annotations
 

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Drake: point pairs, and the surface of its hydroelastic contact."""
 from __future__ import annotations
 

@@ -1,3 +1,6 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
 """Newton's collision pipeline, on the processor, in float32."""
 from __future__ import annotations
 

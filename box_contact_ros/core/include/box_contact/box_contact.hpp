@@ -1,3 +1,6 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
 // The C++17 interface of libbox_contact: whether two boxes touch, where, and along which direction.
 //
 //   box_contact::Solver solver({2.0, 2.0, 2.0}, {1.0, 1.0, 1.0});   // full extents [m]

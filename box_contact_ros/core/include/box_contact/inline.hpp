@@ -1,3 +1,6 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
 // libbox_contact as headers alone, for those who want the compiler to inline a call.
 //
 //   #include "box_contact/inline.hpp"

@@ -1,3 +1,6 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
 // The network of model `mlp` for box_contact/inline.hpp, from a weights file.
 #pragma once
 

@@ -1,3 +1,6 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
 // Lanes: the numbers of one pair of boxes, or of W pairs side by side.
 //
 // Every algorithm of the core is one template over T. T is `double` for a single pair, or

@@ -1,3 +1,6 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
 // Rows of numbers in memory to lanes and back, by shuffles: a lane has a row.
 #pragma once
 

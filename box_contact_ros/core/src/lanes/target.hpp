@@ -1,3 +1,6 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
 // The namespace of the instruction set that a file is compiled for.
 //
 // Templates that two files compile for different machines must not share a name: the linker keeps

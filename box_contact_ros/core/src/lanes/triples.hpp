@@ -1,3 +1,6 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
 // A triple is three numbers that one formula treats alike: the components of a vector, or one number
 // for each pair of opposite faces. W pairs have it as a `Vec`. A single pair has it side by side in
 // one vector of the machine, where the machine has one of four such numbers. The fourth lane then

@@ -1,3 +1,6 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
 // A kernel: the core compiled for one instruction set, as a table of functions without templates.
 #pragma once
 

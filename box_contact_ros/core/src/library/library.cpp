@@ -1,3 +1,6 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
 // The C interface, and the choice of the instruction set.
 #include <cstdarg>
 #include <cstdio>

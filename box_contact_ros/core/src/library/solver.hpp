@@ -1,3 +1,6 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
 // One solver: it owns sizes, model, network, counts and threads. C, C++ and Python are faces of it.
 #pragma once
 

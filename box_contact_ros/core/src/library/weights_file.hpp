@@ -1,3 +1,6 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
 // The numbers of the network of model `mlp` from a safetensors file.
 //
 // The file begins with 8 bytes, the little-endian length of a JSON header. The header gives dtype,

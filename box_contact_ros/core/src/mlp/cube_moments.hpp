@@ -1,3 +1,6 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
 // What the network says of a cut cube: centroid, volume and covariance.
 #pragma once
 

@@ -1,3 +1,6 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
 // What the network is told of an overlap: its bounds as a cut cube, and the features of nine sites.
 //
 // Scaled to its bounding box, A∩B is the cube [−1, 1]³ cut by the six faces of the other box. Two

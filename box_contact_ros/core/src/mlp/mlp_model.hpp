@@ -1,3 +1,6 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
 // Model `mlp`: SAT decides and gives normal and depth; a multilayer perceptron gives the point, the
 // volume and the covariance.
 //

@@ -1,3 +1,6 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
 // The network: one hidden layer of rectified units, asked at nine sites.
 #pragma once
 

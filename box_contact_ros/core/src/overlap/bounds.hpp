@@ -1,3 +1,6 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
 // Bounds of the overlap A∩B: a box about it in the frame of one of the boxes.
 //
 // There are two methods. Both look for bounds in either box's frame, and choose A's, or B's where it

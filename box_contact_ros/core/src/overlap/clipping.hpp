@@ -1,3 +1,6 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
 // The exact moments of the overlap A∩B by clipping: the fallback where face sums are not certain.
 //
 // The frame is that of the reference box, the one with the best face axis. Its contact face is the

@@ -1,3 +1,6 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
 // The twelve edges of a box, each cut off where it leaves the other box.
 //
 // Three slabs cut an edge (Kay and Kajiya 1986). Its direction in the other box's frame is a row or

@@ -1,3 +1,6 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
 // The exact moments of the overlap A∩B without a branch, and a certificate that they are right.
 //
 // The overlap is bounded by parts of the twelve faces of both boxes. By the divergence theorem its

@@ -1,3 +1,6 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
 // The moments of the overlap A∩B that a model finds: volume, centroid, covariance.
 #pragma once
 
