@@ -43,6 +43,7 @@ test_core.py compares the extensions, which have -O3. Builds by clang and with s
 baseline.
 """
 
+
 def missing_flags(level: str) -> list[str]:
     """Return the flags of /proc/cpuinfo that an instruction set needs and this machine lacks."""
     needed = LEVELS[level][1]
