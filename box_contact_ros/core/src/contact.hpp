@@ -111,8 +111,8 @@ inline Moments<double> clipped_overlap(Pair<double> pair, int face, bool pressed
 //   Found<T>: what it finds of an overlap. `Moments<T>`, or `Vec<T>` for the centroid alone.
 //   group<T>: how many queries it takes at once.
 //
-// And `solve(queries, found, counts)` fills `found` for the pairs that touch, points in A's frame. It may
-// move the boxes of the queries.
+// And `solve(queries, found, counts)` fills `found` for the pairs that touch, points in A's frame. It
+// may move the boxes of the queries.
 
 // Model `exact`: the moments of A∩B by face sums, or by clipping where these are not certain.
 // `FoundOf`: Moments, or PointAndVolume.

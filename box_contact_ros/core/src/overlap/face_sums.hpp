@@ -500,8 +500,8 @@ struct CertifiedOverlap {
   Mask<T> certain;
 };
 
-// The overlap of a pair that has been pressed in to `depth` [m], and that may be changed: Moments<T>, or for PointAndVolume<T>
-// without the second moments. Then the equations are those that the centroid needs.
+// The overlap of a pair that has been pressed in to `depth` [m]; the pair is changed. Found: Moments<T>,
+// or PointAndVolume<T>, without second moments and with the equations that the centroid needs alone.
 template <class Found, class T>
 BC_INLINE CertifiedOverlap<Found, T> overlap_by_face_sums(Pair<T>& pair, T depth) {
   using namespace face_sums;
