@@ -272,8 +272,8 @@ template <class T, class Found>
   }
   if (results.covariance) {
     const auto& c = overlap.covariance;
-    T first[4] = {c(0, 0), c(0, 1), c(0, 2), c(1, 0)}, middle[4] = {c(1, 1), c(1, 2), c(2, 0), c(2, 1)};
-    T last[1] = {c(2, 2)};
+    T first[4] = {c(0, 0), c(0, 1), c(0, 2), c(1, 0)};
+    T middle[4] = {c(1, 1), c(1, 2), c(2, 0), c(2, 1)}, last[1] = {c(2, 2)};
     store(results.covariance, 9, 0, first);
     store(results.covariance, 9, 4, middle);
     store(results.covariance, 9, 8, last);
