@@ -228,7 +228,8 @@ class Evaluator:
                     raise Refused('frame_id differs', self._frames(tick, pose))
                 if pose.stamp > stamp:
                     stamp = pose.stamp
-        return max(stamp, 0), frame_id or ''  # 0 where all boxes are fixed
+        # Where all boxes are fixed there is no stamp.
+        return 0 if stamp == NEVER else stamp, frame_id or ''
 
     def _frames(self, tick: Tick, odd: StampedPose) -> str:
         """Describe the frame of a tick, by the scene or the first box, and that of a pose."""

@@ -223,7 +223,7 @@ def test_weights_that_nobody_reads_are_said(capfd):
         result, = node.set_parameters([Parameter('weights', value='')])
         assert result.successful
         said = capfd.readouterr().err
-        assert "changed model: model 'exact'" in said and 'uses no weights' not in said
+        assert "changed weights: model 'exact'" in said and 'uses no weights' not in said
         node.set_parameters([Parameter('model', value='mlp')])
         assert 'the weights are not for' not in capfd.readouterr().err
         node.set_parameters([Parameter('size_a', value=[1.0, 30.0, 1.0])])  # aspect 30

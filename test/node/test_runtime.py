@@ -21,9 +21,10 @@ from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 from ros_client import Client, serving
 
-from box_contact_ros.node import contact_node, runtime, scene_topics, soup_node
+from box_contact_ros.node import contact_node, runtime, soup_node
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.parameters import answer_help
+from box_contact_ros.node.topics import scene_topics
 from box_contact_ros.node.topics.qos_events import QosEvents
 from box_contact_ros.scene.stamp_pairing import RESETS
 
