@@ -19,6 +19,7 @@ from raw_client import APART, ORIGIN, RawClient
 from rcl_interfaces.msg import Log, Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import GetParameters, SetParameters, SetParametersAtomically
 from rclpy.qos import QoSProfile
+from ros_client import PATIENCE
 
 from box_contact_ros.node.contact_node import LARGEST_TEXT
 from box_contact_ros.resources import OpenFiles, resource_path
@@ -43,8 +44,12 @@ class Stranger(RawClient):
     def call(self, kind, name, **fields):
         """Return the reply of a service of the node."""
         service = self.client_of(kind, f'/contact_node/{name}')
-        future = service.call_async(kind.Request(**fields))
-        assert self.spin(future.done)
+        # It may be ready before the way back is: a reply is lost then, and the request made again.
+        for _ in range(3):
+            future = service.call_async(kind.Request(**fields))
+            if self.spin(future.done, PATIENCE / 3):
+                break
+        assert future.done(), 'no reply'
         self.node.destroy_client(service)
         return future.result()
 
