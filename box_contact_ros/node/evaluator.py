@@ -151,7 +151,7 @@ class Evaluator:
         """Yield why pairs are not answered, as far as it can be told."""
         max_age = self._settings['max_age']
         if look.unanswered:
-            pairs = [pair.name or f'{pair.a}_{pair.b}' for pair in look.unanswered]
+            pairs = [pair.label for pair in look.unanswered]
             yield Finding('unanswered', f'unanswered for {UNANSWERED_SECONDS:g} s: {listed(pairs)}',
                           level=ERROR)
         if look.refused:
