@@ -108,7 +108,7 @@ class BuildCore(build_ext):
                                     extra_postargs=[*FLAGS, *flags], depends=ext.depends)
 
         jobs = {name: ('kernel.cpp', flags) for name, flags in INSTRUCTION_SETS.items()}
-        jobs['library'] = 'library.cpp', []
+        jobs |= {name: (f'{name}.cpp', []) for name in ('library', 'force')}
         with ThreadPoolExecutor(os.cpu_count()) as pool:
             # The longest first.
             running = [pool.submit(compiled, name, *job) for name, job in reversed(jobs.items())]

@@ -16,16 +16,19 @@ from .solver.models import MODELS
 if TYPE_CHECKING:
     from .scene.files.scene_file import SceneError, read_scene, write_scene
     from .scene.force.held_wrench import HeldWrench
-    from .scene.force.patch_law import PatchLaw
+    from .scene.force.laws import Body, HeldPatch, PatchLaw, SceneLaw
+    from .scene.force.predictor import Predictor
     from .scene.scene_solver import Box, Pair, Scene, SceneSolver
 
-__all__ = ['MODELS', 'Box', 'Contact', 'ContactSolver', 'Contacts', 'HeldWrench', 'Pair',
-           'PatchLaw', 'Scene', 'SceneError', 'SceneSolver', 'read_scene', 'write_scene']
+__all__ = ['MODELS', 'Body', 'Box', 'Contact', 'ContactSolver', 'Contacts', 'HeldPatch',
+           'HeldWrench', 'Pair', 'PatchLaw', 'Predictor', 'Scene', 'SceneError', 'SceneLaw',
+           'SceneSolver', 'read_scene', 'write_scene']
 
 _LOADED_WHEN_USED = {
     'scene.files.scene_file': ('SceneError', 'read_scene', 'write_scene'),
     'scene.force.held_wrench': ('HeldWrench',),
-    'scene.force.patch_law': ('PatchLaw',),
+    'scene.force.laws': ('Body', 'HeldPatch', 'PatchLaw', 'SceneLaw'),
+    'scene.force.predictor': ('Predictor',),
     'scene.scene_solver': ('Box', 'Pair', 'Scene', 'SceneSolver'),
 }
 

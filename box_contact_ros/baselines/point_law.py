@@ -31,13 +31,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..scene.force.held_wrench import FRICTION, GRAVITY, SLIP_SPEED
+from ..scene.force.laws import FRICTION, GRAVITY
 from ..scene.pose import cross, rotation_matrix
 from ..solver.contact import Contact
 
 STATIC_PENETRATION = 5e-3
 """Depth at which k carries the weight [m]: k = m·g / 5 mm, 3.9e7 N/m for 20 t; 0.2 % of a
 container's height. Touching down at 0.3 m/s adds as much again."""
+
+SLIP_SPEED = 0.1
+"""v_s [m/s]: friction grows in proportion to the slip up to here, or its sign would switch at rest.
+The price: a load at rest on a slope s creeps at v_s·s/μ."""
 
 DAMPING_RATIO = 0.5
 """c = 2·0.5·√(k·m), 8.9e5 N s/m for 20 t: half of critical for the heaving load."""

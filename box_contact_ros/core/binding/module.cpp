@@ -16,6 +16,7 @@
 #include "../src/mlp/mlp_model.hpp"
 #include "arrays.hpp"  // first, as Python.h wants
 #include "bounding_boxes.hpp"
+#include "law.hpp"
 
 namespace {
 
@@ -660,7 +661,8 @@ PyMODINIT_FUNC PyInit__native() {
       add(module.get(), "instruction_set", PyUnicode_FromString(kernel ? kernel->title : "")) &&
       add(module.get(), "lanes", PyLong_FromLong(kernel ? kernel->lanes : 0)) &&
       add(module.get(), "compiler", PyUnicode_FromString(__VERSION__)) &&
-      add(module.get(), "PairSolver", PyType_FromSpec(&solver_spec));
+      add(module.get(), "PairSolver", PyType_FromSpec(&solver_spec)) &&
+      add(module.get(), "Law", PyType_FromSpec(&law_spec));
   for (const Whole& whole : wholes)
     added = added && add(module.get(), whole.name, PyLong_FromLong(whole.value));
   for (const Constant& constant : constants)

@@ -1,47 +1,34 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""What every law from contacts to forces shares: gravity, friction, and a held wrench.
+"""What acts between questions, where answers come late: the newest answer that is due.
 
-A wrench belongs to the time at which its contact was asked for. `HeldWrench` holds it between
-ticks, and over ticks whose answer was lost.
-
-SI units; a wrench (6,) is a force [N], then a torque [N m].
+`InFlight` has answers of any kind. `HeldWrench` has wrenches, for clients that apply one until the
+next. A tick whose answer was lost changes nothing.
 """
 from __future__ import annotations
 
 from collections import deque
+from typing import Generic, TypeVar
 
 import numpy as np
-
-GRAVITY = 9.81
-"""Gravitational acceleration [m/s²]: what the static penetration is reckoned with."""
-
-FRICTION = 0.5
-"""Coulomb's μ [1], steel on steel, dry."""
-
-SLIP_SPEED = 0.1
-"""v_s [m/s]: friction grows in proportion to the slip up to here, or its sign would switch at rest.
-The price: a load at rest on a slope s creeps at v_s·s/μ."""
 
 TIME_ROUNDING = 1e-9
 """Times [s] that differ by less are the same: sums of ticks and latencies are rounded, and a
 nanosecond is far below every physics step."""
 
+Kind = TypeVar('Kind')
 
-class HeldWrench:
-    """The wrench that acts: that of the newest answer that is due, until the next one is.
 
-    Zeros before the first. A tick without an answer changes nothing.
-    """
+class InFlight(Generic[Kind]):
+    """Answers that are under way, each with the time from which on it acts."""
 
     def __init__(self) -> None:
-        self.current = np.zeros(6)
         self._asked = -np.inf
-        self._due: deque[tuple[float, np.ndarray]] = deque()
+        self._due: deque[tuple[float, Kind]] = deque()
 
-    def answer(self, wrench: np.ndarray, *, asked: float, due: float) -> None:
-        """Note the wrench (6,) of a contact asked for at `asked` [s], to act from `due` [s] on.
+    def answer(self, kind: Kind, *, asked: float, due: float) -> None:
+        """Note the answer to a question of `asked` [s], to act from `due` [s] on.
 
         Answers that were overtaken by that to a later question are dropped.
         """
@@ -50,10 +37,30 @@ class HeldWrench:
         self._asked = asked
         while self._due and self._due[-1][0] > due:
             self._due.pop()
-        self._due.append((due, wrench))
+        self._due.append((due, kind))
+
+    def arrived(self, time: float) -> Kind | None:
+        """Return the newest answer that has become due since the last call, by `time` [s]."""
+        newest = None
+        while self._due and self._due[0][0] <= time + TIME_ROUNDING:
+            newest = self._due.popleft()[1]
+        return newest
+
+    def under_way(self) -> list[tuple[float, Kind]]:
+        """Return what is not due yet, the earliest first."""
+        return list(self._due)
+
+
+class HeldWrench(InFlight[np.ndarray]):
+    """The wrench (6,) that acts: that of the newest answer that is due; zeros before the first."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.current = np.zeros(6)
 
     def at(self, time: float) -> np.ndarray:
         """Return the wrench (6,) that acts at `time` [s]; times must not decrease."""
-        while self._due and self._due[0][0] <= time + TIME_ROUNDING:
-            self.current = self._due.popleft()[1]
+        newest = self.arrived(time)
+        if newest is not None:
+            self.current = newest
         return self.current

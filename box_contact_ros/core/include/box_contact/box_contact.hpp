@@ -76,6 +76,23 @@ class Span {
   std::size_t size_ = 0;
 };
 
+namespace detail {
+
+// Without exceptions (-fno-exceptions) the program ends; such programs call box_contact.h instead.
+[[noreturn]] inline void raise(bc_status status, const char* words) {
+#if defined(__cpp_exceptions) || defined(_CPPUNWIND)
+  if (status == BC_NO_MEMORY) throw std::bad_alloc();
+  if (status == BC_BAD_WEIGHTS || status == BC_BAD_ENVIRONMENT || status == BC_BAD_ABI)
+    throw std::runtime_error(words);
+  throw std::invalid_argument(words);
+#else
+  (void)status, (void)words;
+  std::abort();
+#endif
+}
+
+}  // namespace detail
+
 // Arrays of a row for each pair; nullptr for what is not wanted, which is then not computed.
 struct Results {
   bool* colliding = nullptr;
@@ -108,7 +125,7 @@ class Solver {
   // and for an unknown BOX_CONTACT_INSTRUCTION_SET.
   Solver(const Size& size_a, const Size& size_b, const Options& options) {
     if (bc_abi() != BC_ABI)
-      raise(BC_BAD_ABI, "libbox_contact is of another version than its header");
+      detail::raise(BC_BAD_ABI, "libbox_contact is of another version than its header");
     bc_options plain = BC_DEFAULT_OPTIONS;
     plain.model = options.model;
     plain.weights = options.weights.empty() ? nullptr : options.weights.c_str();
@@ -147,7 +164,7 @@ class Solver {
     std::size_t poses = rows.poses_a.size();
     bool fits = rows.poses_b.size() == poses && fits_poses(rows.sizes_a, poses) &&
                 fits_poses(rows.sizes_b, poses) && rows.pairs.size() % 2 == 0;
-    if (!fits) raise(BC_BAD_ARGUMENT, "poses_a, poses_b and sizes must be equally many");
+    if (!fits) detail::raise(BC_BAD_ARGUMENT, "poses_a, poses_b and sizes must be equally many");
     bool by_place = rows.pairs.data() != nullptr;
     const bc_rows plain{sizeof(bc_rows),     std::int64_t(by_place ? rows.pairs.size() / 2 : poses),
                         rows.poses_a.data(), rows.poses_b.data(),
@@ -192,19 +209,7 @@ class Solver {
   }
 
   static void check(bc_status status) {
-    if (status != BC_OK) raise(status, bc_error_text());
-  }
-  // Without exceptions (-fno-exceptions) the program ends; such programs call box_contact.h instead.
-  [[noreturn]] static void raise(bc_status status, const char* words) {
-#if defined(__cpp_exceptions) || defined(_CPPUNWIND)
-    if (status == BC_NO_MEMORY) throw std::bad_alloc();
-    if (status == BC_BAD_WEIGHTS || status == BC_BAD_ENVIRONMENT || status == BC_BAD_ABI)
-      throw std::runtime_error(words);
-    throw std::invalid_argument(words);
-#else
-    (void)status, (void)words;
-    std::abort();
-#endif
+    if (status != BC_OK) detail::raise(status, bc_error_text());
   }
 
   std::unique_ptr<bc_solver, Destroy> solver_;

@@ -2,16 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // The C interface, and the choice of the instruction set.
-#include <cstdarg>
-#include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <exception>
 #include <memory>
-#include <new>
 #include <string>
 
-#include "../poses.hpp"
+#include "refusals.hpp"
 #include "solver.hpp"
 #include "weights_file.hpp"
 
@@ -48,28 +44,6 @@ const Kernel* chosen_kernel() {
 
 namespace {
 
-thread_local char error_text[512];
-
-[[gnu::format(printf, 2, 3)]] bc_status fail(bc_status status, const char* format, ...) {
-  va_list arguments;
-  va_start(arguments, format);
-  std::vsnprintf(error_text, sizeof error_text, format, arguments);
-  va_end(arguments);
-  return status;
-}
-
-// Call `work`; nothing that it throws leaves the library.
-template <class Work>
-bc_status guarded(Work work) noexcept {
-  try {
-    return work();
-  } catch (const std::bad_alloc&) {
-    return fail(BC_NO_MEMORY, "no memory is left");
-  } catch (const std::exception& error) {
-    return fail(BC_BAD_ARGUMENT, "%s", error.what());
-  }
-}
-
 bc_status refuse_size(const char* field, const double* size) {
   return fail(BC_BAD_SIZE, "%s (%g, %g, %g) is not within 1e-50 to 1e50 m", field, size[0], size[1],
               size[2]);
@@ -78,18 +52,6 @@ bc_status refuse_size(const char* field, const double* size) {
 bool size_is_valid(const double* size) {
   return size_valid(Vec<double>{0.5 * size[0], 0.5 * size[1], 0.5 * size[2]});
 }
-bool pose_is_valid(const double* p) {
-  return pose_valid(Pose<double>{{p[0], p[1], p[2]}, {p[3], p[4], p[5], p[6]}});
-}
-
-bc_status refuse_pose(const char* field, const double* p) {
-  for (int k = 0; k < 3; ++k)
-    if (!(std::fabs(p[k]) <= length_max))
-      return fail(BC_BAD_POSE, "%s position (%g, %g, %g) is not finite, or exceeds 1e50 m", field,
-                  p[0], p[1], p[2]);
-  return fail(BC_BAD_POSE, "%s quaternion (%g, %g, %g, %g) has no length within 1e-100 to 1e100",
-              field, p[3], p[4], p[5], p[6]);
-}
 
 // Why a pair is refused.
 bc_status refuse_pair(const double* pose_a, const double* pose_b, const double* size_a,
@@ -97,18 +59,6 @@ bc_status refuse_pair(const double* pose_a, const double* pose_b, const double* 
   if (!pose_is_valid(pose_a)) return refuse_pose("pose_a", pose_a);
   if (!pose_is_valid(pose_b)) return refuse_pose("pose_b", pose_b);
   return size_is_valid(size_a) ? refuse_size("size_b", size_b) : refuse_size("size_a", size_a);
-}
-
-bc_status refuse_null(const char* name) {
-  return fail(BC_BAD_ARGUMENT, "%s is a null pointer", name);
-}
-
-// A copy of a struct that the program may have compiled by an older header, which had less fields.
-template <class Struct>
-bool read(const Struct* given, Struct& copy) {
-  if (given->size == 0 || given->size > sizeof(Struct)) return false;
-  std::memcpy(static_cast<void*>(&copy), given, given->size);
-  return true;
 }
 
 bc_status make(const bc_size* size_a, const bc_size* size_b, const bc_options& options,

@@ -1,0 +1,73 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
+// The force law's constants, and what a loop's rate and latency make of them.
+//
+// docs/explanation/force.md derives them; docs/decisions/patch-law.md has the experiment of each.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "../../include/box_contact/force.h"
+
+namespace box_contact::detail {
+
+// Ω·T of a held patch [1], T the latency and half a period. It is stable up to 3 to 4.
+constexpr double patch_delay_limit = 2.0;
+// Ω·step of a held patch [1], step the time between two evaluations.
+constexpr double step_limit = 0.45;
+// Ω·T of a held wrench [1]: it is that late on average, and lateness feeds energy in.
+constexpr double wrench_delay_limit = 0.45;
+// 2·ζ·Ω·h of a held wrench [1], h the period: what its damper takes out while it is held.
+constexpr double damper_limit = 1.7;
+// Least depth [m] at which a wrench that is held, or that is predicted, carries the weight on Earth.
+constexpr double least_penetration = 5e-4, least_penetration_predicted = 1e-5;
+constexpr double standard_gravity = 9.81;  // [m/s²]
+
+constexpr double damping_ratio = 1.2, damping_ratio_predicted = 0.8;
+// Share of the depth at rest from which on the damper is whole [1].
+constexpr double whole_damper_depth = 0.02;
+// Share of the speed √(2·g·depth), which gravity would stop at the surface, at which a load may be
+// pushed back [1].
+constexpr double recoil = 0.7;
+// Time [s] over which the force that a contact has carried is averaged.
+constexpr double carried_time = 0.1;
+// Share of Ω² that the tangential springs take [1]. 0.5 makes tall boxes jitter.
+constexpr double tangential_share = 0.1;
+constexpr double tangential_damping_ratio = 1.0;
+// The modulus falls at once to what the loop bears, and rises with this time constant [s] ...
+constexpr double rise_time = 1.0;
+// ... up to this share of it [1], so that at rest it is constant.
+constexpr double steady_share = 0.98;
+
+struct LawConstants {
+  double frequency;  // Ω [1/s]: no oscillation on a patch is faster
+  double damping_ratio;
+  double held;    // H [s]: how long a wrench acts, lateness included
+  double period;  // from one evaluation to the next [s]
+  double rise;    // share of what a modulus lacks that it gains per answer [1]
+  double friction, gravity;
+};
+
+inline LawConstants constants_for(const bc_loop& loop) {
+  double period = 1.0 / loop.rate, late = 0.5 * period + loop.latency;
+  LawConstants law{0.0, damping_ratio, period, period, std::min(1.0, period / rise_time),
+                   loop.friction, loop.gravity};
+  if (loop.use == BC_HELD_PATCH) {
+    law.frequency = std::min(patch_delay_limit / late, step_limit / loop.step);
+    law.held = law.period = loop.step;
+  } else if (loop.use == BC_HELD_WRENCH) {
+    law.frequency = std::min({std::sqrt(standard_gravity / least_penetration),
+                              wrench_delay_limit / late,
+                              damper_limit / (2.0 * damping_ratio * period)});
+    law.held = period + loop.latency;
+  } else {
+    law.frequency = std::min(std::sqrt(standard_gravity / least_penetration_predicted),
+                             wrench_delay_limit / late);
+    law.damping_ratio = damping_ratio_predicted;
+  }
+  return law;
+}
+
+}  // namespace box_contact::detail

@@ -1,0 +1,253 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""From contacts to wrenches: laws that hold the patches between questions.
+
+A simulator asks for contacts at some rate, and its answers come late. A law takes each answer with
+the poses for which it was asked. Then it says which wrench acts on each body, from the patches that
+it holds and from where the bodies are by now.
+
+`HeldPatch` is for one load on boxes that are fixed. The simulator asks it at every physics step.
+`SceneLaw` is the same for all bodies of a scene. `PatchLaw` is for clients that can only apply one
+wrench until the next answer: `HeldWrench` then holds it.
+
+All three are faces of the same code in libbox_contact; docs/explanation/force.md derives it. Its
+source is an elastic foundation (Johnson, Contact Mechanics, section 4.3) under each patch, with
+friction by an anchor and a limit surface (Goyal, Ruina and Papadopoulos, 1991).
+
+Conventions: those of `pose`; SI units. A pose (7,) is that of a body's box, as the solver takes it.
+A velocity (6,) is linear [m/s], of the centre of mass, then angular [rad/s]. A wrench (6,) is a
+force [N], then a torque [N m] about the centre of mass. All in the common frame.
+"""
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...core import native
+from ...solver.checks import shown
+from ...solver.contact import Contact
+from ..scene_solver import Answer, Scene, id_of
+
+GRAVITY = 9.81
+"""Gravitational acceleration [m/s²]."""
+
+FRICTION = 0.5
+"""Coulomb's μ [1], steel on steel, dry."""
+
+Touches = Contact | Mapping[str, Contact]
+"""The contact of the only pair, or contacts by the names of their pairs."""
+
+_PATCH, _WRENCH, _PREDICTED = range(3)  # what a program does with wrenches: `bc_use` of force.h
+_FIXED = -1  # place of a box that does not move
+
+
+@dataclass(frozen=True, kw_only=True)
+class Body:
+    """A body that forces move, of one box.
+
+    mass     [kg]
+    inertia  principal moments (3,) about the box's own axes through the centre of mass [kg m²]
+    centre   of mass (3,), in the box's own frame [m]
+    """
+
+    mass: float
+    inertia: Sequence[float] | np.ndarray
+    centre: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0)
+
+    @classmethod
+    def of_box(cls, size: Sequence[float] | np.ndarray, mass: float) -> Self:
+        """Return the body of a box of full extents (3,) [m] and of one density."""
+        squares = np.square(np.asarray(size, dtype=float))
+        return cls(mass=mass, inertia=mass / 12.0 * (squares.sum() - squares))
+
+
+def _native_law(bodies: Sequence[Body], use: int, *, rate_hz: float, latency: float, step: float,
+                friction: float, gravity: float) -> native.Law:
+    mass, inertia, centre = (np.array([getattr(body, name) for body in bodies], dtype=float)
+                             for name in ('mass', 'inertia', 'centre'))
+    return native.Law(mass, inertia, centre, use, rate_hz, latency, step, friction, gravity)
+
+
+def _named(contacts: Touches) -> Mapping[str, Contact]:
+    """Return contacts by the names of their pairs; ValueError where friction could mix them up."""
+    if isinstance(contacts, Contact):
+        return {'': contacts}
+    if isinstance(contacts, Mapping):
+        return contacts
+    raise ValueError(f'contacts must be one Contact, or a dict by the names of their pairs, not a '
+                     f'{type(contacts).__name__}: friction has to know each pair again')
+
+
+class HeldPatch:
+    """The wrench on one load, at every physics step, from the patches of the last answer.
+
+    Make it with `for_loop`. A pair is known by its name, so friction remembers it from answer to
+    answer, in whichever order they come.
+    """
+
+    def __init__(self, law: native.Law) -> None:
+        """Take over a native law of one body; see `for_loop`."""
+        self._law = law
+
+    @classmethod
+    def for_loop(cls, load: Body, *, rate_hz: float, latency: float = 0.0, step: float = 0.001,
+                 friction: float = FRICTION, gravity: float = GRAVITY) -> Self:
+        """Return the law of a load whose contacts are asked for `rate_hz` times a second.
+
+        latency: from a question to the use of its answer [s]. step: the physics step [s].
+        ValueError: names the field and its value.
+        """
+        return cls(_native_law([load], _PATCH, rate_hz=rate_hz, latency=latency, step=step,
+                               friction=friction, gravity=gravity))
+
+    @property
+    def frequency(self) -> float:
+        """Return Ω [1/s]; the load rests at the depth gravity / Ω² on a whole face."""
+        return self._law.frequency
+
+    def hold(self, contacts: Touches, pose: ArrayLike, *, load: Literal['a', 'b'] = 'a') -> None:
+        """Hold the contacts that were asked for with the load at `pose` (7,); forget others.
+
+        load: which of its pair's boxes the load is. ValueError: a contact without a patch (`fcl`,
+        `soup`, `paper`), or a normal that cannot be meant for this load; nothing changes then.
+        """
+        sides = (0, _FIXED) if load == 'a' else (_FIXED, 0)
+        self._law.hold([(id_of(name), *sides, contact)
+                        for name, contact in _named(contacts).items()], pose)
+
+    def wrench(self, pose: ArrayLike, velocity: ArrayLike) -> np.ndarray:
+        """Return the wrench (6,) on the load at `pose` (7,) and `velocity` (6,), a step at a time.
+
+        Friction follows the way from one call to the next.
+        """
+        wrench: np.ndarray = self._law.wrenches(pose, velocity)[0]
+        return wrench
+
+    def reset(self) -> None:
+        """Forget all patches: the load was put elsewhere."""
+        self._law.reset()
+
+    def copy(self) -> Self:
+        """Return a law with the same patches and friction."""
+        return type(self)(self._law.copy())
+
+
+class PatchLaw:
+    """The wrench on one load that a client holds from one answer to the next.
+
+    Make it with `for_loop`, and hold its wrenches by `HeldWrench`. `HeldPatch` is better wherever
+    the law can be asked at every physics step.
+    """
+
+    def __init__(self, law: native.Law) -> None:
+        """Take over a native law of one body; see `for_loop`."""
+        self._law = law
+
+    @classmethod
+    def for_loop(cls, load: Body, *, rate_hz: float, latency: float = 0.0,
+                 friction: float = FRICTION, gravity: float = GRAVITY,
+                 predicted: bool = False) -> Self:
+        """Return the law of a load whose contacts are asked for `rate_hz` times a second.
+
+        latency: from a question to the use of its answer [s]. predicted: contacts, poses and
+        velocities are those of a `Predictor`; latency is then what it may err by.
+        """
+        use = _PREDICTED if predicted else _WRENCH
+        return cls(_native_law([load], use, rate_hz=rate_hz, latency=latency, step=1.0 / rate_hz,
+                               friction=friction, gravity=gravity))
+
+    @property
+    def frequency(self) -> float:
+        """Return Ω [1/s]; the load rests at the depth gravity / Ω² on a whole face."""
+        return self._law.frequency
+
+    def wrench(self, contacts: Touches, pose: ArrayLike, velocity: ArrayLike, *,
+               load: Literal['a', 'b'] = 'a') -> np.ndarray:
+        """Return the wrench (6,) of the contacts at this pose (7,) and velocity (6,), once a tick.
+
+        ValueError as `HeldPatch.hold`.
+        """
+        sides = (0, _FIXED) if load == 'a' else (_FIXED, 0)
+        self._law.hold([(id_of(name), *sides, contact)
+                        for name, contact in _named(contacts).items()], pose)
+        wrench: np.ndarray = self._law.wrenches(pose, velocity)[0]
+        return wrench
+
+    def reset(self) -> None:
+        """Forget all patches: the load was put elsewhere."""
+        self._law.reset()
+
+    def copy(self) -> Self:
+        """Return a law with the same friction."""
+        return type(self)(self._law.copy())
+
+
+class SceneLaw:
+    """The wrenches on all bodies of a scene, at every physics step, from its last answer.
+
+    Make it with `for_loop`. Boxes that move without a body in the law (a conveyor, a spreader on
+    rails) push, and are not pushed.
+    """
+
+    def __init__(self, law: native.Law, scene: Scene, moving: Sequence[str]) -> None:
+        """Take over a native law of the boxes `scene.moving`; see `for_loop`."""
+        self._law, self._scene, self._free = law, scene, frozenset(moving)
+        self._place = {name: place for place, name in enumerate(scene.moving)}
+
+    @classmethod
+    def for_loop(cls, scene: Scene, bodies: Mapping[str, Body | float], *, rate_hz: float,
+                 latency: float = 0.0, step: float = 0.001, friction: float = FRICTION,
+                 gravity: float = GRAVITY) -> Self:
+        """Return the law of a scene whose contacts are asked for `rate_hz` times a second.
+
+        bodies: by the names of their boxes; a number is the mass [kg] of a box of one density.
+        latency: from a question to the use of its answer [s]. step: the physics step [s].
+        ValueError: names the field and its value.
+        """
+        for name in bodies:
+            if name not in scene.moving:
+                raise ValueError(f'bodies: {shown(name)} is none of the boxes that move: '
+                                 f'{shown(list(scene.moving))}')
+        unmoved = Body(mass=0.0, inertia=np.zeros(3))
+        each = []
+        for name in scene.moving:
+            body = bodies.get(name, unmoved)
+            each.append(body if isinstance(body, Body)
+                        else Body.of_box(scene.boxes[name].size, body))
+        return cls(_native_law(each, _PATCH, rate_hz=rate_hz, latency=latency, step=step,
+                               friction=friction, gravity=gravity), scene, tuple(bodies))
+
+    @property
+    def frequency(self) -> float:
+        """Return Ω [1/s]: no body oscillates faster on its patches."""
+        return self._law.frequency
+
+    def hold(self, answer: Answer, poses: ArrayLike) -> None:
+        """Hold the answer of a `SceneSolver` to `poses` (n, 7), a row for each of `scene.moving`.
+
+        ValueError: a contact without a patch (`fcl`, `soup`, `paper`); nothing changes then.
+        """
+        place = self._place
+        self._law.hold([(pair.id, place.get(pair.a, _FIXED), place.get(pair.b, _FIXED), contact)
+                        for pair, contact in answer.touching
+                        if pair.a in self._free or pair.b in self._free], poses)
+
+    def wrenches(self, poses: ArrayLike, velocities: ArrayLike) -> np.ndarray:
+        """Return the wrenches (n, 6) at `poses` (n, 7) and `velocities` (n, 6), once a step.
+
+        Rows are those of `scene.moving`. Friction follows the way from one call to the next.
+        """
+        return self._law.wrenches(poses, velocities)
+
+    def reset(self) -> None:
+        """Forget all patches: boxes were put elsewhere."""
+        self._law.reset()
+
+    def copy(self) -> Self:
+        """Return a law with the same patches and friction."""
+        return type(self)(self._law.copy(), self._scene, tuple(self._free))
