@@ -23,7 +23,7 @@ import numpy as np
 import poses
 import pytest
 
-from box_contact_ros import ContactSolver
+from box_contact_ros import Body, ContactSolver, HeldPatch
 from box_contact_ros.__main__ import PLACES
 from box_contact_ros.core import FORCE, instruction_sets, native
 from box_contact_ros.resources import resource_path
@@ -155,6 +155,38 @@ def test_other_languages_get_the_bits_of_python(library: ctypes.CDLL, model: str
     found = by_ctypes(library, model, all_poses, 2, places)
     for field, one, other in zip(Contacts._fields, found, wanted):
         assert np.array_equal(one, other[places[:, 0]], equal_nan=True), field
+
+
+@pytest.mark.parametrize('source', ['force_test.c', 'force_test.cpp'])
+def test_the_law_has_the_bits_of_python(tmp_path: Path, source: str) -> None:
+    """A load that is dropped and pushed: 2,000 steps in C, in C++ and here."""
+    compiler, standard = ('gcc', 'c11') if source.endswith('.c') else ('g++', 'c++17')
+    program = tmp_path / 'force_test'
+    run(tool(compiler), f'-std={standard}', '-O2', '-ffp-contract=off', *STRICT,
+        PLACES['--includes'], ROOT / 'test/core' / source, LIBRARY, f'-Wl,-rpath,{CORE}', '-lm',
+        '-o', program)
+    *found, failures, _ = run(program).split()
+    assert failures == '0'
+    size = (12.192, 2.438, 2.591)
+    solver = ContactSolver(size, size, model='exact')
+    law = HeldPatch.for_loop(Body(mass=20000.0, inertia=(21000.0, 260000.0, 255000.0)),
+                             rate_hz=200.0, latency=0.002)
+    stack, velocity = np.array([0, 0, 0, 0, 0, 0, 1.0]), np.zeros(6)
+    load = np.array([0.3, 0.1, 2.601, 0.001, 0.002, 0.003, 1.0])
+    for step in range(2000):
+        if step % 5 == 0:
+            contact, asked = solver(load, stack), load.copy()
+        if step % 5 == 2:
+            law.hold(contact, asked)
+        wrench = law.wrench(load, velocity)
+        push = np.array([40000.0 if step > 1000 else 0.0, 0.0, 0.0])
+        velocity[:3] += ((wrench[:3] + push) / 20000.0 - [0.0, 0.0, 9.81]) * 0.001
+        load[:3] += velocity[:3] * 0.001
+    expected = [*load[:3], *wrench]
+    assert [float.fromhex(number) for number in found] == expected
+    assert wrench[2] == pytest.approx(20000.0 * 9.81, rel=1e-3)
+    assert wrench[0] == pytest.approx(-40000.0, rel=1e-3)
+    assert np.abs(velocity).max() < 1e-3
 
 
 def test_the_interface_alone_is_exported() -> None:

@@ -56,8 +56,10 @@ TF = 'node/topics/tf_poses.py'
 TEST_TF = 'test/node/test_tf_poses.py'
 TEST_CORE = 'test/core/test_core.py'
 EXACT = 'test/core/test_exact.py'
-PATCH_LAW = 'scene/force/patch_law.py'
-TEST_PATCH_LAW = 'test/scene/test_patch_law.py'
+LAW = 'core/src/force/patch_law.hpp'
+STIFFNESS = 'core/src/force/stiffness.hpp'
+CONSTANTS = 'core/src/force/constants.hpp'
+TEST_LAW = 'test/scene/test_force_laws.py'
 NAMED = 'verification/named_failures.py'
 TEST_NAMED = 'test/verification/test_named_failures.py'
 MUTANTS = {
@@ -519,32 +521,71 @@ MUTANTS = {
         'node/topics/qos_events.py', 'event.total_count_change - event.current_count_change',
         'max(0, -event.current_count_change)', f'{TEST_SCENE_NODE} -k come_and_go_between'),
     'the modulus rises at once': Mutant(
-        PATCH_LAW, 'self._modulus = min(self._modulus + self.rise * lacking, borne)',
-        'self._modulus = borne', f'{TEST_PATCH_LAW} -k rises_slowly'),
+        LAW, 'patch.modulus = std::min(patch.modulus, borne);', 'patch.modulus = borne;',
+        f'{TEST_LAW} -k rises_slowly'),
     'the modulus survives the contact': Mutant(
-        PATCH_LAW, '            self._modulus = math.inf\n', '',
-        f'{TEST_PATCH_LAW} -k rises_slowly'),
+        LAW, 'patches_.swap(next_);', 'if (!next_.empty()) patches_.swap(next_);',
+        f'{TEST_LAW} -k rises_slowly'),
     'a point alone goes through': Mutant(
-        PATCH_LAW, 'if not (math.isfinite(overlap.volume) and', 'if False and not (True and',
-        f'{TEST_PATCH_LAW} -k point_alone'),
+        'core/src/library/force.cpp', 'if (!is_positive(contact.volume) ||', 'if (false &&',
+        f'{TEST_LAW} -k point_alone'),
     'the foundation pulls': Mutant(
-        PATCH_LAW, 'if share <= 0.0:', 'if False:', f'{TEST_PATCH_LAW} -k never_pulls'),
+        LAW, 'if (!(push > 0.0)) {', 'if (false) {', f'{TEST_LAW} -k never_pulls'),
     'rocking beyond what pressures can': Mutant(
-        PATCH_LAW, 'min(1.0, share / at_rim if at_rim > 0.0 else 1.0)', '1.0',
-        f'{TEST_PATCH_LAW} -k fast_rocking'),
+        LAW, 'at_rim > least ? std::max(0.0, least) / at_rim : 1.0', '1.0',
+        f'{TEST_LAW} -k fast_rocking'),
     'no area of a needle': Mutant(
-        PATCH_LAW, 'LEAST_ASPECT = 1e-7', 'LEAST_ASPECT = 0.0',
-        f'{TEST_PATCH_LAW} -k only_just_touches'),
+        STIFFNESS, 'least_aspect = 1e-7', 'least_aspect = 0.0', f'{TEST_LAW} -k only_just_touches'),
     'a corner as stiff as a face': Mutant(
-        PATCH_LAW, 'stiffness = np.zeros((6, 6))',
-        'stiffness = np.zeros((6, 6)); angular = 0.0 * angular',
-        f'{TEST_PATCH_LAW} -k softer'),
-    'damping as under a whole face': Mutant(
-        PATCH_LAW, 'damping = self.damping * sum(areas) * softness / self.mass',
-        'damping = self.damping', f'{TEST_PATCH_LAW} -k sum_over_the_columns'),
-    'damping that grows beyond the weight': Mutant(
-        PATCH_LAW, '        damping *= min(1.0, self.mass * GRAVITY / elastic)\n', '',
-        f'{TEST_PATCH_LAW} -k beyond_the_weight'),
+        STIFFNESS, 'normal.add(factor * shape.area, r);',
+        'r[3] = r[4] = r[5] = 0.0; normal.add(factor * shape.area, r);', f'{TEST_LAW} -k softer'),
+    'damping that vanishes with the load': Mutant(
+        CONSTANTS, 'whole_damper_depth = 0.02', 'whole_damper_depth = 1.0',
+        f'{TEST_LAW} -k damper_is_whole'),
+    'no cap of the impulse': Mutant(
+        LAW, 'push > 0.0 && push > limit', 'false', f'{TEST_LAW} -k impulse'),
+    'a held patch that does not follow': Mutant(
+        LAW, 'patch.volume + shape.area * relative.deeper', 'patch.volume',
+        f'{TEST_LAW} -k contact_of_the_new_pose'),
+    'a held patch that does not tilt': Mutant(
+        LAW, 'cross(n, relative.turned), depth)', 'cross(n, 0.0 * relative.turned), depth)',
+        f'{TEST_LAW} -k contact_of_the_new_pose'),
+    'a patch that stays where its carrier was': Mutant(
+        LAW, 'if (!is_free(body) || both) found.point', 'if (both) found.point',
+        f'{TEST_LAW} -k goes_with_what_carries'),
+    'friction without memory': Mutant(
+        LAW, 'u = u + relative.slid - dot(relative.slid, n) * n;',
+        'u = relative.slid - dot(relative.slid, n) * n;', f'{TEST_LAW} -k holds_by_a_spring'),
+    'an anchor beyond its limit': Mutant(
+        LAW, 'patch.anchor = (1.0 / beyond) * patch.anchor;', '',
+        f'{TEST_LAW} -k holds_by_a_spring'),
+    'a stiffer spring gains energy': Mutant(
+        LAW, 'if (stiffness > patch.anchor_stiffness) {', 'if (false) {',
+        f'{TEST_LAW} -k gains_no_energy'),
+    'slip and spin have a limit each': Mutant(
+        LAW, 'std::sqrt(dot(force, force) + torsion * torsion) / limit',
+        'std::sqrt(dot(force, force)) / limit', f'{TEST_LAW} -k one_limit'),
+    'the radius of gyration for that of friction': Mutant(
+        STIFFNESS, 'radius * std::sqrt(spread)};', 'std::sqrt(spread)};',
+        f'{TEST_LAW} -k coulombs_sum'),
+    'a pair is known by its place': Mutant(
+        LAW, 'const Patch* old = held(touch.pair);',
+        'const Patch* old = next_.size() < patches_.size() ? &patches_[next_.size()] : nullptr;',
+        f'{TEST_LAW} -k by_its_name'),
+    'two free bodies as stiff as one': Mutant(
+        LAW, 'is_free(patch.b) ? 2.0 : 1.0', 'is_free(patch.b) ? 1.0 : 1.0',
+        f'{TEST_LAW} -k half_the_modulus'),
+    'no reaction': Mutant(
+        LAW, 'add(found[patch.b], -1.0,', 'add(found[patch.b], 0.0,',
+        f'{TEST_LAW} -k acts_back'),
+    'a normal that cannot be meant goes through': Mutant(
+        'core/src/library/force.cpp', 'return body.compound ||', 'return true ||',
+        f'{TEST_LAW} -k cannot_be_meant'),
+    'a held patch as soft as a held wrench': Mutant(
+        CONSTANTS, 'patch_delay_limit = 2.0', 'patch_delay_limit = 0.45',
+        f'{TEST_LAW} -k follow_the_loop'),
+    'a damper that a held wrench does not bear': Mutant(
+        CONSTANTS, 'damper_limit = 1.7', 'damper_limit = 17.0', f'{TEST_LAW} -k follow_the_loop'),
     'the point law pulls': Mutant(
         'baselines/point_law.py', 'push = max(0.0, self.stiffness * depth',
         'push = (self.stiffness * depth',
@@ -589,7 +630,8 @@ def build(checkout: Path) -> None:
         built.unlink()
     folders = [f'-I{path}' for path in (sysconfig.get_path('include'),
                                         *core.extension.include_dirs)]
-    sources = [*core.extension.sources, f'{core.library}/kernel.cpp', f'{core.library}/library.cpp']
+    sources = [*core.extension.sources,
+               *(f'{core.library}/{name}.cpp' for name in ('kernel', 'library', 'force'))]
     # Half as long to compile with -O1. The bits are the same.
     subprocess.run(
         [*os.environ.get('CXX', 'g++').split(), '-shared', '-fPIC', '-DBOX_CONTACT_VERSION=""',

@@ -75,6 +75,7 @@ typedef struct bc_wrench {
 
 typedef struct bc_law bc_law;
 
+/* Make a law for `count` bodies. `loop` NULL: BC_DEFAULT_LOOP. On failure *law is NULL. */
 BC_API bc_status bc_law_create(const bc_body* bodies, int64_t count, const bc_loop* loop,
                                bc_law** law);
 /* The same bodies, with the patches that are held and what their friction remembers. */

@@ -135,8 +135,9 @@ extern "C" {
 
 bc_status bc_law_create(const bc_body* bodies, int64_t count, const bc_loop* loop, bc_law** law) {
   return guarded([&] {
-    if (!law || !bodies) return refuse_null(law ? "bodies" : "law");
+    if (!law) return refuse_null("law");
     *law = nullptr;
+    if (!bodies) return refuse_null("bodies");
     bc_loop all = BC_DEFAULT_LOOP;
     if (loop && !read(loop, all)) return fail(BC_BAD_ABI, "loop.size is unknown");
     if (count < 1) return fail(BC_BAD_ARGUMENT, "count must be 1 or more");
@@ -151,7 +152,9 @@ bc_status bc_law_create(const bc_body* bodies, int64_t count, const bc_loop* loo
 
 bc_status bc_law_copy(const bc_law* law, bc_law** copy) {
   return guarded([&] {
-    if (!law || !copy) return refuse_null(law ? "copy" : "law");
+    if (!copy) return refuse_null("copy");
+    *copy = nullptr;
+    if (!law) return refuse_null("law");
     *copy = reinterpret_cast<bc_law*>(new Law(law_of(law)));
     return BC_OK;
   });
