@@ -5,6 +5,8 @@
 from __future__ import annotations
 
 import math
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,6 +24,7 @@ from box_contact_ros.scene.pose import quaternion_multiply, rotation_matrix
 from box_contact_ros.scene.scene_solver import Box, Pair, Scene
 from box_contact_ros.solver.contact import Contact
 
+PAGE = Path(__file__).resolve().parents[2] / 'docs' / 'explanation' / 'force.md'
 MASS = 20_000.0
 WEIGHT = MASS * GRAVITY
 DOWN = np.array([0.0, 0.0, -1.0])
@@ -373,11 +376,13 @@ def test_friction_knows_a_pair_by_its_name():
     for each in (law, other):
         each.hold({'left': left, 'right': right}, LEVEL)
         each.wrench(LEVEL, STILL)
-    pose = moved(LEVEL, (1e-7, 0, 0))
-    expected = law.wrench(pose, STILL)
-    assert expected[0] < 0.0
-    other.hold({'right': right, 'left': left}, LEVEL)
-    assert np.array_equal(other.wrench(pose, STILL), expected)
+    pose = moved(LEVEL, (1e-7, 0, 0), (0, 0, 3e-8))
+    for each in (law, other):
+        expected = each.wrench(pose, STILL)
+    assert expected[0] < 0.0 and expected[1] != 0.0
+    for contacts in ({'right': right, 'left': left}, {'left': left, 'right': right}):
+        other.hold(contacts, LEVEL)
+        assert np.array_equal(other.wrench(pose, STILL), expected)
     law.hold({'right': right}, LEVEL)
     alone = law.wrench(pose, STILL)
     assert alone[0] == pytest.approx(0.5 * expected[0], rel=0.1)
@@ -505,6 +510,21 @@ def test_the_constants_follow_the_loop(rate, latency):
         min(math.sqrt(9.81 / 5e-4), 0.45 / late, 1.7 * rate / 2.4))
     assert PatchLaw.for_loop(LOAD, **loop, predicted=True).frequency == pytest.approx(
         min(math.sqrt(9.81 / 1e-5), 0.45 / late))
+
+
+def test_the_page_says_what_the_code_does():
+    """The table of rates, latencies and depths in docs/explanation/force.md."""
+    rows = re.findall(r'^\| ([\d.]+) (k?)Hz \| (\d) ms \| [\d.]+ ms \| (\d+) /s \| ([\d.]+) mm '
+                      r'\| (\d+) /s \| ([\d.]+) mm \|$', PAGE.read_text(), re.MULTILINE)
+    assert len(rows) >= 8
+    for rate, kilo, latency, patch, patch_depth, wrench, wrench_depth in rows:
+        loop = {'rate_hz': float(rate) * (1000 if kilo else 1), 'latency': 1e-3 * float(latency)}
+        for law, omega, depth in (
+                (HeldPatch.for_loop(LOAD, **loop, step=0.0005), patch, patch_depth),
+                (PatchLaw.for_loop(LOAD, **loop), wrench, wrench_depth)):
+            digits = len(depth.partition('.')[2])
+            assert f'{law.frequency:.0f}' == omega
+            assert f'{1e3 * GRAVITY / law.frequency**2:.{digits}f}' == depth
 
 
 # --- Refusals -------------------------------------------------------------------------------------
