@@ -395,6 +395,7 @@ def test_a_stiffer_spring_gains_no_energy():
     law = fresh()
     pose = moved(LEVEL, (1e-7, 0, 0))
     wrench_of(slab(4.0, 2.0), law=law)
+    law.hold(slab(2.0, 2.0), pose)
     before = law.wrench(pose, STILL)[0]
     for _ in range(50):
         law.hold(slab(2.0, 2.0), pose)
