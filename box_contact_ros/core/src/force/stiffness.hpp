@@ -57,39 +57,33 @@ struct Stiffness {
 
   // The largest eigenvalue, by cyclic Jacobi rotations (Golub and Van Loan, section 8.5).
   double largest_eigenvalue() const {
-    constexpr double small = 1e-20;  // of the diagonal's squares: eigenvalues are then exact to 1e-10
-    double a[6][6];
+    constexpr double small = 1e-10;  // of the trace: what is left beside the diagonal changes less
+    double a[6][6], trace = 0.0, largest = 0.0;
     std::copy_n(&k[0][0], 36, &a[0][0]);
-    for (int sweep = 0; sweep < 20; ++sweep) {
-      double off = 0.0, diagonal = 0.0;
-      for (int i = 0; i < 6; ++i) {
-        diagonal += a[i][i] * a[i][i];
-        for (int j = 0; j < i; ++j) off += a[i][j] * a[i][j];
-      }
-      if (off <= small * diagonal) break;
+    for (int i = 0; i < 6; ++i) trace += a[i][i];
+    for (bool rotated = true; rotated;) {
+      rotated = false;
       for (int p = 0; p < 5; ++p)
-        for (int q = p + 1; q < 6; ++q) rotate(a, p, q);
+        for (int q = p + 1; q < 6; ++q)
+          if (std::fabs(a[p][q]) > small * trace) rotate(a, p, q), rotated = true;
     }
-    double largest = 0.0;
     for (int i = 0; i < 6; ++i) largest = std::max(largest, a[i][i]);
     return largest;
   }
 
  private:
   static void rotate(double (&a)[6][6], int p, int q) {
-    if (a[p][q] == 0.0) return;
     double half = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
     double t = (half >= 0.0 ? 1.0 : -1.0) / (std::fabs(half) + std::sqrt(half * half + 1.0));
     double c = 1.0 / std::sqrt(t * t + 1.0), s = t * c;
+    a[p][p] -= t * a[p][q];
+    a[q][q] += t * a[p][q];
+    a[p][q] = a[q][p] = 0.0;
     for (int i = 0; i < 6; ++i) {
-      double x = a[i][p], y = a[i][q];
-      a[i][p] = c * x - s * y;
-      a[i][q] = s * x + c * y;
-    }
-    for (int i = 0; i < 6; ++i) {
+      if (i == p || i == q) continue;
       double x = a[p][i], y = a[q][i];
-      a[p][i] = c * x - s * y;
-      a[q][i] = s * x + c * y;
+      a[i][p] = a[p][i] = c * x - s * y;
+      a[i][q] = a[q][i] = s * x + c * y;
     }
   }
 };
