@@ -15,7 +15,8 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / 'docs' / 'examples'
 PAGE = (EXAMPLES / 'README.md').read_text('utf-8')
-NEEDS = {'mujoco_loop.py': 'mujoco', 'recorded_landing.py': 'rosbags',
+NEEDS = {'mujoco_loop.py': 'mujoco', 'container_stack.py': 'mujoco',
+         'recorded_landing.py': 'rosbags',
          'dask_pairs.py': 'distributed', 'lockstep_client.py': 'box_contact_msgs.msg'}
 QUICK = {'vectorised_env.py': 'main(100)', 'dask_pairs.py': 'main(40_000, 10_000)'}
 """Shorter runs, whose figures are not those of the page."""

@@ -1,0 +1,71 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""Five containers fall onto each other and rest: `python docs/examples/container_stack.py`.
+
+All of them move. MuJoCo integrates, and its own contact is off. A SceneSolver answers for the pairs
+200 times a second, and each answer comes 2 ms late. A SceneLaw holds the patches, and gives the
+wrench on every container at every physics step.
+"""
+import mujoco
+import numpy as np
+
+from box_contact_ros import SceneLaw, SceneSolver, read_scene
+
+SIZE, MASS, COUNT = (12.192, 2.438, 2.591), 20_000.0, 5  # [m], [kg]
+RATE, LATENCY, STEP, DURATION = 200.0, 0.002, 0.001, 8.0  # [Hz], [s], [s], [s]
+GAP = 0.01  # between the containers at the start [m]
+
+SCENE = read_scene(f"""
+boxes:
+  ground: {{size: [40, 40, 1], pose: [0, 0, -0.5, 0, 0, 0, 1]}}
+  container: {{size: {list(SIZE)}, count: {COUNT}}}
+pairs:
+  - {{a: 'container*', b: '*'}}
+""")
+MODEL = '\n'.join([
+    f'<mujoco><option timestep="{STEP}"><flag contact="disable"/></option><worldbody>',
+    *(f'<body pos="{0.1 * (-1)**i} 0 {(i + 0.5) * SIZE[2] + (i + 1) * GAP}" euler="0.05 0 {i}">'
+      f'<freejoint/><geom type="box" size="{" ".join(str(x / 2) for x in SIZE)}" mass="{MASS}"/>'
+      '</body>' for i in range(COUNT)), '</worldbody></mujoco>'])
+
+
+def poses_of(data: mujoco.MjData) -> np.ndarray:
+    """Return all poses (n, 7) `x y z qx qy qz qw`; MuJoCo puts w first."""
+    return data.qpos.reshape(COUNT, 7)[:, [0, 1, 2, 4, 5, 6, 3]]
+
+
+def velocities_of(data: mujoco.MjData) -> np.ndarray:
+    """Return all velocities (n, 6) in the world frame; MuJoCo's spins are in the bodies' own."""
+    velocities = data.qvel.reshape(COUNT, 6).copy()
+    velocities[:, 3:] = np.einsum('nij,nj->ni', data.xmat[1:].reshape(COUNT, 3, 3),
+                                  velocities[:, 3:])
+    return velocities
+
+
+def main() -> None:
+    """Let the containers fall, push the lowest, and print how the stack moves."""
+    model = mujoco.MjModel.from_xml_string(MODEL)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    solver = SceneSolver(SCENE)
+    law = SceneLaw.for_loop(SCENE, dict.fromkeys(SCENE.moving, MASS), rate_hz=RATE, latency=LATENCY,
+                            step=STEP)
+    ticks, late = round(1 / (RATE * STEP)), round(LATENCY / STEP)
+    for step in range(round(DURATION / STEP)):
+        poses = poses_of(data)
+        if step % ticks == 0:
+            asked, answer = poses, solver(poses)
+        if step % ticks == late:
+            law.hold(answer, asked)
+        data.xfrc_applied[1:] = law.wrenches(poses, velocities_of(data))
+        mujoco.mj_step(model, data)
+        if step % 1000 == 999:
+            fastest = np.abs(data.qvel.reshape(COUNT, 6)[:, :3]).max()
+            depths = [1e3 * max(0.0, -contact.separation) for _, contact in answer.touching]
+            print(f'{data.time:.0f} s: at most {1e3 * fastest:.2f} mm/s, '
+                  f'{max(depths):.2f} mm deep')
+
+
+if __name__ == '__main__':
+    main()
