@@ -125,6 +125,8 @@ def read_tensors(data: bytes) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
         shape, (begin, end) = entry['shape'], entry['data_offsets']
         if entry['dtype'] != 'F32':
             raise ValueError(f'{name} is {entry["dtype"]}, not F32')
+        if len(shape) > 2:
+            raise ValueError(f'{name} has {len(shape)} dimensions, not 1 or 2')
         if start + begin != place or end - begin != 4 * math.prod(shape):
             raise ValueError(f'{name} has no place of its own')
         # NumPy refuses shapes and places that are not whole numbers within the data.

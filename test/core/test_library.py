@@ -9,6 +9,7 @@ which finds the library by the same `find_package`.
 from __future__ import annotations
 
 import ctypes
+import json
 import os
 import platform
 import shutil
@@ -453,3 +454,43 @@ def test_normals_within_the_margin() -> None:
             ContactSolver(poses.CUBE, poses.CUBE, margin=bad)
     with pytest.raises(ValueError, match="^margin 1 is not a distance that model 'paper' knows"):
         ContactSolver(poses.CUBE, poses.CUBE, model='paper', margin=1.0)
+
+
+def damaged(change: str) -> bytes:
+    """Return the shipped weights file with one thing that a damaged or hostile file may have."""
+    data = WEIGHTS.read_bytes()
+    length = int.from_bytes(data[:8], 'little')
+    header, tensors = data[8:8 + length].decode(), data[8 + length:]
+    if change == 'header longer than any file':
+        return (2**63).to_bytes(8, 'little') + data[8:]
+    if change == 'shape whose product overflows':
+        entries = json.loads(header)
+        entries['point.0.bias'] |= {'shape': [2**62], 'data_offsets': [4, 4]}
+        header = json.dumps(entries, separators=(',', ':'))
+    if change == 'tensors missing':
+        tensors = b''
+    return len(header).to_bytes(8, 'little') + header.encode() + tensors
+
+
+@pytest.mark.parametrize('change', ['header longer than any file', 'shape whose product overflows',
+                                    'tensors missing'])
+def test_damaged_weights_are_refused(library: ctypes.CDLL, tmp_path: Path, change: str) -> None:
+    path = tmp_path / 'weights.safetensors'
+    path.write_bytes(damaged(change))
+    assert status_with(library, path) == BAD_WEIGHTS
+
+
+def test_endless_weights_are_refused(library: ctypes.CDLL) -> None:
+    assert status_with(library, Path('/dev/zero')) == BAD_WEIGHTS
+
+
+BAD_WEIGHTS = 5
+
+
+def status_with(library: ctypes.CDLL, weights: Path) -> int:
+    """Return the status of making a solver with a weights file."""
+    options = Options(ctypes.sizeof(Options), 1, os.fsencode(weights), 0.0)
+    unit, solver = Size((c_double * 3)(1, 1, 1)), ctypes.c_void_p()
+    status: int = library.bc_solver_create(byref(unit), byref(unit), byref(options), byref(solver))
+    assert not solver
+    return status

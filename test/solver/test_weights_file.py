@@ -251,6 +251,7 @@ BAD_HEADERS = {
     'truth': lambda header: header['n.0.bias'].update(shape=[5, True]),
     'beyond 64 bits': lambda header: header['n.0.bias'].update(shape=[0, 2**70]),
     'another size': lambda header: header['n.0.bias'].update(shape=[6]),
+    'two thousand dimensions': lambda header: header['n.0.bias'].update(shape=[2**40] * 2000 + [0]),
     'three offsets': lambda header: header['n.0.bias'].update(data_offsets=[0, 20, 40]),
     'another kind': lambda header: header['n.0.bias'].update(dtype='F64'),
     'beyond the end': lambda header: header.update(

@@ -14,7 +14,6 @@
 #include <cstring>
 #include <fstream>
 #include <initializer_list>
-#include <iterator>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -25,11 +24,17 @@ namespace box_contact::detail {
 
 class WeightsFile {
  public:
+  static constexpr size_t largest_file = size_t(1) << 24;  // header and tensors [bytes]
+
   // Throws std::runtime_error with path and cause, as `numbers` does.
   explicit WeightsFile(const std::string& path) : path_(path) {
     std::ifstream file(path, std::ios::binary);
     if (!file) refuse("cannot be opened");
-    std::string bytes((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+    std::string bytes;
+    for (char part[1 << 16]; file.read(part, sizeof part), file.gcount() > 0;) {
+      bytes.append(part, size_t(file.gcount()));
+      if (bytes.size() > largest_file) refuse("is larger than 16 MiB");
+    }
     std::uint64_t length = 0;
     if (bytes.size() >= 8) std::memcpy(&length, bytes.data(), 8);
     if (bytes.size() < 8 || length > bytes.size() - 8) refuse("is no safetensors file");
@@ -84,7 +89,8 @@ class WeightsFile {
     size_t count = 1;
     for (size_t extent : shape) {
       extents += (extents.empty() ? "" : ",") + std::to_string(extent);
-      count *= extent;
+      if (extent > data_.size()) refuse("has a tensor " + name + " that is larger than the file");
+      count *= extent;  // at most 16 MiB squared
     }
     const std::string key = R"("data_offsets":[)";
     size_t begin = number(told, key), end = number(told, key + std::to_string(begin) + ",");
