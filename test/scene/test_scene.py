@@ -7,6 +7,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import time
 from pathlib import Path
 
 import numpy as np
@@ -215,6 +216,29 @@ def test_numbers_as_json_writes_them(tmp_path):
     for scene in (parse_scene(text), read_scene(tmp_path / 'scene.json')):
         assert scene.boxes['a'].size == (1e16, 1.5e-3, 1.0)
         assert scene.boxes['b'].pose == (0, -1e-05, 1e22, 0, 0, 0, 1)
+
+
+@pytest.mark.parametrize(('text', 'extent'), [
+    ('010', 10.0), ('0x10', 16.0), ('0o17', 15.0), ('+2.5e1', 25.0), ('.5', 0.5)])
+def test_numbers_are_those_of_yaml_1_2(text, extent):
+    """In YAML 1.1, 010 is eight."""
+    scene = read_scene(GOOD.replace('[6, 2.4, 0.5]', f'[{text}, 2.4, 0.5]'))
+    assert extent in {box.size[0] for box in scene.boxes.values()}
+
+
+@pytest.mark.parametrize('text', ['1:30', '1_000', 'no', '1' * 5000, '2001-01-01', '.nan'])
+def test_what_is_no_number_in_yaml_1_2_is_refused(text):
+    """1:30 is ninety in YAML 1.1, and takes time that is quadratic in its length."""
+    with pytest.raises(SceneError, match='size'):
+        read_scene(GOOD.replace('[6, 2.4, 0.5]', f'[{text}, 2.4, 0.5]'))
+
+
+def test_a_text_of_millions_of_values_is_refused_soon():
+    """Megabytes of zeros: they took a minute and gigabytes."""
+    started = time.monotonic()
+    with pytest.raises(SceneError, match='more than 1200000 values'):
+        parse_scene('{boxes: [' + 7_000_000 * '0,' + '0]}')
+    assert time.monotonic() - started < 20.0
 
 
 @pytest.mark.parametrize('pairs', [1, 2])

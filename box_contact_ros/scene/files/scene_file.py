@@ -25,15 +25,33 @@ from .short_forms import expand_boxes, expand_pairs
 
 LARGEST_FILE = 16 * 2**20  # bytes that are read at most; some 100,000 pairs
 DEEPEST = 20  # levels of nesting that are followed; a scene has four
+MOST_EVENTS = 1_200_000  # parts of a text: a hundred thousand pairs that are written out
 MOST_FAULTS = 1000  # that are looked for to name the first: all of a megabyte would take a minute
 
 
 class _Loader(getattr(yaml, 'CSafeLoader', yaml.SafeLoader)):  # type: ignore[misc]
-    """In C where there is libyaml. It takes JSON's numbers too: 1e-05 is a word in YAML 1.1."""
+    """The core schema of YAML 1.2, in C where there is libyaml.
+
+    In YAML 1.1, which PyYAML knows, 010 is eight, 1:30 is ninety, and `no` is false.
+    """
+
+    yaml_implicit_resolvers: dict[str, list[tuple[str, re.Pattern[str]]]] = {}
 
 
-_Loader.add_implicit_resolver('tag:yaml.org,2002:float',
-                              re.compile(r'[-+]?\d+(\.\d*)?[eE][-+]?\d+$'), list('-+0123456789'))
+def _whole(loader: _Loader, node: yaml.ScalarNode) -> int:
+    base = {'0o': 8, '0x': 16}.get(node.value[:2], 10)
+    return int(node.value, base)  # ValueError: thousands of digits, which would take long
+
+
+for _kind, _pattern, _first in (
+        ('null', r'~|null|Null|NULL|', '~nN'),
+        ('bool', r'true|True|TRUE|false|False|FALSE', 'tTfF'),
+        ('int', r'[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+', '-+0123456789'),
+        ('float', r'[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?|'
+                  r'[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)', '-+.0123456789')):
+    _Loader.add_implicit_resolver(f'tag:yaml.org,2002:{_kind}', re.compile(f'(?:{_pattern})$'),
+                                  [*_first, *([''] if _kind == 'null' else [])])
+_Loader.add_constructor('tag:yaml.org,2002:int', _whole)
 
 
 class SceneError(ValueError):
@@ -146,7 +164,7 @@ def scene_text(scene: Scene) -> str:
 def _plain(text: str, lines: dict[Place, int]) -> Any:
     """Return the data of a YAML text; the line of each of its values goes to `lines`."""
     depth = 0
-    for event in yaml.parse(text, Loader=_Loader):
+    for number, event in enumerate(yaml.parse(text, Loader=_Loader)):
         depth += isinstance(event, yaml.CollectionStartEvent)
         depth -= isinstance(event, yaml.CollectionEndEvent)
         reason, tag = '', getattr(event, 'tag', None)
@@ -156,6 +174,8 @@ def _plain(text: str, lines: dict[Place, int]) -> Any:
             reason = f'tag {shown(tag)} is not accepted'
         elif depth > DEEPEST:  # the C loader, which descends, would end the process
             reason = 'nested too deeply'
+        elif number >= MOST_EVENTS:
+            reason = f'more than {MOST_EVENTS} values and brackets'
         if reason:
             lines[()] = event.start_mark.line + 1 if event.start_mark else 1
             raise Fault((), reason)
