@@ -21,7 +21,15 @@ from ..core import LENGTH_MAX, QUATERNION_MAX, QUATERNION_MIN
 from ..scene.scene_solver import Answer, Pair
 from ..scene.stamp_pairing import StampedPose
 from ..solver.contact import Contact, patch_area
-from .messages import CLOUD_ROW, NANOSECONDS, Refused, TypedMessages, checked_pose, headed
+from .messages import (
+    CLOUD_ROW,
+    FRAME_LIMIT,
+    NANOSECONDS,
+    Refused,
+    TypedMessages,
+    checked_pose,
+    headed,
+)
 
 ENCAPSULATION = 4
 """Bytes before the body: two name its kind, two are options, which say nothing about a pose."""
@@ -108,6 +116,8 @@ def _parse_frame(data: bytes, length: int, kind: str) -> str:
     frame = data[FRAME_AT:FRAME_AT + length]
     if length and frame.find(b'\0') != length - 1:
         raise Refused(f'not a {kind}', 'frame_id does not end with its first zero')
+    if length > FRAME_LIMIT + 1:
+        raise Refused('bad header', f'frame_id has more than {FRAME_LIMIT} bytes')
     try:
         return frame[:-1].decode('utf-8')
     except UnicodeDecodeError:

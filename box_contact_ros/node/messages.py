@@ -62,6 +62,9 @@ for _name in {*(CLOUD_ROW.names or ())} - {'pair'}:
     _BLANK[_name] = np.nan
 
 
+FRAME_LIMIT = 255  # bytes of a frame_id: a stranger's could be megabytes
+
+
 class Refused(ValueError):
     """A message that is not taken; `reason` is what it is counted as."""
 
@@ -83,6 +86,8 @@ def headed(numbers: np.ndarray, frame_id: str, sec: int, nanosec: int) -> Stampe
     """Return numbers with the stamp and frame of their message, or raise Refused for these."""
     if nanosec >= NANOSECONDS:
         raise Refused('bad header', f'stamp has {nanosec} nanoseconds, a second or more')
+    if len(frame_id.encode(errors='replace')) > FRAME_LIMIT:
+        raise Refused('bad header', f'frame_id has more than {FRAME_LIMIT} bytes')
     if '\N{REPLACEMENT CHARACTER}' in frame_id:  # rclpy's word for bytes it cannot decode
         raise Refused('bad header', f'frame_id {shown(frame_id)} is not UTF-8')
     return StampedPose(numbers, frame_id, sec * NANOSECONDS + nanosec)
