@@ -33,7 +33,7 @@ from geometry_msgs.msg import (
 from sensor_msgs.msg import PointCloud2, PointField
 from std_msgs.msg import Header
 
-from ..scene.scene_solver import Answer, id_of
+from ..scene.scene_solver import Answer, Scene, id_of
 from ..scene.stamp_pairing import StampedPose
 from ..solver.checks import pose_fault, shown
 from ..solver.contact import Contact, patch_area
@@ -189,6 +189,23 @@ def contacts_by_pair(message: Any, ids: Mapping[str, int] = TWO_BOXES) -> dict[s
     else:
         names = [contact.pair for contact in message.contacts]
     return {name: _contact(row) for name, row in zip(names, rows)}
+
+
+def read_answer(message: Any, scene: Scene) -> Answer:
+    """Return the answer that a message of contacts tells, as `SceneLaw` holds it.
+
+    scene: that of the node. Stale pairs are left out. Raises Refused, also for a pair that is not
+    in the scene.
+    """
+    pair_of = {pair.label: pair for pair in scene.pairs}
+    contacts = contacts_by_pair(message, scene.ids)
+    for name in contacts:
+        if name not in pair_of:
+            raise Refused('unknown pair', f'{shown(name)} is no pair of the scene: read the scene '
+                                          'that the node has, as ~/scene tells it')
+    listed = [(pair_of[name], contact) for name, contact in contacts.items()]
+    return Answer([one for one in listed if one[1].colliding], [], len(listed),
+                  [one for one in listed if not one[1].colliding])
 
 
 def _contact(row: Any) -> Contact:

@@ -15,7 +15,7 @@ from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from ros_client import Client, serving, stamp_of
 
-from box_contact_ros import Body, PatchLaw, SceneSolver
+from box_contact_ros import Body, PatchLaw, SceneLaw, SceneSolver
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import (
     ContactsMessage,
@@ -24,8 +24,10 @@ from box_contact_ros.node.messages import (
     make_cloud,
     make_contacts,
     make_header,
+    read_answer,
 )
 from box_contact_ros.node.wrench_output import WRENCH_PARAMETERS
+from box_contact_ros.scene.files.scene_check import meaning
 from box_contact_ros.scene.files.scene_file import SceneError, parse_scene, scene_text
 from box_contact_ros.scene.scene_solver import Answer, Pair, two_boxes
 from box_contact_ros.solver.contact import Contact
@@ -238,6 +240,7 @@ def test_masses_of_a_scene_file():
     scene = parse_scene(SCENE)
     assert [box.mass for box in scene.boxes.values()] == [1000.0, 500.0, 0.0, 0.0]
     assert parse_scene(scene_text(scene)) == scene
+    assert 'box load: 2 x 2 x 2 m, 1000 kg, moves: load/pose' in meaning(scene)
     for wrong, words in (('mass: 0}', ':3: boxes.load.mass: 0 is not positive'),
                          ('mass: .nan}', 'boxes.load.mass: nan is outside 0 to 1e'),
                          ('mass: heavy}', "'heavy' is not a number"),
@@ -269,6 +272,27 @@ def test_contacts_by_pair_are_those_of_the_solver(cloud):
     if cloud:
         with pytest.raises(Refused, match='hand over `Scene.ids`'):
             contacts_by_pair(message)
+
+
+@pytest.mark.parametrize('cloud', [False, True])
+def test_a_scene_law_holds_messages(cloud):
+    """The wrenches of all bodies are those of the solver's own answer."""
+    if not cloud and ContactsMessage is None:
+        pytest.skip('box_contact_msgs is not installed')
+    scene = parse_scene(SCENE)
+    where = np.array([(0, 0, 0.999, 0, 0, 0, 1), (0.1, 0, 2.497, 0, 0, 0, 1),
+                      (5, 0, 0.9, 0, 0, 0, 1)])
+    answer = SceneSolver(scene, model='exact')(where)
+    message = (make_cloud if cloud else make_contacts)(make_header(0, 'yard'), answer)
+    found = []
+    for one in (answer, read_answer(message, scene)):
+        law = SceneLaw.for_loop(scene, {'load': 1000.0, 'lid': 500.0}, rate_hz=RATE)
+        law.hold(one, where)
+        found.append(law.wrenches(where, np.zeros((3, 6))))
+    assert np.array_equal(*found) and found[0][0, 2] != 0.0 and found[0][1, 2] > 0.0
+    other = parse_scene(BARE.replace('  - {a: lid, b: load}\n', ''))
+    with pytest.raises(Refused, match='hand over|read the scene that the node has'):
+        read_answer(message, other)
 
 
 def test_contacts_without_a_patch_are_still_contacts():
