@@ -3,8 +3,8 @@
 
 """The output `wrench`: its parameters, and the law that they ask for.
 
-A client that can only apply a wrench gets one for each pair of which a box has a mass. Whoever can
-evaluate a law at each physics step holds patches instead, and rests stiller.
+A client that can only apply a wrench gets one for each pair with a body, a moving box with a mass.
+A client that can evaluate a law at each physics step holds patches instead: its loads lie stiller.
 """
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ FRICTION_MAX = 10.0
 LATENCY_MAX = 1.0  # s
 
 WRENCH_PARAMETERS = {
-    'wrench': Setting(False, 'whether pairs of which a box has a mass have a topic wrench: force '
-                             'and torque on their box A, to apply until the next; needs rate',
+    'wrench': Setting(False, 'whether each pair with a box that has a mass has a topic wrench: '
+                             'force and torque on its box A, to apply until the next; needs rate',
                       flag),
     'rate': Setting(0.0, 'with wrench: how often poses come; 0: not given [Hz]',
                     number(0.0, FASTEST)),

@@ -143,7 +143,7 @@ def test_a_container_lands_on_wrenches_alone(client, serialization):
 
 
 def test_wrenches_of_a_scene():
-    """One topic per pair of which a box has a mass, in every evaluation of that pair."""
+    """One topic per pair with a body, in every evaluation of that pair."""
     topics = ('load_floor/wrench', 'lid_load/wrench', 'lorry_floor/wrench')
     client = WrenchClient(wrenches=topics, boxes=('load', 'lid', 'lorry'))
     down, apart = (0, 0, 0.999, 0, 0, 0, 1), (0, 0, 8, 0, 0, 0, 1)

@@ -205,7 +205,7 @@ def test_a_frame_that_never_moves_has_no_velocity():
     assert wrench[0] < -1e3
 
 
-@pytest.mark.parametrize('length', [1.0, 1e-3, 30.0])
+@pytest.mark.parametrize('length', [1.0, 1e-3, 30.0, 1e-99, 1e99])
 def test_velocities_are_those_between_two_poses(length):
     """Of a constant rotation about any axis, for quaternions of any length and either sign."""
     rng = np.random.default_rng(2)

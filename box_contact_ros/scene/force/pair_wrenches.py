@@ -3,12 +3,13 @@
 
 """The wrench of each pair of a scene, for clients that apply it until the next answer.
 
-`PatchLaw` is for one load; `PairWrenches` is the same law for all pairs of which a box has a mass.
-Each pair has a law of its own, so that its wrench can be told from those of other pairs. Velocities
-come from the poses of two ticks. Conventions: those of `laws`.
+`PatchLaw` is for one load; `PairWrenches` is the same law for all pairs with a body: a moving box
+with a mass, of one density. Each pair has a law of its own, so that its wrench can be told from
+those of other pairs. Velocities come from the poses of two ticks. Conventions: those of `laws`.
 """
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from collections.abc import Iterator
 
@@ -23,6 +24,7 @@ from .laws import _FIXED, _WRENCH, FRICTION, GRAVITY, Body, _native_law
 
 SECOND = 1_000_000_000  # [ns]
 STILL = np.zeros(6)
+CONJUGATE = np.array([-1.0, -1.0, -1.0, 1.0])
 LATE = 0.5
 """Age of a velocity in periods, as it is the mean since the pose before."""
 LONGEST_GAP = 10.0
@@ -59,20 +61,21 @@ def velocity_between(before: np.ndarray, now: np.ndarray, seconds: float) -> np.
 
     Of the two turns between the orientations the shorter one is meant.
     """
-    turn = quaternion_multiply(now[3:], before[3:] * [-1.0, -1.0, -1.0, 1.0])
-    turn = turn if turn[3] >= 0.0 else -turn
-    sine = float(np.sqrt(turn[:3] @ turn[:3]))
-    # Quaternions of any length: half the angle is atan2 of both parts, and sine / w where small.
-    angle = 2.0 * np.arctan2(sine, turn[3])
-    angular = turn[:3] * (angle / sine) if sine > 0.0 else np.zeros(3)
+    one, other = (pose[3:] / np.abs(pose[3:]).max() for pose in (before, now))  # of any length
+    turn = quaternion_multiply(other, one * CONJUGATE)
+    if turn[3] < 0.0:
+        turn = -turn
+    sine = math.sqrt(turn[:3] @ turn[:3])
+    half = math.atan2(sine, turn[3])
+    angular = turn[:3] * (2.0 * half / sine) if sine > 0.0 else np.zeros(3)
     return np.concatenate([now[:3] - before[:3], angular]) / seconds
 
 
 class PairWrenches:
-    """The wrenches of all pairs of which a box has a mass, once per tick.
+    """The wrenches of all pairs with a body, once per tick.
 
-    A body is a moving box with a mass, of one density. Its contacts share the stiffness that the
-    loop bears, as in `SceneLaw`: the sum of its wrenches is that of one law of all bodies.
+    The contacts of a body share the stiffness at which the loop stays stable, as in `SceneLaw`: the
+    sum of its wrenches is that of one law of all bodies.
     """
 
     def __init__(self, scene: Scene, *, rate_hz: float, latency: float = 0.0,
@@ -84,7 +87,7 @@ class PairWrenches:
         """
         self.pairs = [pair for pair in scene.pairs
                       if scene.boxes[pair.a].mass or scene.boxes[pair.b].mass]
-        """The pairs that have wrenches."""
+        """The pairs with a body."""
         if not self.pairs:
             raise ValueError('no box has a mass')
         self._scene = scene
@@ -176,4 +179,5 @@ class PairWrenches:
 
 
 def _body(box: Box) -> Body:
+    """Return the body of a box; no force moves one without a mass."""
     return Body.of_box(box.size, box.mass)
