@@ -33,7 +33,7 @@ PATIENCE = 30.0
 
 def programs(context: LaunchContext) -> list[Node]:
     """Return what runs beside the contact node."""
-    given = given_values(context, ARGUMENTS | CONTACT_NODE)
+    given = given_values(context, CONTACT_NODE | ARGUMENTS)
 
     def node(program: str, *names: str, before: tuple[str, ...] = (),
              argument: str = '--shared-parameters', **options: object) -> Node:

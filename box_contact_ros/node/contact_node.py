@@ -9,6 +9,7 @@ contacts (box_contact_msgs/Contacts) on every evaluation, and /diagnostics. Wher
 is not installed, contacts_cloud (sensor_msgs/PointCloud2) takes the place of contacts.
 
 With a scene file: <box>/pose of every moving box, and <pair>/contact/point, <pair>/contact/normal.
+With wrench: contact/wrench (WrenchStamped), or <pair>/wrench, the force law's answer.
 It is a lifecycle node that configures and activates itself, unless autostart is false.
 `contact_node --check FILE` tells what a scene file means, without ROS.
 """
@@ -54,6 +55,7 @@ from .rclpy_workarounds import lifecycle_state, refuse_transitions
 from .runtime import LOG_SECONDS, run_node
 from .topics.scene_topics import SceneTopics
 from .topics.tf_poses import check_frames
+from .wrench_output import WRENCH_PARAMETERS, make_wrenches
 
 
 def model(name: str, value: Any) -> str:
@@ -96,6 +98,7 @@ PARAMETERS = {
     'pair_topics': Setting(True, 'whether pairs have topics of their own next to contacts', flag),
     'contacts_cloud': Setting(False, 'whether contacts are published as a point cloud as well; '
                                      'always where box_contact_msgs is not installed', flag),
+    **WRENCH_PARAMETERS,
     'serialization': Setting('raw', 'raw: read and write the bytes of messages; typed: message '
                                     'objects, slower, the reference', one_of(SERIALIZATIONS)),
     'autostart': Setting(True, 'whether the node configures and activates itself', flag,
@@ -114,15 +117,17 @@ def _files(settings: Mapping[str, Any]) -> dict[str, str]:
             and not (name == 'scene' and is_inline(settings[name]))}
 
 
-def _refuse_sizes(settings: Mapping[str, Any], before: Mapping[str, Any]) -> None:
-    """Raise ValueError for sizes that change although a scene replaces them.
+def _refuse_boxes(settings: Mapping[str, Any], before: Mapping[str, Any]) -> None:
+    """Raise ValueError for sizes and masses that change although a scene replaces them.
 
-    A size may be given again as it is: files of all parameters do so.
+    One may be given again as it is: files of all parameters do so.
     """
-    for name in ('size_a', 'size_b'):
-        if settings['scene'] and settings[name] != before[name]:
-            raise ValueError(f'{name} {shown(settings[name])} has no effect while scene is set: '
-                             "write sizes into the scene file, or set scene to ''")
+    for kind in ('size', 'mass'):
+        for name in (f'{kind}_a', f'{kind}_b'):
+            if settings['scene'] and settings.get(name) != before.get(name):
+                plural = {'size': 'sizes', 'mass': 'masses'}[kind]
+                raise ValueError(f'{name} {shown(settings[name])} has no effect while scene is '
+                                 f"set: write {plural} into the scene file, or set scene to ''")
 
 
 class ContactNode(LifecycleNode):
@@ -143,7 +148,7 @@ class ContactNode(LifecycleNode):
         self._evaluator: Evaluator | None = None  # from configure to cleanup
         self._settings = CheckedParameters(self, self.parameters, self._change)
         values = self._settings.values
-        _refuse_sizes(values, {name: one.default for name, one in self.parameters.items()})
+        _refuse_boxes(values, {name: one.default for name, one in self.parameters.items()})
         if values['locked'] and not values['autostart']:
             raise ValueError('locked: a node that does not start itself could never be started')
         self._open_files = OpenFiles(values['files_from'].split(os.pathsep),
@@ -250,7 +255,7 @@ class ContactNode(LifecycleNode):
 
     def _change(self, settings: dict[str, Any], names: Collection[str]) -> None:
         """Apply parameters if one differs. A scene that is set again may differ in its file."""
-        _refuse_sizes(settings, self._settings.values)
+        _refuse_boxes(settings, self._settings.values)
         if self._evaluator is not None and (
                 settings != self._settings.values or 'scene' in names):
             self._apply(settings)
@@ -284,19 +289,22 @@ class ContactNode(LifecycleNode):
         Boxes that stay keep their subscriptions and the poses that wait.
         """
         scene = (read_scene(settings['scene'], check=check_frames) if settings['scene']
-                 else two_boxes(settings['size_a'], settings['size_b']))
-        self._topics.check(scene, pair_topics=settings['pair_topics'])
+                 else two_boxes(settings['size_a'], settings['size_b'], **{
+                     name: settings[name] for name in ('mass_a', 'mass_b') if name in settings}))
         solver = self.make_solver(settings, scene)
+        wrenches = make_wrenches(settings, solver)
+        covered = wrenches.pairs if wrenches else ()
+        self._topics.check(scene, pair_topics=settings['pair_topics'], wrenches=covered)
         self._topics.set_scene(scene, pair_topics=settings['pair_topics'],
                                cloud=settings['contacts_cloud'] or ContactsMessage is None,
                                raw=SERIALIZATIONS[settings['serialization']].raw,
-                               deadline=settings['deadline'])
+                               deadline=settings['deadline'], wrenches=covered)
         if self._evaluator is None:
             self._evaluator = Evaluator(
-                solver, settings, topics=self._topics, counts=self.counts,
+                solver, wrenches, settings, topics=self._topics, counts=self.counts,
                 diagnostics=self._diagnostics, logger=self.get_logger())
         else:
-            self._evaluator.set_solver(solver, settings)
+            self._evaluator.set_solver(solver, wrenches, settings)
             self._topics.tf.look_up()
 
     def _log_state(self, what: str) -> None:

@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from ..scene.scene_solver import ALL_BOXES, SceneSolver
-from ..scene.stamp_pairing import NEVER, PAIRINGS, Pairing, StampedPose, Tick
+from ..scene.force.pair_wrenches import PairWrenches
+from ..scene.scene_solver import ALL_BOXES, Answer, SceneSolver
+from ..scene.stamp_pairing import NEVER, PAIRINGS, RESETS, Pairing, StampedPose, Tick
 from ..solver.checks import absent_poses, are_poses, pose_fault, shown
 from .diagnostics import (
     ACTIVE,
@@ -45,18 +46,23 @@ class Evaluator:
     _pairing: Pairing
     _messages: RawMessages | TypedMessages
 
-    def __init__(self, solver: SceneSolver, settings: Mapping[str, Any], *, topics: SceneTopics,
-                 counts: Counter[str], diagnostics: Diagnostics, logger: Any) -> None:
+    def __init__(self, solver: SceneSolver, wrenches: PairWrenches | None,
+                 settings: Mapping[str, Any], *, topics: SceneTopics, counts: Counter[str],
+                 diagnostics: Diagnostics, logger: Any) -> None:
         """Begin without poses; `settings` are the checked parameters."""
         self._topics, self._diagnostics, self._logger = topics, diagnostics, logger
         self.counts = counts
         self._settings: Mapping[str, Any] = {}
         self._refusals: dict[str, str] = {}  # log lines of the next report, by their kind
         self._refused_boxes: set[str] = set()  # boxes of which a message was refused
-        self.set_solver(solver, settings)
+        self.set_solver(solver, wrenches, settings)
 
-    def set_solver(self, solver: SceneSolver, settings: Mapping[str, Any]) -> None:
-        """Replace the solver and its scene; poses that wait stay unless the pairing changes."""
+    def set_solver(self, solver: SceneSolver, wrenches: PairWrenches | None,
+                   settings: Mapping[str, Any]) -> None:
+        """Replace the solver and its scene; poses that wait stay unless the pairing changes.
+
+        wrenches: the law of the output `wrench`; None where that is off.
+        """
         old = self._settings
         if old:
             self.close()
@@ -69,7 +75,8 @@ class Evaluator:
             self._pairing = PAIRINGS[settings['pairing']](
                 solver.scene, tolerance=tolerance, max_age=max_age, counts=self.counts)
         self._messages = SERIALIZATIONS[settings['serialization']]()  # it knows names of pairs
-        self.solver, self._settings = solver, settings
+        self.solver, self._wrenches, self._settings = solver, wrenches, settings
+        self._times = self.counts[RESETS]  # how often time had gone back at the last tick
         self._absent = np.zeros(0, dtype=bool)  # which boxes the last array had no pose of
         self._diagnostics.watch.set_pairs(solver.scene.pairs)
 
@@ -82,6 +89,8 @@ class Evaluator:
         self._pairing.reset()
         if not time_only:
             self._pairing.release()
+        if self._wrenches is not None:
+            self._wrenches.reset()
 
     def desert(self) -> None:
         """Note that publishers of all boxes have gone: others may begin a new time."""
@@ -204,6 +213,8 @@ class Evaluator:
                 point, normal = publishers
                 point.publish(messages.point(contact))
                 normal.publish(messages.normal(contact))
+        if self._wrenches is not None:
+            self._publish_wrenches(self._wrenches, answer, tick)
         if self._topics.contacts is not None:
             self._topics.contacts.publish(messages.contacts(answer))
         if self._topics.cloud is not None:
@@ -216,6 +227,14 @@ class Evaluator:
         counts['contacts'] += len(answer.touching)
         counts['evaluations'] += 1
         counts['stale pairs'] += stale
+
+    def _publish_wrenches(self, wrenches: PairWrenches, answer: Answer, tick: Tick) -> None:
+        """Publish the wrenches of a tick; where a new time has begun, from a new start."""
+        if self._times != self.counts[RESETS]:
+            self._times = self.counts[RESETS]
+            wrenches.reset()
+        for pair, wrench in wrenches(answer, tick):
+            self._topics.wrenches[pair].publish(self._messages.wrench(wrench))
 
     def _header_of(self, tick: Tick) -> tuple[int, str]:
         """Return the newest stamp [ns] of a tick and its frame; raise Refused if frames differ."""

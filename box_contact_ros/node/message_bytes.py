@@ -66,6 +66,7 @@ class _FrameBytes(NamedTuple):
     head: bytes
     point: bytes
     normal: bytes
+    wrench: bytes
     contacts_header: bytes
     contacts_at: int  # where the first contact begins, by its distance from a multiple of 8
     cloud_header: bytes
@@ -184,6 +185,10 @@ class RawMessages:
         """Make `contact/normal`."""
         return self._stamp + self._in_frame.normal + contact.normal.tobytes()
 
+    def wrench(self, wrench: np.ndarray) -> bytes:
+        """Make `wrench` of force and torque (6,)."""
+        return self._stamp + self._in_frame.wrench + wrench.tobytes()
+
     def contacts(self, answer: Answer) -> bytes:
         """Make `contacts`."""
         frame, names_of = self._in_frame, self._names_of
@@ -240,8 +245,8 @@ def _upper(square: bytes) -> bytes:
 def _in_frame(frame_id: str) -> _FrameBytes:
     messages = TypedMessages()
     messages.begin(0, frame_id)
-    point, normal, cloud = (bytes(serialize_message(message)) for message in (
-        messages.point(_NOTHING), messages.normal(_NOTHING),
+    point, normal, wrench, cloud = (bytes(serialize_message(message)) for message in (
+        messages.point(_NOTHING), messages.normal(_NOTHING), messages.wrench(np.zeros(6)),
         messages.cloud(Answer([], [], 0))))
     if point[:2] != LITTLE:
         raise RuntimeError('rclpy does not serialise little-endian here: use serialization:=typed')
@@ -251,5 +256,5 @@ def _in_frame(frame_id: str) -> _FrameBytes:
     # A cloud has height and width behind its frame; without rows it ends with row_step, the number
     # of bytes of data, and is_dense. Contacts have their number there.
     return _FrameBytes(point[:ENCAPSULATION], point[body:-24], normal[body:-24],
-                       cloud[body:aligned], (aligned + 4 - ENCAPSULATION) % 8,
+                       wrench[body:-48], cloud[body:aligned], (aligned + 4 - ENCAPSULATION) % 8,
                        cloud[body:aligned + 4], cloud[aligned + 8:-9])

@@ -15,15 +15,25 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from functools import lru_cache
 from importlib import import_module
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import Point, PointStamped, PoseArray, PoseStamped, Vector3, Vector3Stamped
+from geometry_msgs.msg import (
+    Point,
+    PointStamped,
+    PoseArray,
+    PoseStamped,
+    Vector3,
+    Vector3Stamped,
+    Wrench,
+    WrenchStamped,
+)
 from sensor_msgs.msg import PointCloud2, PointField
 from std_msgs.msg import Header
 
-from ..scene.scene_solver import Answer, id_of
+from ..scene.scene_solver import Answer, Scene, id_of
 from ..scene.stamp_pairing import StampedPose
 from ..solver.checks import pose_fault, shown
 from ..solver.contact import Contact, patch_area
@@ -63,6 +73,9 @@ for _name in {*(CLOUD_ROW.names or ())} - {'pair'}:
 
 
 FRAME_LIMIT = 255  # bytes of a frame_id: a stranger's could be megabytes
+
+TWO_BOXES = MappingProxyType({'box_a_box_b': 0})
+"""Id of the only pair, by its name, where there is no scene file."""
 
 
 class Refused(ValueError):
@@ -162,6 +175,52 @@ def read_contacts(message: Any, ids: Mapping[str, int] | None = None) -> np.ndar
     return rows
 
 
+def contacts_by_pair(message: Any, ids: Mapping[str, int] = TWO_BOXES) -> dict[str, Contact]:
+    """Return the contacts that a message lists, by the names of their pairs, as laws of force hold.
+
+    Numbers are those that the node computed, to the bit. Pairs that are close do not collide; stale
+    pairs are left out. ids: as `read_contacts`; a PointCloud2 has no names, so it needs those of
+    all its pairs. Raises Refused.
+    """
+    rows = read_contacts(message, ids)
+    if isinstance(message, PointCloud2):
+        rows = rows[~np.isnan(rows['depth'])]
+        name_of = {number: name for name, number in ids.items()}
+        unknown = [number for number in rows['pair'].tolist() if number not in name_of]
+        if unknown:
+            raise Refused('unknown pair', f'ids have no pair {unknown[0]}: hand over `Scene.ids`')
+        names = [name_of[number] for number in rows['pair'].tolist()]
+    else:
+        names = [contact.pair for contact in message.contacts]
+    return {name: _contact(row) for name, row in zip(names, rows)}
+
+
+def read_answer(message: Any, scene: Scene) -> Answer:
+    """Return the answer that a message of contacts tells, as `SceneLaw` holds it.
+
+    scene: that of the node. Stale pairs are left out. Raises Refused, also for a pair that is not
+    in the scene.
+    """
+    pair_of = {pair.label: pair for pair in scene.pairs}
+    contacts = contacts_by_pair(message, scene.ids)
+    for name in contacts:
+        if name not in pair_of:
+            raise Refused('unknown pair', f'{shown(name)} is no pair of the scene: read the scene '
+                                          'that the node has, as ~/scene tells it')
+    listed = [(pair_of[name], contact) for name, contact in contacts.items()]
+    return Answer([one for one in listed if one[1].colliding], [], len(listed),
+                  [one for one in listed if not one[1].colliding])
+
+
+def _contact(row: Any) -> Contact:
+    """Return the contact of a row of CLOUD_ROW."""
+    covariance = np.empty((3, 3))
+    covariance[_UPPER] = covariance.T[_UPPER] = [row[name] for name in PATCH_FIELDS[1:]]
+    point, normal = (np.array([row[name] for name in names]) for names in (_POINT, _NORMAL))
+    return Contact(not np.isnan(point[0]), -float(row['depth']), normal, point,
+                   float(row['volume']), covariance)
+
+
 def read_cloud(message: PointCloud2) -> np.ndarray:
     """Return the rows of a `contacts_cloud` as an array (n,) of CLOUD_ROW.
 
@@ -240,6 +299,12 @@ class TypedMessages:
         """Make `contact/normal`."""
         x, y, z = map(float, contact.normal)
         return Vector3Stamped(header=self._header, vector=Vector3(x=x, y=y, z=z))
+
+    def wrench(self, wrench: np.ndarray) -> WrenchStamped:
+        """Make `wrench` of force and torque (6,)."""
+        fx, fy, fz, tx, ty, tz = wrench.tolist()
+        return WrenchStamped(header=self._header, wrench=Wrench(
+            force=Vector3(x=fx, y=fy, z=fz), torque=Vector3(x=tx, y=ty, z=tz)))
 
     def contacts(self, answer: Answer) -> Any:
         """Make `contacts`."""

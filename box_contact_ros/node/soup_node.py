@@ -18,13 +18,14 @@ from .contact_node import PARAMETERS as CONTACT_PARAMETERS
 from .contact_node import ContactNode
 from .parameters import Setting, answer_help, whole_number
 from .runtime import run_node
+from .wrench_output import WRENCH_PARAMETERS
 
 PARAMETERS = {
     'divisions': Setting(
         SOUP_DIVISIONS, f'squares along each edge of a face, 1 to {MOST_SOUP_DIVISIONS}; '
         'N make 12 N² triangles a box', whole_number(1, MOST_SOUP_DIVISIONS)),
 } | {name: setting for name, setting in CONTACT_PARAMETERS.items()
-     if name not in ('model', 'weights')}
+     if name not in ('model', 'weights', *WRENCH_PARAMETERS)}  # a soup gives no patch
 
 
 class SoupNode(ContactNode):

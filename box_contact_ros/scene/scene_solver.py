@@ -23,6 +23,7 @@ from ..solver.contact import Contact
 from ..solver.contact_solver import ContactSolver
 
 LARGEST_ID = 2**32 - 1  # ids of pairs are uint32 in the cloud
+MASS_MAX = 1e12  # of a box [kg]: more than any ship
 
 POSE_ARRAY = 'poses'
 """Topic of the poses of all moving boxes, where they come as one message."""
@@ -45,6 +46,7 @@ class Box:
     pose: tuple[float, ...] | None = None  # `x y z qx qy qz qw` in the common frame, of a fixed box
     pose_topic: str = ''  # where a moving box's poses come from
     frame: str = ''  # or the frame in /tf that is the box: at its centre, along its edges
+    mass: float = 0.0  # [kg], of one density, of a moving box that forces move; 0: not given
 
 
 class Pair(NamedTuple):
@@ -117,10 +119,11 @@ class Scene:
         return {name: self.boxes[name].frame for name in self.moving if self.boxes[name].frame}
 
 
-def two_boxes(size_a: Sequence[float], size_b: Sequence[float]) -> Scene:
-    """Return the scene of one pair of moving boxes, box_a and box_b, of full extents [m]."""
-    boxes = {name: Box(name, tuple(map(float, size)), pose_topic=f'{name}/pose')
-             for name, size in (('box_a', size_a), ('box_b', size_b))}
+def two_boxes(size_a: Sequence[float], size_b: Sequence[float], *, mass_a: float = 0.0,
+              mass_b: float = 0.0) -> Scene:
+    """Return the scene of one pair of moving boxes, box_a and box_b: extents [m], masses [kg]."""
+    boxes = {name: Box(name, tuple(map(float, size)), pose_topic=f'{name}/pose', mass=mass)
+             for name, size, mass in (('box_a', size_a, mass_a), ('box_b', size_b, mass_b))}
     return Scene(boxes, (Pair(0, '', 'box_a', 'box_b'),))
 
 
@@ -150,6 +153,11 @@ def _check(boxes: Mapping[str, Box], pairs: Sequence[Pair]) -> None:
         fault = pose_fault(box.pose) if box.pose else None
         if fault:
             raise Fault(('boxes', name, 'pose'), fault)
+        if not 0.0 <= box.mass <= MASS_MAX:
+            raise Fault(('boxes', name, 'mass'),
+                        f'{box.mass:g} is outside 0 to {MASS_MAX:g} kg')
+        if box.mass and box.pose:
+            raise Fault(('boxes', name, 'mass'), 'no force moves a box with a pose')
     if not pairs:
         raise Fault(('pairs',), 'a scene needs at least one pair')
     for number, pair in enumerate(pairs):
@@ -308,7 +316,8 @@ class SceneSolver:
         self._solver.batch(a, b, size_a=size_a, size_b=size_b)
         self.sizes_answered_exactly = self._solver.exact_answers
         """Pairs of sizes that a `mlp` was not trained for."""
-        self._solver(a[0], b[0])
+        self.gives_patch = not np.isnan(self._solver(a[0], b[0]).volume)
+        """Whether contacts have volume and covariance, and not the point alone."""
         self([None] * len(self.scene.moving))
         self._warm_up_answers = self._solver.exact_answers
 

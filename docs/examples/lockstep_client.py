@@ -7,36 +7,39 @@ Start `contact_node` first. A simulator that waits for each answer loses none, h
 it runs. It sends both poses with one stamp, and waits for the contacts of that stamp. The stamps
 are the simulator's own time.
 """
+from typing import Any
+
 import numpy as np
 import rclpy
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseStamped
 from rclpy.node import Node
 
-from box_contact_msgs.msg import Contact, Contacts
+from box_contact_msgs.msg import Contacts
 
 
 class LockstepClient(Node):
-    """Sends poses `x y z qx qy qz qw` of box_a and box_b, and waits for their contacts."""
+    """Sends poses `x y z qx qy qz qw` of box_a and box_b, and waits for the answer to them."""
 
-    def __init__(self) -> None:
+    def __init__(self, kind: type = Contacts, topic: str = 'contacts') -> None:
         super().__init__('lockstep_client')
+        self.topic = topic
         self.poses = [self.create_publisher(PoseStamped, f'box_{name}/pose', 10) for name in 'ab']
-        self.create_subscription(Contacts, 'contacts', self.receive, 10)
-        self.answer: Contacts | None = None
+        self.create_subscription(kind, topic, self.receive, 10)
+        self.answer: Any = None
 
-    def receive(self, answer: Contacts) -> None:
+    def receive(self, answer: Any) -> None:
         """Keep the newest answer."""
         self.answer = answer
 
     def wait_for_node(self) -> None:
         """Wait until the node listens to both poses and this client hears its answers."""
         while not (all(pose.get_subscription_count() for pose in self.poses)
-                   and self.count_publishers('contacts')):
+                   and self.count_publishers(self.topic)):
             rclpy.spin_once(self, timeout_sec=0.05)
 
-    def ask(self, time_ns: int, *poses: np.ndarray, patience: float = 0.5) -> list[Contact]:
-        """Return the contacts of two poses at a time; lost poses are sent again."""
+    def ask(self, time_ns: int, *poses: np.ndarray, patience: float = 0.5) -> Any:
+        """Return the answer to two poses at a time; lost poses are sent again."""
         stamp = Time(sec=time_ns // 10**9, nanosec=time_ns % 10**9)
         while self.answer is None or self.answer.header.stamp != stamp:
             for publisher, pose in zip(self.poses, poses):
@@ -45,7 +48,7 @@ class LockstepClient(Node):
             while ((self.answer is None or self.answer.header.stamp != stamp)
                    and self.get_clock().now().nanoseconds < until):
                 rclpy.spin_once(self, timeout_sec=0.01)
-        return self.answer.contacts
+        return self.answer
 
 
 def message(stamp: Time, pose: np.ndarray) -> PoseStamped:
@@ -65,7 +68,8 @@ def main() -> None:
     stack = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
     load = np.array([0.0, 0.0, 2.5925, 0.0, 0.0, 0.0, 1.0])
     for tick in range(1, 6):
-        contacts = client.ask(tick * 5_000_000, load, stack)  # 5 ms of simulated time per step
+        # 5 ms of simulated time per step
+        contacts = client.ask(tick * 5_000_000, load, stack).contacts
         depth = 1e3 * contacts[0].depth if contacts else 0.0
         print(f'{5 * tick} ms: {"contact" if contacts else "no contact"}, {depth:.1f} mm deep')
         load[2] -= 1e-3

@@ -9,7 +9,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import PointStamped, PoseArray, PoseStamped, Vector3Stamped
+from geometry_msgs.msg import PointStamped, PoseArray, PoseStamped, Vector3Stamped, WrenchStamped
 from hypothesis import given
 from hypothesis import strategies as st
 from message_fuzz import READERS, STRICTER, fuzz
@@ -106,6 +106,8 @@ def test_answers_are_written_alike(data, stamp, frame_id, touching, close, stale
     for _, found in answer.touching:
         assert deserialize_message(raw.point(found), PointStamped) == typed.point(found)
         assert deserialize_message(raw.normal(found), Vector3Stamped) == typed.normal(found)
+    wrench = np.array(data.draw(st.tuples(*[BOUNDED] * 6)))
+    assert deserialize_message(raw.wrench(wrench), WrenchStamped) == typed.wrench(wrench)
 
 
 GOOD = bytes(serialize_message(message((1, 2, 3, 0, 0, 0, 1))))

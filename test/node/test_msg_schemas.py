@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from geometry_msgs.msg import Point, Pose, PoseArray, PoseStamped, Quaternion
+from geometry_msgs.msg import Point, Pose, PoseArray, PoseStamped, Quaternion, WrenchStamped
 from jsonschema import Draft202012Validator
 from rclpy.duration import Infinite
 from rclpy.parameter import Parameter
@@ -287,7 +287,7 @@ def test_shared_definitions_agree():
 @pytest.fixture(scope='module')
 def node():
     settings = {'size_a': [2.0, 2.0, 2.0], 'size_b': [2.0, 2.0, 2.0], 'model': 'exact',
-                'contacts_cloud': True}
+                'contacts_cloud': True, 'wrench': True, 'rate': 200.0, 'mass_a': 1000.0}
     with serving(lambda context: ContactNode(context, parameter_overrides=[
             Parameter(name, value=value) for name, value in settings.items()])) as node:
         yield node
@@ -353,8 +353,8 @@ def live(node, client) -> dict[str, list[Any]]:
         address: [] for address in ADDRESSES.values() if address != 'poses'}
     for topic in ('box_a/pose', 'box_b/pose'):
         client.node.create_subscription(PoseStamped, topic, got[topic].append, 100)
-    client.node.create_subscription(PointCloud2, 'contacts_cloud',
-                                    got['contacts_cloud'].append, 100)
+    for kind, topic in ((PointCloud2, 'contacts_cloud'), (WrenchStamped, 'contact/wrench')):
+        client.node.create_subscription(kind, topic, got[topic].append, 100)
     client.node.create_subscription(String, 'contact_node/scene', got['contact_node/scene'].append,
                                     LATCHED_QOS)
     got['/diagnostics'] = client.diagnostics
@@ -437,6 +437,7 @@ WRONG_MESSAGES = {
     'NaN in the normal': ('contact/normal', set_in('vector.x', math.nan)),
     'normal of length 2': ('contact/normal', set_in('vector.z', 2.0)),
     'NaN in the point': ('contact/point', set_in('point.z', math.nan)),
+    'NaN in the torque': ('contact/wrench', set_in('wrench.torque.y', math.nan)),
     'infinite point': ('contact/point', set_in('point.x', math.inf)),
     'nanoseconds of a second': ('contact/point', set_in('header.stamp.nanosec', 10**9)),
     'depth as FLOAT32': ('contacts_cloud', set_in('fields.10.datatype', PointField.FLOAT32)),

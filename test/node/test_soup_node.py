@@ -24,6 +24,7 @@ from box_contact_ros.node.contact_node import PARAMETERS as CONTACT_PARAMETERS
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import PATCH_FIELDS, read_contacts
 from box_contact_ros.node.soup_node import PARAMETERS, SoupNode
+from box_contact_ros.node.wrench_output import WRENCH_PARAMETERS
 from box_contact_ros.resources import resource_path
 
 ORIGIN = poses.IDENTITY
@@ -128,7 +129,8 @@ def test_its_topics_are_the_documents(client, soup_node):
     """Those of the contact node, with soup/ before what is sent; the same types and QoS."""
     document = yaml.safe_load(resource_path('msg_schemas', 'asyncapi.yaml').read_text('utf-8'))
     addresses = {channel['address'] for channel in document['channels'].values()} - {
-        'poses', 'contact_node/scene', *({'contacts', 'contacts_cloud'} - {ANSWERS['cloud'][1]})}
+        'poses', 'contact_node/scene', 'contact/wrench',  # a soup has no patch
+        *({'contacts', 'contacts_cloud'} - {ANSWERS['cloud'][1]})}
     inputs = {'box_a/pose', 'box_b/pose', '/diagnostics'}
     expected = {f'/{name.lstrip("/")}' if name in inputs else f'/soup/{name}'
                 for name in addresses}
@@ -165,7 +167,8 @@ def test_parameters_are_checked_before_they_are_applied(soup_node):
         assert not result.successful and words in result.reason
     for name in PARAMETERS:
         assert soup_node.describe_parameter(name).description
-    assert set(PARAMETERS) == (set(CONTACT_PARAMETERS) - {'model', 'weights'}) | {'divisions'}
+    assert set(PARAMETERS) == (
+        set(CONTACT_PARAMETERS) - {'model', 'weights', *WRENCH_PARAMETERS}) | {'divisions'}
 
 
 def test_the_contact_node_knows_the_soup_too(client):

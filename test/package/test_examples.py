@@ -15,9 +15,12 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / 'docs' / 'examples'
 PAGE = (EXAMPLES / 'README.md').read_text('utf-8')
+CLIENTS = ('lockstep_client.py', 'held_patch_client.py', 'wrench_client.py')  # of a contact node
 NEEDS = {'mujoco_loop.py': 'mujoco', 'container_stack.py': 'mujoco',
          'recorded_landing.py': 'rosbags',
-         'dask_pairs.py': 'distributed', 'lockstep_client.py': 'box_contact_msgs.msg'}
+         'dask_pairs.py': 'distributed'} | dict.fromkeys(CLIENTS, 'box_contact_msgs.msg')
+NODE_FOR = {'wrench_client.py': ('-p', 'wrench:=true', '-p', 'rate:=200', '-p', 'mass_a:=20000')}
+"""Parameters of the contact node that the page tells to start."""
 QUICK = {'vectorised_env.py': 'main(100)', 'dask_pairs.py': 'main(40_000, 10_000)'}
 """Shorter runs, whose figures are not those of the page."""
 
@@ -35,14 +38,15 @@ def shown(name: str) -> list[str]:
 def test_example(name: str, program, tmp_path: Path) -> None:
     """Figures agree to the printed digits; shorter runs print as many lines in the same words."""
     pytest.importorskip(NEEDS.get(name, 'numpy'))
-    if name == 'lockstep_client.py':
-        program('contact_node', '--ros-args', '-p', 'model:=exact').wait_for_output('ready', 120)
+    if name in CLIENTS:
+        program('contact_node', '--ros-args', '-p', 'model:=exact',
+                *NODE_FOR.get(name, ())).wait_for_output('ready', 120)
     command = [str(EXAMPLES / name)]
     if name in QUICK:
         module = name.removesuffix('.py')
         command = ['-c', f'import {module}\nif __name__ == "__main__": {module}.{QUICK[name]}']
     # A simulator that is started anew repeats the stamps of its last run.
-    for _ in range(2 if name == 'lockstep_client.py' else 1):
+    for _ in range(2 if name in CLIENTS else 1):
         done = subprocess.run(
             [sys.executable, *command], cwd=tmp_path, capture_output=True, text=True, timeout=120,
             env=os.environ | {'PYTHONPATH': os.pathsep.join(

@@ -60,9 +60,32 @@ LAW = 'core/src/force/patch_law.hpp'
 STIFFNESS = 'core/src/force/stiffness.hpp'
 CONSTANTS = 'core/src/force/constants.hpp'
 TEST_LAW = 'test/scene/test_force_laws.py'
+PAIR_WRENCHES = 'scene/force/pair_wrenches.py'
+TEST_PAIR_WRENCHES = 'test/scene/test_pair_wrenches.py'
+TEST_WRENCH = 'test/node/test_wrench.py'
 NAMED = 'verification/named_failures.py'
 TEST_NAMED = 'test/verification/test_named_failures.py'
 MUTANTS = {
+    'each pair as stiff as if it were alone': Mutant(
+        PAIR_WRENCHES, 'in others.get(name, ()):', 'in ():', f'{TEST_PAIR_WRENCHES} -k rest'),
+    'a patch between two bodies counts once': Mutant(
+        PAIR_WRENCHES, 'range(2 if', 'range(1 if', f'{TEST_PAIR_WRENCHES} -k add_up'),
+    'mean velocities taken for those of now': Mutant(
+        PAIR_WRENCHES, 'LATE = 0.5', 'LATE = 0.0', f'{TEST_PAIR_WRENCHES} -k rest'),
+    'friction of before a gap': Mutant(
+        PAIR_WRENCHES, 'law.reset()  # friction', 'pass  # friction',
+        f'{TEST_PAIR_WRENCHES} -k gap'),
+    'wrenches of before time went back': Mutant(
+        EVALUATOR, 'if self._times != self.counts[RESETS]:', 'if False:',
+        f'{TEST_WRENCH} -k goes_back'),
+    'bytes of a wrench out of place': Mutant(
+        BYTES, 'wrench[body:-48]', 'wrench[body:-40]', f'{TEST_BYTES} -k alike'),
+    'wrenches of a model without patches': Mutant(
+        'node/wrench_output.py', 'if not solver.gives_patch:', 'if False:',
+        f'{TEST_WRENCH} -k remedy'),
+    'half a covariance': Mutant(
+        MESSAGES, 'covariance[_UPPER] = covariance.T[_UPPER] = [', 'covariance[_UPPER] = [',
+        f'{TEST_WRENCH} -k by_pair'),
     'normal flipped': Mutant(
         'core/src/separating_axis.hpp', 'select<T>(along >= 0.0, splat<T>(1.0), splat<T>(-1.0));',
         'select<T>(along >= 0.0, splat<T>(-1.0), splat<T>(1.0));', f'{FAMILIES} -k gates'),

@@ -16,7 +16,13 @@ from functools import partial
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from geometry_msgs.msg import PointStamped, PoseArray, PoseStamped, Vector3Stamped
+from geometry_msgs.msg import (
+    PointStamped,
+    PoseArray,
+    PoseStamped,
+    Vector3Stamped,
+    WrenchStamped,
+)
 from rclpy.duration import Duration
 from rclpy.event_handler import PublisherEventCallbacks, UnsupportedEventTypeError
 from rclpy.node import Node
@@ -72,6 +78,7 @@ class Wanted(NamedTuple):
 
     sources: Collection[PoseSource] = ()
     pairs: Collection[Pair] = ()
+    wrenches: Collection[Pair] = ()
     cloud: bool = False
     frame_id: str = ''
     frames: Mapping[str, str] = MappingProxyType({})  # in /tf, by box
@@ -81,7 +88,8 @@ class SceneTopics:
     """Creates and destroys a node's topics, so that they are those of the current scene.
 
     contacts, cloud: publishers of all contacts, from the first `set_scene` to `close`; None where
-    that message is not published.
+    that message is not published. publishers, wrenches: of point and normal, and of the wrench, by
+    the pairs that have them.
     """
 
     def __init__(self, node: Node, prefix: str, counts: Counter[str]) -> None:
@@ -99,7 +107,8 @@ class SceneTopics:
             POLICIES[policy](name, value)
         self.events = QosEvents(node, counts)
         self.tf = TfPoses(node, counts)
-        self.publishers: dict[Pair, tuple[Publisher, Publisher]] = {}  # of point and normal
+        self.publishers: dict[Pair, tuple[Publisher, Publisher]] = {}
+        self.wrenches: dict[Pair, Publisher] = {}
         self._subscriptions: dict[PoseSource, Subscription] = {}
         self._callback_of: Callable[[str, str], Callable[[Any], None]] | None = None
         self.contacts: Publisher | None = None
@@ -109,7 +118,7 @@ class SceneTopics:
         self._pair_of_id: dict[int, Pair] = {}
         self._left: set[str] = set()
 
-    def check(self, scene: Scene, *, pair_topics: bool) -> None:
+    def check(self, scene: Scene, *, pair_topics: bool, wrenches: Collection[Pair] = ()) -> None:
         """Raise ValueError for a scene that reuses an id, or whose names can be no topics here.
 
         A pose topic may not be one of the node's own topics, which have other types.
@@ -123,11 +132,15 @@ class SceneTopics:
         if pair_topics and len(scene.pairs) > MOST_PAIRS_WITH_TOPICS:
             raise ValueError(f'scene: {len(scene.pairs)} pairs are too many for topics of their '
                              f'own (at most {MOST_PAIRS_WITH_TOPICS}): set pair_topics to false')
+        if len(wrenches) > MOST_PAIRS_WITH_TOPICS:
+            raise ValueError(f'wrench: {len(wrenches)} pairs have a box with a mass, and at most '
+                             f'{MOST_PAIRS_WITH_TOPICS} can have a topic: list fewer pairs')
         own = [f'{self._prefix}contacts', f'{self._prefix}contacts_cloud', '~/scene',
                '~/transition_event', *TOPICS_OF_EVERY_NODE]
         if pair_topics:
             own += [f'{self._topic_of(pair)}/{kind}' for pair in scene.pairs
                     for kind in ('point', 'normal')]
+        own += [self._wrench_topic(pair) for pair in wrenches]
         taken = {self._resolved(topic) for topic in own}
         for box, topic in scene.sources.items():
             if self._resolved(topic) in taken:
@@ -135,12 +148,12 @@ class SceneTopics:
                                  'this node that carries no poses')
 
     def set_scene(self, scene: Scene, *, pair_topics: bool, cloud: bool, raw: bool,
-                  deadline: float) -> None:
+                  deadline: float, wrenches: Collection[Pair] = ()) -> None:
         """Replace the topics by those of a scene; on RCLError bring the old ones back."""
         old, was_open = self._wanted, self._scene is not None
         sources = [PoseSource(*source, raw, deadline) for source in scene.sources.items()]
         try:
-            self._change(Wanted(sources, scene.pairs if pair_topics else (), cloud,
+            self._change(Wanted(sources, scene.pairs if pair_topics else (), wrenches, cloud,
                                 scene.frame_id, scene.frames))
         except RCLError:
             if was_open:
@@ -171,7 +184,7 @@ class SceneTopics:
 
     def close(self) -> None:
         """Destroy all publishers."""
-        self._unpublish(list(self.publishers))
+        self._unpublish(list(self.publishers), list(self.wrenches))
         for publisher in (self.contacts, self.cloud, self._scene):
             self._end(publisher)
         self.contacts = self.cloud = self._scene = None
@@ -231,6 +244,9 @@ class SceneTopics:
     def _topic_of(self, pair: Pair) -> str:
         return f'{self._prefix}{pair.name}{"/" if pair.name else ""}contact'
 
+    def _wrench_topic(self, pair: Pair) -> str:
+        return f'{self._prefix}{pair.name or "contact"}/wrench'
+
     def _resolved(self, topic: str) -> str:
         """Return a topic's full name, or raise ValueError if it can have none."""
         try:
@@ -268,10 +284,16 @@ class SceneTopics:
         elif not wanted.cloud:
             self._end(self.cloud)
             self.cloud = None
-        self._unpublish(self.publishers.keys() - set(wanted.pairs))
+        self._unpublish(self.publishers.keys() - set(wanted.pairs),
+                        self.wrenches.keys() - set(wanted.wrenches))
         for pair in wanted.pairs:
             if pair not in self.publishers:
-                self.publishers[pair] = self._publish(pair)
+                topic = self._topic_of(pair)
+                self.publishers[pair] = (self._publish(PointStamped, f'{topic}/point'),
+                                         self._publish(Vector3Stamped, f'{topic}/normal'))
+        for pair in wanted.wrenches:
+            if pair not in self.wrenches:
+                self.wrenches[pair] = self._publish(WrenchStamped, self._wrench_topic(pair))
         for source in wanted.sources:
             if self._callback_of is not None and source not in self._subscriptions:
                 callback = self._callback_of(source.box, source.topic)
@@ -291,18 +313,18 @@ class SceneTopics:
             self.events.unwatch(publisher)
             self._node.destroy_publisher(publisher)
 
-    def _publish(self, pair: Pair) -> tuple[Publisher, Publisher]:
-        def publisher(kind: type, topic: str) -> Publisher:
-            # No events: too many to serve. A subscriber of another QoS is told by its own node.
-            return self._publisher(
-                kind, f'{self._topic_of(pair)}/{topic}',
-                event_callbacks=PublisherEventCallbacks(use_default_callbacks=False))
-        return publisher(PointStamped, 'point'), publisher(Vector3Stamped, 'normal')
+    def _publish(self, kind: type, topic: str) -> Publisher:
+        """Return a new publisher of a pair."""
+        # No events: too many to serve. A subscriber of another QoS is told by its own node.
+        return self._publisher(
+            kind, topic, event_callbacks=PublisherEventCallbacks(use_default_callbacks=False))
 
-    def _unpublish(self, pairs: Collection[Pair]) -> None:
+    def _unpublish(self, pairs: Collection[Pair], wrenches: Collection[Pair]) -> None:
         for pair in pairs:
             for publisher in self.publishers.pop(pair):
                 self._node.destroy_publisher(publisher)
+        for pair in wrenches:
+            self._node.destroy_publisher(self.wrenches.pop(pair))
 
     def _subscribe(self, source: PoseSource, callback: Callable[[Any], None]) -> Subscription:
         kind, usual = pose_input(source.box)

@@ -42,7 +42,8 @@ def meaning(scene: Scene) -> Iterator[str]:
         where = (f'moves: {source_of[name]}' if name in source_of else
                  'fixed at ' + ' '.join(f'{number:g}' for number in box.pose) if box.pose else
                  'moves, but is in no pair: not listened to')
-        yield f'box {name}: {_size(box.size)}, {where}'
+        mass = f', {box.mass:g} kg' if box.mass else ''
+        yield f'box {name}: {_size(box.size)}{mass}, {where}'
     for pair in scene.pairs:
         yield f'pair {pair.name}: id {pair.id}, from {pair.a} to {pair.b}'
     for size, count in Counter(box.size for box in scene.boxes.values()).items():

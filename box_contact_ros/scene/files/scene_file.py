@@ -154,7 +154,8 @@ def scene_text(scene: Scene) -> str:
     for name, box in scene.boxes.items():
         fields = {'size': box.size} | ({'pose': box.pose} if box.pose else {}) | (
             {'pose_topic': box.pose_topic} if box.pose_topic else {}) | (
-            {'frame': box.frame} if box.frame else {})
+            {'frame': box.frame} if box.frame else {}) | (
+            {'mass': box.mass} if box.mass else {})
         lines.append(f'  {json.dumps(name)}: {json.dumps(fields)}')
     lines.append('pairs:')
     lines += [f'  - {json.dumps(pair._asdict() | {"name": pair.label})}' for pair in scene.pairs]

@@ -69,13 +69,14 @@ def _boxes(key: str, entry: Mapping[str, Any], data: Mapping[str, Any]) -> Itera
     in_array = data.get('poses') == 'array'
     if in_array and 'pose_topic' in entry:
         raise Fault(('boxes', key, 'pose_topic'), 'with poses: array, all poses come on one topic')
+    mass = float(entry.get('mass', 0.0))
     if 'frame' in entry:
-        yield Box(key, size, frame=entry['frame'])
+        yield Box(key, size, frame=entry['frame'], mass=mass)
         return
     numbers = range(1, int(entry['count']) + 1) if 'count' in entry else ()
     for name in [f'{key}{number:02}' for number in numbers] or [key]:
         yield Box(name, size, None,
-                  '' if in_array else entry.get('pose_topic', f'{name}/pose'))
+                  '' if in_array else entry.get('pose_topic', f'{name}/pose'), mass=mass)
 
 
 def _size(place: Place, entry: Mapping[str, Any], types: Mapping[str, Any]) -> tuple[float, ...]:
