@@ -93,7 +93,7 @@ def client():
 
 
 def test_lost_ticks_are_bridged(node, client, monkeypatch):
-    """Every eleventh answer is thrown away on arrival: the last wrench is held, and it lands.
+    """Every eleventh answer is thrown away on arrival: the last patch is held, and it lands.
 
     As in real time, the law is made for a period's latency.
     """

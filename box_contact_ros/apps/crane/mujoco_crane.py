@@ -31,7 +31,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from ...scene.force.held_wrench import FRICTION, GRAVITY
+from ...scene.force.laws import FRICTION, GRAVITY, Body
 from ...scene.pose import cross, rotation_matrix
 from ...scene.pose_sets import CONTAINER
 
@@ -175,6 +175,16 @@ class CraneScenario:
         return boxes
 
     @property
+    def pairs(self) -> dict[str, tuple[np.ndarray, tuple[float, float, float]]]:
+        """Return the boxes of `stack_boxes` by the names of their pairs with the load."""
+        return {f'load_stack_{number}': box for number, box in enumerate(self.stack_boxes)}
+
+    @property
+    def load(self) -> Body:
+        """Return what laws of force know of the load."""
+        return Body(mass=self.mass, inertia=self.inertia, centre=self.mass_offset)
+
+    @property
     def _hoist_shares(self) -> dict[str, float]:
         return LANDING_SHARES if self.land else HOIST_SHARES
 
@@ -229,6 +239,11 @@ class Crane:
         return self._ticks / self._rate_hz
 
     @property
+    def physics_step(self) -> float:
+        """Return the time between two evaluations of a wrench [s]."""
+        return float(self._model.opt.timestep)
+
+    @property
     def load_pose(self) -> np.ndarray:
         """Pose of the load's centre in the world frame, float64 (7,): x y z qx qy qz qw."""
         return self._data.qpos[[0, 1, 2, 4, 5, 6, 3]]  # MuJoCo's quaternions are w x y z
@@ -245,13 +260,6 @@ class Crane:
         # MuJoCo keeps a free joint's angular velocity in the body's own frame.
         mujoco.mju_rotVecQuat(angular, self._data.qvel[3:], self._data.qpos[3:])
         return np.concatenate([self._data.qvel[:3] + cross(angular, self._arm()), angular])
-
-    @property
-    def mass_pose(self) -> np.ndarray:
-        """Pose of the load's centre of mass, with the load's axes, world frame, (7,)."""
-        pose = self.load_pose
-        pose[:3] += self._arm()
-        return pose
 
     @property
     def own_contact_force(self) -> np.ndarray:

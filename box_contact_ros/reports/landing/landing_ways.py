@@ -29,10 +29,18 @@ from ...apps.crane.landing import (
     land,
     solvers,
 )
+from ...apps.crane.load_laws import (
+    MakeLaw,
+    WrenchesHeld,
+    held_patch,
+    held_wrench,
+    predicted_wrench,
+)
 from ...apps.crane.mujoco_crane import Crane, CraneScenario
 from ...baselines.engines.engine import Manifold, chosen
 from ...baselines.engines.mujoco_engines import box_geoms, collision
 from ...baselines.point_law import PointLaw
+from ...scene.force.laws import Body
 from ...scene.pose_sets import CONTAINER
 from ...solver.contact import Contact
 
@@ -123,10 +131,11 @@ class LoopTiming(NamedTuple):
 class Way:
     """A law and what gives its contacts."""
 
-    law: str  # 'patch', 'point', or 'MuJoCo', which has the contacts too
+    law: str
     contacts: str
     sources: Callable[[CraneScenario], Sequence[ContactSource]] | None = None
-    """What gives the contacts, for each box of the stack."""
+    """What gives the contacts, for each box of the stack; None for MuJoCo, in the simulator."""
+    make_law: Callable[[CraneScenario], MakeLaw] = lambda _: held_patch
     every: int = 1
     """One of so many landings of the grid is run."""
     added: bool = False
@@ -141,9 +150,16 @@ class Way:
         """Run one landing."""
         if self.sources is None:
             return own_contact(scenario, timing)
-        law = None if self.law == 'patch' else PointLaw.for_load(
-            scenario.mass, scenario.size, timing.rate_hz)
-        return land(scenario, self.sources(scenario), law=law, **timing._asdict())
+        return land(scenario, self.sources(scenario), law=self.make_law(scenario),
+                    **timing._asdict())
+
+
+def point_law(scenario: CraneScenario) -> MakeLaw:
+    """Return what makes the point law, which knows the footprint of a scenario's load."""
+    def made(load: Body, *, rate_hz: float, latency: float, step: float) -> WrenchesHeld:
+        return WrenchesHeld(PointLaw.for_load(load.mass, scenario.size, rate_hz))
+
+    return made
 
 
 class MujocoSource:
@@ -187,17 +203,24 @@ def own_contact(scenario: CraneScenario, timing: LoopTiming) -> LandingRecord:
     return record
 
 
+_exact = partial(solvers, model='exact')
 WAYS = {
-    'exact': Way(law='patch', contacts='exact', sources=partial(solvers, model='exact'),
-                 added=True),
-    'mlp': Way(law='patch', contacts='mlp', sources=partial(solvers, model='mlp'), added=True),
+    'exact': Way(law='held patch', contacts='exact', sources=_exact, added=True),
+    'mlp': Way(law='held patch', contacts='mlp', sources=partial(solvers, model='mlp'), added=True,
+               every=5),
     'manifold': Way(law='MuJoCo', contacts='its manifold, in the simulator', added=True),
-    'point': Way(law='point', contacts='exact', sources=partial(solvers, model='exact')),
-    'mujoco-mean': Way(law='point', contacts='MuJoCo, mean point', every=3,
+    'wrench': Way(law='held wrench', contacts='exact', sources=_exact, every=5,
+                  make_law=lambda _: held_wrench),
+    'predicted': Way(law='predicted wrench', contacts='exact', sources=_exact, every=5,
+                     make_law=lambda _: predicted_wrench),
+    'point': Way(law='point', contacts='exact', sources=_exact, every=5, make_law=point_law),
+    'mujoco-mean': Way(law='point', contacts='MuJoCo, mean point', every=5, make_law=point_law,
                        sources=partial(mujoco_sources, choice='mean')),
-    'mujoco-deepest': Way(law='point', contacts='MuJoCo, deepest point', every=3,
-                          sources=partial(mujoco_sources, choice='deepest')),
-    'fcl': Way(law='point', contacts='fcl', sources=partial(solvers, model='fcl'), every=3),
-    'soup': Way(law='point', contacts='soup', sources=partial(solvers, model='soup'), every=12),
+    'mujoco-deepest': Way(law='point', contacts='MuJoCo, deepest point', every=5,
+                          make_law=point_law, sources=partial(mujoco_sources, choice='deepest')),
+    'fcl': Way(law='point', contacts='fcl', sources=partial(solvers, model='fcl'), every=5,
+               make_law=point_law),
+    'soup': Way(law='point', contacts='soup', sources=partial(solvers, model='soup'), every=13,
+                make_law=point_law),
 }
 """By name: the ways that the table has."""
