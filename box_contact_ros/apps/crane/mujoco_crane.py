@@ -231,6 +231,7 @@ class Crane:
         self._model.opt.timestep = 1.0 / (rate_hz * self._substeps)
         self._data = mujoco.MjData(self._model)
         self._load = self._model.body('load').id
+        self._is_off_centre, self._is_down = any(scenario.mass_offset), False
         self._start()
 
     @property
@@ -259,7 +260,11 @@ class Crane:
         angular = np.empty(3)
         # MuJoCo keeps a free joint's angular velocity in the body's own frame.
         mujoco.mju_rotVecQuat(angular, self._data.qvel[3:], self._data.qpos[3:])
-        return np.concatenate([self._data.qvel[:3] + cross(angular, self._arm()), angular])
+        linear = self._data.qvel[:3]
+        if self._is_off_centre:
+            linear = linear + cross(angular, rotation_matrix(self.load_pose[3:])
+                                    @ self.scenario.mass_offset)
+        return np.concatenate([linear, angular])
 
     @property
     def own_contact_force(self) -> np.ndarray:
@@ -300,15 +305,9 @@ class Crane:
         for substep in range(1, self._substeps + 1):
             start = (self._ticks + (substep - 1) / self._substeps) / self._rate_hz
             self._data.xfrc_applied[self._load] = wrench(start) if wrench else 0.0
-            time = (self._ticks + substep / self._substeps) / self._rate_hz
-            self._set_ropes(self.scenario.hoist_height(time), self.scenario.trim(time))
+            self._move_hoist((self._ticks + substep / self._substeps) / self._rate_hz)
             mujoco.mj_step(self._model, self._data)
         self._ticks += 1
-
-    def _arm(self) -> np.ndarray:
-        """Return the way from the load's centre to its centre of mass (3,), world frame."""
-        offset = self.scenario.mass_offset
-        return rotation_matrix(self.load_pose[3:]) @ offset if any(offset) else np.zeros(3)
 
     def _start(self) -> None:
         """Put the load at its start, and note each rope's extra length (4,) that holds its tilt.
@@ -349,6 +348,13 @@ class Crane:
         mujoco.mju_mat2Quat(self._data.qpos[3:], np.ascontiguousarray(rotation).ravel())
         self._data.qvel[:] = 0.0
         mujoco.mj_forward(self._model, self._data)
+
+    def _move_hoist(self, time: float) -> None:
+        """Set the ropes for a time [s]; those of a landing stay as they are once they are down."""
+        if not (self.scenario.land and self._is_down):
+            height = self.scenario.hoist_height(time)
+            self._set_ropes(height, self.scenario.trim(time))
+            self._is_down = height == 0.0
 
     def _set_ropes(self, height: float, trim: float) -> None:
         """Set the ropes' length limits for a level load `height` over its lowest place, m."""

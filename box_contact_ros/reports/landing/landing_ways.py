@@ -3,9 +3,10 @@
 
 """Which landings are run, and by which ways of contact and force.
 
-A `Way` is a law and what gives its contacts. The patch law asks this package's models. Engines give
-a point, so theirs go to the point law, which knows the load's footprint. MuJoCo's own manifold is
-the bar to reach: forces of several points, implicit, within the simulator, at every physics step.
+A `Way` is a law and what gives its contacts. Held patches and held wrenches ask this package's
+models. Engines give a point, so theirs go to the point law, which knows the load's footprint.
+MuJoCo's own manifold is the bar to reach: forces of several points, implicit, within the simulator,
+at every physics step.
 
 `ADDED` are landings beside the grid of `landing.cases`, each with what it is expected to do.
 """
@@ -15,7 +16,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -64,6 +65,25 @@ class PlannedLanding:
         if self.falls:
             return not result.at_rest and result.drop > LEAST_DROP
         return result.at_rest
+
+
+class HeldLimits(NamedTuple):
+    """What a landing of the grid by held patches must not exceed, from its tenth second on."""
+
+    corner_speed: float = 1e-7  # of the fastest corner [m/s]
+    creep: float = 1e-8  # mean lateral speed of the centre [m/s]
+    depth: float = 3e-3  # ever, as a share of the load's height
+    static_tilt: float = TILT_LIMIT  # [rad]
+
+    @classmethod
+    def at(cls, rate_hz: float) -> Self:
+        """Return the limits at a rate: a load lies flatter on contacts that come more often."""
+        degrees = 0.003 if rate_hz >= 1000.0 else 0.01 if rate_hz >= 200.0 else 0.06
+        return cls(static_tilt=math.radians(degrees))
+
+    def are_met(self, result: LandingResult) -> bool:
+        """Return whether a landing is within all limits."""
+        return all(getattr(result, name) <= limit for name, limit in self._asdict().items())
 
 
 LEAST_DROP = 0.05
@@ -120,6 +140,11 @@ def grid(seed: int = 1) -> list[PlannedLanding]:
 # --- ways -----------------------------------------------------------------------------------------
 
 
+SAMPLE = 5
+"""Ways that are not compared at length run one of so many landings. Prime to three: every third
+landing of the grid has the same overhang."""
+
+
 class LoopTiming(NamedTuple):
     """Ticks a second, and the time [s] from asking for contacts to their force."""
 
@@ -140,11 +165,19 @@ class Way:
     """One of so many landings of the grid is run."""
     added: bool = False
     """Whether the added landings are run too."""
+    late: bool = True
+    """Whether it is run with each latency, or with the least alone."""
 
     @property
     def timed(self) -> bool:
         """Whether rate and latency matter."""
         return self.sources is not None
+
+    def timings(self, timings: Sequence[LoopTiming]) -> list[LoopTiming]:
+        """Return those at which it is run."""
+        least = min(timing.latency for timing in timings)
+        return (list(timings[-1:]) if not self.timed else
+                [timing for timing in timings if self.late or timing.latency == least])
 
     def fly(self, scenario: CraneScenario, timing: LoopTiming) -> LandingRecord:
         """Run one landing."""
@@ -203,24 +236,27 @@ def own_contact(scenario: CraneScenario, timing: LoopTiming) -> LandingRecord:
     return record
 
 
+def _point(contacts: str, sources: Callable[[CraneScenario], Sequence[ContactSource]],
+           every: int = SAMPLE) -> Way:
+    """Return the way of a baseline, which is run without latency."""
+    return Way(law='point', contacts=contacts, sources=sources, every=every, make_law=point_law,
+               late=False)
+
+
 _exact = partial(solvers, model='exact')
 WAYS = {
     'exact': Way(law='held patch', contacts='exact', sources=_exact, added=True),
     'mlp': Way(law='held patch', contacts='mlp', sources=partial(solvers, model='mlp'), added=True,
-               every=5),
+               every=SAMPLE),
     'manifold': Way(law='MuJoCo', contacts='its manifold, in the simulator', added=True),
-    'wrench': Way(law='held wrench', contacts='exact', sources=_exact, every=5,
+    'wrench': Way(law='held wrench', contacts='exact', sources=_exact, every=SAMPLE,
                   make_law=lambda _: held_wrench),
-    'predicted': Way(law='predicted wrench', contacts='exact', sources=_exact, every=5,
+    'predicted': Way(law='predicted wrench', contacts='exact', sources=_exact, every=2 * SAMPLE,
                      make_law=lambda _: predicted_wrench),
-    'point': Way(law='point', contacts='exact', sources=_exact, every=5, make_law=point_law),
-    'mujoco-mean': Way(law='point', contacts='MuJoCo, mean point', every=5, make_law=point_law,
-                       sources=partial(mujoco_sources, choice='mean')),
-    'mujoco-deepest': Way(law='point', contacts='MuJoCo, deepest point', every=5,
-                          make_law=point_law, sources=partial(mujoco_sources, choice='deepest')),
-    'fcl': Way(law='point', contacts='fcl', sources=partial(solvers, model='fcl'), every=5,
-               make_law=point_law),
-    'soup': Way(law='point', contacts='soup', sources=partial(solvers, model='soup'), every=13,
-                make_law=point_law),
+    'point': _point('exact', _exact),
+    'mujoco-mean': _point('MuJoCo, mean point', partial(mujoco_sources, choice='mean')),
+    'mujoco-deepest': _point('MuJoCo, deepest point', partial(mujoco_sources, choice='deepest')),
+    'fcl': _point('fcl', partial(solvers, model='fcl')),
+    'soup': _point('soup', partial(solvers, model='soup'), every=13),
 }
 """By name: the ways that the table has."""
