@@ -1,7 +1,7 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Land a container in MuJoCo on one contact a tick: `python docs/examples/mujoco_loop.py`.
+"""Land a container in MuJoCo on one contact per tick: `python docs/examples/mujoco_loop.py`.
 
 MuJoCo integrates the motion. Its own contact is off. Every 5 ms the solver answers for the pair,
 2 ms late. From then on the law holds that patch: at every physics step it makes the wrench of it.

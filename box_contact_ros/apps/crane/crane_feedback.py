@@ -8,7 +8,7 @@ Plain Python, no ROS. One thread asks and simulates (`ask`, `step`), another han
 
 In real time a tick is simulated at its end. First its poses are published, then the answer is
 awaited for most of the tick, and the contact acts from the time at which it really came. Simulated
-at its beginning, a tick would delay every contact by a tick: at 200 Hz, more than the loop bears.
+at its beginning, a tick would delay every contact by a tick, and the load would rest less flat.
 In lockstep the simulation waits for every answer. The contact acts exactly `latency` after its
 poses were published.
 """
