@@ -4,7 +4,7 @@
 """From a contact's point and depth to a wrench: a spring and a damper at the point, a baseline.
 
 It is what a simulator does with an engine that gives one point. The load's footprint has to be
-known, for the dampers that stand for the patch. `scene.force.patch_law` needs none of that.
+known, for the dampers that stand for the patch. The laws of `scene.force.laws` need none of that.
 
 Box A is the load. Box B is the stack, which does not move. The normal n points from A to B, so the
 stack pushes the load along −n. With the velocity v of the load's material point at the contact
@@ -26,7 +26,7 @@ frame.
 """
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -101,12 +101,14 @@ class PointLaw:
                    torsion_radius=((length**2 + width**2) / 12.0)**0.5,
                    rocking=(rocking[0], rocking[1]))
 
-    def wrench(self, touches: Sequence[Contact], pose: np.ndarray, velocity: np.ndarray,
+    def wrench(self, contacts: Mapping[str, Contact], pose: np.ndarray, velocity: np.ndarray,
                ) -> np.ndarray:
         """Return force and torque (6,) on the load at `pose` (7,) with `velocity` (6,).
 
-        The law is made for one contact; those of several add up.
+        Its mass is in the middle of its box. The law is made for one contact; those of several add
+        up.
         """
+        touches = [contact for contact in contacts.values() if contact.colliding]
         return np.sum([np.zeros(6), *(self._of(touch, pose, velocity) for touch in touches)],
                       axis=0)
 

@@ -25,7 +25,7 @@ from PIL import Image
 from box_contact_ros.apps.crane.landing import LandingRecord, land, landing_scenario, solvers
 from box_contact_ros.apps.crane.mujoco_crane import CraneScenario
 from box_contact_ros.apps.viewer.style import BOX_A, BOX_B, CONTACT, ROPE
-from box_contact_ros.scene.force.held_wrench import GRAVITY
+from box_contact_ros.scene.force.laws import GRAVITY
 from box_contact_ros.scene.pose import rotation_matrix
 
 RATE = 200.0

@@ -26,13 +26,12 @@ from box_contact_ros.apps.crane.landing import (
     landing_scenario,
     scenario_of,
     solvers,
-    touches_in,
     with_patch,
 )
+from box_contact_ros.apps.crane.load_laws import held_wrench, predicted_wrench
 from box_contact_ros.apps.crane.mujoco_crane import Crane, CraneScenario
-from box_contact_ros.baselines.point_law import PointLaw
-from box_contact_ros.scene.force.held_wrench import GRAVITY
-from box_contact_ros.scene.force.patch_law import PatchLaw
+from box_contact_ros.reports.landing.landing_ways import point_law
+from box_contact_ros.scene.force.laws import GRAVITY, Body, PatchLaw
 
 CASES = list(cases())
 HANGING_OVER = 17
@@ -58,16 +57,31 @@ def test_the_grid_covers_what_is_asked_for():
     assert -1.0 <= min(yaws) < -0.8 and 0.8 < max(yaws) <= 1.0
 
 
+TILT_LIMITS = {50.0: 0.06, 200.0: 0.01, 1000.0: 0.003}
+"""By rate [Hz]: what a held patch tilts at most at rest [°]."""
+
+
 @pytest.mark.parametrize(('number', 'rate_hz', 'latency'), [
     (5, 200.0, 0.002), (HANGING_OVER, 200.0, 0.002), (31, 200.0, 0.002), (31, 200.0, 0.005),
-    (HANGING_OVER, 200.0, 0.0), (HANGING_OVER, 1000.0, 0.002)])
-def test_the_patch_lands_flat(number, rate_hz, latency):
+    (HANGING_OVER, 50.0, 0.005), (HANGING_OVER, 1000.0, 0.0), (HANGING_OVER, 1000.0, 0.005)])
+def test_the_held_patch_lands_flat_and_still(number, rate_hz, latency):
     """Among the hardest of the grid: the patch all but lifts off on one side."""
     result = landed(number, rate_hz=rate_hz, latency=latency)
     assert result.at_rest, f'\n{result}'
     assert result.overhang == pytest.approx(CASES[number].overhang, abs=0.01)
-    assert result.point_step == result.exact_point_step < 1e-4
-    assert result.energy_gain < 1.0 and result.creep < 0.3e-3
+    assert result.corner_speed <= 1e-7 and result.creep <= 1e-8
+    assert math.degrees(result.static_tilt) <= TILT_LIMITS[rate_hz]
+    assert result.depth <= 3e-3 and result.energy_gain < 0.01
+    assert result.point_step == result.exact_point_step < 1e-7
+
+
+@pytest.mark.parametrize(('law', 'tilt'), [(held_wrench, 0.06), (predicted_wrench, 0.03)])
+def test_a_wrench_that_is_held_lands_less_flat(law, tilt):
+    """For clients that can only apply a wrench; a predictor makes up for the latency."""
+    flattest = landed(HANGING_OVER, latency=0.002).static_tilt
+    result = landed(HANGING_OVER, latency=0.002, law=law)
+    assert result.at_rest, f'\n{result}'
+    assert flattest < result.static_tilt < math.radians(tilt)
 
 
 def test_a_model_without_a_patch_is_refused_by_name():
@@ -82,15 +96,16 @@ def test_the_patch_of_a_flat_load_is_that_of_the_whole_load():
     turn = (0.0, 0.0, math.sin(0.2), math.cos(0.2))
     load, stack = (12.0, 2.0, 3.0), (20.0, 20.0, 1.0)
     pose = np.array([1.0, 2.0, 1.98, *turn])
-    exact, = touches_in([ContactSolver(load, stack, model='exact')(pose, (0, 0, 0, 0, 0, 0, 1))])
+    exact = ContactSolver(load, stack, model='exact')(pose, (0, 0, 0, 0, 0, 0, 1))
     alone = exact._replace(volume=math.nan, covariance=np.full((3, 3), math.nan))
     assumed = with_patch(alone, pose, load)
     assert with_patch(exact, pose, load) is exact
     assert assumed.volume == pytest.approx(exact.volume) == pytest.approx(12.0 * 2.0 * 0.02)
     assert assumed.covariance[:2, :2] == pytest.approx(exact.covariance[:2, :2])
-    law = PatchLaw.for_loop(20_000.0, (1e4, 2e5, 2e5), 200.0)
     moving = np.array([0.1, 0.0, -0.2, 0.01, 0.02, 0.03])
-    wrenches = [law.wrench([patch], pose, moving) for patch in (exact, assumed)]
+    body = Body(mass=20_000.0, inertia=(1e4, 2e5, 2e5))
+    wrenches = [PatchLaw.for_loop(body, rate_hz=200.0).wrench(patch, pose, moving)
+                for patch in (exact, assumed)]
     assert wrenches[1] == pytest.approx(wrenches[0], rel=1e-9, abs=1e-3)
 
 
@@ -119,19 +134,17 @@ def test_a_load_that_hangs_over_too_far_falls():
 def test_the_deepest_point_does_not_land(rate_hz):
     """The deepest contact of FCL jumps between corners, metres a tick, and the load rattles."""
     pytest.importorskip('fcl')
-    law = PointLaw.for_load(20_000.0, CraneScenario().size, rate_hz)
-    result = landed(HANGING_OVER, 'fcl', rate_hz=rate_hz, law=law)
+    result = landed(HANGING_OVER, 'fcl', rate_hz=rate_hz, law=point_law(CraneScenario()))
     assert not result.at_rest and math.isnan(result.settled)
     assert not result.limits['corner speed'][0] and not result.limits['force'][0]
     assert result.corner_speed > 0.04
     assert result.point_step > 5.0
 
 
-def test_lost_answers_are_bridged_by_the_last_wrench():
-    """Every tenth answer lost at random: with the wrench held, all limits but the force's are met.
+def test_lost_answers_are_bridged_by_the_patches_that_are_held():
+    """Every tenth answer lost at random: all limits are met.
 
-    The load creeps, so a held wrench is off by 1e-5 of the weight. With no force on lost ticks
-    instead, the load does not even settle.
+    With no contact on lost ticks instead, the load does not even settle.
     """
     scenario = scenario_of(CASES[4])
     solver = ContactSolver(scenario.size, scenario.stack_size, model='exact')
@@ -141,8 +154,7 @@ def test_lost_answers_are_bridged_by_the_last_wrench():
         random = np.random.default_rng(2)
         results.append(land(scenario, lambda a, b, on_loss=on_loss, random=random: (
             on_loss if random.random() < 0.1 else solver(a, b))).judge())
-    missed = [name for name, (met, _) in results[0].limits.items() if not met]
-    assert missed in ([], ['force']) and results[0].force_worst < 1e-4, f'\n{results[0]}'
+    assert results[0].at_rest and results[0].corner_speed < 1e-7, f'\n{results[0]}'
     assert not results[1].settled < 3.0
 
 
@@ -186,7 +198,7 @@ def test_progress_prints_a_line_a_change():
     for _ in range(round(12 * 200.0)):
         state = loop.ask()
         contact = solver(state.pose, loop.crane.stack_pose)
-        loop.answer(state, touches_in([contact]), latency=0.0)
+        loop.answer(state, {'': contact}, latency=0.0)
         loop.step()
         lines += progress.lines()
     assert [line.split(' s  ')[1].split('  ')[0] for line in lines] == list(Progress.STAGES)

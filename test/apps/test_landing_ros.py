@@ -46,12 +46,12 @@ def node(program):
 
 
 def test_lands_in_lockstep_faster_than_real_time(program, node):
-    """200 Hz, 2 ms latency: settled, exit status 0, and time does not wait for the clock."""
+    """200 Hz, 2 ms latency: at rest, exit status 0, and time does not wait for the clock."""
     started = time.monotonic()
     crane = program('crane', *arguments(closed_loop=True, lockstep=True, latency=0.002, **HARD))
     assert crane.wait(200) == 0, crane.output
     took = time.monotonic() - started
-    assert 'landing ................ settled' in crane.output  # it overhangs by 0.8 m: not flat
+    assert 'landing ................ at rest' in crane.output
     assert 'messages lost .......... 0 ' in crane.output
     assert took < LANDING_DURATION, f'{took:.1f} s for {LANDING_DURATION:g} s of motion'
 
@@ -93,7 +93,7 @@ def client():
 
 
 def test_lost_ticks_are_bridged(node, client, monkeypatch):
-    """Every eleventh answer is thrown away on arrival: the last wrench is held, and it lands.
+    """Every eleventh answer is thrown away on arrival: the last patch is held, and it lands.
 
     As in real time, the law is made for a period's latency.
     """
@@ -120,7 +120,7 @@ def test_lost_ticks_are_bridged(node, client, monkeypatch):
 
 
 def test_answers_that_say_nothing_are_held_over(client, monkeypatch):
-    """Rows of NaN are no answer, an empty cloud is "no contact", a contact pushes up."""
+    """Rows of NaN are no answer: the patch is still held. An empty cloud is "no contact"."""
     crane, _ = client
     monkeypatch.setattr(crane_feedback, 'LOCKSTEP_PATIENCE', 0.01)
     feedback = crane.feedback
@@ -131,7 +131,7 @@ def test_answers_that_say_nothing_are_held_over(client, monkeypatch):
         feedback.answer(stamp, values, stamp)
         feedback.step(stamp)
         pushes.append(feedback.loop.record.forces[-1][2])
-    assert pushes[0] > 0.0 and pushes[1] == pushes[0] and pushes[2] == 0.0
+    assert pushes[0] > 0.0 and pushes[1] > 0.0 and pushes[2] == 0.0
 
 
 def test_a_model_without_a_patch_does_not_end_the_crane(program):

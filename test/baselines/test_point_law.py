@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from box_contact_ros.baselines.point_law import STATIC_PENETRATION, PointLaw, effective_mass
-from box_contact_ros.scene.force.held_wrench import GRAVITY
+from box_contact_ros.scene.force.laws import GRAVITY
 from box_contact_ros.scene.pose import rotation_matrix
 from box_contact_ros.solver.contact import Contact
 
@@ -34,14 +34,14 @@ def touch(point, normal, depth):
 
 
 def test_no_contact_is_no_wrench():
-    assert not FAST.wrench([], LEVEL, moving(linear=(1, 2, 3), angular=(1, 2, 3))).any()
+    assert not FAST.wrench({}, LEVEL, moving(linear=(1, 2, 3), angular=(1, 2, 3))).any()
 
 
 def test_static_penetration_carries_the_weight():
     """Depth at rest is F_n/k = m g/k, 5 mm where the rate allows it; no torque under the centre."""
     depth = WEIGHT / FAST.stiffness
     assert depth == pytest.approx(STATIC_PENETRATION, rel=1e-12)
-    wrench = FAST.wrench([touch(UNDER, DOWN, depth)], LEVEL, STILL)
+    wrench = FAST.wrench({'': touch(UNDER, DOWN, depth)}, LEVEL, STILL)
     assert wrench == pytest.approx([0, 0, WEIGHT, 0, 0, 0], rel=1e-12, abs=1e-6)
 
 
@@ -49,7 +49,7 @@ def test_the_push_is_against_the_normal_and_turns_about_the_centre():
     """Depth d, normal n from load to stack, at rest: force −n·k·d, torque arm × force."""
     normal = np.array([0.6, 0.0, -0.8])
     point = UNDER + [4.0, -1.0, 0.0]
-    wrench = FAST.wrench([touch(point, normal, 0.002)], LEVEL, STILL)
+    wrench = FAST.wrench({'': touch(point, normal, 0.002)}, LEVEL, STILL)
     force = -normal * FAST.stiffness * 0.002
     assert wrench[:3] == pytest.approx(force)
     assert wrench[3:] == pytest.approx(np.cross(point - LEVEL[:3], force))
@@ -58,7 +58,7 @@ def test_the_push_is_against_the_normal_and_turns_about_the_centre():
 @pytest.mark.parametrize('speed', [-0.1, 0.05, 0.3])
 def test_damping_acts_on_the_speed_along_the_normal(speed):
     """Parting at v_n: F_n = max(0, k·depth − c·v_n); never a pull."""
-    wrench = FAST.wrench([touch(UNDER, DOWN, 1e-3)], LEVEL, moving(linear=(0, 0, speed)))
+    wrench = FAST.wrench({'': touch(UNDER, DOWN, 1e-3)}, LEVEL, moving(linear=(0, 0, speed)))
     expected = max(0.0, FAST.stiffness * 1e-3 - FAST.damping * speed)
     assert wrench[2] == pytest.approx(expected)
     assert (expected == 0.0) == (speed > 0.04)
@@ -70,7 +70,7 @@ def test_friction_opposes_the_slip(speed, heading):
     """Coulomb's μ·F_n above v_s, in proportion to the slip below, against it in either case."""
     along = np.array([math.cos(math.radians(heading)), math.sin(math.radians(heading)), 0.0])
     depth = WEIGHT / FAST.stiffness
-    wrench = FAST.wrench([touch(UNDER, DOWN, depth)], LEVEL, moving(linear=speed * along))
+    wrench = FAST.wrench({'': touch(UNDER, DOWN, depth)}, LEVEL, moving(linear=speed * along))
     size = 0.5 * WEIGHT * min(1.0, speed / 0.1)
     assert wrench[:3] == pytest.approx(-size * along + [0, 0, WEIGHT], rel=1e-9, abs=1e-6)
 
@@ -79,7 +79,7 @@ def test_the_slip_is_that_of_the_material_point():
     """Rolling at ω with the centre moving along: the point under it stands still, no friction."""
     rate = 0.02
     velocity = moving(linear=(rate * CONTAINER[2] / 2, 0, 0), angular=(0, rate, 0))
-    wrench = FAST.wrench([touch(UNDER, DOWN, 1e-3)], LEVEL, velocity)
+    wrench = FAST.wrench({'': touch(UNDER, DOWN, 1e-3)}, LEVEL, velocity)
     assert wrench[0] == pytest.approx(0.0, abs=1e-6)
 
 
@@ -88,7 +88,7 @@ def test_torsion_opposes_the_spin(spin):
     """μ·F_n·r about the normal beyond v_s / r, and r = 3.6 m for a 40-ft container."""
     assert FAST.torsion_radius == pytest.approx(3.6, abs=0.02)
     depth, full = WEIGHT / FAST.stiffness, 0.5 * WEIGHT * FAST.torsion_radius
-    wrench = FAST.wrench([touch(UNDER, DOWN, depth)], LEVEL, moving(angular=(0, 0, spin)))
+    wrench = FAST.wrench({'': touch(UNDER, DOWN, depth)}, LEVEL, moving(angular=(0, 0, spin)))
     share = min(1.0, abs(spin) * FAST.torsion_radius / 0.1)
     assert wrench[5] == pytest.approx(-math.copysign(full * share, spin))
 
@@ -101,7 +101,7 @@ def test_rocking_damper_works_in_the_loads_own_axes():
     turned = np.array([1.0, 2.0, 3.0, 0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5)])
     assert rotation_matrix(turned[3:])[:, 0] == pytest.approx([0, 1, 0])
     at_centre = touch(turned[:3], DOWN, 1e-9)
-    wrench = FAST.wrench([at_centre], turned, moving(angular=(0.1, 0.2, 0.0)))
+    wrench = FAST.wrench({'': at_centre}, turned, moving(angular=(0.1, 0.2, 0.0)))
     damping, (length, width, _) = FAST.damping, CONTAINER
     assert wrench[3] == pytest.approx(-2 * damping * length**2 / 12 * 0.1)  # the load's pitch
     assert wrench[4] == pytest.approx(-2 * damping * width**2 / 12 * 0.2)
@@ -119,7 +119,7 @@ def test_a_bounce_never_gains_energy():
 
     last = first = energy()
     for _ in range(30_000):
-        touches = [touch(UNDER, DOWN, -height)] if height <= 0.0 else []
+        touches = {'': touch(UNDER, DOWN, -height)} if height <= 0.0 else {}
         force = FAST.wrench(touches, LEVEL, moving(linear=(0, 0, speed)))[2]
         speed += step * (force / MASS - GRAVITY)
         height += step * speed

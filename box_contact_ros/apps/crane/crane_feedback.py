@@ -1,14 +1,14 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""The closed loop of the crane client: contacts that come back become the wrench on the load.
+"""The closed loop of the crane client: contacts that come back push the load.
 
 Plain Python, no ROS. One thread asks and simulates (`ask`, `step`), another hands the answers in
 (`answer`). The loop itself is `landing.ClosedLoop`.
 
 In real time a tick is simulated at its end. First its poses are published, then the answer is
 awaited for most of the tick, and the contact acts from the time at which it really came. Simulated
-at its beginning, a tick would delay every contact by a tick: at 200 Hz, more than the loop bears.
+at its beginning, a tick would delay every contact by a tick, and the load would rest less flat.
 In lockstep the simulation waits for every answer. The contact acts exactly `latency` after its
 poses were published.
 """
@@ -22,13 +22,14 @@ import numpy as np
 
 from ...solver.contact import Contact
 from ..bench.answer_log import is_stale, touch_in
-from .landing import ClosedLoop, LoopState, with_patch
+from .landing import ClosedLoop, with_patch
+from .load_laws import LoopState
 from .mujoco_crane import CraneScenario
 
 ANSWER_SHARE = 0.8
 """Share of a tick that waits for its answer in real time; the rest is for simulating it."""
 LOCKSTEP_PATIENCE = 1.0
-"""Time [s] after which lockstep takes an answer for lost, and goes on with the wrench it has."""
+"""Time [s] after which lockstep takes an answer for lost, and goes on with the patch it holds."""
 LOCKSTEP_LOST_MOST = 5
 """So many lost answers in a row end a run in lockstep: then nobody is there any more."""
 POLL = 0.1  # s between looks at whether the run was called off
@@ -47,6 +48,7 @@ class CraneFeedback:
                                max(latency, 1.0 / rate_hz))
         self._rate_hz, self._latency, self._lockstep = rate_hz, latency, lockstep
         self._size, self._stop = scenario.size, stop
+        self._pair, = scenario.pairs
         self.points_alone = 0  # contacts whose model gave no patch
         self._asked: dict[int, LoopState] = {}
         self._arrived: SimpleQueue[tuple[int, Contact | None, int]] = SimpleQueue()
@@ -85,12 +87,13 @@ class CraneFeedback:
         self.loop.step()
 
     def _apply(self, stamp: int, touch: Contact | None, received: int) -> None:
-        """Turn an answer into a wrench."""
+        """Hand an answer to the loop."""
         state = self._asked.pop(stamp, None)
         if state is None:  # an offer's answer, or one that came twice
             return
         # Answers take as long in simulated time as they really took, unless time waits.
         took = 0.0 if self._lockstep else (received - stamp) * 1e-9
-        touches = [with_patch(touch, state.pose, self._size)] if touch else []
-        self.points_alone += bool(touch and touches[0] is not touch)
-        self.loop.answer(state, touches, latency=max(self._latency, took))
+        contacts = {} if touch is None else {
+            self._pair: with_patch(touch, state.pose, self._size)}
+        self.points_alone += bool(touch and contacts[self._pair] is not touch)
+        self.loop.answer(state, contacts, latency=max(self._latency, took))

@@ -3,38 +3,40 @@
 
 """A container set down by its contacts, one per box of the stack and tick. No ROS.
 
-A `ClosedLoop` steps a crane under a `ForceLaw`, wherever the contacts come from, and records what
+A `ClosedLoop` steps a crane under a law of force, wherever the contacts come from, and records what
 happened; `land` closes it with any function of the two poses. `LandingRecord.judge` measures the
 record. The load settles if, from some time on, no corner moves faster than `SETTLED_SPEED`, until
 `WATCHED` s after the first touch. It is at rest if it meets every limit of `LandingResult.limits`.
 The window is the last `WINDOW` s of the time that is watched.
 
 Depth, gap and first touch are those of the exact solver on the recorded poses, whatever model gave
-the contacts. Conventions: those of `pose`, `held_wrench` and `mujoco_crane`.
+the contacts. Conventions: those of `laws` and `mujoco_crane`.
 """
 from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import product
-from typing import Any, NamedTuple, Protocol
+from typing import Any
 
 import numpy as np
 
 from ...output import percentiles
-from ...scene.force.held_wrench import GRAVITY, HeldWrench
-from ...scene.force.patch_law import PatchLaw
+from ...scene.force.laws import GRAVITY
 from ...scene.pose import rotation_matrix
 from ...solver.contact import Contact
 from ...solver.contact_solver import ContactSolver
 from .crane_log import table
+from .load_laws import LoopState, MakeLaw, NamedContacts, held_patch
 from .mujoco_crane import LANDING_OVERLAP, Crane, CraneScenario
 
 SETTLING, WINDOW = 10.0, 5.0
 """The load has to be at rest from `SETTLING` s after the first touch on, for `WINDOW` s."""
 WATCHED = SETTLING + WINDOW
+AHEAD = 0.05
+"""A predictor's first contact may come so much before the first touch [s]."""
 SETTLED_SPEED = 0.010  # speed of the load's fastest corner [m/s] below which it has settled
 SETTLED_LIMIT = 3.0  # time from the first touch until then [s]
 CORNER_SPEED_LIMIT = 0.3e-3  # speed of the fastest corner in the window [m/s]
@@ -50,11 +52,6 @@ LANDING_DURATION = 25.0
 
 ContactSource = Callable[[np.ndarray, np.ndarray], Contact | None]
 """From pose_a and pose_b (7,) to their contact; None stands for an answer that was lost."""
-
-
-def touches_in(contacts: Iterable[Contact | None]) -> list[Contact]:
-    """Return those contacts in which the boxes touch."""
-    return [one for one in contacts if one is not None and one.colliding]
 
 
 def with_patch(touch: Contact, pose: np.ndarray, size: Sequence[float]) -> Contact:
@@ -234,7 +231,7 @@ class LandingRecord:
     def ended(self) -> bool:
         """Whether all that is judged has been recorded, or the scenario's time is over."""
         ticks, first = len(self.forces), next(iter(self.points), len(self.poses))
-        return (ticks - first > WATCHED * self.rate_hz
+        return (ticks - first > (WATCHED + AHEAD) * self.rate_hz
                 or ticks >= round(self.scenario.duration * self.rate_hz))
 
     def corner_speeds(self, first: int = 0) -> np.ndarray:
@@ -339,61 +336,45 @@ def _exact(scenario: CraneScenario, poses: np.ndarray) -> tuple[np.ndarray, ...]
             np.min([one.separation for one in found], axis=0), found[0].point)
 
 
-class ForceLaw(Protocol):
-    """From contacts to the force and the torque on the load."""
-
-    def wrench(self, touches: Sequence[Contact], pose: np.ndarray, velocity: np.ndarray,
-               ) -> np.ndarray:
-        """Return force and torque (6,) on the load at `pose` (7,) with `velocity` (6,).
-
-        touches: the contacts in which the boxes touch.
-        """
-
-
-class LoopState(NamedTuple):
-    """The load's state when its contacts are asked for."""
-
-    tick: int
-    time: float
-    pose: np.ndarray  # of the load's box (7,)
-    mass_pose: np.ndarray  # of its centre of mass (7,), and so is the velocity (6,)
-    velocity: np.ndarray
-
-
 class ClosedLoop:
     """A crane under the wrench of a law, recorded tick by tick, wherever contacts come from."""
 
     def __init__(self, scenario: CraneScenario, rate_hz: float, *, latency: float = 0.0,
-                 law: ForceLaw | None = None) -> None:
-        """Take the patch law for this load, rate and latency [s] where `law` is None."""
+                 law: MakeLaw = held_patch) -> None:
+        """Make the crane, and the law for its load, this rate and latency [s]."""
         self.crane, self.record = Crane(scenario, rate_hz), LandingRecord(scenario, rate_hz)
-        self._law = law or PatchLaw.for_loop(scenario.mass, scenario.inertia, rate_hz, latency)
-        self._held = HeldWrench()
+        self._law = law(scenario.load, rate_hz=rate_hz, latency=latency,
+                        step=self.crane.physics_step)
+        self._wrench = np.zeros(6)
 
     def ask(self) -> LoopState:
         """Begin a tick; return the state whose contacts are asked for."""
         crane = self.crane
-        state = LoopState(len(self.record.poses), crane.time, crane.load_pose, crane.mass_pose,
-                          crane.load_velocity)
+        state = LoopState(len(self.record.poses), crane.time, crane.load_pose, crane.load_velocity)
         self.record.poses.append(state.pose)
         self.record.velocities.append(state.velocity)
-        return state
+        return self._law.asked_for(state)
 
-    def answer(self, state: LoopState, touches: Sequence[Contact], *, latency: float) -> None:
-        """Take the contacts of a state; they act `latency` [s] after they were asked for.
+    def answer(self, state: LoopState, contacts: NamedContacts, *, latency: float) -> None:
+        """Take the contacts of a state; they act `latency` [s] after they were asked for."""
+        touches = [contact for contact in contacts.values() if contact.colliding]
+        if touches:
+            self.record.points[state.tick] = np.array(touches[0].point)
+        self._law.answer(contacts, state, due=state.time + latency)
+
+    def step(self) -> None:
+        """End the tick: advance the crane under what is due.
 
         ValueError: the law needs what a contact's model does not give.
         """
-        if touches:
-            self.record.points[state.tick] = np.array(touches[0].point)
-        self._held.answer(self._law.wrench(touches, state.mass_pose, state.velocity),
-                          asked=state.time, due=state.time + latency)
-
-    def step(self) -> None:
-        """End the tick: advance the crane under the wrench that is due."""
-        self.crane.step(self._held.at)
+        self.crane.step(self._at)
         self.record.tensions.append(self.crane.rope_tensions)
-        self.record.forces.append(self._held.current[:3].copy())
+        self.record.forces.append(self._wrench[:3].copy())
+
+    def _at(self, time: float) -> np.ndarray:
+        """Return the wrench (6,) of the physics step that starts at `time` [s]."""
+        self._wrench = self._law.wrench(time, self.crane.load_pose, self.crane.load_velocity)
+        return self._wrench
 
 
 class Progress:
@@ -427,25 +408,26 @@ def solvers(scenario: CraneScenario, model: str) -> list[ContactSolver]:
 
 
 def land(scenario: CraneScenario, sources: ContactSource | Sequence[ContactSource], *,
-         rate_hz: float = 200.0, latency: float = 0.0, law: ForceLaw | None = None,
-         ) -> LandingRecord:
+         rate_hz: float = 200.0, latency: float = 0.0, law: MakeLaw = held_patch) -> LandingRecord:
     """Run one landing with contacts that act `latency` s after they were asked for.
 
-    sources: for each box of the stack, such as `solvers`; where one gives None, the last wrench is
-    held. ValueError: a contact lacks what the law needs; its source's model is named.
+    sources: for each box of the stack, such as `solvers`; where one gives None, the answer is lost.
+    ValueError: a contact lacks what the law needs; its source's model is named.
     """
     each = [sources] if callable(sources) else list(sources)
-    boxes = [pose for pose, _ in scenario.stack_boxes]
     loop = ClosedLoop(scenario, rate_hz, latency=latency, law=law)
+    pairs = [(name, source, pose) for (name, (pose, _)), source in zip(
+        scenario.pairs.items(), each)]
     while not loop.record.ended:
         state = loop.ask()
-        contacts = [source(state.pose, pose) for source, pose in zip(each, boxes)]
-        if None not in contacts:
-            try:
-                loop.answer(state, touches_in(contacts), latency=latency)
-            except ValueError as error:
-                raise ValueError(f'model {getattr(each[0], "model", "unknown")}: {error}') from None
-        loop.step()
+        contacts = {name: found for name, source, pose in pairs
+                    if (found := source(state.pose, pose)) is not None}
+        try:
+            if len(contacts) == len(pairs):
+                loop.answer(state, contacts, latency=latency)
+            loop.step()
+        except ValueError as error:
+            raise ValueError(f'model {getattr(each[0], "model", "unknown")}: {error}') from None
     return loop.record
 
 

@@ -12,7 +12,6 @@ from __future__ import annotations
 import os
 import tempfile
 import time
-from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
@@ -123,9 +122,10 @@ def fly_over_dds(model: str, scenarios: Sequence[CraneScenario], latencies: Sequ
     def poses() -> list[np.ndarray]:
         return [flight.crane.load_pose for flight in flights]
 
-    pairs_of = defaultdict(list)
-    for pair in scene.pairs:
-        pairs_of[scene.moving.index(pair.a)].append(pair.id)
+    each = ((number, name) for number, scenario in enumerate(scenarios) for name in scenario.pairs)
+    names: list[dict[int, str]] = [{} for _ in flights]  # of a flight's pairs, by their ids
+    for pair, (number, name) in zip(scene.pairs, each, strict=True):
+        names[number][pair.id] = name
     make_node = partial(FlightNode, scene=scene)
     with answering_node(model, scene), joined(make_node) as (node, executor):
         node.await_node(executor, poses())
@@ -133,7 +133,8 @@ def fly_over_dds(model: str, scenarios: Sequence[CraneScenario], latencies: Sequ
             found = node.contacts(executor, poses(), PATIENCE)
             for number, (flight, latency) in enumerate(zip(flights, latencies)):
                 if not flight.record.ended:
-                    touches = [found[pair] for pair in pairs_of[number] if pair in found]
-                    flight.answer(flight.ask(), touches, latency=latency)
+                    contacts = {name: found[pair] for pair, name in names[number].items()
+                                if pair in found}
+                    flight.answer(flight.ask(), contacts, latency=latency)
                     flight.step()
     return [flight.record for flight in flights]

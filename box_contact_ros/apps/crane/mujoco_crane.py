@@ -31,7 +31,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from ...scene.force.held_wrench import FRICTION, GRAVITY
+from ...scene.force.laws import FRICTION, GRAVITY, Body
 from ...scene.pose import cross, rotation_matrix
 from ...scene.pose_sets import CONTAINER
 
@@ -175,6 +175,16 @@ class CraneScenario:
         return boxes
 
     @property
+    def pairs(self) -> dict[str, tuple[np.ndarray, tuple[float, float, float]]]:
+        """Return the boxes of `stack_boxes` by the names of their pairs with the load."""
+        return {f'load_stack_{number}': box for number, box in enumerate(self.stack_boxes)}
+
+    @property
+    def load(self) -> Body:
+        """Return what laws of force know of the load."""
+        return Body(mass=self.mass, inertia=self.inertia, centre=self.mass_offset)
+
+    @property
     def _hoist_shares(self) -> dict[str, float]:
         return LANDING_SHARES if self.land else HOIST_SHARES
 
@@ -221,12 +231,18 @@ class Crane:
         self._model.opt.timestep = 1.0 / (rate_hz * self._substeps)
         self._data = mujoco.MjData(self._model)
         self._load = self._model.body('load').id
+        self._is_off_centre, self._is_down = any(scenario.mass_offset), False
         self._start()
 
     @property
     def time(self) -> float:
         """Return the simulated time since the start, s: whole ticks, so it does not drift."""
         return self._ticks / self._rate_hz
+
+    @property
+    def physics_step(self) -> float:
+        """Return the time between two evaluations of a wrench [s]."""
+        return float(self._model.opt.timestep)
 
     @property
     def load_pose(self) -> np.ndarray:
@@ -244,14 +260,11 @@ class Crane:
         angular = np.empty(3)
         # MuJoCo keeps a free joint's angular velocity in the body's own frame.
         mujoco.mju_rotVecQuat(angular, self._data.qvel[3:], self._data.qpos[3:])
-        return np.concatenate([self._data.qvel[:3] + cross(angular, self._arm()), angular])
-
-    @property
-    def mass_pose(self) -> np.ndarray:
-        """Pose of the load's centre of mass, with the load's axes, world frame, (7,)."""
-        pose = self.load_pose
-        pose[:3] += self._arm()
-        return pose
+        linear = self._data.qvel[:3]
+        if self._is_off_centre:
+            linear = linear + cross(angular, rotation_matrix(self.load_pose[3:])
+                                    @ self.scenario.mass_offset)
+        return np.concatenate([linear, angular])
 
     @property
     def own_contact_force(self) -> np.ndarray:
@@ -292,15 +305,9 @@ class Crane:
         for substep in range(1, self._substeps + 1):
             start = (self._ticks + (substep - 1) / self._substeps) / self._rate_hz
             self._data.xfrc_applied[self._load] = wrench(start) if wrench else 0.0
-            time = (self._ticks + substep / self._substeps) / self._rate_hz
-            self._set_ropes(self.scenario.hoist_height(time), self.scenario.trim(time))
+            self._move_hoist((self._ticks + substep / self._substeps) / self._rate_hz)
             mujoco.mj_step(self._model, self._data)
         self._ticks += 1
-
-    def _arm(self) -> np.ndarray:
-        """Return the way from the load's centre to its centre of mass (3,), world frame."""
-        offset = self.scenario.mass_offset
-        return rotation_matrix(self.load_pose[3:]) @ offset if any(offset) else np.zeros(3)
 
     def _start(self) -> None:
         """Put the load at its start, and note each rope's extra length (4,) that holds its tilt.
@@ -341,6 +348,13 @@ class Crane:
         mujoco.mju_mat2Quat(self._data.qpos[3:], np.ascontiguousarray(rotation).ravel())
         self._data.qvel[:] = 0.0
         mujoco.mj_forward(self._model, self._data)
+
+    def _move_hoist(self, time: float) -> None:
+        """Set the ropes for a time [s]; those of a landing stay as they are once they are down."""
+        if not (self.scenario.land and self._is_down):
+            height = self.scenario.hoist_height(time)
+            self._set_ropes(height, self.scenario.trim(time))
+            self._is_down = height == 0.0
 
     def _set_ropes(self, height: float, trim: float) -> None:
         """Set the ropes' length limits for a level load `height` over its lowest place, m."""

@@ -20,7 +20,7 @@ from ...apps.crane.mujoco_crane import CraneScenario
 from ...scene.pose import rotation_matrix
 from .landing_ways import WAYS, LoopTiming, MujocoSource
 
-SHOWN_WAYS = {'exact': 'patch law', 'point': 'point law', 'fcl': 'deepest point',
+SHOWN_WAYS = {'exact': 'held patch', 'wrench': 'held wrench', 'mujoco-deepest': 'deepest point',
               'manifold': "MuJoCo's manifold"}
 TIMING = LoopTiming(200.0, 0.002)
 EXAGGERATION = 15.0
@@ -47,7 +47,7 @@ def draw(path: Path, scenario: CraneScenario) -> None:
                        color=COLOURS['speed'])
         speed.axhline(1e3 * CORNER_SPEED_LIMIT, color='black', linewidth=0.8, linestyle=':')
         speed.set_xlabel('s after the touch', fontsize=9)
-        speed.set_ylim(1e-5, 3e3)
+        speed.set_ylim(1e-7, 3e3)
     axes[1, 0].set_ylabel('fastest corner [mm/s]', fontsize=9)
     axes[1, 0].text(WATCHED, 1.4e3 * CORNER_SPEED_LIMIT, 'limit', fontsize=8, ha='right')
     figure.suptitle(f'One landing, one contact each {1e3 / TIMING.rate_hz:g} ms, '
@@ -88,7 +88,7 @@ def _contacts(axis: Any, way: str, record: LandingRecord, middle: np.ndarray) ->
         points = np.array([point for tick, point in record.points.items() if tick >= first])
     axis.plot(points[:, 1] - middle[0], points[:, 2] - middle[1], 'o', markersize=6, color=colour,
               zorder=3, clip_on=False)
-    if way == 'exact':
+    if way in ('exact', 'wrench'):
         contact = solvers(scenario, 'exact')[0](pose, stack_pose)
         half = math.sqrt(3.0 * contact.covariance[1, 1])
         axis.plot(contact.point[1] - middle[0] + np.array([-half, half]), [0.0, 0.0],

@@ -3,9 +3,10 @@
 
 """Which landings are run, and by which ways of contact and force.
 
-A `Way` is a law and what gives its contacts. The patch law asks this package's models. Engines give
-a point, so theirs go to the point law, which knows the load's footprint. MuJoCo's own manifold is
-the bar to reach: forces of several points, implicit, within the simulator, at every physics step.
+A `Way` is a law and what gives its contacts. Held patches and held wrenches ask this package's
+models. Engines give a point, so theirs go to the point law, which knows the load's footprint.
+MuJoCo's own manifold is the bar to reach: forces of several points, implicit, within the simulator,
+at every physics step.
 
 `ADDED` are landings beside the grid of `landing.cases`, each with what it is expected to do.
 """
@@ -15,7 +16,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -29,10 +30,18 @@ from ...apps.crane.landing import (
     land,
     solvers,
 )
+from ...apps.crane.load_laws import (
+    MakeLaw,
+    WrenchesHeld,
+    held_patch,
+    held_wrench,
+    predicted_wrench,
+)
 from ...apps.crane.mujoco_crane import Crane, CraneScenario
 from ...baselines.engines.engine import Manifold, chosen
 from ...baselines.engines.mujoco_engines import box_geoms, collision
 from ...baselines.point_law import PointLaw
+from ...scene.force.laws import Body
 from ...scene.pose_sets import CONTAINER
 from ...solver.contact import Contact
 
@@ -56,6 +65,25 @@ class PlannedLanding:
         if self.falls:
             return not result.at_rest and result.drop > LEAST_DROP
         return result.at_rest
+
+
+class HeldLimits(NamedTuple):
+    """What a landing of the grid by held patches must not exceed, from its tenth second on."""
+
+    corner_speed: float = 1e-7  # of the fastest corner [m/s]
+    creep: float = 1e-8  # mean lateral speed of the centre [m/s]
+    depth: float = 3e-3  # ever, as a share of the load's height
+    static_tilt: float = TILT_LIMIT  # [rad]
+
+    @classmethod
+    def at(cls, rate_hz: float) -> Self:
+        """Return the limits at a rate: a load lies flatter on contacts that come more often."""
+        degrees = 0.003 if rate_hz >= 1000.0 else 0.01 if rate_hz >= 200.0 else 0.06
+        return cls(static_tilt=math.radians(degrees))
+
+    def are_met(self, result: LandingResult) -> bool:
+        """Return whether a landing is within all limits."""
+        return all(getattr(result, name) <= limit for name, limit in self._asdict().items())
 
 
 LEAST_DROP = 0.05
@@ -112,6 +140,11 @@ def grid(seed: int = 1) -> list[PlannedLanding]:
 # --- ways -----------------------------------------------------------------------------------------
 
 
+SAMPLE = 5
+"""Ways that are not compared at length run one of so many landings. Prime to three: every third
+landing of the grid has the same overhang."""
+
+
 class LoopTiming(NamedTuple):
     """Ticks a second, and the time [s] from asking for contacts to their force."""
 
@@ -123,27 +156,43 @@ class LoopTiming(NamedTuple):
 class Way:
     """A law and what gives its contacts."""
 
-    law: str  # 'patch', 'point', or 'MuJoCo', which has the contacts too
+    law: str
     contacts: str
     sources: Callable[[CraneScenario], Sequence[ContactSource]] | None = None
-    """What gives the contacts, for each box of the stack."""
+    """What gives the contacts, for each box of the stack; None for MuJoCo, in the simulator."""
+    make_law: Callable[[CraneScenario], MakeLaw] = lambda _: held_patch
     every: int = 1
     """One of so many landings of the grid is run."""
     added: bool = False
     """Whether the added landings are run too."""
+    late: bool = True
+    """Whether it is run with each latency, or with the least alone."""
 
     @property
     def timed(self) -> bool:
         """Whether rate and latency matter."""
         return self.sources is not None
 
+    def timings(self, timings: Sequence[LoopTiming]) -> list[LoopTiming]:
+        """Return those at which it is run."""
+        least = min(timing.latency for timing in timings)
+        return (list(timings[-1:]) if not self.timed else
+                [timing for timing in timings if self.late or timing.latency == least])
+
     def fly(self, scenario: CraneScenario, timing: LoopTiming) -> LandingRecord:
         """Run one landing."""
         if self.sources is None:
             return own_contact(scenario, timing)
-        law = None if self.law == 'patch' else PointLaw.for_load(
-            scenario.mass, scenario.size, timing.rate_hz)
-        return land(scenario, self.sources(scenario), law=law, **timing._asdict())
+        return land(scenario, self.sources(scenario), law=self.make_law(scenario),
+                    **timing._asdict())
+
+
+def point_law(scenario: CraneScenario) -> MakeLaw:
+    """Return what makes the point law, which knows the footprint of a scenario's load."""
+    def made(load: Body, *, rate_hz: float, latency: float, step: float) -> WrenchesHeld:
+        return WrenchesHeld(PointLaw.for_load(load.mass, scenario.size, rate_hz))
+
+    return made
 
 
 class MujocoSource:
@@ -187,17 +236,27 @@ def own_contact(scenario: CraneScenario, timing: LoopTiming) -> LandingRecord:
     return record
 
 
+def _point(contacts: str, sources: Callable[[CraneScenario], Sequence[ContactSource]],
+           every: int = SAMPLE) -> Way:
+    """Return the way of a baseline, which is run without latency."""
+    return Way(law='point', contacts=contacts, sources=sources, every=every, make_law=point_law,
+               late=False)
+
+
+_exact = partial(solvers, model='exact')
 WAYS = {
-    'exact': Way(law='patch', contacts='exact', sources=partial(solvers, model='exact'),
-                 added=True),
-    'mlp': Way(law='patch', contacts='mlp', sources=partial(solvers, model='mlp'), added=True),
+    'exact': Way(law='held patch', contacts='exact', sources=_exact, added=True),
+    'mlp': Way(law='held patch', contacts='mlp', sources=partial(solvers, model='mlp'), added=True,
+               every=SAMPLE),
     'manifold': Way(law='MuJoCo', contacts='its manifold, in the simulator', added=True),
-    'point': Way(law='point', contacts='exact', sources=partial(solvers, model='exact')),
-    'mujoco-mean': Way(law='point', contacts='MuJoCo, mean point', every=3,
-                       sources=partial(mujoco_sources, choice='mean')),
-    'mujoco-deepest': Way(law='point', contacts='MuJoCo, deepest point', every=3,
-                          sources=partial(mujoco_sources, choice='deepest')),
-    'fcl': Way(law='point', contacts='fcl', sources=partial(solvers, model='fcl'), every=3),
-    'soup': Way(law='point', contacts='soup', sources=partial(solvers, model='soup'), every=12),
+    'wrench': Way(law='held wrench', contacts='exact', sources=_exact, every=SAMPLE,
+                  make_law=lambda _: held_wrench),
+    'predicted': Way(law='predicted wrench', contacts='exact', sources=_exact, every=2 * SAMPLE,
+                     make_law=lambda _: predicted_wrench),
+    'point': _point('exact', _exact),
+    'mujoco-mean': _point('MuJoCo, mean point', partial(mujoco_sources, choice='mean')),
+    'mujoco-deepest': _point('MuJoCo, deepest point', partial(mujoco_sources, choice='deepest')),
+    'fcl': _point('fcl', partial(solvers, model='fcl')),
+    'soup': _point('soup', partial(solvers, model='soup'), every=13),
 }
 """By name: the ways that the table has."""
