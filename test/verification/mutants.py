@@ -66,10 +66,6 @@ TEST_WRENCH = 'test/node/test_wrench.py'
 NAMED = 'verification/named_failures.py'
 TEST_NAMED = 'test/verification/test_named_failures.py'
 MUTANTS = {
-    'each pair as stiff as if it were alone': Mutant(
-        PAIR_WRENCHES, 'in others.get(name, ()):', 'in ():', f'{TEST_PAIR_WRENCHES} -k rest'),
-    'a patch between two bodies counts once': Mutant(
-        PAIR_WRENCHES, 'range(2 if', 'range(1 if', f'{TEST_PAIR_WRENCHES} -k add_up'),
     'mean velocities taken for those of now': Mutant(
         PAIR_WRENCHES, 'LATE = 0.5', 'LATE = 0.0', f'{TEST_PAIR_WRENCHES} -k rest'),
     'friction of before a gap': Mutant(

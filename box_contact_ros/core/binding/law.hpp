@@ -132,6 +132,15 @@ inline PyObject* law_wrenches(PyObject* self, PyObject* const* args, Py_ssize_t 
   return found.object.release();
 }
 
+inline PyObject* law_pair_wrench(PyObject* self, PyObject* pair) {
+  long long number = PyLong_AsLongLong(pair);
+  if (number == -1 && PyErr_Occurred()) return nullptr;
+  Array<double> found;
+  if (!make({6}, found)) return nullptr;
+  bc_law_pair_wrench(law_of(self)->law, number, reinterpret_cast<bc_wrench*>(found.numbers));
+  return found.object.release();
+}
+
 inline PyObject* law_reset(PyObject* self, PyObject*) {
   bc_law_reset(law_of(self)->law);
   Py_RETURN_NONE;
@@ -157,6 +166,8 @@ inline PyMethodDef law_methods[] = {
      "hold(touches, poses)\n--\n\nHold contacts: touches (pair, a, b, Contact), asked for at poses."},
     {"wrenches", fastcall(law_wrenches), METH_FASTCALL,
      "wrenches(poses, velocities)\n--\n\nReturn the wrenches (bodies, 6) at (bodies, 7), (bodies, 6)."},
+    {"pair_wrench", law_pair_wrench, METH_O,
+     "pair_wrench(pair)\n--\n\nReturn the wrench (6,) on box A of a pair at the last evaluation."},
     {"reset", law_reset, METH_NOARGS, "reset()\n--\n\nForget all patches."},
     {"copy", law_copy, METH_NOARGS, "copy()\n--\n\nReturn a law with the same patches."},
     {nullptr, nullptr, 0, nullptr}};

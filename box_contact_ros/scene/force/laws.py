@@ -21,8 +21,9 @@ force [N], then a torque [N m] about the centre of mass. All in the common frame
 """
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from enum import IntEnum
 from typing import Literal, Self
 
 import numpy as np
@@ -42,8 +43,15 @@ FRICTION = 0.5
 Touches = Contact | Mapping[str, Contact]
 """The contact of the only pair, or contacts by the names of their pairs."""
 
-_PATCH, _WRENCH, _PREDICTED = range(3)  # what a program does with wrenches: `bc_use` of force.h
-_FIXED = -1  # place of a box that does not move
+FIXED = -1  # place of a box that does not move
+
+
+class Use(IntEnum):
+    """What a program does with wrenches: `bc_use` of force.h."""
+
+    HELD_PATCH = 0
+    HELD_WRENCH = 1
+    PREDICTED_WRENCH = 2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,11 +74,31 @@ class Body:
         return cls(mass=mass, inertia=mass / 12.0 * (squares.sum() - squares))
 
 
-def _native_law(bodies: Sequence[Body], use: int, *, rate_hz: float, latency: float, step: float,
+def native_law(bodies: Sequence[Body], use: Use, *, rate_hz: float, latency: float, step: float,
                 friction: float, gravity: float) -> native.Law:
     mass, inertia, centre = (np.array([getattr(body, name) for body in bodies], dtype=float)
                              for name in ('mass', 'inertia', 'centre'))
     return native.Law(mass, inertia, centre, use, rate_hz, latency, step, friction, gravity)
+
+
+def hold(law: native.Law, touches: Iterable[tuple[str, int, int, int, Contact]],
+         poses: ArrayLike) -> None:
+    """Hold touches: the name and id of a pair, the places of its bodies, its contact.
+
+    ValueError: names the pair.
+    """
+    names, rows = {}, []
+    for name, pair, a, b, contact in touches:
+        names[f'pair {pair}:'] = name
+        rows.append((pair, a, b, contact))
+    try:
+        law.hold(rows, poses)
+    except ValueError as error:
+        start, _, words = str(error).partition(': ')
+        if f'{start}:' not in names:
+            raise
+        label = names[f'{start}:']
+        raise ValueError(f'pair {label}: {words}' if label else words) from None
 
 
 def _named(contacts: Touches) -> Mapping[str, Contact]:
@@ -81,6 +109,12 @@ def _named(contacts: Touches) -> Mapping[str, Contact]:
         return contacts
     raise ValueError(f'contacts must be one Contact, or a dict by the names of their pairs, not a '
                      f'{type(contacts).__name__}: friction has to know each pair again')
+
+
+def _hold_load(law: native.Law, contacts: Touches, pose: ArrayLike, load: str) -> None:
+    a, b = (0, FIXED) if load == 'a' else (FIXED, 0)
+    hold(law, [(name, id_of(name), a, b, contact) for name, contact in _named(contacts).items()],
+         pose)
 
 
 class HeldPatch:
@@ -102,7 +136,7 @@ class HeldPatch:
         latency: from a question to the use of its answer [s]. step: the physics step [s].
         ValueError: names the field and its value.
         """
-        return cls(_native_law([load], _PATCH, rate_hz=rate_hz, latency=latency, step=step,
+        return cls(native_law([load], Use.HELD_PATCH, rate_hz=rate_hz, latency=latency, step=step,
                                friction=friction, gravity=gravity))
 
     @property
@@ -116,9 +150,7 @@ class HeldPatch:
         load: which of its pair's boxes the load is. ValueError: a contact without a patch (`fcl`,
         `soup`, `paper`), or a normal that cannot be meant for this load; nothing changes then.
         """
-        sides = (0, _FIXED) if load == 'a' else (_FIXED, 0)
-        self._law.hold([(id_of(name), *sides, contact)
-                        for name, contact in _named(contacts).items()], pose)
+        _hold_load(self._law, contacts, pose, load)
 
     def wrench(self, pose: ArrayLike, velocity: ArrayLike) -> np.ndarray:
         """Return the wrench (6,) on the load at `pose` (7,) and `velocity` (6,), a step at a time.
@@ -157,8 +189,8 @@ class PatchLaw:
         latency: from a question to the use of its answer [s]. predicted: contacts, poses and
         velocities are those of a `Predictor`; latency is then what it may err by.
         """
-        use = _PREDICTED if predicted else _WRENCH
-        return cls(_native_law([load], use, rate_hz=rate_hz, latency=latency, step=1.0 / rate_hz,
+        use = Use.PREDICTED_WRENCH if predicted else Use.HELD_WRENCH
+        return cls(native_law([load], use, rate_hz=rate_hz, latency=latency, step=1.0 / rate_hz,
                                friction=friction, gravity=gravity))
 
     @property
@@ -172,9 +204,7 @@ class PatchLaw:
 
         ValueError as `HeldPatch.hold`.
         """
-        sides = (0, _FIXED) if load == 'a' else (_FIXED, 0)
-        self._law.hold([(id_of(name), *sides, contact)
-                        for name, contact in _named(contacts).items()], pose)
+        _hold_load(self._law, contacts, pose, load)
         wrench: np.ndarray = self._law.wrenches(pose, velocity)[0]
         return wrench
 
@@ -219,7 +249,7 @@ class SceneLaw:
             body = bodies.get(name, unmoved)
             each.append(body if isinstance(body, Body)
                         else Body.of_box(scene.boxes[name].size, body))
-        return cls(_native_law(each, _PATCH, rate_hz=rate_hz, latency=latency, step=step,
+        return cls(native_law(each, Use.HELD_PATCH, rate_hz=rate_hz, latency=latency, step=step,
                                friction=friction, gravity=gravity), scene, tuple(bodies))
 
     @property
@@ -233,9 +263,10 @@ class SceneLaw:
         ValueError: a contact without a patch (`fcl`, `soup`, `paper`); nothing changes then.
         """
         place = self._place
-        self._law.hold([(pair.id, place.get(pair.a, _FIXED), place.get(pair.b, _FIXED), contact)
-                        for pair, contact in answer.touching
-                        if pair.a in self._free or pair.b in self._free], poses)
+        hold(self._law, [
+            (pair.label, pair.id, place.get(pair.a, FIXED), place.get(pair.b, FIXED), contact)
+            for pair, contact in answer.touching
+            if pair.a in self._free or pair.b in self._free], poses)
 
     def wrenches(self, poses: ArrayLike, velocities: ArrayLike) -> np.ndarray:
         """Return the wrenches (n, 6) at `poses` (n, 7) and `velocities` (n, 6), once a step.

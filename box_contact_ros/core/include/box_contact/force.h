@@ -99,6 +99,10 @@ BC_API bc_status bc_law_hold(bc_law* law, const bc_touch* touches, int64_t count
 BC_API bc_status bc_law_wrenches(bc_law* law, const bc_pose* poses, const bc_velocity* velocities,
                                  bc_wrench* wrenches);
 
+/* The wrench on box A of a pair alone, at the last bc_law_wrenches: about the centre of mass of A's
+ * body, or about the origin where A is fixed. Zeros for a pair that is not held. */
+BC_API bc_status bc_law_pair_wrench(const bc_law* law, int64_t pair, bc_wrench* wrench);
+
 #ifdef __cplusplus
 }
 #endif

@@ -75,6 +75,13 @@ class SceneLaw {
     check(bc_law_wrenches(law_.get(), poses.data(), velocities.data(), found.data()));
   }
 
+  // The wrench on box A of a pair alone, at the last call of `wrenches`.
+  Wrench pair_wrench(std::int64_t pair) const {
+    Wrench found;
+    check(bc_law_pair_wrench(law_.get(), pair, &found));
+    return found;
+  }
+
   void reset() { bc_law_reset(law_.get()); }
   double frequency() const { return bc_law_frequency(law_.get()); }
 

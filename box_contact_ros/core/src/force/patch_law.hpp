@@ -45,6 +45,7 @@ struct Patch {
   double anchor_turn = 0.0;      // φ [rad]
   double anchor_stiffness = 0.0; // k_t when they were last changed [N/m]
   double carried_force = 0.0;    // the pressing force, averaged over `carried_time` [N]
+  bc_wrench on_a{};              // at the last evaluation
 };
 
 // What two bodies do at a patch, seen from B.
@@ -91,13 +92,24 @@ class PatchLaw {
     std::fill_n(found, bodies_.size(), bc_wrench{});
     for (Patch& patch : patches_) {
       Relative relative = relative_at(patch, velocities);
-      Vec<double> force, torque;
+      Vec<double> force, torque, zero{0.0, 0.0, 0.0};
+      patch.on_a = {};
       if (!wrench_of(patch, relative, force, torque)) continue;
-      if (patch.a >= 0) add(found[patch.a], 1.0, places_[patch.a], relative.point, force, torque);
-      if (patch.b >= 0) add(found[patch.b], -1.0, places_[patch.b], relative.point, force, torque);
+      add(patch.on_a, 1.0, patch.a >= 0 ? places_[patch.a].position : zero, relative.point, force,
+          torque);
+      if (patch.a >= 0) add(found[patch.a], patch.on_a);
+      if (patch.b >= 0)
+        add(found[patch.b], -1.0, places_[patch.b].position, relative.point, force, torque);
     }
     last_.swap(places_);
     has_last_ = true;
+  }
+
+  // The patch of a pair, or nullptr.
+  const Patch* held(int64_t pair) const {
+    auto found = std::lower_bound(patches_.begin(), patches_.end(), pair,
+                                  [](const Patch& patch, int64_t id) { return patch.pair < id; });
+    return found != patches_.end() && found->pair == pair ? &*found : nullptr;
   }
 
  private:
@@ -106,11 +118,6 @@ class PatchLaw {
       places_[k] = placed_at(poses[k], bodies_[k].centre);
   }
   bool is_free(int body) const { return body >= 0 && bodies_[body].is_free(); }
-  const Patch* held(int64_t pair) const {
-    auto found = std::lower_bound(patches_.begin(), patches_.end(), pair,
-                                  [](const Patch& patch, int64_t id) { return patch.pair < id; });
-    return found != patches_.end() && found->pair == pair ? &*found : nullptr;
-  }
 
   Patch patch_of(const bc_touch& touch) const {
     const Patch* old = held(touch.pair);
@@ -302,9 +309,16 @@ class PatchLaw {
     return kept * cross(spread, n);
   }
 
-  static void add(bc_wrench& sum, double sign, const Placed& placed, const Vec<double>& point,
+  static void add(bc_wrench& sum, const bc_wrench& wrench) {
+    for (int k = 0; k < 3; ++k) {
+      sum.force[k] += wrench.force[k];
+      sum.torque[k] += wrench.torque[k];
+    }
+  }
+  // Add a force at `point`, and a torque about it.
+  static void add(bc_wrench& sum, double sign, const Vec<double>& centre, const Vec<double>& point,
                   const Vec<double>& force, const Vec<double>& torque) {
-    Vec<double> about = torque + cross(point - placed.position, force);
+    Vec<double> about = torque + cross(point - centre, force);
     for (int k = 0; k < 3; ++k) {
       sum.force[k] += sign * force[k];
       sum.torque[k] += sign * about[k];

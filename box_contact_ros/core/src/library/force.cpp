@@ -197,4 +197,11 @@ bc_status bc_law_wrenches(bc_law* law, const bc_pose* poses, const bc_velocity* 
   });
 }
 
+bc_status bc_law_pair_wrench(const bc_law* law, int64_t pair, bc_wrench* wrench) {
+  if (!law || !wrench) return refuse_null(law ? "wrench" : "law");
+  const box_contact::force::Patch* patch = law_of(law).law.held(pair);
+  *wrench = patch ? patch->on_a : bc_wrench{};
+  return BC_OK;
+}
+
 }  // extern "C"
