@@ -187,11 +187,11 @@ MUTANTS = {
         'core/src/overlap/face_sums.hpp', 'Mask<T> risky = unflush(pair, depth);',
         'Mask<T> risky = depth != depth;', f'{TEST_CORE} -k flush'),
     'mirrored rounding trusted': Mutant(
-        'core/src/overlap/face_sums.hpp', 'found.certain &= risky == 0;', '',
+        'core/src/overlap/face_sums.hpp', 'certain &= risky == 0;', '',
         f'{EXACT} -k almost_aligned'),
     'face sums in the order of the names': Mutant(
-        'core/src/contact.hpp', 'CertifiedOverlap<Found<T>, T> overlap =',
-        'pair.a_first = T{} == T{}; CertifiedOverlap<Found<T>, T> overlap =',
+        'core/src/contact.hpp', 'Mask<T> certain =',
+        'pair.a_first = T{} == T{}; Mask<T> certain =',
         f'{LAWS} -k roundings'),
     'a piece of an edge of length below zero': Mutant(
         'core/src/overlap/face_sums.hpp',

@@ -139,11 +139,11 @@ struct ExactModelOf {
     T depth = max(-q.axis.separation, depth_floor * pair.size);
     Pair<T> ordered;
     put_first_as_a(pair, ordered);
-    CertifiedOverlap<Found<T>, T> overlap = overlap_by_face_sums<Found<T>>(ordered, depth);
-    Found<T> found = overlap.moments;
+    Found<T> found;
+    Mask<T> certain = overlap_by_face_sums(ordered, depth, found);
     found.centroid =
         select(pair.a_first, found.centroid, pair.offset_a + pair.rotation * found.centroid);
-    fallback |= (overlap.certain == 0) & q.touching;
+    fallback |= (certain == 0) & q.touching;
     if (any(fallback)) {
       for (int i = 0; i < width<T>; ++i) {
         if (!lane(fallback, i)) continue;
