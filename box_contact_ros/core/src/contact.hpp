@@ -359,7 +359,7 @@ template <class T, class Model>
     Group<T, Model> group;
     Waiting<T, Model> waiting;
     constexpr int blocks = group.blocks, lanes = group.lanes;
-    constexpr long few = width<T> <= 2 ? blocks - 1 : 2;
+    constexpr long few = width<T> <= 2 ? blocks - 1 : lanes <= 8 ? 2 : lanes / 4;
     for (; end - first > few; first += lanes) {
       long last = min(first + lanes, end);
       fetch_rows(results, first, last);
