@@ -581,8 +581,8 @@ BC_INLINE Mask<T> overlap_by_face_sums(Pair<T>& pair, T depth, Found& found) {
     found.covariance = rotated(pair.axes_a, covariance);
   } else {
     T any_radius = splat<T>(infinity);
-    certain = certificate(x_n, normal, area, length, volume, any_radius, depth != depth,
-                                pair.size, depth);
+    certain = certificate(x_n, normal, area, length, volume, any_radius, depth != depth, pair.size,
+                          depth);
   }
   certain &= risky == 0;
   Mask<T> shallow = depth < safely_inside * pair.size;
