@@ -46,8 +46,8 @@ struct Query {
 };
 
 template <class T>
-BC_INLINE void query(const Pose<T>& a, const Pose<T>& b, const Vec<T>& half_a,
-                     const Vec<T>& half_b, Query<T>& q) {
+BC_INLINE void query(const Pose<T>& a, const Pose<T>& b, const Vec<T>& half_a, const Vec<T>& half_b,
+                     Query<T>& q) {
   prepare(a, b, half_a, half_b, q.pair);
   q.axis = separating_axis(q.pair);
   Mask<T> doubtful = q.axis.doubtful & q.pair.valid;
@@ -139,11 +139,11 @@ struct ExactModelOf {
     T depth = max(-q.axis.separation, depth_floor * pair.size);
     Pair<T> ordered;
     put_first_as_a(pair, ordered);
-    CertifiedOverlap<Found<T>, T> overlap = overlap_by_face_sums<Found<T>>(ordered, depth);
-    Found<T> found = overlap.moments;
+    Found<T> found;
+    Mask<T> certain = overlap_by_face_sums(ordered, depth, found);
     found.centroid =
         select(pair.a_first, found.centroid, pair.offset_a + pair.rotation * found.centroid);
-    fallback |= (overlap.certain == 0) & q.touching;
+    fallback |= (certain == 0) & q.touching;
     if (any(fallback)) {
       for (int i = 0; i < width<T>; ++i) {
         if (!lane(fallback, i)) continue;
@@ -247,7 +247,8 @@ template <class T>
     if (touches) continue;
     for (int k = 0; results.point && k < 3; ++k) results.point[3 * row + k] = not_a_number;
     if (results.volume) results.volume[row] = 0.0;
-    for (int k = 0; results.covariance && k < 9; ++k) results.covariance[9 * row + k] = not_a_number;
+    for (int k = 0; results.covariance && k < 9; ++k)
+      results.covariance[9 * row + k] = not_a_number;
   }
   unsigned refused = here & ~valid;
   return refused ? first + __builtin_ctz(refused) : -1;
@@ -264,8 +265,7 @@ template <class T, class Found>
     for (int i = 0; i < width<T>; ++i) places[i] = array + (numbers * rows[i] + from);
     store_rows(places, touching, x);
   };
-  if (results.point)
-    store(results.point, 3, 0, point_in_common_frame(q.pair, overlap.centroid).v);
+  if (results.point) store(results.point, 3, 0, point_in_common_frame(q.pair, overlap.centroid).v);
   if (results.volume) {
     T volume[1] = {overlap.volume};
     store(results.volume, 1, 0, volume);
@@ -359,7 +359,7 @@ template <class T, class Model>
     Group<T, Model> group;
     Waiting<T, Model> waiting;
     constexpr int blocks = group.blocks, lanes = group.lanes;
-    constexpr long few = width<T> <= 2 ? blocks - 1 : 2;
+    constexpr long few = width<T> <= 2 ? blocks - 1 : lanes <= 8 ? 2 : lanes / 4;
     for (; end - first > few; first += lanes) {
       long last = min(first + lanes, end);
       fetch_rows(results, first, last);
@@ -367,8 +367,10 @@ template <class T, class Model>
       for (int g = 0; g < blocks; ++g) {
         long start = first + g * width<T>;
         query_rows(rows, min(start, last - 1), last, group.queries[g]);
-        if (start >= last) group.queries[g].touching = Mask<T>{};
-        else note(write_query(group.queries[g], start, last, results, counts));
+        if (start >= last)
+          group.queries[g].touching = Mask<T>{};
+        else
+          note(write_query(group.queries[g], start, last, results, counts));
         for (int i = 0; i < width<T>; ++i) group.rows[g][i] = start + i;
         touching += __builtin_popcount(bits(group.queries[g].touching));
       }

@@ -73,10 +73,11 @@ inline bool enforce_on_further_axes(Pair<double>& pair) {
 // are those of the vectors as rounded, as in the separating-axis test.
 template <class T>
 inline Mask<T> has_too_little_depth(const Pair<T>& pair) {
-  BestAxis<T> best = best_face_axis(pair);
-  Mask<T> unused;
-  offer_edge_axes(pair, FirstFrame<T>(pair), best, unused);
-  return best.largest_gap > -0.5 * depth_floor * pair.size;
+  BestAxis<T> best;
+  Mask<T> doubtful;
+  offer_face_axes(pair, best);
+  offer_edge_axes(pair, FirstFrame<T>(pair), best, doubtful);
+  return best.largest() > -0.5 * depth_floor * pair.size;
 }
 
 }  // namespace box_contact::BOX_CONTACT_SET

@@ -105,8 +105,9 @@ BC_INLINE void prepare(const Pose<T>& a, const Pose<T>& b, const Vec<T>& half_a,
   pair.offset_a = transposed_times(axes_a, t);
   pair.offset_b = transposed_times(axes_b, t);
   for (int i = 0; i < 3; ++i) {
-    Triple<T> by_b = (axes_a[0][i] * triple(row(axes_b, 0)) + axes_a[1][i] * triple(row(axes_b, 1))) +
-                     axes_a[2][i] * triple(row(axes_b, 2));
+    Triple<T> by_b =
+        (axes_a[0][i] * triple(row(axes_b, 0)) + axes_a[1][i] * triple(row(axes_b, 1))) +
+        axes_a[2][i] * triple(row(axes_b, 2));
     for (int j = 0; j < 3; ++j) pair.rotation[i][j] = by_b[j];
   }
   pair.size = 2.0 * max(largest(half_a), largest(half_b));

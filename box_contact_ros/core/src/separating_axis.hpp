@@ -58,137 +58,226 @@ struct SeparatingAxis {
   Mask<T> doubtful;  // rounding of an edge axis may matter: see near_parallel_edges.hpp
 };
 
-// The best axis so far. The largest gap is kept apart, because ties keep the earlier axis.
-template <class T>
+// The best axis so far. Axes are offered three at a time. The largest gap is kept apart, because ties
+// keep the earlier axis.
+template <class T, bool = packed<T>>
 struct BestAxis {
-  T gap, axis, largest_gap;
+  T gap, place, scale, largest_gap;
 
-  BC_INLINE void offer(T candidate_gap, T candidate, T tolerance) {
+  // Offer the axes at the places `first` to `first` + 2. `scales` give their vectors length one.
+  BC_INLINE void offer(int first, const Triple<T>& gaps, const Triple<T>& scales, T tolerance) {
+    if (first == 0) gap = largest_gap = gaps[0], place = T{}, scale = scales[0];
+    for (int k = first == 0; k < 3; ++k)
+      offer_one(gaps[k], splat<T>(first + k), scales[k], tolerance);
+  }
+  BC_INLINE T largest() const { return largest_gap; }
+  BC_INLINE T winner(T) const { return place; }
+
+ private:
+  BC_INLINE void offer_one(T candidate_gap, T candidate, T candidate_scale, T tolerance) {
     Mask<T> wins = candidate_gap > gap + tolerance;
     gap = select<T>(wins, candidate_gap, gap);
-    axis = select<T>(wins, candidate, axis);
+    place = select<T>(wins, candidate, place);
+    scale = select<T>(wins, candidate_scale, scale);
     largest_gap = max(largest_gap, candidate_gap);
   }
 };
 
-// The gap on a face axis of a box: `offset` along the axis, `half` its half extent there, and
-// `entries` the other box's axes along it.
+// Of a single pair the gaps are kept. An axis wins in whatever order they come if its gap exceeds all
+// others by more than the tolerance.
 template <class T>
-BC_INLINE T face_gap(T offset, T half, const Vec<T>& other_half, const Vec<T>& entries) {
-  return abs(offset) - (half + dot(other_half, abs(entries)));
+struct BestAxis<T, true> {
+  Triple<T> offered[5], scales[5], highest;
+  int count = 0;
+
+  BC_INLINE void offer(int first, const Triple<T>& gaps, const Triple<T>& their_scales, T) {
+    highest = first == 0 ? gaps : max(highest, gaps);
+    offered[count] = gaps;
+    scales[count++] = their_scales;
+  }
+  BC_INLINE T largest() const { return box_contact::BOX_CONTACT_SET::largest(highest); }
+  BC_INLINE T winner(T tolerance) const {
+    Triple<T> limit = Triple<T>{} + largest();
+    unsigned near = 0;
+    for (int n = 0; n < count; ++n) near |= (~bits(offered[n] + tolerance < limit) & 7) << (3 * n);
+    return (near & (near - 1)) == 0 ? __builtin_ctz(near) : first_of_near(tolerance);
+  }
+
+ private:
+  [[gnu::noinline]] T first_of_near(T tolerance) const {
+    T gap = offered[0][0];
+    int place = 0;
+    for (int n = 0; n < count; ++n)
+      for (int k = 0; k < 3; ++k)
+        if (offered[n][k] > gap + tolerance) gap = offered[n][k], place = 3 * n + k;
+    return place;
+  }
+};
+
+// The gaps on the face axes of a box: `offset` to the other box along them, its half extents, and the
+// other's axes in its frame.
+template <class T>
+BC_INLINE Triple<T> face_gaps(const Triple<T>& offset, const Triple<T>& half,
+                              const Vec<T>& other_half, const Columns<T>& axes) {
+  Columns<T> width = abs(axes);
+  return abs(offset) - (half + ((other_half[0] * width[0] + other_half[1] * width[1]) +
+                                other_half[2] * width[2]));
+}
+
+template <class T>
+BC_INLINE void offer_face_axes(const Pair<T>& pair, BestAxis<T>& best) {
+  T tolerance = tie * pair.size;
+  Columns<T> axes_b = columns(pair.rotation), axes_a = columns(transpose(pair.rotation));
+  Triple<T> one = uniform(splat<T>(1.0));
+  best.offer(0, face_gaps(triple(pair.offset_a), triple(pair.half_a), pair.half_b, axes_b), one,
+             tolerance);
+  best.offer(3, face_gaps(triple(pair.offset_b), triple(pair.half_b), pair.half_a, axes_a), one,
+             tolerance);
 }
 
 // Both boxes in the frame of the one that comes first: its half extents, the offset to the other
-// box, the other's half extents and its edges as columns.
+// box, the other's half extents, and its edges: `edges[k]` has their components along axis k.
 template <class T>
 struct FirstFrame {
-  Vec<T> half, offset, other_half;
-  Mat<T> edges;
+  Triple<T> half, offset, other_half;
+  Columns<T> edges;
 
   BC_INLINE explicit FirstFrame(const Pair<T>& pair)
-      : half(select(pair.a_first, pair.half_a, pair.half_b)),
-        offset(select(pair.a_first, pair.offset_a, pair.offset_b)),
-        other_half(select(pair.a_first, pair.half_b, pair.half_a)),
-        edges(select(pair.a_first, pair.rotation, transpose(pair.rotation))) {}
+      : half(select(pair.a_first, triple(pair.half_a), triple(pair.half_b))),
+        offset(select(pair.a_first, triple(pair.offset_a), triple(pair.offset_b))),
+        other_half(select(pair.a_first, triple(pair.half_b), triple(pair.half_a))),
+        edges(select<T>(pair.a_first, columns(transpose(pair.rotation)), columns(pair.rotation))) {}
 };
 
-// The nine edge axes e_i × u_j. In this frame e_i × u_j is (−u_z, u_y) in the components y and z
-// that follow i.
+// Offer the nine edge axes e_i × u_j. In this frame e_i × u_j is (−u_z, u_y) in the components y and
+// z that follow i.
 template <class T>
 BC_INLINE void offer_edge_axes(const Pair<T>& pair, const FirstFrame<T>& frame, BestAxis<T>& best,
                                Mask<T>& doubtful) {
   T tolerance = tie * pair.size, error = edge_gap_error * pair.size;
-  T none = splat<T>(-infinity);
-  T largest_possible = none, longest_skipped2 = T{};
-  Triple<T> half_k = rotated(triple(frame.other_half)), half_l = rotated(half_k);
+  Triple<T> largest_possible = uniform(splat<T>(-infinity)), longest_skipped2{};
+  Triple<T> half_k = rotated(frame.other_half), half_l = rotated(half_k);
 #pragma GCC unroll 3
   for (int i = 0; i < 3; ++i) {
     int y = (i + 1) % 3, z = (i + 2) % 3;
     // By j, and the other box's axes k and l that follow it.
-    Triple<T> uy = triple(row(frame.edges, y)), uz = triple(row(frame.edges, z));
+    Triple<T> uy = frame.edges[y], uz = frame.edges[z];
     Triple<T> ky = rotated(uy), kz = rotated(uz), ly = rotated(ky), lz = rotated(kz);
     Triple<T> length2 = uy * uy + uz * uz;
-    Triple<T> width = (frame.half[y] * abs(uz) + frame.half[z] * abs(uy)) +
+    Triple<T> width = (spread(frame.half, y) * abs(uz) + spread(frame.half, z) * abs(uy)) +
                       (half_k * abs(kz * uy - ky * uz) + half_l * abs(lz * uy - ly * uz));
-    Triple<T> overlap = abs(frame.offset[z] * uy - frame.offset[y] * uz) - width;
+    Triple<T> overlap = abs(spread(frame.offset, z) * uy - spread(frame.offset, y) * uz) - width;
     Triple<T> inverse = each([](auto x) { return 1.0 / sqrt(x); }, length2);
-    Triple<T> gaps = overlap * inverse, highest_gaps = (overlap + error) * inverse;
-#pragma GCC unroll 3
-    for (int j = 0; j < 3; ++j) {
-      Mask<T> used = length2[j] >= parallel * parallel;
-      Mask<T> inaccurate = used & (length2[j] < almost_parallel * almost_parallel);
-      largest_possible = max(largest_possible, select<T>(inaccurate, highest_gaps[j], none));
-      longest_skipped2 = max(longest_skipped2, select<T>(used, T{}, length2[j]));
-      T number = i == j ? splat<T>(first_edge_axis + 4 * i)
-                        : select<T>(pair.a_first, splat<T>(first_edge_axis + 3 * i + j),
-                                    splat<T>(first_edge_axis + 3 * j + i));
-      best.offer(select<T>(used, gaps[j], none), number, tolerance);
-    }
+    auto if_used = [](auto gap, auto length2) {
+      return select<decltype(gap)>(length2 >= parallel * parallel, gap,
+                                   splat<decltype(gap)>(-infinity));
+    };
+    auto if_inaccurate = [](auto gap, auto length2) {
+      constexpr double least2 = parallel * parallel, most2 = almost_parallel * almost_parallel;
+      return select<decltype(gap)>((length2 >= least2) & (length2 < most2), gap,
+                                   splat<decltype(gap)>(-infinity));
+    };
+    auto if_skipped = [](auto length2) {
+      using N = decltype(length2);
+      return select<N>(length2 >= parallel * parallel, N{}, length2);
+    };
+    largest_possible =
+        max(largest_possible, each(if_inaccurate, (overlap + error) * inverse, length2));
+    longest_skipped2 = max(longest_skipped2, each(if_skipped, length2));
+    best.offer(first_edge_axis + 3 * i, each(if_used, overlap * inverse, length2), inverse,
+               tolerance);
   }
-  T gap = best.largest_gap, reach = skipped_gain * pair.size;
-  Mask<T> skipped_may_win = (longest_skipped2 > cross_product_min * cross_product_min) &
-                            ((gap >= 0.0) | (gap * gap < reach * reach * longest_skipped2));
-  doubtful = (gap <= pair.touch) & ((largest_possible > gap) | skipped_may_win);
+  T gap = best.largest(), reach = skipped_gain * pair.size, skipped2 = largest(longest_skipped2);
+  Mask<T> skipped_may_win = (skipped2 > cross_product_min * cross_product_min) &
+                            ((gap >= 0.0) | (gap * gap < reach * reach * skipped2));
+  doubtful = (gap <= pair.touch) & ((largest(largest_possible) > gap) | skipped_may_win);
+}
+
+// The edge of the first box, 0 to 2, of the edge axis at a place.
+template <class T>
+BC_INLINE T edge_of_first(T place) {
+  return select<T>(place < double(first_edge_axis + 3), T{},
+                   select<T>(place < double(first_edge_axis + 6), splat<T>(1.0), splat<T>(2.0)));
 }
 
 // The winning axis as a unit vector from A to B, in A's frame.
 template <class T>
-BC_INLINE Vec<T> axis_normal(const Pair<T>& pair, const FirstFrame<T>& frame, T axis) {
+BC_INLINE Vec<T> axis_normal(const Pair<T>& pair, const FirstFrame<T>& frame,
+                             const BestAxis<T>& best) {
+  T place = best.place;
   // A face of A or of B: a unit vector, or a column of R.
   Vec<T> face{};
   T face_offset{};
   for (int k = 0; k < 3; ++k) {
-    Mask<T> of_a = axis == double(k), of_b = axis == double(3 + k);
+    Mask<T> of_a = place == double(k), of_b = place == double(3 + k);
     face_offset = select<T>(of_a, pair.offset_a[k], select<T>(of_b, pair.offset_b[k], face_offset));
     face = select<T>(of_b, column(pair.rotation, k), face);
     face[k] = select<T>(of_a, splat<T>(1.0), face[k]);
   }
   // A pair of edges, in the very frame in which their gap was evaluated.
-  T number = axis - double(first_edge_axis);
-  T edge_a = select<T>(number < 3.0, T{}, select<T>(number < 6.0, splat<T>(1.0), splat<T>(2.0)));
-  T edge_b = number - 3.0 * edge_a;
-  T i = select<T>(pair.a_first, edge_a, edge_b), j = select<T>(pair.a_first, edge_b, edge_a);
-  Vec<T> u = select(j == 0.0, column(frame.edges, 0),
-                    select(j == 1.0, column(frame.edges, 1), column(frame.edges, 2)));
+  T i = edge_of_first(place), j = (place - double(first_edge_axis)) - 3.0 * i;
+  Vec<T> u;
+  for (int k = 0; k < 3; ++k) {
+    const Triple<T>& edges = frame.edges[k];
+    u[k] = select<T>(j == 0.0, edges[0], select<T>(j == 1.0, edges[1], edges[2]));
+  }
   Vec<T> n;
   n[0] = select<T>(i == 0.0, T{}, select<T>(i == 1.0, u[2], -u[1]));
   n[1] = select<T>(i == 0.0, -u[2], select<T>(i == 1.0, T{}, u[0]));
   n[2] = select<T>(i == 0.0, u[1], select<T>(i == 1.0, -u[0], T{}));
 
-  Mask<T> edges = axis >= double(first_edge_axis);
-  T length2 = dot(n, n);
+  Mask<T> edges = place >= double(first_edge_axis);
   T along = select<T>(edges, dot(frame.offset, n), face_offset);
   T side = select<T>(along >= 0.0, splat<T>(1.0), splat<T>(-1.0));
-  n = (side / sqrt(select<T>(length2 > 0.0, length2, splat<T>(1.0)))) * n;
+  n = (side * best.scale) * n;
   n = select(pair.a_first, n, pair.rotation * n);
   return select(edges, n, side * face);
 }
 
-// The best of the six face axes.
+// The same for a single pair whose triples are vectors of the machine, without a choice: the vectors
+// of all axes are in memory, three axes side by side.
 template <class T>
-BC_INLINE BestAxis<T> best_face_axis(const Pair<T>& pair) {
-  T tolerance = tie * pair.size;
-  T gap = face_gap(pair.offset_a[0], pair.half_a[0], pair.half_b, row(pair.rotation, 0));
-  BestAxis<T> best{gap, T{}, gap};
-  for (int k = 1; k < 3; ++k)
-    best.offer(face_gap(pair.offset_a[k], pair.half_a[k], pair.half_b, row(pair.rotation, k)),
-               splat<T>(k), tolerance);
-  for (int k = 0; k < 3; ++k)
-    best.offer(face_gap(pair.offset_b[k], pair.half_b[k], pair.half_a, column(pair.rotation, k)),
-               splat<T>(3 + k), tolerance);
-  return best;
+BC_INLINE Vec<T> axis_normal_by_place(const Pair<T>& pair, const FirstFrame<T>& frame,
+                                      const BestAxis<T>& best, int place) {
+  Columns<T> axes_b = columns(pair.rotation), vectors[5];
+  Triple<T> along[5] = {triple(pair.offset_a), triple(pair.offset_b)};
+  vectors[0] = columns(Mat<T>{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}});
+  vectors[1] = transpose(axes_b);
+  for (int i = 0; i < 3; ++i) {
+    int y = (i + 1) % 3, z = (i + 2) % 3;
+    vectors[2 + i][i] = Triple<T>{};
+    vectors[2 + i][y] = -frame.edges[z];
+    vectors[2 + i][z] = frame.edges[y];
+    along[2 + i] =
+        spread(frame.offset, z) * frame.edges[y] - spread(frame.offset, y) * frame.edges[z];
+  }
+  int group = place / 3, k = place % 3;
+  T scale = best.scales[group][k], side = along[group][k] >= 0.0 ? scale : -scale;
+  const Columns<T>& v = vectors[group];
+  Triple<T> n = side * triple(Vec<T>{v[0][k], v[1][k], v[2][k]});
+  return components<T>(select(place < first_edge_axis || pair.a_first, n, axes_b * n));
 }
 
 template <class T>
 BC_INLINE SeparatingAxis<T> separating_axis(const Pair<T>& pair) {
-  BestAxis<T> best = best_face_axis(pair);
+  T tolerance = tie * pair.size;
+  BestAxis<T> best;
+  offer_face_axes(pair, best);
   SeparatingAxis<T> found;
-  found.face = best.axis;
+  found.face = best.winner(tolerance);
   FirstFrame<T> frame(pair);
   offer_edge_axes(pair, frame, best, found.doubtful);
-  found.separation = best.largest_gap;
-  found.axis = best.axis;
-  found.normal = axis_normal(pair, frame, best.axis);
+  found.separation = best.largest();
+  // Edge axes are offered by the edges of the first box, and numbered by those of A.
+  T place = best.winner(tolerance), i = edge_of_first(place);
+  T j = (place - double(first_edge_axis)) - 3.0 * i;
+  found.axis = select<T>((place < double(first_edge_axis)) | pair.a_first, place,
+                         (double(first_edge_axis) + 3.0 * j) + i);
+  if constexpr (packed<T>) {
+    found.normal = axis_normal_by_place(pair, frame, best, int(place));
+  } else {
+    found.normal = axis_normal(pair, frame, best);
+  }
   return found;
 }
 

@@ -41,11 +41,11 @@ extern "C" {
 
 typedef enum bc_status {
   BC_OK = 0,
-  BC_BAD_ARGUMENT = 1,    /* a null pointer, a count below zero, an unknown model */
-  BC_BAD_SIZE = 2,        /* extents outside 1e-50 to 1e50 m */
-  BC_BAD_POSE = 3,        /* numbers that are not finite, or a quaternion without a length */
-  BC_BAD_ROWS = 4,        /* some rows of a batch are refused: bad poses, sizes or places */
-  BC_BAD_WEIGHTS = 5,     /* a weights file that is missing, damaged, or made for something else */
+  BC_BAD_ARGUMENT = 1, /* a null pointer, a count below zero, an unknown model */
+  BC_BAD_SIZE = 2,     /* extents outside 1e-50 to 1e50 m */
+  BC_BAD_POSE = 3,     /* numbers that are not finite, or a quaternion without a length */
+  BC_BAD_ROWS = 4,     /* some rows of a batch are refused: bad poses, sizes or places */
+  BC_BAD_WEIGHTS = 5,  /* a weights file that is missing, damaged, or made for something else */
   BC_NO_MEMORY = 6,
   BC_BAD_ENVIRONMENT = 7, /* BOX_CONTACT_INSTRUCTION_SET names none that this machine has */
   BC_BAD_ABI = 8          /* the program was compiled for another version of this header */
@@ -89,7 +89,7 @@ typedef struct bc_counts {
 } bc_counts;
 
 typedef struct bc_options {
-  size_t size;         /* sizeof(bc_options) */
+  size_t size; /* sizeof(bc_options) */
   bc_model model;
   const char* weights; /* path of the weights file of model mlp */
   double margin;       /* [m]; normals are given up to this separation */

@@ -86,6 +86,12 @@ BC_INLINE Packed total(Packed a) {
   return (spread(a, 0) + spread(a, 1)) + spread(a, 2);
 }
 
+// The largest component.
+template <class Packed, class = std::enable_if_t<!is_scalar<Packed> && !std::is_class_v<Packed>>>
+BC_INLINE Number<Packed> largest(Packed a) {
+  return max(max(a[0], a[1]), a[2]);
+}
+
 // The components y z x.
 template <class T>
 BC_INLINE Vec<T> rotated(const Vec<T>& a) {
