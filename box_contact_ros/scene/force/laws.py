@@ -75,7 +75,8 @@ class Body:
 
 
 def native_law(bodies: Sequence[Body], use: Use, *, rate_hz: float, latency: float, step: float,
-                friction: float, gravity: float) -> native.Law:
+               friction: float, gravity: float) -> native.Law:
+    """Return the library's law of some bodies; ValueError: names the field and its value."""
     mass, inertia, centre = (np.array([getattr(body, name) for body in bodies], dtype=float)
                              for name in ('mass', 'inertia', 'centre'))
     return native.Law(mass, inertia, centre, use, rate_hz, latency, step, friction, gravity)
@@ -137,7 +138,7 @@ class HeldPatch:
         ValueError: names the field and its value.
         """
         return cls(native_law([load], Use.HELD_PATCH, rate_hz=rate_hz, latency=latency, step=step,
-                               friction=friction, gravity=gravity))
+                              friction=friction, gravity=gravity))
 
     @property
     def frequency(self) -> float:
@@ -191,7 +192,7 @@ class PatchLaw:
         """
         use = Use.PREDICTED_WRENCH if predicted else Use.HELD_WRENCH
         return cls(native_law([load], use, rate_hz=rate_hz, latency=latency, step=1.0 / rate_hz,
-                               friction=friction, gravity=gravity))
+                              friction=friction, gravity=gravity))
 
     @property
     def frequency(self) -> float:
@@ -250,7 +251,7 @@ class SceneLaw:
             each.append(body if isinstance(body, Body)
                         else Body.of_box(scene.boxes[name].size, body))
         return cls(native_law(each, Use.HELD_PATCH, rate_hz=rate_hz, latency=latency, step=step,
-                               friction=friction, gravity=gravity), scene, tuple(bodies))
+                              friction=friction, gravity=gravity), scene, tuple(bodies))
 
     @property
     def frequency(self) -> float:
