@@ -372,5 +372,5 @@ class SceneSolver:
                 colliding = bool(found.colliding[row])
                 (touching if colliding else close).append((pairs[near[row]], Contact(
                     colliding, float(found.separation[row]), found.normal[row], found.point[row],
-                    float(found.volume[row]), found.covariance[row])))
+                    float(found.volume[row]), found.covariance[row], int(found.axis[row]))))
         return Answer(touching, stale, len(near), close)

@@ -20,7 +20,7 @@ class Contact(NamedTuple):
     separation: float
     """Signed [m]: negative is the overlap depth, positive the largest gap on a SAT axis."""
     normal: np.ndarray
-    """(3,) unit vector from A to B; NaN without contact."""
+    """(3,) unit vector from A to B; NaN where the separation exceeds the solver's margin."""
     point: np.ndarray
     """(3,) centroid of A∩B [m]; NaN without contact."""
     volume: float
@@ -29,6 +29,11 @@ class Contact(NamedTuple):
     """(3, 3) second central moments of A∩B by its volume [m²]; NaN without contact, or as volume.
 
     Volume and covariance are those of the overlap whose centroid is `point`, pressed in or not.
+    """
+    axis: int = -1
+    """The winning axis, also of pairs apart; −1 from models that do not tell it.
+
+    0 to 2 faces of A, 3 to 5 faces of B, 6 + 3·i + j the edges i of A and j of B.
     """
 
 
@@ -62,6 +67,8 @@ class Contacts(NamedTuple):
     """(n,) [m³]."""
     covariance: np.ndarray
     """(n, 3, 3) [m²]."""
+    axis: np.ndarray
+    """(n,) int32."""
 
 
 def without_patch(colliding: np.ndarray, separation: np.ndarray, normal: np.ndarray,
@@ -71,7 +78,8 @@ def without_patch(colliding: np.ndarray, separation: np.ndarray, normal: np.ndar
     Volume and covariance of those in contact are NaN, as of the core with `patch=False`.
     """
     return Contacts(colliding, separation, normal, point, np.where(colliding, np.nan, 0.0),
-                    np.full((len(colliding), 3, 3), np.nan))
+                    np.full((len(colliding), 3, 3), np.nan),
+                    np.full(len(colliding), -1, dtype=np.int32))
 
 
 native.use_contact_types(Contact, Contacts)

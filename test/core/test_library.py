@@ -28,6 +28,7 @@ from box_contact_ros import Body, ContactSolver, HeldPatch
 from box_contact_ros.__main__ import PLACES
 from box_contact_ros.core import FORCE, instruction_sets, native
 from box_contact_ros.resources import resource_path
+from box_contact_ros.scene.pose import rotation_matrix
 from box_contact_ros.scene.pose_sets import SETS, Pairs
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.verification import fuzz
@@ -122,11 +123,12 @@ def by_ctypes(library: ctypes.CDLL, model: str, pairs: Pairs, threads: int = 1,
 
     count = len(pairs.pose_a if places is None else places)
     found = Contacts(np.empty(count, bool), np.empty(count), np.empty((count, 3)),
-                     np.empty((count, 3)), np.empty(count), np.empty((count, 3, 3)))
+                     np.empty((count, 3)), np.empty(count), np.empty((count, 3, 3)),
+                     np.empty(count, np.int32))
     rows = Rows(ctypes.sizeof(Rows), count, *(at(part, c_double) for part in pairs),
                 None if places is None else at(places, c_int64), len(pairs.pose_a))
     results = Results(ctypes.sizeof(Results), at(found.colliding, c_bool),
-                      *(at(field, c_double) for field in found[1:]), None)
+                      *(at(field, c_double) for field in found[1:-1]), at(found.axis, c_int32))
     assert library.bc_solve_rows(solver, byref(rows), byref(results), threads, None) == 0
     library.bc_solver_destroy(solver)
     return found
@@ -454,6 +456,26 @@ def test_normals_within_the_margin() -> None:
             ContactSolver(poses.CUBE, poses.CUBE, margin=bad)
     with pytest.raises(ValueError, match="^margin 1 is not a distance that model 'paper' knows"):
         ContactSolver(poses.CUBE, poses.CUBE, model='paper', margin=1.0)
+
+
+@pytest.mark.parametrize('model', ['exact', 'mlp'])
+def test_the_winning_axis(model: str) -> None:
+    """The normal lies along the face of A or of B, or across both edges, also of pairs apart."""
+    pairs = some_pairs()
+    solver = ContactSolver((1, 1, 1), (1, 1, 1), model=model, margin=np.inf)
+    found = solver.batch(*pairs[:2], size_a=pairs.size_a, size_b=pairs.size_b)
+    assert set(found.axis) == set(range(15))
+    a, b = rotation_matrix(pairs.pose_a[:, 3:]), rotation_matrix(pairs.pose_b[:, 3:])
+    rows, edges = np.arange(len(a)), found.axis >= 6
+    for axes, first in ((a, 0), (b, 3)):
+        face = (found.axis >= first) & (found.axis < first + 3)
+        along = axes[rows, :, (found.axis - first) % 3]
+        assert np.abs(np.abs((along * found.normal).sum(axis=1)[face]) - 1.0).max() < 1e-12
+    for axes, edge in ((a, (found.axis - 6) // 3), (b, (found.axis - 6) % 3)):
+        along = axes[rows, :, edge % 3]
+        assert np.abs((along * found.normal).sum(axis=1)[edges]).max() < 1e-6
+    one = ContactSolver(pairs.size_a[0], pairs.size_b[0], model=model)
+    assert one(pairs.pose_a[0], pairs.pose_b[0]).axis == found.axis[0]
 
 
 def damaged(change: str) -> bytes:

@@ -29,6 +29,7 @@ template <class Number>
 constexpr int numpy_type = std::is_same_v<Number, double>    ? NPY_DOUBLE
                            : std::is_same_v<Number, float>   ? NPY_FLOAT
                            : std::is_same_v<Number, int64_t> ? NPY_INT64
+                           : std::is_same_v<Number, int32_t> ? NPY_INT32
                                                              : NPY_BOOL;
 
 // An array of numbers in C order.

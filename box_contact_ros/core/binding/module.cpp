@@ -179,7 +179,8 @@ PyObject* new_contact(const bc_contact& contact) {
   PyObject* const fields[] = {
       PyBool_FromLong(contact.colliding), PyFloat_FromDouble(contact.separation),
       new_array(contact.normal, 1),       new_array(contact.point, 1),
-      PyFloat_FromDouble(contact.volume), new_array(contact.covariance[0], 2)};
+      PyFloat_FromDouble(contact.volume), new_array(contact.covariance[0], 2),
+      PyLong_FromLong(contact.axis)};
   return new_tuple(contact_type, fields);
 }
 
@@ -187,10 +188,11 @@ PyObject* new_contact(const bc_contact& contact) {
 struct ContactArrays {
   Array<bool> colliding;
   Array<double> separation, normal, point, volume, covariance;
+  Array<int32_t> axis;
 
   bool make_for(npy_intp count, bool patch) {
     return make({count}, colliding) && make({count}, separation) && make({count, 3}, normal) &&
-           make({count, 3}, point) && make({count}, volume) &&
+           make({count, 3}, point) && make({count}, volume) && make({count}, axis) &&
            (patch ? make({count, 3, 3}, covariance) : make_unknown(count));
   }
   Results results(bool patch) const {
@@ -200,7 +202,7 @@ struct ContactArrays {
             point.numbers,
             patch ? volume.numbers : nullptr,
             patch ? covariance.numbers : nullptr,
-            nullptr,
+            axis.numbers,
             0.0};
   }
   // Without a patch, the volume of pairs in contact is unknown.
@@ -211,7 +213,8 @@ struct ContactArrays {
   PyObject* release(PyTypeObject* type) {
     PyObject* const fields[] = {colliding.object.release(), separation.object.release(),
                                 normal.object.release(),    point.object.release(),
-                                volume.object.release(),    covariance.object.release()};
+                                volume.object.release(),    covariance.object.release(),
+                                axis.object.release()};
     return new_tuple(type, fields);
   }
 
@@ -419,8 +422,8 @@ PyCFunction with_keywords(PyCFunctionWithKeywords function) {
 PyMethodDef solver_methods[] = {
     {"solve", fastcall(solver_solve), METH_FASTCALL,
      "solve(poses_a, poses_b, sizes_a, sizes_b, threads, patch=True, pairs=None)\n--\n\n"
-     "Return (colliding, separation, normal, point, volume, covariance), and the first refused row "
-     "or -1.\n\n"
+     "Return (colliding, separation, normal, point, volume, covariance, axis), and the first refused "
+     "row or -1.\n\n"
      "poses (m, 7), sizes (m, 3) or (1, 3) full extents [m]; frame: that of the poses. pairs (n, "
      "2): "
      "places of the boxes of each row."},
