@@ -85,7 +85,8 @@ class ContactSolver(native.PairSolver):
         b = as_floats(pose_b, 'pose_b', 'a pose (7,)', (7,)).reshape(1, 7)
         found = self._solve(a, b, self._size_a, self._size_b, _SINGLE)
         return Contact(bool(found.colliding[0]), float(found.separation[0]), found.normal[0],
-                       found.point[0], float(found.volume[0]), found.covariance[0], int(found.axis[0]))
+                       found.point[0], float(found.volume[0]), found.covariance[0],
+                       int(found.axis[0]))
 
     def converted_batch(self, poses_a: ArrayLike, poses_b: ArrayLike | None = None, *,
                         size_a: ArrayLike | None = None, size_b: ArrayLike | None = None,
