@@ -232,8 +232,8 @@ def test_frames_know_no_history(series):
 def test_the_point_keeps_to_its_slope(series):
     """The law of K from frame to frame: of `exact` always.
 
-    Of `mlp` between frames in which the network is asked the same way, where the point moves by more
-    than float32 rounds: a load at rest moves by 1e-14 m.
+    Of `mlp` between frames in which the network is asked the same way, where the point moves by
+    more than float32 rounds: a load at rest moves by 1e-14 m.
     """
     name, motion = series
     pairs, motions, _ = motion
