@@ -371,6 +371,15 @@ MUTANTS = {
     'a point alone has no patch': Mutant(
         'apps/crane/landing.py', 'if math.isfinite(touch.volume):', 'if True:',
         'test/apps/test_landing.py -k whole_load'),
+    'a patch held at the pose of its arrival': Mutant(
+        'apps/crane/load_laws.py', 'self._law.hold(*newest)', 'self._law.hold(newest[0], pose)',
+        'test/apps/test_load_laws.py -k was_asked'),
+    'contacts asked for where the load is': Mutant(
+        'apps/crane/load_laws.py', 'return state._replace(pose=pose, velocity=velocity)',
+        'return state', 'test/apps/test_load_laws.py -k predicted_wrench'),
+    'held patches without limits of their own': Mutant(
+        'reports/landing/landing_report.py', 'held = self.landing.way in GATED and self.of_grid',
+        'held = False', 'test/reports/test_landing_report.py -k limits_of_their_own'),
     'numbers of a pose not checked': Mutant(
         BYTES, 'and _LEAST < hypot(qx, qy, qz, qw) < _MOST):', '):',
         'test/node/test_faults.py -k half_of_the_poses'),
