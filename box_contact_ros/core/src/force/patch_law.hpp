@@ -9,7 +9,8 @@
 //     1. Pressure   P = κ·V' + b·v_c              along −n at c, on body A
 //     2. Rocking    κ·A·C_t·(n × θ) × n           by the turn θ since then, and so for its damper
 //     3. Friction   k_t·u + c_t·slip at c         u: an anchor that follows the slip
-//        Torsion    k_t·r·φ + c_t·r·spin about n  φ: its turn; both within √(f² + m²) ≤ μ·P
+//        Torsion    k_t·r·φ + c_t·r·spin about n  φ: its turn; both within f² + m² + a·f²·m² ≤ 1
+//                                                 by μ·P, a: how square the patch is
 //
 // V' = V + A·δ, δ how much deeper the bodies are by now. v_c is the closing speed at c. κ = Ω² / w,
 // w the largest eigenvalue of M⁻¹K of the bodies on a foundation of modulus 1, so no oscillation is
@@ -272,7 +273,11 @@ class PatchLaw {
     Vec<double> force = stiffness * patch.anchor;
     double torsion = stiffness * radius * patch.anchor_turn;  // by the radius [N]
     // First the springs alone, which give way; then with their dampers.
-    auto over = [&] { return std::sqrt(dot(force, force) + torsion * torsion) / limit; };
+    auto over = [&] {
+      double slide = dot(force, force), turn = torsion * torsion, both = slide + turn;
+      double dent = 4.0 * patch.shape.dent * slide * turn;
+      return std::sqrt(0.5 * (both + std::sqrt(both * both + dent))) / limit;
+    };
     if (double beyond = over(); beyond > 1.0) {
       patch.anchor = (1.0 / beyond) * patch.anchor;
       patch.anchor_turn /= beyond;
