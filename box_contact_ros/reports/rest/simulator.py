@@ -1,7 +1,7 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""A simulator of boxes, on MuJoCo: its own contact switched off, and forces by held patches instead.
+"""A simulator of boxes on MuJoCo, its own contact switched off: held patches push instead.
 
 It is the loop of a client: contacts are asked for at a rate, answers arrive late, and the law is
 asked at every physics step. `own_contact` runs the same boxes with MuJoCo's contact.
