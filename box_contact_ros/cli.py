@@ -90,6 +90,9 @@ PROGRAMS = {
     'landing': Program(
         'box_contact_ros.reports.landing.landing_report', ('sim', 'soup', 'report'),
         'whether a load comes to rest by each way of contact and force, as table and picture'),
+    'rest': Program(
+        'box_contact_ros.reports.rest.rest_report', ('sim', 'report'),
+        'drops, slopes, pushes and stacks against results stated beforehand, and MuJoCo beside'),
     'paper': Program(
         'box_contact_ros.reports.paper.paper_tables', ('report',),
         "redo the source paper's tables, with its figures and ours"),

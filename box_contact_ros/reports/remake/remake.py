@@ -57,6 +57,7 @@ REPORTS = (
         '--out', OUT)),
     Report(name='fuzz', minutes=4.0, arguments=('fuzz', '--out', f'{OUT}/fuzz.csv')),
     Report(name='landing', minutes=7.0, arguments=('landing', '--out', OUT)),
+    Report(name='rest', minutes=5.0, arguments=('rest', '--out', OUT)),
     Report(name='frontier', minutes=7.0, arguments=('frontier', '--out', OUT)),
     Report(name='speed', minutes=2.1, arguments=('frontier', '--speed', '--out', OUT)),
     Report(name='paper', minutes=2.7, arguments=('paper', '--out', f'{OUT}/paper_tables.md')),

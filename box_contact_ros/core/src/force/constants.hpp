@@ -14,7 +14,7 @@
 namespace box_contact::detail {
 
 // Ω·T of a held patch [1], T the latency and half a period. It is stable up to 3 to 4.
-constexpr double patch_delay_limit = 2.0;
+constexpr double patch_delay_limit = 2.5;
 // Ω·step of a held patch [1], step the time between two evaluations.
 constexpr double step_limit = 0.45;
 // Ω·T of a held wrench [1]: it is that late on average, and lateness feeds energy in.
@@ -26,6 +26,10 @@ constexpr double least_penetration = 5e-4, least_penetration_predicted = 1e-5;
 constexpr double standard_gravity = 9.81;  // [m/s²]
 
 constexpr double damping_ratio = 1.2, damping_ratio_predicted = 0.8;
+// Rocking is resisted by the turn of the last `lean_time` [s], too, beside all of the turn: so much
+// more stiffly [1], and no more than Ω·step of both together allows. It gives way at this share of the
+// pressure [1], or a body that falls onto its face would be thrown back.
+constexpr double lean_time = 0.05, lean_limit = 10.0, lean_step_limit = 0.8, lean_yield = 0.3;
 // Share of the depth at rest from which on the damper is whole [1].
 constexpr double whole_damper_depth = 0.02;
 // Share of the speed √(2·g·depth), which gravity would stop at the surface, at which a load may be
@@ -37,26 +41,34 @@ constexpr double carried_time = 0.1;
 constexpr double tangential_share = 0.1;
 constexpr double tangential_damping_ratio = 1.0;
 // The modulus falls at once to what the loop bears, and rises with this time constant [s] ...
-constexpr double rise_time = 1.0;
+constexpr double rise_time = 0.5;
 // ... up to this share of it [1], so that at rest it is constant.
 constexpr double steady_share = 0.98;
 
 struct LawConstants {
   double frequency;  // Ω [1/s]: no oscillation on a patch is faster
-  double damping_ratio;
+  double damping_ratio, tangential_damping_ratio;
   double held;    // H [s]: how long a wrench acts, lateness included
   double period;  // from one evaluation to the next [s]
   double rise;    // share of what a modulus lacks that it gains per answer [1]
   double friction, gravity;
+  double lean = 0.0;    // stiffness against the turn of late, by that against all of it [1]
+  double forget = 1.0;  // share of the turn of late that is forgotten per evaluation [1]
 };
 
 inline LawConstants constants_for(const bc_loop& loop) {
   double period = 1.0 / loop.rate, late = 0.5 * period + loop.latency;
-  LawConstants law{0.0, damping_ratio, period, period, std::min(1.0, period / rise_time),
+  LawConstants law{0.0, damping_ratio, tangential_damping_ratio, period, period, std::min(1.0, period / rise_time),
                    loop.friction, loop.gravity};
   if (loop.use == BC_HELD_PATCH) {
     law.frequency = std::min(patch_delay_limit / late, step_limit / loop.step);
     law.held = law.period = loop.step;
+    double unit = law.frequency * loop.step, leaning = lean_step_limit / unit;
+    // Slow modes of a stack decay by ζ·ω²/Ω: dampers are as large as the step allows.
+    law.damping_ratio *= step_limit / unit;
+    law.tangential_damping_ratio *= step_limit / unit;
+    law.lean = std::min(lean_limit, leaning * leaning - 1.0);
+    law.forget = std::min(1.0, loop.step / lean_time);
   } else if (loop.use == BC_HELD_WRENCH) {
     law.frequency = std::min({std::sqrt(standard_gravity / least_penetration),
                               wrench_delay_limit / late,

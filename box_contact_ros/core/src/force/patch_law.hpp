@@ -7,10 +7,14 @@
 // overlap, and how the bodies have moved since they were asked for, give the resultant:
 //
 //     1. Pressure   P = κ·V' + b·v_c              along −n at c, on body A
-//     2. Rocking    κ·A·C_t·(n × θ) × n           by the turn θ since then, and so for its damper
+//     2. Rocking    κ·A·C_t·(n × (θ + ρ·ψ)) × n   by the turn θ since then, and so for its damper
 //     3. Friction   k_t·u + c_t·slip at c         u: an anchor that follows the slip
-//        Torsion    k_t·r·φ + c_t·r·spin about n  φ: its turn; both within √(f² + m²) ≤ μ·P
+//        Torsion    k_t·r·φ + c_t·r·spin about n  φ: its turn; both within f² + m² + a·f²·m² ≤ 1
+//                                                 by μ·P, a: how square the patch is
 //
+// ψ is the turn of late: ψ' = θ' − ψ / `lean_time`. Together with θ it is a spring beside a spring and
+// damper in line, which takes energy out of the slow sway of stacks, where a damper alone would have
+// to be stiffer than the step allows.
 // V' = V + A·δ, δ how much deeper the bodies are by now. v_c is the closing speed at c. κ = Ω² / w,
 // w the largest eigenvalue of M⁻¹K of the bodies on a foundation of modulus 1, so no oscillation is
 // faster than Ω. docs/explanation/force.md derives all of this.
@@ -43,6 +47,7 @@ struct Patch {
   bool is_anchored = false;
   Vec<double> anchor{};          // u [m], in the tangent plane
   double anchor_turn = 0.0;      // φ [rad]
+  Vec<double> lean{};            // ψ [rad]
   double anchor_stiffness = 0.0; // k_t when they were last changed [N/m]
   double carried_force = 0.0;    // the pressing force, averaged over `carried_time` [N]
   bc_wrench on_a{};              // at the last evaluation
@@ -233,6 +238,7 @@ class PatchLaw {
     if (!(push > 0.0)) {
       patch.anchor = {0.0, 0.0, 0.0};
       patch.anchor_turn = 0.0;
+      patch.lean = {0.0, 0.0, 0.0};
       patch.anchor_stiffness = stiffness;
       patch.is_anchored = true;
       return false;
@@ -243,9 +249,18 @@ class PatchLaw {
     Vec<double> grip = friction(patch, slip, dot(relative.spin, n), law_.friction * push, about);
     force = -(push * n) - grip;
     Vec<double> damped = rocking(shape, n, damping * cross(n, relative.spin), share);
-    Vec<double> tilted = rocking(shape, n, cross(n, relative.turned), depth);
+    lean(patch, relative, depth);
+    Vec<double> tilted = rocking(shape, n, cross(n, relative.turned + law_.lean * patch.lean), depth);
     torque = -(about * n) - cut * (elastic * damped + patch.modulus * shape.area * tilted);
     return true;
+  }
+
+  // Follow the turn of late. The spring gives way at a share of the pressure.
+  void lean(Patch& patch, const Relative& relative, double depth) const {
+    patch.lean = (1.0 - law_.forget) * patch.lean + relative.spun;
+    double at_rim = law_.lean * rim(patch.shape, cross(patch.normal, patch.lean));
+    double most = detail::lean_yield * std::max(0.0, depth);
+    if (at_rim > most) patch.lean = (most / at_rim) * patch.lean;
   }
 
   // Move the anchor by the way that A's point under the patch has gone since the last evaluation.
@@ -279,14 +294,18 @@ class PatchLaw {
     Vec<double> force = stiffness * patch.anchor;
     double torsion = stiffness * radius * patch.anchor_turn;  // by the radius [N]
     // First the springs alone, which give way; then with their dampers.
-    auto over = [&] { return std::sqrt(dot(force, force) + torsion * torsion) / limit; };
+    auto over = [&] {
+      double slide = dot(force, force), turn = torsion * torsion, both = slide + turn;
+      double dent = 4.0 * patch.shape.dent * slide * turn;
+      return std::sqrt(0.5 * (both + std::sqrt(both * both + dent))) / limit;
+    };
     if (double beyond = over(); beyond > 1.0) {
       patch.anchor = (1.0 / beyond) * patch.anchor;
       patch.anchor_turn /= beyond;
       force = (1.0 / beyond) * force;
       torsion /= beyond;
     }
-    double damper = 2.0 * detail::tangential_damping_ratio * stiffness /
+    double damper = 2.0 * law_.tangential_damping_ratio * stiffness /
                     (law_.frequency * std::sqrt(detail::tangential_share));
     force = force + damper * slip;
     torsion += damper * radius * spin;
@@ -303,10 +322,13 @@ class PatchLaw {
   // cut to that.
   static Vec<double> rocking(const PatchShape& shape, const Vec<double>& n,
                              const Vec<double>& slope, double least) {
-    Vec<double> spread = shape.covariance * slope;
-    double at_rim = std::sqrt(3.0 * std::max(0.0, dot(slope, spread)));
+    double at_rim = rim(shape, slope);
     double kept = at_rim > least ? std::max(0.0, least) / at_rim : 1.0;
-    return kept * cross(spread, n);
+    return kept * cross(shape.covariance * slope, n);
+  }
+
+  static double rim(const PatchShape& shape, const Vec<double>& slope) {
+    return std::sqrt(3.0 * std::max(0.0, dot(slope, shape.covariance * slope)));
   }
 
   static void add(bc_wrench& sum, const bc_wrench& wrench) {

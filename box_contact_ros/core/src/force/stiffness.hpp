@@ -19,12 +19,17 @@ constexpr double least_aspect = 1e-7;
 // Between them linear in 2·√(e₁·e₂) / (e₁ + e₂), to 1 %.
 constexpr double radius_of_line = 0.866025403784438647, radius_of_square = 0.937082;
 
+// Friction and torsion together are less than on an ellipsoid: f² + m² + a·f²·m² ≤ 1, with this `a`
+// of a square [1], and of others by the square of their squareness. Of a line, a = 0.
+constexpr double dent_of_square = 0.45;
+
 // What of an overlap does not depend on any body.
 struct PatchShape {
   Mat<double> covariance;  // within the tangent plane [m²]
   double area;             // 12·√(e₁·e₂) of its eigenvalues [m²]: exact for a rectangle
   double spread;           // e₁ + e₂ [m²]
   double radius;           // at which friction resists spin [m]
+  double dent;             // of the limit surface of friction [1]
 };
 
 inline PatchShape shape_of(const bc_contact& contact) {
@@ -43,7 +48,8 @@ inline PatchShape shape_of(const bc_contact& contact) {
   double middle = std::sqrt(std::max(0.0, product));
   double squareness = spread > 0.0 ? std::min(1.0, 2.0 * middle / spread) : 1.0;
   double radius = radius_of_line + (radius_of_square - radius_of_line) * squareness;
-  return {c, 12.0 * std::max(middle, least_aspect * spread), spread, radius * std::sqrt(spread)};
+  return {c, 12.0 * std::max(middle, least_aspect * spread), spread, radius * std::sqrt(spread),
+          dent_of_square * squareness * squareness};
 }
 
 // A symmetric matrix (6, 6) of a body's motions, scaled so that its mass matrix is 1.
