@@ -3,11 +3,11 @@
 
 /* A load that is dropped on a stack and pushed aside, by the C interface of the law. Prints where it
  * ends as hexadecimal floats: test_library.py has the same loop in Python. */
+#include "box_contact/force.h"
+
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-
-#include "box_contact/force.h"
 
 static int failures = 0;
 

@@ -239,7 +239,8 @@ def test_a_bounce_never_gains_energy():
 def test_a_held_patch_is_the_contact_of_the_new_pose(way, turn):
     """The load moves by some micrometres: the old patch gives the wrench of a new question.
 
-    Wrenches are divided by κ, which a new question finds anew.
+    Wrenches are divided by κ, which a new question finds anew. What resists the turn of late has
+    been forgotten after a second.
     """
     solver = ContactSolver(SIZE, SIZE, model='exact')
     stack = LEVEL - [0, 0, SIZE[2] - SUNK, 0, 0, 0, 0]
@@ -247,7 +248,8 @@ def test_a_held_patch_is_the_contact_of_the_new_pose(way, turn):
     held, asked = fresh(friction=0.0), fresh(friction=0.0)
     old, new = solver(LEVEL, stack), solver(pose, stack)
     modulus = wrench_of(old, law=held)[2] / old.volume
-    one = held.wrench(pose, STILL) / modulus
+    for _ in range(1000):
+        one = held.wrench(pose, STILL) / modulus
     other = wrench_of(new, pose, law=asked)
     other /= other[2] / new.volume
     assert one[2] == pytest.approx(other[2], rel=1e-3)
@@ -271,6 +273,33 @@ def test_a_patch_goes_with_what_carries_it():
         assert law.wrenches(later, [velocity, velocity]) == pytest.approx(first, rel=1e-9, abs=1e-2)
 
 
+def test_the_turn_of_late_is_resisted_and_forgotten():
+    """A small turn meets 1 + ρ of the elastic moment, ρ = (0.8 / (Ω·step))² − 1 and at most 10.
+
+    It decays with 50 ms to the elastic moment alone.
+    """
+    law, turn = fresh(friction=0.0), (0, 1e-8, 0)
+    law.hold(slab(), LEVEL)
+    law.wrench(LEVEL, STILL)
+    moments = [law.wrench(moved(LEVEL, turn=turn), STILL)[4] for _ in range(1000)]
+    rho = min(10.0, (0.8 / (OMEGA * STEP))**2 - 1.0)
+    assert rho > 1.0
+    assert moments[0] / moments[-1] == pytest.approx(1.0 + rho, rel=1e-3)
+    assert moments[50] / moments[-1] == pytest.approx(1.0 + rho * (1.0 - STEP / 0.05)**50, rel=1e-3)
+
+
+@pytest.mark.parametrize('latency', [0.0, 0.005, 0.02])
+def test_dampers_are_as_large_as_the_step_allows(latency):
+    """b = 2·ζ·Ω·m with ζ = 1.2·0.45 / (Ω·step): slow modes of stacks decay by ζ·ω²/Ω."""
+    law = fresh(latency=latency)
+    sunk = GRAVITY / law.frequency**2
+    speed = 1e-7
+    law.hold(slab(depth=sunk), LEVEL)
+    still, closing = (law.wrench(LEVEL, velocity)[2]
+                      for velocity in (STILL, moving(linear=(0, 0, -speed))))
+    assert (closing - still) / speed == pytest.approx(2.0 * 1.2 * 0.45 / STEP * MASS, rel=1e-4)
+
+
 def test_the_modulus_falls_at_once_and_rises_slowly():
     """A patch that halves keeps κ at first; κ doubles with the time constant, nearly to the end.
 
@@ -286,7 +315,7 @@ def test_the_modulus_falls_at_once_and_rises_slowly():
     assert modulus(half) == pytest.approx(small, rel=0.01)
     for _ in range(200):
         at_1_s = modulus(half)
-    assert at_1_s / small == pytest.approx(2.0 * 0.98 - 0.96 * math.exp(-1.0), rel=0.01)
+    assert at_1_s / small == pytest.approx(2.0 * 0.98 - 0.96 * math.exp(-2.0), rel=0.01)
     for _ in range(3000):
         modulus(half)
     assert modulus(half) / small == pytest.approx(2.0 * 0.98, rel=1e-6)
@@ -358,14 +387,17 @@ def test_torsion_is_coulombs_sum_over_the_face(length, width):
 
 @pytest.mark.parametrize('seed', range(5))
 def test_slip_and_spin_share_one_limit(seed):
-    """√(f² + (m/r)²) = μ·P for any fast slip with any spin."""
+    """f² + (m/r)² + a·f²·(m/r)² = 1, by μ·P, for any fast slip with any spin."""
     random = np.random.default_rng(seed)
     velocity = moving(linear=[*random.uniform(-1, 1, 2), 0], angular=[0, 0, random.uniform(-1, 1)])
     patch = slab(centre=(1.0, 2.0, 1.7))
     wrench = wrench_of(patch, velocity=velocity)
     radius = -wrench_of(patch, velocity=moving(angular=(0, 0, 1.0)))[5] / (0.5 * WEIGHT)
-    force = math.hypot(wrench[0], wrench[1], wrench[5] / radius)
-    assert force == pytest.approx(0.5 * WEIGHT, rel=1e-9)
+    force, torsion = (np.square([math.hypot(*wrench[:2]), wrench[5] / radius])
+                      / (0.5 * WEIGHT)**2)
+    squareness = 2.0 * 12.0 * 2.4 / (12.0**2 + 2.4**2)
+    dent = 0.45 * squareness**2
+    assert force + torsion + dent * force * torsion == pytest.approx(1.0, rel=1e-9)
     assert wrench[:2] @ velocity[:2] < 0.0 and wrench[5] * velocity[5] < 0.0
 
 

@@ -578,7 +578,8 @@ MUTANTS = {
         LAW, 'patch.volume + shape.area * relative.deeper', 'patch.volume',
         f'{TEST_LAW} -k contact_of_the_new_pose'),
     'a held patch that does not tilt': Mutant(
-        LAW, 'cross(n, relative.turned), depth)', 'cross(n, 0.0 * relative.turned), depth)',
+        LAW, 'cross(n, relative.turned + law_.lean * patch.lean)',
+        'cross(n, law_.lean * patch.lean)',
         f'{TEST_LAW} -k contact_of_the_new_pose'),
     'a patch that stays where its carrier was': Mutant(
         LAW, 'if (!is_free(body) || both) found.point', 'if (both) found.point',
@@ -593,15 +594,20 @@ MUTANTS = {
         LAW, 'if (stiffness > patch.anchor_stiffness) {', 'if (false) {',
         f'{TEST_LAW} -k gains_no_energy'),
     'slip and spin have a limit each': Mutant(
-        LAW, 'std::sqrt(dot(force, force) + torsion * torsion) / limit',
-        'std::sqrt(dot(force, force)) / limit', f'{TEST_LAW} -k one_limit'),
+        LAW, 'turn = torsion * torsion, both', 'turn = 0.0, both', f'{TEST_LAW} -k one_limit'),
     'the radius of gyration for that of friction': Mutant(
-        STIFFNESS, 'radius * std::sqrt(spread)};', 'std::sqrt(spread)};',
+        STIFFNESS, 'radius * std::sqrt(spread),', 'std::sqrt(spread),',
         f'{TEST_LAW} -k coulombs_sum'),
     'a pair is known by its place': Mutant(
         LAW, 'const Patch* old = held(touch.pair);',
         'const Patch* old = next_.size() < patches_.size() ? &patches_[next_.size()] : nullptr;',
         f'{TEST_LAW} -k by_its_name'),
+    'the turn of late is never forgotten': Mutant(
+        LAW, '(1.0 - law_.forget) * patch.lean', 'patch.lean', f'{TEST_LAW} -k turn_of_late'),
+    'dampers smaller than the step allows': Mutant(
+        CONSTANTS, 'law.damping_ratio *= step_limit / unit;', '', f'{TEST_LAW} -k step_allows'),
+    'a limit surface without its dent': Mutant(
+        STIFFNESS, 'dent_of_square = 0.45', 'dent_of_square = 0.0', f'{TEST_LAW} -k one_limit'),
     'two free bodies as stiff as one': Mutant(
         LAW, 'is_free(patch.b) ? 2.0 : 1.0', 'is_free(patch.b) ? 1.0 : 1.0',
         f'{TEST_LAW} -k half_the_modulus'),

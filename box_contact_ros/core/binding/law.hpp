@@ -76,7 +76,8 @@ inline PyObject* law_new(PyTypeObject* type, PyObject* args, PyObject*) {
   Array<double> mass, inertia, centre;
   if (!read(masses, "mass", {any_length}, mass)) return nullptr;
   npy_intp count = mass.length(0);
-  if (!read(inertias, "inertia", {count, 3}, inertia) || !read(centres, "centre", {count, 3}, centre))
+  if (!read(inertias, "inertia", {count, 3}, inertia) ||
+      !read(centres, "centre", {count, 3}, centre))
     return nullptr;
   std::vector<bc_body> bodies(static_cast<size_t>(count), bc_body{});
   for (npy_intp k = 0; k < count; ++k) {
@@ -163,9 +164,11 @@ inline PyObject* law_frequency(PyObject* self, void*) {
 
 inline PyMethodDef law_methods[] = {
     {"hold", fastcall(law_hold), METH_FASTCALL,
-     "hold(touches, poses)\n--\n\nHold contacts: touches (pair, a, b, Contact), asked for at poses."},
+     "hold(touches, poses)\n--\n\nHold contacts: touches (pair, a, b, Contact), asked for at "
+     "poses."},
     {"wrenches", fastcall(law_wrenches), METH_FASTCALL,
-     "wrenches(poses, velocities)\n--\n\nReturn the wrenches (bodies, 6) at (bodies, 7), (bodies, 6)."},
+     "wrenches(poses, velocities)\n--\n\nReturn the wrenches (bodies, 6) at (bodies, 7), (bodies, "
+     "6)."},
     {"pair_wrench", law_pair_wrench, METH_O,
      "pair_wrench(pair)\n--\n\nReturn the wrench (6,) on box A of a pair at the last evaluation."},
     {"reset", law_reset, METH_NOARGS, "reset()\n--\n\nForget all patches."},

@@ -422,7 +422,8 @@ PyCFunction with_keywords(PyCFunctionWithKeywords function) {
 PyMethodDef solver_methods[] = {
     {"solve", fastcall(solver_solve), METH_FASTCALL,
      "solve(poses_a, poses_b, sizes_a, sizes_b, threads, patch=True, pairs=None)\n--\n\n"
-     "Return (colliding, separation, normal, point, volume, covariance, axis), and the first refused "
+     "Return (colliding, separation, normal, point, volume, covariance, axis), and the first "
+     "refused "
      "row or -1.\n\n"
      "poses (m, 7), sizes (m, 3) or (1, 3) full extents [m]; frame: that of the poses. pairs (n, "
      "2): "

@@ -14,7 +14,7 @@
 namespace box_contact::detail {
 
 // Ω·T of a held patch [1], T the latency and half a period. It is stable up to 3 to 4.
-constexpr double patch_delay_limit = 2.5;
+constexpr double patch_delay_limit = 2.0;
 // Ω·step of a held patch [1], step the time between two evaluations.
 constexpr double step_limit = 0.45;
 // Ω·T of a held wrench [1]: it is that late on average, and lateness feeds energy in.
@@ -58,7 +58,8 @@ struct LawConstants {
 
 inline LawConstants constants_for(const bc_loop& loop) {
   double period = 1.0 / loop.rate, late = 0.5 * period + loop.latency;
-  LawConstants law{0.0, damping_ratio, tangential_damping_ratio, period, period, std::min(1.0, period / rise_time),
+  LawConstants law{0.0,           damping_ratio, tangential_damping_ratio,
+                   period,        period,        std::min(1.0, period / rise_time),
                    loop.friction, loop.gravity};
   if (loop.use == BC_HELD_PATCH) {
     law.frequency = std::min(patch_delay_limit / late, step_limit / loop.step);
@@ -70,9 +71,9 @@ inline LawConstants constants_for(const bc_loop& loop) {
     law.lean = std::min(lean_limit, leaning * leaning - 1.0);
     law.forget = std::min(1.0, loop.step / lean_time);
   } else if (loop.use == BC_HELD_WRENCH) {
-    law.frequency = std::min({std::sqrt(standard_gravity / least_penetration),
-                              wrench_delay_limit / late,
-                              damper_limit / (2.0 * damping_ratio * period)});
+    law.frequency =
+        std::min({std::sqrt(standard_gravity / least_penetration), wrench_delay_limit / late,
+                  damper_limit / (2.0 * damping_ratio * period)});
     law.held = period + loop.latency;
   } else {
     law.frequency = std::min(std::sqrt(standard_gravity / least_penetration_predicted),

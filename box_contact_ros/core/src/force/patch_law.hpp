@@ -45,29 +45,33 @@ struct Patch {
   double mass;     // that resists at the point along the normal [kg]
 
   bool is_anchored = false;
-  Vec<double> anchor{};          // u [m], in the tangent plane
-  double anchor_turn = 0.0;      // φ [rad]
-  Vec<double> lean{};            // ψ [rad]
-  double anchor_stiffness = 0.0; // k_t when they were last changed [N/m]
-  double carried_force = 0.0;    // the pressing force, averaged over `carried_time` [N]
-  bc_wrench on_a{};              // at the last evaluation
+  Vec<double> anchor{};           // u [m], in the tangent plane
+  double anchor_turn = 0.0;       // φ [rad]
+  Vec<double> lean{};             // ψ [rad]
+  double anchor_stiffness = 0.0;  // k_t when they were last changed [N/m]
+  double carried_force = 0.0;     // the pressing force, averaged over `carried_time` [N]
+  bc_wrench on_a{};               // at the last evaluation
 };
 
 // What two bodies do at a patch, seen from B.
 struct Relative {
-  Vec<double> point;      // of the patch, by now
-  double deeper;          // than when it was asked for [m]
-  Vec<double> turned;     // θ, since it was asked for
-  Vec<double> slid, spun; // since the last evaluation [m], [rad]
-  Vec<double> carrier;    // turn of what the anchor is fixed to, since the last evaluation
+  Vec<double> point;        // of the patch, by now
+  double deeper;            // than when it was asked for [m]
+  Vec<double> turned;       // θ, since it was asked for
+  Vec<double> slid, spun;   // since the last evaluation [m], [rad]
+  Vec<double> carrier;      // turn of what the anchor is fixed to, since the last evaluation
   Vec<double> speed, spin;  // [m/s], [rad/s]
 };
 
 class PatchLaw {
  public:
   PatchLaw(std::vector<Body> bodies, const LawConstants& constants)
-      : bodies_(std::move(bodies)), law_(constants), places_(bodies_.size()),
-        last_(bodies_.size()), normal_(bodies_.size()), shear_(bodies_.size()) {}
+      : bodies_(std::move(bodies)),
+        law_(constants),
+        places_(bodies_.size()),
+        last_(bodies_.size()),
+        normal_(bodies_.size()),
+        shear_(bodies_.size()) {}
 
   const std::vector<Body>& bodies() const { return bodies_; }
   const LawConstants& constants() const { return law_; }
@@ -119,8 +123,7 @@ class PatchLaw {
 
  private:
   void place(const bc_pose* poses) {
-    for (size_t k = 0; k < bodies_.size(); ++k)
-      places_[k] = placed_at(poses[k], bodies_[k].centre);
+    for (size_t k = 0; k < bodies_.size(); ++k) places_[k] = placed_at(poses[k], bodies_[k].centre);
   }
   bool is_free(int body) const { return body >= 0 && bodies_[body].is_free(); }
 
@@ -250,7 +253,8 @@ class PatchLaw {
     force = -(push * n) - grip;
     Vec<double> damped = rocking(shape, n, damping * cross(n, relative.spin), share);
     lean(patch, relative, depth);
-    Vec<double> tilted = rocking(shape, n, cross(n, relative.turned + law_.lean * patch.lean), depth);
+    Vec<double> tilted =
+        rocking(shape, n, cross(n, relative.turned + law_.lean * patch.lean), depth);
     torque = -(about * n) - cut * (elastic * damped + patch.modulus * shape.area * tilted);
     return true;
   }

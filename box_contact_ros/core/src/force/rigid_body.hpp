@@ -47,7 +47,8 @@ inline Mat<double> vector3(const double (&numbers)[3][3]) {
 
 // Two unit vectors across a unit normal.
 inline void tangents(const Vec<double>& n, Vec<double>& t1, Vec<double>& t2) {
-  Vec<double> aside = std::fabs(n[0]) < 0.6 ? Vec<double>{1.0, 0.0, 0.0} : Vec<double>{0.0, 1.0, 0.0};
+  Vec<double> aside =
+      std::fabs(n[0]) < 0.6 ? Vec<double>{1.0, 0.0, 0.0} : Vec<double>{0.0, 1.0, 0.0};
   t1 = cross(n, aside);
   t1 = (1.0 / length(t1)) * t1;
   t2 = cross(n, t1);

@@ -42,8 +42,9 @@ inline PatchShape shape_of(const bc_contact& contact) {
     for (int i = 0; i < 3; ++i) c[i][j] = spread[i];
   }
   // e₁·e₂ is the sum of the three principal minors of two rows.
-  double product = ((c[0][0] * c[1][1] - c[0][1] * c[1][0]) + (c[1][1] * c[2][2] - c[1][2] * c[2][1])) +
-                   (c[2][2] * c[0][0] - c[2][0] * c[0][2]);
+  double product =
+      ((c[0][0] * c[1][1] - c[0][1] * c[1][0]) + (c[1][1] * c[2][2] - c[1][2] * c[2][1])) +
+      (c[2][2] * c[0][0] - c[2][0] * c[0][2]);
   double spread = std::max(0.0, (c[0][0] + c[1][1]) + c[2][2]);
   double middle = std::sqrt(std::max(0.0, product));
   double squareness = spread > 0.0 ? std::min(1.0, 2.0 * middle / spread) : 1.0;

@@ -38,8 +38,8 @@ bc_status read_body(const bc_body& given, int64_t place, std::vector<Body>& bodi
   if (moves && !is_positive(given.mass))
     return fail(BC_BAD_ARGUMENT, "mass of body %lld must be positive, or 0, not %g",
                 (long long)place, given.mass);
-  Body body{moves ? 1.0 / given.mass : 0.0, {0.0, 0.0, 0.0}, force::vector(given.centre),
-            given.compound};
+  Body body{
+      moves ? 1.0 / given.mass : 0.0, {0.0, 0.0, 0.0}, force::vector(given.centre), given.compound};
   for (int k = 0; k < 3; ++k) {
     if (moves && !is_positive(given.inertia[k]))
       return fail(BC_BAD_ARGUMENT, "inertia of body %lld must be positive, not %g",
@@ -75,12 +75,14 @@ bc_status check_loop(const bc_loop& loop) {
 // centre of mass, and the contact lies between that plane and one a depth behind it.
 bool is_outward(const bc_contact& contact, const Body& body, const bc_pose& pose, double sign) {
   force::Placed placed = force::placed_at(pose, body.centre);
-  double outward = dot(force::vector(contact.point) - placed.position, force::vector(contact.normal));
+  double outward =
+      dot(force::vector(contact.point) - placed.position, force::vector(contact.normal));
   // Half a depth more, for models whose point is not exact.
   return body.compound || sign * outward >= 1.5 * contact.separation;
 }
 
-bc_status check_touch(const bc_touch& touch, const std::vector<Body>& bodies, const bc_pose* poses) {
+bc_status check_touch(const bc_touch& touch, const std::vector<Body>& bodies,
+                      const bc_pose* poses) {
   const bc_contact& contact = touch.contact;
   auto pair = (long long)touch.pair;
   int64_t count = int64_t(bodies.size());
@@ -103,10 +105,11 @@ bc_status check_touch(const bc_touch& touch, const std::vector<Body>& bodies, co
     return fail(BC_BAD_ARGUMENT, "pair %lld: normal or point is not finite", pair);
   for (auto [body, sign, side] : {std::tuple{touch.a, 1.0, 'A'}, {touch.b, -1.0, 'B'}})
     if (body >= 0 && !is_outward(contact, bodies[size_t(body)], poses[body], sign))
-      return fail(BC_BAD_ARGUMENT,
-                  "pair %lld: the normal points %s body %d, which is box %c: change a and b, or ask "
-                  "for the contact with the boxes in this order",
-                  pair, side == 'A' ? "into" : "out of", int(body), side);
+      return fail(
+          BC_BAD_ARGUMENT,
+          "pair %lld: the normal points %s body %d, which is box %c: change a and b, or ask "
+          "for the contact with the boxes in this order",
+          pair, side == 'A' ? "into" : "out of", int(body), side);
   return BC_OK;
 }
 
