@@ -43,8 +43,9 @@ constexpr double carried_time = 0.1;
 // Share of Ω² that the tangential springs take [1]. 0.5 makes tall boxes jitter.
 constexpr double tangential_share = 0.1;
 constexpr double tangential_damping_ratio = 1.0;
-// The modulus falls at once to what the loop bears, and rises with this time constant [s] ...
-constexpr double rise_time = 1.0;
+// The modulus falls at once to what the loop bears, and rises with this time constant [s], of
+// held patches with the second ...
+constexpr double rise_time = 1.0, patch_rise_time = 0.5;
 // ... up to this share of it [1], so that at rest it is constant.
 constexpr double steady_share = 0.98;
 
@@ -66,6 +67,7 @@ inline LawConstants constants_for(const bc_loop& loop) {
   if (loop.use == BC_HELD_PATCH) {
     law.frequency = std::min(patch_delay_limit / late, step_limit / loop.step);
     law.held = law.period = loop.step;
+    law.rise = std::min(1.0, period / patch_rise_time);
     double unit = law.frequency * loop.step, leaning = lean_step_limit / unit;
     // Slow modes of a stack decay by ζ·ω²/Ω: dampers are as large as the step allows.
     double larger = std::min(damping_growth_limit, step_limit / unit);
