@@ -327,7 +327,7 @@ def topples() -> list[RestCase]:
             turning = np.array([0.0, math.sqrt(2.0 * needed / about_edge), 0.0])
             pushed = replace(load, velocity=(*np.cross(turning, arm), *turning))
             # So rough that the edge does not slip.
-            setup = Setup(parts=(FLOOR, pushed), seconds=30.0 if share < 1.0 else 8.0, friction=2.0)
+            setup = Setup(parts=(FLOOR, pushed), seconds=40.0 if share < 1.0 else 8.0, friction=2.0)
             cases.append(RestCase(
                 'topple', f'{name}, {share:g} of the energy that topples it',
                 'stands' if share < 1.0 else 'falls on its side', setup,

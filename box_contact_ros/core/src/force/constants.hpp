@@ -26,10 +26,13 @@ constexpr double least_penetration = 5e-4, least_penetration_predicted = 1e-5;
 constexpr double standard_gravity = 9.81;  // [m/s²]
 
 constexpr double damping_ratio = 1.2, damping_ratio_predicted = 0.8;
+// How many times as large as for Ω the dampers of held patches may be [1]: with 4, a load that is
+// pressed in at 50 Hz and 5 ms comes up with a time constant of 70 ms.
+constexpr double damping_growth_limit = 4.0;
 // Rocking is resisted by the turn of the last `lean_time` [s], too, beside all of the turn: so much
 // more stiffly [1], and no more than Ω·step of both together allows. It gives way at this share of the
 // pressure [1], or a body that falls onto its face would be thrown back.
-constexpr double lean_time = 0.05, lean_limit = 10.0, lean_step_limit = 0.8, lean_yield = 0.3;
+constexpr double lean_time = 0.05, lean_limit = 10.0, lean_step_limit = 0.8, lean_yield = 0.15;
 // Share of the depth at rest from which on the damper is whole [1].
 constexpr double whole_damper_depth = 0.02;
 // Share of the speed √(2·g·depth), which gravity would stop at the surface, at which a load may be
@@ -40,8 +43,9 @@ constexpr double carried_time = 0.1;
 // Share of Ω² that the tangential springs take [1]. 0.5 makes tall boxes jitter.
 constexpr double tangential_share = 0.1;
 constexpr double tangential_damping_ratio = 1.0;
-// The modulus falls at once to what the loop bears, and rises with this time constant [s] ...
-constexpr double rise_time = 0.5;
+// The modulus falls at once to what the loop bears, and rises with this time constant [s], of
+// held patches with the second ...
+constexpr double rise_time = 1.0, patch_rise_time = 0.5;
 // ... up to this share of it [1], so that at rest it is constant.
 constexpr double steady_share = 0.98;
 
@@ -64,10 +68,12 @@ inline LawConstants constants_for(const bc_loop& loop) {
   if (loop.use == BC_HELD_PATCH) {
     law.frequency = std::min(patch_delay_limit / late, step_limit / loop.step);
     law.held = law.period = loop.step;
+    law.rise = std::min(1.0, period / patch_rise_time);
     double unit = law.frequency * loop.step, leaning = lean_step_limit / unit;
     // Slow modes of a stack decay by ζ·ω²/Ω: dampers are as large as the step allows.
-    law.damping_ratio *= step_limit / unit;
-    law.tangential_damping_ratio *= step_limit / unit;
+    double larger = std::min(damping_growth_limit, step_limit / unit);
+    law.damping_ratio *= larger;
+    law.tangential_damping_ratio *= larger;
     law.lean = std::min(lean_limit, leaning * leaning - 1.0);
     law.forget = std::min(1.0, loop.step / lean_time);
   } else if (loop.use == BC_HELD_WRENCH) {
