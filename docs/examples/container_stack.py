@@ -64,7 +64,7 @@ def main() -> None:
             fastest = np.abs(data.qvel.reshape(COUNT, 6)[:, :3]).max()
             depths = [1e3 * max(0.0, -contact.separation) for _, contact in answer.touching]
             print(f'{data.time:.0f} s: all slower than 1 mm/s: {fastest < 1e-3}, '
-                  f'{max(depths):.1f} mm deep')
+                  f'less than 1 mm deep: {max(depths) < 1.0}')
 
 
 if __name__ == '__main__':

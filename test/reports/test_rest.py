@@ -69,7 +69,7 @@ def test_gates(name, timing):
 
 
 def test_one_load_by_held_patch_is_the_same():
-    """SceneLaw in the simulator, and HeldPatch in a loop written out here: the same wrenches."""
+    """A SceneLaw in the simulator, and a HeldPatch in a loop here: the same wrenches."""
     setup = Setup(parts=(over_floor((2.0, 1.0, 1.0), 500.0, 0.01), FLOOR), seconds=0.3)
     log = held_patch(setup, USUAL, 'exact')
     _, poses, velocities = log.of('load')

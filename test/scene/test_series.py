@@ -93,9 +93,9 @@ def slopes(one: Pairs, other: Pairs, before: Contacts, after: Contacts) -> np.nd
     """
     size = largest(one)
     depth = np.maximum(-np.maximum(before.separation, after.separation), DEPTH_FLOOR * size)
-    with np.errstate(invalid='ignore'):  # no step at all
-        return (np.linalg.norm(after.point - before.point, axis=1) / pose_steps(one, other)
-                * depth / size)
+    way = pose_steps(one, other)
+    way[way == 0.0] = np.nan  # no step at all, or one that float64 rounds to none
+    return np.linalg.norm(after.point - before.point, axis=1) / way * depth / size
 
 
 def frames(whole: tuple, motions: int) -> tuple:

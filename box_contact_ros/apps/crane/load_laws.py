@@ -44,7 +44,7 @@ class LoadLaw(Protocol):
         """Take the contacts of a state, which act from `due` [s] on."""
 
     def wrench(self, time: float, pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-        """Return the wrench (6,) at `time` [s], a physics step at a time."""
+        """Return force and torque (6,) at `time` [s], a physics step at a time."""
 
 
 class MakeLaw(Protocol):
@@ -59,7 +59,7 @@ class WrenchLaw(Protocol):
 
     def wrench(self, contacts: NamedContacts, pose: np.ndarray, velocity: np.ndarray,
                ) -> np.ndarray:
-        """Return the wrench (6,) of the contacts at the load's pose (7,) and velocity (6,)."""
+        """Return force and torque (6,) of the contacts at this pose (7,) and velocity (6,)."""
 
 
 class PatchesHeld:
@@ -78,7 +78,7 @@ class PatchesHeld:
         self._under_way.answer((contacts, state.pose), asked=state.time, due=due)
 
     def wrench(self, time: float, pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-        """Return the wrench (6,) of the newest patches at this pose and velocity."""
+        """Return force and torque (6,) of the newest patches at this pose and velocity."""
         newest = self._under_way.arrived(time)
         if newest is not None:
             self._law.hold(*newest)
@@ -107,7 +107,7 @@ class WrenchesHeld:
         self._held.answer(wrench, asked=state.time, due=due)
 
     def wrench(self, time: float, pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-        """Return the wrench (6,) that acts, wherever the load is by now."""
+        """Return force and torque (6,) that acts, wherever the load is by now."""
         return self._held.at(time)
 
 

@@ -180,7 +180,7 @@ def at_rest(start: float) -> tuple[Gate, ...]:
 
 
 def quaternion(axis: Sequence[float], degrees: float) -> np.ndarray:
-    """Return the quaternion (4,) x y z w of a turn about an axis (3,)."""
+    """Return x y z w (4,) of a turn about an axis (3,)."""
     half = 0.5 * math.radians(degrees)
     return np.append(math.sin(half) * np.array(axis, dtype=float) / np.linalg.norm(axis),
                      math.cos(half))

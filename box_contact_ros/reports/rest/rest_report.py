@@ -60,7 +60,7 @@ class Figure(NamedTuple):
 
     @property
     def limit(self) -> float:
-        """The most that it may be."""
+        """Return the most that it may be."""
         return self.gate.limit_at(self.run.timing.rate_hz)
 
     @property
@@ -70,7 +70,7 @@ class Figure(NamedTuple):
 
     @property
     def excess(self) -> float:
-        """The figure by its limit; infinite for NaN."""
+        """Return the figure divided by its limit; infinite for NaN."""
         return math.inf if math.isnan(self.value) else self.value / self.limit
 
 

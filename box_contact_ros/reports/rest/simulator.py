@@ -48,7 +48,7 @@ class Part:
 
     @property
     def body(self) -> Body:
-        """The body of a free box of one density, but for where its centre of mass is."""
+        """Return the body of a free box of one density, but for where its centre of mass is."""
         squares = np.square(self.size)
         return Body(mass=self.mass, inertia=self.mass / 12.0 * (squares.sum() - squares),
                     centre=self.centre)
@@ -82,7 +82,7 @@ class Setup:
 
     @cached_property
     def moving(self) -> list[Part]:
-        """The boxes that are not fixed, in their order."""
+        """Return the boxes that are not fixed, in their order."""
         return [part for part in self.parts if part.moves]
 
     def scene(self) -> Scene:

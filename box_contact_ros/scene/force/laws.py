@@ -154,7 +154,7 @@ class HeldPatch:
         _hold_load(self._law, contacts, pose, load)
 
     def wrench(self, pose: ArrayLike, velocity: ArrayLike) -> np.ndarray:
-        """Return the wrench (6,) on the load at `pose` (7,) and `velocity` (6,), a step at a time.
+        """Return force and torque (6,) at `pose` (7,) and `velocity` (6,), a step at a time.
 
         Friction follows the way from one call to the next.
         """
@@ -201,7 +201,7 @@ class PatchLaw:
 
     def wrench(self, contacts: Touches, pose: ArrayLike, velocity: ArrayLike, *,
                load: Literal['a', 'b'] = 'a') -> np.ndarray:
-        """Return the wrench (6,) of the contacts at this pose (7,) and velocity (6,), once a tick.
+        """Return force and torque (6,) of contacts at this pose (7,) and velocity (6,), once a tick.
 
         ValueError as `HeldPatch.hold`.
         """
@@ -270,7 +270,7 @@ class SceneLaw:
             if pair.a in self._free or pair.b in self._free], poses)
 
     def wrenches(self, poses: ArrayLike, velocities: ArrayLike) -> np.ndarray:
-        """Return the wrenches (n, 6) at `poses` (n, 7) and `velocities` (n, 6), once a step.
+        """Return forces and torques (n, 6) at `poses` (n, 7) and `velocities` (n, 6), once a step.
 
         Rows are those of `scene.moving`. Friction follows the way from one call to the next.
         """

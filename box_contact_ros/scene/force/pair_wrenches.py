@@ -45,7 +45,7 @@ class _Motion:
         self.pose, self._stamp = pose, stamp
 
     def velocity(self) -> np.ndarray | None:
-        """Return the mean velocity (6,) since the pose before; None if it is unknown."""
+        """Return the mean motion (6,) since the pose before; None if it is unknown."""
         if self._stamp == NEVER:
             return STILL  # fixed, in the scene or in /tf
         return self._before and velocity_between(self._before[0], self.pose, self._before[1])
