@@ -201,7 +201,7 @@ class PatchLaw:
 
     def wrench(self, contacts: Touches, pose: ArrayLike, velocity: ArrayLike, *,
                load: Literal['a', 'b'] = 'a') -> np.ndarray:
-        """Return force and torque (6,) of contacts at this pose (7,) and velocity (6,), once a tick.
+        """Return force and torque (6,) of contacts at this pose and velocity, once a tick.
 
         ValueError as `HeldPatch.hold`.
         """
