@@ -152,8 +152,7 @@ class CraneScenario:
     @property
     def inertia(self) -> np.ndarray:
         """Principal moments (3,) of the load about its own axes through its centre of mass."""
-        squares = np.square(self.size)
-        return self.mass / 12.0 * (squares.sum() - squares)
+        return np.asarray(Body.of_box(self.size, self.mass).inertia)
 
     @property
     def stack_pose(self) -> np.ndarray:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
 
@@ -49,9 +49,7 @@ class Part:
     @property
     def body(self) -> Body:
         """Return the body of a free box of one density, but for where its centre of mass is."""
-        squares = np.square(self.size)
-        return Body(mass=self.mass, inertia=self.mass / 12.0 * (squares.sum() - squares),
-                    centre=self.centre)
+        return replace(Body.of_box(self.size, self.mass), centre=self.centre)
 
     @property
     def moves(self) -> bool:

@@ -112,22 +112,38 @@ def _named(contacts: Touches) -> Mapping[str, Contact]:
                      f'{type(contacts).__name__}: friction has to know each pair again')
 
 
-def _hold_load(law: native.Law, contacts: Touches, pose: ArrayLike, load: str) -> None:
-    a, b = (0, FIXED) if load == 'a' else (FIXED, 0)
-    hold(law, [(name, id_of(name), a, b, contact) for name, contact in _named(contacts).items()],
-         pose)
+class _LoadLaw:
+    """What the laws of one load share; made by their `for_loop`."""
+
+    def __init__(self, law: native.Law) -> None:
+        """Take over a native law of one body."""
+        self._law = law
+
+    @property
+    def frequency(self) -> float:
+        """Return Ω [1/s]; the load rests at the depth gravity / Ω² on a whole face."""
+        return self._law.frequency
+
+    def reset(self) -> None:
+        """Forget all patches: the load was put elsewhere."""
+        self._law.reset()
+
+    def copy(self) -> Self:
+        """Return a law with the same patches and friction."""
+        return type(self)(self._law.copy())
+
+    def _hold(self, contacts: Touches, pose: ArrayLike, load: str) -> None:
+        a, b = (0, FIXED) if load == 'a' else (FIXED, 0)
+        hold(self._law, [(name, id_of(name), a, b, contact)
+                         for name, contact in _named(contacts).items()], pose)
 
 
-class HeldPatch:
+class HeldPatch(_LoadLaw):
     """The wrench on one load, at every physics step, from the patches of the last answer.
 
     Make it with `for_loop`. A pair is known by its name, so friction remembers it from answer to
     answer, in whichever order they come.
     """
-
-    def __init__(self, law: native.Law) -> None:
-        """Take over a native law of one body; see `for_loop`."""
-        self._law = law
 
     @classmethod
     def for_loop(cls, load: Body, *, rate_hz: float, latency: float = 0.0, step: float = 0.001,
@@ -140,18 +156,13 @@ class HeldPatch:
         return cls(native_law([load], Use.HELD_PATCH, rate_hz=rate_hz, latency=latency, step=step,
                               friction=friction, gravity=gravity))
 
-    @property
-    def frequency(self) -> float:
-        """Return Ω [1/s]; the load rests at the depth gravity / Ω² on a whole face."""
-        return self._law.frequency
-
     def hold(self, contacts: Touches, pose: ArrayLike, *, load: Literal['a', 'b'] = 'a') -> None:
         """Hold the contacts that were asked for with the load at `pose` (7,); forget others.
 
         load: which of its pair's boxes the load is. ValueError: a contact without a patch (`fcl`,
         `soup`, `paper`), or a normal that cannot be meant for this load; nothing changes then.
         """
-        _hold_load(self._law, contacts, pose, load)
+        self._hold(contacts, pose, load)
 
     def wrench(self, pose: ArrayLike, velocity: ArrayLike) -> np.ndarray:
         """Return force and torque (6,) at `pose` (7,) and `velocity` (6,), a step at a time.
@@ -161,25 +172,13 @@ class HeldPatch:
         wrench: np.ndarray = self._law.wrenches(pose, velocity)[0]
         return wrench
 
-    def reset(self) -> None:
-        """Forget all patches: the load was put elsewhere."""
-        self._law.reset()
 
-    def copy(self) -> Self:
-        """Return a law with the same patches and friction."""
-        return type(self)(self._law.copy())
-
-
-class PatchLaw:
+class PatchLaw(_LoadLaw):
     """The wrench on one load that a client holds from one answer to the next.
 
     Make it with `for_loop`, and hold its wrenches by `HeldWrench`. `HeldPatch` is better wherever
     the law can be asked at every physics step.
     """
-
-    def __init__(self, law: native.Law) -> None:
-        """Take over a native law of one body; see `for_loop`."""
-        self._law = law
 
     @classmethod
     def for_loop(cls, load: Body, *, rate_hz: float, latency: float = 0.0,
@@ -194,28 +193,15 @@ class PatchLaw:
         return cls(native_law([load], use, rate_hz=rate_hz, latency=latency, step=1.0 / rate_hz,
                               friction=friction, gravity=gravity))
 
-    @property
-    def frequency(self) -> float:
-        """Return Ω [1/s]; the load rests at the depth gravity / Ω² on a whole face."""
-        return self._law.frequency
-
     def wrench(self, contacts: Touches, pose: ArrayLike, velocity: ArrayLike, *,
                load: Literal['a', 'b'] = 'a') -> np.ndarray:
         """Return force and torque (6,) of contacts at this pose and velocity, once a tick.
 
         ValueError as `HeldPatch.hold`.
         """
-        _hold_load(self._law, contacts, pose, load)
+        self._hold(contacts, pose, load)
         wrench: np.ndarray = self._law.wrenches(pose, velocity)[0]
         return wrench
-
-    def reset(self) -> None:
-        """Forget all patches: the load was put elsewhere."""
-        self._law.reset()
-
-    def copy(self) -> Self:
-        """Return a law with the same friction."""
-        return type(self)(self._law.copy())
 
 
 class SceneLaw:

@@ -81,6 +81,7 @@ class PairWrenches:
         """The pairs with a body."""
         if not self.pairs:
             raise ValueError('no box has a mass')
+        self._covered = frozenset(self.pairs)
         self._scene = scene
         self._longest = round(LONGEST_GAP * SECOND / rate_hz)
         names = dict.fromkeys(name for pair in self.pairs for name in (pair.a, pair.b))
@@ -114,14 +115,10 @@ class PairWrenches:
         poses, velocities = self._state()
         hold(self._law, [(pair.label, pair.id, place[pair.a], place[pair.b], contact)
                          for pair, contact in answer.touching
-                         if pair.a in place and pair.b in place and self._is_free(pair)], poses)
+                         if pair in self._covered], poses)
         self._law.wrenches(poses, velocities)
         stale = set(answer.stale)
         return [(pair, self._law.pair_wrench(pair.id)) for pair in self.pairs if pair not in stale]
-
-    def _is_free(self, pair: Pair) -> bool:
-        boxes = self._scene.boxes
-        return bool(boxes[pair.a].mass or boxes[pair.b].mass)
 
     def _poses(self, tick: Tick) -> Iterator[tuple[str, np.ndarray, int]]:
         """Yield name, pose and stamp of the moving boxes that are there."""

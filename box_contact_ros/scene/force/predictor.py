@@ -15,7 +15,7 @@ import math
 import numpy as np
 
 from ..pose import cross, quaternion_multiply, rotation_matrix
-from .held_wrench import HeldWrench
+from .held_wrench import TIME_ROUNDING, HeldWrench
 from .laws import Body
 
 LONGEST_STEP = 5e-4  # of the integration [s]
@@ -60,7 +60,7 @@ class Predictor:
         """Return the wrench that will act at a time that is still to come."""
         acting = self._held.current
         for due, wrench in self._held.under_way():
-            if due <= time + 1e-9:
+            if due <= time + TIME_ROUNDING:
                 acting = wrench
         return acting
 

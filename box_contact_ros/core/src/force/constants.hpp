@@ -40,7 +40,8 @@ constexpr double whole_damper_depth = 0.02;
 constexpr double recoil = 0.7;
 // Time [s] over which the force that a contact has carried is averaged.
 constexpr double carried_time = 0.1;
-// Share of Ω² that the tangential springs take [1]. 0.5 makes tall boxes jitter.
+// Share of Ω² that the tangential springs take [1]. 0.5 makes tall boxes jitter
+// on held wrenches.
 constexpr double tangential_share = 0.1;
 constexpr double tangential_damping_ratio = 1.0;
 // The modulus falls at once to what the loop bears, and rises with this time constant [s], of

@@ -12,11 +12,12 @@
 //        Torsion    k_t·r·φ + c_t·r·spin about n  φ: its turn; both within f² + m² + a·f²·m² ≤ 1
 //                                                 by μ·P, a: how square the patch is
 //
-// ψ is the turn of late: ψ' = θ' − ψ / `lean_time`. Together with θ it is a spring beside a spring and
-// damper in line, which takes energy out of the slow sway of stacks, where a damper alone would have
-// to be stiffer than the step allows.
-// V' = V + A·δ, δ how much deeper the bodies are by now. v_c is the closing speed at c. κ = Ω² / w,
-// w the largest eigenvalue of M⁻¹K of the bodies on a foundation of modulus 1, so no oscillation is
+// ψ is the turn of late: ψ' = θ' − ψ / `lean_time`. It acts as a spring and a damper in line, beside
+// the spring of θ. It takes energy out of the slow sway of stacks. A plain damper that did so would be
+// stiffer than the step allows.
+//
+// V' = V + A·δ: δ is how much deeper the bodies are by now. v_c is the closing speed at c. κ = Ω² / w:
+// w is the largest eigenvalue of M⁻¹K of the bodies on a foundation of modulus 1. So no oscillation is
 // faster than Ω. docs/explanation/force.md derives all of this.
 //
 // Nothing but + − · / √ is computed, so all instruction sets give the same bits.

@@ -71,8 +71,8 @@ bc_status check_loop(const bc_loop& loop) {
   return BC_OK;
 }
 
-// Whether the normal can be meant for a body: a plane across it bounds the box on the far side of the
-// centre of mass, and the contact lies between that plane and one a depth behind it.
+// Whether the normal can be meant for a body. A plane across the normal bounds the body's box. The
+// contact is at most a depth behind that plane, and the centre of mass is not beyond it.
 bool is_outward(const bc_contact& contact, const Body& body, const bc_pose& pose, double sign) {
   force::Placed placed = force::placed_at(pose, body.centre);
   double outward =
