@@ -42,7 +42,7 @@ help:
 	echo 'make dist     wheel and source distribution in dist/, both installed and tried'
 	echo 'make coverage lines of solver, scenes and nodes that their tests run'
 	echo 'make reports  every table and picture of docs, in 45 minutes'
-	echo 'make docs     the documentation as HTML: build/docs/README.html'
+	echo 'make docs     the documentation as HTML: build/docs/index.html'
 	echo 'make docs-links asks every link to another site'
 	echo 'make tables   write the figures of docs/results/ into README and docs'
 	echo 'make clean    remove .venv and everything that was generated'
@@ -109,11 +109,12 @@ define sphinx
 	@.ci/setup demo
 	$(PY) -c 'import myst_parser, sphinx, sphinx_rtd_theme' 2>/dev/null || \
 	    $(PY) -m pip install -q -c constraints.txt $(DOCS_TOOLS)
-	exec $(PY) -m sphinx -q -W --keep-going -b
+	$(PY) -m sphinx -q -W --keep-going -b
 endef
 
 docs:
 	$(sphinx) html docs build/docs $(ARGS)
+	echo 'open $(CURDIR)/build/docs/index.html'
 
 docs-links:
 	$(sphinx) linkcheck docs build/docs-links $(ARGS)

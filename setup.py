@@ -42,7 +42,7 @@ if os.environ.get('BOX_CONTACT_BUILD') == 'best' and CPU.is_file():
 cli = runpy.run_path(str(Path(__file__).with_name(NAME) / 'cli.py'))
 
 # colcon and bloom run `setup.py install` or `develop`. `ros2 run` needs programs in
-# lib/box_contact_ros under their bare names: setup.cfg says where. pip puts programs into bin/,
+# lib/box_contact_ros under their bare names. setup.cfg says where. pip puts programs into bin/,
 # among those of all other packages, so they get a prefix there. Two signs tell who calls:
 # setuptools has this module for PEP 517, and pip sets this variable for all that it builds.
 BY_PIP = 'setuptools.build_meta' in sys.modules or 'PIP_BUILD_TRACKER' in os.environ
@@ -97,7 +97,7 @@ class BuildCore(build_ext):
         super().build_extension(ext)
 
     def build_library(self, ext) -> list[str]:
-        """Build libbox_contact beside the extension `ext`; return its objects."""
+        """Build libbox_contact next to the extension `ext`; return its objects."""
         compiler, folder = copy.copy(self.compiler), Path(self.build_temp, 'library')
 
         def compiled(name: str, source: str, flags: list[str]) -> list[str]:
@@ -170,7 +170,7 @@ setup(
     name=NAME,
     version='0.1.0',
     description='ROS 2 node that answers, for every pair of box poses, with one contact point and '
-    'one normal: exact separating-axis test, then a small neural network',
+    'one normal: exact separating-axis test, then geometry and a small neural network',
     long_description=Path(__file__).resolve().with_name('README.md').read_text('utf-8'),
     long_description_content_type='text/markdown',
     maintainer='The box_contact_ros maintainers',
@@ -178,6 +178,7 @@ setup(
     license='Apache-2.0',
     packages=find_packages(include=[NAME, f'{NAME}.*']),
     package_data={NAME: ['py.typed', '**/*.pyi', 'verification/*.npz', '**/*.md', '**/*.yaml',
+                         'reports/frontier/*.cpp',
                          'core/cmake/*', 'core/include/**/*.h*', 'core/src/**/*.hpp']},
     ext_modules=extensions(),
     data_files=data_files(),

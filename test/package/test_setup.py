@@ -28,6 +28,7 @@ case "$1 $2" in
         echo "$* ${{BOX_CONTACT_BUILD:-all}}" >>calls
         if [ -e uncompiled ]; then echo 'no g++'; exit 1; fi ;;
     *run_setup*) echo numpy ;;
+    '.ci/locked.py '*) echo locked >>calls ;;
     *) exec {sys.executable} "$@" ;;
 esac
 """
@@ -43,7 +44,7 @@ def checkout(tmp_path: Path) -> Path:
     """Return a folder with the files that the set-up looks at, and no Python on its PATH."""
     folder = tmp_path / 'checkout'
     for name in ('.ci/setup', 'Makefile', 'setup.py', 'setup.cfg', 'pyproject.toml',
-                 'constraints.txt', 'box_contact_ros/cli.py',
+                 'constraints.txt', '.ci/locked.py', 'box_contact_ros/cli.py',
                  'box_contact_ros/core/src/contact.hpp', 'box_contact_msgs/package.xml',
                  'box_contact_msgs/msg/Contact.msg'):
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
@@ -102,6 +103,19 @@ def test_a_target_is_installed_once(checkout: Path, offer: Callable) -> None:
     assert installed(checkout) == ['ros,sim,view,bag,train,soup,report,test']
     for target in ('demo', 'view', 'test'):
         assert (set_up(checkout, target).stdout, installed(checkout)) == ('', [])
+
+
+def test_nothing_is_fetched_without_a_hash(checkout: Path, offer: Callable) -> None:
+    """Once pip has chosen, the lock gives hashes, and then pip may choose no more."""
+    offer('python3.12', PYTHON)
+    assert set_up(checkout, 'test').returncode == 0
+    calls = [line for line in called(checkout) if not line.startswith('setup.py')]
+    installs = [line for line in calls if '--dry-run' not in line and line != 'locked']
+    assert len(installs) == 4 and all('--no-deps' in line for line in installs)
+    for place in range(2):
+        choice, lock, install = calls[3 * place:3 * place + 3]
+        assert '--dry-run --report .venv/report.json -c constraints.txt' in choice
+        assert lock == 'locked' and install.endswith('-r .venv/locked.txt')
 
 
 @pytest.mark.parametrize('changed', ['setup.py', 'constraints.txt', 'box_contact_ros/cli.py',
