@@ -3,10 +3,10 @@
 
 """Where the data files are: weights/, msg_schemas/, recordings/, launch/, config/.
 
-These folders stand at the top level of the repository, beside the Python package and not inside
+These folders stand at the top level of the repository, next to the Python package and not inside
 it, so `importlib.resources` does not see them. Every kind of install puts them somewhere else:
 
-    checkout, pip install -e, colcon --symlink-install   beside the package
+    checkout, pip install -e, colcon --symlink-install   next to the package
     pip install, apt                                     PREFIX/share/box_contact_ros
     colcon build                                         WORKSPACE/install/.../share/...
 

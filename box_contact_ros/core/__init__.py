@@ -42,13 +42,11 @@ QUATERNION_MIN, QUATERNION_MAX = native.QUATERNION_MIN, native.QUATERNION_MAX
 """Least and largest norm of a quaternion that are accepted."""
 DEPTH_FLOOR = native.DEPTH_FLOOR
 """Least depth to which B is pressed in before the overlap is taken [of the size]."""
-ASPECT_MAX, SIZE_RATIO_MAX, DEPTH_MAX = (
-    native.ASPECT_MAX, native.SIZE_RATIO_MAX, native.DEPTH_MAX)
-"""The range of the MLP: edge ratio of a box, size ratio of both, depth by the shortest edge."""
-CENTROID_REACH = native.CENTROID_REACH
-"""Farthest that a centroid is from the middle of its bounding box [half extents]."""
+BRACKET_LIMIT, SPREAD_LIMIT, UPPER_LIMIT = (
+    native.BRACKET_LIMIT, native.SPREAD_LIMIT, native.UPPER_LIMIT)
+"""Limits of `mlp`, relative to the overlap. The first two say how far apart the brackets of volume
+and second moments may be, the third how much upper faces may cut off."""
 NETWORK_FORMAT = native.NETWORK_FORMAT
 """Format of the network's file that the core reads: what its numbers mean."""
-SITES, FEATURES = native.SITES, native.FEATURES
-OUTPUTS, POINT_OUTPUTS = native.OUTPUTS, native.POINT_OUTPUTS
-"""Sites at which the MLP is asked, features and outputs of each, those for the point."""
+FEATURES = native.FEATURES
+"""Features of an upper face, which the network of `mlp` reads."""

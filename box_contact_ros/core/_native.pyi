@@ -14,16 +14,12 @@ QUATERNION_MIN: float
 QUATERNION_MAX: float
 CONTACT_ULPS: float
 DEPTH_FLOOR: float
-ASPECT_MAX: float
-SIZE_RATIO_MAX: float
-DEPTH_MAX: float
-CENTROID_REACH: float
+BRACKET_LIMIT: float
+SPREAD_LIMIT: float
+UPPER_LIMIT: float
 
 NETWORK_FORMAT: int
-SITES: int
 FEATURES: int
-OUTPUTS: int
-POINT_OUTPUTS: int
 
 kernel: str
 instruction_set: str
@@ -31,9 +27,9 @@ lanes: int
 compiler: str
 
 class PairSolver:
-    def __init__(self, model: str | None, size_a: tuple[float, float, float],
+    def __init__(self, model: object, size_a: tuple[float, float, float],
                  size_b: tuple[float, float, float], network: np.ndarray | None = None,
-                 listed: np.ndarray | None = None, margin: float = 0.0) -> None: ...
+                 margin: float = 0.0) -> None: ...
     def __call__(self, pose_a: ArrayLike, pose_b: ArrayLike) -> Any: ...
     def batch(self, *args: Any, **keywords: Any) -> Any: ...
     def solve(self, poses_a: np.ndarray, poses_b: np.ndarray, sizes_a: np.ndarray,
@@ -62,10 +58,9 @@ def instruction_sets() -> tuple[str, ...]: ...
 def use_contact_types(single: type[tuple[object, ...]], many: type[tuple[object, ...]], /,
                       ) -> None: ...
 def stages(poses_a: np.ndarray, poses_b: np.ndarray, sizes_a: np.ndarray, sizes_b: np.ndarray,
-           network: np.ndarray | None, names: Sequence[str], by_edges: bool, /,
-           ) -> tuple[dict[str, np.ndarray], int]: ...
+           names: Sequence[str], /) -> tuple[dict[str, np.ndarray], int]: ...
 def near_pairs(poses: np.ndarray, sizes: np.ndarray, moved: np.ndarray, low: np.ndarray,
                high: np.ndarray, known: np.ndarray, first: np.ndarray, second: np.ndarray,
                near: np.ndarray, unknown: np.ndarray, /) -> tuple[int, int]: ...
-def near_boxes(low: np.ndarray, high: np.ndarray, known: np.ndarray, moves: np.ndarray, /,
-               ) -> np.ndarray: ...
+def near_boxes(low: np.ndarray, high: np.ndarray, known: np.ndarray, moves: np.ndarray, most: int,
+               /) -> np.ndarray | None: ...

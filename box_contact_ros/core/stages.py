@@ -12,15 +12,16 @@ from numpy.typing import ArrayLike
 
 from . import native
 
-BOUNDS = ('slab', 'edges')  # methods of the overlap's bounds
-
 
 class Stages(NamedTuple):
-    """The stages of n pairs; arrays that were not asked for are empty. Answers need a network.
+    """The stages of n pairs; arrays that were not asked for are empty.
 
     Lengths are in metres. The frame is A's, from A's centre, unless said otherwise. "Pressed" pairs
-    have the minimum depth (`DEPTH_FLOOR`). The bounds' frame is that of B where `frame_b`, else of
-    A, from that box's centre; the other box is the one whose faces cut the bounding box.
+    have the minimum depth (`DEPTH_FLOOR`).
+
+    Arrays from `unit` on are in the coordinates t_k of the columns (core/src/columns/): along the
+    edges of the incident box, from the contact frame's origin, in `unit`. Volumes are in unit²
+    times the origin's depth.
     """
 
     colliding: np.ndarray  # (n,) bool
@@ -43,48 +44,39 @@ class Stages(NamedTuple):
     covariance: np.ndarray  # (n, 3, 3) its second central moments by its volume [m²], common frame
     clipped_covariance: np.ndarray  # (n, 3, 3) the same by clipping
     certain: np.ndarray  # (n,) bool: the exact moments are by face sums; else by clipping
-    frame_b: np.ndarray  # (n,) bool: the bounds are in B's frame
-    in_range: np.ndarray  # (n,) bool: the MLP may be asked; else the exact answer is given
-    bounds_middle: np.ndarray  # (n, 3) middle of the overlap's bounds, their frame
-    bounds_half: np.ndarray  # (n, 3) its half extents
-    other_axes: np.ndarray  # (n, 3, 3) the other box's axes as rows, bounds' frame
-    other_offset: np.ndarray
-    """(n, 3) from the other box's centre to `bounds_middle`, along the other box's axes."""
-    other_half: np.ndarray  # (n, 3) half extents of the other box
-    features: np.ndarray
-    """(n, 9, 12) float32 features of the sites f · 3 + q: four of the site, of its faces, axis."""
-    vectors: np.ndarray  # (n, 9, 3) float32 factors of the sites' outputs for the point
-    slant: np.ndarray
-    """(n, 3, 3) float32 normals of the other box's pairs of faces as rows, in the cut cube."""
-    cut: np.ndarray  # (n, 3) float32 how far both faces of each pair cut into the cube
-    answer: np.ndarray  # (n, 3) the network's centroid, from `bounds_middle` [half extents]
-    answer_volume: np.ndarray  # (n,) its volume by that of the bounds
-    answer_covariance: np.ndarray  # (n, 3, 3) its covariance, bounds' frame [half extents]
+    accurate: np.ndarray  # (n,) bool: float32 is enough for the columns
+    unit: np.ndarray  # (n,) unit of length [m]
+    true_volume: np.ndarray  # (n,) exact volume of the overlap
+    true_mean: np.ndarray  # (n, 3) its exact centroid
+    true_covariance: np.ndarray  # (n, 3, 3) its exact covariance
+    columns_volume: np.ndarray  # (n,) float32 volume of the columns
+    columns_mean: np.ndarray  # (n, 3) float32 their centroid
+    columns_covariance: np.ndarray  # (n, 3, 3) float32 their covariance
+    upper_volume: np.ndarray
+    """(n, 3) float32 what each upper face cuts off the columns, without P's side faces."""
+    upper_least: np.ndarray  # (n, 3) float32 least share of it that P's side faces leave
+    upper_most: np.ndarray  # (n, 3) float32 largest share of it
+    upper_features: np.ndarray  # (n, 3, 6) float32 what the network is told of it
+    upper_points: np.ndarray  # (n, 3, 2, 3) float32 two points that carry it
+    upper_carries: np.ndarray  # (n, 3, 2) float32 their shares
 
 
 def stages(poses_a: ArrayLike, poses_b: ArrayLike, size_a: ArrayLike, size_b: ArrayLike, *,
-           names: Sequence[str], network: np.ndarray | None = None,
-           bounds: str = 'slab') -> Stages:
+           names: Sequence[str]) -> Stages:
     """Compute what the stages of n pairs give, one pair after the other.
 
     poses_a, poses_b: (n, 7) `x y z qx qy qz qw` in a common frame [m].
     size_a, size_b: (n, 3), or (1, 3) for all pairs, full extents [m].
     names: fields of `Stages` that are wanted.
-    network: numbers of an MLP (`mlp.core_numbers`), for `answer`.
-    bounds: the method of the overlap's bounds, 'slab' or 'edges'; see overlap/bounds.hpp.
 
     Raises ValueError for unknown names, and for rows that are no poses or sizes.
     """
     unknown = [name for name in names if name not in Stages._fields]
     if unknown:
         raise ValueError(f'names {unknown} are not fields of Stages')
-    if bounds not in BOUNDS:
-        raise ValueError(f'bounds {bounds!r} is not one of: {", ".join(BOUNDS)}')
-    if network is None and (unanswered := [name for name in names if name.startswith('answer')]):
-        raise ValueError(f'{unanswered[0]!r} needs a network')
     a, b, one, other = (np.asarray(values, dtype=np.float64)
                         for values in (poses_a, poses_b, size_a, size_b))
-    arrays, refused = native.stages(a, b, one, other, network, tuple(names), bounds == 'edges')
+    arrays, refused = native.stages(a, b, one, other, tuple(names))
     if refused >= 0:
         raise ValueError(f'row {refused} is refused: its poses or sizes are not valid')
     return Stages(*(arrays.get(name, np.empty(0)) for name in Stages._fields))

@@ -30,7 +30,7 @@ def program_parser(program: str, doc: str | None, *, quick: str = '', seed: int 
         parser.add_argument('--quick', action='store_true', help=quick)
     if seed is not None:
         parser.add_argument('--seed', type=seed_number, default=seed,
-                            help='of what is drawn at random (default: %(default)s)')
+                            help='seed of the random numbers (default: %(default)s)')
     if out:
         parser.add_argument('--out', type=Path, metavar='DIR', help=f'folder for {out} (default: '
                             'docs/results, or quick-results with --quick)')
@@ -46,7 +46,7 @@ def add_models(parser: argparse.ArgumentParser, flag: str, default: str | Sequen
     more = ', or package.module:Class' if kind else ''
     parser.add_argument(flag, nargs=None if isinstance(default, str) else '+',
                         type=kind or model_name, default=default, metavar='MODEL',
-                        help=f'of {model_names()}{more} (default: %(default)s)')
+                        help=f'one of {model_names()}{more} (default: %(default)s)')
 
 
 def model_name(text: str) -> str:
@@ -61,7 +61,7 @@ def model_name(text: str) -> str:
 def seed_number(text: str) -> int:
     """Return a seed of random numbers, as a program's argument: a whole number from 0."""
     if not text.isascii() or not text.isdecimal() or len(text) > 18:
-        raise argparse.ArgumentTypeError(f'{shown(text)} is no whole number from 0')
+        raise argparse.ArgumentTypeError(f'{shown(text)} is not a whole number from 0')
     return int(text)
 
 

@@ -10,7 +10,8 @@ from __future__ import annotations
 import math
 import numbers
 import reprlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
@@ -32,6 +33,12 @@ def shown(value: Any) -> str:
     except ValueError:  # integers of more than 4,300 digits have no repr
         return f'a {type(value).__name__}'
     return text if len(text) <= SHOWN else f'{text[:SHOWN]}...'
+
+
+def nearest_name(name: object, known: Iterable[str]) -> str:
+    """Return the end of a refusal that names the nearest of the known names; '' if none is near."""
+    nearest = ''.join(get_close_matches(str(name)[:SHOWN], known, n=1))
+    return nearest and f'; the nearest name is {nearest}'
 
 
 def pose_fault(pose: Sequence[float] | np.ndarray) -> str | None:

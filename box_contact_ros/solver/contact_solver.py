@@ -45,15 +45,16 @@ class ContactSolver(native.PairSolver):
         one, other = as_size(size_a, 'size_a'), as_size(size_b, 'size_b')
         margin = as_floats(margin, 'margin', 'a number', ()).item()
         built = build_model(model, one, other, weights)
-        core = built if isinstance(built, NativeModel) else NativeModel(name=None)
+        core = built if isinstance(built, NativeModel) else NativeModel()
         if np.isnan(margin) or (margin and core.name is None):
             raise ValueError(f'margin {margin:g} is not a distance that model {model!r} knows')
         # Calls are answered in C++, which calls `converted` and `converted_batch` for the rest.
-        super().__init__(core.name, tuple(one[0]), tuple(other[0]), core.network, core.listed,
+        super().__init__(core.kernel or core.name, tuple(one[0]), tuple(other[0]), core.network,
                          margin)
         self.model = model
         self._size_a, self._size_b, self._weights, self._margin = one, other, weights, margin
         self._model: Model | None = None if isinstance(built, NativeModel) else built
+        self._size_fault = core.size_fault
 
     if TYPE_CHECKING:  # the core, which does it, knows no type of ours
         def __call__(self, pose_a: ArrayLike, pose_b: ArrayLike) -> Contact: ...  # noqa: D102
@@ -81,8 +82,8 @@ class ContactSolver(native.PairSolver):
 
         Raises ValueError, with field and value, for poses that are refused.
         """
-        a = as_floats(pose_a, 'pose_a', 'a pose (7,)', (7,)).reshape(1, 7)
-        b = as_floats(pose_b, 'pose_b', 'a pose (7,)', (7,)).reshape(1, 7)
+        a = as_floats(pose_a, 'pose_a', 'a pose (x y z qx qy qz qw)', (7,)).reshape(1, 7)
+        b = as_floats(pose_b, 'pose_b', 'a pose (x y z qx qy qz qw)', (7,)).reshape(1, 7)
         found = self._solve(a, b, self._size_a, self._size_b, _SINGLE)
         return Contact(bool(found.colliding[0]), float(found.separation[0]), found.normal[0],
                        found.point[0], float(found.volume[0]), found.covariance[0],
@@ -102,15 +103,15 @@ class ContactSolver(native.PairSolver):
             if poses_b is not None or size_a is not None or size_b is not None:
                 raise ValueError('pairs are places in poses and sizes: batch(poses, sizes=…, '
                                  'pairs=…) has neither poses_b nor size_a nor size_b')
-            poses = as_floats(poses_a, 'poses', 'poses (m, 7)', (None, 7))
+            poses = as_floats(poses_a, 'poses', 'poses (m, 7) of rows x y z qx qy qz qw', (None, 7))
             one = self._sizes(sizes, 'sizes', self._size_a, len(poses))
             other = self._size_b if sizes is None else one
             places = as_places(pairs, 'pairs', len(poses))
             return self._solve(poses, poses, one, other, _BY_PLACE, threads, patch, places)
         if sizes is not None or poses_b is None:
             raise ValueError('batch takes (poses_a, poses_b), or (poses, sizes=…, pairs=…)')
-        a = as_floats(poses_a, 'poses_a', 'poses (n, 7)', (None, 7))
-        b = as_floats(poses_b, 'poses_b', 'poses (n, 7)', (None, 7))
+        a = as_floats(poses_a, 'poses_a', 'poses (n, 7) of rows x y z qx qy qz qw', (None, 7))
+        b = as_floats(poses_b, 'poses_b', 'poses (n, 7) of rows x y z qx qy qz qw', (None, 7))
         if len(a) != len(b):
             raise ValueError(f'poses_a and poses_b must be equally many, not {len(a)} and {len(b)}')
         return self._solve(a, b, self._sizes(size_a, 'size_a', self._size_a, len(a)),
@@ -142,16 +143,23 @@ class ContactSolver(native.PairSolver):
             found = found if patch else without_patch(*found[:4])
         if refused >= 0:
             at = (refused, refused) if places is None else tuple(places[refused])
-            raise ValueError(_refusal(a, b, size_a, size_b, at, names))
+            raise ValueError(self._refusal(a, b, size_a, size_b, at, names))
         return found
 
+    def _refusal(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
+                 at: tuple[int, int], names: Names) -> str:
+        """Return why a pair is refused, by anyone or by the model; at: places of A and of B."""
+        fault = _fault(a, b, size_a, size_b, at, names)
+        if not fault and self._size_fault:
+            fault = self._size_fault(size_a[at[0] % len(size_a)], size_b[at[1] % len(size_b)])
+        if not fault:
+            raise AssertionError(f'row {at} was refused without a fault')
+        return fault
 
-def _refusal(a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
-             at: tuple[int, int], names: Names) -> str:
-    """Return why a pair is refused: the first of its poses and sizes that has a fault.
 
-    at: places of A and of B.
-    """
+def _fault(a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
+           at: tuple[int, int], names: Names) -> str | None:
+    """Return the first fault of a pair's poses and sizes, or None; at: places of A and of B."""
     for values, name, fault_of, row in ((a, names[0], pose_fault, at[0]),
                                         (b, names[1], pose_fault, at[1]),
                                         (size_a, names[2], size_fault, at[0]),
@@ -160,4 +168,4 @@ def _refusal(a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarra
         if fault:
             numbered = name.startswith('poses') or len(a) > 1
             return f'{name}[{row}] {fault}' if numbered else f'{name} {fault}'
-    raise AssertionError(f'row {at} was refused without a fault')
+    return None

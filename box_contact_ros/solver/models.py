@@ -18,7 +18,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..core import native
-from .checks import shown
+from .checks import nearest_name, shown
 from .contact import Contacts
 from .weights_file import Weights
 
@@ -39,12 +39,14 @@ class Model(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class NativeModel:
-    """A model of the core: what `PairSolver` takes beside the sizes."""
+    """A model in C++: what `PairSolver` takes besides the sizes."""
 
-    name: str | None  # as the core has it; None: a model in Python answers
+    name: str | None = None  # as the core has it; None: a kernel or a model in Python answers
     weights: Weights | None = None
     network: np.ndarray | None = None
-    listed: np.ndarray | None = None
+    kernel: object = None  # of another extension: see core/src/library/kernel.hpp
+    size_fault: Callable[[np.ndarray, np.ndarray], str | None] | None = None
+    """Return why the kernel refuses boxes of two full extents (3,) [m], or None."""
 
 
 def exact() -> NativeModel:
@@ -90,6 +92,9 @@ class ModelEntry:
     native_batch: bool = False  # whether the rows of a batch are answered in C++
     gated: bool = False  # whether fuzz, stability and the speed report hold it to their limits
     family: Family | None = None
+    most_near: int = 2**15
+    """Pairs near each other that a node answers in one tick, in about a second; messages of so many
+    have 30 MB."""
 
     @property
     def any_boxes(self) -> bool:
@@ -146,7 +151,7 @@ SOUP_DIVISIONS, MOST_SOUP_DIVISIONS = 8, 64
 _NEEDS = ('size_a', 'size_b', 'weights')
 _ENTRIES = (
     ModelEntry(
-        name='mlp', line='SAT, and a network for point and patch; constant cost; the default',
+        name='mlp', line='SAT, columns, a network between proven brackets; the default',
         builder='box_contact_ros.solver.mlp:mlp', takes=('weights',),
         native_batch=True, gated=True),
     ModelEntry(
@@ -155,11 +160,15 @@ _ENTRIES = (
         native_batch=True, gated=True),
     ModelEntry(
         name='paper', line="the paper's network 6-20-18-4",
-        builder='box_contact_ros.baselines.paper.paper_models:Paper', takes=_NEEDS,
+        builder='box_contact_ros.baselines.paper.paper_models:paper', takes=_NEEDS,
         boxes='two equal cubes, or two 40 ft containers', native_batch=True),
     ModelEntry(
         name='paper-continuous', line="the paper's networks 6-20-17-4 on subsets without jumps",
-        builder='box_contact_ros.baselines.paper.paper_models:PaperContinuous', takes=_NEEDS,
+        builder='box_contact_ros.baselines.paper.paper_models:paper_continuous', takes=_NEEDS,
+        boxes='two equal cubes', native_batch=True),
+    ModelEntry(
+        name='paper-committee', line="a classifier and the paper's network for each class",
+        builder='box_contact_ros.baselines.paper.paper_models:paper_committee', takes=_NEEDS,
         boxes='two equal cubes', native_batch=True),
     ModelEntry(
         name='fcl', line="FCL's box-box, its deepest contact; a baseline",
@@ -167,6 +176,7 @@ _ENTRIES = (
     ModelEntry(
         name='soup', line='polygon soup on FCL, N divisions an edge; a baseline',
         builder='box_contact_ros.baselines.soup:Soup', takes=('divisions',), extra='soup',
+        most_near=64,  # each takes a third of a second at worst
         family=Family(argument='divisions', default=SOUP_DIVISIONS, most=MOST_SOUP_DIVISIONS,
                       reported=(8, 10, 12, 14, 16, 18, 20, 22))),  # of the paper's Table 3
 )
@@ -193,7 +203,8 @@ def find_model(where: str, name: object) -> tuple[ModelEntry, dict[str, int]]:
         options = entry.options(str(name))
         if options is not None:
             return entry, options
-    raise ValueError(f'{where} {shown(name)} is not one of: {model_names()}')
+    raise ValueError(f'{where} {shown(name)} is not one of: {model_names()}'
+                     f'{nearest_name(name, MODELS)}')
 
 
 def build_model(name: str, size_a: np.ndarray, size_b: np.ndarray, weights: str | None,

@@ -27,8 +27,8 @@ from ..resources import resource_path
 
 CARD_FIELDS = ('name', 'model', 'architecture', 'inputs', 'outputs', 'sizes', 'data', 'seed',
                'commit', 'metrics', 'sha256')
-"""Entries that every model card has: `inputs` with their ranges, `sizes` it was trained for, the
-`sha256` of the tensors."""
+"""Entries that every model card has: `architecture`, the units of each layer, of all networks or by
+network, `inputs` with their ranges, `sizes` it was trained for, the `sha256` of the tensors."""
 
 FILE_LIMIT = 2**24
 """Bytes of the largest file that is read, header and tensors: a thousand times what is shipped."""
@@ -71,7 +71,7 @@ class Weights:
     card: dict[str, Any]
 
     def network(self, name: str, inputs: int, outputs: int, model: str) -> Network:
-        """Return a network for a model; raises `WeightsError` where there is none of that shape."""
+        """Return a network for a model; raises `WeightsError` if the file has no such shape."""
         found = self.networks.get(name)
         if found is None or (found.widths[0], found.widths[-1]) != (inputs, outputs):
             raise WeightsError(
@@ -192,9 +192,10 @@ def _checked(tensors: dict[str, np.ndarray], metadata: dict[str, Any],
     networks = {name: _network(name, tensors)
                 for name in sorted({key.split('.')[0] for key in tensors})}
     for name, network in networks.items():
-        if list(network.widths) != card['architecture']:
-            raise ValueError(
-                f'{name} is {network.widths}, the model card says {card["architecture"]}')
+        wanted = card['architecture']
+        wanted = wanted.get(name) if isinstance(wanted, dict) else wanted
+        if list(network.widths) != wanted:
+            raise ValueError(f'{name} is {network.widths}, the model card says {wanted}')
     if not networks:
         raise ValueError('it holds no network')
     return networks, card

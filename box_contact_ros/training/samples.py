@@ -1,19 +1,17 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Training samples of model `mlp`: contacts of all kinds, as the network is asked about them."""
+"""Training samples of model `mlp`: contacts whose brackets are open."""
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from tqdm import tqdm
 
-from ..core import stages
-from ..scene.files.scene_file import read_scene
+from ..core import BRACKET_LIMIT, SPREAD_LIMIT, UPPER_LIMIT, stages
 from ..scene.pose import quaternion_multiply, rotation_matrix
 from ..scene.pose_sets import (
     CONTAINER,
@@ -28,94 +26,107 @@ from ..scene.pose_sets import (
     turns,
 )
 
-SizePair = tuple[tuple[float, float, float], tuple[float, float, float]]
-"""Full extents of two boxes [m]."""
-ROW, COLUMN = [0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1]
-"""Places of the six numbers of a symmetric matrix: xx, yy, zz, yz, xz, xy."""
 PIECE = 100_000
 """Pairs that are made at a time."""
+OPEN = 1e-5
+"""Least distance of the brackets from which a contact is learned from [of the volume]."""
+BEYOND = 1.5
+"""Limits of the model by which contacts are still learned from, times this."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class MlpSamples:
-    """Features and exact answers of n contacts, each at SITES sites, counted f · 3 + q.
+    """Upper faces k and exact answers of n contacts, as arrays or as tensors.
 
-    Arrays of float32, or tensors. The contacts are last, so that all operations run along them.
+    Coordinates are those of the columns, from the centroid of the columns. Volumes are relative to
+    that of the columns, lengths to the root of the exact covariance's trace.
     """
 
-    features: Any  # (SITES, FEATURES, n)
-    vectors: Any
-    """(SITES, 3, n): the factors of the outputs for the point. The answer along q is the sum of
-    the products over these outputs and f."""
-    slant: Any  # (3, 3, n) normals of the other box's pairs of faces f, by q
-    cut: Any  # (3, n) how far both faces f cut into the bounds
-    offsets: Any  # (3, n) exact centroid from the middle of the bounds [half extents]
-    scale: Any  # (3, n) half extents [longest edge of the smaller box]
-    volume: Any  # (n,) exact volume by that of the bounds
-    covariance: Any
-    """(6, n) exact covariance xx, yy, zz, yz, xz, xy, frame of the bounds [half extents]."""
-    spread: Any  # (3, n) half extents [root of the covariance's trace]
+    features: Any  # (n, 3, FEATURES)
+    cut: Any  # (n, 3) volume that an upper face cuts off, without side faces
+    least: Any  # (n, 3) brackets of the share that side faces leave of it
+    most: Any  # (n, 3)
+    points: Any  # (n, 3, 2, 3) points that carry it
+    carries: Any  # (n, 3, 2) their shares
+    columns_covariance: Any  # (n, 3, 3)
+    volume: Any  # (n,) exact
+    mean: Any  # (n, 3) exact centroid
+    covariance: Any  # (n, 3, 3) exact
+    whitening: Any  # (n, 3, 3) W with W · covariance · Wᵀ = 1
 
     def __len__(self) -> int:
         """Return n."""
-        return self.offsets.shape[-1]
+        return len(self.volume)
 
     def each(self, change: Callable[[Any], Any]) -> MlpSamples:
         """Return the samples with a function applied to each array."""
         return MlpSamples(**{name: change(array) for name, array in vars(self).items()})
 
-    def part(self, rows: np.ndarray | slice) -> MlpSamples:
+    def part(self, rows: Any) -> MlpSamples:
         """Return some of the samples."""
-        return self.each(lambda array: array[..., rows])
+        return self.each(lambda array: array[rows])
 
     @staticmethod
     def joined(parts: Sequence[MlpSamples]) -> MlpSamples:
         """Return the samples of all parts, one part after the other."""
-        return MlpSamples(**{name: np.concatenate([vars(part)[name] for part in parts], axis=-1)
+        return MlpSamples(**{name: np.concatenate([vars(part)[name] for part in parts])
                              for name in vars(parts[0])})
 
 
-def describe(pairs: Pairs) -> MlpSamples:
-    """Return the samples of pairs that overlap."""
+def describe(pairs: Pairs) -> tuple[MlpSamples, np.ndarray]:
+    """Return the samples of those pairs that the network decides about, and which they are (n,)."""
     found = stages(*pairs, names=(
-        'features', 'vectors', 'slant', 'cut', 'centroid', 'volume', 'covariance', 'frame_b',
-        'rotation', 'pressed_offset_a', 'bounds_middle', 'bounds_half'))
-    turn, half = found.rotation, found.bounds_half
-    from_b = np.einsum('nji,nj->ni', turn, found.centroid - found.pressed_offset_a)
-    centroid = np.where(found.frame_b[:, None], from_b, found.centroid)
-    axes = rotation_matrix(np.where(
-        found.frame_b[:, None], pairs.pose_b[:, 3:], pairs.pose_a[:, 3:]))
-    covariance = np.swapaxes(axes, 1, 2) @ found.covariance @ axes
-    trace = np.trace(covariance, axis1=1, axis2=2)[:, None]
-    samples = MlpSamples(
-        features=found.features, vectors=found.vectors, slant=found.slant, cut=found.cut,
-        offsets=(centroid - found.bounds_middle) / half, scale=half / pairs.edge[:, None],
-        volume=found.volume / (8.0 * half.prod(axis=1)),
-        covariance=covariance[:, ROW, COLUMN] / (half[:, ROW] * half[:, COLUMN]),
-        spread=half / np.sqrt(trace))
-    return samples.each(lambda array: np.moveaxis(array.astype(np.float32), 0, -1).copy())
+        'accurate', 'true_volume', 'true_mean', 'true_covariance', 'columns_volume',
+        'columns_mean', 'columns_covariance', 'upper_volume', 'upper_least', 'upper_most',
+        'upper_features', 'upper_points', 'upper_carries'))
+    with np.errstate(divide='ignore', invalid='ignore'):
+        cut = found.upper_volume / found.columns_volume[:, None]
+        open_share = (cut * (found.upper_most - found.upper_least)).sum(axis=1)
+        from_middle = found.upper_points - found.columns_mean[:, None, None]
+        spread = np.einsum('nk,nkp,nkpi->n', cut * (found.upper_most - found.upper_least),
+                           found.upper_carries, from_middle**2)
+        trace = np.trace(found.columns_covariance, axis1=1, axis2=2)
+        rows = (found.accurate & (found.true_volume > 0.0) & (open_share > OPEN)
+                & (open_share < BEYOND * BRACKET_LIMIT) & (cut.sum(axis=1) < BEYOND * UPPER_LIMIT)
+                & (spread < BEYOND * SPREAD_LIMIT * trace))
+    chosen = [array[rows].astype(np.float64) if len(array) else array for array in found]
+    found = found._replace(**dict(zip(found._fields, chosen)))
+    trace = np.trace(found.true_covariance, axis1=1, axis2=2)
+    radius, origin = np.sqrt(trace)[:, None], found.columns_mean
+    covariance = found.true_covariance / trace[:, None, None]
+    return MlpSamples(
+        features=found.upper_features, cut=cut[rows], least=found.upper_least,
+        most=found.upper_most, carries=found.upper_carries,
+        points=(found.upper_points - origin[:, None, None]) / radius[:, None, None],
+        columns_covariance=found.columns_covariance / trace[:, None, None],
+        volume=found.true_volume / found.columns_volume,
+        mean=(found.true_mean - origin) / radius, covariance=covariance,
+        whitening=np.linalg.inv(np.linalg.cholesky(covariance))), rows
 
 
 def draw_samples(make: Generator, seed: Sequence[int], n: int, progress: bool = False,
                  ) -> MlpSamples:
-    """Return the samples of about n pairs of `make(rng, n)`.
+    """Return the samples among about n pairs of `make(rng, n)`.
 
     Each piece of PIECE pairs has its own seed.
     """
     starts = tqdm(range(0, n, PIECE), desc='data', unit='piece', disable=not progress)
     return MlpSamples.joined([
-        describe(make(np.random.default_rng([*seed, start]), min(PIECE, n - start)))
+        describe(make(np.random.default_rng([*seed, start]), min(PIECE, n - start)))[0]
         for start in starts])
 
 
 def mixture(rng: np.random.Generator, n: int) -> Pairs:
     """Draw about n pairs of the kinds that scenes have.
 
-    Equal cubes and random sizes in any pose, and with an edge of one almost along an edge of the
-    other; stacks of boxes with a tilt of 1e-6 to 0.3 rad, and containers; containers and cubes
-    stacked squarely, almost in line and flat.
+    - Equal cubes and random sizes in any pose, some with an edge of one almost along an edge of the
+      other.
+    - Stacks of boxes with a tilt of 1e-6 to 0.3 rad, and containers.
+
+    - Containers and cubes stacked squarely, almost in line and flat.
+    - Random sizes laid flat on each other.
     """
-    share = n // 28
+    share = n // 34
     parts = []
     sizes = np.ones((4 * share, 3))
     parts.append(any_pose(rng, sizes, sizes, depths(rng, sizes, sizes)))
@@ -138,6 +149,9 @@ def mixture(rng: np.random.Generator, n: int) -> Pairs:
         parts.append(stacked(rng, size, log_uniform(rng, 1e-7, 0.02, share),
                              rng.uniform(-0.03, 0.03, share),
                              min(size) * log_uniform(rng, 1e-4, 0.02, share), spread=0.1))
+    size_a, size_b = random_sizes(rng, 6 * share)
+    parts.append(laid(rng, size_a, size_b, log_uniform(rng, 1e-4, 0.1, 6 * share),
+                      depths(rng, size_a, size_b)))
     return Pairs(*(np.concatenate(columns) for columns in zip(*parts)))
 
 
@@ -163,32 +177,3 @@ def along_edges(rng: np.random.Generator, size_a: np.ndarray, size_b: np.ndarray
     place = (rng.uniform(-0.5, 0.5, (n, 3)) * size_a
              - np.einsum('nij,nj->ni', rotation_matrix(turn), at_b))
     return onto(place, turn, size_a, size_b, depths(rng, size_a, size_b))
-
-
-def scene_sizes(path: Path) -> list[SizePair]:
-    """Return the distinct pairs of sizes in a scene file's list of pairs.
-
-    A swapped pair counts once. So do boxes that differ in which axis is called x, y or z: extents
-    are sorted, longest first. Raises SceneError for a file that is no scene.
-    """
-    scene = read_scene(path)
-    sizes = {name: tuple(sorted(box.size, reverse=True)) for name, box in scene.boxes.items()}
-    return list(dict.fromkeys(
-        tuple(sorted((sizes[pair.a], sizes[pair.b]), reverse=True)) for pair in scene.pairs))
-
-
-def scene_mixture(rng: np.random.Generator, n: int, sizes: Sequence[SizePair]) -> Pairs:
-    """Draw about n pairs of the sizes listed, each in turn as A.
-
-    Half are in any pose, half one on the other, any of their axes up, with a tilt of 1e-6 to
-    0.3 rad.
-    """
-    share = max(1, n // (4 * len(sizes)))
-    parts = []
-    for pair in sizes:
-        for one, other in (pair, pair[::-1]):
-            size_a, size_b = (np.tile(size, (share, 1)) for size in (one, other))
-            any_depth, laid_depth = (depths(rng, size_a, size_b) for _ in range(2))
-            parts.append(any_pose(rng, size_a, size_b, any_depth))
-            parts.append(laid(rng, size_a, size_b, log_uniform(rng, 1e-6, 0.3, share), laid_depth))
-    return Pairs(*(np.concatenate(columns) for columns in zip(*parts)))

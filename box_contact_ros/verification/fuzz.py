@@ -4,10 +4,11 @@
 """Program `fuzz`: millions of random pairs, judged by code that shares nothing with the solver.
 
 `python -m box_contact_ros fuzz` draws pairs of boxes by class of size, in poses of the kinds that
-break collision tests. Each model answers all of them. Every gate stands at zero: contacts
-missed or invented, depths wrong, an axis that is not the shallowest, a point outside, NaN, an
-exception. What is too near exact touch for float64 is judged in 60 digits. A broken gate prints the
-pose, ready to be pasted into a test; the exit status is then 1.
+break collision tests. Each model answers all of them. Every gate is zero. There is one
+each for contacts missed or invented, wrong depths, and axes that are not the shallowest. Others are
+for points outside, NaN, negative eigenvalues, volumes of `mlp` outside their brackets, exceptions.
+What is too near exact touch for float64 is judged in 60 digits. A broken gate prints the pose,
+ready to be pasted into a test; the exit status is then 1.
 """
 from __future__ import annotations
 
@@ -40,6 +41,7 @@ from ..solver.arguments import add_models, program_parser, within
 from ..solver.contact_solver import ContactSolver
 from ..solver.models import gated_models
 from .judge import GATES, exact_gap, judge
+from .patches import mlp_faults, patch_faults
 
 PAIRS, QUICK_PAIRS = 10_000_000, 60_000
 PIECE = 50_000  # pairs that are drawn and judged at a time
@@ -223,7 +225,9 @@ def examine(pairs: Pairs, name: str, solvers: dict[str, ContactSolver]) -> list[
             continue
         verdict = judge(*pairs, found)
         verdict.settle(found, gap)
-        faults = verdict.faults
+        faults = verdict.faults | patch_faults(pairs, found)
+        if model == 'mlp':
+            faults |= mlp_faults(pairs, found)
         tally.contacts = int(found.colliding.sum())
         tally.near_touch = int(verdict.doubtful.sum())
         tally.exact_answers = solver.exact_answers - before
@@ -289,9 +293,9 @@ def main(args: Sequence[str] | None = None) -> int:
     """Fuzz, print a line per class and model; 1 if a gate is broken."""
     parser = program_parser('fuzz', __doc__, quick=f'{QUICK_PAIRS:,} pairs', seed=1)
     parser.add_argument('--pairs', type=within(1), default=PAIRS,
-                        help='in all (default: %(default)s)')
+                        help='pairs in all (default: %(default)s)')
     parser.add_argument('--classes', nargs='+', choices=list(CLASSES), default=list(CLASSES),
-                        metavar='CLASS', help=f'of {", ".join(CLASSES)} (default: all)')
+                        metavar='CLASS', help=f'classes, of {", ".join(CLASSES)} (default: all)')
     add_models(parser, '--models', gated_models())
     parser.add_argument('--workers', type=within(1), default=os.cpu_count() or 1, help='processes')
     parser.add_argument('--out', type=Path, metavar='FILE', help='CSV with the tallies')

@@ -5,7 +5,7 @@
 
 Tests and reports read them from `hard_poses.npz` and do not draw them anew. At 1e-12 the rounding
 of a recipe is part of the case, and another machine's sine may round differently. Each family has a
-recipe with a docstring in `test/helpers/hard_pose_recipes.py`. `make_hard_poses.py` beside it
+recipe with a docstring in `test/helpers/hard_pose_recipes.py`. `make_hard_poses.py` next to it
 stores what the recipes draw, with the true gap, centroid, volume and covariance in 60 digits.
 """
 from __future__ import annotations

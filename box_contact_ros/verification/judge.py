@@ -23,8 +23,8 @@ TOLERANCE = 1e-12  # what separations and depths have to keep, of the size
 COORDINATE_ULPS = 8.0
 """And far from the origin, of the coordinates' last place: poses are known no better."""
 TOUCH_ULPS = 8.0
-"""Largest gap that is a touch, in units in the last place of the largest coordinate or size: a
-convention of the package that the judge has to know."""
+"""Largest gap that is a touch, in units in the last place of the largest coordinate or size. The
+judge has to know this convention of the package."""
 DOUBT = 1e-14  # gap, of the size, up to which its sign is not known in float64
 PRESSED = 3e-9
 """How far a corner moves, of the size, when boxes are pressed in along three axes. Contacts
@@ -35,15 +35,16 @@ AXES = 15  # normals of A's faces, of B's, and cross products of their edges
 TINY = 1e-140
 """Least length of a cross product that is made a unit vector; its square must not underflow."""
 FAR_BEHIND, MOSTLY_ROUNDING = 1e-9, 1e-6
-"""An axis is not taken in 60 digits if its gap in float64 is less than the greatest by so much of
-the size. Its edges must cross at a larger sine than the second: else its direction is rounding."""
+"""An axis is not taken in 60 digits if its gap in float64 is less than the greatest by this share
+of the size. Its edges must cross at a larger sine than the second, or its direction is noise."""
 
-MISSED, PHANTOM, TOO_DEEP, TOO_SHALLOW, WRONG_AXIS, NOT_UNIT, OUTSIDE, NOT_FINITE = (
-    1 << k for k in range(8))
+(MISSED, PHANTOM, TOO_DEEP, TOO_SHALLOW, WRONG_AXIS, NOT_UNIT, OUTSIDE, NOT_FINITE, NEGATIVE,
+ OUT_OF_BRACKETS) = (1 << k for k in range(10))
 GATES = {MISSED: 'missed contact', PHANTOM: 'phantom contact', TOO_DEEP: 'too deep',
          TOO_SHALLOW: 'too shallow', WRONG_AXIS: 'wrong axis', NOT_UNIT: 'normal not unit',
-         OUTSIDE: 'point outside', NOT_FINITE: 'NaN'}
-"""Faults by bit; `judge` returns sums of them."""
+         OUTSIDE: 'point outside', NOT_FINITE: 'NaN', NEGATIVE: 'negative eigenvalue',
+         OUT_OF_BRACKETS: 'volume outside its brackets'}
+"""Faults by bit. `judge` returns sums of them; the last two are those of `patches`."""
 BY_GAP = MISSED | PHANTOM | TOO_DEEP | TOO_SHALLOW | WRONG_AXIS  # what the true gap decides
 PIECE = 2048  # pairs that are judged at a time: their corners fit a processor's caches
 _SIGNS = np.array([[0.5 if k >> c & 1 else -0.5 for c in range(3)] for k in range(8)])

@@ -30,10 +30,9 @@ here=$!
 aarch64-linux-gnu-g++ "${flags[@]}" -o "$work/arm"
 wait "$here"
 
-data=("$work/families.txt" "$root/weights/mlp.safetensors")
 echo "$(uname -m):"
-"$work/here" "${data[@]}" "$work/here.answers"
+"$work/here" "$work/families.txt" "$work/here.answers"
 echo 'aarch64:'
-qemu-aarch64 -L /usr/aarch64-linux-gnu "$work/arm" "${data[@]}" "$work/arm.answers"
+qemu-aarch64 -L /usr/aarch64-linux-gnu "$work/arm" "$work/families.txt" "$work/arm.answers"
 cmp "$work/here.answers" "$work/arm.answers"
 echo "the same bits of verdict, separation and normal in $(wc -l <"$work/arm.answers") pairs"

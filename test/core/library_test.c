@@ -36,8 +36,8 @@ static void check_contacts(void) {
   bc_contact contact;
   check(bc_solve(solver, &origin, &b, NULL, NULL, BC_COVARIANCE, &contact) == BC_OK, "solve");
   check(contact.colliding && contact.separation == -0.5 && contact.axis == 2, "depth, axis");
-  check(contact.normal[2] == 1.0 && fabs(contact.point[2] - 0.75) < 1e-12, "normal, point");
-  check(fabs(contact.volume - 2.0) < 1e-12 && fabs(contact.covariance[0][0] - 1.0 / 3.0) < 1e-12,
+  check(contact.normal[2] == 1.0 && fabs(contact.point[2] - 0.75) < 1e-6, "normal, point");
+  check(fabs(contact.volume - 2.0) < 1e-6 && fabs(contact.covariance[0][0] - 1.0 / 3.0) < 1e-6,
         "volume, covariance");
   bc_size small = {{1.0, 1.0, 1.0}};
   check(bc_solve(solver, &origin, &b, &small, &small, BC_VOLUME, &contact) == BC_OK, "other sizes");
@@ -93,8 +93,7 @@ static void check_refusals(const char* weights) {
   check(strstr(bc_error_text(), "size_b (1, 0, 1) is not within"), "its words");
   check(bc_solver_create(NULL, &cube, NULL, &solver) == BC_BAD_ARGUMENT, "no size");
   bc_options options = BC_DEFAULT_OPTIONS;
-  options.model = BC_MLP;
-  check(bc_solver_create(&cube, &cube, &options, &solver) == BC_BAD_WEIGHTS, "no weights");
+  check(options.model == BC_MLP && options.weights == NULL, "the default: mlp, as shipped");
   options.weights = "/no/such/file";
   check(bc_solver_create(&cube, &cube, &options, &solver) == BC_BAD_WEIGHTS, "no file");
   options.weights = weights;

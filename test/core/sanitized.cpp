@@ -1,7 +1,7 @@
 // Copyright 2026 The box_contact_ros maintainers
 // SPDX-License-Identifier: Apache-2.0
 
-// The test and the fuzz as one program, so that sanitizers instrument the core once: with three
+// The test and the fuzz as one program, so that sanitizers instrument the core once: with two
 // arguments it is the test, with one the fuzz.
 #include <algorithm>
 #include <cmath>
@@ -17,7 +17,6 @@
 #include <vector>
 
 #include "box_contact/inline.hpp"
-#include "box_contact/weights.hpp"
 
 // What these include is above: nothing but their own text comes into the namespaces.
 namespace test {

@@ -25,7 +25,6 @@ pytestmark = [pytest.mark.slow, pytest.mark.timeout(PATIENCE)]
 
 ROOT = Path(__file__).resolve().parents[2]
 SOURCES = ROOT / 'test' / 'core'
-WEIGHTS = ROOT / 'weights' / 'mlp.safetensors'
 FLAGS = ['-std=c++17', '-Wall', '-Wextra', '-Werror']
 """None that the header would need."""
 SANITIZE = ['-Og', '-g1', '-fsanitize=address,undefined,float-cast-overflow',
@@ -139,7 +138,7 @@ def run_test(builds: Builds, folder: Path, name: str) -> None:
     """Run a build of contact_test; its answers have to be those of the first build that ran."""
     program = builds.program(name)
     answers = folder / f'{name}.answers'
-    assert ' 0 failures' in run(program, folder / 'families.txt', WEIGHTS, answers)
+    assert ' 0 failures' in run(program, folder / 'families.txt', answers)
     first = folder / 'first.answers'
     if not first.exists():
         shutil.copy(answers, first)

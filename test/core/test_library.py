@@ -162,7 +162,7 @@ def test_other_languages_get_the_bits_of_python(library: ctypes.CDLL, model: str
 
 @pytest.mark.parametrize('source', ['force_test.c', 'force_test.cpp'])
 def test_the_law_has_the_bits_of_python(tmp_path: Path, source: str) -> None:
-    """A load that is dropped and pushed: 2,000 steps in C, in C++ and here."""
+    """A load that is dropped and pushed: 2,000 steps in C, in C++ and here; the default model."""
     compiler, standard = ('gcc', 'c11') if source.endswith('.c') else ('g++', 'c++17')
     program = tmp_path / 'force_test'
     run(tool(compiler), f'-std={standard}', '-O2', '-ffp-contract=off', *STRICT,
@@ -171,7 +171,7 @@ def test_the_law_has_the_bits_of_python(tmp_path: Path, source: str) -> None:
     *found, failures, _ = run(program).split()
     assert failures == '0'
     size = (12.192, 2.438, 2.591)
-    solver = ContactSolver(size, size, model='exact')
+    solver = ContactSolver(size, size)
     law = HeldPatch.for_loop(Body(mass=20000.0, inertia=(21000.0, 260000.0, 255000.0)),
                              rate_hz=200.0, latency=0.002)
     stack, velocity = np.array([0, 0, 0, 0, 0, 0, 1.0]), np.zeros(6)
@@ -487,15 +487,27 @@ def damaged(change: str) -> bytes:
         return (2**63).to_bytes(8, 'little') + data[8:]
     if change == 'shape whose product overflows':
         entries = json.loads(header)
-        entries['point.0.bias'] |= {'shape': [2**62], 'data_offsets': [4, 4]}
+        entries['share.0.bias'] |= {'shape': [2**62], 'data_offsets': [4, 4]}
         header = json.dumps(entries, separators=(',', ':'))
     if change == 'tensors missing':
         tensors = b''
+    if change in OTHER_WORDS:
+        before, after = OTHER_WORDS[change]
+        assert before in header
+        header = header.replace(before, after)
+    if change in OTHER_WEIGHTS:
+        tensors = np.array(OTHER_WEIGHTS[change], '<f4').tobytes() * (len(tensors) // 4)
     return len(header).to_bytes(8, 'little') + header.encode() + tensors
 
 
+OTHER_WORDS = {'another name': ('share.1.weight', 'share.1.height'),
+               'another type': ('"F32"', '"I32"'), 'another shape': ('"shape":[1]', '"shape":[2]'),
+               'another format': (r'\"format\": 3', r'\"format\": 2')}
+OTHER_WEIGHTS = {'not a number': np.nan, 'infinite': np.inf, 'too large': -2e4}
+
+
 @pytest.mark.parametrize('change', ['header longer than any file', 'shape whose product overflows',
-                                    'tensors missing'])
+                                    'tensors missing', *OTHER_WORDS, *OTHER_WEIGHTS])
 def test_damaged_weights_are_refused(library: ctypes.CDLL, tmp_path: Path, change: str) -> None:
     path = tmp_path / 'weights.safetensors'
     path.write_bytes(damaged(change))
@@ -504,6 +516,21 @@ def test_damaged_weights_are_refused(library: ctypes.CDLL, tmp_path: Path, chang
 
 def test_endless_weights_are_refused(library: ctypes.CDLL) -> None:
     assert status_with(library, Path('/dev/zero')) == BAD_WEIGHTS
+
+
+def test_the_compiled_network_is_the_default(library: ctypes.CDLL) -> None:
+    """Without options: the bits of Python's default."""
+    pairs = some_pairs().rows(slice(500))
+    unit, solver = Size((c_double * 3)(1, 1, 1)), ctypes.c_void_p()
+    assert library.bc_solver_create(byref(unit), byref(unit), None, byref(solver)) == 0
+    points = np.empty((500, 3))
+    rows = Rows(ctypes.sizeof(Rows), 500, *(part.ctypes.data_as(POINTER(c_double))
+                                            for part in pairs), None, 500)
+    results = Results(size=ctypes.sizeof(Results), point=points.ctypes.data_as(POINTER(c_double)))
+    assert library.bc_solve_rows(solver, byref(rows), byref(results), 1, None) == 0
+    library.bc_solver_destroy(solver)
+    assert np.array_equal(points, pairs.contacts(ContactSolver((1, 1, 1), (1, 1, 1))).point,
+                          equal_nan=True)
 
 
 BAD_WEIGHTS = 5

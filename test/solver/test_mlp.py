@@ -4,58 +4,55 @@
 """Model `mlp`: what it promises whatever its network says, and how good its network is."""
 from __future__ import annotations
 
+import ctypes
+import ctypes.util
+import platform
+import re
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import poses
 import pytest
 
+import box_contact_ros
 from box_contact_ros import ContactSolver
 from box_contact_ros.core import (
-    ASPECT_MAX,
+    BRACKET_LIMIT,
     DEPTH_FLOOR,
-    DEPTH_MAX,
     FEATURES,
-    OUTPUTS,
-    SIZE_RATIO_MAX,
+    NETWORK_FORMAT,
+    SPREAD_LIMIT,
     native,
     stages,
 )
-from box_contact_ros.reports.accuracy import limit_of, statistics
-from box_contact_ros.resources import resource_path
+from box_contact_ros.reports.accuracy import limit_of
+from box_contact_ros.reports.frontier.speed import flush_stacks
 from box_contact_ros.scene.pose import rotation_matrix
-from box_contact_ros.scene.pose_sets import (
-    SETS,
-    Pairs,
-    contact_errors,
-    log_uniform,
-    quaternion_multiply,
-    turns,
-)
-from box_contact_ros.solver.mlp import ACTIVATION, DESCRIPTION, FORMAT, UNITS_MAX, core_numbers
-from box_contact_ros.solver.weights_file import WeightsError, load_weights, save_weights
+from box_contact_ros.scene.pose_sets import LOADS, SETS, Pairs, contact_errors
+from box_contact_ros.solver.contact import Contacts
+from box_contact_ros.solver.mlp import ACTIVATION, NETWORK, UNITS_MAX, core_numbers, load_mlp
+from box_contact_ros.solver.weights_file import WeightsError, save_weights
+from box_contact_ros.training.worst_case import climb, worst_start
+from box_contact_ros.verification.steps import drawn_paths, largest_steps
 
-N = 10_000
+N = 4000
 LANES = native.lanes
 """Rows of a batch that are solved side by side."""
 UNIT = (1.0, 1.0, 1.0)
 EXACT = ContactSolver(UNIT, UNIT, model='exact')
-
+ALL_SETS = {**SETS, **LOADS}
 INSIDE = 2.0**-44
 """How far outside a box the point may be, of the size (5.7e-14); for a contact that is pressed in,
 DEPTH_FLOOR more. Far from the origin, ulps of the coordinates are added (none here)."""
-
-FAMILIES = {
-    'random': poses.random_pairs,
-    'near-parallel': poses.near_parallel_pairs,
-    'aligned': lambda rng, n: aligned(rng, n),
-    **SETS}
+ROUNDING = 3000 * 2.0**-24
+"""Of float32, as the model's header bounds it [of volume and covariance]."""
 
 
-def aligned(rng, n):
+def aligned(rng: np.random.Generator, n: int) -> tuple[np.ndarray, ...]:
     """Containers exactly above each other, tilted about a level axis of the box or not at all."""
     axes = np.eye(3)[rng.integers(0, 3, n)]
-    tilt = rng.choice([0.0, 1e-12, 1e-9, 1e-6, 1e-4, 1e-3], n)
+    tilt = rng.choice([0.0, 1e-12, 2e-9, 1e-6, 1e-4, 1e-3], n)
     height = poses.CONTAINER[2] - rng.choice([0.0, 1e-9, 1e-4, 1e-2], n)
     b = np.column_stack([np.zeros((n, 2)), height, poses.small_rotations(axes, tilt)])
     turn, shift = poses.unit_quaternions(rng, n), rng.uniform(-20, 20, (n, 3))
@@ -64,90 +61,86 @@ def aligned(rng, n):
             size, size)
 
 
+FAMILIES = {
+    'random': poses.random_pairs, 'near-parallel': poses.near_parallel_pairs,
+    'flush': poses.flush_pairs, 'equal thickness': poses.equal_thickness, 'ridges': poses.ridges,
+    'cards': poses.cards, 'aligned': aligned, **ALL_SETS}
+
+
+def drawn(name: str, n: int = N) -> Pairs:
+    return Pairs(*FAMILIES[name](np.random.default_rng([771, list(FAMILIES).index(name)]), n))
+
+
 @pytest.fixture(scope='module')
-def mlp():
-    return ContactSolver(UNIT, UNIT, model='mlp')
+def mlp() -> ContactSolver:
+    return ContactSolver(UNIT, UNIT)
 
 
 @pytest.fixture(params=FAMILIES)
-def pairs(request):
-    return Pairs(*FAMILIES[request.param](np.random.default_rng(771), N))
+def pairs(request: pytest.FixtureRequest) -> Pairs:
+    return drawn(request.param)
 
 
-@pytest.fixture(params=SETS)
-def named_set(request):
-    return request.param, SETS[request.param](np.random.default_rng(772), N)
+@pytest.fixture(params=ALL_SETS)
+def named_set(request: pytest.FixtureRequest) -> tuple[str, Pairs]:
+    return request.param, drawn(request.param)
 
 
-def solve(solver, pairs):
-    return solver.batch(pairs.pose_a, pairs.pose_b, size_a=pairs.size_a, size_b=pairs.size_b)
+def with_numbers(pairs: Pairs, numbers: np.ndarray) -> Contacts:
+    """Return the contacts by a network as the core reads it."""
+    return Contacts(*native.PairSolver('mlp', UNIT, UNIT, numbers).solve(*pairs, 1)[0])
 
 
-def largest(pairs):
-    return np.maximum(pairs.size_a.max(axis=1), pairs.size_b.max(axis=1))
+def left_to_exact(pairs: Pairs) -> np.ndarray:
+    """Return which rows (n,) are left to `exact`, by asking for one after the other."""
+    solver = native.PairSolver('mlp', UNIT, UNIT, SHIPPED)
+    counts = [0]
+    for row in range(len(pairs.pose_a)):
+        solver.solve(*(part[row:row + 1] for part in pairs), 1)
+        counts.append(solver.answered_exactly)
+    return np.diff(counts) > 0
 
 
-def edge(pairs):
-    """Return the smaller box's longest edge [m]: what errors are given in."""
-    return np.minimum(pairs.size_a.max(axis=1), pairs.size_b.max(axis=1))
+def assert_same_bits(one: Contacts, other: Contacts, where: object = None) -> None:
+    for name, mine, theirs in zip(Contacts._fields, one, other, strict=True):
+        assert np.array_equal(mine, theirs, equal_nan=True), (name, where)
 
 
-def percent(one, other, pairs):
-    """Distance between points, in % of `edge`; rows with a contact in both."""
-    distance = 100.0 * np.linalg.norm(one - other, axis=1) / edge(pairs)
-    return distance[np.isfinite(distance)]
+def rows_of(found: Contacts, rows: np.ndarray) -> Contacts:
+    return Contacts(*(field[rows] for field in found))
 
 
-def in_range(pairs, found):
-    """Rows that the MLP must answer itself, worked out the plain way."""
-    aspect = np.maximum(pairs.size_a.max(axis=1) / pairs.size_a.min(axis=1),
-                        pairs.size_b.max(axis=1) / pairs.size_b.min(axis=1))
-    ratio = largest(pairs) / edge(pairs)
-    shortest = np.minimum(pairs.size_a.min(axis=1), pairs.size_b.min(axis=1))
-    return ((aspect <= ASPECT_MAX * (1 + 1e-9)) & (ratio <= SIZE_RATIO_MAX * (1 + 1e-9))
-            & (-found.separation <= DEPTH_MAX * (1 + 1e-9) * shortest))
-
-
-def outside(pairs, found):
-    """(n,) by how much the point is outside either box [m]; negative inside."""
-    worst = np.full(len(pairs.pose_a), -np.inf)
-    for pose, size in ((pairs.pose_a, pairs.size_a), (pairs.pose_b, pairs.size_b)):
-        local = poses.rotate(pose[:, 3:] * (-1, -1, -1, 1), found.point - pose[:, :3])
-        worst = np.maximum(worst, (np.abs(local) - size / 2).max(axis=1))
-    return worst
-
-
-def is_inside(pairs, found):
-    """Every contact's point lies in both boxes, up to INSIDE and how far B is pressed in."""
-    rows = found.colliding
-    size = largest(pairs)
-    coordinates = np.maximum(np.abs(pairs.pose_a[:, :3]), np.abs(pairs.pose_b[:, :3])).max(axis=1)
-    slack = (INSIDE * np.maximum(size, coordinates)
-             + np.maximum(0.0, DEPTH_FLOOR * size + found.separation))
-    return np.isfinite(found.point[rows]).all() and np.all((outside(pairs, found) <= slack)[rows])
-
-
-def trace(covariance):
+def trace(covariance: np.ndarray) -> np.ndarray:
     return np.trace(covariance, axis1=1, axis2=2)
 
 
-def is_a_patch(found):
-    """Every contact has a finite, positive volume and a covariance of no negative eigenvalue."""
-    volume, covariance = found.volume[found.colliding], found.covariance[found.colliding]
-    # The covariance is summed and turned in float64.
-    least = np.linalg.eigvalsh(covariance)[:, 0]
-    return (np.all(np.isfinite(volume) & (volume > 0.0))
-            and np.array_equal(covariance, np.swapaxes(covariance, 1, 2))
-            and np.all(least >= -1e-14 * trace(covariance)))
+def assert_sound(pairs: Pairs, found: Contacts) -> None:
+    """Points are in both boxes, volumes positive, covariances symmetric and positive definite.
+
+    Definite are those of the columns: clipping may lose the least eigenvalue of a card.
+    """
+    reach = np.maximum(np.abs(pairs.pose_a[:, :3]), np.abs(pairs.pose_b[:, :3])).max(axis=1)
+    slack = (INSIDE * np.maximum(pairs.size, reach)
+             + np.maximum(0.0, DEPTH_FLOOR * pairs.size + found.separation))
+    rows = found.colliding
+    assert rows.any() and np.isfinite(found.point[rows]).all()
+    assert np.all((pairs.beyond(found.point) <= slack)[rows])
+    volume, covariance = found.volume[rows], found.covariance[rows]
+    assert np.all(np.isfinite(volume) & (volume > 0.0))
+    assert np.array_equal(covariance, np.swapaxes(covariance, 1, 2))
+    covariance = covariance[volume != pairs.contacts().volume[rows]]
+    # The covariance is turned in float64, which may lose the least eigenvalue of a sliver.
+    assert np.all(np.linalg.eigvalsh(covariance)[:, 0] >= -1e-15 * trace(covariance))
 
 
 # --- what SAT gives -------------------------------------------------------------------------------
 
 
-def test_verdict_separation_and_normal_are_those_of_exact(mlp, pairs):
+def test_verdict_separation_normal_and_axis_are_those_of_exact(
+        mlp: ContactSolver, pairs: Pairs) -> None:
     """Bit for bit; the network has no say in them."""
-    one, other = solve(mlp, pairs), solve(EXACT, pairs)
-    for name in ('colliding', 'separation', 'normal'):
+    one, other = pairs.contacts(mlp), pairs.contacts()
+    for name in ('colliding', 'separation', 'normal', 'axis'):
         assert np.array_equal(getattr(one, name), getattr(other, name), equal_nan=True), name
     for name in ('point', 'volume', 'covariance'):
         assert np.array_equal(np.isnan(getattr(one, name)), np.isnan(getattr(other, name)))
@@ -155,281 +148,250 @@ def test_verdict_separation_and_normal_are_those_of_exact(mlp, pairs):
 
 # --- what holds whatever the network says ---------------------------------------------------------
 
-
-def garbage(rng, kind):
-    """(weight, bias) of two layers that were not trained."""
-    widths = (FEATURES, 32, OUTPUTS)
-    layers = []
-    for number, (inputs, outputs) in enumerate(zip(widths, widths[1:])):
-        weight, bias = rng.normal(size=(outputs, inputs)), rng.normal(size=outputs)
-        if kind == 'as large as a loader believes':
-            weight, bias = 1e4 * np.sign(weight), 1e4 * np.sign(bias)
-        elif kind == 'tiny':  # float32 denormals
-            weight, bias = 1e-40 * weight, 1e-40 * bias
-        elif kind == 'zero':
-            weight, bias = 0.0 * weight, 0.0 * bias
-        elif kind == 'one direction':
-            weight, bias = 0.0 * weight, np.full(outputs, -1e4 if number % 2 else 1e4)
-        layers.append((weight, bias))
-    return layers
+SHIPPED = core_numbers(load_mlp().networks[NETWORK])
+LEAST, MOST = np.array([-4.0], np.float32), np.array([4.0], np.float32)
+"""Networks of no unit, which always choose the one bracket or the other."""
 
 
-def card_of(widths: tuple[int, ...]) -> dict[str, Any]:
-    """Return a model card that the MLP takes."""
-    return {'name': 'other', 'model': 'mlp', 'format': FORMAT,
-            'inputs': {'description': DESCRIPTION}, 'activation': ACTIVATION, 'outputs': [],
-            'sizes': [], 'architecture': list(widths), 'data': {},
-            'seed': 0, 'commit': '', 'metrics': {}}
+def garbage(kind: str) -> np.ndarray:
+    """Return the numbers of a network that was not trained."""
+    rng = np.random.default_rng(4)
+    numbers = rng.normal(size=1 + 32 * (FEATURES + 2))
+    factor = {'random': 1.0, 'large': 100.0, 'tiny': 1e-40}.get(kind)  # tiny: denormals
+    if factor is None:  # as large as a loader believes
+        return (1e4 * np.sign(numbers)).astype(np.float32)
+    return (factor * numbers).astype(np.float32)
 
 
-def written(path, layers):
-    """Return the weights file of these layers."""
-    save_weights(path, {'point': layers}, card_of((FEATURES, 32, OUTPUTS)))
-    return str(path)
+GARBAGE = {'least': LEAST, 'most': MOST,
+           **{kind: garbage(kind) for kind in ('random', 'large', 'tiny', 'largest')}}
+FE_UNDERFLOW = 0x10 if platform.machine() == 'x86_64' else 0x8
+WORST = {'point': 3.0, 'volume': 100.0 * (BRACKET_LIMIT / (1.0 - BRACKET_LIMIT) + ROUNDING),
+         'covariance': 45.0}
+"""Largest errors of garbage [%]. That of the volume is proven, as the brackets hold the truth."""
 
 
-@pytest.mark.parametrize('kind', ['random', 'as large as a loader believes', 'tiny', 'zero',
-                                  'one direction'])
-def test_contacts_are_sound_even_with_garbage_for_weights(tmp_path, kind):
-    """Weights that nobody trained: points are wrong, finite, and inside; volumes are positive.
+@pytest.mark.parametrize('kind', GARBAGE)
+def test_garbage_for_weights_stays_within_the_brackets(kind: str) -> None:
+    """Volumes err by what the brackets allow; points are in both boxes, covariances definite."""
+    for name in FAMILIES:
+        pairs = drawn(name, N // 2)
+        found, truth = with_numbers(pairs, GARBAGE[kind]), pairs.contacts()
+        assert_sound(pairs, found)
+        rows = truth.colliding
+        with np.errstate(invalid='ignore', divide='ignore'):  # slivers have no width in the plane
+            errors = contact_errors(rows_of(found, rows), rows_of(truth, rows), pairs.edge[rows])
+        for quantity, most in WORST.items():
+            assert getattr(errors, quantity).max() <= most, (name, quantity)
 
-    Covariances are positive semidefinite.
+
+@pytest.mark.parametrize('name', FAMILIES)
+def test_the_network_has_no_more_influence_than_the_brackets_leave_it(name: str) -> None:
+    """None where the brackets meet: equal bits. Else, by Cauchy and Schwarz from the limits.
+
+    |Δpoint|² ≤ BRACKET_LIMIT · SPREAD_LIMIT · trace, |Δvolume| as the brackets are apart.
     """
-    file = written(tmp_path / 'garbage.safetensors', garbage(np.random.default_rng(4), kind))
-    solver = ContactSolver(UNIT, UNIT, model='mlp', weights=file)
-    for name, make in FAMILIES.items():
-        pairs = Pairs(*make(np.random.default_rng(31), N))
-        found = solve(solver, pairs)
-        assert is_inside(pairs, found) and is_a_patch(found), name
+    pairs = drawn(name)
+    least, most = with_numbers(pairs, LEAST), with_numbers(pairs, MOST)
+    found = stages(*pairs, names=('colliding', 'volume', 'true_volume', 'upper_volume',
+                                  'upper_least', 'upper_most'))
+    rows = found.colliding
+    scale = found.volume[rows] / found.true_volume[rows]
+    apart = (found.upper_volume * (found.upper_most - found.upper_least)).sum(axis=1)[rows] * scale
+    least, most = rows_of(least, rows), rows_of(most, rows)
+    meet = apart == 0.0
+    assert_same_bits(rows_of(least, meet), rows_of(most, meet))
+    change = least.volume - most.volume
+    assert np.all(change >= -ROUNDING * least.volume)
+    assert np.all(change <= apart + ROUNDING * least.volume)
+    point = np.linalg.norm(least.point - most.point, axis=1)
+    bound = np.sqrt(BRACKET_LIMIT * SPREAD_LIMIT * trace(most.covariance))
+    assert np.all(point <= bound * (1.0 + 2.0 * SPREAD_LIMIT))
+    print(f'{name}: brackets meet {meet.mean():.3f}, point {(point / bound).max():.3f}')
 
 
-@pytest.mark.parametrize('size', [1.0, 30.0, 1e4])
-def test_patches_fit_the_bounds_even_with_garbage_for_weights(size):
-    """In the bounds: volumes above zero and at most one, variances above zero and at most 1/3.
-
-    The core is asked itself, as the solver would replace what is not sound.
-    """
-    rng = np.random.default_rng(9)
-    numbers = (size * rng.normal(size=OUTPUTS + 20 * 32)).astype(np.float32)
-    for name, make in SETS.items():
-        pairs = make(np.random.default_rng(31), N)
-        found = stages(*pairs, names=('answer_volume', 'answer_covariance'), network=numbers)
-        variances = np.linalg.eigvalsh(found.answer_covariance)
-        assert np.all((found.answer_volume > 0.0) & (found.answer_volume <= 1.0)), name
-        assert np.all((variances > 0.0) & (variances < 1.0 / 3.0 + INVERSE_ROUNDING)), name
-        assert np.ptp(variances) > 0.3  # not all alike
+def test_the_network_is_really_asked() -> None:
+    """The tests above would prove nothing of a network whose answer is not used."""
+    pairs = drawn('crossed bars')
+    least, most = with_numbers(pairs, LEAST), with_numbers(pairs, MOST)
+    assert (least.volume > (1.0 + 1e-4) * most.volume).mean() > 0.01
 
 
-@pytest.mark.parametrize('output', range(OUTPUTS))
-def test_weights_that_are_no_numbers_are_answered_exactly(output):
-    """A loader refuses them; if one gets through, point, volume and covariance are exact ones."""
-    numbers = core_numbers(load_weights(resource_path('weights', 'mlp.safetensors'))
-                           .networks['point'])
-    numbers[output] = np.nan
-    pairs = SETS['stacks'](np.random.default_rng(31), 1000)
-    solver = native.PairSolver('mlp', UNIT, UNIT, numbers)
-    found, _ = solver.solve(*pairs, 1)
-    assert solver.answered_exactly == len(pairs.pose_a)
-    for mine, theirs in zip(found, solve(EXACT, pairs)):
-        assert np.array_equal(mine, theirs, equal_nan=True)
+def test_weights_that_are_no_numbers_are_refused() -> None:
+    """Behind the loader, which refuses them too."""
+    numbers = SHIPPED.copy()
+    numbers[0] = np.nan
+    with pytest.raises(ValueError, match='weight that is not within'):
+        with_numbers(drawn('containers', 8), numbers)
 
 
-def test_garbage_for_weights_is_really_asked(tmp_path):
-    """The test above would prove nothing of a network whose answer is not used."""
-    file = written(tmp_path / 'garbage.safetensors',
-                   garbage(np.random.default_rng(4), 'one direction'))
-    pairs = SETS['stacks'](np.random.default_rng(31), N)
-    found = solve(ContactSolver(UNIT, UNIT, model='mlp', weights=file), pairs)
-    assert np.median(percent(found.point, solve(EXACT, pairs).point, pairs)) > 10.0
-
-
-def test_the_point_is_in_both_boxes(mlp, pairs):
-    """With the shipped weights; volume and covariance are sound, too."""
-    found = solve(mlp, pairs)
-    assert is_inside(pairs, found) and is_a_patch(found)
-
-
-def test_points_of_an_aligned_stack_are_inside(mlp):
-    """Two containers exactly above each other, turned anywhere.
-
-    All their sides lie in pairs of one plane, and rounding put the edges of each outside the other:
-    no bounds, and a point 6 m off.
-    """
-    rng = np.random.default_rng(8)
-    n = 5000
-    b = np.tile((0, 0, poses.CONTAINER[2] - 1e-3, 0, 0, 0, 1.0), (n, 1))
-    turn, shift = poses.unit_quaternions(rng, n), rng.uniform(-20, 20, (n, 3))
-    size = np.tile(poses.CONTAINER, (n, 1))
-    pairs = Pairs(poses.moved(np.tile(poses.IDENTITY, (n, 1)), shift, turn),
-                  poses.moved(b, shift, turn), size, size)
-    found = solve(mlp, pairs)
-    assert is_inside(pairs, found)
-    assert percent(found.point, solve(EXACT, pairs).point, pairs).max() < 3.0
+def test_contacts_are_sound(mlp: ContactSolver, pairs: Pairs) -> None:
+    assert_sound(pairs, pairs.contacts(mlp))
 
 
 @pytest.mark.parametrize('size_a, size_b', [((1e-9,) * 3, (1e-9,) * 3), ((1e9,) * 3, (1e9,) * 3),
                                             (UNIT, (1e-6,) * 3), ((1e-50,) * 3, (1e-50,) * 3),
                                             ((1e50,) * 3, (1e50,) * 3)])
-def test_extreme_sizes_are_finite_and_inside(mlp, size_a, size_b):
+def test_extreme_sizes(mlp: ContactSolver, size_a: tuple, size_b: tuple) -> None:
     """From the smallest to the largest that is accepted: nothing over- or underflows."""
     n = 64
-    reach = 0.5 * (size_a[2] + size_b[2])
-    b = np.tile((0, 0, 0, 0, 0, 0, 1.0), (n, 1))
-    b[:, 2] = reach - min(size_a[2], size_b[2]) * np.linspace(0.0, 0.2, n)
+    b = np.tile(poses.IDENTITY, (n, 1))
+    b[:, 2] = (0.5 * (size_a[2] + size_b[2])
+               - min(size_a[2], size_b[2]) * np.linspace(0.0, 0.2, n))
     b[:, :2] = 0.1 * size_b[0]
     pairs = Pairs(np.tile(poses.IDENTITY, (n, 1)), b, np.tile(size_a, (n, 1)),
                   np.tile(size_b, (n, 1)))
-    found = solve(mlp, pairs)
-    assert found.colliding.all() and is_inside(pairs, found) and is_a_patch(found)
+    found = pairs.contacts(mlp)
+    assert found.colliding.all()
+    covariance = found.covariance
+    found = found._replace(covariance=covariance / trace(covariance)[:, None, None])
+    assert_sound(pairs, found)
 
 
-# --- the range ------------------------------------------------------------------------------------
+def test_boxes_that_stand_squarely_do_not_underflow(mlp: ContactSolver) -> None:
+    """Where numbers of float32 underflow, the machine takes a hundred times as long for them."""
+    libm = ctypes.CDLL(ctypes.util.find_library('m'))
+    pairs = flush_stacks(np.random.default_rng(3), N)
+    libm.feclearexcept(FE_UNDERFLOW)
+    pairs.contacts(mlp)
+    assert not libm.fetestexcept(FE_UNDERFLOW)
+    assert np.multiply(np.float32(1e-30), np.float32(1e-12)) < 1e-40
+    assert libm.fetestexcept(FE_UNDERFLOW)  # it would have been seen
 
 
-def test_outside_the_range_the_answer_is_the_exact_one_and_counted(pairs):
-    """To the bit; inside the range the network answers, and nothing is counted."""
-    solver = ContactSolver(UNIT, UNIT, model='mlp')
-    assert solver.exact_answers == 0
-    found, exact = solve(solver, pairs), solve(EXACT, pairs)
-    out = found.colliding & ~in_range(pairs, found)
-    assert solver.exact_answers == out.sum()
-    for name, one, other in zip(found._fields, found, exact):
-        assert np.array_equal(one[out], other[out]), name
+# --- left to exact --------------------------------------------------------------------------------
+
+SHARES = {'random cubes': 0.002, 'touching': 0.001, 'random sizes': 0.012, 'stacks': 0.012,
+          'tilted stacks': 0.012, 'containers': 0.004, 'parcels': 0.001, 'crossed bars': 0.1,
+          'overhang': 0.02, 'near flush': 0.001, 'landings': 0.001}
+"""Largest share of a set that may be left to `exact`: about twice what was measured."""
 
 
-@pytest.mark.parametrize('name', SETS)
-def test_the_sets_are_inside_the_range(name):
-    """An MLP that hands the hard half to `exact` has not been built."""
-    solver = ContactSolver(UNIT, UNIT, model='mlp')
-    solve(solver, SETS[name](np.random.default_rng(5), N))
-    assert solver.exact_answers == 0
+def test_what_is_left_to_exact_is_exact_and_counted(pairs: Pairs) -> None:
+    """Those rows have its bits. A batch counts what its single calls count, in any order."""
+    left, exact = left_to_exact(pairs), pairs.contacts()
+    for order in (np.arange(len(left)), np.random.default_rng(1).permutation(len(left))):
+        solver = ContactSolver(UNIT, UNIT)
+        found = pairs.rows(order).contacts(solver)
+        assert solver.exact_answers == left.sum()
+        at = left[order]
+        assert_same_bits(rows_of(found, at), rows_of(exact, order[at]))
+    assert not left[~exact.colliding].any()
 
 
-@pytest.mark.parametrize('what, size_a, size_b, depth', [
-    ('aspect', (ASPECT_MAX, 1, 1), (ASPECT_MAX, 1, 1), 0.01),
-    ('ratio', (SIZE_RATIO_MAX,) * 3, UNIT, 0.01),
-    ('depth', UNIT, UNIT, DEPTH_MAX)])
-def test_the_limits_belong_to_the_range(what, size_a, size_b, depth):
-    """At the limit itself the network answers; a little beyond, `exact`. Single calls count too."""
-    for factor, counted in ((1.0, 0), (1.001, 1)):
-        mine = np.array(size_a, dtype=float)
-        if what != 'depth':
-            mine[0 if what == 'aspect' else slice(None)] *= factor
-        deep = depth * (factor if what == 'depth' else 1.0)
-        b = (0.2, 0.1, 0.5 * (mine[2] + size_b[2]) - deep, 0, 0, 0, 1)
-        for call in ('single', 'batch'):
-            solver = ContactSolver(mine, size_b, model='mlp')
-            one = (solver(poses.IDENTITY, b) if call == 'single'
-                   else solver.batch([poses.IDENTITY], [b]))
-            assert np.all(one.colliding) and solver.exact_answers == counted, (what, factor, call)
+@pytest.mark.parametrize('name', ALL_SETS)
+def test_few_are_left_to_exact(name: str) -> None:
+    """A model that hands the hard half to `exact` has not been built."""
+    solver = ContactSolver(UNIT, UNIT)
+    pairs = drawn(name, 5 * N)
+    pairs.contacts(solver)
+    assert solver.exact_answers <= SHARES[name] * len(pairs.pose_a)
+
+
+@pytest.mark.parametrize('b', [poses.IDENTITY, poses.IDENTITY + (0.1, 0, 0, 0, 0, 0, 0)])
+def test_a_box_through_its_like_is_left_to_exact(b: np.ndarray) -> None:
+    """Deeper than any contact; single calls count, too."""
+    solver = ContactSolver(UNIT, (0.5, 0.5, 3.0))
+    assert solver(poses.IDENTITY, b).colliding and solver.exact_answers == 1
+    solver.batch([poses.IDENTITY] * 3, [b] * 3)
+    assert solver.exact_answers == 4
 
 
 # --- laws -----------------------------------------------------------------------------------------
 
 
-def test_batch_equals_single_calls(mlp, pairs):
+def test_swap(mlp: ContactSolver, pairs: Pairs) -> None:
+    """B against A: equal bits of all but the normal, by either model.
+
+    Clipping and pressing depend on the face that wins a tie, A's or B's: there `exact` may differ.
+    """
+    other = Pairs(pairs.pose_b, pairs.pose_a, pairs.size_b, pairs.size_a)
+    found = stages(*pairs, names=('certain', 'separation', 'size'))
+    certain = found.certain & (found.separation < -DEPTH_FLOOR * found.size)
+    left = left_to_exact(pairs)
+    assert np.array_equal(left, left_to_exact(other))
+    for solver, asked in ((mlp, ~left | certain), (None, certain)):
+        one, two = (rows_of(found, asked)
+                    for found in (pairs.contacts(solver), other.contacts(solver)))
+        for name in ('colliding', 'separation', 'point', 'volume', 'covariance'):
+            assert np.array_equal(getattr(one, name), getattr(two, name), equal_nan=True), name
+
+
+def test_a_batch_is_its_single_calls(mlp: ContactSolver, pairs: Pairs) -> None:
     """Row i of a batch is the single call of row i, to the bit."""
-    many = solve(mlp, pairs)
-    solver, sizes = None, None
-    for i in range(0, len(pairs.pose_a), 29):
-        if sizes != (tuple(pairs.size_a[i]), tuple(pairs.size_b[i])):
-            sizes = (tuple(pairs.size_a[i]), tuple(pairs.size_b[i]))
-            solver = ContactSolver(*sizes, model='mlp')
-        one = solver(pairs.pose_a[i], pairs.pose_b[i])
-        for name, single, row in zip(one._fields, one, (field[i] for field in many)):
-            assert np.array_equal(single, row, equal_nan=True), (name, i)
+    many = pairs.contacts(mlp)
+    for i in range(0, len(pairs.pose_a), 7):
+        one = native.PairSolver('mlp', tuple(pairs.size_a[i]), tuple(pairs.size_b[i]), SHIPPED)(
+            pairs.pose_a[i], pairs.pose_b[i])
+        assert_same_bits(one, Contacts(*(field[i] for field in many)), i)
 
 
-@pytest.mark.parametrize('count', [1, 2, LANES - 1, LANES, LANES + 1, 2 * LANES + 2])
+@pytest.mark.parametrize('count', [1, 2, LANES - 1, LANES, LANES + 1, 2 * LANES, 4 * LANES + 2])
 @pytest.mark.parametrize('first', [0, 5])
-def test_a_row_does_not_know_its_neighbours(mlp, count, first):
+def test_a_row_does_not_know_its_neighbours(mlp: ContactSolver, count: int, first: int) -> None:
     """Vectors that are not full, and rows in other lanes: the same bits."""
-    pairs = Pairs(*poses.near_parallel_pairs(np.random.default_rng(6), 200))
-    all_rows = solve(mlp, pairs)
-    some = solve(mlp, Pairs(*(part[first:first + count] for part in pairs)))
-    for name, one, many in zip(some._fields, some, all_rows):
-        assert np.array_equal(one, many[first:first + count], equal_nan=True), name
+    pairs = drawn('crossed bars', 200)  # of which some are left to `exact`
+    some = slice(first, first + count)
+    assert_same_bits(pairs.rows(some).contacts(mlp),
+                     Contacts(*(field[some] for field in pairs.contacts(mlp))))
 
 
-def test_rows_apart_refused_or_out_of_range_do_not_disturb_neighbours(mlp):
+def test_rows_apart_refused_or_left_do_not_disturb_neighbours(mlp: ContactSolver) -> None:
     """Side by side, contacts between rows of all other kinds keep their bits.
 
     A refused row raises, and the next call is right again.
     """
-    rng = np.random.default_rng(7)
-    pairs = SETS['random sizes'](rng, 32)
-    clean = solve(mlp, pairs)
+    pairs = drawn('random sizes', 32)
+    clean = pairs.contacts(mlp)
     mixed = Pairs(*(part.copy() for part in pairs))
     mixed.pose_b[1::4, :3] += 1e3                       # far apart
-    mixed.size_a[2::4] = (1.0, 1e-3, 1.0)               # out of range
+    mixed.size_a[2::4] = (1.0, 1e-3, 1.0)               # a card
     mixed.pose_b[3::8] = mixed.pose_a[3::8]             # one in the other
-    found = solve(mlp, mixed)
-    assert np.array_equal(found.point[::4], clean.point[::4])
+    found = mixed.contacts(mlp)
+    assert_same_bits(*(Contacts(*(field[::4] for field in each)) for each in (found, clean)))
     assert not found.colliding[1::4].any() and np.isnan(found.point[1::4]).all()
     for bad in ((np.nan, 0, 0, 0, 0, 0, 1), (0, 0, 0, 0, 0, 0, 0)):
         refused = Pairs(*(part.copy() for part in pairs))
         refused.pose_b[17] = bad
         with pytest.raises(ValueError, match=r'poses_b\[17\]'):
-            solve(mlp, refused)
-        again = solve(mlp, pairs)
-        assert np.array_equal(again.point, clean.point)
-
-
-def test_same_input_same_bits(pairs):
-    """Two solvers, one of them after other work, rows in another order."""
-    one = ContactSolver(UNIT, UNIT, model='mlp')
-    two = ContactSolver(UNIT, UNIT, model='mlp')
-    solve(two, Pairs(*poses.random_pairs(np.random.default_rng(0), 300)))
-    order = np.random.default_rng(1).permutation(len(pairs.pose_a))
-    shuffled = solve(two, Pairs(*(part[order] for part in pairs)))
-    for name, left, right in zip(shuffled._fields, solve(one, pairs), shuffled):
-        assert np.array_equal(left[order], right, equal_nan=True), name
+            refused.contacts(mlp)
+        assert_same_bits(pairs.contacts(mlp), clean)
 
 
 @pytest.mark.parametrize('power', [-30, 1, 30])
-def test_scale_by_powers_of_two_is_exact(mlp, pairs, power):
+def test_scale_by_powers_of_two_is_exact(mlp: ContactSolver, pairs: Pairs, power: int) -> None:
     """Everything scaled by 2^k: point, volume and covariance scale to the bit."""
     factor = 2.0**power
     scaling = np.array([factor] * 3 + [1.0] * 4)
     scaled = Pairs(pairs.pose_a * scaling, pairs.pose_b * scaling, pairs.size_a * factor,
                    pairs.size_b * factor)
-    one, two = solve(mlp, pairs), solve(mlp, scaled)
+    one, two = pairs.contacts(mlp), scaled.contacts(mlp)
     assert np.array_equal(one.point * factor, two.point, equal_nan=True)
     assert np.array_equal(one.volume * factor**3, two.volume)
     assert np.array_equal(one.covariance * factor**2, two.covariance, equal_nan=True)
 
 
-def test_minus_q_is_q(mlp, pairs):
+def test_minus_q_is_q(mlp: ContactSolver, pairs: Pairs) -> None:
     """To the bit."""
     minus = np.array([1, 1, 1, -1, -1, -1, -1.0])
     other = pairs._replace(pose_a=pairs.pose_a * minus, pose_b=pairs.pose_b * minus)
-    for name, left, right in zip(Pairs._fields, solve(mlp, pairs), solve(mlp, other)):
-        assert np.array_equal(left, right, equal_nan=True), name
+    assert_same_bits(pairs.contacts(mlp), other.contacts(mlp))
 
 
-def assert_close(found, wanted, pairs):
-    """Check that all rows have the same contacts, up to roundings of the network's float32 [%].
+MOVED = {'point': (1e-4, 0.1), 'volume': (5e-3, WORST['volume']), 'covariance': (5e-3, 3.0)}
+"""Differences after a motion [%], as poses and float32 round: of 99 rows in 100, and of a row that
+changes over to `exact` or back."""
 
-    Measured: 9e-6, 4e-4 and 4e-4 at worst. A rounding could choose another of the two frames only
-    where the bounding boxes tie, which none of these pairs does.
-    """
+
+def assert_close(found: Contacts, wanted: Contacts, pairs: Pairs) -> None:
+    """Check that all rows have the same contacts, up to MOVED."""
     errors = contact_errors(found, wanted, pairs.edge)
-    assert len(errors.point) > N / 4
-    assert errors.point.max() < 1e-4
-    assert errors.volume.max() < PATCH_ROUNDING and errors.covariance.max() < PATCH_ROUNDING
+    for quantity, (usual, most) in MOVED.items():
+        error = getattr(errors, quantity)
+        assert np.percentile(error, 99) <= usual and error.max() <= most, quantity
 
 
-def test_swap(mlp, named_set):
-    """B against A: another frame, and so another answer within the stated error."""
-    name, pairs = named_set
-    other = Pairs(pairs.pose_b, pairs.pose_a, pairs.size_b, pairs.size_a)
-    errors = contact_errors(solve(mlp, other), solve(mlp, pairs), pairs.edge)
-    for quantity, found in errors._asdict().items():
-        for value, most in zip(statistics(found), limit_of(quantity, name)):
-            assert value <= 2.0 * most, quantity
-
-
-def test_rigid_motion(mlp, named_set):
+def test_rigid_motion(mlp: ContactSolver, named_set: tuple[str, Pairs]) -> None:
     """Moved together, point and covariance move along, and the volume stays."""
     _, pairs = named_set
     rng = np.random.default_rng(3)
@@ -437,16 +399,16 @@ def test_rigid_motion(mlp, named_set):
     turn, shift = poses.unit_quaternions(rng, n), rng.uniform(-5, 5, (n, 3))
     moved = pairs._replace(pose_a=poses.moved(pairs.pose_a, shift, turn),
                            pose_b=poses.moved(pairs.pose_b, shift, turn))
-    found, axes = solve(mlp, pairs), rotation_matrix(turn)
-    assert_close(solve(mlp, moved), found._replace(
+    found, axes = pairs.contacts(mlp), rotation_matrix(turn)
+    assert_close(moved.contacts(mlp), found._replace(
         point=poses.rotate(turn, found.point) + shift,
         covariance=axes @ found.covariance @ np.swapaxes(axes, 1, 2)), pairs)
 
 
-def test_box_symmetries(mlp, named_set):
+def test_box_symmetries(mlp: ContactSolver, named_set: tuple[str, Pairs]) -> None:
     """A box's axes relabelled: a quarter turn about each of its axes, extents along."""
     _, pairs = named_set
-    one = solve(mlp, pairs)
+    one = pairs.contacts(mlp)
     half = np.sqrt(0.5)
     for axis, order in (((half, 0, 0, half), (0, 2, 1)), ((0, half, 0, half), (2, 1, 0)),
                         ((0, 0, half, half), (1, 0, 2))):
@@ -454,207 +416,107 @@ def test_box_symmetries(mlp, named_set):
             turned = getattr(pairs, pose).copy()
             turned[:, 3:] = poses.multiply(turned[:, 3:], np.tile(axis, (len(turned), 1)))
             other = pairs._replace(**{pose: turned, size: getattr(pairs, size)[:, order]})
-            assert_close(solve(mlp, other), one, pairs)
+            assert_close(other.contacts(mlp), one, pairs)
 
 
-# --- continuity -----------------------------------------------------------------------------------
-
-INVERSE_ROUNDING = 1e-3
-"""Of variances [half extents²]: float32 and couplings as large as they may be; measured: 2e-4."""
-PATCH_ROUNDING = 1e-3
-"""Largest differences of volume and covariance by roundings of float32 [%]; see `assert_close`."""
-PATHS, FRAMES = 100, 400
-JUMP = 4.0
-"""Bound of a step of the point beyond the exact point's [% of the edge]. Measured: 2.3, where the
-frame changes, or the exact point itself moves by much of the box."""
-JUMP_999 = 1.3
-"""999 steps of 1,000 [%]; measured: 0.7 on the worst path."""
+# --- errors and steps -----------------------------------------------------------------------------
 
 
-def swaying(rng, size, *, tilt, heading, yaw, lateral, depth):
-    """Frames of paths of a box over another, the lowest corner `depth` deep: (PATHS, FRAMES)."""
-    n = PATHS * FRAMES
-    shape = (PATHS, FRAMES)
-    tilt, heading, yaw, depth = (np.broadcast_to(x, shape).ravel()
-                                 for x in (tilt, heading, yaw, depth))
-    level = np.column_stack([np.cos(heading), np.sin(heading), np.zeros(n)])
-    turn = quaternion_multiply(turns(level, tilt), turns((0.0, 0.0, 1.0), yaw))
-    low = np.full(n, np.inf)
-    for signs in np.ndindex(2, 2, 2):
-        corner = np.tile((np.array(signs) - 0.5) * size, (n, 1))
-        low = np.minimum(low, poses.rotate(turn, corner)[:, 2])
-    place = np.broadcast_to(lateral, (*shape, 2)).reshape(n, 2) * np.array(size)[:2]
-    b = np.column_stack([place, 0.5 * size[2] - low - depth, turn])
-    sizes = np.tile(size, (n, 1))
-    return Pairs(np.tile(poses.IDENTITY, (n, 1)), b, sizes, sizes)
-
-
-def path(name, rng, size):
-    """Paths of one kind; angles in rad."""
-    def each(low, high, *more):
-        return rng.uniform(low, high, (PATHS, 1, *more))
-
-    time = np.linspace(0.0, 1.0, FRAMES)[None]
-    motion = {'tilt': each(1e-4, 0.01), 'heading': each(-np.pi, np.pi), 'yaw': each(-0.3, 0.3),
-              'lateral': each(-0.2, 0.2, 2), 'depth': 0.004 * size[2]}
-    motion |= {
-        'landing': {'tilt': each(0.005, 0.05) * (1 - time), 'depth': 1e-3 * size[2]},
-        'through zero tilt': {'tilt': each(5e-4, 5e-3) * (1 - 2 * time)},
-        'aligned, through zero tilt': {
-            'tilt': each(5e-4, 5e-3) * (1 - 2 * time), 'lateral': 0.0, 'yaw': 0.0,
-            'heading': 0.5 * np.pi * rng.integers(0, 4, (PATHS, 1))},
-        'yaw': {'yaw': np.pi * time * each(0.1, 1.0), 'depth': 0.01 * size[2]},
-        'sliding': {'lateral': each(-0.4, 0.4, 2) + each(-0.8, 0.8, 2) * time[..., None] / 2},
-        'deepening': {'depth': 0.1 * min(size) * 10.0**(-5.0 * (1 - time))},
-        'rolling': {'heading': each(-np.pi, np.pi) + 2 * np.pi * time}}[name]
-    return swaying(rng, size, **motion)
-
-
-@pytest.mark.parametrize('size', [poses.CONTAINER, poses.CUBE], ids=['containers', 'cubes'])
-@pytest.mark.parametrize('name', ['landing', 'through zero tilt', 'aligned, through zero tilt',
-                                  'yaw', 'sliding', 'deepening', 'rolling'])
-def test_continuity_along_smooth_paths(mlp, name, size):
-    """Per frame the point moves at most as far as the exact one plus a jump."""
-    pairs = path(name, np.random.default_rng(12), size)
-    steps = []
-    for model in (mlp, EXACT):
-        point = solve(model, pairs).point.reshape(PATHS, FRAMES, 3)
-        steps.append(100.0 * np.linalg.norm(np.diff(point, axis=1), axis=2) / max(size))
-    beyond = steps[0] - steps[1]
-    beyond = beyond[np.isfinite(beyond)]
-    assert len(beyond) > 0.4 * PATHS * FRAMES
-    assert np.quantile(beyond, 0.999) <= JUMP_999
-    assert beyond.max() <= JUMP
-
-
-def test_a_face_that_comes_in_comes_in_smoothly(mlp):
-    """A cube's corner nears the border of a face, where the overlap begins to be cut off.
-
-    There is no step there.
-    """
-    n = 3601
-    turn = poses.small_rotations(np.array([[1.0, -0.7, 0.2]]), np.array([0.6]))
-    b = np.tile(np.concatenate([(0, 0, 0), turn[0]]), (n, 1))
-    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
-    turned = poses.rotate(np.tile(turn, (8, 1)), corners)
-    lowest = turned[np.argmin(turned[:, 2])]
-    b[:, :3] = np.array([0.3, 0.0, 0.99]) - lowest
-    b[:, 1] += np.linspace(0.9, 0.99, n)
-    size = np.full((n, 3), 2.0)
-    pairs = Pairs(np.tile(poses.IDENTITY, (n, 1)), b, size, size)
-    steps = [np.linalg.norm(np.diff(solve(model, pairs).point, axis=0), axis=1)
-             for model in (mlp, EXACT)]
-    # In the exact steps the face comes in with a kink, so the path did reach it.
-    assert np.ptp(steps[1][:3000]) < 1e-9 < np.ptp(steps[1][3000:])
-    assert steps[0].max() <= 5e-4 * 2.0  # of the edge
-
-
-# --- accuracy -------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize('name', SETS)
-def test_errors_are_within_the_limits(mlp, name):
-    """Mean, 99th percentile and worst error, on 20,000 pairs that nobody has trained on."""
-    pairs = SETS[name](np.random.default_rng([20270101, list(SETS).index(name)]), 20_000)
-    errors = contact_errors(solve(mlp, pairs), solve(EXACT, pairs), pairs.edge)
+@pytest.mark.parametrize('name', ALL_SETS)
+def test_errors_are_within_the_limits(mlp: ContactSolver, name: str) -> None:
+    """The 99th percentile, on pairs that nobody has trained on."""
+    pairs = ALL_SETS[name](np.random.default_rng([20270101, list(ALL_SETS).index(name)]), 5 * N)
+    errors = contact_errors(pairs.contacts(mlp), pairs.contacts(), pairs.edge)
     for quantity, found in errors._asdict().items():
-        assert len(found) == len(pairs.pose_a)
-        for value, most in zip(statistics(found), limit_of(quantity, name)):
-            assert value <= most, quantity
+        assert np.percentile(found, 99) <= limit_of(quantity, name), quantity
 
 
-# --- network --------------------------------------------------------------------------------------
+WORST_STEP = {'point': 0.1, 'volume': 1.0}
+"""Largest steps at a vanishing change of pose [%]; that of the volume is proven."""
 
 
-def test_missing_weights_name_the_model_that_needs_none(monkeypatch):
+@pytest.mark.parametrize('name', ALL_SETS)
+def test_steps_at_a_vanishing_change_of_pose(mlp: ContactSolver, name: str) -> None:
+    """Where frame, winner, range or limits change over; from pairs that a climb finds steepest."""
+    rng = np.random.default_rng(7)
+
+    def error(pairs: Pairs) -> np.ndarray:
+        found, truth = pairs.contacts(mlp), pairs.contacts()
+        with np.errstate(invalid='ignore', divide='ignore'):
+            return np.nan_to_num(np.where(truth.colliding, contact_errors(
+                found, truth, pairs.edge).point, -1.0), nan=-1.0)
+
+    start = worst_start(drawn(name), error, 60)
+    pairs, _ = climb(rng, start, error, generations=20)
+    for flat in (False, True):
+        steps = largest_steps(mlp, drawn_paths(rng, pairs.rows(slice(30)), 0.02, flat))
+        print(name, [f'{step.max():.2g}' for step in steps])
+        for step, most in zip(steps, WORST_STEP.values()):
+            assert step.max() <= most
+
+
+# --- the network ----------------------------------------------------------------------------------
+
+
+def test_the_compiled_network_is_the_shipped_file() -> None:
+    """core/src/mlp/shipped_network.hpp has the numbers of weights/mlp.safetensors, to the bit."""
+    header = Path(box_contact_ros.__file__).parent / 'core' / 'src' / 'mlp' / 'shipped_network.hpp'
+    body = header.read_text('utf-8').partition('{\n')[2].partition('};')[0]
+    numbers = np.array([float(text) for text in re.findall(r'([-\d.e]+)F', body)], np.float32)
+    assert np.array_equal(numbers, SHIPPED)
+
+
+def test_missing_weights_name_the_model_that_needs_none(monkeypatch: pytest.MonkeyPatch) -> None:
     """`exact` is what a user without weights can go on with."""
-    def nowhere(*parts):
+    def nowhere(*parts: str) -> Path:
         raise FileNotFoundError(parts)
 
     monkeypatch.setattr('box_contact_ros.solver.weights_file.resource_path', nowhere)
     with pytest.raises(WeightsError, match="'exact'"):
-        ContactSolver(UNIT, UNIT, model='mlp')
+        ContactSolver(UNIT, UNIT)
 
 
-@pytest.mark.parametrize('hidden', [(), (8, 8), (UNITS_MAX + 1,)])
-def test_layers_that_the_core_does_not_have_are_refused(tmp_path, hidden):
-    """None or two hidden layers, or too many units."""
-    widths = (FEATURES, *hidden, OUTPUTS)
+def written(path: Path, widths: tuple[int, ...] = (FEATURES, 4, 1), name: str = NETWORK,
+            **changes: Any) -> str:
+    """Return a weights file with a network of zeros and a card that fits it, but for `changes`."""
     layers = [(np.zeros((b, a)), np.zeros(b)) for a, b in zip(widths, widths[1:])]
-    path = tmp_path / 'other.safetensors'
-    save_weights(path, {'point': layers}, card_of(widths))
-    with pytest.raises(WeightsError, match=f'one hidden layer, of at most {UNITS_MAX} units'):
-        ContactSolver(UNIT, UNIT, model='mlp', weights=str(path))
-
-
-@pytest.mark.parametrize('change, words', [
-    ({'format': 3}, 'has format 3; this version reads 2 and 1'),
-    ({'format': '2'}, "has format '2'"), ({'format': True}, 'has format True'),
-    ({'format': None}, 'has format None'),
-    ({'activation': 'softsign'}, "units are 'relu', not 'softsign'"),
-    ({'activation': None}, "units are 'relu', not None")])
-def test_weights_with_another_meaning_are_refused(tmp_path, change, words):
-    """They would be taken without complaint, and answer nonsense."""
-    widths = (FEATURES, 4, OUTPUTS)
-    layers = [(np.zeros((b, a)), np.zeros(b)) for a, b in zip(widths, widths[1:])]
-    path = tmp_path / 'other.safetensors'
-    save_weights(path, {'point': layers}, card_of(widths))
-    ContactSolver(UNIT, UNIT, model='mlp', weights=str(path))
-    save_weights(path, {'point': layers}, card_of(widths) | change)
-    with pytest.raises(WeightsError, match=words):
-        ContactSolver(UNIT, UNIT, model='mlp', weights=str(path))
-
-
-def test_weights_of_another_model_are_refused(tmp_path):
-    """A network that is none of the MLP's."""
-    path = tmp_path / 'other.safetensors'
-    rng = np.random.default_rng(1)
-    card = {'name': 'other', 'model': 'other', 'inputs': {}, 'outputs': [], 'sizes': [],
-            'architecture': [6, 4], 'data': {}, 'seed': 0, 'commit': '', 'metrics': {}}
-    save_weights(path, {'point': [(rng.normal(size=(4, 6)), rng.normal(size=4))]}, card)
-    with pytest.raises(WeightsError, match=f'{FEATURES} inputs and {OUTPUTS}'):
-        ContactSolver(UNIT, UNIT, model='mlp', weights=str(path))
-
-
-def listing(path, sizes):
-    """Return a copy of the shipped network whose card lists pairs of sizes."""
-    shipped = load_weights(resource_path('weights', 'mlp.safetensors'))
-    save_weights(path, {'point': shipped.networks['point'].layers},
-                 shipped.card | {'sizes': sizes})
+    card = {'name': 'other', 'model': 'mlp', 'format': NETWORK_FORMAT, 'inputs': {},
+            'activation': ACTIVATION, 'outputs': [], 'sizes': [], 'architecture': list(widths),
+            'data': {}, 'seed': 0, 'commit': '', 'metrics': {}}
+    save_weights(path, {name: layers}, card | changes)
     return str(path)
 
 
-def test_sizes_that_the_card_lists_are_for_the_network(mlp, tmp_path):
-    """In one batch, too, in either order of the boxes and of the axes; the rest is exact."""
-    weights = listing(tmp_path / 'some', [[poses.CUBE, poses.CONTAINER]])
-    some = ContactSolver(poses.CONTAINER[::-1], poses.CUBE, model='mlp', weights=weights)
-    pairs = SETS['random cubes'](np.random.default_rng(8), 60)
-    sizes_b = np.tile(poses.CUBE, (len(pairs.pose_b), 1))
-    sizes_b[::2] = poses.CONTAINER
-    a, b = pairs.pose_a, pairs.pose_b
-    found, network, exact = (one.batch(a, b, size_a=poses.CUBE, size_b=sizes_b)
-                             for one in (some, mlp, EXACT))
-    assert np.array_equal(found.point[::2], network.point[::2], equal_nan=True)
-    assert np.array_equal(found.point[1::2], exact.point[1::2], equal_nan=True)
-    assert some.exact_answers >= np.count_nonzero(exact.colliding[1::2]) > 0
-    one = ContactSolver(poses.CUBE, poses.CUBE, model='mlp', weights=weights)
-    assert np.array_equal(one(a[0], b[0]).point, EXACT.batch(
-        a[:1], b[:1], size_a=poses.CUBE, size_b=poses.CUBE).point[0])
-    with pytest.raises(ValueError, match='zero length'):
-        one.batch(np.zeros((1, 7)), b[:1])
+def test_a_network_of_zeros_is_taken(tmp_path: Path) -> None:
+    """It chooses the middle between the brackets."""
+    pairs = drawn('crossed bars')
+    found = pairs.contacts(ContactSolver(UNIT, UNIT, weights=written(tmp_path / 'zeros')))
+    assert_same_bits(found, with_numbers(pairs, np.zeros(1, np.float32)))
+    least, most = with_numbers(pairs, LEAST), with_numbers(pairs, MOST)
+    both = found.volume != pairs.contacts().volume  # not left to `exact` by any
+    np.testing.assert_allclose(found.volume[both], 0.5 * (least.volume + most.volume)[both],
+                               rtol=1e-6)
 
 
-@pytest.mark.parametrize('sizes', [5, 'abc', [[2, 2]], [poses.CUBE], [[poses.CUBE, (1, -1, 1)]]])
-def test_sizes_in_a_card_that_are_none(tmp_path, sizes):
-    with pytest.raises(WeightsError, match='no pairs of three extents'):
-        ContactSolver(UNIT, UNIT, model='mlp', weights=listing(tmp_path / 'bad', sizes))
+@pytest.mark.parametrize('hidden', [(), (8, 8), (UNITS_MAX + 1,)])
+def test_layers_that_the_core_does_not_have_are_refused(tmp_path: Path, hidden: tuple) -> None:
+    """None or two hidden layers, or too many units."""
+    weights = written(tmp_path / 'other', (FEATURES, *hidden, 1))
+    with pytest.raises(WeightsError, match=f'one hidden layer, of at most {UNITS_MAX} units'):
+        ContactSolver(UNIT, UNIT, weights=weights)
 
 
-def test_depths_in_the_sets_are_what_they_say():
-    """The accuracy above is of contacts that are as deep as they should be."""
-    pairs = SETS['random cubes'](np.random.default_rng(3), N)
-    depth = -solve(EXACT, pairs).separation
-    assert depth.min() == pytest.approx(2e-3, rel=0.05) and depth.max() <= 0.2 * (1 + 1e-9)
-    assert log_uniform(np.random.default_rng(0), 1.0, 2.0, 5).min() >= 1.0
-    assert np.abs(solve(EXACT, SETS['touching'](np.random.default_rng(3), N)).separation
-                  ).max() < 1e-14
+@pytest.mark.parametrize('change, words', [
+    ({'format': NETWORK_FORMAT - 1}, f'has format 2; this version reads {NETWORK_FORMAT}'),
+    ({'format': '3'}, "has format '3'"), ({'format': True}, 'has format True'),
+    ({'format': None}, 'has format None'),
+    ({'activation': 'softsign'}, "units are 'relu', not 'softsign'"),
+    ({'activation': None}, "units are 'relu', not None"),
+    ({'name': 'point'}, f"no network 'share' with {FEATURES} inputs and 1 outputs"),
+    ({'widths': (FEATURES + 1, 4, 1)}, f'with {FEATURES} inputs and 1 outputs'),
+    ({'widths': (FEATURES, 4, 2)}, f'with {FEATURES} inputs and 1 outputs')])
+def test_weights_with_another_meaning_are_refused(
+        tmp_path: Path, change: dict[str, Any], words: str) -> None:
+    """They would be taken without complaint, and answer nonsense."""
+    with pytest.raises(WeightsError, match=words):
+        ContactSolver(UNIT, UNIT, weights=written(tmp_path / 'other', **change))

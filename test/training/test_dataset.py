@@ -31,7 +31,7 @@ def draw(size=CUBE, kinds=GENERATORS, count=COUNT, seed=11) -> Placements:
     rng = np.random.default_rng(seed)
     parts = [dataset.touching(rng, count, size, kind) for kind in kinds]
     return Placements(parts[0].size, *(np.concatenate([getattr(part, name) for part in parts])
-                                       for name in ('pose', 'point', 'normal')))
+                                       for name in ('inputs', 'point', 'normal')))
 
 
 @pytest.fixture(scope='module', params=[CUBE, CONTAINER], ids=['cube', 'container'])
@@ -137,6 +137,50 @@ def test_impact_point_is_what_the_solver_calls_the_point(placements: Placements)
     assert np.quantile(off, 0.99) < 1e-6
 
 
+@pytest.mark.parametrize('kind', GENERATORS)
+def test_kept_placements_interpenetrate_and_grids_hold_their_values(kind) -> None:
+    """As the paper writes it: some are deep; angles are multiples of 30°; no normal is missing."""
+    drawing = dataset.Drawing(kept=True, grid=7)
+    kept = dataset.touching(np.random.default_rng(2), COUNT, CUBE, kind, drawing)
+    assert (dataset.query(kept).separation < -0.1).mean() > 0.3
+    assert np.isfinite(kept.normal).all()
+    steps = dataset.fold(kept, NO_FOLD).inputs[:, 3:] / (np.pi / 6)
+    assert np.array_equal(np.unique(np.round(steps, 9)), np.arange(-3, 4))
+    half = np.ones(3)
+    for point in (kept.point, in_second_box(kept)):
+        assert np.all(np.abs(point).max(axis=1) <= half[0] + 1e-12)
+
+
+def test_faces_lie_on_faces() -> None:
+    """Tilted by up to TILT, they touch; the point is the middle of the overlap, on both faces."""
+    laid = dataset.touching(np.random.default_rng(2), 500, CUBE, dataset.face_face_candidates)
+    assert np.abs(dataset.query(laid).separation).max() < 1e-12
+    turn = rotation_matrix(laid.pose[:, 3:])
+    level = np.abs(np.einsum('nij,ni->nj', turn, laid.normal)).max(axis=1)
+    assert level.min() > np.cos(dataset.TILT) - 1e-9
+    assert np.sum(laid.point * laid.normal, axis=1) == pytest.approx(np.ones(500))
+    assert np.abs(in_second_box(laid)).max() < 1.0 + 3 * dataset.TILT
+    a, b = dataset.as_poses(laid.inputs)
+    b[:, :3] -= 0.1 * laid.normal  # deeper than the tilt reaches
+    middle = ContactSolver(CUBE, CUBE, model='exact').batch(a, b).point
+    across = np.linalg.norm(np.where(laid.normal == 1.0, 0.0, middle - laid.point), axis=1)
+    assert np.quantile(across, 0.9) < 0.1
+
+
+def test_a_committee_shares_out_the_classes() -> None:
+    """Each expert has its class alone; the classifier a third of each, and none of an expert's."""
+    sets = dataset.committee(5, counts=(300, 30, 30))
+    classes = sets.pop('classifier')['training']
+    assert tuple(sets) == dataset.CLASSES
+    assert np.array_equal(classes.outputs.sum(axis=0), [100, 100, 100])
+    assert set(np.unique(classes.outputs)) == {0.0, 1.0}
+    for kind, (name, expert) in enumerate(sets.items()):
+        assert len(expert['training']) == 300, name
+        known = {row.tobytes() for row in expert['training'].inputs}
+        own = classes.inputs[classes.outputs[:, kind] == 1.0]
+        assert not any(row.tobytes() in known for row in own)
+
+
 # --- folding --------------------------------------------------------------------------------------
 
 
@@ -152,7 +196,7 @@ def test_folded_boxes_touch_where_the_folded_label_says(how: int, cubes: Placeme
     """What a network is taught is a touching pose with its right answer."""
     result = dataset.fold(cubes, how)
     patterns = result.patterns()
-    again = Placements(CUBE, dataset.as_poses(patterns.inputs)[1], result.point, result.normal)
+    again = Placements(CUBE, patterns.inputs, result.point, result.normal)
     sat = dataset.query(again)
     assert np.abs(sat.separation).max() < 1e-11
     assert np.sum(sat.normal * again.normal, axis=1).min() > 1.0 - 1e-9
@@ -212,7 +256,7 @@ def test_subset_depends_on_the_pose_only(cubes: Placements) -> None:
     result = dataset.fold(cubes, FEATURES)
     rng = np.random.default_rng(0)
     order = rng.permutation(len(cubes))
-    blind = dataset.fold(Placements(CUBE, cubes.pose[order], np.full_like(cubes.point, np.nan),
+    blind = dataset.fold(Placements(CUBE, cubes.inputs[order], np.full_like(cubes.point, np.nan),
                                     rng.normal(size=cubes.normal.shape)), FEATURES)
     np.testing.assert_array_equal(blind.subset, result.subset[order])
     np.testing.assert_array_equal(blind.inputs, result.inputs[order])
@@ -235,7 +279,7 @@ def test_the_same_pose_from_another_generator() -> None:
     """A vertex-face pose of which only the pose is known: labelled edge-edge, it stays face."""
     face = draw(kinds=GENERATORS[:1], count=500)
     edge = draw(kinds=GENERATORS[1:], count=500)
-    mislabelled = Placements(CUBE, face.pose, edge.point, edge.normal)
+    mislabelled = Placements(CUBE, face.inputs, edge.point, edge.normal)
     assert np.all(dataset.fold(mislabelled, FEATURES).subset == dataset.SUBSETS['vertex_face'])
 
 
@@ -248,8 +292,8 @@ def test_a_winning_face_of_the_second_box_is_not_data(cubes: Placements) -> None
     """Such a pose needs the boxes to change places; it is refused, not put into a subset."""
     turn = rotation_matrix(cubes.pose[:5, 3:])
     seen_from_b = -np.einsum('nji,nj->ni', turn, cubes.pose[:5, :3])
-    inverse = cubes.pose[:5, 3:] * np.array([-1.0, -1.0, -1.0, 1.0])
-    swapped = Placements(CUBE, np.concatenate([seen_from_b, inverse], axis=1), cubes.point[:5],
+    angles = dataset.euler_angles(turn.swapaxes(1, 2))
+    swapped = Placements(CUBE, np.concatenate([seen_from_b, angles], axis=1), cubes.point[:5],
                          cubes.normal[:5])
     with pytest.raises(ValueError, match='is no face of the first box'):
         dataset.fold(swapped, FEATURES)

@@ -18,7 +18,6 @@ import pytest
 torch = pytest.importorskip('torch')
 pytest.importorskip('matplotlib')
 
-from box_contact_ros.training import mlp_recipe
 from box_contact_ros.training.experiments import search, successive_halving
 from box_contact_ros.training.experiments.successive_halving import Candidate, CheckpointError, Rung
 
@@ -94,50 +93,21 @@ def test_checkpoint_of_another_search_is_refused(tmp_path: Path) -> None:
             Toy().run(tmp_path / 'c')
 
 
-def test_frontier() -> None:
-    """Cheapest first, each better than all before; equal cost: the better one."""
-    points = [(3, 0.3), (1, 0.9), (2, 0.5), (2, 0.4), (5, 0.35)]
-    assert search.pareto(points) == [1, 3, 0]
-
-
-def test_small_networks_are_kept_though_they_are_worse() -> None:
-    """Errors that fall with the size: of four classes of cost each keeps its best."""
-    some = search.MlpSearch(seed=1, count=400, quick=True, device='cpu')
-    ranked = sorted(some.candidates(), key=some.cost, reverse=True)
-    kept = some.keep(ranked, 16)
-    classes = np.bincount(np.searchsorted([8, 16, 32], [one.hidden[0] for one in kept]))
-    assert len(kept) == len({one.number for one in kept}) == 16
-    assert classes.tolist() == [4, 4, 4, 4]
-
-
-def test_candidates_are_over_the_whole_range() -> None:
-    """Hidden units 4 to 64 by fours, small ones more often; the first is what is in use."""
-    found = search.MlpSearch(seed=1, count=2048, quick=False, device='cpu').candidates()
-    assert len(found) == 2048
-    assert found[0].shipped and found[0].hidden == (mlp_recipe.HIDDEN,)
-    units = {units for one in found for units in one.hidden}
-    assert units == set(range(4, 65, 4))
-    assert len({one.rate for one in found}) == 2048
-
-
 def table(folder: Path, name: str) -> str:
     return (folder / f'{name}.csv').read_text('utf-8')
 
 
-@pytest.mark.parametrize(('what', 'name', 'networks'), [
-    ('mlp', 'search', 48), ('paper', 'search_paper', 48)])
 def test_killed_and_started_again_it_ends_the_same(
-        tmp_path: Path, what: str, name: str, networks: int,
-        capsys: pytest.CaptureFixture[str]) -> None:
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The program, killed when its first checkpoint is there; then the page, table and plot."""
-    whole, killed = tmp_path / 'whole', tmp_path / 'killed'
-    assert search.main([what, *QUICK, '--out', str(whole)]) == 0
+    whole, killed, name = tmp_path / 'whole', tmp_path / 'killed', 'search_paper'
+    assert search.main(['paper', *QUICK, '--out', str(whole)]) == 0
     # A checkpoint after every group.
     process = subprocess.Popen(
         [sys.executable, '-c', 'import sys\n'
          'from box_contact_ros.training.experiments import search, successive_halving\n'
          'successive_halving.SAVE_EVERY = 0.0\n'
-         'sys.exit(search.main(sys.argv[1:]))', what, *QUICK, '--out', str(killed)],
+         'sys.exit(search.main(sys.argv[1:]))', 'paper', *QUICK, '--out', str(killed)],
         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     deadline = time.monotonic() + 150
     while not list(killed.glob('*.checkpoint')) and process.poll() is None:
@@ -147,11 +117,11 @@ def test_killed_and_started_again_it_ends_the_same(
     process.wait()
     if (killed / f'{name}.csv').exists():
         pytest.skip('it was faster than the signal')
-    assert search.main([what, *QUICK, '--out', str(killed)]) == 0
+    assert search.main(['paper', *QUICK, '--out', str(killed)]) == 0
     assert 'going on from' in capsys.readouterr().out
     assert table(killed, name) == table(whole, name)
     rows = list(csv.DictReader(table(whole, name).splitlines()))
-    assert len(rows) == networks
+    assert len(rows) == 48
     assert {row['shipped'] for row in rows} == {'True', 'False'}
     assert {int(row['rungs']) for row in rows} == {1, 2}
     assert sorted(path.name for path in whole.iterdir()) == [
@@ -161,9 +131,9 @@ def test_killed_and_started_again_it_ends_the_same(
 
 
 @pytest.mark.parametrize(('arguments', 'message'), [
-    (['committe'], 'invalid choice'),
+    (['mlp'], 'invalid choice'),
     (['paper', '--candidates', '3'], '--candidates: must be at least 16, got 3'),
-    (['paper', '--seed', '-1'], "'-1' is no whole number from 0"),
+    (['paper', '--seed', '-1'], "'-1' is not a whole number from 0"),
 ])
 def test_refused_arguments(arguments: list[str], message: str,
                            capsys: pytest.CaptureFixture[str]) -> None:
@@ -175,6 +145,6 @@ def test_refused_arguments(arguments: list[str], message: str,
 
 def test_a_checkpoint_of_other_options_is_said_in_one_line(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / 'search_0.checkpoint').write_bytes(b'x')
-    assert search.main(['mlp', *QUICK, '--out', str(tmp_path)]) == 1
-    assert 'search_0.checkpoint cannot be read, remove it' in capsys.readouterr().err
+    (tmp_path / 'search_paper_0.checkpoint').write_bytes(b'x')
+    assert search.main(['paper', *QUICK, '--out', str(tmp_path)]) == 1
+    assert 'search_paper_0.checkpoint cannot be read, remove it' in capsys.readouterr().err

@@ -125,8 +125,13 @@ def test_normalisation_is_folded_into_the_first_layer(sets: dict[str, dataset.Pa
 @pytest.fixture(scope='module')
 def quick(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp('weights')
-    assert train.main(['all', '--quick', '--seed', '3', '--out', str(folder)]) == 0
+    assert train.main([*JOBS, '--quick', '--seed', '3', '--out', str(folder)]) == 0
     return folder
+
+
+def one_answer(job: PaperJob, network: str) -> bool:
+    """Whether the inputs tell the outputs: not where boxes interpenetrate, hardly of a class."""
+    return not job.drawing.kept and network != 'classifier'
 
 
 @pytest.mark.parametrize('job', JOBS.values(), ids=lambda job: job.name)
@@ -139,10 +144,12 @@ def test_quick_training(quick: Path, job: PaperJob) -> None:
     for name, sets in dataset.of_card(card).items():
         external = sets['external']
         assert len(external) == train.QUICK_COUNTS[2]
-        errors = errors_of(weights.networks[name], external.inputs, external.outputs)
+        errors = errors_of(weights.networks[name], external.inputs, external.outputs,
+                           job.settings.wrap)
         assert card['metrics'][name]['external']['all'] == pytest.approx(figures(errors))
         constant = external.outputs - external.outputs.mean(axis=0)
-        assert figures(errors)['RMSE'] < 0.6 * figures(constant)['RMSE']
+        assert figures(errors)['RMSE'] < (0.6 if one_answer(job, name) else 0.9) * figures(
+            constant)['RMSE']
         assert np.all(np.isfinite(predict(weights.networks[name], external.inputs)))
 
 
@@ -154,14 +161,27 @@ def test_train_again_is_the_same_file_but_for_the_clock(quick: Path, tmp_path: P
     assert first['metrics'] == again['metrics']
 
 
-@pytest.mark.parametrize(('job', 'folded'), [('paper', True), ('paper-as-drawn', False)])
+@pytest.mark.parametrize(('job', 'folded'), [('containers', True), ('table-1-dropped', False)])
 def test_one_job_is_folded_and_one_as_drawn(job: str, folded: bool, tmp_path: Path) -> None:
     arguments = [job, '--quick', '--epochs', '2', '--starts', '1', '--out', str(tmp_path)]
     assert train.main(arguments) == 0
-    card = load_weights(tmp_path / f'{job}.safetensors').card
+    card = load_weights(tmp_path / f'{JOBS[job].name}.safetensors').card
     assert card['data']['folded_in'] is folded
-    assert all((entry['min'] >= 0.0) is folded for entry in card['inputs']['contact'][:3])
-    assert card['training']['contact']['starts'] == 1
+    network, = card['inputs']
+    assert all((entry['min'] >= 0.0) is folded for entry in card['inputs'][network][:3])
+    assert card['training'][network]['starts'] == 1
+
+
+def test_a_loss_that_is_not_wrapped_sees_the_turn(sets: dict[str, dataset.Patterns]) -> None:
+    """Outputs moved by 2π: the wrapped loss learns the same, the other learns them as they are."""
+    moved = {name: dataset.Patterns(one.inputs, one.outputs + 2 * np.pi)
+             for name, one in sets.items()}
+    wrap, plain = (run(moved, wrap=wrap) for wrap in (True, False))
+    np.testing.assert_allclose(wrap.error, run(sets).error, rtol=1e-3)
+    with torch.no_grad():
+        near, far = (outputs_of(one.networks, moved['external'], one.scaling).mean().item()
+                     for one in (wrap, plain))
+    assert far - near == pytest.approx(2 * np.pi, abs=1.0)
 
 
 def test_a_folder_that_cannot_be_written_is_said_at_once(
@@ -174,12 +194,12 @@ def test_a_folder_that_cannot_be_written_is_said_at_once(
 
 @pytest.mark.parametrize(('arguments', 'message'), [
     (['--quick'], 'name a folder with --out'),
-    *([] if torch.cuda.is_available() else [
-        (['paper', '--out', '.', '--device', 'cuda'], '--device: cuda: PyTorch finds no GPU')]),
-    (['papers'], "'papers' is not one of paper, paper-as-drawn, paper-continuous, containers, "
-     'mlp, all'),
+    (['mlp', '--hidden', '65', '--out', '.'], '--hidden: must lie in 1 to 64'),
+    (['mlp', '--scene', 'yard.yaml'], 'unrecognized arguments: --scene'),
+    (['papers'], "'papers' is not one of paper, paper-continuous, paper-committee, containers, "
+     'table-1-as-written, table-1-on-grid, table-1-dropped, table-1-folded, mlp, all'),
     (['paper', '--starts', '0'], '--starts: must be at least 1, got 0'),
-    (['paper', '--seed', '-1'], "'-1' is no whole number from 0"),
+    (['paper', '--seed', '-1'], "'-1' is not a whole number from 0"),
 ])
 def test_refused_arguments(arguments: list[str], message: str,
                            capsys: pytest.CaptureFixture[str]) -> None:

@@ -42,11 +42,19 @@ class Mutant(NamedTuple):
 FAMILIES = 'test/verification/test_hard_poses.py'
 LAWS = 'test/core/test_laws.py'
 MLP = 'test/solver/test_mlp.py'
+FUZZ = 'test/verification/test_fuzz.py'
+TEST_TRAINING_MLP = 'test/training/test_training_mlp.py'
+MLP_MODEL = 'core/src/mlp/mlp_model.hpp'
+UPPER_FACES = 'core/src/columns/upper_faces.hpp'
+LOWER_FACE = 'core/src/columns/lower_face.hpp'
+CONTACT_FRAME = 'core/src/columns/contact_frame.hpp'
 EVALUATOR = 'node/evaluator.py'
 BYTES = 'node/message_bytes.py'
 MESSAGES = 'node/messages.py'
 NODE = 'node/contact_node.py'
+FILES = 'node/named_files.py'
 STRANGERS = 'test/node/test_strangers.py'
+ATTACKS = 'test/node/test_attacks.py'
 TEST_BYTES = 'test/node/test_message_bytes.py'
 TOPICS = 'node/topics/scene_topics.py'
 TEST_PAIRING = 'test/scene/test_stamp_pairing.py'
@@ -126,7 +134,7 @@ MUTANTS = {
         'q[k] = std::ldexp(q[k], 0);', f'{LAWS} -k any_length'),
     'quaternion taken for a unit one': Mutant(
         'core/src/poses.hpp', 'T s = 2.0 / (', 'T s = 2.0 + 0.0 * (',
-        'test/verification/test_fuzz.py -k gates_are'),
+        f'{FUZZ} -k gates_are'),
     'the first of concentric boxes is A': Mutant(
         'core/src/poses.hpp',
         '  if (any(concentric)) {', '  if (false) {', f'{LAWS} -k concentric'),
@@ -219,51 +227,44 @@ MUTANTS = {
         'Four<T> length = max(t - s, Four<T>{}), middle = 0.5 * (s + t) - origin[j];',
         'Four<T> length = t - s, middle = 0.5 * (s + t) - origin[j];',
         f'{TEST_CORE} -k certain'),
-    'point left outside': Mutant(
-        'core/src/mlp/mlp_model.hpp', ' & placed.inside;', ';', f'{MLP} -k contacts_are_sound'),
-    'patch that is no number': Mutant(
-        'core/src/mlp/mlp_model.hpp',
-        'answered &= (one.volume > 0.0) & (trace(one.covariance) > 0.0);', '',
-        f'{MLP} -k no_numbers'),
-    'volume larger than its bounds': Mutant(
-        'core/src/mlp/cube_moments.hpp', 'exp(min(F{}, max(', 'exp(min(splat<F>(9.0F), max(',
-        f'{MLP} -k fit_the_bounds'),
-    'volume by one half extent': Mutant(
-        'core/src/mlp/mlp_model.hpp',
-        '(half[0] * half[1] * half[2])', '(half[0] * half[0] * half[0])',
-        f'{MLP} -k box_symmetries'),
-    'precision without what cuts add': Mutant(
-        'core/src/mlp/cube_moments.hpp',
-        'said.variance = (own + over_faces(squares)) + push * push;',
-        'said.variance = own;', f'{MLP} -k fit_the_bounds'),
-    'coupling of any sign': Mutant(
-        'core/src/mlp/cube_moments.hpp', 'clamp(cube.slant[q] * out[to_coupling], reach)',
-        'clamp(abs(cube.slant[q]) * out[to_coupling], reach)', f'{MLP} -k box_symmetries'),
-    'covariance by one half extent': Mutant(
-        'core/src/mlp/mlp_model.hpp',
-        'said.variance[k] * (half[k] * half[k])', 'said.variance[k] * half[k]',
-        f'{MLP} -k scale_by_powers'),
-    'covariance left in the frame of the bounds': Mutant(
-        'core/src/mlp/mlp_model.hpp',
-        'select(bounds[g].in_b, q.pair.axes_b, q.pair.axes_a);', 'q.pair.axes_a;',
-        f'{MLP} -k swap'),
-    'exponential in steps': Mutant(
-        'core/src/mlp/cube_moments.hpp', 'whole * 0x1.62ep-1F', 'whole * 0.69F',
-        'test/scene/test_series.py -k patches_are_continuous'),
-    'smaller bounding box, always': Mutant(
-        'core/src/overlap/bounds.hpp', 'clearly_smaller = 0.8;', 'clearly_smaller = 1.0 - 1e-6;',
-        'test/core/test_overlap_bounds.py -k keep_their_frame'),
-    'slabs not widened': Mutant(
-        'core/src/overlap/bounds.hpp', 'constexpr double flush = 0x1p-46;',
-        'constexpr double flush = 0.0;', 'test/core/test_overlap_bounds.py -k whole_patch'),
-    'side of a pair of faces taken as it comes': Mutant(
-        'core/src/mlp/cut_cube.hpp',
-        'features.of_faces[1] = abs(push);', 'features.of_faces[1] = push;',
-        f'{MLP} -k box_symmetries'),
-    'range without its depth': Mutant(
-        'core/src/mlp/mlp_model.hpp', 'excess = max(excess, -separation / (2.0 * depth_max',
-        'excess = max(excess, 0.0 * -separation / (2.0 * depth_max',
-        f'{MLP} -k limits_belong'),
+    # What model `mlp` guarantees.
+    'brackets however far apart': Mutant(
+        MLP_MODEL, '(bracket <= bracket_limit * volume)', '(bracket <= volume)',
+        f'{FUZZ} -k garbage'),
+    'second moments however far apart': Mutant(
+        MLP_MODEL, '(spread <= spread_limit * volume * sum(moments.variance))',
+        '(spread == spread)', f'{TEST_TRAINING_MLP} -k beyond'),
+    'a network beyond its brackets': Mutant(
+        'core/src/mlp/network.hpp', 'min(splat<F>(3.0F), max(splat<F>(-3.0F), sum))', 'sum',
+        f'{FUZZ} -k garbage'),
+    'a side face leaves all but its share of the extent': Mutant(
+        UPPER_FACES, 'least_in - (one - inside * (inside * inside))', 'least_in - share',
+        f'{FUZZ} -k gates_are'),
+    'a side face takes off its share of the extent': Mutant(
+        UPPER_FACES, 'one - share * (share * share)', 'one - share', f'{FUZZ} -k gates_are'),
+    'upper faces that cut little are not looked at': Mutant(
+        MLP_MODEL, 'upper_least = 1e-6F', 'upper_least = 1e-2F', f'{FUZZ} -k gates_are'),
+    'float32 whatever it costs': Mutant(
+        MLP_MODEL, 'rounding_limit = 3000.0F', 'rounding_limit = 3e30F', f'{FUZZ} -k gates_are'),
+    'pieces for the terms whose differences they are': Mutant(
+        LOWER_FACE, 'abs(by_length) * reach(from, to)', 'abs(by_length) * length',
+        f'{FUZZ} -k gates_are'),
+    'a piece lost where three lines coincide': Mutant(
+        MLP_MODEL, ' & (may_lose_a_piece(frame) == 0);', ';', f'{FUZZ} -k gates_are'),
+    'a variance below zero': Mutant(
+        MLP_MODEL, ' & (moments.variance[k] > F{});', ';', f'{FUZZ} -k variance'),
+    'corners of columns pressed along one axis': Mutant(
+        MLP_MODEL, ' & mlp::is_deep_enough(queries[g])', '', f'{FUZZ} -k gates_are'),
+    'columns pressed along another face': Mutant(
+        CONTACT_FRAME, 'upright > least_upright', 'upright == upright', f'{FUZZ} -k gates_are'),
+    'the origin beyond points of the overlap': Mutant(
+        CONTACT_FRAME, 'beyond - second * frame.depth, T{}), T{});', 'beyond, T{}), T{});',
+        f'{FUZZ} -k gates_are'),
+    'covariance in mirrored coordinates': Mutant(
+        MLP_MODEL, '(rotated(sign) * rotated_back(sign)) *', 'uniform(splat<T>(1.0)) *',
+        f'{TEST_TRAINING_MLP} -k errors_are'),
+    'point in mirrored coordinates': Mutant(
+        MLP_MODEL, 'return frame.sign * (', 'return (', f'{FUZZ} -k gates_are'),
     'threads overlap': Mutant(
         'core/src/library/solver.hpp', 'long begin = chunk * rows_per_chunk,',
         'long begin = std::max(0L, chunk * rows_per_chunk - 8),',
@@ -365,6 +366,30 @@ MUTANTS = {
     'a replay of other names': Mutant(
         'apps/recording/bag_file.py', "about.get('topics', {}).get(connection.topic, "
         'connection.topic)', 'connection.topic', 'test/apps/test_record.py -k remapped'),
+    'a website may drive the page': Mutant(
+        'apps/viewer/page/server.py', 'refusal(request.headers, self._name)', "''",
+        'test/apps/test_page_attacks.py -k foreign'),
+    'a public tunnel': Mutant(
+        'apps/viewer/page/server.py', 'def request_share_url', 'def request_no_share_url',
+        'test/apps/test_page_attacks.py -k client_gets_no_tunnel'),
+    'clients that stand still are waited for': Mutant(
+        'apps/viewer/page/server.py', 'connection.transport.abort()', 'pass',
+        'test/apps/test_page_attacks.py -k stand_still_do'),
+    'names are HTML': Mutant(
+        'apps/viewer/page/read_outs.py', 'html.escape(part[:LONGEST])', 'part',
+        'test/apps/test_page_attacks.py -k escaped'),
+    'the log of the view grows': Mutant(
+        'apps/viewer/view_log.py', 'or len(self._counts) > KEPT', '',
+        'test/apps/test_page_attacks.py -k grow'),
+    'contacts at infinity are drawn': Mutant(
+        'apps/viewer/view_log.py', 'np.abs(rows[name]) <= largest', 'np.abs(rows[name]) > -1.0',
+        'test/apps/test_page_attacks.py -k contacts_that_none'),
+    'a FIFO is waited for': Mutant(
+        'apps/recording/bag_file.py', 'if file.exists() and not', 'if False and not',
+        'test/apps/test_hostile_recordings.py -k fifo'),
+    'a recording is read to its end': Mutant(
+        'apps/processes.py', 'if self._raises:', 'if False:',
+        'test/apps/test_ends.py -k while_it_reads'),
     'two boxes ride on one': Mutant(
         'apps/viewer/scene_driver.py', 'tier_of.pop(below)', 'tier_of[below]',
         'test/apps/test_view.py -k riders'),
@@ -498,9 +523,10 @@ MUTANTS = {
         'scene/files/scene_file.py', 'if depth > DEEPEST:', 'if False:',
         'test/scene/test_scene.py -k refusal_names'),
     'a file is quoted': Mutant(
-        NODE, 'if not files or self._raises_faults:', 'if True:', f'{STRANGERS} -k quoted'),
+        FILES, 'if starts or not files:', 'if True:', f'{STRANGERS} -k quoted'),
     'a refused file in /rosout': Mutant(
-        NODE, "get_logger(f'{self.get_logger().name}.local').error(", 'self.get_logger().error(',
+        FILES, "get_logger(f'{self._node.get_logger().name}.local').error(",
+        'self._node.get_logger().error(',
         f'{STRANGERS} -k "quoted or transition"'),
     'files from anywhere': Mutant(
         'resources.py', 'if found in self._files or any(', 'if found.name or any(',
@@ -512,7 +538,13 @@ MUTANTS = {
         'resources.py', "if name and (name == '/' or os.path.realpath(name) != '/')", 'if name',
         f'{STRANGERS} -k open'),
     'a scene as text of any length': Mutant(
-        NODE, '> LARGEST_TEXT:', '> 2**40:', f'{STRANGERS} -k texts'),
+        FILES, '> LARGEST_TEXT:', '> 2**40:', f'{STRANGERS} -k texts'),
+    'a request without an answer': Mutant(
+        'node/runtime.py', 'service.callback = self.answered(', 'self.answered(',
+        f'{ATTACKS} -k "rclpy_cannot_read or transitions"'),
+    'a stranger may ask for as much as the owner': Mutant(
+        FILES, "return OWN if settings['scene'] == self._scene else FOREIGN", 'return OWN',
+        f'{ATTACKS} -k "files or texts"'),
     'a reason as long as what is refused': Mutant(
         'node/parameters.py', '[:LONGEST_REASON]', '', f'{STRANGERS} -k texts'),
     'a locked node takes parameters': Mutant(

@@ -13,8 +13,11 @@ from gmpy2 import mpfr
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.output import write_csv
+from box_contact_ros.scene.pose_sets import Pairs
+from box_contact_ros.solver.mlp import NETWORK, load_mlp
 from box_contact_ros.solver.models import gated_models
-from box_contact_ros.verification import fuzz, judge
+from box_contact_ros.solver.weights_file import save_weights
+from box_contact_ros.verification import fuzz, judge, patches
 
 SEED = 20260
 
@@ -42,6 +45,35 @@ def test_gates_are_at_zero(tmp_path):
         rows = list(csv.DictReader(file))
     assert [(row['class'], row['model']) for row in rows] == list(tallies)
     assert all(row[gate] == '0' for row in rows for gate in judge.GATES.values())
+
+
+FOUND = (
+    ((2.174385854802605, 1.7423444865568714, 0.018359584513697198),
+     (0.3285916961368096, 1.9737782818419705, 2.249013888475856),
+     (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.001),
+     (-0.9661190733016685, 0.7043735812224385, -0.868164791886224, 0.9379606111123887,
+      -0.07905910332264629, 0.029043985626381868, -0.33635694891354684)),
+    ((0.9027071194252946, 0.009173512037271597, 0.032544240127844196),
+     (0.001539321248840585, 1.6685102645855436, 0.012604139436660758),
+     (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0),
+     (0.5783181994663252, -0.01304447153503672, 0.5848927855700055, 0.2653662666841818,
+      0.653231693671417, 0.6584996879522708, -0.2631487409356848)),
+    ((0.030564828219958404,) * 3, (0.030564828219958404,) * 3,
+     (40447.70247700687, 187829.60454168968, -118208.32766634913, 0.7734375846689708,
+      0.6138048268957524, 0.09548148507679807, 0.12618012168500645),
+     (40447.721512345306, 187829.6003642818, -118208.28908367682, -0.5237715711153959,
+      0.47986669473710386, 0.3451475039495857, 0.6150329235827783)))
+"""Sizes and poses of which a fuzz of ten million found faults: a variance below zero, twice, and a
+needle a thousand-millionth as wide as it is long."""
+
+
+def test_found_poses_have_no_variance_below_zero():
+    size_a, size_b, pose_a, pose_b = (np.array(column) for column in zip(*FOUND))
+    pairs = Pairs(pose_a, pose_b, size_a, size_b)
+    found = pairs.contacts(ContactSolver((1, 1, 1), (1, 1, 1)))
+    assert found.colliding.all()
+    assert not patches.patch_faults(pairs, found).any()
+    assert not patches.mlp_faults(pairs, found).any()
 
 
 @pytest.mark.parametrize('name', fuzz.CLASSES)
@@ -93,6 +125,62 @@ def test_planted_faults_are_found(name):
                           (deep[5], 'point outside'), (deep[6], 'NaN')):
         assert expected in faults[row]
     assert sum(map(bool, faults)) == 8
+
+
+def test_planted_faults_of_patches_are_found():
+    """A negative eigenvalue, a volume of 0, half a patch."""
+    pairs = drawn('container')
+    found = pairs.contacts()
+    rows = np.flatnonzero(found.colliding)[:3]
+    assert not patches.patch_faults(pairs, found).any()
+    found.covariance[rows[0]] = np.diag([1.0, 1.0, -1e-5])
+    found.volume[rows[1]] = 0.0
+    found.covariance[rows[2], 1, 1] = np.nan
+    faults = patches.patch_faults(pairs, found)
+    assert faults[rows].tolist() == [judge.NEGATIVE, judge.NEGATIVE, judge.NOT_FINITE]
+    assert np.count_nonzero(faults) == 3
+
+
+@pytest.mark.parametrize('factor', [1.0 + 1e-3, 1.0 - 1e-3, 1.02, -1.0])
+def test_planted_volumes_are_outside_their_brackets(factor):
+    """Most brackets meet; what was left to `exact` is not judged."""
+    pairs, found, own = answered_by_mlp()
+    found.volume[own] *= factor
+    faults = patches.mlp_faults(pairs, found)
+    assert np.count_nonzero(faults == judge.OUT_OF_BRACKETS) > 0.75 * own.sum()
+    assert not faults[~own].any()
+
+
+def test_a_covariance_of_mlp_is_judged_to_rounding():
+    pairs, found, own = answered_by_mlp()
+    found.covariance[own] = np.diag([1.0, 1.0, -1e-13])
+    assert (patches.mlp_faults(pairs, found)[own] == judge.NEGATIVE).all()
+    assert not patches.patch_faults(pairs, found).any()
+
+
+def answered_by_mlp():
+    """Pairs, sound contacts, and which of these `mlp` has found itself."""
+    pairs = drawn('container')
+    found = pairs.contacts(ContactSolver((1, 1, 1), (1, 1, 1)))
+    own = found.colliding & (found.volume != pairs.contacts().volume)
+    assert own.sum() > 200 and not patches.mlp_faults(pairs, found).any()
+    return pairs, found, own
+
+
+@pytest.mark.parametrize('scale', [1.0, 1e4])
+def test_garbage_weights_break_no_gate(tmp_path, scale):
+    """What model `mlp` guarantees, it does whatever its weights are."""
+    shipped = load_mlp()
+    rng = np.random.default_rng(1)
+    layers = [(rng.uniform(-scale, scale, weight.shape), rng.uniform(-scale, scale, bias.shape))
+              for weight, bias in shipped.networks[NETWORK].layers]
+    save_weights(tmp_path / 'garbage.safetensors', {NETWORK: layers}, shipped.card)
+    garbage = ContactSolver((1, 1, 1), (1, 1, 1), weights=str(tmp_path / 'garbage.safetensors'))
+    for number, name in enumerate(fuzz.CLASSES):
+        pairs = fuzz.draw(name, np.random.default_rng([SEED, number]), 5_000)
+        tally, = fuzz.examine(pairs, name, {'mlp': garbage})
+        assert tally.broken == 0, tally.poses
+        assert tally.exact_answers < 0.65 * tally.contacts
 
 
 def test_a_fault_is_printed_so_that_it_can_be_pasted(monkeypatch):

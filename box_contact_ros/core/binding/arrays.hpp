@@ -11,8 +11,10 @@
 
 #include <cstdint>
 #include <cstring>
+#include <exception>
 #include <initializer_list>
 #include <memory>
+#include <new>
 #include <type_traits>
 
 #include "../src/lanes/vectors.hpp"
@@ -51,12 +53,8 @@ struct Array {
 using Shape = std::initializer_list<npy_intp>;
 constexpr npy_intp any_length = -1;
 
-// Take an argument. Returns false with a Python error if its kind or shape differs.
-template <class Number>
-bool read(PyObject* argument, const char* name, Shape shape, Array<Number>& array) {
-  array.take(PyArray_FROM_OTF(argument, numpy_type<Number>, NPY_ARRAY_CARRAY_RO));
-  if (!array.object) return false;
-  auto* given = reinterpret_cast<PyArrayObject*>(array.object.get());
+// Returns false with a Python error where the shape differs.
+inline bool has_shape(PyArrayObject* given, const char* name, Shape shape) {
   bool fits = PyArray_NDIM(given) == int(shape.size());
   for (size_t axis = 0; fits && axis < shape.size(); ++axis) {
     npy_intp wanted = shape.begin()[axis];
@@ -64,6 +62,29 @@ bool read(PyObject* argument, const char* name, Shape shape, Array<Number>& arra
   }
   if (!fits) PyErr_Format(PyExc_ValueError, "%s has the wrong shape", name);
   return fits;
+}
+
+// Take an argument. Returns false with a Python error if its kind or shape differs. Booleans are read
+// as `npy_bool`: NumPy's may be any byte, and C++ knows two.
+template <class Number>
+bool read(PyObject* argument, const char* name, Shape shape, Array<Number>& array) {
+  static_assert(!std::is_same_v<Number, bool>);
+  array.take(PyArray_FROM_OTF(argument, numpy_type<Number>, NPY_ARRAY_CARRAY_RO));
+  return array.object &&
+         has_shape(reinterpret_cast<PyArrayObject*>(array.object.get()), name, shape);
+}
+
+// Take a writable array in C order as it is. Returns false with a Python error for all others.
+template <class Number>
+bool read_in_place(PyObject* argument, const char* name, Shape shape, Array<Number>& array) {
+  auto* given = reinterpret_cast<PyArrayObject*>(argument);
+  if (!PyArray_Check(argument) || PyArray_TYPE(given) != numpy_type<Number> ||
+      !PyArray_ISCARRAY(given)) {
+    PyErr_Format(PyExc_TypeError, "%s is no array of the type that is written in place", name);
+    return false;
+  }
+  array.take(Py_NewRef(argument));
+  return has_shape(given, name, shape);
 }
 
 template <class Number>
@@ -87,9 +108,45 @@ inline PyObject* fail(PyObject* kind, const char* message) {
   return nullptr;
 }
 
-template <class Function>
-PyCFunction fastcall(Function* function) {
-  return reinterpret_cast<PyCFunction>(reinterpret_cast<void (*)()>(function));
+// A function as Python calls it: what it throws becomes a Python error.
+template <auto function>
+struct Guarded;
+template <class Result, class... Arguments, Result (*function)(Arguments...)>
+struct Guarded<function> {
+  static Result call(Arguments... arguments) noexcept {
+    try {
+      return function(arguments...);
+    } catch (const std::bad_alloc&) {
+      PyErr_NoMemory();
+    } catch (const std::exception& error) {
+      PyErr_SetString(PyExc_RuntimeError, error.what());
+    }
+    if constexpr (std::is_pointer_v<Result>) {
+      return nullptr;
+    } else {
+      return -1;
+    }
+  }
+};
+
+// An entry of a table of methods or slots. All entries that can fail go through it.
+template <auto function>
+PyCFunction method() {
+  return reinterpret_cast<PyCFunction>(reinterpret_cast<void (*)()>(Guarded<function>::call));
+}
+template <auto function>
+void* slot() {
+  return reinterpret_cast<void*>(Guarded<function>::call);
+}
+
+// Call `work` without Python's lock. What it throws is thrown on, with the lock.
+template <class Work>
+auto without_lock(Work work) {
+  struct Unlocked {
+    PyThreadState* state = PyEval_SaveThread();
+    ~Unlocked() { PyEval_RestoreThread(state); }
+  } unlocked;
+  return work();
 }
 
 }  // namespace box_contact::binding

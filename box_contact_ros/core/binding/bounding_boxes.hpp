@@ -67,11 +67,13 @@ struct BoundingBoxes {
     return int(std::max_element(variance.v, variance.v + 3) - variance.v);
   }
 
-  // Call `visit` with every two of the boxes that are near, and of which one moves: sweep and prune.
+  // Call `visit` with every two boxes that are near if one of them moves: sweep and prune.
   // Each box has an interval on one axis. Where it begins, the box meets those that have begun and
   // not ended. Intervals are widened, so that are_near, which decides, sees all that it would take.
+  // Returns false, and stops, where more than `most` boxes have met: thousands may be in one place.
   template <class Visit>
-  void sweep(const std::vector<int64_t>& boxes, const bool* moves, Visit visit) const {
+  bool sweep(const std::vector<int64_t>& boxes, const unsigned char* moves, int64_t most,
+             Visit visit) const {
     struct Interval {
       double begin, end;
       int64_t box;
@@ -86,9 +88,10 @@ struct BoundingBoxes {
               [](const Interval& a, const Interval& b) { return a.begin < b.begin; });
     std::vector<Interval> begun[2];  // boxes that do not move, boxes that do
     for (const Interval& interval : intervals) {
-      bool is_moving = moves[interval.box];
+      bool is_moving = moves[interval.box] != 0;
       for (int kind = is_moving ? 0 : 1; kind < 2; ++kind) {
         size_t kept = 0;
+        if ((most -= int64_t(begun[kind].size())) < 0) return false;
         for (const Interval& other : begun[kind]) {
           if (other.end < interval.begin) continue;
           if (are_near(other.box, interval.box)) visit(other.box, interval.box);
@@ -98,6 +101,7 @@ struct BoundingBoxes {
       }
       begun[is_moving].push_back(interval);
     }
+    return true;
   }
 };
 

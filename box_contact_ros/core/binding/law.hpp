@@ -18,7 +18,9 @@ struct LawObject {
 
 inline LawObject* law_of(PyObject* object) { return reinterpret_cast<LawObject*>(object); }
 
-inline PyObject* refused() { return fail(PyExc_ValueError, bc_error_text()); }
+inline PyObject* refused(bc_status status) {
+  return fail(status == BC_NO_MEMORY ? PyExc_MemoryError : PyExc_ValueError, bc_error_text());
+}
 
 // `rows` rows of numbers, in any shape.
 inline bool read_numbers(PyObject* argument, const char* name, npy_intp rows, npy_intp columns,
@@ -72,7 +74,7 @@ inline PyObject* law_new(PyTypeObject* type, PyObject* args, PyObject*) {
   if (!PyArg_ParseTuple(args, "OOOiddddd:Law", &masses, &inertias, &centres, &use, &loop.rate,
                         &loop.latency, &loop.step, &loop.friction, &loop.gravity))
     return nullptr;
-  loop.use = bc_use(use);
+  std::memcpy(&loop.use, &use, sizeof use);  // the law refuses what is no use
   Array<double> mass, inertia, centre;
   if (!read(masses, "mass", {any_length}, mass)) return nullptr;
   npy_intp count = mass.length(0);
@@ -87,7 +89,7 @@ inline PyObject* law_new(PyTypeObject* type, PyObject* args, PyObject*) {
     std::memcpy(body.centre, centre.numbers + 3 * k, sizeof body.centre);
   }
   bc_law* law;
-  if (bc_law_create(bodies.data(), count, &loop, &law) != BC_OK) return refused();
+  if (bc_status status = bc_law_create(bodies.data(), count, &loop, &law)) return refused(status);
   PyObject* self = type->tp_alloc(type, 0);
   if (!self) return bc_law_destroy(law), nullptr;
   law_of(self)->law = law;
@@ -99,13 +101,14 @@ inline PyObject* law_hold(PyObject* self, PyObject* const* args, Py_ssize_t coun
   if (count != 2) return fail(PyExc_TypeError, "hold(touches, poses)");
   Array<double> poses;
   if (!read_numbers(args[1], "poses", law_of(self)->count, 7, poses)) return nullptr;
-  Owned touches(PySequence_Fast(args[0], "touches must be a sequence"));
+  // A tuple of their own: numbers that are read may be objects whose code changes a list.
+  Owned touches(PySequence_Tuple(args[0]));
   if (!touches) return nullptr;
-  std::vector<bc_touch> read(size_t(PySequence_Fast_GET_SIZE(touches.get())), bc_touch{});
+  std::vector<bc_touch> read(size_t(PyTuple_GET_SIZE(touches.get())), bc_touch{});
   for (size_t k = 0; k < read.size(); ++k) {
     long long pair;
     int a, b;
-    PyObject *item = PySequence_Fast_GET_ITEM(touches.get(), Py_ssize_t(k)), *contact;
+    PyObject *item = PyTuple_GET_ITEM(touches.get(), Py_ssize_t(k)), *contact;
     if (!PyTuple_Check(item) || !PyArg_ParseTuple(item, "LiiO", &pair, &a, &b, &contact))
       return PyErr_Occurred() ? nullptr : fail(PyExc_TypeError, "a touch is (pair, a, b, contact)");
     read[k].pair = pair;
@@ -113,9 +116,9 @@ inline PyObject* law_hold(PyObject* self, PyObject* const* args, Py_ssize_t coun
     read[k].b = b;
     if (!read_contact(contact, read[k].contact)) return nullptr;
   }
-  if (bc_law_hold(law_of(self)->law, read.data(), int64_t(read.size()),
-                  reinterpret_cast<const bc_pose*>(poses.numbers)) != BC_OK)
-    return refused();
+  if (bc_status status = bc_law_hold(law_of(self)->law, read.data(), int64_t(read.size()),
+                                     reinterpret_cast<const bc_pose*>(poses.numbers)))
+    return refused(status);
   Py_RETURN_NONE;
 }
 
@@ -126,10 +129,11 @@ inline PyObject* law_wrenches(PyObject* self, PyObject* const* args, Py_ssize_t 
   if (!read_numbers(args[0], "poses", bodies, 7, poses) ||
       !read_numbers(args[1], "velocities", bodies, 6, velocities) || !make({bodies, 6}, found))
     return nullptr;
-  if (bc_law_wrenches(law_of(self)->law, reinterpret_cast<const bc_pose*>(poses.numbers),
-                      reinterpret_cast<const bc_velocity*>(velocities.numbers),
-                      reinterpret_cast<bc_wrench*>(found.numbers)) != BC_OK)
-    return refused();
+  if (bc_status status =
+          bc_law_wrenches(law_of(self)->law, reinterpret_cast<const bc_pose*>(poses.numbers),
+                          reinterpret_cast<const bc_velocity*>(velocities.numbers),
+                          reinterpret_cast<bc_wrench*>(found.numbers)))
+    return refused(status);
   return found.object.release();
 }
 
@@ -149,7 +153,7 @@ inline PyObject* law_reset(PyObject* self, PyObject*) {
 
 inline PyObject* law_copy(PyObject* self, PyObject*) {
   bc_law* law;
-  if (bc_law_copy(law_of(self)->law, &law) != BC_OK) return refused();
+  if (bc_status status = bc_law_copy(law_of(self)->law, &law)) return refused(status);
   PyTypeObject* type = Py_TYPE(self);
   PyObject* copy = type->tp_alloc(type, 0);
   if (!copy) return bc_law_destroy(law), nullptr;
@@ -163,27 +167,27 @@ inline PyObject* law_frequency(PyObject* self, void*) {
 }
 
 inline PyMethodDef law_methods[] = {
-    {"hold", fastcall(law_hold), METH_FASTCALL,
+    {"hold", method<law_hold>(), METH_FASTCALL,
      "hold(touches, poses)\n--\n\nHold contacts: touches (pair, a, b, Contact), asked for at "
      "poses."},
-    {"wrenches", fastcall(law_wrenches), METH_FASTCALL,
+    {"wrenches", method<law_wrenches>(), METH_FASTCALL,
      "wrenches(poses, velocities)\n--\n\nReturn the wrenches (bodies, 6) at (bodies, 7), (bodies, "
      "6)."},
-    {"pair_wrench", law_pair_wrench, METH_O,
+    {"pair_wrench", method<law_pair_wrench>(), METH_O,
      "pair_wrench(pair)\n--\n\nReturn the wrench (6,) on box A of a pair at the last evaluation."},
-    {"reset", law_reset, METH_NOARGS, "reset()\n--\n\nForget all patches."},
-    {"copy", law_copy, METH_NOARGS, "copy()\n--\n\nReturn a law with the same patches."},
+    {"reset", method<law_reset>(), METH_NOARGS, "reset()\n--\n\nForget all patches."},
+    {"copy", method<law_copy>(), METH_NOARGS, "copy()\n--\n\nReturn a law with the same patches."},
     {nullptr, nullptr, 0, nullptr}};
 inline PyGetSetDef law_attributes[] = {
-    {"frequency", law_frequency, nullptr, "The greatest angular frequency on a patch [1/s].",
-     nullptr},
+    {"frequency", Guarded<law_frequency>::call, nullptr,
+     "The greatest angular frequency on a patch [1/s].", nullptr},
     {nullptr, nullptr, nullptr, nullptr, nullptr}};
 inline PyType_Slot law_slots[] = {
     {Py_tp_doc,
      const_cast<char*>(
          "Law(mass, inertia, centre, use, rate, latency, step, friction, gravity)\n--\n\n"
          "The force law of bodies: arrays (n,), (n, 3), (n, 3). See force.h.")},
-    {Py_tp_new, reinterpret_cast<void*>(law_new)},
+    {Py_tp_new, slot<law_new>()},
     {Py_tp_dealloc, reinterpret_cast<void*>(law_dealloc)},
     {Py_tp_methods, law_methods},
     {Py_tp_getset, law_attributes},

@@ -6,6 +6,7 @@
 // Arguments are checked here for kind and shape only. What is no plain number goes to Python, which
 // converts it or says what is wrong with it.
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <limits>
 #include <memory>
@@ -17,6 +18,7 @@
 #include "arrays.hpp"  // first, as Python.h wants
 #include "bounding_boxes.hpp"
 #include "law.hpp"
+#include "other_kernel.hpp"
 
 namespace {
 
@@ -31,10 +33,15 @@ using detail::Solver;
 using detail::StageArrays;
 
 const Kernel* kernel = nullptr;        // of this process
-PyTypeObject* contact_type = nullptr;  // the named tuples that `use_contact_types` was given
+PyTypeObject* contact_type = nullptr;  // tuples, until `use_contact_types` is called
 PyTypeObject* contacts_type = nullptr;
 PyObject* name_converted = nullptr;  // of the methods for what is no plain array
 PyObject* name_converted_batch = nullptr;
+
+// Where the environment names an unknown instruction set, core/__init__.py goes no further.
+bool has_kernel() {
+  return kernel || fail(PyExc_RuntimeError, "the environment names an unknown instruction set");
+}
 
 // --- Numbers ------------------------------------------------------------------------------------
 
@@ -134,22 +141,20 @@ bool read_pairs(PyObject* const* args, PyObject* places, PairArrays& pairs) {
   return true;
 }
 
-// A network from a float32 array: the outputs' biases, then the numbers of each unit. Leaves
-// `network` empty for None.
+// A network from a float32 array. Leaves `network` empty for None.
 bool read_network(PyObject* object, std::vector<float>& network) {
   if (object == Py_None) return true;
   Array<float> array;
   if (!read(object, "network", {any_length}, array)) return false;
-  npy_intp of_units = array.length(0) - detail::site_outputs;
-  if (of_units < 0 || of_units % detail::unit_numbers != 0)
-    return fail(PyExc_ValueError, "a network has 7 + 20 · units numbers");
+  if (!std::all_of(array.numbers, array.numbers + array.length(0), detail::is_weight))
+    return fail(PyExc_ValueError, "the network has a weight that is not within -1e4 to 1e4");
   network.assign(array.numbers, array.numbers + array.length(0));
   return true;
 }
 
 // --- Contacts -----------------------------------------------------------------------------------
 
-// A new tuple of a type; takes over the fields, of which some may be nullptr.
+// A new tuple of a type; takes over the fields, and some of them may be nullptr.
 template <Py_ssize_t count>
 PyObject* new_tuple(PyTypeObject* type, PyObject* const (&fields)[count]) {
   bool complete = true;
@@ -234,6 +239,7 @@ struct ContactArrays {
 
 struct PairSolver {
   PyObject_HEAD std::shared_ptr<Solver> solver;  // none: Python answers
+  bool is_made;
 };
 
 PairSolver* self_of(PyObject* object) { return reinterpret_cast<PairSolver*>(object); }
@@ -256,19 +262,9 @@ PyObject* solver_call(PyObject* self, PyObject* args, PyObject* keywords) {
   return call_method(self, name_converted, args, keywords);
 }
 
-// Solve rows without Python's lock. Returns the first row that is refused, or −1; −2 with an error.
-long solve(const std::shared_ptr<Solver>& solver, const Rows& rows, npy_intp count,
-           const Results& results, long threads) {
-  long refused = -2;
-  Py_BEGIN_ALLOW_THREADS;
-  try {
-    refused = solver->solve(rows, long(count), results, threads);
-  } catch (const std::bad_alloc&) {
-    // The rows need none: the threads' counts do.
-  }
-  Py_END_ALLOW_THREADS;
-  if (refused == -2) PyErr_NoMemory();
-  return refused;
+// Solve rows without Python's lock. Returns the first row that is refused, or −1.
+long solve(Solver& solver, const Rows& rows, npy_intp count, const Results& results, long threads) {
+  return without_lock([&] { return solver.solve(rows, long(count), results, threads); });
 }
 
 // What a call of `batch` asks for, if it is all plain.
@@ -292,7 +288,7 @@ struct PlainBatch {
     if (!rows.poses_b) return false;
     PyObject *key, *value;
     for (Py_ssize_t place = 0; keywords && PyDict_Next(keywords, &place, &key, &value);)
-      if (!read_keyword(key, value)) return false;
+      if (!PyUnicode_Check(key) || !read_keyword(key, value)) return false;
     return true;
   }
 
@@ -322,55 +318,58 @@ PyObject* solver_batch(PyObject* self, PyObject* args, PyObject* keywords) {
     ContactArrays found;
     if (!found.make_for(plain.count, plain.patch)) return nullptr;
     long refused =
-        solve(solver, plain.rows, plain.count, found.results(plain.patch), plain.threads);
-    if (refused == -2) return nullptr;
+        solve(*solver, plain.rows, plain.count, found.results(plain.patch), plain.threads);
     if (!plain.patch) found.fill_volumes(plain.count);
     if (refused < 0) return found.release(contacts_type);
   }
   return call_method(self, name_converted_batch, args, keywords);
 }
 
-// Sizes, model, network and the sizes that the network is for, as `PairSolver` takes them.
+// Whether a model has the network that it needs. A network of `mlp` has the output's bias, then the
+// numbers of each unit.
+bool fits(Model model, const std::vector<float>& network) {
+  if (model == Model::exact) return network.empty();
+  return !network.empty() && (network.size() - 1) % detail::unit_numbers == 0;
+}
+
+// Sizes, model and network, as `PairSolver` takes them. A capsule is the kernel of another extension,
+// whose only model takes the place of `exact` and knows what its network means.
 bool read_setup(PyObject* args, PyObject* keywords, Solver::Setup& setup, bool& has_model) {
-  const char* name;
-  PyObject *weights = Py_None, *listed = Py_None;
+  PyObject *name, *weights = Py_None;
   double *a = setup.size_a.data(), *b = setup.size_b.data();
-  static const char* names[] = {"model",  "size_a", "size_b", "network",
-                                "listed", "margin", nullptr};
-  if (!PyArg_ParseTupleAndKeywords(args, keywords, "z(ddd)(ddd)|OOd", const_cast<char**>(names),
-                                   &name, a, a + 1, a + 2, b, b + 1, b + 2, &weights, &listed,
+  static const char* names[] = {"model", "size_a", "size_b", "network", "margin", nullptr};
+  if (!PyArg_ParseTupleAndKeywords(args, keywords, "O(ddd)(ddd)|Od", const_cast<char**>(names),
+                                   &name, a, a + 1, a + 2, b, b + 1, b + 2, &weights,
                                    &setup.margin) ||
       !read_network(weights, setup.network))
     return false;
-  std::string model = name ? name : "";
-  has_model = name != nullptr;
-  setup.model = model == "mlp"         ? Model::mlp
-                : model == "mlp-edges" ? Model::mlp_by_edges
-                                       : Model::exact;
-  bool known = !has_model || model == "exact" || setup.model != Model::exact;
-  if (!known || setup.network.empty() != (setup.model == Model::exact))
-    return fail(PyExc_ValueError, "model is 'exact', 'mlp' or 'mlp-edges' with a network, or None");
-  Array<double> sizes;
-  if (listed != Py_None && !read(listed, "listed", {any_length, 2, 3}, sizes)) return false;
-  for (npy_intp pair = 0; listed != Py_None && pair < sizes.length(0); ++pair) {
-    const double* n = sizes.numbers + 6 * pair;
-    setup.listed.push_back({{{n[0], n[1], n[2]}, {n[3], n[4], n[5]}}});
-  }
+  auto is = [name](const char* one) {
+    return PyUnicode_Check(name) && PyUnicode_CompareWithASCIIString(name, one) == 0;
+  };
+  has_model = name != Py_None;
+  setup.model = is("mlp") ? Model::mlp : Model::exact;
   setup.kernel = kernel;
-  return true;
+  if (PyCapsule_IsValid(name, kernel_capsule)) {
+    auto* other = static_cast<const OtherKernel*>(PyCapsule_GetPointer(name, kernel_capsule));
+    setup.kernel = &other->kernel;
+    if (other->reads({setup.network.data(), long(setup.network.size())})) return true;
+    return fail(PyExc_ValueError, "the network is not one of this kernel's");
+  }
+  if ((is("mlp") || is("exact") || !has_model) && fits(setup.model, setup.network))
+    return has_kernel();
+  return fail(PyExc_ValueError, "model is 'exact', 'mlp' with a network, a kernel, or None");
 }
 
 int solver_init(PyObject* self, PyObject* args, PyObject* keywords) {
-  try {
-    Solver::Setup setup{};
-    bool has_model;
-    if (!read_setup(args, keywords, setup, has_model)) return -1;
-    self_of(self)->solver = has_model ? std::make_shared<Solver>(std::move(setup)) : nullptr;
-    return 0;
-  } catch (const std::bad_alloc&) {
-    PyErr_NoMemory();
-    return -1;
-  }
+  Solver::Setup setup{};
+  bool has_model;
+  if (!read_setup(args, keywords, setup, has_model)) return -1;
+  // Other threads may be using it.
+  if (self_of(self)->is_made)
+    return fail(PyExc_RuntimeError, "a solver is made once: make another"), -1;
+  if (has_model) self_of(self)->solver = std::make_shared<Solver>(std::move(setup));
+  self_of(self)->is_made = true;
+  return 0;
 }
 
 PyObject* solver_new(PyTypeObject* type, PyObject*, PyObject*) {
@@ -393,14 +392,14 @@ PyObject* solver_solve(PyObject* self, PyObject* const* args, Py_ssize_t count) 
                 "solve(poses_a, poses_b, sizes_a, sizes_b, threads, patch=True, pairs=None)");
   PairArrays pairs;
   long threads = PyLong_AsLong(args[4]);
+  if (threads == -1 && PyErr_Occurred()) return nullptr;
   int patch = count > 5 ? PyObject_IsTrue(args[5]) : 1;
-  if ((threads == -1 && PyErr_Occurred()) || patch < 0 ||
-      !read_pairs(args, count > 6 ? args[6] : Py_None, pairs))
-    return nullptr;
+  if (patch < 0) return nullptr;
+  if (threads < 1) return fail(PyExc_ValueError, "threads must be 1 or more");
+  if (!read_pairs(args, count > 6 ? args[6] : Py_None, pairs)) return nullptr;
   ContactArrays found;
   if (!found.make_for(pairs.count, patch)) return nullptr;
-  long refused = solve(solver, pairs.rows, pairs.count, found.results(patch), threads);
-  if (refused == -2) return nullptr;
+  long refused = solve(*solver, pairs.rows, pairs.count, found.results(patch), threads);
   if (!patch) found.fill_volumes(pairs.count);
   Owned contacts(found.release(&PyTuple_Type));
   return contacts ? Py_BuildValue("(Ol)", contacts.get(), refused) : nullptr;
@@ -415,12 +414,8 @@ PyObject* solver_exact(PyObject* self, void*) {
   return PyLong_FromLongLong(solver ? solver->counts().exact : 0);
 }
 
-PyCFunction with_keywords(PyCFunctionWithKeywords function) {
-  return reinterpret_cast<PyCFunction>(reinterpret_cast<void (*)()>(function));
-}
-
 PyMethodDef solver_methods[] = {
-    {"solve", fastcall(solver_solve), METH_FASTCALL,
+    {"solve", method<solver_solve>(), METH_FASTCALL,
      "solve(poses_a, poses_b, sizes_a, sizes_b, threads, patch=True, pairs=None)\n--\n\n"
      "Return (colliding, separation, normal, point, volume, covariance, axis), and the first "
      "refused "
@@ -428,7 +423,7 @@ PyMethodDef solver_methods[] = {
      "poses (m, 7), sizes (m, 3) or (1, 3) full extents [m]; frame: that of the poses. pairs (n, "
      "2): "
      "places of the boxes of each row."},
-    {"batch", with_keywords(solver_batch), METH_VARARGS | METH_KEYWORDS,
+    {"batch", method<solver_batch>(), METH_VARARGS | METH_KEYWORDS,
      "batch($self, poses_a, poses_b=None, *, size_a=None, size_b=None, sizes=None, pairs=None, "
      "threads=1, patch=True)\n--\n\n"
      "Return the contacts of n pairs: row i is what a single call gives for row i.\n\n"
@@ -440,26 +435,25 @@ PyMethodDef solver_methods[] = {
      "points\n"
      "then have the same error bounds, not always the same bits."},
     {nullptr, nullptr, 0, nullptr}};
-PyGetSetDef solver_attributes[] = {
-    {"clipped", solver_clipped, nullptr, "Contacts of model exact that were clipped.", nullptr},
-    {"answered_exactly", solver_exact, nullptr, "Contacts of model mlp outside its range.",
-     nullptr},
-    {nullptr, nullptr, nullptr, nullptr, nullptr}};
+PyGetSetDef solver_attributes[] = {{"clipped", Guarded<solver_clipped>::call, nullptr,
+                                    "Contacts of model exact that were clipped.", nullptr},
+                                   {"answered_exactly", Guarded<solver_exact>::call, nullptr,
+                                    "Contacts that model mlp left to exact.", nullptr},
+                                   {nullptr, nullptr, nullptr, nullptr, nullptr}};
 
 PyType_Slot solver_slots[] = {
     {Py_tp_doc,
      const_cast<char*>(
-         "PairSolver(model, size_a, size_b, network=None, listed=None, margin=0.0)\n--\n\n"
-         "Solve pairs of boxes by model 'exact' or 'mlp'; None leaves all to Python.\n\n"
-         "listed: the pairs of sizes (n, 2, 3) that the network is for, extents sorted; None: "
-         "any.\n\n"
+         "PairSolver(model, size_a, size_b, network=None, margin=0.0)\n--\n\n"
+         "Solve pairs of boxes by model 'exact' or 'mlp', or by another extension's kernel; None "
+         "leaves all to Python.\n\n"
          "A call with two poses (7,) returns a Contact, and batch(poses_a, poses_b) returns "
          "Contacts. What is no plain array, tuple or list of numbers, and what is refused, goes to "
          "self.converted(pose_a, pose_b) and self.converted_batch(...).")},
-    {Py_tp_new, reinterpret_cast<void*>(solver_new)},
-    {Py_tp_init, reinterpret_cast<void*>(solver_init)},
+    {Py_tp_new, slot<solver_new>()},
+    {Py_tp_init, slot<solver_init>()},
     {Py_tp_dealloc, reinterpret_cast<void*>(solver_dealloc)},
-    {Py_tp_call, reinterpret_cast<void*>(solver_call)},
+    {Py_tp_call, slot<solver_call>()},
     {Py_tp_methods, solver_methods},
     {Py_tp_getset, solver_attributes},
     {0, nullptr}};
@@ -473,111 +467,122 @@ PyObject* use_contact_types(PyObject*, PyObject* const* args, Py_ssize_t count) 
              PyType_IsSubtype(reinterpret_cast<PyTypeObject*>(args[k]), &PyTuple_Type);
   if (!tuples) return fail(PyExc_TypeError, "two named tuple types are needed");
   for (auto [place, type] : {std::pair{&contact_type, args[0]}, {&contacts_type, args[1]}}) {
-    Py_INCREF(type);
-    Py_XDECREF(reinterpret_cast<PyObject*>(*place));
-    *place = reinterpret_cast<PyTypeObject*>(type);
+    Owned before(reinterpret_cast<PyObject*>(*place));
+    *place = reinterpret_cast<PyTypeObject*>(Py_NewRef(type));
   }
   Py_RETURN_NONE;
 }
 
 PyObject* stages(PyObject*, PyObject* const* args, Py_ssize_t count) {
-  if (count != 7 || !PySequence_Check(args[5])) {
-    return fail(PyExc_TypeError,
-                "stages(poses_a, poses_b, sizes_a, sizes_b, network, names, by_edges)");
-  }
+  if (count != 5 || !PySequence_Check(args[4]))
+    return fail(PyExc_TypeError, "stages(poses_a, poses_b, sizes_a, sizes_b, names)");
   PairArrays pairs;
-  std::vector<float> network;
-  int by_edges = PyObject_IsTrue(args[6]);
-  if (by_edges < 0 || !read_pairs(args, Py_None, pairs) || !read_network(args[4], network))
-    return nullptr;
+  if (!has_kernel() || !read_pairs(args, Py_None, pairs)) return nullptr;
   Owned found(PyDict_New());
   if (!found) return nullptr;
   StageArrays arrays;
   bool filled = true;
   arrays.each([&](const char* name, auto*& place, std::initializer_list<npy_intp> shape) {
     using Number = std::decay_t<decltype(*place)>;
+    if (!filled) return;
     Owned key(PyUnicode_FromString(name));
-    int asked = key ? PySequence_Contains(args[5], key.get()) : -1;
+    int asked = key ? PySequence_Contains(args[4], key.get()) : -1;
     if (asked <= 0) {
-      filled &= asked == 0;
+      filled = asked == 0;
       return;
     }
     npy_intp dimensions[4] = {pairs.count};
     std::copy(shape.begin(), shape.end(), dimensions + 1);
     Array<Number> array;
     array.take(PyArray_SimpleNew(1 + int(shape.size()), dimensions, numpy_type<Number>));
-    filled =
-        filled && array.object && PyDict_SetItem(found.get(), key.get(), array.object.get()) == 0;
+    filled = array.object && PyDict_SetItem(found.get(), key.get(), array.object.get()) == 0;
     if (filled) place = array.numbers;
   });
   if (!filled) return nullptr;
-  detail::NetworkNumbers numbers{network.empty() ? nullptr : network.data(),
-                                 long(network.size()) / detail::unit_numbers};
-  long refused = -1;
-  Py_BEGIN_ALLOW_THREADS;
-  for (long row = 0; row < pairs.count && refused < 0; ++row)
-    if (!kernel->fill_stages(numbers, by_edges, pairs.rows, row, arrays)) refused = row;
-  Py_END_ALLOW_THREADS;
+  long refused = without_lock([&] {
+    for (long row = 0; row < pairs.count; ++row)
+      if (!kernel->fill_stages(pairs.rows, row, arrays)) return row;
+    return -1L;
+  });
   return Py_BuildValue("(Nl)", found.release(), refused);
 }
 
-// A writable array of a type, or nullptr with a Python error.
-PyArrayObject* in_place(PyObject* object, int type) {
-  if (PyArray_Check(object)) {
-    auto* array = reinterpret_cast<PyArrayObject*>(object);
-    if (PyArray_TYPE(array) == type && PyArray_ISCARRAY(array)) return array;
-  }
-  fail(PyExc_TypeError, "near_pairs works in place on arrays of its own types");
-  return nullptr;
+// Whether `place` is one of `count` boxes; false with a Python error otherwise.
+bool is_box(int64_t place, npy_intp count, const char* name) {
+  if (place >= 0 && place < count) return true;
+  PyErr_Format(PyExc_ValueError, "%s has the box %lld of %zd", name, (long long)place, count);
+  return false;
 }
 
 PyObject* near_pairs(PyObject*, PyObject* const* args, Py_ssize_t count) {
-  constexpr int types[] = {NPY_DOUBLE, NPY_DOUBLE, NPY_INT64, NPY_DOUBLE, NPY_DOUBLE,
-                           NPY_BOOL,   NPY_INT64,  NPY_INT64, NPY_INT64,  NPY_INT64};
   if (count != 10) {
     return fail(PyExc_TypeError,
                 "near_pairs(poses, sizes, moved, low, high, known, first, second, near, unknown)");
   }
-  PyArrayObject* arrays[10];
-  for (int k = 0; k < 10; ++k)
-    if (!(arrays[k] = in_place(args[k], types[k]))) return nullptr;
-  auto numbers = [&](int k) { return static_cast<double*>(PyArray_DATA(arrays[k])); };
-  auto integers = [&](int k) { return static_cast<int64_t*>(PyArray_DATA(arrays[k])); };
-  BoundingBoxes boxes{numbers(0), numbers(1), numbers(3), numbers(4)};
-  const bool* known = static_cast<const bool*>(PyArray_DATA(arrays[5]));
-  const int64_t *moved = integers(2), *first = integers(6), *second = integers(7);
-  int64_t *near = integers(8), *unknown = integers(9);
-  npy_intp left = 0, left_out = 0;
-  for (npy_intp i = 0; i < PyArray_SIZE(arrays[2]); ++i)
-    if (known[moved[i]] && !boxes.update(moved[i])) return Py_BuildValue("(iL)", -1, moved[i]);
-  for (npy_intp i = 0; i < PyArray_SIZE(arrays[6]); ++i) {
-    if (!known[first[i]] || !known[second[i]]) {
-      unknown[left_out++] = i;
-    } else if (boxes.are_near(first[i], second[i])) {
-      near[left++] = i;
+  Array<double> poses, sizes, low, high;
+  Array<int64_t> moved, first, second, near, unknown;
+  Array<npy_bool> known;
+  if (!read_in_place(args[0], "poses", {any_length, 7}, poses)) return nullptr;
+  npy_intp n = poses.length(0);
+  if (!read_in_place(args[1], "sizes", {n, 3}, sizes) ||
+      !read_in_place(args[2], "moved", {any_length}, moved) ||
+      !read_in_place(args[3], "low", {n, 3}, low) ||
+      !read_in_place(args[4], "high", {n, 3}, high) ||
+      !read_in_place(args[5], "known", {n}, known) ||
+      !read_in_place(args[6], "first", {any_length}, first) ||
+      !read_in_place(args[7], "second", {first.length(0)}, second) ||
+      !read_in_place(args[8], "near", {any_length}, near) ||
+      !read_in_place(args[9], "unknown", {any_length}, unknown))
+    return nullptr;
+  npy_intp pairs = first.length(0), left = 0, left_out = 0;
+  if (near.length(0) < pairs || unknown.length(0) < pairs)
+    return fail(PyExc_ValueError, "near and unknown must have room for all pairs");
+  BoundingBoxes boxes{poses.numbers, sizes.numbers, low.numbers, high.numbers};
+  for (npy_intp i = 0; i < moved.length(0); ++i) {
+    int64_t box = moved.numbers[i];
+    if (!is_box(box, n, "moved")) return nullptr;
+    if (known.numbers[box] && !boxes.update(box)) return Py_BuildValue("(iL)", -1, box);
+  }
+  // A place is checked when it is read: the arrays may overlap.
+  for (npy_intp i = 0; i < pairs; ++i) {
+    int64_t a = first.numbers[i], b = second.numbers[i];
+    if (!is_box(a, n, "first") || !is_box(b, n, "second")) return nullptr;
+    if (!known.numbers[a] || !known.numbers[b]) {
+      unknown.numbers[left_out++] = i;
+    } else if (boxes.are_near(a, b)) {
+      near.numbers[left++] = i;
     }
   }
   return Py_BuildValue("(nn)", left, left_out);
 }
 
-// near_boxes(low, high, known, moves): all near pairs of boxes, whichever are listed.
+// near_boxes(low, high, known, moves, most): all near pairs of boxes, whichever are listed.
 PyObject* near_boxes(PyObject*, PyObject* const* args, Py_ssize_t count) {
   Array<double> low, high;
-  Array<bool> known, moves;
-  if (count != 4) return fail(PyExc_TypeError, "near_boxes(low, high, known, moves)");
+  Array<npy_bool> known, moves;
+  if (count != 5) return fail(PyExc_TypeError, "near_boxes(low, high, known, moves, most)");
   if (!read(args[0], "low", {any_length, 3}, low)) return nullptr;
   npy_intp n = low.length(0);
   if (!read(args[1], "high", {n, 3}, high) || !read(args[2], "known", {n}, known) ||
       !read(args[3], "moves", {n}, moves))
     return nullptr;
+  long long most = PyLong_AsLongLong(args[4]);
+  if (most == -1 && PyErr_Occurred()) return nullptr;
   std::vector<int64_t> boxes, found;
-  for (npy_intp box = 0; box < n; ++box)
-    if (known.numbers[box]) boxes.push_back(box);
-  BoundingBoxes{nullptr, nullptr, low.numbers, high.numbers}.sweep(
-      boxes, moves.numbers, [&](int64_t a, int64_t b) {
+  for (npy_intp box = 0; box < n; ++box) {
+    if (!known.numbers[box]) continue;
+    // Numbers that are not finite have no order to be sorted by.
+    for (npy_intp k = 3 * box; k < 3 * box + 3; ++k)
+      if (!std::isfinite(low.numbers[k]) || !std::isfinite(high.numbers[k]))
+        return PyErr_Format(PyExc_ValueError, "box %zd has bounds that are not finite", box);
+    boxes.push_back(box);
+  }
+  bool all = BoundingBoxes{nullptr, nullptr, low.numbers, high.numbers}.sweep(
+      boxes, moves.numbers, most, [&](int64_t a, int64_t b) {
         found.push_back(std::min(a, b));
         found.push_back(std::max(a, b));
       });
+  if (!all) Py_RETURN_NONE;
   Array<int64_t> pairs;
   if (!make({npy_intp(found.size() / 2), 2}, pairs)) return nullptr;
   std::copy(found.begin(), found.end(), pairs.numbers);
@@ -586,9 +591,9 @@ PyObject* near_boxes(PyObject*, PyObject* const* args, Py_ssize_t count) {
 
 PyObject* instruction_sets(PyObject*, PyObject*) {
   const auto& kernels = detail::kernels();
-  Owned names(PyTuple_New(Py_ssize_t(kernels.size())));
-  for (size_t k = 0; names && k < kernels.size(); ++k) {
-    PyObject* name = PyUnicode_FromString(kernels[k]->name);
+  Owned names(PyTuple_New(Py_ssize_t(kernels.count)));
+  for (size_t k = 0; names && k < kernels.count; ++k) {
+    PyObject* name = PyUnicode_FromString(kernels.all[k]->name);
     if (!name) return nullptr;
     PyTuple_SET_ITEM(names.get(), Py_ssize_t(k), name);
   }
@@ -596,20 +601,21 @@ PyObject* instruction_sets(PyObject*, PyObject*) {
 }
 
 PyMethodDef module_methods[] = {
-    {"instruction_sets", instruction_sets, METH_NOARGS,
+    {"instruction_sets", method<instruction_sets>(), METH_NOARGS,
      "instruction_sets()\n--\n\n"
      "Return the instruction sets that were built and that this machine can run, best last."},
-    {"use_contact_types", fastcall(use_contact_types), METH_FASTCALL,
+    {"use_contact_types", method<use_contact_types>(), METH_FASTCALL,
      "use_contact_types(single, many)\n--\n\nSet the named tuples that calls and batches return."},
-    {"stages", fastcall(stages), METH_FASTCALL, "See core.stages."},
-    {"near_pairs", fastcall(near_pairs), METH_FASTCALL,
+    {"stages", method<stages>(), METH_FASTCALL, "See core.stages."},
+    {"near_pairs", method<near_pairs>(), METH_FASTCALL,
      "near_pairs(poses, sizes, moved, low, high, known, first, second, near, unknown)\n--\n\n"
      "Write numbers of pairs that may touch, and of those without poses; return how many.\n\n"
      "Boxes `moved` are bounded anew in low, high (boxes, 3). Returns -1 and the box for no pose."},
-    {"near_boxes", fastcall(near_boxes), METH_FASTCALL,
-     "near_boxes(low, high, known, moves)\n--\n\n"
+    {"near_boxes", method<near_boxes>(), METH_FASTCALL,
+     "near_boxes(low, high, known, moves, most)\n--\n\n"
      "Return the pairs (n, 2) of known boxes that may touch and of which one moves, in no "
      "order.\n\n"
+     "Returns None where more than `most` intervals on the swept axis had to be compared.\n"
      "low, high (boxes, 3): bounding boxes as near_pairs leaves them."},
     {nullptr, nullptr, 0, nullptr}};
 
@@ -618,10 +624,7 @@ struct Whole {
   long value;
 };
 constexpr Whole wholes[] = {{"NETWORK_FORMAT", detail::network_format},
-                            {"SITES", detail::site_count},
-                            {"FEATURES", detail::site_features},
-                            {"OUTPUTS", detail::site_outputs},
-                            {"POINT_OUTPUTS", detail::point_outputs}};
+                            {"FEATURES", detail::network_features}};
 struct Constant {
   const char* name;
   double value;
@@ -630,8 +633,8 @@ constexpr Constant constants[] = {
     {"LENGTH_MIN", length_min},         {"LENGTH_MAX", length_max},
     {"QUATERNION_MIN", quaternion_min}, {"QUATERNION_MAX", quaternion_max},
     {"CONTACT_ULPS", contact_ulps},     {"DEPTH_FLOOR", depth_floor},
-    {"ASPECT_MAX", aspect_max},         {"SIZE_RATIO_MAX", size_ratio_max},
-    {"DEPTH_MAX", depth_max},           {"CENTROID_REACH", centroid_reach}};
+    {"BRACKET_LIMIT", bracket_limit},   {"SPREAD_LIMIT", spread_limit},
+    {"UPPER_LIMIT", upper_limit}};
 
 bool add(PyObject* module, const char* name, PyObject* value) {
   Owned owned(value);
@@ -655,11 +658,12 @@ PyModuleDef module_definition = {PyModuleDef_HEAD_INIT,
 PyMODINIT_FUNC PyInit__native() {
   import_array();
   kernel = detail::chosen_kernel();
+  for (auto place : {&contact_type, &contacts_type})
+    *place = reinterpret_cast<PyTypeObject*>(Py_NewRef(&PyTuple_Type));
   name_converted = PyUnicode_InternFromString("converted");
   name_converted_batch = PyUnicode_InternFromString("converted_batch");
   Owned module(PyModule_Create(&module_definition));
   if (!name_converted || !name_converted_batch || !module) return nullptr;
-  // Where the environment names an unknown instruction set, core/__init__.py refuses to go on.
   bool added =
       add(module.get(), "kernel", PyUnicode_FromString(kernel ? kernel->name : "")) &&
       add(module.get(), "instruction_set", PyUnicode_FromString(kernel ? kernel->title : "")) &&

@@ -82,7 +82,8 @@ BC_INLINE Query<double> lane(const Query<T>& q, int i) {
 template <class T>
 BC_INLINE void put_first_as_a(const Pair<T>& pair, Pair<T>& ordered) {
   Mask<T> a_first = pair.a_first;
-  ordered.origin_a = pair.origin_a;
+  ordered.origin_a = select(a_first, pair.origin_a, pair.origin_b);
+  ordered.origin_b = select(a_first, pair.origin_b, pair.origin_a);
   ordered.size = pair.size;
   ordered.touch = pair.touch;
   ordered.a_first = a_first;
@@ -100,19 +101,22 @@ BC_INLINE void put_first_as_a(const Pair<T>& pair, Pair<T>& ordered) {
     }
 }
 
-// The exact overlap of a single pair that `enforce_minimum_depth` has moved.
+// The exact overlap of a single pair that `enforce_minimum_depth` has moved; the centroid in A's frame.
 inline Moments<double> clipped_overlap(Pair<double> pair, int face, bool pressed) {
   if (pressed) enforce_on_further_axes(pair);
   return overlap_by_clipping(pair, face);
 }
 
-// A model has two members for lanes T:
+// A model has three members for lanes T:
 //
-//   Found<T>: what it finds of an overlap. `Moments<T>`, or `Vec<T>` for the centroid alone.
+//   Found<T>: what it finds of an overlap: `Moments<T>`, or `PointAndVolume<T>`.
 //   group<T>: how many queries it takes at once.
+//   Rest: the model to which it leaves pairs, or void.
 //
-// And `solve(queries, found, counts)` fills `found` for the pairs that touch, points in A's frame. It
-// may move the boxes of the queries.
+// And `solve(queries, found, left, counts)` fills `found` for the pairs that touch, with the centroid
+// in the common frame. It may move the boxes of the queries, unless it leaves them: then it sets the
+// pair's bit in `left`. Swapping A and B changes no bit of what it finds, except where `exact` presses
+// or clips: a tie of A's and B's faces decides there.
 
 // Model `exact`: the moments of A∩B by face sums, or by clipping where these are not certain.
 // `FoundOf`: Moments, or PointAndVolume.
@@ -122,9 +126,11 @@ struct ExactModelOf {
   using Found = FoundOf<T>;
   template <class T>
   static constexpr int group = 1;
+  using Rest = void;
 
   template <class T>
-  BC_INLINE void solve(Query<T> (&queries)[1], Found<T> (&found)[1], Counts& counts) const {
+  BC_INLINE void solve(Query<T> (&queries)[1], Found<T> (&found)[1], unsigned (&)[1],
+                       Counts& counts) const {
     found[0] = solve(queries[0], counts);
   }
 
@@ -141,15 +147,18 @@ struct ExactModelOf {
     put_first_as_a(pair, ordered);
     Found<T> found;
     Mask<T> certain = overlap_by_face_sums(ordered, depth, found);
-    found.centroid =
-        select(pair.a_first, found.centroid, pair.offset_a + pair.rotation * found.centroid);
     fallback |= (certain == 0) & q.touching;
+    found.centroid = point_in_common_frame(ordered, found.centroid);
     if (any(fallback)) {
       for (int i = 0; i < width<T>; ++i) {
         if (!lane(fallback, i)) continue;
         ++counts.clipped;
-        set_lane(found, i,
-                 clipped_overlap(lane(pair, i), int(lane(q.axis.face, i)), lane(pressed, i) != 0));
+        Pair<double> one;
+        put_first_as_a(lane(pair, i), one);
+        int face = int(lane(q.axis.face, i)), of_first = one.a_first ? face : (face + 3) % 6;
+        Moments<double> clipped = clipped_overlap(one, of_first, lane(pressed, i) != 0);
+        clipped.centroid = point_in_common_frame(one, clipped.centroid);
+        set_lane(found, i, clipped);
       }
     }
     return found;
@@ -164,20 +173,15 @@ inline Moments<double> exact_overlap(Query<double> q, Counts& counts) {
   return ExactModel{}.solve(q, counts);
 }
 
-// The one place that decides what a contact says of moments that its model does not give: NaN.
+// All moments. What a model does not find is NaN.
 template <class T>
-BC_INLINE Moments<T> moments(const Moments<T>& found) {
+BC_INLINE const Moments<T>& all_moments(const Moments<T>& found) {
   return found;
 }
 template <class T>
-BC_INLINE Moments<T> moments(const PointAndVolume<T>& found) {
+BC_INLINE Moments<T> all_moments(const PointAndVolume<T>& found) {
   T unknown = splat<T>(not_a_number);
   return {found.volume, found.centroid, {{unknown, unknown, unknown, unknown, unknown, unknown}}};
-}
-template <class T>
-BC_INLINE Moments<T> moments(const Vec<T>& centroid) {
-  T unknown = splat<T>(not_a_number);
-  return {unknown, centroid, {{unknown, unknown, unknown, unknown, unknown, unknown}}};
 }
 
 // The numbers of row `row`: places of the poses and sizes of its boxes.
@@ -254,18 +258,17 @@ template <class T>
   return refused ? first + __builtin_ctz(refused) : -1;
 }
 
-// Write the overlaps of the lanes that touch to their rows.
+// Write the overlaps of the chosen lanes to their rows.
 template <class T, class Found>
-[[gnu::noinline]] inline void write_overlaps(const Query<T>& q, const Found& found,
+[[gnu::noinline]] inline void write_overlaps(const Found& found, unsigned chosen,
                                              const long (&rows)[width<T>], const Results& results) {
-  unsigned touching = bits(q.touching);
-  Moments<T> overlap = moments(found);
+  const Moments<T>& overlap = all_moments(found);
   double* places[width<T>];
   auto store = [&](double* array, int numbers, int from, const auto& x) {
     for (int i = 0; i < width<T>; ++i) places[i] = array + (numbers * rows[i] + from);
-    store_rows(places, touching, x);
+    store_rows(places, chosen, x);
   };
-  if (results.point) store(results.point, 3, 0, point_in_common_frame(q.pair, overlap.centroid).v);
+  if (results.point) store(results.point, 3, 0, overlap.centroid.v);
   if (results.volume) {
     T volume[1] = {overlap.volume};
     store(results.volume, 1, 0, volume);
@@ -299,15 +302,25 @@ struct Group {
   Query<T> queries[blocks];
   long rows[blocks][width<T>];
 
-  // Solve the lanes that touch.
-  BC_INLINE void solve(const Model& model, const Results& results, Counts& counts) {
+  // Solve the lanes that touch, and hand those that the model leaves to `rest`.
+  template <class Rest>
+  BC_INLINE void solve(const Model& model, const Results& results, Counts& counts, Rest& rest) {
     typename Model::template Found<T> found[blocks]{};
-    model.solve(queries, found, counts);
-    for (int g = 0; g < blocks; ++g) write_overlaps(queries[g], found[g], rows[g], results);
+    unsigned left[blocks]{};
+    model.solve(queries, found, left, counts);
+    for (int g = 0; g < blocks; ++g) {
+      unsigned touching = bits(queries[g].touching);
+      write_overlaps<T>(found[g], touching & ~left[g], rows[g], results);
+      for (unsigned lanes_left = touching & left[g]; lanes_left; lanes_left &= lanes_left - 1) {
+        int i = __builtin_ctz(lanes_left);
+        ++counts.exact;
+        rest.take(queries[g], i, rows[g][i], results);
+      }
+    }
   }
 };
 
-// Rows that touch, from blocks in which others do not: they wait until they fill a group.
+// Rows that wait until they fill a group.
 template <class T, class Model>
 struct Waiting {
   Group<T, Model> group;
@@ -323,16 +336,46 @@ struct Waiting {
     group.rows[at / width<T>][at % width<T>] = row;
   }
   // Solve what waits. Idle lanes repeat the first one.
-  BC_INLINE void solve(const Model& model, const Results& results, Counts& counts) {
+  template <class Rest>
+  BC_INLINE void solve(const Model& model, const Results& results, Counts& counts, Rest& rest) {
     if (!count) return;
     for (int at = count; at < group.lanes; ++at) {
       put(group.queries[0], 0, 0, at);
       set_lane(group.queries[at / width<T>].touching, at % width<T>, 0);
     }
-    group.solve(model, results, counts);
+    group.solve(model, results, counts, rest);
     count = 0;
   }
 };
+
+// What becomes of the pairs that a model leaves: nothing, where there are none.
+template <class T, class Model>
+struct RestOf {
+  BC_INLINE void take(const Query<T>&, int, long, const Results&) {}
+  BC_INLINE void finish(const Results&) {}
+};
+template <class T, class Model>
+struct WaitingRest {
+  Waiting<T, Model> waiting;
+  RestOf<T, void> none;
+  Counts uncounted{};
+
+  BC_INLINE void take(const Query<T>& q, int i, long row, const Results& results) {
+    if constexpr (is_scalar<T>) {
+      waiting.group.queries[0] = q;
+      waiting.group.rows[0][0] = row;
+    } else {
+      waiting.put(q, i, row, waiting.count);
+    }
+    if (++waiting.count == waiting.group.lanes) finish(results);
+  }
+  [[gnu::noinline]] void finish(const Results& results) {
+    waiting.solve(Model{}, results, uncounted, none);
+  }
+};
+template <class T, class Model>
+using Rest = std::conditional_t<std::is_void_v<typename Model::Rest>, RestOf<T, void>,
+                                WaitingRest<T, typename Model::Rest>>;
 
 // One row alone.
 template <class Model>
@@ -341,7 +384,10 @@ template <class Model>
   Group<double, Model> one;
   query_rows(rows, row, row + 1, one.queries[0]);
   one.rows[0][0] = row;
-  if (one.queries[0].touching) one.solve(model, results, counts);
+  if (one.queries[0].touching) {
+    Rest<double, Model> rest;
+    one.solve(model, results, counts, rest);
+  }
   return write_query(one.queries[0], row, row + 1, results, counts);
 }
 
@@ -349,7 +395,7 @@ template <class Model>
 // rows get `colliding` false and `separation` NaN.
 //
 // A few rows that are left are solved one by one, which is faster than a group with idle lanes. With
-// registers of two a pair alone is slower than a block of two, of which one lane is idle.
+// registers of two a pair alone is slower than a block of two with an idle lane.
 template <class T, class Model>
 [[gnu::noinline]] inline long solve_rows(const Model& model, const Rows& rows, long begin, long end,
                                          const Results& results, Counts& counts) {
@@ -358,6 +404,7 @@ template <class T, class Model>
   if constexpr (!is_scalar<T>) {
     Group<T, Model> group;
     Waiting<T, Model> waiting;
+    Rest<T, Model> rest;
     constexpr int blocks = group.blocks, lanes = group.lanes;
     constexpr long few = width<T> <= 2 ? blocks - 1 : lanes <= 8 ? 2 : lanes / 4;
     for (; end - first > few; first += lanes) {
@@ -375,17 +422,18 @@ template <class T, class Model>
         touching += __builtin_popcount(bits(group.queries[g].touching));
       }
       if (touching == lanes || (touching && first == begin && last == end)) {
-        group.solve(model, results, counts);
+        group.solve(model, results, counts, rest);
       } else if (touching) {
         for (int g = 0; g < blocks; ++g)
           for (unsigned left = bits(group.queries[g].touching); left; left &= left - 1) {
             int i = __builtin_ctz(left);
             waiting.put(group.queries[g], i, group.rows[g][i], waiting.count);
-            if (++waiting.count == lanes) waiting.solve(model, results, counts);
+            if (++waiting.count == lanes) waiting.solve(model, results, counts, rest);
           }
       }
     }
-    waiting.solve(model, results, counts);
+    waiting.solve(model, results, counts, rest);
+    rest.finish(results);
   }
   for (; first < end; ++first) note(solve_row(model, rows, first, results, counts));
   return refused;

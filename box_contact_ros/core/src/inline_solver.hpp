@@ -5,6 +5,7 @@
 #pragma once
 
 #include "mlp/mlp_model.hpp"
+#include "mlp/shipped_network.hpp"
 
 namespace box_contact::BOX_CONTACT_SET {
 
@@ -12,6 +13,7 @@ namespace box_contact::BOX_CONTACT_SET {
 // allocate no memory.
 class Solver {
  public:
+  enum class Model { exact, mlp };
   using Pose = BOX_CONTACT_SET::Pose<double>;  // position [m]; quaternion x y z w of any length
   using Size = Vec<double>;                    // full extents along the box's own axes [m]
 
@@ -33,28 +35,14 @@ class Solver {
   static constexpr int lanes = 2;
 #endif
 
-  // Model `exact`. Throws std::invalid_argument for extents outside 1e-50 to 1e50 m, and
-  // std::logic_error where the compiler fuses products and sums in spite of the pragmas.
-  Solver(const Size& size_a, const Size& size_b) : size_a_(size_a), size_b_(size_b) {
+  // Throws std::invalid_argument for extents outside 1e-50 to 1e50 m. Throws std::logic_error where
+  // the compiler fuses products and sums in spite of the pragmas.
+  Solver(const Size& size_a, const Size& size_b, Model model = Model::mlp)
+      : size_a_(size_a), size_b_(size_b), model_(model) {
     if (fuses_products())
       throw std::logic_error("box_contact: compile with -ffp-contract=off, without -ffast-math");
     check_size("size_a", size_a);
     check_size("size_b", size_b);
-  }
-
-  // Model `mlp`, with its own copy of a network. Throws std::invalid_argument also for weights that
-  // are not finite or beyond ±1e4.
-  Solver(const Size& size_a, const Size& size_b, const Network& network) : Solver(size_a, size_b) {
-    for (const Network::Unit& unit : network.units) {
-      check_weights(&unit.bias, 1);
-      check_weights(unit.of_faces, 4);
-      check_weights(unit.of_axis, 4);
-      check_weights(unit.of_site, 4);
-      check_weights(unit.to_outputs, site_outputs);
-    }
-    check_weights(network.output_bias, site_outputs);
-    network_ = network;
-    has_network_ = true;
   }
 
   // The contact of one pair. Throws std::invalid_argument with field and value. Refused are numbers
@@ -104,9 +92,14 @@ class Solver {
     detail::Results results{wanted.colliding, wanted.separation, wanted.normal, wanted.point,
                             wanted.volume,    wanted.covariance, wanted.axis,   0.0};
     Counts counts{};
-    if (has_network_)
-      return solve_rows<Block>(MlpModel{view(network_)}, rows, 0, count, results, counts);
+    if (model_ == Model::mlp)
+      return solve_rows<Block>(MlpModel{shipped()}, rows, 0, count, results, counts);
     return solve_rows<Block>(ExactModel{}, rows, 0, count, results, counts);
+  }
+
+  static Network shipped() {
+    constexpr long count = std::size(detail::shipped_network);
+    return view(detail::shipped_network, count);
   }
 
   // (1 + 2⁻³⁰)² has one bit more than a double holds. Fused or wider arithmetic keeps this bit.
@@ -122,15 +115,6 @@ class Solver {
     std::snprintf(words, sizeof words, "%s (%g, %g, %g) is not within 1e-50 to 1e50 m", field,
                   size[0], size[1], size[2]);
     throw std::invalid_argument(words);
-  }
-  static void check_weights(const float* weights, int count) {
-    for (int k = 0; k < count; ++k)
-      if (!(abs(weights[k]) <= 1e4F)) {
-        char words[200];
-        std::snprintf(words, sizeof words, "network: weight %f is not within -1e4 to 1e4",
-                      double(weights[k]));
-        throw std::invalid_argument(words);
-      }
   }
   [[noreturn]] static void refuse(const Pose& pose_a, const Pose& pose_b) {
     bool of_a = !pose_valid(pose_a);
@@ -152,8 +136,7 @@ class Solver {
   }
 
   Size size_a_, size_b_;
-  Network network_;
-  bool has_network_ = false;
+  Model model_;
 };
 
 }  // namespace box_contact::BOX_CONTACT_SET

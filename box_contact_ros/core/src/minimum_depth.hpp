@@ -3,8 +3,9 @@
 
 // Pressing: the least depth at which the overlap of two boxes has a volume.
 //
-// At exact touch A∩B has no volume. The contact point is then that of the boxes after B was pressed
-// in against the normal, to a depth of `depth_floor` of the size. The separation stays as it was.
+// At exact touch A∩B has no volume. The box that is second in the order of the data is then pressed
+// in against the normal, to a depth of `depth_floor` of the size. The contact point is that of the
+// pressed boxes. The separation stays as it was.
 #pragma once
 
 #include "separating_axis.hpp"

@@ -3,8 +3,8 @@
 
 // The separating-axis test with 32 digits, for edges that are almost parallel.
 //
-// Where two edges almost along each other meet, their cross product is what is left of a
-// cancellation: at an angle of θ its direction is good to 1e-16/θ. That matters only if another
+// Where two edges almost along each other meet, their cross product is what a cancellation leaves.
+// At an angle of θ its direction is good to 1e-16/θ. That matters only if another
 // axis wins by less than the gap along it may be wrong; `SeparatingAxis::doubtful` marks those
 // pairs. Without this, some have depths wrong by up to 1e-8 of the size.
 #pragma once
@@ -70,8 +70,8 @@ inline DoubleDouble sqrt(DoubleDouble a) {
   return quick_sum(root, rest.high / (2.0 * root));
 }
 
-// Two boxes in the frame of the one that comes first in the order of the data: gaps have the same
-// bits whichever of the two is called A.
+// Two boxes in the frame of the one that comes first in the order of the data. So gaps have the
+// same bits, whichever box is called A.
 struct PrecisePair {
   Vec<double> half, other_half;
   DoubleDouble rotation[3][3];      // the other box's axes as columns, in the first one's frame

@@ -6,8 +6,8 @@
 // Conventions: SI units, right-handed frames. A pose is `x y z qx qy qz qw` in a frame common to
 // both boxes. A size is three full extents [m]; the core works with half extents.
 //
-// What can cancel does so once, in float64: the offset is B − A before anything else, and
-// R[i][j] = a_i · b_j are the products of the boxes' axes. When A and B are swapped, R becomes its
+// What can cancel does so once, in float64. The offset is B − A before anything else. The
+// products of the boxes' axes are R[i][j] = a_i · b_j. When A and B are swapped, R becomes its
 // transpose and the offsets change sign, bit for bit. The verdict relies on that.
 #pragma once
 
@@ -37,7 +37,7 @@ struct Pose {
 template <class T>
 struct Pair {
   Vec<T> half_a, half_b;      // half extents [m]
-  Vec<T> origin_a;            // A's centre, common frame [m]
+  Vec<T> origin_a, origin_b;  // the boxes' centres, common frame [m]
   Mat<T> axes_a, axes_b;      // the boxes' axes as columns, common frame
   Vec<T> offset_a, offset_b;  // B − A in A's frame, and in B's [m]
   Mat<T> rotation;            // R: B's axes as columns, in A's frame
@@ -100,6 +100,7 @@ BC_INLINE void prepare(const Pose<T>& a, const Pose<T>& b, const Vec<T>& half_a,
   pair.half_a = half_a;
   pair.half_b = half_b;
   pair.origin_a = a.position;
+  pair.origin_b = b.position;
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) pair.axes_a[i][j] = axes_a[i][j], pair.axes_b[i][j] = axes_b[i][j];
   pair.offset_a = transposed_times(axes_a, t);
@@ -146,6 +147,7 @@ BC_INLINE Pair<double> lane(const Pair<T>& pair, int i) {
   one.half_a = lane(pair.half_a, i);
   one.half_b = lane(pair.half_b, i);
   one.origin_a = lane(pair.origin_a, i);
+  one.origin_b = lane(pair.origin_b, i);
   one.axes_a = lane(pair.axes_a, i);
   one.axes_b = lane(pair.axes_b, i);
   one.offset_a = lane(pair.offset_a, i);

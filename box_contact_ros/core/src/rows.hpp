@@ -9,12 +9,11 @@
 
 namespace box_contact::detail {
 
-// The network of model `mlp`: sites at which it is asked, features and outputs of each, and those of
-// the outputs that give the point. `network_format` counts changes of what the numbers mean.
-constexpr int network_format = 2;
-constexpr int site_count = 9, site_features = 12, site_outputs = 7, point_outputs = 3;
-// Numbers of a unit: its bias, its weights for the features, and its weights to the outputs.
-constexpr int unit_numbers = 1 + site_features + site_outputs;
+// The network of model `mlp`: features of what it is asked of; it has one output. `network_format`
+// counts changes of what the numbers mean.
+constexpr int network_format = 3, network_features = 6;
+// Numbers of a unit: its bias, its weights for the features, and its weight to the output.
+constexpr int unit_numbers = 1 + network_features + 1;
 
 // A step of 0 gives all rows the same sizes, one of 3 each row its own.
 struct Rows {
@@ -37,7 +36,7 @@ struct Results {
 struct Counts {
   long contacts;
   long clipped;  // by model `exact`: clipped, because the certificate did not hold
-  long exact;    // by model `mlp`: answered by `exact`: outside the trained range, or a box
+  long exact;    // by model `mlp`: left to `exact`
 };
 
 }  // namespace box_contact::detail

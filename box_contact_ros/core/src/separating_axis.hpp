@@ -3,11 +3,11 @@
 
 // The separating-axis test (SAT): which of 15 axes separates two boxes, or is the shallowest.
 //
-// Two boxes are disjoint exactly if one of 15 axes separates their projections: the three face
-// normals of each box and the nine cross products of their edges (Gottschalk, Lin and Manocha
-// 1996). The gap on a unit axis n is |t·n| − r_A(n) − r_B(n), with t = B − A and r the half widths.
-// The largest of the 15 gaps is the separation. For boxes that overlap, its negative is the least
-// translation that separates them.
+// Two boxes are disjoint exactly if one of 15 axes separates their projections (Gottschalk, Lin and
+// Manocha 1996). The axes are the three face normals of each box and the nine cross products of
+// their edges. The gap on a unit axis n is |t·n| − r_A(n) − r_B(n), with t = B − A and r the half
+// widths. The largest of the 15 gaps is the separation. For boxes that overlap, its negative is the
+// least translation that separates them.
 //
 // 1. Face axes. Their gaps need the entries of R alone.
 // 2. Edge axes, normalised. Each gap is the exact gap along the axis AS ROUNDED: its half widths
@@ -16,15 +16,15 @@
 // 3. Ties. An axis replaces an earlier one only if its gap is larger by more than `tie`, in the
 //    order faces of A, faces of B, edges. Aligned boxes get the normal of a face.
 //
-// The separation has the same bits when A and B are swapped: face gaps are symmetric formulas, and
-// edge gaps are evaluated in the frame of the box that comes first in an order of the data.
+// The separation has the same bits when A and B are swapped. Face gaps are symmetric formulas. Edge
+// gaps are evaluated in the frame of the box that comes first in an order of the data.
 #pragma once
 
 #include "poses.hpp"
 
 namespace box_contact::BOX_CONTACT_SET {
 
-// Gaps closer than this fraction of the size count as equal: the rounding error of a gap is below
+// Gaps closer than this fraction of the size count as equal. The rounding error of a gap is below
 // 12 · 2⁻⁵³ of the size, and twice that must not decide.
 constexpr double tie = 0x1p-46;
 

@@ -1,13 +1,11 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Program `search`: which size and settings a network should have, by training thousands at once.
+"""Program `search`: the paper's search for its two networks, by training thousands at once.
 
-- `search mlp`: hidden units and learning rate of the MLP, and the frontier of cost against error.
-- `search paper`: the paper's search for its two networks: learning rate, momentum, hidden units and
-  range of the initial weights. It also ranks the settings in use.
-
-Both use successive halving. Each writes a page of Markdown, a CSV of all candidates and a plot.
+Searched are learning rate, momentum, hidden units and range of the initial weights, by successive
+halving. The settings in use are ranked, too. Written are a page of Markdown, a CSV of all
+candidates and a plot.
 """
 from __future__ import annotations
 
@@ -16,112 +14,33 @@ import sys
 import time
 from collections.abc import Sequence
 from dataclasses import asdict
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
 
-from ...core import FEATURES, OUTPUTS, SITES, native
+from ...core import native
 from ...output import (
     command_line,
     machine,
     make_folder,
     markdown_table,
     page,
-    pareto,
     subplots,
     write_csv,
 )
 from ...scene.pose_sets import log_uniform
 from ...solver.arguments import program_parser, within
-from ...solver.mlp import UNITS_MAX
-from .. import mlp_recipe
-from ..ensemble import Ensemble, Scaling
-from ..mlp_fit import fit, point_errors, random_batches, started
 from ..paper_recipe import dataset
 from ..paper_recipe.fit import PaperSettings
 from ..paper_recipe.fit import fit as fit_paper
 from ..paper_recipe.paper_jobs import JOBS, PaperJob
-from ..samples import MlpSamples, draw_samples, mixture
 from .successive_halving import Candidate, CheckpointError, Rung, Rungs, Scores, Search, ranking
 
 PACKAGES = ('numpy', 'torch')  # whose versions are named
-UNITS = np.arange(4, UNITS_MAX + 1, 4)  # hidden units that are tried
 
-# Streams of random numbers.
-_CANDIDATES, _TRAINING, _CHECKING = 1001, 1003, 1004
-
-
-class MlpSearch(Search):
-    """Hidden units and learning rate of the MLP."""
-
-    name = 'mlp'
-    cost_classes = 4
-    """Classes of cost, equally wide in its logarithm. The best of each go on. A small network is
-    never as good as a large one, and the small ones are wanted."""
-
-    def __init__(self, *, seed: int, count: int, quick: bool, device: str) -> None:
-        self.seed, self.device = seed, device
-        plan = ([(count, 10, 128), (max(count // 4, 8), 20, 128)] if quick else
-                [(count, 100, 64), (max(count // 4, 64), 400, 64),
-                 (max(count // 16, 48), 1500, 64), (max(count // 64, 32), 3000, 256)])
-        self.pairs, self.checked = (20_000, 4_000) if quick else (1_000_000, 40_000)
-        # Groups small enough for a CPU's caches, or as much as a GPU can get.
-        inputs = 4096 if device == 'cpu' else 131_072
-        self.rungs = [Rung(*entry, group=inputs // entry[2]) for entry in plan]
-
-    def cost(self, candidate: Candidate) -> int:
-        """Return the multiplications of its network for one pair, at all sites.
-
-        Two in three of a site's features are those of its faces or its axis, summed once for these.
-        """
-        own, shared = FEATURES // 3, FEATURES - FEATURES // 3
-        return candidate.hidden[0] * (3 * shared + SITES * (own + OUTPUTS))
-
-    def candidates(self) -> list[Candidate]:
-        """Return units uniform in their logarithm, so that half of the candidates are small."""
-        found = [Candidate(0, (mlp_recipe.HIDDEN,), mlp_recipe.GENERAL.rate, shipped=True)]
-        for number in range(1, self.rungs[0].candidates):
-            rng = np.random.default_rng([self.seed, _CANDIDATES, number])
-            units = log_uniform(rng, UNITS[0], UNITS[-1], ())
-            nearest = int(UNITS[np.argmin(np.abs(np.log(UNITS / units)))])
-            found.append(Candidate(number, (nearest,), float(log_uniform(rng, 1e-3, 1e-1, ()))))
-        return found
-
-    @cached_property
-    def data(self) -> tuple[MlpSamples, MlpSamples, Scaling]:
-        """Return what is trained on, what errors are measured on, and the scaling of both."""
-        training = draw_samples(mixture, [self.seed, _TRAINING], self.pairs)
-        return (training, draw_samples(mixture, [self.seed, _CHECKING], self.checked),
-                Scaling.of(training.features.swapaxes(1, 2)))
-
-    def train(self, rung: Rung, group: Sequence[Candidate], seed: int) -> list[Scores]:
-        """Train by Adam; the error is the 99th percentile of the point error, % of the edge."""
-        training, checking, scaling = self.data
-        generator = torch.Generator().manual_seed(seed)
-        widest = max(one.hidden[0] for one in group)
-        networks = Ensemble([started(widest, generator, hidden=one.hidden)
-                             for one in group], [one.rate for one in group]).to(self.device)
-        batches = random_batches(training, scaling, np.random.default_rng(seed), size=rung.batch,
-                                 count=rung.effort, device=self.device)
-        for _ in fit(networks, batches, steps=rung.effort, rate=1.0):
-            pass
-        errors = 100.0 * point_errors(networks, checking, scaling)
-        return [{'error': found['p99'], 'mean': found['mean'], 'worst': found['worst']}
-                for found in map(mlp_recipe.error_summary, errors)]
-
-    def keep(self, ranked: Sequence[Candidate], count: int) -> list[Candidate]:
-        """Return the best of every class of cost in turn."""
-        edges = np.geomspace(UNITS[0], UNITS[-1], self.cost_classes + 1)[1:-1]
-        places = [0] * self.cost_classes
-        turns = []
-        for order, one in enumerate(ranked):
-            cost_class = int(np.searchsorted(edges, one.hidden[0]))
-            places[cost_class] += 1
-            turns.append((places[cost_class], order))
-        return [ranked[order] for _, order in sorted(turns)[:count]]
+_CANDIDATES = 1001  # stream of random numbers
 
 
 class PaperSearch(Search):
@@ -185,10 +104,8 @@ def paper_searches(*, seed: int, count: int, quick: bool, device: str) -> list[P
 
 def settings_of(search: Search, one: Candidate) -> dict[str, float]:
     """Return the settings that the search varies, by their names on the page."""
-    found = {'multiply-adds': search.cost(one), 'learning rate': one.rate}
-    if search.name != 'mlp':
-        found |= {'momentum': one.momentum, 'initial range': one.initial}
-    return found
+    return {'multiply-adds': search.cost(one), 'learning rate': one.rate,
+            'momentum': one.momentum, 'initial range': one.initial}
 
 
 def section(search: Search, done: Rungs) -> str:
@@ -196,14 +113,7 @@ def section(search: Search, done: Rungs) -> str:
     last = done[-1]
     ranked = ranking([one for one in search.candidates() if one.number in last], last)
     rank = next(place for place, one in enumerate(ranked, start=1) if one.shipped)
-    if search.name == 'mlp':
-        front = pareto([(search.cost(one), last[one.number]['error']) for one in ranked])
-        shown = [one for place, one in enumerate(ranked) if place in front or one.shipped]
-        shown.sort(key=search.cost)
-        what = 'The frontier: no other finalist is both cheaper and better.'
-    else:
-        shown = [one for place, one in enumerate(ranked) if place < 8 or one.shipped]
-        what = 'The best finalists.'
+    shown = [one for place, one in enumerate(ranked) if place < 8 or one.shipped]
     rows = [['-'.join(map(str, one.hidden)) + (', in use' if one.shipped else ''),
              *(f'{value:.4g}' for value in (*settings_of(search, one).values(),
                                             *last[one.number].values()))] for one in shown]
@@ -212,9 +122,9 @@ def section(search: Search, done: Rungs) -> str:
         for number, rung in enumerate(search.rungs, start=1)], words=0)
     found = markdown_table(['hidden units', *settings_of(search, ranked[0]), *last[0]], rows,
                            words=0)
-    return (f'\n## {search.name}\n\n{rungs}\n\n{what}\n\n{found}\n\nThe settings in use are {rank} '
-            f'of {len(ranked)} finalists. The best has {last[ranked[0].number]["error"]:.4g}, they '
-            f'have {last[0]["error"]:.4g}.\n')
+    return (f'\n## {search.name}\n\n{rungs}\n\nThe best finalists.\n\n{found}\n\n'
+            f'The settings in use are {rank} of {len(ranked)} finalists. The best has '
+            f'{last[ranked[0].number]["error"]:.4g}, they have {last[0]["error"]:.4g}.\n')
 
 
 def write_table(path: Path, results: Sequence[tuple[Search, Rungs]]) -> None:
@@ -251,25 +161,30 @@ def plot(path: Path, results: Sequence[tuple[Search, Rungs]]) -> None:
     figure.savefig(path)
 
 
+def device_of(name: str) -> str:
+    """Return what the argument --device names; `auto` is a GPU where PyTorch finds one."""
+    if name == 'cuda' and not torch.cuda.is_available():
+        raise argparse.ArgumentTypeError('cuda: PyTorch finds no GPU here')
+    return ('cuda' if torch.cuda.is_available() else 'cpu') if name == 'auto' else name
+
+
 def _options(args: Sequence[str] | None) -> argparse.Namespace:
     parser = program_parser(
         'search', 'Train thousands of networks at once, keep the best, train those longer.\n\n'
-        'Measured on one core, without a GPU:\n'
-        '  mlp        size and learning rate of the MLP                    8 minutes\n'
-        "  paper      the paper's search for its two networks              8 minutes\n\n"
+        'Measured on one core, without a GPU: 8 minutes.\n\n'
         'Stopped, it goes on from its checkpoint file when it is started again with the same\n'
         'options, and ends with the same result.', seed=1,
         quick='little data and two short rungs, to try it out in seconds')
     add = parser.add_argument
-    add('what', choices=('mlp', 'paper'), help='what is searched for')
+    add('what', choices=('paper',), help='what is searched for')
     add('--candidates', type=within(16), default=2048, metavar='N', help='networks to begin with '
         '(default 2048); the time grows with them')
     add('--out', type=Path, default=Path(), help='folder for the page, the table, the plot and, '
         'until the end, the checkpoint (default: the current one)')
-    add('--device', choices=('auto', 'cpu', 'cuda'), type=mlp_recipe.device_of, default='auto',
+    add('--device', choices=('auto', 'cpu', 'cuda'), type=device_of, default='auto',
         help='auto: a GPU where there is one (default)')
-    add('--threads', type=within(1), default=1, help='of PyTorch (default 1; matrices this small '
-        'gain little from more)')
+    add('--threads', type=within(1), default=1, help='threads of PyTorch (default 1; matrices '
+        'this small gain little from more)')
     options = parser.parse_args(args)
     make_folder(parser, options.out)
     return options
@@ -283,11 +198,10 @@ def main(args: Sequence[str] | None = None) -> int:
     common = {'seed': options.seed, 'count': options.candidates, 'quick': options.quick,
               'device': options.device}
     began = time.monotonic()
-    searches: list[Search] = ([MlpSearch(**common)] if options.what == 'mlp' else
-                              [*paper_searches(**common)])
-    name = 'search' if options.what == 'mlp' else 'search_paper'
+    searches = paper_searches(**common)
+    name = 'search_paper'
     checkpoints = [options.out / f'{name}_{k}.checkpoint' for k in range(len(searches))]
-    results = []
+    results: list[tuple[Search, Rungs]] = []
     for search, checkpoint in zip(searches, checkpoints):
         if checkpoint.exists():
             print(f'going on from {checkpoint}')
@@ -299,7 +213,7 @@ def main(args: Sequence[str] | None = None) -> int:
     made = (f'Made by `{command_line("box_contact_ros search", args)}` in '
             f'{(time.monotonic() - began) / 60.0:.1f} minutes ({options.device}) on '
             f'{machine(native, PACKAGES)}.')
-    text = page(f'training/experiments/search_{options.what}', made=made,
+    text = page('training/experiments/search_paper', made=made,
                 total=sum(len(done[0]) for _, done in results))
     text += f'\n![Settings and errors]({name}.png)\n' + ''.join(
         section(*result) for result in results)

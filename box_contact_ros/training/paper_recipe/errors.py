@@ -36,9 +36,15 @@ def figures(errors: np.ndarray) -> dict[str, float]:
             'RMSE': float(np.sqrt(np.mean(errors**2)))}
 
 
-def errors_of(network: Network, inputs: np.ndarray, outputs: np.ndarray) -> np.ndarray:
-    """Return the wrapped errors (n, outputs) [rad]: prediction minus truth."""
-    return wrapped(predict(network, inputs) - outputs)
+def difference(answer: Any, truth: Any, wrap: bool) -> Any:
+    """Return answer minus truth [rad], arrays or tensors, wrapped or as it is."""
+    return wrapped(answer - truth) if wrap else answer - truth
+
+
+def errors_of(network: Network, inputs: np.ndarray, outputs: np.ndarray, wrap: bool = True,
+              ) -> np.ndarray:
+    """Return the errors (n, outputs) [rad]: prediction minus truth."""
+    return difference(predict(network, inputs), outputs, wrap)
 
 
 def figures_by_part(errors: np.ndarray) -> dict[str, dict[str, float]]:

@@ -6,8 +6,8 @@
 1. Inputs are normalised to mean 0 and deviation 1; `export` folds that into the first layer.
 2. Every epoch goes through the training set once in random order. The learning rate falls from its
    value to zero along half a cosine over the epochs.
-3. The loss is the squared error of the angles, differences wrapped into [−π, π): −π and π are the
-   same direction.
+3. The loss is the squared error of the angles. Differences are wrapped into [−π, π), as −π and π
+   are the same direction, unless the settings leave them as they are.
 4. Cross-validation: each network keeps the weights of the epoch in which its error on the
    cross-validation set was least.
 
@@ -27,7 +27,7 @@ from tqdm import tqdm
 
 from ..ensemble import Ensemble, Layers, Scaling, drawn
 from .dataset import Patterns
-from .errors import wrapped
+from .errors import difference
 
 CHECKS = 200  # least number of times that the cross-validation error is looked at in a training
 
@@ -47,6 +47,7 @@ class PaperSettings:
     """Range of the initial weights, times √(inputs of the layer)."""
     hidden: Sequence[tuple[int, ...]] = ()
     """Units of the hidden layers that each network has, if it has fewer than `widths`."""
+    wrap: bool = True  # whether differences of angles are wrapped
     seed: int = 0
     device: str = 'cpu'
 
@@ -83,6 +84,7 @@ class Fitted:
     epoch: Tensor  # (networks,) epoch of the best weights
     history: list[Tensor]
     """Per check, cross-validation errors (networks,) [rad] in the course of the training."""
+    wrap: bool = True  # whether differences of angles are wrapped
 
     @torch.no_grad()
     def check(self, epoch: int, networks: Ensemble, error: Tensor) -> None:
@@ -100,7 +102,7 @@ class Fitted:
 
     def errors(self, patterns: Patterns) -> Tensor:
         """Return the RMSE (networks,) of the best weights [rad]."""
-        return rmse(self.networks, *tensors(patterns, self.scaling, self.error.device))
+        return rmse(self.networks, *tensors(patterns, self.scaling, self.error.device), self.wrap)
 
 
 def perceptron(widths: Sequence[int]) -> torch.nn.Sequential:
@@ -120,9 +122,9 @@ def tensors(patterns: Patterns, scaling: Scaling, device: torch.device | str,
 
 
 @torch.no_grad()
-def rmse(networks: Ensemble, x: Tensor, y: Tensor) -> Tensor:
+def rmse(networks: Ensemble, x: Tensor, y: Tensor, wrap: bool) -> Tensor:
     """Return the root mean square errors (networks,) [rad]."""
-    return wrapped(networks(x) - y).square().mean((1, 2)).sqrt()
+    return difference(networks(x), y, wrap).square().mean((1, 2)).sqrt()
 
 
 def fit(training: Patterns, checking: Patterns, settings: PaperSettings, *, progress: str = '',
@@ -140,7 +142,7 @@ def fit(training: Patterns, checking: Patterns, settings: PaperSettings, *, prog
     check = tensors(checking, scaling, s.device)
     fitted = Fitted(copy.deepcopy(networks), scaling,
                     torch.full((s.networks,), math.inf, device=s.device),
-                    torch.zeros(s.networks, dtype=torch.int64, device=s.device), [])
+                    torch.zeros(s.networks, dtype=torch.int64, device=s.device), [], s.wrap)
     optimiser = Momentum(networks, rate.to(s.device), momentum.to(s.device))
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, s.epochs)
 
@@ -149,12 +151,12 @@ def fit(training: Patterns, checking: Patterns, settings: PaperSettings, *, prog
     for epoch in epochs:
         order = torch.randperm(len(x), generator=generator).to(s.device)
         for inputs, outputs in zip(x[order].split(s.batch), y[order].split(s.batch)):
-            loss = 0.5 * wrapped(networks(inputs) - outputs).square().sum(-1).mean(-1)
+            loss = 0.5 * difference(networks(inputs), outputs, s.wrap).square().sum(-1).mean(-1)
             optimiser.zero_grad()
             loss.sum().backward()
             optimiser.step()
         schedule.step()
         if epoch % max(1, s.epochs // CHECKS) == 0 or epoch == s.epochs:
-            fitted.check(epoch, networks, rmse(networks, *check))
+            fitted.check(epoch, networks, rmse(networks, *check, s.wrap))
             epochs.set_postfix(rmse=f'{fitted.error.min():.4f}', refresh=False)
     return fitted

@@ -41,7 +41,7 @@ extern "C" {
 
 typedef enum bc_status {
   BC_OK = 0,
-  BC_BAD_ARGUMENT = 1, /* a null pointer, a count below zero, an unknown model */
+  BC_BAD_ARGUMENT = 1, /* a null pointer, a count of no array, an unknown model, patch or use */
   BC_BAD_SIZE = 2,     /* extents outside 1e-50 to 1e50 m */
   BC_BAD_POSE = 3,     /* numbers that are not finite, or a quaternion without a length */
   BC_BAD_ROWS = 4,     /* some rows of a batch are refused: bad poses, sizes or places */
@@ -53,7 +53,7 @@ typedef enum bc_status {
 
 typedef enum bc_model {
   BC_EXACT = 0, /* the exact moments of the overlap */
-  BC_MLP = 1    /* a network between proven bounds; needs weights */
+  BC_MLP = 1    /* columns under the contact face, a network between proven brackets; the default */
 } bc_model;
 
 /* What is computed of the overlap, beside its centroid. */
@@ -85,17 +85,17 @@ typedef struct bc_contact {
 /* How many contacts took another way than most, since the solver was made. */
 typedef struct bc_counts {
   int64_t clipped; /* by model exact: clipped, as the certificate of the face sums did not hold */
-  int64_t exact;   /* by model mlp: answered by model exact */
+  int64_t exact;   /* by model mlp: left to model exact */
 } bc_counts;
 
 typedef struct bc_options {
   size_t size; /* sizeof(bc_options) */
   bc_model model;
-  const char* weights; /* path of the weights file of model mlp */
+  const char* weights; /* path of a regular file of at most 16 MiB; NULL: the shipped weights */
   double margin;       /* [m]; normals are given up to this separation */
 } bc_options;
 
-#define BC_DEFAULT_OPTIONS {sizeof(bc_options), BC_EXACT, NULL, 0.0}
+#define BC_DEFAULT_OPTIONS {sizeof(bc_options), BC_MLP, NULL, 0.0}
 
 /* Rows of pairs. Row i is (poses_a[i], poses_b[i]), or with `pairs` (poses_a[p], poses_b[q]) for
  * p = pairs[2 i], q = pairs[2 i + 1]; `poses_a` and `poses_b` may then be one array. */

@@ -9,7 +9,8 @@
 //
 // Most programs take box_contact.hpp, which compiles at once. A file that includes this one compiles
 // for ten seconds with -O3. Classes have the names of box_contact.hpp, so a file includes one of the
-// two. The bits of answers are the library's.
+// two. The bits of answers are the library's. Model `mlp` is the default, with the shipped weights; a
+// third argument, box_contact::Solver::Model::exact, takes model `exact`.
 //
 // No flag is needed. The pragmas below keep g++ and clang++ from fusing products and sums, within
 // this header alone. All names are in a namespace of the instruction set, so that files compiled with
@@ -48,8 +49,8 @@
 #pragma float_control(push)
 #pragma clang fp contract(off)
 #else
-// Vectors wider than the machine's registers are passed between inlined functions only. g++ says so
-// at the end of the file, where templates are compiled, so the note stays off.
+// Vectors wider than the machine's registers are passed between inlined functions only. g++ notes
+// this at the end of the file, where templates are compiled. So the note stays off.
 #pragma GCC diagnostic ignored "-Wpsabi"
 #pragma GCC push_options
 #pragma GCC optimize("fp-contract=off", "no-tree-slp-vectorize")

@@ -26,11 +26,11 @@ constexpr double least_penetration = 5e-4, least_penetration_predicted = 1e-5;
 constexpr double standard_gravity = 9.81;  // [m/s²]
 
 constexpr double damping_ratio = 1.2, damping_ratio_predicted = 0.8;
-// How many times as large as for Ω the dampers of held patches may be [1]: with 4, a load that is
+// How many times as large as for Ω the dampers of held patches may be [1]. With 4, a load that is
 // pressed in at 50 Hz and 5 ms comes up with a time constant of 70 ms.
 constexpr double damping_growth_limit = 4.0;
-// Rocking is resisted by the turn of the last `lean_time` [s], too, beside all of the turn: so much
-// more stiffly [1], and no more than Ω·step of both together allows. It gives way at this share of the
+// Rocking is resisted by all of the turn, and so many times [1] more stiffly by the turn of the
+// last `lean_time` [s]. Ω·step limits both together. The second gives way at this share of the
 // pressure [1], or a body that falls onto its face would be thrown back.
 constexpr double lean_time = 0.05, lean_limit = 10.0, lean_step_limit = 0.8, lean_yield = 0.15;
 // Share of the depth at rest from which on the damper is whole [1].

@@ -12,9 +12,9 @@
 //        Torsion    k_t·r·φ + c_t·r·spin about n  φ: its turn; both within f² + m² + a·f²·m² ≤ 1
 //                                                 by μ·P, a: how square the patch is
 //
-// ψ is the turn of late: ψ' = θ' − ψ / `lean_time`. It acts as a spring and a damper in line, beside
-// the spring of θ. It takes energy out of the slow sway of stacks. A plain damper that did so would be
-// stiffer than the step allows.
+// ψ is the turn of late: ψ' = θ' − ψ / `lean_time`. It acts as a spring and a damper in line,
+// parallel to the spring of θ. It takes energy out of the slow sway of stacks. A plain damper that
+// did so would be stiffer than the step allows.
 //
 // V' = V + A·δ: δ is how much deeper the bodies are by now. v_c is the closing speed at c. κ = Ω² / w:
 // w is the largest eigenvalue of M⁻¹K of the bodies on a foundation of modulus 1. So no oscillation is
@@ -82,8 +82,8 @@ class PatchLaw {
     has_last_ = false;
   }
 
-  // Take the contacts that are in force from now on, and the poses (of all bodies) for which they
-  // were asked. Pairs that are missing, or apart, are forgotten.
+  // Take the contacts that are in force from now on, and the poses of all bodies when they were
+  // asked for. Pairs that are missing, or apart, are forgotten.
   void hold(const bc_touch* touches, int64_t count, const bc_pose* poses) {
     place(poses);
     next_.clear();
@@ -217,7 +217,7 @@ class PatchLaw {
     return found;
   }
 
-  // Force at the patch's point and torque about it, on body A. Returns false where there is none.
+  // Force at the patch's point and torque about it, on body A. Returns false if no force acts.
   bool wrench_of(Patch& patch, const Relative& relative, Vec<double>& force, Vec<double>& torque) {
     const Vec<double>& n = patch.normal;
     const PatchShape& shape = patch.shape;

@@ -56,6 +56,11 @@ using Number = typename NumberOf<T>::type;
 template <class T>
 constexpr int width = sizeof(T) / sizeof(Number<T>);
 
+// The bits of float64, as integers.
+template <class T>
+using BitsOf = typename std::conditional_t<is_scalar<T>, NumberOf<uint64_t>,
+                                           LanesOf<uint64_t, is_scalar<T> ? 2 : width<T>>>::type;
+
 // What a comparison of T gives: bool, or a vector of integers, 0 or −1.
 template <class T>
 using Mask = decltype(T() < T());
@@ -114,7 +119,9 @@ BC_INLINE T max(T a, T b) {
 
 template <class T>
 BC_INLINE T abs(T x) {
-  if constexpr (is_scalar<T>) {
+  if constexpr (std::is_same_v<T, float>) {
+    return __builtin_fabsf(x);  // std::fabs of float is a function that files of all sets share
+  } else if constexpr (is_scalar<T>) {
     return std::fabs(x);
   } else {
     using Bits = Mask<T>;
@@ -146,6 +153,27 @@ BC_INLINE T sqrt(T x) {
   }
 }
 
+// The power of two at or below the root of x > 0, and what a power of two is divided into 1.
+template <class T>
+BC_INLINE T power_of_two_near_root(T x) {
+  static_assert(sizeof(Number<T>) == sizeof(uint64_t), "float64");
+  constexpr int exponent = 52, bias = 1023;
+  BitsOf<T> bits;
+  std::memcpy(&bits, &x, sizeof bits);
+  bits = ((bits >> exponent) + bias) >> 1 << exponent;
+  std::memcpy(&x, &bits, sizeof bits);
+  return x;
+}
+template <class T>
+BC_INLINE T reciprocal_of_power(T x) {
+  constexpr int exponent = 52, bias = 1023;
+  BitsOf<T> bits;
+  std::memcpy(&bits, &x, sizeof bits);
+  bits = (uint64_t(2 * bias) << exponent) - bits;
+  std::memcpy(&x, &bits, sizeof bits);
+  return x;
+}
+
 template <class T>
 BC_INLINE auto lane(const T& x, int i) {
   if constexpr (is_scalar<T>) {
@@ -171,14 +199,20 @@ BC_INLINE unsigned bits(M mask) {
 #if defined(__AVX512F__)
   } else if constexpr (sizeof(M) == 64 && width<M> == 8) {
     return _mm512_test_epi64_mask((__m512i)mask, (__m512i)mask);
+  } else if constexpr (sizeof(M) == 64 && width<M> == 16) {
+    return _mm512_test_epi32_mask((__m512i)mask, (__m512i)mask);
 #endif
 #if defined(__AVX__)
   } else if constexpr (sizeof(M) == 32 && width<M> == 4) {
     return _mm256_movemask_pd((__m256d)mask);
+  } else if constexpr (sizeof(M) == 32 && width<M> == 8) {
+    return _mm256_movemask_ps((__m256)mask);
 #endif
 #if defined(__SSE2__)
   } else if constexpr (sizeof(M) == 16 && width<M> == 2) {
     return _mm_movemask_pd((__m128d)mask);
+  } else if constexpr (sizeof(M) == 16 && width<M> == 4) {
+    return _mm_movemask_ps((__m128)mask);
 #endif
   } else {
     unsigned found = 0;

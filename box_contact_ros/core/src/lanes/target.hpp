@@ -3,7 +3,7 @@
 
 // The namespace of the instruction set that a file is compiled for.
 //
-// Templates that two files compile for different machines must not share a name: the linker keeps
+// Templates that two files compile for different machines must not share a name. The linker keeps
 // one of two, and a machine could run the wrong one. So each file has its own namespace here.
 #pragma once
 

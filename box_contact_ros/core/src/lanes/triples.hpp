@@ -86,6 +86,18 @@ BC_INLINE Packed total(Packed a) {
   return (spread(a, 0) + spread(a, 1)) + spread(a, 2);
 }
 
+// The sum of the components.
+template <class Three>
+BC_INLINE auto sum(const Three& a) {
+  return (a[0] + a[1]) + a[2];
+}
+// The sum of the products of the components.
+template <class Packed, class = std::enable_if_t<!is_scalar<Packed> && !std::is_class_v<Packed>>>
+BC_INLINE Number<Packed> dot(Packed a, Packed b) {
+  Packed products = a * b;
+  return (products[0] + products[1]) + products[2];
+}
+
 // The largest component.
 template <class Packed, class = std::enable_if_t<!is_scalar<Packed> && !std::is_class_v<Packed>>>
 BC_INLINE Number<Packed> largest(Packed a) {
@@ -100,6 +112,11 @@ BC_INLINE Vec<T> rotated(const Vec<T>& a) {
 template <class Packed>
 BC_INLINE Packed rotated(Packed a) {
   return __builtin_shufflevector(a, a, 1, 2, 0, 0);
+}
+// The components z x y.
+template <class Three>
+BC_INLINE Three rotated_back(const Three& a) {
+  return rotated(rotated(a));
 }
 
 // One choice for all three numbers of a single pair, without a branch.

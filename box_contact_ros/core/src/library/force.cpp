@@ -62,8 +62,8 @@ bc_status check_loop(const bc_loop& loop) {
                        {"step", loop.step, false},
                        {"friction", loop.friction, true},
                        {"gravity", loop.gravity, true}};
-  if (loop.use < BC_HELD_PATCH || loop.use > BC_PREDICTED_WRENCH)
-    return fail(BC_BAD_ARGUMENT, "use %d is unknown", int(loop.use));
+  if (number_of(loop.use) > BC_PREDICTED_WRENCH)
+    return fail(BC_BAD_ARGUMENT, "use %u is unknown", number_of(loop.use));
   for (const Number& number : numbers)
     if (!is_positive(number.value) && !(number.may_be_zero && number.value == 0.0))
       return fail(BC_BAD_ARGUMENT, "%s must be %s, not %g", number.name,
@@ -107,9 +107,11 @@ bc_status check_touch(const bc_touch& touch, const std::vector<Body>& bodies,
     if (body >= 0 && !is_outward(contact, bodies[size_t(body)], poses[body], sign))
       return fail(
           BC_BAD_ARGUMENT,
-          "pair %lld: the normal points %s body %d, which is box %c: change a and b, or ask "
-          "for the contact with the boxes in this order",
-          pair, side == 'A' ? "into" : "out of", int(body), side);
+          "pair %lld: the normal points %s body %d, which is box %c: say that it is box %c "
+          "(load='%c' for one load; else exchange a and b), or ask for the contact with the boxes "
+          "in the other order",
+          pair, side == 'A' ? "into" : "out of", int(body), side, side == 'A' ? 'B' : 'A',
+          side == 'A' ? 'b' : 'a');
   return BC_OK;
 }
 
@@ -201,10 +203,12 @@ bc_status bc_law_wrenches(bc_law* law, const bc_pose* poses, const bc_velocity* 
 }
 
 bc_status bc_law_pair_wrench(const bc_law* law, int64_t pair, bc_wrench* wrench) {
-  if (!law || !wrench) return refuse_null(law ? "wrench" : "law");
-  const box_contact::force::Patch* patch = law_of(law).law.held(pair);
-  *wrench = patch ? patch->on_a : bc_wrench{};
-  return BC_OK;
+  return guarded([&] {
+    if (!law || !wrench) return refuse_null(law ? "wrench" : "law");
+    const box_contact::force::Patch* patch = law_of(law).law.held(pair);
+    *wrench = patch ? patch->on_a : bc_wrench{};
+    return BC_OK;
+  });
 }
 
 }  // extern "C"

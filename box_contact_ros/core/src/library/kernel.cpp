@@ -28,25 +28,12 @@ constexpr const char* title = "baseline";
 #endif
 #endif
 
-NetworkView view(const NetworkNumbers& network) {
-  auto* units = reinterpret_cast<const Network::Unit*>(network.numbers + site_outputs);
-  return {network.numbers, units, network.units};
-}
-
 template <class M>
 long solve(const NetworkNumbers& network, const Rows& rows, long begin, long end,
            const Results& results, Counts& counts) {
   M model{};
-  if constexpr (!std::is_empty_v<M>) model = {view(network)};
+  if constexpr (!std::is_empty_v<M>) model = {view(network.numbers, network.count)};
   return solve_rows<Lanes<double, lanes>>(model, rows, begin, end, results, counts);
-}
-
-bool fill(const NetworkNumbers& network, bool by_edges, const Rows& rows, long row,
-          const StageArrays& arrays) {
-  NetworkView numbers = view(network);
-  const NetworkView* asked = network.numbers ? &numbers : nullptr;
-  return by_edges ? fill_stages<Network::Bounds::edges>(rows, row, asked, arrays)
-                  : fill_stages<Network::Bounds::slab>(rows, row, asked, arrays);
 }
 
 #define NAME_OF(set) #set
@@ -54,19 +41,16 @@ bool fill(const NetworkNumbers& network, bool by_edges, const Rows& rows, long r
 #define KERNEL_OF(set) kernel_##set
 #define KERNEL(set) KERNEL_OF(set)
 
-using MlpByEdges = MlpModelBy<Network::Bounds::edges>;
-
 }  // namespace
 }  // namespace box_contact::BOX_CONTACT_SET
 
 namespace box_contact::detail {
 
-const Kernel KERNEL(BOX_CONTACT_SET) = {NAME(BOX_CONTACT_SET),
-                                        title,
-                                        lanes,
-                                        {{solve<ExactPointModel>, solve<ExactModel>},
-                                         {solve<MlpPointModel>, solve<MlpModel>},
-                                         {solve<MlpByEdges>, solve<MlpByEdges>}},
-                                        fill};
+const Kernel KERNEL(BOX_CONTACT_SET) = {
+    NAME(BOX_CONTACT_SET),
+    title,
+    lanes,
+    {{solve<ExactPointModel>, solve<ExactModel>}, {solve<MlpPointModel>, solve<MlpModel>}},
+    fill_stages};
 
 }  // namespace box_contact::detail

@@ -9,17 +9,16 @@
 
 namespace box_contact::detail {
 
-// `mlp_by_edges`: with other bounds, as it was formerly; a measured baseline.
-enum class Model { exact, mlp, mlp_by_edges };
-constexpr int model_count = 3;
+enum class Model { exact, mlp };
+constexpr int model_count = 2;
 
-// Whether a function finds the point alone (of model `exact` the volume too), or all moments.
+// Whether a function finds point and volume alone, or all moments.
 enum class Finds { point, patch };
 
-// A network in memory: the biases of its outputs, then the numbers of each unit.
+// A network in memory: the bias of its output, then the numbers of each unit.
 struct NetworkNumbers {
   const float* numbers;
-  long units;
+  long count;
 };
 
 struct Kernel {
@@ -30,9 +29,8 @@ struct Kernel {
   // Solve rows `begin` to `end`. Returns the first row that is refused, or −1.
   long (*solve_rows[model_count][2])(const NetworkNumbers&, const Rows&, long begin, long end,
                                      const Results&, Counts&);
-  // Fill one row; see stages.hpp. `network.numbers` may be nullptr.
-  bool (*fill_stages)(const NetworkNumbers& network, bool by_edges, const Rows&, long row,
-                      const StageArrays&);
+  // Fill one row; see stages.hpp.
+  bool (*fill_stages)(const Rows&, long row, const StageArrays&);
 };
 
 extern const Kernel kernel_baseline, kernel_avx2, kernel_avx512;

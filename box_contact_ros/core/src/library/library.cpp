@@ -7,26 +7,27 @@
 #include <memory>
 #include <string>
 
+#include "../mlp/shipped_network.hpp"
 #include "refusals.hpp"
 #include "solver.hpp"
 #include "weights_file.hpp"
 
 namespace box_contact::detail {
 
-const std::vector<const Kernel*>& kernels() {
-  static const std::vector<const Kernel*> found = [] {
-    std::vector<const Kernel*> names{&kernel_baseline};
+const Kernels& kernels() {
+  static const Kernels found = [] {
+    Kernels here{{&kernel_baseline}, 1};
 #if defined(BOX_CONTACT_AVX2)
     if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
         __builtin_cpu_supports("bmi2"))
-      names.push_back(&kernel_avx2);
+      here.all[here.count++] = &kernel_avx2;
 #endif
 #if defined(BOX_CONTACT_AVX512)
     if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
         __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512bw"))
-      names.push_back(&kernel_avx512);
+      here.all[here.count++] = &kernel_avx512;
 #endif
-    return names;
+    return here;
   }();
   return found;
 }
@@ -34,7 +35,7 @@ const std::vector<const Kernel*>& kernels() {
 const Kernel* chosen_kernel() {
   static const Kernel* const chosen = []() -> const Kernel* {
     const char* forced = std::getenv("BOX_CONTACT_INSTRUCTION_SET");
-    if (!forced || !*forced) return kernels().back();
+    if (!forced || !*forced) return kernels().end()[-1];
     for (const Kernel* kernel : kernels())
       if (!std::strcmp(forced, kernel->name)) return kernel;
     return nullptr;
@@ -77,16 +78,19 @@ bc_status make(const bc_size* size_a, const bc_size* size_b, const bc_options& o
   std::copy_n(size_b->extent, 3, setup.size_b.begin());
   setup.margin = options.margin;
   if (std::isnan(options.margin)) return fail(BC_BAD_ARGUMENT, "margin is not a number");
-  if (options.model == BC_MLP) {
-    if (!options.weights) return fail(BC_BAD_WEIGHTS, "model mlp needs a weights file");
+  if (number_of(options.model) == BC_MLP) {
     setup.model = Model::mlp;
     try {
-      setup.network = read_numbers(options.weights);
+      if (options.weights) {
+        setup.network = read_numbers(options.weights);
+      } else {
+        setup.network.assign(std::begin(shipped_network), std::end(shipped_network));
+      }
     } catch (const std::runtime_error& error) {
       return fail(BC_BAD_WEIGHTS, "%s", error.what());
     }
-  } else if (options.model != BC_EXACT) {
-    return fail(BC_BAD_ARGUMENT, "model %d is unknown", int(options.model));
+  } else if (number_of(options.model) != BC_EXACT) {
+    return fail(BC_BAD_ARGUMENT, "model %u is unknown", number_of(options.model));
   }
   *solver = reinterpret_cast<bc_solver*>(new Solver(std::move(setup)));
   return BC_OK;
@@ -104,12 +108,16 @@ bool places_are_valid(const bc_rows& rows, int64_t& first) {
   return true;
 }
 
+// No memory holds more rows.
+constexpr int64_t largest_count = PTRDIFF_MAX / int64_t(sizeof(bc_contact));
+
 const double* numbers(const bc_pose* poses) { return reinterpret_cast<const double*>(poses); }
 const double* numbers(const bc_size* sizes) { return reinterpret_cast<const double*>(sizes); }
 
 bc_status solve_rows(Solver& solver, const bc_rows& given, const bc_results& wanted, int threads,
                      int64_t& refused) {
-  if (given.count < 0) return fail(BC_BAD_ARGUMENT, "count is below zero");
+  if (given.count < 0 || given.count > largest_count)
+    return fail(BC_BAD_ARGUMENT, "count %lld is that of no array", (long long)given.count);
   if (threads < 1) return fail(BC_BAD_ARGUMENT, "threads must be 1 or more, not %d", threads);
   if (given.count == 0) return BC_OK;
   if (!given.poses_a || !given.poses_b) return refuse_null(given.poses_a ? "poses_b" : "poses_a");
@@ -170,14 +178,18 @@ void bc_solver_destroy(bc_solver* solver) { delete reinterpret_cast<Solver*>(sol
 bc_status bc_solve(bc_solver* solver, const bc_pose* pose_a, const bc_pose* pose_b,
                    const bc_size* size_a, const bc_size* size_b, bc_patch patch,
                    bc_contact* contact) {
-  if (!solver || !pose_a || !pose_b || !contact)
-    return refuse_null(!solver ? "solver" : !pose_a ? "pose_a" : !pose_b ? "pose_b" : "contact");
-  const double *a = numbers(pose_a), *b = numbers(pose_b);
-  const double *extents_a = numbers(size_a), *extents_b = numbers(size_b);
-  Solver& self = solver_of(solver);
-  if (self.solve(a, b, extents_a, extents_b, patch, *contact)) return BC_OK;
-  return refuse_pair(a, b, extents_a ? extents_a : self.setup().size_a.data(),
-                     extents_b ? extents_b : self.setup().size_b.data());
+  return guarded([&] {
+    if (!solver || !pose_a || !pose_b || !contact)
+      return refuse_null(!solver ? "solver" : !pose_a ? "pose_a" : !pose_b ? "pose_b" : "contact");
+    if (number_of(patch) > BC_COVARIANCE)
+      return fail(BC_BAD_ARGUMENT, "patch %u is unknown", number_of(patch));
+    const double *a = numbers(pose_a), *b = numbers(pose_b);
+    const double *extents_a = numbers(size_a), *extents_b = numbers(size_b);
+    Solver& self = solver_of(solver);
+    if (self.solve(a, b, extents_a, extents_b, patch, *contact)) return BC_OK;
+    return refuse_pair(a, b, extents_a ? extents_a : self.setup().size_a.data(),
+                       extents_b ? extents_b : self.setup().size_b.data());
+  });
 }
 
 bc_status bc_solve_rows(bc_solver* solver, const bc_rows* rows, const bc_results* results,

@@ -25,7 +25,8 @@ inline thread_local char error_text[512];
   return status;
 }
 
-// Call `work`; nothing that it throws leaves the library.
+// Call `work`; nothing that it throws leaves the library. Every function that returns a status does
+// its work in here.
 template <class Work>
 bc_status guarded(Work work) noexcept {
   try {
@@ -34,6 +35,8 @@ bc_status guarded(Work work) noexcept {
     return fail(BC_NO_MEMORY, "no memory is left");
   } catch (const std::exception& error) {
     return fail(BC_BAD_ARGUMENT, "%s", error.what());
+  } catch (...) {
+    return fail(BC_BAD_ARGUMENT, "unknown failure");
   }
 }
 
@@ -47,6 +50,16 @@ bool read(const Struct* given, Struct& copy) {
   if (given->size == 0 || given->size > sizeof(Struct)) return false;
   std::memcpy(static_cast<void*>(&copy), given, given->size);
   return true;
+}
+
+// The number in the place of an enumeration, where a program may have put any. C++ may read none but
+// those of the enumeration from there.
+template <class Enumeration>
+unsigned number_of(const Enumeration& given) {
+  unsigned number;
+  static_assert(sizeof number == sizeof given);
+  std::memcpy(&number, &given, sizeof number);
+  return number;
 }
 
 inline bool pose_is_valid(const double* p) {

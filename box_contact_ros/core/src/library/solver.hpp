@@ -8,7 +8,7 @@
 #include <array>
 #include <atomic>
 #include <cmath>
-#include <system_error>
+#include <exception>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -18,12 +18,22 @@
 
 namespace box_contact::detail {
 
-// The kernels that this machine can run and that were built, best last.
-const std::vector<const Kernel*>& kernels();
-// The best of them, or the one that the environment names; nullptr if there is none of that name.
+// The kernels that this machine can run and that were built, best last. No memory is allocated.
+struct Kernels {
+  std::array<const Kernel*, 3> all{};
+  size_t count = 0;
+
+  const Kernel* const* begin() const { return all.data(); }
+  const Kernel* const* end() const { return all.data() + count; }
+};
+const Kernels& kernels();
+// The best of them, or the one that the environment names; nullptr for a name that no set has.
 const Kernel* chosen_kernel();
 
 using Extents = std::array<double, 3>;
+
+// Whether a loader believes a weight: trained ones stay below 1e2, a flipped exponent bit does not.
+inline bool is_weight(float number) { return std::fabs(number) <= 1e4F; }
 
 class Solver {
  public:
@@ -36,16 +46,15 @@ class Solver {
     Model model = Model::exact;
     Extents size_a{}, size_b{};  // full extents [m]
     double margin = 0.0;         // [m]
-    std::vector<float> network;  // biases of the outputs, then the numbers of each unit
-    // Pairs of sizes that the network is for, extents sorted; of no pair: any. `exact` answers others.
-    std::vector<std::array<Extents, 2>> listed;
+    std::vector<float>
+        network;  // of model `mlp`: bias of the output, then the numbers of each unit
   };
 
   explicit Solver(Setup setup) : setup_(std::move(setup)) {}
 
   const Setup& setup() const { return setup_; }
   const NetworkNumbers network() const {
-    return {setup_.network.data(), (long(setup_.network.size()) - site_outputs) / unit_numbers};
+    return {setup_.network.data(), long(setup_.network.size())};
   }
 
   // Solve one pair. Sizes nullptr: the solver's. Returns false, and leaves `contact`, if poses or
@@ -118,8 +127,8 @@ class Solver {
     others.reserve(threads - 1);
     try {
       for (long thread = 1; thread < threads; ++thread) others.emplace_back(work, thread);
-    } catch (const std::system_error&) {
-      // No more threads are to be had: those that run take all chunks.
+    } catch (const std::exception&) {
+      // No more threads, or no memory for them: those that run take all chunks.
     }
     work(0);
     for (std::thread& other : others) other.join();
@@ -131,55 +140,13 @@ class Solver {
     return refused < count ? refused : -1;
   }
 
-  // Solve rows `begin` to `end` in this thread: runs of rows that the network is for, or is not.
+  // Solve rows `begin` to `end` in this thread.
   long solve_chunk(const Rows& rows, long begin, long end, const Results& results,
                    Counts& counts) const {
-    if (setup_.listed.empty()) return solve_run(setup_.model, rows, begin, end, results, counts);
-    long refused = -1;
-    for (long last; begin < end; begin = last) {
-      bool listed = is_listed(rows, begin);
-      for (last = begin + 1; last < end && is_listed(rows, last) == listed;) ++last;
-      Counts others{};
-      long row = solve_run(listed ? setup_.model : Model::exact, rows, begin, last, results,
-                           listed ? counts : others);
-      counts.exact += others.contacts;
-      if (refused < 0) refused = row;
-    }
-    return refused;
-  }
-
-  long solve_run(Model model, const Rows& rows, long begin, long end, const Results& results,
-                 Counts& counts) const {
-    bool patch = results.covariance || (results.volume && model != Model::exact);
     auto* solve_rows =
-        setup_.kernel->solve_rows[int(model)][int(patch ? Finds::patch : Finds::point)];
+        setup_.kernel
+            ->solve_rows[int(setup_.model)][int(results.covariance ? Finds::patch : Finds::point)];
     return solve_rows(network(), rows, begin, end, results, counts);
-  }
-
-  // Whether the network is for the sizes of a row. The order of the boxes does not matter, nor which
-  // of a box's axes is called x, y, z.
-  bool is_listed(const Rows& rows, long row) const {
-    long of_a = rows.pairs ? long(rows.pairs[2 * row]) : row;
-    long of_b = rows.pairs ? long(rows.pairs[2 * row + 1]) : row;
-    auto sorted = [](const double* size) {
-      Extents extents{size[0], size[1], size[2]};
-      std::sort(extents.begin(), extents.end());
-      return extents;
-    };
-    Extents a = sorted(rows.sizes_a + rows.size_step_a * of_a),
-            b = sorted(rows.sizes_b + rows.size_step_b * of_b);
-    for (const auto& [one, other] : setup_.listed)
-      if ((is_same(a, one) && is_same(b, other)) || (is_same(a, other) && is_same(b, one)))
-        return true;
-    return false;
-  }
-
-  // Relative difference up to which an extent is a listed one: sizes may come through float32.
-  static constexpr double same_extent = 1e-6;
-  static bool is_same(const Extents& size, const Extents& known) {
-    for (int k = 0; k < 3; ++k)
-      if (!(std::fabs(size[k] - known[k]) <= same_extent * known[k])) return false;
-    return true;
   }
 
   Setup setup_;

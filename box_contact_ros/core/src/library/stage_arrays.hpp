@@ -10,22 +10,20 @@ namespace box_contact::detail {
 
 // Arrays with a row for each pair, nullptr where one is not wanted. core/stages.py documents them.
 struct StageArrays {
-  bool *colliding{}, *frame_b{}, *in_range{}, *certain{};
+  bool *colliding{}, *certain{}, *accurate{};
   int64_t *axis{}, *face{};
   double *separation{}, *touch{}, *size{}, *normal{}, *rotation{}, *offset_a{}, *offset_b{};
   double *pressed_offset_a{}, *pressed_offset_b{}, *centroid{}, *clipped_centroid{};
   double *volume{}, *clipped_volume{}, *covariance{}, *clipped_covariance{};
-  double *bounds_middle{}, *bounds_half{};
-  double *other_axes{}, *other_offset{}, *other_half{}, *answer{}, *answer_volume{},
-      *answer_covariance{};
-  float *features{}, *vectors{}, *slant{}, *cut{};
+  double *unit{}, *true_volume{}, *true_mean{}, *true_covariance{};
+  float *columns_volume{}, *columns_mean{}, *columns_covariance{};
+  float *upper_volume{}, *upper_least{}, *upper_most{}, *upper_features{}, *upper_points{},
+      *upper_carries{};
 
   // Call visit(name, pointer, shape of a row) for each array.
   template <class Visit>
   void each(Visit visit) {
     visit("colliding", colliding, {});
-    visit("frame_b", frame_b, {});
-    visit("in_range", in_range, {});
     visit("certain", certain, {});
     visit("axis", axis, {});
     visit("face", face, {});
@@ -44,18 +42,20 @@ struct StageArrays {
     visit("clipped_volume", clipped_volume, {});
     visit("covariance", covariance, {3, 3});
     visit("clipped_covariance", clipped_covariance, {3, 3});
-    visit("bounds_middle", bounds_middle, {3});
-    visit("bounds_half", bounds_half, {3});
-    visit("other_axes", other_axes, {3, 3});
-    visit("other_offset", other_offset, {3});
-    visit("other_half", other_half, {3});
-    visit("answer", answer, {3});
-    visit("answer_volume", answer_volume, {});
-    visit("answer_covariance", answer_covariance, {3, 3});
-    visit("features", features, {9, 12});
-    visit("vectors", vectors, {9, 3});
-    visit("slant", slant, {3, 3});
-    visit("cut", cut, {3});
+    visit("accurate", accurate, {});
+    visit("unit", unit, {});
+    visit("true_volume", true_volume, {});
+    visit("true_mean", true_mean, {3});
+    visit("true_covariance", true_covariance, {3, 3});
+    visit("columns_volume", columns_volume, {});
+    visit("columns_mean", columns_mean, {3});
+    visit("columns_covariance", columns_covariance, {3, 3});
+    visit("upper_volume", upper_volume, {3});
+    visit("upper_least", upper_least, {3});
+    visit("upper_most", upper_most, {3});
+    visit("upper_features", upper_features, {3, 6});
+    visit("upper_points", upper_points, {3, 2, 3});
+    visit("upper_carries", upper_carries, {3, 2});
   }
 };
 

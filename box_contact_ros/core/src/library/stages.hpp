@@ -23,32 +23,58 @@ inline void put(double* array, long row, const Mat<double>& m) {
     for (int j = 0; j < 3; ++j) array[9 * row + 3 * i + j] = m[i][j];
 }
 
-inline void put_features(const StageArrays& arrays, long row, const CutCube<double> (&cubes)[1]) {
-  SiteFeatures<float> features;
-  SiteVectors<float> vectors;
-  CutCube<float> cube = narrow(cubes);
-  describe(cube, features, vectors);
-  for (int f = 0; f < 3; ++f) {
-    put(arrays.cut, 3 * row + f, cube.cut[f]);
-    for (int q = 0; q < 3; ++q) {
-      long site = site_count * row + 3 * f + q;
-      for (int k = 0; arrays.features && k < 4; ++k) {
-        float* at = arrays.features + site_features * site + k;
-        at[0] = features.of_site[q][k][f];
-        at[4] = features.of_faces[k][f];
-        at[8] = features.of_axis[k][q];
-      }
-      for (int k = 0; arrays.vectors && k < point_outputs; ++k)
-        arrays.vectors[point_outputs * site + k] = vectors.along[q][k][f];
-      put(arrays.slant, site, cube.slant[q][f]);
-    }
-  }
+inline void put(float* array, long row, const Triple<float>& v) {
+  for (int k = 0; array && k < 3; ++k) array[3 * row + k] = v[k];
 }
 
-// Fill one row. Returns false if its poses or sizes are refused. `network` may be nullptr.
-template <Network::Bounds method>
-bool fill_stages(const Rows& rows, long row, const NetworkView* network,
-                 const StageArrays& arrays) {
+// The columns and what cuts them, and the exact moments in the same coordinates.
+inline void put_columns(const StageArrays& arrays, long row, const Query<double> (&queries)[1],
+                        const Moments<double>& exact) {
+  mlp::Described<double, 1> pair(queries);
+  const ContactFrame<double>& frame = pair.frames[0];
+  ColumnMoments<float> moments = column_moments(pair.columns);
+  put(arrays.accurate, row,
+      mlp::is_accurate(pair.columns, moments) && frame.depth > 0.0 &&
+          frame.depth <= frame.thickness);
+  put(arrays.unit, row, pair.unit[0]);
+  put(arrays.columns_volume, row, moments.volume);
+  put(arrays.columns_mean, row, moments.mean);
+  Triple<float> by_z = column_sums::reciprocals(pair.columns.qz);
+  for (int k = 0; k < 3; ++k) {
+    UpperFace<float> face = upper_face(pair.columns, by_z, k);
+    long at = 3 * row + k;
+    put(arrays.upper_volume, at, face.volume);
+    put(arrays.upper_least, at, face.least);
+    put(arrays.upper_most, at, face.most);
+    for (int n = 0; n < detail::network_features; ++n)
+      put(arrays.upper_features, detail::network_features * at + n, face.features[n]);
+    for (int n = 0; n < 2; ++n) {
+      put(arrays.upper_carries, 2 * at + n, face.carries[n]);
+      put(arrays.upper_points, 2 * at + n, face.at[n]);
+    }
+  }
+  // From A's frame to that of the columns.
+  const Pair<double>& boxes = queries[0].pair;
+  double by_unit = 1.0 / pair.unit[0];
+  Mat<double> axes = frame.b_is_incident ? boxes.axes_b : boxes.axes_a;
+  Vec<double> centre = frame.b_is_incident ? boxes.origin_b : boxes.origin_a;
+  Vec<double> t = transposed_times(axes, exact.centroid - centre), mean;
+  Sym<double> covariance = rotated(transpose(axes), exact.covariance);
+  for (int k = 0; k < 3; ++k) {
+    mean[k] = by_unit * ((frame.sign[k] * t[k] + frame.half[k]) - frame.start[k]);
+    for (int l = 0; l < 3; ++l) {
+      long at = 9 * row + 3 * k + l;
+      put(arrays.true_covariance, at,
+          by_unit * by_unit * frame.sign[k] * frame.sign[l] * covariance(k, l));
+      put(arrays.columns_covariance, at, k == l ? moments.variance[k] : moments.beside[3 - k - l]);
+    }
+  }
+  put(arrays.true_mean, row, mean);
+  put(arrays.true_volume, row, exact.volume * by_unit * by_unit / pair.depth[0]);
+}
+
+// Fill one row. Returns false if its poses or sizes are refused.
+inline bool fill_stages(const Rows& rows, long row, const StageArrays& arrays) {
   Query<double> q;
   query_rows(rows, row, row + 1, q);
   if (!q.pair.valid) return false;
@@ -62,13 +88,20 @@ bool fill_stages(const Rows& rows, long row, const NetworkView* network,
   put(arrays.rotation, row, q.pair.rotation);
   put(arrays.offset_a, row, q.pair.offset_a);
   put(arrays.offset_b, row, q.pair.offset_b);
-  if (arrays.centroid || arrays.volume || arrays.covariance || arrays.certain) {
+  bool of_columns = arrays.accurate || arrays.unit || arrays.true_volume || arrays.true_mean ||
+                    arrays.true_covariance || arrays.columns_volume || arrays.columns_mean ||
+                    arrays.columns_covariance || arrays.upper_volume || arrays.upper_least ||
+                    arrays.upper_most || arrays.upper_features || arrays.upper_points ||
+                    arrays.upper_carries;
+  if (of_columns || arrays.centroid || arrays.volume || arrays.covariance || arrays.certain) {
     Counts counts{};
     Moments<double> exact = exact_overlap(q, counts);
-    put(arrays.centroid, row, exact.centroid);
+    put(arrays.centroid, row, transposed_times(q.pair.axes_a, exact.centroid - q.pair.origin_a));
     put(arrays.volume, row, exact.volume);
     put(arrays.covariance, row, matrix(exact.covariance));
     put(arrays.certain, row, counts.clipped == 0);
+    Query<double> queries[1] = {q};
+    if (of_columns) put_columns(arrays, row, queries, exact);
   }
   Pair<double> pressed = q.pair;
   bool was_pressed = enforce_minimum_depth(pressed, q.axis);
@@ -80,26 +113,6 @@ bool fill_stages(const Rows& rows, long row, const NetworkView* network,
   }
   put(arrays.pressed_offset_a, row, pressed.offset_a);
   put(arrays.pressed_offset_b, row, pressed.offset_b);
-  OverlapBounds<double> bounds = MlpModelBy<method>::bounds_of(pressed, q.axis);
-  put(arrays.frame_b, row, bounds.in_b);
-  put(arrays.in_range, row, in_range(pressed, q.axis.separation, bounds));
-  put(arrays.bounds_middle, row, components<double>(bounds.middle));
-  put(arrays.bounds_half, row, components<double>(bounds.half));
-  put(arrays.other_axes, row, matrix(bounds.other_axes));
-  put(arrays.other_offset, row, components<double>(bounds.other_offset));
-  put(arrays.other_half, row, components<double>(bounds.other_half));
-  CutCube<double> cubes[1] = {cut_cube(bounds, q.pair.size)};
-  if (network) {
-    CubeMoments<double> said[1];
-    ask<site_outputs>(*network, cubes, said);
-    const auto &diagonal = said[0].variance, &rest = said[0].covariant;
-    put(arrays.answer, row, components<double>(said[0].centroid));
-    put(arrays.answer_volume, row, said[0].volume[0]);
-    put(arrays.answer_covariance, row,
-        matrix(Sym<double>{{diagonal[0], diagonal[1], diagonal[2], rest[0], rest[1], rest[2]}}));
-  }
-  if (arrays.features || arrays.vectors || arrays.slant || arrays.cut)
-    put_features(arrays, row, cubes);
   return true;
 }
 

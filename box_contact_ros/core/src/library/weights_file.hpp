@@ -12,13 +12,16 @@
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <initializer_list>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include "../rows.hpp"
+#include "solver.hpp"
 
 namespace box_contact::detail {
 
@@ -28,6 +31,12 @@ class WeightsFile {
 
   // Throws std::runtime_error with path and cause, as `numbers` does.
   explicit WeightsFile(const std::string& path) : path_(path) {
+    // To open a FIFO would wait for its writer.
+    std::error_code unknown;
+    if (auto kind = std::filesystem::status(path, unknown).type();
+        kind != std::filesystem::file_type::regular)
+      refuse(kind == std::filesystem::file_type::not_found ? "does not exist"
+                                                           : "is no regular file");
     std::ifstream file(path, std::ios::binary);
     if (!file) refuse("cannot be opened");
     std::string bytes;
@@ -43,30 +52,26 @@ class WeightsFile {
     data_ = bytes.substr(8 + length);
   }
 
-  // The biases of the outputs; then for each unit its bias, its weights for features of faces, axis
-  // and site, and its weights to the outputs.
+  // The bias of the output; then for each unit its bias, its weights for the features, and its weight
+  // to the output.
   std::vector<float> numbers() const {
-    // The model card lists no sizes: the network is for boxes of any size.
-    if (header_.find(R"(\"sizes\":[])") == std::string::npos)
-      refuse("is for boxes of some sizes only, or has no model card");
     // White space has gone from the header.
     const std::string format = std::to_string(network_format);
     if (header_.find(R"(\"format\":)" + format + ",") == std::string::npos)
       refuse("is not of format " + format);
-    constexpr size_t features = site_features, outputs = site_outputs;
-    size_t units = number(entry("point.0.bias"), R"("shape":[)");
-    std::vector<float> bias = tensor("point.0.bias", {units});
-    std::vector<float> first = tensor("point.0.weight", {units, features});
-    std::vector<float> last = tensor("point.1.weight", {outputs, units});
-    std::vector<float> found = tensor("point.1.bias", {outputs});
+    constexpr size_t features = network_features;
+    size_t units = number(entry("share.0.bias"), R"("shape":[)");
+    std::vector<float> bias = tensor("share.0.bias", {units});
+    std::vector<float> first = tensor("share.0.weight", {units, features});
+    std::vector<float> last = tensor("share.1.weight", {1, units});
+    std::vector<float> found = tensor("share.1.bias", {1});
     for (size_t u = 0; u < units; ++u) {
       found.push_back(bias[u]);
-      for (size_t k : {4, 5, 6, 7, 8, 9, 10, 11, 0, 1, 2, 3})
-        found.push_back(first[features * u + k]);
-      for (size_t k = 0; k < outputs; ++k) found.push_back(last[units * k + u]);
+      found.insert(found.end(), &first[features * u], &first[features * u] + features);
+      found.push_back(last[u]);
     }
     for (float weight : found)
-      if (!(weight >= -1e4F && weight <= 1e4F))
+      if (!is_weight(weight))
         refuse("has a weight " + std::to_string(weight) + ", which is not within -1e4 to 1e4");
     return found;
   }

@@ -4,7 +4,7 @@
 // The moments of the overlap A∩B that a model finds: volume, centroid, covariance.
 #pragma once
 
-#include "../lanes/vectors.hpp"
+#include "../lanes/triples.hpp"
 
 namespace box_contact::BOX_CONTACT_SET {
 
@@ -75,14 +75,14 @@ BC_INLINE void set_lane(Sym<T>& a, int i, const Sym<N>& value) {
 template <class T>
 struct PointAndVolume {
   T volume;         // [m³]
-  Vec<T> centroid;  // from A's centre, in A's frame [m]
+  Vec<T> centroid;  // in A's frame from a kernel, in the common frame from a model [m]
 };
 
 // What a model finds of the overlap.
 template <class T>
 struct Moments {
   T volume;           // [m³]
-  Vec<T> centroid;    // from A's centre, in A's frame [m]
+  Vec<T> centroid;    // in A's frame from a kernel, in the common frame from a model [m]
   Sym<T> covariance;  // second central moments by the volume, common frame [m²]
 };
 
