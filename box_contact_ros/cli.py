@@ -113,7 +113,7 @@ MODULES_OF_EXTRA = {
     'sim': ('mujoco', 'rich'),
     'bag': ('rosbags',),
     'soup': ('fcl',),
-    'view': ('viser',),
+    'view': ('viser', 'websockets'),
     'train': ('safetensors', 'torch', 'tqdm'),
     'report': ('matplotlib', 'tqdm'),
     'peers': ('coal', 'dartpy', 'pybullet', 'rapier3d'),
@@ -240,7 +240,7 @@ def _missing_module(name: str, module: str) -> str | None:
     listed = ','.join(extras)
     text = (
         f'box_contact_ros: {name} needs the Python module {module!r}, which is not installed: '
-        f"in the checkout, pip install -c constraints.txt '.[{listed}]'"
+        f"in the checkout, pip install -c constraints.txt -e '.[{listed}]'"
     )
     if 'ros' in bring_it:
         text += ', or apt install ros-jazzy-ros-base and source /opt/ros/jazzy/setup.bash'
@@ -273,7 +273,7 @@ class Nothing(Exception, metaclass=_AlsoNothing):
 
 
 class _StandIns(MetaPathFinder, Loader):
-    """Finds stand-ins for the modules of all extras: classes, of which every name is `Nothing`."""
+    """Finds stand-ins for the modules of all extras: classes whose every name is `Nothing`."""
 
     def find_spec(self, name: str, path: Any = None, target: Any = None) -> ModuleSpec | None:
         known = name.partition('.')[0] in chain(*MODULES_OF_EXTRA.values())

@@ -25,7 +25,8 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from ..solver.arguments import within
+from ..solver.arguments import model_name, within
+from ..solver.models import gated_models, model_names
 from . import processes
 from .crane.landing import LANDING_DURATION
 from .crane.mujoco_crane import CraneScenario
@@ -63,12 +64,7 @@ def main(args: Sequence[str] | None = None) -> int:
     node = program('contact_node', model=options.model)
     crane = program('crane', duration=options.duration, rate=options.rate, report=True,
                     wait=TIME_LIMIT - OVERHEAD - options.duration, closed_loop=options.closed_loop)
-    what = ('sets one container down on another' if options.closed_loop
-            else 'lowers one container onto another and lifts it')
-    how = 'its contacts hold the load up' if options.closed_loop else 'nothing is done with it'
-    print(f'A crane {what}, {options.duration:g} s in real time at most; it publishes both poses '
-          f'at {options.rate:g} Hz.\nA contact node answers; {how}. Both are ROS 2 processes of '
-          f'their own, in domain {options.domain} on this host.', flush=True)
+    print(_announcement(options), flush=True)
     deadline = time.monotonic() + TIME_LIMIT
     started: list[subprocess.Popen[bytes]] = []
     with tempfile.TemporaryFile() as node_output, asked_to_end() as stop:
@@ -84,8 +80,27 @@ def main(args: Sequence[str] | None = None) -> int:
             print(f'demo: failed with status {status}; what contact_node printed:\n'
                   f'{printed(node_output) or "(nothing)"}', file=sys.stderr)
             return status
-    print(NEXT.format(python=_python()))
+    rest = ', and the load is at rest' if options.closed_loop else ''
+    print(f'PASS: contacts came, and none was lost{rest}.\n{NEXT.format(python=_python())}')
     return 0
+
+
+def _announcement(options: argparse.Namespace) -> str:
+    """Return what will run, what will be judged, and what the model cannot do."""
+    what = ('sets one container down on another' if options.closed_loop
+            else 'lowers one container onto another and lifts it')
+    how = 'its contacts hold the load up' if options.closed_loop else 'nothing is done with it'
+    lines = [f'A crane {what}, {options.duration:g} s in real time at most; it publishes both '
+             f'poses at {options.rate:g} Hz.',
+             f'A contact node answers; {how}. Both are ROS 2 processes of their own, in domain '
+             f'{options.domain} on this host.',
+             'It passes if contacts come and none is lost'
+             f'{", and if the load comes to rest" if options.closed_loop else ""}.']
+    if options.closed_loop and options.model not in gated_models():
+        lines.append(f'Model {options.model} gives points without a patch. The whole bottom of the '
+                     'load stands for the patch, so the load may not come to rest. With '
+                     '--open-loop, its contacts are only recorded.')
+    return '\n'.join(lines)
 
 
 def _options(args: Sequence[str] | None) -> argparse.Namespace:
@@ -101,8 +116,9 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
                              'comes to rest')
     parser.add_argument('--open-loop', dest='closed_loop', action='store_false',
                         help='only record the contacts')
-    parser.add_argument('--model', default='mlp', help="the node's model of the contact point; the "
-                        'closed loop needs one with volume and covariance (default: %(default)s)')
+    parser.add_argument('--model', type=model_name, default='mlp', metavar='MODEL',
+                        help=f'one of {model_names()}; the closed loop needs volume and '
+                             'covariance: mlp or exact (default: %(default)s)')
     parser.add_argument('--rate', type=within(1.0, 2000.0), default=200.0, metavar='HZ',
                         help='pairs of poses a second (default: %(default)g)')
     open_loop = CraneScenario().duration

@@ -23,7 +23,7 @@ from ..solver.arguments import within
 
 DOMAINS = range(1, 102)
 """Domains to draw from: 0 is everybody's; beyond 101, ports run into those that Linux assigns."""
-END_PATIENCE = 3.0  # time [s] between asking a process group to end and killing it
+END_PATIENCE = 1.0  # time [s] between asking a process group to end and killing it
 LOOK_PERIOD = 0.05  # time [s] after which a signal is noticed, at most
 
 
@@ -89,6 +89,24 @@ class Stop:
 
     def __init__(self) -> None:
         self.signals: list[int] = []
+        self._raises = False
+
+    def take(self, number: int, _frame: Any) -> None:
+        """Note a signal; raise KeyboardInterrupt within `interrupting`."""
+        self.signals.append(number)
+        if self._raises:
+            raise KeyboardInterrupt
+
+    @contextlib.contextmanager
+    def interrupting(self) -> Iterator[None]:
+        """Let signals interrupt the block, which starts nothing that would be left behind."""
+        self._raises = True
+        try:
+            if self.signals:
+                raise KeyboardInterrupt
+            yield
+        finally:
+            self._raises = False
 
     def is_set(self) -> bool:
         """Return whether a signal came."""
@@ -114,11 +132,7 @@ def asked_to_end() -> Iterator[Stop]:
     An exception could fall between a subprocess's start and its entry in a list, and orphan it.
     """
     stop = Stop()
-
-    def take(number: int, _frame: Any) -> None:
-        stop.signals.append(number)
-
-    with _handled_by(take, signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+    with _handled_by(stop.take, signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         yield stop
 
 

@@ -16,6 +16,7 @@ from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
+from ..core import LENGTH_MAX
 from ..node.message_bytes import RawMessages
 from ..node.messages import NANOSECONDS, ContactsMessage, Refused, read_contacts
 from ..node.topics.scene_topics import pose_input
@@ -38,7 +39,7 @@ CONTACT_TYPES: dict[str, type] = {'sensor_msgs/msg/PointCloud2': PointCloud2} | 
 """Messages of all contacts that can be read here, by the names of their types."""
 CRANE_MARKERS = 'crane/markers'
 """Where the crane publishes its ropes and its spreader, as lines."""
-
+MOST_ENDS = 10_000  # of lines that are drawn of a crane
 DEEP_RELIABLE = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
 """What the DDS layer delivers while Python is busy must not push out the rest."""
 
@@ -135,10 +136,15 @@ def line_marker(header: Header, name: str, lines: np.ndarray, *, width: float,
 
 
 def lines_of(message: MarkerArray) -> np.ndarray:
-    """Return the ends (n, 2, 3) of all lines of a `line_marker`."""
-    ends = [(point.x, point.y, point.z) for marker in message.markers
-            if marker.type == Marker.LINE_LIST for point in marker.points]
-    return np.array(ends).reshape(-1, 2, 3)
+    """Return the ends (n, 2, 3) [m] of all lines of a `line_marker`, or raise Refused."""
+    lines = [marker.points for marker in message.markers if marker.type == Marker.LINE_LIST]
+    count = sum(map(len, lines))
+    if count > MOST_ENDS:
+        raise Refused('bad lines', f'{count} ends of lines; at most {MOST_ENDS}')
+    ends = np.array([(point.x, point.y, point.z) for points in lines for point in points])
+    if count % 2 or not (np.abs(ends) <= LENGTH_MAX).all():
+        raise Refused('bad lines', 'a line has one end, or ends nowhere')
+    return ends.reshape(-1, 2, 3)
 
 
 def stamp_of(header: Header) -> int:

@@ -4,9 +4,9 @@
 """The contact node: box poses in, contact points and normals out.
 
 Subscribes box_a/pose and box_b/pose (geometry_msgs/PoseStamped). Publishes contact/point
-(PointStamped) and contact/normal (Vector3Stamped, from A to B) while the boxes touch, then
-contacts (box_contact_msgs/Contacts) on every evaluation, and /diagnostics. Where box_contact_msgs
-is not installed, contacts_cloud (sensor_msgs/PointCloud2) takes the place of contacts.
+(PointStamped) and contact/normal (Vector3Stamped, from A to B) while the boxes touch. On every
+evaluation it publishes contacts (box_contact_msgs/Contacts), and once a second /diagnostics. Where
+box_contact_msgs is not installed, contacts_cloud (sensor_msgs/PointCloud2) replaces contacts.
 
 With a scene file: <box>/pose of every moving box, and <pair>/contact/point, <pair>/contact/normal.
 With wrench: contact/wrench (WrenchStamped), or <pair>/wrench, the force law's answer.
@@ -16,7 +16,6 @@ It is a lifecycle node that configures and activates itself, unless autostart is
 from __future__ import annotations
 
 import gc
-import os
 from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any, ClassVar
@@ -26,19 +25,17 @@ from rclpy.clock_type import ClockType
 from rclpy.context import Context
 from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
-from rclpy.logging import get_logger
 
 from ..core import LENGTH_MAX
-from ..resources import OpenFiles
-from ..scene.files.scene_file import is_inline, read_scene
 from ..scene.pose_sets import CONTAINER
-from ..scene.scene_solver import Scene, SceneSolver, two_boxes
+from ..scene.scene_solver import Scene, SceneSolver
 from ..scene.stamp_pairing import PAIRINGS, RESETS
 from ..solver.checks import shown
 from ..solver.models import find_model, model_names
 from .diagnostics import DIAGNOSTICS_SECONDS, Diagnostics
 from .evaluator import SERIALIZATIONS, Evaluator
 from .messages import ContactsMessage
+from .named_files import FIXED_PARAMETERS, SCENE, NamedFiles, named_scene
 from .parameters import (
     CheckedParameters,
     Limits,
@@ -52,7 +49,7 @@ from .parameters import (
     text,
 )
 from .rclpy_workarounds import lifecycle_state, refuse_transitions
-from .runtime import LOG_SECONDS, run_node
+from .runtime import LOG_SECONDS, GuardedNode, run_node
 from .topics.scene_topics import SceneTopics
 from .topics.tf_poses import check_frames
 from .wrench_output import WRENCH_PARAMETERS, make_wrenches
@@ -64,23 +61,12 @@ def model(name: str, value: Any) -> str:
     return str(value)
 
 
-def scene_source(name: str, value: Any) -> str:
-    """Check the path of a scene file, or a scene as text, by its length."""
-    if len(text(name, value)) > LARGEST_TEXT:
-        raise ValueError(f'{name}: a text of {len(value)} characters; at most {LARGEST_TEXT}, '
-                         'and a file may be larger')
-    return str(value)
-
-
-LARGEST_TEXT = 2**18  # characters of a scene as text: some 2,000 pairs, read in a second or two
 NAMED_TOPICS = 3  # how many pose topics the node names when it is ready
 LONGEST = 1e6  # s, about twelve days
 PARAMETERS = {
     'size_a': Setting(CONTAINER, 'full extents of box A, three numbers > 0 [m]', size),
     'size_b': Setting(CONTAINER, 'full extents of box B, three numbers > 0 [m]', size),
-    'scene': Setting('', 'scene file, its text, or the bare name of one in config/scenes/; '
-                         'replaces size_a and size_b; setting it again reads it again',
-                     scene_source),
+    'scene': SCENE,
     'model': Setting('mlp', f'how the contact point is found: {model_names()}',
                      Limits(model, f'one of: {model_names()}')),
     'weights': Setting('', 'weights file to use instead of the shipped one', text),
@@ -103,18 +89,8 @@ PARAMETERS = {
                                     'objects, slower, the reference', one_of(SERIALIZATIONS)),
     'autostart': Setting(True, 'whether the node configures and activates itself', flag,
                          fixed=True),
-    'files_from': Setting('.', "directories, with ':' between them, below which `scene` and "
-                               '`weights` may name files while the node runs, next to the '
-                               "package's own", text, fixed=True),
-    'locked': Setting(False, 'whether all parameters and states stay as they are after the start',
-                      flag, fixed=True),
+    **FIXED_PARAMETERS,
 }
-
-
-def _files(settings: Mapping[str, Any]) -> dict[str, str]:
-    """Return the files that `scene` and `weights` name, as far as they do."""
-    return {name: settings[name] for name in ('scene', 'weights') if settings.get(name)
-            and not (name == 'scene' and is_inline(settings[name]))}
 
 
 def _refuse_boxes(settings: Mapping[str, Any], before: Mapping[str, Any]) -> None:
@@ -130,7 +106,7 @@ def _refuse_boxes(settings: Mapping[str, Any], before: Mapping[str, Any]) -> Non
                                  f"set: write {plural} into the scene file, or set scene to ''")
 
 
-class ContactNode(LifecycleNode):
+class ContactNode(GuardedNode, LifecycleNode):
     """Wires parameters, topics, evaluation and diagnostics to the states of a lifecycle node.
 
     A node on another method derives from this one. It sets `name`, the `prefix` of its contact
@@ -151,8 +127,7 @@ class ContactNode(LifecycleNode):
         _refuse_boxes(values, {name: one.default for name, one in self.parameters.items()})
         if values['locked'] and not values['autostart']:
             raise ValueError('locked: a node that does not start itself could never be started')
-        self._open_files = OpenFiles(values['files_from'].split(os.pathsep),
-                                     _files(values).values())
+        self._files = NamedFiles(self, values)
         self._topics = SceneTopics(self, self.prefix, self.counts)
         self._diagnostics = Diagnostics(self)
         # On a clock of its own: simulated time may stand still.
@@ -179,8 +154,9 @@ class ContactNode(LifecycleNode):
     @staticmethod
     def make_solver(settings: Mapping[str, Any], scene: Scene) -> SceneSolver:
         """Return the solver that checked parameters ask for, or raise ValueError."""
+        entry, _ = find_model('model', settings['model'])
         return SceneSolver(scene, model=settings['model'], weights=settings['weights'] or None,
-                           margin=settings['margin'])
+                           margin=settings['margin'], most_near=entry.most_near)
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Read the scene, load the weights, create the publishers.
@@ -242,7 +218,7 @@ class ContactNode(LifecycleNode):
         except Exception as error:  # rclpy would swallow it
             self._fault = error
             if not self._raises_faults:
-                self.get_logger().error(reason_of(error))
+                self.get_logger().error(reason_of(error), throttle_duration_sec=LOG_SECONDS)
             return False
         return True
 
@@ -259,38 +235,20 @@ class ContactNode(LifecycleNode):
         if self._evaluator is not None and (
                 settings != self._settings.values or 'scene' in names):
             self._apply(settings)
-            self._log_scene(f'changed {", ".join(sorted(names))}', settings)
+            if self.may_log('changed'):
+                self._log_scene(f'changed {", ".join(sorted(names))}', settings)
 
     def _apply(self, settings: dict[str, Any]) -> None:
-        """Apply parameters as a whole, or raise ValueError or RCLError and keep the old.
+        """Apply parameters as a whole, or raise ValueError or RCLError and keep the old."""
+        with self._files.resolved(settings, starts=self._raises_faults) as resolved:
+            self._replace(resolved, named_scene(
+                resolved, check=check_frames, limits=self._files.limits(settings)))
 
-        While the node runs, anybody may have set them. So the answer is the same for all files that
-        do not serve: it tells neither what a file holds nor whether there is one.
-        """
-        files = _files(settings)
-        try:
-            self._replace(settings | {name: self._open_files.find(file)
-                                      for name, file in files.items()})
-        except ImportError:  # an extra is not installed
-            raise
-        except Exception as error:
-            if not files or self._raises_faults:
-                raise
-            # A logger of no node: /rosout does not publish it.
-            get_logger(f'{self.get_logger().name}.local').error(
-                reason_of(error), throttle_duration_sec=LOG_SECONDS)
-            named = ' and '.join(f'{name} {shown(file)}' for name, file in files.items())
-            raise ValueError(f'{named} refused: the log on the machine of the node says why') \
-                from None
-
-    def _replace(self, settings: Mapping[str, Any]) -> None:
+    def _replace(self, settings: Mapping[str, Any], scene: Scene) -> None:
         """Replace scene, solver and topics, or raise and keep the old.
 
         Boxes that stay keep their subscriptions and the poses that wait.
         """
-        scene = (read_scene(settings['scene'], check=check_frames) if settings['scene']
-                 else two_boxes(settings['size_a'], settings['size_b'], **{
-                     name: settings[name] for name in ('mass_a', 'mass_b') if name in settings}))
         solver = self.make_solver(settings, scene)
         wrenches = make_wrenches(settings, solver)
         covered = wrenches.pairs if wrenches else ()
@@ -318,7 +276,7 @@ class ContactNode(LifecycleNode):
             self.get_logger().info(f'{what}: no pose is answered')
 
     def _log_scene(self, what: str, settings: Mapping[str, Any]) -> None:
-        """Log what the node works on, and warn of weights that do not serve it."""
+        """Log what the node works on, and warn of weights that the model does not use."""
         assert self._evaluator is not None
         logger = self.get_logger()
         solver, scene = self._evaluator.solver, self._evaluator.solver.scene
@@ -326,9 +284,6 @@ class ContactNode(LifecycleNode):
         if settings.get('weights') and 'weights' not in entry.takes:
             logger.warning(f'model {solver.model!r} uses no weights: '
                            f'{shown(settings["weights"])} is ignored')
-        elif solver.sizes_answered_exactly:  # 0 for models that answer themselves
-            logger.warning(f'pairs of sizes that the weights are not for: '
-                           f'{solver.sizes_answered_exactly}; the exact model answers them')
         pairs, topics = len(scene.pairs), self._topics.pose_topics()
         more = len(topics) - NAMED_TOPICS
         frame = f' in frame {shown(scene.frame_id)}' if scene.frame_id else ''
@@ -343,7 +298,8 @@ class ContactNode(LifecycleNode):
             self._evaluator.reset(time_only=True)
             cause = ('/clock was set back' if jump.clock_change == ClockChange.ROS_TIME_NO_CHANGE
                      else 'use_sim_time was changed')
-            self.get_logger().warning(f'time went back: {cause}; a new time begins')
+            self.get_logger().warning(f'time went back: {cause}; a new time begins',
+                                      throttle_duration_sec=LOG_SECONDS)
 
     def _report(self) -> None:
         """Serve QoS events and publish diagnostics, once a second."""

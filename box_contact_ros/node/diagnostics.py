@@ -19,7 +19,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 
 from ..scene.scene_solver import Pair
-from ..scene.stamp_pairing import AGAIN, OLD, REPEATED, RESETS, TOO_LATE, Note
+from ..scene.stamp_pairing import AGAIN, AHEAD, OLD, REPEATED, RESETS, TOO_LATE, Note
 from .messages import make_header
 
 DIAGNOSTICS_SECONDS = 1.0
@@ -61,6 +61,9 @@ def note_line(kind: str, note: Note) -> str:
     if kind == OLD:
         return (f'{note.box}: stamp {stamp} is older than {newest}; refused: publish in the order '
                 'of the stamps, from one publisher')
+    if kind == AHEAD:
+        return (f'{note.box}: stamp {stamp} is {1e-9 * (note.stamp - note.newest):.3g} s ahead of '
+                'the other boxes, max_age is less; refused: stamp all by the same clock')
     assert kind == REPEATED
     if note.stamp == note.newest:
         return (f'{note.box}: stamp {stamp} does not advance; refused: set header.stamp (`ros2 '

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..scene.force.pair_wrenches import PairWrenches
-from ..scene.scene_solver import ALL_BOXES, Answer, SceneSolver
+from ..scene.scene_solver import ALL_BOXES, Answer, SceneSolver, TooManyNear
 from ..scene.stamp_pairing import NEVER, PAIRINGS, RESETS, Pairing, StampedPose, Tick
 from ..solver.checks import absent_poses, are_poses, pose_fault, shown
 from .diagnostics import (
@@ -36,7 +36,7 @@ from .topics.scene_topics import SceneTopics
 SERIALIZATIONS: dict[str, type[RawMessages] | type[TypedMessages]] = {
     'raw': RawMessages, 'typed': TypedMessages}
 """Values of the node parameter `serialization`."""
-OUTSIDE = 'outside the trained range'
+LEFT_TO_EXACT = 'left to exact'
 COMPARED = 16  # pairs at most whose stamps are compared for a report
 
 
@@ -82,7 +82,7 @@ class Evaluator:
 
     def close(self) -> None:
         """Keep the count of a solver that goes."""
-        self.counts[OUTSIDE] += self.solver.exact_answers
+        self.counts[LEFT_TO_EXACT] += self.solver.exact_answers
 
     def reset(self, *, time_only: bool = False) -> None:
         """Forget all poses; with `time_only` all but those that hold at all stamps."""
@@ -142,7 +142,7 @@ class Evaluator:
         for line in (*refusals.values(), *(note_line(*note) for note in notes.items())):
             self._logger.warning(line)
         counts = self.counts - self._pairing.held()
-        counts[OUTSIDE] += self.solver.exact_answers
+        counts[LEFT_TO_EXACT] += self.solver.exact_answers
         scene = self.solver.scene
         look = self._diagnostics.look(counts, self._settings['max_age'])
         never = self._pairing.unseen()
@@ -154,7 +154,8 @@ class Evaluator:
         self._diagnostics.log(findings)
         self._diagnostics.publish(
             counts, findings, state=state, pairs=len(scene.pairs), stale_boxes=' '.join(stale),
-            boxes_that_never_came=' '.join(unseen), unanswered_pairs=len(look.unanswered))
+            boxes_that_never_came=' '.join(unseen),
+            boxes_ahead=' '.join(self._pairing.ahead()), unanswered_pairs=len(look.unanswered))
 
     def _findings(self, look: Look, unseen: list[str], stale: list[str]) -> Iterator[Finding]:
         """Yield why pairs are not answered, as far as it can be told."""
@@ -265,7 +266,7 @@ class Evaluator:
 
     def _refuse(self, error: Exception, topic: str) -> None:
         """Count what was refused; keep the first line of its kind for the next report."""
-        if isinstance(error, Refused):
+        if isinstance(error, (Refused, TooManyNear)):
             reason, text = error.reason, f'{topic}: {error}'
         else:
             reason, text = 'internal error', f'{type(error).__name__}: {error}'

@@ -55,7 +55,7 @@ def given_values(context: Any, arguments: Mapping[str, Setting]) -> dict[str, An
     """Return the checked values of the arguments that were given to a launch file.
 
     An argument whose text is empty was not given. A launch file that includes this one may have
-    arguments of other names, and they reach this one too: the context does not tell whose they are.
+    arguments of other names, and they reach this one too. The context does not tell whose they are.
     So names are looked up in the include itself. Raise ValueError for a name that there is not, or
     a bad value.
     """

@@ -114,11 +114,11 @@ def _parse_head(data: bytes, kind: str) -> tuple[str, int, int, int]:
 
 
 def _parse_frame(data: bytes, length: int, kind: str) -> str:
+    if length > FRAME_LIMIT + 1:
+        raise Refused('bad header', f'frame_id has more than {FRAME_LIMIT} bytes')
     frame = data[FRAME_AT:FRAME_AT + length]
     if length and frame.find(b'\0') != length - 1:
         raise Refused(f'not a {kind}', 'frame_id does not end with its first zero')
-    if length > FRAME_LIMIT + 1:
-        raise Refused('bad header', f'frame_id has more than {FRAME_LIMIT} bytes')
     try:
         return frame[:-1].decode('utf-8')
     except UnicodeDecodeError:

@@ -72,7 +72,10 @@ for _name in {*(CLOUD_ROW.names or ())} - {'pair'}:
     _BLANK[_name] = np.nan
 
 
-FRAME_LIMIT = 255  # bytes of a frame_id: a stranger's could be megabytes
+FRAME_LIMIT = 255
+"""Bytes of a name that the network brings, of a frame or a pair: it could have megabytes."""
+MOST_ROWS = 2**15
+"""Contacts of a message that are read, unless the scene has more pairs."""
 
 TWO_BOXES = MappingProxyType({'box_a_box_b': 0})
 """Id of the only pair, by its name, where there is no scene file."""
@@ -84,6 +87,14 @@ class Refused(ValueError):
     def __init__(self, reason: str, text: str) -> None:
         super().__init__(text)
         self.reason = reason
+
+
+def check_name(what: str, name: str) -> None:
+    """Raise Refused for a name that is longer than FRAME_LIMIT."""
+    # A character has at least a byte: what is certainly too long is not encoded.
+    if len(name) > FRAME_LIMIT or len(name.encode(errors='replace')) > FRAME_LIMIT:
+        raise Refused('bad header' if what == 'frame_id' else 'bad name',
+                      f'{what} has more than {FRAME_LIMIT} bytes')
 
 
 def checked_pose(numbers: Sequence[float], frame_id: str, sec: int, nanosec: int) -> StampedPose:
@@ -99,8 +110,7 @@ def headed(numbers: np.ndarray, frame_id: str, sec: int, nanosec: int) -> Stampe
     """Return numbers with the stamp and frame of their message, or raise Refused for these."""
     if nanosec >= NANOSECONDS:
         raise Refused('bad header', f'stamp has {nanosec} nanoseconds, a second or more')
-    if len(frame_id.encode(errors='replace')) > FRAME_LIMIT:
-        raise Refused('bad header', f'frame_id has more than {FRAME_LIMIT} bytes')
+    check_name('frame_id', frame_id)
     if '\N{REPLACEMENT CHARACTER}' in frame_id:  # rclpy's word for bytes it cannot decode
         raise Refused('bad header', f'frame_id {shown(frame_id)} is not UTF-8')
     return StampedPose(numbers, frame_id, sec * NANOSECONDS + nanosec)
@@ -162,8 +172,13 @@ def read_contacts(message: Any, ids: Mapping[str, int] | None = None) -> np.ndar
     `id_of` its name. Stale pairs are rows of NaN. Raises Refused, as `read_cloud`.
     """
     if isinstance(message, PointCloud2):
-        return read_cloud(message)
+        return read_cloud(message, most=len(ids or ()))
     known = ids or {}
+    check_name('frame_id', message.header.frame_id)
+    _check_rows(len(message.contacts) + len(message.stale), len(known))
+    for name in (*(contact.pair for contact in message.contacts), *message.stale):
+        if name not in known:
+            check_name('pair', name)
     rows = np.repeat(_BLANK, len(message.contacts) + len(message.stale))
     for row, c in zip(rows, message.contacts):
         point, normal = c.point, c.normal
@@ -173,6 +188,13 @@ def read_contacts(message: Any, ids: Mapping[str, int] | None = None) -> np.ndar
         known.get(name, id_of(name)) for name in message.stale]
     _round(rows)
     return rows
+
+
+def _check_rows(count: int, most: int) -> None:
+    """Raise Refused for more contacts than a node with `most` pairs may list, or MOST_ROWS."""
+    if count > max(most, MOST_ROWS):
+        raise Refused('too many contacts', f'{count} contacts in a message are more than '
+                                           f'{max(most, MOST_ROWS)}')
 
 
 def contacts_by_pair(message: Any, ids: Mapping[str, int] = TWO_BOXES) -> dict[str, Contact]:
@@ -221,13 +243,19 @@ def _contact(row: Any) -> Contact:
                    float(row['volume']), covariance)
 
 
-def read_cloud(message: PointCloud2) -> np.ndarray:
+def read_cloud(message: PointCloud2, *, most: int = 0) -> np.ndarray:
     """Return the rows of a `contacts_cloud` as an array (n,) of CLOUD_ROW.
+
+    most: pairs of the scene, where it is known; a cloud of more rows, and of MOST_ROWS, is refused.
 
     Fields are found by name, whatever their order, padding and byte order; others are ignored. A
     cloud without any of PATCH_FIELDS, from an older recording, has NaN there. Raises Refused, with
     the field's name, for a field that is missing or of another type.
     """
+    check_name('frame_id', message.header.frame_id)
+    _check_rows(message.width * message.height, most)
+    for field in message.fields:
+        check_name('field', field.name)
     layout = _cloud_layout(
         tuple([(field.name, field.offset, field.datatype, field.count)
                for field in message.fields]), message.point_step, message.is_bigendian)

@@ -13,7 +13,6 @@ import math
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from difflib import get_close_matches
 from typing import Any
 
 from rcl_interfaces.msg import (
@@ -26,7 +25,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from ..solver.arguments import program_parser
-from ..solver.checks import shown, size_fault
+from ..solver.checks import nearest_name, shown, size_fault
 from .rclpy_workarounds import parameter_overrides
 
 Check = Callable[[str, Any], Any]
@@ -135,7 +134,8 @@ def one_of(choices: Iterable[str]) -> Check:
     def check(name: str, value: Any) -> str:
         choice = text(name, value)
         if choice not in choices:
-            raise ValueError(f'{name} {shown(value)} is not one of: {", ".join(choices)}')
+            raise ValueError(f'{name} {shown(value)} is not one of: {", ".join(choices)}'
+                             f'{nearest_name(choice, choices)}')
         return choice
     return Limits(check, f'one of: {", ".join(choices)}')
 
@@ -177,8 +177,7 @@ def _say_unknown(node: Node, settings: Mapping[str, Setting]) -> None:
 
 def unknown_name(kind: str, name: str, known: Iterable[str]) -> str:
     """Return the refusal of a name that there is not, with the nearest name if one is near."""
-    nearest = ''.join(get_close_matches(name, known, n=1))
-    return f'unknown {kind} {shown(name)}' + (nearest and f'; the nearest name is {nearest}')
+    return f'unknown {kind} {shown(name)}{nearest_name(name, known)}'
 
 
 def checked(settings: Mapping[str, Setting], values: Mapping[str, Any]) -> dict[str, Any]:
@@ -245,7 +244,12 @@ def answer_help(program: str, doc: str | None, settings: Mapping[str, Setting],
     if unknown:
         hint = ' (parameters stand after --ros-args)' if '-p' in unknown else ''
         parser.error(f'unrecognized arguments: {" ".join(unknown)}{hint}')
-    for name in parameters_after_p(args or ()):
+    for rule in rules_after_p(args or ()):
+        name, _, value = rule.partition(':=')
+        if value.startswith('[') and ']' not in value:  # a shell has cut it in pieces
+            parser.error(f'{shown(rule)} is half a list: write it without blanks, as in '
+                         f'{name}:=[1,2,3], or put it in quotes, as in "{name}:=[1, 2, 3]"')
+        name = name.rpartition(':')[2]
         if not (name in settings or name in OF_RCLPY or name.startswith(QOS_OVERRIDES)
                 or options.shared_parameters):
             parser.error(f'{unknown_name("parameter", name, settings)} (for parameters that '
@@ -263,10 +267,10 @@ def outside_ros_args(args: Sequence[str]) -> list[str]:
     return found
 
 
-def parameters_after_p(args: Sequence[str]) -> list[str]:
-    """Return the names NAME of all `-p NAME:=VALUE` and `-p NODE:NAME:=VALUE`."""
-    return [rule.partition(':=')[0].rpartition(':')[2]
-            for flag, rule in zip(args, args[1:]) if flag in ('-p', '--param') and ':=' in rule]
+def rules_after_p(args: Sequence[str]) -> list[str]:
+    """Return the rules of all `-p NAME:=VALUE` and `-p NODE:NAME:=VALUE`."""
+    return [rule for flag, rule in zip(args, args[1:])
+            if flag in ('-p', '--param') and ':=' in rule]
 
 
 def default_text(default: Any) -> str:

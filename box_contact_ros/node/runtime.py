@@ -59,14 +59,18 @@ LOG_SECONDS = 1.0  # the same complaint is logged at most this often
 class GuardedNode(Node):
     """A node whose callbacks raise nothing: what one raises is logged, and the node goes on.
 
+    Each request gets an answer, also where rclpy raises: its client would wait for ever.
+
     EventsExecutor ends the process with SIGSEGV where the callback of a future raises. It raises
     what other callbacks raise, under two unthrottled lines that name no topic.
     """
 
     def __init__(self, *args: Any, **options: Any) -> None:
         """Begin as rclpy's node does."""
-        self._silent_until: dict[str, float] = {}  # monotonic time [s], by kind of error
+        self._silent_until: dict[str, float] = {}  # monotonic time [s], by kind of line
         super().__init__(*args, **options)
+        for service in self.services:  # rclpy's own: parameters, and states of a lifecycle node
+            service.callback = self.answered(service.callback, service.service_name)
 
     def create_subscription(self, msg_type: Any, topic: str, callback: Callable[..., None],
                             *args: Any, **options: Any) -> Subscription:
@@ -96,10 +100,28 @@ class GuardedNode(Node):
                     self._complain(what, error)
         return guarded
 
+    def answered(self, callback: Callable[[Any, Any], Any], what: str) -> Callable[[Any, Any], Any]:
+        """Return a service's callback that raises nothing: it answers with an empty response."""
+        @functools.wraps(callback)
+        def answered(request: Any, response: Any) -> Any:
+            try:
+                return callback(request, response)
+            except Exception as error:
+                if self.context.ok():
+                    self._complain(what, error)
+                return type(response)()  # nothing in it says success
+        return answered
+
+    def may_log(self, kind: str) -> bool:
+        """Return whether no line of a kind was logged within LOG_SECONDS."""
+        now = time.monotonic()
+        if now < self._silent_until.get(kind, 0.0):
+            return False
+        self._silent_until[kind] = now + LOG_SECONDS
+        return True
+
     def _complain(self, what: str, error: Exception) -> None:
-        kind, now = getattr(error, 'reason', type(error).__name__), time.monotonic()
-        if now >= self._silent_until.get(kind, 0.0):
-            self._silent_until[kind] = now + LOG_SECONDS
+        if self.may_log(getattr(error, 'reason', type(error).__name__)):
             logger, line = self.get_logger(), f'{what}: {reason_of(error)}; ignored'
             # Two lines of code: rclpy refuses another severity from the same one.
             if isinstance(error, ValueError):  # a refusal

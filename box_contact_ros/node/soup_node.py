@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..scene.scene_solver import Scene, SceneSolver
-from ..solver.models import MOST_SOUP_DIVISIONS, SOUP_DIVISIONS
+from ..solver.models import MODELS, MOST_SOUP_DIVISIONS, SOUP_DIVISIONS
 from .contact_node import PARAMETERS as CONTACT_PARAMETERS
 from .contact_node import ContactNode
 from .parameters import Setting, answer_help, whole_number
@@ -39,7 +39,7 @@ class SoupNode(ContactNode):
     def make_solver(settings: Mapping[str, Any], scene: Scene) -> SceneSolver:
         """Return the solver for a soup of so many divisions."""
         return SceneSolver(scene, model=f'soup-{settings["divisions"]}',
-                           margin=settings['margin'])
+                           margin=settings['margin'], most_near=MODELS['soup'].most_near)
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -75,6 +75,8 @@ class ContactErrors(NamedTuple):
     """(n,) of the exact volume; NaN from models that give the point alone."""
     covariance: np.ndarray
     """(n,) Frobenius norm, of the exact covariance's trace; NaN like the volume's."""
+    in_plane: np.ndarray
+    """(n,) of either eigenvalue in the plane of the contact, relative; NaN like the volume's."""
 
     def rows(self, chosen: np.ndarray) -> ContactErrors:
         """Return some of the errors."""
@@ -84,10 +86,25 @@ class ContactErrors(NamedTuple):
 def contact_errors(found: Contacts, truth: Contacts, edge: np.ndarray) -> ContactErrors:
     """Return the errors of n contacts; edge: see `Pairs.edge`. All pairs touch, by both."""
     off = np.linalg.norm(found.covariance - truth.covariance, axis=(1, 2))
+    exact = _in_plane(truth.covariance, truth.normal)
+    in_plane = np.abs(_in_plane(found.covariance, truth.normal) - exact) / exact
     return ContactErrors(*(100.0 * error for error in (
         np.linalg.norm(found.point - truth.point, axis=1) / edge,
         np.abs(found.volume - truth.volume) / truth.volume,
-        off / np.trace(truth.covariance, axis1=1, axis2=2))))
+        off / np.trace(truth.covariance, axis1=1, axis2=2), in_plane.max(axis=1, initial=0.0))))
+
+
+def _in_plane(covariance: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """Return eigenvalues (n, 2), least first, of covariances (n, 3, 3) across normals (n, 3)."""
+    helper = np.eye(3)[np.abs(normal).argmin(axis=1)]
+    x = np.cross(normal, helper)
+    x /= np.linalg.norm(x, axis=1, keepdims=True)
+    axes = np.stack([x, np.cross(normal, x)], axis=1)
+    across = axes @ covariance @ axes.swapaxes(1, 2)
+    one, other, both = across[:, 0, 0], across[:, 1, 1], across[:, 0, 1]
+    largest = 0.5 * (one + other) + np.hypot(0.5 * (one - other), both)
+    least = (one * other - both**2) / largest
+    return np.stack([least, largest], axis=1)
 
 
 Generator = Callable[[np.random.Generator, int], Pairs]
@@ -252,6 +269,67 @@ def size_pairs(rng: np.random.Generator, n: int) -> Pairs:
     return any_pose(rng, size_a, size_b, shortest * log_uniform(rng, 1e-3, 0.1, n))
 
 
+def parcels(rng: np.random.Generator, n: int) -> Pairs:
+    """Parcels of 0.4 × 0.3 × 0.2 m on a pallet, tilt to 1°, any yaw, 0.1–5 % of its height deep."""
+    pallet, parcel = (np.tile(size, (n, 1)) for size in ((1.2, 0.8, 0.144), (0.4, 0.3, 0.2)))
+    turn = quaternion_multiply(
+        turns(_level(rng.uniform(-np.pi, np.pi, n)), log_uniform(rng, 1e-5, np.radians(1.0), n)),
+        turns(Z, rng.uniform(-np.pi, np.pi, n)))
+    place = np.column_stack([rng.uniform(-1, 1, (n, 2)) * (0.55, 0.38), np.full(n, 0.17)])
+    return onto(place, turn, pallet, parcel, 0.144 * log_uniform(rng, 1e-3, 0.05, n))
+
+
+def crossed_bars(rng: np.random.Generator, n: int) -> Pairs:
+    """Bars of 6 × 0.3 × 0.3 m laid across each other, tilt to 2°, 0.1–5 % of their width deep."""
+    sizes = np.tile((6.0, 0.3, 0.3), (n, 1))
+    yaw = rng.uniform(np.radians(20.0), np.radians(160.0), n)
+    turn = quaternion_multiply(
+        turns(_level(rng.uniform(-np.pi, np.pi, n)), log_uniform(rng, 1e-5, np.radians(2.0), n)),
+        turns(Z, yaw))
+    along, across = rng.uniform(-2.8, 2.8, (2, n, 1))
+    place = (np.eye(3)[0] * along - across * np.column_stack([_level(yaw)])
+             + np.array([0.0, 0.0, 0.295]))
+    return onto(place, turn, sizes, sizes, 0.3 * log_uniform(rng, 1e-3, 0.05, n))
+
+
+def overhang(rng: np.random.Generator, n: int) -> Pairs:
+    """Containers that overhang others by 85–97 %, tilt to 1°, 1e-4–1e-2 m deep."""
+    sizes = np.tile(CONTAINER, (n, 1))
+    turn = quaternion_multiply(
+        turns(_level(rng.uniform(-np.pi, np.pi, n)), log_uniform(rng, 1e-6, np.radians(1.0), n)),
+        turns(Z, np.radians(rng.uniform(-2.0, 2.0, n))))
+    beyond, other = rng.uniform(0.85, 0.97, n), rng.uniform(-0.2, 0.2, n)
+    place = np.where(rng.random((n, 1)) < 0.5, np.column_stack([beyond, other]),
+                     np.column_stack([other, beyond])) * CONTAINER[:2]
+    place = np.column_stack([place, np.full(n, 0.995 * CONTAINER[2])])
+    return onto(place, turn, sizes, sizes, log_uniform(rng, 1e-4, 1e-2, n))
+
+
+def near_flush(rng: np.random.Generator, n: int) -> Pairs:
+    """Containers stacked squarely: offsets of 1e-9–1e-2 m or none, yaw to 1e-3 rad or none."""
+    def often(values: np.ndarray) -> np.ndarray:
+        return values * (rng.random(values.shape) < 0.7)
+
+    sizes = np.tile(CONTAINER, (n, 1))
+    turn = quaternion_multiply(
+        turns(_level(rng.uniform(-np.pi, np.pi, n)), often(log_uniform(rng, 1e-9, 1e-3, n))),
+        turns(Z, often(log_uniform(rng, 1e-9, 1e-3, n))))
+    shift = often(log_uniform(rng, 1e-9, 1e-2, (n, 2))) * rng.choice([-1.0, 1.0], (n, 2))
+    place = np.column_stack([shift, np.full(n, 0.995 * CONTAINER[2])])
+    return onto(place, turn, sizes, sizes, log_uniform(rng, 1e-6, 1e-2, n))
+
+
+def landings(rng: np.random.Generator, n: int) -> Pairs:
+    """Containers set down on containers: off by 0.5 and 0.25 m, tilt to 0.02 rad, yaw to 1°."""
+    sizes = np.tile(CONTAINER, (n, 1))
+    turn = quaternion_multiply(
+        turns(_level(rng.uniform(-np.pi, np.pi, n)), log_uniform(rng, 1e-5, 2e-2, n)),
+        turns(Z, np.radians(rng.uniform(-1.0, 1.0, n))))
+    place = np.column_stack([rng.uniform(-0.5, 0.5, n), rng.uniform(-0.25, 0.25, n),
+                             np.full(n, 0.98 * CONTAINER[2])])
+    return onto(place, turn, sizes, sizes, log_uniform(rng, 5e-4, 2e-2, n))
+
+
 SETS: dict[str, Generator] = {
     'random cubes': cubes,
     'touching': touching,
@@ -260,4 +338,12 @@ SETS: dict[str, Generator] = {
     'tilted stacks': tilted,
     'containers': containers,
 }
-"""The sets of the accuracy and speed reports."""
+"""The sets of the speed report, and of the accuracy report."""
+LOADS: dict[str, Generator] = {
+    'parcels': parcels,
+    'crossed bars': crossed_bars,
+    'overhang': overhang,
+    'near flush': near_flush,
+    'landings': landings,
+}
+"""Loads on what they stand on: more sets of the accuracy report."""

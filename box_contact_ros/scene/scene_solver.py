@@ -33,6 +33,9 @@ ALL_BOXES = 'all boxes'
 SWEPT_FROM = 64
 """Pairs a box: above this the broad phase sweeps the boxes, below it tests each pair. Measured: the
 two take as long there."""
+SWEPT_MOST = 2**22
+"""Comparisons of a sweep. Of more, as where thousands of boxes are in one place, testing each
+listed pair is faster, and needs no room for the others."""
 
 _new_tuple = tuple.__new__  # a named tuple's own constructor is Python code
 
@@ -202,6 +205,12 @@ def _check_frames(boxes: Mapping[str, Box], frame_id: str, pose_array: bool) -> 
                 raise Fault(where, f'{shown(frame)}: names of frames in /tf begin with no slash')
 
 
+class TooManyNear(ValueError):
+    """A tick with more pairs near each other than the solver was to answer."""
+
+    reason = 'too many pairs near'
+
+
 class Answer(NamedTuple):
     """What one tick found."""
 
@@ -226,13 +235,18 @@ class SceneSolver:
     """
 
     def __init__(self, scene: Scene, *, model: str = 'mlp', weights: str | None = None,
-                 margin: float = 0.0) -> None:
-        """Begin without poses; `margin` [m] is up to which separation pairs apart are listed."""
+                 margin: float = 0.0, most_near: int | None = None) -> None:
+        """Begin without poses.
+
+        margin: up to which separation pairs apart are listed [m].
+        most_near: pairs that a tick may leave to the model; of more, it raises TooManyNear.
+        """
         if not 0.0 <= margin <= LENGTH_MAX:
             raise ValueError(f'margin must lie within 0 and {LENGTH_MAX:g} m, not {margin:g}')
         self.scene = scene
         self.model = model
         self.margin = margin
+        self._most_near = len(scene.pairs) if most_near is None else most_near
         numbers = {name: number for number, name in enumerate(scene.boxes)}
         boxes = list(scene.boxes.values())
         self._size = np.array([box.size for box in boxes], dtype=float)
@@ -290,11 +304,14 @@ class SceneSolver:
         if count < 0:
             box = list(self.scene.boxes)[left_out]
             raise ValueError(f'pose of {box}: {pose_fault(self._poses[left_out])}')
-        if not self._is_swept:
+        swept = native.near_boxes(self._low, self._high, self._known, self._moves,
+                                  SWEPT_MOST) if self._is_swept else None
+        if self._is_swept and swept is None:
+            count, left_out = self._near_pairs(self._moving[:0])
+        if swept is None:
             return self._near[:count], self._unknown[:left_out]
         # Sorted keys are looked up several times faster.
-        keys = np.sort(self._key(*native.near_boxes(
-            self._low, self._high, self._known, self._moves).T))
+        keys = np.sort(self._key(*swept.T))
         at = np.searchsorted(self._keys, keys)
         is_pair = self._keys[np.minimum(at, len(self._keys) - 1)] == keys
         unknown = self._unknown[:0] if self._known.all() else np.flatnonzero(
@@ -304,8 +321,7 @@ class SceneSolver:
     def _warm_up(self) -> None:
         """Let the model refuse sizes that it has no answer for.
 
-        Only a corner overlaps: where faces coincide, a soup takes seconds. And by little: it is not
-        the depth that an MLP was not trained for.
+        Only a corner overlaps: where faces coincide, a soup takes seconds.
         """
         sizes = {name: tuple(box.size) for name, box in self.scene.boxes.items()}
         kinds = dict.fromkeys((sizes[pair.a], sizes[pair.b]) for pair in self.scene.pairs)
@@ -314,8 +330,6 @@ class SceneSolver:
         a[:, 6] = b[:, 6] = 1.0
         b[:, :3] = 0.5 * (size_a + size_b) - 0.02 * np.minimum(size_a, size_b)
         self._solver.batch(a, b, size_a=size_a, size_b=size_b)
-        self.sizes_answered_exactly = self._solver.exact_answers
-        """Pairs of sizes that a `mlp` was not trained for."""
         self.gives_patch = not np.isnan(self._solver(a[0], b[0]).volume)
         """Whether contacts have volume and covariance, and not the point alone."""
         self([None] * len(self.scene.moving))
@@ -360,6 +374,9 @@ class SceneSolver:
         """Return the answer to the poses that are set."""
         near, unknown = self._broad_phase()
         pairs = self.scene.pairs
+        if len(near) > self._most_near:
+            raise TooManyNear(f'{len(near)} pairs are near each other: more than '
+                              f'{self._most_near} are not answered')
         stale = [pairs[i] for i in unknown]
         touching: list[tuple[Pair, Contact]] = []
         close: list[tuple[Pair, Contact]] = []

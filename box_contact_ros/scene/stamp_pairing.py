@@ -19,7 +19,8 @@ waiting  no awaited box is left, or                answered  a tick, None for a 
 waiting  one of its boxes leaves the scene         waiting   its pose is dropped, not counted
 waiting  time is set back                          dropped   NO_PARTNER for each pose
 ```
-A tick awaits the boxes that are current or missing. Before the first answer it awaits all boxes.
+A tick awaits the boxes that are current or missing, but none whose newest stamp is more than
+max_age ahead of it. Before the first answer it awaits all boxes.
 ```
 box      event                                     next      effect
 -------  ----------------------------------------  --------  ---------------------------------
@@ -43,7 +44,12 @@ held back, as long as they advance and no box has a newer stamp. The last of AGA
 a new time, with all poses that were held back. Else they are refused. A stream that sends each
 stamp once never begins anew this way, in whatever order it arrives.
 
-Policy `latest` makes a tick of every pose that is not OLD. A box is stale by its newest stamp.
+A stamp is ahead if two other boxes agree on a time, to max_age, and it is more than max_age later.
+Its pose is AHEAD: set aside, and refused unless the others come as far, another box is as far
+ahead, or its box alone gives poses for max_age. So one wrong clock holds up nobody else's contacts.
+
+Policy `latest` makes a tick of every pose that is neither OLD nor AHEAD. A box is stale by its
+newest stamp.
 Why no library does this: docs/decisions/contact-node.md.
 """
 from __future__ import annotations
@@ -73,9 +79,10 @@ MARGIN = 1.2
 FEWEST_STAMPS = 5  # of a box, before its period is known, even if there is a gap among them
 NO_PARTNER = 'dropped: no partner'
 TOO_LATE = 'dropped: tick answered before'
-NEVER = -2**63  # before any stamp [ns]
+NEVER, ALWAYS = -2**63, 2**63  # before and after any stamp [ns]
 REPEATED = 'refused: repeated stamp'
 OLD = 'refused: older than the last'
+AHEAD = 'refused: stamp ahead of the other boxes'
 RESETS = 'time went back'
 
 
@@ -154,6 +161,11 @@ class Pairing(ABC):
         self._deserted = False
         self._held: dict[str, list[tuple[str, StampedPose]]] = {}
         """Poses by box whose stamps were taken before, and what they are counted as so far."""
+        self._aside: dict[str, deque[StampedPose]] = {}  # poses ahead, the last ones, by box
+        self._horizon = NEVER  # up to this stamp none is ahead
+        self._speaker = ''  # who gave the last pose
+        self._since: int | None = None
+        """Its first stamp that is ahead since others gave a pose; NEVER once it may go on alone."""
         self._boxes: dict[str, BoxState] = {}
         self._fixed: dict[str, StampedPose] = {}  # of boxes that no tick waits for
         self._scene = scene
@@ -168,6 +180,8 @@ class Pairing(ABC):
         self._boxes = {box: self._boxes.get(box) or BoxState() for box in scene.streams
                        if box not in self._fixed}
         self._held.clear()
+        self._aside = {box: poses for box, poses in self._aside.items() if box in self._boxes}
+        self._horizon = NEVER
         self._partners = {tuple({pair.a, pair.b} & self._boxes.keys()) for pair in scene.pairs}
 
     def fix(self, box: str, pose: StampedPose) -> list[Tick]:
@@ -190,17 +204,86 @@ class Pairing(ABC):
         """Forget all poses and stamps but of fixed boxes, as when time is set back."""
         self._boxes = {box: BoxState(came=state.came or state.newest != NEVER)
                        for box, state in self._boxes.items()}
-        self._now = NEVER
+        self._now = self._horizon = NEVER
         self._deserted = False
         self._held.clear()
+        self._aside.clear()
 
     def desert(self) -> None:
         """Note that publishers of all boxes have gone: others may begin a new time."""
         self._deserted = True
 
-    @abstractmethod
     def add(self, box: str, pose: StampedPose) -> list[Tick]:
         """Take a pose; return the ticks that can be answered now, in their order."""
+        stamp = pose.stamp
+        if box != self._speaker:
+            self._speaker, self._since = box, None
+        if stamp > self._horizon and stamp > self._limit(box):
+            return self._set_aside(box, pose)
+        if not self._aside:
+            return self._take(box, pose)
+        ticks = self._take_aside({box: stamp}) + self._take(box, pose)
+        return ticks + self._take_aside({other: self._limit(other) for other in self._aside})
+
+    @abstractmethod
+    def _take(self, box: str, pose: StampedPose) -> list[Tick]:
+        """Take a pose that is not ahead, as `add`."""
+
+    def ahead(self) -> list[str]:
+        """Return the boxes whose last poses were ahead."""
+        return list(self._aside)
+
+    def _limit(self, box: str) -> int:
+        """Return the stamp up to which poses of a box are not ahead."""
+        if not self.max_age or len(self._boxes) < 3:
+            self._horizon = ALWAYS
+        elif (agreed := self._agreed(box)) != NEVER:
+            self._horizon = agreed + self.max_age
+        else:
+            return ALWAYS
+        return self._horizon
+
+    def _agreed(self, without: str = '') -> int:
+        """Return the latest newest stamp that another box's is near, to max_age; NEVER: none."""
+        newest = sorted((state.newest for box, state in self._boxes.items()
+                         if box != without and state.newest != NEVER), reverse=True)
+        return next((one for one, other in zip(newest, newest[1:])
+                     if one - other <= self.max_age), NEVER)
+
+    def _set_aside(self, box: str, pose: StampedPose) -> list[Tick]:
+        """Set a pose aside that is ahead; take what is aside if time has moved on."""
+        stamp = pose.stamp
+        self._aside.setdefault(box, deque(maxlen=WAITING_TICKS)).append(pose)
+        self.counts[AHEAD] += 1
+        self.notes[AHEAD] = Note(box, stamp, self._horizon - self.max_age)
+        as_far = [other for other, poses in self._aside.items()
+                  if other != box and abs(poses[-1].stamp - stamp) <= self.max_age]
+        if self._since is None:
+            self._since = stamp
+        if stamp - self._since > self.max_age:
+            self._since = NEVER
+        elif not as_far:
+            return []
+        return self._take_aside(dict.fromkeys([box, *as_far], ALWAYS))
+
+    def _take_aside(self, limits: Mapping[str, int]) -> list[Tick]:
+        """Take the poses of boxes that are aside, up to stamps by box, in the order of stamps."""
+        poses = []
+        for box, limit in limits.items():
+            aside = self._aside.pop(box, ())
+            poses += [(pose.stamp, box, pose) for pose in aside if pose.stamp <= limit]
+            if ahead := [pose for pose in aside if pose.stamp > limit]:
+                self._aside[box] = deque(ahead, maxlen=WAITING_TICKS)
+        self.counts[AHEAD] -= len(poses)
+        if not self._aside:
+            self.notes.pop(AHEAD, None)
+        poses.sort(key=itemgetter(0))
+        return [tick for _, box, pose in poses for tick in self._take(box, pose)]
+
+    def _come_back(self, stamp: int) -> None:
+        """Set the time back to what two boxes agree on, if a stamp is far behind it."""
+        if 0 < self.max_age < self._now - stamp and stamp <= (agreed := self._agreed()) < self._now:
+            self._now = agreed
 
     def stale(self) -> list[str]:
         """Return the boxes without a recent pose, by the newest stamp of all."""
@@ -269,7 +352,7 @@ class Pairing(ABC):
                         for _, pose in held), key=itemgetter(0))
         self.counts.subtract(self.held())
         self._set_back(box, poses[0][0])
-        return [tick for _, box, pose in poses for tick in self.add(box, pose)]
+        return [tick for _, box, pose in poses for tick in self._take(box, pose)]
 
     def _refuse_held(self) -> None:
         """Note the poses that are held back as refused: time goes on."""
@@ -310,7 +393,7 @@ class StampPairing(Pairing):
         before = self._boxes.keys()
         super().set_scene(scene)
         for box in self._boxes.keys() - before:
-            self._boxes[box].joined = self._newest_closed = self._newest_answered
+            self._boxes[box].joined = self._newest_closed = min(self._newest_answered, self._now)
         for key, tick in list(self._waiting.items()):
             tick.poses = {box: pose for box, pose in tick.poses.items() if box in self._boxes}
             if not tick.poses:
@@ -325,7 +408,7 @@ class StampPairing(Pairing):
         self._has_answered = False
         self._newest_answered = self._newest_closed = NEVER
 
-    def add(self, box: str, pose: StampedPose) -> list[Tick]:
+    def _take(self, box: str, pose: StampedPose) -> list[Tick]:
         """Take a pose; return its tick if complete, after those that need wait no longer."""
         stamp = pose.stamp
         state = self._state_at(box, stamp)
@@ -336,7 +419,7 @@ class StampPairing(Pairing):
         elif stamp == state.newest:
             if self._deserted:
                 self._set_back(box, stamp)
-                return self.add(box, pose)
+                return self._take(box, pose)
             self._count(REPEATED, box, stamp)
             return []
         elif kind := self._fault(state, stamp):
@@ -345,6 +428,8 @@ class StampPairing(Pairing):
         state.missing_since = None
         if stamp > self._now:
             self._advance(stamp)
+        else:
+            self._come_back(stamp)
         waiting = self._waiting
         key = self._nearest_tick(box, stamp) if self.tolerance else stamp
         tick = waiting.get(key)
@@ -359,7 +444,7 @@ class StampPairing(Pairing):
             self.counts[NO_PARTNER] += 1
         tick.poses[box] = pose
         ticks = self._give_up(key) if len(waiting) > 1 else []
-        if len(tick.poses) == len(self._boxes) or not self._is_awaiting(tick):
+        if len(tick.poses) == len(self._boxes) or not self._is_awaiting(key, tick):
             ticks.append(self._answer(key))
             if not self._has_answered:
                 self._has_answered = self._awaits_less = True
@@ -426,11 +511,16 @@ class StampPairing(Pairing):
         since = state.missing_since
         return since is not None and 0 < self.max_age < now - since
 
-    def _is_awaiting(self, tick: WaitingTick) -> bool:
-        """Return whether a tick waits for a box that is neither stale nor unseen."""
+    def _is_awaiting(self, stamp: int, tick: WaitingTick) -> bool:
+        """Return whether a tick waits for a box that is neither stale nor unseen, nor far ahead."""
+        now, max_age = self._now, self.max_age
+        if 0 < 2 * max_age < now - stamp:  # time as it is near the tick: another's may be far off
+            now = max((state.newest for state in self._boxes.values()
+                       if state.newest <= stamp + 2 * max_age), default=stamp)
         for box, state in self._boxes.items():
             if (box not in tick.poses and (state.newest != NEVER or not self._has_answered)
-                    and not self._is_stale(state, self._now)):
+                    and not 0 < max_age < state.newest - stamp
+                    and not self._is_stale(state, now)):
                 return True
         return False
 
@@ -439,7 +529,7 @@ class StampPairing(Pairing):
         over = []
         for key, tick in self._waiting.items():  # as they began
             if tick.number + WAITING_TICKS < self._begun or (
-                    self._awaits_less and not self._is_awaiting(tick)):
+                    self._awaits_less and not self._is_awaiting(key, tick)):
                 over.append(key)
             elif not self._awaits_less:
                 break
@@ -502,7 +592,7 @@ class LatestPairing(Pairing):
     publishers that do not stamp.
     """
 
-    def add(self, box: str, pose: StampedPose) -> list[Tick]:
+    def _take(self, box: str, pose: StampedPose) -> list[Tick]:
         """Take a pose; return the tick that it makes, once both boxes of a pair have been seen."""
         stamp = pose.stamp
         state = self._state_at(box, stamp)
@@ -517,6 +607,7 @@ class LatestPairing(Pairing):
                 self._refuse_held()
         state.newest, state.last = stamp, pose
         self._now = max(self._now, stamp)
+        self._come_back(stamp)
         if not self._is_evaluable({box for box, state in self._boxes.items() if state.last}):
             return []
         return [self._tick({box: None if self._is_stale(other, stamp) else other.last

@@ -42,7 +42,7 @@ from box_contact_ros.apps.recording.bag_file import (
 from box_contact_ros.apps.recording.record import RecordNode
 from box_contact_ros.apps.ros_client import ANSWERS, array_message, line_marker, pose_message
 from box_contact_ros.node.messages import make_cloud, make_header, read_cloud
-from box_contact_ros.reports.accuracy import LIMITS
+from box_contact_ros.reports.accuracy import limit_of
 from box_contact_ros.resources import resource_path
 from box_contact_ros.scene.files.scene_file import read_scene
 from box_contact_ros.scene.scene_solver import SceneSolver
@@ -141,7 +141,7 @@ def test_recorded_contacts_agree_with_the_exact_solver():
             assert [*point, *normal] == first_row(rows)[:6].tolist()
             errors.append(np.linalg.norm(point - contact.point))
     assert len(errors) == COUNTS['/contact/point']
-    assert 100.0 * max(errors) / CONTAINER[0] < LIMITS['containers'].worst
+    assert 100.0 * max(errors) / CONTAINER[0] < limit_of('point', 'containers')
 
 
 def test_it_can_be_made_again(tmp_path):

@@ -138,7 +138,8 @@ def nodes(tmp_path_factory: pytest.TempPathFactory,
           served(client, SoupNode(client.context, parameter_overrides=[
               *sizes, folder, Parameter('divisions', value=1)])) as soup,
           served(client, ViewNode(client.context, 'contact_node')) as view,
-          served(client, MarkersNode(client.context, parameter_overrides=sizes)) as markers):
+          served(client, MarkersNode(client.context, parameter_overrides=[
+              *sizes, folder])) as markers):
         yield contact, soup, view, markers, client
     client.close()
     gc.unfreeze()  # what the contact node keeps from being collected

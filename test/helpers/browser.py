@@ -16,7 +16,7 @@ import subprocess
 import tempfile
 import time
 import urllib.request
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -87,14 +87,16 @@ class Tab:
 
 
 @contextmanager
-def open_page(url: str, width: int = 1280, height: int = 720) -> Iterator[Tab]:
-    """Return the page in a browser of its own, which is ended in the end."""
+def open_page(url: str, width: int = 1280, height: int = 720, *, flags: Sequence[str] = (),
+              ) -> Iterator[Tab]:
+    """Return the page in a browser of its own, with more flags, which is ended in the end."""
     with tempfile.TemporaryDirectory(prefix='box_contact_browser_',
                                      ignore_cleanup_errors=True) as profile:
         browser = subprocess.Popen(
-            [chromium(), *FLAGS, f'--user-data-dir={profile}', f'--window-size={width},{height}',
-             'about:blank'], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL, start_new_session=True)
+            [chromium(), *FLAGS, *flags, f'--user-data-dir={profile}',
+             f'--window-size={width},{height}', 'about:blank'],
+            stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+            start_new_session=True)
         try:
             with connect(_tab_address(browser, Path(profile)), max_size=None, proxy=None) as socket:
                 tab = Tab(socket)

@@ -186,10 +186,10 @@ def test_parameters_have_descriptions(node):
     ({'model': 'paper', 'size_a': '[1.0, 2.0, 3.0]', 'size_b': '[1.0, 2.0, 3.0]'},
      "use model 'exact'"),
     ({'model': 'paper', 'weights': '/nowhere.safetensors'}, 'does not exist'),
-    ({'size_a': '[2.0,'}, "Couldn't parse")])
+    ({'size_a': '[2.0,'}, 'is half a list'), ({'size_a': '{2.0'}, "Couldn't parse")])
 def test_a_bad_start_is_one_clear_line(program, parameters, words):
     running = program('contact_node', *arguments(**parameters))
-    assert running.wait(120) == 1
+    assert running.wait(120) == (2 if 'half' in words else 1)
     assert words in running.output
     assert 'Traceback' not in running.output
 
@@ -216,7 +216,7 @@ def test_interrupted_twice(program, pause):
 
 
 def test_weights_that_nobody_reads_are_said(capfd):
-    """Otherwise a file that was trained for the scene does nothing, quietly."""
+    """Otherwise a file does nothing, quietly."""
     given = overrides(weights='mlp-yard.safetensors')
     with serving(lambda context: ContactNode(context, parameter_overrides=given)) as node:
         assert "'exact' uses no weights: 'mlp-yard.safetensors'" in capfd.readouterr().err
@@ -224,10 +224,6 @@ def test_weights_that_nobody_reads_are_said(capfd):
         assert result.successful
         said = capfd.readouterr().err
         assert "changed weights: model 'exact'" in said and 'uses no weights' not in said
-        node.set_parameters([Parameter('model', value='mlp')])
-        assert 'the weights are not for' not in capfd.readouterr().err
-        node.set_parameters([Parameter('size_a', value=[1.0, 30.0, 1.0])])  # aspect 30
-        assert 'the weights are not for: 1' in capfd.readouterr().err
 
 
 def test_parameters_explain_themselves():

@@ -21,6 +21,8 @@ from box_contact_ros.apps.bench.answer_log import first_row, touch_in
 from box_contact_ros.node.message_bytes import KEPT_FRAMES, RawMessages
 from box_contact_ros.node.messages import (
     CLOUD_ROW,
+    FRAME_LIMIT,
+    MOST_ROWS,
     PATCH_FIELDS,
     ContactsMessage,
     Refused,
@@ -251,6 +253,40 @@ def test_a_wrong_field_is_refused_by_its_name(name):
 def test_a_cloud_that_is_cut_short_is_refused():
     with pytest.raises(Refused, match='2 rows of 128 bytes are more than the 255 bytes'):
         read_cloud(as_message(some_rows(), data=some_rows().tobytes()[:-1]))
+
+
+@pytest.mark.parametrize('long', ['n' * (FRAME_LIMIT + 1), '港' * 100, 'n' * 5_000_000])
+def test_names_that_a_stranger_made_long_are_refused(long):
+    """Of frames, fields and pairs, unless the scene has a pair of that name."""
+    answer = Answer([(Pair(1, long, 'a', 'b'), Contact(
+        True, -0.1, np.ones(3), np.ones(3), 1.0, np.eye(3)))], [], 1)
+    stale = Answer([], [Pair(1, long, 'a', 'b')], 0)
+    messages = TypedMessages()
+    for kind in ('cloud', 'contacts'):
+        messages.begin(0, long)
+        with pytest.raises(Refused, match=f'frame_id has more than {FRAME_LIMIT} bytes'):
+            read_contacts(getattr(messages, kind)(Answer([], [], 0)))
+    messages.begin(0, 'map')
+    for named in (answer, stale):
+        with pytest.raises(Refused, match='pair has more than'):
+            read_contacts(messages.contacts(named))
+        assert read_contacts(messages.contacts(named), {long: 7})['pair'] == [7]
+    cloud = messages.cloud(answer)
+    cloud.fields = [*cloud.fields, PointField(name=long, count=1)]
+    with pytest.raises(Refused, match='field has more than'):
+        read_contacts(cloud)
+
+
+def test_as_many_contacts_as_the_scene_has_pairs():
+    """A stranger may send any number, which took its readers seconds a message."""
+    stale = Answer([], [Pair(n, f'p{n}', 'a', 'b') for n in range(MOST_ROWS + 1)], 0)
+    ids = {pair.name: pair.id for pair in stale.stale}
+    messages = TypedMessages()
+    messages.begin(0, 'map')
+    for message in (messages.contacts(stale), messages.cloud(stale)):
+        with pytest.raises(Refused, match=f'{MOST_ROWS + 1} contacts in a message are more than'):
+            read_contacts(message)
+        assert len(read_contacts(message, ids)) == MOST_ROWS + 1
 
 
 def test_an_empty_cloud_has_no_rows():

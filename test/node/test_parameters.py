@@ -73,6 +73,15 @@ def test_an_unknown_parameter_after_p_ends_the_program(args, refused, capsys):
     assert f"unknown parameter '{refused}'; the nearest name is model" in capsys.readouterr().err
 
 
+def test_a_list_with_blanks_gets_a_hint(capsys):
+    """A shell cuts `-p size_a:=[1, 2, 3]` in three."""
+    settings = {'size_a': parameters.Setting((1.0,), 'a test', parameters.size)}
+    with pytest.raises(SystemExit, match='2'):
+        parameters.answer_help('node', 'Test.', settings,
+                               ['--ros-args', '-p', 'size_a:=[1,', '2,', '3]'])
+    assert 'write it without blanks, as in size_a:=[1,2,3]' in capsys.readouterr().err
+
+
 @pytest.mark.parametrize('change, lost', [(2, 2), (0, 0), (-1, 0)])
 def test_publishers_that_show_no_life_are_counted(change, lost):
     """Publishers that came back are none that are lost."""

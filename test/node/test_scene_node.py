@@ -30,6 +30,7 @@ from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import PATCH_FIELDS, make_header, read_contacts
 from box_contact_ros.node.rclpy_workarounds import RCLError
 from box_contact_ros.node.runtime import LATCHED_QOS
+from box_contact_ros.node.topics import scene_topics
 from box_contact_ros.scene.files.scene_file import parse_scene
 
 MS = 1_000_000  # ns
@@ -112,6 +113,19 @@ def node(client):
 def set_scene(node, text):
     result, = node.set_parameters([Parameter('scene', value=text)])
     return result
+
+
+def test_ids_that_are_given_away_have_a_limit(client, monkeypatch):
+    """A node remembers each, and a stranger's scenes may have new ones for ever."""
+    monkeypatch.setattr(scene_topics, 'MOST_IDS', 6)
+    text = '{{boxes: {{a: {{size: [1, 1, 1]}}, b: {{size: [1, 1, 1]}}}}, pairs: [{}]}}'
+    with scene_node() as node:
+        first = len({pair.id for pair in node._evaluator.solver.scene.pairs})
+        for number in range(6 - first):
+            assert set_scene(node, text.format(f'{{a: a, b: b, id: {100 + number}}}')).successful
+        result = set_scene(node, text.format('{a: a, b: b, id: 200}'))
+        assert not result.successful and '7 ids, of at most 6' in result.reason
+        assert set_scene(node, text.format('{a: a, b: b, id: 100}')).successful
 
 
 @pytest.mark.parametrize('serialization', ['raw', 'typed'])

@@ -14,14 +14,13 @@ from pathlib import Path
 
 import pytest
 from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import ChangeState, GetState
-from raw_client import APART, ORIGIN, RawClient
-from rcl_interfaces.msg import Log, Parameter, ParameterType, ParameterValue
-from rcl_interfaces.srv import GetParameters, SetParameters, SetParametersAtomically
-from rclpy.qos import QoSProfile
-from ros_client import PATIENCE
+from lifecycle_msgs.srv import ChangeState
+from raw_client import APART, ORIGIN
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+from rcl_interfaces.srv import GetParameters, SetParameters
+from stranger import Stranger
 
-from box_contact_ros.node.contact_node import LARGEST_TEXT
+from box_contact_ros.node.named_files import LARGEST_TEXT
 from box_contact_ros.resources import OpenFiles, resource_path
 
 SECRET = 'hunter2'
@@ -30,44 +29,6 @@ SCENE = """\
 boxes: {load: {size: [2, 2, 2]}, lorry: {size: [2, 2, 2]}}
 pairs: [{id: 0, name: load_lorry, a: load, b: lorry}]
 """
-
-
-class Stranger(RawClient):
-    """Anybody on the network: calls services of the node, and reads /rosout."""
-
-    def __init__(self):
-        super().__init__()
-        self.heard_logs: list[str] = []
-        self.node.create_subscription(Log, '/rosout', lambda log: self.heard_logs.append(log.msg),
-                                      QoSProfile(depth=1000))
-
-    def call(self, kind, name, **fields):
-        """Return the reply of a service of the node."""
-        service = self.client_of(kind, f'/contact_node/{name}')
-        # It may be ready before the way back is: a reply is lost then, and the request made again.
-        for _ in range(3):
-            future = service.call_async(kind.Request(**fields))
-            if self.spin(future.done, PATIENCE / 3):
-                break
-        assert future.done(), 'no reply'
-        self.node.destroy_client(service)
-        return future.result()
-
-    def set(self, **values):
-        """Set parameters together, strings or flags; return the result."""
-        return self.call(SetParametersAtomically, 'set_parameters_atomically', parameters=[
-            Parameter(name=name, value=ParameterValue(
-                type=ParameterType.PARAMETER_BOOL if isinstance(value, bool)
-                else ParameterType.PARAMETER_STRING,
-                **{'bool_value' if isinstance(value, bool) else 'string_value': value}))
-            for name, value in values.items()]).result
-
-    def ask_for(self, transition):
-        """Return whether a transition was made."""
-        return self.call(ChangeState, 'change_state', transition=Transition(id=transition)).success
-
-    def state(self):
-        return self.call(GetState, 'get_state').current_state.label
 
 
 @pytest.fixture
@@ -186,7 +147,7 @@ def test_files_that_are_open(start, stranger, tmp_path):
                          ('../named.yaml', True), ('../other.yaml', False)):
         assert stranger.set(scene=str(path)).successful is opened, path
     assert stranger.set(scene='', model='mlp', weights=str(
-        resource_path('weights', 'mlp-edges-64.safetensors'))).successful
+        resource_path('weights', 'mlp.safetensors'))).successful
 
 
 def test_open_directories(tmp_path, monkeypatch):

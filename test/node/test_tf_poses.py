@@ -287,6 +287,23 @@ def test_transforms_that_are_none(client):
         (at, by_pair(message)) for at, message in client.clouds.items()) if at < stamp)
 
 
+@pytest.mark.parametrize('static', [True, False])
+def test_names_and_numbers_of_strangers_frames_are_bounded(client, monkeypatch, static):
+    """tf2 forgets no frame. Those that are known go on, and are answered."""
+    monkeypatch.setattr(tf_poses, 'MOST_FRAMES', 20)
+    node = client.start(max_age=0.0)
+    client.move(transform('map', 'post', POST), static=True)
+    client.move(transform('map', 'hook', LOAD, START))
+    client.move(*(transform(parent, child, LOAD, START) for parent, child in (
+        ('map', 'x' * 256), ('x' * 256, 'y'))), static=static)
+    assert client.spin(lambda: node.counts[tf_poses.BAD] == 2)
+    client.move(*(transform('map', f'f{n}', LOAD, START) for n in range(100)), static=static)
+    assert client.spin(lambda: node.counts[tf_poses.BAD] == 2 + 100 - 20 + 3)
+    client.move(transform('map', 'hook', LOAD, START + 1))
+    client.pose('/yard/lorry/pose', LORRY, START + 1)
+    assert 'load_lorry' in client.answer(START + 1)
+
+
 def test_time_goes_back(client):
     """A recording begins anew: it is answered from its second tick, as tf2 would not."""
     node = client.start()

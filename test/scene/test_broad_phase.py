@@ -4,6 +4,9 @@
 """The broad phase of scenes with many pairs: a sweep finds what a test of every pair finds."""
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import numpy as np
 import poses
 import pytest
@@ -12,7 +15,7 @@ from box_contact_ros import ContactSolver
 from box_contact_ros.core import native
 from box_contact_ros.scene import scene_solver
 from box_contact_ros.scene.files.scene_file import parse_scene
-from box_contact_ros.scene.scene_solver import Box, Pair, Scene, SceneSolver
+from box_contact_ros.scene.scene_solver import Box, Pair, Scene, SceneSolver, TooManyNear
 
 NEAR = 1e-9
 """Share of the largest coordinate or extent up to which bounding boxes count as near."""
@@ -68,7 +71,7 @@ def test_boxes_that_are_near(kind, upright):
         low, high = np.full((2, n, 3), np.nan)
         none = np.zeros(0, dtype=np.int64)
         native.near_pairs(pose, size, np.arange(n), low, high, known, none, none, none, none)
-        near = [tuple(pair) for pair in native.near_boxes(low, high, known, moves)]
+        near = [tuple(pair) for pair in native.near_boxes(low, high, known, moves, n * n)]
         scale = np.max([abs(low), abs(high), high - low], axis=(0, 2))
         gap = (low[:, None] - high).max(axis=2)
         gap = np.maximum(np.maximum(gap, gap.T), 0.0)
@@ -141,3 +144,56 @@ def test_many_pairs_are_swept_and_few_are_not():
     assert SceneSolver(parse_scene(crowd), model='exact')._is_swept
     star = crowd.replace("{a: '*'", '{a: m01')
     assert not SceneSolver(parse_scene(star), model='exact')._is_swept
+
+
+CROWD = """
+import resource
+import numpy as np
+from box_contact_ros.scene.scene_solver import Box, Pair, Scene, SceneSolver, TooManyNear
+
+boxes = {f'b{n}': Box(f'b{n}', (1.0, 1.0, 1.0)) for n in range(8000)}
+names = list(boxes)
+pairs = tuple(Pair(n, f'p{n}', names[n % 8000], names[(n + 1 + n // 8000) % 8000])
+              for n in range(65 * 8000))
+solver = SceneSolver(Scene(boxes, pairs, pose_array=True), model='exact', most_near=1000)
+before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+try:
+    solver(np.tile([0.0, 0, 0, 0, 0, 0, 1], (8000, 1)))
+except TooManyNear as error:
+    print(error, (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) // 1024)
+"""
+
+
+def test_a_crowd_in_one_place_costs_no_memory():
+    """8,000 boxes, of which 65 pairs each are listed, are in one place: a tick took 6.6 s and 1 GB.
+
+    The sweep gives up, and each listed pair is tested.
+    """
+    ended = subprocess.run([sys.executable, '-c', CROWD], capture_output=True, text=True)
+    words, _, megabytes = ended.stdout.strip().rpartition(' ')
+    assert words == ('520000 pairs are near each other: more than 1000 are not answered'), ended
+    assert int(megabytes) < 150
+
+
+@pytest.mark.parametrize('kind', KINDS)
+def test_a_sweep_that_gives_up_changes_no_answer(kind, monkeypatch):
+    rng = np.random.default_rng(4)
+    size, pose = made(rng, kind, 40, False)
+    boxes = {f'b{n}': Box(f'b{n}', tuple(extents)) for n, extents in enumerate(size.tolist())}
+    scene = Scene(boxes, tuple(Pair.between(f'b{n}', f'b{m}') for n in range(40)
+                               for m in range(n)), pose_array=True)
+    monkeypatch.setattr(scene_solver, 'SWEPT_FROM', 0)
+    swept = SceneSolver(scene, model='exact')(pose)
+    monkeypatch.setattr(scene_solver, 'SWEPT_MOST', 10)
+    tested = SceneSolver(scene, model='exact')(pose)
+    assert swept.near == tested.near and [pair for pair, _ in swept.touching] == [
+        pair for pair, _ in tested.touching]
+
+
+def test_more_pairs_than_are_to_be_answered():
+    scene = Scene({name: Box(name, (1.0, 1.0, 1.0)) for name in 'abc'},
+                  (Pair.between('a', 'b'), Pair.between('b', 'c')), pose_array=True)
+    place = np.tile([0.0, 0, 0, 0, 0, 0, 1], (3, 1))
+    assert len(SceneSolver(scene, model='exact', most_near=2)(place).touching) == 2
+    with pytest.raises(TooManyNear, match='2 pairs are near each other: more than 1 are not'):
+        SceneSolver(scene, model='exact', most_near=1)(place)

@@ -269,13 +269,6 @@ def test_two_boxes_is_the_solver():
             assert np.array_equal(answer.touching[0][1].point, wanted.point)
 
 
-@pytest.mark.parametrize(('size', 'exactly'), [(12.0, 0), (19.9, 0), (20.1, 1)])
-def test_sizes_that_a_mlp_was_not_trained_for(size, exactly):
-    """Cubes up to 20 times as large as the other are within its range, whatever is asked first."""
-    solver = SceneSolver(two_boxes((1, 1, 1), (size,) * 3), model='mlp')
-    assert solver.sizes_answered_exactly == exactly
-
-
 def test_models_that_do_not_know_a_size_refuse_the_scene():
     with pytest.raises(ValueError, match='model'):
         SceneSolver(yard(1, 2, 2), model='nothing')

@@ -15,11 +15,9 @@ from typing import NamedTuple
 import numpy as np
 import poses
 import pytest
-from mlp_choices import solve_with_choices
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.core import DEPTH_FLOOR
-from box_contact_ros.resources import resource_path
 from box_contact_ros.scene.pose_sets import (
     SETS,
     Pairs,
@@ -29,14 +27,13 @@ from box_contact_ros.scene.pose_sets import (
     turns,
 )
 from box_contact_ros.solver.contact import Contacts
-from box_contact_ros.solver.weights_file import Network, load_weights
 
 UNIT = (1.0, 1.0, 1.0)
-NETWORK = load_weights(resource_path('weights', 'mlp.safetensors')).networks['point']
 
 K = 1.0
-"""|Δpoint| ≤ K · |Δpose| · size / depth, wherever the network is asked the same way before and
-after: see docs/explanation/motion.md, which has the figures measured."""
+"""|Δpoint| ≤ K · |Δpose| · size / depth: see docs/explanation/motion.md, with figures measured."""
+STEP = 1e-3
+"""What a step of `mlp` may have beyond that [of the smaller box's longest edge]."""
 
 
 class Series(NamedTuple):
@@ -96,6 +93,24 @@ def slopes(one: Pairs, other: Pairs, before: Contacts, after: Contacts) -> np.nd
     way = pose_steps(one, other)
     way[way == 0.0] = np.nan  # no step at all, or one that float64 rounds to none
     return np.linalg.norm(after.point - before.point, axis=1) / way * depth / size
+
+
+def slopes_per_step(one: Pairs, other: Pairs, before: Contacts, after: Contacts) -> np.ndarray:
+    """(n,) depth / |Δpose|: what a step of one counts in `slopes`, but for its unit."""
+    depth = np.maximum(-np.maximum(before.separation, after.separation),
+                       DEPTH_FLOOR * largest(one))
+    way = pose_steps(one, other)
+    way[way == 0.0] = np.nan
+    return depth / way
+
+
+def assert_keeps_to_its_slope(one: Pairs, other: Pairs, before: Contacts, after: Contacts) -> None:
+    """Check the law of K with a STEP more, in all steps between two contacts."""
+    slope = slopes(one, other, before, after)
+    edge = np.minimum(one.size_a.max(axis=1), one.size_b.max(axis=1))
+    step = STEP * edge * slopes_per_step(one, other, before, after) / largest(one)
+    known = np.isfinite(slope)
+    assert np.all((slope <= K + step)[known])
 
 
 def frames(whole: tuple, motions: int) -> tuple:
@@ -230,24 +245,14 @@ def test_frames_know_no_history(series):
 
 
 def test_the_point_keeps_to_its_slope(series):
-    """The law of K from frame to frame: of `exact` always.
-
-    Of `mlp` between frames in which the network is asked the same way, where the point moves by
-    more than float32 rounds: a load at rest moves by 1e-14 m.
-    """
+    """The law of K from frame to frame: of `exact`, and of `mlp` with a STEP more."""
     name, motion = series
     pairs, motions, _ = motion
     one, other = frames(pairs, motions)
     exact = slopes(one, other, *frames(motion.solve('exact'), motions))
-    found, choices = solve_with_choices(NETWORK, pairs)
-    before, after = frames(choices, motions)
-    same = before.equal(after) & (
-        steps(found, motions) > np.finfo(np.float32).eps * largest(one))
-    slope = slopes(one, other, *frames(found, motions))
-    print(f'{name}: K of exact {np.nanmax(exact):.2f}, of MLP {np.nanmax(slope[same]):.2f} '
-          f'in {100 * same[np.isfinite(slope)].mean():.2f} % of the frames')
+    print(f'{name}: K of exact {np.nanmax(exact):.2f}')
     assert np.nanmax(exact) <= K
-    assert np.nanmax(slope[same]) <= K
+    assert_keeps_to_its_slope(one, other, *frames(motion.solve('mlp'), motions))
 
 
 # --- how far the point steps ----------------------------------------------------------------------
@@ -330,13 +335,14 @@ def small_steps(name: str) -> tuple[Pairs, Pairs]:
 
 
 @pytest.mark.parametrize('name', SETS)
-def test_exact_is_continuous(name):
-    """|Δpoint| ≤ K · |Δpose| · size / depth, in every step between two contacts."""
+def test_points_are_continuous(name):
+    """|Δpoint| ≤ K · |Δpose| · size / depth, and for `mlp` STEP · edge more, in every step."""
     pairs, moved = small_steps(name)
     slope = slopes(pairs, moved, solve('exact', pairs), solve('exact', moved))
     print(f'{name}: K {np.nanmax(slope):.2f} in {np.isfinite(slope).sum()} steps')
     assert np.isfinite(slope).sum() > 0.9 * N
     assert np.nanmax(slope) <= K
+    assert_keeps_to_its_slope(pairs, moved, solve('mlp', pairs), solve('mlp', moved))
 
 
 def patch_slopes(one: Pairs, other: Pairs, before: Contacts, after: Contacts) -> np.ndarray:
@@ -352,84 +358,25 @@ def patch_slopes(one: Pairs, other: Pairs, before: Contacts, after: Contacts) ->
     return np.stack(moved, axis=1) * (depth / pose_steps(one, other))[:, None]
 
 
-K_PATCH = 3.0, 6.0
-"""Of `exact` and `mlp`. A corner's volume is as the cube of its depth, hence three for `exact`.
-Measured of `mlp`: 4.9."""
+K_PATCH = 3.0
+"""A corner's volume is as the cube of its depth, hence three."""
+PATCH_STEP = 0.01, 0.03
+"""Largest steps of `mlp` [of the volume, and of the covariance's trace]."""
 
 
 @pytest.mark.parametrize('name', SETS)
-def test_patches_are_continuous_wherever_the_choices_are_equal(name):
-    """|Δvolume| ≤ K_PATCH · volume · |Δpose| / depth, and so for the covariance by its trace."""
+def test_patches_are_continuous(name):
+    """|Δvolume| ≤ K_PATCH · volume · |Δpose| / depth, and so for the covariance by its trace.
+
+    For `mlp` PATCH_STEP more.
+    """
     pairs, moved = small_steps(name)
     exact = patch_slopes(pairs, moved, solve('exact', pairs), solve('exact', moved))
-    before, chosen = solve_with_choices(NETWORK, pairs)
-    after, chosen_then = solve_with_choices(NETWORK, moved)
-    same = before.colliding & after.colliding & chosen.equal(chosen_then)
-    slope = patch_slopes(pairs, moved, before, after)[same]
-    print(f'{name}: exact {exact[same].max(axis=0)}, mlp {slope.max(axis=0)}')
-    assert same.mean() > 0.9
-    assert exact[same].max() <= K_PATCH[0] and slope.max() <= K_PATCH[1]
-
-
-def walked(name: str, network: Network = NETWORK) -> tuple[np.ndarray, np.ndarray]:
-    """Slopes of small steps between two contacts, and whether the network was asked alike."""
-    pairs, moved = small_steps(name)
-    before, chosen = solve_with_choices(network, pairs)
-    after, chosen_then = solve_with_choices(network, moved)
-    both = before.colliding & after.colliding
-    return slopes(pairs, moved, before, after)[both], chosen.equal(chosen_then)[both]
-
-
-@pytest.mark.parametrize('name', SETS)
-def test_continuous_wherever_the_choices_are_equal(name):
-    """|Δpoint| ≤ K · |Δpose| · size / depth."""
-    slope, same = walked(name)
-    print(f'{name}: K {slope[same].max():.2f} in {100 * same.mean():.1f} % of {len(slope)} steps; '
-          f'in the others {slope[~same].max():.3g}')
-    assert len(slope) > 0.9 * N
-    assert same.mean() > 0.998  # the law is about almost all steps
-    assert slope[same].max() <= K
-
-
-def test_where_choices_change_the_point_steps():
-    """The law is not one of every step, and the choices are what it takes."""
-    slope, same = walked('tilted stacks')
-    assert slope[~same].max() > 1.5 * K
-
-
-def test_a_rougher_network_breaks_the_law():
-    """Weights that are all ten times as large make the point steeper than K.
-
-    It is still continuous and inside both boxes.
-    """
-    rough = Network([(10.0 * weight, 10.0 * bias) for weight, bias in NETWORK.layers])
-    slope, same = walked('containers', rough)
-    assert slope[same].max() > 1.5 * K
-
-
-def test_choices_are_those_of_the_answer():
-    """Solved with choices or without: the same contacts; outside the range no network is asked."""
-    pairs = SETS['random sizes'](np.random.default_rng(4), 1000)
-    deep = pairs._replace(pose_b=pairs.pose_b.copy())
-    deep.pose_b[::3, :3] = deep.pose_a[::3, :3]
-    found, choices = solve_with_choices(NETWORK, deep)
-    for one, other in zip(found, solve('mlp', deep)):
-        assert np.array_equal(one, other, equal_nan=True)
-    assert not choices.network[::3].any() and choices.network[1::3].all()
-    assert choices.equal(choices)[1::3].all() and not choices.equal(choices)[::3].any()
-
-
-def test_each_choice_counts():
-    """Two answers that differ in one choice are not asked alike."""
-    _, choices = solve_with_choices(NETWORK, SETS['random cubes'](np.random.default_rng(4), 1000))
-    assert choices.equal(choices).all()
-    for name, chosen in zip(choices._fields, choices):
-        assert not choices.equal(choices._replace(**{name: ~chosen})).any(), name
-
-
-def test_a_batch_with_a_bad_pose_is_refused():
-    """No choices of a pair that is none."""
-    pairs = SETS['random cubes'](np.random.default_rng(4), 10)
-    pairs.pose_b[3, 0] = np.nan
-    with pytest.raises(ValueError, match='row 3 is refused'):
-        solve_with_choices(NETWORK, pairs)
+    before, after = solve('mlp', pairs), solve('mlp', moved)
+    slope = patch_slopes(pairs, moved, before, after)
+    step = np.multiply.outer(slopes_per_step(pairs, moved, before, after), PATCH_STEP)
+    both = np.isfinite(slope).all(axis=1) & before.colliding & after.colliding
+    print(f'{name}: exact {exact[both].max(axis=0)}, mlp {slope[both].max(axis=0)}')
+    assert both.mean() > 0.9
+    assert exact[both].max() <= K_PATCH
+    assert np.all((slope <= K_PATCH + step)[both])

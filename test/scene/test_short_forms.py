@@ -7,6 +7,7 @@ from __future__ import annotations
 import resource
 import time
 import zlib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from box_contact_ros.scene.files import short_forms
+from box_contact_ros.scene.files.limits import FOREIGN, MOST_STREAMS, OWN
 from box_contact_ros.scene.files.scene_check import meaning
 from box_contact_ros.scene.files.scene_file import (
     SceneError,
@@ -216,10 +218,43 @@ def test_what_grows_without_bound_is_refused_before_it_is_built(text, words):
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - memory < 100_000  # KiB
 
 
-def test_comparisons_have_a_limit(monkeypatch):
-    monkeypatch.setattr(short_forms, 'MOST_COMPARISONS', 20)
+def test_comparisons_have_a_limit():
     with pytest.raises(SceneError, match=r'pairs\[1\].moving: more than 20 names'):
-        parse_scene(FLEET + "  - {moving: 'm*', fixed: all}\n")
+        parse_scene(FLEET + "  - {moving: 'm*', fixed: all}\n",
+                    limits=replace(OWN, comparisons=20))
+
+
+def fleet_of(count, *, array=False, pairs='{a: a01, b: a02}'):
+    return (f'{{boxes: {{a: {{size: [1, 1, 1], count: {count}}}}}, '
+            f'{"poses: array, " if array else ""}pairs: [{pairs}]}}')
+
+
+def test_streams_have_a_limit():
+    """A line asked every listener for a hundred thousand subscriptions."""
+    many, all_of_them = MOST_STREAMS + 1, "{a: 'a*', b: a01}"
+    assert len(parse_scene(fleet_of(MOST_STREAMS, pairs=all_of_them)).sources) == MOST_STREAMS
+    with pytest.raises(SceneError, match=f'{many} boxes have a topic .* set poses: array'):
+        parse_scene(fleet_of(many, pairs=all_of_them))
+    assert len(parse_scene(fleet_of(many, pairs=all_of_them, array=True)).moving) == many
+    frames = ', '.join(f'b{n}: {{size: [1, 1, 1], frame: f{n}}}' for n in range(many))
+    with pytest.raises(SceneError, match=f'{many} boxes have a topic or a frame'):
+        parse_scene(f"{{frame_id: map, boxes: {{{frames}}}, pairs: [{{a: 'b*', b: b0}}]}}")
+
+
+@pytest.mark.parametrize('text, words', [
+    ('{boxes: {' + ','.join(f'"k{n}":{{}}' for n in range(390_000)) + '}, pairs: []}',
+     'more than 100000 values and brackets'),
+    ('{boxes: [' + 1_190_000 * '1,' + '1], pairs: []}', 'more than 100000 values'),
+    (fleet_of(100_000, array=True), 'boxes: 100000 boxes are more than 10000'),
+    (fleet_of(1000, array=True, pairs="{a: 'a*', b: 'a*'}"),
+     'patterns of 1000000 pairs of boxes: more than 40000')],
+    ids=['keys', 'numbers', 'boxes', 'pairs'])
+def test_a_scene_of_a_stranger_is_refused_within_a_second(text, words):
+    """Each of these took its reader ten seconds or hundreds of megabytes, and now a share."""
+    started = time.process_time()
+    with pytest.raises(SceneError, match=words):
+        parse_scene(text, limits=FOREIGN)
+    assert time.process_time() - started < 1.0
 
 
 # --- scenes written to files ----------------------------------------------------------------------

@@ -13,6 +13,7 @@ import pytest
 from box_contact_ros.scene.scene_solver import Box, Pair, Scene, two_boxes
 from box_contact_ros.scene.stamp_pairing import (
     AGAIN,
+    AHEAD,
     NEVER,
     NO_PARTNER,
     OLD,
@@ -497,3 +498,108 @@ def test_fixed_boxes_alone_make_a_tick_when_they_come():
     pairing = StampPairing(scene('ab', ['ab']))
     assert pairing.fix('a', pose(NEVER)) == []
     assert len(pairing.fix('b', pose(NEVER))) == len(pairing.fix('a', pose(NEVER))) == 1
+
+
+HOUR = 3600 * 10**9
+
+
+def play(pairing, boxes, stamps_of_ticks):
+    """Give a pose of each box at each stamp; return the stamps that are answered, as they come."""
+    return [(stamp, [next(entry.stamp for entry in tick if entry) for tick in pairing.add(
+        box, pose(stamp))]) for stamp in stamps_of_ticks for box in boxes]
+
+
+def answered_at_once(played):
+    """Return the stamps whose tick is answered at the last of their poses, and no other is."""
+    return [stamp for stamp, ticks in played if ticks == [stamp]]
+
+
+@pytest.mark.parametrize('begins', [0, 50])
+@pytest.mark.parametrize('ahead', [HOUR, 10**18, 4 * RESET])
+def test_a_silent_box_that_is_ahead_once_costs_the_others_nothing(begins, ahead):
+    """Box c gives one pose an hour ahead: a and b are answered as where it gives none.
+
+    All their contacts were late by max_age from then on.
+    """
+    attacked, plain = (StampPairing(scene(), max_age=RESET) for _ in range(2))
+    ticks = [10**17 + n * MS for n in range(2000)]
+    for pairing in (attacked, plain):
+        play(pairing, 'abc', ticks[:1])
+        play(pairing, 'ab', ticks[1:begins])
+    assert attacked.add('c', pose(ticks[begins] + ahead)) == []
+    assert attacked.counts[AHEAD] == 1 and attacked.ahead() == ['c']
+    assert attacked.notes[AHEAD] == Note('c', ticks[begins] + ahead, ticks[max(begins - 1, 0)])
+    rest = ticks[max(begins, 1):]
+    assert play(attacked, 'ab', rest) == play(plain, 'ab', rest)
+    assert attacked.stale() == plain.stale() == ['c']
+
+
+def test_the_first_pose_of_all_is_ahead():
+    """Then a and b agree on another time, and are answered at once."""
+    pairing = StampPairing(scene(), max_age=RESET)
+    pairing.add('c', pose(10**17 + HOUR))
+    ticks = [10**17 + n * MS for n in range(200)]
+    assert answered_at_once(play(pairing, 'ab', ticks)) == ticks
+    assert pairing.add('c', pose(10**17 + HOUR + MS)) == [] and pairing.ahead() == ['c']
+
+
+@pytest.mark.parametrize('policy', PAIRINGS)
+def test_a_stream_ahead_is_refused_and_counted(policy):
+    """Box c stamps by another clock: each of its poses is refused, a and b are answered as ever."""
+    with_c, without = (PAIRINGS[policy](scene(), max_age=RESET) for _ in range(2))
+    for pairing in (with_c, without):
+        play(pairing, 'abc', [10**17])
+    for n in range(1, 3000):
+        stamp = 10**17 + n * MS
+        assert with_c.add('c', pose(stamp + HOUR)) == []
+        for box in 'ab':
+            assert [stamps([tick]) for tick in with_c.add(box, pose(stamp))] == [
+                stamps([tick]) for tick in without.add(box, pose(stamp))]
+    assert with_c.counts[AHEAD] == 2999
+
+
+def test_poses_that_are_early_are_taken_when_the_others_come_as_far():
+    """Of c nearly 2 max_age come before a and b: executors serve one subscription first."""
+    pairing = StampPairing(scene(), max_age=20 * MS)
+    play(pairing, 'abc', [0])
+    ticks = [n * MS for n in range(1, 40)]
+    early = play(pairing, 'c', ticks)
+    assert not any(found for _, found in early) and pairing.counts[AHEAD] == 19
+    played = play(pairing, 'ab', ticks)
+    assert sum((found for _, found in played), []) == ticks
+    assert +pairing.counts == {} and pairing.ahead() == [] and AHEAD not in pairing.notes
+
+
+@pytest.mark.parametrize('order', ['abc', 'cba', 'bca'])
+@pytest.mark.parametrize('policy', PAIRINGS)
+def test_after_a_pause_nobody_is_ahead(policy, order):
+    """All boxes stop and go on later: the first tick is whole, and no pose is lost."""
+    pairing = PAIRINGS[policy](scene(), max_age=50 * MS)
+    for stamp in (0, MS, 1000 * MS, HOUR):
+        ticks = sum((pairing.add(box, pose(stamp)) for box in order), [])
+        assert stamps(ticks[-1:]) == [stamp] * 3
+    assert +pairing.counts == {}
+
+
+def test_a_box_alone_goes_on():
+    """Boxes b and c end, a goes on; its first poses beyond max_age wait, then all are answered."""
+    pairing = StampPairing(scene('abc', ['aF', 'bF', 'cF']), max_age=50 * MS)
+    play(pairing, 'abc', [0])
+    ticks = [n * MS for n in range(1, 300)]
+    played = play(pairing, 'a', ticks)
+    assert sum((found for _, found in played), []) == ticks
+    assert answered_at_once(played[110:]) == ticks[110:] and +pairing.counts == {}
+    # Another one comes back, at a time of its own: both are answered.
+    for stamp in ticks[:50]:
+        assert play(pairing, 'a', [stamp + HOUR])[0][1] in ([], [stamp + HOUR])
+        pairing.add('b', pose(stamp + RESET // 2))
+
+
+def test_a_box_that_joins_after_one_was_ahead_is_answered():
+    """The tick of a box ahead closes no time to others."""
+    pairing = StampPairing(scene('abc', ['ab', 'cF']), max_age=50 * MS)
+    pairing.add('c', pose(HOUR))
+    play(pairing, 'ab', [n * MS for n in range(100)])
+    pairing.set_scene(scene('abcd', ['ab', 'cF', 'da']))
+    play(pairing, 'dab', [200 * MS])
+    assert play(pairing, 'abd', [201 * MS])[-1][1] == [201 * MS]

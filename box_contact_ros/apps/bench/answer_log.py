@@ -10,9 +10,9 @@ poses' common frame.
 A pair is answered when the cloud came. If it reports a contact, point and normal must come too.
 Every other pair is lost, for one of three reasons:
 
-- lost evaluation: no cloud came;
-- lost contact: point or normal did not come;
-- not evaluated: the cloud says that the node could not evaluate the pair.
+- Lost evaluation: no cloud came.
+- Lost contact: point or normal did not come.
+- Not evaluated: the cloud says that the node could not evaluate the pair.
 
 The latency runs from the stamp, taken just before the poses are published, to the last message of
 the answer.

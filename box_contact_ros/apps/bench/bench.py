@@ -85,18 +85,19 @@ def _options(args: Sequence[str]) -> argparse.Namespace:
                              f'(default: {SECONDS:g}; of a replay, all of it)')
     _add_source(parser)
     parser.add_argument('--nodes', nargs='+', choices=NODES, default=list(NODES), metavar='NODE',
-                        help=f'which of: {", ".join(NODES)} (default: all)')
+                        help=f'nodes to drive, of {", ".join(NODES)} (default: all)')
     add_models(parser, '--model', PARAMETERS['model'].default)
     parser.add_argument('--divisions', type=within(1, MOST_SOUP_DIVISIONS), default=SOUP_DIVISIONS,
-                        metavar='N', help='of an edge in the polygon soup (default: %(default)s)')
+                        metavar='N', help='divisions of an edge in the polygon soup (default: '
+                                          '%(default)s)')
     parser.add_argument('--side-by-side', action='store_true',
                         help='one input for all nodes at the same time, as they would run next to '
                              'a simulator; they then compete for cores, and the floor with them '
                              '(default: each stream goes to one node after the other)')
     parser.add_argument('--out', type=Path, default=Path('bench-results'), metavar='FOLDER',
-                        help='for bench.csv, bench.md, bench.png (default: %(default)s/)')
+                        help='folder for bench.csv, bench.md, bench.png (default: %(default)s/)')
     parser.add_argument('--boxes', type=within(8, 10_000), default=0, metavar='N',
-                        help='moving boxes, all in one message, in place of the streams')
+                        help='moving boxes, all in one message, instead of the streams')
     add_domain(parser)
     options = parser.parse_args(list(args))
     if options.replay is None:
@@ -119,18 +120,18 @@ def _add_source(parser: argparse.ArgumentParser) -> None:
     """Add the options of what is sent: streams, or a recording."""
     source = parser.add_mutually_exclusive_group()
     source.add_argument('--streams', nargs='+', choices=STREAMS, default=list(STREAMS),
-                        metavar='NAME', help='which of the streams below (default: all)')
+                        metavar='NAME', help='streams to send, of those below (default: all)')
     source.add_argument('--replay', type=Path, metavar='BAG',
                         help='a recording instead of the streams: the folder of a rosbag2 bag, or '
                              'an .mcap file')
     parser.add_argument('--pair', default='', metavar='NAME',
-                        help='of the replay: a pair of the recorded scene (default: its first)')
+                        help='pair of the recorded scene to replay (default: its first)')
     for box in 'ab':
         parser.add_argument(f'--topic-{box}', default='', metavar='NAME',
-                            help=f'of the replay: poses of box {box.upper()} (default: those of '
-                                 f'the pair, or box_{box}/pose where no scene was recorded)')
+                            help=f'topic of the poses of box {box.upper()} to replay (default: '
+                                 f'that of the pair, or box_{box}/pose if no scene was recorded)')
         parser.add_argument(f'--size-{box}', type=float, nargs=3, metavar=('X', 'Y', 'Z'),
-                            help=f'of the replay: full extents of box {box.upper()} [m] '
+                            help=f'full extents of box {box.upper()} in the replay [m] '
                                  '(default: as the recording says)')
 
 

@@ -120,13 +120,13 @@ def _contact(options: argparse.Namespace) -> MeasuredNode:
 def _options(args: Sequence[str]) -> argparse.Namespace:
     parser = program_parser('soak', __doc__, quick='two blocks of a second')
     parser.add_argument('--minutes', type=within(0.02, 24 * 60.0), default=10.0, metavar='MIN',
-                        help='of poses to the contact node; each echo node takes half as long '
-                             'beside (default: %(default)g)')
+                        help='minutes of poses to the contact node; each echo node takes half '
+                             'as long in addition (default: %(default)g)')
     parser.add_argument('--rate', type=within(1.0, 4000.0), default=1000.0, metavar='HZ',
                         help='pairs of poses sent per second (default: %(default)g)')
     add_models(parser, '--model', PARAMETERS['model'].default)
     parser.add_argument('--out', type=Path, default=Path('soak-results'), metavar='FOLDER',
-                        help='for soak.csv and soak.md (default: %(default)s/)')
+                        help='folder for soak.csv and soak.md (default: %(default)s/)')
     add_domain(parser)
     options = parser.parse_args(list(args))
     make_folder(parser, options.out)

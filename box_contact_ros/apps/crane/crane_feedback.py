@@ -7,7 +7,7 @@ Plain Python, no ROS. One thread asks and simulates (`ask`, `step`), another han
 (`answer`). The loop itself is `landing.ClosedLoop`.
 
 In real time a tick is simulated at its end. First its poses are published, then the answer is
-awaited for most of the tick, and the contact acts from the time at which it really came. Simulated
+awaited for most of the tick. The contact acts from the time at which it really came. Simulated
 at its beginning, a tick would delay every contact by a tick, and the load would rest less flat.
 In lockstep the simulation waits for every answer. The contact acts exactly `latency` after its
 poses were published.
@@ -61,9 +61,10 @@ class CraneFeedback:
     def answer(self, stamp: int, values: np.ndarray, received: int) -> None:
         """Take the first row of a `contacts` cloud, received at `received` [ns] of the same clock.
 
-        No row is no contact; a row of NaN could not be evaluated, which is no answer.
+        No row is no contact; a row of NaN could not be evaluated, which is no answer. Nor is what
+        nobody asked for.
         """
-        if not is_stale(values):
+        if stamp in self._asked and not is_stale(values):  # else a stranger's
             self._arrived.put((stamp, touch_in(values), received))
 
     def step(self, stamp: int) -> None:

@@ -209,8 +209,8 @@ class LandingResult:
         rows += [('creep', f'{1e3 * self.creep:.2g} mm/s'),
                  ('point steps', f'{1e3 * self.point_step:.2g} mm at most between ticks (exact: '
                                  f'{1e3 * self.exact_point_step:.2g}), while settling '
-                                 f'{1e3 * self.point_step_ever:.2g} mm (exact: '
-                                 f'{1e3 * self.exact_point_step_ever:.2g})')]
+                                 f'{1e3 * self.point_step_ever:,.0f} mm (exact: '
+                                 f'{1e3 * self.exact_point_step_ever:,.0f})')]
         return table(rows)
 
 

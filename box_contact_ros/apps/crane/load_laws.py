@@ -26,7 +26,7 @@ NamedContacts = Mapping[str, Contact]
 
 
 class LoopState(NamedTuple):
-    """The load's state for which contacts are asked."""
+    """The state of the load at which contacts are asked for."""
 
     tick: int
     time: float  # at which they are asked for [s]
@@ -38,7 +38,7 @@ class LoadLaw(Protocol):
     """The wrench on a load at every physics step, from the answers that have come."""
 
     def asked_for(self, state: LoopState) -> LoopState:
-        """Return the state for which contacts are asked, from the state by now."""
+        """Return the state at which contacts are asked for, from the present state."""
 
     def answer(self, contacts: NamedContacts, state: LoopState, *, due: float) -> None:
         """Take the contacts of a state, which act from `due` [s] on."""

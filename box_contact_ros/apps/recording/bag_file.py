@@ -11,7 +11,6 @@ the sizes of two boxes: they are in the bag's custom data, where they were known
 from __future__ import annotations
 
 import json
-import math
 import os
 import sys
 from collections import Counter
@@ -46,7 +45,7 @@ from rosbags.typesys.store import Typestore
 
 from ...scene.files.scene_file import SceneError, parse_scene
 from ...scene.scene_solver import POSE_ARRAY, Scene, two_boxes
-from ...solver.checks import as_size, shown
+from ...solver.checks import as_size, pose_fault, shown
 from ..bench.pose_streams import Replay, Size
 
 BAG_VERSION: Final = 9  # of rosbag2's metadata: what Jazzy writes and reads
@@ -160,7 +159,7 @@ class Recording:
 def read_recording(path: Path) -> Recording:
     """Return a bag that says its scene, or the sizes of its two boxes. Raises RecordingError."""
     with _opened(path) as reader:
-        about = _about(reader)
+        about = _about(reader, path)
         kinds = {_name_of(connection, about): connection.msgtype
                  for connection in reader.connections}
         messages = [(at, _name_of(connection, about), data)
@@ -177,6 +176,10 @@ def read_recording(path: Path) -> Recording:
 @contextmanager
 def _opened(path: Path) -> Iterator[Reader]:
     """Give the reader of a bag: a folder, or an .mcap file alone; or raise RecordingError."""
+    for file in (path, *(path.iterdir() if path.is_dir() else ())):
+        if file.exists() and not file.is_file() and not file.is_dir():
+            # Opening a FIFO would wait for its writer, and /dev/zero has no end.
+            raise RecordingError(f'{file} cannot be read as a bag: it is no regular file')
     try:
         with Reader(path) as reader:
             yield reader
@@ -186,12 +189,21 @@ def _opened(path: Path) -> Iterator[Reader]:
         raise RecordingError(f'{path} cannot be read as a bag: {error}') from error
 
 
-def _about(reader: Reader) -> dict[str, Any]:
-    """Return what was kept with the messages."""
+def _about(reader: Reader, path: Path) -> dict[str, Any]:
+    """Return what was kept with the messages, or raise RecordingError for what cannot be that."""
     about = {}
     for name, value in (reader.storage.metadata.custom or {}).items():
-        with suppress(ValueError):  # another program's entry need not be JSON
+        with suppress(ValueError, TypeError, RecursionError):  # another program's need not be JSON
             about[name] = json.loads(value)
+    for name, kind in (('scene', str), ('model', str), ('topics', dict)):
+        if name in about and not isinstance(about[name], kind):
+            raise RecordingError(f'{path}: its {name} is {shown(about[name])}, no {kind.__name__}')
+    for name in ('size_a', 'size_b'):
+        if name in about:
+            try:
+                as_size(about[name], name)
+            except ValueError as error:
+                raise RecordingError(f'{path}: its {error}') from None
     return about
 
 
@@ -217,11 +229,11 @@ def read_replay(path: Path, topic_a: str = '', topic_b: str = '', *, pair: str =
 
     They are those of a pair of the recorded scene (default: the first), or those on two topics
     (default: box_a/pose, box_b/pose). Sizes that are not given are those that the recording says.
-    Raises RecordingError for what is no bag, lacks a topic or the pair, has no two poses of equal
-    stamp, or says no sizes where none are given.
+    Raises RecordingError for what is not a bag, lacks a topic or the pair, or has no two poses of
+    equal stamp. Sizes that are neither given nor in the bag raise it, too.
     """
     with _opened(path) as reader:
-        about = _about(reader)
+        about = _about(reader, path)
         if pair or ('scene' in about and not topic_a and not topic_b):
             sides = _of_pair(path, about, pair)
         else:
@@ -268,7 +280,7 @@ def _of_pair(path: Path, about: Mapping[str, Any], name: str) -> list[_Side]:
 
 def _poses(reader: Reader, path: Path, about: Mapping[str, Any], side: _Side,
            ) -> dict[int, tuple[float, ...]]:
-    """Return poses `x y z qx qy qz qw` of a box by stamp [ns], without those where it is absent."""
+    """Return poses `x y z qx qy qz qw` of a box by stamp [ns], the valid ones alone."""
     found = [c for c in reader.connections
              if side.topic.lstrip('/') in (c.topic.lstrip('/'), _name_of(c, about))]
     if not found:
@@ -285,6 +297,7 @@ def _poses(reader: Reader, path: Path, about: Mapping[str, Any], side: _Side,
             continue  # the contact node refuses it
         pose = message.poses[side.array.index(side.name)] if side.array else message.pose
         stamp, p, q = message.header.stamp, pose.position, pose.orientation
-        if not math.isnan(p.x):
-            poses[stamp.sec * NANOSECONDS + stamp.nanosec] = (p.x, p.y, p.z, q.x, q.y, q.z, q.w)
+        numbers = (p.x, p.y, p.z, q.x, q.y, q.z, q.w)
+        if pose_fault(numbers) is None:
+            poses[stamp.sec * NANOSECONDS + stamp.nanosec] = numbers
     return poses

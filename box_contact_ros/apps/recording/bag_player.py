@@ -14,12 +14,14 @@ import numpy as np
 from rclpy.serialization import deserialize_message
 from visualization_msgs.msg import MarkerArray
 
-from ...node.messages import Refused, read_contacts
+from ...node.messages import read_contacts
+from ...solver.checks import shown
 from ..ros_client import CONTACT_TYPES, CRANE_MARKERS, PoseTopic, lines_of, pose_topics, stamp_of
-from ..viewer.view_log import OtherSceneError, ViewLog
+from ..viewer.view_log import ViewLog
 from .bag_file import NANOSECONDS, RecordingError, read_recording
 
 PAUSE = 1.5  # time [s] between the end of a recording and its next beginning
+STEP_SECONDS = 0.05  # a step takes, however much is due: the page and signals wait for it
 
 
 class BagPlayer:
@@ -42,7 +44,8 @@ class BagPlayer:
                 self._take.pop('contacts_cloud', None)
                 self._take[topic] = partial(self._on_contacts, CONTACT_TYPES[kind])
             elif kind is not None:
-                raise RecordingError(f'{path}: {topic} is {kind}, whose package is not installed')
+                raise RecordingError(f'{path}: {topic} is {shown(kind)}, which is none of '
+                                     'contacts, or whose package is not installed')
         self._take |= {topic.name.lstrip('/'): partial(self._on_poses, topic)
                        for topic in pose_topics(recording.scene)}
         self._messages = [message for message in recording.messages if message[1] in self._take]
@@ -65,13 +68,14 @@ class BagPlayer:
         while True:
             self.log.start_anew()
             first, start = self._messages[0][0], time.monotonic()
-            self._now, began = first, True
+            self._now, began, until = first, True, start + STEP_SECONDS
             for at, topic, data in self._messages:
-                while self._now < at:
+                while self._now < at or time.monotonic() > until:
                     yield began
                     began = False
+                    until = time.monotonic() + STEP_SECONDS
                     self._now = first + round(NANOSECONDS * (time.monotonic() - start))
-                with contextlib.suppress(Refused, OtherSceneError):
+                with contextlib.suppress(Exception):  # what a node would ignore, too
                     self._take[topic](at, data)
             end = time.monotonic() + PAUSE
             while time.monotonic() < end:

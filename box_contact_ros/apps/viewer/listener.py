@@ -3,7 +3,8 @@
 
 """Nodes that hear what is drawn: poses of all boxes of a scene, and contacts.
 
-`ViewNode` learns the scene from the contact node's parameters, and sets its model.
+`ViewNode` learns from the contact node what it is set to, and sets its model. A path that the node
+names is one of the node's machine: it is not opened here. The node tells the scene as text.
 """
 from __future__ import annotations
 
@@ -20,12 +21,15 @@ from rclpy.parameter_client import AsyncParameterClient
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 from rclpy.task import Future
+from std_msgs.msg import String
 from visualization_msgs.msg import MarkerArray
 
-from ...node.messages import read_contacts
-from ...node.runtime import POSE_QOS, GuardedNode
+from ...node.messages import Refused, read_contacts
+from ...node.runtime import LATCHED_QOS, POSE_QOS, GuardedNode
+from ...node.topics.scene_topics import LARGEST_SCENE_TEXT
 from ...node.topics.tf_poses import TfPoses, has_tf2
-from ...scene.files.scene_file import SceneError, read_scene
+from ...scene.files.limits import FOREIGN
+from ...scene.files.scene_file import SceneError, parse_scene
 from ...scene.scene_solver import Scene, two_boxes
 from ...scene.stamp_pairing import NEVER, StampedPose
 from ..ros_client import (
@@ -45,13 +49,6 @@ ANSWER_PATIENCE = 3.0
 ASKED = ('size_a', 'size_b', 'scene', 'pairing', 'tolerance', 'model')
 OF_SCENE = ASKED[:-1]
 """With another value of one of these, what came before is forgotten."""
-
-
-def named_scene(settings: Mapping[str, Any]) -> Scene:
-    """Return the scene of a node's parameters: that of its file, or of its two sizes."""
-    if settings['scene']:
-        return read_scene(settings['scene'])
-    return two_boxes(settings['size_a'], settings['size_b'])
 
 
 class Listener(GuardedNode):
@@ -117,12 +114,12 @@ class ViewNode(Listener):
 
     def __init__(self, context: Context, target: str, scene: Scene | None = None,
                  **options: Any) -> None:
-        """`target` is the name of the contact node; `scene` replaces the one that it names."""
+        """`target` is the name of the contact node; `scene` replaces the one that it tells."""
         self.settings: Mapping[str, Any] = {}  # the contact node's parameters, those of ASKED
         self.wish = ''  # the model that was asked for last, until it is granted
         self.refusal = ''  # why the last wish was refused, or the scene cannot be read
         self.lines = np.zeros((0, 2, 3))  # ends of the crane's lines, where a crane runs
-        self._scene = scene
+        self._scene, self._told = scene, ''
         self._answered = 0.0
         self._question: Future | None = None
         # Contacts best effort: the view must never hold up the contact node.
@@ -130,6 +127,7 @@ class ViewNode(Listener):
         self._target = AsyncParameterClient(self, target)
         self.create_timer(ASK_PERIOD, self._ask)
         self.create_subscription(MarkerArray, CRANE_MARKERS, self._on_crane, POSE_QOS)
+        self.create_subscription(String, f'{target}/scene', self._on_scene, LATCHED_QOS)
 
     @property
     def connected(self) -> bool:
@@ -175,8 +173,31 @@ class ViewNode(Listener):
         settings = dict(zip(ASKED, map(parameter_value_to_python, future.result().values)))
         old, self.settings = self.settings, settings
         if any(str(settings[name]) != str(old.get(name)) for name in OF_SCENE):
-            try:
-                self.listen_to(self._scene or named_scene(settings), pairing=settings['pairing'],
-                               tolerance=float(settings['tolerance']))
-            except SceneError as error:
-                self.refusal = f'{error} (--scene names the scene)'
+            self._draw_anew()
+
+    def _on_scene(self, message: String) -> None:
+        if len(message.data) > LARGEST_SCENE_TEXT:
+            raise Refused('bad scene', f'a text of {len(message.data)} characters; at most '
+                                       f'{LARGEST_SCENE_TEXT}')
+        if message.data != self._told:
+            self._told = message.data
+            if self.settings.get('scene'):
+                self._draw_anew()
+
+    def _draw_anew(self) -> None:
+        """Listen to what the contact node is set to; a scene that is not told yet comes later."""
+        settings = self.settings
+        try:
+            if self._scene is not None:
+                scene = self._scene
+            elif not settings['scene']:
+                scene = two_boxes(settings['size_a'], settings['size_b'])
+            elif self._told:
+                scene = parse_scene(self._told, 'scene of the contact node', limits=FOREIGN)
+            else:
+                return
+            self.listen_to(scene, pairing=settings['pairing'],
+                           tolerance=float(settings['tolerance']))
+            self.refusal = ''
+        except SceneError as error:
+            self.refusal = f'{error} (--scene names the scene)'

@@ -21,16 +21,18 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from ...node.contact_node import PARAMETERS as CONTACT_PARAMETERS
 from ...node.messages import NANOSECONDS, make_header
+from ...node.named_files import FIXED_PARAMETERS, NamedFiles, named_scene
 from ...node.parameters import CheckedParameters, Setting, answer_help, number
 from ...node.runtime import CONTACT_QOS, run_node
 from ..ros_client import line_marker, make_marker, set_pose
 from . import style
-from .listener import Listener, named_scene
+from .listener import Listener
 from .view_log import AnsweredTick, Snapshot
 
 OF_SCENE = ('size_a', 'size_b', 'scene')
 PARAMETERS = {name: CONTACT_PARAMETERS[name] for name in OF_SCENE} | {
     'rate': Setting(30.0, 'most marker arrays published per second [Hz]', number(0.1, 1000)),
+    **FIXED_PARAMETERS,
 }
 NAMESPACES = ('boxes', 'points', 'normals', 'patches', 'depths')
 """RViz shows a tick box for each. Of boxes, normals and depths every marker has its own id."""
@@ -101,14 +103,17 @@ class MarkersNode(Listener):
         self._changed = False
         super().__init__('markers', context, CONTACT_QOS, **options)
         self._settings = CheckedParameters(self, PARAMETERS, self._apply)
+        self._files = NamedFiles(self, self._settings.values)
         self._markers = self.create_publisher(MarkerArray, 'markers', CONTACT_QOS)
         self._timer = self.create_timer(1.0, self._publish)
-        self._apply(self._settings.values, PARAMETERS)
+        self._apply(self._settings.values, PARAMETERS, starts=True)
         self.get_logger().info(f'ready: at most {self._settings.values["rate"]:g} Hz')
 
-    def _apply(self, settings: dict[str, Any], names: Collection[str]) -> None:
+    def _apply(self, settings: dict[str, Any], names: Collection[str], *,
+               starts: bool = False) -> None:
         if not set(OF_SCENE).isdisjoint(names):
-            self.listen_to(named_scene(settings))
+            with self._files.resolved(settings, starts=starts) as resolved:
+                self.listen_to(named_scene(resolved, limits=self._files.limits(settings)))
         self._timer.timer_period_ns = round(NANOSECONDS / settings['rate'])
         self._changed = True
 

@@ -67,9 +67,9 @@ class Programs:
                                    f'{printed(self._outputs[name])}')
         return False
 
-    def close(self) -> None:
-        """End everything."""
-        processes.end(list(self._running.values()))
+    def close(self, *more: subprocess.Popen[bytes]) -> None:
+        """End everything, and `more`, at once."""
+        processes.end([*self._running.values(), *more])
         for output in self._outputs.values():
             output.close()
 
@@ -110,11 +110,10 @@ class Simulation(Programs):
             self._crane = None
         self.run, self._next_at = run, 0.0
 
-    def close(self) -> None:
-        """End everything."""
-        processes.end([self._crane] if self._crane is not None else [])
+    def close(self, *more: subprocess.Popen[bytes]) -> None:
+        """End everything at once."""
+        super().close(*more, *([self._crane] if self._crane is not None else []))
         self._crane_output.close()
-        super().close()
 
 
 @contextmanager
@@ -177,6 +176,8 @@ def main(args: Sequence[str] | None = None) -> int:
         except (*REFUSALS, RuntimeError, OSError) as error:
             print(f'error: {error}', file=sys.stderr)
             return 1
+        except KeyboardInterrupt:
+            pass
     return 0 if stop.signals[0] == signal.SIGINT else stop.status
 
 
@@ -184,7 +185,8 @@ def replay(options: argparse.Namespace, stop: Stop) -> None:
     """Serve the page with a recording, again and again, until `stop` is set."""
     from ..recording.bag_player import BagPlayer  # only here: rosbags is an extra
 
-    player = BagPlayer(options.replay)
+    with stop.interrupting():
+        player = BagPlayer(options.replay)
     with closing(Page(options.host, options.port)) as page:
         announce(page, options, 'a recording')
         watch(player, page, player, queue.SimpleQueue(), stop)
@@ -203,7 +205,8 @@ def serve(options: argparse.Namespace, args: Sequence[str], stop: Stop) -> None:
     started: Programs | None = None
     run = (None if options.attach or options.scene else
            CraneRun(options.seed, options.rate, not options.open_loop))
-    scene = read_scene(options.scene) if options.scene else None
+    with stop.interrupting():
+        scene = read_scene(options.scene) if options.scene else None
     with listening(options.node, scene, args) as node, ExitStack() as ending:
         page = ending.enter_context(closing(Page(
             options.host, options.port, run=run,
@@ -235,29 +238,30 @@ def _options(args: Sequence[str]) -> argparse.Namespace:
         'view', __doc__, epilog='What follows --ros-args is for the view itself; with --attach, '
                                 '-r remaps topics.')
     parser.add_argument('--host', default='127.0.0.1',
-                        help='address to serve at; everybody who reaches it can change the model '
-                             '(default: %(default)s)')
+                        help='address to serve at, or the name that browsers open it by; everybody '
+                             'who reaches it can change the model (default: %(default)s)')
     parser.add_argument('--port', type=within(1, 65535), default=8080,
-                        help='to serve at, or the next that is free (default: %(default)s)')
+                        help='port to serve at, or the next that is free (default: %(default)s)')
     parser.add_argument('--no-browser', action='store_true', help='do not open a browser')
     parser.add_argument('--attach', action='store_true',
                         help='start nothing: listen to nodes that run already')
     parser.add_argument('--node', default='contact_node', metavar='NAME',
-                        help='of the contact node (default: %(default)s)')
+                        help='name of the contact node (default: %(default)s)')
     parser.add_argument('--scene', metavar='NAME',
                         help='draw this scene, and move its boxes: a file, or the bare name of one '
-                             'in config/scenes/; with --attach in place of the one that the '
-                             'contact node names')
+                             'in config/scenes/; with --attach instead of the one that the '
+                             'contact node tells')
     parser.add_argument('--replay', type=Path, metavar='RUN',
                         help='start nothing: play a recording, a folder that `record` made')
     processes.add_domain(parser, '; with --attach, ROS_DOMAIN_ID')
     parser.set_defaults(domain=None)
     parser.add_argument('--model', type=model_name, default=PARAMETERS['model'].default,
-                        metavar='NAME', help='the contact node starts with (default: %(default)s)')
+                        metavar='NAME',
+                        help='model that the contact node starts with (default: %(default)s)')
     parser.add_argument('--seed', type=within(0, 2**31), default=0, metavar='N',
-                        help='of the first landing (default: %(default)s)')
+                        help='seed of the first landing (default: %(default)s)')
     parser.add_argument('--rate', type=within(1.0, 1000.0), metavar='HZ',
-                        help=f'ticks a second (default: crane {CRANE_RATE:g}, scene '
+                        help=f'ticks per second (default: crane {CRANE_RATE:g}, scene '
                              f'{SCENE_RATE:g})')
     parser.add_argument('--open-loop', action='store_true',
                         help='contacts are shown, but do not carry the load')

@@ -20,7 +20,8 @@ from functools import cached_property
 
 import numpy as np
 
-from ...node.messages import NANOSECONDS
+from ...core import LENGTH_MAX
+from ...node.messages import CLOUD_ROW, NANOSECONDS, PATCH_FIELDS, Refused
 from ...output import percentiles
 from ...scene.scene_solver import Scene
 from ...scene.stamp_pairing import RESET
@@ -32,7 +33,11 @@ WINDOW = 2.0  # figures are those of the answers to the poses of the last so man
 LOST_AFTER = NANOSECONDS
 """A tick without an answer is lost once a tick that is so much newer [ns] has come."""
 ANSWERED = -math.inf  # in place of the number of a tick's poses: however many come, none is lost
-KEPT = 20_000  # answers kept at most, whatever their stamps: `WINDOW` at 10 kHz
+KEPT = 20_000  # answers, and poses of a box, kept at most, whatever their stamps: 10 kHz
+KEPT_POSES = 200_000  # of all boxes together, some 50 MB
+KEPT_ROWS = 500_000  # of all answers together: contacts, and the poses that they answer
+LARGEST = {'normal': 1.0 + 1e-6, 'cov': LENGTH_MAX**2, 'volume': LENGTH_MAX**3}
+"""Of numbers of a contact, by the beginnings of their names; LENGTH_MAX for lengths."""
 
 
 class SceneArrays:
@@ -84,6 +89,11 @@ class AnsweredTick:
     poses: np.ndarray  # (n, 7), NaN for a box that has none
     stamps: np.ndarray  # (n,) of the poses; that of the tick for fixed boxes
     tolerance: int  # poses further from the tick [ns] may not be those that were answered
+
+    @property
+    def rows(self) -> int:
+        """Return how much memory it takes."""
+        return len(self.contacts) + len(self.stale) + len(self.poses)
 
     @property
     def latency(self) -> float:
@@ -178,8 +188,25 @@ class ViewFigures:
     point_error_p99: float
     edge: float  # median of `SceneArrays.edges`, what point errors are a share of
     rate: float  # answers that came within the last second
-    answered: int  # since the start of the run, and so are the lost
+    answered: int  # since the start of the run, and so are the lost and the refused
     lost: int
+    refused: int
+
+
+def _fault(rows: np.ndarray, pairs: int) -> str:
+    """Return what is wrong with the contacts of a scene of so many pairs, or ''."""
+    if len(rows) > pairs:
+        return f'{len(rows)} contacts, but the scene has {pairs} pairs'
+    rows = rows[~np.isnan(rows['depth'])]
+    for name in CLOUD_ROW.names or ():
+        if CLOUD_ROW[name].kind == 'f' and name not in 'xyz':
+            largest = LARGEST.get(name.partition('_')[0], LENGTH_MAX)
+            good = np.abs(rows[name]) <= largest
+            if name in PATCH_FIELDS:  # models that give the point alone
+                good |= np.isnan(rows[name])
+            if not good.all():
+                return f'{name} is {rows[name][~good][0]:g}'
+    return ''
 
 
 class OtherSceneError(ValueError):
@@ -201,12 +228,16 @@ class ViewLog:
         """Forget everything: another run begins."""
         with self._lock:
             self._tracks: dict[str, deque[tuple[int, np.ndarray]]] = {
-                name: deque() for name, number in self.scene.moving.items()
+                name: self._track() for name, number in self.scene.moving.items()
                 if np.isnan(self.scene.fixed[number, 0])}
             self._newest = self._frame_id = None
+            self._ahead: tuple[str, int] | None = None  # a box far ahead alone, and since when
             self._counts: OrderedDict[int, float] = OrderedDict()  # poses by stamp, or ANSWERED
-            self._answers: deque[AnsweredTick] = deque(maxlen=KEPT)
-            self._answered = self._lost = 0
+            self._answers: deque[AnsweredTick] = deque()
+            self._answered = self._lost = self._refused = self._rows = 0
+
+    def _track(self) -> deque[tuple[int, np.ndarray]]:
+        return deque(maxlen=min(KEPT, 1 + KEPT_POSES // len(self.scene.moving)))
 
     def pose(self, box: str, stamp: int, numbers: np.ndarray, frame_id: str = '') -> None:
         """Take where a moving box is: numbers (7,)."""
@@ -224,8 +255,11 @@ class ViewLog:
         with self._lock:
             for box in boxes:
                 if box not in self._tracks:  # fixed so far
-                    self._tracks[box] = deque()
+                    self._tracks[box] = self._track()
                     self.scene.fixed[self.scene.moving[box]] = np.nan
+            if len(boxes) == 1 and self._is_ahead(boxes[0], stamp):
+                self._refused += 1
+                return
             if any(track and stamp < track[-1][0] - RESET
                    for track in map(self._tracks.__getitem__, boxes)):
                 self.start_anew()
@@ -235,18 +269,41 @@ class ViewLog:
                     track.append((stamp, row))
                     while stamp - track[0][0] > WINDOW * NANOSECONDS:
                         track.popleft()
-            if self._newest is None or stamp > self._newest:
+            if (self._newest is None or stamp > self._newest
+                    or stamp < self._newest - RESET and self._boxes_near(stamp) > max(
+                        1, self._boxes_near(self._newest))):  # that one was ahead
                 self._newest, self._frame_id = stamp, frame_id
-                self._give_up(stamp)
             self._counts[stamp] = self._counts.get(stamp, 0) + len(boxes)
+            self._give_up(self._newest)
+
+    def _is_ahead(self, box: str, stamp: int) -> bool:
+        """Return whether a box is far ahead of the others, and they still give poses."""
+        far = self._newest is not None and stamp > self._newest + RESET
+        if not far or len(self._tracks) < 3:
+            self._ahead = None
+            return False
+        other, since = self._ahead or (box, stamp)
+        self._ahead = box, since if other == box else stamp
+        # Another box is as far: all have paused. Or it goes on alone.
+        return (abs(stamp - since) <= RESET) == (other == box)
+
+    def _boxes_near(self, stamp: int) -> int:
+        """Return how many boxes gave a last pose within a second of a stamp."""
+        return sum(bool(track) and abs(track[-1][0] - stamp) <= RESET
+                   for track in self._tracks.values())
 
     def contacts(self, stamp: int, rows: np.ndarray, received: int, frame_id: str = '') -> None:
         """Take what a tick found: rows of messages.CLOUD_ROW, received at this time [ns].
 
         A row of NaN says that its pair could not be evaluated. Pairs that are close, without a
-        point, are left out. Raises OtherSceneError.
+        point, are left out. Raises OtherSceneError, and Refused for what no contact can be.
         """
         rows = rows[~np.isnan(rows['point_x']) | np.isnan(rows['depth'])]
+        fault = _fault(rows, len(self.scene.labels))
+        if fault:
+            with self._lock:
+                self._refused += 1
+            raise Refused('bad contacts', fault)
         try:
             pairs = np.array([self.scene.row_of_id[number] for number in rows['pair'].tolist()],
                              dtype=int)
@@ -264,6 +321,8 @@ class ViewLog:
             self._answers.append(AnsweredTick(
                 self.scene, stamp, received, frame_id, rows[~stale], pairs[~stale], pairs[stale],
                 *self._poses_at(stamp), self._tolerance))
+            self._rows += self._answers[-1].rows
+            self._give_up(self._newest or stamp)
 
     def _refreshed_answer(self) -> AnsweredTick | None:
         """Give the last answer its poses as they are known now: some may come after it."""
@@ -289,13 +348,15 @@ class ViewLog:
 
     def _give_up(self, now: int) -> None:
         """Drop what is too old by the poses' clock [ns]."""
-        while self._counts and now - next(iter(self._counts)) > LOST_AFTER:
+        while self._counts and (now - next(iter(self._counts)) > LOST_AFTER
+                                or len(self._counts) > KEPT):
             stamp, count = self._counts.popitem(last=False)
             # Before the first answer nobody need have been there.
             self._lost += bool(count >= len(self._tracks) and self._answered
                                and stamp > self._first)
-        while self._answers and now - self._answers[0].stamp > WINDOW * NANOSECONDS:
-            self._answers.popleft()
+        while self._answers and (now - self._answers[0].stamp > WINDOW * NANOSECONDS
+                                 or len(self._answers) > KEPT or self._rows > KEPT_ROWS):
+            self._rows -= self._answers.popleft().rows
 
     def snapshot(self) -> Snapshot | None:
         """Return the last answer with its poses, or the last poses if nobody answers."""
@@ -312,7 +373,8 @@ class ViewLog:
         """Return the figures as things stand at this time [ns], of the clock of `contacts`."""
         with self._lock:
             self._refreshed_answer()
-            answers, answered, lost = list(self._answers), self._answered, self._lost
+            answers, refused = list(self._answers), self._refused
+            answered, lost = self._answered, self._lost
         median, p99 = percentiles(np.array([answer.latency for answer in answers]), 50, 99)
         errors = np.concatenate([np.zeros(0), *(answer.point_errors for answer in answers)])
         error_median, error_p99 = percentiles(errors, 50, 99)
@@ -320,4 +382,4 @@ class ViewLog:
             latency_median=median, latency_p99=p99, point_error_median=error_median,
             point_error_p99=error_p99, edge=float(np.median(self.scene.edges)),
             rate=sum(now - answer.received < NANOSECONDS for answer in answers),
-            answered=answered, lost=lost)
+            answered=answered, lost=lost, refused=refused)

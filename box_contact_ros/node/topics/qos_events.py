@@ -24,7 +24,7 @@ class QosEvents:
         self._node, self._counts = node, counts
         self._handlers_of: dict[Publisher | Subscription, list[EventHandler]] = {}
         self.left: set[str] = set()
-        """Boxes of which a publisher has gone. Whoever asks clears it."""
+        """Boxes that have lost a publisher. A read clears the list."""
 
     def callbacks(self, box: str, *, deadline: bool) -> SubscriptionEventCallbacks:
         """Return the callbacks for events of the poses of a box."""

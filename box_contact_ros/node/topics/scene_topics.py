@@ -3,8 +3,8 @@
 
 """Topics of a scene: pose subscriptions of its moving boxes, contact publishers of its pairs.
 
-All contacts of a tick go to `contacts` as box_contact_msgs/Contacts, where that package is
-installed, and to `contacts_cloud` as a PointCloud2, where it is asked for. Boxes that are frames
+All contacts of a tick go to `contacts` as box_contact_msgs/Contacts, if that package is installed.
+They go to `contacts_cloud` as a PointCloud2, if a parameter asks for it. Boxes that are frames
 take their poses from /tf, by `TfPoses`. `~/scene` is latched and
 has the scene as YAML, so that a reader far away, or of a recording, knows boxes and pairs.
 """
@@ -47,6 +47,8 @@ TOPICS_OF_EVERY_NODE = ('/diagnostics', '/parameter_events', '/rosout', '/clock'
 """Topics of other types than poses."""
 MOST_PAIRS_WITH_TOPICS = 1000
 """Two publishers a pair take milliseconds and memory, here and in every process that listens."""
+MOST_IDS = 2**19
+"""Ids that a node gives away while it runs, of all its scenes: as many as one scene may have."""
 LARGEST_SCENE_TEXT = 2**20
 """Bytes that `~/scene` has at most: some 10,000 pairs. Whoever joins later is sent all of them."""
 DEEPEST = 100_000  # messages of a queue
@@ -129,6 +131,11 @@ class SceneTopics:
                 raise ValueError(f'scene: id {pair.id} of pair {pair.name} was given to '
                                  f'{before.name} ({before.a}, {before.b}) before: ids are never '
                                  f'used again while a node runs (start it anew)')
+        ids = self._pair_of_id.keys() | {pair.id for pair in scene.pairs if pair.name}
+        if len(ids) > MOST_IDS:
+            raise ValueError(f'scene: with its pairs the node would have given away '
+                             f'{len(ids)} ids, of at most {MOST_IDS}, and none is used again: '
+                             'start it anew')
         if pair_topics and len(scene.pairs) > MOST_PAIRS_WITH_TOPICS:
             raise ValueError(f'scene: {len(scene.pairs)} pairs are too many for topics of their '
                              f'own (at most {MOST_PAIRS_WITH_TOPICS}): set pair_topics to false')

@@ -21,7 +21,7 @@ from rclpy.subscription import Subscription
 from ...scene.scene_solver import Fault, Scene
 from ...scene.stamp_pairing import NEVER, RESET, StampedPose
 from ...solver.checks import shown
-from ..messages import NANOSECONDS
+from ..messages import NANOSECONDS, check_name
 from ..rclpy_workarounds import silence
 from ..runtime import LOG_SECONDS, POSE_QOS
 
@@ -31,6 +31,8 @@ STATIC_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE,
 LOOKUPS = 'lookups in /tf failed'
 UNSTAMPED = 'refused: transform without a stamp'
 BAD = 'refused: bad transform'
+MOST_FRAMES = 10_000
+"""Frames of /tf that are kept; tf2 never forgets one, and each may be a stranger's."""
 REMEDY = 'apt install ros-jazzy-tf2-ros-py, or give the box a pose_topic'
 
 
@@ -163,14 +165,14 @@ class TfPoses:
                                              self._frame_id, stamp))
 
     def _on_static(self, message: Any) -> None:
-        for transform in message.transforms:
+        for transform in filter(self._is_taken, message.transforms):
             self._set(self._buffer.set_transform_static, transform, NEVER)
         # What was static may have another value now.
         self._given = {box: stamp for box, stamp in self._given.items() if stamp != NEVER}
         self.look_up()
 
     def _on_moving(self, message: Any) -> None:
-        for transform in message.transforms:
+        for transform in filter(self._is_taken, message.transforms):
             stamp, name = transform.header.stamp, _name(transform.child_frame_id)
             at = stamp.sec * NANOSECONDS + stamp.nanosec
             if not at:  # its common time would say that the chain is static
@@ -186,14 +188,31 @@ class TfPoses:
             self._set(self._buffer.set_transform, transform, at)
         self.look_up()
 
+    def _is_taken(self, transform: Any) -> bool:
+        """Return whether a transform's names may be kept; else it is counted and logged."""
+        names = transform.header.frame_id, transform.child_frame_id
+        try:
+            for name in names:
+                check_name('frame_id', name)
+            new = {*map(_name, names)} - self._newest.keys() - self._unstamped
+            if new and len(self._newest) + len(self._unstamped) + len(new) > MOST_FRAMES:
+                raise ValueError(f'{MOST_FRAMES} frames are known, and no more are taken')
+        except ValueError as error:
+            self._refuse(error)
+            return False
+        return True
+
+    def _refuse(self, error: Exception) -> None:
+        self._counts[BAD] += 1
+        self._node.get_logger().warning(f'{TF}: {error}; ignored',
+                                        throttle_duration_sec=LOG_SECONDS)
+
     def _set(self, setter: Callable[[Any, str], None], transform: Any, stamp: int) -> None:
         """Give a transform to tf2; what it refuses is counted and logged."""
         try:
             setter(transform, 'box_contact_ros')
         except Exception as error:
-            self._counts[BAD] += 1
-            self._node.get_logger().warning(f'{TF}: {error}; ignored',
-                                            throttle_duration_sec=LOG_SECONDS)
+            self._refuse(error)
             return
         self._newest.setdefault(_name(transform.header.frame_id), NEVER)
         name = _name(transform.child_frame_id)

@@ -21,11 +21,11 @@ import yaml
 from ...resources import find_file, resource_path
 from ...solver.checks import shown
 from ..scene_solver import Fault, Place, Scene, dotted
-from .short_forms import expand_boxes, expand_pairs
+from .limits import OWN, SceneLimits
+from .short_forms import check_streams, expand_boxes, expand_pairs
 
 LARGEST_FILE = 16 * 2**20  # bytes that are read at most; some 100,000 pairs
 DEEPEST = 20  # levels of nesting that are followed; a scene has four
-MOST_EVENTS = 1_200_000  # parts of a text: a hundred thousand pairs that are written out
 MOST_FAULTS = 1000  # that are looked for to name the first: all of a megabyte would take a minute
 
 
@@ -59,17 +59,18 @@ class SceneError(ValueError):
 
 
 def read_scene(source: str | os.PathLike[str], *,
-               check: Callable[[Scene], None] = lambda _: None) -> Scene:
+               check: Callable[[Scene], None] = lambda _: None,
+               limits: SceneLimits = OWN) -> Scene:
     """Return the scene of a file, or of a text that begins with `{` or has more than one line.
 
-    A path that leads to no file from here may be one of the package's own: config/scenes/…, or the
-    bare name of a scene there, such as `yard_bay`.
+    A path that leads to no file from here may be one of the package's own, config/scenes/…. So may
+    the bare name of a scene there, such as `yard_bay`.
     Raises SceneError, whose words name file, line and field. `check` may raise Fault.
     """
     if not isinstance(source, str):
         source = os.fspath(source)
     elif is_inline(source):
-        return parse_scene(source, check=check)
+        return parse_scene(source, check=check, limits=limits)
     try:
         path = find_file(source)
         if path.exists() and not path.is_file() and not path.is_dir():
@@ -84,7 +85,7 @@ def read_scene(source: str | os.PathLike[str], *,
         raise SceneError(f'scene {shown(source)} cannot be read: {reason}') from error
     if len(data) > LARGEST_FILE:
         raise SceneError(f'{source}: larger than {LARGEST_FILE} bytes')
-    return parse_scene(text, source, check=check)
+    return parse_scene(text, source, check=check, limits=limits)
 
 
 def is_inline(source: str) -> bool:
@@ -93,7 +94,8 @@ def is_inline(source: str) -> bool:
 
 
 def parse_scene(text: str, name: str = 'scene', *,
-                check: Callable[[Scene], None] = lambda _: None) -> Scene:
+                check: Callable[[Scene], None] = lambda _: None,
+                limits: SceneLimits = OWN) -> Scene:
     """Return the scene that a text describes; `name` is how errors call it.
 
     check: Whether the scene can be computed here; it raises Fault.
@@ -101,7 +103,7 @@ def parse_scene(text: str, name: str = 'scene', *,
     lines: dict[Place, int] = {}
     try:
         text.encode('utf-8')
-        return _scene_of(_plain(text, lines), lines, check)
+        return _scene_of(_plain(text, lines, limits.events), lines, check, limits)
     except UnicodeEncodeError as error:
         raise SceneError(f'{name}: not UTF-8 at character {error.start}') from error
     except yaml.YAMLError as error:
@@ -116,13 +118,15 @@ def parse_scene(text: str, name: str = 'scene', *,
         raise SceneError(f'{name}:{line}: {where}{error.reason}') from None
 
 
-def _scene_of(data: Any, lines: dict[Place, int], check: Callable[[Scene], None]) -> Scene:
+def _scene_of(data: Any, lines: dict[Place, int], check: Callable[[Scene], None],
+              limits: SceneLimits) -> Scene:
     """Return the scene that data means, or raise Fault with a place in the data."""
     _check_schema(data, lines)
-    boxes, key_of = expand_boxes(data)
-    pairs, entry_of = expand_pairs(data['pairs'], boxes)
+    boxes, key_of = expand_boxes(data, limits)
+    pairs, entry_of = expand_pairs(data['pairs'], boxes, limits)
     try:
         scene = Scene(boxes, pairs, data.get('frame_id', ''), data.get('poses') == 'array')
+        check_streams(scene)
         check(scene)
     except Fault as error:
         kind, *rest = error.place
@@ -162,7 +166,7 @@ def scene_text(scene: Scene) -> str:
     return '\n'.join([*lines, ''])
 
 
-def _plain(text: str, lines: dict[Place, int]) -> Any:
+def _plain(text: str, lines: dict[Place, int], most_events: int) -> Any:
     """Return the data of a YAML text; the line of each of its values goes to `lines`."""
     depth = 0
     for number, event in enumerate(yaml.parse(text, Loader=_Loader)):
@@ -175,8 +179,8 @@ def _plain(text: str, lines: dict[Place, int]) -> Any:
             reason = f'tag {shown(tag)} is not accepted'
         elif depth > DEEPEST:  # the C loader, which descends, would end the process
             reason = 'nested too deeply'
-        elif number >= MOST_EVENTS:
-            reason = f'more than {MOST_EVENTS} values and brackets'
+        elif number >= most_events:
+            reason = f'more than {most_events} values and brackets'
         if reason:
             lines[()] = event.start_mark.line + 1 if event.start_mark else 1
             raise Fault((), reason)

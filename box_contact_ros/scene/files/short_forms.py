@@ -17,21 +17,19 @@ from decimal import Decimal
 from typing import Any
 
 from ...solver.checks import shown
-from ..scene_solver import LARGEST_ID, Box, Fault, Pair, Place, id_of
+from ..scene_solver import LARGEST_ID, Box, Fault, Pair, Place, Scene, id_of
+from .limits import MOST_STREAMS, SceneLimits
 
-MOST_BOXES = 100_000  # of a scene
-MOST_PAIRS = 2**19  # of a scene: 1,000 boxes, each with each
-MOST_COMPARISONS = 10_000_000
-"""Names that are compared with patterns; these take some seconds."""
 _WILDCARDS = frozenset('*?[')
 
 
-def expand_boxes(data: Mapping[str, Any]) -> tuple[dict[str, Box], dict[str, str]]:
+def expand_boxes(data: Mapping[str, Any], limits: SceneLimits,
+                 ) -> tuple[dict[str, Box], dict[str, str]]:
     """Return the boxes of a file by name, and by name the key that they stand under there."""
     entries = data['boxes']
     total = sum(_count(entry) for entry in entries.values())
-    if total > MOST_BOXES:
-        raise Fault(('boxes',), f'{total} boxes are more than {MOST_BOXES}')
+    if total > limits.boxes:
+        raise Fault(('boxes',), f'{total} boxes are more than {limits.boxes}')
     boxes: dict[str, Box] = {}
     key_of: dict[str, str] = {}
     for key, entry in entries.items():
@@ -114,16 +112,16 @@ def _stacked(key: str, stack: Mapping[str, Any], size: tuple[float, ...]) -> Ite
 
 
 def expand_pairs(entries: Sequence[Mapping[str, Any]], boxes: Mapping[str, Box],
-                 ) -> tuple[tuple[Pair, ...], list[int]]:
+                 limits: SceneLimits) -> tuple[tuple[Pair, ...], list[int]]:
     """Return the pairs of a file in its order, and of each the number of its entry.
 
     A pattern leaves out two fixed boxes, a pair that is listed by its names, and what an earlier
     pattern has.
     """
-    sides = _sides(entries, boxes)
+    sides = _sides(entries, boxes, limits.comparisons)
     most = sum(len(a) * len(b) for a, b in filter(None, sides))
-    if most > 2 * MOST_PAIRS:  # moving boxes among themselves: each pair is met twice
-        raise Fault(('pairs',), f'patterns of {most} pairs of boxes: more than {2 * MOST_PAIRS}')
+    if most > 2 * limits.pairs:  # moving boxes among themselves: each pair is met twice
+        raise Fault(('pairs',), f'patterns of {most} pairs of boxes: more than {2 * limits.pairs}')
     known = {_both(entry['a'], entry['b'])
              for entry, side in zip(entries, sides) if side is None}
     found: list[tuple[str, str, str, int | None]] = []
@@ -135,8 +133,8 @@ def expand_pairs(entries: Sequence[Mapping[str, Any]], boxes: Mapping[str, Box],
         else:
             found += _new_pairs(number, *side, boxes, known)
         entry_of += [number] * (len(found) - len(entry_of))
-    if len(found) > MOST_PAIRS:
-        raise Fault(('pairs',), f'{len(found)} pairs are more than {MOST_PAIRS}')
+    if len(found) > limits.pairs:
+        raise Fault(('pairs',), f'{len(found)} pairs are more than {limits.pairs}')
     taken = {key for *_, key in found if key is not None}
     pairs = []
     for a, b, name, key in found:
@@ -147,6 +145,14 @@ def expand_pairs(entries: Sequence[Mapping[str, Any]], boxes: Mapping[str, Box],
             taken.add(key)
         pairs.append(Pair(int(key), name, a, b))
     return tuple(pairs), entry_of
+
+
+def check_streams(scene: Scene) -> None:
+    """Raise Fault for a scene that nobody could listen to."""
+    streams = len(scene.sources) + len(scene.frames)
+    if streams > MOST_STREAMS:
+        raise Fault(('boxes',), f'{streams} boxes have a topic or a frame of their own, and at '
+                                f'most {MOST_STREAMS} may: set poses: array')
 
 
 def _both(a: str, b: str) -> tuple[str, str]:
@@ -170,7 +176,7 @@ def _new_pairs(number: int, side_a: Sequence[str], side_b: Sequence[str],
         raise Fault(('pairs', number), 'no two boxes of this pattern are a pair of which one moves')
 
 
-def _sides(entries: Sequence[Mapping[str, Any]], boxes: Mapping[str, Box],
+def _sides(entries: Sequence[Mapping[str, Any]], boxes: Mapping[str, Box], comparisons: int,
            ) -> list[tuple[Sequence[str], Sequence[str]] | None]:
     """Return the boxes on both sides of each pattern; None for a pair listed by its names."""
     matches: dict[tuple[str, str], Sequence[str]] = {}
@@ -181,8 +187,8 @@ def _sides(entries: Sequence[Mapping[str, Any]], boxes: Mapping[str, Box],
         if not _WILDCARDS & set(pattern) and pattern not in boxes:
             raise Fault(place, f'{shown(pattern)} is none of the boxes')
         if (side, pattern) not in matches:
-            if (len(matches) + 1) * len(boxes) > MOST_COMPARISONS:
-                raise Fault(place, f'more than {MOST_COMPARISONS} names to compare with patterns')
+            if (len(matches) + 1) * len(boxes) > comparisons:
+                raise Fault(place, f'more than {comparisons} names to compare with patterns')
             names: Iterable[str] = boxes if _WILDCARDS & set(pattern) else [pattern]
             # fnmatch's expressions take time in proportion to the name, whatever the pattern.
             is_alike = re.compile(fnmatch.translate(pattern)).match

@@ -12,8 +12,8 @@ it holds and from where the bodies are by now.
 wrench until the next answer: `HeldWrench` then holds it.
 
 All three are faces of the same code in libbox_contact; docs/explanation/force.md derives it. Its
-source is an elastic foundation (Johnson, Contact Mechanics, section 4.3) under each patch, with
-friction by an anchor and a limit surface (Goyal, Ruina and Papadopoulos, 1991).
+source is an elastic foundation under each patch (Johnson, Contact Mechanics, section 4.3). Friction
+has an anchor and a limit surface (Goyal, Ruina and Papadopoulos, 1991).
 
 Conventions: those of `pose`; SI units. A pose (7,) is that of a body's box, as the solver takes it.
 A velocity (6,) is linear [m/s], of the centre of mass, then angular [rad/s]. A wrench (6,) is a

@@ -4,10 +4,6 @@
 """The page: drawing, read-outs and controls, served by viser. No ROS."""
 from __future__ import annotations
 
-import contextlib
-import io
-import logging
-import socket
 import time
 from collections import deque
 from collections.abc import Callable
@@ -19,7 +15,8 @@ import viser
 from ....solver.models import MODELS
 from ..style import CONTACT
 from ..view_log import Snapshot, ViewFigures
-from .read_outs import deepest_contacts, legend, line, read_out, report
+from .read_outs import Html, deepest_contacts, legend, line, read_out, report
+from .server import PageServer
 from .stage import Stage
 
 CHART_LEAST, CHART_MOST = ({'pad': 0.1, 'soft': value, 'mode': 1} for value in (-20.0, 20.0))
@@ -45,14 +42,7 @@ class Page:
                  on_model: Callable[[str], None] | None = None,
                  on_land: Callable[[CraneRun], None] | None = None) -> None:
         """Serve at a port, or the next that is free; None: no crane, no node to be asked."""
-        # viser would wait for ever for a server that cannot start.
-        with socket.create_server((host, 0), family=socket.getaddrinfo(host, 0)[0][0]):
-            pass
-        # Browsers open connections on suspicion, and close them unused; that is no error.
-        logging.getLogger('websockets').setLevel(logging.CRITICAL)
-        with contextlib.redirect_stdout(io.StringIO()):  # viser greets
-            self._server = server = viser.ViserServer(host=host, port=port, verbose=False,
-                                                      label='box_contact_ros')
+        self._server = server = PageServer(host, port)
         self.url = f'http://{host}:{server.get_port()}'
         server.gui.configure_theme(show_logo=False, show_share_button=False, brand_color=CONTACT,
                                    control_width='large')
@@ -61,7 +51,7 @@ class Page:
         self._stage = Stage(server)
         self._read_out = server.gui.add_html('')
         self._deepest = server.gui.add_html('')
-        server.gui.add_html(legend())
+        _put(server.gui.add_html(''), legend())
         self._add_chart()
         self._next_read_out = 0.0
         if on_model is not None:
@@ -112,8 +102,8 @@ class Page:
         """Show the figures."""
         now = time.monotonic()
         self._next_read_out = now + READ_OUT_PERIOD
-        self._read_out.content = read_out(snapshot, figures, model)
-        self._deepest.content = deepest_contacts(snapshot)
+        _put(self._read_out, read_out(snapshot, figures, model))
+        _put(self._deepest, deepest_contacts(snapshot))
         if snapshot is not None:
             self._history.append((now, 1e3 * snapshot.separation))
             while now - self._history[0][0] > HISTORY:
@@ -129,7 +119,7 @@ class Page:
             text = f'switching to {wish} …'
         elif refusal:
             text, bad = f'refused: {refusal}', True
-        self._status.content = line('model-status', text, bad=bad)
+        _put(self._status, line('model-status', text, bad=bad))
 
     def show_run(self, run: CraneRun) -> None:
         """Show which run is under way."""
@@ -137,12 +127,16 @@ class Page:
 
     def show_last_run(self, passed: bool, text: str) -> None:
         """Show whether the crane's last run passed, and its report."""
-        self._verdict.content = line('last-run', f'last run: {"passed" if passed else "FAILED"}',
-                                     bad=not passed)
+        _put(self._verdict, line('last-run', f'last run: {"passed" if passed else "FAILED"}',
+                                 bad=not passed))
         self._report.visible = True
-        self._last_run.content = report(text)
+        _put(self._last_run, report(text))
 
     def close(self) -> None:
         """End the server."""
-        with contextlib.redirect_stdout(io.StringIO()):
-            self._server.stop()
+        self._server.stop()
+
+
+def _put(place: viser.GuiHtmlHandle, content: Html) -> None:
+    """Show HTML, and nothing else, at a place of the panel."""
+    place.content = str(content)  # viser takes no other kind of text
