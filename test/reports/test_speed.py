@@ -72,8 +72,8 @@ EXACT_BATCHES = [140.0, 150.0, 160.0]
     (run_of(480.0, EXACT_BATCHES, mlp=361.0), ['single call of `mlp`']),
     (run_of(480.0, [155.0, 160.0, 169.0]), ['in a batch of `exact`']),
     (run_of(480.0, [140.0, 145.0, 175.0], unit=1100.0), ['set 2 take `exact`']),
-    (run_of(480.0, EXACT_BATCHES, mlp_batches=[80.0, 80.0, 85.0]), ['set 2 take `mlp`']),
-    (run_of(480.0, EXACT_BATCHES, mlp_batches=[85.0, 84.0, 84.0]), ['`exact` on set 0']),
+    (run_of(480.0, EXACT_BATCHES, mlp_batches=[90.0, 90.0, 95.0]), ['set 2 take `mlp`']),
+    (run_of(480.0, EXACT_BATCHES, mlp_batches=[99.0, 98.0, 98.0]), ['`exact` on set 0']),
     (run_of(480.0, EXACT_BATCHES, unit=None),
      ['single call of `mlp`', 'single call of `exact`', 'in a batch of `exact`']),
 ])

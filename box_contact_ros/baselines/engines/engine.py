@@ -60,7 +60,7 @@ class Engine:
     returns: str
     patch: str = '–'  # what it says of the patch beyond points: its volume or area
     package: str = ''  # distribution whose version reports name
-    choices: tuple[str, ...] = ('deepest', 'mean', 'patch centroid')
+    choices: tuple[str, ...] = ('deepest', 'mean', 'mean by depth', 'patch centroid')
     """Ways, of `CHOICES`, in which users make one point of the answer."""
     boxes: Callable[[np.ndarray, np.ndarray], Callable[..., Any]]
     """Return what answers for boxes of two sizes (3,). ValueError: not for these sizes."""
@@ -88,10 +88,10 @@ def packages_of(engines: Sequence[Engine]) -> list[str]:
     return list(dict.fromkeys(['numpy', *(one.package for one in engines if one.package)]))
 
 
-def ours(model: str, name: str | None = None, weights: str | None = None) -> Engine:
-    """Return a model of this package, which reports show as `name`."""
+def ours(model: str) -> Engine:
+    """Return a model of this package."""
     entry, _ = find_model('model', model)
-    solver = partial(ContactSolver, model=model, weights=weights)
+    solver = partial(ContactSolver, model=model)
 
     def prepare_batch(pairs: Pairs, threads: int = 1) -> Callable[[], Any]:
         a, b, size_a, size_b = pairs
@@ -103,7 +103,7 @@ def ours(model: str, name: str | None = None, weights: str | None = None) -> Eng
             return APART
         return manifold([(contact.point, contact.normal, -contact.separation)])
 
-    return Engine(name=name or model, call='ContactSolver(…)(pose_a, pose_b)',
+    return Engine(name=model, call='ContactSolver(…)(pose_a, pose_b)',
                   returns='one contact', patch='volume, covariance', choices=('its point',),
                   boxes=solver, at=lambda a, b: (a, b), read=read, any_boxes=entry.any_boxes,
                   prepare_batch=prepare_batch if entry.native_batch else None)
@@ -115,6 +115,12 @@ def _deepest(points: np.ndarray, normals: np.ndarray, depths: np.ndarray) -> np.
 
 def _mean(points: np.ndarray, normals: np.ndarray, depths: np.ndarray) -> np.ndarray:
     return points.mean(axis=0)
+
+
+def _mean_by_depth(points: np.ndarray, normals: np.ndarray, depths: np.ndarray) -> np.ndarray:
+    """Return the mean with the depths as weights: where springs at the points push, all alike."""
+    weights = np.maximum(depths, 0.0)
+    return weights @ points / weights.sum() if weights.sum() > 0.0 else points.mean(axis=0)
 
 
 def _patch_centroid(points: np.ndarray, normals: np.ndarray, depths: np.ndarray) -> np.ndarray:
@@ -134,7 +140,7 @@ def _patch_centroid(points: np.ndarray, normals: np.ndarray, depths: np.ndarray)
 
 
 CHOICES: dict[str, Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]] = {
-    'its point': _deepest, 'deepest': _deepest, 'mean': _mean,
+    'its point': _deepest, 'deepest': _deepest, 'mean': _mean, 'mean by depth': _mean_by_depth,
     'patch centroid': _patch_centroid}
 """One point of n > 0 points (n, 3), with their normals (n, 3) and depths (n,)."""
 

@@ -26,17 +26,15 @@ FARTHEST = 1.0  # distance up to which mj_geomDistance looks [m]
 def distance(name: str, flags: str) -> Engine:
     """Return `mj_geomDistance`: signed distance and two nearest points; their middle."""
     ends = np.zeros(6)
-    measure, matrix = mujoco.mj_geomDistance, mujoco.mju_quat2Mat
+    measure, kinematics = mujoco.mj_geomDistance, mujoco.mj_kinematics
 
     def boxes(p: np.ndarray, q: np.ndarray) -> Callable[..., Any]:
         model, data = _model(box_geoms, flags, p, q)
-        (place_a, place_b), (turn_a, turn_b) = data.geom_xpos, data.geom_xmat
+        places = data.qpos
 
-        def ask(a: np.ndarray, b: np.ndarray, quat_a: np.ndarray, quat_b: np.ndarray) -> float:
-            place_a[:] = a
-            place_b[:] = b
-            matrix(turn_a, quat_a)
-            matrix(turn_b, quat_b)
+        def ask(poses: np.ndarray) -> float:
+            places[:] = poses
+            kinematics(model, data)
             return measure(model, data, 0, 1, FARTHEST, ends)
         return ask
 
@@ -48,9 +46,10 @@ def distance(name: str, flags: str) -> Engine:
         normal = (start - end) / length if length else np.full(3, np.nan)
         return manifold([(0.5 * (start + end), normal, -result)])
 
-    return Engine(name=f'MuJoCo mj_geomDistance{name}', call=f'mj_geomDistance(model, data, 0, 1, '
-                  f'1.0, fromto){flags and f", {flags}"}', returns='distance, two nearest points',
-                  package='mujoco', choices=('its point',), boxes=boxes, at=wxyz, read=read,
+    return Engine(name=f'MuJoCo mj_geomDistance{name}', call='data.qpos[:] = poses; mj_kinematics('
+                  'model, data); mj_geomDistance(model, data, 0, 1, 1.0, fromto)'
+                  f'{flags and f", {flags}"}', returns='distance, two nearest points',
+                  package='mujoco', choices=('its point',), boxes=boxes, at=as_qpos, read=read,
                   causes={'normal': _CCD_ENDS + ' The two nearest points coincide, and give no '
                           'direction.'})
 
@@ -70,19 +69,22 @@ def collision(name: str, shape: Shape, flags: str, normal: str = '', **about: An
             return data
         return ask
 
-    def at(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray]:
-        place_a, place_b, quat_a, quat_b = wxyz(a, b)
-        return (np.concatenate([place_a, quat_a, place_b, quat_b]),)
-
     def read(data: Any) -> Manifold:
         found = data.contact
         # A frame's first row is the normal, from the geom of lower number to the other.
         return Manifold(np.array(found.pos), np.array(found.frame)[:, :3], -np.array(found.dist))
 
-    return Engine(name=f'MuJoCo mj_collision{name}', call=f'mj_kinematics, mj_collision'
-                  f'{flags and f", {flags}"}', returns='up to 8 points with depths, normals',
-                  package='mujoco', boxes=boxes, at=at, read=read, **about,
+    return Engine(name=f'MuJoCo mj_collision{name}', call='data.qpos[:] = poses; mj_kinematics('
+                  f'model, data); mj_collision(model, data){flags and f", {flags}"}',
+                  returns='up to 8 points with depths, normals',
+                  package='mujoco', boxes=boxes, at=as_qpos, read=read, **about,
                   causes={'missed': _CCD_ENDS, 'normal': normal})
+
+
+def as_qpos(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray]:
+    """Return both poses (7,) as MuJoCo's `qpos` of two free bodies, (14,)."""
+    place_a, place_b, quat_a, quat_b = wxyz(a, b)
+    return (np.concatenate([place_a, quat_a, place_b, quat_b]),)
 
 
 def box_geoms(name: str, size: np.ndarray) -> tuple[str, str]:

@@ -11,6 +11,13 @@ INPUTS: Final[int]
 OUTPUTS: Final[int]
 """Outputs of a network: azimuth and elevation of the impact point, then of the normal [rad]."""
 
+MOST_UNITS: Final[int]
+"""Most units of a layer."""
+SAME_SIZE: Final[float]
+"""Relative difference of extents up to which two sizes are one."""
+KERNEL: Final[object]
+"""What `PairSolver` takes as its model: networks as `paper_models` packs them."""
+
 NO_FOLD: Final[int]
 """Leave pairs as they are."""
 OCTANT: Final[int]
@@ -22,17 +29,6 @@ VERTEX_FACE: Final[int]
 """Subset of pairs in which a vertex meets a face."""
 EDGE_EDGE: Final[int]
 """Subset of pairs in which two edges meet."""
-
-def solve(poses_a: np.ndarray, poses_b: np.ndarray, sizes_a: np.ndarray, sizes_b: np.ndarray,
-          networks: np.ndarray, widths: np.ndarray, cubes: bool, fold_to: int, /,
-          ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, int]:
-    """Return colliding, separation, normal, point, and the first refused row or −1.
-
-    poses (n, 7), sizes (n, 3) or (1, 3) full extents [m]; frame: that of the poses.
-    networks: (networks, parameters) float32, one a subset for FEATURES, else one.
-    widths: (layers + 1,) int64 units of the layers.
-    cubes: the networks were trained on cubes of edge 2.
-    """
 
 def fold(fold_to: int, offset: np.ndarray, rotation: np.ndarray, axis: np.ndarray,
          normal: np.ndarray, /,

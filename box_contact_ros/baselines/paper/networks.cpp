@@ -7,9 +7,10 @@
 // Python, which is told the row.
 #include "networks.hpp"
 
-#include <string>
+#include <vector>
 
 #include "../../core/binding/arrays.hpp"
+#include "../../core/binding/other_kernel.hpp"
 
 namespace {
 
@@ -19,15 +20,16 @@ using namespace box_contact::paper;
 
 // --- Arguments ----------------------------------------------------------------------------------
 
-// Read the units of a network's layers. `count` is how many parameters the network has.
-bool read_widths(PyObject* argument, npy_intp count, Widths& widths) {
+// Read a network: its parameters, and the units of its layers, which go to `widths`.
+bool read_network(PyObject* const* args, Array<float>& parameters, std::vector<float>& widths,
+                  Network& network) {
   Array<int64_t> given;
-  if (!read(argument, "widths", {any_length}, given)) return false;
-  widths.assign(given.numbers, given.numbers + given.length(0));
-  // Limits that keep the products of `parameter_count` in range.
-  bool possible = widths.size() >= 2;
-  for (long units : widths) possible = possible && units >= 1 && units <= count;
-  if (possible && parameter_count(widths) == count) return true;
+  if (!read(args[0], "network", {any_length}, parameters) ||
+      !read(args[1], "widths", {any_length}, given))
+    return false;
+  for (npy_intp k = 0; k < given.length(0); ++k) widths.push_back(float(given.numbers[k]));
+  network = {widths.data(), long(widths.size()), parameters.numbers};
+  if (network.parameter_count(parameters.length(0)) == parameters.length(0)) return true;
   fail(PyExc_ValueError, "widths do not fit the parameters");
   return false;
 }
@@ -41,61 +43,7 @@ bool read_fold_to(PyObject* argument, FoldTo& to) {
   return false;
 }
 
-// Sizes are as many as poses, or one for all.
-bool read_sizes(PyObject* argument, const char* name, npy_intp count, Array<double>& sizes,
-                long& step) {
-  if (!read(argument, name, {any_length, 3}, sizes)) return false;
-  step = sizes.length(0) == 1 ? 0 : 3;
-  if (step == 0 || sizes.length(0) == count) return true;
-  PyErr_Format(PyExc_ValueError, "%s are neither one nor as many as the poses", name);
-  return false;
-}
-
 // --- Functions ----------------------------------------------------------------------------------
-
-PyObject* solve_pairs(PyObject*, PyObject* const* args, Py_ssize_t given) {
-  if (given != 8)
-    return fail(PyExc_TypeError,
-                "solve(poses_a, poses_b, sizes_a, sizes_b, networks, widths, cubes, fold_to)");
-  Array<double> poses_a, poses_b, sizes_a, sizes_b;
-  Array<float> parameters;
-  Rows rows{};
-  Networks networks{};
-  if (!read(args[0], "poses_a", {any_length, 7}, poses_a)) return nullptr;
-  npy_intp count = poses_a.length(0);
-  if (!read(args[1], "poses_b", {count, 7}, poses_b) ||
-      !read_sizes(args[2], "sizes_a", count, sizes_a, rows.size_step_a) ||
-      !read_sizes(args[3], "sizes_b", count, sizes_b, rows.size_step_b) ||
-      !read(args[4], "networks", {any_length, any_length}, parameters) ||
-      !read_widths(args[5], parameters.length(1), networks.widths) ||
-      !read_fold_to(args[7], networks.fold_to))
-    return nullptr;
-  int cubes = PyObject_IsTrue(args[6]);
-  if (cubes < 0) return nullptr;
-  networks.cubes = cubes;
-  if (networks.widths.front() != input_count || networks.widths.back() != output_count)
-    return fail(PyExc_ValueError, "the networks must have 6 inputs and 4 outputs");
-  if (parameters.length(0) != (networks.fold_to == FoldTo::features ? 2 : 1))
-    return fail(PyExc_ValueError, "FEATURES needs two networks, other folds one");
-  for (npy_intp k = 0; k < parameters.length(0); ++k)
-    networks.parameters.push_back(parameters.numbers + k * parameters.length(1));
-  rows.poses_a = poses_a.numbers, rows.poses_b = poses_b.numbers;
-  rows.sizes_a = sizes_a.numbers, rows.sizes_b = sizes_b.numbers;
-
-  Array<bool> colliding;
-  Array<double> separation, normal, point;
-  if (!make({count}, colliding) || !make({count}, separation) || !make({count, 3}, normal) ||
-      !make({count, 3}, point))
-    return nullptr;
-  long refused;
-  Py_BEGIN_ALLOW_THREADS;
-  refused = solve(networks, rows, count,
-                  {colliding.numbers, separation.numbers, normal.numbers, point.numbers, nullptr,
-                   nullptr, nullptr, 0.0});
-  Py_END_ALLOW_THREADS;
-  return Py_BuildValue("(NNNNl)", colliding.object.release(), separation.object.release(),
-                       normal.object.release(), point.object.release(), refused);
-}
 
 PyObject* fold_pairs(PyObject*, PyObject* const* args, Py_ssize_t given) {
   if (given != 5) return fail(PyExc_TypeError, "fold(fold_to, offset, rotation, axis, normal)");
@@ -141,34 +89,30 @@ PyObject* fold_pairs(PyObject*, PyObject* const* args, Py_ssize_t given) {
 PyObject* forward_rows(PyObject*, PyObject* const* args, Py_ssize_t given) {
   if (given != 3) return fail(PyExc_TypeError, "forward(network, widths, inputs)");
   Array<float> parameters, inputs, outputs;
-  Widths widths;
-  if (!read(args[0], "network", {any_length}, parameters) ||
-      !read_widths(args[1], parameters.length(0), widths) ||
-      !read(args[2], "inputs", {any_length, widths.front()}, inputs))
+  std::vector<float> widths;
+  Network network;
+  if (!read_network(args, parameters, widths, network) ||
+      !read(args[2], "inputs", {any_length, network.width(0)}, inputs))
     return nullptr;
   npy_intp count = inputs.length(0);
-  if (!make({count, widths.back()}, outputs)) return nullptr;
-  Py_BEGIN_ALLOW_THREADS;
-  Units units(widths);
-  for (npy_intp row = 0; row < count; ++row) {
-    std::copy_n(inputs.numbers + row * widths.front(), widths.front(), units.layer.begin());
-    forward(parameters.numbers, widths, units);
-    std::copy_n(units.layer.begin(), widths.back(), outputs.numbers + row * widths.back());
-  }
-  Py_END_ALLOW_THREADS;
+  long into = network.width(0), out_of = network.outputs();
+  if (!make({count, out_of}, outputs)) return nullptr;
+  without_lock([&] {
+    Units units;
+    for (npy_intp row = 0; row < count; ++row)
+      std::copy_n(forward(network, inputs.numbers + row * into, units), out_of,
+                  outputs.numbers + row * out_of);
+  });
   return outputs.object.release();
 }
 
 // --- Module -------------------------------------------------------------------------------------
 
 PyMethodDef module_methods[] = {
-    {"solve", fastcall(solve_pairs), METH_FASTCALL,
-     "solve(poses_a, poses_b, sizes_a, sizes_b, networks, widths, cubes, fold_to, /)\n--\n\n"
-     "Return colliding, separation, normal, point, and the first refused row or -1."},
-    {"fold", fastcall(fold_pairs), METH_FASTCALL,
+    {"fold", method<fold_pairs>(), METH_FASTCALL,
      "fold(fold_to, offset, rotation, axis, normal, /)\n--\n\n"
      "Return M, N, offset, rotation, roll pitch yaw, and subset of folded pairs."},
-    {"forward", fastcall(forward_rows), METH_FASTCALL,
+    {"forward", method<forward_rows>(), METH_FASTCALL,
      "forward(network, widths, inputs, /)\n--\n\nReturn the outputs of a network."},
     {nullptr, nullptr, 0, nullptr}};
 
@@ -178,11 +122,22 @@ struct Constant {
 };
 constexpr Constant constants[] = {{"INPUTS", input_count},
                                   {"OUTPUTS", output_count},
+                                  {"MOST_UNITS", most_units},
                                   {"NO_FOLD", long(FoldTo::nothing)},
                                   {"OCTANT", long(FoldTo::octant)},
                                   {"FEATURES", long(FoldTo::features)},
                                   {"VERTEX_FACE", long(Subset::vertex_face)},
                                   {"EDGE_EDGE", long(Subset::edge_edge)}};
+
+bool reads(const detail::NetworkNumbers& packed) { return PaperModel(packed).count > 0; }
+
+const OtherKernel kernel = {
+    {"paper", "paper", 1, {{solve_rows, solve_rows}, {solve_rows, solve_rows}}, nullptr}, reads};
+
+bool add(PyObject* module, const char* name, PyObject* value) {
+  Owned owned(value);
+  return value && PyModule_AddObjectRef(module, name, value) == 0;
+}
 
 PyModuleDef module_definition = {PyModuleDef_HEAD_INIT,
                                  "_networks",
@@ -202,5 +157,8 @@ PyMODINIT_FUNC PyInit__networks() {
   if (!module) return nullptr;
   for (const Constant& constant : constants)
     if (PyModule_AddIntConstant(module.get(), constant.name, constant.value) < 0) return nullptr;
-  return module.release();
+  bool added = add(module.get(), "SAME_SIZE", PyFloat_FromDouble(same_size)) &&
+               add(module.get(), "KERNEL",
+                   PyCapsule_New(const_cast<OtherKernel*>(&kernel), kernel_capsule, nullptr));
+  return added ? module.release() : nullptr;
 }

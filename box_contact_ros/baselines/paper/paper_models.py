@@ -1,105 +1,113 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Models `paper` and `paper-continuous`: contact point and normal from the source's networks.
+"""The source's networks as models: contact point and normal of two equal boxes.
 
 The separating-axis test decides whether the boxes collide and gives the separation. A network gives
 azimuth and elevation of the contact point and of the normal: see baselines/paper/networks.hpp.
 
-One network for all poses is `paper`. `paper-continuous` has one network for each subset without
-discontinuities; the features that meet choose it. Both are for two equal boxes: cubes of any edge,
-or the very size that the weights were trained for (`paper` only).
+- `paper`: one network for all poses.
+- `paper-continuous`: one for each subset without discontinuities; the features that meet choose it.
+- `paper-committee`: one for each kind of contact. A network that has learnt to tell the kinds apart
+  weights their answers, as the source proposes for further work.
+
+Weights are for cubes of any edge, or for the very size that they were trained for (`paper` only).
 """
 from __future__ import annotations
+
+from functools import partial
 
 import numpy as np
 
 from ...solver.checks import as_size
-from ...solver.contact import Contacts, without_patch
-from ...solver.weights_file import WeightsError, weights_for
-from . import _networks
-from ._networks import FEATURES, INPUTS, OCTANT, OUTPUTS
+from ...solver.models import NativeModel
+from ...solver.weights_file import Network, Weights, WeightsError, weights_for
+from ._networks import FEATURES, INPUTS, KERNEL, MOST_UNITS, OCTANT, OUTPUTS, SAME_SIZE
 
-SAME_SIZE = 1e-9
-"""Relative difference of extents up to which a size is the one that the weights were made for."""
+EXPERTS = ('vertex', 'edge', 'face')  # of the committee, in the order of the classifier's outputs
+
+
+def paper(size_a: np.ndarray, size_b: np.ndarray, weights: str | None) -> NativeModel:
+    """Return model `paper` for full extents (1, 3) [m]; weights: a file, None for the shipped one.
+
+    Raises ValueError for sizes that no weights are for.
+    """
+    return _model('paper', {'contact': OUTPUTS}, OCTANT, size_a[0], size_b[0], weights)
+
+
+def paper_continuous(size_a: np.ndarray, size_b: np.ndarray, weights: str | None) -> NativeModel:
+    """Return model `paper-continuous`: see `paper`."""
+    # In the order of symmetry.VERTEX_FACE, EDGE_EDGE.
+    return _model('paper-continuous', {'vertex_face': OUTPUTS, 'edge_edge': OUTPUTS}, FEATURES,
+                  size_a[0], size_b[0], weights)
+
+
+def paper_committee(size_a: np.ndarray, size_b: np.ndarray, weights: str | None) -> NativeModel:
+    """Return model `paper-committee`: see `paper`."""
+    outputs = {'classifier': len(EXPERTS), **dict.fromkeys(EXPERTS, OUTPUTS)}
+    return _model('paper-committee', outputs, OCTANT, size_a[0], size_b[0], weights)
+
+
+def _model(model: str, outputs: dict[str, int], fold_to: int, size_a: np.ndarray,
+           size_b: np.ndarray, path: str | None) -> NativeModel:
+    """Return a model; outputs: of each network of its weights file, in the kernel's order."""
+    cubes = _is_cube(size_a)
+    suffix = '' if cubes else '-' + 'x'.join(f'{extent:g}' for extent in size_a)
+    _refuse(_pair_fault(model, size_a, size_b))
+    weights = weights_for(model, path, shipped=model + suffix,
+                          boxes=f' for boxes of size {_text(size_a)}')
+    networks = [weights.network(name, INPUTS, count, model) for name, count in outputs.items()]
+    size = _size_of(weights)
+    if fold_to == FEATURES and not _is_cube(size):
+        raise WeightsError(f'model {model!r} needs weights for cubes')
+    if max(width for network in networks for width in network.widths) > MOST_UNITS:
+        raise WeightsError(f'weights file {weights.path}: a layer has more than {MOST_UNITS} units')
+    fault = partial(_size_fault, model, weights.path.name, size)
+    _refuse(fault(size_a, size_b))
+    numbers = np.concatenate([[fold_to], size, *map(_numbers, networks)])
+    return NativeModel(kernel=KERNEL, weights=weights, size_fault=fault,
+                       network=numbers.astype(np.float32))
+
+
+def _numbers(network: Network) -> np.ndarray:
+    """Return a network as the kernel reads it: its layers, their units, its parameters."""
+    return np.concatenate([[len(network.widths)], network.widths, network.packed])
+
+
+def _size_of(weights: Weights) -> np.ndarray:
+    try:
+        return as_size(weights.card['sizes'][0], 'size')[0]
+    except (LookupError, TypeError, ValueError) as error:
+        raise WeightsError(f'weights file {weights.path}: the sizes in its card are no list of '
+                           f'three extents') from error
+
+
+def _size_fault(model: str, file: str, trained: np.ndarray, size_a: np.ndarray,
+                size_b: np.ndarray) -> str | None:
+    """Return why weights trained for a size (3,) are not for two sizes (3,), or None."""
+    if _is_cube(trained):
+        known, fits = 'cubes', _is_cube(size_a)
+    else:
+        known, fits = _text(trained), np.allclose(size_a, trained, rtol=SAME_SIZE, atol=0.0)
+    return _pair_fault(model, size_a, size_b) or (None if fits else (
+        f'the weights {file} of model {model!r} are for {known}, not for size {_text(size_a)}; '
+        f"any size works with model 'exact'"))
+
+
+def _pair_fault(model: str, size_a: np.ndarray, size_b: np.ndarray) -> str | None:
+    if np.allclose(size_b, size_a, rtol=SAME_SIZE, atol=0.0):
+        return None
+    return (f'model {model!r} is for two boxes of one size, not {_text(size_a)} and '
+            f"{_text(size_b)}; any sizes work with model 'exact'")
 
 
 def _is_cube(size: np.ndarray) -> bool:
     return bool(np.ptp(size) <= SAME_SIZE * size.max())
 
 
-class Paper:
-    """The source's networks behind the solver's interface.
-
-    size_a, size_b: (1, 3) full extents [m]; weights: a file, or None for the shipped one.
-    Raises ValueError for sizes that no weights are for.
-    """
-
-    model = 'paper'
-    experts: tuple[str, ...] = ('contact',)  # the networks of the weights file
-    fold_to = OCTANT  # the way into the networks' domain
-
-    def __init__(self, size_a: np.ndarray, size_b: np.ndarray, weights: str | None) -> None:
-        self._check_equal(size_a, size_b)
-        size = size_a[0]
-        suffix = '' if _is_cube(size) else '-' + 'x'.join(f'{extent:g}' for extent in size)
-        self.weights = weights_for(self.model, weights, shipped=self.model + suffix,
-                                   boxes=f' for boxes of size {_text(size)}')
-        networks = [self.weights.network(name, INPUTS, OUTPUTS, self.model)
-                    for name in self.experts]
-        try:
-            self._size = as_size(self.weights.card['sizes'][0], 'size')[0]
-        except (LookupError, TypeError, ValueError) as error:
-            raise WeightsError(f'weights file {self.weights.path}: the sizes in its card are no '
-                               f'list of three extents') from error
-        self._cubes = _is_cube(self._size)
-        self._check_sizes(size_a, size_b)
-        self._packed = np.stack([network.packed for network in networks])
-        self._widths = np.array(networks[0].widths, dtype=np.int64)
-
-    def _check_equal(self, size_a: np.ndarray, size_b: np.ndarray) -> None:
-        differs = np.any(np.abs(size_a - size_b) > SAME_SIZE * size_a, axis=1)
-        if differs.any():
-            row = int(np.argmax(differs))
-            raise ValueError(
-                f'model {self.model!r} is for two boxes of one size, not '
-                f'{_text(size_a[row % len(size_a)])} and '
-                f"{_text(size_b[row % len(size_b)])}; any sizes work with model 'exact'")
-
-    def _check_sizes(self, size_a: np.ndarray, size_b: np.ndarray) -> None:
-        self._check_equal(size_a, size_b)
-        for size in size_a:
-            fits = (_is_cube(size) if self._cubes
-                    else np.allclose(size, self._size, rtol=SAME_SIZE, atol=0.0))
-            if not fits:
-                known = 'cubes' if self._cubes else _text(self._size)
-                raise ValueError(
-                    f'the weights {self.weights.path.name} of model {self.model!r} are for {known},'
-                    f" not for size {_text(size)}; any size works with model 'exact'")
-
-    def solve(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
-              threads: int = 1) -> tuple[Contacts, int]:
-        """Return the contacts of poses (n, 7), sizes (n or 1, 3), and the first refused row or −1.
-
-        One thread solves all rows, whatever `threads` is. Raises ValueError for other sizes.
-        """
-        self._check_sizes(size_a, size_b)
-        *found, refused = _networks.solve(a, b, size_a, size_b, self._packed, self._widths,
-                                          self._cubes, self.fold_to)
-        return without_patch(*found), refused
-
-
-class PaperContinuous(Paper):
-    """One network for each subset on which the map is continuous; cubes only."""
-
-    model = 'paper-continuous'
-    experts = ('vertex_face', 'edge_edge')  # in the order of symmetry.VERTEX_FACE, EDGE_EDGE
-    fold_to = FEATURES
-
-    def _check_sizes(self, size_a: np.ndarray, size_b: np.ndarray) -> None:
-        if not self._cubes:
-            raise WeightsError(f'model {self.model!r} needs weights for cubes')
-        super()._check_sizes(size_a, size_b)
+def _refuse(fault: str | None) -> None:
+    if fault:
+        raise ValueError(fault)
 
 
 def _text(size: np.ndarray) -> str:

@@ -30,12 +30,11 @@ from ...baselines.engines import installed
 from ...baselines.engines.engine import Engine, ours, packages_of
 from ...core import FORCE, instruction_sets, native
 from ...output import markdown_table, number
-from ...resources import resource_path
 from ...solver.arguments import program_parser
 from ...solver.models import MODELS, gated_models
-from ...solver.weights_file import load_weights
 from ..accuracy import CLASSES
 from .frontier_picture import draw
+from .native import write_native
 from .speed import pinned, usable_cores, with_instruction_set, write_speed
 from .trials import (
     ALL_SETS,
@@ -48,26 +47,20 @@ from .trials import (
     measure_all,
 )
 
-IN_SHORT = ('exact', 'mlp', 'paper', 'fcl', 'soup-8', 'soup-22')
-"""Models in the table of the README, beside all other engines."""
+IN_SHORT = ('exact', 'mlp', 'paper', 'soup-8', 'soup-22')
+"""Models in the table of the README that engines answer, too."""
+AS_ENGINES = ('fcl',)
+"""Models whose library is measured as an engine, by the call that its own documentation shows."""
 ODD_NORMAL = 10.0  # error of an engine's normal that is explained [deg]
 
 
 def contestants(members: int = FULL.members) -> tuple[list[Engine], list[str]]:
     """Return all that can be measured here, and a line about each that cannot."""
-    sizes = {}
-    for path in resource_path('weights').glob('mlp-*.safetensors'):
-        card = load_weights(path).card
-        if not card['sizes']:  # those of a scene are for its boxes alone
-            words = path.stem.split('-')  # mlp-edges-32: the description, and its units
-            sizes[tuple(words[1:-1]), int(words[-1])] = str(path)
     found = []
-    for entry in MODELS.values():
+    for entry in (one for one in MODELS.values() if one.name not in AS_ENGINES):
         with suppress(ImportError):  # of an extra whose libraries `missing` names
             entry.load()
             found += map(ours, entry.reported_names[:members])
-    found += [ours('mlp', ' '.join(['mlp', *description, str(units)]), path)
-              for (description, units), path in sorted(sizes.items())]
     rivals, missing = installed()
     return [*found, *rivals], missing
 
@@ -114,8 +107,7 @@ def in_short(rows: Sequence[FrontierRow], odd: Mapping[Odd, str]) -> str:
     """Return the short table: containers and stacks, what a crane has all day."""
     by = {(row.name, row.instruction_set, row.set): row for row in rows}
     best, notes, lines = native.instruction_set, list(odd), []
-    rivals = [name for name in dict.fromkeys(row.name for row in rows) if ' ' in name
-              and not name.startswith('mlp ')]
+    rivals = [name for name in dict.fromkeys(row.name for row in rows) if ' ' in name]
     for name in (*IN_SHORT, *rivals):
         def marked(kind: str, cell: object, name: str = name) -> str:
             place = notes.index((name, kind)) + 1 if (name, kind) in odd else 0
@@ -229,6 +221,8 @@ def main(args: Sequence[str] | None = None) -> int:
                             out='frontier.md, .csv, .png')
     parser.add_argument('--speed', action='store_true',
                         help='the speed gates instead: speed.md, .csv')
+    parser.add_argument('--native', action='store_true',
+                        help="C against C instead, with MuJoCo's colliders: native.md, .csv")
     cores = usable_cores()
     parser.add_argument('--core', type=int, default=cores[-1], choices=cores, metavar='N',
                         help='core to run on (default: the last one)')
@@ -237,6 +231,8 @@ def main(args: Sequence[str] | None = None) -> int:
     command = output.command_line('box_contact_ros frontier', args)
     if options.speed:
         return write_speed(folder, command, core=options.core, quick=options.quick)
+    if options.native:
+        return write_native(folder, command, core=options.core, quick=options.quick)
     plan = QUICK if options.quick else FULL
     with pinned({options.core}):
         found, missing = contestants(plan.members)

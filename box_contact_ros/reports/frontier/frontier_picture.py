@@ -59,7 +59,7 @@ def draw(path: Path, rows: Sequence[FrontierRow]) -> None:
 
 
 def _points(axis: Any, found: Sequence[tuple[float, FrontierRow]]) -> None:
-    """Draw times and errors with their names in a column beside them, and the frontier."""
+    """Draw times and errors with their names in a column next to them, and the frontier."""
     height = output.log_errors(axis, *ERRORS)
     axis.set_xscale('log')
     points = [(time, height(row.errors.points['all'][2]), row) for time, row in found

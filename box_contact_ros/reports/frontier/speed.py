@@ -45,8 +45,9 @@ BATCH_LIMITS = {'AVX-512': 0.088 * PATCH_COST, 'AVX2': 0.125 * PATCH_COST}
 """Pair of `exact` in a batch, on every set of poses, by instruction set [calls of UNIT]."""
 SPREAD_LIMITS = {'mlp': 1.05, 'exact': 1.20}
 """Slowest set of poses by the median set, for the instruction sets above."""
-MLP_BY_EXACT = 0.60
-"""Pair of `mlp` in a batch, on every set of poses, for the instruction sets above [of `exact`]."""
+MLP_BY_EXACT = 0.70
+"""Pair of `mlp` in a batch, on every set of poses, for the instruction sets above [of `exact`]. It
+was 0.60 of an `exact` that took a third more."""
 THREADS_LIMIT = 1.8  # least gain of two threads on two cores, batch of `exact`
 LONGEST_RUN = 3600.0  # of a subprocess with one instruction set [s]
 START_LIMIT = 0.15  # from the start of a process to its first contact, without ROS [s]
@@ -355,7 +356,7 @@ def page(runs: Sequence[Sequence[Timing]], claims: Sequence[Claim], command: str
     """Return the Markdown page."""
     return filled_page(
         'reports/pages/speed', command=command, machine=machine(native, PACKAGES), effort=effort,
-        claims='\n'.join(f'- {"" if one.holds else "BROKEN: "}{one.text}' for one in claims),
+        claims='\n'.join(f'- {"" if one.holds else "goal missed: "}{one.text}' for one in claims),
         tables='\n\n'.join(f'## {run[0].instruction_set}\n\n{table(run)}' for run in runs))
 
 

@@ -10,7 +10,7 @@ digits. Models that build on FCL run in a subprocess, family by family: an abort
 an end.
 
 `--named` replays public reports about pairs of boxes instead, with every model and every other
-engine that is installed, and writes named_failures.md: see `named_failures`.
+engine that is installed. It writes named_failures.md: see `named_failures`.
 """
 from __future__ import annotations
 
@@ -152,7 +152,7 @@ def page(rows: Sequence[StabilityRow], command: str) -> str:
     models = dict.fromkeys(row.model for row in rows)
     return output.page(
         'reports/pages/stability', command=command, machine=output.machine(native, PACKAGES),
-        verdict=f'BROKEN: {"; ".join(broken)}.' if broken else 'Of `exact` and `mlp`, every '
+        verdict=f'Goals missed: {"; ".join(broken)}.' if broken else 'Of `exact` and `mlp`, every '
         'verdict and normal is right, and every point in both boxes.', models='\n\n'.join(
             f'## `{model}`\n\n{table([row for row in rows if row.model == model])}'
             for model in models))

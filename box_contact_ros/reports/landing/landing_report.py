@@ -3,12 +3,12 @@
 
 """Landings by the way of contact and force: whether the container comes to rest, and how flat.
 
-It runs a grid of 36 landings by every way (some by a sample), rate and latency, and landings of
-other loads and stacks whose outcome is stated beforehand (`landing_ways`). Written are landing.csv
-(a row per landing), landing.md (tables) and landing.png (one landing, four ways). With --dds the
-contacts of a sample come from a contact node in another process, in lockstep, and landing_dds.csv
-and .md are written. The exit status is 1 if held patches of `exact` or `mlp` do not do all that is
-expected.
+It runs a grid of 36 landings by every way (some by a sample), rate and latency. It also lands other
+loads and stacks, with an outcome that is stated beforehand (`landing_ways`). Written are
+landing.csv (a row per landing), landing.md (tables) and landing.png (one landing, four ways). With
+--dds the contacts of a sample come from a contact node in another process, in lockstep, and
+landing_dds.csv and .md are written. The exit status is 1 if held patches of `exact` or `mlp` do not
+do all that is expected.
 """
 from __future__ import annotations
 
@@ -290,12 +290,12 @@ def _options(args: Sequence[str] | None) -> tuple[argparse.Namespace, Path]:
         'landing', __doc__, seed=1, out='pages, tables and the picture',
         quick=f'every {QUICK}th landing of the grid, every third of the others')
     parser.add_argument('--ways', nargs='+', choices=list(WAYS), metavar='WAY',
-                        help=f'of {", ".join(WAYS)} (default: all; with --dds '
+                        help=f'ways to land, of {", ".join(WAYS)} (default: all; with --dds '
                              f'{" ".join(OVER_DDS)})')
     parser.add_argument('--rates', nargs='+', type=float, default=[50.0, 200.0, 1000.0],
-                        metavar='HZ', help='ticks a second, default: %(default)s')
+                        metavar='HZ', help='ticks per second, default: %(default)s')
     parser.add_argument('--latency', nargs='+', type=float, default=[0.0, 0.002, 0.005],
-                        metavar='S', help='from asking to acting [s], default: %(default)s')
+                        metavar='S', help='times from asking to acting [s], default: %(default)s')
     parser.add_argument('--dds', action='store_true', help='contacts from a contact node, over '
                         'DDS in lockstep')
     parser.add_argument('--workers', type=int, default=os.cpu_count(), help='processes')

@@ -8,7 +8,7 @@ models. Engines give a point, so theirs go to the point law, which knows the loa
 MuJoCo's own manifold is the bar to reach: forces of several points, implicit, within the simulator,
 at every physics step.
 
-`ADDED` are landings beside the grid of `landing.cases`, each with what it is expected to do.
+`ADDED` are landings outside the grid of `landing.cases`, each with what it is expected to do.
 """
 from __future__ import annotations
 
@@ -127,8 +127,8 @@ ADDED = [
     PlannedLanding(name='overhanging by 55 % of the length',
                    case=_aimed(overhang=0.55 * _LENGTH, heading=180.0), falls=True),
 ]
-"""Landings beside the grid. Where the load's middle is a fifth of the width within the edge, its
-weight rests on a strip of three fifths, whose other end is bare: it cannot lie as flat."""
+"""Landings outside the grid. Where the load's middle is a fifth of the width within the edge, its
+weight rests on a strip of three fifths. The other end is bare, so it cannot lie as flat."""
 
 
 def grid(seed: int = 1) -> list[PlannedLanding]:

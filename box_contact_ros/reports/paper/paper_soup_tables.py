@@ -118,7 +118,8 @@ def coplanar(rng: np.random.Generator, n: int) -> Pairs:
     return on_cube(rng.permutation(np.concatenate(parts)))
 
 
-def _cubes(model: str) -> ContactSolver:
+def cubes_model(model: str) -> ContactSolver:
+    """Return a model's solver for two cubes of edge 2."""
     return ContactSolver(CUBE, CUBE, model=model)
 
 
@@ -142,7 +143,7 @@ def pair_count(contacts: Sequence[fcl.Contact]) -> int:
 
 def time_soup(divisions: int, patterns: Pairs, thin: int, bar: tqdm) -> Row:
     """Return the columns of times of the soup of N divisions, and of its pairs of triangles."""
-    boxes, solver = soup.Soup(divisions), _cubes(f'soup-{divisions}')
+    boxes, solver = soup.Soup(divisions), cubes_model(f'soup-{divisions}')
     poses = list(zip(patterns.pose_a, patterns.pose_b))
     for a, b in poses[:WARM_UP]:
         pair = boxes.place(a, b, CUBE, CUBE)
@@ -206,7 +207,7 @@ def time_calls(solver: ContactSolver, patterns: Pairs) -> float:
 
 def judge_network(model: str, patterns: Pairs, exact: Contacts) -> Row:
     """Return a network's row on touching patterns."""
-    solver = _cubes(model)
+    solver = cubes_model(model)
     found = patterns.contacts(solver)
     return {'model': model, 'regime': 'touching', 'answer_mean_ms': time_calls(solver, patterns),
             'point_error_mean_m': float(np.linalg.norm(found.point - exact.point, axis=1).mean()),
@@ -263,7 +264,7 @@ def measure(inputs: np.ndarray, *, quick: bool = False) -> SoupResult:
                 bar.update(len(judged[regime].size))
         networks = {model: judge_network(model, judged['touching'], truth['touching'])
                     for model in ('paper', 'paper-continuous')}
-        exact = time_calls(_cubes('exact'), judged['touching'])
+        exact = time_calls(cubes_model('exact'), judged['touching'])
     return SoupResult(soups=soups, networks=networks, exact=exact, counts=counts)
 
 

@@ -1,12 +1,12 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Program `paper`: the source paper's Tables 1 to 4 and Figures 9 and 10, redone, as Markdown.
+"""Program `paper`: the source paper's Tables 1 to 4 and Figures 4, 9 and 10, redone, as Markdown.
 
 Tables 1 and 2, Figure 9: the data sets are made again from the seed in each model card. The code
 that the solver uses runs the shipped weights on them. Nothing is copied from the cards, and PyTorch
-is not used. Tables 3 and 4, Figure 10: see `paper_soup_tables`; they need python-fcl. All of them
-are made, unless some are chosen.
+is not used. Tables 3 and 4, Figure 10: see `paper_soup_tables`. Figure 4: see `rotation`. They need
+python-fcl. All of them are made, unless some are chosen.
 """
 from __future__ import annotations
 
@@ -25,6 +25,7 @@ from ...solver.weights_file import Weights, WeightsError, load_weights
 from ...training.paper_recipe import dataset
 from ...training.paper_recipe.dataset import SETS, Patterns
 from ...training.paper_recipe.errors import PARTS, errors_of, figures, figures_by_part, predict
+from . import committee
 
 PAPER = {
     1: {'ME': (0.0332, 0.0259, -0.0005), 'MAE': (0.4161, 0.4383, 0.5624),
@@ -39,11 +40,14 @@ PAPER_SOUP = {8: (1.10, 11233, 11.52), 10: (1.47, 14323, 15.47), 12: (1.85, 1791
 """By N: Table 3's mean time [ms]; Table 4's largest number of tests, and its time [ms]."""
 PAPER_NETWORK = 0.5  # the paper's time of its network [ms]
 
-TABLES, FIGURES = (1, 2, 3, 4), (9, 10)
+TABLE_1 = {'as written': 'table-1-as-written', 'as written, grid': 'table-1-on-grid',
+           'dropped': 'table-1-dropped', 'folded': 'table-1-folded'}
+"""Files of Table 1's networks, one network a seed, by what the table calls them."""
+TABLES, FIGURES = (1, 2, 3, 4), (4, 9, 10)
 QUICK = 10  # `--quick` looks at every tenth pattern
 SHOWN = 150  # patterns in Figure 9
 
-Errors = dict[str, np.ndarray]  # wrapped errors (n, 4) [rad] by set
+Errors = dict[str, np.ndarray]  # errors (n, 4) [rad] by set
 
 
 def shipped(name: str) -> tuple[Weights, dict[str, dict[str, Patterns]]]:
@@ -58,10 +62,14 @@ def _loaded(path: Path) -> tuple[Weights, dict[str, dict[str, Patterns]]]:
 
 
 def evaluate(name: str, step: int = 1) -> dict[str, Errors]:
-    """Return errors of a shipped file's networks on its sets, every `step`-th pattern."""
+    """Return errors of a shipped file's networks on its sets, every `step`-th pattern.
+
+    Differences are wrapped if they were in training.
+    """
     weights, sets = shipped(name)
+    wrap = weights.card['data'].get('wrap', True)
     return {network: {one: errors_of(weights.networks[network], p.inputs[::step],
-                                     p.outputs[::step]) for one, p in patterns.items()}
+                                     p.outputs[::step], wrap) for one, p in patterns.items()}
             for network, patterns in sets.items()}
 
 
@@ -81,6 +89,33 @@ def beside_paper(number: int, columns: Mapping[str, Errors]) -> str:
         rows.append(row)
     return output.markdown_table(
         ['', *[f'{name}, {who}' for name in SETS for who in ('paper', *columns)]], rows)
+
+
+Trainings = Mapping[str, Sequence[Errors]]  # errors of each seed by the name of the variant
+
+
+def over_seeds(values: Sequence[float]) -> str:
+    """Return mean ± standard deviation."""
+    mean = round(float(np.mean(values)), 3) + 0.0  # zero without a sign
+    return f'{mean:.3f} ± {np.std(values, ddof=1):.3f}'
+
+
+def table_1(found: Trainings) -> str:
+    """Return Table 1: the paper's figures and ours over the seeds, a row per set and figure."""
+    rows = [[name, figure, _number(theirs[place]),
+             *[over_seeds([figures(errors[name])[figure] for errors in seeds])
+               for seeds in found.values()]]
+            for place, name in enumerate(SETS) for figure, theirs in PAPER[1].items()]
+    return output.markdown_table(['set', '', 'paper', *found], rows, words=2)
+
+
+def by_output(found: Trainings) -> str:
+    """Return MAE and RMSE of each output on the external set."""
+    rows = [[title, figure, *[over_seeds([
+        figures(errors['external'][:, output])[figure] for errors in seeds])
+        for output in range(len(dataset.OUTPUTS))]]
+        for title, seeds in found.items() for figure in ('MAE', 'RMSE')]
+    return output.markdown_table(['', '', *dataset.OUTPUTS], rows, words=2)
 
 
 def by_part(columns: Mapping[str, Errors]) -> str:
@@ -104,10 +139,12 @@ def sections_1_and_2(tables: Collection[int], step: int) -> list[str]:
     """Return Tables 1 and 2, those of them that were chosen, and their notes."""
     sections, detail = [], {}
     if 1 in tables:
-        ours = {title: evaluate(name, step)['contact']
-                for title, name in (('as drawn', 'paper-as-drawn'), ('folded', 'paper'))}
-        detail |= {f'paper, {title}': errors for title, errors in ours.items()}
-        sections.append(_page('table_1', table=beside_paper(1, ours)))
+        found = {title: list(evaluate(name, step).values()) for title, name in TABLE_1.items()}
+        card = shipped(TABLE_1['as written'])[0].card
+        sections.append(_page('table_1', table=table_1(found), by_output=by_output(found),
+                              seeds=len(card['data']['seeds']),
+                              starts=card['training']['seed_1']['starts']))
+        detail['paper'] = evaluate('paper', step)['contact']
     if 2 in tables:
         subsets = evaluate('paper-continuous', step)
         pooled = {name: np.concatenate([errors[name] for errors in subsets.values()])
@@ -116,6 +153,7 @@ def sections_1_and_2(tables: Collection[int], step: int) -> list[str]:
         sections.append(_page('table_2', table=beside_paper(2, {'ours, easier': pooled})))
     if 1 in tables:
         detail['containers'] = evaluate('paper-12.192x2.438x2.591', step)['contact']
+        sections.append(committee.section(step))
     return [*sections, _page('tables_1_2', by_part=by_part(detail))]
 
 
@@ -150,6 +188,13 @@ def report(tables: Collection[int], drawn: Collection[int], *, quick: bool = Fal
         if folder:
             draw_figure_9(folder / 'paper_figure_9.png')
         sections.append(_page('figure_9', shown=SHOWN))
+    if 4 in drawn:
+        from . import rotation  # only here: python-fcl is an extra
+
+        rows = rotation.measure(quick=quick)
+        if folder:
+            rotation.draw(rows, folder / 'paper_figure_4.png')
+        sections.append(rotation.section(rows))
     if {3, 4} & set(tables) or 10 in drawn:
         from . import paper_soup_tables  # only here: python-fcl is an extra
 

@@ -47,7 +47,6 @@ def _bench(rate: int, seconds: int, *words: str) -> Report:
 
 
 REPORTS = (
-    Report(name='search-mlp', minutes=7.0, alone=False, arguments=('search', 'mlp', '--out', OUT)),
     Report(name='search-paper', minutes=6.0, alone=False,
            arguments=('search', 'paper', '--out', OUT)),
     Report(name='accuracy', minutes=0.5, alone=False, arguments=('accuracy', '--out', OUT)),

@@ -4,7 +4,7 @@
 """Drops, light contacts, slopes, pushes, spins and stacks, by held patches and by MuJoCo's contact.
 
 Every case has its result stated beforehand (`rest_cases`). It runs at rates of 50 to 1,000 Hz and
-latencies of 0 to 5 ms, in a small simulator on MuJoCo. Beside it the same boxes run with MuJoCo's
+latencies of 0 to 5 ms, in a small simulator on MuJoCo. The same boxes also run with MuJoCo's
 own contact. Written are rest.csv (a row per run and figure) and rest.md (a table). The exit status
 is 1 if `exact` or `mlp` misses a limit.
 """
@@ -149,7 +149,7 @@ def main(args: Sequence[str] | None = None) -> int:
                             )
     kinds = list(dict.fromkeys(case.kind for case in CASES.values()))
     parser.add_argument('--kinds', nargs='+', choices=kinds, metavar='KIND', default=kinds,
-                        help=f'of {", ".join(kinds)} (default: all)')
+                        help=f'cases to run, of {", ".join(kinds)} (default: all)')
     parser.add_argument('--workers', type=int, default=os.cpu_count(), help='processes')
     options: argparse.Namespace = parser.parse_args(args)
     folder = output.results_folder(parser, options)

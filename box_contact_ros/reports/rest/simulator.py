@@ -3,7 +3,7 @@
 
 """A simulator of boxes on MuJoCo, its own contact switched off: held patches push instead.
 
-It is the loop of a client: contacts are asked for at a rate, answers arrive late, and the law is
+It is the loop of a client. Contacts are asked for at a rate, and answers arrive late. The law is
 asked at every physics step. `own_contact` runs the same boxes with MuJoCo's contact.
 """
 from __future__ import annotations
@@ -84,7 +84,7 @@ class Setup:
         return [part for part in self.parts if part.moves]
 
     def scene(self) -> Scene:
-        """Return the boxes, and all pairs of which one is free."""
+        """Return the boxes, and all pairs with a free box."""
         boxes = {part.name: Box(part.name, part.size, None if part.moves else (
             *map(float, part.position), *map(float, part.quaternion))) for part in self.parts}
         return Scene(boxes, tuple(Pair.between(one.name, other.name)
