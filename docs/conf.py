@@ -3,12 +3,14 @@
 
 """How Sphinx builds the pages: `make docs`. The pages are also plain Markdown for a forge.
 
-A folder's README.md is its index. Its table of contents is made from its links, in their order, and
-pages of the folder that it does not link come after them.
+The front page begins with the repository's README, up to its first program. A folder's README.md
+is its index. Its table of contents is made from its links, in their order, and pages of the folder
+that it does not link come after them.
 """
 from __future__ import annotations
 
 import re
+import shutil
 from pathlib import Path
 
 from sphinx.application import Sphinx
@@ -56,6 +58,21 @@ def contents(app: Sphinx, page: str, source: list[str]) -> None:
         source[0] += '\n\n```{toctree}\n:hidden:\n\n' + '\n'.join(below) + '\n```\n'
 
 
+def front(app: Sphinx, page: str, source: list[str]) -> None:
+    """Put the first screen of the repository's README on top of the front page."""
+    if page == 'README':
+        screen = (ROOT / 'README.md').read_text('utf-8').partition('\n## Use it from Python')[0]
+        screen = re.sub(r'\]\((?!\w+:|docs/)', '](../', screen).replace('](docs/', '](')
+        source[0] = screen + source[0].partition('\n')[2]
+
+
+def index(app: Sphinx, error: Exception | None) -> None:
+    """Write the front page under the name that browsers and servers look for."""
+    page = Path(app.outdir) / 'README.html'
+    if error is None and page.exists():
+        shutil.copy(page, page.with_name('index.html'))
+
+
 def plain_docstring(app: Sphinx, kind: str, name: str, item: object, options: object,
                     lines: list[str]) -> None:
     """Turn a docstring of plain text into reStructuredText: code blocks, and no markup else."""
@@ -72,6 +89,8 @@ def plain_docstring(app: Sphinx, kind: str, name: str, item: object, options: ob
 
 
 def setup(app: Sphinx) -> None:
-    """Connect both to Sphinx."""
+    """Connect them to Sphinx."""
     app.connect('source-read', contents)
+    app.connect('source-read', front)
+    app.connect('build-finished', index)
     app.connect('autodoc-process-docstring', plain_docstring)

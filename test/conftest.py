@@ -32,7 +32,7 @@ CHAINS = (
      'test_markers.py', 'test_processes.py'),
     ('test_bench.py', 'test_scene_node.py', 'test_landing_ros.py', 'test_hygiene_ros.py',
      'test_msg_schemas.py', 'test_view.py', 'test_record.py', 'test_scene_forms.py',
-     'test_callbacks.py', 'test_soup_node.py'))
+     'test_callbacks.py', 'test_soup_node.py', 'test_ends.py'))
 """Files whose programs lose messages or time where they have to wait for a processor. They mostly
 wait for each other. The files of a chain run one after the other, and go before all others."""
 LONGEST_FIRST = (

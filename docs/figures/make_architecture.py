@@ -16,7 +16,8 @@ from pathlib import Path
 PACKAGE = Path(__file__).resolve().parents[2] / 'box_contact_ros'
 PLACES = {  # column and row of a folder's box, and what it is for
     'reports': (1, 0, 'what writes docs/results'),
-    'verification': (0, 1, 'hard poses, judge, fuzz'), 'training': (1, 1, 'weights of the MLP'),
+    'training': (0, 1, 'weights of the networks'),
+    'verification': (1, 1, 'hard poses, judge, fuzz'),
     'apps': (2, 1, 'crane, view, record, bench'), 'baselines': (1, 2, 'what we compare with'),
     'node': (2, 2, 'all rclpy of the product'), 'scene': (1, 3, 'boxes, pairs, ticks, forces'),
     'solver': (1, 4, 'ContactSolver, models'), 'core': (1, 5, 'poses → contact, C++17')}
@@ -61,7 +62,9 @@ def drawing() -> str:
     for name, other in arrows():
         (x1, y1), (x2, y2) = middle[name], middle[other]
         aside = WIDTH / 2 if x2 > x1 else -WIDTH / 2
-        if PLACES[name][0] == 1 and x1 != x2:  # from the middle column to the side
+        if y1 == y2:
+            x1, x2 = x1 + aside, x2 - aside
+        elif PLACES[name][0] == 1 and x1 != x2:  # from the middle column to the side
             x1, y2 = x1 + aside, y2 - HEIGHT / 2
         elif x1 != x2:
             x2, y1 = x2 - aside, y1 + HEIGHT / 2

@@ -16,11 +16,9 @@ matplotlib.use('Agg')  # before pyplot: no display is needed
 from matplotlib import pyplot as plt  # noqa: E402
 
 from box_contact_ros import ContactSolver  # noqa: E402
-from box_contact_ros.output import read_csv  # noqa: E402
 
 STACK, LOAD, OVERLAP, POINT, CORNER = '#8c8c8c', '#4477aa', '#ccbb44', '#222222', '#ee6677'
 CONTAINER = (12.192, 2.438, 2.591)
-RESULTS = Path(__file__).parents[1] / 'results'
 DEPTH = 0.05  # of the lowest corner below the stack's top, in the graph [m]
 
 
@@ -92,39 +90,6 @@ def slide(axes: plt.Axes) -> None:
     axes.spines[['top', 'right']].set_visible(False)
 
 
-NETWORKS = {'slab': ('mlp 8', 'mlp', 'mlp 32'),
-            '24 edges, point alone': ('mlp edges 8', 'mlp edges 32', 'mlp edges 64'),
-            'exact': ('exact',)}
-"""Contestants of the frontier by description, smallest first."""
-EXACT_SHOWN = 0.1  # where error 0 is drawn [%], below the least error
-
-
-def network_sizes(axes: plt.Axes) -> None:
-    """Draw point error over cost of every network of the frontier, on stacks."""
-    rows = [row for row in read_csv(RESULTS / 'frontier.csv')
-            if row['set'] == 'stacks' and row['class'] == 'all']
-    best = next(row['instruction_set'] for row in rows if row['contestant'] == 'mlp')
-    found = {row['contestant']: (float(row['batch_p50']), float(row['point_p99'])) for row in rows
-             if row['instruction_set'] == best and row['batch_p50']}
-    for (description, names), colour in zip(NETWORKS.items(), (LOAD, CORNER, POINT)):
-        points = [(found[name][0], max(found[name][1], EXACT_SHOWN)) for name in names
-                  if name in found]
-        axes.plot(*zip(*points), 'o-', color=colour, label=description)
-        for name, point in zip((name for name in names if name in found), points):
-            units = name.split()[-1] if name[-1].isdigit() else '20' if name == 'mlp' else ''
-            axes.annotate(units, point, xytext=(5, 4), textcoords='offset points', fontsize=8)
-    cost, error = found['paper-continuous']
-    axes.text(0.99, 0.97, f"off the picture: the paper's network, {cost:,.0f} ns, {error:.0f} %",
-              transform=axes.transAxes, ha='right', va='top', fontsize=8)
-    axes.axhspan(0.5 * EXACT_SHOWN, 1.5 * EXACT_SHOWN, color='0.93')
-    axes.text(0.02, 0.08, 'exact (0)', transform=axes.transAxes, fontsize=8)
-    axes.set(yscale='log', xlabel=f'batch [ns a pair], {best}; labels: hidden units',
-             ylabel='p99 point error on stacks [%]', xlim=(0.0, None),
-             ylim=(0.5 * EXACT_SHOWN, 3.0))
-    axes.legend(fontsize=8, frameon=False)
-    axes.grid(color='#dddddd')
-
-
 def main() -> None:
     """Draw all figures."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -140,9 +105,6 @@ def main() -> None:
     left.legend(loc='upper left', fontsize=8, frameon=False, borderaxespad=0)
     # No version and no date in the file: the same figure is the same bytes.
     figure.savefig(folder / 'centroid.png', metadata={'Software': None})
-    figure, axes = plt.subplots(figsize=(7.2, 4.0), dpi=110, layout='constrained')
-    network_sizes(axes)
-    figure.savefig(folder / 'network_sizes.png', metadata={'Software': None})
 
 
 if __name__ == '__main__':

@@ -18,7 +18,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 NAME = 'box_contact_ros'
 
-FOLDERS = ('core', 'solver', 'scene', 'node', 'apps', 'baselines', 'training', 'verification',
+FOLDERS = ('core', 'solver', 'scene', 'node', 'apps', 'baselines', 'verification', 'training',
            'reports')
 EVERYBODYS = ('output', 'resources')
 """Root modules that every folder may import, and that import none of the folders."""

@@ -219,7 +219,7 @@ def test_missing_extra_is_one_line_that_names_it(
     assert cli.run(name, []) == 1
     message = capsys.readouterr().err
     assert message.count('\n') == 1
-    assert f"pip install -c constraints.txt '.[{extras}]'" in message
+    assert f"pip install -c constraints.txt -e '.[{extras}]'" in message
     assert ('apt install ros-jazzy-ros-base' in message) == module.startswith('rclpy')
     # Where there is a ROS, perhaps apt's, its wheels are not recommended.
     monkeypatch.setattr(cli.importlib.util, 'find_spec', lambda _: object())
@@ -264,6 +264,13 @@ def test_help_needs_no_extra() -> None:
     # What stands behind defaults and choices is the package's own.
     assert '(default: [12.192,2.438,2.591])' in found['contact_node'][1]
     assert found['bench'][1] == _run('-m', 'box_contact_ros', 'bench', '--help').stdout
+
+
+def test_helps_begin_with_a_noun() -> None:
+    """An option says what it is: 'folder for …', not 'for …'."""
+    for file in Path(cli.__file__).parent.rglob('*.py'):
+        found = re.search(r"help=f?['\"](of|for|to|from|in|at|which of) ", file.read_text('utf-8'))
+        assert not found, file
 
 
 def test_missing_module_of_our_own_keeps_its_traceback(

@@ -162,11 +162,12 @@ def pip(words: list[str], setup_arguments, **_) -> None:
         elif word.startswith('./'):
             assert (ROOT / word / 'pyproject.toml').is_file()
         elif word.startswith('.'):
+            assert '-e' in words, 'without -e, the clone hides what was installed'
             extras = re.fullmatch(r'\.(?:\[([\w,]+)\])?', word).group(1)
             assert set(extras.split(',') if extras else ()) <= set(
                 setup_arguments['extras_require'])
         elif not word.startswith('-'):
-            assert word in setup_arguments['install_requires']
+            assert word in [*setup_arguments['install_requires'], 'uv']  # which .ci/lock names
 
 
 def rviz(words: list[str], **_) -> None:
@@ -217,8 +218,23 @@ def built(words: list[str], **_) -> None:
 
 
 def clone(words: list[str], **_) -> None:
-    """Clone into the folder that the next command names; the address is the reader's."""
-    assert words[2:] == ['REPOSITORY', 'box_contact_ros']
+    """Clone into the folder that the next command names, from the address of package.xml.
+
+    Where package.xml has none, the reader copies it, and the page says from where.
+    """
+    assert words[2:] == [address(), 'box_contact_ros']
+    assert address() != 'REPOSITORY' or 'Replace `REPOSITORY`' in (ROOT / 'README.md').read_text()
+
+
+def address() -> str:
+    """Return the address that package.xml gives of the repository, or a placeholder."""
+    found = re.search('<url type="repository">(.+?)</url>', (ROOT / 'package.xml').read_text())
+    return found[1] if found else 'REPOSITORY'
+
+
+def locked(words: list[str], **_) -> None:
+    """Remake the lock: the program is there, and knows the option; it asks PyPI."""
+    assert all(word in (ROOT / '.ci' / 'lock').read_text('utf-8') for word in words[1:])
 
 
 def exported(words: list[str], **_) -> None:
@@ -237,6 +253,7 @@ def venv(words: list[str], **_) -> None:
 
 
 COMMANDS = {
+    r'\.ci/lock( --upgrade)?': locked,
     r'git clone .+': clone,
     r'(mkdir -p build|g\+\+|build/first).*': built,
     r'ln -s \S+ src/\S+': linked,
@@ -265,15 +282,87 @@ def test_command(command, program, setup_arguments):
     matching[0](shlex.split(command), program=program, setup_arguments=setup_arguments)
 
 
+def test_commands_leave_nothing_in_the_clone():
+    """What a command writes goes outside, or where git ignores it: `make test` reads the rest."""
+    outputs = {word for command in commands() for flag, word in zip(
+        command.split(), command.split()[1:]) if flag in ('--out', '--export', '-o', '-p')
+        and not (flag == '-p' and ':=' in word)}
+    assert '/tmp/run' in outputs
+    for folder in outputs:
+        ignored = subprocess.run(['git', 'check-ignore', '-q', folder], cwd=ROOT).returncode == 0
+        assert folder.startswith('/tmp/') or ignored, folder
+    for page, _, text in blocks('python'):
+        for file in re.findall(r"write_scene[(].*?'([^' ]+[.]yaml)'", text, re.DOTALL):
+            assert file.startswith('/tmp/'), page.name
+
+
 def test_programs_are_shown_as_pip_installs_them():
     """The tested installation has no `ros2`; two pages say how a workspace starts a program."""
     assert {page.name for page, _, text in blocks('bash', 'console')
             if 'ros2 run' in text} == {'install.md', 'programs.md'}
 
 
+def test_blocks_with_ros2_say_what_they_need():
+    """Above each stands that the command comes with a workspace, or with ROS from apt."""
+    for page in PAGES:
+        text = page.read_text('utf-8')
+        for found in FENCE.finditer(text):
+            if found[1] and re.search('(?m)^ros2 |[$][(]ros2 ', found[2]):
+                above = text[:found.start()].split()[-60:]
+                assert re.search('workspace|from apt|Launch files', ' '.join(above)), (
+                    f'{page.name}: {found[2]}')
+
+
+def test_the_load_comes_first_on_every_page():
+    """One order of boxes for README, tutorials and laws of force, which take the load as A."""
+    for page, _, text in blocks('python', 'cpp'):
+        assert not re.search(r'[(]stack, (load|asked)', text), page.name
+
+
+def test_no_page_says_that_a_point_never_jumps():
+    """Between two ticks of a landing, the exact point moves more than a metre."""
+    for page in PAGES:
+        assert 'without jump' not in page.read_text('utf-8'), page.name
+
+
+FOREIGN = {'ros2: command not found', 'externally-managed-environment', 'ros2 topic pub',
+           "cannot import name … from 'box_contact_ros' (unknown location)", 'Timeout (0:00:08)!',
+           'librcl_action.so: cannot open shared object file', 'No executable found', 'python'}
+"""What troubleshooting quotes of the shell, pip, Python, the loader and ROS."""
+
+
+def quoted_messages() -> list[str]:
+    """Return what two pages quote of the log, and of errors."""
+    page = (ROOT / 'docs' / 'how-to' / 'troubleshooting.md').read_text('utf-8')
+    found = [one or other for heading in re.findall(r'^[*]{2}(.+?)[*]{2}', page, re.M | re.S)
+             for one, other in re.findall('`([^`]+)`|"([^"]+)"', heading)]
+    page = (ROOT / 'docs' / 'reference' / 'diagnostics.md').read_text('utf-8')
+    for line in page.partition('| The log says')[2].splitlines()[2:]:
+        if not line.startswith('|'):
+            break
+        found += re.findall('`([^`]+)`', line.split('|')[1])
+    return sorted(set(found) - FOREIGN)
+
+
+@cache
+def sources() -> str:
+    """Return the package's code with its strings joined, and without the names of values."""
+    text = '\n'.join(path.read_text('utf-8') for kind in ('*.py', '*.cpp', '*.hpp')
+                     for path in sorted((ROOT / 'box_contact_ros').rglob(kind)))
+    return re.sub(r'\{[^{}]*\}', '…', re.sub(r"""['"]\s*\n\s*f?['"]""", '', text))
+
+
+@pytest.mark.parametrize('message', quoted_messages())
+def test_quoted_messages_exist(message):
+    """Each part between its values is in the source, so no page explains what nobody can see."""
+    parts = re.split(r"…|\b[A-Z]+\b|\b(?:box_)?[ab]\b|'[\w/]+'|(?<= )/\w+|\b\d+ s\b", message)
+    parts = [part.strip() for part in parts if len(part.strip(' ,')) > 2]
+    assert parts and all(part in sources() for part in parts), parts
+
+
 def test_first_commands_are_clone_and_demo():
     """What a newcomer types first stands first."""
-    assert commands()[:2] == ['git clone REPOSITORY box_contact_ros',
+    assert commands()[:2] == [f'git clone {address()} box_contact_ros',
                               'cd box_contact_ros && make demo']
 
 
@@ -300,7 +389,9 @@ def test_python_example(text, lines, program, tmp_path, monkeypatch):
     """It runs, next to a node if a client, and prints what the page says."""
     monkeypatch.chdir(tmp_path)  # some write files
     if 'rclpy' in text:
-        program('contact_node', '--ros-args', '-p', 'model:=exact').wait_for_output('ready', 120)
+        scene = ['-p', f'scene:={ROOT}/config/scenes/yard_bay.yaml'] if 'crane/' in text else []
+        program('contact_node', '--ros-args', '-p', 'model:=exact', *scene).wait_for_output(
+            'ready', 120)
     with contextlib.redirect_stdout(io.StringIO()) as printed:
         exec(compile(text, 'example', 'exec'), {'__name__': 'example'})
     assert printed.getvalue().splitlines() == lines
@@ -396,3 +487,11 @@ def test_pages_build_without_a_warning(tmp_path):
         str(tmp_path))
     assert 'Return the contacts of n pairs' in (
         tmp_path / 'reference' / 'python_api.html').read_text('utf-8')
+    first = (tmp_path / 'index.html').read_text('utf-8')
+    assert 'Replace <code' in first and 'centroid.png' in first  # the README's first screen
+    browser = pytest.importorskip('browser', reason='needs websockets', exc_type=ImportError)
+    if browser.chromium() is None:
+        pytest.skip('Chromium is not installed')
+    with browser.open_page((tmp_path / 'index.html').as_uri(), width=800) as tab:
+        wide = "document.querySelector('[itemprop=articleBody]')?.clientWidth"
+        assert tab.wait_for(wide) >= 640
