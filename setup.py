@@ -142,7 +142,8 @@ def extensions() -> list[Extension]:
                 'extra_compile_args': FLAGS}
     return [Extension(CORE_EXTENSION, [f'{CORE}/binding/module.cpp'],
                       extra_link_args=['-pthread'], **settings),
-            Extension(f'{NAME}.baselines.paper._networks', [f'{NAME}/baselines/paper/networks.cpp'],
+            Extension(f'{NAME}.evidence.contestants.paper._networks',
+                      [f'{NAME}/evidence/contestants/paper/networks.cpp'],
                       **settings)]
 
 
@@ -177,8 +178,8 @@ setup(
     maintainer_email='maintainers@box-contact-ros.org',
     license='Apache-2.0',
     packages=find_packages(include=[NAME, f'{NAME}.*']),
-    package_data={NAME: ['py.typed', '**/*.pyi', 'verification/*.npz', '**/*.md', '**/*.yaml',
-                         'reports/frontier/*.cpp',
+    package_data={NAME: ['py.typed', '**/*.pyi', 'evidence/verification/*.npz', '**/*.md', '**/*.yaml',
+                         'evidence/reports/frontier/*.cpp',
                          'core/cmake/*', 'core/include/**/*.h*', 'core/src/**/*.hpp']},
     ext_modules=extensions(),
     data_files=data_files(),

@@ -61,43 +61,43 @@ PROGRAMS = {
         'box_contact_ros.apps.viewer.markers', ('ros',),
         'draw boxes and contacts as markers for RViz'),
     'bench': Program(
-        'box_contact_ros.apps.bench.bench', ('ros', 'sim', 'soup', 'report'),
+        'box_contact_ros.evidence.bench.bench', ('ros', 'sim', 'soup', 'report'),
         'drive contact, soup and echo node with streams of poses: latency, losses, errors'),
     'record': Program(
         'box_contact_ros.apps.recording.record', ('ros', 'bag'),
         'write poses and contacts of running nodes to a bag (MCAP) for Foxglove and ros2 bag'),
     'soak': Program(
-        'box_contact_ros.apps.bench.soak', ('ros', 'sim', 'report'),
+        'box_contact_ros.evidence.bench.soak', ('ros', 'sim', 'report'),
         'ten minutes at 1 kHz: losses, mispairs, memory, latency next to echo nodes'),
     'train': Program(
-        'box_contact_ros.training.train', ('train',),
+        'box_contact_ros.evidence.training.train', ('train',),
         'make the data sets, fit the networks, write weights/'),
     'search': Program(
-        'box_contact_ros.training.experiments.search', ('train', 'report'),
+        'box_contact_ros.evidence.training.experiments.search', ('train', 'report'),
         'train thousands of networks at once to find the size and settings that they should have'),
     'accuracy': Program(
-        'box_contact_ros.reports.accuracy', ('report',),
+        'box_contact_ros.evidence.reports.accuracy', ('report',),
         'point error of a model against the exact one, per set of poses and contact class'),
     'frontier': Program(
-        'box_contact_ros.reports.frontier.frontier', ('report',),
+        'box_contact_ros.evidence.reports.frontier.frontier', ('report',),
         'speed against error of every model and of other engines, as table and picture'),
     'fuzz': Program(
-        'box_contact_ros.verification.fuzz', ('report', 'fuzz'),
+        'box_contact_ros.evidence.verification.fuzz', ('report', 'fuzz'),
         'millions of random pairs, judged by an independent test; gates at zero'),
     'stability': Program(
-        'box_contact_ros.reports.hard.stability', ('report', 'soup'),
+        'box_contact_ros.evidence.reports.hard.stability', ('report', 'soup'),
         'what each model makes of families of hard poses'),
     'landing': Program(
-        'box_contact_ros.reports.landing.landing_report', ('sim', 'soup', 'report'),
+        'box_contact_ros.evidence.reports.landing.landing_report', ('sim', 'soup', 'report'),
         'whether a load comes to rest by each way of contact and force, as table and picture'),
     'rest': Program(
-        'box_contact_ros.reports.rest.rest_report', ('sim', 'report'),
+        'box_contact_ros.evidence.reports.rest.rest_report', ('sim', 'report'),
         'drops, slopes, pushes and stacks against results stated beforehand, and MuJoCo beside'),
     'paper': Program(
-        'box_contact_ros.reports.paper.paper_tables', ('report',),
+        'box_contact_ros.evidence.reports.paper.paper_tables', ('report',),
         "redo the source paper's tables, with its figures and ours"),
     'reports': Program(
-        'box_contact_ros.reports.remake.remake',
+        'box_contact_ros.evidence.reports.remake.remake',
         ('ros', 'sim', 'soup', 'train', 'report', 'fuzz', 'peers'),
         'remake every table and picture of docs/results, with the programs above'),
 }

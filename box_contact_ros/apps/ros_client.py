@@ -25,7 +25,7 @@ from ..scene.files.scene_file import read_scene
 from ..scene.scene_solver import ALL_BOXES, Scene
 from ..scene.stamp_pairing import StampedPose
 from ..solver.checks import are_poses
-from .bench.answer_log import first_row
+from .answer_log import first_row
 
 ANSWERS: dict[str, tuple[type, str]] = {
     'point': (PointStamped, 'contact/point'),

@@ -160,22 +160,22 @@ _ENTRIES = (
         native_batch=True, gated=True),
     ModelEntry(
         name='paper', line="the paper's network 6-20-18-4",
-        builder='box_contact_ros.baselines.paper.paper_models:paper', takes=_NEEDS,
+        builder='box_contact_ros.evidence.contestants.paper.paper_models:paper', takes=_NEEDS,
         boxes='two equal cubes, or two 40 ft containers', native_batch=True),
     ModelEntry(
         name='paper-continuous', line="the paper's networks 6-20-17-4 on subsets without jumps",
-        builder='box_contact_ros.baselines.paper.paper_models:paper_continuous', takes=_NEEDS,
+        builder='box_contact_ros.evidence.contestants.paper.paper_models:paper_continuous', takes=_NEEDS,
         boxes='two equal cubes', native_batch=True),
     ModelEntry(
         name='paper-committee', line="a classifier and the paper's network for each class",
-        builder='box_contact_ros.baselines.paper.paper_models:paper_committee', takes=_NEEDS,
+        builder='box_contact_ros.evidence.contestants.paper.paper_models:paper_committee', takes=_NEEDS,
         boxes='two equal cubes', native_batch=True),
     ModelEntry(
         name='fcl', line="FCL's box-box, its deepest contact; a baseline",
-        builder='box_contact_ros.baselines.fcl_box:FclBox', extra='soup'),
+        builder='box_contact_ros.evidence.contestants.fcl_box:FclBox', extra='soup'),
     ModelEntry(
         name='soup', line='polygon soup on FCL, N divisions an edge; a baseline',
-        builder='box_contact_ros.baselines.soup:Soup', takes=('divisions',), extra='soup',
+        builder='box_contact_ros.evidence.contestants.soup:Soup', takes=('divisions',), extra='soup',
         most_near=64,  # each takes a third of a second at worst
         family=Family(argument='divisions', default=SOUP_DIVISIONS, most=MOST_SOUP_DIVISIONS,
                       reported=(8, 10, 12, 14, 16, 18, 20, 22))),  # of the paper's Table 3

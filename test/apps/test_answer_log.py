@@ -10,8 +10,8 @@ import math
 import numpy as np
 import pytest
 
-from box_contact_ros.apps.bench.answer_log import ECHO_MESSAGES, AnswerLog
-from box_contact_ros.apps.bench.bench_report import (
+from box_contact_ros.apps.answer_log import ECHO_MESSAGES, AnswerLog
+from box_contact_ros.evidence.bench.bench_report import (
     columns,
     draw,
     error_table,

@@ -27,8 +27,8 @@ from types import SimpleNamespace
 from geometry_msgs.msg import PointStamped, PoseStamped
 from rclpy.parameter import Parameter
 from std_msgs.msg import Header
-from box_contact_ros.apps.bench.bench_drive import BenchNode, echo_node
-from box_contact_ros.apps.bench.echo_node import EchoNode
+from box_contact_ros.evidence.bench.bench_drive import BenchNode, echo_node
+from box_contact_ros.evidence.bench.echo_node import EchoNode
 from box_contact_ros.apps.crane.crane_node import CraneNode
 from box_contact_ros.apps.crane.landing_flights import FlightNode
 from box_contact_ros.apps.recording.record import RecordNode

@@ -30,7 +30,7 @@ from box_contact_ros.apps.crane.landing import (
 )
 from box_contact_ros.apps.crane.load_laws import held_wrench, predicted_wrench
 from box_contact_ros.apps.crane.mujoco_crane import Crane, CraneScenario
-from box_contact_ros.reports.landing.landing_ways import point_law
+from box_contact_ros.evidence.reports.landing.landing_ways import point_law
 from box_contact_ros.scene.force.laws import GRAVITY, Body, PatchLaw
 
 CASES = list(cases())

@@ -24,7 +24,7 @@ from stranger import ANSWER_SECONDS, Stranger
 pytest.importorskip('mujoco')
 pytest.importorskip('rosbags')
 
-from box_contact_ros.apps.bench.bench_drive import BenchNode, echo_node
+from box_contact_ros.evidence.bench.bench_drive import BenchNode, echo_node
 from box_contact_ros.apps.crane.crane_feedback import CraneFeedback
 from box_contact_ros.apps.crane.crane_node import CraneNode
 from box_contact_ros.apps.crane.crane_parameters import PARAMETERS, scenario_from

@@ -29,7 +29,7 @@ from test_bench import bench, rows_of
 from visualization_msgs.msg import MarkerArray
 
 from box_contact_ros import ContactSolver
-from box_contact_ros.apps.bench.answer_log import first_row
+from box_contact_ros.apps.answer_log import first_row
 from box_contact_ros.apps.recording import bag_player
 from box_contact_ros.apps.recording.bag_file import (
     TOPICS,
@@ -42,7 +42,7 @@ from box_contact_ros.apps.recording.bag_file import (
 from box_contact_ros.apps.recording.record import RecordNode
 from box_contact_ros.apps.ros_client import ANSWERS, array_message, line_marker, pose_message
 from box_contact_ros.node.messages import make_cloud, make_header, read_cloud
-from box_contact_ros.reports.accuracy import limit_of
+from box_contact_ros.evidence.reports.accuracy import limit_of
 from box_contact_ros.resources import resource_path
 from box_contact_ros.scene.files.scene_file import read_scene
 from box_contact_ros.scene.scene_solver import SceneSolver

@@ -18,7 +18,7 @@ import pytest
 from gmpy2 import mpfr
 
 from box_contact_ros.core import FEATURES, Stages, native, stages
-from box_contact_ros.scene.pose_sets import LOADS, SETS, Pairs
+from box_contact_ros.evidence.pose_sets import LOADS, SETS, Pairs
 
 DEEP_SETS = {name: make for name, make in {**SETS, **LOADS}.items() if name != 'touching'}
 """Those whose pairs are not pressed in."""

@@ -25,10 +25,10 @@ import pytest
 import box_contact_ros
 from box_contact_ros import Contact, ContactSolver
 from box_contact_ros.core import FORCE, instruction_sets, native, stages
-from box_contact_ros.scene.pose_sets import SETS, Pairs
+from box_contact_ros.evidence.pose_sets import SETS, Pairs
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.mlp import NETWORK, core_numbers, load_mlp
-from box_contact_ros.verification import fuzz
+from box_contact_ros.evidence.verification import fuzz
 
 TESTS = Path(__file__).resolve().parents[1]
 PACKAGE = Path(box_contact_ros.__file__).parent

@@ -23,7 +23,7 @@ import numpy as np
 import pytest
 from test_library import BAD_WEIGHTS, LIBRARY, WEIGHTS, Options, Results, Rows, Size, run, tool
 
-from box_contact_ros.baselines.paper import _networks
+from box_contact_ros.evidence.contestants.paper import _networks
 from box_contact_ros.core import FORCE, native
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -13,7 +13,7 @@ import pytest
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.core import stages
-from box_contact_ros.verification import fuzz
+from box_contact_ros.evidence.verification import fuzz
 
 N = 2000
 SOLVER = ContactSolver((1, 1, 1), (1, 1, 1), model='exact')

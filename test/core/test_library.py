@@ -29,9 +29,9 @@ from box_contact_ros.__main__ import PLACES
 from box_contact_ros.core import FORCE, instruction_sets, native
 from box_contact_ros.resources import resource_path
 from box_contact_ros.scene.pose import rotation_matrix
-from box_contact_ros.scene.pose_sets import SETS, Pairs
+from box_contact_ros.evidence.pose_sets import SETS, Pairs
 from box_contact_ros.solver.contact import Contacts
-from box_contact_ros.verification import fuzz
+from box_contact_ros.evidence.verification import fuzz
 
 ROOT = Path(__file__).resolve().parents[2]
 CORE = Path(native.__file__).parent

@@ -13,8 +13,8 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from box_contact_ros.scene.pose import quaternion_multiply, rotation_matrix
-from box_contact_ros.scene.pose_sets import CONTAINER as FORTY
-from box_contact_ros.scene.pose_sets import (
+from box_contact_ros.evidence.pose_sets import CONTAINER as FORTY
+from box_contact_ros.evidence.pose_sets import (
     CUBE,
     HIGH_CUBE,
     TWENTY,

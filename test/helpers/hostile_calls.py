@@ -36,7 +36,7 @@ def preload(folder: str) -> None:
 if 'EXTENSIONS' in os.environ:
     preload(os.environ['EXTENSIONS'])
 
-from box_contact_ros.baselines.paper import _networks as networks  # noqa: E402
+from box_contact_ros.evidence.contestants.paper import _networks as networks  # noqa: E402
 from box_contact_ros.core import native  # noqa: E402
 
 POSE = np.array([0.0, 0, 0, 0, 0, 0, 1])

@@ -1,12 +1,12 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Write box_contact_ros/verification/hard_poses.npz: the hard poses, with their truth in 60 digits.
+"""Write box_contact_ros/evidence/verification/hard_poses.npz: the hard poses, with their truth in 60 digits.
 
     python test/helpers/make_hard_poses.py [FAMILY ...]
 
 Families that are not named stay as they are: another machine may round a recipe differently. Once
-written, the file is what tests and reports read (see `box_contact_ros.verification.hard_poses`).
+written, the file is what tests and reports read (see `box_contact_ros.evidence.verification.hard_poses`).
 """
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ import oracle
 from gmpy2 import mpfr
 from tqdm import tqdm
 
-from box_contact_ros.verification import hard_poses
+from box_contact_ros.evidence.verification import hard_poses
 
 FLOOR = mpfr(10)**-9
 """Depth, of the size, below which the point is that of boxes pressed in: no truth for it here."""

@@ -257,7 +257,7 @@ def memory(running):
 def test_floods_on_a_locked_node(attacked, name):
     """Poses that are none, names and texts of a megabyte: it answers on, and keeps none of them.
 
-    An hour of them, beside an echo node: `python -m box_contact_ros.apps.bench.flood`.
+    An hour of them, beside an echo node: `python -m box_contact_ros.evidence.bench.flood`.
     """
     running, stranger = attacked(name, 'locked:=true')
     assert stranger.spin(lambda: all(

@@ -23,7 +23,7 @@ from box_contact_ros.scene.files import scene_file
 from box_contact_ros.scene.files.scene_file import SceneError, parse_scene, read_scene
 from box_contact_ros.scene.scene_solver import Box, Pair, Scene, SceneSolver, two_boxes
 from box_contact_ros.solver.checks import SHOWN
-from box_contact_ros.verification import hard_poses
+from box_contact_ros.evidence.verification import hard_poses
 
 IDENTITY = (0, 0, 0, 0, 0, 0, 1)
 

@@ -18,7 +18,7 @@ import pytest
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.core import DEPTH_FLOOR
-from box_contact_ros.scene.pose_sets import (
+from box_contact_ros.evidence.pose_sets import (
     SETS,
     Pairs,
     at_depth,

@@ -100,7 +100,7 @@ def test_entries_say_what_their_models_do(name):
 
 def test_a_missing_library_is_named_with_its_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, 'fcl', None)
-    monkeypatch.delitem(sys.modules, 'box_contact_ros.baselines.fcl_box', raising=False)
+    monkeypatch.delitem(sys.modules, 'box_contact_ros.evidence.contestants.fcl_box', raising=False)
     with pytest.raises(ModuleNotFoundError, match="fcl.*model 'fcl' needs the extra 'soup'"):
         ContactSolver((1, 1, 1), (1, 1, 1), model='fcl')
 
@@ -136,9 +136,9 @@ def test_the_solver_imports_no_baseline():
 @pytest.mark.slow
 def test_an_added_model_is_in_reports_and_programs(lifted, tmp_path, capsys):
     """None of them has a list of its own."""
-    from box_contact_ros.reports.frontier import frontier, speed
-    from box_contact_ros.reports.hard import stability
-    from box_contact_ros.verification import fuzz
+    from box_contact_ros.evidence.reports.frontier import frontier, speed
+    from box_contact_ros.evidence.reports.hard import stability
+    from box_contact_ros.evidence.verification import fuzz
 
     assert {'lifted-1', 'lifted-7'} <= {engine.name for engine in frontier.contestants()[0]}
     assert 'lifted-1' in [stint.name for stint in speed.single_calls(10)]
@@ -150,8 +150,8 @@ def test_an_added_model_is_in_reports_and_programs(lifted, tmp_path, capsys):
 
 @pytest.mark.slow
 @pytest.mark.parametrize('module', [
-    'reports.accuracy', 'reports.hard.stability', 'verification.fuzz', 'apps.bench.bench',
-    'apps.bench.soak'])
+    'reports.accuracy', 'reports.hard.stability', 'verification.fuzz', 'evidence.bench.bench',
+    'evidence.bench.soak'])
 def test_programs_accept_an_added_model(lifted, module, capsys):
     main = pytest.importorskip(f'box_contact_ros.{module}').main
     with pytest.raises(SystemExit, match='0'):

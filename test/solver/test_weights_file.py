@@ -15,8 +15,8 @@ from safetensors import SafetensorError, safe_open
 from safetensors.numpy import load, load_file, save_file
 
 from box_contact_ros import ContactSolver
-from box_contact_ros.baselines.paper import _networks
-from box_contact_ros.reports.paper import paper_tables
+from box_contact_ros.evidence.contestants.paper import _networks
+from box_contact_ros.evidence.reports.paper import paper_tables
 from box_contact_ros.resources import resource_path
 from box_contact_ros.solver.weights_file import (
     CARD_FIELDS,
@@ -27,8 +27,8 @@ from box_contact_ros.solver.weights_file import (
     save_weights,
     tensors_digest,
 )
-from box_contact_ros.training.paper_recipe import dataset
-from box_contact_ros.training.paper_recipe.errors import (
+from box_contact_ros.evidence.training.paper_recipe import dataset
+from box_contact_ros.evidence.training.paper_recipe.errors import (
     errors_of,
     figures,
     figures_by_part,

@@ -21,7 +21,7 @@ from queue import Empty, SimpleQueue
 import numpy as np
 
 from ...solver.contact import Contact
-from ..bench.answer_log import is_stale, touch_in
+from ..answer_log import is_stale, touch_in
 from .landing import ClosedLoop, with_patch
 from .load_laws import LoopState
 from .mujoco_crane import CraneScenario

@@ -15,7 +15,7 @@ from rich.text import Text
 
 from ...output import percentiles
 from ...solver.contact_solver import ContactSolver
-from ..bench.answer_log import AnswerLog, StreamResult
+from ..answer_log import AnswerLog, StreamResult
 
 
 def table(rows: list[tuple[str, str]]) -> str:

@@ -27,7 +27,7 @@ from ...scene.files.scene_file import write_scene
 from ...scene.scene_solver import POSE_ARRAY, Box, Pair, Scene
 from ...solver.contact import Contact
 from .. import processes
-from ..bench.answer_log import first_row, is_stale, touch_in
+from ..answer_log import first_row, is_stale, touch_in
 from ..ros_client import DEEP_RELIABLE, array_message, stamp_of, subscribe_contacts
 from .landing import ClosedLoop, LandingRecord
 from .mujoco_crane import CraneScenario

@@ -1,0 +1,60 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""The page of public reports, replayed: which model and which other engine passes which."""
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from box_contact_ros import output
+from ...contestants.engines import installed
+from ...contestants.engines.engine import ours, packages_of
+from box_contact_ros.core import native
+from box_contact_ros.solver.models import gated_models
+from ...verification.named_failures import NamedFailure, load, replay_apart
+
+
+def reports_table(failures: Mapping[str, NamedFailure]) -> str:
+    """Return what was reported, with the thread, its numbers and the truth."""
+    return output.markdown_table(
+        ['', 'thread', 'reported', 'numbers from', 'separation'],
+        [[place, f'[{one.repo} {one.number}]({one.link})', one.report, one.source,
+          f'{one.separation:.4g}'] for place, one in enumerate(failures.values(), start=1)],
+        words=4)
+
+
+def passes_table(found: Mapping[str, Mapping[str, str]]) -> str:
+    """Return a row a contestant: '·' for what it passes, else a letter."""
+    places = range(1, 1 + len(next(iter(found.values()))))
+    return output.markdown_table(
+        ['', *map(str, places), 'passed'],
+        [[name, *('·' if not text else _letter(text) for text in faults.values()),
+          f'{sum(not text for text in faults.values())} of {len(faults)}']
+         for name, faults in found.items()])
+
+
+def _letter(text: str) -> str:
+    if 'along' in text:
+        return 'N'
+    return {'missed': 'M', 'invented': 'I', 'depth': 'D', 'point': 'P', 'raised': 'E'}.get(
+        text.partition(' ')[0], 'A')
+
+
+def write_named(folder: Path, command: str, models: Sequence[str]) -> int:
+    """Replay all for models and every other engine, print, write; 1 if a gated model fails one."""
+    failures = load()
+    rivals, missing = installed()
+    engines = [*map(ours, models), *rivals]
+    found = {engine.name: replay_apart(engine, failures) for engine in engines}
+    place = {name: number for number, name in enumerate(failures, start=1)}
+    text = output.page(
+        'reports/pages/named_failures', command=command,
+        machine=output.machine(native, packages_of(engines)), reports=reports_table(failures),
+        passes=passes_table(found), skipped=''.join(f'\n\nLeft out: {line}.' for line in missing),
+        faults='\n'.join(f'- {name}: {", ".join(wrong)}.' for name, faults in found.items()
+                         if (wrong := [f'{place[one]} {text}' for one, text in faults.items()
+                                       if text])))
+    print(text)
+    (folder / 'named_failures.md').write_text(text, encoding='utf-8')
+    return int(any(text for model in gated_models() for text in found[model].values()))

@@ -1,0 +1,427 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""Tables 3 and 4 and Figure 10 of the source paper: what a polygon soup costs, and its errors.
+
+Times are CPU times of one thread on one pinned core, after a warm-up, with garbage collection off.
+Like the paper's gprof, they leave out what other programs take meanwhile. table_3.md says what is
+timed: the step, FCL alone, the answer.
+"""
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import fcl
+import numpy as np
+from tqdm import tqdm
+
+from box_contact_ros import output
+from ...contestants import soup
+from box_contact_ros.scene.pose import degrees_between
+from ...pose_sets import CUBE, Pairs, at_depth, stacks
+from box_contact_ros.solver.contact import Contacts
+from box_contact_ros.solver.contact_solver import ContactSolver
+from ...training.paper_recipe.dataset import as_poses
+from ..frontier.speed import pinned, usable_cores
+from .paper_tables import PAPER_NETWORK
+from .paper_tables import PAPER_SOUP as PAPER
+
+ALSO = (1, 2, 4, 32, 64)  # divisions at which only the accuracy is measured, on touching boxes
+
+OVERLAP = 1e-3
+"""Depth [m] of touching and near-parallel cubes of edge 2 where the accuracy is measured. At exact
+touch the soup finds nothing in a part of the patterns."""
+SEED = 20
+WARM_UP = 30      # patterns before any that counts
+REPEATS = 5       # timings of the pattern with the most pairs; their median counts
+
+
+@dataclass(frozen=True)
+class Counts:
+    """How many patterns of a regime are looked at."""
+
+    timed: int
+    thin: int  # every so many of them are timed for FCL alone and for the answer
+    judged: int  # of how many the accuracy is measured
+
+
+FULL = {'touching': Counts(75_000, 25, 1000), 'near-parallel': Counts(1000, 1, 1000),
+        'coplanar': Counts(1000, 10, 100)}
+QUICK = {'touching': Counts(100, 10, 20), 'near-parallel': Counts(20, 1, 20),
+         'coplanar': Counts(10, 2, 10)}
+REGIMES = tuple(FULL)
+
+Row = dict[str, Any]
+"""A row of paper_soup.csv by column; of an N or a model that is not timed, it has no times."""
+
+
+class SoupErrors(NamedTuple):
+    """A soup, judged on a regime; a row per pattern that the soup answered."""
+
+    point: np.ndarray  # [m]
+    normal: np.ndarray  # [deg]
+    depth: np.ndarray  # deepest contact minus the true depth [m]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SoupResult:
+    """All that is measured."""
+
+    soups: Mapping[tuple[str, int], Row]  # by regime and N
+    networks: Mapping[str, Row]  # on the touching patterns that the soup's accuracy is measured on
+    exact: float  # mean time of a call of model `exact` [ms]
+    counts: Mapping[str, Counts]
+
+    @property
+    def rows(self) -> list[Row]:
+        """Return the rows of paper_soup.csv."""
+        return [*self.soups.values(), *self.networks.values()]
+
+    def ends(self, regime: str) -> tuple[Row, Row]:
+        """Return the rows of the least N of Table 3, and of the largest."""
+        return self.soups[regime, min(PAPER)], self.soups[regime, max(PAPER)]
+
+
+def on_cube(pose_b: np.ndarray) -> Pairs:
+    """Return pairs of cubes of edge 2, A at the origin and B at poses (n, 7)."""
+    sizes = np.tile(CUBE, (len(pose_b), 1))
+    return Pairs(np.tile([0.0, 0, 0, 0, 0, 0, 1], (len(pose_b), 1)), pose_b, sizes, sizes)
+
+
+def near_parallel(rng: np.random.Generator, n: int) -> Pairs:
+    """Draw one cube on the other, tilted by 1e-6–1e-3 rad, 1 mm deep, any yaw, anywhere on it."""
+    return stacks(rng, 2 * n).rows(slice(n))  # a few are placed beside the cube and left out
+
+
+def coplanar(rng: np.random.Generator, n: int) -> Pairs:
+    """Draw one cube on the other, faces in one plane to the last bit.
+
+    One in ten stands exactly on top; the others anywhere on it, half of them with their sides
+    parallel, half under any yaw.
+    """
+    exactly = np.zeros((math.ceil(n / 10), 7))
+    exactly[:, 2], exactly[:, 6] = CUBE[2], 1.0
+    parallel = (n - len(exactly)) // 2
+    parts = [exactly]
+    for count, largest in ((parallel, 0.0), (n - len(exactly) - parallel, np.pi)):
+        b = np.zeros((2 * count + 10, 7))  # some are placed beside the cube, and left out
+        b[:, :2] = 0.98 * rng.uniform(-CUBE[0], CUBE[0], (len(b), 2))
+        b[:, 2] = CUBE[2]
+        yaw = largest * rng.uniform(-1.0, 1.0, len(b))
+        b[:, 5], b[:, 6] = np.sin(0.5 * yaw), np.cos(0.5 * yaw)
+        parts.append(b[on_cube(b).contacts().colliding][:count])
+    return on_cube(rng.permutation(np.concatenate(parts)))
+
+
+def cubes_model(model: str) -> ContactSolver:
+    """Return a model's solver for two cubes of edge 2."""
+    return ContactSolver(CUBE, CUBE, model=model)
+
+
+def search(first: fcl.CollisionObject, second: fcl.CollisionObject) -> None:
+    """Search for all pairs; FCL returns one of them, and goes on because costs are asked for."""
+    fcl.collide(first, second, fcl.CollisionRequest(num_max_contacts=1, enable_contact=True,
+                                                    enable_cost=True), fcl.CollisionResult())
+
+
+def milliseconds(work: Callable[..., object], *arguments: object) -> float:
+    """Return the CPU time of one call [ms]."""
+    started = time.thread_time_ns()
+    work(*arguments)
+    return 1e-6 * (time.thread_time_ns() - started)
+
+
+def pair_count(contacts: Sequence[fcl.Contact]) -> int:
+    """Return how many pairs of triangles meet; FCL gives one contact or two for each."""
+    return len({(contact.b1, contact.b2) for contact in contacts})
+
+
+def time_soup(divisions: int, patterns: Pairs, thin: int, bar: tqdm) -> Row:
+    """Return the columns of times of the soup of N divisions, and of its pairs of triangles."""
+    boxes, solver = soup.Soup(divisions), cubes_model(f'soup-{divisions}')
+    poses = list(zip(patterns.pose_a, patterns.pose_b))
+    for a, b in poses[:WARM_UP]:
+        pair = boxes.place(a, b, CUBE, CUBE)
+        soup.collide(*pair), search(*pair), solver(a, b)
+    step, pairs, alone, answers = np.empty(len(poses)), np.empty(len(poses), np.int64), [], []
+    for row, (a, b) in enumerate(poses):
+        pair = boxes.place(a, b, CUBE, CUBE)
+        started = time.thread_time_ns()
+        contacts = soup.collide(*pair)
+        step[row] = 1e-6 * (time.thread_time_ns() - started)
+        pairs[row] = pair_count(contacts)
+        if row % thin == 0:
+            alone.append(milliseconds(search, *pair))
+            answers.append(milliseconds(solver, a, b))
+        bar.update()
+    most = boxes.place(*poses[int(np.argmax(pairs))], CUBE, CUBE)
+    most_step, most_alone = (float(np.median([milliseconds(work, *most) for _ in range(REPEATS)]))
+                             for work in (soup.collide, search))
+    touching = patterns.contacts().colliding
+    p50, p99, longest = output.percentiles(step, 50, 99, 100)
+    return {
+        'patterns': len(poses),
+        'touching': int(touching.sum()),  # by SAT
+        'misses': int((touching & (pairs == 0)).sum()),
+        'step_mean_ms': float(step.mean()), 'step_p50_ms': p50, 'step_p99_ms': p99,
+        'step_max_ms': longest,
+        'alone_patterns': len(alone), 'alone_mean_ms': float(np.mean(alone)),
+        'alone_by_step': float(np.mean(alone) / step[::thin].mean()),  # of the same patterns
+        'answer_mean_ms': float(np.mean(answers)),
+        'most_pairs': int(pairs.max()), 'most_pairs_step_ms': most_step,
+        'most_pairs_alone_ms': most_alone}
+
+
+def judge_soup(divisions: int, patterns: Pairs, exact: Contacts) -> SoupErrors:
+    """Compare with `exact`; patterns without an answer of the soup are left out."""
+    boxes, areas = soup.Soup(divisions), soup.mesh(CUBE, divisions).areas
+    rows, points, normals, depths = [], [], [], []
+    for row, (a, b) in enumerate(zip(patterns.pose_a, patterns.pose_b)):
+        contacts = soup.collide(*boxes.place(a, b, CUBE, CUBE))
+        answer = soup.point_and_normal(contacts, areas, areas)
+        if answer is not None:
+            rows.append(row)
+            points.append(a[:3] + answer[0])
+            normals.append(answer[1])
+            depths.append(max(contact.penetration_depth for contact in contacts))
+    return SoupErrors(
+        point=np.linalg.norm(np.reshape(points, (-1, 3)) - exact.point[rows], axis=1),
+        normal=degrees_between(np.reshape(normals, (-1, 3)), exact.normal[rows]),
+        depth=np.array(depths) + exact.separation[rows])
+
+
+def time_calls(solver: ContactSolver, patterns: Pairs) -> float:
+    """Return the mean time of a call [ms]; calls are too short for a clock each."""
+    def calls() -> None:
+        for a, b in zip(patterns.pose_a, patterns.pose_b):
+            solver(a, b)
+
+    calls()
+    return milliseconds(calls) / len(patterns.pose_a)
+
+
+def judge_network(model: str, patterns: Pairs, exact: Contacts) -> Row:
+    """Return a network's row on touching patterns."""
+    solver = cubes_model(model)
+    found = patterns.contacts(solver)
+    return {'model': model, 'regime': 'touching', 'answer_mean_ms': time_calls(solver, patterns),
+            'point_error_mean_m': float(np.linalg.norm(found.point - exact.point, axis=1).mean()),
+            'normal_error_mean_deg': float(degrees_between(found.normal, exact.normal).mean())}
+
+
+def crossing(errors: Mapping[int, float], level: float) -> float:
+    """Return the N at which the error falls to `level`.
+
+    The line between those measured is straight on log-log paper. The N is 0 if the error is below
+    from the first on, infinite if it never is.
+    """
+    divisions = sorted(errors)
+    if errors[divisions[0]] <= level:
+        return 0.0
+    for low, high in zip(divisions, divisions[1:]):
+        if errors[high] <= level:
+            share = math.log(errors[low] / level) / math.log(errors[low] / errors[high])
+            return low * (high / low)**share
+    return math.inf
+
+
+def measure(inputs: np.ndarray, *, quick: bool = False) -> SoupResult:
+    """Time and judge every N on every regime; inputs: the paper's external set (n, 6)."""
+    counts = QUICK if quick else FULL
+    rng = np.random.default_rng(SEED)
+    patterns = {'touching': on_cube(as_poses(inputs[:counts['touching'].timed])[1]),
+                'near-parallel': near_parallel(rng, counts['near-parallel'].timed),
+                'coplanar': coplanar(rng, counts['coplanar'].timed)}
+    judged = {name: pairs.rows(slice(counts[name].judged)) for name, pairs in patterns.items()}
+    # At exact touch a few are apart by rounding, and left out.
+    some = patterns['touching'].rows(slice(2 * counts['touching'].judged))
+    judged['touching'] = at_depth(some, np.full(len(some.size), OVERLAP)).rows(
+        slice(counts['touching'].judged))
+    truth = {name: pairs.contacts() for name, pairs in judged.items()}
+    soups: dict[tuple[str, int], Row] = {}
+    work = len(PAPER) * sum(c.timed + c.judged for c in counts.values())
+    work += len(ALSO) * counts['touching'].judged
+    with (pinned({usable_cores()[-1]}), output.no_garbage_collection(),
+          tqdm(total=work, unit='pattern', disable=None) as bar):
+        for divisions in (*PAPER, *ALSO):
+            for regime in REGIMES if divisions in PAPER else ['touching']:
+                bar.set_description(f'soup, N = {divisions}, {regime}')
+                row: Row = {'model': 'soup', 'divisions': divisions,
+                            'triangles': 12 * divisions**2, 'regime': regime}
+                if divisions in PAPER:
+                    row |= time_soup(divisions, patterns[regime], counts[regime].thin, bar)
+                errors = judge_soup(divisions, judged[regime], truth[regime])
+                soups[regime, divisions] = row | {
+                    'judged': len(errors.point), 'point_error_mean_m': float(errors.point.mean()),
+                    'point_error_max_m': float(errors.point.max()),
+                    'normal_error_mean_deg': float(errors.normal.mean()),
+                    'depth_error_mean_m': float(errors.depth.mean())}
+                bar.update(len(judged[regime].size))
+        networks = {model: judge_network(model, judged['touching'], truth['touching'])
+                    for model in ('paper', 'paper-continuous')}
+        exact = time_calls(cubes_model('exact'), judged['touching'])
+    return SoupResult(soups=soups, networks=networks, exact=exact, counts=counts)
+
+
+def _cell(value: float) -> str:
+    """Return a number of pairs, or a time [ms]."""
+    if isinstance(value, int):
+        return f'{value:,}'
+    return f'{value:.3f}' if value < 0.1 else f'{value:.2f}'
+
+
+def _by_regime(paper: Mapping[str, Callable[[int], str]], ours: Mapping[str, str],
+               result: SoupResult) -> str:
+    """Return a table with a row per N.
+
+    paper: the paper's figures by title, as functions of N; ours: columns of our rows by title.
+    """
+    first = next(iter(ours))
+    titles = [f'{regime}: {title}' if title == first else title
+              for regime in REGIMES for title in ours]
+    return output.markdown_table(['N', *paper, *titles], [
+        [n, *(figure(n) for figure in paper.values()),
+         *(_cell(result.soups[regime, n][column]) for regime in REGIMES
+           for column in ours.values())] for n in PAPER], words=0)
+
+
+def table_of_errors(result: SoupResult) -> str:
+    """Return errors by N and regime, then the networks'."""
+    def cell(row: Row, column: str, unit: float, digits: int = 0) -> str:
+        return f'{unit * row[column]:.{digits}f}' if column in row else ''
+
+    head = ['N', 'misses at exact touch']
+    for regime in REGIMES:
+        head += [f'{regime}: point, mean', 'max', 'normal, mean']
+    found = {str(n): [result.soups.get((regime, n), {}) for regime in REGIMES]
+             for n in sorted({n for _, n in result.soups})}
+    found |= {f'`{name}`': [row, {}, {}] for name, row in result.networks.items()}
+    lines = []
+    for label, (touching, parallel, flat) in found.items():
+        line = [label, f'{100 * touching["misses"] / touching["touching"]:.0f} %'
+                if 'misses' in touching else '']
+        for row in (touching, parallel, flat):
+            line += [cell(row, 'point_error_mean_m', 1e3, 1), cell(row, 'point_error_max_m', 1e3),
+                     cell(row, 'normal_error_mean_deg', 1.0, 1)]
+        lines.append(line + [cell(row, 'depth_error_mean_m', 1e3) for row in (touching, parallel)])
+    return output.markdown_table([*head, 'depth, touching', 'depth, near-parallel'], lines, words=0)
+
+
+def _touching_errors(result: SoupResult) -> dict[int, float]:
+    """Return the mean point error on touching cubes [m], by N."""
+    return {n: row['point_error_mean_m'] for (regime, n), row in sorted(result.soups.items())
+            if regime == 'touching'}
+
+
+def equal_at(result: SoupResult) -> dict[str, float]:
+    """Return, by network, the N at which the soup's mean point error equals its."""
+    errors = _touching_errors(result)
+    return {name: crossing(errors, row['point_error_mean_m'])
+            for name, row in result.networks.items()}
+
+
+def in_words(divisions: float) -> str:
+    """Return a `crossing` in words."""
+    if divisions == 0.0:
+        return f'below N = {min(ALSO)}'
+    return f'N ≈ {divisions:.0f}' if math.isfinite(divisions) else f'beyond N = {max(ALSO)}'
+
+
+def section_3(result: SoupResult) -> str:
+    """Return Table 3, mean times by N and regime, with its notes."""
+    table = _by_regime(
+        {'triangles a cube': lambda n: f'{12 * n**2:,}',
+         'paper: touching': lambda n: f'{PAPER[n][0]:.2f}'},
+        {'step': 'step_mean_ms', 'FCL alone': 'alone_mean_ms', 'answer': 'answer_mean_ms'}, result)
+    _, last = result.ends('coplanar')
+    network = result.networks['paper']['answer_mean_ms']
+    touching, coplanar = ([row['step_mean_ms'] / network for row in result.ends(regime)]
+                          for regime in ('touching', 'coplanar'))
+    return output.page(
+        'reports/paper/pages/table_3', counts=result.counts, table=table,
+        share=100 * (1 - last['alone_by_step']), low=min(PAPER), high=max(PAPER),
+        thin=', '.join(f'{result.ends(regime)[0]["alone_patterns"]:,} {regime}'
+                       for regime in REGIMES),
+        network=1e3 * network, exact=1e3 * result.exact, touching=touching, coplanar=coplanar)
+
+
+def section_4(result: SoupResult) -> str:
+    """Return Table 4, the patterns with the most pairs and their times, with its notes."""
+    table = _by_regime(
+        {'paper: tests': lambda n: f'{PAPER[n][1]:,}', 'paper: ms': lambda n: f'{PAPER[n][2]:.2f}'},
+        {'pairs': 'most_pairs', 'step, ms': 'most_pairs_step_ms',
+         'FCL alone, ms': 'most_pairs_alone_ms'}, result)
+    ends = {regime: result.ends(regime) for regime in REGIMES}
+    low, high = min(PAPER), max(PAPER)
+    return output.page(
+        'reports/paper/pages/table_4', table=table, repeats=REPEATS, low=low, high=high,
+        growth_paper=PAPER[high][2] / PAPER[low][2],
+        growth={regime: last['most_pairs_step_ms'] / first['most_pairs_step_ms']
+                for regime, (first, last) in ends.items()},
+        most={regime: f'{first["most_pairs"]:,} to {last["most_pairs"]:,}'
+              for regime, (first, last) in ends.items()},
+        few=max(result.soups['touching', n]['most_pairs'] for n in PAPER))
+
+
+def section_errors(result: SoupResult) -> str:
+    """Return the soup's errors, and what differs from the paper."""
+    along = 1e3 * result.ends('near-parallel')[1]['point_error_mean_m']
+    return output.page('reports/paper/pages/soup_errors', counts=result.counts, along=along,
+                       table=table_of_errors(result))
+
+
+def section_figure_10(result: SoupResult) -> str:
+    """Return Figure 10's caption."""
+    return output.page('reports/paper/pages/figure_10', equal='; '.join(
+        f"`{name}`'s ({1e3 * result.networks[name]['point_error_mean_m']:.0f} mm) at {in_words(n)}"
+        for name, n in equal_at(result).items()))
+
+
+SECTIONS = {3: section_3, 4: section_4, 10: section_figure_10}
+"""Sections of the page by the number of the table or figure."""
+
+
+def draw_figure_10(result: SoupResult, path: Path) -> None:
+    """Draw times and errors against N."""
+    figure, ((upper,), (lower,)) = output.subplots(2, 1, (8.0, 8.4))
+    _draw_times(upper, result)
+    ticks = [1, 2, 4, 8, 16, 32, 64]
+    errors = _touching_errors(result)
+    lower.plot(list(errors), [1e3 * error for error in errors.values()], '-o', color='tab:blue',
+               markersize=3.5, label='soup, touching')
+    for (name, n), colour in zip(equal_at(result).items(), ('tab:orange', 'tab:purple')):
+        lower.axhline(1e3 * result.networks[name]['point_error_mean_m'], color=colour,
+                      label=f'{name}: {in_words(n)}')
+        for axes in (upper, lower) if min(PAPER) <= n <= max(PAPER) else (lower,):
+            if 0.0 < n < math.inf:
+                axes.axvline(n, color=colour, linestyle='--', label=f'as exact as {name}')
+    lower.set(xscale='log', yscale='log', xlabel='divisions N of an edge',
+              ylabel='mean point error [mm]')
+    lower.set_xticks(ticks, [str(tick) for tick in ticks])
+    lower.set_xticks([], minor=True)
+    for axes in (upper, lower):
+        axes.legend(fontsize=8.5, loc='upper left', bbox_to_anchor=(1.01, 1.0))
+        axes.grid(color='0.9', which='both', linewidth=0.6)
+        axes.set_axisbelow(True)
+    figure.savefig(path)
+
+
+def _draw_times(axes: Any, result: SoupResult) -> None:
+    divisions = list(PAPER)
+    for regime, colour in zip(REGIMES, ('tab:blue', 'tab:green', 'tab:red')):
+        for column, style, label in (('step_mean_ms', '-o', 'mean'),
+                                     ('most_pairs_step_ms', ':s', 'most pairs')):
+            axes.plot(divisions, [result.soups[regime, n][column] for n in divisions], style,
+                      color=colour, markersize=3.5, label=f'{regime}, {label}')
+    axes.axhline(result.networks['paper']['answer_mean_ms'], color='black',
+                 label='call of model paper')
+    for column, style, label in ((0, '-', 'mean'), (2, ':', 'maximum')):
+        axes.plot(divisions, [PAPER[n][column] for n in divisions], style, color='0.6',
+                  label=f"the paper's soup, {label}")
+    axes.axhline(PAPER_NETWORK, color='0.6', linestyle='--', label="the paper's network")
+    axes.set(yscale='log', xlabel='divisions N of an edge', ylabel='time [ms]', xticks=divisions)
