@@ -178,12 +178,20 @@ setup(
     maintainer_email='maintainers@box-contact-ros.org',
     license='Apache-2.0',
     packages=find_packages(include=[NAME, f'{NAME}.*']),
-    package_data={NAME: ['py.typed', '**/*.pyi', 'evidence/verification/*.npz', '**/*.md', '**/*.yaml',
-                         'evidence/reports/frontier/*.cpp',
+    package_data={NAME: ['py.typed', '**/*.pyi', '**/*.md', '**/*.yaml',
+                         'evidence/verification/*.npz', 'evidence/reports/frontier/*.cpp',
                          'core/cmake/*', 'core/include/**/*.h*', 'core/src/**/*.hpp']},
     ext_modules=extensions(),
     data_files=data_files(),
-    entry_points={'console_scripts': cli['entry_points']('box_contact_' if BY_PIP else '')},
+    entry_points={
+        'console_scripts': cli['entry_points']('box_contact_' if BY_PIP else ''),
+        # Models outside the core; other packages add theirs in the same way.
+        f'{NAME}.models': [f'{model} = {NAME}.evidence.contestants.entries:{entry}'
+                           for model, entry in {
+                               'paper': 'PAPER', 'paper-continuous': 'CONTINUOUS',
+                               'paper-committee': 'COMMITTEE', 'fcl': 'FCL', 'soup': 'SOUP'
+                           }.items()],
+    },
     cmdclass={'build_ext': BuildCore},
     distclass=PipDistribution if BY_PIP else Distribution,
     zip_safe=False,

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from .solver.contact import Contact, Contacts
 from .solver.contact_solver import ContactSolver
-from .solver.models import MODELS
+from .solver.models import models
 
 if TYPE_CHECKING:
     from .scene.files.scene_file import SceneError, read_scene, write_scene
@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from .scene.force.predictor import Predictor
     from .scene.scene_solver import Box, Pair, Scene, SceneSolver
 
-__all__ = ['MODELS', 'Body', 'Box', 'Contact', 'ContactSolver', 'Contacts', 'HeldPatch',
+__all__ = ['Body', 'Box', 'Contact', 'ContactSolver', 'Contacts', 'HeldPatch',
            'HeldWrench', 'Pair', 'PatchLaw', 'Predictor', 'Scene', 'SceneError', 'SceneLaw',
-           'SceneSolver', 'read_scene', 'write_scene']
+           'SceneSolver', 'models', 'read_scene', 'write_scene']
 
 _LOADED_WHEN_USED = {
     'scene.files.scene_file': ('SceneError', 'read_scene', 'write_scene'),

@@ -52,7 +52,7 @@ PROGRAMS = {
         'box_contact_ros.apps.crane.crane_node', ('ros', 'sim'),
         'a MuJoCo crane that lowers one container onto another and publishes both poses'),
     'soup_node': Program(
-        'box_contact_ros.node.soup_node', ('ros', 'soup'),
+        'box_contact_ros.evidence.contestants.soup_node', ('ros', 'soup'),
         'the same node on a polygon soup, under soup/: what the source paper compares with'),
     'view': Program(
         'box_contact_ros.apps.viewer.view', ('ros', 'sim', 'view'),

@@ -26,7 +26,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..solver.arguments import model_name, within
-from ..solver.models import gated_models, model_names
+from ..solver.models import model_names, models_with_patch
 from . import processes
 from .crane.landing import LANDING_DURATION
 from .crane.mujoco_crane import CraneScenario
@@ -96,7 +96,7 @@ def _announcement(options: argparse.Namespace) -> str:
              f'{options.domain} on this host.',
              'It passes if contacts come and none is lost'
              f'{", and if the load comes to rest" if options.closed_loop else ""}.']
-    if options.closed_loop and options.model not in gated_models():
+    if options.closed_loop and options.model not in models_with_patch():
         lines.append(f'Model {options.model} gives points without a patch. The whole bottom of the '
                      'load stands for the patch, so the load may not come to rest. With '
                      '--open-loop, its contacts are only recorded.')

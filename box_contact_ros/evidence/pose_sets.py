@@ -16,12 +16,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from box_contact_ros.scene.pose import quaternion_multiply, rotation_matrix
+from box_contact_ros.scene.scene_solver import CONTAINER as CONTAINER
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
-from box_contact_ros.scene.pose import quaternion_multiply, rotation_matrix
 
 CUBE = (2.0, 2.0, 2.0)
-CONTAINER = (12.192, 2.438, 2.591)  # ISO 40 ft [m]
 TWENTY, HIGH_CUBE = (6.058, 2.438, 2.591), (12.192, 2.438, 2.896)
 """ISO 20 ft, and 40 ft high cube [m]."""
 Z = (0.0, 0.0, 1.0)

@@ -27,8 +27,7 @@ from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 
 from ..core import LENGTH_MAX
-from ..evidence.pose_sets import CONTAINER
-from ..scene.scene_solver import Scene, SceneSolver
+from ..scene.scene_solver import CONTAINER, Scene, SceneSolver
 from ..scene.stamp_pairing import PAIRINGS, RESETS
 from ..solver.checks import shown
 from ..solver.models import find_model, model_names

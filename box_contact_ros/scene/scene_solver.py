@@ -40,6 +40,10 @@ listed pair is faster, and needs no room for the others."""
 _new_tuple = tuple.__new__  # a named tuple's own constructor is Python code
 
 
+CONTAINER = (12.192, 2.438, 2.591)
+"""Full extents of an ISO 40 ft container [m]."""
+
+
 @dataclass(frozen=True)
 class Box:
     """A box of the scene: fixed if it has a pose, else moving."""

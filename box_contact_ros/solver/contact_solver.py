@@ -35,7 +35,7 @@ class ContactSolver(native.PairSolver):
     `ValueError`, with the field and the value, for anything that is not a size or a pose. A solver
     may be called from several threads.
 
-    model: a name of the registry, `models.MODELS`.
+    model: a name of the registry, `models.models()`.
     weights: a file to use instead of the shipped weights.
     margin: separation up to which pairs apart have a normal too [m]; infinity: all.
     """

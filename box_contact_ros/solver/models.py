@@ -3,16 +3,19 @@
 
 """The registry of models: what each is called, what it is for, and how it is built.
 
-A new model is a module with its class and an entry of `MODELS`. Solver, node, programs and tests
-read the table. A test compares the table in docs/how-to/models.md.
+The core's own models are here. A package adds one by an entry point of the group
+`box_contact_ros.models`, which leads to a `ModelEntry`. Solver, node and programs read `models()`.
 """
 from __future__ import annotations
 
 import os
 import re
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from importlib import import_module
+from importlib.metadata import entry_points
 from typing import Any, Protocol
 
 import numpy as np
@@ -74,7 +77,6 @@ class Family:
     argument: str  # the builder's name for N
     default: int
     most: int  # N is 1 to this
-    reported: tuple[int, ...]  # the N that reports show
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,7 +92,7 @@ class ModelEntry:
     boxes: str = 'any'  # the boxes that it answers
     extra: str = ''  # extra of setup.py that brings its library
     native_batch: bool = False  # whether the rows of a batch are answered in C++
-    gated: bool = False  # whether fuzz, stability and the speed report hold it to their limits
+    patch: bool = False  # whether it gives volume and covariance
     family: Family | None = None
     most_near: int = 2**15
     """Pairs near each other that a node answers in one tick, in about a second; messages of so many
@@ -110,12 +112,6 @@ class ModelEntry:
     def full_name(self) -> str:
         """Return the name that says all: with the default N, for a family."""
         return f'{self.name}-{self.family.default}' if self.family else self.name
-
-    @property
-    def reported_names(self) -> tuple[str, ...]:
-        """Return the full names of the models that reports show."""
-        return tuple(f'{self.name}-{n}' for n in self.family.reported) if self.family else (
-            self.name,)
 
     def load(self) -> Callable[..., Model | NativeModel]:
         """Return the builder; ModuleNotFoundError, which names the extra, where it is missing."""
@@ -146,52 +142,51 @@ class ModelEntry:
         return {family.argument: int(number)}
 
 
-SOUP_DIVISIONS, MOST_SOUP_DIVISIONS = 8, 64
-"""Divisions of an edge in model `soup`, and the most that are accepted (49,152 triangles a box)."""
-_NEEDS = ('size_a', 'size_b', 'weights')
-_ENTRIES = (
+GROUP = 'box_contact_ros.models'
+"""The group of entry points by which packages add models."""
+OWN = {entry.name: entry for entry in (
     ModelEntry(
         name='mlp', line='SAT, columns, a network between proven brackets; the default',
         builder='box_contact_ros.solver.mlp:mlp', takes=('weights',),
-        native_batch=True, gated=True),
+        native_batch=True, patch=True),
     ModelEntry(
         name='exact', line='SAT and the exact centroid of the overlap; the reference',
         builder='box_contact_ros.solver.models:exact',
-        native_batch=True, gated=True),
-    ModelEntry(
-        name='paper', line="the paper's network 6-20-18-4",
-        builder='box_contact_ros.evidence.contestants.paper.paper_models:paper', takes=_NEEDS,
-        boxes='two equal cubes, or two 40 ft containers', native_batch=True),
-    ModelEntry(
-        name='paper-continuous', line="the paper's networks 6-20-17-4 on subsets without jumps",
-        builder='box_contact_ros.evidence.contestants.paper.paper_models:paper_continuous', takes=_NEEDS,
-        boxes='two equal cubes', native_batch=True),
-    ModelEntry(
-        name='paper-committee', line="a classifier and the paper's network for each class",
-        builder='box_contact_ros.evidence.contestants.paper.paper_models:paper_committee', takes=_NEEDS,
-        boxes='two equal cubes', native_batch=True),
-    ModelEntry(
-        name='fcl', line="FCL's box-box, its deepest contact; a baseline",
-        builder='box_contact_ros.evidence.contestants.fcl_box:FclBox', extra='soup'),
-    ModelEntry(
-        name='soup', line='polygon soup on FCL, N divisions an edge; a baseline',
-        builder='box_contact_ros.evidence.contestants.soup:Soup', takes=('divisions',), extra='soup',
-        most_near=64,  # each takes a third of a second at worst
-        family=Family(argument='divisions', default=SOUP_DIVISIONS, most=MOST_SOUP_DIVISIONS,
-                      reported=(8, 10, 12, 14, 16, 18, 20, 22))),  # of the paper's Table 3
-)
-MODELS = {entry.name: entry for entry in _ENTRIES}
-"""The models by name, in the order in which they are listed to users."""
+        native_batch=True, patch=True),
+)}
+"""The core's models by name."""
+
+
+@cache
+def models() -> dict[str, ModelEntry]:
+    """Return all models by name: the core's, then those of installed packages, in their order.
+
+    Warns of an entry point that gives no entry, and leaves it out: the others are not its concern.
+    """
+    found = dict(OWN)
+    for point in sorted(entry_points(group=GROUP)):
+        try:
+            entry = point.load()
+            if not isinstance(entry, ModelEntry) or entry.name != point.name:
+                raise TypeError(f'it is not the ModelEntry of a model {point.name!r}')
+            if point.name in OWN:
+                raise ValueError('this name is one of the core')
+        except Exception as error:  # of any kind: the code is a stranger's
+            warnings.warn(f'model {point.name!r} of {point.value} is left out: '
+                          f'{type(error).__name__}: {error}', stacklevel=2)
+        else:
+            found[entry.name] = entry
+    return found
 
 
 def model_names() -> str:
     """Return the names of all models for help texts, separated by commas."""
-    return ', '.join(name for entry in MODELS.values() for name in entry.names)
+    return ', '.join(name for entry in models().values() for name in entry.names)
 
 
-def gated_models() -> list[str]:
-    """Return the full names of the models that reports hold to limits."""
-    return [entry.full_name for entry in MODELS.values() if entry.gated]
+def models_with_patch() -> list[str]:
+    """Return the full names of the models that give volume and covariance."""
+    return [entry.full_name for entry in models().values() if entry.patch]
 
 
 def find_model(where: str, name: object) -> tuple[ModelEntry, dict[str, int]]:
@@ -199,12 +194,14 @@ def find_model(where: str, name: object) -> tuple[ModelEntry, dict[str, int]]:
 
     Raises ValueError, which begins with `where`, for a name that no entry has.
     """
-    for entry in MODELS.values() if isinstance(name, str) else ():
+    if isinstance(name, str) and name in OWN:  # spares the search for other packages' models
+        return OWN[name], {}
+    for entry in models().values() if isinstance(name, str) else ():
         options = entry.options(str(name))
         if options is not None:
             return entry, options
     raise ValueError(f'{where} {shown(name)} is not one of: {model_names()}'
-                     f'{nearest_name(name, MODELS)}')
+                     f'{nearest_name(name, models())}')
 
 
 def build_model(name: str, size_a: np.ndarray, size_b: np.ndarray, weights: str | None,

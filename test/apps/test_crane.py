@@ -14,9 +14,9 @@ import pytest
 pytest.importorskip('mujoco')
 
 from box_contact_ros.apps.crane.mujoco_crane import MAX_HOIST_SPEED, Crane, CraneScenario
+from box_contact_ros.evidence.pose_sets import CONTAINER
 from box_contact_ros.scene.force.laws import GRAVITY
 from box_contact_ros.scene.pose import rotation_matrix
-from box_contact_ros.evidence.pose_sets import CONTAINER
 
 LENGTH, WIDTH, HEIGHT = CONTAINER
 

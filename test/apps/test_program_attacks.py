@@ -24,7 +24,6 @@ from stranger import ANSWER_SECONDS, Stranger
 pytest.importorskip('mujoco')
 pytest.importorskip('rosbags')
 
-from box_contact_ros.evidence.bench.bench_drive import BenchNode, echo_node
 from box_contact_ros.apps.crane.crane_feedback import CraneFeedback
 from box_contact_ros.apps.crane.crane_node import CraneNode
 from box_contact_ros.apps.crane.crane_parameters import PARAMETERS, scenario_from
@@ -33,6 +32,7 @@ from box_contact_ros.apps.ros_client import ANSWERS
 from box_contact_ros.apps.viewer.listener import ViewNode
 from box_contact_ros.apps.viewer.markers import MarkersNode
 from box_contact_ros.apps.viewer.view_log import ViewLog
+from box_contact_ros.evidence.bench.bench_drive import BenchNode, echo_node
 from box_contact_ros.node.messages import (
     MOST_ROWS,
     TypedMessages,

@@ -41,8 +41,8 @@ from box_contact_ros.apps.recording.bag_file import (
 )
 from box_contact_ros.apps.recording.record import RecordNode
 from box_contact_ros.apps.ros_client import ANSWERS, array_message, line_marker, pose_message
-from box_contact_ros.node.messages import make_cloud, make_header, read_cloud
 from box_contact_ros.evidence.reports.accuracy import limit_of
+from box_contact_ros.node.messages import make_cloud, make_header, read_cloud
 from box_contact_ros.resources import resource_path
 from box_contact_ros.scene.files.scene_file import read_scene
 from box_contact_ros.scene.scene_solver import SceneSolver

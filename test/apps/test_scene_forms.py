@@ -33,6 +33,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 pytest.importorskip('rosbags')
 pytest.importorskip('fcl')
 
+from box_contact_ros.node.soup_node import SoupNode
 from rosbags.rosbag2 import Reader
 from test_bench import bench, rows_of
 
@@ -49,7 +50,6 @@ from box_contact_ros.apps.viewer.view_log import Snapshot
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import read_contacts
 from box_contact_ros.node.runtime import spin_for
-from box_contact_ros.node.soup_node import SoupNode
 from box_contact_ros.scene.files.scene_check import meaning
 from box_contact_ros.scene.files.scene_file import read_scene
 from box_contact_ros.scene.scene_solver import Scene, SceneSolver, two_boxes

@@ -17,6 +17,8 @@ import poses
 import pytest
 from gmpy2 import mpfr
 
+pytest.importorskip('box_contact_ros.evidence')
+
 from box_contact_ros.core import FEATURES, Stages, native, stages
 from box_contact_ros.evidence.pose_sets import LOADS, SETS, Pairs
 

@@ -18,13 +18,16 @@ from collections.abc import Callable, Iterator
 from ctypes import byref, c_double, c_int64, c_void_p
 from pathlib import Path
 
-import hostile_calls
 import numpy as np
 import pytest
 from test_library import BAD_WEIGHTS, LIBRARY, WEIGHTS, Options, Results, Rows, Size, run, tool
 
-from box_contact_ros.evidence.contestants.paper import _networks
+pytest.importorskip('box_contact_ros.evidence')
+
+import hostile_calls
+
 from box_contact_ros.core import FORCE, native
+from box_contact_ros.evidence.contestants.paper import _networks
 
 ROOT = Path(__file__).resolve().parents[2]
 CALLS = hostile_calls.__file__
@@ -131,7 +134,7 @@ def test_with_sanitizers(tmp_path: Path) -> None:
     core = ROOT / 'box_contact_ros' / 'core'
     sources = [core / 'binding' / 'module.cpp', *(
         core / 'src' / 'library' / f'{name}.cpp' for name in ('kernel', 'library', 'force'))]
-    paper = ROOT / 'box_contact_ros' / 'baselines' / 'paper' / 'networks.cpp'
+    paper = Path(_networks.__file__).with_name('networks.cpp')
     builds = [subprocess.Popen([tool('g++'), *arguments, *map(str, given), '-o',
                                 str(tmp_path / Path(made.__file__).name)])
               for made, given in ((native, sources), (_networks, [paper]))]

@@ -23,15 +23,14 @@ from pathlib import Path
 import numpy as np
 import poses
 import pytest
+from poses import Pairs
 
 from box_contact_ros import Body, ContactSolver, HeldPatch
 from box_contact_ros.__main__ import PLACES
 from box_contact_ros.core import FORCE, instruction_sets, native
 from box_contact_ros.resources import resource_path
 from box_contact_ros.scene.pose import rotation_matrix
-from box_contact_ros.evidence.pose_sets import SETS, Pairs
 from box_contact_ros.solver.contact import Contacts
-from box_contact_ros.evidence.verification import fuzz
 
 ROOT = Path(__file__).resolve().parents[2]
 CORE = Path(native.__file__).parent
@@ -135,10 +134,7 @@ def by_ctypes(library: ctypes.CDLL, model: str, pairs: Pairs, threads: int = 1,
 
 
 def some_pairs() -> Pairs:
-    parts = [fuzz.draw(name, np.random.default_rng([6, number]), 400)
-             for number, name in enumerate(fuzz.CLASSES)]
-    parts += [make(np.random.default_rng(44), 300) for make in SETS.values()]
-    return Pairs(*(np.ascontiguousarray(np.concatenate(part)) for part in zip(*parts)))
+    return poses.of_all_kinds(500, 6)
 
 
 @pytest.mark.parametrize('model', ['exact', 'mlp'])
@@ -520,7 +516,7 @@ def test_endless_weights_are_refused(library: ctypes.CDLL) -> None:
 
 def test_the_compiled_network_is_the_default(library: ctypes.CDLL) -> None:
     """Without options: the bits of Python's default."""
-    pairs = some_pairs().rows(slice(500))
+    pairs = some_pairs().first(500)
     unit, solver = Size((c_double * 3)(1, 1, 1)), ctypes.c_void_p()
     assert library.bc_solver_create(byref(unit), byref(unit), None, byref(solver)) == 0
     points = np.empty((500, 3))
@@ -529,8 +525,9 @@ def test_the_compiled_network_is_the_default(library: ctypes.CDLL) -> None:
     results = Results(size=ctypes.sizeof(Results), point=points.ctypes.data_as(POINTER(c_double)))
     assert library.bc_solve_rows(solver, byref(rows), byref(results), 1, None) == 0
     library.bc_solver_destroy(solver)
-    assert np.array_equal(points, pairs.contacts(ContactSolver((1, 1, 1), (1, 1, 1))).point,
-                          equal_nan=True)
+    wanted = ContactSolver((1, 1, 1), (1, 1, 1)).batch(
+        *pairs[:2], size_a=pairs.size_a, size_b=pairs.size_b)
+    assert np.array_equal(points, wanted.point, equal_nan=True)
 
 
 BAD_WEIGHTS = 5

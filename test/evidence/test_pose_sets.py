@@ -7,9 +7,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from box_contact_ros.evidence.pose_sets import CUBE, SETS, Pairs
 from box_contact_ros.scene import pose_sets
 from box_contact_ros.scene.pose import degrees_between, rotation_matrix
-from box_contact_ros.evidence.pose_sets import CUBE, SETS, Pairs
 
 N = 200
 DEPTHS = {'random cubes': (2e-3, 0.2), 'touching': (0.0, 0.0), 'stacks': (1e-3, 1e-3),

@@ -12,7 +12,6 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from box_contact_ros.scene.pose import quaternion_multiply, rotation_matrix
 from box_contact_ros.evidence.pose_sets import CONTAINER as FORTY
 from box_contact_ros.evidence.pose_sets import (
     CUBE,
@@ -22,6 +21,7 @@ from box_contact_ros.evidence.pose_sets import (
     right_angles,
     turned,
 )
+from box_contact_ros.scene.pose import quaternion_multiply, rotation_matrix
 
 X, Y, Z = np.eye(3)
 UPRIGHT = np.array([0.0, 0.0, 0.0, 1.0])

@@ -21,12 +21,14 @@ from typing import Any
 
 import numpy as np
 
+FOLDERS = {'_native': 'core', '_networks': 'evidence.contestants.paper'}
+
 
 def preload(folder: str) -> None:
     """Load extensions from a folder, before the package looks for its own."""
     for path in Path(folder).glob('_n*.so'):
         base = path.name.partition('.')[0]
-        name = f'box_contact_ros.{"core" if base == "_native" else "baselines.paper"}.{base}'
+        name = f'box_contact_ros.{FOLDERS[base]}.{base}'
         spec = importlib.util.spec_from_file_location(name, path)
         assert spec and spec.loader
         sys.modules[name] = module = importlib.util.module_from_spec(spec)
@@ -36,8 +38,8 @@ def preload(folder: str) -> None:
 if 'EXTENSIONS' in os.environ:
     preload(os.environ['EXTENSIONS'])
 
-from box_contact_ros.evidence.contestants.paper import _networks as networks  # noqa: E402
 from box_contact_ros.core import native  # noqa: E402
+from box_contact_ros.evidence.contestants.paper import _networks as networks  # noqa: E402
 
 POSE = np.array([0.0, 0, 0, 0, 0, 0, 1])
 ABOVE = np.array([0.1, 0.2, 0.9, 0, 0, 0, 1])

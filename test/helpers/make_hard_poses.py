@@ -1,12 +1,12 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Write box_contact_ros/evidence/verification/hard_poses.npz: the hard poses, with their truth in 60 digits.
+"""Write the hard poses, with their truth in 60 digits: evidence/verification/hard_poses.npz.
 
     python test/helpers/make_hard_poses.py [FAMILY ...]
 
 Families that are not named stay as they are: another machine may round a recipe differently. Once
-written, the file is what tests and reports read (see `box_contact_ros.evidence.verification.hard_poses`).
+written, the file is what tests and reports read (see `hard_poses.py` beside it).
 """
 from __future__ import annotations
 

@@ -4,11 +4,29 @@
 """Families of poses that many tests draw from. Every one is seeded and stored as doubles."""
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 CONTAINER = (12.192, 2.438, 2.591)
 CUBE = (2.0, 2.0, 2.0)
 IDENTITY = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+
+
+class Pairs(NamedTuple):
+    """n pairs: poses (n, 7), full extents (n, 3)."""
+
+    pose_a: np.ndarray
+    pose_b: np.ndarray
+    size_a: np.ndarray
+    size_b: np.ndarray
+
+    def first(self, count: int) -> Pairs:
+        return Pairs(*(part[:count] for part in self))
+
+
+def joined(*parts: tuple[np.ndarray, ...]) -> Pairs:
+    return Pairs(*(np.ascontiguousarray(np.concatenate(columns)) for columns in zip(*parts)))
 
 
 def unit_quaternions(rng, n):
@@ -215,3 +233,11 @@ def columns_that_touch(rng, n):
     zero = np.zeros((n, 3))
     return (moved(np.tile(IDENTITY, (n, 1)), zero, whole), moved(b, zero, whole), size_a,
             size_b), rotate(whole, at_a)
+
+
+def of_all_kinds(n, seed):
+    """Draw n pairs of each family above, but for those that touch exactly."""
+    return joined(*(family(np.random.default_rng([seed, number]), n)
+                    for number, family in enumerate((
+                        random_pairs, near_parallel_pairs, flush_pairs, equal_thickness, ridges,
+                        cards, sharing_an_axis))))

@@ -16,6 +16,8 @@ import numpy as np
 import poses
 import pytest
 
+pytest.importorskip('box_contact_ros.evidence')
+
 from box_contact_ros import ContactSolver
 from box_contact_ros.core import DEPTH_FLOOR
 from box_contact_ros.evidence.pose_sets import (

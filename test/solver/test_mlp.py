@@ -16,6 +16,9 @@ import poses
 import pytest
 
 import box_contact_ros
+
+pytest.importorskip('box_contact_ros.evidence')
+
 from box_contact_ros import ContactSolver
 from box_contact_ros.core import (
     BRACKET_LIMIT,
@@ -26,15 +29,15 @@ from box_contact_ros.core import (
     native,
     stages,
 )
+from box_contact_ros.evidence.pose_sets import LOADS, SETS, Pairs, contact_errors
 from box_contact_ros.evidence.reports.accuracy import limit_of
 from box_contact_ros.evidence.reports.frontier.speed import flush_stacks
+from box_contact_ros.evidence.training.worst_case import climb, worst_start
+from box_contact_ros.evidence.verification.steps import drawn_paths, largest_steps
 from box_contact_ros.scene.pose import rotation_matrix
-from box_contact_ros.evidence.pose_sets import LOADS, SETS, Pairs, contact_errors
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.mlp import ACTIVATION, NETWORK, UNITS_MAX, core_numbers, load_mlp
 from box_contact_ros.solver.weights_file import WeightsError, save_weights
-from box_contact_ros.evidence.training.worst_case import climb, worst_start
-from box_contact_ros.evidence.verification.steps import drawn_paths, largest_steps
 
 N = 4000
 LANES = native.lanes

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import re
 import subprocess
 import sys
@@ -17,7 +18,7 @@ import pytest
 import yaml
 
 import box_contact_ros
-from box_contact_ros import MODELS, ContactSolver
+from box_contact_ros import ContactSolver, models
 from box_contact_ros.solver.arguments import model_name, seed_number
 from box_contact_ros.solver.models import (
     Exact,
@@ -50,10 +51,10 @@ class Lifted(Exact):
 def lifted(monkeypatch):
     """Return the model above as an entry, which is all that it takes."""
     monkeypatch.setitem(sys.modules, 'of_a_test', SimpleNamespace(Lifted=Lifted))
-    monkeypatch.setitem(MODELS, 'lifted', ModelEntry(
+    monkeypatch.setitem(models(), 'lifted', ModelEntry(
         name='lifted', line='the exact point, lifted', builder='of_a_test:Lifted',
-        takes=('millimetres',), native_batch=True, gated=True,
-        family=Family(argument='millimetres', default=1, most=9, reported=(1, 7))))
+        takes=('millimetres',), native_batch=True, patch=True,
+        family=Family(argument='millimetres', default=1, most=9)))
 
 
 @pytest.mark.parametrize('name, lift', [('lifted', 1e-3), ('lifted-7', 7e-3)])
@@ -85,17 +86,17 @@ def test_an_added_model_is_named_where_another_is_refused(lifted):
         ContactSolver(poses.CUBE, poses.CUBE, model='lifted-10')
 
 
-@pytest.mark.parametrize('name', MODELS)
+@pytest.mark.parametrize('name', models())
 def test_entries_say_what_their_models_do(name):
     """Weights are read where the entry says so; the core answers for its own models."""
-    if MODELS[name].extra:
+    if models()[name].extra:
         pytest.importorskip('fcl')
     size = np.array([poses.CUBE])
     made = build_model(name, size, size, None)
-    assert MODELS[name].name == name and find_model('model', name)[0] is MODELS[name]
-    assert isinstance(made, NativeModel) is MODELS[name].native_batch
+    assert models()[name].name == name and find_model('model', name)[0] is models()[name]
+    assert isinstance(made, NativeModel) is models()[name].native_batch
     has_weights = getattr(made, 'weights', None) is not None
-    assert has_weights == ('weights' in MODELS[name].takes)
+    assert has_weights == ('weights' in models()[name].takes)
 
 
 def test_a_missing_library_is_named_with_its_extra(monkeypatch):
@@ -112,8 +113,8 @@ def test_the_docs_have_a_row_for_every_entry():
     rows = [line.strip('| ').split(' | ')
             for line in table.partition('\n\n')[0].splitlines()[2:]]
     assert [re.findall('`(.*?)`', names) for names, _, _ in rows] == [
-        list(entry.names) for entry in MODELS.values()]
-    for (_, boxes, point), entry in zip(rows, MODELS.values(), strict=True):
+        list(entry.names) for entry in models().values()]
+    for (_, boxes, point), entry in zip(rows, models().values(), strict=True):
         assert boxes == entry.boxes
         assert re.findall('extra `(.*)`', point) == ([entry.extra] if entry.extra else [])
 
@@ -124,36 +125,46 @@ def test_the_parameter_file_lists_every_name():
     assert find_model('model', yaml.safe_load(text)['/**']['ros__parameters']['model'])
 
 
-def test_the_solver_imports_no_baseline():
-    """Builders are imported when they are asked for."""
-    code = ('import sys, box_contact_ros.solver.arguments; '
-            'print([name for name in sys.modules if "baselines" in name])')
-    done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True,
-                          cwd=Path(box_contact_ros.__file__).parents[1])
-    assert done.stdout == '[]\n', done.stderr
+PACKAGE = """
+from box_contact_ros.solver.models import ModelEntry, exact as build
+ENTRY = ModelEntry(name='mine', line='exact, renamed', builder='mine:build')
+"""
+POINTS = """
+[box_contact_ros.models]
+mine = mine:ENTRY
+lost = mine:NOTHING
+exact = mine:ENTRY
+"""
+ASKED = """
+import box_contact_ros as b
+solver = b.ContactSolver((1, 1, 1), (1, 1, 1), model='mine')
+print(solver([0.0] * 6 + [1.0], [0.0, 0.0, 0.5, 0.0, 0.0, 0.0, 1.0]).separation)
+print([name for name in b.models() if name in ('mlp', 'exact', 'lost', 'mine')])
+"""
 
 
-@pytest.mark.slow
-def test_an_added_model_is_in_reports_and_programs(lifted, tmp_path, capsys):
-    """None of them has a list of its own."""
-    from box_contact_ros.evidence.reports.frontier import frontier, speed
-    from box_contact_ros.evidence.reports.hard import stability
-    from box_contact_ros.evidence.verification import fuzz
-
-    assert {'lifted-1', 'lifted-7'} <= {engine.name for engine in frontier.contestants()[0]}
-    assert 'lifted-1' in [stint.name for stint in speed.single_calls(10)]
-    assert fuzz.main(['--pairs', '6', '--workers', '1']) in (0, 1)
-    assert '\ncube            lifted-1' in capsys.readouterr().out
-    assert stability.main(['--families', 'a4_ridges', '--out', str(tmp_path)]) in (0, 1)
-    assert '## `lifted-1`' in (tmp_path / 'stability.md').read_text('utf-8')
+def python(code, **environment):
+    return subprocess.run([sys.executable, '-c', code], capture_output=True, text=True,
+                          cwd=Path(box_contact_ros.__file__).parents[1],
+                          env={**os.environ, **environment})
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize('module', [
-    'reports.accuracy', 'reports.hard.stability', 'verification.fuzz', 'evidence.bench.bench',
-    'evidence.bench.soak'])
-def test_programs_accept_an_added_model(lifted, module, capsys):
-    main = pytest.importorskip(f'box_contact_ros.{module}').main
-    with pytest.raises(SystemExit, match='0'):
-        main(['--help'])
-    assert 'lifted, lifted-N' in ' '.join(capsys.readouterr().out.split())
+def test_a_package_adds_a_model(tmp_path):
+    """By an entry point of its own; one that cannot be loaded warns and hides no other."""
+    (tmp_path / 'mine.py').write_text(PACKAGE)
+    info = tmp_path / 'mine-1.0.dist-info'
+    info.mkdir()
+    (info / 'METADATA').write_text('Metadata-Version: 2.1\nName: mine\nVersion: 1.0\n')
+    (info / 'entry_points.txt').write_text(POINTS)
+    done = python(ASKED, PYTHONPATH=str(tmp_path))
+    assert done.stdout == "-0.5\n['mlp', 'exact', 'mine']\n", done.stderr
+    for name, cause in (('lost', "AttributeError: module 'mine' has no attribute 'NOTHING'"),
+                        ('exact', "TypeError: it is not the ModelEntry of a model 'exact'")):
+        assert re.search(f"model '{name}' of mine:.* is left out: {cause}", done.stderr)
+
+
+def test_the_default_asks_for_no_other_model():
+    """Looking for packages takes 20 ms, and importing their models longer."""
+    done = python('import box_contact_ros.solver.models as m; m.build_model("mlp", *[None] * 3); '
+                  'print(m.models.cache_info().currsize)')
+    assert done.stdout == '0\n', done.stderr

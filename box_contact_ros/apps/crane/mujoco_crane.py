@@ -33,7 +33,7 @@ import numpy as np
 
 from ...scene.force.laws import FRICTION, GRAVITY, Body
 from ...scene.pose import cross, rotation_matrix
-from ...evidence.pose_sets import CONTAINER
+from ...scene.scene_solver import CONTAINER
 
 # MuJoCo would write warnings to a file MUJOCO_LOG.TXT in the working directory.
 mujoco.set_mju_user_warning(logging.getLogger(__name__).warning)

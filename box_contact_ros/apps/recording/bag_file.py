@@ -46,7 +46,7 @@ from rosbags.typesys.store import Typestore
 from ...scene.files.scene_file import SceneError, parse_scene
 from ...scene.scene_solver import POSE_ARRAY, Scene, two_boxes
 from ...solver.checks import as_size, pose_fault, shown
-from ...evidence.bench.pose_streams import Replay, Size
+from .stream import Replay, Size
 
 BAG_VERSION: Final = 9  # of rosbag2's metadata: what Jazzy writes and reads
 NANOSECONDS = 1_000_000_000

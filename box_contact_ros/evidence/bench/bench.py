@@ -24,15 +24,17 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
+from box_contact_ros.apps.answer_log import StreamResult
+from box_contact_ros.apps.processes import add_domain
+from box_contact_ros.apps.recording.stream import Replay, Stream
 from box_contact_ros.node.contact_node import PARAMETERS
 from box_contact_ros.node.parameters import outside_ros_args
 from box_contact_ros.node.runtime import refusals_end
 from box_contact_ros.output import make_folder, percentiles
 from box_contact_ros.scene.scene_solver import SceneSolver
 from box_contact_ros.solver.arguments import add_models, program_parser, within
-from box_contact_ros.solver.models import MOST_SOUP_DIVISIONS, SOUP_DIVISIONS
-from box_contact_ros.apps.processes import add_domain
-from box_contact_ros.apps.answer_log import StreamResult
+
+from ..contestants.entries import MOST_SOUP_DIVISIONS, SOUP_DIVISIONS
 from .bench_drive import (
     Bench,
     MeasuredNode,
@@ -43,7 +45,7 @@ from .bench_drive import (
     solver_node,
 )
 from .bench_report import all_latencies, bullets, draw, error_table, latency_table, write_results
-from .pose_streams import STREAMS, Replay, Stream, by_sizes, crowd, make_stream
+from .pose_streams import STREAMS, by_sizes, crowd, make_stream
 
 NODES = ('contact', 'soup', 'echo')
 SECONDS, LONGEST = 60.0, 3600.0  # of sending, in all: the default, and what is accepted
@@ -152,7 +154,9 @@ def _streams(options: argparse.Namespace) -> list[Stream]:
     shares = max(1, len(options.streams)) * (1 if options.side_by_side else len(options.nodes))
     count = options.duration and max(2, round(options.rate * options.duration / shares))
     if options.replay:
-        from box_contact_ros.apps.recording.bag_file import read_replay  # only here: rosbags is an extra
+        from box_contact_ros.apps.recording.bag_file import (
+            read_replay,  # only here: rosbags is an extra
+        )
 
         replay = read_replay(options.replay, options.topic_a, options.topic_b,
                              pair=options.pair, size_a=options.size_a, size_b=options.size_b)

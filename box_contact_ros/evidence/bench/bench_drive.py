@@ -27,6 +27,25 @@ from rclpy.serialization import deserialize_message, serialize_message
 from std_msgs.msg import Header
 from tqdm import tqdm
 
+from box_contact_ros.apps.answer_log import CONTACT_MESSAGES, ECHO_MESSAGES, AnswerLog
+from box_contact_ros.apps.processes import (
+    Stop,
+    asked_to_end,
+    end,
+    on_this_host,
+    parameters,
+    printed,
+    program,
+    start,
+)
+from box_contact_ros.apps.recording.stream import Stream
+from box_contact_ros.apps.ros_client import (
+    ANSWERS,
+    DEEP_RELIABLE,
+    answer_values,
+    array_message,
+    pose_message,
+)
 from box_contact_ros.core import native
 from box_contact_ros.node.messages import make_header, read_contacts
 from box_contact_ros.node.runtime import GuardedNode, joined, let_callbacks_finish, spin_for
@@ -34,11 +53,8 @@ from box_contact_ros.output import machine, no_garbage_collection
 from box_contact_ros.scene.files.scene_file import write_scene
 from box_contact_ros.scene.scene_solver import POSE_ARRAY, Scene
 from box_contact_ros.solver.contact import Contacts
-from box_contact_ros.apps.processes import Stop, asked_to_end, end, on_this_host, parameters, printed, program, start
-from box_contact_ros.apps.ros_client import ANSWERS, DEEP_RELIABLE, answer_values, array_message, pose_message
-from box_contact_ros.apps.answer_log import CONTACT_MESSAGES, ECHO_MESSAGES, AnswerLog
+
 from .echo_node import raw_stamp, with_stamp
-from .pose_streams import Stream
 
 # Bounds on everything that waits, so that a bench always ends.
 START_LIMIT = 30.0  # s until a node answers
@@ -101,8 +117,8 @@ def solver_node(name: str, model: str, /, *, poses: str, prefix: str = '',
 def echo_node(name: str, *, poses: str, prefix: str = '', bare: bool = False) -> MeasuredNode:
     """Return an echo node that is not started yet."""
     return MeasuredNode(AnswerLog(name, '', ECHO_MESSAGES), [
-        '-m', 'box_contact_ros.evidence.bench.echo_node', *(['--bare'] if bare else []), '--ros-args',
-        '-r', f'echo:={prefix}echo'], poses, prefix=prefix)
+        '-m', 'box_contact_ros.evidence.bench.echo_node', *(['--bare'] if bare else []),
+        '--ros-args', '-r', f'echo:={prefix}echo'], poses, prefix=prefix)
 
 
 def monotonic_clock() -> Callable[[], int]:

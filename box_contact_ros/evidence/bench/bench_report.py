@@ -13,8 +13,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import LogFormatter
 
-from box_contact_ros.output import log_errors, markdown_table, percentiles, subplots, write_csv
 from box_contact_ros.apps.answer_log import StreamResult
+from box_contact_ros.output import log_errors, markdown_table, percentiles, subplots, write_csv
 
 ERRORS = (1e-6, 1e5)
 """Point errors that are drawn to scale [mm]; 0 has a band of its own below."""

@@ -8,8 +8,8 @@ node refuses: `PER_HOUR` of each kind. A second process sends them to the contac
 to the echo node, which computes nothing: what both show is the middleware's. Meanwhile both are
 measured at 1 kHz, as in the soak.
 
-`python -m box_contact_ros.evidence.bench.flood [--seconds S]`; the exit status is 0 only if the contact
-node's memory grew by less than 50 MB more than the echo node's, and requests were answered.
+`python -m box_contact_ros.evidence.bench.flood [--seconds S]`; the exit status is 0 only if the
+contact node's memory grew by less than 50 MB more than the echo node's, and requests were answered.
 """
 from __future__ import annotations
 
@@ -35,13 +35,14 @@ from rclpy.context import Context
 from rclpy.serialization import serialize_message
 from rclpy.task import Future
 
+from box_contact_ros.apps.processes import add_domain, end, printed, start
+from box_contact_ros.apps.ros_client import DEEP_RELIABLE, pose_message
 from box_contact_ros.node.messages import make_header
 from box_contact_ros.node.parameters import outside_ros_args
 from box_contact_ros.node.runtime import GuardedNode, joined, refusals_end, spin_for, spin_once
 from box_contact_ros.output import markdown_table, percentiles
 from box_contact_ros.solver.arguments import program_parser, within
-from box_contact_ros.apps.processes import add_domain, end, printed, start
-from box_contact_ros.apps.ros_client import DEEP_RELIABLE, pose_message
+
 from .bench_drive import SLICE, Bench, MeasuredNode, echo_node, open_bench, solver_node
 from .pose_streams import make_stream
 from .soak import resident

@@ -7,20 +7,17 @@ All poses of a stream are made before it is played, so that playing one costs no
 """
 from __future__ import annotations
 
-import dataclasses
 import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from box_contact_ros.apps.recording.stream import Size, Stream
+from box_contact_ros.scene.scene_solver import Box, Pair, Scene
+
 from .. import pose_sets
 from ..pose_sets import CONTAINER, CUBE, Generator, Pairs
-from box_contact_ros.scene.scene_solver import Box, Pair, Scene
-from box_contact_ros.solver.contact import Contacts
-from box_contact_ros.solver.contact_solver import ContactSolver
-
-Size = tuple[float, float, float]
 
 EXTRA_DRAWS = 16
 """Pairs drawn beyond those that are still needed: a few draws of a set miss and are left out."""
@@ -29,50 +26,6 @@ COPLANAR_OFFSET = 0.8
 faces of edge 2 overlap whatever the yaw t: 2·0.85·(cos t + sin t) < (cos t + sin t) + 1, the sum
 of their half-widths along a side of the rotated face."""
 GAPS = (1e-3, 1.0)  # least and largest SAT gap of the pairs that are apart [m]
-
-
-@dataclass(frozen=True)
-class Stream:
-    """n pairs of poses `x y z qx qy qz qw` in a common frame, in the order they are sent."""
-
-    name: str
-    size_a: Size  # full extents of box A [m]
-    size_b: Size  # full extents of box B [m]
-    pose_a: np.ndarray  # (n, 7)
-    pose_b: np.ndarray  # (n, 7)
-
-    def __len__(self) -> int:
-        return len(self.pose_a)
-
-    @property
-    def sizes(self) -> tuple[Size, Size]:
-        """Full extents of both boxes [m]: what the nodes have to be started with."""
-        return self.size_a, self.size_b
-
-    def contacts(self, model: str) -> Contacts:
-        """Return what a model answers to each pair."""
-        return ContactSolver(*self.sizes, model=model).batch(self.pose_a, self.pose_b)
-
-
-@dataclass(frozen=True)
-class Replay(Stream):
-    """The pairs of poses of equal stamp of a recording, in the order of their stamps."""
-
-    stamps: np.ndarray  # (n,) as recorded [ns]
-
-    @property
-    def described(self) -> str:
-        """How much it is, and over what time it was recorded, in words."""
-        seconds = (int(self.stamps[-1]) - int(self.stamps[0])) * 1e-9
-        return f'{len(self)} pairs of poses, recorded in {seconds:.2f} s'
-
-    def thinned(self, count: int | None) -> Replay:
-        """Return `count` pairs spread over the whole; all if there are fewer, or for None."""
-        if count is None or count >= len(self):
-            return self
-        rows = np.linspace(0, len(self) - 1, count).round().astype(int)
-        return dataclasses.replace(self, pose_a=self.pose_a[rows], pose_b=self.pose_b[rows],
-                                   stamps=self.stamps[rows])
 
 
 def coplanar(rng: np.random.Generator, n: int) -> Pairs:
@@ -96,7 +49,10 @@ def crane_run(rng: np.random.Generator, n: int) -> Pairs:
 
     The motion takes 18 s; it is played faster or slower if n poses take another time to send.
     """
-    from box_contact_ros.apps.crane.mujoco_crane import Crane, CraneScenario  # only here: MuJoCo is an extra
+    from box_contact_ros.apps.crane.mujoco_crane import (  # only here: MuJoCo is an extra
+        Crane,
+        CraneScenario,
+    )
 
     scenario = CraneScenario.drawn(int(rng.integers(1, 2**31)))
     crane = Crane(scenario, n / scenario.duration)

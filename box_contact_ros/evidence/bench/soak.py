@@ -24,17 +24,19 @@ from pathlib import Path
 
 import numpy as np
 
+from box_contact_ros.apps.answer_log import AnswerLog, StreamLog, StreamResult
+from box_contact_ros.apps.processes import add_domain
+from box_contact_ros.apps.recording.stream import Stream
 from box_contact_ros.node.contact_node import PARAMETERS
 from box_contact_ros.node.parameters import outside_ros_args
 from box_contact_ros.node.runtime import refusals_end
 from box_contact_ros.output import make_folder, markdown_table, percentiles
 from box_contact_ros.solver.arguments import add_models, program_parser, within
 from box_contact_ros.solver.contact import Contacts
-from box_contact_ros.apps.processes import add_domain
-from box_contact_ros.apps.answer_log import AnswerLog, StreamLog, StreamResult
+
 from .bench_drive import Bench, MeasuredNode, about_the_machine, echo_node, open_bench, solver_node
 from .bench_report import bullets, write_results
-from .pose_streams import Stream, make_stream
+from .pose_streams import make_stream
 
 BLOCK_SECONDS = 1.0
 ECHO_SHARE = 0.5  # of a block, for each echo node

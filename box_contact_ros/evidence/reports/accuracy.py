@@ -28,12 +28,13 @@ import numpy as np
 from box_contact_ros import output
 from box_contact_ros.core import DEPTH_FLOOR, Stages, native, stages
 from box_contact_ros.resources import resource_path
-from ..pose_sets import LOADS, SETS, ContactErrors, Pairs, contact_errors
 from box_contact_ros.solver.arguments import add_models, model_name, program_parser, within
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
-from box_contact_ros.solver.models import MODELS, ModelEntry, find_model
+from box_contact_ros.solver.models import ModelEntry, find_model, models
 from box_contact_ros.solver.weights_file import WeightsError, load_weights
+
+from ..pose_sets import LOADS, SETS, ContactErrors, Pairs, contact_errors
 from ..training.paper_recipe import dataset
 from ..training.paper_recipe.errors import errors_of, figures, figures_by_part, wrapped
 from . import searched
@@ -214,7 +215,7 @@ def model_or_class(text: str) -> str:
         own.load()
     except (ImportError, AttributeError) as error:
         raise argparse.ArgumentTypeError(f'{text}: {error}') from error
-    MODELS[text] = own
+    models()[text] = own
     return text
 
 

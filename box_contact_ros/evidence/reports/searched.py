@@ -17,10 +17,11 @@ import numpy as np
 
 from box_contact_ros import output
 from box_contact_ros.core import native
-from ..pose_sets import LOADS, SETS, Pairs, contact_errors
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.solver.mlp import NETWORK, core_numbers, load_mlp
+
+from ..pose_sets import LOADS, SETS, Pairs, contact_errors
 from ..training.worst_case import RESTART, climb, worst_start
 from ..verification.steps import drawn_paths, largest_steps
 

@@ -17,6 +17,7 @@ from torch import Tensor
 
 from box_contact_ros.core import FEATURES
 from box_contact_ros.solver.weights_file import Layers
+
 from .ensemble import as_layers
 from .samples import MlpSamples
 

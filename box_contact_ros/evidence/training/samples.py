@@ -13,6 +13,7 @@ from tqdm import tqdm
 
 from box_contact_ros.core import BRACKET_LIMIT, SPREAD_LIMIT, UPPER_LIMIT, stages
 from box_contact_ros.scene.pose import quaternion_multiply, rotation_matrix
+
 from ..pose_sets import (
     CONTAINER,
     Generator,

@@ -21,6 +21,7 @@ from box_contact_ros.resources import resource_path
 from box_contact_ros.solver.arguments import program_parser, within
 from box_contact_ros.solver.mlp import NETWORK, UNITS_MAX
 from box_contact_ros.solver.weights_file import load_weights
+
 from . import mlp_recipe
 from .paper_recipe import paper_jobs
 

@@ -27,6 +27,10 @@ import numpy as np
 from box_contact_ros.core import native
 from box_contact_ros.output import machine, make_room, write_csv
 from box_contact_ros.scene.pose import quaternion_multiply, rotation_matrix
+from box_contact_ros.solver.arguments import add_models, program_parser, within
+from box_contact_ros.solver.contact_solver import ContactSolver
+from box_contact_ros.solver.models import models_with_patch
+
 from ..pose_sets import (
     CONTAINER,
     HIGH_CUBE,
@@ -37,9 +41,6 @@ from ..pose_sets import (
     turns,
     unit_quaternions,
 )
-from box_contact_ros.solver.arguments import add_models, program_parser, within
-from box_contact_ros.solver.contact_solver import ContactSolver
-from box_contact_ros.solver.models import gated_models
 from .judge import GATES, exact_gap, judge
 from .patches import mlp_faults, patch_faults
 
@@ -265,7 +266,7 @@ def fuzz(total: int, *, seed: int = 1, classes: Sequence[str] = tuple(CLASSES),
     """Return tallies by class and model, of `total` pairs spread evenly over the classes."""
     from tqdm import tqdm
 
-    models = models or gated_models()
+    models = models or models_with_patch()
     each = -(-total // len(classes))
     counts = [min(PIECE, each - drawn) for drawn in range(0, each, PIECE)]
     jobs = [(name, seed, number, count, tuple(models))
@@ -296,7 +297,7 @@ def main(args: Sequence[str] | None = None) -> int:
                         help='pairs in all (default: %(default)s)')
     parser.add_argument('--classes', nargs='+', choices=list(CLASSES), default=list(CLASSES),
                         metavar='CLASS', help=f'classes, of {", ".join(CLASSES)} (default: all)')
-    add_models(parser, '--models', gated_models())
+    add_models(parser, '--models', models_with_patch())
     parser.add_argument('--workers', type=within(1), default=os.cpu_count() or 1, help='processes')
     parser.add_argument('--out', type=Path, metavar='FILE', help='CSV with the tallies')
     options = parser.parse_args(args)

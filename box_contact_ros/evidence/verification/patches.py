@@ -12,8 +12,9 @@ from __future__ import annotations
 import numpy as np
 
 from box_contact_ros.core import BRACKET_LIMIT, DEPTH_FLOOR, stages
-from ..pose_sets import Pairs
 from box_contact_ros.solver.contact import Contacts
+
+from ..pose_sets import Pairs
 from .judge import NEGATIVE, NOT_FINITE, OUT_OF_BRACKETS
 
 SMOOTH = 2.0**-46

@@ -14,8 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from box_contact_ros.scene.pose import quaternion_multiply
-from ..pose_sets import Pairs, turns
 from box_contact_ros.solver.contact_solver import ContactSolver
+
+from ..pose_sets import Pairs, turns
 
 SAMPLES, KEPT, BISECTIONS = 200, 4, 45
 

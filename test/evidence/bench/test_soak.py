@@ -16,9 +16,9 @@ pytest.importorskip('mujoco')
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.apps.answer_log import AnswerLog
+from box_contact_ros.core import native
 from box_contact_ros.evidence.bench.pose_streams import make_stream
 from box_contact_ros.evidence.bench.soak import by_block, mispairs, without_contact
-from box_contact_ros.core import native
 
 MS = 1_000_000  # ns
 

@@ -9,6 +9,7 @@ import poses
 import pytest
 
 from box_contact_ros import ContactSolver
+from box_contact_ros.core import native
 from box_contact_ros.evidence.contestants.paper._networks import KERNEL, MOST_UNITS
 from box_contact_ros.evidence.contestants.paper.symmetry import (
     EDGE_EDGE,
@@ -18,12 +19,11 @@ from box_contact_ros.evidence.contestants.paper.symmetry import (
     VERTEX_FACE,
     fold,
 )
-from box_contact_ros.core import native
+from box_contact_ros.evidence.training.paper_recipe import dataset
 from box_contact_ros.resources import resource_path
 from box_contact_ros.scene.pose import rotation_matrix
 from box_contact_ros.solver.models import build_model
 from box_contact_ros.solver.weights_file import WeightsError, load_weights, save_weights
-from box_contact_ros.evidence.training.paper_recipe import dataset
 
 EDGE = 2.0
 MODELS = {'paper': (poses.CUBE, 0.6, 12.0), 'paper-continuous': (poses.CUBE, 0.008, 0.15),

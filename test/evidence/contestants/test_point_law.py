@@ -9,7 +9,11 @@ import math
 import numpy as np
 import pytest
 
-from box_contact_ros.evidence.contestants.point_law import STATIC_PENETRATION, PointLaw, effective_mass
+from box_contact_ros.evidence.contestants.point_law import (
+    STATIC_PENETRATION,
+    PointLaw,
+    effective_mass,
+)
 from box_contact_ros.scene.force.laws import GRAVITY
 from box_contact_ros.scene.pose import rotation_matrix
 from box_contact_ros.solver.contact import Contact

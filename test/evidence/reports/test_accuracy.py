@@ -11,8 +11,6 @@ import numpy as np
 import poses
 import pytest
 
-from box_contact_ros.evidence.reports import accuracy, searched
-from box_contact_ros.evidence.reports.accuracy import CLASSES, AccuracyRow
 from box_contact_ros.evidence.pose_sets import (
     CUBE,
     LOADS,
@@ -21,6 +19,8 @@ from box_contact_ros.evidence.pose_sets import (
     Pairs,
     contact_errors,
 )
+from box_contact_ros.evidence.reports import accuracy, searched
+from box_contact_ros.evidence.reports.accuracy import CLASSES, AccuracyRow
 
 
 def on_a_cube(turn: np.ndarray, depth: float = 1e-3) -> Pairs:

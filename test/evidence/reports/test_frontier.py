@@ -17,10 +17,10 @@ import pytest
 from box_contact_ros import output
 from box_contact_ros.evidence.contestants.engines import installed
 from box_contact_ros.evidence.contestants.engines.engine import Engine, Manifold, chosen, ours
+from box_contact_ros.evidence.pose_sets import SETS, Pairs
 from box_contact_ros.evidence.reports.frontier import frontier, trials
 from box_contact_ros.evidence.reports.frontier.speed import take_turns
 from box_contact_ros.scene.pose import rotation_matrix
-from box_contact_ros.evidence.pose_sets import SETS, Pairs
 from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.solver.models import MODELS
 

@@ -20,7 +20,12 @@ pytest.importorskip('matplotlib')
 
 from box_contact_ros.apps.crane.landing import LandingCase, LandingResult, scenario_of
 from box_contact_ros.evidence.reports.landing import landing_report, landing_ways
-from box_contact_ros.evidence.reports.landing.landing_ways import ADDED, WAYS, LoopTiming, MujocoSource
+from box_contact_ros.evidence.reports.landing.landing_ways import (
+    ADDED,
+    WAYS,
+    LoopTiming,
+    MujocoSource,
+)
 from box_contact_ros.solver.contact_solver import ContactSolver
 
 RESTS = LandingResult(settled=1.0, corner_speed=1e-4, rope_tension=0.0, force_worst=1e-9,

@@ -15,12 +15,17 @@ import pytest
 fcl = pytest.importorskip('fcl')
 pytest.importorskip('matplotlib')
 
-from box_contact_ros.evidence.contestants import soup
 from box_contact_ros.core import stages
-from box_contact_ros.evidence.reports.paper import committee, paper_soup_tables, paper_tables, rotation
+from box_contact_ros.evidence.contestants import soup
 from box_contact_ros.evidence.pose_sets import at_depth
-from box_contact_ros.solver.weights_file import load_weights
+from box_contact_ros.evidence.reports.paper import (
+    committee,
+    paper_soup_tables,
+    paper_tables,
+    rotation,
+)
 from box_contact_ros.evidence.training.paper_recipe import dataset
+from box_contact_ros.solver.weights_file import load_weights
 
 
 @pytest.fixture

@@ -14,9 +14,9 @@ pytest.importorskip('tqdm')
 
 from box_contact_ros import output
 from box_contact_ros.cli import PROGRAMS
-from box_contact_ros.output import RESULTS
 from box_contact_ros.evidence.reports.remake import compare, latency, remake
 from box_contact_ros.evidence.reports.remake.remake import REPORTS, Report
+from box_contact_ros.output import RESULTS
 
 ROOT = Path(__file__).resolve().parents[3]
 

@@ -26,7 +26,14 @@ from box_contact_ros.evidence.reports.rest.rest_cases import (
     speed,
 )
 from box_contact_ros.evidence.reports.rest.rest_report import OWN, SOME_TIMINGS, TIMINGS, Run
-from box_contact_ros.evidence.reports.rest.simulator import Log, Part, Setup, Timing, held_patch, own_contact
+from box_contact_ros.evidence.reports.rest.simulator import (
+    Log,
+    Part,
+    Setup,
+    Timing,
+    held_patch,
+    own_contact,
+)
 from box_contact_ros.scene.force.held_wrench import InFlight
 from box_contact_ros.scene.force.laws import GRAVITY, HeldPatch
 from box_contact_ros.solver.contact_solver import ContactSolver

@@ -15,10 +15,10 @@ import pytest
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.core import instruction_sets, stages
-from box_contact_ros.output import processor, versions
 from box_contact_ros.evidence.reports.frontier import frontier, speed
 from box_contact_ros.evidence.reports.frontier.speed import UNIT, Timing
-from box_contact_ros.solver.models import gated_models
+from box_contact_ros.output import processor, versions
+from box_contact_ros.solver.models import models_with_patch
 
 
 def test_flush_stacks_are_aligned_and_flush() -> None:
@@ -90,7 +90,7 @@ def test_limits_break(timings: list[Timing], broken: list[str]) -> None:
 def test_limits_of_threads_and_starts_break() -> None:
     def timings(gain: float) -> list[Timing]:
         return [Timing(name=f'{model}: set', kind=kind, instruction_set='AVX2', rounds=[value])
-                for model in gated_models()
+                for model in models_with_patch()
                 for kind, value in zip(speed.SHARED, (gain, 1.0))]
 
     assert all(claim.holds for claim in speed.thread_claims(timings(1.81)))
@@ -111,7 +111,7 @@ def test_quick_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for label in by_set:
         names = {row['name'] for row in rows if row['instruction_set'] == label}
         assert names >= {f'{model}: {name}'
-                         for model in gated_models() for name in speed.BATCH_SETS}
+                         for model in models_with_patch() for name in speed.BATCH_SETS}
     assert all(float(row['ns']) > 0.0 for row in rows)
     assert {row['processor'] for row in rows} == {processor()}
     assert 'new process' in {row['kind'] for row in rows}

@@ -11,7 +11,6 @@ from poses import IDENTITY
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.evidence.contestants.paper.symmetry import fold
-from box_contact_ros.scene.pose import rotation_matrix
 from box_contact_ros.evidence.pose_sets import CONTAINER, CUBE
 from box_contact_ros.evidence.training.paper_recipe import dataset
 from box_contact_ros.evidence.training.paper_recipe.dataset import (
@@ -21,6 +20,7 @@ from box_contact_ros.evidence.training.paper_recipe.dataset import (
     OCTANT,
     Placements,
 )
+from box_contact_ros.scene.pose import rotation_matrix
 
 COUNT = 4000
 SMALL = (300, 200, 400)

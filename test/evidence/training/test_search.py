@@ -19,7 +19,11 @@ torch = pytest.importorskip('torch')
 pytest.importorskip('matplotlib')
 
 from box_contact_ros.evidence.training.experiments import search, successive_halving
-from box_contact_ros.evidence.training.experiments.successive_halving import Candidate, CheckpointError, Rung
+from box_contact_ros.evidence.training.experiments.successive_halving import (
+    Candidate,
+    CheckpointError,
+    Rung,
+)
 
 QUICK = ['--quick', '--candidates', '48', '--seed', '2', '--device', 'cpu']
 

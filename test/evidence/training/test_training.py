@@ -12,13 +12,18 @@ import pytest
 
 torch = pytest.importorskip('torch')
 
-from box_contact_ros.solver.weights_file import load_weights
 from box_contact_ros.evidence.training import train
 from box_contact_ros.evidence.training.ensemble import Ensemble, Scaling
 from box_contact_ros.evidence.training.paper_recipe import dataset
-from box_contact_ros.evidence.training.paper_recipe.errors import errors_of, figures, predict, wrapped
+from box_contact_ros.evidence.training.paper_recipe.errors import (
+    errors_of,
+    figures,
+    predict,
+    wrapped,
+)
 from box_contact_ros.evidence.training.paper_recipe.fit import PaperSettings, fit, tensors
 from box_contact_ros.evidence.training.paper_recipe.paper_jobs import JOBS, PaperJob
+from box_contact_ros.solver.weights_file import load_weights
 
 SMALL = PaperSettings((6, 9, 7, 4), networks=3, epochs=12, batch=50, rate=0.05)
 

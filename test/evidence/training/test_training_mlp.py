@@ -15,11 +15,11 @@ torch = pytest.importorskip('torch')
 from box_contact_ros import ContactSolver
 from box_contact_ros.core import BRACKET_LIMIT, FEATURES, SPREAD_LIMIT, UPPER_LIMIT
 from box_contact_ros.evidence.pose_sets import SETS, Pairs
-from box_contact_ros.solver.mlp import NETWORK, load_mlp
-from box_contact_ros.solver.weights_file import load_weights, save_weights
 from box_contact_ros.evidence.training import mlp_recipe, samples, train
 from box_contact_ros.evidence.training.mlp_fit import ShareNetwork, errors_of, fit, loss_of, tensors
 from box_contact_ros.evidence.training.samples import BEYOND, OPEN, MlpSamples, describe
+from box_contact_ros.solver.mlp import NETWORK, load_mlp
+from box_contact_ros.solver.weights_file import load_weights, save_weights
 
 PAIRS = 40_000
 

@@ -12,12 +12,12 @@ import pytest
 from gmpy2 import mpfr
 
 from box_contact_ros import ContactSolver
-from box_contact_ros.output import write_csv
 from box_contact_ros.evidence.pose_sets import Pairs
-from box_contact_ros.solver.mlp import NETWORK, load_mlp
-from box_contact_ros.solver.models import gated_models
-from box_contact_ros.solver.weights_file import save_weights
 from box_contact_ros.evidence.verification import fuzz, judge, patches
+from box_contact_ros.output import write_csv
+from box_contact_ros.solver.mlp import NETWORK, load_mlp
+from box_contact_ros.solver.models import models_with_patch
+from box_contact_ros.solver.weights_file import save_weights
 
 SEED = 20260
 
@@ -217,7 +217,7 @@ def test_the_program(capsys):
     """A line for each class and model, and 0 at the end of a run without faults."""
     assert fuzz.main(['--pairs', '600', '--workers', '1', '--seed', '3']) == 0
     out = capsys.readouterr().out
-    assert out.count('no fault') == len(fuzz.CLASSES) * len(gated_models())
+    assert out.count('no fault') == len(fuzz.CLASSES) * len(models_with_patch())
     assert 'all gates at zero' in out
 
 

@@ -15,8 +15,8 @@ from gmpy2 import mpfr
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.core import stages
-from box_contact_ros.evidence.reports.hard import stability
 from box_contact_ros.evidence.pose_sets import Pairs
+from box_contact_ros.evidence.reports.hard import stability
 from box_contact_ros.evidence.verification import hard_poses, judge
 
 CASES = hard_poses.load()

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from box_contact_ros.evidence.reports.hard import stability
+from box_contact_ros.evidence.verification import hard_poses
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
-from box_contact_ros.evidence.verification import hard_poses
 
 ROOT = Path(__file__).resolve().parents[3]
 CASES = hard_poses.load()

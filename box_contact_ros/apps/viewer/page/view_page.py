@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import viser
 
-from ....solver.models import MODELS
+from ....solver.models import models
 from ..style import CONTACT
 from ..view_log import Snapshot, ViewFigures
 from .read_outs import Html, deepest_contacts, legend, line, read_out, report
@@ -55,7 +55,7 @@ class Page:
         self._add_chart()
         self._next_read_out = 0.0
         if on_model is not None:
-            self._model = server.gui.add_button_group('model', tuple(MODELS))
+            self._model = server.gui.add_button_group('model', tuple(models()))
             self._model.on_click(lambda event: on_model(event.target.value))
         self._status = server.gui.add_html('')
         if run is not None and on_land is not None:

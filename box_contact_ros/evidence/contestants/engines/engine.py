@@ -19,9 +19,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from box_contact_ros.scene.pose import rotation_matrix
-from ...pose_sets import Pairs
 from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.solver.models import find_model
+
+from ...pose_sets import Pairs
 
 MOST_CONTACTS = 16  # contacts asked for; two boxes have at most eight
 

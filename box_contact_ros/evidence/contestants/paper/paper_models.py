@@ -4,7 +4,7 @@
 """The source's networks as models: contact point and normal of two equal boxes.
 
 The separating-axis test decides whether the boxes collide and gives the separation. A network gives
-azimuth and elevation of the contact point and of the normal: see baselines/paper/networks.hpp.
+azimuth and elevation of the contact point and of the normal: see networks.hpp.
 
 - `paper`: one network for all poses.
 - `paper-continuous`: one for each subset without discontinuities; the features that meet choose it.
@@ -22,6 +22,7 @@ import numpy as np
 from box_contact_ros.solver.checks import as_size
 from box_contact_ros.solver.models import NativeModel
 from box_contact_ros.solver.weights_file import Network, Weights, WeightsError, weights_for
+
 from ._networks import FEATURES, INPUTS, KERNEL, MOST_UNITS, OCTANT, OUTPUTS, SAME_SIZE
 
 EXPERTS = ('vertex', 'edge', 'face')  # of the committee, in the order of the classifier's outputs

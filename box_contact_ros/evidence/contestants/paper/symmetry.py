@@ -3,7 +3,7 @@
 
 """Box symmetries, which bring touching pairs into the domain of the paper's networks.
 
-baselines/paper/symmetry.hpp has the formulas and the ways into a domain: NO_FOLD, OCTANT, FEATURES.
+symmetry.hpp has the formulas and the ways into a domain: NO_FOLD, OCTANT, FEATURES.
 """
 from __future__ import annotations
 

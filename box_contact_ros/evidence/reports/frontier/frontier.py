@@ -26,12 +26,13 @@ from dataclasses import asdict
 from inspect import getdoc
 
 from box_contact_ros import output
-from ...contestants.engines import installed
-from ...contestants.engines.engine import Engine, ours, packages_of
 from box_contact_ros.core import FORCE, instruction_sets, native
 from box_contact_ros.output import markdown_table, number
 from box_contact_ros.solver.arguments import program_parser
-from box_contact_ros.solver.models import MODELS, gated_models
+from box_contact_ros.solver.models import models, models_with_patch
+
+from ...contestants.engines import installed
+from ...contestants.engines.engine import Engine, ours, packages_of
 from ..accuracy import CLASSES
 from .frontier_picture import draw
 from .native import write_native
@@ -51,23 +52,25 @@ IN_SHORT = ('exact', 'mlp', 'paper', 'soup-8', 'soup-22')
 """Models in the table of the README that engines answer, too."""
 AS_ENGINES = ('fcl',)
 """Models whose library is measured as an engine, by the call that its own documentation shows."""
+FAMILIES = {'soup': [f'soup-{n}' for n in (8, 10, 12, 14, 16, 18, 20, 22)]}
+"""The members of a family that are measured: those of the paper's Table 3."""
 ODD_NORMAL = 10.0  # error of an engine's normal that is explained [deg]
 
 
 def contestants(members: int = FULL.members) -> tuple[list[Engine], list[str]]:
     """Return all that can be measured here, and a line about each that cannot."""
     found = []
-    for entry in (one for one in MODELS.values() if one.name not in AS_ENGINES):
+    for entry in (one for one in models().values() if one.name not in AS_ENGINES):
         with suppress(ImportError):  # of an extra whose libraries `missing` names
             entry.load()
-            found += map(ours, entry.reported_names[:members])
+            found += map(ours, FAMILIES.get(entry.name, [entry.full_name])[:members])
     rivals, missing = installed()
     return [*found, *rivals], missing
 
 
 def measure_native(seed: int, plan: Plan) -> list[FrontierRow]:
     """Measure the models with native batches, by the instruction set of this process."""
-    return measure_all([ours(model) for model in gated_models()], seed=seed, plan=plan)
+    return measure_all([ours(model) for model in models_with_patch()], seed=seed, plan=plan)
 
 
 def _errors(values: Sequence[float]) -> str:
@@ -121,7 +124,7 @@ def in_short(rows: Sequence[FrontierRow], odd: Mapping[Odd, str]) -> str:
             worst = [one.errors.normal[1] for one in mine if not math.isnan(one.errors.normal[1])]
             lines.append([
                 name if name in rivals else f'`{name}`' + (f', {one}' if one != best or name in
-                                                           gated_models() else ''),
+                                                           models_with_patch() else ''),
                 f'{number(row.single[0] / 1e3)} / {number(row.single[1] / 1e3)}',
                 number(row.batch), row.best if name in rivals else '–',
                 *[number(one.errors.points['all'][2]) if one and one.errors.points else '–'
@@ -153,7 +156,7 @@ def set_table(rows: Sequence[FrontierRow], name: str) -> str:
         ['', 'call p50 [µs]', 'p99', 'max', 'batch [ns]', 'judged', 'best point',
          *[f'{label}: p50/p99/worst' for label in labels], 'normal p99/worst [°]', 'missed',
          'invented'],
-        [[f'{row.name}, {row.instruction_set}' if row.name in gated_models() else row.name,
+        [[f'{row.name}, {row.instruction_set}' if row.name in models_with_patch() else row.name,
           *[number(value / 1e3) for value in row.single], number(row.batch),
           f'{row.judged:,}', row.best if len(row.choices) > 1 else '–',
           *[_errors(row.errors.points[label][1:]) if label in row.errors.points else '–'

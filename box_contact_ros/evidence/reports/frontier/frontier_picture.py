@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from box_contact_ros import output
-from box_contact_ros.solver.models import gated_models
+from box_contact_ros.solver.models import models_with_patch
+
 from ..paper.paper_tables import PAPER_NETWORK, PAPER_SOUP
 from .trials import FrontierRow
 
@@ -76,7 +77,7 @@ def _points(axis: Any, found: Sequence[tuple[float, FrontierRow]]) -> None:
 
 def _label(row: FrontierRow) -> str:
     parts = [row.name.removeprefix('MuJoCo ').removeprefix('PyBullet ')]
-    if row.name in gated_models():
+    if row.name in models_with_patch():
         parts.append(row.instruction_set)
     if len(row.choices) > 1:
         parts.append(row.best)

@@ -19,6 +19,7 @@ import numpy as np
 
 from box_contact_ros.core import FORCE, instruction_sets, native
 from box_contact_ros.output import PACKAGE, machine, markdown_table, page, percentiles, write_csv
+
 from ...pose_sets import LOADS, SETS, Pairs
 from .speed import flush_stacks, pinned, usable_cores
 

@@ -25,14 +25,21 @@ from typing import Any
 
 import numpy as np
 
-from ...contestants.engines import installed
-from ...contestants.engines.engine import in_subprocess, ours
 from box_contact_ros.core import FORCE, instruction_sets, native
-from box_contact_ros.output import machine, markdown_table, no_garbage_collection, percentiles, write_csv
+from box_contact_ros.output import (
+    machine,
+    markdown_table,
+    no_garbage_collection,
+    percentiles,
+    write_csv,
+)
 from box_contact_ros.output import page as filled_page
 from box_contact_ros.scene.pose import quaternion_multiply
+from box_contact_ros.solver.models import models_with_patch
+
+from ...contestants.engines import installed
+from ...contestants.engines.engine import in_subprocess, ours
 from ...pose_sets import CONTAINER, CUBE, SETS, Pairs, log_uniform, turns
-from box_contact_ros.solver.models import gated_models
 
 UNIT = 'MuJoCo mj_geomDistance'  # the contestant whose median single call is the unit of all ratios
 UNITS = (UNIT, 'python-fcl collide')
@@ -183,7 +190,7 @@ def single_calls(count: int) -> list[Stint]:
     for line in missing:
         print(f'left out: {line}', file=sys.stderr)
     # Ours come last: batches follow, and the first one after scalar code is slow for milliseconds.
-    engines = [*(one for one in rivals if one.name in UNITS), *map(ours, gated_models())]
+    engines = [*(one for one in rivals if one.name in UNITS), *map(ours, models_with_patch())]
     pairs = _drawn('random cubes', count)
     return [Stint(name=engine.name, kind='single', count=count,
                   run=partial(_call_all, engine.prepare(pairs))) for engine in engines]
@@ -222,7 +229,8 @@ def with_instruction_set(name: str, work: Callable[..., list[Any]], *arguments: 
 
 def measure_on(core: int, effort: Effort) -> list[Timing]:
     """Measure single calls and batches on one core."""
-    batches = [batch(model, name, effort.batch) for model in gated_models() for name in BATCH_SETS]
+    batches = [batch(model, name, effort.batch)
+               for model in models_with_patch() for name in BATCH_SETS]
     with pinned({core}):
         return timed([*single_calls(effort.calls), *batches], effort.rounds)
 
@@ -234,7 +242,7 @@ def measure_threads(cores: Sequence[int], effort: Effort) -> list[Timing]:
     cores on one of its own. Moving one of them away takes the host a while.
     """
     stints = [batch(model, 'random cubes', effort.shared_batch, kind, threads)
-              for model in gated_models() for threads, kind in enumerate(SHARED, start=1)]
+              for model in models_with_patch() for threads, kind in enumerate(SHARED, start=1)]
     with pinned(cores):
         return [timing for stint in stints for timing in timed([stint], effort.rounds)]
 
@@ -321,7 +329,7 @@ def _at_most(text: str, value: float, limit: float) -> Claim:
 def thread_claims(timings: Sequence[Timing]) -> list[Claim]:
     """Return the claims about two threads; only that of `exact` has a limit."""
     claims = []
-    for model in gated_models():
+    for model in models_with_patch():
         one, two = (next(t for t in timings if t.kind == kind and t.name.startswith(model))
                     for kind in SHARED)
         limit = THREADS_LIMIT if model == 'exact' else None

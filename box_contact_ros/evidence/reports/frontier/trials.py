@@ -11,15 +11,16 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from box_contact_ros.core import native
+from box_contact_ros.output import percentiles
+from box_contact_ros.scene.pose import degrees_between
+
 from ...contestants.engines.engine import (
     APART,
     Engine,
     chosen,
     part_by_part,
 )
-from box_contact_ros.core import native
-from box_contact_ros.output import percentiles
-from box_contact_ros.scene.pose import degrees_between
 from ...pose_sets import (
     CONTAINER,
     SETS,

@@ -8,10 +8,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from box_contact_ros import output
+from box_contact_ros.core import native
+from box_contact_ros.solver.models import models_with_patch
+
 from ...contestants.engines import installed
 from ...contestants.engines.engine import ours, packages_of
-from box_contact_ros.core import native
-from box_contact_ros.solver.models import gated_models
 from ...verification.named_failures import NamedFailure, load, replay_apart
 
 
@@ -57,4 +58,4 @@ def write_named(folder: Path, command: str, models: Sequence[str]) -> int:
                                        if text])))
     print(text)
     (folder / 'named_failures.md').write_text(text, encoding='utf-8')
-    return int(any(text for model in gated_models() for text in found[model].values()))
+    return int(any(text for model in models_with_patch() for text in found[model].values()))

@@ -22,13 +22,14 @@ from pathlib import Path
 import numpy as np
 
 from box_contact_ros import output
-from ...contestants.engines.engine import in_subprocess
 from box_contact_ros.core import native
 from box_contact_ros.scene.pose import quaternion_multiply
-from ...pose_sets import Pairs
 from box_contact_ros.solver.arguments import add_models, program_parser
 from box_contact_ros.solver.contact_solver import ContactSolver
-from box_contact_ros.solver.models import MODELS, find_model, gated_models
+from box_contact_ros.solver.models import find_model, models, models_with_patch
+
+from ...contestants.engines.engine import in_subprocess
+from ...pose_sets import Pairs
 from ...verification.hard_poses import Cases, load
 from ...verification.judge import NOT_FINITE, NOT_UNIT, OUTSIDE, judge
 from .named_report import write_named
@@ -143,7 +144,7 @@ def table(rows: Sequence[StabilityRow]) -> str:
 def gates(rows: Sequence[StabilityRow]) -> list[str]:
     """Return what is broken of what gated models promise."""
     return [f'{row.model}, {row.family}: {getattr(row, name)} {name}' for row in rows
-            if row.model in gated_models() for name in COUNTS if getattr(row, name)]
+            if row.model in models_with_patch() for name in COUNTS if getattr(row, name)]
 
 
 def page(rows: Sequence[StabilityRow], command: str) -> str:
@@ -164,7 +165,7 @@ def main(args: Sequence[str] | None = None) -> int:
 
     cases = load()
     parser = program_parser('stability', __doc__)
-    reported = [entry.full_name for entry in MODELS.values() if entry.any_boxes]
+    reported = [entry.full_name for entry in models().values() if entry.any_boxes]
     add_models(parser, '--models', reported)
     parser.add_argument('--families', nargs='+', default=list(cases), choices=list(cases),
                         metavar='FAMILY', help='default: all')

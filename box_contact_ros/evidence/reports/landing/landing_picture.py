@@ -18,6 +18,7 @@ from box_contact_ros import output
 from box_contact_ros.apps.crane.landing import CORNER_SPEED_LIMIT, WATCHED, LandingRecord, solvers
 from box_contact_ros.apps.crane.mujoco_crane import CraneScenario
 from box_contact_ros.scene.pose import rotation_matrix
+
 from .landing_ways import WAYS, LoopTiming, MujocoSource
 
 SHOWN_WAYS = {'exact': 'held patch', 'wrench': 'held wrench', 'mujoco-deepest': 'deepest point',

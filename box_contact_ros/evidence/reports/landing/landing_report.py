@@ -33,6 +33,7 @@ from box_contact_ros.apps.crane.mujoco_crane import CraneScenario
 from box_contact_ros.apps.processes import DOMAINS, left_when_asked
 from box_contact_ros.core import native
 from box_contact_ros.solver.arguments import program_parser
+
 from .landing_picture import draw
 from .landing_ways import ADDED, WAYS, HeldLimits, LoopTiming, PlannedLanding, grid
 

@@ -38,12 +38,13 @@ from box_contact_ros.apps.crane.load_laws import (
     predicted_wrench,
 )
 from box_contact_ros.apps.crane.mujoco_crane import Crane, CraneScenario
+from box_contact_ros.scene.force.laws import Body
+from box_contact_ros.solver.contact import Contact
+
 from ...contestants.engines.engine import Manifold, chosen
 from ...contestants.engines.mujoco_engines import box_geoms, collision
 from ...contestants.point_law import PointLaw
-from box_contact_ros.scene.force.laws import Body
 from ...pose_sets import CONTAINER
-from box_contact_ros.solver.contact import Contact
 
 # --- cases ----------------------------------------------------------------------------------------
 

@@ -9,9 +9,10 @@ import numpy as np
 from box_contact_ros import output
 from box_contact_ros.resources import resource_path
 from box_contact_ros.scene.pose import degrees_between
-from ...pose_sets import CUBE
 from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.solver.weights_file import load_weights
+
+from ...pose_sets import CUBE
 from ...training.paper_recipe import dataset
 from ...training.paper_recipe.dataset import CLASSES, Placements
 

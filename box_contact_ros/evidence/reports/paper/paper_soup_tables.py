@@ -21,11 +21,12 @@ import numpy as np
 from tqdm import tqdm
 
 from box_contact_ros import output
-from ...contestants import soup
 from box_contact_ros.scene.pose import degrees_between
-from ...pose_sets import CUBE, Pairs, at_depth, stacks
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
+
+from ...contestants import soup
+from ...pose_sets import CUBE, Pairs, at_depth, stacks
 from ...training.paper_recipe.dataset import as_poses
 from ..frontier.speed import pinned, usable_cores
 from .paper_tables import PAPER_NETWORK

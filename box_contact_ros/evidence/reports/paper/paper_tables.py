@@ -22,6 +22,7 @@ from box_contact_ros.core import native
 from box_contact_ros.resources import resource_path
 from box_contact_ros.solver.arguments import program_parser
 from box_contact_ros.solver.weights_file import Weights, WeightsError, load_weights
+
 from ...training.paper_recipe import dataset
 from ...training.paper_recipe.dataset import SETS, Patterns
 from ...training.paper_recipe.errors import PARTS, errors_of, figures, figures_by_part, predict

@@ -20,9 +20,10 @@ from typing import NamedTuple
 import numpy as np
 
 from box_contact_ros import output
-from ...contestants import soup
 from box_contact_ros.core import stages
 from box_contact_ros.scene.pose import quaternion_multiply, rotation_matrix
+
+from ...contestants import soup
 from ...pose_sets import CUBE, Pairs, turned
 from ...training.paper_recipe.dataset import euler_angles, quaternion_from_euler
 from ..frontier.speed import pinned, usable_cores

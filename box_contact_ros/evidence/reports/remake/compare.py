@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from box_contact_ros import output
+
 from ..frontier.speed import SHARED, UNIT
 
 LIMIT = 0.10  # largest change of a ratio, of the smaller value, between runs that agree

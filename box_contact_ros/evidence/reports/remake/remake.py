@@ -22,6 +22,7 @@ from pathlib import Path
 
 from box_contact_ros.output import results_folder
 from box_contact_ros.solver.arguments import program_parser
+
 from . import latency
 from .compare import compare
 

@@ -17,6 +17,7 @@ import numpy as np
 
 from box_contact_ros.scene.force.laws import FRICTION, GRAVITY
 from box_contact_ros.scene.pose import rotation_matrix
+
 from ...pose_sets import CONTAINER
 from .columns import STOPPED, stop_times
 from .simulator import CORNERS, Log, Part, Push, Setup

@@ -25,6 +25,7 @@ from box_contact_ros import output
 from box_contact_ros.apps.processes import left_when_asked
 from box_contact_ros.core import native
 from box_contact_ros.solver.arguments import program_parser
+
 from .rest_cases import CASES, Gate, RestCase
 from .simulator import Timing, held_patch, own_contact
 

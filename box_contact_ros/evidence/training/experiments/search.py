@@ -30,8 +30,9 @@ from box_contact_ros.output import (
     subplots,
     write_csv,
 )
-from ...pose_sets import log_uniform
 from box_contact_ros.solver.arguments import program_parser, within
+
+from ...pose_sets import log_uniform
 from ..paper_recipe import dataset
 from ..paper_recipe.fit import PaperSettings
 from ..paper_recipe.fit import fit as fit_paper

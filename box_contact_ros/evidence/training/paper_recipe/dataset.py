@@ -38,12 +38,13 @@ from typing import Any
 
 import numpy as np
 
-from ...contestants.paper.symmetry import EDGE_EDGE, FEATURES, NO_FOLD, OCTANT, VERTEX_FACE
-from ...contestants.paper.symmetry import fold as fold_pairs
 from box_contact_ros.core import Stages, stages
 from box_contact_ros.scene.pose import quaternion_multiply, rotation_matrix
-from ...pose_sets import CUBE, turns
 from box_contact_ros.solver.contact_solver import ContactSolver
+
+from ...contestants.paper.symmetry import EDGE_EDGE, FEATURES, NO_FOLD, OCTANT, VERTEX_FACE
+from ...contestants.paper.symmetry import fold as fold_pairs
+from ...pose_sets import CUBE, turns
 
 SETS = ('training', 'cross-validation', 'external')
 PAPER_COUNTS = (8000, 5000, 75000)  # patterns per set, with discontinuities

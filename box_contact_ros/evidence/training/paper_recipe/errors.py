@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from ...contestants.paper import _networks
 from box_contact_ros.solver.weights_file import Network
+
+from ...contestants.paper import _networks
 
 PARTS = {'all': slice(0, 4), 'point': slice(0, 2), 'normal': slice(2, 4)}
 """Outputs that are reported together."""

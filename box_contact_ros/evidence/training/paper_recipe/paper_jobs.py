@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from ...pose_sets import CONTAINER, CUBE
 from box_contact_ros.solver.weights_file import Network, load_weights, save_weights
+
+from ...pose_sets import CONTAINER, CUBE
 from . import dataset
 from .dataset import TOUCHING, Drawing
 from .errors import errors_of, figures, figures_by_part

@@ -13,6 +13,7 @@ import numpy as np
 import warp
 
 from box_contact_ros.scene.pose import rotation_matrix
+
 from ....pose_sets import Pairs
 from ..engine import Engine, Manifold
 

@@ -11,6 +11,7 @@ import numpy as np
 import rapier3d as rapier
 
 from box_contact_ros.scene.pose import rotation_matrix
+
 from ..engine import Engine, Manifold, manifold
 
 

@@ -18,12 +18,13 @@ from ros_client import Client, serving, stamp_of
 
 pytest.importorskip('fcl')
 
+from box_contact_ros.node.soup_node import PARAMETERS, SoupNode
+
 from box_contact_ros import ContactSolver
 from box_contact_ros.apps.ros_client import ANSWERS
 from box_contact_ros.node.contact_node import PARAMETERS as CONTACT_PARAMETERS
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import PATCH_FIELDS, read_contacts
-from box_contact_ros.node.soup_node import PARAMETERS, SoupNode
 from box_contact_ros.node.wrench_output import WRENCH_PARAMETERS
 from box_contact_ros.resources import resource_path
 

@@ -12,13 +12,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..scene.scene_solver import Scene, SceneSolver
-from ..solver.models import MODELS, MOST_SOUP_DIVISIONS, SOUP_DIVISIONS
-from .contact_node import PARAMETERS as CONTACT_PARAMETERS
-from .contact_node import ContactNode
-from .parameters import Setting, answer_help, whole_number
-from .runtime import run_node
-from .wrench_output import WRENCH_PARAMETERS
+from box_contact_ros.node.contact_node import PARAMETERS as CONTACT_PARAMETERS
+from box_contact_ros.node.contact_node import ContactNode
+from box_contact_ros.node.parameters import Setting, answer_help, whole_number
+from box_contact_ros.node.runtime import run_node
+from box_contact_ros.node.wrench_output import WRENCH_PARAMETERS
+from box_contact_ros.scene.scene_solver import Scene, SceneSolver
+
+from .entries import MOST_SOUP_DIVISIONS, SOUP, SOUP_DIVISIONS
 
 PARAMETERS = {
     'divisions': Setting(
@@ -39,7 +40,7 @@ class SoupNode(ContactNode):
     def make_solver(settings: Mapping[str, Any], scene: Scene) -> SceneSolver:
         """Return the solver for a soup of so many divisions."""
         return SceneSolver(scene, model=f'soup-{settings["divisions"]}',
-                           margin=settings['margin'], most_near=MODELS['soup'].most_near)
+                           margin=settings['margin'], most_near=SOUP.most_near)
 
 
 def main(args: Sequence[str] | None = None) -> int:
