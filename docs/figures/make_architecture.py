@@ -15,12 +15,10 @@ from pathlib import Path
 
 PACKAGE = Path(__file__).resolve().parents[2] / 'box_contact_ros'
 PLACES = {  # column and row of a folder's box, and what it is for
-    'reports': (1, 0, 'what writes docs/results'),
-    'training': (0, 1, 'weights of the networks'),
-    'verification': (1, 1, 'hard poses, judge, fuzz'),
-    'apps': (2, 1, 'crane, view, record, bench'), 'baselines': (1, 2, 'what we compare with'),
-    'node': (2, 2, 'all rclpy of the product'), 'scene': (1, 3, 'boxes, pairs, ticks, forces'),
-    'solver': (1, 4, 'ContactSolver, models'), 'core': (1, 5, 'poses → contact, C++17')}
+    'evidence': (0, 0, 'what proves and compares'),
+    'apps': (1, 0, 'crane, view, record, demo'),
+    'node': (1, 1, 'all rclpy of the product'), 'scene': (1, 2, 'boxes, pairs, ticks, forces'),
+    'solver': (1, 3, 'ContactSolver, models'), 'core': (1, 4, 'poses → contact, C++17')}
 WIDTH, HEIGHT, COLUMN, ROW = 190, 50, 240, 90
 
 
@@ -33,6 +31,8 @@ def imports(folder: str) -> set[str]:
                 above = path.relative_to(PACKAGE).parts[:-node.level]
                 names = [node.module] if node.module else [name.name for name in node.names]
                 found |= {(*above, *name.split('.'))[0] for name in names}
+            elif isinstance(node, ast.ImportFrom) and node.module.startswith(PACKAGE.name + '.'):
+                found.add(node.module.split('.')[1])
     return (found & PLACES.keys()) - {folder}
 
 

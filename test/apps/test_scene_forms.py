@@ -33,7 +33,6 @@ from visualization_msgs.msg import Marker, MarkerArray
 pytest.importorskip('rosbags')
 pytest.importorskip('fcl')
 
-from box_contact_ros.node.soup_node import SoupNode
 from rosbags.rosbag2 import Reader
 from test_bench import bench, rows_of
 
@@ -47,6 +46,7 @@ from box_contact_ros.apps.viewer.listener import ViewNode
 from box_contact_ros.apps.viewer.markers import MarkersNode
 from box_contact_ros.apps.viewer.scene_driver import SceneDriver
 from box_contact_ros.apps.viewer.view_log import Snapshot
+from box_contact_ros.evidence.contestants.soup_node import SoupNode
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import read_contacts
 from box_contact_ros.node.runtime import spin_for

@@ -7,8 +7,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from box_contact_ros.evidence import pose_sets
 from box_contact_ros.evidence.pose_sets import CUBE, SETS, Pairs
-from box_contact_ros.scene import pose_sets
 from box_contact_ros.scene.pose import degrees_between, rotation_matrix
 
 N = 200

@@ -367,7 +367,8 @@ def page(rows: Sequence[AccuracyRow], errors: dict[str, np.ndarray], drawn: int,
     else:
         verdict = 'A model of your own has no limits.'
     return output.page(
-        'reports/pages/accuracy', command=command, machine=output.machine(native), seed=seed,
+        'evidence/reports/pages/accuracy',
+        command=command, machine=output.machine(native), seed=seed,
         verdict=verdict, table=table(rows), error_table=error_table(rows), mae_limit=MAE_LIMIT,
         point_classes=class_table(rows, 'point'), paper_table=paper_table(errors, drawn))
 
@@ -403,7 +404,8 @@ def search(folder: Path, minutes: float, seeds: Sequence[int], args: Sequence[st
     output.write_csv(folder / 'searched.csv', searched.csv_rows(rows),
                      about=output.machine(native))
     (folder / 'searched.md').write_text(output.page(
-        'reports/pages/searched', command=output.command_line('box_contact_ros accuracy', args),
+        'evidence/reports/pages/searched',
+        command=output.command_line('box_contact_ros accuracy', args),
         machine=output.machine(native), seeds=' and '.join(map(str, seeds)), minutes=minutes,
         verdict=f'Goals missed: {"; ".join(broken)}.' if broken else 'All limits hold.',
         table=searched.table(rows)), encoding='utf-8')

@@ -18,10 +18,9 @@ from ros_client import Client, serving, stamp_of
 
 pytest.importorskip('fcl')
 
-from box_contact_ros.node.soup_node import PARAMETERS, SoupNode
-
 from box_contact_ros import ContactSolver
 from box_contact_ros.apps.ros_client import ANSWERS
+from box_contact_ros.evidence.contestants.soup_node import PARAMETERS, SoupNode
 from box_contact_ros.node.contact_node import PARAMETERS as CONTACT_PARAMETERS
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import PATCH_FIELDS, read_contacts

@@ -21,6 +21,7 @@ from box_contact_ros.evidence.pose_sets import (
 )
 from box_contact_ros.evidence.reports import accuracy, searched
 from box_contact_ros.evidence.reports.accuracy import CLASSES, AccuracyRow
+from box_contact_ros.solver.models import models
 
 
 def on_a_cube(turn: np.ndarray, depth: float = 1e-3) -> Pairs:
@@ -162,10 +163,9 @@ def test_searched_for_the_worst(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
 def test_a_class_is_measured_like_a_model(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The example's middle of the bounding boxes is no centroid; its depth is the exact one."""
     monkeypatch.syspath_prepend(Path(__file__).parents[3] / 'docs' / 'examples')
-    monkeypatch.setattr(accuracy, 'MODELS', accuracy.MODELS.copy())
-    monkeypatch.setattr('box_contact_ros.solver.models.MODELS', accuracy.MODELS)
     status = accuracy.main(['--model', 'own_model:Middle', '--pairs', '200', '--quick',
                             '--out', str(tmp_path)])
+    del models()['own_model:Middle']
     with (tmp_path / 'accuracy.csv').open() as file:
         rows = [row for row in csv.DictReader(file) if row['part'] == 'all']
     assert status == 0 and {row['set'] for row in rows} == set(SETS | LOADS)

@@ -171,7 +171,8 @@ def honesty(rows: Sequence[FrontierRow]) -> str:
           if row.instruction_set == native.instruction_set}
     net = by['mlp', 'containers']
     return output.page(
-        'reports/pages/frontier_honesty', single=net.by_exact[0], containers=net.by_exact[1],
+        'evidence/reports/pages/frontier_honesty',
+        single=net.by_exact[0], containers=net.by_exact[1],
         stacks=by['mlp', 'stacks'].by_exact[1],
         paper=by['paper', 'random cubes'].errors.points['all'][1]).rstrip()
 
@@ -181,7 +182,7 @@ def page(rows: Sequence[FrontierRow], found: Sequence[Engine], missing: Sequence
     """Return the Markdown page."""
     odd = odd_cells(rows, found)
     return output.page(
-        'reports/pages/frontier', command=command,
+        'evidence/reports/pages/frontier', command=command,
         machine=output.machine(native, packages_of(found)),
         skipped=''.join(f'\n\nLeft out: {line}.' for line in missing),
         in_short=in_short(rows, odd), odd='\n'.join(

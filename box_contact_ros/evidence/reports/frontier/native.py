@@ -160,7 +160,7 @@ def write_native(folder: Path, command: str, *, core: int | None, quick: bool) -
         for instruction_set, by_set in found.items() for name, times in by_set.items()
         for contestant, values in times.items()], about=machine(native))
     (folder / 'native.md').write_text(page(
-        'reports/pages/native', command=command, machine=machine(native), rounds=rounds,
+        'evidence/reports/pages/native', command=command, machine=machine(native), rounds=rounds,
         calls=calls, pairs=pairs, tables=tables), encoding='utf-8')
     print(tables)
     return 0

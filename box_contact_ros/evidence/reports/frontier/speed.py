@@ -363,7 +363,8 @@ def page(runs: Sequence[Sequence[Timing]], claims: Sequence[Claim], command: str
          effort: Effort) -> str:
     """Return the Markdown page."""
     return filled_page(
-        'reports/pages/speed', command=command, machine=machine(native, PACKAGES), effort=effort,
+        'evidence/reports/pages/speed',
+        command=command, machine=machine(native, PACKAGES), effort=effort,
         claims='\n'.join(f'- {"" if one.holds else "goal missed: "}{one.text}' for one in claims),
         tables='\n\n'.join(f'## {run[0].instruction_set}\n\n{table(run)}' for run in runs))
 

@@ -50,7 +50,7 @@ def write_named(folder: Path, command: str, models: Sequence[str]) -> int:
     found = {engine.name: replay_apart(engine, failures) for engine in engines}
     place = {name: number for number, name in enumerate(failures, start=1)}
     text = output.page(
-        'reports/pages/named_failures', command=command,
+        'evidence/reports/pages/named_failures', command=command,
         machine=output.machine(native, packages_of(engines)), reports=reports_table(failures),
         passes=passes_table(found), skipped=''.join(f'\n\nLeft out: {line}.' for line in missing),
         faults='\n'.join(f'- {name}: {", ".join(wrong)}.' for name, faults in found.items()

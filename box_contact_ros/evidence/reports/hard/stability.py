@@ -152,7 +152,8 @@ def page(rows: Sequence[StabilityRow], command: str) -> str:
     broken = gates(rows)
     models = dict.fromkeys(row.model for row in rows)
     return output.page(
-        'reports/pages/stability', command=command, machine=output.machine(native, PACKAGES),
+        'evidence/reports/pages/stability',
+        command=command, machine=output.machine(native, PACKAGES),
         verdict=f'Goals missed: {"; ".join(broken)}.' if broken else 'Of `exact` and `mlp`, every '
         'verdict and normal is right, and every point in both boxes.', models='\n\n'.join(
             f'## `{model}`\n\n{table([row for row in rows if row.model == model])}'

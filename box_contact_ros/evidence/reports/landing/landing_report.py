@@ -252,8 +252,9 @@ def page(results: Sequence[Landed], command: str, *, dds: bool = False) -> str:
               'good': sum(one.as_expected for one in gated), 'grid': grid_table(results),
               'added': added_table(results), 'missed': missed(gated)}
     if dds:
-        return output.page('reports/landing/over_dds', together=TOGETHER, **values)
-    return output.page('reports/landing/offline', against=against_manifold(results), **values)
+        return output.page('evidence/reports/landing/over_dds', together=TOGETHER, **values)
+    return output.page('evidence/reports/landing/offline',
+                       against=against_manifold(results), **values)
 
 
 def main(args: Sequence[str] | None = None) -> int:

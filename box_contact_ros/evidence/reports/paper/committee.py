@@ -51,6 +51,6 @@ def section(step: int) -> str:
         rows.append(row)
     head = [f'{kind}: {what}' for kind in kinds for what in ('point [mm]', 'normal [°]')]
     card = load_weights(resource_path('weights', 'paper-committee.safetensors')).card
-    return output.page('reports/paper/pages/committee', table=output.markdown_table(
+    return output.page('evidence/reports/paper/pages/committee', table=output.markdown_table(
         ['', *head], rows), wrong=100 * card['metrics']['classifier']['external']['wrong'],
         count=COUNT // step)

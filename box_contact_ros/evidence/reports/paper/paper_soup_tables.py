@@ -344,7 +344,7 @@ def section_3(result: SoupResult) -> str:
     touching, coplanar = ([row['step_mean_ms'] / network for row in result.ends(regime)]
                           for regime in ('touching', 'coplanar'))
     return output.page(
-        'reports/paper/pages/table_3', counts=result.counts, table=table,
+        'evidence/reports/paper/pages/table_3', counts=result.counts, table=table,
         share=100 * (1 - last['alone_by_step']), low=min(PAPER), high=max(PAPER),
         thin=', '.join(f'{result.ends(regime)[0]["alone_patterns"]:,} {regime}'
                        for regime in REGIMES),
@@ -360,7 +360,7 @@ def section_4(result: SoupResult) -> str:
     ends = {regime: result.ends(regime) for regime in REGIMES}
     low, high = min(PAPER), max(PAPER)
     return output.page(
-        'reports/paper/pages/table_4', table=table, repeats=REPEATS, low=low, high=high,
+        'evidence/reports/paper/pages/table_4', table=table, repeats=REPEATS, low=low, high=high,
         growth_paper=PAPER[high][2] / PAPER[low][2],
         growth={regime: last['most_pairs_step_ms'] / first['most_pairs_step_ms']
                 for regime, (first, last) in ends.items()},
@@ -372,13 +372,14 @@ def section_4(result: SoupResult) -> str:
 def section_errors(result: SoupResult) -> str:
     """Return the soup's errors, and what differs from the paper."""
     along = 1e3 * result.ends('near-parallel')[1]['point_error_mean_m']
-    return output.page('reports/paper/pages/soup_errors', counts=result.counts, along=along,
+    return output.page('evidence/reports/paper/pages/soup_errors',
+                       counts=result.counts, along=along,
                        table=table_of_errors(result))
 
 
 def section_figure_10(result: SoupResult) -> str:
     """Return Figure 10's caption."""
-    return output.page('reports/paper/pages/figure_10', equal='; '.join(
+    return output.page('evidence/reports/paper/pages/figure_10', equal='; '.join(
         f"`{name}`'s ({1e3 * result.networks[name]['point_error_mean_m']:.0f} mm) at {in_words(n)}"
         for name, n in equal_at(result).items()))
 

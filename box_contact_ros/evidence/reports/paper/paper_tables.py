@@ -133,7 +133,7 @@ def by_part(columns: Mapping[str, Errors]) -> str:
 
 
 def _page(name: str, **values: object) -> str:
-    return output.page(f'reports/paper/pages/{name}', **values)
+    return output.page(f'evidence/reports/paper/pages/{name}', **values)
 
 
 def sections_1_and_2(tables: Collection[int], step: int) -> list[str]:
@@ -182,7 +182,8 @@ def report(tables: Collection[int], drawn: Collection[int], *, quick: bool = Fal
            folder: Path | None = None) -> str:
     """Return the page with some of the tables and figures; files go to `folder`, if any."""
     note = f' Quick run: every {QUICK}th pattern only, and fewer for the soup.' if quick else ''
-    sections = [output.page('reports/pages/paper', machine=output.machine(native), note=note)]
+    sections = [output.page('evidence/reports/pages/paper',
+                            machine=output.machine(native), note=note)]
     if {1, 2} & set(tables):
         sections += sections_1_and_2(tables, QUICK if quick else 1)
     if 9 in drawn:

@@ -131,7 +131,8 @@ def section(rows: Sequence[Row]) -> str:
     table = output.markdown_table(
         ['N', 'most tests', 'fewest', 'ratio', 'of the most: pairs that meet',
          'longest step / shortest', 'tests in one plane', 'paper: most tests'], chosen, words=0)
-    return output.page('reports/paper/pages/figure_4', table=table, depth=1e3 * DEPTH, spin=SPIN,
+    return output.page('evidence/reports/paper/pages/figure_4',
+                       table=table, depth=1e3 * DEPTH, spin=SPIN,
                        network=1e3 * np.percentile(network, [0, 100]), low=min(TILTS),
                        high=max(TILTS))
 

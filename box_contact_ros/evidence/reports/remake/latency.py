@@ -60,7 +60,7 @@ def page(folder: Path) -> str:
             machine = run[0]['machine']
             rows += node_rows(load, run)
     head = ['what', 'load, or instruction set', 'sent', 'lost', 'p50 [µs]', 'p99 [µs]']
-    return output.page('reports/remake/latency', machine=machine,
+    return output.page('evidence/reports/remake/latency', machine=machine,
                        table=output.markdown_table(head, rows, words=2))
 
 

@@ -136,7 +136,7 @@ def page(figures: Sequence[Figure], command: str) -> str:
     gated = [one for one in figures if one.run.way != OWN]
     own = [one for one in figures if one.run.way == OWN]
     return output.page(
-        'reports/pages/rest', command=command, machine=output.machine(native, PACKAGES),
+        'evidence/reports/pages/rest', command=command, machine=output.machine(native, PACKAGES),
         met=len(gated) - len(broken(figures)), all=len(gated),
         own_met=sum(one.is_met for one in own), own_all=len(own),
         exact=', '.join(map(str, TIMINGS)), mlp=', '.join(map(str, SOME_TIMINGS)),

@@ -214,7 +214,7 @@ def main(args: Sequence[str] | None = None) -> int:
     made = (f'Made by `{command_line("box_contact_ros search", args)}` in '
             f'{(time.monotonic() - began) / 60.0:.1f} minutes ({options.device}) on '
             f'{machine(native, PACKAGES)}.')
-    text = page('training/experiments/search_paper', made=made,
+    text = page('evidence/training/experiments/search_paper', made=made,
                 total=sum(len(done[0]) for _, done in results))
     text += f'\n![Settings and errors]({name}.png)\n' + ''.join(
         section(*result) for result in results)
