@@ -31,8 +31,8 @@ from box_contact_ros.output import markdown_table, number
 from box_contact_ros.solver.arguments import program_parser
 from box_contact_ros.solver.models import models, models_with_patch
 
+from ...contestants.contestant import Contestant, ours, packages_of
 from ...contestants.engines import installed
-from ...contestants.engines.engine import Engine, ours, packages_of
 from ..accuracy import CLASSES
 from .frontier_picture import draw
 from .native import write_native
@@ -57,7 +57,7 @@ FAMILIES = {'soup': [f'soup-{n}' for n in (8, 10, 12, 14, 16, 18, 20, 22)]}
 ODD_NORMAL = 10.0  # error of an engine's normal that is explained [deg]
 
 
-def contestants(members: int = FULL.members) -> tuple[list[Engine], list[str]]:
+def contestants(members: int = FULL.members) -> tuple[list[Contestant], list[str]]:
     """Return all that can be measured here, and a line about each that cannot."""
     found = []
     for entry in (one for one in models().values() if one.name not in AS_ENGINES):
@@ -80,7 +80,7 @@ def _errors(values: Sequence[float]) -> str:
 Odd = tuple[str, str]  # an engine's name, and 'missed', 'invented', 'normal' or 'failure'
 
 
-def odd_cells(rows: Sequence[FrontierRow], found: Sequence[Engine]) -> dict[Odd, str]:
+def odd_cells(rows: Sequence[FrontierRow], found: Sequence[Contestant]) -> dict[Odd, str]:
     """Return what is odd in the answers of other engines: a line with a pose and the cause."""
     lines: dict[Odd, str] = {}
     for engine in found:
@@ -141,7 +141,7 @@ def in_short(rows: Sequence[FrontierRow], odd: Mapping[Odd, str]) -> str:
          'exceptions / aborts'], lines)
 
 
-def calls_table(found: Sequence[Engine]) -> str:
+def calls_table(found: Sequence[Contestant]) -> str:
     """Return what is called of other engines, and what they return."""
     return markdown_table(
         ['', 'call', 'returns', 'volume or area', 'one point by', 'batch'],
@@ -177,7 +177,7 @@ def honesty(rows: Sequence[FrontierRow]) -> str:
         paper=by['paper', 'random cubes'].errors.points['all'][1]).rstrip()
 
 
-def page(rows: Sequence[FrontierRow], found: Sequence[Engine], missing: Sequence[str],
+def page(rows: Sequence[FrontierRow], found: Sequence[Contestant], missing: Sequence[str],
          command: str, plan: Plan) -> str:
     """Return the Markdown page."""
     odd = odd_cells(rows, found)
@@ -194,7 +194,7 @@ def page(rows: Sequence[FrontierRow], found: Sequence[Engine], missing: Sequence
             for name in ALL_SETS))
 
 
-def csv_rows(rows: Sequence[FrontierRow], found: Sequence[Engine]) -> list[dict[str, object]]:
+def csv_rows(rows: Sequence[FrontierRow], found: Sequence[Contestant]) -> list[dict[str, object]]:
     """Return a row per contestant, set, choice and class; times [ns], errors [%], normals [deg]."""
     packages, lines = {engine.name: engine.package for engine in found}, []
     here = {package: asdict(output.machine(native, ['numpy', *filter(None, [package])]))

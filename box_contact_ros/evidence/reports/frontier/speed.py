@@ -37,8 +37,8 @@ from box_contact_ros.output import page as filled_page
 from box_contact_ros.scene.pose import quaternion_multiply
 from box_contact_ros.solver.models import models_with_patch
 
+from ...contestants.contestant import in_subprocess, ours
 from ...contestants.engines import installed
-from ...contestants.engines.engine import in_subprocess, ours
 from ...pose_sets import CONTAINER, CUBE, SETS, Pairs, log_uniform, turns
 
 UNIT = 'MuJoCo mj_geomDistance'  # the contestant whose median single call is the unit of all ratios

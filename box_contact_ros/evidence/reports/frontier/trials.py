@@ -15,12 +15,7 @@ from box_contact_ros.core import native
 from box_contact_ros.output import percentiles
 from box_contact_ros.scene.pose import degrees_between
 
-from ...contestants.engines.engine import (
-    APART,
-    Engine,
-    chosen,
-    part_by_part,
-)
+from ...contestants.contestant import APART, Contestant, chosen, part_by_part
 from ...pose_sets import (
     CONTAINER,
     SETS,
@@ -85,7 +80,7 @@ ALL_SETS: dict[str, Generator] = {**SETS, 'just apart': apart}
 
 
 @dataclass(frozen=True, kw_only=True)
-class EngineErrors:
+class SetErrors:
     """Answers on a set against the exact ones."""
 
     points: dict[str, tuple[int, float, float, float]]
@@ -106,7 +101,7 @@ class Answers:
     points: dict[str, np.ndarray]  # (n, 3), by choice
     exceptions: int = 0  # pairs at which the engine raised one; they count as apart
 
-    def judged(self, pairs: Pairs) -> dict[str, EngineErrors]:
+    def judged(self, pairs: Pairs) -> dict[str, SetErrors]:
         """Return the errors by choice."""
         first = pairs.rows(slice(len(self.colliding)))
         return {choice: judge(first, self.colliding, self.normals, points)
@@ -126,11 +121,11 @@ class FrontierRow:
     batch: float  # p50 of a pair in a batch [ns]
     by_exact: list[float]
     """Single call and batch by those of `exact`: medians over the rounds of their own ratios."""
-    choices: dict[str, EngineErrors]  # by the way in which a point was made
+    choices: dict[str, SetErrors]  # by the way in which a point was made
     exceptions: int = 0
     failure: str = ''  # what ended the engine before its answers, if anything
     poses: Mapping[str, tuple[list[float], ...]] = field(default_factory=dict)
-    """Poses and sizes of the odd pairs of `EngineErrors`."""
+    """Poses and sizes of the odd pairs of `SetErrors`."""
 
     @property
     def best(self) -> str:
@@ -139,13 +134,13 @@ class FrontierRow:
             'all', (0, math.nan, math.inf, math.nan))[2])
 
     @property
-    def errors(self) -> EngineErrors:
+    def errors(self) -> SetErrors:
         """Return the errors of the best choice."""
         return self.choices[self.best]
 
 
 def judge(pairs: Pairs, colliding: np.ndarray, normals: np.ndarray, points: np.ndarray,
-          ) -> EngineErrors:
+          ) -> SetErrors:
     """Compare answers (n,), (n, 3), (n, 3) with the exact ones."""
     truth = pairs.contacts()
     both = colliding & truth.colliding
@@ -165,11 +160,11 @@ def judge(pairs: Pairs, colliding: np.ndarray, normals: np.ndarray, points: np.n
     odd = {kind: int(rows[0]) for kind, rows in wrong.items() if len(rows)}
     if len(rows):
         odd['normal'] = int(rows[np.argmax(angles)])
-    return EngineErrors(points=found, normal=percentiles(angles, 99, 100), odd=odd,
-                        missed=len(wrong['missed']), invented=len(wrong['invented']))
+    return SetErrors(points=found, normal=percentiles(angles, 99, 100), odd=odd,
+                     missed=len(wrong['missed']), invented=len(wrong['invented']))
 
 
-def ask(engine: Engine, pairs: Pairs, plan: Plan) -> Answers:
+def ask(engine: Contestant, pairs: Pairs, plan: Plan) -> Answers:
     """Return answers to as many pairs as there is time to ask."""
     if engine.prepare_batch and engine.make is None:
         found = engine.prepare_batch(pairs)()
@@ -201,7 +196,8 @@ def _at_once(pairs: Pairs) -> int:
     return FEW_PAIRS if len(sizes) > FEW_PAIRS else len(pairs.size)
 
 
-def answers_of(engine: Engine, sets: Mapping[str, Pairs], plan: Plan) -> dict[str, Answers | str]:
+def answers_of(engine: Contestant, sets: Mapping[str, Pairs], plan: Plan,
+               ) -> dict[str, Answers | str]:
     """Return answers by set, or what ended the engine; sets with boxes not for it are left out."""
     if engine.make is None or not plan.subprocesses:
         return _ask_all(engine, sets, plan)
@@ -209,7 +205,7 @@ def answers_of(engine: Engine, sets: Mapping[str, Pairs], plan: Plan) -> dict[st
     return part_by_part(_ask_all, engine.make, few, plan, patience=PATIENCE)
 
 
-def _ask_all(engine: Engine, sets: Mapping[str, Pairs], plan: Plan) -> dict[str, Answers | str]:
+def _ask_all(engine: Contestant, sets: Mapping[str, Pairs], plan: Plan) -> dict[str, Answers | str]:
     found: dict[str, Answers | str] = {}
     for name, pairs in sets.items():
         try:
@@ -223,7 +219,7 @@ def _ask_all(engine: Engine, sets: Mapping[str, Pairs], plan: Plan) -> dict[str,
 class Trial:
     """A contestant on a set: its answers, judged, and its times, gathered in rounds."""
 
-    def __init__(self, engine: Engine, name: str, pairs: Pairs, answers: Answers | str,
+    def __init__(self, engine: Contestant, name: str, pairs: Pairs, answers: Answers | str,
                  plan: Plan) -> None:
         """Judge, and prepare the calls; an engine that failed is not timed."""
         self.name, self.set = engine.name, name
@@ -281,7 +277,8 @@ class Trial:
                    for kind, row in odd.items()})
 
 
-def measure_all(found: Sequence[Engine], *, seed: int = 3, plan: Plan = FULL) -> list[FrontierRow]:
+def measure_all(found: Sequence[Contestant], *, seed: int = 3, plan: Plan = FULL,
+                ) -> list[FrontierRow]:
     """Return all rows, set by set. All contestants on all sets take turns.
 
     A neighbour that slows the machine for seconds then slows few rounds of a set, not all of them.

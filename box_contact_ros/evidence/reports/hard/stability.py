@@ -28,7 +28,7 @@ from box_contact_ros.solver.arguments import add_models, program_parser
 from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.solver.models import find_model, models, models_with_patch
 
-from ...contestants.engines.engine import in_subprocess
+from ...contestants.contestant import in_subprocess
 from ...pose_sets import Pairs
 from ...verification.hard_poses import Cases, load
 from ...verification.judge import NOT_FINITE, NOT_UNIT, OUTSIDE, judge
