@@ -34,6 +34,7 @@ from box_contact_ros.output import make_folder, markdown_table, percentiles
 from box_contact_ros.solver.arguments import add_models, program_parser, within
 from box_contact_ros.solver.contact import Contacts
 
+from ..verification.errors import distances
 from .bench_drive import Bench, MeasuredNode, about_the_machine, echo_node, open_bench, solver_node
 from .bench_report import bullets, write_results
 from .pose_streams import make_stream
@@ -229,6 +230,6 @@ def mispairs(stream: StreamLog) -> int:
     """Count the answers whose point is not the model's for that stamp's poses."""
     rows, truth = slice(0, len(stream.stamps)), stream.truth
     here = (stream.received['point'][rows] > 0) & truth.colliding[rows]
-    apart = np.linalg.norm(stream.values['point'][rows] - truth.point[rows], axis=1)
+    apart = distances(stream.values['point'][rows], truth.point[rows])
     depth = np.abs(stream.values['cloud'][rows, 6] + truth.separation[rows])
     return np.count_nonzero(here & ~((apart <= SAME_POINT) & (depth <= SAME_POINT)))

@@ -34,9 +34,10 @@ from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.solver.models import ModelEntry, find_model, models
 from box_contact_ros.solver.weights_file import WeightsError, load_weights
 
-from ..pose_sets import LOADS, SETS, ContactErrors, Pairs, contact_errors
+from ..pose_sets import LOADS, SETS, Pairs
 from ..training.paper_recipe import dataset
 from ..training.paper_recipe.errors import errors_of, figures, figures_by_part, wrapped
+from ..verification.errors import ContactErrors, contact_errors
 from . import searched
 from .paper.paper_tables import PAPER
 

@@ -26,6 +26,7 @@ from ...pose_sets import (
     log_uniform,
     stacked,
 )
+from ...verification.errors import point_errors
 from ..accuracy import CLASSES, classify
 from .speed import take_turns
 
@@ -147,7 +148,7 @@ def judge(pairs: Pairs, colliding: np.ndarray, normals: np.ndarray, points: np.n
     found: dict[str, tuple[int, float, float, float]] = {}
     if both.any():
         touching = pairs.rows(both)
-        errors = 100.0 * np.linalg.norm(points[both] - truth.point[both], axis=1) / touching.edge
+        errors = point_errors(points[both], truth.point[both], touching.edge)
         classes = classify(touching)[0]
         parts = {'all': errors, **{c: errors[classes == k] for k, c in enumerate(CLASSES)}}
         found = {label: (len(part), *percentiles(part, 50, 99, 100))

@@ -30,6 +30,7 @@ from box_contact_ros.solver.models import find_model, models, models_with_patch
 
 from ...contestants.contestant import in_subprocess
 from ...pose_sets import Pairs
+from ...verification.errors import distances, point_errors
 from ...verification.hard_poses import Cases, load
 from ...verification.judge import NOT_FINITE, NOT_UNIT, OUTSIDE, judge
 from .named_report import write_named
@@ -83,8 +84,8 @@ def examine(model: str, family: str, cases: Cases) -> StabilityRow:
         'outside': touching & (verdict.faults & OUTSIDE > 0),
         'not_finite': touching & (verdict.faults & NOT_FINITE > 0)}
     known = touching & np.isfinite(cases.centroid).all(axis=1)
-    off = np.linalg.norm((found.point - pairs.pose_a[:, :3] - cases.centroid)[known], axis=1)
-    errors = 100.0 * off / pairs.edge[known]
+    points = found.point - pairs.pose_a[:, :3]
+    errors = point_errors(points[known], cases.centroid[known], pairs.edge[known])
     ratio, exact_ratio = _ratios(solver, pairs)
     return StabilityRow(
         model, family, len(gap), contacts=int(found.colliding.sum()),
@@ -110,7 +111,7 @@ def _ratios(solver: ContactSolver, pairs: Pairs) -> tuple[float, float]:
         for k, one in enumerate((solver, exact)):
             before, after = pairs.contacts(one), nudged.contacts(one)
             both = before.colliding & after.colliding
-            ratios = np.linalg.norm(after.point - before.point, axis=1) / moved
+            ratios = distances(after.point, before.point) / moved
             worst[k] = max(worst[k], float(ratios[both].max(initial=0.0)))
     return worst[0], worst[1]
 

@@ -28,6 +28,7 @@ from box_contact_ros.solver.contact_solver import ContactSolver
 from ...contestants import soup
 from ...pose_sets import CUBE, Pairs, at_depth, stacks
 from ...training.paper_recipe.dataset import as_poses
+from ...verification.errors import distances
 from ..frontier.speed import pinned, usable_cores
 from .paper_tables import PAPER_NETWORK
 from .paper_tables import PAPER_SOUP as PAPER
@@ -191,7 +192,7 @@ def judge_soup(divisions: int, patterns: Pairs, exact: Contacts) -> SoupErrors:
             normals.append(answer[1])
             depths.append(max(contact.penetration_depth for contact in contacts))
     return SoupErrors(
-        point=np.linalg.norm(np.reshape(points, (-1, 3)) - exact.point[rows], axis=1),
+        point=distances(np.reshape(points, (-1, 3)), exact.point[rows]),
         normal=degrees_between(np.reshape(normals, (-1, 3)), exact.normal[rows]),
         depth=np.array(depths) + exact.separation[rows])
 
@@ -211,7 +212,7 @@ def judge_network(model: str, patterns: Pairs, exact: Contacts) -> Row:
     solver = cubes_model(model)
     found = patterns.contacts(solver)
     return {'model': model, 'regime': 'touching', 'answer_mean_ms': time_calls(solver, patterns),
-            'point_error_mean_m': float(np.linalg.norm(found.point - exact.point, axis=1).mean()),
+            'point_error_mean_m': float(distances(found.point, exact.point).mean()),
             'normal_error_mean_deg': float(degrees_between(found.normal, exact.normal).mean())}
 
 
