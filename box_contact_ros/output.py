@@ -6,13 +6,11 @@ from __future__ import annotations
 
 import argparse
 import csv
-import gc
 import math
 import platform
 import sys
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, astuple, dataclass
 from importlib import metadata
 from pathlib import Path
@@ -200,19 +198,6 @@ def number(value: float, digits: int = 3) -> str:
     if value >= 1e3:
         return f'{value:,.0f}'
     return f'{value:.{max(0, digits - 1 - math.floor(math.log10(value)))}f}'
-
-
-@contextmanager
-def no_garbage_collection() -> Iterator[None]:
-    """Collect the garbage now, and none until the end: it takes milliseconds."""
-    gc.collect()
-    gc.freeze()
-    gc.disable()
-    try:
-        yield
-    finally:
-        gc.enable()
-        gc.unfreeze()
 
 
 _AMD = ((23, 0x00, 0x2f, 'Zen'), (23, 0x30, 0xff, 'Zen 2'), (25, 0x00, 0x0f, 'Zen 3'),

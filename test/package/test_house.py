@@ -19,7 +19,8 @@ NAME = 'box_contact_ros'
 PRODUCT = ('core', 'solver', 'scene', 'node', 'apps')
 FOLDERS = (*PRODUCT, 'evidence')
 """A folder imports only itself and folders before it."""
-OF_EVIDENCE = ('pose_sets', 'contestants', 'verification', 'training', 'reports', 'bench')
+OF_EVIDENCE = ('pose_sets', 'contestants', 'verification', 'timing', 'training',
+               'reports', 'bench')
 """Likewise, below evidence/."""
 EVERYBODYS = ('output', 'resources')
 """Root modules that every folder may import, and that import none of the folders."""

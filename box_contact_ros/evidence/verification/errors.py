@@ -61,8 +61,7 @@ def distances(points: np.ndarray, truth: np.ndarray) -> np.ndarray:
 
 def lengths(vectors: np.ndarray) -> np.ndarray:
     """Return the lengths (n,) of vectors (n, k)."""
-    norms: np.ndarray = np.linalg.norm(vectors, axis=1)
-    return norms
+    return np.linalg.norm(vectors, axis=1)
 
 
 def _of_edge(points: np.ndarray, truth: np.ndarray, edge: np.ndarray) -> np.ndarray:

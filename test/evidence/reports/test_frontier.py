@@ -19,7 +19,7 @@ from box_contact_ros.evidence.contestants.contestant import Contestant, Manifold
 from box_contact_ros.evidence.contestants.engines import installed
 from box_contact_ros.evidence.pose_sets import SETS, Pairs
 from box_contact_ros.evidence.reports.frontier import frontier, trials
-from box_contact_ros.evidence.reports.frontier.speed import take_turns
+from box_contact_ros.evidence.timing import take_turns
 from box_contact_ros.scene.pose import rotation_matrix
 from box_contact_ros.solver.contact_solver import ContactSolver
 

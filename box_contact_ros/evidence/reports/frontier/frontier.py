@@ -33,10 +33,11 @@ from box_contact_ros.solver.models import models, models_with_patch
 
 from ...contestants.contestant import Contestant, ours, packages_of
 from ...contestants.engines import installed
+from ...timing import pinned, usable_cores
 from ..accuracy import CLASSES
 from .frontier_picture import draw
 from .native import write_native
-from .speed import pinned, usable_cores, with_instruction_set, write_speed
+from .speed import with_instruction_set, write_speed
 from .trials import (
     ALL_SETS,
     FEW_PAIRS,

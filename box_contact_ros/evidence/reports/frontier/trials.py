@@ -26,9 +26,9 @@ from ...pose_sets import (
     log_uniform,
     stacked,
 )
+from ...timing import Stint, by_round, each_call, take_turns
 from ...verification.errors import point_errors
 from ..accuracy import CLASSES, classify
-from .speed import take_turns
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,7 +56,6 @@ FEW_PAIRS = 17
 """Pairs that are prepared at once where more pairs of sizes than that are among them. Odd, so that
 a median is the time of one pair, not between two that may differ tenfold."""
 LEAST_PAIRS = 10  # pairs judged, whatever they take
-WARM_UP = 3  # calls before a round
 PATIENCE = 120.0  # for an engine's answers in a subprocess [s]
 VERDICT = 1e-9
 """Least gap or depth, of the size, at which verdicts and normals are judged. At exact touch both
@@ -227,11 +226,13 @@ class Trial:
         self._engine, self._pairs, self._answers = engine, pairs, answers
         self._seconds = plan.seconds / plan.rounds
         self._calls: Sequence[Callable[[], object]] = ()
-        self._ask_all = None
+        self._batch: Stint | None = None
         if isinstance(answers, Answers) and not answers.exceptions:
             timed = pairs.rows(slice(plan.timed_pairs))
             self._calls = engine.prepare(timed.rows(slice(_at_once(timed))))
-            self._ask_all = engine.prepare_batch and engine.prepare_batch(pairs)
+            if engine.prepare_batch:
+                self._batch = Stint(name=engine.name, kind='batch', count=len(pairs.size),
+                                    run=engine.prepare_batch(pairs))
         for call in self._calls:  # what is made at a pair's first call is not timed
             call()
         self._singles: list[np.ndarray] = []
@@ -240,22 +241,12 @@ class Trial:
 
     def time(self) -> None:
         """Time one round, after a warm-up: all single calls, again and again, then a batch."""
-        clock, times, batch = time.perf_counter_ns, list[int](), math.nan
-        for call in self._calls[:WARM_UP]:
-            call()
-        until = clock() + int(1e9 * self._seconds)
-        while self._calls and clock() < until:
-            for call in self._calls:
-                began = clock()
-                call()
-                times.append(clock() - began)
-        if self._ask_all:
-            self._ask_all()
-            began = clock()
-            self._ask_all()
-            batch = (clock() - began) / len(self._pairs.size)
+        times = each_call(self._calls, self._seconds)
         self._singles.append(np.array(times, np.int64))
-        self.rounds.append((percentiles(times, 50)[0], batch))
+        if self._batch:
+            self._batch.time()
+        self.rounds.append((percentiles(times, 50)[0],
+                            self._batch.times[-1] if self._batch else math.nan))
 
     def row(self, exact: Trial) -> FrontierRow:
         """Return what was found; times also by those of `exact` in the same rounds."""
@@ -272,7 +263,7 @@ class Trial:
             judged=len(answers.colliding), calls=len(singles),
             single=percentiles(singles, 50, 99, 100),
             batch=float(np.median([batch for _, batch in self.rounds])), choices=choices,
-            by_exact=np.median(np.divide(self.rounds, exact.rounds), axis=0).tolist(),
+            by_exact=by_round(self.rounds, exact.rounds).tolist(),
             exceptions=answers.exceptions, failure=failure,
             poses={kind: tuple(part[row].tolist() for part in self._pairs)
                    for kind, row in odd.items()})
