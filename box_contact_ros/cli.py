@@ -66,9 +66,6 @@ PROGRAMS = {
     'record': Program(
         'box_contact_ros.apps.recording.record', ('ros', 'bag'),
         'write poses and contacts of running nodes to a bag (MCAP) for Foxglove and ros2 bag'),
-    'soak': Program(
-        'box_contact_ros.evidence.bench.soak', ('ros', 'sim', 'report'),
-        'ten minutes at 1 kHz: losses, mispairs, memory, latency next to echo nodes'),
     'train': Program(
         'box_contact_ros.evidence.training.train', ('train',),
         'make the data sets, fit the networks, write weights/'),

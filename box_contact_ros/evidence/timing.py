@@ -14,7 +14,7 @@ import os
 import time
 from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -102,36 +102,26 @@ def each_call(calls: Sequence[Callable[[], object]], seconds: float) -> list[int
 
 @dataclass(frozen=True, kw_only=True)
 class Timing:
-    """Times of one contestant [ns for each call or pair], over the rounds."""
+    """What is timed as a whole, once a round, and its times."""
 
     name: str
     kind: str  # 'single' or 'batch'; for a large batch 'one thread' or 'two threads'
-    instruction_set: str
-    rounds: list[float]
+    count: int = 1  # calls or pairs of a run
+    run: Callable[[], object] | None = None  # None once all rounds are timed
+    instruction_set: str = native.instruction_set
+    rounds: list[float] = field(default_factory=list)  # of a call or pair [ns]
+
+    def time(self) -> None:
+        """Time a run right after an untimed one."""
+        self.run()
+        self.rounds.append(nanoseconds(self.run)[0] / self.count)
 
     def by(self, other: Timing) -> float:
         """Return the ratio to another contestant's time."""
         return float(by_round(self.rounds, other.rounds))
 
 
-@dataclass(frozen=True, kw_only=True)
-class Stint:
-    """What is timed as a whole, once a round."""
-
-    name: str
-    kind: str
-    count: int  # calls or pairs of a run
-    run: Callable[[], object]
-    times: list[float] = field(default_factory=list)  # of a call or pair, by round [ns]
-
-    def time(self) -> None:
-        """Time a run right after an untimed one."""
-        self.run()
-        self.times.append(nanoseconds(self.run)[0] / self.count)
-
-
-def timed(stints: Sequence[Stint], rounds: int) -> list[Timing]:
-    """Time all in turn, `rounds` times."""
-    take_turns([one.time for one in stints], rounds)
-    return [Timing(name=one.name, kind=one.kind, instruction_set=native.instruction_set,
-                   rounds=one.times) for one in stints]
+def timed(timings: Sequence[Timing], rounds: int) -> list[Timing]:
+    """Time all in turn, `rounds` times; what is returned can go to another process."""
+    take_turns([one.time for one in timings], rounds)
+    return [replace(one, run=None) for one in timings]

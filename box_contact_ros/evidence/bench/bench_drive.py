@@ -401,6 +401,12 @@ def about_the_machine(node_cores: set[int]) -> dict[str, str]:
             'load at start': f'{os.getloadavg()[0]:.2f}'}
 
 
+def adds_up(bench: Bench) -> bool:
+    """Return whether sent = answered + lost, by node and by stream."""
+    return all(node.log.adds_up and all(result.adds_up for result in node.log.results())
+               for node in bench.nodes)
+
+
 def _unanswered(turn: list[MeasuredNode], offers: set[int]) -> int:
     """Return how many answers to these offers (stamps) have not come."""
     return sum(len(offers - node.log.offers_answered) for node in turn)

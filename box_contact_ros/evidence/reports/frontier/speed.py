@@ -32,7 +32,7 @@ from box_contact_ros.solver.models import models_with_patch
 from ...contestants.contestant import in_subprocess, ours
 from ...contestants.engines import installed
 from ...pose_sets import CONTAINER, CUBE, SETS, Pairs, log_uniform, turns
-from ...timing import Stint, Timing, nanoseconds, pinned, timed, usable_cores
+from ...timing import Timing, nanoseconds, pinned, timed, usable_cores
 
 UNIT = 'MuJoCo mj_geomDistance'  # the contestant whose median single call is the unit of all ratios
 UNITS = (UNIT, 'python-fcl collide')
@@ -113,7 +113,7 @@ def _drawn(name: str, count: int) -> Pairs:
     return BATCH_SETS[name](rng, count + count // 20 + 20).rows(slice(count))
 
 
-def single_calls(count: int) -> list[Stint]:
+def single_calls(count: int) -> list[Timing]:
     """Return the contestants for equal cubes, from two poses to a result in Python."""
     rivals, missing = installed(('mujoco', 'fcl'))
     for line in missing:
@@ -121,8 +121,8 @@ def single_calls(count: int) -> list[Stint]:
     # Ours come last: batches follow, and the first one after scalar code is slow for milliseconds.
     engines = [*(one for one in rivals if one.name in UNITS), *map(ours, models_with_patch())]
     pairs = _drawn('random cubes', count)
-    return [Stint(name=engine.name, kind='single', count=count,
-                  run=partial(_call_all, engine.prepare(pairs))) for engine in engines]
+    return [Timing(name=engine.name, kind='single', count=count,
+                   run=partial(_call_all, engine.prepare(pairs))) for engine in engines]
 
 
 def _call_all(calls: Sequence[Callable[[], object]]) -> None:
@@ -130,10 +130,10 @@ def _call_all(calls: Sequence[Callable[[], object]]) -> None:
         call()
 
 
-def batch(model: str, name: str, count: int, kind: str = 'batch', threads: int = 1) -> Stint:
+def batch(model: str, name: str, count: int, kind: str = 'batch', threads: int = 1) -> Timing:
     """Return the contestant for a batch of a model on a set, every row its own sizes."""
-    return Stint(name=f'{model}: {name}', kind=kind, count=count,
-                 run=ours(model).prepare_batch(_drawn(name, count), threads=threads))
+    return Timing(name=f'{model}: {name}', kind=kind, count=count,
+                  run=ours(model).prepare_batch(_drawn(name, count), threads=threads))
 
 
 def with_instruction_set(name: str, work: Callable[..., list[Any]], *arguments: Any) -> list[Any]:
@@ -163,10 +163,10 @@ def measure_threads(cores: Sequence[int], effort: Effort) -> list[Timing]:
     Each has its rounds in a row. After a rest the host of a virtual machine may run both virtual
     cores on one of its own. Moving one of them away takes the host a while.
     """
-    stints = [batch(model, 'random cubes', effort.shared_batch, kind, threads)
-              for model in models_with_patch() for threads, kind in enumerate(SHARED, start=1)]
+    batches = [batch(model, 'random cubes', effort.shared_batch, kind, threads)
+               for model in models_with_patch() for threads, kind in enumerate(SHARED, start=1)]
     with pinned(cores):
-        return [timing for stint in stints for timing in timed([stint], effort.rounds)]
+        return [timing for one in batches for timing in timed([one], effort.rounds)]
 
 
 def measure_in_passes(core: int, cores: Sequence[int], effort: Effort) -> list[list[Timing]]:

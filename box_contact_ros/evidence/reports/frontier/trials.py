@@ -26,7 +26,7 @@ from ...pose_sets import (
     log_uniform,
     stacked,
 )
-from ...timing import Stint, by_round, each_call, take_turns
+from ...timing import Timing, by_round, each_call, take_turns
 from ...verification.errors import point_errors
 from ..accuracy import CLASSES, classify
 
@@ -226,13 +226,13 @@ class Trial:
         self._engine, self._pairs, self._answers = engine, pairs, answers
         self._seconds = plan.seconds / plan.rounds
         self._calls: Sequence[Callable[[], object]] = ()
-        self._batch: Stint | None = None
+        self._batch: Timing | None = None
         if isinstance(answers, Answers) and not answers.exceptions:
             timed = pairs.rows(slice(plan.timed_pairs))
             self._calls = engine.prepare(timed.rows(slice(_at_once(timed))))
             if engine.prepare_batch:
-                self._batch = Stint(name=engine.name, kind='batch', count=len(pairs.size),
-                                    run=engine.prepare_batch(pairs))
+                self._batch = Timing(name=engine.name, kind='batch', count=len(pairs.size),
+                                     run=engine.prepare_batch(pairs))
         for call in self._calls:  # what is made at a pair's first call is not timed
             call()
         self._singles: list[np.ndarray] = []
@@ -246,7 +246,7 @@ class Trial:
         if self._batch:
             self._batch.time()
         self.rounds.append((percentiles(times, 50)[0],
-                            self._batch.times[-1] if self._batch else math.nan))
+                            self._batch.rounds[-1] if self._batch else math.nan))
 
     def row(self, exact: Trial) -> FrontierRow:
         """Return what was found; times also by those of `exact` in the same rounds."""
