@@ -41,7 +41,6 @@ PATCH_ROUNDING = 1e-5
 every_model = pytest.mark.parametrize('model', MODELS)
 
 
-
 def solve(solver: ContactSolver, pairs: Pairs, threads: int = 1) -> Contacts:
     return solver.batch(pairs.pose_a, pairs.pose_b, size_a=pairs.size_a, size_b=pairs.size_b,
                         threads=threads)

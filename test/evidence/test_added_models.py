@@ -5,7 +5,9 @@
 from __future__ import annotations
 
 import pytest
-from test_models import lifted as lifted
+from test_models import lifted
+
+__all__ = ['lifted']
 
 
 @pytest.mark.slow
