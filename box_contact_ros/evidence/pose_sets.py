@@ -180,6 +180,11 @@ def laid(rng: np.random.Generator, size_a: np.ndarray, size_b: np.ndarray, tilt:
     return onto(place, turn, size_a, size_b, depth)
 
 
+def drawn(make: Generator, rng: np.random.Generator, n: int) -> Pairs:
+    """Draw exactly n pairs of a set: up to 7 draws in 100 miss."""
+    return make(rng, n + n // 10 + 20).rows(slice(n))
+
+
 def cubes(rng: np.random.Generator, n: int) -> Pairs:
     """Cubes of edge 2 in any pose, 0.1–10 % of the edge deep."""
     sizes = np.tile(CUBE, (n, 1))
@@ -202,6 +207,32 @@ def tilted(rng: np.random.Generator, n: int) -> Pairs:
     """Cubes of edge 2 stacked with a tilt of 1e-3–0.1 rad, 1e-3 m deep, any yaw."""
     return stacked(rng, CUBE, log_uniform(rng, 1e-3, 0.1, n), rng.uniform(-np.pi, np.pi, n),
                    np.full(n, 1e-3))
+
+
+def on_cube(pose_b: np.ndarray) -> Pairs:
+    """Return pairs of cubes of edge 2, A at the origin and B at poses (n, 7)."""
+    sizes = np.tile(CUBE, (len(pose_b), 1))
+    return Pairs(np.tile([0.0, 0, 0, 0, 0, 0, 1], (len(pose_b), 1)), pose_b, sizes, sizes)
+
+
+def coplanar(rng: np.random.Generator, n: int) -> Pairs:
+    """Draw cubes of edge 2 on each other, faces in one plane to the last bit.
+
+    One in ten stands exactly on top; the others anywhere on it, half of them with their sides
+    parallel, half under any yaw.
+    """
+    exactly = np.zeros((-(-n // 10), 7))
+    exactly[:, 2], exactly[:, 6] = CUBE[2], 1.0
+    parallel = (n - len(exactly)) // 2
+    parts = [exactly]
+    for count, largest in ((parallel, 0.0), (n - len(exactly) - parallel, np.pi)):
+        b = np.zeros((2 * count + 10, 7))  # some are placed beside the cube, and left out
+        b[:, :2] = 0.98 * rng.uniform(-CUBE[0], CUBE[0], (len(b), 2))
+        b[:, 2] = CUBE[2]
+        yaw = largest * rng.uniform(-1.0, 1.0, len(b))
+        b[:, 5], b[:, 6] = np.sin(0.5 * yaw), np.cos(0.5 * yaw)
+        parts.append(b[on_cube(b).contacts().colliding][:count])
+    return on_cube(rng.permutation(np.concatenate(parts)))
 
 
 def containers(rng: np.random.Generator, n: int) -> Pairs:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -17,25 +18,9 @@ from box_contact_ros.apps.recording.stream import Size, Stream
 from box_contact_ros.scene.scene_solver import Box, Pair, Scene
 
 from .. import pose_sets
-from ..pose_sets import CONTAINER, CUBE, Generator, Pairs
+from ..pose_sets import CONTAINER, CUBE, SETS, Pairs, coplanar, drawn
 
-EXTRA_DRAWS = 16
-"""Pairs drawn beyond those that are still needed: a few draws of a set miss and are left out."""
-COPLANAR_OFFSET = 0.8
-"""Largest offset of stacked cubes along x and along y, as a share of the edge. Up to 0.85 the two
-faces of edge 2 overlap whatever the yaw t: 2·0.85·(cos t + sin t) < (cos t + sin t) + 1, the sum
-of their half-widths along a side of the rotated face."""
 GAPS = (1e-3, 1.0)  # least and largest SAT gap of the pairs that are apart [m]
-
-
-def coplanar(rng: np.random.Generator, n: int) -> Pairs:
-    """Draw cubes of edge 2 stacked with exactly coplanar faces, zero depth, any yaw and place."""
-    offset = COPLANAR_OFFSET * rng.uniform(-2.0, 2.0, (n, 2))
-    quaternions = pose_sets.turns(np.array([0.0, 0.0, 1.0]), rng.uniform(-np.pi, np.pi, n))
-    a = np.tile([0.0, 0, 0, 0, 0, 0, 1], (n, 1))
-    b = np.concatenate([offset, np.full((n, 1), 2.0), quaternions], axis=1)
-    sizes = np.tile(CUBE, (n, 1))
-    return Pairs(a, b, sizes, sizes)
 
 
 def separated(rng: np.random.Generator, n: int) -> Pairs:
@@ -72,25 +57,15 @@ class StreamSource:
     description: str
 
 
-def _of_set(draw: Generator) -> Generator:
-    """Return a set of `pose_sets`, filled up to exactly n pairs."""
-    def filled(rng: np.random.Generator, n: int) -> Pairs:
-        parts: list[Pairs] = []
-        while (missing := n - sum(len(part.pose_a) for part in parts)) > 0:
-            parts.append(draw(rng, missing + EXTRA_DRAWS))
-        return Pairs(*(np.concatenate(column)[:n] for column in zip(*parts, strict=True)))
-    return filled
-
-
 STREAMS: dict[str, StreamSource] = {name: StreamSource(*source) for name, source in {
-    'random': (_of_set(pose_sets.SETS['random cubes']), CUBE,
+    'random': (partial(drawn, SETS['random cubes']), CUBE,
                'cubes in any pose, 0.1 to 10 % deep'),
-    'touching': (_of_set(pose_sets.SETS['touching']), CUBE, 'cubes in any pose that just touch'),
-    'near-parallel': (_of_set(pose_sets.SETS['stacks']), CUBE,
+    'touching': (partial(drawn, SETS['touching']), CUBE, 'cubes in any pose that just touch'),
+    'near-parallel': (partial(drawn, SETS['stacks']), CUBE,
                       'stacked cubes, tilt 1e-6 to 1e-3 rad, 1 mm deep'),
     'coplanar': (coplanar, CUBE, 'stacked cubes, faces exactly coplanar'),
-    'separated': (_of_set(separated), CUBE, 'cubes in any pose, 1 mm to 1 m apart'),
-    'containers': (_of_set(pose_sets.SETS['containers']), CONTAINER,
+    'separated': (partial(drawn, separated), CUBE, 'cubes in any pose, 1 mm to 1 m apart'),
+    'containers': (partial(drawn, SETS['containers']), CONTAINER,
                    '40 ft containers with sway, 0.1 to 10 % deep'),
     'crane': (crane_run, CONTAINER, 'a recorded run of the crane'),
 }.items()}

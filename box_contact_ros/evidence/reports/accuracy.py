@@ -34,7 +34,7 @@ from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.solver.models import ModelEntry, find_model, models
 from box_contact_ros.solver.weights_file import WeightsError, load_weights
 
-from ..pose_sets import LOADS, SETS, Pairs
+from ..pose_sets import LOADS, SETS, Pairs, drawn
 from ..training.paper_recipe import dataset
 from ..training.paper_recipe.errors import errors_of, figures, figures_by_part, wrapped
 from ..verification.errors import ContactErrors, contact_errors
@@ -191,9 +191,7 @@ def measure(model: str, name: str, pairs: Pairs, truth: Contacts, weights: str |
 def drawn_pairs(count: int, seed: int) -> Iterator[tuple[str, Pairs, Contacts]]:
     """Yield name, `count` pairs and exact contacts of every set."""
     for number, (name, make) in enumerate({**SETS, **LOADS}.items()):
-        # A few draws miss, up to 3 in 100.
-        pairs = make(np.random.default_rng([seed, number]),
-                     count + count // 20 + 10).rows(slice(count))
+        pairs = drawn(make, np.random.default_rng([seed, number]), count)
         yield name, pairs, pairs.contacts()
 
 

@@ -40,18 +40,17 @@ def contact_errors(found: Contacts, truth: Contacts, edge: np.ndarray) -> Contac
                          100.0 * in_plane.max(axis=1, initial=0.0))
 
 
-def departures(found: Contacts, truth: Contacts, edge: np.ndarray,
-               ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def departures(found: Contacts, truth: Contacts, edge: np.ndarray) -> tuple[np.ndarray, ...]:
     """Return answers minus exact ones [%]: points (n, 3), volumes (n, 1), covariances (n, 9)."""
-    trace = np.trace(truth.covariance, axis1=1, axis2=2)[:, None]
-    return (_of_edge(found.point, truth.point, edge),
-            100.0 * ((found.volume - truth.volume) / truth.volume)[:, None],
-            100.0 * (found.covariance - truth.covariance).reshape(-1, 9) / trace)
+    trace = np.trace(truth.covariance, axis1=1, axis2=2)
+    return tuple(100.0 * difference.reshape(len(edge), -1) / unit[:, None] for difference, unit in (
+        (found.point - truth.point, edge), (found.volume - truth.volume, truth.volume),
+        (found.covariance - truth.covariance, trace)))
 
 
 def point_errors(points: np.ndarray, truth: np.ndarray, edge: np.ndarray) -> np.ndarray:
     """Return the errors (n,) of points (n, 3) alone, in % as in `ContactErrors`."""
-    return lengths(_of_edge(points, truth, edge))
+    return 100.0 * distances(points, truth) / edge
 
 
 def distances(points: np.ndarray, truth: np.ndarray) -> np.ndarray:
@@ -62,10 +61,6 @@ def distances(points: np.ndarray, truth: np.ndarray) -> np.ndarray:
 def lengths(vectors: np.ndarray) -> np.ndarray:
     """Return the lengths (n,) of vectors (n, k)."""
     return np.linalg.norm(vectors, axis=1)
-
-
-def _of_edge(points: np.ndarray, truth: np.ndarray, edge: np.ndarray) -> np.ndarray:
-    return 100.0 * (points - truth) / edge[:, None]
 
 
 def _in_plane(covariance: np.ndarray, normal: np.ndarray) -> np.ndarray:

@@ -17,7 +17,7 @@ pytest.importorskip('matplotlib')
 
 from box_contact_ros.core import stages
 from box_contact_ros.evidence.contestants import soup
-from box_contact_ros.evidence.pose_sets import at_depth
+from box_contact_ros.evidence.pose_sets import at_depth, on_cube
 from box_contact_ros.evidence.reports.paper import (
     committee,
     paper_soup_tables,
@@ -40,24 +40,9 @@ def small(monkeypatch):
     return sets['contact']['external'].inputs
 
 
-def test_coplanar_faces_lie_in_one_plane():
-    """Exact touch to the last bit, all in contact; one in ten exactly on top."""
-    pairs = paper_soup_tables.coplanar(np.random.default_rng(1), 200)
-    found, b = pairs.contacts(), pairs.pose_b
-    assert found.colliding.all() and (found.separation == 0.0).all()
-    assert (found.normal == [0, 0, 1]).all()
-    assert np.sum((b[:, :2] == 0.0).all(axis=1)) == 20
-    assert np.sum(b[:, 5] == 0.0) == 20 + 90 and len(b) == 200
-
-
-def test_near_parallel_cubes_are_a_millimetre_deep():
-    pairs = paper_soup_tables.near_parallel(np.random.default_rng(1), 200)
-    assert pairs.contacts().separation == pytest.approx(-1e-3 * np.ones(200), abs=1e-12)
-
-
 def test_touching_poses_are_the_patterns(small):
     """They touch to within rounding, and pressed they are as deep as was asked for."""
-    given = paper_soup_tables.on_cube(dataset.as_poses(small)[1])
+    given = on_cube(dataset.as_poses(small)[1])
     assert np.abs(given.contacts().separation).max() < 1e-14
     pressed = at_depth(given, np.full(len(given.size), 1e-3))
     assert len(pressed.size) > 100
@@ -92,7 +77,7 @@ def test_crossing_is_on_log_log_paper():
 
 def test_planted_errors_show(small, monkeypatch):
     """A point shifted by 10 mm, a normal turned round, contacts withheld: each is seen."""
-    touching = paper_soup_tables.on_cube(dataset.as_poses(small[:40])[1])
+    touching = on_cube(dataset.as_poses(small[:40])[1])
     given = at_depth(touching, np.full(40, 1e-3))
     truth = given.contacts()
     answer = soup.point_and_normal

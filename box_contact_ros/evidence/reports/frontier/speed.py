@@ -31,7 +31,7 @@ from box_contact_ros.solver.models import models_with_patch
 
 from ...contestants.contestant import in_subprocess, ours
 from ...contestants.engines import installed
-from ...pose_sets import CONTAINER, CUBE, SETS, Pairs, log_uniform, turns
+from ...pose_sets import CONTAINER, CUBE, SETS, Pairs, drawn, log_uniform, turns
 from ...timing import Timing, nanoseconds, pinned, timed, usable_cores
 
 UNIT = 'MuJoCo mj_geomDistance'  # the contestant whose median single call is the unit of all ratios
@@ -108,9 +108,8 @@ SHARED = ('one thread', 'two threads')
 
 
 def _drawn(name: str, count: int) -> Pairs:
-    """Draw exactly `count` pairs of a set; a few draws miss."""
     rng = np.random.default_rng([1, list(BATCH_SETS).index(name)])
-    return BATCH_SETS[name](rng, count + count // 20 + 20).rows(slice(count))
+    return drawn(BATCH_SETS[name], rng, count)
 
 
 def single_calls(count: int) -> list[Timing]:

@@ -23,6 +23,7 @@ from ...pose_sets import (
     Pairs,
     any_pose,
     at_depth,
+    drawn,
     log_uniform,
     stacked,
 )
@@ -277,9 +278,8 @@ def measure_all(found: Sequence[Contestant], *, seed: int = 3, plan: Plan = FULL
     """
     from tqdm import tqdm
 
-    count = plan.batch_pairs
-    sets = {name: make(np.random.default_rng([seed, place]), count + count // 10 + 20).rows(
-        slice(count)) for place, (name, make) in enumerate(ALL_SETS.items())}
+    sets = {name: drawn(make, np.random.default_rng([seed, place]), plan.batch_pairs)
+            for place, (name, make) in enumerate(ALL_SETS.items())}
     with tqdm(total=len(found) * (1 + len(sets) * plan.rounds), desc='frontier',
               unit='step') as bar:
         answers = []

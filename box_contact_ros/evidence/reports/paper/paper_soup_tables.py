@@ -25,7 +25,7 @@ from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
 
 from ...contestants import soup
-from ...pose_sets import CUBE, Pairs, at_depth, stacks
+from ...pose_sets import CUBE, Pairs, at_depth, coplanar, drawn, on_cube, stacks
 from ...timing import cpu_milliseconds, no_garbage_collection, pinned, usable_cores
 from ...training.paper_recipe.dataset import as_poses
 from ...verification.errors import distances
@@ -86,37 +86,6 @@ class SoupResult:
     def ends(self, regime: str) -> tuple[Row, Row]:
         """Return the rows of the least N of Table 3, and of the largest."""
         return self.soups[regime, min(PAPER)], self.soups[regime, max(PAPER)]
-
-
-def on_cube(pose_b: np.ndarray) -> Pairs:
-    """Return pairs of cubes of edge 2, A at the origin and B at poses (n, 7)."""
-    sizes = np.tile(CUBE, (len(pose_b), 1))
-    return Pairs(np.tile([0.0, 0, 0, 0, 0, 0, 1], (len(pose_b), 1)), pose_b, sizes, sizes)
-
-
-def near_parallel(rng: np.random.Generator, n: int) -> Pairs:
-    """Draw one cube on the other, tilted by 1e-6–1e-3 rad, 1 mm deep, any yaw, anywhere on it."""
-    return stacks(rng, 2 * n).rows(slice(n))  # a few are placed beside the cube and left out
-
-
-def coplanar(rng: np.random.Generator, n: int) -> Pairs:
-    """Draw one cube on the other, faces in one plane to the last bit.
-
-    One in ten stands exactly on top; the others anywhere on it, half of them with their sides
-    parallel, half under any yaw.
-    """
-    exactly = np.zeros((math.ceil(n / 10), 7))
-    exactly[:, 2], exactly[:, 6] = CUBE[2], 1.0
-    parallel = (n - len(exactly)) // 2
-    parts = [exactly]
-    for count, largest in ((parallel, 0.0), (n - len(exactly) - parallel, np.pi)):
-        b = np.zeros((2 * count + 10, 7))  # some are placed beside the cube, and left out
-        b[:, :2] = 0.98 * rng.uniform(-CUBE[0], CUBE[0], (len(b), 2))
-        b[:, 2] = CUBE[2]
-        yaw = largest * rng.uniform(-1.0, 1.0, len(b))
-        b[:, 5], b[:, 6] = np.sin(0.5 * yaw), np.cos(0.5 * yaw)
-        parts.append(b[on_cube(b).contacts().colliding][:count])
-    return on_cube(rng.permutation(np.concatenate(parts)))
 
 
 def cubes_model(model: str) -> ContactSolver:
@@ -228,7 +197,7 @@ def measure(inputs: np.ndarray, *, quick: bool = False) -> SoupResult:
     counts = QUICK if quick else FULL
     rng = np.random.default_rng(SEED)
     patterns = {'touching': on_cube(as_poses(inputs[:counts['touching'].timed])[1]),
-                'near-parallel': near_parallel(rng, counts['near-parallel'].timed),
+                'near-parallel': drawn(stacks, rng, counts['near-parallel'].timed),
                 'coplanar': coplanar(rng, counts['coplanar'].timed)}
     judged = {name: pairs.rows(slice(counts[name].judged)) for name, pairs in patterns.items()}
     # At exact touch a few are apart by rounding, and left out.

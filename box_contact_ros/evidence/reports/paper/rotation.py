@@ -24,10 +24,10 @@ from box_contact_ros.core import stages
 from box_contact_ros.scene.pose import quaternion_multiply, rotation_matrix
 
 from ...contestants import soup
-from ...pose_sets import CUBE, Pairs, turned
+from ...pose_sets import CUBE, Pairs, on_cube, turned
 from ...timing import cpu_milliseconds, no_garbage_collection, pinned, usable_cores
 from ...training.paper_recipe.dataset import euler_angles, quaternion_from_euler
-from .paper_soup_tables import Row, cubes_model, on_cube, pair_count, time_calls
+from .paper_soup_tables import Row, cubes_model, pair_count, time_calls
 from .paper_tables import PAPER_SOUP
 
 DEPTH = 0.01  # of the corner [m]
