@@ -25,8 +25,6 @@ from pathlib import Path
 from random import sample
 from typing import NamedTuple
 
-from tqdm import tqdm
-
 from box_contact_ros import output
 from box_contact_ros.apps.crane.landing import LandingRecord, LandingResult, scenario_of
 from box_contact_ros.apps.crane.mujoco_crane import CraneScenario
@@ -260,6 +258,8 @@ def page(results: Sequence[Landed], command: str, *, dds: bool = False) -> str:
 def main(args: Sequence[str] | None = None) -> int:
     """Run the sweep and write its files; 1 if a gated way fails an expectation."""
     options, folder = _options(args)
+    from tqdm import tqdm
+
     step = QUICK if options.quick or options.dds else 1
     of_grid, added = grid(options.seed)[::step], ADDED[::3] if step > 1 else ADDED
     timings = [LoopTiming(rate, latency) for rate in options.rates for latency in options.latency]
