@@ -21,7 +21,7 @@ from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 from ros_client import Client, serving
 
-from box_contact_ros.node import contact_program, runtime
+from box_contact_ros.node import contact_node, contact_program, runtime
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.parameters import answer_help
 from box_contact_ros.node.topics import scene_topics
