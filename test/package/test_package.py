@@ -268,13 +268,6 @@ def test_help_needs_no_extra() -> None:
     assert sum('options:' in text for _, text in found.values()) >= 7
 
 
-def test_helps_begin_with_a_noun() -> None:
-    """An option says what it is: 'folder for …', not 'for …'."""
-    for file in Path(cli.__file__).parent.rglob('*.py'):
-        found = re.search(r"help=f?['\"](of|for|to|from|in|at|which of) ", file.read_text('utf-8'))
-        assert not found, file
-
-
 def test_missing_module_of_our_own_keeps_its_traceback(
     probe: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -284,16 +277,6 @@ def test_missing_module_of_our_own_keeps_its_traceback(
     )
     with pytest.raises(ModuleNotFoundError, match='no_such'):
         cli.run('probe', [])
-
-
-def test_program_fixture_ends_the_whole_group(program) -> None:
-    """The fixture starts a real process, catches its output and leaves nothing behind."""
-    running = program('--help')
-    assert running.wait() == 0
-    assert 'contact_node' in running.output
-    running.end()
-    with pytest.raises(ProcessLookupError):
-        os.killpg(running.process.pid, 0)
 
 
 def test_a_reader_that_ends_early_is_no_error() -> None:
