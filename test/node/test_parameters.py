@@ -11,7 +11,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from box_contact_ros.node import parameters
+from box_contact_ros.node import declared_parameters, parameters
 from box_contact_ros.node.topics.qos_events import QosEvents
 
 
@@ -46,7 +46,8 @@ def test_integers_are_as_good_as_floats():
 def test_a_descriptor_shows_range_choices_and_what_is_for_the_start():
     """Doubles and whole numbers have ranges of their own; choices and counts are words."""
     def described(default, check, fixed=False):
-        return parameters.Setting(default, 'a test', check).descriptor(read_only=fixed)
+        setting = parameters.Setting(default, 'a test', check)
+        return declared_parameters._descriptor(setting, read_only=fixed)
     one, = described(0.5, parameters.number(0, 3)).floating_point_range
     assert (one.from_value, one.to_value) == (0.0, 3.0)
     one, = described(5, parameters.whole_number(1, 9)).integer_range

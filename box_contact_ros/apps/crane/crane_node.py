@@ -28,8 +28,9 @@ from rclpy.executors import ExternalShutdownException
 from rclpy.signals import SignalHandlerOptions
 from visualization_msgs.msg import MarkerArray
 
+from ...node.declared_parameters import declare
 from ...node.messages import make_header
-from ...node.parameters import answer_help, declare
+from ...node.parameters import answer_help
 from ...node.runtime import CONTACT_QOS, REFUSALS, GuardedNode, joined, spin_once
 from ...solver.contact_solver import ContactSolver
 from ..ros_client import (

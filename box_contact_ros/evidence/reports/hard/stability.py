@@ -163,8 +163,6 @@ def page(rows: Sequence[StabilityRow], command: str) -> str:
 
 def main(args: Sequence[str] | None = None) -> int:
     """Ask all, print, write; 1 if a gate is broken."""
-    from tqdm import tqdm
-
     cases = load()
     parser = program_parser('stability', __doc__)
     reported = [entry.full_name for entry in models().values() if entry.any_boxes]
@@ -185,6 +183,8 @@ def main(args: Sequence[str] | None = None) -> int:
     whole = set(options.models) >= set(reported) and set(options.families) == set(cases)
     folder = output.make_folder(parser, options.out or (
         output.RESULTS if whole else output.QUICK_RESULTS))
+    from tqdm import tqdm
+
     rows = []
     with tqdm(total=len(options.models) * len(options.families), desc='stability',
               unit='family') as bar:

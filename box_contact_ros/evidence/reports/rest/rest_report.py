@@ -19,8 +19,6 @@ from dataclasses import asdict
 from multiprocessing import Pool
 from typing import NamedTuple
 
-from tqdm import tqdm
-
 from box_contact_ros import output
 from box_contact_ros.apps.processes import left_when_asked
 from box_contact_ros.core import native
@@ -156,6 +154,8 @@ def main(args: Sequence[str] | None = None) -> int:
     folder = output.results_folder(parser, options)
     cases = [case for case in CASES.values() if case.kind in options.kinds]
     runs = runs_of(cases[::QUICK] if options.quick else cases, quick=options.quick)
+    from tqdm import tqdm
+
     with left_when_asked(), Pool(options.workers) as pool:
         figures = [figure for found in tqdm(pool.imap(measured, runs), total=len(runs),
                                             desc='rest', unit='') for figure in found]
