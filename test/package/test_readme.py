@@ -289,8 +289,8 @@ def test_commands_leave_nothing_in_the_clone():
         and not (flag == '-p' and ':=' in word)}
     assert '/tmp/run' in outputs
     for folder in outputs:
-        ignored = subprocess.run(['git', 'check-ignore', '-q', folder], cwd=ROOT).returncode == 0
-        assert folder.startswith('/tmp/') or ignored, folder
+        ignored = subprocess.run(['git', 'check-ignore', '-q', f'{folder}/'], cwd=ROOT)
+        assert folder.startswith('/tmp/') or ignored.returncode == 0, folder
     for page, _, text in blocks('python'):
         for file in re.findall(r"write_scene[(].*?'([^' ]+[.]yaml)'", text, re.DOTALL):
             assert file.startswith('/tmp/'), page.name

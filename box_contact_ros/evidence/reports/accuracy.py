@@ -62,7 +62,7 @@ OUTSIDE = 2.0**-44
 
 OPENED = 5e-12
 """By how much boxes of the paper's set may be apart [of the size]. Near a pitch of ±90° the angles
-keep a pose to 12 digits only. Still far below the 1e-9 that B is pressed in."""
+keep a pose to 12 digits only. Still far below the 1e-9 that boxes are pressed in."""
 
 PAIRS, QUICK_PAIRS = 100_000, 5_000
 CLASSES = ('vertex-face', 'edge-edge', 'edge-face', 'face-face')

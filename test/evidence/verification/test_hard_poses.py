@@ -49,7 +49,7 @@ def test_the_file_holds_what_the_generators_draw():
 
 def test_the_docs_know_how_many():
     count = sum(len(cases.gap) for cases in CASES.values())
-    page = Path(__file__).resolve().parents[3] / 'docs' / 'reference' / 'testing.md'
+    page = Path(__file__).resolve().parents[3] / 'docs' / 'contributing' / 'testing.md'
     assert f'{count:,} cases in {len(CASES)} families' in page.read_text('utf-8')
 
 

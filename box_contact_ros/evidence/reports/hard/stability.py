@@ -174,11 +174,11 @@ def main(args: Sequence[str] | None = None) -> int:
                              'or quick-results with fewer models or families than that)')
     parser.add_argument('--named', action='store_true',
                         help='the named public reports instead, as named_failures.md (default '
-                             'folder: docs/reference)')
+                             'folder: docs/contributing)')
     options = parser.parse_args(args)
     command = output.command_line('box_contact_ros stability', args)
     if options.named:
-        return write_named(output.make_folder(parser, options.out or Path('docs/reference')),
+        return write_named(output.make_folder(parser, options.out or Path('docs/contributing')),
                            command, reported)
     whole = set(options.models) >= set(reported) and set(options.families) == set(cases)
     folder = output.make_folder(parser, options.out or (
