@@ -4,10 +4,10 @@
 """Landings by the way of contact and force: whether the container comes to rest, and how flat.
 
 It runs a grid of 36 landings by every way (some by a sample), rate and latency. It also lands other
-loads and stacks, with an outcome that is stated beforehand (`landing_ways`). Written are
-landing.csv (a row per landing), landing.md (tables) and landing.png (one landing, four ways). With
---dds the contacts of a sample come from a contact node in another process, in lockstep, and
-landing_dds.csv and .md are written. The exit status is 1 if held patches of `exact` or `mlp` do not
+loads and stacks, with an outcome that is stated beforehand. It writes landing.csv (a row per
+landing), landing.md (tables) and landing.png (one landing, three ways). With --dds the contacts of
+a sample come from a contact node in another process, in lockstep, and the files are landing_dds.csv
+and landing_dds.md. The exit status is 1 if held patches of `exact` or `mlp` do not
 do all that is expected.
 """
 from __future__ import annotations
@@ -300,7 +300,7 @@ def _options(args: Sequence[str] | None) -> tuple[argparse.Namespace, Path]:
                         metavar='S', help='times from asking to acting [s], default: %(default)s')
     parser.add_argument('--dds', action='store_true', help='contacts from a contact node, over '
                         'DDS in lockstep')
-    parser.add_argument('--workers', type=int, default=os.cpu_count(), help='processes')
+    parser.add_argument('--workers', type=int, default=os.cpu_count(), help='processes at once')
     options = parser.parse_args(args)
     options.ways = options.ways or list(OVER_DDS if options.dds else WAYS)
     if options.dds and not set(options.ways) <= set(OVER_DDS):
