@@ -8,7 +8,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -151,18 +151,29 @@ def answer_help(program: str, doc: str | None, settings: Mapping[str, Setting],
                         'in a launch file: log unknown ones, and start')
     options, unknown = parser.parse_known_args(outside_ros_args(args or ()))
     if unknown:
-        hint = ' (parameters stand after --ros-args)' if '-p' in unknown else ''
+        hint = _as_parameter(unknown, settings)
         parser.error(f'unrecognized arguments: {" ".join(unknown)}{hint}')
     for rule in rules_after_p(args or ()):
-        name, _, value = rule.partition(':=')
+        name, given, value = rule.partition(':=')
+        if not given:
+            parser.error(f'{shown(rule)} is not NAME:=VALUE, such as rate:=200.0')
         if value.startswith('[') and ']' not in value:  # a shell has cut it in pieces
             parser.error(f'{shown(rule)} is half a list: write it without blanks, as in '
                          f'{name}:=[1,2,3], or put it in quotes, as in "{name}:=[1, 2, 3]"')
         name = name.rpartition(':')[2]
         if not (name in settings or name in OF_RCLPY or name.startswith(QOS_OVERRIDES)
                 or options.shared_parameters):
-            parser.error(f'{unknown_name("parameter", name, settings)} (for parameters that '
-                         'several nodes share: --params-file, or --shared-parameters)')
+            parser.error(f'{unknown_name("parameter", name, settings)}. Parameters that several '
+                         'nodes share need --params-file or --shared-parameters')
+
+
+def _as_parameter(arguments: Sequence[str], settings: Collection[str]) -> str:
+    """Return how to write the first of unknown arguments that names a parameter; '' for none."""
+    for argument in arguments:
+        name = argument.lstrip('-').partition('=')[0].rstrip(':').replace('-', '_')
+        if name in settings:
+            return f' (parameters follow --ros-args: --ros-args -p {name}:=VALUE)'
+    return ''
 
 
 def outside_ros_args(args: Sequence[str]) -> list[str]:
@@ -177,9 +188,8 @@ def outside_ros_args(args: Sequence[str]) -> list[str]:
 
 
 def rules_after_p(args: Sequence[str]) -> list[str]:
-    """Return the rules of all `-p NAME:=VALUE` and `-p NODE:NAME:=VALUE`."""
-    return [rule for flag, rule in zip(args, args[1:])
-            if flag in ('-p', '--param') and ':=' in rule]
+    """Return what follows each `-p`: `NAME:=VALUE` or `NODE:NAME:=VALUE`."""
+    return [rule for flag, rule in zip(args, args[1:]) if flag in ('-p', '--param')]
 
 
 def default_text(default: Any) -> str:

@@ -201,7 +201,7 @@ def test_parameters_from_a_file(program, tmp_path):
                     "'qos_overrides./contact.publisher.depth': 5}}")
     running = program('contact_node', '--ros-args', '--params-file', str(file))
     printed = running.wait_for_output('ready', 120)
-    assert "unknown parameter 'sizea'; the nearest name is size_a" in printed
+    assert "unknown parameter 'sizea' (did you mean size_a?)" in printed
     assert printed.count('unknown parameter') == 1
     assert 'qos_overrides./contact.publisher.depth: the node has no such topic' in printed
     assert printed.count('no such topic') == 1

@@ -179,7 +179,7 @@ def test_options_outside_ros_args_are_refused(capsys):
             contact_program.main(arguments)
         assert ended.value.code == status
     printed = capsys.readouterr()
-    assert 'parameters stand after --ros-args' in printed.err
+    assert '--ros-args -p ' in printed.err
     assert 'unrecognized arguments: --fast' in printed.err
     for name in contact_program.PARAMETERS:
         assert f'\n  {name} ' in printed.out
@@ -265,7 +265,7 @@ def test_a_node_is_told_of_its_clock_and_of_names_that_are_none(client, capfd):
     with serving(lambda context: ContactNode(context, parameter_overrides=[
             Parameter(name, value=value) for name, value in given.items()])) as node:
         assert "unknown parameter 'modle'" in (told := capfd.readouterr().err)
-        assert 'the nearest name is model' in told
+        assert 'did you mean model?' in told
         result, = node.set_parameters([Parameter('pair_topics', value='yes')])
         assert result.reason == "pair_topics must be true or false, not 'yes'"
         node.set_parameters([Parameter('use_sim_time', value=True)])

@@ -292,7 +292,7 @@ def test_a_reader_that_ends_early_is_no_error() -> None:
 def test_parameters_before_ros_args_are_explained() -> None:
     done = _run('-m', 'box_contact_ros', 'contact_node', '-p', 'model:=exact')
     assert done.returncode == 2
-    assert '-p model:=exact (parameters stand after --ros-args)' in done.stderr
+    assert '(parameters follow --ros-args: --ros-args -p model:=VALUE)' in done.stderr
 
 
 # --- metadata -------------------------------------------------------------------------------------

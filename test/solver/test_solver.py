@@ -73,7 +73,8 @@ BAD_POSES = {
     'position': [([math.nan, 0, 0, 0, 0, 0, 1], r'position \(nan, 0, 0\) is not finite'),
                  ([0, math.inf, 0, 0, 0, 0, 1], r'position \(0, inf, 0\) is not finite'),
                  ([0, 0, 1e308, 0, 0, 0, 1], r'position \(0, 0, 1e\+308\) exceeds')],
-    'quaternion': [([0, 0, 0, 0, 0, 0, 0], r'quaternion \(x=0, y=0, z=0, w=0\) has zero length'),
+    'quaternion': [([0, 0, 0, 0, 0, 0, 0], r'quaternion \(x=0, y=0, z=0, w=0\) has zero length; a '
+                    'pose is x y z qx qy qz qw$'),
                    ([0, 0, 0, 0, 0, 0, 5e-324], 'zero length'),
                    ([0, 0, 0, 0, math.nan, 0, 1], r'y=nan.* is not finite'),
                    ([0, 0, 0, 0, 0, -math.inf, 1], 'is not finite'),

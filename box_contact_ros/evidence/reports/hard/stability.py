@@ -3,14 +3,14 @@
 
 """Program `stability`: what each model makes of the families of hard poses.
 
-`python -m box_contact_ros stability` asks every model for every stored case (`hard_poses`) and
+`python -m box_contact_ros stability` asks every model for every stored case and
 writes stability.md and .csv. The tables have wrong verdicts, wrong normals, the worst error of
 depth and point, and how far the point moves when a pose is nudged. The truth is stored, in 60
 digits. Models that build on FCL run in a subprocess, family by family: an abort is a finding, not
 an end.
 
 `--named` replays public reports about pairs of boxes instead, with every model and every other
-engine that is installed. It writes named_failures.md: see `named_failures`.
+engine that is installed. It writes named_failures.md.
 """
 from __future__ import annotations
 

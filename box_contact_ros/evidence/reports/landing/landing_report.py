@@ -4,9 +4,7 @@
 """Landings by the way of contact and force: whether the container comes to rest, and how flat.
 
 It runs a grid of 36 landings by every way (some by a sample), rate and latency. It also lands other
-loads and stacks, with an outcome that is stated beforehand (`landing_ways`). Written are
-landing.csv (a row per landing), landing.md (tables) and landing.png (one landing, four ways). The
-exit status is 1 if held patches of `exact` or `mlp` do not do all that is expected.
+    parser.add_argument('--workers', type=int, default=os.cpu_count(), help='processes at once')
 """
 from __future__ import annotations
 
@@ -254,6 +252,6 @@ def _options(args: Sequence[str] | None) -> tuple[argparse.Namespace, Path]:
                         metavar='HZ', help='ticks per second, default: %(default)s')
     parser.add_argument('--latency', nargs='+', type=float, default=[0.0, 0.002, 0.005],
                         metavar='S', help='times from asking to acting [s], default: %(default)s')
-    parser.add_argument('--workers', type=int, default=os.cpu_count(), help='processes')
+    parser.add_argument('--workers', type=int, default=os.cpu_count(), help='processes at once')
     options = parser.parse_args(args)
     return options, output.results_folder(parser, options)
