@@ -41,10 +41,10 @@ if os.environ.get('BOX_CONTACT_BUILD') == 'best' and CPU.is_file():
 # Not imported from the package: its __init__.py needs what is only about to be installed.
 cli = runpy.run_path(str(Path(__file__).with_name(NAME) / 'cli.py'))
 
-# colcon and bloom run `setup.py install` or `develop`. `ros2 run` needs programs in
-# lib/box_contact_ros under their bare names. setup.cfg says where. pip puts programs into bin/,
-# among those of all other packages, so they get a prefix there. Two signs tell who calls:
-# setuptools has this module for PEP 517, and pip sets this variable for all that it builds.
+# colcon and bloom run `setup.py install` or `develop`. `ros2 run` needs programs under their bare
+# names in lib/box_contact_ros, which setup.cfg names. pip puts programs into bin/ among those of
+# all other packages, so they get a prefix there. Two signs show that pip builds: setuptools has
+# loaded its module for PEP 517, or pip has set its variable.
 BY_PIP = 'setuptools.build_meta' in sys.modules or 'PIP_BUILD_TRACKER' in os.environ
 
 

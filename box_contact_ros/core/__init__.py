@@ -41,7 +41,7 @@ LENGTH_MIN, LENGTH_MAX = native.LENGTH_MIN, native.LENGTH_MAX
 QUATERNION_MIN, QUATERNION_MAX = native.QUATERNION_MIN, native.QUATERNION_MAX
 """Least and largest norm of a quaternion that are accepted."""
 DEPTH_FLOOR = native.DEPTH_FLOOR
-"""Least depth to which B is pressed in before the overlap is taken [of the size]."""
+"""Least depth to which boxes are pressed together before the overlap is taken [of the size]."""
 BRACKET_LIMIT, SPREAD_LIMIT, UPPER_LIMIT = (
     native.BRACKET_LIMIT, native.SPREAD_LIMIT, native.UPPER_LIMIT)
 """Limits of `mlp`, relative to the overlap. The first two say how far apart the brackets of volume

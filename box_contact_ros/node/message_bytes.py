@@ -6,7 +6,7 @@
 Poses are read by what CDR promises, whichever middleware wrote them. All other bytes are refused.
 Answers are put together from what rclpy serialises once for each frame_id: nothing here knows the
 layout of a cloud's constant parts.
-Bytes are kept because they halve the latency: docs/decisions/contact-node.md.
+Bytes are kept because they halve the latency: docs/contributing/decisions/contact-node.md.
 """
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ ENCAPSULATION = 4
 LITTLE = b'\0\1'
 _ORDERS = {b'\0\0': '>', LITTLE: '<'}
 """Byte order by kind: CDR_BE and CDR_LE, which every ROS middleware writes. Others are laid out in
-another way: docs/decisions/contact-node.md."""
+another way: docs/contributing/decisions/contact-node.md."""
 _PADDING = 3
 """Most bytes after the body, of any value: RTPS pads a message to a multiple of four."""
 _STAMP = struct.Struct('<iI')

@@ -176,7 +176,7 @@ def let_callbacks_finish() -> None:
     """Keep this process's other threads from interrupting the one that calls this (Linux).
 
     Every reliable publish wakes two or three threads of the middleware. As batch threads they wait
-    until this one is idle: docs/decisions/contact-node.md.
+    until this one is idle: docs/contributing/decisions/contact-node.md.
     """
     try:
         mine = threading.get_native_id()

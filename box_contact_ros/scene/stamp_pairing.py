@@ -50,7 +50,7 @@ ahead, or its box alone gives poses for max_age. So one wrong clock holds up nob
 
 Policy `latest` makes a tick of every pose that is neither OLD nor AHEAD. A box is stale by its
 newest stamp.
-Why no library does this: docs/decisions/contact-node.md.
+Why no library does this: docs/contributing/decisions/contact-node.md.
 """
 from __future__ import annotations
 

@@ -26,7 +26,8 @@ class Contact(NamedTuple):
     volume: float
     """Volume of A∩B [m³]; 0 without contact; NaN from models that give the point alone."""
     covariance: np.ndarray
-    """(3, 3) second central moments of A∩B by its volume [m²]; NaN without contact, or as volume.
+    """(3, 3) second central moments of A∩B divided by its volume [m²]; NaN where volume is
+    NaN, and without contact.
 
     Volume and covariance are those of the overlap whose centroid is `point`, pressed in or not.
     """

@@ -55,12 +55,12 @@ def sketch(axes: plt.Axes, tilt: float, letter: str) -> None:
     axes.fill(*overlap.T, facecolor=OVERLAP, edgecolor='none')
     axes.plot(*deepest, 'o', color=CORNER, markersize=7)
     axes.plot(*centroid, 'o', color=POINT, markersize=7)
-    axes.annotate('', centroid + (0, 0.75), centroid,
+    axes.annotate('', centroid - (0, 0.75), centroid,
                   arrowprops={'arrowstyle': '-|>', 'color': POINT, 'linewidth': 1.5})
-    axes.text(centroid[0] + 0.12, centroid[1] + 0.5, 'normal', fontsize=8)
-    axes.text(0.0, -0.85, 'A, the stack', ha='center', fontsize=8)
+    axes.text(centroid[0] + 0.12, centroid[1] - 0.55, 'normal', fontsize=8)
+    axes.text(-math.copysign(1.0, centroid[0]), -0.85, 'B, the stack', ha='center', fontsize=8)
     beside = load.mean(axis=0) + turn @ (math.copysign(0.8, tilt), 0.0)
-    axes.text(*beside, 'B, the load', ha='center', va='center', fontsize=8, color=LOAD,
+    axes.text(*beside, 'A, the load', ha='center', va='center', fontsize=8, color=LOAD,
               rotation=math.degrees(tilt))
     axes.set(title=f'({letter})', aspect='equal', xlim=(-2.3, 2.3), ylim=(-1.1, 1.6))
     axes.axis('off')

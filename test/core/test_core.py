@@ -167,20 +167,6 @@ def test_no_fused_multiply_add_of_doubles(file: Path) -> None:
     assert not found, f'{len(found)} in {file.name}: {sorted(set(found))}'
 
 
-def test_a_fused_multiply_add_would_be_found(tmp_path: Path) -> None:
-    """The test above fails for what a compiler makes of a · b + c without our flags."""
-    compiler = shutil.which(os.environ.get('CXX', 'g++').split()[0])
-    if not compiler:
-        pytest.skip('no C++ compiler is installed')
-    source, file = tmp_path / 'one.cpp', tmp_path / 'one.o'
-    source.write_text('double f(double a, double b, double c) { return a * b + c; }\n')
-    for flags, found in (([], True), (['-ffp-contract=off'], False)):
-        subprocess.run([compiler, '-O3', '-march=x86-64-v3', *flags, '-c', source, '-o', file],
-                       check=True)
-        assert bool(FUSED.search(disassembled(file))) is found
-    assert not FUSED.search('vfmadd231ps %zmm0,%zmm1,%zmm2  vfmsub213ss  vfnmadd132ps')
-
-
 LAWS = ('core/test_laws.py', 'evidence/verification/test_hard_poses.py', 'core/test_exact.py')
 """Tests that every instruction set runs."""
 WITH_ORACLE = ('parts', 'truth', 'the_file', 'reach_what', 'oracle', 'thin_overlaps', 'pieces')

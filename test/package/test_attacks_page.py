@@ -9,7 +9,7 @@ import re
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGE = (ROOT / 'docs' / 'reference' / 'attacks.md').read_text('utf-8')
+PAGE = (ROOT / 'docs' / 'contributing' / 'attacks.md').read_text('utf-8')
 PROGRAMS = ['contact_node', 'soup_node', 'markers', 'view', 'record', 'crane', 'bench']
 
 

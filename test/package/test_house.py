@@ -75,28 +75,6 @@ def test_imports_point_one_way() -> None:
     assert list(import_faults(ROOT / NAME)) == []
 
 
-@pytest.mark.parametrize('file, text, path', [
-    ('core/stages.py', 'from ..solver.ask import ask', 'solver.ask.ask'),
-    ('core/_native.pyi', f'from {NAME}.apps import demo', 'apps.demo'),
-    ('scene/one.py', f'def f():\n    import {NAME}.node', 'node'),
-    ('apps/deep/one.py', 'from ...evidence import pose_sets', 'evidence.pose_sets'),
-    ('core/stages.py', f'from {NAME} import ask', 'ask'),
-    ('evidence/training/one.py', f'from {NAME}.cli import PROGRAMS', 'cli.PROGRAMS'),
-    ('evidence/training/one.py', 'from ..reports import speed', 'evidence.reports.speed'),
-    ('output.py', 'from .solver import ask', 'solver.ask'),
-    ('cli.py', 'if 1:\n    from .core import stages', 'core.stages'),
-])
-def test_an_import_against_the_order_is_found(tmp_path: Path, file: str, text: str, path: str,
-                                              ) -> None:
-    for name, content in (('__init__.py', 'from .solver.ask import ask\n'),
-                          ('evidence/reports/a.py', f'from {NAME}.apps import demo\n'),
-                          (file, text)):
-        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / name).write_text(content)
-    fault, = import_faults(tmp_path)
-    assert fault.startswith(f'{file}:') and fault.endswith(f' imports {path}')
-
-
 # --- the product without evidence -----------------------------------------------------------------
 
 

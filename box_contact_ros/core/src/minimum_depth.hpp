@@ -3,9 +3,9 @@
 
 // Pressing: the least depth at which the overlap of two boxes has a volume.
 //
-// At exact touch A∩B has no volume. The box that is second in the order of the data is then pressed
-// in against the normal, to a depth of `depth_floor` of the size. The contact point is that of the
-// pressed boxes. The separation stays as it was.
+// At exact touch A∩B has no volume. One box is then moved against the normal, to a depth of
+// `depth_floor` of the size. Model `exact` moves the box that is second in the order of the data
+// (`Pair::a_first`). The contact point is that of the moved boxes. The separation stays as it was.
 #pragma once
 
 #include "separating_axis.hpp"
@@ -19,7 +19,7 @@ constexpr double depth_floor = 1e-9;
 // right angles.
 constexpr int most_presses = 8;
 
-// Enforce the minimum depth along the normal. Returns where B had to be moved.
+// Enforce the minimum depth along the normal. Returns where a box had to be moved.
 template <class T>
 BC_INLINE Mask<T> enforce_minimum_depth(Pair<T>& pair, const SeparatingAxis<T>& axis) {
   T distance = max(depth_floor * pair.size + axis.separation, T{});
@@ -56,8 +56,8 @@ inline Gap largest_gap(const Pair<double>& pair) {
 }
 
 // Go on where `enforce_minimum_depth` has left a pair with less than half of the minimum depth.
-// Where a corner touches a corner or an edge, several axes have gap zero: B is moved along each in
-// turn. Returns whether B was moved.
+// Where a corner touches a corner or an edge, several axes have gap zero: the box is moved along
+// each in turn. Returns whether it was moved.
 inline bool enforce_on_further_axes(Pair<double>& pair) {
   double floor = depth_floor * pair.size;
   bool moved = false;

@@ -28,16 +28,16 @@ namespace box_contact::BOX_CONTACT_SET {
 // 12 · 2⁻⁵³ of the size, and twice that must not decide.
 constexpr double tie = 0x1p-46;
 
-// Edge axes shorter than this (the sine of the angle between the edges) are skipped. Boxes that
-// share an edge direction are separated by a face axis if at all. Of an overlap, at most 1e-8 of
-// the size is lost.
+// Edge axes shorter than this (the sine of the angle between the edges) are skipped. A face axis
+// separates boxes that share an edge direction, if any axis does. The depth of an overlap changes
+// by at most 1e-8 of the size.
 constexpr double parallel = 1e-8;
 
 // Sine below which rounding costs an edge axis digits that may matter.
 constexpr double almost_parallel = 1e-3;
 
-// Error of a gap times that sine [of the size]: entries of R are good to 2⁻⁵¹, so at an angle θ the
-// axis's direction is good to 2⁻⁵¹/θ, and levers are up to the size on both sides.
+// Error of a gap times that sine [of the size]. Entries of R are good to 2⁻⁵¹. So at an angle θ the
+// axis's direction is good to 2⁻⁵¹/θ. Levers are as long as the size, on both sides.
 constexpr double edge_gap_error = 0x1p-47;
 
 // By how many times sine · size a skipped axis may better the best face axis.
@@ -234,7 +234,7 @@ BC_INLINE Vec<T> axis_normal(const Pair<T>& pair, const FirstFrame<T>& frame,
   return select(edges, n, side * face);
 }
 
-// The same for a single pair whose triples are vectors of the machine, without a choice: the vectors
+// The same for a single pair whose triples are vectors of the machine, without a branch. The vectors
 // of all axes are in memory, three axes side by side.
 template <class T>
 BC_INLINE Vec<T> axis_normal_by_place(const Pair<T>& pair, const FirstFrame<T>& frame,

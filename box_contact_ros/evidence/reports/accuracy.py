@@ -3,13 +3,13 @@
 
 """Program `accuracy`: how far a model's contacts are from the exact ones, per set and class.
 
-Measured are the point, the volume and the covariance. Every set of `pose_sets` is drawn anew from
-`--seed`; model `exact` gives the truth. Written are accuracy.csv (a row per model, set, quantity
-and part of the set), accuracy.md and accuracy.png. The exit status is 1 if `mlp` misses one of its
-limits (`limit_of`) or differs from `exact` in a separation or normal. It is 1, too, for a point
-outside a box, and for too many contacts that are left to `exact`.
+It measures point, volume and covariance. Every set of poses is drawn anew from `--seed`; model
+`exact` gives the truth. It writes accuracy.csv (a row per model, set, quantity and part of the
+set), accuracy.md and accuracy.png. The exit status is 1 if `mlp` misses one of its limits or
+differs from `exact` in a separation or normal. It is 1, too, for a point outside a box, and for too
+many contacts that are left to `exact`.
 
-pages/accuracy.md defines the classes. The pose decides which features meet, not the SAT
+accuracy.md defines the classes. The pose decides which features meet, not the SAT
 axis that wins. In stacks, half the winners are edge pairs although the contact is a patch.
 """
 from __future__ import annotations
@@ -62,7 +62,7 @@ OUTSIDE = 2.0**-44
 
 OPENED = 5e-12
 """By how much boxes of the paper's set may be apart [of the size]. Near a pitch of ±90° the angles
-keep a pose to 12 digits only. Still far below the 1e-9 that B is pressed in."""
+keep a pose to 12 digits only. Still far below the 1e-9 that boxes are pressed in."""
 
 PAIRS, QUICK_PAIRS = 100_000, 5_000
 CLASSES = ('vertex-face', 'edge-edge', 'edge-face', 'face-face')

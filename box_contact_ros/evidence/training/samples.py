@@ -120,12 +120,10 @@ def draw_samples(make: Generator, seed: Sequence[int], n: int, progress: bool = 
 def mixture(rng: np.random.Generator, n: int) -> Pairs:
     """Draw about n pairs of the kinds that scenes have.
 
-    - Equal cubes and random sizes in any pose, some with an edge of one almost along an edge of the
-      other.
-    - Stacks of boxes with a tilt of 1e-6 to 0.3 rad, and containers.
-
-    - Containers and cubes stacked squarely, almost in line and flat.
-    - Random sizes laid flat on each other.
+    - Equal cubes and boxes of random sizes have any pose. Some have edges that are almost parallel.
+    - Stacks of boxes are tilted by 1e-6 to 0.3 rad. So are stacks of containers.
+    - Containers and cubes are stacked squarely, almost in line and flat.
+    - Boxes of random sizes lie flat on each other.
     """
     share = n // 34
     parts = []

@@ -140,7 +140,7 @@ def expand_pairs(entries: Sequence[Mapping[str, Any]], boxes: Mapping[str, Box],
     for a, b, name, key in found:
         if key is None:
             key = id_of(name)
-            while key in taken:  # two names with the same checksum: docs/decisions/scene-files.md
+            while key in taken:  # two names with one checksum; see docs/contributing/decisions
                 key = (key + 1) % (LARGEST_ID + 1)
             taken.add(key)
         pairs.append(Pair(int(key), name, a, b))

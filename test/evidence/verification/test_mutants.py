@@ -1,7 +1,7 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""The list of mutants is of this code; trying them takes long: docs/reference/testing.md."""
+"""The list of mutants is of this code; trying them takes long: docs/contributing/testing.md."""
 
 import mutants
 import pytest

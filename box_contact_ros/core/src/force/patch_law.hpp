@@ -3,22 +3,25 @@
 
 // From contacts to wrenches: an elastic foundation over each patch, with friction that remembers.
 //
-// The foundation has the modulus κ [N/m³]. Volume V, centroid c, area A and covariance C of the
-// overlap, and how the bodies have moved since they were asked for, give the resultant:
+// The foundation has the modulus κ [N/m³]. The overlap has volume V, centroid c, area A and
+// covariance C. They and the motion of the bodies since the question give the resultant:
 //
 //     1. Pressure   P = κ·V' + b·v_c              along −n at c, on body A
-//     2. Rocking    κ·A·C_t·(n × (θ + ρ·ψ)) × n   by the turn θ since then, and so for its damper
+//     2. Rocking    κ·A·C_t·(n × (θ + ρ·ψ)) × n   θ: the turn since then; the damper has this form
 //     3. Friction   k_t·u + c_t·slip at c         u: an anchor that follows the slip
-//        Torsion    k_t·r·φ + c_t·r·spin about n  φ: its turn; both within f² + m² + a·f²·m² ≤ 1
-//                                                 by μ·P, a: how square the patch is
+//        Torsion    k_t·r·φ + c_t·r·spin about n  φ: the anchor's turn
+//
+// Friction f and torsion m, each divided by its limit under μ·P, stay within f² + m² + a·f²·m² ≤ 1.
+// The more square the patch is, the larger is a.
 //
 // ψ is the turn of late: ψ' = θ' − ψ / `lean_time`. It acts as a spring and a damper in line,
 // parallel to the spring of θ. It takes energy out of the slow sway of stacks. A plain damper that
 // did so would be stiffer than the step allows.
 //
-// V' = V + A·δ: δ is how much deeper the bodies are by now. v_c is the closing speed at c. κ = Ω² / w:
-// w is the largest eigenvalue of M⁻¹K of the bodies on a foundation of modulus 1. So no oscillation is
-// faster than Ω. docs/explanation/force.md derives all of this.
+// V' = V + A·δ: δ is how much deeper the bodies are by now. v_c is the closing speed at c.
+//
+// κ = Ω² / w. Here w is the largest eigenvalue of M⁻¹K of the bodies on a foundation of modulus 1. So
+// no oscillation is faster than Ω. docs/explanation/force.md derives all of this.
 //
 // Nothing but + − · / √ is computed, so all instruction sets give the same bits.
 #pragma once

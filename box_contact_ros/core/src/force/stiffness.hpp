@@ -19,8 +19,8 @@ constexpr double least_aspect = 1e-7;
 // Between them linear in 2·√(e₁·e₂) / (e₁ + e₂), to 1 %.
 constexpr double radius_of_line = 0.866025403784438647, radius_of_square = 0.937082;
 
-// Friction and torsion together are less than on an ellipsoid: f² + m² + a·f²·m² ≤ 1, with this `a`
-// of a square [1], and of others by the square of their squareness. Of a line, a = 0.
+// Friction and torsion together are less than on an ellipsoid: f² + m² + a·f²·m² ≤ 1. A square has
+// this `a` [1], a line has a = 0. Other patches have this `a` times the square of their squareness.
 constexpr double dent_of_square = 0.45;
 
 // What of an overlap does not depend on any body.

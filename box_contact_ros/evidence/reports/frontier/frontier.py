@@ -9,11 +9,11 @@ take turns. The models with native batches run once more with each other instruc
 machine, in a subprocess. Times are read as ratios within a run; the machine is named.
 
 Errors are against the exact model. Those of points are in % of the smaller box's longest edge, per
-contact class (`accuracy`); those of normals in degrees. Verdicts that differ are contacts missed
+contact class; those of normals in degrees. Verdicts that differ are contacts missed
 and contacts invented. An engine that returns several points is entered with the best of the ways
 to make one of them. Other engines are judged in subprocesses, where an abort is a finding.
 
-`--speed` writes the speed gates instead, speed.md and speed.csv: see `speed`.
+`--speed` writes the speed gates instead, speed.md and speed.csv.
 """
 from __future__ import annotations
 

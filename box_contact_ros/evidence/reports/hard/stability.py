@@ -3,14 +3,14 @@
 
 """Program `stability`: what each model makes of the families of hard poses.
 
-`python -m box_contact_ros stability` asks every model for every stored case (`hard_poses`) and
+`python -m box_contact_ros stability` asks every model for every stored case and
 writes stability.md and .csv. The tables have wrong verdicts, wrong normals, the worst error of
 depth and point, and how far the point moves when a pose is nudged. The truth is stored, in 60
 digits. Models that build on FCL run in a subprocess, family by family: an abort is a finding, not
 an end.
 
 `--named` replays public reports about pairs of boxes instead, with every model and every other
-engine that is installed. It writes named_failures.md: see `named_failures`.
+engine that is installed. It writes named_failures.md.
 """
 from __future__ import annotations
 
@@ -163,8 +163,6 @@ def page(rows: Sequence[StabilityRow], command: str) -> str:
 
 def main(args: Sequence[str] | None = None) -> int:
     """Ask all, print, write; 1 if a gate is broken."""
-    from tqdm import tqdm
-
     cases = load()
     parser = program_parser('stability', __doc__)
     reported = [entry.full_name for entry in models().values() if entry.any_boxes]
@@ -176,15 +174,17 @@ def main(args: Sequence[str] | None = None) -> int:
                              'or quick-results with fewer models or families than that)')
     parser.add_argument('--named', action='store_true',
                         help='the named public reports instead, as named_failures.md (default '
-                             'folder: docs/reference)')
+                             'folder: docs/contributing)')
     options = parser.parse_args(args)
     command = output.command_line('box_contact_ros stability', args)
     if options.named:
-        return write_named(output.make_folder(parser, options.out or Path('docs/reference')),
+        return write_named(output.make_folder(parser, options.out or Path('docs/contributing')),
                            command, reported)
     whole = set(options.models) >= set(reported) and set(options.families) == set(cases)
     folder = output.make_folder(parser, options.out or (
         output.RESULTS if whole else output.QUICK_RESULTS))
+    from tqdm import tqdm
+
     rows = []
     with tqdm(total=len(options.models) * len(options.families), desc='stability',
               unit='family') as bar:

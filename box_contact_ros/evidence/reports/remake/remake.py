@@ -7,7 +7,7 @@ Each report is a program of its own, and runs as a subprocess. Programs that mea
 the others share the cores. The exit status is 1 if a program failed or a limit was broken.
 
 `--compare DIR` runs nothing, and compares the ratios of times in DIR with those in the folder of
-results. The exit status is 1 if a ratio changed by more than 10 %: see `compare`.
+results. The exit status is 1 if a ratio changed by more than 10 %.
 """
 from __future__ import annotations
 
