@@ -14,7 +14,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from box_contact_ros import output
 from box_contact_ros.evidence.contestants.engines import installed
 from box_contact_ros.evidence.contestants.engines.engine import Engine, Manifold, chosen, ours
 from box_contact_ros.evidence.pose_sets import SETS, Pairs
@@ -214,15 +213,6 @@ def test_the_mean_by_depth() -> None:
 
 
 # --- the frontier ---------------------------------------------------------------------------------
-
-
-def test_pareto() -> None:
-    """Against the definition, point by point."""
-    rng = np.random.default_rng(2)
-    points = [tuple(p) for p in rng.uniform(size=(60, 2))]
-    expected = sorted(p for p in points
-                      if not any(q[0] <= p[0] and q[1] <= p[1] and q != p for q in points))
-    assert [points[place] for place in output.pareto(points)] == expected
 
 
 def test_quick_run(tmp_path: Path) -> None:
