@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 PACKAGE = Path(__file__).parent
 RESULTS, QUICK_RESULTS = Path('docs/results'), Path('quick-results')
 DPI = 110  # of pictures
-LABEL_STEP = 0.14  # height of a line of labels in a picture [inch]
 
 
 def make_folder(parser: argparse.ArgumentParser, folder: Path) -> Path:
@@ -144,47 +143,11 @@ def log_errors(axis: Axes, least: float, most: float, zero: str = 'exact (0)',
     return lambda error: middle if error == 0.0 else min(max(error, least), most)
 
 
-def name_points(axis: Axes, points: Sequence[tuple[float, float, str, str]]) -> None:
-    """Name points (x, y, label, colour) of an axis in a column on its right, joined by lines."""
-    ordered = sorted(points, key=lambda point: (point[1], -point[0]))
-    wanted = [float(axis.transAxes.inverted().transform(axis.transData.transform(point[:2]))[1])
-              for point in ordered]
-    step = min(1.0 / max(1, len(wanted)), LABEL_STEP * DPI / axis.get_window_extent().height)
-    places = spread(wanted, step)
-    for (x, y, label, colour), place in zip(ordered, places):
-        line = {'arrowstyle': '-', 'color': '0.75', 'linewidth': 0.5, 'relpos': (0.0, 0.5)}
-        axis.annotate(label, (x, y), xytext=(1.02, place), textcoords='axes fraction', fontsize=7.5,
-                      va='center', color=colour, annotation_clip=False, arrowprops=line)
-
-
-def spread(wanted: Sequence[float], step: float) -> np.ndarray:
-    """Return places in [0, 1], in the order of those wanted (ascending), at least a step apart."""
-    places, steps = np.array(wanted), step * np.arange(len(wanted))
-
-    def pushed(values: np.ndarray) -> np.ndarray:
-        return np.maximum.accumulate(np.maximum(values - steps, 0.0)) + steps
-
-    def from_above(values: np.ndarray) -> np.ndarray:
-        return 1.0 - pushed(1.0 - values[::-1])[::-1]
-
-    # Pushed up and pushed down: what lies between keeps the steps, too.
-    return 0.5 * (from_above(pushed(places)) + pushed(from_above(places)))
-
-
 def percentiles(values: Sequence[float] | np.ndarray, *percents: float) -> tuple[float, ...]:
     """Return percentiles of values (n,), 0 being the least and 100 the largest; NaN of none."""
     if not len(values):
         return (math.nan,) * len(percents)
     return tuple(float(value) for value in np.percentile(values, percents))
-
-
-def pareto(points: Sequence[tuple[float, float]]) -> list[int]:
-    """Return which points (cost, error) have no other as cheap and as good, cheapest first."""
-    found: list[int] = []
-    for place in sorted(range(len(points)), key=lambda place: points[place]):
-        if not found or points[place][1] < points[found[-1]][1]:
-            found.append(place)
-    return found
 
 
 def number(value: float, digits: int = 3) -> str:

@@ -38,6 +38,7 @@ CONTACT_TYPES: dict[str, type] = {'sensor_msgs/msg/PointCloud2': PointCloud2} | 
     {} if ContactsMessage is None else {'box_contact_msgs/msg/Contacts': ContactsMessage})
 """Messages of all contacts that can be read here, by the names of their types."""
 CRANE_MARKERS = 'crane/markers'
+CRANE_WRENCH = 'crane/wrench'
 """Where the crane publishes its ropes and its spreader, as lines."""
 MOST_ENDS = 10_000  # of lines that are drawn of a crane
 DEEP_RELIABLE = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)

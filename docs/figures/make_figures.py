@@ -42,7 +42,7 @@ def area_centroid(polygon: np.ndarray) -> np.ndarray:
     return ((polygon + following) * doubled[:, None]).sum(axis=0) / (3.0 * doubled.sum())
 
 
-def sketch(axes: plt.Axes, tilt: float, letter: str) -> None:
+def sketch(axes: plt.Axes, tilt: float) -> None:
     """Return a load of 4 × 1, its lowest corner 0.35 below the stack's top, y = 0; tilt [rad]."""
     stack = np.array([(-2.0, -1.0), (2.0, -1.0), (2.0, 0.0), (-2.0, 0.0)])
     turn = np.array([[math.cos(tilt), -math.sin(tilt)], [math.sin(tilt), math.cos(tilt)]])
@@ -57,12 +57,14 @@ def sketch(axes: plt.Axes, tilt: float, letter: str) -> None:
     axes.plot(*centroid, 'o', color=POINT, markersize=7)
     axes.annotate('', centroid - (0, 0.75), centroid,
                   arrowprops={'arrowstyle': '-|>', 'color': POINT, 'linewidth': 1.5})
-    axes.text(centroid[0] + 0.12, centroid[1] - 0.55, 'normal', fontsize=8)
-    axes.text(-math.copysign(1.0, centroid[0]), -0.85, 'B, the stack', ha='center', fontsize=8)
-    beside = load.mean(axis=0) + turn @ (math.copysign(0.8, tilt), 0.0)
-    axes.text(*beside, 'A, the load', ha='center', va='center', fontsize=8, color=LOAD,
+    inner, outer = ('left', 'right') if centroid[0] < 0.0 else ('right', 'left')
+    side = math.copysign(1.0, centroid[0])
+    axes.text(centroid[0] - 0.12 * side, centroid[1] - 0.55, 'normal', ha=inner)
+    axes.text(-1.9 * side, -0.9, 'B, the stack', ha=outer)
+    beside = load.mean(axis=0) + turn @ (math.copysign(0.6, tilt), 0.0)
+    axes.text(*beside, 'A, the load', ha='center', va='center', color=LOAD,
               rotation=math.degrees(tilt))
-    axes.set(title=f'({letter})', aspect='equal', xlim=(-2.3, 2.3), ylim=(-1.1, 1.6))
+    axes.set(aspect='equal', xlim=(-2.3, 2.3), ylim=(-1.1, 1.6))
     axes.axis('off')
 
 
@@ -82,9 +84,9 @@ def slide(axes: plt.Axes) -> None:
     ends[tilts == 0.0] = np.nan
     axes.plot(degrees, ends, color=CORNER, linewidth=2)
     axes.plot(degrees, found.point[:, 0], color=POINT, linewidth=2)
-    axes.text(0.05, 5.4, 'deepest corner', color=CORNER, fontsize=8)
-    axes.text(0.3, 2.2, 'centroid', color=POINT, fontsize=8)
-    axes.set(title='(c)', xlabel='tilt of a 40 ft container on another [deg]',
+    axes.text(0.08, -6.05, 'deepest corner', color=CORNER, fontsize=11, va='center')
+    axes.text(0.35, 2.2, 'centroid', color=POINT, fontsize=11)
+    axes.set(title='The deepest corner jumps by 12 m', xlabel='tilt of a container [deg]',
              ylabel='contact point along its length [m]', xlim=(-1.5, 1.5), ylim=(-6.6, 6.6))
     axes.grid(color='#dddddd')
     axes.spines[['top', 'right']].set_visible(False)
@@ -95,14 +97,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--out', type=Path, default=Path(__file__).parent, help='folder')
     folder = parser.parse_args().out
-    figure, (left, middle, right) = plt.subplots(
-        1, 3, figsize=(10.5, 2.9), dpi=110, width_ratios=(1, 1, 1.1), layout='constrained')
-    sketch(left, math.radians(7.0), 'a')
-    sketch(middle, math.radians(-7.0), 'b')
-    slide(right)
-    left.plot([], [], 'o', color=POINT, label='centroid of the overlap')
-    left.plot([], [], 'o', color=CORNER, label='deepest corner')
-    left.legend(loc='upper left', fontsize=8, frameon=False, borderaxespad=0)
+    figure, axes = plt.subplot_mosaic(
+        [['one way', 'graph'], ['other way', 'graph']], figsize=(6.4, 3.4), dpi=110,
+        width_ratios=(1, 1.25), layout='constrained')
+    sketch(axes['one way'], math.radians(7.0))
+    sketch(axes['other way'], math.radians(-7.0))
+    slide(axes['graph'])
     # No version and no date in the file: the same figure is the same bytes.
     figure.savefig(folder / 'centroid.png', metadata={'Software': None})
 

@@ -38,7 +38,8 @@ from box_contact_ros.apps.ros_client import (
 )
 from box_contact_ros.apps.viewer.listener import ViewNode
 from box_contact_ros.apps.viewer.page.read_outs import deepest_contacts, legend, read_out
-from box_contact_ros.apps.viewer.page.stage import CUBE_EDGES
+from box_contact_ros.apps.viewer.page.stage import CUBE as CUBE_CORNERS
+from box_contact_ros.apps.viewer.page.stage import CUBE_EDGES, camera_position
 from box_contact_ros.apps.viewer.page.view_page import Page
 from box_contact_ros.apps.viewer.scene_driver import DEPTH, LIFT, TIERS, VISIT, motions
 from box_contact_ros.apps.viewer.style import (
@@ -343,12 +344,31 @@ def shown(text, name):
     return re.sub('<[^>]*>', '', re.search(rf'id="{name}"[^>]*>(.*?)</td>', text).group(1))
 
 
+def headline(text):
+    return re.search(r'id="verdict"[^>]*>(.*?)</div>', text).group(1)
+
+
+@pytest.mark.parametrize('aspect', [0.5, 530 / 600, 16 / 9, 4.0])
+@pytest.mark.parametrize('extents', [(12.2, 2.4, 5.2), (1.0, 1.0, 30.0), (60.0, 40.0, 10.0)])
+def test_all_corners_are_in_view_whatever_its_shape(aspect, extents):
+    """And they fill it: one of them is near an edge."""
+    fov, corners = math.radians(75.0), CUBE_CORNERS * extents
+    camera = camera_position(corners, fov, aspect)
+    back = camera / np.linalg.norm(camera)
+    right = np.cross([0.0, 0.0, 1.0], back) / np.linalg.norm(np.cross([0.0, 0.0, 1.0], back))
+    depth = np.linalg.norm(camera) - corners @ back
+    tangent = math.tan(0.5 * fov)
+    shares = np.abs([corners @ right / (aspect * tangent), corners @ np.cross(back, right)
+                     / tangent]) / depth
+    assert depth.min() > 0.0 and 0.9 < shares.max() < 1.0
+
+
 def test_read_out_says_lengths_in_mm_and_shares_of_the_edge(log):
     """3 mm of an edge of 2 m are 0.15 %."""
     send(log, START)
     log.contacts(START, rows(0.003), START + 2 * MS)
     text = read_out(log.snapshot(), log.figures(START + 3 * MS), 'soup')
-    assert shown(text, 'verdict') == 'contact'
+    assert headline(text) == 'contact, 125.0 mm deep'
     assert shown(text, 'separation') == '-125.00 mm'
     assert shown(text, 'error') == '3.0 mm = 0.15 %'
     assert '>0.328</td>' in deepest_contacts(log.snapshot())  # 1.5 × 1.75 × 0.125 m³
@@ -360,13 +380,13 @@ def test_read_out_says_lengths_in_mm_and_shares_of_the_edge(log):
 
 def test_read_out_without_contact_answer_or_poses(log):
     """No figure is made up."""
-    assert shown(read_out(None, None, ''), 'verdict') == 'waiting for poses'
+    assert headline(read_out(None, None, '')) == 'waiting for poses'
     send(log, START, APART)
     text = read_out(log.snapshot(), log.figures(START), 'exact')
-    assert (shown(text, 'verdict'), shown(text, 'error')) == ('no answer', '–')
+    assert (headline(text), shown(text, 'error')) == ('no answer', '–')
     log.contacts(START, NO_ROWS, START)
     text = read_out(log.snapshot(), log.figures(START), 'exact')
-    assert (shown(text, 'verdict'), shown(text, 'error')) == ('no contact', '–')
+    assert (headline(text), shown(text, 'error')) == ('no contact, 500.0 mm apart', '–')
     assert deepest_contacts(None) == '' and '</td></tr></table>' in deepest_contacts(log.snapshot())
 
 
@@ -618,28 +638,62 @@ def near(picture, colour, distance):
     return np.mean((saturation > 25) & (aligned > (1.0 - distance) * saturation))
 
 
+CANVASES = '[...document.querySelectorAll("canvas")].map(c => c.clientWidth)'
+
+
+def filled(tab):
+    """Return the models whose buttons are filled."""
+    return tab.evaluate(
+        '[...document.querySelectorAll("button")].filter(b => '
+        f'getComputedStyle(b).backgroundColor == "rgb{CONTACT}").map(b => b.innerText)')
+
+
+@pytest.mark.timeout(600)
+@pytest.mark.skipif(chromium() is None, reason='no Chromium here: apt install chromium')
+@pytest.mark.parametrize('width', [800, 1280])
+def test_a_page_of_any_width(log, width):
+    """The panel takes a third at most, the model that runs is marked, the force has a chart."""
+    send(log, START)
+    log.contacts(START, rows(), START + MS)
+    page = Page('127.0.0.1', 8450, on_model=print)
+    try:
+        page.draw(log.snapshot(), np.zeros((0, 2, 3)), 2e5)
+        page.show(log.snapshot(), log.figures(START), model='exact', wish='', refusal='',
+                  connected=True)
+        with open_page(page.url, width) as tab:
+            tab.wait_for('document.getElementById("verdict")?.innerText.startsWith("contact, ")')
+            tab.wait_for(f'{CANVASES}.length == 4')  # two layers, two charts
+            tab.wait_for(f'Math.max(...{CANVASES}) < {width}')  # the panel has come
+            assert filled(tab) == ['exact']
+            assert tab.evaluate(f'Math.max(...{CANVASES})') >= 0.65 * width
+    finally:
+        page.close()
+
+
 @pytest.mark.timeout(600)
 @pytest.mark.skipif(chromium() is None, reason='no Chromium here: apt install chromium')
 def test_the_page_in_a_browser(program):
     """It draws both boxes; the figures come and are sound; a button switches the running node."""
     _, url = start_view(program, '--model', 'exact', '--rate', '100')
     with open_page(url) as tab:
-        tab.wait_for('document.getElementById("verdict")?.innerText == "no contact"', 400)
+        tab.wait_for('document.getElementById("verdict")?.innerText.startsWith("no contact, ")',
+                     400)
         assert float(tab.text('separation').split()[0]) > 0.0
         picture = np.array(Image.open(io.BytesIO(tab.picture())).convert('RGB'), float)
         scene = picture[:, :picture.shape[1] // 2]
         assert len(np.unique(scene.reshape(-1, 3), axis=0)) > 50
         assert near(scene, BOX_A, 0.1) > 0.02 and near(scene, BOX_B, 0.1) > 0.02
         # All at once: the next landing begins with a load in the air.
-        assert tab.wait_for('document.getElementById("verdict")?.innerText == "contact"'
+        assert tab.wait_for('document.getElementById("verdict")?.innerText.startsWith("contact, ")'
                             ' && document.getElementById("error")?.innerText.startsWith("0.0 mm")'
                             ' && parseFloat(document.getElementById("separation").innerText) < 0')
         assert 0.0 < float(tab.text('latency').split()[0]) < 1000.0
         pytest.importorskip('fcl')
         tab.click('soup')
         tab.wait_for('document.getElementById("model-status").innerText == "running: soup"')
+        assert filled(tab) == ['soup']
         tab.click('land again')
-        tab.wait_for('document.getElementById("verdict").innerText == "no contact"')
+        tab.wait_for('document.getElementById("verdict").innerText.startsWith("no contact, ")')
 
 
 @pytest.mark.timeout(600)

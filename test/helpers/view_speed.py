@@ -78,7 +78,8 @@ def main() -> None:
     for boxes in options.boxes:
         with (page_of(stacks(boxes), '--rate', options.rate) as url,
               open_page(url, *options.window) as tab):
-            tab.wait_for('document.getElementById("verdict")?.innerText == "contact"', 200)
+            tab.wait_for(
+                'document.getElementById("verdict")?.innerText.startsWith("contact, ")', 200)
             time.sleep(2.0)
             frames = frames_per_second(tab, options.seconds)
             print(f'| {boxes} | {frames:.1f} | {tab.text("rate").split()[0]} |', flush=True)

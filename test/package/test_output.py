@@ -10,7 +10,6 @@ from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from box_contact_ros import output
 from box_contact_ros.core import native
@@ -60,15 +59,6 @@ def test_a_machine_names_all_that_a_time_depends_on() -> None:
         f'{output.processor()}, {found.instruction_set}, {found.compiler}, {output.versions()}')
 
 
-def test_labels_are_spread(rng_seed: int = 5) -> None:
-    """At least a step apart, in order, within [0, 1], and unmoved where there is room."""
-    rng = np.random.default_rng(rng_seed)
-    for count in (1, 5, 20):
-        wanted = np.sort(rng.uniform(size=count) ** 4).tolist()
-        places = output.spread(wanted, 0.04)
-        assert (np.diff(places) >= 0.04 - 1e-12).all()
-        assert places[0] >= -1e-12 and places[-1] <= 1.0 + 1e-12
-    assert output.spread([0.1, 0.5, 0.9], 0.04) == pytest.approx([0.1, 0.5, 0.9])
 
 
 def test_rows_name_the_machine(tmp_path: Path) -> None:

@@ -419,6 +419,19 @@ def test_cpp_examples(tmp_path):
         for line in re.findall(r'printf\(.*\);  // (.*)$', text, re.MULTILINE)]
 
 
+OUTPUT = re.compile(r'(?:--out|--export|-B|-o|mkdir(?: -p)?|tee|>)[ =]([^\s;&|]+)')
+
+
+def test_what_commands_write_is_not_seen_by_git():
+    """A file in the checkout that git neither tracks nor ignores breaks `make dist`."""
+    written = [path for command in commands() if not command.startswith('cd ')
+               for path in OUTPUT.findall(command)]
+    assert '/tmp/run' in written and 'build' in written
+    for path in written:
+        if not path.startswith(('/', '~', '$')):
+            run('git', 'check-ignore', '--no-index', f'{path}/anything')
+
+
 def test_pages_build_without_a_warning(tmp_path):
     """`make docs`: every page is in a table of contents, and every link and reference leads on."""
     pytest.importorskip('myst_parser')

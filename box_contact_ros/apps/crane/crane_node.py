@@ -22,7 +22,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import PoseStamped, Vector3, WrenchStamped
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException
 from rclpy.signals import SignalHandlerOptions
@@ -37,6 +37,7 @@ from ...solver.contact_solver import ContactSolver
 from ..ros_client import (
     ANSWERS,
     CRANE_MARKERS,
+    CRANE_WRENCH,
     DEEP_RELIABLE,
     answer_values,
     line_marker,
@@ -80,6 +81,7 @@ class CraneNode(GuardedNode):
         self.solver = ContactSolver(self.scenario.size, self.scenario.stack_size, model='exact')
 
         self._crane_markers = self.create_publisher(MarkerArray, CRANE_MARKERS, CONTACT_QOS)
+        self._crane_wrench = self.create_publisher(WrenchStamped, CRANE_WRENCH, CONTACT_QOS)
         self._publishers_ab = [self.create_publisher(PoseStamped, f'{box}/pose', DEEP_RELIABLE)
                                for box in ('box_a', 'box_b')]
         self._answers = [
@@ -122,6 +124,7 @@ class CraneNode(GuardedNode):
             stamp = self._publish()
             if tick % self._draw_every == 0:
                 self._draw(stamp)
+                self._tell_force(stamp)
             if self.feedback is None:
                 self.crane.step()
             else:
@@ -169,6 +172,14 @@ class CraneNode(GuardedNode):
         self._crane_markers.publish(MarkerArray(markers=[
             line_marker(header, name, lines, width=width, colour=ROPE)
             for name, lines, width in (('ropes', ropes, 0.04), ('spreader', spreader, 0.15))]))
+
+    def _tell_force(self, stamp: int) -> None:
+        """Publish the contacts' force on the load, of the last physics step before a tick."""
+        if self.feedback and self.feedback.loop.record.forces:
+            message = WrenchStamped(header=make_header(stamp, self.frame_id))
+            x, y, z = map(float, self.feedback.loop.record.forces[-1])
+            message.wrench.force = Vector3(x=x, y=y, z=z)
+            self._crane_wrench.publish(message)
 
     def _now(self) -> int:
         return int(self.get_clock().now().nanoseconds)

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import time
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -29,6 +30,7 @@ class BagPlayer:
 
     wish = refusal = ''
     connected = True
+    force = math.nan  # of no recording
 
     def __init__(self, path: Path) -> None:
         """Read a recording that says its scene, or both sizes. Raises RecordingError."""

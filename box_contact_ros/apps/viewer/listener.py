@@ -8,6 +8,7 @@ names is one of the node's machine: it is not opened here. The node tells the sc
 """
 from __future__ import annotations
 
+import math
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping
@@ -15,6 +16,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from geometry_msgs.msg import WrenchStamped
 from rclpy.context import Context
 from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
@@ -34,6 +36,7 @@ from ...scene.scene_solver import Scene, two_boxes
 from ...scene.stamp_pairing import NEVER, StampedPose
 from ..ros_client import (
     CRANE_MARKERS,
+    CRANE_WRENCH,
     PoseTopic,
     lines_of,
     pose_topics,
@@ -47,6 +50,7 @@ ASK_PERIOD = 0.5
 ANSWER_PATIENCE = 3.0
 """Without an answer for so long [s], the contact node is not there, or is busy."""
 ASKED = ('size_a', 'size_b', 'scene', 'pairing', 'tolerance', 'model')
+MOST_FORCE = 1e12  # N: a chart of more shows nothing else
 OF_SCENE = ASKED[:-1]
 """With another value of one of these, what came before is forgotten."""
 
@@ -119,6 +123,7 @@ class ViewNode(Listener):
         self.wish = ''  # the model that was asked for last, until it is granted
         self.refusal = ''  # why the last wish was refused, or the scene cannot be read
         self.lines = np.zeros((0, 2, 3))  # ends of the crane's lines, where a crane runs
+        self.force = math.nan  # upward part of the force on the crane's load [N]
         self._scene, self._told = scene, ''
         self._answered = 0.0
         self._question: Future | None = None
@@ -127,6 +132,7 @@ class ViewNode(Listener):
         self._target = AsyncParameterClient(self, target)
         self.create_timer(ASK_PERIOD, self._ask)
         self.create_subscription(MarkerArray, CRANE_MARKERS, self._on_crane, POSE_QOS)
+        self.create_subscription(WrenchStamped, CRANE_WRENCH, self._on_force, POSE_QOS)
         self.create_subscription(String, f'{target}/scene', self._on_scene, LATCHED_QOS)
 
     @property
@@ -158,6 +164,12 @@ class ViewNode(Listener):
 
     def _on_crane(self, message: MarkerArray) -> None:
         self.lines = lines_of(message)
+
+    def _on_force(self, message: WrenchStamped) -> None:
+        force = message.wrench.force.z
+        if not abs(force) <= MOST_FORCE:
+            raise Refused('bad force', f'a force of {force:g} N')
+        self.force = force
 
     def _ask(self) -> None:
         if self._question is not None and not self.connected:

@@ -151,7 +151,7 @@ def watch(node: ViewNode | BagPlayer, page: Page, started: Programs | BagPlayer 
             if log is not None:
                 log.start_anew()
         snapshot = log.snapshot() if log else None
-        page.draw(snapshot, node.lines)
+        page.draw(snapshot, node.lines, node.force)
         if page.due:
             figures = log.figures(node.now()) if log else None
             page.show(snapshot, figures, model=node.model, wish=node.wish, refusal=node.refusal,

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
@@ -20,6 +21,7 @@ ERRORS = (1e-6, 1e5)
 """Point errors that are drawn to scale [mm]; 0 has a band of its own below."""
 COLORS = {'contact': 'tab:blue', 'soup': 'tab:red', 'echo': 'tab:gray'}
 MARKERS = 'osD^vP*X<>hpd8'
+TITLE_WIDTH = 90  # characters of a title's line: a longer one is clipped
 DIGITS = 9  # significant digits of a figure in the CSV file
 COUNTS = [entry.name for entry in dataclasses.fields(StreamResult) if entry.type in ('str', 'int')]
 
@@ -88,7 +90,8 @@ def draw(path: Path, results: Sequence[StreamResult], title: str) -> None:
     for axis, drawn in zip(axes[:, 0], (_draw_tails, _draw_streams, _draw_errors)):
         drawn(axis, results, colors)
         axis.grid(alpha=0.3, axis='x' if drawn is _draw_streams else 'both')
-    figure.suptitle(title)
+    figure.suptitle('\n'.join(piece for line in title.splitlines()
+                              for piece in textwrap.wrap(line, TITLE_WIDTH)))
     figure.savefig(path)
 
 

@@ -14,11 +14,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from box_contact_ros import output
 from box_contact_ros.evidence.contestants.contestant import Contestant, Manifold, chosen, ours
 from box_contact_ros.evidence.contestants.engines import installed
 from box_contact_ros.evidence.pose_sets import SETS, Pairs
-from box_contact_ros.evidence.reports.frontier import frontier, trials
+from box_contact_ros.evidence.reports.frontier import frontier, frontier_picture, trials
 from box_contact_ros.evidence.timing import take_turns
 from box_contact_ros.scene.pose import rotation_matrix
 from box_contact_ros.solver.contact_solver import ContactSolver
@@ -38,6 +37,16 @@ def answers(pairs: Pairs) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     found = ContactSolver((1, 1, 1), (1, 1, 1), model='exact').batch(
         pairs.pose_a, pairs.pose_b, size_a=pairs.size_a, size_b=pairs.size_b)
     return found.colliding.copy(), found.normal.copy(), found.point.copy()
+
+
+def test_the_picture_has_five_contestants() -> None:
+    """Those of the committed table, each with the best of its points: a time and an error."""
+    found = frontier_picture.shown_points(ROOT / 'docs' / 'results' / 'frontier.csv')
+    assert set(found) == set(frontier_picture.SHOWN) and len(found) == 5
+    low, high = frontier_picture.TIMES
+    assert all(low < time < high and error <= frontier_picture.ERRORS[1]
+               for time, error in found.values())
+    assert found['exact'][1] == 0.0 < found['mlp'][1] < found['MuJoCo mj_collision'][1]
 
 
 def wrong_verdicts(pairs: Pairs, *given: np.ndarray) -> tuple[int, int]:
@@ -204,15 +213,6 @@ def test_the_mean_by_depth() -> None:
 
 
 # --- the frontier ---------------------------------------------------------------------------------
-
-
-def test_pareto() -> None:
-    """Against the definition, point by point."""
-    rng = np.random.default_rng(2)
-    points = [tuple(p) for p in rng.uniform(size=(60, 2))]
-    expected = sorted(p for p in points
-                      if not any(q[0] <= p[0] and q[1] <= p[1] and q != p for q in points))
-    assert [points[place] for place in output.pareto(points)] == expected
 
 
 def test_quick_run(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import html
 import math
 
-from ..style import LEGEND, LISTED, patch_areas
+from ..style import CONTACT, LEGEND, LISTED, patch_areas
 from ..view_log import Snapshot, ViewFigures
 
 LONGEST = 20_000
@@ -32,19 +32,18 @@ def tag(kind: str, *content: str, **attributes: str) -> Html:
 
 
 def read_out(snapshot: Snapshot | None, figures: ViewFigures | None, model: str) -> Html:
-    """Return the figures as an HTML table; each value has its name as id."""
+    """Return a line in plain words, and figures as an HTML table; each value has its name as id."""
+    words = tag('div', in_words(snapshot), id='verdict',
+                style='padding:0.5em 0.6em 0;font-size:1.15em;font-weight:600')
     if snapshot is None or figures is None:
-        return _table('read-out', [('verdict', 'verdict', 'waiting for poses')])
+        return words
     answer, edge = snapshot.answer, figures.edge
-    verdict, pairs = 'no answer', len(snapshot.scene.labels)
-    error = math.nan
+    pairs, rows, error = len(snapshot.scene.labels), [], math.nan
     if answer is not None:
-        verdict = 'contact' if len(answer.pairs) else 'no contact'
         error = max(answer.point_errors, default=math.nan)
-    rows = [('verdict', 'verdict', verdict)]
     if pairs > 1 and answer is not None:
         rows.append(('pairs', 'pairs in contact', f'{len(answer.pairs)} of {pairs}'))
-    return _table('read-out', [
+    return Html(words + _table('read-out', [
         *rows,
         ('separation', 'separation' + (', least' if pairs > 1 else ''),
          f'{_text(1e3 * snapshot.separation, "+.2f")} mm'),
@@ -55,7 +54,31 @@ def read_out(snapshot: Snapshot | None, figures: ViewFigures | None, model: str)
         ('rate', 'answers', f'{figures.rate:g} /s'),
         ('lost', 'lost', f'{figures.lost} of {figures.answered + figures.lost}'),
         *([('refused', 'refused', f'{figures.refused}')] if figures.refused else []),
-    ])
+    ]))
+
+
+def in_words(snapshot: Snapshot | None) -> str:
+    """Return in words whether there is contact, and how deep; of several contacts the deepest."""
+    if snapshot is None:
+        return 'waiting for poses'
+    if snapshot.answer is None:
+        return 'no answer'
+    if len(snapshot.answer.pairs):
+        return f'contact, {_length(float(snapshot.answer.contacts["depth"].max()))} deep'
+    gap = snapshot.separation
+    return f'no contact, {_length(gap)} apart' if gap > 0.0 else 'no contact'
+
+
+def _length(metres: float) -> str:
+    return f'{metres:.2f} m' if metres >= 1.0 else f'{1e3 * metres:.1f} mm'
+
+
+def highlight(number: int | None) -> Html:
+    """Return the style that fills one button of the group that comes next; None: of none."""
+    chosen = '' if number is None else (
+        f'div:has(> #highlight) + div button:nth-of-type({number + 1}) '
+        f'{{background: rgb{CONTACT}; color: white}}')
+    return Html(f'<style id="highlight">{chosen}</style>')
 
 
 def deepest_contacts(snapshot: Snapshot | None) -> Html:
@@ -107,7 +130,8 @@ def report(text: str) -> Html:
 
 def _table(name: str, rows: list[tuple[str, str, str]]) -> Html:
     return tag('table', *(tag('tr', tag('td', label, style='opacity:0.7'), tag(
-        'td', tag('b', text), id=key, style='text-align:right;font-variant-numeric:tabular-nums'))
+        'td', tag('b', text), id=key, style='text-align:right;white-space:nowrap;'
+        'font-variant-numeric:tabular-nums'))
         for key, label, text in rows), id=name,
         style='width:100%;padding:0.6em;font-size:0.9em;line-height:1.3')
 

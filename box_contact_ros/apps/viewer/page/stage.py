@@ -9,6 +9,7 @@ in map coordinates.
 """
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,10 @@ from ..view_log import AnsweredTick, SceneArrays, Snapshot
 GROUND, LINES, SECTIONS = (236, 238, 241), (206, 211, 217), (176, 183, 191)
 VIEWPOINT = np.array([-0.55, -0.78, 0.42])
 """Direction from the boxes to the camera at first."""
+MARGIN = 1.05  # how much wider the view is than the boxes, so that none touches its edge
+WIDE = 16.0 / 9.0  # width divided by height of the view that "reset view" goes back to
+SAME_ASPECT = 0.01
+"""Views whose ratios of width to height differ by less need no other camera."""
 CUBE = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
 CUBE_FACES = np.array([[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],
                        [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]])
@@ -82,9 +87,10 @@ class Stage:
         self._server = server
         self._scene: SceneArrays | None = None
         self._origin: np.ndarray | None = None
+        self._corners = np.zeros((8, 3))  # of what is looked at, about the origin
         self._seen = 0  # boxes; each that joins brings all of them into view
         self._groups: list[BoxGroup] = []
-        server.on_client_connect(self._aim)
+        server.on_client_connect(self._follow)
         self._light()
         scene = server.scene
         self._ground = scene.add_grid('/ground', 60.0, 60.0, cell_size=1.0, section_size=5.0,
@@ -184,18 +190,47 @@ class Stage:
             setattr(self._ground, name, max(60.0, 3.0 * extent))
         self._ground.visible = True
         initial = self._server.initial_camera  # what the button "reset view" goes back to
-        initial.position = 0.85 * extent * VIEWPOINT
+        self._corners = CUBE * (high - low)
+        initial.position = camera_position(self._corners, initial.fov, WIDE)
         initial.look_at = np.zeros(3)
         for client in self._server.get_clients().values():
             self._aim(client)
 
+    def _follow(self, client: viser.ClientHandle) -> None:
+        """Bring all boxes into a browser's view, and again whenever its shape changes."""
+        aspect = client.camera.aspect
+        self._aim(client)
+
+        def updated(camera: viser.CameraHandle) -> None:
+            nonlocal aspect
+            if abs(camera.aspect / aspect - 1.0) > SAME_ASPECT:
+                aspect = camera.aspect
+                self._aim(client)
+        client.camera.on_update(updated)
+
     def _aim(self, client: viser.ClientHandle) -> None:
-        """Bring a browser's camera to where it is to start."""
+        """Bring a browser's camera to where all boxes are in its view."""
         if self._origin is None:
             return
+        camera = client.camera
         # In this order: setting the position moves the other along.
-        client.camera.position = self._server.initial_camera.position
-        client.camera.look_at = self._server.initial_camera.look_at
+        camera.position = camera_position(self._corners, camera.fov, camera.aspect)
+        camera.look_at = np.zeros(3)
+
+
+def camera_position(corners: np.ndarray, fov: float, aspect: float) -> np.ndarray:
+    """Return where a camera (3,) towards the origin has corners (n, 3) in view, from VIEWPOINT.
+
+    fov: vertical angle of view [rad]; aspect: width of the view divided by its height.
+    """
+    back = VIEWPOINT / np.linalg.norm(VIEWPOINT)
+    right = np.cross([0.0, 0.0, 1.0], back)
+    right /= np.linalg.norm(right)
+    tangent = math.tan(0.5 * fov)
+    aside = np.maximum(np.abs(corners @ right) / (tangent * aspect),
+                       np.abs(corners @ np.cross(back, right)) / tangent)
+    position: np.ndarray = (MARGIN * aside + corners @ back).max() * back
+    return position
 
 
 def _linear(colours: np.ndarray) -> np.ndarray:

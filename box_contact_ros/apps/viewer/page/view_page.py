@@ -4,10 +4,12 @@
 """The page: drawing, read-outs and controls, served by viser. No ROS."""
 from __future__ import annotations
 
+import math
 import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import viser
@@ -15,15 +17,18 @@ import viser
 from ....solver.models import models
 from ..style import CONTACT
 from ..view_log import Snapshot, ViewFigures
-from .read_outs import Html, deepest_contacts, legend, line, read_out, report
+from .read_outs import Html, deepest_contacts, highlight, legend, line, read_out, report
 from .server import PageServer
 from .stage import Stage
 
-CHART_LEAST, CHART_MOST = ({'pad': 0.1, 'soft': value, 'mode': 1} for value in (-20.0, 20.0))
-"""Of the separation [mm]: the chart shows at least this, so that it does not magnify noise."""
+SHALLOW, DEEP = -10.0, 5.0
+"""Of the depth [mm]: the chart begins at the first, around the touch, and shows at least the
+second, so that it does not magnify noise."""
 READ_OUT_PERIOD = 0.2  # time [s] between new figures: faster, nobody can read them
+ROOM = 1.1  # how much higher than its largest value a chart is
 HISTORY = 12.0  # length [s] of the chart
-PANEL_WIDTH = 410  # pixels
+PANEL_WIDTH = 410  # pixels at most, of a wide window
+PANEL_SHARE = 3  # the panel takes one part in so many of the window's width
 
 
 @dataclass(frozen=True)
@@ -47,13 +52,16 @@ class Page:
         server.gui.configure_theme(show_logo=False, show_share_button=False, brand_color=CONTACT,
                                    control_width='large')
         server.gui.main_panel.dock_right()
-        server.gui.main_panel.set_width(PANEL_WIDTH)
+        server.on_client_connect(_narrow)
         self._stage = Stage(server)
+        self._figures: ViewFigures | None = None
+        self._running = ''  # the model that answers
         self._read_out = server.gui.add_html('')
-        self._deepest = server.gui.add_html('')
+        self._add_charts()
         _put(server.gui.add_html(''), legend())
-        self._add_chart()
+        self._deepest = server.gui.add_html('')
         self._next_read_out = 0.0
+        self._highlight = server.gui.add_html('')  # styles what comes next
         if on_model is not None:
             self._model = server.gui.add_button_group('model', tuple(models()))
             self._model.on_click(lambda event: on_model(event.target.value))
@@ -61,15 +69,19 @@ class Page:
         if run is not None and on_land is not None:
             self._add_crane(run, on_land)
 
-    def _add_chart(self) -> None:
-        self._history: deque[tuple[float, float]] = deque()
-        self._chart = self._server.gui.add_uplot(
+    def _add_charts(self) -> None:
+        self._history: deque[tuple[float, float, float]] = deque()  # time, depth, force
+        self._depth_chart = self._add_chart('depth [mm]')
+        self._force_chart = self._add_chart('force [kN]')
+        self._force_chart.visible = False
+
+    def _add_chart(self, label: str) -> Any:
+        return self._server.gui.add_uplot(
             (np.zeros(1), np.zeros(1)),
-            ({'label': 's'}, {'label': 'separation', 'stroke': f'rgb{CONTACT}', 'width': 2}),
+            ({'label': 's'}, {'label': label, 'stroke': f'rgb{CONTACT}', 'width': 2}),
             axes=({'label': 'time [s]', 'size': 30, 'labelSize': 18},
-                  {'label': 'separation [mm]', 'size': 56, 'labelSize': 18}),
-            scales={'x': {'time': False}, 'y': {'range': {'min': CHART_LEAST, 'max': CHART_MOST}}},
-            legend={'show': False}, height=160)
+                  {'label': label, 'size': 56, 'labelSize': 18}),
+            scales=_scales(0.0, 1.0), legend={'show': False}, height=135)
 
     def _add_crane(self, run: CraneRun, on_land: Callable[[CraneRun], None]) -> None:
         gui = self._server.gui
@@ -87,10 +99,24 @@ class Page:
             with self._report:
                 self._last_run = gui.add_html('')
 
-    def draw(self, snapshot: Snapshot | None, lines: np.ndarray) -> None:
-        """Show boxes, contacts, and the lines (n, 2, 3) of a crane."""
-        if snapshot is not None:
+    def draw(self, snapshot: Snapshot | None, lines: np.ndarray, force: float = math.nan) -> None:
+        """Show boxes, contacts, and the lines (n, 2, 3) of a crane, and the figures of that tick.
+
+        force: upward part of the force on the crane's load [N], NaN where none is known.
+        """
+        if snapshot is None:
+            return
+        with self._server.atomic():
             self._stage.draw(snapshot, lines)
+            self._read(snapshot)
+        now = time.monotonic()
+        self._history.append((now, -1e3 * snapshot.separation, 1e-3 * force))
+        while now - self._history[0][0] > HISTORY:
+            self._history.popleft()
+
+    def _read(self, snapshot: Snapshot | None) -> None:
+        _put(self._read_out, read_out(snapshot, self._figures, self._running))
+        _put(self._deepest, deepest_contacts(snapshot))
 
     @property
     def due(self) -> bool:
@@ -99,17 +125,12 @@ class Page:
 
     def show(self, snapshot: Snapshot | None, figures: ViewFigures | None, *, model: str, wish: str,
              refusal: str, connected: bool) -> None:
-        """Show the figures."""
-        now = time.monotonic()
-        self._next_read_out = now + READ_OUT_PERIOD
-        _put(self._read_out, read_out(snapshot, figures, model))
-        _put(self._deepest, deepest_contacts(snapshot))
-        if snapshot is not None:
-            self._history.append((now, 1e3 * snapshot.separation))
-            while now - self._history[0][0] > HISTORY:
-                self._history.popleft()
-            times, separations = np.array(self._history).T
-            self._chart.data = times - now, separations
+        """Show figures of the last seconds, and which model runs, next to those of a tick."""
+        self._next_read_out = time.monotonic() + READ_OUT_PERIOD
+        self._figures, self._running = figures, model
+        self._read(snapshot)
+        self._draw_charts()
+        _put(self._highlight, highlight(list(models()).index(model) if model in models() else None))
         text, bad = f'running: {model}', False
         if not model:
             text = 'waiting for the contact node …'
@@ -120,6 +141,18 @@ class Page:
         elif refusal:
             text, bad = f'refused: {refusal}', True
         _put(self._status, line('model-status', text, bad=bad))
+
+    def _draw_charts(self) -> None:
+        if not self._history:
+            return
+        times, depths, forces = np.array(self._history).T
+        self._depth_chart.data = times - times[-1], depths
+        self._depth_chart.scales = _scales(SHALLOW, max(DEEP, ROOM * depths.max()))
+        known = ~np.isnan(forces)
+        self._force_chart.visible = bool(known.any())
+        if known.any():
+            self._force_chart.data = times[known] - times[-1], forces[known]
+            self._force_chart.scales = _scales(0.0, max(1.0, ROOM * forces[known].max()))
 
     def show_run(self, run: CraneRun) -> None:
         """Show which run is under way."""
@@ -137,6 +170,18 @@ class Page:
         self._server.stop()
 
 
+def _scales(low: float, high: float) -> dict[str, Any]:
+    """Return the axes of a chart whose values run from `low` to `high`, whatever it shows."""
+    bounds = ({'hard': end, 'soft': end, 'mode': 1} for end in (low, float(high)))
+    return {'x': {'time': False}, 'y': {'range': dict(zip(('min', 'max'), bounds))}}
+
+
+def _narrow(client: viser.ClientHandle) -> None:
+    """Give the panel its share of a browser's window, which is all that there is at first."""
+    client.gui.main_panel.set_width(min(PANEL_WIDTH, client.camera.image_width // PANEL_SHARE))
+
+
 def _put(place: viser.GuiHtmlHandle, content: Html) -> None:
     """Show HTML, and nothing else, at a place of the panel."""
-    place.content = str(content)  # viser takes no other kind of text
+    if place.content != content:
+        place.content = str(content)  # viser takes no other kind of text

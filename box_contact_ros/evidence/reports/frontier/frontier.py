@@ -250,6 +250,6 @@ def main(args: Sequence[str] | None = None) -> int:
     output.write_csv(folder / 'frontier.csv', csv_rows(rows, found))
     (folder / 'frontier.md').write_text(page(rows, found, missing, command, plan),
                                         encoding='utf-8')
-    draw(folder / 'frontier.png', rows)
+    draw(folder / 'frontier.png', folder / 'frontier.csv')
     print(in_short(rows, odd_cells(rows, found)), honesty(rows), sep='\n\n')
     return 0

@@ -1,97 +1,65 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""The picture of `frontier`: point error over time of single calls, of batches, and the paper's."""
+"""The picture of `frontier`: point error over the time of a call, for five contestants.
+
+It is drawn from frontier.csv, which has all of them:
+`python -m box_contact_ros.evidence.reports.frontier.frontier_picture frontier.csv frontier.png`.
+"""
 from __future__ import annotations
 
+import csv
 import math
-from collections.abc import Sequence
+import sys
 from pathlib import Path
-from typing import Any
 
 from box_contact_ros import output
-from box_contact_ros.solver.models import models_with_patch
 
-from ..paper.paper_tables import PAPER_NETWORK, PAPER_SOUP
-from .trials import FrontierRow
-
-SHOWN_SET = 'containers'
-ERRORS = (0.1, 100.0)
-"""Errors that are drawn to scale [%]; 0 has a band of its own below."""
-PAPER_ERROR = 34.0
-"""The paper's MAE of 0.5624 rad in % of an edge. Seen from 1.2 m, the mean distance of a touching
-cube's surface, the MAE is a point error of 0.67 m, a third of the edge of 2 m."""
-GROUPS = {'this package': ('C0', 'o', ('exact', 'mlp')),
-          'the paper: network': ('C4', 'X', ('paper',)), 'the paper: soup': ('C5', 'D', ('soup',)),
-          'FCL, Coal': ('C2', 's', ('fcl', 'python', 'Coal')),
-          'MuJoCo': ('C1', '^', ('MuJoCo',)), 'Bullet': ('C3', 'v', ('PyBullet',)),
-          'Drake': ('C6', 'P', ('Drake',)), 'DART': ('C8', 'p', ('DART',)),
-          'Rapier, Newton': ('C9', '<', ('Rapier', 'Newton')),
-          'others': ('0.35', 'h', ('',))}
-"""Colour, marker, and how names of the group begin; the first that fits."""
-LEFT_OUT = ('paper-continuous', *(f'soup-{n}' for n in list(PAPER_SOUP)[1:-1]))
+SHOWN_SET, EDGE = 'containers', 12.192e3
+"""The set of poses that is drawn, and its longest edge [mm], which errors are a share of."""
+SHOWN = {'exact': ('exact', 'C0'), 'mlp': ('mlp', 'C0'),
+         'paper': ("the paper's network", 'C4'), 'soup-8': ('polygon soup, N = 8', 'C5'),
+         'MuJoCo mj_collision': ('MuJoCo, best of its points', 'C1')}
+"""Contestant: how the picture calls it, and its colour."""
+ERRORS = (0.1, 1e4)
+"""Errors that are drawn to scale [mm]; 0 has a band of its own below."""
+TIMES = (0.3, 2e4)
+"""Times that the picture shows [µs]: names stand on the right of their points."""
 
 
-def group_of(name: str) -> str:
-    """Return the group of a contestant."""
-    return next(group for group, (*_, starts) in GROUPS.items() if name.startswith(starts))
+def shown_points(table: Path) -> dict[str, tuple[float, float]]:
+    """Return the time of a call [µs] and the p99 point error [mm] of each contestant of a CSV.
+
+    An engine with several ways to make one point has the best of them. Models have the fastest
+    instruction set, whose rows come first.
+    """
+    found: dict[str, tuple[float, float]] = {}
+    with table.open(newline='', encoding='utf-8') as file:
+        for row in csv.DictReader(file):
+            if row['set'] == SHOWN_SET and row['class'] == 'all' and row['contestant'] in SHOWN:
+                time, error = float(row['call_p50']) / 1e3, float(row['point_p99']) * EDGE / 100.0
+                before = found.get(row['contestant'], (time, math.inf))
+                found[row['contestant']] = before[0], min(before[1], error)
+    return found
 
 
-def draw(path: Path, rows: Sequence[FrontierRow]) -> None:
-    """Draw point error (p99) over time on one set: single calls, batches, the paper's figures."""
-    figure = output.figure((8.0, 9.6), layout=None)
-    single = figure.add_axes((0.13, 0.49, 0.53, 0.47))
-    batch = figure.add_axes((0.13, 0.1, 0.29, 0.3))
-    shown = [row for row in rows if row.set == SHOWN_SET and row.errors.points
-             and row.name not in LEFT_OUT]
-    _points(single, [(row.single[0] / 1e3, row) for row in shown])
-    _points(batch, [(row.batch / 1e3, row) for row in shown])
-    single.set(title=f'A single call from Python, {SHOWN_SET}', xlabel='time [µs]')
-    batch.set(title=f'A pair in a batch, one core, {SHOWN_SET}', xlabel='time [µs]')
-    for axis in (single, batch):
-        axis.set_ylabel('point error, p99 [% of the edge]')
-    _the_papers(figure.add_axes((0.76, 0.1, 0.21, 0.3)))
-    handles = {group: single.plot([], [], marker, color=colour)[0]
-               for group, (colour, marker, _) in GROUPS.items()
-               if group in map(group_of, (row.name for row in shown))}
-    figure.legend(handles.values(), handles, loc='lower center', ncols=7, fontsize=8,
-                  handletextpad=0.1)
-    figure.savefig(path)
-
-
-def _points(axis: Any, found: Sequence[tuple[float, FrontierRow]]) -> None:
-    """Draw times and errors with their names in a column next to them, and the frontier."""
+def draw(path: Path, table: Path) -> None:
+    """Draw what `shown_points` finds in a CSV."""
+    figure = output.figure((6.4, 4.2))
+    axis = figure.subplots()
     height = output.log_errors(axis, *ERRORS)
     axis.set_xscale('log')
-    points = [(time, height(row.errors.points['all'][2]), row) for time, row in found
-              if not math.isnan(time)]
-    for time, error, row in points:
-        colour, marker, _ = GROUPS[group_of(row.name)]
-        axis.plot(time, error, marker, color=colour, markersize=6)
-    line = [(time, error) for time, error, _ in points]
-    axis.step(*zip(*(line[place] for place in output.pareto(line))), where='post', color='0.4',
-              linewidth=1.0, zorder=0)
-    output.name_points(axis, [(time, error, _label(row), GROUPS[group_of(row.name)][0])
-                              for time, error, row in points])
+    axis.xaxis.set_major_formatter('{x:g}')
+    axis.set(xlim=TIMES, xlabel='time of a call from Python [µs]',
+             ylabel='point error, p99 [mm]',
+             title='A 12 m container on another: error and time')
+    for name, (time, error) in shown_points(table).items():
+        label, colour = SHOWN[name]
+        axis.plot(time, height(error), 'o', color=colour, markersize=8)
+        axis.annotate(label, (time, height(error)), xytext=(9, 0), textcoords='offset points',
+                      va='center', color=colour, fontsize=11)
+    figure.savefig(path, metadata={'Software': None})
 
 
-def _label(row: FrontierRow) -> str:
-    parts = [row.name.removeprefix('MuJoCo ').removeprefix('PyBullet ')]
-    if row.name in models_with_patch():
-        parts.append(row.instruction_set)
-    if len(row.choices) > 1:
-        parts.append(row.best)
-    return ', '.join(parts)
-
-
-def _the_papers(axis: Any) -> None:
-    """Draw the paper's own figures, of a computer of 2003."""
-    height = output.log_errors(axis, *ERRORS, zero='no error\ngiven')
-    axis.plot(PAPER_NETWORK, PAPER_ERROR, '*', color='C4', markersize=12)
-    axis.annotate('network', (PAPER_NETWORK, PAPER_ERROR), xytext=(8, -3),
-                  textcoords='offset points', fontsize=8)
-    times = [PAPER_SOUP[n][0] for n in PAPER_SOUP]
-    axis.plot(times, [height(0.0)] * len(times), 'D-', color='C5', markersize=4)
-    axis.annotate(f'soup, N = {min(PAPER_SOUP)} to {max(PAPER_SOUP)}', (times[0], height(0.0)),
-                  xytext=(0, 10), textcoords='offset points', fontsize=8)
-    axis.set(title='The paper, 2003', xlabel='time [ms]', xlim=(0.0, 3.4))
+if __name__ == '__main__':
+    draw(Path(sys.argv[2]), Path(sys.argv[1]))
