@@ -25,14 +25,9 @@ import importlib
 import importlib.util
 import os
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib.abc import Loader, MetaPathFinder
-from importlib.machinery import ModuleSpec
-from itertools import chain
 from types import SimpleNamespace
-from typing import Any
 
 
 @dataclass(frozen=True)
@@ -46,7 +41,7 @@ class Program:
 
 PROGRAMS = {
     'contact_node': Program(
-        'box_contact_ros.node.contact_node', ('ros',),
+        'box_contact_ros.node.contact_program', ('ros',),
         'the ROS 2 node: two box poses in, contact point and normal out'),
     'crane': Program(
         'box_contact_ros.apps.crane.crane_node', ('ros', 'sim'),
@@ -66,9 +61,6 @@ PROGRAMS = {
     'record': Program(
         'box_contact_ros.apps.recording.record', ('ros', 'bag'),
         'write poses and contacts of running nodes to a bag (MCAP) for Foxglove and ros2 bag'),
-    'soak': Program(
-        'box_contact_ros.evidence.bench.soak', ('ros', 'sim', 'report'),
-        'ten minutes at 1 kHz: losses, mispairs, memory, latency next to echo nodes'),
     'train': Program(
         'box_contact_ros.evidence.training.train', ('train',),
         'make the data sets, fit the networks, write weights/'),
@@ -124,8 +116,9 @@ MODULES_OF_EXTRA = {
 def run(name: str, args: Sequence[str]) -> int:
     """Start program `name` with the arguments after its name; return its exit status.
 
-    A module of an extra that is not installed gives one line on stderr and status 1; `--help` needs
-    none of them. An unknown name gives one line and status 2, as argparse does.
+    A module of an extra that is not installed gives one line on stderr and status 1. With `--help`
+    the line is printed below what the program does. An unknown name gives one line and status 2, as
+    argparse does.
     """
     if name not in PROGRAMS:
         print(_unknown(name), file=sys.stderr)
@@ -137,14 +130,16 @@ def run(name: str, args: Sequence[str]) -> int:
     sys.argv = [name, *args]
     try:
         try:
-            with help_without_extras() if {'-h', '--help'} & set(args) else nullcontext():
-                status = importlib.import_module(program.module).main(list(args))
+            status = importlib.import_module(program.module).main(list(args))
         finally:  # --help, too, which leaves by SystemExit
             sys.stdout.flush()
     except ModuleNotFoundError as error:
         message = _missing_module(name, error.name or '')
         if message is None:
             raise
+        if {'-h', '--help'} & set(args):
+            print(f'usage: {name} [ARGUMENT ...]\n\n{program.description}\n\n{message}')
+            return 0
         print(message, file=sys.stderr)
         return 1
     except KeyboardInterrupt:
@@ -245,53 +240,3 @@ def _missing_module(name: str, module: str) -> str | None:
     if 'ros' in bring_it:
         text += ', or apt install ros-jazzy-ros-base and source /opt/ros/jazzy/setup.bash'
     return text
-
-
-# --- help without extras --------------------------------------------------------------------------
-
-
-class _AlsoNothing(type):
-    """Attributes, items and calls of the class are the class itself."""
-
-    def __getattr__(cls, name: str) -> Any:
-        if name.startswith('__'):
-            raise AttributeError(name)
-        return Nothing
-
-    def __call__(cls, *args: Any, **options: Any) -> Any:
-        return Nothing
-
-    def __getitem__(cls, key: Any) -> Any:
-        return Nothing
-
-    def __iter__(cls) -> Iterator[Any]:
-        return iter(())
-
-
-class Nothing(Exception, metaclass=_AlsoNothing):
-    """Any name of a module that is not installed: a base, a decorator, a default, an exception."""
-
-
-class _StandIns(MetaPathFinder, Loader):
-    """Finds stand-ins for the modules of all extras: classes whose every name is `Nothing`."""
-
-    def find_spec(self, name: str, path: Any = None, target: Any = None) -> ModuleSpec | None:
-        known = name.partition('.')[0] in chain(*MODULES_OF_EXTRA.values())
-        return ModuleSpec(name, self) if known else None
-
-    def create_module(self, spec: ModuleSpec) -> Any:
-        return _AlsoNothing(spec.name, (Nothing,), {'__path__': []})
-
-    def exec_module(self, module: object) -> None:
-        pass
-
-
-@contextmanager
-def help_without_extras() -> Iterator[None]:
-    """Let programs import stand-ins for what is not installed: their parsers need none of it."""
-    finder = _StandIns()
-    sys.meta_path.append(finder)  # last: what is installed is found before
-    try:
-        yield
-    finally:
-        sys.meta_path.remove(finder)

@@ -6,13 +6,11 @@ from __future__ import annotations
 
 import argparse
 import csv
-import gc
 import math
 import platform
 import sys
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, astuple, dataclass
 from importlib import metadata
 from pathlib import Path
@@ -202,37 +200,6 @@ def number(value: float, digits: int = 3) -> str:
     return f'{value:.{max(0, digits - 1 - math.floor(math.log10(value)))}f}'
 
 
-@contextmanager
-def no_garbage_collection() -> Iterator[None]:
-    """Collect the garbage now, and none until the end: it takes milliseconds."""
-    gc.collect()
-    gc.freeze()
-    gc.disable()
-    try:
-        yield
-    finally:
-        gc.enable()
-        gc.unfreeze()
-
-
-_AMD = ((23, 0x00, 0x2f, 'Zen'), (23, 0x30, 0xff, 'Zen 2'), (25, 0x00, 0x0f, 'Zen 3'),
-        (25, 0x10, 0x1f, 'Zen 4'), (25, 0x20, 0x5f, 'Zen 3'), (25, 0x60, 0x7f, 'Zen 4'),
-        (25, 0xa0, 0xaf, 'Zen 4'), (26, 0x00, 0xff, 'Zen 5'))
-_INTEL = ((6, 61, 61, 'Broadwell'), (6, 63, 63, 'Haswell-EP'), (6, 71, 71, 'Broadwell'),
-          (6, 78, 78, 'Skylake'), (6, 79, 79, 'Broadwell-EP'),
-          (6, 85, 85, 'Skylake-SP or Cascade Lake'), (6, 106, 108, 'Ice Lake-SP'),
-          (6, 125, 126, 'Ice Lake'), (6, 140, 141, 'Tiger Lake'),
-          (6, 142, 142, 'Kaby Lake or later'), (6, 143, 143, 'Sapphire Rapids'),
-          (6, 151, 151, 'Alder Lake'), (6, 154, 154, 'Alder Lake'),
-          (6, 158, 158, 'Kaby Lake or later'), (6, 167, 167, 'Rocket Lake'),
-          (6, 170, 170, 'Meteor Lake'), (6, 173, 174, 'Granite Rapids'),
-          (6, 175, 175, 'Sierra Forest'), (6, 183, 183, 'Raptor Lake'),
-          (6, 189, 189, 'Lunar Lake'), (6, 197, 198, 'Arrow Lake'),
-          (6, 207, 207, 'Emerald Rapids'))
-_GENERATIONS = {'AuthenticAMD': _AMD, 'GenuineIntel': _INTEL}
-"""By vendor: CPU family, first and last model, generation."""
-
-
 class Core(Protocol):
     """What the machine's description asks the native core: `box_contact_ros.core.native`."""
 
@@ -244,7 +211,7 @@ class Core(Protocol):
 class Machine:
     """What a figure was measured on; `dataclasses.asdict` gives the columns of a CSV file."""
 
-    processor: str  # name, microarchitecture, CPU family and model
+    processor: str  # name, CPU family and model
     instruction_set: str
     compiler: str
     versions: str  # versions of Python and of packages
@@ -263,23 +230,12 @@ def machine(core: Core, packages: Sequence[str] = ('numpy',)) -> Machine:
 
 
 def processor() -> str:
-    """Return name, CPU family, model and, where it is known, generation of the processor."""
+    """Return name, CPU family and model of the processor, as the system tells them."""
     found = _cpu_fields()
     name = found.get('model name') or platform.processor() or platform.machine()
-    try:
-        family, model = int(found['cpu family']), int(found['model'])
-    except (KeyError, ValueError):
+    if not {'cpu family', 'model'} <= found.keys():
         return name
-    known = generation(found.get('vendor_id', ''), family, model)
-    return f'{name} ({known + ", " if known else ""}family {family}, model {model})'
-
-
-def generation(vendor: str, family: int, model: int) -> str | None:
-    """Return the name of a processor's generation, or None where it is not known here."""
-    for known, first, last, name in _GENERATIONS.get(vendor, ()):
-        if family == known and first <= model <= last:
-            return name
-    return None
+    return f'{name} (family {found["cpu family"]}, model {found["model"]})'
 
 
 def _cpu_fields(path: Path = Path('/proc/cpuinfo')) -> dict[str, str]:

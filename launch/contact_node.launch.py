@@ -14,7 +14,7 @@ from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
-from box_contact_ros.node.contact_node import PARAMETERS
+from box_contact_ros.node.contact_program import PARAMETERS
 from box_contact_ros.node.launch_arguments import CONTACT_NODE, descriptions, given_values
 from box_contact_ros.resources import resource_path
 

@@ -25,7 +25,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from ..solver.arguments import model_name, within
+from ..solver.arguments import WholeNames, model_name, within
 from ..solver.models import model_names, models_with_patch
 from . import processes
 from .crane.landing import LANDING_DURATION
@@ -80,8 +80,7 @@ def main(args: Sequence[str] | None = None) -> int:
             print(f'demo: failed with status {status}; what contact_node printed:\n'
                   f'{printed(node_output) or "(nothing)"}', file=sys.stderr)
             return status
-    rest = ', and the load is at rest' if options.closed_loop else ''
-    print(f'PASS: contacts came, and none was lost{rest}.\n{NEXT.format(python=_python())}')
+    print(NEXT.format(python=_python()))
     return 0
 
 
@@ -97,17 +96,18 @@ def _announcement(options: argparse.Namespace) -> str:
              'It passes if contacts come and none is lost'
              f'{", and if the load comes to rest" if options.closed_loop else ""}.']
     if options.closed_loop and options.model not in models_with_patch():
-        lines.append(f'Model {options.model} gives points without a patch. The whole bottom of the '
-                     'load stands for the patch, so the load may not come to rest. With '
-                     '--open-loop, its contacts are only recorded.')
+        lines.append(f'Model {options.model} gives points without a patch. The law of force then '
+                     'takes the whole bottom of the load as the patch. The load may not come to '
+                     'rest, and the demo then ends with FAIL. With --open-loop, contacts are only '
+                     'recorded.')
     return '\n'.join(lines)
 
 
 def _options(args: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
-        prog='python -m box_contact_ros.apps.demo',
-        description='A contact node and a crane simulator, live in this terminal for less than a '
-                    'minute.',
+        prog='python -m box_contact_ros.apps.demo', formatter_class=WholeNames,
+        description='Run a contact node and a crane simulator in this terminal, for less than '
+                    'a minute.',
         epilog=f'{DOMAIN_VARIABLE}=N in the environment chooses the ROS domain, '
                f'0 to {DOMAINS[-1]}; without it one is drawn at random.',
     )
@@ -120,7 +120,7 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
                         help=f'one of {model_names()}; the closed loop needs volume and '
                              'covariance: mlp or exact (default: %(default)s)')
     parser.add_argument('--rate', type=within(1.0, 2000.0), default=200.0, metavar='HZ',
-                        help='pairs of poses a second (default: %(default)g)')
+                        help='pairs of poses per second (default: %(default)g)')
     open_loop = CraneScenario().duration
     parser.add_argument('--duration', type=float, metavar='S',
                         help=f'longest motion, closed loop {LANDING_LEAST:g} to 40 s '

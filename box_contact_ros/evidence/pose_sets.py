@@ -66,47 +66,6 @@ class Pairs(NamedTuple):
         return solver.batch(self.pose_a, self.pose_b, size_a=self.size_a, size_b=self.size_b)
 
 
-class ContactErrors(NamedTuple):
-    """Errors of n contacts against the exact ones, in %."""
-
-    point: np.ndarray
-    """(n,) of the smaller box's longest edge."""
-    volume: np.ndarray
-    """(n,) of the exact volume; NaN from models that give the point alone."""
-    covariance: np.ndarray
-    """(n,) Frobenius norm, of the exact covariance's trace; NaN like the volume's."""
-    in_plane: np.ndarray
-    """(n,) of either eigenvalue in the plane of the contact, relative; NaN like the volume's."""
-
-    def rows(self, chosen: np.ndarray) -> ContactErrors:
-        """Return some of the errors."""
-        return ContactErrors(*(errors[chosen] for errors in self))
-
-
-def contact_errors(found: Contacts, truth: Contacts, edge: np.ndarray) -> ContactErrors:
-    """Return the errors of n contacts; edge: see `Pairs.edge`. All pairs touch, by both."""
-    off = np.linalg.norm(found.covariance - truth.covariance, axis=(1, 2))
-    exact = _in_plane(truth.covariance, truth.normal)
-    in_plane = np.abs(_in_plane(found.covariance, truth.normal) - exact) / exact
-    return ContactErrors(*(100.0 * error for error in (
-        np.linalg.norm(found.point - truth.point, axis=1) / edge,
-        np.abs(found.volume - truth.volume) / truth.volume,
-        off / np.trace(truth.covariance, axis1=1, axis2=2), in_plane.max(axis=1, initial=0.0))))
-
-
-def _in_plane(covariance: np.ndarray, normal: np.ndarray) -> np.ndarray:
-    """Return eigenvalues (n, 2), least first, of covariances (n, 3, 3) across normals (n, 3)."""
-    helper = np.eye(3)[np.abs(normal).argmin(axis=1)]
-    x = np.cross(normal, helper)
-    x /= np.linalg.norm(x, axis=1, keepdims=True)
-    axes = np.stack([x, np.cross(normal, x)], axis=1)
-    across = axes @ covariance @ axes.swapaxes(1, 2)
-    one, other, both = across[:, 0, 0], across[:, 1, 1], across[:, 0, 1]
-    largest = 0.5 * (one + other) + np.hypot(0.5 * (one - other), both)
-    least = (one * other - both**2) / largest
-    return np.stack([least, largest], axis=1)
-
-
 Generator = Callable[[np.random.Generator, int], Pairs]
 
 

@@ -14,7 +14,7 @@ from typing import Any
 import yaml
 
 from ..solver.checks import shown
-from .contact_node import PARAMETERS
+from .contact_program import PARAMETERS
 from .parameters import Setting, default_text, flag, one_of, text, unknown_name
 
 

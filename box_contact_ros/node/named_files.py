@@ -12,10 +12,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any
-
-from rclpy.logging import get_logger
-from rclpy.node import Node
+from typing import TYPE_CHECKING, Any
 
 from ..resources import OpenFiles
 from ..scene.files.limits import FOREIGN, OWN, SceneLimits
@@ -23,7 +20,9 @@ from ..scene.files.scene_file import is_inline, read_scene
 from ..scene.scene_solver import Scene, two_boxes
 from ..solver.checks import shown
 from .parameters import Setting, flag, reason_of, text
-from .runtime import LOG_SECONDS
+
+if TYPE_CHECKING:
+    from rclpy.node import Node
 
 FILES = ('scene', 'weights')
 """Parameters that name a file."""
@@ -73,6 +72,10 @@ class NamedFiles:
         except Exception as error:
             if starts or not files:
                 raise
+            from rclpy.logging import get_logger  # the table of parameters needs no ROS
+
+            from .runtime import LOG_SECONDS
+
             # A logger of no node: /rosout does not publish it.
             get_logger(f'{self._node.get_logger().name}.local').error(
                 reason_of(error), throttle_duration_sec=LOG_SECONDS)

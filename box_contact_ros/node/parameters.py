@@ -1,32 +1,19 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Node parameters as one table per node: declared, checked, and listed by `--help`.
+"""Node parameters as one table per node: checked, and listed by `--help`, which needs no ROS.
 
-Parameters are declared with dynamic typing, so that the check of each setting refuses a value of
-another type, and not rclpy. What the check returns is stored: 200 becomes 200.0 where a double is
-meant. rclpy itself enforces the ranges in the descriptors.
+`declared_parameters` gives them to a node.
 """
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
-from rcl_interfaces.msg import (
-    FloatingPointRange,
-    IntegerRange,
-    ParameterDescriptor,
-    SetParametersResult,
-)
-from rclpy.node import Node
-from rclpy.parameter import Parameter
-
 from ..solver.arguments import program_parser
 from ..solver.checks import nearest_name, shown, size_fault
-from .rclpy_workarounds import parameter_overrides
 
 Check = Callable[[str, Any], Any]
 """From a parameter's name and value to the value as the node uses it; ValueError if it is wrong."""
@@ -35,7 +22,6 @@ Check = Callable[[str, Any], Any]
 OF_RCLPY = ('use_sim_time', 'start_type_description_service')  # every node has them
 QOS_OVERRIDES = 'qos_overrides.'  # begins the names of those that are declared with a topic
 LONGEST_REASON = 1000  # characters: it may quote what a stranger sent
-LOCKED = 'the node is locked: nothing can be changed after its start'
 
 
 @dataclass(frozen=True)
@@ -59,21 +45,6 @@ class Setting:
     description: str
     check: Check
     fixed: bool = False  # whether it is for the start only
-
-    def descriptor(self, *, read_only: bool) -> ParameterDescriptor:
-        """Return what tools show of the parameter."""
-        limits = self.check if isinstance(self.check, Limits) else Limits(self.check)
-        descriptor = ParameterDescriptor(
-            description=self.description, dynamic_typing=True, read_only=read_only,
-            additional_constraints=limits.words)
-        if limits.range:
-            low, high = limits.range
-            if isinstance(self.default, int):
-                descriptor.integer_range = [IntegerRange(from_value=low, to_value=high)]
-            else:
-                descriptor.floating_point_range = [
-                    FloatingPointRange(from_value=float(low), to_value=float(high))]
-        return descriptor
 
 
 def _is_number(value: Any) -> bool:
@@ -147,34 +118,6 @@ def flag(name: str, value: Any) -> bool:
     return value
 
 
-def declare(node: Node, settings: Mapping[str, Setting], *, fixed: bool = False,
-            ) -> dict[str, Any]:
-    """Declare and check a node's parameters; `fixed`: none can be changed while it runs."""
-    given = parameter_overrides(node)
-    values = checked(settings, {name: given.get(name, setting.default)
-                                for name, setting in settings.items()})
-    for name, setting in settings.items():
-        node.declare_parameter(
-            name, _stored(values[name]), setting.descriptor(
-                read_only=fixed or setting.fixed or values.get('locked', False)),
-            ignore_override=True)  # the checked value holds the override
-    _say_unknown(node, settings)
-    return values
-
-
-def _stored(value: Any) -> Any:
-    """Return a checked value as rclpy takes it."""
-    return list(value) if isinstance(value, tuple) else value
-
-
-def _say_unknown(node: Node, settings: Mapping[str, Setting]) -> None:
-    """Warn of names without a parameter; a file of parameters may be meant for several nodes."""
-    for name in parameter_overrides(node):
-        # Those of topics are declared with the topics.
-        if not node.has_parameter(name) and not name.startswith(QOS_OVERRIDES):
-            node.get_logger().warning(f'{unknown_name("parameter", name, settings)}; it is ignored')
-
-
 def unknown_name(kind: str, name: str, known: Iterable[str]) -> str:
     """Return the refusal of a name that there is not, with the nearest name if one is near."""
     return f'unknown {kind} {shown(name)}{nearest_name(name, known)}'
@@ -183,40 +126,6 @@ def unknown_name(kind: str, name: str, known: Iterable[str]) -> str:
 def checked(settings: Mapping[str, Setting], values: Mapping[str, Any]) -> dict[str, Any]:
     """Return all values as the node uses them, or raise ValueError for the first bad one."""
     return {name: setting.check(name, values[name]) for name, setting in settings.items()}
-
-
-class CheckedParameters:
-    """The parameters of a running node: changed together if all are good, else not at all."""
-
-    def __init__(self, node: Node, settings: Mapping[str, Setting],
-                 apply: Callable[[dict[str, Any], Collection[str]], None]) -> None:
-        """Declare and check; `apply` gets new values and the names that were set, or refuses."""
-        self._settings, self._apply = settings, apply
-        self.values = declare(node, settings)
-        node.add_pre_set_parameters_callback(self._as_checked)
-        node.add_on_set_parameters_callback(self._on_set)
-
-    def _as_checked(self, parameters: list[Parameter]) -> list[Parameter]:
-        """Return parameters with the values that are stored, bad ones as they came."""
-        found = []
-        for parameter in parameters:
-            with suppress(Exception):  # `_on_set` refuses what is bad
-                value = self._settings[parameter.name].check(parameter.name, parameter.value)
-                parameter = Parameter(parameter.name, value=_stored(value))
-            found.append(parameter)
-        return found
-
-    def _on_set(self, parameters: list[Parameter]) -> SetParametersResult:
-        if self.values.get('locked'):  # other nodes' parameters, such as use_sim_time, too
-            return SetParametersResult(successful=False, reason=LOCKED)
-        changes = {p.name: p.value for p in parameters if p.name in self._settings}
-        try:
-            values = checked(self._settings, {**self.values, **changes})
-            self._apply(values, changes)
-        except Exception as error:  # the client would wait for ever
-            return SetParametersResult(successful=False, reason=reason_of(error))
-        self.values = values
-        return SetParametersResult(successful=True)
 
 
 def reason_of(error: Exception) -> str:
@@ -242,18 +151,29 @@ def answer_help(program: str, doc: str | None, settings: Mapping[str, Setting],
                         'in a launch file: log unknown ones, and start')
     options, unknown = parser.parse_known_args(outside_ros_args(args or ()))
     if unknown:
-        hint = ' (parameters stand after --ros-args)' if '-p' in unknown else ''
+        hint = _as_parameter(unknown, settings)
         parser.error(f'unrecognized arguments: {" ".join(unknown)}{hint}')
     for rule in rules_after_p(args or ()):
-        name, _, value = rule.partition(':=')
+        name, given, value = rule.partition(':=')
+        if not given:
+            parser.error(f'{shown(rule)} is not NAME:=VALUE, such as rate:=200.0')
         if value.startswith('[') and ']' not in value:  # a shell has cut it in pieces
             parser.error(f'{shown(rule)} is half a list: write it without blanks, as in '
                          f'{name}:=[1,2,3], or put it in quotes, as in "{name}:=[1, 2, 3]"')
         name = name.rpartition(':')[2]
         if not (name in settings or name in OF_RCLPY or name.startswith(QOS_OVERRIDES)
                 or options.shared_parameters):
-            parser.error(f'{unknown_name("parameter", name, settings)} (for parameters that '
-                         'several nodes share: --params-file, or --shared-parameters)')
+            parser.error(f'{unknown_name("parameter", name, settings)}. Parameters that several '
+                         'nodes share need --params-file or --shared-parameters')
+
+
+def _as_parameter(arguments: Sequence[str], settings: Collection[str]) -> str:
+    """Return how to write the first of unknown arguments that names a parameter; '' for none."""
+    for argument in arguments:
+        name = argument.lstrip('-').partition('=')[0].rstrip(':').replace('-', '_')
+        if name in settings:
+            return f' (parameters follow --ros-args: --ros-args -p {name}:=VALUE)'
+    return ''
 
 
 def outside_ros_args(args: Sequence[str]) -> list[str]:
@@ -268,9 +188,8 @@ def outside_ros_args(args: Sequence[str]) -> list[str]:
 
 
 def rules_after_p(args: Sequence[str]) -> list[str]:
-    """Return the rules of all `-p NAME:=VALUE` and `-p NODE:NAME:=VALUE`."""
-    return [rule for flag, rule in zip(args, args[1:])
-            if flag in ('-p', '--param') and ':=' in rule]
+    """Return what follows each `-p`: `NAME:=VALUE` or `NODE:NAME:=VALUE`."""
+    return [rule for flag, rule in zip(args, args[1:]) if flag in ('-p', '--param')]
 
 
 def default_text(default: Any) -> str:

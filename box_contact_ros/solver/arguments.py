@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import textwrap
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
@@ -16,6 +17,13 @@ from .models import find_model, model_names
 Number = TypeVar('Number', int, float)
 
 
+class WholeNames(argparse.RawDescriptionHelpFormatter):
+    """Help that keeps its description as written, and breaks no name at a hyphen."""
+
+    def _split_lines(self, text: str, width: int) -> list[str]:
+        return textwrap.wrap(' '.join(text.split()), width, break_on_hyphens=False)
+
+
 def program_parser(program: str, doc: str | None, *, quick: str = '', seed: int | None = None,
                    out: str = '', **options: Any) -> argparse.ArgumentParser:
     """Return the parser of a program, whose help begins with `doc`.
@@ -24,8 +32,7 @@ def program_parser(program: str, doc: str | None, *, quick: str = '', seed: int 
     `--out`, which `output.results_folder` reads. The program has those of them that are given.
     """
     parser = argparse.ArgumentParser(
-        prog=program, description=doc, formatter_class=argparse.RawDescriptionHelpFormatter,
-        **options)
+        prog=program, description=doc, formatter_class=WholeNames, **options)
     if quick:
         parser.add_argument('--quick', action='store_true', help=quick)
     if seed is not None:
@@ -44,9 +51,10 @@ def add_models(parser: argparse.ArgumentParser, flag: str, default: str | Sequen
     kind: the type of its arguments, a function that takes more than the names of models.
     """
     more = ', or package.module:Class' if kind else ''
+    shown_default = default if isinstance(default, str) else ' '.join(default)
     parser.add_argument(flag, nargs=None if isinstance(default, str) else '+',
                         type=kind or model_name, default=default, metavar='MODEL',
-                        help=f'one of {model_names()}{more} (default: %(default)s)')
+                        help=f'one of {model_names()}{more} (default: {shown_default})')
 
 
 def model_name(text: str) -> str:

@@ -36,9 +36,13 @@ def shown(value: Any) -> str:
 
 
 def nearest_name(name: object, known: Iterable[str]) -> str:
-    """Return the end of a refusal that names the nearest of the known names; '' if none is near."""
-    nearest = ''.join(get_close_matches(str(name)[:SHOWN], known, n=1))
-    return nearest and f'; the nearest name is {nearest}'
+    """Return the end of a refusal that asks for the nearest of the known names; '' if none is near.
+
+    Capitals make no difference.
+    """
+    spelled = {one.lower(): one for one in known}
+    nearest = ''.join(get_close_matches(str(name)[:SHOWN].lower(), spelled, n=1))
+    return nearest and f' (did you mean {spelled[nearest]}?)'
 
 
 def pose_fault(pose: Sequence[float] | np.ndarray) -> str | None:

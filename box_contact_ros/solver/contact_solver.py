@@ -167,5 +167,6 @@ def _fault(a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
         fault = fault_of(values[0 if len(values) == 1 else row])
         if fault:
             numbered = name.startswith('poses') or len(a) > 1
-            return f'{name}[{row}] {fault}' if numbered else f'{name} {fault}'
+            order = '; a pose is x y z qx qy qz qw' if fault_of is pose_fault else ''
+            return f'{name}[{row}] {fault}{order}' if numbered else f'{name} {fault}{order}'
     return None

@@ -12,7 +12,6 @@ from pathlib import Path
 
 import pytest
 
-from box_contact_ros.apps.ros_client import ANSWERS
 from box_contact_ros.node.runtime import LOG_SECONDS
 
 pytest.importorskip('rosbags')
@@ -30,7 +29,6 @@ from std_msgs.msg import Header
 from box_contact_ros.evidence.bench.bench_drive import BenchNode, echo_node
 from box_contact_ros.evidence.bench.echo_node import EchoNode
 from box_contact_ros.apps.crane.crane_node import CraneNode
-from box_contact_ros.apps.crane.landing_flights import FlightNode
 from box_contact_ros.apps.recording.record import RecordNode
 from box_contact_ros.apps.ros_client import ANSWERS
 from box_contact_ros.apps.viewer.listener import ViewNode
@@ -46,7 +44,7 @@ TWO = two_boxes((1, 1, 1), (1, 1, 1))
 def fails(*_, **__):
     raise KeyError('planted')
 
-for kind, name in ((BenchNode, '_keep'), (CraneNode, '_on_answer'), (FlightNode, '_on_contacts'),
+for kind, name in ((BenchNode, '_keep'), (CraneNode, '_on_answer'),
                    (RecordNode, '_keep'), (ViewNode, 'listen_to'),
                    (MarkersNode, 'heard'), (SceneDriver, '_publish'), (Evaluator, '_answer')):
     setattr(kind, name, fails)
@@ -70,7 +68,7 @@ class Source(GuardedNode):
 def nodes(context):
     echo = echo_node('echo', poses='for_echo/')
     return [Source(context), BenchNode(context, [echo], time.time_ns),
-            CraneNode(context), EchoNode(context), FlightNode(context, TWO),
+            CraneNode(context), EchoNode(context),
             RecordNode(context, Path(sys.argv[1]), ['box_a/pose'], {{}}),
             ContactNode(context), ViewNode(context, 'contact_node'), MarkersNode(context),
             SceneDriver(context, TWO, 50.0)]
@@ -84,7 +82,7 @@ with joined(Source) as (source, executor):
     while time.monotonic() < until:
         spin_for(source, executor, 0.5)
     print('went on', flush=True)
-    for node in others[:5] + others[6:]:
+    for node in others[:4] + others[5:]:
         node.destroy_node()
 """
 
@@ -100,7 +98,7 @@ def printed(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 @pytest.mark.parametrize('node, what', [
     ('bench', 'echo'), ('crane', 'contact/point'), ('echo_node', 'box_b/pose'),
-    ('flights', ANSWERS['cloud'][1]), ('record', 'box_a/pose'), ('markers', 'box_[ab]/pose'),
+    ('record', 'box_a/pose'), ('markers', 'box_[ab]/pose'),
     ('view', 'parameters of the contact node'), ('scene_driver', 'fails'),
     ('contact_node', '')])
 def test_a_callback_that_raises(printed, node, what):

@@ -4,7 +4,6 @@
 """Landings over DDS: the crane client closes the loop with a contact node in another process."""
 from __future__ import annotations
 
-import os
 import time
 
 import numpy as np
@@ -19,12 +18,7 @@ from rclpy.parameter import Parameter
 from box_contact_ros.apps.crane import crane_feedback, crane_node
 from box_contact_ros.apps.crane.landing import (
     LANDING_DURATION,
-    cases,
-    land,
-    scenario_of,
-    solvers,
 )
-from box_contact_ros.apps.crane.landing_flights import fly_over_dds
 from box_contact_ros.node.runtime import make_executor
 
 EXACT = ('--ros-args', '-p', 'model:=exact')
@@ -54,18 +48,6 @@ def test_lands_in_lockstep_faster_than_real_time(program, node):
     assert 'landing ................ at rest' in crane.output
     assert 'messages lost .......... 0 ' in crane.output
     assert took < LANDING_DURATION, f'{took:.1f} s for {LANDING_DURATION:g} s of motion'
-
-
-def test_flights_of_the_report_are_the_landings_offline():
-    """What `landing --dds` runs: in lockstep neither transport nor company changes anything."""
-    case = next(cases())
-    scenarios = [scenario_of(case), scenario_of(case, castings=True, size=(12.192, 2.438, 1.5))]
-    flown = fly_over_dds('exact', scenarios, (0.002, 0.0), rate_hz=200.0,
-                         domain=int(os.environ['ROS_DOMAIN_ID']))
-    for scenario, record, latency in zip(scenarios, flown, (0.002, 0.0)):
-        offline = land(scenario, solvers(scenario, 'exact'), rate_hz=200.0, latency=latency)
-        assert record.judge() == offline.judge()
-    assert flown[0].judge().at_rest
 
 
 def test_a_landing_that_does_not_rest_fails(program, node):

@@ -284,17 +284,11 @@ def test_quality_of_service_can_be_overridden(client, serialization):
 @pytest.mark.parametrize('name, value, words', [
     ('/contacts.publisher.depth', 0, 'must be a whole number from 1 to 100000, not 0'),
     ('/contacts.publisher.reliability', 'maybe', "'maybe' is not one of: best_effort, reliable"),
-    ('/contacts.publisher.dept', 5, "unknown policy 'dept'; the nearest name is depth")])
+    ('/contacts.publisher.dept', 5, r"unknown policy 'dept' \(did you mean depth\?\)")])
 def test_a_quality_of_service_that_there_is_not(name, value, words):
     with pytest.raises(ValueError, match=words), serving(lambda context: ContactNode(
             context, parameter_overrides=overrides(**{f'qos_overrides.{name}': value}))):
         pass
-
-
-def test_messages_are_checked_in_tests(client):
-    """ROS_PYTHON_CHECK_FIELDS is on: an np.float32 in a message would fail, not turn to garbage."""
-    with pytest.raises(AssertionError):
-        client.send(ORIGIN, TOUCHING, frames=(7, 7))
 
 
 def stream(client, seconds, rate=200.0):

@@ -166,15 +166,15 @@ def test_an_including_launch_file_keeps_its_parameters_and_its_own_arguments(pre
     assert starts(prefix, parent)['contact_node']['parameters']['max_age'] == 2.0
     status, told = output(prefix, parent_of(prefix, {'modle': 'exact'}))
     assert status == 1
-    assert "unknown launch argument 'modle'; the nearest name is model" in told
+    assert "unknown launch argument 'modle' (did you mean model?)" in told
 
 
 @needs_launch
 @pytest.mark.parametrize('file, argument, words', [
-    ('contact_node', 'modle:=exact', "unknown launch argument 'modle'; the nearest name is model"),
+    ('contact_node', 'modle:=exact', "unknown launch argument 'modle' (did you mean model?)"),
     ('contact_node', 'max_age:=fast', "max_age must be a number, not 'fast'"),
     ('contact_node', 'use_lifecycle_manager:=true autostart:=true', 'so leave autostart out'),
-    ('crane', 'modle:=exact', "unknown launch argument 'modle'; the nearest name is model")])
+    ('crane', 'modle:=exact', "unknown launch argument 'modle' (did you mean model?)")])
 def test_a_wrong_argument_starts_nothing(
         prefix: Path, file: str, argument: str, words: str) -> None:
     status, told = output(prefix, f'{file}.launch.py', *argument.split())

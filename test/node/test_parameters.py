@@ -11,7 +11,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from box_contact_ros.node import parameters
+from box_contact_ros.node import declared_parameters, parameters
 from box_contact_ros.node.topics.qos_events import QosEvents
 
 
@@ -33,7 +33,7 @@ def test_a_refusal_names_the_parameter_and_the_value(check, value, words):
 def test_only_a_near_name_is_proposed():
     """A file for several nodes has names that are none of this one's."""
     known = ('size_a', 'serialization', 'files_from')
-    assert parameters.unknown_name('parameter', 'sizea', known).endswith('nearest name is size_a')
+    assert parameters.unknown_name('parameter', 'sizea', known).endswith('(did you mean size_a?)')
     for name in ('robot_description', 'robot', ''):
         assert parameters.unknown_name('parameter', name, known) == f'unknown parameter {name!r}'
 
@@ -46,7 +46,8 @@ def test_integers_are_as_good_as_floats():
 def test_a_descriptor_shows_range_choices_and_what_is_for_the_start():
     """Doubles and whole numbers have ranges of their own; choices and counts are words."""
     def described(default, check, fixed=False):
-        return parameters.Setting(default, 'a test', check).descriptor(read_only=fixed)
+        setting = parameters.Setting(default, 'a test', check)
+        return declared_parameters._descriptor(setting, read_only=fixed)
     one, = described(0.5, parameters.number(0, 3)).floating_point_range
     assert (one.from_value, one.to_value) == (0.0, 3.0)
     one, = described(5, parameters.whole_number(1, 9)).integer_range
@@ -70,7 +71,17 @@ def test_an_unknown_parameter_after_p_ends_the_program(args, refused, capsys):
         return parameters.answer_help('node', 'Test.', settings, ['--ros-args', *args])
     with pytest.raises(SystemExit, match='2'):
         parameters.answer_help('node', 'Test.', settings, ['--ros-args', *args])
-    assert f"unknown parameter '{refused}'; the nearest name is model" in capsys.readouterr().err
+    assert f"unknown parameter '{refused}' (did you mean model?)" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize('args, words', [
+    (['--model', 'exact'], 'parameters follow --ros-args: --ros-args -p model:=VALUE'),
+    (['--ros-args', '-p', 'model=exact'], "'model=exact' is not NAME:=VALUE")])
+def test_a_parameter_that_is_typed_in_another_way_gets_a_hint(args, words, capsys):
+    settings = {'model': parameters.Setting('mlp', 'a test', parameters.text)}
+    with pytest.raises(SystemExit, match='2'):
+        parameters.answer_help('node', 'Test.', settings, args)
+    assert words in capsys.readouterr().err
 
 
 def test_a_list_with_blanks_gets_a_hint(capsys):

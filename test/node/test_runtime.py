@@ -21,7 +21,7 @@ from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 from ros_client import Client, serving
 
-from box_contact_ros.node import contact_node, runtime
+from box_contact_ros.node import contact_node, contact_program, runtime
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.parameters import answer_help
 from box_contact_ros.node.topics import scene_topics
@@ -176,20 +176,21 @@ def test_options_outside_ros_args_are_refused(capsys):
     for arguments, status in ((['--help'], 0), (['-p', 'rate:=1'], 2),
                               (['--ros-args', '-p', 'model:=exact', '--', '--fast'], 2)):
         with pytest.raises(SystemExit) as ended:
-            contact_node.main(arguments)
+            contact_program.main(arguments)
         assert ended.value.code == status
     printed = capsys.readouterr()
-    assert 'parameters stand after --ros-args' in printed.err
+    assert '--ros-args -p ' in printed.err
     assert 'unrecognized arguments: --fast' in printed.err
-    for name in contact_node.PARAMETERS:
+    for name in contact_program.PARAMETERS:
         assert f'\n  {name} ' in printed.out
     assert '[12.192,2.438,2.591]' in printed.out and 'default: none' in printed.out
-    answer_help('contact_node', '', contact_node.PARAMETERS, ['--ros-args', '-p', 'pairing:=stamp'])
+    answer_help('contact_node', '', contact_program.PARAMETERS,
+                ['--ros-args', '-p', 'pairing:=stamp'])
 
 
 def test_a_word_that_ros_does_not_know_ends_the_program(capsys):
     """With one line and status 1: -p is easily forgotten."""
-    assert contact_node.main(['--ros-args', 'model:=exact']) == 1
+    assert contact_program.main(['--ros-args', 'model:=exact']) == 1
     assert capsys.readouterr().err == (
         "error: after --ros-args, ROS does not know ['model:=exact']: a parameter is "
         '-p NAME:=VALUE, a name is remapped by -r FROM:=TO\n')
@@ -198,8 +199,8 @@ def test_a_word_that_ros_does_not_know_ends_the_program(capsys):
 def test_main_serves_its_node(monkeypatch):
     """With the arguments that it was given."""
     seen = []
-    monkeypatch.setattr(contact_node, 'run_node', lambda *call: seen.append(call) or 0)
-    assert contact_node.main(['--ros-args']) == 0
+    monkeypatch.setattr(runtime, 'run_node', lambda *call: seen.append(call) or 0)
+    assert contact_program.main(['--ros-args']) == 0
     (kind, args), = seen
     assert issubclass(kind, ContactNode) and args == ['--ros-args']
 
@@ -264,7 +265,7 @@ def test_a_node_is_told_of_its_clock_and_of_names_that_are_none(client, capfd):
     with serving(lambda context: ContactNode(context, parameter_overrides=[
             Parameter(name, value=value) for name, value in given.items()])) as node:
         assert "unknown parameter 'modle'" in (told := capfd.readouterr().err)
-        assert 'the nearest name is model' in told
+        assert 'did you mean model?' in told
         result, = node.set_parameters([Parameter('pair_topics', value='yes')])
         assert result.reason == "pair_topics must be true or false, not 'yes'"
         node.set_parameters([Parameter('use_sim_time', value=True)])

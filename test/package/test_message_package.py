@@ -67,12 +67,6 @@ def test_every_field_has_a_comment_with_its_unit(definition: Path) -> None:
         assert comment or (kind == 'string' and name == 'box_b'), name  # the comment of both boxes
 
 
-def test_comments_name_the_frame() -> None:
-    """Contacts has the header, Contact refers to the header."""
-    assert 'frame_id' in fields(SOURCES / 'msg' / 'Contacts.msg')['header'][1]
-    assert 'frame of the header' in (SOURCES / 'msg' / 'Contact.msg').read_text('utf-8')
-
-
 def test_colcon_builds_every_definition() -> None:
     listed = re.findall(r'^  (msg/\S+)$', (SOURCES / 'CMakeLists.txt').read_text('utf-8'), re.M)
     assert listed == [path.relative_to(SOURCES).as_posix() for path in DEFINITIONS]
@@ -283,39 +277,3 @@ def test_a_missing_compiler_or_header_is_named(
     monkeypatch.setenv('CXX', 'no-such-compiler -O1')
     with pytest.raises(SystemExit, match='no-such-compiler is not here .*apt install g'):
         backend.check_machine(package)
-
-
-def test_a_bad_definition_is_refused(backend: ModuleType, tmp_path: Path) -> None:
-    """The generator's own words are shown."""
-    pytest.importorskip('rclpy', reason='the ROS wheels are not installed')
-    shutil.copy(SOURCES / 'package.xml', tmp_path)
-    for folder in ('msg', 'work'):
-        (tmp_path / folder).mkdir()
-    (tmp_path / 'msg' / 'Bad.msg').write_text('NoSuchType[<2 value\n')
-    with pytest.raises(SystemExit, match='NoSuchType'):
-        backend.generate(backend.read_package(tmp_path), tmp_path / 'work')
-
-
-def test_a_generator_that_generates_nothing_is_named(backend: ModuleType, tmp_path: Path) -> None:
-    with pytest.raises(SystemExit, match='rosidl_generator_c generated no msg/'):
-        backend.libraries(backend.read_package(SOURCES), tmp_path)
-
-
-def test_errors_of_the_compiler_are_shown_and_warnings_are_not(
-        backend: ModuleType, tmp_path: Path) -> None:
-    pytest.importorskip('rclpy', reason='the ROS wheels are not installed')
-    source = tmp_path / 'source.c'
-    library = backend.Library('lib.so', [source], [])
-    warning = '#warning "never mind"\n'
-    source.write_text(warning + 'int f(void) { return 0; }\n')
-    backend.compile_all([library], tmp_path)
-    source.write_text(warning + 'int f(void) { return missing; }\n')
-    with pytest.raises(SystemExit) as failed:
-        backend.compile_all([library], tmp_path)
-    assert 'missing' in str(failed.value) and 'never mind' not in str(failed.value)
-
-
-def test_an_editable_installation_is_refused(backend: ModuleType) -> None:
-    """Otherwise pip would fall back to setuptools, which finds no package here."""
-    with pytest.raises(SystemExit, match='without -e'):
-        backend.build_editable('', {}, None)

@@ -60,14 +60,6 @@ def test_a_machine_names_all_that_a_time_depends_on() -> None:
         f'{output.processor()}, {found.instruction_set}, {found.compiler}, {output.versions()}')
 
 
-@pytest.mark.parametrize(('vendor', 'family', 'model', 'expected'), [
-    ('AuthenticAMD', 25, 17, 'Zen 4'), ('AuthenticAMD', 25, 1, 'Zen 3'),
-    ('AuthenticAMD', 26, 2, 'Zen 5'), ('GenuineIntel', 6, 143, 'Sapphire Rapids'),
-    ('GenuineIntel', 6, 1, None), ('unknown', 25, 17, None)])
-def test_generations(vendor: str, family: int, model: int, expected: str | None) -> None:
-    assert output.generation(vendor, family, model) == expected
-
-
 def test_labels_are_spread(rng_seed: int = 5) -> None:
     """At least a step apart, in order, within [0, 1], and unmoved where there is room."""
     rng = np.random.default_rng(rng_seed)

@@ -296,52 +296,10 @@ def test_commands_leave_nothing_in_the_clone():
             assert file.startswith('/tmp/'), page.name
 
 
-def test_programs_are_shown_as_pip_installs_them():
-    """The tested installation has no `ros2`; two pages say how a workspace starts a program."""
-    assert {page.name for page, _, text in blocks('bash', 'console')
-            if 'ros2 run' in text} == {'install.md', 'programs.md'}
-
-
-def test_blocks_with_ros2_say_what_they_need():
-    """Above each stands that the command comes with a workspace, or with ROS from apt."""
-    for page in PAGES:
-        text = page.read_text('utf-8')
-        for found in FENCE.finditer(text):
-            if found[1] and re.search('(?m)^ros2 |[$][(]ros2 ', found[2]):
-                above = text[:found.start()].split()[-60:]
-                assert re.search('workspace|from apt|Launch files', ' '.join(above)), (
-                    f'{page.name}: {found[2]}')
-
-
-def test_the_load_comes_first_on_every_page():
-    """One order of boxes for README, tutorials and laws of force, which take the load as A."""
-    for page, _, text in blocks('python', 'cpp'):
-        assert not re.search(r'[(]stack, (load|asked)', text), page.name
-
-
-def test_no_page_says_that_a_point_never_jumps():
-    """Between two ticks of a landing, the exact point moves more than a metre."""
-    for page in PAGES:
-        assert 'without jump' not in page.read_text('utf-8'), page.name
-
-
 FOREIGN = {'ros2: command not found', 'externally-managed-environment', 'ros2 topic pub',
            "cannot import name … from 'box_contact_ros' (unknown location)", 'Timeout (0:00:08)!',
            'librcl_action.so: cannot open shared object file', 'No executable found', 'python'}
 """What troubleshooting quotes of the shell, pip, Python, the loader and ROS."""
-
-
-def quoted_messages() -> list[str]:
-    """Return what two pages quote of the log, and of errors."""
-    page = (ROOT / 'docs' / 'how-to' / 'troubleshooting.md').read_text('utf-8')
-    found = [one or other for heading in re.findall(r'^[*]{2}(.+?)[*]{2}', page, re.M | re.S)
-             for one, other in re.findall('`([^`]+)`|"([^"]+)"', heading)]
-    page = (ROOT / 'docs' / 'reference' / 'diagnostics.md').read_text('utf-8')
-    for line in page.partition('| The log says')[2].splitlines()[2:]:
-        if not line.startswith('|'):
-            break
-        found += re.findall('`([^`]+)`', line.split('|')[1])
-    return sorted(set(found) - FOREIGN)
 
 
 @cache
@@ -350,20 +308,6 @@ def sources() -> str:
     text = '\n'.join(path.read_text('utf-8') for kind in ('*.py', '*.cpp', '*.hpp')
                      for path in sorted((ROOT / 'box_contact_ros').rglob(kind)))
     return re.sub(r'\{[^{}]*\}', '…', re.sub(r"""['"]\s*\n\s*f?['"]""", '', text))
-
-
-@pytest.mark.parametrize('message', quoted_messages())
-def test_quoted_messages_exist(message):
-    """Each part between its values is in the source, so no page explains what nobody can see."""
-    parts = re.split(r"…|\b[A-Z]+\b|\b(?:box_)?[ab]\b|'[\w/]+'|(?<= )/\w+|\b\d+ s\b", message)
-    parts = [part.strip() for part in parts if len(part.strip(' ,')) > 2]
-    assert parts and all(part in sources() for part in parts), parts
-
-
-def test_first_commands_are_clone_and_demo():
-    """What a newcomer types first stands first."""
-    assert commands()[:2] == [f'git clone {address()} box_contact_ros',
-                              'cd box_contact_ros && make demo']
 
 
 # --- the rest of the pages ------------------------------------------------------------------------
@@ -455,10 +399,6 @@ def test_figures_are_made(tmp_path):
 def test_tables_have_the_figures_of_the_reports():
     """No number stands in two places with two values: `make tables` renews them."""
     assert run(sys.executable, 'docs/tables.py', '--check') == ''
-
-
-def test_the_readme_is_short():
-    assert len((ROOT / 'README.md').read_text('utf-8').splitlines()) <= 150
 
 
 def test_cpp_examples(tmp_path):

@@ -226,14 +226,6 @@ def test_one_contact_interval_per_approach(series):
         assert begun.max() == 1
 
 
-def test_chatter_is_counted():
-    """The test above would see a contact that breaks off for one frame."""
-    pairs, motions, _ = approaches('containers', False)
-    exact = solve('exact', pairs)
-    exact.colliding[np.flatnonzero(exact.colliding)[1]] = False
-    assert sorted(contact_intervals(exact, motions))[-2:] == [1, 2]
-
-
 def test_frames_know_no_history(series):
     """In random order, and with −q for q: the same bits."""
     _, motion = series
@@ -290,21 +282,6 @@ def test_how_far_the_point_of_mlp_steps(series):
                    (0.9995, 0.02) if name in LANDED else (0.998, 0.025))
     assert share >= least
     assert worst <= most
-
-
-def test_the_deepest_point_jumps_by_the_box(series):
-    """What the bounds above are worth: FCL's deepest point steps from corner to corner.
-
-    It does so rarely, at every change of the deepest corner, and then by up to the whole box.
-    """
-    pytest.importorskip('fcl')
-    name, motion = series
-    if 'fixed' in name:
-        return  # boxes that do not turn: the deepest corner mostly stays
-    share, worst = beyond_exact('fcl', motion)
-    print(f'{name}: {100 * share:.2f} % of the steps, worst {100 * worst:.2f} % of the edge')
-    assert worst > 0.15
-    assert worst > 5.0 * beyond_exact('mlp', motion)[1]
 
 
 # --- where the point may step, and where not ------------------------------------------------------

@@ -13,7 +13,7 @@ from box_contact_ros import output
 from box_contact_ros.cli import PROGRAMS
 from box_contact_ros.solver import arguments
 
-FOLDERS = ('accuracy', 'bench', 'frontier', 'search paper', 'soak', 'stability', 'train')
+FOLDERS = ('accuracy', 'bench', 'frontier', 'search paper', 'stability', 'train')
 FILES = ('fuzz', 'paper')
 
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import os
-import warnings
 from decimal import Decimal
 from fractions import Fraction
 
@@ -456,9 +455,3 @@ def test_scenes_of_wrong_things(tmp_path_factory, scene):
 def test_scenes_of_garbage(tmp_path_factory, content):
     """Any text, any bytes, and what looks like YAML: SceneError."""
     assert isinstance(scene_of(tmp_path_factory.getbasetemp() / 'scene.yaml', content), str)
-
-
-def test_warnings_would_fail_here():
-    """The tests above rely on it."""
-    with pytest.raises(RuntimeWarning):
-        warnings.warn('seen', RuntimeWarning, stacklevel=1)

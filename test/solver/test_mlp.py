@@ -29,10 +29,11 @@ from box_contact_ros.core import (
     native,
     stages,
 )
-from box_contact_ros.evidence.pose_sets import LOADS, SETS, Pairs, contact_errors
+from box_contact_ros.evidence.pose_sets import LOADS, SETS, Pairs
 from box_contact_ros.evidence.reports.accuracy import limit_of
 from box_contact_ros.evidence.reports.frontier.speed import flush_stacks
 from box_contact_ros.evidence.training.worst_case import climb, worst_start
+from box_contact_ros.evidence.verification.errors import contact_errors
 from box_contact_ros.evidence.verification.steps import drawn_paths, largest_steps
 from box_contact_ros.scene.pose import rotation_matrix
 from box_contact_ros.solver.contact import Contacts

@@ -79,8 +79,8 @@ def test_programs_take_names_and_seeds():
 
 
 def test_an_added_model_is_named_where_another_is_refused(lifted):
-    with pytest.raises(ValueError, match="model 'lifte' is not one of: .*, lifted, lifted-N; the "
-                       'nearest name is lifted$'):
+    with pytest.raises(ValueError, match="model 'lifte' is not one of: .*, lifted, lifted-N "
+                       r'\(did you mean lifted\?\)$'):
         ContactSolver(poses.CUBE, poses.CUBE, model='lifte')
     with pytest.raises(ValueError, match='millimetres N of lifted-N must be a whole .* 1 to 9'):
         ContactSolver(poses.CUBE, poses.CUBE, model='lifted-10')

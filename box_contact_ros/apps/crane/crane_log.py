@@ -51,6 +51,14 @@ class Screen:
         if self._bar:
             self._bar.update(self._bar.task_ids[0], completed=seconds)
 
+    def verdict(self, passed: bool, text: str) -> None:
+        """Print the line that says how it went, before all figures."""
+        if self._bar:
+            self._bar.console.print(text, style='bold green' if passed else 'bold red',
+                                    highlight=False, markup=False)
+        else:
+            print(text, flush=True)
+
     def line(self, text: str) -> None:
         """Print a line; a reader of a pipe wants it live as well."""
         if self._bar:
@@ -120,10 +128,17 @@ class CraneSummary:
         return self.result.wrong_verdicts + self.result.contradictions
 
     @property
+    def faults(self) -> list[str]:
+        """What went wrong, in words: nothing if contacts came, none was lost, and none is wrong."""
+        counted = ((self.result.lost, 'lost answers'), (self.wrong_verdicts, 'wrong verdicts'),
+                   (self.result.strangers, 'answers to no pose'))
+        return ['no contacts came'] * (not self.result.contacts) + [
+            f'{count} {what}' for count, what in counted if count]
+
+    @property
     def passed(self) -> bool:
         """Whether contacts really came through, nothing was lost and no verdict was wrong."""
-        faults = self.result.lost + self.result.strangers + self.wrong_verdicts
-        return self.result.contacts > 0 and faults == 0
+        return not self.faults
 
     def __str__(self) -> str:
         """Return several lines for people, every figure with its unit."""

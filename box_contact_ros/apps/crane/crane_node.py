@@ -28,9 +28,11 @@ from rclpy.executors import ExternalShutdownException
 from rclpy.signals import SignalHandlerOptions
 from visualization_msgs.msg import MarkerArray
 
+from ...node.declared_parameters import declare
 from ...node.messages import make_header
-from ...node.parameters import answer_help, declare
+from ...node.parameters import answer_help
 from ...node.runtime import CONTACT_QOS, REFUSALS, GuardedNode, joined, spin_once
+from ...output import percentiles
 from ...solver.contact_solver import ContactSolver
 from ..ros_client import (
     ANSWERS,
@@ -220,9 +222,30 @@ def main(args: Sequence[str] | None = None) -> int:
     summary, landing = (node.summary(), node.landing()) if node else (None, None)
     if node is None or summary is None:
         return signalled
+    passed, words = verdict(summary, landing)
+    if not signalled:
+        screen.verdict(passed, words)
     screen.tables(
         f'crane: {"interrupted" if signalled else "done"} after '
         f'{summary.result.sent / node.rate:g} s of motion at {node.rate:g} Hz',
         *filter(None, (summary, landing)))
-    passed = summary.passed and (landing is None or landing.carried)
     return signalled or (0 if passed else 1)
+
+
+def verdict(summary: CraneSummary, landing: LandingResult | None) -> tuple[bool, str]:
+    """Return whether a run passed, and that in one line with the reasons.
+
+    landing: None for an open loop.
+    """
+    faults = summary.faults
+    if landing is not None and not landing.carried:
+        faults.append('the load did not come to rest on the stack')
+    if faults:
+        return False, f'FAIL: {", ".join(faults)}'
+    figures = [f'{summary.result.contacts} contacts, none lost',
+               f'median latency {1e3 * percentiles(summary.latencies, 50)[0]:.2f} ms']
+    if landing is not None:
+        state = 'is at rest' if landing.at_rest else 'lies on the stack, not within all limits'
+        figures.insert(0, f'the load {state}, settled {landing.settled:.1f} s after the first '
+                          'touch')
+    return True, f'PASS: {"; ".join(figures)}'

@@ -29,7 +29,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ...node.contact_node import PARAMETERS
+from ...node.contact_program import PARAMETERS
 from ...node.parameters import outside_ros_args
 from ...node.runtime import REFUSALS, joined, spin_once
 from ...node.topics.scene_topics import MOST_PAIRS_WITH_TOPICS

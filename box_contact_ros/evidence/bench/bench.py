@@ -11,9 +11,13 @@ With --boxes N one contact node alone gets a pose array of N moving boxes a tick
 Prints what was lost or wrong, the node's share of its core, and latencies; writes no files.
 With --replay the stream is a recording's pairs of poses of equal stamp, sent at --rate. Prints two
 tables and writes bench.csv, bench.md and bench.png.
+With --soak a contact node runs at 1 kHz for ten minutes, in turn with a bare echo node and one that
+is served alike. Detects answers that mix poses of two ticks, and memory that grows. Prints a table
+and writes soak.csv and soak.md.
 
 The exit status is 0 only if every node answered and the counts add up (sent = answered + lost).
-The contact node must lose nothing, and give no wrong verdict and no answer twice.
+The contact node must lose nothing, and give no wrong verdict and no answer twice. In a soak its
+memory must grow by less than 1 MB after the first ten seconds.
 """
 from __future__ import annotations
 
@@ -39,6 +43,7 @@ from .bench_drive import (
     Bench,
     MeasuredNode,
     about_the_machine,
+    adds_up,
     drive_array,
     echo_node,
     open_bench,
@@ -46,10 +51,13 @@ from .bench_drive import (
 )
 from .bench_report import all_latencies, bullets, draw, error_table, latency_table, write_results
 from .pose_streams import STREAMS, by_sizes, crowd, make_stream
+from .soak import soak
 
 NODES = ('contact', 'soup', 'echo')
-SECONDS, LONGEST = 60.0, 3600.0  # of sending, in all: the default, and what is accepted
-QUICK_SECONDS = 0.5  # of every stream, with --quick
+SECONDS, SOAK_SECONDS, LONGEST = 60.0, 600.0, 86_400.0
+"""Of sending, in all: the defaults, and what is accepted."""
+RATE, SOAK_RATE = 200.0, 1000.0  # [Hz]
+QUICK_SECONDS, SOAK_QUICK = 0.5, 2.0  # of every stream, and of a soak, with --quick
 
 
 @refusals_end
@@ -59,6 +67,8 @@ def main(args: Sequence[str] | None = None) -> int:
     options = _options(outside_ros_args(args))
     if options.boxes:
         return _bench_array(options, args)
+    if options.soak:
+        return soak(options, args)
     with open_bench(_nodes(options), args, rate=options.rate, domain=options.domain) as bench:
         streams = _streams(options)
         truths = {stream.name: stream.contacts('exact') for stream in streams}
@@ -80,11 +90,14 @@ def _options(args: Sequence[str]) -> argparse.Namespace:
         epilog='streams:\n' + '\n'.join(
             f'  {name:<14} {source.description}' for name, source in STREAMS.items())
         + '\n\nWhat follows --ros-args is for the bench itself, not for the nodes.')
-    parser.add_argument('--rate', type=within(1.0, 4000.0), default=200.0, metavar='HZ',
-                        help='pairs of poses sent per second (default: %(default)g)')
+    parser.add_argument('--rate', type=within(1.0, 4000.0), metavar='HZ',
+                        help=f'pairs of poses sent per second (default: {RATE:g}; of a soak '
+                             f'{SOAK_RATE:g})')
     parser.add_argument('--duration', type=within(0.1, LONGEST), metavar='S',
-                        help='time in which poses are sent, split evenly over streams and nodes '
-                             f'(default: {SECONDS:g}; of a replay, all of it)')
+                        help='time in which poses are sent, split evenly over streams and nodes; '
+                             'of a soak, to the contact node, and each echo node takes half as '
+                             f'long in addition (default: {SECONDS:g}; of a soak '
+                             f'{SOAK_SECONDS:g}, of a replay all of it)')
     _add_source(parser)
     parser.add_argument('--nodes', nargs='+', choices=NODES, default=list(NODES), metavar='NODE',
                         help=f'nodes to drive, of {", ".join(NODES)} (default: all)')
@@ -97,9 +110,7 @@ def _options(args: Sequence[str]) -> argparse.Namespace:
                              'a simulator; they then compete for cores, and the floor with them '
                              '(default: each stream goes to one node after the other)')
     parser.add_argument('--out', type=Path, default=Path('bench-results'), metavar='FOLDER',
-                        help='folder for bench.csv, bench.md, bench.png (default: %(default)s/)')
-    parser.add_argument('--boxes', type=within(8, 10_000), default=0, metavar='N',
-                        help='moving boxes, all in one message, instead of the streams')
+                        help='folder for the files (default: %(default)s/)')
     add_domain(parser)
     options = parser.parse_args(list(args))
     if options.replay is None:
@@ -108,11 +119,12 @@ def _options(args: Sequence[str]) -> argparse.Namespace:
         if options.pair:
             parser.error('--pair is of a --replay')
         if options.duration is None:
-            options.duration = SECONDS
+            options.duration = SOAK_SECONDS if options.soak else SECONDS
+    options.rate = options.rate or (SOAK_RATE if options.soak else RATE)
     options.streams = [name for name in STREAMS if name in options.streams and not options.replay]
     options.nodes = [name for name in NODES if name in options.nodes]
     if options.quick:
-        quick = QUICK_SECONDS * max(1, len(options.streams))
+        quick = SOAK_QUICK if options.soak else QUICK_SECONDS * max(1, len(options.streams))
         options.duration = min(options.duration or quick, quick)
     make_folder(parser, options.out)
     return options
@@ -126,6 +138,10 @@ def _add_source(parser: argparse.ArgumentParser) -> None:
     source.add_argument('--replay', type=Path, metavar='BAG',
                         help='a recording instead of the streams: the folder of a rosbag2 bag, or '
                              'an .mcap file')
+    source.add_argument('--boxes', type=within(8, 10_000), default=0, metavar='N',
+                        help='moving boxes, all in one message, instead of the streams')
+    source.add_argument('--soak', action='store_true',
+                        help='the long form: contact node and echo nodes in turn, ten minutes')
     parser.add_argument('--pair', default='', metavar='NAME',
                         help='pair of the recorded scene to replay (default: its first)')
     for box in 'ab':
@@ -185,8 +201,7 @@ def _report(options: argparse.Namespace, bench: Bench, about: Mapping[str, str])
     if bench.stop.is_set() and not results:
         print('\ninterrupted before the first stream had been answered: no results')
         return False
-    adds_up = all(r.adds_up for r in results) and all(node.log.adds_up for node in bench.nodes)
-    lines = _findings(bench, results, adds_up=adds_up)
+    lines = _findings(bench, results)
     text = ('latency [ms], from the stamp of the poses to the answer\n\n'
             f'{latency_table(results)}\n\n'
             'error against the exact contact: point [mm], normal [deg]\n\n'
@@ -201,16 +216,17 @@ def _report(options: argparse.Namespace, bench: Bench, about: Mapping[str, str])
              f'{options.rate:g} Hz, nodes {about["nodes run"]}\n{about["machine"]}')
         print(f'results: {options.out}/bench.csv, bench.md, bench.png', flush=True)
     faulty = any(r.faults for r in results if r.node == 'contact')
-    return bool(results) and adds_up and not bench.notes and not faulty and not bench.stop.is_set()
+    return (bool(results) and adds_up(bench) and not bench.notes and not faulty
+            and not bench.stop.is_set())
 
 
-def _findings(bench: Bench, results: Sequence[StreamResult], *, adds_up: bool) -> list[str]:
+def _findings(bench: Bench, results: Sequence[StreamResult]) -> list[str]:
     """Return what stands below the tables: faults, sums by node, and how late the bench was."""
     lines = list(bench.notes)
     if bench.stop.is_set():
         lines.append('interrupted: figures are of the streams that ended before')
     lines += [f'{node.name}: {_sum(node.name, results)}' for node in bench.nodes]
-    lines.append('sent = answered + lost: ' + ('yes' if adds_up else 'NO'))
+    lines.append('sent = answered + lost: ' + ('yes' if adds_up(bench) else 'NO'))
     late = [1e3 * np.array(percentiles(r.lateness, 99, 100)) for r in results]
     if late and np.max(late) > 0.0:
         p99, most = np.max(late, axis=0)

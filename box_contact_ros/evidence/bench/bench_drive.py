@@ -49,11 +49,12 @@ from box_contact_ros.apps.ros_client import (
 from box_contact_ros.core import native
 from box_contact_ros.node.messages import make_header, read_contacts
 from box_contact_ros.node.runtime import GuardedNode, joined, let_callbacks_finish, spin_for
-from box_contact_ros.output import machine, no_garbage_collection
+from box_contact_ros.output import machine
 from box_contact_ros.scene.files.scene_file import write_scene
 from box_contact_ros.scene.scene_solver import POSE_ARRAY, Scene
 from box_contact_ros.solver.contact import Contacts
 
+from ..timing import no_garbage_collection, pinned
 from .echo_node import raw_stamp, with_stamp
 
 # Bounds on everything that waits, so that a bench always ends.
@@ -328,19 +329,16 @@ def open_bench(nodes: Sequence[MeasuredNode], args: Sequence[str], *, rate: floa
     cores = os.sched_getaffinity(0)
     own = {max(cores)} if len(cores) > 1 else cores
     clock = monotonic_clock()
-    with asked_to_end() as stop:
+    # Pinned before rclpy starts its threads, which inherit it.
+    with asked_to_end() as stop, pinned(own), joined(
+            partial(BenchNode, nodes=nodes, clock=clock), args) as (client, executor):
+        let_callbacks_finish()
+        bench = Bench(nodes, client, executor, clock=clock, rate=rate, stop=stop,
+                      node_cores=cores - own or cores)
         try:
-            os.sched_setaffinity(0, own)  # before rclpy starts its threads, which inherit it
-            with joined(partial(BenchNode, nodes=nodes, clock=clock), args) as (client, executor):
-                let_callbacks_finish()
-                bench = Bench(nodes, client, executor, clock=clock, rate=rate, stop=stop,
-                              node_cores=cores - own or cores)
-                try:
-                    yield bench
-                finally:
-                    bench.end()
+            yield bench
         finally:
-            os.sched_setaffinity(0, cores)
+            bench.end()
 
 
 @dataclass
@@ -401,6 +399,12 @@ def about_the_machine(node_cores: set[int]) -> dict[str, str]:
     return {'machine': f'{platform.node()}: {machine(native, PACKAGES)}, {os.cpu_count()} cores',
             'cores': f'bench on {listed(os.sched_getaffinity(0))}, nodes on {listed(node_cores)}',
             'load at start': f'{os.getloadavg()[0]:.2f}'}
+
+
+def adds_up(bench: Bench) -> bool:
+    """Return whether sent = answered + lost, by node and by stream."""
+    return all(node.log.adds_up and all(result.adds_up for result in node.log.results())
+               for node in bench.nodes)
 
 
 def _unanswered(turn: list[MeasuredNode], offers: set[int]) -> int:

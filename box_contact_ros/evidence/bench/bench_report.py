@@ -1,7 +1,7 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""The results of bench and soak as tables, page, CSV file and picture. No ROS."""
+"""The results of the bench as tables, page, CSV file and picture. No ROS."""
 from __future__ import annotations
 
 import dataclasses

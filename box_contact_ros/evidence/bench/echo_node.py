@@ -10,7 +10,7 @@ are in. Messages stay the bytes they come as; no faster answer can be given from
 It is served as the contact node is, or, with --bare, as any node on this executor: without
 `runtime.let_callbacks_finish`.
 
-`python -m box_contact_ros.evidence.bench.echo_node [--bare]`; for bench and soak, not a program of
+`python -m box_contact_ros.evidence.bench.echo_node [--bare]`; for the bench, not a program of
 its own.
 """
 from __future__ import annotations

@@ -1,17 +1,15 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""The soak: a contact node at 1 kHz for ten minutes, with echo nodes in between.
+"""The long form of the bench: a contact node at 1 kHz for ten minutes, echo nodes in between.
 
-There are two, which compute nothing: a bare one, and one served as the contact node is, with the
-middleware's threads kept from interrupting it. All run as processes of their own, in a ROS domain
-of their own on this host. Blocks of a second go to the one and then to the others, so that what
-disturbs the machine disturbs all. Every answer is compared with the same model's for the same two
-poses, which detects answers that mix poses of two ticks. Prints a table, and writes soak.csv and
-soak.md.
+The two echo nodes compute nothing. One is bare, and one is served as the contact node is, with the
+middleware's threads kept from interrupting it. Blocks of a second go to the contact node and then
+to the others, so that what disturbs the machine disturbs all. Every answer is compared with the
+same model's for the same two poses, which detects answers that mix poses of two ticks.
 
-The exit status is 0 only if nothing was lost, mispaired, answered twice or wrong. The contact
-node's memory must grow by less than 1 MB after its first ten blocks.
+All is right only if nothing was lost, mispaired, answered twice or wrong. The contact node's memory
+must grow by less than 1 MB after its first ten blocks.
 """
 from __future__ import annotations
 
@@ -25,16 +23,20 @@ from pathlib import Path
 import numpy as np
 
 from box_contact_ros.apps.answer_log import AnswerLog, StreamLog, StreamResult
-from box_contact_ros.apps.processes import add_domain
 from box_contact_ros.apps.recording.stream import Stream
-from box_contact_ros.node.contact_node import PARAMETERS
-from box_contact_ros.node.parameters import outside_ros_args
-from box_contact_ros.node.runtime import refusals_end
-from box_contact_ros.output import make_folder, markdown_table, percentiles
-from box_contact_ros.solver.arguments import add_models, program_parser, within
+from box_contact_ros.output import markdown_table, percentiles
 from box_contact_ros.solver.contact import Contacts
 
-from .bench_drive import Bench, MeasuredNode, about_the_machine, echo_node, open_bench, solver_node
+from ..verification.errors import distances
+from .bench_drive import (
+    Bench,
+    MeasuredNode,
+    about_the_machine,
+    adds_up,
+    echo_node,
+    open_bench,
+    solver_node,
+)
 from .bench_report import bullets, write_results
 from .pose_streams import make_stream
 
@@ -51,6 +53,15 @@ P50_LIMIT, P99_LIMIT, START_LIMIT = 1.25, 1.5, 2.5
 first answer."""
 STREAMS = ('containers', 'crane')
 """Played in turn: unrelated poses, and a motion. For boxes of one size, so that nobody restarts."""
+HEAD = """\
+# Soak
+
+Made by `python -m box_contact_ros bench --soak`. Blocks of poses go to the contact node and
+to two echo nodes in turn. One echo node is bare, and the threads of the other are scheduled as the
+contact node's are. Latencies run from the stamp of the poses to the later of point and normal.
+Ratios are medians over the blocks. The aims are for the ratio to the echo node served alike.
+Errors in soak.csv are against the same model's answers.
+"""
 
 
 def resident(pid: int) -> float:
@@ -62,11 +73,8 @@ def resident(pid: int) -> float:
     return pages * os.sysconf('SC_PAGE_SIZE') / 2**20
 
 
-@refusals_end
-def main(args: Sequence[str] | None = None) -> int:
-    """Run the soak; 0 only if all was right."""
-    args = list(args or ())
-    options = _options(outside_ros_args(args))
+def soak(options: argparse.Namespace, args: Sequence[str]) -> int:
+    """Run the soak with the bench's options; 0 only if all was right. args: for rclpy."""
     nodes = [_contact(options),
              echo_node('bare echo', poses='for_bare/', prefix='bare/', bare=True),
              echo_node('echo', poses='for_served/', prefix='served/')]
@@ -119,28 +127,11 @@ def _contact(options: argparse.Namespace) -> MeasuredNode:
     return solver_node('contact', options.model, poses='for_contact/', model=options.model)
 
 
-def _options(args: Sequence[str]) -> argparse.Namespace:
-    parser = program_parser('soak', __doc__, quick='two blocks of a second')
-    parser.add_argument('--minutes', type=within(0.02, 24 * 60.0), default=10.0, metavar='MIN',
-                        help='minutes of poses to the contact node; each echo node takes half '
-                             'as long in addition (default: %(default)g)')
-    parser.add_argument('--rate', type=within(1.0, 4000.0), default=1000.0, metavar='HZ',
-                        help='pairs of poses sent per second (default: %(default)g)')
-    add_models(parser, '--model', PARAMETERS['model'].default)
-    parser.add_argument('--out', type=Path, default=Path('soak-results'), metavar='FOLDER',
-                        help='folder for soak.csv and soak.md (default: %(default)s/)')
-    add_domain(parser)
-    options = parser.parse_args(list(args))
-    make_folder(parser, options.out)
-    options.seconds = 2.0 if options.quick else 60.0 * options.minutes
-    return options
-
-
 def _blocks(options: argparse.Namespace) -> tuple[list[Stream], dict[str, Contacts]]:
     """Return the blocks in the order they are played, and what the model answers to each."""
-    count = max(2, round(options.seconds / BLOCK_SECONDS))
-    rows = round(options.rate * options.seconds / count)
-    streams = [make_stream(name, rows) for name in STREAMS]
+    count = max(2, round(options.duration / BLOCK_SECONDS))
+    rows = round(options.rate * options.duration / count)
+    streams = [make_stream(name, rows, options.seed) for name in STREAMS]
     answers = [stream.contacts(options.model) for stream in streams]
     blocks, truths = [], {}
     for number in range(count):
@@ -182,17 +173,10 @@ def _report(options: argparse.Namespace, bench: Bench, memory: Sequence[float],
     write_results(options.out / 'soak.csv', sum(results, []),
                   {name: value for name, value in about.items() if name != 'model'})
     (options.out / 'soak.md').write_text(
-        '# Soak\n\nMade by `python -m box_contact_ros soak`. Blocks of poses go to the contact '
-        'node and to two echo\nnodes in turn. One echo node is bare, and the threads of the other '
-        "are scheduled as the contact\nnode's are. Latencies run from the stamp of the poses to "
-        'the later of point and normal.\nRatios are medians over the blocks. The aims are for the '
-        "ratio to the echo node served alike.\nErrors in soak.csv are against the same model's "
-        'answers.'
-        f"\n\n{bullets(about)}\n\n{table}\n\n{text}\n", 'utf-8')
+        f'{HEAD}\n{bullets(about)}\n\n{table}\n\n{text}\n', 'utf-8')
     print(f'results: {options.out}/soak.csv, soak.md')
-    adds_up = (all(r.adds_up for r in sum(results, []))
-               and all(node.log.adds_up for node in bench.nodes))
-    return not any(counts.values()) and adds_up and not bench.notes and not growth >= GROWTH_LIMIT
+    return (not any(counts.values()) and adds_up(bench) and not bench.notes
+            and not growth >= GROWTH_LIMIT)
 
 
 def _latency_table(log: AnswerLog, contact: Sequence[StreamResult], bare: Sequence[StreamResult],
@@ -229,6 +213,6 @@ def mispairs(stream: StreamLog) -> int:
     """Count the answers whose point is not the model's for that stamp's poses."""
     rows, truth = slice(0, len(stream.stamps)), stream.truth
     here = (stream.received['point'][rows] > 0) & truth.colliding[rows]
-    apart = np.linalg.norm(stream.values['point'][rows] - truth.point[rows], axis=1)
+    apart = distances(stream.values['point'][rows], truth.point[rows])
     depth = np.abs(stream.values['cloud'][rows, 6] + truth.separation[rows])
     return np.count_nonzero(here & ~((apart <= SAME_POINT) & (depth <= SAME_POINT)))

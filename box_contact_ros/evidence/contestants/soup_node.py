@@ -12,8 +12,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from box_contact_ros.node.contact_node import PARAMETERS as CONTACT_PARAMETERS
 from box_contact_ros.node.contact_node import ContactNode
+from box_contact_ros.node.contact_program import PARAMETERS as CONTACT_PARAMETERS
 from box_contact_ros.node.parameters import Setting, answer_help, whole_number
 from box_contact_ros.node.runtime import run_node
 from box_contact_ros.node.wrench_output import WRENCH_PARAMETERS

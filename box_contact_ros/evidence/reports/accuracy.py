@@ -3,13 +3,13 @@
 
 """Program `accuracy`: how far a model's contacts are from the exact ones, per set and class.
 
-Measured are the point, the volume and the covariance. Every set of `pose_sets` is drawn anew from
-`--seed`; model `exact` gives the truth. Written are accuracy.csv (a row per model, set, quantity
-and part of the set), accuracy.md and accuracy.png. The exit status is 1 if `mlp` misses one of its
-limits (`limit_of`) or differs from `exact` in a separation or normal. It is 1, too, for a point
-outside a box, and for too many contacts that are left to `exact`.
+It measures point, volume and covariance. Every set of poses is drawn anew from `--seed`; model
+`exact` gives the truth. It writes accuracy.csv (a row per model, set, quantity and part of the
+set), accuracy.md and accuracy.png. The exit status is 1 if `mlp` misses one of its limits or
+differs from `exact` in a separation or normal. It is 1, too, for a point outside a box, and for too
+many contacts that are left to `exact`.
 
-pages/accuracy.md defines the classes. The pose decides which features meet, not the SAT
+accuracy.md defines the classes. The pose decides which features meet, not the SAT
 axis that wins. In stacks, half the winners are edge pairs although the contact is a patch.
 """
 from __future__ import annotations
@@ -34,9 +34,10 @@ from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.solver.models import ModelEntry, find_model, models
 from box_contact_ros.solver.weights_file import WeightsError, load_weights
 
-from ..pose_sets import LOADS, SETS, ContactErrors, Pairs, contact_errors
+from ..pose_sets import LOADS, SETS, Pairs
 from ..training.paper_recipe import dataset
 from ..training.paper_recipe.errors import errors_of, figures, figures_by_part, wrapped
+from ..verification.errors import ContactErrors, contact_errors
 from . import searched
 from .paper.paper_tables import PAPER
 

@@ -21,8 +21,9 @@ from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.solver.mlp import NETWORK, core_numbers, load_mlp
 
-from ..pose_sets import LOADS, SETS, Pairs, contact_errors
+from ..pose_sets import LOADS, SETS, Pairs
 from ..training.worst_case import RESTART, climb, worst_start
+from ..verification.errors import contact_errors
 from ..verification.steps import drawn_paths, largest_steps
 
 DRAWN, CLIMBING = 20_000, 500

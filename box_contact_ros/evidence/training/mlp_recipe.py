@@ -23,7 +23,8 @@ from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.solver.mlp import ACTIVATION, FEATURE_NAMES, NETWORK, core_numbers
 from box_contact_ros.solver.weights_file import Network, save_weights
 
-from ..pose_sets import SETS, Pairs, contact_errors
+from ..pose_sets import SETS, Pairs
+from ..verification.errors import contact_errors
 from .mlp_fit import MlpErrors, ShareNetwork, errors_of, fit, tensors
 from .samples import MlpSamples, describe, draw_samples, mixture
 from .worst_case import climb, worst_start

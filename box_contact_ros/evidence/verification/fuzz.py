@@ -4,11 +4,11 @@
 """Program `fuzz`: millions of random pairs, judged by code that shares nothing with the solver.
 
 `python -m box_contact_ros fuzz` draws pairs of boxes by class of size, in poses of the kinds that
-break collision tests. Each model answers all of them. Every gate is zero. There is one
-each for contacts missed or invented, wrong depths, and axes that are not the shallowest. Others are
-for points outside, NaN, negative eigenvalues, volumes of `mlp` outside their brackets, exceptions.
-What is too near exact touch for float64 is judged in 60 digits. A broken gate prints the pose,
-ready to be pasted into a test; the exit status is then 1.
+break collision tests. Each model answers all of them. Every gate is zero: contacts missed or
+invented, wrong depths, axes that are not the shallowest, points outside, NaN, negative eigenvalues,
+volumes of `mlp` outside their brackets, and exceptions. What is too near exact touch for float64 is
+judged in 60 digits. A broken gate prints the pose, ready to be pasted into a test; the exit status
+is then 1.
 """
 from __future__ import annotations
 
@@ -298,7 +298,8 @@ def main(args: Sequence[str] | None = None) -> int:
     parser.add_argument('--classes', nargs='+', choices=list(CLASSES), default=list(CLASSES),
                         metavar='CLASS', help=f'classes, of {", ".join(CLASSES)} (default: all)')
     add_models(parser, '--models', models_with_patch())
-    parser.add_argument('--workers', type=within(1), default=os.cpu_count() or 1, help='processes')
+    parser.add_argument('--workers', type=within(1), default=os.cpu_count() or 1,
+                        help='processes at once')
     parser.add_argument('--out', type=Path, metavar='FILE', help='CSV with the tallies')
     options = parser.parse_args(args)
     if options.out:

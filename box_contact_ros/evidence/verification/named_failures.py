@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from ..contestants.engines.engine import Engine, Manifold, part_by_part
+from ..contestants.contestant import Contestant, Manifold, part_by_part
 from ..pose_sets import Pairs
 from .judge import PRESSED, judge, two_touches
 
@@ -90,7 +90,7 @@ def fault(one: NamedFailure, found: Manifold, bound: float) -> str:
     return '' if beyond <= reach else f'point {beyond:.3g} outside'
 
 
-def replay(engine: Engine, failures: Mapping[str, NamedFailure], bounds: Mapping[str, float],
+def replay(engine: Contestant, failures: Mapping[str, NamedFailure], bounds: Mapping[str, float],
            ) -> dict[str, str]:
     """Return by id what is wrong with an engine's answer, '' if nothing."""
     found = {}
@@ -103,7 +103,7 @@ def replay(engine: Engine, failures: Mapping[str, NamedFailure], bounds: Mapping
     return found
 
 
-def replay_apart(engine: Engine, failures: Mapping[str, NamedFailure]) -> dict[str, str]:
+def replay_apart(engine: Contestant, failures: Mapping[str, NamedFailure]) -> dict[str, str]:
     """Do as `replay`, with the bounds of other engines, in a subprocess if it is another's."""
     bounds = {name: one.lenience for name, one in failures.items()}
     if engine.make is None:

@@ -17,6 +17,7 @@ from box_contact_ros.scene.pose import quaternion_multiply
 from box_contact_ros.solver.contact_solver import ContactSolver
 
 from ..pose_sets import Pairs, turns
+from .errors import departures, lengths
 
 SAMPLES, KEPT, BISECTIONS = 200, 4, 45
 
@@ -59,7 +60,7 @@ def largest_steps(solver: ContactSolver, paths: Paths,
     found = _departures(solver, paths, rows, times)
     steps = []
     for place in range(3):
-        change = _size(found[place][1:] - found[place][:-1])
+        change = lengths(found[place][1:] - found[place][:-1])
         change[SAMPLES - 1::SAMPLES] = 0.0  # from one path to the next
         change = np.append(change, 0.0).reshape(n, SAMPLES)
         first = np.argsort(-change, axis=1)[:, :KEPT].ravel()
@@ -75,11 +76,11 @@ def _bisected(solver: ContactSolver, paths: Paths, rows: np.ndarray, first: np.n
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
         at_middle = _departures(solver, paths, rows, middle)[place]
-        left = _size(at_middle - at_low) >= _size(at_high - at_middle)
+        left = lengths(at_middle - at_low) >= lengths(at_high - at_middle)
         high, low = np.where(left, middle, high), np.where(left, low, middle)
         at_high = np.where(left[:, None], at_middle, at_high)
         at_low = np.where(left[:, None], at_low, at_middle)
-    return _size(at_high - at_low)
+    return lengths(at_high - at_low)
 
 
 def _departures(solver: ContactSolver, paths: Paths, rows: np.ndarray, times: np.ndarray,
@@ -88,13 +89,5 @@ def _departures(solver: ContactSolver, paths: Paths, rows: np.ndarray, times: np
     pairs = paths.at(rows, times)
     found, truth = pairs.contacts(solver), pairs.contacts()
     with np.errstate(invalid='ignore', divide='ignore'):
-        trace = np.trace(truth.covariance, axis1=1, axis2=2)[:, None]
-        parts = ((found.point - truth.point) / pairs.edge[:, None],
-                 ((found.volume - truth.volume) / truth.volume)[:, None],
-                 (found.covariance - truth.covariance).reshape(-1, 9) / trace)
-    point, volume, covariance = (100.0 * np.nan_to_num(part) for part in parts)
+        point, volume, covariance = map(np.nan_to_num, departures(found, truth, pairs.edge))
     return point, volume, covariance
-
-
-def _size(change: np.ndarray) -> np.ndarray:
-    return np.linalg.norm(change, axis=1)

@@ -157,6 +157,7 @@ def test_called_off(program, tmp_path):
     ('--model exakt', "argument --model: model 'exakt' is not one of"),
     ('--streams randon', 'invalid choice'),
     ('--divisions 0', 'argument --divisions: must lie in'),
+    ('--soak --boxes 64', 'argument --boxes: not allowed with argument --soak'),
 ])
 def test_bad_options(program, arguments, words):
     running = program('bench', *arguments.split())

@@ -10,16 +10,12 @@ import pytest
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.core import native
-from box_contact_ros.evidence.contestants.paper._networks import KERNEL, MOST_UNITS
+from box_contact_ros.evidence.contestants.paper._networks import KERNEL
 from box_contact_ros.evidence.contestants.paper.symmetry import (
-    EDGE_EDGE,
     FEATURES,
-    NO_FOLD,
     OCTANT,
-    VERTEX_FACE,
     fold,
 )
-from box_contact_ros.evidence.training.paper_recipe import dataset
 from box_contact_ros.resources import resource_path
 from box_contact_ros.scene.pose import rotation_matrix
 from box_contact_ros.solver.models import build_model
@@ -222,16 +218,6 @@ def test_numbers_that_are_no_networks_are_refused():
         'paper', size, size, None).network[1:]]))
 
 
-def test_layers_that_are_too_wide_are_refused(tmp_path):
-    pytest.importorskip('safetensors')
-    widths = [6, MOST_UNITS + 1, 4]
-    layers = [(np.zeros((n, m)), np.zeros(n)) for m, n in zip(widths, widths[1:])]
-    card = load_weights(resource_path('weights', 'paper.safetensors')).card
-    save_weights(tmp_path / 'wide', {'contact': layers}, {**card, 'architecture': widths})
-    with pytest.raises(WeightsError, match=f'more than {MOST_UNITS} units'):
-        ContactSolver(poses.CUBE, poses.CUBE, model='paper', weights=str(tmp_path / 'wide'))
-
-
 def test_continuous_covers_both_subsets():
     """The sweep above reaches faces of A, faces of B and edges."""
     solver, exact, size = make('paper-continuous')
@@ -274,79 +260,6 @@ def test_weights_for_something_else_are_refused():
 def rotations(n, seed=2):
     rng = np.random.default_rng(seed)
     return rng, rng.normal(size=(n, 3)), rotation_matrix(poses.unit_quaternions(rng, n))
-
-
-def assert_proper(folds, offsets, turns):
-    """Check that offset M t and rotation M R Nᵀ are a pair of the same boxes, with its angles."""
-    assert np.abs(np.linalg.det(folds.rotation) - 1).max() < 1e-12
-    assert np.abs(folds.angles).max() <= np.pi / 2
-    assert np.array_equal(folds.folded(offsets), folds.offset)
-    assert np.array_equal(folds.map_first @ turns @ np.swapaxes(folds.map_second, 1, 2),
-                          folds.rotation)
-    assert np.allclose(folds.unfolded(folds.folded(offsets)), offsets)
-    assert np.allclose(rotation_matrix(dataset.quaternion_from_euler(folds.angles)),
-                       folds.rotation)
-
-
-def test_fold_octant_reaches_the_domain():
-    """The fold has t' ≥ 0, R' proper with angles in [−π/2, π/2], and unfolding undoes it."""
-    _, offsets, turns = rotations(2000)
-    folds = fold(OCTANT, offsets, turns, axis=np.zeros(2000), normal=offsets)
-    assert np.all(folds.offset >= 0)
-    assert_proper(folds, offsets, turns)
-    assert np.allclose(np.abs(folds.offset), np.abs(offsets))
-    assert np.allclose(np.abs(folds.rotation), np.abs(turns))
-    assert np.all(folds.subset == -1)
-
-
-@pytest.mark.parametrize('axis', [0, 1, 2, *range(6, 15)])
-def test_fold_features_reaches_the_reference_features(axis):
-    """The face becomes +x and the corner that looks at it (−, −, −).
-
-    Or the edges become those of z at (+, +) and y at (−, −); angles stay within ±π/2.
-    """
-    rng, offsets, turns = rotations(500)
-    if axis < 3:
-        n = np.tile(np.eye(3)[axis], (500, 1))
-    else:
-        n = np.cross(np.eye(3)[(axis - 6) // 3], turns[:, :, (axis - 6) % 3])
-        n /= np.linalg.norm(n, axis=1, keepdims=True)
-    n *= rng.choice([-1.0, 1.0], (500, 1))
-    folds = fold(FEATURES, offsets, turns, axis=np.full(500, axis), normal=n)
-    assert_proper(folds, offsets, turns)
-    normal = folds.folded(n)
-    on_b = np.einsum('nji,nj->ni', folds.rotation, normal)
-    if axis < 3:
-        assert np.all(folds.subset == VERTEX_FACE)
-        assert np.allclose(normal, (1, 0, 0))
-        assert np.all(on_b >= 0)
-    else:
-        assert np.all(folds.subset == EDGE_EDGE)
-        assert np.abs(normal[:, 2]).max() < 1e-12
-        assert np.all((normal[:, 0] >= normal[:, 1]) & (normal[:, 1] >= -1e-12))
-        assert np.abs(on_b[:, 1]).max() < 1e-12
-        assert np.all((on_b[:, 0] >= on_b[:, 2]) & (on_b[:, 2] >= -1e-12))
-
-
-@pytest.mark.parametrize('axis', [0, 1, 2])
-def test_equally_steep_edges_keep_their_order(axis):
-    """Aligned cubes: the edge along the normal comes first, the two level ones after it."""
-    n = np.eye(3)[[axis]]
-    folds = fold(FEATURES, n, np.eye(3)[None], axis=np.array([axis]), normal=n)
-    order = [axis, *(k for k in range(3) if k != axis)]
-    assert np.array_equal(np.abs(folds.map_second[0]), np.eye(3)[order])
-
-
-@pytest.mark.parametrize('axis', [-1, 3, 5, 15])
-def test_axes_without_reference_features(axis):
-    """FEATURES refuses them; other ways read no axis."""
-    _, offsets, turns = rotations(3)
-    axes = np.array([0, 6, axis])
-    with pytest.raises(ValueError, match=r'axis\[2\] is no face of the first box'):
-        fold(FEATURES, offsets, turns, axis=axes, normal=offsets)
-    untouched = fold(NO_FOLD, offsets, turns, axis=axes, normal=offsets)
-    assert np.array_equal(untouched.offset, offsets)
-    assert np.array_equal(untouched.rotation, turns)
 
 
 def test_arrays_that_do_not_fit_are_refused():

@@ -20,11 +20,9 @@ pytest.importorskip('fcl')
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.apps.ros_client import ANSWERS
-from box_contact_ros.evidence.contestants.soup_node import PARAMETERS, SoupNode
-from box_contact_ros.node.contact_node import PARAMETERS as CONTACT_PARAMETERS
+from box_contact_ros.evidence.contestants.soup_node import SoupNode
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import PATCH_FIELDS, read_contacts
-from box_contact_ros.node.wrench_output import WRENCH_PARAMETERS
 from box_contact_ros.resources import resource_path
 
 ORIGIN = poses.IDENTITY
@@ -100,21 +98,6 @@ def test_both_nodes_answer_one_input(client):
     assert row['depth'] == exact['depth'] and row['point_x'] != exact['point_x']
 
 
-def test_no_contact_is_an_empty_cloud(client):
-    stamp = client.ask_both(ORIGIN, APART)
-    assert len(read_contacts(client.soup['contacts'][stamp])) == 0
-    assert stamp not in client.soup['point'] and stamp not in client.soup['normal']
-
-
-def test_a_bad_pose_is_refused_by_both(client, soup_node):
-    """Counted, never answered; then all is well again."""
-    before = soup_node.counts['refused: bad pose']
-    refused = client.send(ORIGIN, (math.nan, 0, 0, 0, 0, 0, 1))
-    client.ask_both(ORIGIN, TOUCHING)
-    assert soup_node.counts['refused: bad pose'] == before + 1
-    assert refused not in client.soup['contacts'] and refused not in client.clouds
-
-
 def test_a_contained_box_is_answered(client, soup_node):
     """The soup's surfaces may not meet: an answer with finite numbers all the same."""
     result, = soup_node.set_parameters([Parameter('size_b', value=[0.5, 0.5, 0.5])])
@@ -150,27 +133,6 @@ def test_its_topics_are_the_documents(client, soup_node):
         assert one.qos_profile.durability == other.qos_profile.durability
 
 
-def test_diagnostics_name_the_node(client):
-    names = set()
-    client.spin(lambda: names.update(message.status[0].name for message in client.diagnostics)
-                or len(names) > 1)
-    assert names >= {'/contact_node: contacts', '/soup_node: contacts'}
-
-
-def test_parameters_are_checked_before_they_are_applied(soup_node):
-    for name, value, words in (('divisions', 0, 'divisions out of range. Min: 1, Max: 64'),
-                               ('divisions', 65, 'divisions out of range. Min: 1, Max: 64'),
-                               ('divisions', 8.5, 'a whole number from 1 to 64'),
-                               ('size_a', [0.0, 2.0, 2.0], 'size_a (0, 2, 2) is not positive'),
-                               ('pairing', 'first', "pairing 'first' is not one of")):
-        result, = soup_node.set_parameters([Parameter(name, value=value)])
-        assert not result.successful and words in result.reason
-    for name in PARAMETERS:
-        assert soup_node.describe_parameter(name).description
-    assert set(PARAMETERS) == (
-        set(CONTACT_PARAMETERS) - {'model', 'weights', *WRENCH_PARAMETERS}) | {'divisions'}
-
-
 def test_the_contact_node_knows_the_soup_too(client):
     """model:=soup-2 is a model like any other."""
     with serving(lambda context: ContactNode(context, parameter_overrides=overrides(
@@ -186,11 +148,4 @@ def test_starts_at_its_worst_and_ends_cleanly(program):
     assert "model 'soup-64'" in running.output
     running.signal(signal.SIGINT)
     assert running.wait() == 0
-    assert 'Traceback' not in running.output
-
-
-def test_a_bad_start_is_one_clear_line(program):
-    running = program('soup_node', '--ros-args', '-p', 'divisions:=0')
-    assert running.wait(120) == 1
-    assert 'divisions must be a whole number from 1 to 64, not 0' in running.output
     assert 'Traceback' not in running.output

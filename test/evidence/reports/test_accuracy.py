@@ -11,16 +11,10 @@ import numpy as np
 import poses
 import pytest
 
-from box_contact_ros.evidence.pose_sets import (
-    CUBE,
-    LOADS,
-    SETS,
-    ContactErrors,
-    Pairs,
-    contact_errors,
-)
+from box_contact_ros.evidence.pose_sets import CUBE, LOADS, SETS, Pairs
 from box_contact_ros.evidence.reports import accuracy, searched
 from box_contact_ros.evidence.reports.accuracy import CLASSES, AccuracyRow
+from box_contact_ros.evidence.verification.errors import ContactErrors, contact_errors
 from box_contact_ros.solver.models import models
 
 

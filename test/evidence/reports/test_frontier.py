@@ -15,11 +15,11 @@ import numpy as np
 import pytest
 
 from box_contact_ros import output
+from box_contact_ros.evidence.contestants.contestant import Contestant, Manifold, chosen, ours
 from box_contact_ros.evidence.contestants.engines import installed
-from box_contact_ros.evidence.contestants.engines.engine import Engine, Manifold, chosen, ours
 from box_contact_ros.evidence.pose_sets import SETS, Pairs
 from box_contact_ros.evidence.reports.frontier import frontier, trials
-from box_contact_ros.evidence.reports.frontier.speed import take_turns
+from box_contact_ros.evidence.timing import take_turns
 from box_contact_ros.scene.pose import rotation_matrix
 from box_contact_ros.solver.contact_solver import ContactSolver
 
@@ -103,7 +103,7 @@ def test_at_exact_touch_either_verdict_is_right() -> None:
 
 
 @pytest.mark.parametrize('engine', [ours('exact'), *RIVALS], ids=lambda one: one.name)
-def test_conventions(engine: Engine) -> None:
+def test_conventions(engine: Contestant) -> None:
     """Two containers, 20 mm deep, under any rigid motion.
 
     The normal is from A to B, the point is in the patch, thickened by the depth. An order of axes
@@ -129,7 +129,7 @@ def test_conventions(engine: Engine) -> None:
 
 
 @pytest.mark.parametrize('engine', [ours('exact'), *RIVALS], ids=lambda one: one.name)
-def test_boxes_apart(engine: Engine) -> None:
+def test_boxes_apart(engine: Contestant) -> None:
     size = np.tile((2.0, 2.0, 2.0), (1, 1))
     pose = np.array([[0.0, 0, 0, 0, 0, 0, 1]])
     pairs = Pairs(pose, pose + [[0, 0, 2.5, 0, 0, 0, 0]], size, size)
@@ -146,7 +146,7 @@ def test_what_is_not_installed_is_said() -> None:
     assert all("extra 'peers'" in line or 'pip install' in line for line in MISSING)
 
 
-def aborting() -> Engine:
+def aborting() -> Contestant:
     """Return an engine that aborts on cubes, raises on containers, and answers on others."""
     exact = ours('exact')
 

@@ -7,10 +7,6 @@ from __future__ import annotations
 import csv
 import dataclasses
 import math
-import os
-import signal
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -154,40 +150,3 @@ class _Here:
 
     def __exit__(self, *_):
         return None
-
-
-SIGNALLED = """
-import os, signal, sys, time
-from box_contact_ros.apps import processes
-from box_contact_ros.evidence.reports.landing import landing_report
-
-def fly(number):
-    with processes.left_when_asked():
-        node = processes.start(['-c', 'import time; time.sleep(100.0)'])
-        try:
-            print(os.getpid(), node.pid, flush=True)
-            os.kill(os.getppid(), signal.SIGTERM)
-            time.sleep(100.0)
-        finally:
-            processes.end([node])
-
-landing_report.grid, landing_report.ADDED = lambda seed: [], []
-landing_report.over_dds = lambda pool, landings: pool.imap(fly, [0])
-landing_report.main(['--dds', '--workers', '1', '--out', sys.argv[1]])
-"""
-
-
-def test_sigterm_ends_what_a_run_has_started(tmp_path):
-    """A node that is left alive would answer whoever draws its domain next."""
-    done = subprocess.run([sys.executable, '-c', SIGNALLED, str(tmp_path)], capture_output=True,
-                          text=True, timeout=60)
-    assert done.returncode == 128 + signal.SIGTERM, done.stderr
-    for number in map(int, done.stdout.split()):
-        with pytest.raises(ProcessLookupError):
-            os.kill(number, 0)
-
-
-def test_other_ways_are_refused_over_dds(capsys):
-    with pytest.raises(SystemExit):
-        landing_report.main(['--dds', '--ways', 'fcl'])
-    assert '--dds takes the ways exact, mlp' in capsys.readouterr().err

@@ -5,8 +5,6 @@
 from __future__ import annotations
 
 import csv
-import gc
-import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -16,7 +14,8 @@ import pytest
 from box_contact_ros import ContactSolver
 from box_contact_ros.core import instruction_sets, stages
 from box_contact_ros.evidence.reports.frontier import frontier, speed
-from box_contact_ros.evidence.reports.frontier.speed import UNIT, Timing
+from box_contact_ros.evidence.reports.frontier.speed import UNIT
+from box_contact_ros.evidence.timing import Timing
 from box_contact_ros.output import processor, versions
 from box_contact_ros.solver.models import models_with_patch
 
@@ -34,22 +33,6 @@ def test_flush_stacks_are_aligned_and_flush() -> None:
     depth = -contacts.separation / pairs.size_a[:, 2]
     assert contacts.colliding.all()
     assert 0.99e-5 < depth.min() < 2e-5 and 0.008 < depth.max() < 1.1e-2
-
-
-def test_what_was_pinned_and_switched_off_is_given_back() -> None:
-    cores = os.sched_getaffinity(0)
-    with pytest.raises(RuntimeError, match='planted'):
-        with speed.pinned({speed.usable_cores()[-1]}), speed.no_garbage_collection():
-            assert len(os.sched_getaffinity(0)) == 1 and not gc.isenabled()
-            raise RuntimeError('planted')
-    assert os.sched_getaffinity(0) == cores and gc.isenabled()
-
-
-def test_all_take_their_turn() -> None:
-    seen: list[str] = []
-    speed.take_turns([lambda: seen.append('a'), lambda: seen.append('b')], 2,
-                     lambda: seen.append('.'))
-    assert ''.join(seen) == 'a.b.a.b.' and gc.isenabled()
 
 
 def run_of(exact: float, batches: list[float], *, unit: float | None = 1000.0,

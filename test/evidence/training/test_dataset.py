@@ -74,44 +74,6 @@ def test_every_face_vertex_and_edge_occurs() -> None:
         assert np.all(np.count_nonzero(on_edge, axis=1) == 2)
 
 
-def test_points_are_uniform_by_area_and_by_length() -> None:
-    """Before rejection: on a container the shares are far from equal."""
-    half = 0.5 * np.array(CONTAINER)
-    rng = np.random.default_rng(3)
-    count = 100000
-    face = dataset.vertex_face_candidates(rng, count, half).normal.mean(axis=0)
-    area = np.prod(half) / half
-    np.testing.assert_allclose(face, area / area.sum(), atol=0.01)
-    point = dataset.edge_edge_candidates(rng, count, half).point
-    along = (np.abs(np.abs(point) - half) > 1e-9).mean(axis=0)
-    np.testing.assert_allclose(along, half / half.sum(), atol=0.01)
-
-
-def test_angles_are_uniform_and_never_aligned() -> None:
-    """Before rejection, roll, pitch and yaw fill [−π/2, π/2]; a pattern is never axis-aligned."""
-    rng = np.random.default_rng(4)
-    drawn = dataset.vertex_face_candidates(rng, 20000, np.ones(3))
-    angles = dataset.fold(drawn, NO_FOLD).inputs[:, 3:]
-    quarters = np.histogram(angles[:, 1], bins=4, range=(-np.pi / 2, np.pi / 2))[0]
-    np.testing.assert_allclose(quarters / 20000, 0.25, atol=0.02)
-    assert np.all(np.abs(angles) <= np.pi / 2 + 1e-12)
-    kept = dataset.fold(draw(), NO_FOLD).inputs[:, 3:]
-    assert np.abs(kept).min() > 0.0 and np.abs(np.abs(kept) - np.pi / 2).min() > 0.0
-
-
-def test_placements_touch_and_do_not_interpenetrate(placements: Placements) -> None:
-    """SAT: separation 0 to rounding, never deeper."""
-    found = dataset.query(placements)
-    assert np.abs(found.separation).max() <= dataset.INTERPENETRATION * max(placements.size)
-    assert np.quantile(np.abs(found.separation), 0.99) <= 4e-15 * max(placements.size)
-
-
-def test_label_is_the_separating_normal(placements: Placements) -> None:
-    """SAT finds the label's normal from the pose alone; rounding grows for edges near parallel."""
-    cosine = np.sum(dataset.query(placements).normal * placements.normal, axis=1)
-    assert cosine.min() > 1.0 - 1e-9
-
-
 def test_placements_against_the_oracle() -> None:
     """In 60 digits: the same separation and normal, for both kinds and both sizes."""
     for size in (CUBE, CONTAINER):
@@ -209,14 +171,6 @@ def test_folded_boxes_touch_where_the_folded_label_says(how: int, cubes: Placeme
     np.testing.assert_allclose(direction(patterns.outputs[:, 2:]), result.normal, atol=1e-12)
 
 
-@pytest.mark.parametrize('size', [CUBE, CONTAINER])
-def test_octant(size: tuple[float, float, float]) -> None:
-    """The domain of the networks: t ≥ 0 and angles in [−π/2, π/2]."""
-    inputs = dataset.fold(draw(size), OCTANT).inputs
-    assert np.all(inputs[:, :3] >= 0.0)
-    assert np.all(np.abs(inputs[:, 3:]) <= np.pi / 2)
-
-
 def test_reference_features(cubes: Placements) -> None:
     """vertex_face: on face +x. edge_edge: on the edge along z at (+, +); normals across."""
     result = dataset.fold(cubes, FEATURES)
@@ -227,11 +181,6 @@ def test_reference_features(cubes: Placements) -> None:
     n = result.normal[~face]
     assert np.all(np.abs(n[:, 2]) < 1e-12) and np.all(n[:, 0] >= n[:, 1] - 1e-12)
     assert np.all(n[:, 1] >= -1e-12)
-
-
-def test_inputs_do_not_wrap(cubes: Placements) -> None:
-    """No subset reaches roll or yaw ±π, where a network would see a jump in its inputs."""
-    assert np.abs(dataset.fold(cubes, FEATURES).inputs[:, 3:]).max() < 0.5 * np.pi + 1e-9
 
 
 def test_labels_unfold(cubes: Placements) -> None:
@@ -275,40 +224,12 @@ def test_subset_is_what_the_oracle_says() -> None:
         assert axis < 3 or axis >= 6
 
 
-def test_the_same_pose_from_another_generator() -> None:
-    """A vertex-face pose of which only the pose is known: labelled edge-edge, it stays face."""
-    face = draw(kinds=GENERATORS[:1], count=500)
-    edge = draw(kinds=GENERATORS[1:], count=500)
-    mislabelled = Placements(CUBE, face.inputs, edge.point, edge.normal)
-    assert np.all(dataset.fold(mislabelled, FEATURES).subset == dataset.SUBSETS['vertex_face'])
-
-
 def test_features_are_for_cubes() -> None:
     with pytest.raises(ValueError, match='for cubes, not for'):
         dataset.fold(draw(CONTAINER, count=5), FEATURES)
 
 
-def test_a_winning_face_of_the_second_box_is_not_data(cubes: Placements) -> None:
-    """Such a pose needs the boxes to change places; it is refused, not put into a subset."""
-    turn = rotation_matrix(cubes.pose[:5, 3:])
-    seen_from_b = -np.einsum('nji,nj->ni', turn, cubes.pose[:5, :3])
-    angles = dataset.euler_angles(turn.swapaxes(1, 2))
-    swapped = Placements(CUBE, np.concatenate([seen_from_b, angles], axis=1), cubes.point[:5],
-                         cubes.normal[:5])
-    with pytest.raises(ValueError, match='is no face of the first box'):
-        dataset.fold(swapped, FEATURES)
-
-
 # --- angles ---------------------------------------------------------------------------------------
-
-
-def test_spherical() -> None:
-    """Azimuth from x towards y, elevation towards z; azimuth 0 at the poles, whatever the zeros."""
-    vectors = np.array([[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -2, 0], [0, 0, 3], [0, 0, -1],
-                        [-0.0, 0.0, 1], [-0.0, -0.0, -1], [-1e-17, 1e-17, 1], [1, 1, 2**0.5]])
-    want = [[0, 0], [np.pi / 2, 0], [np.pi, 0], [-np.pi / 2, 0], [0, np.pi / 2], [0, -np.pi / 2],
-            [0, np.pi / 2], [0, -np.pi / 2], [0, np.pi / 2], [np.pi / 4, np.pi / 4]]
-    np.testing.assert_allclose(dataset.spherical(vectors), want, atol=1e-15)
 
 
 # --- sets -----------------------------------------------------------------------------------------
@@ -352,20 +273,3 @@ def test_sets_come_from_the_seed_alone() -> None:
                 np.testing.assert_array_equal(patterns.outputs, again[subset][name].outputs)
             both = np.concatenate([all_inputs(sets), all_inputs(other[subset])])
             assert len(np.unique(both, axis=0)) == len(both)
-
-
-@pytest.mark.parametrize('edge_share', [0.0, 0.25, 0.5, 1.0])
-def test_share_of_edges(edge_share: float) -> None:
-    """Exact in every set, and in no order."""
-    some = dataset.mixed(np.random.default_rng(2), 400, CUBE, edge_share)
-    edges = dataset.fold(some, FEATURES).subset == dataset.SUBSETS['edge_edge']
-    assert edges.sum() == 400 * edge_share
-    assert edges[:200].sum() == pytest.approx(200 * edge_share, abs=40)
-
-
-def test_literal_and_folded_are_the_same_placements() -> None:
-    """`folded_in` changes the frame, not what is drawn."""
-    literal = dataset.paper(1, counts=SMALL, folded_in=False)['training'].inputs
-    inside = dataset.paper(1, counts=SMALL, folded_in=True)['training'].inputs
-    np.testing.assert_allclose(np.abs(literal[:, :3]), inside[:, :3], atol=1e-15)
-    assert np.any(literal[:, :3] < 0.0)

@@ -517,7 +517,7 @@ MUTANTS = {
         EVALUATOR, "if settings['pairing'] == old.get('pairing'):", 'if False:',
         f'{TEST_SCENE_NODE} -k come_and_go'),
     'a bad scene goes through': Mutant(
-        'node/parameters.py',
+        'node/declared_parameters.py',
         'return SetParametersResult(successful=False, reason=reason_of(error))',
         'return SetParametersResult(successful=True)', f'{TEST_SCENE_NODE} -k bad_scene'),
     'nesting without limit': Mutant(
@@ -549,7 +549,7 @@ MUTANTS = {
     'a reason as long as what is refused': Mutant(
         'node/parameters.py', '[:LONGEST_REASON]', '', f'{STRANGERS} -k texts'),
     'a locked node takes parameters': Mutant(
-        'node/parameters.py', "if self.values.get('locked'):", 'if False:',
+        'node/declared_parameters.py', "if self.values.get('locked'):", 'if False:',
         f'{STRANGERS} -k locked'),
     'a locked node makes transitions': Mutant(
         NODE, 'refuse_transitions(self)', 'pass', f'{STRANGERS} -k locked'),

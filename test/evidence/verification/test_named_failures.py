@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from helpers import oracle
 
-from box_contact_ros.evidence.contestants.engines.engine import APART, Manifold, ours
+from box_contact_ros.evidence.contestants.contestant import APART, Manifold, ours
 from box_contact_ros.evidence.verification import judge
 from box_contact_ros.evidence.verification.named_failures import NamedFailure, fault, load, replay
 from box_contact_ros.solver.models import models_with_patch

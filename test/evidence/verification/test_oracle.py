@@ -4,9 +4,6 @@
 """The oracle itself, against closed forms and against sampling."""
 from __future__ import annotations
 
-import itertools
-from concurrent.futures import ThreadPoolExecutor
-
 import numpy as np
 import oracle
 import poses
@@ -26,16 +23,6 @@ def test_axis_aligned_overlap():
     for j, row in enumerate(oracle.covariance(a, b)):
         for k, entry in enumerate(row):
             assert abs(entry - (extents[j]**2 / 12 if j == k else 0)) < 1e-50
-
-
-@pytest.mark.parametrize('offset', [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0.5, 0.5, 0.5)])
-def test_shared_faces_count_once(offset):
-    """Boxes with faces in one plane, looking the same way: the volume is still that of a box."""
-    a = oracle.make_box(poses.IDENTITY, (2, 2, 2))
-    b = oracle.make_box((*offset, 0, 0, 0, 1), (2, 2, 2))
-    volume, centroid = oracle.overlap(a, b)
-    assert abs(volume - (2 - offset[0]) * (2 - offset[1]) * (2 - offset[2])) < 1e-50
-    assert np.allclose(oracle.as_array(centroid), np.array(offset) / 2, atol=1e-16)
 
 
 def test_corner_pyramid():
@@ -83,44 +70,3 @@ def test_overlap_against_sampling():
             assert np.abs(drawn - spread).max() < 10 * np.trace(spread) / np.sqrt(inside.sum())
         assert (volume > 0) == (oracle.separation(box_a, box_b) < 0)
     assert hits >= 4
-
-
-def hull_depth(a, b):
-    """Depth by the hull of the 64 differences of corners.
-
-    It is the distance from the origin to the nearest of the planes through three of them that have
-    all the others on one side.
-    """
-    def corners(box):
-        return np.array([[float(v) for v in p] for s in (-1, 1) for p in box.face(2, s)])
-
-    points = (corners(a)[:, None] - corners(b)[None]).reshape(-1, 3)
-    i, j, k = np.array(list(itertools.combinations(range(64), 3))).T
-    normals = np.cross(points[j] - points[i], points[k] - points[i])
-    lengths = np.linalg.norm(normals, axis=1)
-    keep = lengths > 1e-6
-    normals, place = normals[keep] / lengths[keep, None], points[i[keep]]
-    heights = normals @ points.T - np.sum(normals * place, axis=1)[:, None]
-    outer = (heights.max(axis=1) < 1e-9) | (heights.min(axis=1) > -1e-9)
-    return np.abs(np.sum(normals * place, axis=1))[outer].min()
-
-
-@pytest.mark.parametrize('seed', range(8))
-def test_depth_against_the_hull_of_differences(seed):
-    """Fifteen axes say what the hull of all differences of corners says."""
-    found = 0
-    for row in zip(*poses.random_pairs(np.random.default_rng(900 + seed), 6)):
-        a, b = oracle.make_box(row[0], row[2]), oracle.make_box(row[1], row[3])
-        depth = -float(oracle.separation(a, b))
-        if depth > 0.0:
-            found += 1
-            assert hull_depth(a, b) == pytest.approx(depth, abs=1e-9)
-    assert found
-
-
-def test_sixty_digits():
-    """A third keeps its digits; in a thread, which has a precision of its own, nothing starts."""
-    box = oracle.make_box(poses.IDENTITY, (1, 1, 1))
-    assert abs(oracle.scaled(box.half, mpfr(2) / 3)[0] * 3 - 1) < 1e-59
-    with ThreadPoolExecutor(1) as pool, pytest.raises(AssertionError):
-        pool.submit(oracle.make_box, poses.IDENTITY, (1, 1, 1)).result()

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from box_contact_ros import ContactSolver
-from box_contact_ros.evidence.pose_sets import LOADS, SETS, Pairs, contact_errors
+from box_contact_ros.evidence.pose_sets import LOADS, SETS, Pairs
 from box_contact_ros.evidence.training import worst_case
 from box_contact_ros.evidence.verification import steps
+from box_contact_ros.evidence.verification.errors import contact_errors
 
 N = 200
 

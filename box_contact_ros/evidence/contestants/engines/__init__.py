@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from importlib import import_module
 
-from .engine import Engine
+from ..contestant import Contestant
 
 RIVALS = {'mujoco': "extra 'sim'", 'fcl': "extra 'soup'", 'coal': "extra 'peers'",
           'bullet': "extra 'peers'", 'optional.rapier': "extra 'peers'",
@@ -20,7 +20,7 @@ RIVALS = {'mujoco': "extra 'sim'", 'fcl': "extra 'soup'", 'coal': "extra 'peers'
 """The engines' modules, each with what brings its library."""
 
 
-def installed(modules: Iterable[str] = tuple(RIVALS)) -> tuple[list[Engine], list[str]]:
+def installed(modules: Iterable[str] = tuple(RIVALS)) -> tuple[list[Contestant], list[str]]:
     """Return the rivals that can be imported, and a line about each that cannot."""
     found, missing = [], []
     for module in modules:

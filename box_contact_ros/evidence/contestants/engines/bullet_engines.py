@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 import pybullet as bullet
 
-from .engine import Engine, Manifold, manifold
+from ..contestant import Contestant, Manifold, manifold
 
 FILLING = 4
 """Detections of the same pose before the manifold is read: it takes up to four points."""
 FAR = (1e6, 0.0, 0.0)
 
 
-def points(persistent: bool) -> Engine:
+def points(persistent: bool) -> Contestant:
     """Return `getClosestPoints` at distance 0, or `getContactPoints` of the filled manifold."""
     def boxes(p: np.ndarray, q: np.ndarray) -> Callable[..., Any]:
         client = bullet.connect(bullet.DIRECT)  # other boxes in its world would slow it down
@@ -53,7 +53,7 @@ def points(persistent: bool) -> Engine:
         return manifold((0.5 * (np.array(c[5]) + np.array(c[6])), -np.array(c[7]), -c[8])
                         for c in contacts if c[8] <= 0.0)
 
-    engine = partial(Engine, package='pybullet', boxes=boxes, at=at, read=read)
+    engine = partial(Contestant, package='pybullet', boxes=boxes, at=at, read=read)
     if persistent:
         return engine(name='PyBullet getContactPoints', returns='up to 4 points with depths, '
                       'normals', call=f'{FILLING} × performCollisionDetection, getContactPoints',

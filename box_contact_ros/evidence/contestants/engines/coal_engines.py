@@ -11,10 +11,10 @@ from typing import Any
 import coal
 import numpy as np
 
-from .engine import APART, MOST_CONTACTS, Engine, Manifold, manifold, matrices
+from ..contestant import APART, MOST_CONTACTS, Contestant, Manifold, manifold, matrices
 
 
-def collision(patches: bool) -> Engine:
+def collision(patches: bool) -> Contestant:
     """Return Coal's `collide`: the deepest point; or the polygon of its contact patch after it."""
     request, result = coal.CollisionRequest(), coal.CollisionResult()
     request.enable_contact = True
@@ -49,13 +49,13 @@ def collision(patches: bool) -> Engine:
         return manifold((patch.getPoint(k), normal, depth) for k in range(patch.size()))
 
     if patches:
-        return Engine(name='Coal collide, contact patch',
-                      call='coal.collide, coal.computeContactPatch', returns='polygon, normal',
-                      patch='area', package='coal', choices=('mean', 'patch centroid'),
-                      boxes=boxes, at=matrices, read=read)
-    return Engine(name='Coal collide', call='coal.collide, enable_contact',
-                  returns='deepest point, depth, normal', package='coal', choices=('its point',),
-                  boxes=boxes, at=matrices, read=read)
+        return Contestant(name='Coal collide, contact patch',
+                          call='coal.collide, coal.computeContactPatch', returns='polygon, normal',
+                          patch='area', package='coal', choices=('mean', 'patch centroid'),
+                          boxes=boxes, at=matrices, read=read)
+    return Contestant(name='Coal collide', call='coal.collide, enable_contact',
+                      returns='deepest point, depth, normal', choices=('its point',),
+                      package='coal', boxes=boxes, at=matrices, read=read)
 
 
 ENGINES = [partial(collision, False), partial(collision, True)]

@@ -10,10 +10,10 @@ from typing import Any
 import fcl
 import numpy as np
 
-from .engine import MOST_CONTACTS, Engine, Manifold, manifold, wxyz
+from ..contestant import MOST_CONTACTS, Contestant, Manifold, manifold, wxyz
 
 
-def collision() -> Engine:
+def collision() -> Contestant:
     """Return python-fcl's `collide` of two boxes."""
     request = fcl.CollisionRequest(num_max_contacts=MOST_CONTACTS, enable_contact=True)
 
@@ -31,9 +31,9 @@ def collision() -> Engine:
     def read(result: Any) -> Manifold:
         return manifold((c.pos, c.normal, c.penetration_depth) for c in result.contacts)
 
-    return Engine(name='python-fcl collide', call='fcl.collide, enable_contact',
-                  returns='up to 8 points with depths, normals', package='python-fcl',
-                  boxes=boxes, at=wxyz, read=read)
+    return Contestant(name='python-fcl collide', call='fcl.collide, enable_contact',
+                      returns='up to 8 points with depths, normals', package='python-fcl',
+                      boxes=boxes, at=wxyz, read=read)
 
 
 ENGINES = [collision]

@@ -16,14 +16,14 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from .engine import APART, Engine, Manifold, manifold, wxyz
+from ..contestant import APART, Contestant, Manifold, manifold, wxyz
 
 Shape = Callable[[str, np.ndarray], tuple[str, str]]  # (name, size) -> asset, geom
 _CCD_ENDS = 'The search for the depth ends at 0, on boxes of very unequal sizes.'
 FARTHEST = 1.0  # distance up to which mj_geomDistance looks [m]
 
 
-def distance(name: str, flags: str) -> Engine:
+def distance(name: str, flags: str) -> Contestant:
     """Return `mj_geomDistance`: signed distance and two nearest points; their middle."""
     ends = np.zeros(6)
     measure, kinematics = mujoco.mj_geomDistance, mujoco.mj_kinematics
@@ -46,15 +46,16 @@ def distance(name: str, flags: str) -> Engine:
         normal = (start - end) / length if length else np.full(3, np.nan)
         return manifold([(0.5 * (start + end), normal, -result)])
 
-    return Engine(name=f'MuJoCo mj_geomDistance{name}', call='data.qpos[:] = poses; mj_kinematics('
-                  'model, data); mj_geomDistance(model, data, 0, 1, 1.0, fromto)'
-                  f'{flags and f", {flags}"}', returns='distance, two nearest points',
-                  package='mujoco', choices=('its point',), boxes=boxes, at=as_qpos, read=read,
-                  causes={'normal': _CCD_ENDS + ' The two nearest points coincide, and give no '
-                          'direction.'})
+    return Contestant(name=f'MuJoCo mj_geomDistance{name}',
+                      call='data.qpos[:] = poses; mj_kinematics(model, data); '
+                      'mj_geomDistance(model, data, 0, 1, 1.0, fromto)'
+                      f'{flags and f", {flags}"}', returns='distance, two nearest points',
+                      package='mujoco', choices=('its point',), boxes=boxes, at=as_qpos, read=read,
+                      causes={'normal': _CCD_ENDS + ' The two nearest points coincide, and give no '
+                              'direction.'})
 
 
-def collision(name: str, shape: Shape, flags: str, normal: str = '', **about: Any) -> Engine:
+def collision(name: str, shape: Shape, flags: str, normal: str = '', **about: Any) -> Contestant:
     """Return `mj_collision`, after `mj_kinematics`: up to eight contacts."""
     kinematics, collide = mujoco.mj_kinematics, mujoco.mj_collision
 
@@ -74,11 +75,12 @@ def collision(name: str, shape: Shape, flags: str, normal: str = '', **about: An
         # A frame's first row is the normal, from the geom of lower number to the other.
         return Manifold(np.array(found.pos), np.array(found.frame)[:, :3], -np.array(found.dist))
 
-    return Engine(name=f'MuJoCo mj_collision{name}', call='data.qpos[:] = poses; mj_kinematics('
-                  f'model, data); mj_collision(model, data){flags and f", {flags}"}',
-                  returns='up to 8 points with depths, normals',
-                  package='mujoco', boxes=boxes, at=as_qpos, read=read, **about,
-                  causes={'missed': _CCD_ENDS, 'normal': normal})
+    return Contestant(name=f'MuJoCo mj_collision{name}',
+                      call='data.qpos[:] = poses; mj_kinematics(model, data); '
+                      f'mj_collision(model, data){flags and f", {flags}"}',
+                      returns='up to 8 points with depths, normals',
+                      package='mujoco', boxes=boxes, at=as_qpos, read=read, **about,
+                      causes={'missed': _CCD_ENDS, 'normal': normal})
 
 
 def as_qpos(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray]:

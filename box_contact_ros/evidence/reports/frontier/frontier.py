@@ -9,11 +9,11 @@ take turns. The models with native batches run once more with each other instruc
 machine, in a subprocess. Times are read as ratios within a run; the machine is named.
 
 Errors are against the exact model. Those of points are in % of the smaller box's longest edge, per
-contact class (`accuracy`); those of normals in degrees. Verdicts that differ are contacts missed
+contact class; those of normals in degrees. Verdicts that differ are contacts missed
 and contacts invented. An engine that returns several points is entered with the best of the ways
 to make one of them. Other engines are judged in subprocesses, where an abort is a finding.
 
-`--speed` writes the speed gates instead, speed.md and speed.csv: see `speed`.
+`--speed` writes the speed gates instead, speed.md and speed.csv.
 """
 from __future__ import annotations
 
@@ -31,12 +31,13 @@ from box_contact_ros.output import markdown_table, number
 from box_contact_ros.solver.arguments import program_parser
 from box_contact_ros.solver.models import models, models_with_patch
 
+from ...contestants.contestant import Contestant, ours, packages_of
 from ...contestants.engines import installed
-from ...contestants.engines.engine import Engine, ours, packages_of
+from ...timing import pinned, usable_cores
 from ..accuracy import CLASSES
 from .frontier_picture import draw
 from .native import write_native
-from .speed import pinned, usable_cores, with_instruction_set, write_speed
+from .speed import with_instruction_set, write_speed
 from .trials import (
     ALL_SETS,
     FEW_PAIRS,
@@ -57,7 +58,7 @@ FAMILIES = {'soup': [f'soup-{n}' for n in (8, 10, 12, 14, 16, 18, 20, 22)]}
 ODD_NORMAL = 10.0  # error of an engine's normal that is explained [deg]
 
 
-def contestants(members: int = FULL.members) -> tuple[list[Engine], list[str]]:
+def contestants(members: int = FULL.members) -> tuple[list[Contestant], list[str]]:
     """Return all that can be measured here, and a line about each that cannot."""
     found = []
     for entry in (one for one in models().values() if one.name not in AS_ENGINES):
@@ -80,7 +81,7 @@ def _errors(values: Sequence[float]) -> str:
 Odd = tuple[str, str]  # an engine's name, and 'missed', 'invented', 'normal' or 'failure'
 
 
-def odd_cells(rows: Sequence[FrontierRow], found: Sequence[Engine]) -> dict[Odd, str]:
+def odd_cells(rows: Sequence[FrontierRow], found: Sequence[Contestant]) -> dict[Odd, str]:
     """Return what is odd in the answers of other engines: a line with a pose and the cause."""
     lines: dict[Odd, str] = {}
     for engine in found:
@@ -141,7 +142,7 @@ def in_short(rows: Sequence[FrontierRow], odd: Mapping[Odd, str]) -> str:
          'exceptions / aborts'], lines)
 
 
-def calls_table(found: Sequence[Engine]) -> str:
+def calls_table(found: Sequence[Contestant]) -> str:
     """Return what is called of other engines, and what they return."""
     return markdown_table(
         ['', 'call', 'returns', 'volume or area', 'one point by', 'batch'],
@@ -177,7 +178,7 @@ def honesty(rows: Sequence[FrontierRow]) -> str:
         paper=by['paper', 'random cubes'].errors.points['all'][1]).rstrip()
 
 
-def page(rows: Sequence[FrontierRow], found: Sequence[Engine], missing: Sequence[str],
+def page(rows: Sequence[FrontierRow], found: Sequence[Contestant], missing: Sequence[str],
          command: str, plan: Plan) -> str:
     """Return the Markdown page."""
     odd = odd_cells(rows, found)
@@ -194,7 +195,7 @@ def page(rows: Sequence[FrontierRow], found: Sequence[Engine], missing: Sequence
             for name in ALL_SETS))
 
 
-def csv_rows(rows: Sequence[FrontierRow], found: Sequence[Engine]) -> list[dict[str, object]]:
+def csv_rows(rows: Sequence[FrontierRow], found: Sequence[Contestant]) -> list[dict[str, object]]:
     """Return a row per contestant, set, choice and class; times [ns], errors [%], normals [deg]."""
     packages, lines = {engine.name: engine.package for engine in found}, []
     here = {package: asdict(output.machine(native, ['numpy', *filter(None, [package])]))

@@ -1,7 +1,7 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""How contestants are timed, and the speed gates: limits on ratios of times.
+"""The speed gates: limits on ratios of times.
 
 `python -m box_contact_ros frontier --speed` writes speed.md and speed.csv. Each instruction set of
 the machine is measured in subprocesses of its own, on one pinned core. The contestants take turns,
@@ -14,10 +14,8 @@ import math
 import os
 import subprocess
 import sys
-import time
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from operator import itemgetter
 from pathlib import Path
@@ -26,20 +24,15 @@ from typing import Any
 import numpy as np
 
 from box_contact_ros.core import FORCE, instruction_sets, native
-from box_contact_ros.output import (
-    machine,
-    markdown_table,
-    no_garbage_collection,
-    percentiles,
-    write_csv,
-)
+from box_contact_ros.output import machine, markdown_table, percentiles, write_csv
 from box_contact_ros.output import page as filled_page
 from box_contact_ros.scene.pose import quaternion_multiply
 from box_contact_ros.solver.models import models_with_patch
 
+from ...contestants.contestant import in_subprocess, ours
 from ...contestants.engines import installed
-from ...contestants.engines.engine import in_subprocess, ours
 from ...pose_sets import CONTAINER, CUBE, SETS, Pairs, log_uniform, turns
+from ...timing import Timing, nanoseconds, pinned, timed, usable_cores
 
 UNIT = 'MuJoCo mj_geomDistance'  # the contestant whose median single call is the unit of all ratios
 UNITS = (UNIT, 'python-fcl collide')
@@ -86,35 +79,6 @@ FULL = Effort(calls=2_000, batch=20_000, shared_batch=100_000, passes=5, rounds=
 QUICK = Effort(calls=200, batch=1_000, shared_batch=1_000, passes=2, rounds=2, starts=2)
 
 
-@contextmanager
-def pinned(cores: Collection[int]) -> Iterator[None]:
-    """Run on these cores only, where the system can do so."""
-    if not hasattr(os, 'sched_setaffinity'):
-        yield
-        return
-    before = os.sched_getaffinity(0)
-    os.sched_setaffinity(0, cores)
-    try:
-        yield
-    finally:
-        os.sched_setaffinity(0, before)
-
-
-def usable_cores() -> list[int]:
-    """Return the cores that this process may use; reports measure on the last one."""
-    return sorted(os.sched_getaffinity(0)) if hasattr(os, 'sched_getaffinity') else [0]
-
-
-def take_turns(runs: Sequence[Callable[[], object]], rounds: int,
-               after_each: Callable[[], object] = lambda: None) -> None:
-    """Call all in turn, `rounds` times, so that a slow moment hits all of them."""
-    with no_garbage_collection():
-        for _ in range(rounds):
-            for run in runs:
-                run()
-                after_each()
-
-
 def flush_stacks(rng: np.random.Generator, n: int) -> Pairs:
     """Draw aligned flush stacks: equal boxes, the sides of one in the planes of the other's.
 
@@ -143,48 +107,13 @@ SHARED = ('one thread', 'two threads')
 """Kinds of timings of a large batch, which threads share."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Timing:
-    """Times of one contestant [ns for each call or pair], over the rounds."""
-
-    name: str
-    kind: str  # 'single' or 'batch'; for a large batch 'one thread' or 'two threads'
-    instruction_set: str
-    rounds: list[float]
-
-    def by(self, other: Timing) -> float:
-        """Return the ratio to another contestant's time: the median of the rounds' own ratios.
-
-        Neighbours on a machine may slow it by half for minutes; both times of a round share that.
-        """
-        return float(np.median(np.divide(self.rounds, other.rounds)))
-
-
-@dataclass(frozen=True, kw_only=True)
-class Stint:
-    """What is timed as a whole, once a round."""
-
-    name: str
-    kind: str
-    count: int  # calls or pairs of a run
-    run: Callable[[], object]
-    times: list[float] = field(default_factory=list)  # of a call or pair, by round [ns]
-
-    def clock(self) -> None:
-        """Time a run right after an untimed one."""
-        self.run()
-        began = time.perf_counter_ns()
-        self.run()
-        self.times.append((time.perf_counter_ns() - began) / self.count)
-
-
 def _drawn(name: str, count: int) -> Pairs:
     """Draw exactly `count` pairs of a set; a few draws miss."""
     rng = np.random.default_rng([1, list(BATCH_SETS).index(name)])
     return BATCH_SETS[name](rng, count + count // 20 + 20).rows(slice(count))
 
 
-def single_calls(count: int) -> list[Stint]:
+def single_calls(count: int) -> list[Timing]:
     """Return the contestants for equal cubes, from two poses to a result in Python."""
     rivals, missing = installed(('mujoco', 'fcl'))
     for line in missing:
@@ -192,8 +121,8 @@ def single_calls(count: int) -> list[Stint]:
     # Ours come last: batches follow, and the first one after scalar code is slow for milliseconds.
     engines = [*(one for one in rivals if one.name in UNITS), *map(ours, models_with_patch())]
     pairs = _drawn('random cubes', count)
-    return [Stint(name=engine.name, kind='single', count=count,
-                  run=partial(_call_all, engine.prepare(pairs))) for engine in engines]
+    return [Timing(name=engine.name, kind='single', count=count,
+                   run=partial(_call_all, engine.prepare(pairs))) for engine in engines]
 
 
 def _call_all(calls: Sequence[Callable[[], object]]) -> None:
@@ -201,17 +130,10 @@ def _call_all(calls: Sequence[Callable[[], object]]) -> None:
         call()
 
 
-def batch(model: str, name: str, count: int, kind: str = 'batch', threads: int = 1) -> Stint:
+def batch(model: str, name: str, count: int, kind: str = 'batch', threads: int = 1) -> Timing:
     """Return the contestant for a batch of a model on a set, every row its own sizes."""
-    return Stint(name=f'{model}: {name}', kind=kind, count=count,
-                 run=ours(model).prepare_batch(_drawn(name, count), threads=threads))
-
-
-def timed(stints: Sequence[Stint], rounds: int) -> list[Timing]:
-    """Time all in turn, `rounds` times."""
-    take_turns([one.clock for one in stints], rounds)
-    return [Timing(name=one.name, kind=one.kind, instruction_set=native.instruction_set,
-                   rounds=one.times) for one in stints]
+    return Timing(name=f'{model}: {name}', kind=kind, count=count,
+                  run=ours(model).prepare_batch(_drawn(name, count), threads=threads))
 
 
 def with_instruction_set(name: str, work: Callable[..., list[Any]], *arguments: Any) -> list[Any]:
@@ -241,10 +163,10 @@ def measure_threads(cores: Sequence[int], effort: Effort) -> list[Timing]:
     Each has its rounds in a row. After a rest the host of a virtual machine may run both virtual
     cores on one of its own. Moving one of them away takes the host a while.
     """
-    stints = [batch(model, 'random cubes', effort.shared_batch, kind, threads)
-              for model in models_with_patch() for threads, kind in enumerate(SHARED, start=1)]
+    batches = [batch(model, 'random cubes', effort.shared_batch, kind, threads)
+               for model in models_with_patch() for threads, kind in enumerate(SHARED, start=1)]
     with pinned(cores):
-        return [timing for stint in stints for timing in timed([stint], effort.rounds)]
+        return [timing for one in batches for timing in timed([one], effort.rounds)]
 
 
 def measure_in_passes(core: int, cores: Sequence[int], effort: Effort) -> list[list[Timing]]:
@@ -262,14 +184,17 @@ def measure_starts(count: int) -> list[float]:
     """Return times from the start of a process to its first contact [s], after one warm-up."""
     times = []
     for _ in range(1 + count):
-        began = time.perf_counter()
-        with subprocess.Popen([sys.executable, '-c', FIRST_CONTACT], stdout=subprocess.PIPE) as new:
-            answered = bool(new.stdout.readline())
-            times.append(time.perf_counter() - began)
-            new.stdout.read()
-        if not answered or new.returncode:
+        took, (new, answer) = nanoseconds(_first_contact)
+        new.communicate()
+        if not answer or new.returncode:
             raise RuntimeError('a new process gave no contact')
+        times.append(1e-9 * took)
     return times[1:]
+
+
+def _first_contact() -> tuple[subprocess.Popen[bytes], bytes]:
+    new = subprocess.Popen([sys.executable, '-c', FIRST_CONTACT], stdout=subprocess.PIPE)
+    return new, new.stdout.readline()
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -15,12 +15,7 @@ from box_contact_ros.core import native
 from box_contact_ros.output import percentiles
 from box_contact_ros.scene.pose import degrees_between
 
-from ...contestants.engines.engine import (
-    APART,
-    Engine,
-    chosen,
-    part_by_part,
-)
+from ...contestants.contestant import APART, Contestant, chosen, part_by_part
 from ...pose_sets import (
     CONTAINER,
     SETS,
@@ -31,8 +26,9 @@ from ...pose_sets import (
     log_uniform,
     stacked,
 )
+from ...timing import Timing, by_round, each_call, take_turns
+from ...verification.errors import point_errors
 from ..accuracy import CLASSES, classify
-from .speed import take_turns
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,7 +56,6 @@ FEW_PAIRS = 17
 """Pairs that are prepared at once where more pairs of sizes than that are among them. Odd, so that
 a median is the time of one pair, not between two that may differ tenfold."""
 LEAST_PAIRS = 10  # pairs judged, whatever they take
-WARM_UP = 3  # calls before a round
 PATIENCE = 120.0  # for an engine's answers in a subprocess [s]
 VERDICT = 1e-9
 """Least gap or depth, of the size, at which verdicts and normals are judged. At exact touch both
@@ -85,7 +80,7 @@ ALL_SETS: dict[str, Generator] = {**SETS, 'just apart': apart}
 
 
 @dataclass(frozen=True, kw_only=True)
-class EngineErrors:
+class SetErrors:
     """Answers on a set against the exact ones."""
 
     points: dict[str, tuple[int, float, float, float]]
@@ -106,7 +101,7 @@ class Answers:
     points: dict[str, np.ndarray]  # (n, 3), by choice
     exceptions: int = 0  # pairs at which the engine raised one; they count as apart
 
-    def judged(self, pairs: Pairs) -> dict[str, EngineErrors]:
+    def judged(self, pairs: Pairs) -> dict[str, SetErrors]:
         """Return the errors by choice."""
         first = pairs.rows(slice(len(self.colliding)))
         return {choice: judge(first, self.colliding, self.normals, points)
@@ -126,11 +121,11 @@ class FrontierRow:
     batch: float  # p50 of a pair in a batch [ns]
     by_exact: list[float]
     """Single call and batch by those of `exact`: medians over the rounds of their own ratios."""
-    choices: dict[str, EngineErrors]  # by the way in which a point was made
+    choices: dict[str, SetErrors]  # by the way in which a point was made
     exceptions: int = 0
     failure: str = ''  # what ended the engine before its answers, if anything
     poses: Mapping[str, tuple[list[float], ...]] = field(default_factory=dict)
-    """Poses and sizes of the odd pairs of `EngineErrors`."""
+    """Poses and sizes of the odd pairs of `SetErrors`."""
 
     @property
     def best(self) -> str:
@@ -139,20 +134,20 @@ class FrontierRow:
             'all', (0, math.nan, math.inf, math.nan))[2])
 
     @property
-    def errors(self) -> EngineErrors:
+    def errors(self) -> SetErrors:
         """Return the errors of the best choice."""
         return self.choices[self.best]
 
 
 def judge(pairs: Pairs, colliding: np.ndarray, normals: np.ndarray, points: np.ndarray,
-          ) -> EngineErrors:
+          ) -> SetErrors:
     """Compare answers (n,), (n, 3), (n, 3) with the exact ones."""
     truth = pairs.contacts()
     both = colliding & truth.colliding
     found: dict[str, tuple[int, float, float, float]] = {}
     if both.any():
         touching = pairs.rows(both)
-        errors = 100.0 * np.linalg.norm(points[both] - truth.point[both], axis=1) / touching.edge
+        errors = point_errors(points[both], truth.point[both], touching.edge)
         classes = classify(touching)[0]
         parts = {'all': errors, **{c: errors[classes == k] for k, c in enumerate(CLASSES)}}
         found = {label: (len(part), *percentiles(part, 50, 99, 100))
@@ -165,11 +160,11 @@ def judge(pairs: Pairs, colliding: np.ndarray, normals: np.ndarray, points: np.n
     odd = {kind: int(rows[0]) for kind, rows in wrong.items() if len(rows)}
     if len(rows):
         odd['normal'] = int(rows[np.argmax(angles)])
-    return EngineErrors(points=found, normal=percentiles(angles, 99, 100), odd=odd,
-                        missed=len(wrong['missed']), invented=len(wrong['invented']))
+    return SetErrors(points=found, normal=percentiles(angles, 99, 100), odd=odd,
+                     missed=len(wrong['missed']), invented=len(wrong['invented']))
 
 
-def ask(engine: Engine, pairs: Pairs, plan: Plan) -> Answers:
+def ask(engine: Contestant, pairs: Pairs, plan: Plan) -> Answers:
     """Return answers to as many pairs as there is time to ask."""
     if engine.prepare_batch and engine.make is None:
         found = engine.prepare_batch(pairs)()
@@ -201,7 +196,8 @@ def _at_once(pairs: Pairs) -> int:
     return FEW_PAIRS if len(sizes) > FEW_PAIRS else len(pairs.size)
 
 
-def answers_of(engine: Engine, sets: Mapping[str, Pairs], plan: Plan) -> dict[str, Answers | str]:
+def answers_of(engine: Contestant, sets: Mapping[str, Pairs], plan: Plan,
+               ) -> dict[str, Answers | str]:
     """Return answers by set, or what ended the engine; sets with boxes not for it are left out."""
     if engine.make is None or not plan.subprocesses:
         return _ask_all(engine, sets, plan)
@@ -209,7 +205,7 @@ def answers_of(engine: Engine, sets: Mapping[str, Pairs], plan: Plan) -> dict[st
     return part_by_part(_ask_all, engine.make, few, plan, patience=PATIENCE)
 
 
-def _ask_all(engine: Engine, sets: Mapping[str, Pairs], plan: Plan) -> dict[str, Answers | str]:
+def _ask_all(engine: Contestant, sets: Mapping[str, Pairs], plan: Plan) -> dict[str, Answers | str]:
     found: dict[str, Answers | str] = {}
     for name, pairs in sets.items():
         try:
@@ -223,18 +219,20 @@ def _ask_all(engine: Engine, sets: Mapping[str, Pairs], plan: Plan) -> dict[str,
 class Trial:
     """A contestant on a set: its answers, judged, and its times, gathered in rounds."""
 
-    def __init__(self, engine: Engine, name: str, pairs: Pairs, answers: Answers | str,
+    def __init__(self, engine: Contestant, name: str, pairs: Pairs, answers: Answers | str,
                  plan: Plan) -> None:
         """Judge, and prepare the calls; an engine that failed is not timed."""
         self.name, self.set = engine.name, name
         self._engine, self._pairs, self._answers = engine, pairs, answers
         self._seconds = plan.seconds / plan.rounds
         self._calls: Sequence[Callable[[], object]] = ()
-        self._ask_all = None
+        self._batch: Timing | None = None
         if isinstance(answers, Answers) and not answers.exceptions:
             timed = pairs.rows(slice(plan.timed_pairs))
             self._calls = engine.prepare(timed.rows(slice(_at_once(timed))))
-            self._ask_all = engine.prepare_batch and engine.prepare_batch(pairs)
+            if engine.prepare_batch:
+                self._batch = Timing(name=engine.name, kind='batch', count=len(pairs.size),
+                                     run=engine.prepare_batch(pairs))
         for call in self._calls:  # what is made at a pair's first call is not timed
             call()
         self._singles: list[np.ndarray] = []
@@ -243,22 +241,12 @@ class Trial:
 
     def time(self) -> None:
         """Time one round, after a warm-up: all single calls, again and again, then a batch."""
-        clock, times, batch = time.perf_counter_ns, list[int](), math.nan
-        for call in self._calls[:WARM_UP]:
-            call()
-        until = clock() + int(1e9 * self._seconds)
-        while self._calls and clock() < until:
-            for call in self._calls:
-                began = clock()
-                call()
-                times.append(clock() - began)
-        if self._ask_all:
-            self._ask_all()
-            began = clock()
-            self._ask_all()
-            batch = (clock() - began) / len(self._pairs.size)
+        times = each_call(self._calls, self._seconds)
         self._singles.append(np.array(times, np.int64))
-        self.rounds.append((percentiles(times, 50)[0], batch))
+        if self._batch:
+            self._batch.time()
+        self.rounds.append((percentiles(times, 50)[0],
+                            self._batch.rounds[-1] if self._batch else math.nan))
 
     def row(self, exact: Trial) -> FrontierRow:
         """Return what was found; times also by those of `exact` in the same rounds."""
@@ -275,13 +263,14 @@ class Trial:
             judged=len(answers.colliding), calls=len(singles),
             single=percentiles(singles, 50, 99, 100),
             batch=float(np.median([batch for _, batch in self.rounds])), choices=choices,
-            by_exact=np.median(np.divide(self.rounds, exact.rounds), axis=0).tolist(),
+            by_exact=by_round(self.rounds, exact.rounds).tolist(),
             exceptions=answers.exceptions, failure=failure,
             poses={kind: tuple(part[row].tolist() for part in self._pairs)
                    for kind, row in odd.items()})
 
 
-def measure_all(found: Sequence[Engine], *, seed: int = 3, plan: Plan = FULL) -> list[FrontierRow]:
+def measure_all(found: Sequence[Contestant], *, seed: int = 3, plan: Plan = FULL,
+                ) -> list[FrontierRow]:
     """Return all rows, set by set. All contestants on all sets take turns.
 
     A neighbour that slows the machine for seconds then slows few rounds of a set, not all of them.

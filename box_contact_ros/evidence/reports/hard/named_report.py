@@ -11,8 +11,8 @@ from box_contact_ros import output
 from box_contact_ros.core import native
 from box_contact_ros.solver.models import models_with_patch
 
+from ...contestants.contestant import ours, packages_of
 from ...contestants.engines import installed
-from ...contestants.engines.engine import ours, packages_of
 from ...verification.named_failures import NamedFailure, load, replay_apart
 
 

@@ -3,14 +3,14 @@
 
 """Program `stability`: what each model makes of the families of hard poses.
 
-`python -m box_contact_ros stability` asks every model for every stored case (`hard_poses`) and
+`python -m box_contact_ros stability` asks every model for every stored case and
 writes stability.md and .csv. The tables have wrong verdicts, wrong normals, the worst error of
 depth and point, and how far the point moves when a pose is nudged. The truth is stored, in 60
 digits. Models that build on FCL run in a subprocess, family by family: an abort is a finding, not
 an end.
 
 `--named` replays public reports about pairs of boxes instead, with every model and every other
-engine that is installed. It writes named_failures.md: see `named_failures`.
+engine that is installed. It writes named_failures.md.
 """
 from __future__ import annotations
 
@@ -28,8 +28,9 @@ from box_contact_ros.solver.arguments import add_models, program_parser
 from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.solver.models import find_model, models, models_with_patch
 
-from ...contestants.engines.engine import in_subprocess
+from ...contestants.contestant import in_subprocess
 from ...pose_sets import Pairs
+from ...verification.errors import distances, point_errors
 from ...verification.hard_poses import Cases, load
 from ...verification.judge import NOT_FINITE, NOT_UNIT, OUTSIDE, judge
 from .named_report import write_named
@@ -83,8 +84,8 @@ def examine(model: str, family: str, cases: Cases) -> StabilityRow:
         'outside': touching & (verdict.faults & OUTSIDE > 0),
         'not_finite': touching & (verdict.faults & NOT_FINITE > 0)}
     known = touching & np.isfinite(cases.centroid).all(axis=1)
-    off = np.linalg.norm((found.point - pairs.pose_a[:, :3] - cases.centroid)[known], axis=1)
-    errors = 100.0 * off / pairs.edge[known]
+    points = found.point - pairs.pose_a[:, :3]
+    errors = point_errors(points[known], cases.centroid[known], pairs.edge[known])
     ratio, exact_ratio = _ratios(solver, pairs)
     return StabilityRow(
         model, family, len(gap), contacts=int(found.colliding.sum()),
@@ -110,7 +111,7 @@ def _ratios(solver: ContactSolver, pairs: Pairs) -> tuple[float, float]:
         for k, one in enumerate((solver, exact)):
             before, after = pairs.contacts(one), nudged.contacts(one)
             both = before.colliding & after.colliding
-            ratios = np.linalg.norm(after.point - before.point, axis=1) / moved
+            ratios = distances(after.point, before.point) / moved
             worst[k] = max(worst[k], float(ratios[both].max(initial=0.0)))
     return worst[0], worst[1]
 
@@ -162,8 +163,6 @@ def page(rows: Sequence[StabilityRow], command: str) -> str:
 
 def main(args: Sequence[str] | None = None) -> int:
     """Ask all, print, write; 1 if a gate is broken."""
-    from tqdm import tqdm
-
     cases = load()
     parser = program_parser('stability', __doc__)
     reported = [entry.full_name for entry in models().values() if entry.any_boxes]
@@ -184,6 +183,8 @@ def main(args: Sequence[str] | None = None) -> int:
     whole = set(options.models) >= set(reported) and set(options.families) == set(cases)
     folder = output.make_folder(parser, options.out or (
         output.RESULTS if whole else output.QUICK_RESULTS))
+    from tqdm import tqdm
+
     rows = []
     with tqdm(total=len(options.models) * len(options.families), desc='stability',
               unit='family') as bar:

@@ -4,11 +4,7 @@
 """Landings by the way of contact and force: whether the container comes to rest, and how flat.
 
 It runs a grid of 36 landings by every way (some by a sample), rate and latency. It also lands other
-loads and stacks, with an outcome that is stated beforehand (`landing_ways`). Written are
-landing.csv (a row per landing), landing.md (tables) and landing.png (one landing, four ways). With
---dds the contacts of a sample come from a contact node in another process, in lockstep, and
-landing_dds.csv and .md are written. The exit status is 1 if held patches of `exact` or `mlp` do not
-do all that is expected.
+    parser.add_argument('--workers', type=int, default=os.cpu_count(), help='processes at once')
 """
 from __future__ import annotations
 
@@ -20,17 +16,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from itertools import groupby
 from multiprocessing import Pool
-from multiprocessing.pool import Pool as PoolType
 from pathlib import Path
-from random import sample
 from typing import NamedTuple
-
-from tqdm import tqdm
 
 from box_contact_ros import output
 from box_contact_ros.apps.crane.landing import LandingRecord, LandingResult, scenario_of
 from box_contact_ros.apps.crane.mujoco_crane import CraneScenario
-from box_contact_ros.apps.processes import DOMAINS, left_when_asked
+from box_contact_ros.apps.processes import left_when_asked
 from box_contact_ros.core import native
 from box_contact_ros.solver.arguments import program_parser
 
@@ -38,15 +30,12 @@ from .landing_picture import draw
 from .landing_ways import ADDED, WAYS, HeldLimits, LoopTiming, PlannedLanding, grid
 
 QUICK = 10
-"""`--quick` and `--dds` run every tenth landing of the grid, and every third of the added ones."""
+"""`--quick` runs every tenth landing of the grid, and every third of the added ones."""
 SHOWN = 17
 """The landing that is drawn: sway of 1.25°, tilt of 3°, 0.6 m of overhang."""
 PACKAGES = ('numpy', 'mujoco')  # whose versions are named
 GATED = ('exact', 'mlp')
 """Ways that have to do all that is expected."""
-OVER_DDS = ('exact', 'mlp')
-TOGETHER = 14
-"""Landings that share a scene over DDS: fewer start more nodes, more come back later."""
 
 
 class Landing(NamedTuple):
@@ -171,37 +160,6 @@ def added_table(results: Sequence[Landed]) -> str:
     return output.markdown_table(['landing', 'expected', *head], rows, words=2)
 
 
-def together(landings: Sequence[Landing]) -> Iterator[list[Landing]]:
-    """Yield the landings in groups of one model and rate, which fly in one scene over DDS."""
-    def kind(one: Landing) -> tuple[str, float]:
-        return one.way, one.timing.rate_hz
-
-    for _, group in groupby(sorted(landings, key=kind), key=kind):
-        flights = list(group)
-        yield from (flights[first:first + TOGETHER] for first in range(0, len(flights), TOGETHER))
-
-
-def run_over_dds(flight: tuple[Sequence[Landing], int]) -> list[Landed]:
-    """Run and judge landings that fly together, their contacts from a node in a ROS domain."""
-    # Only here: needs ROS.
-    from box_contact_ros.apps.crane.landing_flights import fly_over_dds
-
-    landings, domain = flight
-    first = landings[0]
-    with left_when_asked():
-        records = fly_over_dds(
-            first.way, [one.scenario for one in landings],
-            [one.timing.latency for one in landings], rate_hz=first.timing.rate_hz, domain=domain)
-    return [judged(one, record) for one, record in zip(landings, records)]
-
-
-def over_dds(pool: PoolType, landings: Sequence[Landing]) -> Iterator[Landed]:
-    """Run and judge landings over DDS, each group in a ROS domain of its own."""
-    groups = list(together(landings))
-    for found in pool.imap(run_over_dds, zip(groups, sample(DOMAINS, len(groups)))):
-        yield from found
-
-
 COMPARED = {'corner [mm/s]': ('corner_speed', 1e3), 'creep [mm/s]': ('creep', 1e3),
             'static tilt [°]': ('static_tilt', 180.0 / math.pi), 'depth [%]': ('depth', 100.0),
             'settled [s]': ('settled', 1.0), 'force off the weight': ('force_worst', 1.0),
@@ -245,14 +203,12 @@ def missed(gated: Sequence[Landed]) -> str:
     return '\n'.join(lines) or 'No goal was missed.'
 
 
-def page(results: Sequence[Landed], command: str, *, dds: bool = False) -> str:
+def page(results: Sequence[Landed], command: str) -> str:
     """Return the Markdown page."""
     gated = [one for one in results if one.landing.way in GATED]
     values = {'command': command, 'machine': output.machine(native, PACKAGES), 'all': len(gated),
               'good': sum(one.as_expected for one in gated), 'grid': grid_table(results),
               'added': added_table(results), 'missed': missed(gated)}
-    if dds:
-        return output.page('evidence/reports/landing/over_dds', together=TOGETHER, **values)
     return output.page('evidence/reports/landing/offline',
                        against=against_manifold(results), **values)
 
@@ -260,25 +216,24 @@ def page(results: Sequence[Landed], command: str, *, dds: bool = False) -> str:
 def main(args: Sequence[str] | None = None) -> int:
     """Run the sweep and write its files; 1 if a gated way fails an expectation."""
     options, folder = _options(args)
-    step = QUICK if options.quick or options.dds else 1
+    from tqdm import tqdm
+
+    step = QUICK if options.quick else 1
     of_grid, added = grid(options.seed)[::step], ADDED[::3] if step > 1 else ADDED
     timings = [LoopTiming(rate, latency) for rate in options.rates for latency in options.latency]
     everything = [*of_grid, *added]
-    # Leaving the pool ends its workers, and they their contact nodes.
     with left_when_asked(), Pool(options.workers) as pool:
         scenarios = dict(zip([one.name for one in everything], tqdm(
             pool.imap(aimed, everything), total=len(everything), desc='aiming', unit='')))
         landings = list(landings_of(options.ways, timings, of_grid, added, scenarios, step=step))
-        flown = over_dds(pool, landings) if options.dds else pool.imap(run, landings)
-        results = list(tqdm(flown, total=len(landings), desc='landings', unit=''))
-    name = 'landing_dds' if options.dds else 'landing'
-    if not options.dds:
-        draw(folder / 'landing.png', scenarios[of_grid[-1].name] if options.quick else
-             scenarios[f'grid {SHOWN}'])
-    output.write_csv(folder / f'{name}.csv', map(csv_row, results),
+        results = list(tqdm(pool.imap(run, landings), total=len(landings), desc='landings',
+                            unit=''))
+    draw(folder / 'landing.png', scenarios[of_grid[-1].name] if options.quick else
+         scenarios[f'grid {SHOWN}'])
+    output.write_csv(folder / 'landing.csv', map(csv_row, results),
                      about=output.machine(native, PACKAGES))
     command = output.command_line('box_contact_ros landing', args)
-    (folder / f'{name}.md').write_text(page(results, command, dds=options.dds), encoding='utf-8')
+    (folder / 'landing.md').write_text(page(results, command), encoding='utf-8')
     print(f'{grid_table(results)}\n\n{added_table(results)}')
     broken = [one for one in results if one.landing.way in GATED and not one.as_expected]
     for one in broken:
@@ -291,18 +246,12 @@ def _options(args: Sequence[str] | None) -> tuple[argparse.Namespace, Path]:
     parser = program_parser(
         'landing', __doc__, seed=1, out='pages, tables and the picture',
         quick=f'every {QUICK}th landing of the grid, every third of the others')
-    parser.add_argument('--ways', nargs='+', choices=list(WAYS), metavar='WAY',
-                        help=f'ways to land, of {", ".join(WAYS)} (default: all; with --dds '
-                             f'{" ".join(OVER_DDS)})')
+    parser.add_argument('--ways', nargs='+', choices=list(WAYS), default=list(WAYS),
+                        metavar='WAY', help=f'ways to land, of {", ".join(WAYS)} (default: all)')
     parser.add_argument('--rates', nargs='+', type=float, default=[50.0, 200.0, 1000.0],
                         metavar='HZ', help='ticks per second, default: %(default)s')
     parser.add_argument('--latency', nargs='+', type=float, default=[0.0, 0.002, 0.005],
                         metavar='S', help='times from asking to acting [s], default: %(default)s')
-    parser.add_argument('--dds', action='store_true', help='contacts from a contact node, over '
-                        'DDS in lockstep')
-    parser.add_argument('--workers', type=int, default=os.cpu_count(), help='processes')
+    parser.add_argument('--workers', type=int, default=os.cpu_count(), help='processes at once')
     options = parser.parse_args(args)
-    options.ways = options.ways or list(OVER_DDS if options.dds else WAYS)
-    if options.dds and not set(options.ways) <= set(OVER_DDS):
-        parser.error(f'--dds takes the ways {", ".join(OVER_DDS)}')
     return options, output.results_folder(parser, options)

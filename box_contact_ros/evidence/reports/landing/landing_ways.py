@@ -41,7 +41,7 @@ from box_contact_ros.apps.crane.mujoco_crane import Crane, CraneScenario
 from box_contact_ros.scene.force.laws import Body
 from box_contact_ros.solver.contact import Contact
 
-from ...contestants.engines.engine import Manifold, chosen
+from ...contestants.contestant import Manifold, chosen
 from ...contestants.engines.mujoco_engines import box_geoms, collision
 from ...contestants.point_law import PointLaw
 from ...pose_sets import CONTAINER

@@ -15,6 +15,7 @@ from box_contact_ros.solver.weights_file import load_weights
 from ...pose_sets import CUBE
 from ...training.paper_recipe import dataset
 from ...training.paper_recipe.dataset import CLASSES, Placements
+from ...verification.errors import distances
 
 MODELS = ('paper', 'paper-committee', 'paper-continuous')
 COUNT = 20_000  # placements of each kind
@@ -35,7 +36,7 @@ def errors(model: str, some: Placements) -> tuple[float, float]:
     a, b = dataset.as_poses(some.inputs)
     b[:, :3] -= PRESSED * dataset.query(some).normal
     found = ContactSolver(CUBE, CUBE, model=model).batch(a, b)
-    return (1e3 * float(np.linalg.norm(found.point - some.point, axis=1).mean()),
+    return (1e3 * float(distances(found.point, some.point).mean()),
             float(degrees_between(found.normal, some.normal).mean()))
 
 

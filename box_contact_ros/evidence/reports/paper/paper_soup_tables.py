@@ -10,7 +10,6 @@ timed: the step, FCL alone, the answer.
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,8 +26,9 @@ from box_contact_ros.solver.contact_solver import ContactSolver
 
 from ...contestants import soup
 from ...pose_sets import CUBE, Pairs, at_depth, stacks
+from ...timing import cpu_milliseconds, no_garbage_collection, pinned, usable_cores
 from ...training.paper_recipe.dataset import as_poses
-from ..frontier.speed import pinned, usable_cores
+from ...verification.errors import distances
 from .paper_tables import PAPER_NETWORK
 from .paper_tables import PAPER_SOUP as PAPER
 
@@ -130,13 +130,6 @@ def search(first: fcl.CollisionObject, second: fcl.CollisionObject) -> None:
                                                     enable_cost=True), fcl.CollisionResult())
 
 
-def milliseconds(work: Callable[..., object], *arguments: object) -> float:
-    """Return the CPU time of one call [ms]."""
-    started = time.thread_time_ns()
-    work(*arguments)
-    return 1e-6 * (time.thread_time_ns() - started)
-
-
 def pair_count(contacts: Sequence[fcl.Contact]) -> int:
     """Return how many pairs of triangles meet; FCL gives one contact or two for each."""
     return len({(contact.b1, contact.b2) for contact in contacts})
@@ -152,17 +145,16 @@ def time_soup(divisions: int, patterns: Pairs, thin: int, bar: tqdm) -> Row:
     step, pairs, alone, answers = np.empty(len(poses)), np.empty(len(poses), np.int64), [], []
     for row, (a, b) in enumerate(poses):
         pair = boxes.place(a, b, CUBE, CUBE)
-        started = time.thread_time_ns()
-        contacts = soup.collide(*pair)
-        step[row] = 1e-6 * (time.thread_time_ns() - started)
+        step[row], contacts = cpu_milliseconds(soup.collide, *pair)
         pairs[row] = pair_count(contacts)
         if row % thin == 0:
-            alone.append(milliseconds(search, *pair))
-            answers.append(milliseconds(solver, a, b))
+            alone.append(cpu_milliseconds(search, *pair)[0])
+            answers.append(cpu_milliseconds(solver, a, b)[0])
         bar.update()
     most = boxes.place(*poses[int(np.argmax(pairs))], CUBE, CUBE)
-    most_step, most_alone = (float(np.median([milliseconds(work, *most) for _ in range(REPEATS)]))
-                             for work in (soup.collide, search))
+    most_step, most_alone = (
+        float(np.median([cpu_milliseconds(work, *most)[0] for _ in range(REPEATS)]))
+        for work in (soup.collide, search))
     touching = patterns.contacts().colliding
     p50, p99, longest = output.percentiles(step, 50, 99, 100)
     return {
@@ -191,7 +183,7 @@ def judge_soup(divisions: int, patterns: Pairs, exact: Contacts) -> SoupErrors:
             normals.append(answer[1])
             depths.append(max(contact.penetration_depth for contact in contacts))
     return SoupErrors(
-        point=np.linalg.norm(np.reshape(points, (-1, 3)) - exact.point[rows], axis=1),
+        point=distances(np.reshape(points, (-1, 3)), exact.point[rows]),
         normal=degrees_between(np.reshape(normals, (-1, 3)), exact.normal[rows]),
         depth=np.array(depths) + exact.separation[rows])
 
@@ -203,7 +195,7 @@ def time_calls(solver: ContactSolver, patterns: Pairs) -> float:
             solver(a, b)
 
     calls()
-    return milliseconds(calls) / len(patterns.pose_a)
+    return cpu_milliseconds(calls)[0] / len(patterns.pose_a)
 
 
 def judge_network(model: str, patterns: Pairs, exact: Contacts) -> Row:
@@ -211,7 +203,7 @@ def judge_network(model: str, patterns: Pairs, exact: Contacts) -> Row:
     solver = cubes_model(model)
     found = patterns.contacts(solver)
     return {'model': model, 'regime': 'touching', 'answer_mean_ms': time_calls(solver, patterns),
-            'point_error_mean_m': float(np.linalg.norm(found.point - exact.point, axis=1).mean()),
+            'point_error_mean_m': float(distances(found.point, exact.point).mean()),
             'normal_error_mean_deg': float(degrees_between(found.normal, exact.normal).mean())}
 
 
@@ -247,7 +239,7 @@ def measure(inputs: np.ndarray, *, quick: bool = False) -> SoupResult:
     soups: dict[tuple[str, int], Row] = {}
     work = len(PAPER) * sum(c.timed + c.judged for c in counts.values())
     work += len(ALSO) * counts['touching'].judged
-    with (pinned({usable_cores()[-1]}), output.no_garbage_collection(),
+    with (pinned({usable_cores()[-1]}), no_garbage_collection(),
           tqdm(total=work, unit='pattern', disable=None) as bar):
         for divisions in (*PAPER, *ALSO):
             for regime in REGIMES if divisions in PAPER else ['touching']:

@@ -3,10 +3,10 @@
 
 """Program `paper`: the source paper's Tables 1 to 4 and Figures 4, 9 and 10, redone, as Markdown.
 
-Tables 1 and 2, Figure 9: the data sets are made again from the seed in each model card. The code
-that the solver uses runs the shipped weights on them. Nothing is copied from the cards, and PyTorch
-is not used. Tables 3 and 4, Figure 10: see `paper_soup_tables`. Figure 4: see `rotation`. They need
-python-fcl. All of them are made, unless some are chosen.
+For Tables 1 and 2 and Figure 9, the data sets are made again from the seed in each model card. The
+code that the solver uses runs the shipped weights on them. Nothing is copied from the cards, and
+PyTorch is not used. Tables 3 and 4 and Figures 4 and 10 need python-fcl. The program makes all of
+them, unless some are chosen.
 """
 from __future__ import annotations
 

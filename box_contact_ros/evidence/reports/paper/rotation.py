@@ -25,9 +25,9 @@ from box_contact_ros.scene.pose import quaternion_multiply, rotation_matrix
 
 from ...contestants import soup
 from ...pose_sets import CUBE, Pairs, turned
+from ...timing import cpu_milliseconds, no_garbage_collection, pinned, usable_cores
 from ...training.paper_recipe.dataset import euler_angles, quaternion_from_euler
-from ..frontier.speed import pinned, usable_cores
-from .paper_soup_tables import Row, cubes_model, milliseconds, on_cube, pair_count, time_calls
+from .paper_soup_tables import Row, cubes_model, on_cube, pair_count, time_calls
 from .paper_tables import PAPER_SOUP
 
 DEPTH = 0.01  # of the corner [m]
@@ -101,17 +101,17 @@ def measure(*, quick: bool = False) -> list[Row]:
     """Return a row per angle and N: tests, pairs that meet, times of soup and network [ms]."""
     rows: list[Row] = []
     network = cubes_model('paper')
-    with pinned({usable_cores()[-1]}), output.no_garbage_collection():
+    with pinned({usable_cores()[-1]}), no_garbage_collection():
         for divisions in QUICK_DIVISIONS if quick else DIVISIONS:
             boxes, placer = leaves(divisions), soup.Soup(divisions)
             for tilt in QUICK_TILTS if quick else TILTS:
                 pair = tilted_cube(tilt)
                 placed = placer.place(pair.pose_a[0], pair.pose_b[0], CUBE, CUBE)
                 many = pair.rows(np.zeros(CALLS, dtype=np.int64))
+                steps = [cpu_milliseconds(soup.collide, *placed) for _ in range(REPEATS)]
                 rows.append({
                     'divisions': divisions, 'tilt_deg': tilt, 'tests': count_tests(boxes, pair),
-                    'pairs': pair_count(soup.collide(*placed)),
-                    'step_ms': min(milliseconds(soup.collide, *placed) for _ in range(REPEATS)),
+                    'pairs': pair_count(steps[0][1]), 'step_ms': min(took for took, _ in steps),
                     'network_ms': min(time_calls(network, many) for _ in range(REPEATS))})
     return rows
 

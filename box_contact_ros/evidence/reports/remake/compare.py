@@ -17,6 +17,7 @@ import numpy as np
 
 from box_contact_ros import output
 
+from ...timing import by_round
 from ..frontier.speed import SHARED, UNIT
 
 LIMIT = 0.10  # largest change of a ratio, of the smaller value, between runs that agree
@@ -74,7 +75,7 @@ def ratios_of(folder: Path) -> dict[str, float]:
 def _ratio(times: list[float], units: list[float]) -> float:
     """Return the median ratio of times that belong together; of others, that of their medians."""
     if len(times) == len(units):
-        return np.median(np.divide(times, units))
+        return by_round(times, units)
     return np.median(times) / np.median(units)
 
 

@@ -7,7 +7,7 @@ Each report is a program of its own, and runs as a subprocess. Programs that mea
 the others share the cores. The exit status is 1 if a program failed or a limit was broken.
 
 `--compare DIR` runs nothing, and compares the ratios of times in DIR with those in the folder of
-results. The exit status is 1 if a ratio changed by more than 10 %: see `compare`.
+results. The exit status is 1 if a ratio changed by more than 10 %.
 """
 from __future__ import annotations
 
@@ -62,7 +62,8 @@ REPORTS = (
     Report(name='speed', minutes=2.1, arguments=('frontier', '--speed', '--out', OUT)),
     Report(name='paper', minutes=2.7, arguments=('paper', '--out', f'{OUT}/paper_tables.md')),
     _bench(200, 30, '--side-by-side'), _bench(1000, 30, '--side-by-side'), _bench(1000, 90),
-    Report(name='soak', minutes=2.0, arguments=('soak', '--minutes', '1', '--out', OUT)),
+    Report(name='soak', minutes=2.0, arguments=(
+        'bench', '--soak', '--duration', '60', '--out', OUT)),
 )
 """In the order in which they run; the page of latencies follows the last."""
 

@@ -3,10 +3,10 @@
 
 """Drops, light contacts, slopes, pushes, spins and stacks, by held patches and by MuJoCo's contact.
 
-Every case has its result stated beforehand (`rest_cases`). It runs at rates of 50 to 1,000 Hz and
-latencies of 0 to 5 ms, in a small simulator on MuJoCo. The same boxes also run with MuJoCo's
-own contact. Written are rest.csv (a row per run and figure) and rest.md (a table). The exit status
-is 1 if `exact` or `mlp` misses a limit.
+The result of every case is stated beforehand. A case runs at rates of 50 to 1,000 Hz and latencies
+of 0 to 5 ms, in a small simulator on MuJoCo. The same boxes also run with MuJoCo's own contact. The
+program writes rest.csv (a row per run and figure) and rest.md (a table). The exit status is 1 if
+`exact` or `mlp` misses a limit.
 """
 from __future__ import annotations
 
@@ -18,8 +18,6 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from multiprocessing import Pool
 from typing import NamedTuple
-
-from tqdm import tqdm
 
 from box_contact_ros import output
 from box_contact_ros.apps.processes import left_when_asked
@@ -151,11 +149,13 @@ def main(args: Sequence[str] | None = None) -> int:
     kinds = list(dict.fromkeys(case.kind for case in CASES.values()))
     parser.add_argument('--kinds', nargs='+', choices=kinds, metavar='KIND', default=kinds,
                         help=f'cases to run, of {", ".join(kinds)} (default: all)')
-    parser.add_argument('--workers', type=int, default=os.cpu_count(), help='processes')
+    parser.add_argument('--workers', type=int, default=os.cpu_count(), help='processes at once')
     options: argparse.Namespace = parser.parse_args(args)
     folder = output.results_folder(parser, options)
     cases = [case for case in CASES.values() if case.kind in options.kinds]
     runs = runs_of(cases[::QUICK] if options.quick else cases, quick=options.quick)
+    from tqdm import tqdm
+
     with left_when_asked(), Pool(options.workers) as pool:
         figures = [figure for found in tqdm(pool.imap(measured, runs), total=len(runs),
                                             desc='rest', unit='') for figure in found]

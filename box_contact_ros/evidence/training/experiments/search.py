@@ -3,9 +3,9 @@
 
 """Program `search`: the paper's search for its two networks, by training thousands at once.
 
-Searched are learning rate, momentum, hidden units and range of the initial weights, by successive
-halving. The settings in use are ranked, too. Written are a page of Markdown, a CSV of all
-candidates and a plot.
+It searches learning rate, momentum, hidden units and range of the initial weights, by successive
+halving, and ranks the settings in use, too. It writes a page of Markdown, a CSV of all candidates
+and a plot.
 """
 from __future__ import annotations
 

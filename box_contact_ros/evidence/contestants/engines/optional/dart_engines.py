@@ -10,10 +10,10 @@ from typing import Any
 import dartpy as dart
 import numpy as np
 
-from ..engine import MOST_CONTACTS, Engine, Manifold, manifold, matrices
+from ...contestant import MOST_CONTACTS, Contestant, Manifold, manifold, matrices
 
 
-def collision() -> Engine:
+def collision() -> Contestant:
     """Return DART's `CollisionGroup.collide`: up to eight contacts."""
     detector = dart.collision.DARTCollisionDetector()
     option, result = dart.collision.CollisionOption(), dart.collision.CollisionResult()
@@ -44,9 +44,9 @@ def collision() -> Engine:
         return manifold((c.point, -np.array(c.normal), c.penetrationDepth)
                         for c in map(result.getContact, range(result.getNumContacts())))
 
-    return Engine(name='DART collide', call='CollisionGroup.collide', package='dartpy',
-                  returns='up to 8 points with depths, normals',
-                  boxes=boxes, at=matrices, read=read)
+    return Contestant(name='DART collide', call='CollisionGroup.collide', package='dartpy',
+                      returns='up to 8 points with depths, normals',
+                      boxes=boxes, at=matrices, read=read)
 
 
 ENGINES = [collision]

@@ -13,7 +13,7 @@ from pydrake import geometry
 from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RigidTransform
 
-from ..engine import APART, Engine, Manifold, manifold
+from ...contestant import APART, Contestant, Manifold, manifold
 
 MODULUS = 1e5  # hydroelastic modulus [Pa]; equal on both boxes, so that it shifts nothing
 
@@ -51,17 +51,17 @@ class _DrakeScene:
         return self.first, query.ComputePointPairPenetration()
 
 
-def _engine(surfaces: bool, read: Callable[[Any], Manifold], **about: Any) -> Engine:
+def _engine(surfaces: bool, read: Callable[[Any], Manifold], **about: Any) -> Contestant:
     def place(pose: np.ndarray) -> Any:
         x, y, z, w = pose[3:] / np.linalg.norm(pose[3:])
         return RigidTransform(Quaternion(w, x, y, z), pose[:3])
 
-    return Engine(package='drake', choices=('its point',), read=read,
-                  boxes=partial(_DrakeScene, surfaces),
-                  at=lambda a, b: (place(a), place(b)), **about)
+    return Contestant(package='drake', choices=('its point',), read=read,
+                      boxes=partial(_DrakeScene, surfaces),
+                      at=lambda a, b: (place(a), place(b)), **about)
 
 
-def point_pair() -> Engine:
+def point_pair() -> Contestant:
     """Return Drake's `ComputePointPairPenetration`: two points; their middle."""
     def read(found: Any) -> Manifold:
         first, pairs = found
@@ -76,7 +76,7 @@ def point_pair() -> Engine:
                    call='QueryObject.ComputePointPairPenetration')
 
 
-def surface() -> Engine:
+def surface() -> Contestant:
     """Return Drake's `ComputeContactSurfaces`: the surface of equal pressure, its centroid."""
     def read(found: Any) -> Manifold:
         first, surfaces = found

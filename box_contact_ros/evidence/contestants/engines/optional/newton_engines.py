@@ -15,7 +15,7 @@ import warp
 from box_contact_ros.scene.pose import rotation_matrix
 
 from ....pose_sets import Pairs
-from ..engine import Engine, Manifold
+from ...contestant import Contestant, Manifold
 
 warp.config.quiet = True
 
@@ -41,7 +41,7 @@ class _NewtonModel:
         return self.contacts, poses
 
 
-def collision() -> Engine:
+def collision() -> Contestant:
     """Return Newton's `CollisionPipeline.collide`: up to four points or so."""
     def prepare_batch(pairs: Pairs, threads: int = 1) -> Callable[[], Any]:
         poses = np.stack([pairs.pose_a, pairs.pose_b], axis=1).reshape(-1, 7)
@@ -63,11 +63,11 @@ def collision() -> Engine:
         deep = depths >= 0.0
         return Manifold(0.5 * (ends[0] + ends[1])[deep], normals[deep], depths[deep])
 
-    return Engine(name='Newton collide', call='CollisionPipeline.collide',
-                  returns='up to 5 points with normals; float32', package='newton',
-                  boxes=lambda p, q: _NewtonModel(p[None], q[None]),
-                  at=lambda a, b: (np.array([a, b], dtype=np.float32),), read=read,
-                  prepare_batch=prepare_batch)
+    return Contestant(name='Newton collide', call='CollisionPipeline.collide',
+                      returns='up to 5 points with normals; float32', package='newton',
+                      boxes=lambda p, q: _NewtonModel(p[None], q[None]),
+                      at=lambda a, b: (np.array([a, b], dtype=np.float32),), read=read,
+                      prepare_batch=prepare_batch)
 
 
 ENGINES = [collision]

@@ -12,10 +12,10 @@ import rapier3d as rapier
 
 from box_contact_ros.scene.pose import rotation_matrix
 
-from ..engine import Engine, Manifold, manifold
+from ...contestant import Contestant, Manifold, manifold
 
 
-def collision() -> Engine:
+def collision() -> Contestant:
     """Return Rapier's contacts after a step of detection: up to four points."""
     def boxes(p: np.ndarray, q: np.ndarray) -> Callable[..., Any]:
         bodies, colliders = rapier.RigidBodySet(), rapier.ColliderSet()
@@ -52,11 +52,11 @@ def collision() -> Engine:
                     contacts.append((0.5 * (ends[0] + ends[1]), normal, -point.dist))
         return manifold(contacts)
 
-    return Engine(name='Rapier contact_pair', package='rapier3d',
-                  call='CollisionPipeline.step, NarrowPhase.contact_pair',
-                  returns='up to 4 points with depths, normals; float32',
-                  boxes=boxes, read=read,
-                  at=lambda a, b: (place(a), place(b), np.array([a, b])))
+    return Contestant(name='Rapier contact_pair', package='rapier3d',
+                      call='CollisionPipeline.step, NarrowPhase.contact_pair',
+                      returns='up to 4 points with depths, normals; float32',
+                      boxes=boxes, read=read,
+                      at=lambda a, b: (place(a), place(b), np.array([a, b])))
 
 
 ENGINES = [collision]

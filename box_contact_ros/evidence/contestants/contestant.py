@@ -1,11 +1,11 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""What an engine is, what it answers, and the ways to make one point of its answer.
+"""What a contestant is, what it answers, and the ways to make one point of its answer.
 
-All contestants are an `Engine`, so reports ask and time them alike. A call goes from two poses, in
-the engine's own form, to a result that Python can read. Making shapes and models is preparation
-and is not timed. Setting both poses is timed.
+Models of this package and other engines are a `Contestant`, so reports ask and time them alike. A
+call goes from two poses, in the contestant's own form, to a result that Python can read. Making
+shapes and models is preparation and is not timed. Setting both poses is timed.
 """
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from box_contact_ros.scene.pose import rotation_matrix
 from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.solver.models import find_model
 
-from ...pose_sets import Pairs
+from ..pose_sets import Pairs
 
 MOST_CONTACTS = 16  # contacts asked for; two boxes have at most eight
 
 
 class Manifold(NamedTuple):
-    """What an engine answers for a pair: n points, none where the boxes are apart."""
+    """What a contestant answers for a pair: n points, none where the boxes are apart."""
 
     points: np.ndarray  # (n, 3)
     normals: np.ndarray  # (n, 3), unit, from A to B; NaN: none was given
@@ -44,7 +44,7 @@ def manifold(contacts: Iterable[tuple[ArrayLike, ArrayLike, float]]) -> Manifold
     return Manifold(*map(np.array, columns)) if columns else APART
 
 
-class EngineAnswer(NamedTuple):
+class Answer(NamedTuple):
     """One contact of a pair: normal (3,) from A to B and point (3,), NaN if apart."""
 
     touching: bool
@@ -53,8 +53,8 @@ class EngineAnswer(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Engine:
-    """One way to answer."""
+class Contestant:
+    """One way to answer: a model of this package or another engine."""
 
     name: str  # as reports show it
     call: str  # what a user writes
@@ -74,8 +74,8 @@ class Engine:
     any_boxes: bool = True  # whether it answers for boxes of any sizes
     causes: Mapping[str, str] = field(default_factory=dict)
     """Why it is 'missed', 'invented' or 'normal' in a report, where that is known."""
-    make: Callable[[], Engine] | None = None
-    """Makes the engine again in a subprocess, where another's library may abort."""
+    make: Callable[[], Contestant] | None = None
+    """Makes the contestant again in a subprocess, where another's library may abort."""
 
     def prepare(self, pairs: Pairs) -> list[Callable[[], Any]]:
         """Return a call for each pair, to be timed. ValueError: not for boxes of these sizes."""
@@ -84,12 +84,12 @@ class Engine:
                 for a, b, p, q in zip(*map(np.ascontiguousarray, pairs))]
 
 
-def packages_of(engines: Sequence[Engine]) -> list[str]:
-    """Return the distributions whose versions a report of these engines names."""
-    return list(dict.fromkeys(['numpy', *(one.package for one in engines if one.package)]))
+def packages_of(found: Sequence[Contestant]) -> list[str]:
+    """Return the distributions whose versions a report of these contestants names."""
+    return list(dict.fromkeys(['numpy', *(one.package for one in found if one.package)]))
 
 
-def ours(model: str) -> Engine:
+def ours(model: str) -> Contestant:
     """Return a model of this package."""
     entry, _ = find_model('model', model)
     solver = partial(ContactSolver, model=model)
@@ -104,10 +104,10 @@ def ours(model: str) -> Engine:
             return APART
         return manifold([(contact.point, contact.normal, -contact.separation)])
 
-    return Engine(name=model, call='ContactSolver(…)(pose_a, pose_b)',
-                  returns='one contact', patch='volume, covariance', choices=('its point',),
-                  boxes=solver, at=lambda a, b: (a, b), read=read, any_boxes=entry.any_boxes,
-                  prepare_batch=prepare_batch if entry.native_batch else None)
+    return Contestant(name=model, call='ContactSolver(…)(pose_a, pose_b)',
+                      returns='one contact', patch='volume, covariance', choices=('its point',),
+                      boxes=solver, at=lambda a, b: (a, b), read=read, any_boxes=entry.any_boxes,
+                      prepare_batch=prepare_batch if entry.native_batch else None)
 
 
 def _deepest(points: np.ndarray, normals: np.ndarray, depths: np.ndarray) -> np.ndarray:
@@ -146,11 +146,11 @@ CHOICES: dict[str, Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]] =
 """One point of n > 0 points (n, 3), with their normals (n, 3) and depths (n,)."""
 
 
-def chosen(found: Manifold, choice: str) -> EngineAnswer:
+def chosen(found: Manifold, choice: str) -> Answer:
     """Return one contact of an answer: the deepest one's normal, the point by a choice."""
     if not len(found.points):
-        return EngineAnswer(False, np.full(3, np.nan), np.full(3, np.nan))
-    return EngineAnswer(True, found.normals[int(np.argmax(found.depths))], CHOICES[choice](*found))
+        return Answer(False, np.full(3, np.nan), np.full(3, np.nan))
+    return Answer(True, found.normals[int(np.argmax(found.depths))], CHOICES[choice](*found))
 
 
 def in_subprocess(work: Callable[..., Any], *arguments: Any, patience: float) -> Any:
@@ -174,12 +174,12 @@ def in_subprocess(work: Callable[..., Any], *arguments: Any, patience: float) ->
         process.join()
 
 
-def part_by_part(work: Callable[..., dict[str, Any]], make: Callable[[], Engine],
+def part_by_part(work: Callable[..., dict[str, Any]], make: Callable[[], Contestant],
                  parts: Mapping[str, Any], *arguments: Any, patience: float) -> dict[str, Any]:
-    """Return what `work` returns by part for an engine in a subprocess.
+    """Return what `work` returns by part for a contestant in a subprocess.
 
-    Where the engine ends the subprocess, the parts are asked one by one, and what ended it is the
-    answer, a string.
+    Where the contestant ends the subprocess, the parts are asked one by one, and what ended the
+    subprocess is the answer, a string.
     """
     try:
         return in_subprocess(_work_with, work, make, parts, *arguments, patience=patience)
@@ -190,7 +190,7 @@ def part_by_part(work: Callable[..., dict[str, Any]], make: Callable[[], Engine]
         work, make, dict([part]), *arguments, patience=patience).items()}
 
 
-def _work_with(work: Callable[..., Any], make: Callable[[], Engine], *arguments: Any) -> Any:
+def _work_with(work: Callable[..., Any], make: Callable[[], Contestant], *arguments: Any) -> Any:
     return work(replace(make(), make=make), *arguments)
 
 

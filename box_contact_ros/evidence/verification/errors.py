@@ -1,0 +1,81 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""How wrong points, volumes and covariances are: the one place that all reports ask.
+
+Each error has the unit that its size depends on: the point's is relative to the smaller box's
+longest edge, the volume's to the exact volume, the covariance's to the exact one's trace.
+"""
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from box_contact_ros.solver.contact import Contacts
+
+
+class ContactErrors(NamedTuple):
+    """Errors of n contacts against the exact ones, in %."""
+
+    point: np.ndarray
+    """(n,) of the smaller box's longest edge."""
+    volume: np.ndarray
+    """(n,) of the exact volume; NaN from models that give the point alone."""
+    covariance: np.ndarray
+    """(n,) Frobenius norm, of the exact covariance's trace; NaN like the volume's."""
+    in_plane: np.ndarray
+    """(n,) of either eigenvalue in the plane of the contact, relative; NaN like the volume's."""
+
+    def rows(self, chosen: np.ndarray) -> ContactErrors:
+        """Return some of the errors."""
+        return ContactErrors(*(errors[chosen] for errors in self))
+
+
+def contact_errors(found: Contacts, truth: Contacts, edge: np.ndarray) -> ContactErrors:
+    """Return the errors of n contacts; edge: see `Pairs.edge`. All pairs touch, by both."""
+    exact = _in_plane(truth.covariance, truth.normal)
+    in_plane = np.abs(_in_plane(found.covariance, truth.normal) - exact) / exact
+    return ContactErrors(*map(lengths, departures(found, truth, edge)),
+                         100.0 * in_plane.max(axis=1, initial=0.0))
+
+
+def departures(found: Contacts, truth: Contacts, edge: np.ndarray,
+               ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return answers minus exact ones [%]: points (n, 3), volumes (n, 1), covariances (n, 9)."""
+    trace = np.trace(truth.covariance, axis1=1, axis2=2)[:, None]
+    return (_of_edge(found.point, truth.point, edge),
+            100.0 * ((found.volume - truth.volume) / truth.volume)[:, None],
+            100.0 * (found.covariance - truth.covariance).reshape(-1, 9) / trace)
+
+
+def point_errors(points: np.ndarray, truth: np.ndarray, edge: np.ndarray) -> np.ndarray:
+    """Return the errors (n,) of points (n, 3) alone, in % as in `ContactErrors`."""
+    return lengths(_of_edge(points, truth, edge))
+
+
+def distances(points: np.ndarray, truth: np.ndarray) -> np.ndarray:
+    """Return how far points (n, 3) are from the true ones, (n,) [m]."""
+    return lengths(points - truth)
+
+
+def lengths(vectors: np.ndarray) -> np.ndarray:
+    """Return the lengths (n,) of vectors (n, k)."""
+    return np.linalg.norm(vectors, axis=1)
+
+
+def _of_edge(points: np.ndarray, truth: np.ndarray, edge: np.ndarray) -> np.ndarray:
+    return 100.0 * (points - truth) / edge[:, None]
+
+
+def _in_plane(covariance: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """Return eigenvalues (n, 2), least first, of covariances (n, 3, 3) across normals (n, 3)."""
+    helper = np.eye(3)[np.abs(normal).argmin(axis=1)]
+    x = np.cross(normal, helper)
+    x /= np.linalg.norm(x, axis=1, keepdims=True)
+    axes = np.stack([x, np.cross(normal, x)], axis=1)
+    across = axes @ covariance @ axes.swapaxes(1, 2)
+    one, other, both = across[:, 0, 0], across[:, 1, 1], across[:, 0, 1]
+    largest = 0.5 * (one + other) + np.hypot(0.5 * (one - other), both)
+    least = (one * other - both**2) / largest
+    return np.stack([least, largest], axis=1)
