@@ -246,8 +246,8 @@ def test_messages_that_are_read_are_freed(monkeypatch, choice, kept):
         monkeypatch.delenv(name, raising=False)
     done = subprocess.run([sys.executable, '-c', QUEUED], env={**os.environ, **choice},
                           capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
     read, queued, left = map(float, done.stdout.split())
-    print(done.stdout, done.stderr)
     assert read == 60 and queued > 50.0 and (left > 50.0) is kept
 
 
