@@ -27,7 +27,7 @@ from .messages import ContactsMessage
 from .named_files import NamedFiles, named_scene
 from .parameters import Setting, reason_of
 from .rclpy_workarounds import lifecycle_state, refuse_transitions
-from .runtime import LOG_SECONDS, GuardedNode
+from .runtime import LOG_SECONDS, GuardedNode, give_back_memory
 from .topics.scene_topics import SceneTopics
 from .topics.tf_poses import check_frames
 from .wrench_output import make_wrenches
@@ -244,7 +244,7 @@ class ContactNode(GuardedNode, LifecycleNode):
                                       throttle_duration_sec=LOG_SECONDS)
 
     def _report(self) -> None:
-        """Serve QoS events and publish diagnostics, once a second."""
+        """Serve QoS events, publish diagnostics and give memory back, once a second."""
         if self._topics.serve_events() and self._evaluator is not None:
             self._evaluator.desert()
         state = lifecycle_state(self)
@@ -252,3 +252,4 @@ class ContactNode(GuardedNode, LifecycleNode):
             self._diagnostics.publish(self.counts, state=state, pairs=0)
         else:
             self._evaluator.report(state)
+        give_back_memory()

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import ctypes
 import functools
 import os
 import signal
@@ -30,6 +31,7 @@ from rclpy.subscription import Subscription
 from rclpy.task import Future
 from rclpy.timer import Timer
 
+from ..resources import resource_path
 from .parameters import reason_of
 from .rclpy_workarounds import RCLError, UnknownROSArgsError, ends_within, keep_for_ever
 
@@ -52,6 +54,13 @@ SPIN_SECONDS = 10.0
 """EventsExecutor hangs when it spins without a timeout, so it is spun in slices. Each leaves some
 32 bytes behind in rclpy (7.1): of slices this long, 0.3 MB a day."""
 END_SECONDS = 8.0  # for a clean end; launch kills after ten
+PROFILES_FILE = 'FASTRTPS_DEFAULT_PROFILES_FILE'  # environment variables of Fast DDS and its rmw
+QOS_FROM_FILE = 'RMW_FASTRTPS_USE_QOS_FROM_XML'
+USERS_CHOICES = (PROFILES_FILE, QOS_FROM_FILE, 'FASTDDS_DEFAULT_PROFILES_FILE',
+                 'RMW_FASTRTPS_PUBLICATION_MODE')
+"""A user who sets one of these has settings of Fast DDS that a file of ours would replace."""
+USERS_FILE = 'DEFAULT_FASTRTPS_PROFILES.xml'  # which Fast DDS reads from the working directory
+FREE_LIMIT = 16 * 2**20  # bytes that are freed and not given back to the system
 NodeKind = TypeVar('NodeKind', bound=Node)
 LOG_SECONDS = 1.0  # the same complaint is logged at most this often
 
@@ -221,6 +230,37 @@ def interrupted_once() -> Iterator[Callable[[], None]]:
         atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)
 
 
+def free_read_messages() -> None:
+    """Let Fast DDS free each message once it is read, unless the user has settings of their own.
+
+    By default a place in a queue keeps the size of its largest message: docs/how-to/security.md.
+    """
+    if os.path.exists(USERS_FILE) or not os.environ.keys().isdisjoint(USERS_CHOICES):
+        return
+    os.environ |= {PROFILES_FILE: str(resource_path('config', 'fast_dds.xml')), QOS_FROM_FILE: '1'}
+
+
+class _MallocState(ctypes.Structure):
+    """glibc's struct mallinfo2."""
+
+    _fields_ = [(name, ctypes.c_size_t) for name in (
+        'arena', 'ordblks', 'smblks', 'hblks', 'hblkhd', 'usmblks', 'fsmblks', 'uordblks',
+        'fordblks', 'keepcost')]
+
+
+def give_back_memory() -> None:
+    """Return freed memory to the system where FREE_LIMIT is exceeded; needs glibc 2.33.
+
+    glibc keeps what lies below memory in use, as after a flood that filled queues.
+    """
+    with contextlib.suppress(AttributeError, OSError):  # another C library
+        libc = ctypes.CDLL(None)
+        state = libc.mallinfo2
+        state.restype = _MallocState
+        if state().fordblks > FREE_LIMIT:
+            libc.malloc_trim(ctypes.c_size_t(0))
+
+
 @contextlib.contextmanager
 def joined(make_node: Callable[[Context], NodeKind], args: Sequence[str] | None = None, *,
            signals: SignalHandlerOptions = SignalHandlerOptions.NO,
@@ -230,6 +270,7 @@ def joined(make_node: Callable[[Context], NodeKind], args: Sequence[str] | None 
     signals: which handlers of rclpy's are installed; none where the caller has its own. After a
     signal, whatever was under way fails; that is raised as ExternalShutdownException.
     """
+    free_read_messages()
     context = Context()
     node = executor = None
     with interrupted_once() as begin_end:

@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 from collections import Counter
+from pathlib import Path
 from threading import Event, Thread, get_native_id
 from types import SimpleNamespace
 
@@ -194,6 +195,61 @@ def test_a_word_that_ros_does_not_know_ends_the_program(capsys):
     assert capsys.readouterr().err == (
         "error: after --ros-args, ROS does not know ['model:=exact']: a parameter is "
         '-p NAME:=VALUE, a name is remapped by -r FROM:=TO\n')
+
+
+@pytest.mark.parametrize('choice', ['', *runtime.USERS_CHOICES])
+def test_settings_of_fast_dds_are_the_users_where_there_are_any(monkeypatch, tmp_path, choice):
+    """A file of ours, to free messages that are read, would replace them."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(os, 'environ', {choice: 'of a user'} if choice else {})
+    runtime.free_read_messages()
+    if choice:
+        assert os.environ == {choice: 'of a user'}
+        return
+    assert Path(os.environ.pop(runtime.PROFILES_FILE)).is_file()
+    assert os.environ.pop(runtime.QOS_FROM_FILE) == '1' and not os.environ
+    (tmp_path / runtime.USERS_FILE).touch()
+    runtime.free_read_messages()
+    assert not os.environ
+
+
+QUEUED = """
+import sys
+from geometry_msgs.msg import PoseStamped
+from rclpy.node import Node
+from box_contact_ros.node.runtime import POSE_QOS, give_back_memory, joined, spin_once
+
+def resident():  # memory [MB]
+    return int(open('/proc/self/statm').read().split()[1]) * 4096 / 2**20
+
+with joined(lambda context: Node('queued', context=context), []) as (node, executor):
+    read = []
+    node.create_subscription(PoseStamped, 'pose', lambda data: read.append(len(data)), POSE_QOS,
+                             raw=True)
+    publisher = node.create_publisher(PoseStamped, 'pose', POSE_QOS)
+    message = bytes(2**20)
+    before = resident()
+    for _ in range(60):
+        publisher.publish(message)
+    queued = resident() - before
+    while executor and len(read) < 60:
+        spin_once(node, executor, 1.0)
+    give_back_memory()
+    print(len(read), queued, resident() - before)
+"""
+
+
+@pytest.mark.skipif(not os.path.isdir('/proc/self'), reason='no /proc: not Linux')
+@pytest.mark.parametrize('choice, kept', [({}, False), ({runtime.QOS_FROM_FILE: '0'}, True)])
+def test_messages_that_are_read_are_freed(monkeypatch, choice, kept):
+    """By default Fast DDS keeps the size of the largest message for each place in a queue."""
+    for name in runtime.USERS_CHOICES:
+        monkeypatch.delenv(name, raising=False)
+    done = subprocess.run([sys.executable, '-c', QUEUED], env={**os.environ, **choice},
+                          capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    read, queued, left = map(float, done.stdout.split())
+    assert read == 60 and queued > 50.0 and (left > 50.0) is kept
 
 
 def test_main_serves_its_node(monkeypatch):

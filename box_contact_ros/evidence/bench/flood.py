@@ -4,12 +4,13 @@
 """Floods of strangers: what an hour of them does to a locked contact node, sent in two minutes.
 
 Poses that are not finite, names of a megabyte, requests that nobody can read or that a locked
-node refuses: `PER_HOUR` of each kind. A second process sends them to the contact node, then
-to the echo node, which computes nothing: what both show is the middleware's. Meanwhile both are
-measured at 1 kHz, as in the soak.
+node refuses: `PER_HOUR` of each kind, or as many as can be sent. A second process sends them to the
+contact node, then to the echo node, which computes nothing: what both show is the middleware's.
+Meanwhile both are measured at 1 kHz, as in the soak.
 
 `python -m box_contact_ros.evidence.bench.flood [--seconds S]`; the exit status is 0 only if the
-contact node's memory grew by less than 50 MB more than the echo node's, and requests were answered.
+contact node's memory grew by less than 50 MB, and both nodes answered requests after the floods.
+Latencies decide nothing: they depend on what else the machine does.
 """
 from __future__ import annotations
 
@@ -51,11 +52,16 @@ PER_HOUR = {'garbage': 3_600_000, 'long name': 3_600, 'bad pose': 360_000,
             'unreadable parameter': 36_000, 'refused parameter': 36_000, 'large text': 3_600,
             'transition': 36_000}
 """Floods of an hour: a kilohertz of garbage, ten requests a second, a megabyte a second."""
-GROWTH_LIMIT = 50.0  # beyond what the middleware keeps, which the echo node shows [MB]
-OUTSTANDING = 50  # requests that may wait for their answer
+OF_POSES = ('garbage', 'long name', 'bad pose')  # which nobody answers
+GROWTH_LIMIT = 50.0  # of the contact node's memory [MB]
+OUTSTANDING = 8  # requests that may wait for their answer: ROS's queues of them hold ten
+PATIENCE = 1.0  # s after which a request is taken for lost
+PART = 20  # messages of a kind at most before answers are read
 END_SECONDS = 30.0  # for the last answers of a flood
+SETTLE_SECONDS = 2.5  # in which a contact node gives memory back, once a second
 MEGABYTE = 'n' * 2**20
 UNKNOWN_TYPE = 77
+ANSWERED = 'requests are answered'
 RATE = 1000.0  # Hz
 
 
@@ -65,7 +71,7 @@ class Stranger(GuardedNode):
     def __init__(self, context: Context, target: str, poses: str) -> None:
         super().__init__('stranger', context=context)
         self.sent = dict.fromkeys(PER_HOUR, 0)
-        self._waiting: list[Future] = []
+        self._waiting: list[tuple[float, Future]] = []  # with when it was asked
         self._publishers = [self.create_publisher(PoseStamped, f'{poses}{box}/pose', DEEP_RELIABLE)
                             for box in ('box_a', 'box_b')]
         self._clients_of: dict[type, Client] = {
@@ -105,7 +111,7 @@ class Stranger(GuardedNode):
     def _ask(self, kind: type, request: Any) -> None:
         service = self._clients_of[kind]
         if service.service_is_ready():
-            self._waiting.append(service.call_async(request))
+            self._waiting.append((time.monotonic(), service.call_async(request)))
 
     def flood(self, seconds: float, serve: Callable[[float], None]) -> None:
         """Send PER_HOUR within so many seconds, or as much of it as can be sent."""
@@ -113,22 +119,30 @@ class Stranger(GuardedNode):
         while (share := (time.monotonic() - began) / seconds) < 1.0:
             late = False
             for name, wanted in PER_HOUR.items():
-                for _ in range(min(round(share * wanted) - self.sent[name], 100)):
-                    if len(self._waiting) < OUTSTANDING or name in ('garbage', 'bad pose'):
+                for _ in range(min(round(share * wanted) - self.sent[name], PART)):
+                    if name in OF_POSES or len(self._waiting) < OUTSTANDING:
                         self._floods[name]()
                         self.sent[name] += 1
                         late = True
-            self._waiting = [future for future in self._waiting if not future.done()]
             serve(0.0 if late else 0.001)
+            for _ in self._waiting:
+                serve(0.0)
+            since = time.monotonic() - PATIENCE
+            self._waiting = [(asked, future) for asked, future in self._waiting
+                             if asked > since and not future.done()]
 
     def answers(self, serve: Callable[[float], None]) -> bool:
         """Return whether a request is answered within ten seconds, after all that."""
-        future = self._clients_of[GetParameters].call_async(GetParameters.Request(
-            names=['use_sim_time']))
         until = time.monotonic() + 10.0
-        while not future.done() and time.monotonic() < until:
-            serve(0.01)
-        return bool(future.done())
+        while time.monotonic() < until:
+            future = self._clients_of[GetParameters].call_async(GetParameters.Request(
+                names=['use_sim_time']))
+            patient = time.monotonic() + PATIENCE
+            while time.monotonic() < patient:
+                serve(0.01)
+                if future.done():
+                    return True
+        return False
 
 
 @refusals_end
@@ -155,9 +169,12 @@ def main(args: Sequence[str] | None = None) -> int:
                 before = _memory(node)
                 with _flooded(bench, node, options) as told[node.name]:
                     bench.play(flooded, truth['flooded'], [node])
+                spin_for(bench.client, bench.executor, SETTLE_SECONDS)
                 growth[node.name] = _memory(node) - before
         bench.run([[quiet]], play)
-    return bench.stop.status or _report(nodes, growth, told, bench.notes)
+    if bench.notes:  # a node did not start, or ended
+        print(*bench.notes, sep='\n')
+    return bench.stop.status or int(bool(bench.notes)) or _report(nodes, growth, told)
 
 
 @contextlib.contextmanager
@@ -184,8 +201,9 @@ def _send(options: argparse.Namespace, args: Sequence[str]) -> int:
         serve = partial(spin_once, node, executor)
         node.flood(options.seconds, serve)
         answered = node.answers(serve)
-    print(', '.join(f'{name} {number}' for name, number in node.sent.items()))
-    print('requests are answered' if answered else 'NO REQUEST IS ANSWERED')
+    print(', '.join(f'{name} {number} of {PER_HOUR[name]}'
+                    for name, number in node.sent.items()))
+    print(ANSWERED if answered else 'NO REQUEST IS ANSWERED')
     return 0 if answered else 1
 
 
@@ -194,23 +212,30 @@ def _memory(node: MeasuredNode) -> float:
 
 
 def _report(nodes: Sequence[MeasuredNode], growth: Mapping[str, float],
-            told: Mapping[str, Sequence[str]], notes: Sequence[str]) -> int:
+            told: Mapping[str, Sequence[str]]) -> int:
     """Print what was found; return the exit status."""
-    rows, passed = [], not notes
+    rows, late = [], {}
     for node in nodes:
-        quiet, flooded = ([f'{1e3 * value:.3f}' for value in percentiles(
-            result.latencies, 50, 99)] + [str(result.lost)] for result in node.log.results())
-        rows.append([node.name, *quiet, *flooded, f'{growth[node.name]:.1f}'])
-        passed &= told[node.name][-1:] == ['requests are answered']
-    print(markdown_table(['node', 'p50 [ms]', 'p99 [ms]', 'lost', 'p50 in floods [ms]',
-                          'p99 in floods [ms]', 'lost in floods', 'memory grown [MB]'], rows,
-                         padded=True))
+        quiet, flooded = (percentiles(result.latencies, 50, 99) for result in node.log.results())
+        late[node.name] = flooded[1]
+        rows.append([node.name, *(f'{1e3 * value:.3f}' for value in (*quiet, *flooded)),
+                     *(str(result.lost) for result in node.log.results()),
+                     f'{growth[node.name]:.1f}'])
+    print(markdown_table(['node', 'p50 [ms]', 'p99 [ms]', 'p50 in floods [ms]',
+                          'p99 in floods [ms]', 'lost', 'lost in floods', 'memory grown [MB]'],
+                         rows, padded=True))
     for name, lines in told.items():
         print(f'{name}: {"; ".join(lines[-2:])}')
-    beyond = growth['contact'] - max(0.0, growth['echo'])
-    print(f'the contact node has grown by {beyond:.1f} MB more than the echo node (limit '
-          f'{GROWTH_LIMIT:g})', *notes, sep='\n')
-    return 0 if passed and beyond < GROWTH_LIMIT else 1
+    print(f'p99 in floods: {late["contact"] / late["echo"]:.1f} times that of the echo node')
+    return 0 if passed(growth, told) else 1
+
+
+def passed(growth: Mapping[str, float], told: Mapping[str, Sequence[str]]) -> bool:
+    """Print and return whether memory stayed within its limit, and requests were answered."""
+    bounded = growth['contact'] < GROWTH_LIMIT
+    print(f'the contact node has grown by {growth["contact"]:.1f} MB: '
+          f'{"within" if bounded else "BEYOND"} the limit of {GROWTH_LIMIT:g}')
+    return bounded and all(lines[-1:] == [ANSWERED] for lines in told.values())
 
 
 def _options(args: Sequence[str]) -> argparse.Namespace:
