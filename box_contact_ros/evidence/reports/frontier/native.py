@@ -1,7 +1,7 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""C++ against C++: libbox_contact and other engines, through their C and C++ interfaces.
+"""C against C: libbox_contact and other engines, through their C and C++ interfaces.
 
 `python -m box_contact_ros frontier --native` compiles native_calls/, which calls all in turn in one
 process, and writes native.md and native.csv. MuJoCo's wheel has its headers and its library. Coal
@@ -11,11 +11,13 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import shlex
 import shutil
 import subprocess
 import tempfile
 import textwrap
 from collections.abc import Mapping
+from importlib import metadata
 from pathlib import Path
 from typing import NamedTuple
 
@@ -43,9 +45,10 @@ CALLS_FOLDER = Path(__file__).with_name('native_calls')
 OPTIONAL = {'coal': 'pip install coal cmeel-eigen', 'bullet': 'apt install libbullet-dev'}
 """By file of native_calls/ and by name for pkg-config: what brings headers and library."""
 CLEAR = 1e-6
-"""Least gap or depth, of the size, at which verdicts are compared. Bullet is in single precision."""
-MOST_WRONG = 0.02
-"""Share of wrong verdicts at which a call is held for a wrong one, and the run ends."""
+"""Least gap or depth, of the size, at which verdicts are compared; Bullet's are single floats."""
+MOST_WRONG, MOST_OFF = 0.2, 0.1
+"""Share of wrong verdicts, and median depth error [%], above which the call itself must be wrong.
+Bullet's query in single precision misses up to a tenth of the shallow contacts of overhang."""
 
 
 class Times(NamedTuple):
@@ -61,8 +64,8 @@ class Times(NamedTuple):
 Found = Mapping[str, Times]  # by contestant
 
 
-def package_flags(name: str) -> list[str] | None:
-    """Return a library's flags for the compiler, by pkg-config; None where it is not installed."""
+def package_config(name: str, *options: str) -> str | None:
+    """Return what pkg-config answers about a library; None where either is not installed."""
     tool = shutil.which('pkg-config')
     if tool is None:
         return None
@@ -71,16 +74,24 @@ def package_flags(name: str) -> list[str] | None:
     for above in Path(spec.origin).parents if spec and spec.origin else ():
         if above.name == 'cmeel.prefix':  # what wheels of cmeel install into
             folders += [str(above / 'lib/pkgconfig'), str(above / 'share/pkgconfig')]
-    done = subprocess.run([tool, '--cflags', '--libs', name], capture_output=True, text=True,
-                          env={**os.environ, 'PKG_CONFIG_PATH': os.pathsep.join(folders)})
-    if done.returncode:
+    done = subprocess.run([tool, *options, name], capture_output=True, text=True, env={
+        **os.environ, 'PKG_CONFIG_PATH': os.pathsep.join(folders)})
+    return None if done.returncode else done.stdout.strip()
+
+
+def package_flags(name: str) -> list[str] | None:
+    """Return a library's flags for the compiler and the linker; None where it is not installed."""
+    found = package_config(name, '--cflags', '--libs')
+    if found is None:
         return None
     flags = []
-    for flag in done.stdout.split():
+    for flag in shlex.split(found):
         if flag.startswith('-I'):  # warnings in headers of others are not ours
             flags += ['-isystem', flag[2:]]
+        elif flag.startswith('-L'):
+            flags += [flag, f'-Wl,-rpath,{flag[2:]}']
         else:
-            flags += [flag] if not flag.startswith('-L') else [flag, f'-Wl,-rpath,{flag[2:]}']
+            flags.append(flag)
     return flags
 
 
@@ -111,6 +122,13 @@ def compiled(folder: Path) -> tuple[Path, list[str]]:
     if done.returncode:
         raise RuntimeError(f'native_calls does not compile:\n{done.stderr}')
     return folder / 'native', missing
+
+
+def engines(missing: list[str]) -> str:
+    """Return the versions of the engines that were compiled in."""
+    return ', '.join([f'MuJoCo {metadata.version("mujoco")}', *[
+        f'{name.capitalize()} {package_config(name, "--modversion")}'
+        for name in OPTIONAL if name not in missing]])
 
 
 def calls_shown(missing: list[str]) -> str:
@@ -170,12 +188,12 @@ def judged(name: str, nanoseconds: np.ndarray, separation: np.ndarray, pairs: Pa
     clear = np.abs(truth) > CLEAR * size
     missed, invented = ((separation > 0.0) & (truth < 0.0) & clear,
                         (separation <= 0.0) & (truth > 0.0) & clear)
-    if (missed | invented).sum() > MOST_WRONG * len(truth):
-        raise RuntimeError(f'{name} misses {missed.sum()} and invents {invented.sum()} contacts '
-                           f'of {len(truth)} pairs')
     both = (separation <= 0.0) & (truth < 0.0)
     errors = 100.0 * np.abs(separation - truth)[both] / size[both]
     p50, p99, worst = percentiles(errors, 50, 99, 100)
+    if (missed | invented).sum() > MOST_WRONG * len(truth) or p50 > MOST_OFF:
+        raise RuntimeError(f'{name} misses {missed.sum()} and invents {invented.sum()} contacts of '
+                           f'{len(truth)} pairs; its median depth error is {p50:.3g} % of the size')
     return Times(nanoseconds, int(missed.sum()), int(invented.sum()), int(clear.sum()),
                  (p50, p99, worst))
 
@@ -197,15 +215,18 @@ def contestants_table(times: Found) -> str:
 
 
 def answers_table(found: Mapping[str, Found]) -> str:
-    """Return how the answers of each contestant on all sets differ from those of `exact`."""
+    """Return how the answers of other engines on all sets differ from those of `exact`."""
     lines = []
     for name in next(iter(found.values())):
+        if name.startswith(('exact', 'mlp')):
+            continue
         mine = {of_set: times[name] for of_set, times in found.items()}
-        worst = max(mine, key=lambda of_set: mine[of_set].depth_errors[2])
+        worst = max(mine, key=lambda of_set: np.nan_to_num(mine[of_set].depth_errors[2]))
         lines.append([
             name, *[f'{sum(getattr(one, kind) for one in mine.values()):,}'
                     for kind in ('judged', 'missed', 'invented')],
-            *['/'.join(map(number, mine[of_set].depth_errors)) for of_set in ('containers', 'stacks')],
+            *['/'.join(map(number, mine[of_set].depth_errors))
+              for of_set in ('containers', 'stacks')],
             f'{number(mine[worst].depth_errors[2])}, {worst}'])
     return markdown_table(
         ['', 'judged', 'missed', 'invented', 'depth error on containers, p50/p99/worst [%]',
@@ -266,7 +287,7 @@ def write_native(folder: Path, command: str, *, core: int | None, quick: bool) -
     (folder / 'native.md').write_text(page(
         'evidence/reports/pages/native', command=command, machine=machine(native), rounds=rounds,
         calls=calls, pairs=pairs, tables=tables, answers=answers, code=calls_shown(missing),
-        clear=CLEAR, missing=''.join(
+        clear=CLEAR, engines=engines(missing), missing=''.join(
             f'\n\nLeft out: {name.capitalize()} is not installed with its headers '
             f'(`{OPTIONAL[name]}`).' for name in missing)), encoding='utf-8')
     print(tables, answers, sep='\n\n')

@@ -1,7 +1,8 @@
 // Copyright 2026 The box_contact_ros maintainers
 // SPDX-License-Identifier: Apache-2.0
 
-// Bullet through its C++ interface: its detector of two boxes alone, and a query of its world.
+// Bullet through its C++ interface: its detector of two boxes alone, and a query of its world, which
+// takes boxes as convex shapes.
 #include <BulletCollision/CollisionDispatch/btBoxBoxDetector.h>
 #include <btBulletCollisionCommon.h>
 
@@ -48,7 +49,7 @@ struct World {
                                   f(m[7]), f(m[8])),
                       btVector3(f(p[0]), f(p[1]), f(p[2])));
       shapes.emplace_back(btVector3(f(h[0]), f(h[1]), f(h[2])));
-      shapes.back().setMargin(f(MARGIN));
+      shapes.back().setMargin(0);  // the query rounds edges and corners by the margin
     };
     for (const PlacedBox& box : poses.placed_a) add(box, shape_a, at_a);
     for (const PlacedBox& box : poses.placed_b) add(box, shape_b, at_b);

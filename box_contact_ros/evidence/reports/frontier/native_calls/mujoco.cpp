@@ -9,10 +9,6 @@
 
 #include "contestants.hpp"
 
-// MuJoCo's collider of two boxes, which the library exports without a public declaration.
-extern "C" int mjc_BoxBox(const mjModel* m, const mjData* d, mjContact* found, int a, int b,
-                          mjtNum margin);
-
 namespace {
 
 constexpr char BOXES[] = R"(<mujoco><worldbody>
@@ -23,7 +19,8 @@ constexpr char BOXES[] = R"(<mujoco><worldbody>
 struct Scene {
   mjModel* model;
   mjData* data;
-  mjContact contacts[16];
+  mjfCollision box_box = mjCOLLISIONFUNC[mjGEOM_BOX][mjGEOM_BOX];  // mjc_BoxBox
+  mjPreContact contacts[mjMAXCONPAIR];
   int count = 0;
   double distance = 0.0, from_to[6];
 
@@ -53,7 +50,7 @@ void add_mujoco(const Poses& poses, size_t calls, Contestants& all) {
     // call: mjc_BoxBox
     scene.place(0, poses.placed_a[i]);
     scene.place(1, poses.placed_b[i]);
-    scene.count = mjc_BoxBox(scene.model, scene.data, scene.contacts, 0, 1, 0.0);
+    scene.count = scene.box_box(scene.model, scene.data, scene.contacts, 0, 1, 0.0);
     // end of call
     return scene.count;
   };
