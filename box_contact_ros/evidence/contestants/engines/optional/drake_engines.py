@@ -78,8 +78,8 @@ def point_pair() -> Engine:
 def centre_of_pressure(surface: Any) -> np.ndarray:
     """Return the mean of the surface's points (3,), weighted by area and pressure.
 
-    A face is a fan of triangles, on which the pressure p is linear: ∫ p x = area/12 · Σ p_i (x_i + s),
-    where x_i are the corners and s is their sum.
+    A face is a fan of triangles, on which the pressure p is linear:
+    ∫ p x = area / 12 · Σ p_i (x_i + s), x_i the corners and s their sum.
     """
     mesh, field = surface.poly_mesh_W(), surface.poly_e_MN()
     total, moment = 0.0, np.zeros(3)
