@@ -179,7 +179,7 @@ setup(
     license='Apache-2.0',
     packages=find_packages(include=[NAME, f'{NAME}.*']),
     package_data={NAME: ['py.typed', '**/*.pyi', '**/*.md', '**/*.yaml',
-                         'evidence/verification/*.npz', 'evidence/reports/frontier/*.cpp',
+                         'evidence/verification/*.npz', 'evidence/reports/**/*.[ch]pp',
                          'core/cmake/*', 'core/include/**/*.h*', 'core/src/**/*.hpp']},
     ext_modules=extensions(),
     data_files=data_files(),

@@ -140,9 +140,13 @@ def _patch_centroid(points: np.ndarray, normals: np.ndarray, depths: np.ndarray)
     return middle + areas @ (points[one] + points[two] - 2.0 * middle) / (3.0 * areas.sum())
 
 
+def _last(points: np.ndarray, normals: np.ndarray, depths: np.ndarray) -> np.ndarray:
+    return points[-1]
+
+
 CHOICES: dict[str, Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]] = {
     'its point': _deepest, 'deepest': _deepest, 'mean': _mean, 'mean by depth': _mean_by_depth,
-    'patch centroid': _patch_centroid}
+    'patch centroid': _patch_centroid, 'centre of pressure': _last}
 """One point of n > 0 points (n, 3), with their normals (n, 3) and depths (n,)."""
 
 

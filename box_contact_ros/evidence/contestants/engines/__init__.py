@@ -16,7 +16,8 @@ from ..contestant import Contestant
 RIVALS = {'mujoco': "extra 'sim'", 'fcl': "extra 'soup'", 'coal': "extra 'peers'",
           'bullet': "extra 'peers'", 'optional.rapier': "extra 'peers'",
           'optional.dart': "extra 'peers'",
-          'optional.drake': 'pip install drake', 'optional.newton': 'pip install newton'}
+          'optional.drake': 'pip install drake', 'optional.newton': 'pip install newton',
+          'optional.manifold': 'pip install manifold3d'}
 """The engines' modules, each with what brings its library."""
 
 

@@ -227,7 +227,7 @@ def main(args: Sequence[str] | None = None) -> int:
     parser.add_argument('--speed', action='store_true',
                         help='the speed gates instead: speed.md, .csv')
     parser.add_argument('--native', action='store_true',
-                        help="C against C instead, with MuJoCo's colliders: native.md, .csv")
+                        help='C against C instead, with other engines: native.md, .csv')
     cores = usable_cores()
     parser.add_argument('--core', type=int, default=cores[-1], choices=cores, metavar='N',
                         help='core to run on (default: the last one)')

@@ -56,8 +56,7 @@ def _engine(surfaces: bool, read: Callable[[Any], Manifold], **about: Any) -> Co
         x, y, z, w = pose[3:] / np.linalg.norm(pose[3:])
         return RigidTransform(Quaternion(w, x, y, z), pose[:3])
 
-    return Contestant(package='drake', choices=('its point',), read=read,
-                      boxes=partial(_DrakeScene, surfaces),
+    return Contestant(package='drake', read=read, boxes=partial(_DrakeScene, surfaces),
                       at=lambda a, b: (place(a), place(b)), **about)
 
 
@@ -73,11 +72,35 @@ def point_pair() -> Contestant:
                           towards * np.array(pair.nhat_BA_W), pair.depth)])
 
     return _engine(False, read, name='Drake point pair', returns='two points, depth, normal',
-                   call='QueryObject.ComputePointPairPenetration')
+                   call='QueryObject.ComputePointPairPenetration', choices=('its point',))
+
+
+def centre_of_pressure(surface: Any) -> np.ndarray:
+    """Return the mean of the surface's points (3,), weighted by area and pressure.
+
+    A face is a fan of triangles, on which the pressure p is linear:
+    ∫ p x = area / 12 · Σ p_i (x_i + s), x_i the corners and s their sum.
+    """
+    mesh, field = surface.poly_mesh_W(), surface.poly_e_MN()
+    total, moment = 0.0, np.zeros(3)
+    for k in range(mesh.num_elements()):
+        face = mesh.element(k)
+        places = [face.vertex(i) for i in range(face.num_vertices())]
+        corners = np.array([mesh.vertex(place) for place in places])
+        pressures = np.array([field.EvaluateAtVertex(place) for place in places])
+        for i in range(1, len(places) - 1):
+            x, p = corners[[0, i, i + 1]], pressures[[0, i, i + 1]]
+            area = 0.5 * np.linalg.norm(np.cross(x[1] - x[0], x[2] - x[0]))
+            total += area * p.sum() / 3.0
+            moment += area / 12.0 * (p @ (x + x.sum(axis=0)))
+    return moment / total if total > 0.0 else np.array(surface.centroid())
 
 
 def surface() -> Contestant:
-    """Return Drake's `ComputeContactSurfaces`: the surface of equal pressure, its centroid."""
+    """Return Drake's `ComputeContactSurfaces`: the surface of equal pressure.
+
+    Its points are the surface's centroid and its centre of pressure.
+    """
     def read(found: Any) -> Manifold:
         first, surfaces = found
         if not surfaces:
@@ -85,11 +108,13 @@ def surface() -> Contestant:
         one = surfaces[0]
         normal = sum(one.area(k) * np.array(one.face_normal(k)) for k in range(one.num_faces()))
         towards = -1.0 if one.id_M() == first else 1.0  # face normals point from N to M
-        return manifold([(one.centroid(), towards * normal / np.linalg.norm(normal),
-                          float('nan'))])
+        normal *= towards / np.linalg.norm(normal)
+        return manifold([(point, normal, float('nan'))
+                         for point in (one.centroid(), centre_of_pressure(one))])
 
     return _engine(True, read, name='Drake hydroelastic', returns='polygons with pressure, normals',
                    call='QueryObject.ComputeContactSurfaces, kPolygon', patch='area, pressure',
+                   choices=('its point', 'centre of pressure'),
                    causes={'normal': 'The surface of equal pressure bends round edges and corners: '
                            'its normal is not that of the least depth.'})
 

@@ -1,0 +1,70 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
+// What a contestant of `frontier --native` is. Each library has one file, which adds its contestants.
+// The page of the report shows what lies between "// call: NAME" and "// end of call".
+#pragma once
+
+#include <box_contact/box_contact.h>
+
+#include <cstddef>
+#include <functional>
+#include <limits>
+#include <string>
+#include <vector>
+
+constexpr double APART = std::numeric_limits<double>::infinity();
+
+// A pose and a size as other engines take them, made before anything is timed.
+struct PlacedBox {
+  double half[3];      // half extents [m]
+  double position[3];  // [m]
+  double matrix[9];    // of the rotation, row by row
+};
+
+struct Poses {
+  std::vector<bc_pose> a, b;
+  std::vector<bc_size> size_a, size_b;
+  std::vector<PlacedBox> placed_a, placed_b;
+
+  explicit Poses(const char* path);
+  size_t count() const { return a.size(); }
+};
+
+struct Contestant {
+  std::string name;
+  size_t pairs;                             // of a round
+  std::function<void(size_t first)> round;  // what is timed
+  // The signed separation [m] that it answers for a pair, to be checked; not timed.
+  std::function<double(size_t pair)> separation;
+};
+
+using Contestants = std::vector<Contestant>;
+
+extern double kept;  // depends on every call, so that the compiler can leave none out
+
+// Return a contestant that is called pair by pair. `call` returns any number that depends on its
+// answer; `read` returns the signed separation in the answer of the last call.
+template <class Call, class Read>
+Contestant single(const std::string& name, size_t calls, Call call, Read read) {
+  return {name + ", single", calls,
+          [=](size_t first) {
+            for (size_t pair = first; pair < first + calls; ++pair) kept += call(pair);
+          },
+          [=](size_t pair) {
+            call(pair);
+            return read();
+          }};
+}
+
+[[noreturn]] void fail(const std::string& what);
+
+// Each adds its contestants, with `calls` single calls a round. What they use is never freed.
+void add_ours(const Poses& poses, size_t calls, Contestants& all);
+void add_mujoco(const Poses& poses, size_t calls, Contestants& all);
+#ifdef WITH_COAL
+void add_coal(const Poses& poses, size_t calls, Contestants& all);
+#endif
+#ifdef WITH_BULLET
+void add_bullet(const Poses& poses, size_t calls, Contestants& all);
+#endif
