@@ -4,7 +4,6 @@
 """Landings without ROS: the exact point brings the load to rest, the deepest point does not."""
 from __future__ import annotations
 
-import dataclasses
 import math
 
 import numpy as np
@@ -15,12 +14,8 @@ pytest.importorskip('mujoco')
 from box_contact_ros import ContactSolver
 from box_contact_ros.apps.crane.landing import (
     CORNER_SPEED_LIMIT,
-    WATCHED,
-    ClosedLoop,
     LandingCase,
-    LandingRecord,
     LandingResult,
-    Progress,
     cases,
     land,
     landing_scenario,
@@ -158,16 +153,6 @@ def test_lost_answers_are_bridged_by_the_patches_that_are_held():
     assert not results[1].settled < 3.0
 
 
-def test_without_contact_nothing_is_judged():
-    """A load that meets no force hangs in the stack, and none that is watched too briefly rests."""
-    scenario = landing_scenario()
-    hanging = land(scenario, lambda a, b: None, rate_hz=100.0).judge()
-    assert not hanging.at_rest and hanging.depth > 0.1 and math.isnan(hanging.settled)
-    brief = land(dataclasses.replace(scenario, duration=0.2), lambda a, b: None).judge()
-    assert not brief.at_rest and 'not judged' in str(brief)
-    assert not LandingRecord(scenario, 200.0).judge().at_rest
-
-
 def test_every_limit_counts():
     """A landing that meets all limits but one is not at rest, and says which."""
     good = {'corner_speed': 1e-4, 'rope_tension': 0.0, 'force_worst': 1e-7, 'static_tilt': 1e-3,
@@ -186,65 +171,6 @@ def test_every_limit_counts():
         assert ('landing ................ settled' in str(bad)) is carried
     assert not any(met for met, _ in LandingResult().limits.values())
     assert not LandingResult(**good | {'settled': math.nan}).carried
-
-
-def test_progress_prints_a_line_a_change():
-    """Hanging, first touch, settling, at rest: once each, whatever is between two looks."""
-    scenario = scenario_of(WELL_AIMED)
-    loop, lines = ClosedLoop(scenario, 200.0), []
-    progress = Progress(loop.record)
-    solver, = solvers(scenario, 'exact')
-    assert not list(progress.lines())
-    for _ in range(round(12 * 200.0)):
-        state = loop.ask()
-        contact = solver(state.pose, loop.crane.stack_pose)
-        loop.answer(state, {'': contact}, latency=0.0)
-        loop.step()
-        lines += progress.lines()
-    assert [line.split(' s  ')[1].split('  ')[0] for line in lines] == list(Progress.STAGES)
-    assert 'contact force   0.0 kN' in lines[0] and 'contact force 196.2 kN' in lines[-1]
-    times = [float(line.split()[0]) for line in lines]
-    assert times == sorted(times) and times[-1] < 12.0
-    assert [line.split(' s  ')[1].split('  ')[0] for line in Progress(loop.record).lines()] == list(
-        Progress.STAGES)
-
-
-def test_a_swinging_load_keeps_its_energy():
-    """Kinetic and potential energy of a load out of its middle, on ropes that do not move."""
-    scenario = landing_scenario(lowering_speed=0.0, overlap=-0.5, mass_offset=(0.6, 0.1, -0.2),
-                                rope_angle=3.0)
-    crane, record = Crane(scenario, 200.0), LandingRecord(scenario, 200.0)
-    for _ in range(1000):
-        record.poses.append(crane.load_pose)
-        record.velocities.append(crane.load_velocity)
-        crane.step()
-    energies = record.energies()[400:]  # at first the ropes stretch
-    swing = np.ptp(scenario.mass * GRAVITY * np.array(record.poses)[400:, 2])
-    assert swing > 300.0
-    assert np.ptp(energies) < 0.1 * swing
-
-
-def test_corner_speeds_and_tilts_are_rigid_motion():
-    """Spinning at ω about the vertical, corners move at ω·√(L² + W²)/2; a pitch of θ tilts by θ."""
-    scenario = landing_scenario()
-    record = LandingRecord(scenario, 200.0)
-    record.poses = [np.array([1.0, 2, 3, 0, math.sin(0.1), 0, math.cos(0.1)]),
-                    np.array([1.0, 2, 3, 0, 0, 0, 1])]
-    record.velocities = [np.array([0.3, 0, 0.4, 0, 0, 0]), np.array([0, 0, 0, 0, 0, 0.2])]
-    reach = math.hypot(*scenario.size[:2]) / 2
-    assert record.corner_speeds() == pytest.approx([0.5, 0.2 * reach])
-    assert record.tilts() == pytest.approx([0.2, 0.0])
-
-
-def test_the_hoist_of_a_landing_never_lifts():
-    """Down within half of the duration, monotonously, and then it stays."""
-    scenario = landing_scenario()
-    heights = [scenario.hoist_height(time) for time in np.linspace(0.0, scenario.duration, 500)]
-    assert (np.diff(heights) <= 0.0).all()
-    assert heights[0] == scenario.lowering_distance > scenario.overlap
-    assert scenario.hoist_height(0.5 * scenario.duration) == pytest.approx(0.0, abs=1e-12)
-    assert heights[-1] == pytest.approx(0.0, abs=1e-12)
-    assert WATCHED < 0.7 * scenario.duration
 
 
 def test_a_wrench_may_change_within_a_tick():

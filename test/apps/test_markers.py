@@ -22,7 +22,6 @@ from box_contact_ros import ContactSolver
 from box_contact_ros.apps.ros_client import ANSWERS, CRANE_MARKERS
 from box_contact_ros.apps.viewer.markers import (
     NAMESPACES,
-    PARAMETERS,
     MarkersNode,
     scene_markers,
 )
@@ -43,7 +42,6 @@ YARD = Scene({'slab': Box('slab', SLAB, pose_topic='slab/pose'),
              (Pair(4, 'slab_s1', 'slab', 's1'), Pair(7, 'slab_s2', 'slab', 's2')))
 CONTACT = Contact(True, -0.0125, np.array([0.0, 0.6, 0.8]), np.array([1.0, 2.0, 3.0]), 0.05,
                   np.eye(3) / 12)
-NO_PATCH = CONTACT._replace(volume=math.nan, covariance=np.full((3, 3), math.nan))
 TOUCHING = np.array([0.5, 0.25, 1.875, 0, 0, 0, 1])
 APART = np.array([0.5, 0.25, 2.5, 0, 0, 0, 1])
 
@@ -100,12 +98,6 @@ def test_a_contact_is_point_normal_depth_and_patch():
     assert np.roll(ends[:, 1], 1, axis=0) == pytest.approx(ends[:, 0], abs=1e-12)
     assert np.abs(ends @ CONTACT.normal).max() < 1e-12
     assert np.linalg.norm(ends, axis=2) == pytest.approx(0.5)
-
-
-def test_a_model_without_patch_has_no_ellipse():
-    """The point, normal and depth are drawn all the same."""
-    _, found = drawing([(YARD.pairs[0], NO_PATCH)])
-    assert [len(found[name]) for name in NAMESPACES] == [3, 1, 1, 0, 1]
 
 
 def test_all_contacts_are_drawn_and_the_deepest_labelled():
@@ -309,6 +301,15 @@ def test_no_more_often_than_asked(client, node, contact_node):
     assert 2 <= len(client.arrays) <= 20.0 * lasted + 2  # and a timer that catches up
 
 
+def test_program(program, client):
+    """As a process, with parameters from the command line; ends with status 0 on SIGINT."""
+    running = program('markers', '--ros-args', '-p', 'rate:=10', '-p', 'size_b:=[1.0,1.0,1.0]')
+    running.wait_for_output('ready', 60)
+    running.signal(2)
+    assert running.wait() == 0, running.output
+    assert 'rate' in program('markers', '--help').wait_for_output('most marker arrays')
+
+
 def test_bad_poses_are_not_drawn(client, node):
     """Neither NaN nor a quaternion of zero length; the box stays where it was."""
     offer_until_drawn(client, 2)
@@ -319,21 +320,3 @@ def test_bad_poses_are_not_drawn(client, node):
         client.send(poses.IDENTITY, bad)
     assert client.spin(lambda: client.arrays)
     assert xyz(client.arrays[-1].markers[1].pose.position) == (0.5, 0.25, 2.5)
-
-
-@pytest.mark.parametrize('name, value', [
-    ('rate', 0.0), ('rate', 'often'), ('size_a', [1.0, 2.0]), ('size_b', [1.0, 0.0, 1.0])])
-def test_bad_parameters_are_refused(node, name, value):
-    """By name, and the old ones stay."""
-    result, = node.set_parameters([Parameter(name, value=value)])
-    assert not result.successful and name in result.reason
-    assert node.get_parameter(name).value == SETTINGS.get(name, PARAMETERS[name].default)
-
-
-def test_program(program, client):
-    """As a process, with parameters from the command line; ends with status 0 on SIGINT."""
-    running = program('markers', '--ros-args', '-p', 'rate:=10', '-p', 'size_b:=[1.0,1.0,1.0]')
-    running.wait_for_output('ready', 60)
-    running.signal(2)
-    assert running.wait() == 0, running.output
-    assert 'rate' in program('markers', '--help').wait_for_output('most marker arrays')

@@ -14,13 +14,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import rclpy
-import yaml
 from ros_client import PATIENCE, Client, stamp_of
 
 pytest.importorskip('rosbags')
 
 from geometry_msgs.msg import PoseStamped
-from make_recording import make
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rclpy.context import Context
@@ -107,17 +105,6 @@ def test_others_can_read_it():
     assert sum(path.stat().st_size for path in SHIPPED.iterdir()) < 1e6
 
 
-def test_the_folder_is_a_bag():
-    """metadata.yaml says what `ros2 bag` needs, and agrees with the file."""
-    about = yaml.safe_load((SHIPPED / 'metadata.yaml').read_text('utf-8'))[
-        'rosbag2_bagfile_information']
-    assert about['storage_identifier'] == 'mcap' and about['version'] == 9
-    assert about['relative_file_paths'] == ['crane_landing.mcap']
-    assert about['message_count'] == sum(COUNTS.values())
-    assert {topic['topic_metadata']['name']: topic['message_count']
-            for topic in about['topics_with_message_count']} == COUNTS
-
-
 def test_recorded_contacts_agree_with_the_exact_solver():
     """Of every pair of recorded poses: verdict, depth and normal to rounding.
 
@@ -142,22 +129,6 @@ def test_recorded_contacts_agree_with_the_exact_solver():
             errors.append(np.linalg.norm(point - contact.point))
     assert len(errors) == COUNTS['/contact/point']
     assert 100.0 * max(errors) / CONTAINER[0] < limit_of('point', 'containers')
-
-
-def test_it_can_be_made_again(tmp_path):
-    """The documented command makes the same landing: same counts, poses to 1 µm and 1e-6."""
-    assert dict(make(tmp_path / 'again').counts) == COUNTS
-    one, other = (read_replay(folder) for folder in (SHIPPED, tmp_path / 'again'))
-    assert np.array_equal(one.stamps, other.stamps)
-    assert np.abs(one.pose_a - other.pose_a).max() < 1e-6
-    assert np.array_equal(one.pose_b, other.pose_b)
-
-
-def test_it_is_installed(setup_arguments):
-    """setup.py takes it to share/."""
-    files = dict(setup_arguments['data_files'])
-    assert set(files['share/box_contact_ros/recordings/crane_landing']) == {
-        f'recordings/crane_landing/{name}' for name in ('crane_landing.mcap', 'metadata.yaml')}
 
 
 # --- recording ------------------------------------------------------------------------------------
@@ -381,16 +352,6 @@ def test_a_recording_without_its_scene_is_not_played(tmp_path):
                                      size_a=CONTAINER, size_b=CONTAINER))
 
 
-def test_notes_of_other_programs_do_not_matter(tmp_path):
-    """A bag's custom data are anybody's: text that is no JSON is not ours."""
-    bag = written(tmp_path / 'bag', [1], [1], size_a=CONTAINER, size_b=CONTAINER, operator='me')
-    file = bag / 'metadata.yaml'
-    text = file.read_text()
-    assert '\'"me"\'' in text
-    file.write_text(text.replace('\'"me"\'', 'me, at noon'))
-    assert read_recording(bag).about['size_a'] == list(CONTAINER)
-
-
 # --- replay ---------------------------------------------------------------------------------------
 
 
@@ -496,15 +457,3 @@ def test_a_replay_leaves_out_ticks_without_a_box(tmp_path):
         read_replay(tmp_path / 'run', pair='b_flor')
     with pytest.raises(RecordingError, match='does not say its scene'):
         read_replay(SHIPPED, pair='a_b')
-
-
-@pytest.mark.parametrize('arguments, status, words', [
-    ('--pair a_b', 2, '--pair is of a --replay'),
-    ('--replay /no/such/bag', 1, 'error: /no/such/bag cannot be read as a bag'),
-    ('--replay x --streams crane', 2, 'not allowed with'),
-    ('--size-a 1 1 1', 2, 'are of a --replay'),
-])
-def test_bad_replay_options(program, arguments, status, words):
-    running = program('bench', *arguments.split())
-    assert running.wait(60) == status
-    assert words in running.output and 'Traceback' not in running.output

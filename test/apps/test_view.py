@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import io
-import itertools
 import math
 import os
 import re
@@ -37,18 +36,17 @@ from box_contact_ros.apps.ros_client import (
     pose_topics,
 )
 from box_contact_ros.apps.viewer.listener import ViewNode
-from box_contact_ros.apps.viewer.page.read_outs import deepest_contacts, legend, read_out
+from box_contact_ros.apps.viewer.page.read_outs import deepest_contacts, read_out
 from box_contact_ros.apps.viewer.page.stage import CUBE as CUBE_CORNERS
-from box_contact_ros.apps.viewer.page.stage import CUBE_EDGES, camera_position
+from box_contact_ros.apps.viewer.page.stage import camera_position
 from box_contact_ros.apps.viewer.page.view_page import Page
-from box_contact_ros.apps.viewer.scene_driver import DEPTH, LIFT, TIERS, VISIT, motions
+from box_contact_ros.apps.viewer.scene_driver import VISIT, motions
 from box_contact_ros.apps.viewer.style import (
     BOX_A,
     BOX_B,
     CONTACT,
     LEGEND,
     LISTED,
-    STALE,
     patch_areas,
     patch_axes,
     patch_outlines,
@@ -73,7 +71,6 @@ APART = np.array([0.5, 0.25, 2.5, 0, 0, 0, 1])
 CUBE = (2.0, 2.0, 2.0)
 EXACT = ContactSolver(CUBE, CUBE, model='exact')(ORIGIN, TOUCHING)
 NO_ROWS = np.zeros(0, CLOUD_ROW)
-NOT_EVALUATED = np.array([(*[math.nan] * 3, 0, *[math.nan] * 14)], CLOUD_ROW)
 BOTH = two_boxes(CUBE, CUBE)
 START = 1_000 * NANOSECONDS
 MS = 1_000_000
@@ -127,24 +124,6 @@ def test_point_errors_are_distances_from_the_exact_point(log):
     assert figures.rate == 100
 
 
-def test_the_rate_ends_with_the_answers(log):
-    """What came more than a second ago is not counted."""
-    send(log, START)
-    log.contacts(START, rows(), START + MS)
-    assert log.figures(START + 2 * MS).rate == 1
-    assert log.figures(START + NANOSECONDS + 2 * MS).rate == 0
-
-
-@pytest.mark.parametrize('cloud', [NO_ROWS, NOT_EVALUATED])
-def test_no_contact_has_no_point_and_no_error(log, cloud):
-    """No row, or a row of NaN for what could not be evaluated."""
-    send(log, START, APART)
-    log.contacts(START, cloud, START + MS)
-    seen, figures = log.snapshot(), log.figures(START)
-    assert not len(seen.answer.pairs) and seen.separation == pytest.approx(0.5)
-    assert math.isnan(figures.point_error_median) and figures.answered == 1
-
-
 def test_a_pair_without_an_answer_is_lost_in_the_end(log):
     """Of five pairs the third has no answer: lost a second later, not before."""
     for i in range(5):
@@ -170,24 +149,6 @@ def test_nothing_is_lost_before_the_first_answer_nor_on_the_way_to_the_view(log)
         send(log, later)
         log.contacts(later, rows(), later)
     assert log.figures(later).lost == 0
-
-
-def test_boxes_move_on_when_nobody_answers(log):
-    """The last answer is drawn for half a second, then the poses without a contact."""
-    send(log, START)
-    log.contacts(START, rows(), START + MS)
-    send(log, START + STALE, APART)
-    assert np.array_equal(log.snapshot().poses[1], TOUCHING)
-    send(log, START + STALE + 1, APART)
-    seen = log.snapshot()
-    assert np.array_equal(seen.poses[1], APART) and seen.answer is None
-
-
-def test_a_run_starts_anew(log):
-    send(log, START)
-    log.contacts(START, rows(), START + MS)
-    log.start_anew()
-    assert log.snapshot() is None and log.figures(START).answered == 0
 
 
 def test_latest_pairing_answers_with_the_newer_stamp():
@@ -310,14 +271,6 @@ def test_an_array_for_another_number_of_boxes_is_refused(count):
         topic.read(array_of(*[ORIGIN] * count))
 
 
-def test_of_two_moving_boxes_the_older_is_grey(log):
-    send(log, START)
-    log.contacts(START, rows(), START)
-    log.pose('box_a', START + MS, ORIGIN)
-    log.contacts(START + MS, NOT_EVALUATED, START + MS)
-    assert log.snapshot().stale_boxes.tolist() == [False, True]
-
-
 def test_a_pair_that_the_scene_has_not_is_refused(log):
     """And what was drawn stays."""
     send(log, START)
@@ -327,14 +280,6 @@ def test_a_pair_that_the_scene_has_not_is_refused(log):
     with pytest.raises(OtherSceneError, match='pair 7'):
         log.contacts(START + MS, other, START + MS)
     assert log.snapshot().answer.stamp == START
-
-
-def test_time_that_is_set_back_begins_anew(log):
-    """A simulation that starts again from zero is drawn from its first pose."""
-    send(log, START)
-    log.contacts(START, rows(), START)
-    send(log, 0, APART)
-    assert log.snapshot().stamp == 0 and log.figures(0).answered == 0
 
 
 # --- what is shown --------------------------------------------------------------------------------
@@ -390,11 +335,6 @@ def test_read_out_without_contact_answer_or_poses(log):
     assert deepest_contacts(None) == '' and '</td></tr></table>' in deepest_contacts(log.snapshot())
 
 
-def test_the_legend_names_every_colour():
-    text = legend()
-    assert all(f'rgb{colour}' in text and name in text for colour, name in LEGEND)
-
-
 @pytest.mark.parametrize('turn', [(0, 0, 0, 1), (0.1, -0.5, 0.3, 0.8)])
 def test_the_ellipse_of_a_rectangle(turn):
     """A patch l × w: semi-axes l/2 and w/2 along its edges, area l·w; however the boxes lie."""
@@ -424,15 +364,6 @@ def test_the_ellipse_of_a_line_of_a_point_and_of_no_patch():
     assert np.isnan(semi_axes[2]).all()
 
 
-def test_a_cube_has_twelve_edges():
-    """Four along each axis. A triangle's third corner is so near its first that nobody sees it."""
-    edges = CUBE_EDGES[:, 1] - CUBE_EDGES[:, 0]
-    assert sorted(map(tuple, edges)) == sorted(map(tuple, np.repeat(np.eye(3), 4, axis=0)))
-    assert len(np.unique(CUBE_EDGES[:, :2].mean(axis=1), axis=0)) == 12
-    assert np.abs(CUBE_EDGES[:, 2] - CUBE_EDGES[:, 0]).max() < 1e-4
-    assert np.linalg.norm(np.cross(edges, CUBE_EDGES[:, 2]), axis=1).min() > 0.1  # it has a normal
-
-
 # --- moved without a simulator -------------------------------------------------------------------
 
 
@@ -449,20 +380,6 @@ def test_the_driver_sets_boxes_down_on_their_partners(name, in_contact):
         found.append({pair.name for pair, _ in answer.touching})
     assert in_contact <= set().union(*found)
     assert len(set(map(frozenset, found))) > 1
-
-
-def test_riders_make_towers_and_towers_stand_apart():
-    """Of 23 boxes that all move and are all paired, none is deep in another."""
-    boxes = {f'b{n}': Box(f'b{n}', (2.0, 1.0, 0.5), pose_topic=f'b{n}/pose') for n in range(23)}
-    pairs = [(one, other) for one, other in itertools.combinations(boxes, 2)]
-    scene = Scene(boxes, tuple(Pair(n, f'p{n}', *pair) for n, pair in enumerate(pairs)))
-    solver, moves = SceneSolver(scene, model='exact'), motions(scene)
-    answers = [solver([moves[box](time_) for box in scene.moving])
-               for time_ in np.arange(0.0, VISIT, 0.5)]
-    assert all(contact.separation >= -DEPTH - 1e-9
-               for answer in answers for _, contact in answer.touching)
-    assert any(answer.touching for answer in answers)
-    assert max(moves[box](0.0)[2] for box in boxes) < 0.5 * TIERS + LIFT * TIERS
 
 
 # --- over DDS -------------------------------------------------------------------------------------
@@ -542,20 +459,6 @@ def test_it_switches_the_model_of_the_running_node(view, client, contact_node):
     view.set_model('exact')
     assert not view.refusal
     assert client.spin(lambda: view.settings['model'] == 'exact' and not view.wish)
-
-
-def test_another_size_is_another_log(view, client, contact_node):
-    """Whoever sets it: the exact point is that of the new boxes."""
-    assert client.spin(lambda: view.log is not None)
-    old = view.log
-    result, = contact_node.set_parameters([Parameter('size_b', value=[2.0, 2.0, 3.0])])
-    assert result.successful
-    assert client.spin(lambda: view.log is not old)
-    view.log.pose('box_a', START, ORIGIN)
-    view.log.pose('box_b', START, TOUCHING)
-    assert view.log.snapshot().separation == pytest.approx(1.875 - 2.5)
-    contact_node.set_parameters([Parameter('size_b', value=[2.0, 2.0, 2.5])])  # as others expect
-    assert client.spin(lambda: list(view.settings['size_b']) == [2.0, 2.0, 2.5])
 
 
 # --- the program ----------------------------------------------------------------------------------

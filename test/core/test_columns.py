@@ -19,7 +19,7 @@ from gmpy2 import mpfr
 
 pytest.importorskip('box_contact_ros.evidence')
 
-from box_contact_ros.core import FEATURES, Stages, native, stages
+from box_contact_ros.core import Stages, native, stages
 from box_contact_ros.evidence.pose_sets import LOADS, SETS, Pairs
 
 DEEP_SETS = {name: make for name, make in {**SETS, **LOADS}.items() if name != 'touching'}
@@ -172,30 +172,6 @@ def test_brackets_are_shares_and_points_carry_all(name: str) -> None:
 
 
 # --- the arrays -----------------------------------------------------------------------------------
-
-
-def test_stages_that_there_are_not() -> None:
-    with pytest.raises(ValueError, match="names .'corner'. are not fields"):
-        stages([poses.IDENTITY], [poses.IDENTITY], [UNIT], [UNIT], names=('corner',))
-
-
-def test_stages_name_the_row_that_is_refused() -> None:
-    pair = np.tile(poses.IDENTITY, (5, 1))
-    bad = pair.copy()
-    bad[3, 3:] = 0.0
-    for poses_b, size in ((bad, [UNIT]), (pair, [UNIT] * 3 + [(1.0, 0.0, 1.0)] + [UNIT])):
-        with pytest.raises(ValueError, match='row 3 '):
-            stages(pair, poses_b, [UNIT], size, names=('normal',))
-
-
-def test_stages_that_are_not_asked_for_are_empty() -> None:
-    """The others have their shapes and kinds."""
-    pair, size = np.tile(poses.IDENTITY, (4, 1)), np.ones((4, 3))
-    found = stages(pair, pair, size, size, names=('axis', 'upper_features'))
-    assert found.axis.shape == (4,) and found.axis.dtype == np.int64
-    assert found.upper_features.shape == (4, 3, FEATURES)
-    assert found.upper_features.dtype == np.float32
-    assert sum(values.size > 0 for values in found) == 2
 
 
 @pytest.mark.parametrize('name', {**SETS, **LOADS})

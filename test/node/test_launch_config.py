@@ -18,7 +18,6 @@ import sys
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 import yaml
 
@@ -27,7 +26,7 @@ from box_contact_ros.cli import PROGRAMS
 from box_contact_ros.node.contact_node import PARAMETERS
 from box_contact_ros.node.launch_arguments import CONTACT_NODE, descriptions, value_of
 from box_contact_ros.scene.files.scene_file import read_scene
-from box_contact_ros.scene.scene_solver import Pair, Scene
+from box_contact_ros.scene.scene_solver import Scene
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -246,32 +245,8 @@ def test_node_starts_with_the_parameter_file(program: Any, tmp_path: Path) -> No
 # --- scenes ---------------------------------------------------------------------------------------
 
 
-each_scene = pytest.mark.parametrize(
-    'path', sorted((ROOT / 'config' / 'scenes').glob('*.yaml')), ids=lambda path: path.stem)
-
-
 def scene(name: str) -> Scene:
     return read_scene(str(ROOT / 'config' / 'scenes' / f'{name}.yaml'))
-
-
-@each_scene
-def test_scene_loads(path: Path) -> None:
-    """The loader takes it; a pair is called after its boxes; ids follow from names."""
-    for pair in read_scene(str(path)).pairs:
-        assert pair == Pair.between(pair.a, pair.b)
-
-
-@each_scene
-def test_fixed_boxes_stand_beside_each_other(path: Path) -> None:
-    """Upright, on the ground or on each other: none in another, none that floats."""
-    fixed = [box for box in read_scene(str(path)).boxes.values() if box.pose]
-    low = np.array([np.subtract(box.pose[:3], np.divide(box.size, 2)) for box in fixed])
-    high = np.array([np.add(box.pose[:3], np.divide(box.size, 2)) for box in fixed])
-    for number, box in enumerate(fixed):
-        assert box.pose[3:] == (0, 0, 0, 1)
-        inside = ((low < high[number] - 1e-6) & (high > low[number] + 1e-6)).all(axis=1)
-        assert inside.sum() == 1, box.name  # itself
-        assert low[number, 2] == pytest.approx(0) or np.isclose(high[:, 2], low[number, 2]).any()
 
 
 def test_two_boxes_are_the_node_s_default() -> None:
@@ -281,9 +256,3 @@ def test_two_boxes_are_the_node_s_default() -> None:
         f'box_{letter}': (PARAMETERS[f'size_{letter}'].default, f'box_{letter}/pose')
         for letter in 'ab'}
     assert scene('two_boxes').frame_id == CRANE_PARAMETERS['frame_id'].default
-
-
-def test_a_shipped_scene_is_short() -> None:
-    """The bay of 51 boxes has at most 12 lines; what it means: test_short_forms.py."""
-    text = (ROOT / 'config' / 'scenes' / 'yard_bay.yaml').read_text('utf-8')
-    assert len(text.splitlines()) <= 12 and len(scene('yard_bay').boxes) == 51

@@ -216,13 +216,6 @@ def test_ids_are_never_used_again(node, client):
     assert set_scene(node, WITH_CRATE).successful
 
 
-def test_shipped_scenes_replace_each_other(node):
-    """Their ids follow from the names of their pairs."""
-    for name in ('two_boxes', 'yard_bay', 'spreader_container_stack', 'yard_bay', 'two_boxes'):
-        result = set_scene(node, name)
-        assert result.successful, result.reason
-
-
 def test_a_stale_box_is_nan_and_never_an_old_contact(client):
     """The lorry falls silent while the load lies on it: its pair becomes a row of NaN.
 
@@ -406,12 +399,6 @@ def test_a_scene_of_topics_becomes_one_of_an_array(array_node, array_client):
     assert set(array_client.rows(ON_FLOOR, LORRY)) == {3, 5}
 
 
-def test_too_many_pairs_for_topics_of_their_own(node):
-    text = "{boxes: {m: {size: [1, 1, 1], count: 60}}, pairs: [{a: '*', b: '*'}]}"
-    refused = set_scene(node, text)
-    assert not refused.successful and 'set pair_topics to false' in refused.reason
-
-
 def test_latest_pairs_boxes_of_different_rates(client):
     """A lorry at 5 Hz and a load at 100 Hz: every pose is answered with the other's last."""
     with scene_node(pairing='latest', max_age=1.0):
@@ -423,27 +410,6 @@ def test_latest_pairs_boxes_of_different_rates(client):
             assert rows[5]['depth'] == pytest.approx(0.2)
         stamp = client.tick(stamp=client.next_stamp() + 1500 * MS, load=ON_LORRY)
         assert math.isnan(client.rows(stamp)[5]['depth'])
-
-
-def test_tolerance_joins_stamps_that_are_near(client):
-    with scene_node(tolerance=0.002):
-        client.offer(load=ON_LORRY, lorry=LORRY)
-        stamp = client.next_stamp()
-        client.tick(stamp=stamp, lorry=LORRY)
-        client.tick(stamp=stamp + 1 * MS, load=ON_LORRY)
-        assert client.rows(stamp + 1 * MS)[5]['depth'] == pytest.approx(0.2)  # the newer stamp
-        client.tick(stamp=stamp + 50 * MS, lorry=LORRY)
-        client.tick(stamp=stamp + 55 * MS, load=ON_LORRY)
-        assert not client.answered(stamp + 55 * MS, 0.5)
-
-
-def test_repeated_and_late_stamps_are_counted(node, client):
-    stamp = client.tick(load=ON_FLOOR, lorry=LORRY)
-    client.rows(stamp)
-    for _ in range(5):
-        client.tick(stamp=stamp, load=ON_LORRY, lorry=LORRY)
-    assert client.counts()['refused: repeated stamp'] == 10
-    assert client.rows(stamp)[3]['depth'] == pytest.approx(0.1)
 
 
 def test_time_that_goes_back_begins_anew(node, client):
@@ -583,11 +549,6 @@ def test_a_name_that_is_too_long_changes_nothing(node, client, long):
     assert client.rows(client.tick(load=ON_FLOOR, lorry=LORRY)).keys() == {3, 5}
     assert set_scene(node, SCENE).successful
     assert client.rows(client.tick(load=ON_FLOOR, lorry=LORRY)).keys() == {3, 5}
-
-
-def test_autostart_is_for_the_start(node):
-    result, = node.set_parameters([Parameter('autostart', value=False)])
-    assert not result.successful and 'read-only' in result.reason
 
 
 def test_counts_outlive_cleanup(node, client, capfd):

@@ -26,7 +26,6 @@ from box_contact_ros.node.messages import (
     make_header,
     read_answer,
 )
-from box_contact_ros.node.wrench_output import WRENCH_PARAMETERS
 from box_contact_ros.scene.files.scene_check import meaning
 from box_contact_ros.scene.files.scene_file import SceneError, parse_scene, scene_text
 from box_contact_ros.scene.scene_solver import Answer, Pair, two_boxes
@@ -191,23 +190,6 @@ def test_time_that_goes_back_begins_anew(client):
         assert again == pytest.approx(first, rel=1e-9, abs=1e-6)
 
 
-def test_it_is_off_by_default():
-    with node_with(mass_a=MASS) as node:
-        assert not any('wrench' in publisher.topic_name for publisher in node.publishers)
-        assert node.describe_parameter('mass_a').floating_point_range[0].from_value == 0.0
-        for name in WRENCH_PARAMETERS:
-            assert node.describe_parameter(name).description
-        for name, value, words in (('mass_a', -1.0, 'mass_a out of range Min: 0'),
-                                   ('friction', math.nan, 'friction'), ('wrench', 1, 'wrench must'),
-                                   ('wrench', True, 'set rate:=200.0')):
-            result, = node.set_parameters([Parameter(name, value=value)])
-            assert not result.successful and words in result.reason
-        results = node.set_parameters_atomically(
-            [Parameter('wrench', value=True), Parameter('rate', value=500)])
-        assert results.successful
-        assert any('/contact/wrench' == one.topic_name for one in node.publishers)
-
-
 BARE = SCENE.replace(', mass: 1000', '').replace(', mass: 500', '')
 
 
@@ -223,16 +205,6 @@ BARE = SCENE.replace(', mass: 1000', '').replace(', mass: 500', '')
 def test_wrong_use_is_refused_with_the_remedy(change, words):
     pytest.importorskip('fcl')
     assert words in refusal(**LANDING | change)
-
-
-def test_too_many_topics_are_refused():
-    scene = ('boxes: {b: {size: [1, 1, 1], count: 60, mass: 1}}\n'
-             "pairs: [{a: '*', b: '*'}]\n")
-    assert 'at most 1000 can have a topic' in refusal(
-        scene=scene, wrench=True, rate=RATE, pair_topics=False)
-    assert "pose_topic 'load_floor/wrench' of box lorry is a topic of this node" in refusal(
-        scene=SCENE.replace('lorry: {', 'lorry: {pose_topic: load_floor/wrench, '), wrench=True,
-        rate=RATE)
 
 
 def test_masses_of_a_scene_file():

@@ -139,13 +139,6 @@ def test_bad_poses_are_refused_in_a_sweep(monkeypatch):
         SceneSolver(scene, model='exact')(rows)
 
 
-def test_many_pairs_are_swept_and_few_are_not():
-    crowd = "{poses: array, boxes: {m: {size: [1, 1, 1], count: 200}}, pairs: [{a: '*', b: '*'}]}"
-    assert SceneSolver(parse_scene(crowd), model='exact')._is_swept
-    star = crowd.replace("{a: '*'", '{a: m01')
-    assert not SceneSolver(parse_scene(star), model='exact')._is_swept
-
-
 CROWD = """
 import resource
 import numpy as np

@@ -499,17 +499,6 @@ def test_either_box_may_be_the_load():
 # --- Forms ----------------------------------------------------------------------------------------
 
 
-def test_a_centre_of_mass_elsewhere():
-    """The same body, described from another box: the same wrench."""
-    centre = np.array([0.5, -0.2, 0.1])
-    pose = moved(LEVEL, turn=(0, 0, 0.4))
-    about = np.concatenate([pose[:3] + rotation_matrix(pose[3:]) @ centre, pose[3:]])
-    aside = HeldPatch.for_loop(Body(mass=MASS, inertia=INERTIA, centre=centre), rate_hz=RATE)
-    velocity = moving(linear=(1e-3, 0, -1e-4), angular=(1e-4, 0, 1e-4))
-    assert wrench_of(slab(), pose, velocity, law=aside) == pytest.approx(
-        wrench_of(slab(), about, velocity), rel=1e-9, abs=1e-6)
-
-
 def test_a_copy_goes_its_own_way_and_reset_forgets():
     law = fresh()
     law.hold(slab(), LEVEL)
@@ -522,16 +511,6 @@ def test_a_copy_goes_its_own_way_and_reset_forgets():
     assert not law.wrench(pose, STILL).any()
     assert copy.wrench(pose, STILL).any()
     assert np.array_equal(wrench_of(slab(), law=law), wrench_of(slab()))
-
-
-def test_a_patch_law_is_the_same_law_once_a_tick():
-    """At the pose it was asked for, a held wrench of the same Ω is a held patch's."""
-    solver = ContactSolver(SIZE, SIZE, model='exact')
-    law = PatchLaw.for_loop(LOAD, rate_hz=RATE, latency=0.002)
-    sunk = GRAVITY / law.frequency**2
-    contact = solver(LEVEL, LEVEL - [0, 0, SIZE[2] - sunk, 0, 0, 0, 0])
-    assert law.wrench(contact, LEVEL, STILL) == pytest.approx([0, 0, WEIGHT, 0, 0, 0], rel=1e-9,
-                                                              abs=1e-3)
 
 
 @pytest.mark.parametrize('rate', [50.0, 200.0, 1000.0])

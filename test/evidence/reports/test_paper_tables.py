@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import csv
 import json
-import math
 
 import numpy as np
 import poses
@@ -62,17 +61,6 @@ def test_the_search_alone_finds_every_pair():
                                             enable_cost=True, num_max_cost_sources=10_000), result)
     assert len(result.contacts) == 1
     assert 0.9 * pairs < len(result.cost_sources) <= pairs and pairs > 20
-
-
-def test_crossing_is_on_log_log_paper():
-    """Error 1/N reaches 1/6 at 6; below from the first on; never."""
-    errors = {n: 1 / n for n in (1, 4, 16)}
-    assert paper_soup_tables.crossing(errors, 1 / 6) == pytest.approx(6.0)
-    assert paper_soup_tables.crossing(errors, 1.5) == 0.0
-    assert paper_soup_tables.crossing(errors, 0.01) == math.inf
-    assert paper_soup_tables.in_words(0.0) == 'below N = 1'
-    assert paper_soup_tables.in_words(17.6) == 'N ≈ 18'
-    assert paper_soup_tables.in_words(math.inf) == 'beyond N = 64'
 
 
 def test_planted_errors_show(small, monkeypatch):
@@ -196,17 +184,3 @@ def test_all_is_written(small, tmp_path, capsys):
     assert f'{most:,}' in page
     assert '11,233' in page and '36.77' not in page  # the paper's, of the N that were run
     assert {row['model'] for row in rows} == {'soup', 'paper', 'paper-continuous'}
-
-
-def test_one_figure_alone(small, tmp_path, monkeypatch, capsys):
-    """Without --out, the picture that was asked for goes to the current folder."""
-    monkeypatch.chdir(tmp_path)
-    assert paper_tables.main(['--figure', '9']) == 0
-    assert [path.name for path in tmp_path.iterdir()] == ['paper_figure_9.png']
-    assert 'paper_figure_9.png' in capsys.readouterr().out
-
-
-def test_no_such_table(capsys):
-    with pytest.raises(SystemExit):
-        paper_tables.main(['--table', '5'])
-    assert '--table' in capsys.readouterr().err

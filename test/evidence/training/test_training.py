@@ -77,27 +77,6 @@ def test_one_step_is_the_papers_formula(sets: dict[str, dataset.Patterns]) -> No
     assert with_momentum - without == pytest.approx(0.9 * first, rel=1e-2)
 
 
-def test_networks_of_a_batch_have_their_own_settings(sets: dict[str, dataset.Patterns]) -> None:
-    """Learning rate, momentum and initial range per network; a network at rest stays at rest."""
-    together = run(sets, rate=[0.0, 0.05, 0.05], momentum=[0.9, 0.0, 0.9], initial=[1.0, 1.0, 0.0])
-    history = torch.stack(together.history).numpy()
-    assert np.ptp(history[:, 0]) == 0.0
-    assert np.ptp(history[:, 1]) > 0.01
-    # Without any asymmetry to start from, hidden units cannot come apart: only biases learn.
-    assert not together.networks.layers(2)[0][0].any()
-    alone = run(sets, rate=0.05, momentum=[0.5, 0.0, 0.1])
-    np.testing.assert_allclose(torch.stack(alone.history)[:, 1].numpy(), history[:, 1], rtol=1e-5)
-
-
-def test_smaller_networks_in_a_batch_stay_small(sets: dict[str, dataset.Patterns]) -> None:
-    """Units that a network does not have learn nothing."""
-    fitted = run(sets, hidden=[(9, 7), (4, 3), (9, 7)])
-    (first, _), (second, bias), (last, _) = fitted.networks.layers(1)
-    assert first[:4].all() and not first[4:].any()
-    assert not second[3:].any() and not second[:, 4:].any() and not bias[3:].any()
-    assert last[:, :3].all() and not last[:, 3:].any()
-
-
 def test_same_seed_same_weights(sets: dict[str, dataset.Patterns]) -> None:
     first, again, other = run(sets), run(sets), run(sets, seed=1)
     for (a, _), (b, _), (c, _) in zip(*(one.networks.layers(2) for one in (first, again, other))):
@@ -158,14 +137,6 @@ def test_quick_training(quick: Path, job: PaperJob) -> None:
         assert np.all(np.isfinite(predict(weights.networks[name], external.inputs)))
 
 
-def test_train_again_is_the_same_file_but_for_the_clock(quick: Path, tmp_path: Path) -> None:
-    assert train.main(['paper', '--quick', '--seed', '3', '--out', str(tmp_path)]) == 0
-    assert [path.name for path in tmp_path.iterdir()] == ['paper.safetensors']
-    first, again = (load_weights(folder / 'paper.safetensors').card for folder in (quick, tmp_path))
-    assert first['sha256'] == again['sha256']
-    assert first['metrics'] == again['metrics']
-
-
 @pytest.mark.parametrize(('job', 'folded'), [('containers', True), ('table-1-dropped', False)])
 def test_one_job_is_folded_and_one_as_drawn(job: str, folded: bool, tmp_path: Path) -> None:
     arguments = [job, '--quick', '--epochs', '2', '--starts', '1', '--out', str(tmp_path)]
@@ -187,14 +158,6 @@ def test_a_loss_that_is_not_wrapped_sees_the_turn(sets: dict[str, dataset.Patter
         near, far = (outputs_of(one.networks, moved['external'], one.scaling).mean().item()
                      for one in (wrap, plain))
     assert far - near == pytest.approx(2 * np.pi, abs=1.0)
-
-
-def test_a_folder_that_cannot_be_written_is_said_at_once(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / 'file').write_text('')
-    with pytest.raises(SystemExit):
-        train.main(['--out', str(tmp_path / 'file' / 'weights')])
-    assert 'cannot write to' in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(('arguments', 'message'), [

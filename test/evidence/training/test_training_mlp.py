@@ -99,15 +99,6 @@ def test_samples_are_the_exact_overlap(pairs: Pairs, data: MlpSamples) -> None:
     assert (data.volume > least - 2e-4).all() and (data.volume < most + 2e-4).all()
 
 
-def test_pieces_have_seeds_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(samples, 'PIECE', 3_000)
-    whole, first = (samples.draw_samples(samples.mixture, [4], n) for n in (6_000, 3_000))
-    for array, part in zip(vars(whole).values(), vars(first).values()):
-        np.testing.assert_array_equal(array[:len(first)], part)
-    assert len(whole) > 1.5 * len(first)
-    assert not np.array_equal(whole.volume[len(first):2 * len(first)], first.volume)
-
-
 # --- network and errors ---------------------------------------------------------------------------
 
 
@@ -194,9 +185,3 @@ def test_what_is_learned_is_better_than_the_middle(quick: Path, data: MlpSamples
             parameter.copy_(torch.from_numpy(array.copy()))
         one, other = (errors_of(network, tensors(data)) for network in (learned, middle))
     assert loss_of(one) < loss_of(other)
-
-
-def test_the_library_has_the_shipped_weights(tmp_path: Path) -> None:
-    """Its header is what `train` writes beside weights/mlp.safetensors."""
-    header = mlp_recipe.header(load_mlp().networks[NETWORK].layers)
-    assert train.SHIPPED_HEADER.read_text('utf-8') == header
