@@ -3,7 +3,8 @@
 
 // The force law's constants, and what a loop's rate and latency make of them.
 //
-// docs/explanation/force.md derives them; docs/contributing/decisions/patch-law.md has the experiment of each.
+// docs/explanation/force.md derives them. docs/contributing/decisions/patch-law.md describes the
+// experiment of each.
 #pragma once
 
 #include <algorithm>
