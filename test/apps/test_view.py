@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 import poses
 import pytest
+from geometry_msgs.msg import WrenchStamped
 from rclpy.parameter import Parameter
 from rclpy.serialization import serialize_message
 from ros_client import PATIENCE, Client, row_of, serving
@@ -32,6 +33,7 @@ from PIL import Image
 from box_contact_ros import ContactSolver
 from box_contact_ros.apps.ros_client import (
     CRANE_MARKERS,
+    CRANE_WRENCH,
     array_message,
     line_marker,
     pose_topics,
@@ -527,6 +529,23 @@ def test_it_hears_the_crane(view, client):
             for name, part in (('ropes', lines[:4]), ('spreader', lines[4:]))]))
         client.spin(lambda: False, 0.05)
     assert np.array_equal(view.lines, lines)
+
+
+def test_it_hears_the_force_on_the_load(view, client):
+    """Its upward part; a force that none can be is refused, and the one before stays."""
+    publisher = client.node.create_publisher(WrenchStamped, CRANE_WRENCH, 10)
+    message = WrenchStamped()
+    message.wrench.force.z = 196e3
+    deadline = time.monotonic() + PATIENCE
+    while math.isnan(view.force):
+        assert time.monotonic() < deadline, 'nothing heard'
+        publisher.publish(message)
+        client.spin(lambda: False, 0.05)
+    for force in (math.inf, math.nan, 1e300):
+        message.wrench.force.z = force
+        with pytest.raises(Refused, match='force'):
+            view._on_force(message)
+    assert view.force == 196e3
 
 
 def test_it_switches_the_model_of_the_running_node(view, client, contact_node):
