@@ -695,9 +695,8 @@ def test_the_page_in_a_browser(program):
     """It draws both boxes; the figures come and are sound; a button switches the running node."""
     _, url = start_view(program, '--model', 'exact', '--rate', '100')
     with open_page(url) as tab:
-        tab.wait_for('document.getElementById("verdict")?.innerText.startsWith("no contact, ")',
-                     400)
-        assert float(tab.text('separation').split()[0]) > 0.0
+        tab.wait_for('document.getElementById("verdict")?.innerText.startsWith("no contact, ")'
+                     ' && parseFloat(document.getElementById("separation")?.innerText) > 0', 400)
         picture = np.array(Image.open(io.BytesIO(tab.picture())).convert('RGB'), float)
         scene = picture[:, :picture.shape[1] // 2]
         assert len(np.unique(scene.reshape(-1, 3), axis=0)) > 50
