@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 import poses
 import pytest
+from geometry_msgs.msg import WrenchStamped
 from rclpy.parameter import Parameter
 from rclpy.serialization import serialize_message
 from ros_client import PATIENCE, Client, row_of, serving
@@ -31,6 +32,7 @@ from PIL import Image
 from box_contact_ros import ContactSolver
 from box_contact_ros.apps.ros_client import (
     CRANE_MARKERS,
+    CRANE_WRENCH,
     array_message,
     line_marker,
     pose_topics,
@@ -446,6 +448,23 @@ def test_it_hears_the_crane(view, client):
     assert np.array_equal(view.lines, lines)
 
 
+def test_it_hears_the_force_on_the_load(view, client):
+    """Its upward part; a force that none can be is refused, and the one before stays."""
+    publisher = client.node.create_publisher(WrenchStamped, CRANE_WRENCH, 10)
+    message = WrenchStamped()
+    message.wrench.force.z = 196e3
+    deadline = time.monotonic() + PATIENCE
+    while math.isnan(view.force):
+        assert time.monotonic() < deadline, 'nothing heard'
+        publisher.publish(message)
+        client.spin(lambda: False, 0.05)
+    for force in (math.inf, math.nan, 1e300):
+        message.wrench.force.z = force
+        with pytest.raises(Refused, match='force'):
+            view._on_force(message)
+    assert view.force == 196e3
+
+
 def test_it_switches_the_model_of_the_running_node(view, client, contact_node):
     """Granted, or refused with the node's own words, and then the old one stays."""
     assert client.spin(lambda: view.log is not None)
@@ -579,9 +598,8 @@ def test_the_page_in_a_browser(program):
     """It draws both boxes; the figures come and are sound; a button switches the running node."""
     _, url = start_view(program, '--model', 'exact', '--rate', '100')
     with open_page(url) as tab:
-        tab.wait_for('document.getElementById("verdict")?.innerText.startsWith("no contact, ")',
-                     400)
-        assert float(tab.text('separation').split()[0]) > 0.0
+        tab.wait_for('document.getElementById("verdict")?.innerText.startsWith("no contact, ")'
+                     ' && parseFloat(document.getElementById("separation")?.innerText) > 0', 400)
         picture = np.array(Image.open(io.BytesIO(tab.picture())).convert('RGB'), float)
         scene = picture[:, :picture.shape[1] // 2]
         assert len(np.unique(scene.reshape(-1, 3), axis=0)) > 50
