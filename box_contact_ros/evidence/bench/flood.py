@@ -54,7 +54,7 @@ PER_HOUR = {'garbage': 3_600_000, 'long name': 3_600, 'bad pose': 360_000,
 """Floods of an hour: a kilohertz of garbage, ten requests a second, a megabyte a second."""
 OF_POSES = ('garbage', 'long name', 'bad pose')  # which nobody answers
 GROWTH_LIMIT = 50.0  # of the contact node's memory [MB]
-OUTSTANDING = 8  # requests that may wait for their answer: ROS's queues of them hold ten
+OUTSTANDING = 4  # requests of a kind that may wait: two kinds share a queue of ten
 PATIENCE = 1.0  # s after which a request is taken for lost
 PART = 20  # messages of a kind at most before answers are read
 END_SECONDS = 30.0  # for the last answers of a flood
@@ -71,7 +71,8 @@ class Stranger(GuardedNode):
     def __init__(self, context: Context, target: str, poses: str) -> None:
         super().__init__('stranger', context=context)
         self.sent = dict.fromkeys(PER_HOUR, 0)
-        self._waiting: list[tuple[float, Future]] = []  # with when it was asked
+        self._kind = ''  # of flood that is being sent
+        self._waiting: list[tuple[float, str, Future]] = []  # when it was asked, and its kind
         self._publishers = [self.create_publisher(PoseStamped, f'{poses}{box}/pose', DEEP_RELIABLE)
                             for box in ('box_a', 'box_b')]
         self._clients_of: dict[type, Client] = {
@@ -111,7 +112,7 @@ class Stranger(GuardedNode):
     def _ask(self, kind: type, request: Any) -> None:
         service = self._clients_of[kind]
         if service.service_is_ready():
-            self._waiting.append((time.monotonic(), service.call_async(request)))
+            self._waiting.append((time.monotonic(), self._kind, service.call_async(request)))
 
     def flood(self, seconds: float, serve: Callable[[float], None]) -> None:
         """Send PER_HOUR within so many seconds, or as much of it as can be sent."""
@@ -120,7 +121,9 @@ class Stranger(GuardedNode):
             late = False
             for name, wanted in PER_HOUR.items():
                 for _ in range(min(round(share * wanted) - self.sent[name], PART)):
-                    if name in OF_POSES or len(self._waiting) < OUTSTANDING:
+                    if name in OF_POSES or sum(
+                            kind == name for _, kind, _ in self._waiting) < OUTSTANDING:
+                        self._kind = name
                         self._floods[name]()
                         self.sent[name] += 1
                         late = True
@@ -128,8 +131,7 @@ class Stranger(GuardedNode):
             for _ in self._waiting:
                 serve(0.0)
             since = time.monotonic() - PATIENCE
-            self._waiting = [(asked, future) for asked, future in self._waiting
-                             if asked > since and not future.done()]
+            self._waiting = [one for one in self._waiting if one[0] > since and not one[2].done()]
 
     def answers(self, serve: Callable[[float], None]) -> bool:
         """Return whether a request is answered within ten seconds, after all that."""
