@@ -167,6 +167,20 @@ def test_no_fused_multiply_add_of_doubles(file: Path) -> None:
     assert not found, f'{len(found)} in {file.name}: {sorted(set(found))}'
 
 
+def test_a_fused_multiply_add_would_be_found(tmp_path: Path) -> None:
+    """The test above fails for what a compiler makes of a · b + c without our flags."""
+    compiler = shutil.which(os.environ.get('CXX', 'g++').split()[0])
+    if not compiler:
+        pytest.skip('no C++ compiler is installed')
+    source, file = tmp_path / 'one.cpp', tmp_path / 'one.o'
+    source.write_text('double f(double a, double b, double c) { return a * b + c; }\n')
+    for flags, found in (([], True), (['-ffp-contract=off'], False)):
+        subprocess.run([compiler, '-O3', '-march=x86-64-v3', *flags, '-c', source, '-o', file],
+                       check=True)
+        assert bool(FUSED.search(disassembled(file))) is found
+    assert not FUSED.search('vfmadd231ps %zmm0,%zmm1,%zmm2  vfmsub213ss  vfnmadd132ps')
+
+
 LAWS = ('core/test_laws.py', 'evidence/verification/test_hard_poses.py', 'core/test_exact.py')
 """Tests that every instruction set runs."""
 WITH_ORACLE = ('parts', 'truth', 'the_file', 'reach_what', 'oracle', 'thin_overlaps', 'pieces')
@@ -228,6 +242,13 @@ def test_threads_name_the_first_row_that_is_refused(model: str, bad: tuple[int, 
         assert solver.exact_answers == 0  # nothing was answered
     assert len(set(said)) == 1
     assert said[0].startswith(f'poses_b[{bad[0]}] quaternion ')
+
+
+@every_model
+@pytest.mark.parametrize('threads', [0, -1, True, 1.0, 2.5, '2', None, [2], np.nan])
+def test_threads_that_are_none_are_refused(model: str, threads: object) -> None:
+    with pytest.raises(ValueError, match='^threads must be '):
+        solve(a_solver(model), MIXED.first(3), threads)
 
 
 def test_more_threads_than_rows() -> None:
@@ -340,6 +361,25 @@ KINDS: dict[str, Callable[[np.ndarray], object]] = {
     'subclass': lambda v: v.view(Marked), 'longdouble': lambda v: v.astype(np.longdouble)}
 
 
+@every_model
+@pytest.mark.parametrize('kind', KINDS)
+def test_kinds_of_arrays_have_the_same_bits(model: str, kind: str) -> None:
+    """Single calls and batches take poses and sizes of any kind; numbers are float32's here."""
+    pairs = Pairs(*(part[:300].astype(np.float32).astype(float) for part in MIXED))
+    size_a, size_b = pairs.size_a[0], pairs.size_b[0]
+    turned = Pairs(*map(KINDS[kind], pairs))
+    wanted = solve(a_solver(model), pairs)
+    found = solve(a_solver(model), turned)
+    assert_same_bits(found, wanted)
+    assert all(type(field) is np.ndarray for field in found)
+    plain = ContactSolver(size_a, size_b, model=model)
+    other = ContactSolver(KINDS[kind](size_a), KINDS[kind](size_b), model=model)
+    for a, b in zip(pairs.pose_a, pairs.pose_b):
+        one = other(KINDS[kind](a), KINDS[kind](b))
+        assert_same_bits(one, plain(a, b))
+        assert type(one) is Contact and type(one.normal) is type(one.point) is np.ndarray
+
+
 # --- the object -----------------------------------------------------------------------------------
 
 ABOVE = np.array([0.1, 0.05, 1.9, 0.02, 0.01, 0.0, 1.0])
@@ -356,6 +396,16 @@ def test_a_solver_is_pickled(model: str) -> None:
         assert other.exact_answers == 0
         assert_same_bits(other(poses.IDENTITY, above), solver(poses.IDENTITY, above))
         assert_same_bits(solve(other, MIXED.first(9)), solve(solver, MIXED.first(9)))
+
+
+def test_a_solver_is_made_once() -> None:
+    """A second __init__ is refused, and leaves all of the first."""
+    solver = ContactSolver((2, 2, 2), poses.CUBE, model='exact')
+    wanted = solver(poses.IDENTITY, ABOVE)
+    for model in ('exact', 'mlp', 'fcl'):
+        with pytest.raises(RuntimeError, match='a solver is made once'):
+            solver.__init__((1, 2, 3), poses.CUBE, model=model)
+    assert_same_bits(solver(poses.IDENTITY, ABOVE), wanted)
 
 
 def test_a_solver_that_was_not_made_answers_nothing() -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import os
+import warnings
 from decimal import Decimal
 from fractions import Fraction
 
@@ -20,7 +21,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from box_contact_ros import ContactSolver
-from box_contact_ros.core import LENGTH_MAX, QUATERNION_MAX, QUATERNION_MIN
+from box_contact_ros.core import LENGTH_MAX, LENGTH_MIN, QUATERNION_MAX, QUATERNION_MIN
 from box_contact_ros.scene.files.scene_file import SceneError, read_scene
 from box_contact_ros.solver.checks import absent_poses, are_poses, pose_fault, size_fault
 
@@ -212,6 +213,19 @@ def test_whatever_comes_in(model, two_poses, two_sizes, changes):
 
 
 exponent = math.log10(LENGTH_MAX)
+any_good_extent = st.floats(-exponent, exponent).map(
+    lambda x: min(max(10.0**x, LENGTH_MIN), LENGTH_MAX))
+
+
+@every_model
+@few
+@given(numbers(any_good_extent, 3), numbers(any_good_extent, 3),
+       numbers(st.floats(-1, 1), 3), numbers(any_float, 8))
+def test_every_accepted_size_is_answered(model, size_a, size_b, offset, turns):
+    """A hundred orders of magnitude between two extents, boxes near each other: a sound answer."""
+    turns = [turn if not pose_fault([0, 0, 0, *turn]) else TURN for turn in (turns[:4], turns[4:])]
+    position = np.clip(np.multiply(offset, np.minimum(size_a, size_b)), -LENGTH_MAX, LENGTH_MAX)
+    assert_sound(both_ways(model, [0, 0, 0, *turns[0]], [*position, *turns[1]], size_a, size_b))
 
 
 # --- kinds ----------------------------------------------------------------------------------------
@@ -264,6 +278,15 @@ def test_numbers_of_any_kind(model, kind):
 
 
 @every_model
+def test_integers_are_numbers(model):
+    for kind in (int, np.int8, np.uint64):
+        pose = np.array([0, 0, 1, 0, 0, 0, 1]).astype(kind)
+        assert both_ways(model, poses.IDENTITY, pose).separation == -1.0
+        assert both_ways(model, poses.IDENTITY, list(pose)).separation == -1.0
+    assert not both_ways(model, poses.IDENTITY, [2**70, 0, 0, 0, 0, 0, 1]).colliding
+
+
+@every_model
 @pytest.mark.parametrize('strange', [
     None, 'pose', '0000001', b'1234567', 1.0, True, [], {}, set(), {1: 2}, 1 + 2j, object(),
     ['0'] * 6 + ['1'], [0.0] * 6 + [None], [0.0] * 6 + ['1'], [0.0] * 6 + [1j],
@@ -289,6 +312,15 @@ def test_what_is_no_pose(model, strange):
             ask()
         text = str(refusal.value)
         assert text.startswith(f'{field} must be ') and '\n' not in text and len(text) < 1000
+
+
+def test_a_long_double_beyond_float64():
+    """It becomes infinite and is refused as such, without NumPy's RuntimeWarning."""
+    if np.finfo(np.longdouble).max == np.finfo(float).max:
+        pytest.skip('long double is double here')
+    bad = np.r_[np.longdouble('1e4000'), ABOVE[1:].astype(np.longdouble)]
+    with pytest.raises(ValueError, match=r'^pose_b position \(inf, .*is not finite'):
+        SOLVERS['exact'](poses.IDENTITY, bad)
 
 
 def test_a_refusal_leaves_no_trace():
@@ -416,3 +448,17 @@ scenes = st.fixed_dictionaries({}, optional={
 def test_scenes_of_wrong_things(tmp_path_factory, scene):
     """What YAML can say, in the places of boxes, sizes and names: SceneError, or a scene."""
     scene_of(tmp_path_factory.getbasetemp() / 'scene.yaml', yaml.safe_dump(scene))
+
+
+@few
+@given(st.one_of(st.text(), st.binary(),
+                 st.text(alphabet='{}[]:,-?&*!|>%@#\'" \n\tab01.', max_size=60)))
+def test_scenes_of_garbage(tmp_path_factory, content):
+    """Any text, any bytes, and what looks like YAML: SceneError."""
+    assert isinstance(scene_of(tmp_path_factory.getbasetemp() / 'scene.yaml', content), str)
+
+
+def test_warnings_would_fail_here():
+    """The tests above rely on it."""
+    with pytest.raises(RuntimeWarning):
+        warnings.warn('seen', RuntimeWarning, stacklevel=1)

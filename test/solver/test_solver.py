@@ -5,15 +5,19 @@
 from __future__ import annotations
 
 import math
+import pickle
+import warnings
 
 import numpy as np
 import poses
 import pytest
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from box_contact_ros import Contact, ContactSolver
 from box_contact_ros.solver.checks import pose_fault
 from box_contact_ros.solver.contact import patch_area
+from box_contact_ros.solver.models import models
 
 SOLVER = ContactSolver(poses.CUBE, poses.CUBE, model='exact')
 ABOVE = [0.5, 0.25, 1.875, 0, 0, 0, 1]
@@ -53,6 +57,18 @@ def test_results_are_not_shared():
     assert np.array_equal(one.point, kept)
 
 
+@pytest.mark.parametrize('model', models())
+def test_a_solver_goes_to_other_processes(model):
+    """Pickled and back, for a pool of processes, it answers the same."""
+    solver = ContactSolver((1, 2, 3), poses.CUBE, model=model) if 'paper' not in model else (
+        ContactSolver(poses.CUBE, poses.CUBE, model=model))
+    other = pickle.loads(pickle.dumps(solver))
+    assert other.model == model
+    above = [0.1, 0.05, 1.9, 0.02, 0.01, 0, 1]
+    for one, two in zip(solver(poses.IDENTITY, above), other(poses.IDENTITY, above)):
+        assert np.array_equal(one, two, equal_nan=True)
+
+
 @pytest.mark.parametrize('gap, colliding', [
     (0.0, True), (1e-15, True), (1e-14, False), (1e-12, False), (-1e-15, True)])
 def test_exact_touch_is_contact(gap, colliding):
@@ -67,6 +83,15 @@ def test_touch_tolerance_follows_the_coordinates():
     for gap, colliding in ((8 * 2.0**-30, True), (9 * 2.0**-30, False)):
         b = np.r_[origin + (0, 2 + gap, 0), 0, 0, 0, 1]
         assert SOLVER(a, b).colliding is colliding
+
+
+@pytest.mark.parametrize('length', [1e-8, 0.5, 0.999, 2.0, 1e8, 1e-99, 1e99])
+def test_quaternion_of_any_length_is_normalised(length):
+    turn = np.array([0.1, -0.2, 0.3, 0.9])
+    one = SOLVER(poses.IDENTITY, np.r_[0, 0, 2, turn / np.linalg.norm(turn)])
+    two = SOLVER(poses.IDENTITY, np.r_[0, 0, 2, length * turn])
+    assert two.separation == pytest.approx(one.separation, abs=1e-15)
+    assert two.point == pytest.approx(one.point, abs=1e-14)
 
 
 BAD_POSES = {
@@ -115,9 +140,30 @@ def test_bad_sizes_are_refused(bad, words):
             SOLVER.batch(two, two, size_b=rows)
 
 
+@pytest.mark.parametrize('bad', [[1, 2, 3], np.zeros((2, 7)), 'pose', None, [[0] * 7], 1.0,
+                                 [0, 0, 0, 0, 0, 0, 'w'], [0, 0, 0, 0, 0, 0, None]])
+def test_bad_shapes_are_refused(bad):
+    with pytest.raises(ValueError, match=r'^pose_a .*'):
+        SOLVER(bad, ABOVE)
+    with pytest.raises(ValueError, match='^poses_b '):
+        SOLVER.batch(np.zeros((1, 7)), np.zeros((1, 6)) if bad is None else 'poses')
+
+
 def test_unequal_batches_are_refused():
     with pytest.raises(ValueError, match='equally many, not 2 and 3'):
         SOLVER.batch(np.tile(poses.IDENTITY, (2, 1)), np.tile(poses.IDENTITY, (3, 1)))
+
+
+@pytest.mark.parametrize('threads', [0, -1, True, 1.0, '2', None])
+def test_threads_are_a_whole_number(threads):
+    with pytest.raises(ValueError, match='threads must be a whole number from 1 on'):
+        SOLVER.batch([poses.IDENTITY], [ABOVE], threads=threads)
+
+
+@pytest.mark.parametrize(('name', 'value'), [('model', None), ('model', 3), ('weights', 3)])
+def test_names_that_are_none(name, value):
+    with pytest.raises(ValueError, match=name):
+        ContactSolver(poses.CUBE, poses.CUBE, **{name: value})
 
 
 def test_empty_batch():
@@ -126,4 +172,40 @@ def test_empty_batch():
     assert found.normal.shape == found.point.shape == (0, 3)
 
 
+def test_unknown_model():
+    with pytest.raises(ValueError, match="model 'exakt' is not one of: .*exact"):
+        ContactSolver(poses.CUBE, poses.CUBE, model='exakt')
+
+
+def test_inputs_of_any_kind():
+    """Lists, float32, integers, strided views: all the same to the solver."""
+    wanted = SOLVER(poses.IDENTITY, ABOVE)
+    wide = np.zeros((7, 3))
+    wide[:, 1] = ABOVE
+    for given_as in (tuple(ABOVE), np.array(ABOVE, dtype=np.float32), wide[:, 1]):
+        assert np.array_equal(SOLVER([0, 0, 0, 0, 0, 0, 1], given_as).point, wanted.point)
+
+
 numbers = st.floats(allow_nan=True, allow_infinity=True, width=64)
+
+
+@settings(max_examples=500, deadline=None)
+@given(st.lists(numbers, min_size=7, max_size=7), st.lists(numbers, min_size=7, max_size=7))
+def test_any_fourteen_doubles(pose_a, pose_b):
+    """Whatever comes in: a finite answer, or a ValueError; never NaN in a contact."""
+    try:
+        contact = SOLVER(pose_a, pose_b)
+    except ValueError:
+        assert pose_fault(pose_a) or pose_fault(pose_b)
+        return
+    assert not pose_fault(pose_a) and not pose_fault(pose_b)
+    assert math.isfinite(contact.separation)
+    if contact.colliding:
+        assert np.isfinite(contact.point).all()
+        assert abs(np.linalg.norm(contact.normal) - 1) < 1e-12
+
+
+def test_warnings_are_errors_here():
+    """The suite runs with warnings as errors, so none hides."""
+    with pytest.raises(UserWarning):
+        warnings.warn('seen', UserWarning, stacklevel=1)

@@ -127,6 +127,30 @@ def test_planted_faults_are_found(name):
     assert sum(map(bool, faults)) == 8
 
 
+def test_planted_faults_of_patches_are_found():
+    """A negative eigenvalue, a volume of 0, half a patch."""
+    pairs = drawn('container')
+    found = pairs.contacts()
+    rows = np.flatnonzero(found.colliding)[:3]
+    assert not patches.patch_faults(pairs, found).any()
+    found.covariance[rows[0]] = np.diag([1.0, 1.0, -1e-5])
+    found.volume[rows[1]] = 0.0
+    found.covariance[rows[2], 1, 1] = np.nan
+    faults = patches.patch_faults(pairs, found)
+    assert faults[rows].tolist() == [judge.NEGATIVE, judge.NEGATIVE, judge.NOT_FINITE]
+    assert np.count_nonzero(faults) == 3
+
+
+@pytest.mark.parametrize('factor', [1.0 + 1e-3, 1.0 - 1e-3, 1.02, -1.0])
+def test_planted_volumes_are_outside_their_brackets(factor):
+    """Most brackets meet; what was left to `exact` is not judged."""
+    pairs, found, own = answered_by_mlp()
+    found.volume[own] *= factor
+    faults = patches.mlp_faults(pairs, found)
+    assert np.count_nonzero(faults == judge.OUT_OF_BRACKETS) > 0.75 * own.sum()
+    assert not faults[~own].any()
+
+
 def test_a_covariance_of_mlp_is_judged_to_rounding():
     pairs, found, own = answered_by_mlp()
     found.covariance[own] = np.diag([1.0, 1.0, -1e-13])
@@ -178,9 +202,27 @@ def test_a_fault_is_printed_so_that_it_can_be_pasted(monkeypatch):
     assert comment == '# too deep' and contact.colliding
 
 
+def test_an_exception_is_a_fault():
+    class Broken:
+        exact_answers = 0
+
+        def batch(self, *poses, **sizes):
+            raise ZeroDivisionError('planted')
+
+    tally = fuzz.examine(drawn('cube', 5), 'cube', {'exact': Broken()})[0]
+    assert tally.faults['exception'] == 1 and 'planted' in tally.poses[0]
+
+
 def test_the_program(capsys):
     """A line for each class and model, and 0 at the end of a run without faults."""
     assert fuzz.main(['--pairs', '600', '--workers', '1', '--seed', '3']) == 0
     out = capsys.readouterr().out
     assert out.count('no fault') == len(fuzz.CLASSES) * len(models_with_patch())
     assert 'all gates at zero' in out
+
+
+def test_pieces_do_not_depend_on_who_draws_them():
+    """One worker or two: the same tallies."""
+    one, two = (fuzz.fuzz(2000, seed=5, classes=['cube', 'card'], workers=workers)
+                for workers in (1, 2))
+    assert one == two

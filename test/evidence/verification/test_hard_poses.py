@@ -149,6 +149,23 @@ def test_mlp_point(name):
     assert row.point_worst <= STATED
 
 
+@pytest.mark.parametrize('model', MODELS)
+@pytest.mark.parametrize('name', CASES)
+def test_a_batch_is_its_single_calls(name, model):
+    """Bit for bit, and the same again, in any order."""
+    pairs = CASES[name].pairs
+    whole = solve(model, pairs)
+    order = np.random.default_rng(1).permutation(len(pairs.pose_a))
+    shuffled = solve(model, Pairs(*(part[order] for part in pairs)))
+    for one, other in zip(shuffled, whole):
+        np.testing.assert_array_equal(one, other[order])
+    for row in range(0, len(order), 9):
+        a, b, size_a, size_b = (part[row] for part in pairs)
+        single = ContactSolver(size_a, size_b, model=model)(a, b)
+        for one, other in zip(single, whole):
+            np.testing.assert_array_equal(one, other[row])
+
+
 # --- laws, on all families ------------------------------------------------------------------------
 
 
@@ -171,6 +188,15 @@ def test_swap(everything, model):
 
 
 @pytest.mark.parametrize('model', MODELS)
+def test_q_and_minus_q(everything, model):
+    """The same orientation: the same bits."""
+    pose_b = everything.pose_b.copy()
+    pose_b[:, 3:] *= -1.0
+    for one, two in zip(solve(model, everything), solve(model, everything._replace(pose_b=pose_b))):
+        np.testing.assert_array_equal(one, two)
+
+
+@pytest.mark.parametrize('model', MODELS)
 @pytest.mark.parametrize('power', [-20, 13])
 def test_scale_by_a_power_of_two(everything, model, power):
     """Exact: no absolute length anywhere."""
@@ -188,6 +214,70 @@ def test_scale_by_a_power_of_two(everything, model, power):
     np.testing.assert_array_equal(k * one.point, two.point)
     np.testing.assert_array_equal(k**3 * one.volume, two.volume)
     np.testing.assert_array_equal(k**2 * one.covariance, two.covariance)
+
+
+@pytest.mark.parametrize('model', MODELS)
+def test_reflection(everything, model):
+    """The mirror image of a scene has the mirror image of its answer: verdict and separation."""
+    def mirrored(pose):
+        return pose * np.array([-1, 1, 1, 1, -1, -1, 1])
+
+    one = solve(model, everything)
+    two = solve(model, everything._replace(pose_a=mirrored(everything.pose_a),
+                                           pose_b=mirrored(everything.pose_b)))
+    np.testing.assert_array_equal(one.colliding, two.colliding)
+    allowed = judge.rounding(*everything)
+    assert (np.abs(one.separation - two.separation) <= allowed).all()
+
+
+@pytest.mark.parametrize('model', MODELS)
+def test_free_after_moving_by_the_depth(everything, model):
+    """Moved by depth + m along the normal B is free, by depth − m it is not.
+
+    In between the depth falls by what it was moved. m = max(1e-9 · depth, 8 ulp of the
+    coordinates).
+    """
+    one = solve(model, everything)
+    rows = one.colliding & (one.separation < -1e-7 * size_of(everything))
+    depth = -one.separation[:, None]
+    reach = np.abs(np.hstack([everything.pose_a[:, :3], everything.pose_b[:, :3]])).max(axis=1)
+    m = np.maximum(1e-9 * depth[:, 0], 8 * np.spacing(np.maximum(reach, size_of(everything))))
+    m = (m + 2 * judge.rounding(*everything))[:, None]
+
+    def moved(by):
+        pose_b = everything.pose_b.copy()
+        pose_b[:, :3] += by * one.normal
+        pose_b[~rows] = everything.pose_b[~rows]
+        return solve(model, everything._replace(pose_b=pose_b))
+
+    assert not moved(depth + m).colliding[rows].any()
+    assert moved(depth - m).colliding[rows].all()
+    half = moved(0.5 * depth)
+    assert (np.abs(half.separation + 0.5 * depth[:, 0]) <= 2 * m[:, 0])[rows].all()
+
+
+def test_depth_is_lipschitz(everything):
+    """The separation changes by no more than the poses do, ties or not."""
+    rng = np.random.default_rng(8)
+    size, n = size_of(everything), len(everything.pose_a)
+    one = solve('exact', everything)
+    for scale in (1e-9, 1e-4, 1e-2):
+        step = rng.normal(size=(n, 3))
+        step *= (scale * size / np.linalg.norm(step, axis=1))[:, None]
+        pose_b = everything.pose_b.copy()
+        pose_b[:, :3] += step
+        two = solve('exact', everything._replace(pose_b=pose_b))
+        allowed = scale * size + 2 * judge.rounding(*everything)
+        assert (np.abs(two.separation - one.separation) <= allowed).all()
+
+
+@pytest.mark.parametrize('model', MODELS)
+def test_boxes_that_grow_are_no_less_deep(everything, model):
+    """Growing a box never lowers the depth."""
+    one = solve(model, everything)
+    two = solve(model, everything._replace(size_b=1.01 * everything.size_b))
+    assert (two.separation <= one.separation + 2 * judge.rounding(*everything)).all()
+    assert two.colliding[one.colliding].all()
 
 
 def test_float32_poses_have_float32_errors(everything):
