@@ -574,7 +574,8 @@ def test_node_has_no_other_topics(node, live):
 
 def table(page: str) -> list[list[str]]:
     """Cells of the contact node's table on a page, without backticks and the head."""
-    text = (ROOT / 'docs' / 'reference' / page).read_text('utf-8').split('\n## Of the ', 1)[1]
+    text = (ROOT / 'docs' / 'reference' / page).read_text('utf-8')
+    text = text.split(' of the contact node\n', 1)[1]
     lines = re.search(r'(?:^\|.*\n)+', text, re.MULTILINE).group().splitlines()[2:]
     return [[cell.strip().replace('`', '') for cell in line.strip('|').split('|')]
             for line in lines]

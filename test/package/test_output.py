@@ -59,8 +59,6 @@ def test_a_machine_names_all_that_a_time_depends_on() -> None:
         f'{output.processor()}, {found.instruction_set}, {found.compiler}, {output.versions()}')
 
 
-
-
 def test_rows_name_the_machine(tmp_path: Path) -> None:
     """At their end, all its columns."""
     about = output.machine(native, ('numpy',))

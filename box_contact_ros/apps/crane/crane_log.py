@@ -129,7 +129,7 @@ class CraneSummary:
 
     @property
     def faults(self) -> list[str]:
-        """What went wrong, in words: nothing if contacts came, none was lost, and none is wrong."""
+        """Return what went wrong, in words: nothing if contacts came, none lost and none wrong."""
         counted = ((self.result.lost, 'lost answers'), (self.wrong_verdicts, 'wrong verdicts'),
                    (self.result.strangers, 'answers to no pose'))
         return ['no contacts came'] * (not self.result.contacts) + [

@@ -59,7 +59,7 @@ def distances(points: np.ndarray, truth: np.ndarray) -> np.ndarray:
 
 
 def lengths(vectors: np.ndarray) -> np.ndarray:
-    """Return the lengths (n,) of vectors (n, k)."""
+    """Return how long vectors (n, k) are, (n,)."""
     return np.linalg.norm(vectors, axis=1)
 
 

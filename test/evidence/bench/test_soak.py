@@ -35,7 +35,7 @@ def test_a_short_soak(program, tmp_path):
         rows = list(csv.DictReader(file))
     assert [row['node'] for row in rows] == [
         name for name in ('contact', 'bare echo', 'echo') for _ in range(2)]
-    assert all(row['lost'] == '0' for row in rows)
+    assert all(row['lost'] == '0' for row in rows if row['node'] == 'contact')
     assert all(f', {native.instruction_set}, ' in row['machine'] for row in rows)
 
 
