@@ -156,7 +156,7 @@ def test_a_package_adds_a_model(tmp_path):
     info.mkdir()
     (info / 'METADATA').write_text('Metadata-Version: 2.1\nName: mine\nVersion: 1.0\n')
     (info / 'entry_points.txt').write_text(POINTS)
-    done = python(ASKED, PYTHONPATH=str(tmp_path))
+    done = python(ASKED, PYTHONPATH=os.pathsep.join([str(tmp_path), *filter(None, sys.path)]))
     assert done.stdout == "-0.5\n['mlp', 'exact', 'mine']\n", done.stderr
     for name, cause in (('lost', "AttributeError: module 'mine' has no attribute 'NOTHING'"),
                         ('exact', "TypeError: it is not the ModelEntry of a model 'exact'")):

@@ -157,9 +157,11 @@ def test_searched_for_the_worst(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
 def test_a_class_is_measured_like_a_model(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The example's middle of the bounding boxes is no centroid; its depth is the exact one."""
     monkeypatch.syspath_prepend(Path(__file__).parents[3] / 'docs' / 'examples')
-    status = accuracy.main(['--model', 'own_model:Middle', '--pairs', '200', '--quick',
-                            '--out', str(tmp_path)])
-    del models()['own_model:Middle']
+    try:
+        status = accuracy.main(['--model', 'own_model:Middle', '--pairs', '200', '--quick',
+                                '--out', str(tmp_path)])
+    finally:
+        models().pop('own_model:Middle', None)
     with (tmp_path / 'accuracy.csv').open() as file:
         rows = [row for row in csv.DictReader(file) if row['part'] == 'all']
     assert status == 0 and {row['set'] for row in rows} == set(SETS | LOADS)
