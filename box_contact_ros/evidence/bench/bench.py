@@ -31,7 +31,7 @@ from tqdm import tqdm
 from box_contact_ros.apps.answer_log import StreamResult
 from box_contact_ros.apps.processes import add_domain
 from box_contact_ros.apps.recording.stream import Replay, Stream
-from box_contact_ros.node.contact_node import PARAMETERS
+from box_contact_ros.node.contact_program import PARAMETERS
 from box_contact_ros.node.parameters import outside_ros_args
 from box_contact_ros.node.runtime import refusals_end
 from box_contact_ros.output import make_folder, percentiles

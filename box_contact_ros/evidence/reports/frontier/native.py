@@ -35,7 +35,8 @@ from box_contact_ros.output import (
 )
 
 from ...pose_sets import LOADS, SETS, Pairs
-from .speed import flush_stacks, pinned, usable_cores
+from ...timing import pinned, usable_cores
+from .speed import flush_stacks
 
 PAIRS, ROUNDS, CALLS = 20_000, 24, 2_000
 QUICK_PAIRS, QUICK_ROUNDS, QUICK_CALLS = 1_000, 2, 200
