@@ -21,7 +21,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -67,7 +67,9 @@ keep a pose to 12 digits only. Still far below the 1e-9 that boxes are pressed i
 PAIRS, QUICK_PAIRS = 100_000, 5_000
 CLASSES = ('vertex-face', 'edge-edge', 'edge-face', 'face-face')
 WINNERS = ('face axis', 'edge axis')
-SHOWN = (1e-6, 100.0)  # errors that are drawn [%]
+SHOWN = (1e-6, 1.0)  # errors that are drawn [%]
+MARKS = {('o', 'half of the pairs'): 50.0, ('|', '99 %'): 99.0, ('D', 'worst pair'): 100.0}
+"""What is drawn of a set: marks, their names, and percentiles."""
 FACE_LIKE = math.cos(math.radians(6.0))
 """Cosine of the angle to a face's normal up to which an edge pair's axis stands for the face."""
 
@@ -373,27 +375,27 @@ def page(rows: Sequence[AccuracyRow], errors: dict[str, np.ndarray], drawn: int,
 
 
 def draw(path: Path, rows: Sequence[AccuracyRow]) -> None:
-    """Draw the share of pairs with a larger point error: a curve for each set and model."""
-    figure, axes = output.subplots(1, 1, (8.0, 5.0))
-    axis = axes[0, 0]
+    """Draw half, 99 % and the worst of the point errors: a line for each set and model."""
     models = list(dict.fromkeys(row.model for row in rows))
-    sets = list(dict.fromkeys(row.set for row in rows))
-    for row in rows:
-        _curve(axis, row.errors.point, linewidth=1.4, color=f'C{sets.index(row.set) % 10}',
-               linestyle=('-', '--', ':', '-.')[models.index(row.model) % 4],
-               label=f'{row.model}, {row.set}')
-    axis.set(xlim=SHOWN, xlabel="point error [% of the smaller box's longest edge]",
-             ylabel='share of pairs with a larger error')
+    figure, axes = output.subplots(1, 1, (7.5, 1.3 + 0.3 * len(rows)))
+    axis = axes[0, 0]
+    for place, row in enumerate(rows):
+        values = [max(value, SHOWN[0]) for value in output.percentiles(
+            row.errors.point, *MARKS.values())]
+        colour = f'C{models.index(row.model)}'
+        axis.plot(values, [place] * len(values), color=colour, linewidth=1.2)
+        for (mark, label), value in zip(MARKS, values):
+            axis.plot(value, place, mark, color=colour, markersize=7, clip_on=False,
+                      label='' if place else label)
+    names = [row.set if len(models) == 1 else f'{row.set}, {row.model}' for row in rows]
+    axis.set_yticks(range(len(rows)), names)
+    axis.invert_yaxis()
+    axis.set(xscale='log', xlim=SHOWN, title=f'Point error of {" and ".join(models)}',
+             xlabel="point error [% of the smaller box's longest edge]")
     axis.grid(color='0.9', linewidth=0.5)
-    axis.legend(fontsize=8)
+    axis.set_axisbelow(True)
+    axis.legend(fontsize=9, loc='lower right')
     figure.savefig(path)
-
-
-def _curve(axis: Any, errors: np.ndarray, **style: Any) -> None:
-    """Draw the share of pairs with a larger error; what is too small stands at the left."""
-    if len(errors):
-        axis.loglog(np.sort(np.maximum(errors, SHOWN[0] / 10)),
-                    1.0 - np.arange(len(errors)) / len(errors), **style)
 
 
 def search(folder: Path, minutes: float, seeds: Sequence[int], args: Sequence[str] | None) -> int:

@@ -4,7 +4,9 @@
 """Landings by the way of contact and force: whether the container comes to rest, and how flat.
 
 It runs a grid of 36 landings by every way (some by a sample), rate and latency. It also lands other
-    parser.add_argument('--workers', type=int, default=os.cpu_count(), help='processes at once')
+loads and stacks, with an outcome that is stated beforehand (`landing_ways`). It writes landing.csv
+(a row per landing), landing.md (tables) and landing.png (one landing, four ways). The exit status
+is 1 if held patches of `exact` or `mlp` do not do all that is expected.
 """
 from __future__ import annotations
 

@@ -350,41 +350,42 @@ SECTIONS = {3: section_3, 4: section_4, 10: section_figure_10}
 
 
 def draw_figure_10(result: SoupResult, path: Path) -> None:
-    """Draw times and errors against N."""
-    figure, ((upper,), (lower,)) = output.subplots(2, 1, (8.0, 8.4))
-    _draw_times(upper, result)
-    ticks = [1, 2, 4, 8, 16, 32, 64]
+    """Draw the mean times and the errors against N."""
+    figure, ((upper,), (lower,)) = output.subplots(2, 1, (7.0, 7.0))
+    divisions = list(PAPER)
+    colours = dict(zip(REGIMES, ('tab:blue', 'tab:green', 'tab:red')))
+    for regime, colour in colours.items():
+        _line(upper, divisions, [result.soups[regime, n]['step_mean_ms'] for n in divisions],
+              f'soup, {regime}', color=colour, marker='o')
+    _line(upper, divisions, [PAPER[n][0] for n in divisions], "the paper's soup", color='0.5')
+    for name, time in (('model paper', result.networks['paper']['answer_mean_ms']),
+                       ("the paper's network", PAPER_NETWORK)):
+        _line(upper, divisions, [time] * len(divisions), name, linestyle='--',
+              color='black' if name == 'model paper' else '0.5')
+    upper.set(yscale='log', ylabel='mean time [ms]', xticks=divisions)
     errors = _touching_errors(result)
-    lower.plot(list(errors), [1e3 * error for error in errors.values()], '-o', color='tab:blue',
-               markersize=3.5, label='soup, touching')
-    for (name, n), colour in zip(equal_at(result).items(), ('tab:orange', 'tab:purple')):
-        lower.axhline(1e3 * result.networks[name]['point_error_mean_m'], color=colour,
-                      label=f'{name}: {in_words(n)}')
-        for axes in (upper, lower) if min(PAPER) <= n <= max(PAPER) else (lower,):
-            if 0.0 < n < math.inf:
-                axes.axvline(n, color=colour, linestyle='--', label=f'as exact as {name}')
-    lower.set(xscale='log', yscale='log', xlabel='divisions N of an edge',
-              ylabel='mean point error [mm]')
+    _line(lower, list(errors), [1e3 * error for error in errors.values()], 'soup, touching',
+          color=colours['touching'], marker='o')
+    for name, n in equal_at(result).items():
+        error = 1e3 * result.networks[name]['point_error_mean_m']
+        _line(lower, list(errors), [error] * len(errors), name, color='black', linestyle='--')
+        if 0.0 < n < math.inf:
+            lower.plot(n, error, 'k*', markersize=11)
+    lower.set(xscale='log', yscale='log', ylabel='mean point error [mm]')
+    ticks = [2**power for power in range(7)]
     lower.set_xticks(ticks, [str(tick) for tick in ticks])
     lower.set_xticks([], minor=True)
     for axes in (upper, lower):
-        axes.legend(fontsize=8.5, loc='upper left', bbox_to_anchor=(1.01, 1.0))
-        axes.grid(color='0.9', which='both', linewidth=0.6)
+        axes.set_xlabel('divisions N of an edge')
+        axes.grid(color='0.9', linewidth=0.6)
         axes.set_axisbelow(True)
+        axes.spines[['top', 'right']].set_visible(False)
     figure.savefig(path)
 
 
-def _draw_times(axes: Any, result: SoupResult) -> None:
-    divisions = list(PAPER)
-    for regime, colour in zip(REGIMES, ('tab:blue', 'tab:green', 'tab:red')):
-        for column, style, label in (('step_mean_ms', '-o', 'mean'),
-                                     ('most_pairs_step_ms', ':s', 'most pairs')):
-            axes.plot(divisions, [result.soups[regime, n][column] for n in divisions], style,
-                      color=colour, markersize=3.5, label=f'{regime}, {label}')
-    axes.axhline(result.networks['paper']['answer_mean_ms'], color='black',
-                 label='call of model paper')
-    for column, style, label in ((0, '-', 'mean'), (2, ':', 'maximum')):
-        axes.plot(divisions, [PAPER[n][column] for n in divisions], style, color='0.6',
-                  label=f"the paper's soup, {label}")
-    axes.axhline(PAPER_NETWORK, color='0.6', linestyle='--', label="the paper's network")
-    axes.set(yscale='log', xlabel='divisions N of an edge', ylabel='time [ms]', xticks=divisions)
+def _line(axes: Any, divisions: Sequence[int], values: Sequence[float], label: str, *, color: str,
+          marker: str = '', linestyle: str = '-') -> None:
+    """Draw values against N, with their name at the right end."""
+    axes.plot(divisions, values, linestyle, color=color, marker=marker, markersize=3.5)
+    axes.annotate(label, (divisions[-1], values[-1]), (8, 0), textcoords='offset points',
+                  va='center', color=color, annotation_clip=False)

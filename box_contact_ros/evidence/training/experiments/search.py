@@ -142,23 +142,23 @@ def write_table(path: Path, results: Sequence[tuple[Search, Rungs]]) -> None:
 
 
 def plot(path: Path, results: Sequence[tuple[Search, Rungs]]) -> None:
-    """Draw the error after each rung against each setting."""
-    names = list(settings_of(results[0][0], results[0][0].candidates()[0]))
-    figure, rows = subplots(len(results), len(names), (2.5 * len(names), 2.4 * len(results)),
-                            sharey='row')
-    for axes, (search, done) in zip(rows, results):
+    """Draw the error after each rung against the network's size."""
+    name = 'multiply-adds'
+    figure, panels = subplots(1, len(results), (3.3 * len(results), 3.3))
+    for panel, (search, done) in zip(panels[0], results):
         some = search.candidates()
         for number, rung in enumerate(done, start=1):
             left = [one for one in some if one.number in rung]
-            errors = [rung[one.number]['error'] for one in left]
-            for panel, name in zip(axes, names):
-                panel.scatter([settings_of(search, one)[name] for one in left], errors, s=4,
-                              linewidths=0, color=f'C{number}', label=f'rung {number}')
-        for panel, (name, value) in zip(axes, settings_of(search, some[0]).items()):
-            panel.plot(value, done[-1][0]['error'], 'k*', label='in use')
-            panel.set(xlabel=name, yscale='log', xscale='linear' if name == 'momentum' else 'log')
-        axes[0].set_ylabel(f'{search.name}\nerror')
-        axes[-1].legend(fontsize=6)
+            panel.scatter([settings_of(search, one)[name] for one in left],
+                          [rung[one.number]['error'] for one in left], s=5, linewidths=0,
+                          color=f'C{number}', label=f'after rung {number}')
+        panel.plot(settings_of(search, some[0])[name], done[-1][0]['error'], 'k*', markersize=11,
+                   label='in use')
+        panel.set(title=search.name, xlabel=f'{name} of the network', yscale='log')
+        panel.yaxis.set_major_formatter('{x:g}')
+        panel.yaxis.set_minor_formatter('')
+    panels[0, 0].set_ylabel('RMSE over the angles [rad]')
+    panels[0, 0].legend(fontsize=8)
     figure.savefig(path)
 
 
