@@ -19,6 +19,7 @@ from rcl_interfaces.msg import (
     ParameterDescriptor,
     SetParametersResult,
 )
+from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
@@ -72,6 +73,28 @@ def _descriptor(setting: Setting, *, read_only: bool) -> ParameterDescriptor:
     return descriptor
 
 
+def _refuse_requests(node: Node) -> None:
+    """Refuse what others ask to set, rclpy's own parameters too, before any value is looked at.
+
+    A stranger's megabyte of text or unknown type costs no more than its transport.
+    """
+    refusal = SetParametersResult(successful=False, reason=LOCKED)
+
+    def refuse(request: Any, response: Any) -> Any:
+        response.results = [refusal] * len(request.parameters)
+        return response
+
+    def refuse_all(request: Any, response: Any) -> Any:
+        response.result = refusal
+        return response
+
+    for service in node.services:
+        if service.srv_type is SetParameters:
+            service.callback = refuse
+        elif service.srv_type is SetParametersAtomically:
+            service.callback = refuse_all
+
+
 class CheckedParameters:
     """The parameters of a running node: changed together if all are good, else not at all."""
 
@@ -80,6 +103,8 @@ class CheckedParameters:
         """Declare and check; `apply` gets new values and the names that were set, or refuses."""
         self._settings, self._apply = settings, apply
         self.values = declare(node, settings)
+        if self.values.get('locked'):
+            _refuse_requests(node)
         node.add_pre_set_parameters_callback(self._as_checked)
         node.add_on_set_parameters_callback(self._on_set)
 
@@ -94,8 +119,6 @@ class CheckedParameters:
         return found
 
     def _on_set(self, parameters: list[Parameter]) -> SetParametersResult:
-        if self.values.get('locked'):  # other nodes' parameters, such as use_sim_time, too
-            return SetParametersResult(successful=False, reason=LOCKED)
         changes = {p.name: p.value for p in parameters if p.name in self._settings}
         try:
             values = checked(self._settings, {**self.values, **changes})

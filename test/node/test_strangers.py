@@ -17,7 +17,7 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from raw_client import APART, ORIGIN
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
-from rcl_interfaces.srv import GetParameters, SetParameters
+from rcl_interfaces.srv import GetParameters, SetParameters, SetParametersAtomically
 from stranger import Stranger
 
 from box_contact_ros.node.named_files import LARGEST_TEXT
@@ -185,14 +185,14 @@ def test_a_locked_node_takes_no_changes(start, stranger):
     for values in ({'model': 'mlp'}, {'scene': SCENE}, {'use_sim_time': True}, {'locked': False},
                    {'files_from': '/'}, {'start_type_description_service': False}):
         assert not stranger.set(**values).successful, values
-    result, = stranger.call(SetParameters, 'set_parameters', parameters=[
-        Parameter(name='model', value=ParameterValue(type=ParameterType.PARAMETER_STRING,
-                                                     string_value='exact'))]).results
-    assert result.reason == 'Trying to set a read-only parameter: model.'  # as its descriptor says
-    result, = stranger.call(SetParameters, 'set_parameters', parameters=[
-        Parameter(name='use_sim_time', value=ParameterValue(type=ParameterType.PARAMETER_BOOL,
-                                                            bool_value=True))]).results
-    assert result.reason == 'the node is locked: nothing can be changed after its start'
+    unreadable = Parameter(name='scene', value=ParameterValue(type=77))
+    for asked in (Parameter(name='model', value=ParameterValue(
+            type=ParameterType.PARAMETER_STRING, string_value='exact')), unreadable):
+        results = stranger.call(SetParameters, 'set_parameters', parameters=[asked] * 2).results
+        result = stranger.call(SetParametersAtomically, 'set_parameters_atomically',
+                               parameters=[asked]).result
+        assert [one.reason for one in (*results, result)] == 3 * [
+            'the node is locked: nothing can be changed after its start']
     for transition in (Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP,
                        Transition.TRANSITION_ACTIVE_SHUTDOWN):
         assert not stranger.ask_for(transition)
