@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 FILES = ('scene', 'weights')
 """Parameters that name a file."""
-LARGEST_TEXT = 2**18  # characters of a scene as text: some 2,000 pairs, read in a second or two
+LARGEST_TEXT = 2**18  # characters of a scene as text: some 1,000 boxes and pairs
 
 
 def scene_source(name: str, value: Any) -> str:

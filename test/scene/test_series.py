@@ -271,9 +271,8 @@ def beyond_exact(model: str, series: Series) -> tuple[float, float]:
 def test_how_far_the_point_of_mlp_steps(series):
     """While the crane lowers and lifts: no farther than the exact point plus 1 % of the width.
 
-    Of landings one frame in 2,000 steps farther, and of family I one in 17,000: the exact point
-    itself crosses much of the box in it, and the network's errors before and after differ by more
-    than that. The bounds leave room for other weights.
+    Where the exact point itself crosses much of the box in one frame, the errors before and after
+    may differ by more than that. The bounds leave room for other weights.
     """
     name, motion = series
     share, worst = beyond_exact('mlp', motion)

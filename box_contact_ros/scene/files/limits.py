@@ -23,5 +23,5 @@ class SceneLimits:
 
 OWN = SceneLimits(events=1_200_000, boxes=100_000, pairs=2**19, comparisons=10_000_000)
 """A scene of one's own: a hundred thousand pairs written out, or 1,000 boxes each with each."""
-FOREIGN = SceneLimits(events=100_000, boxes=10_000, pairs=20_000, comparisons=1_000_000)
+FOREIGN = SceneLimits(events=50_000, boxes=10_000, pairs=20_000, comparisons=1_000_000)
 """A scene that a stranger may have named: its reader is deaf for a second at most."""

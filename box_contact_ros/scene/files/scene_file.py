@@ -11,7 +11,7 @@ from __future__ import annotations
 import json
 import os
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -220,17 +220,35 @@ def _check_schema(data: Any, lines: dict[Place, int]) -> None:
     from jsonschema import Draft202012Validator  # only here: it takes 0.1 s
 
     schema = json.loads(resource_path('msg_schemas', 'scene.json').read_text('utf-8'))
-    found = [(tuple(error.absolute_path), error) for error in islice(
+    schema = _with_definitions(schema, schema['$defs'])
+    found = [(_place(error), error) for error in islice(
         Draft202012Validator(schema).iter_errors(data), MOST_FAULTS)]
     if found:
         path, error = min(found, key=lambda entry: (lines.get(entry[0], 0), entry[0] == ()))
         raise Fault(path, _words(error))
 
 
+def _with_definitions(schema: Any, definitions: Mapping[str, Any]) -> Any:
+    """Return a schema with each reference replaced: jsonschema looks references up at every use."""
+    if isinstance(schema, list):
+        return [_with_definitions(item, definitions) for item in schema]
+    if not isinstance(schema, dict):
+        return schema
+    target = definitions[schema['$ref'].rpartition('/')[2]] if '$ref' in schema else {}
+    return target | {key: _with_definitions(value, definitions)
+                     for key, value in schema.items() if key != '$ref'}
+
+
+def _place(error: Any) -> Place:
+    """Return the place of an error; of two fields that exclude each other, what has them."""
+    path = tuple(error.absolute_path)
+    return path[:-1] if error.validator == 'not' else path
+
+
 def _words(error: Any) -> str:
+    if error.validator == 'not':  # its path: …, dependentSchemas, FIELD, properties, EXCLUDED, not
+        return f'has both {error.schema_path[-4]} and {error.schema_path[-2]}'
     value = shown(error.instance)
-    if error.validator == 'not':
-        return 'has both {} and {}'.format(*error.validator_value['required'])
     if error.validator == 'oneOf':
         return 'needs one of: ' + '; '.join(
             ' and '.join(choice['required']) for choice in error.validator_value)
