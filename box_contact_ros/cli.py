@@ -75,7 +75,7 @@ PROGRAMS = {
         'speed against error of every model and of other engines, as table and picture'),
     'fuzz': Program(
         'box_contact_ros.evidence.verification.fuzz', ('report', 'fuzz'),
-        'millions of random pairs, judged by an independent test; gates at zero'),
+        'millions of random pairs, judged by an independent test'),
     'stability': Program(
         'box_contact_ros.evidence.reports.hard.stability', ('report', 'soup'),
         'what each model makes of families of hard poses'),

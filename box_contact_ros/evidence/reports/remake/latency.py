@@ -12,8 +12,8 @@ import numpy as np
 
 from box_contact_ros import output
 
-RUNS = {'node alone, 1 kHz': '1000-in-turn', 'beside others, 200 Hz': '200-side-by-side',
-        'beside others, 1 kHz': '1000-side-by-side'}
+RUNS = {'node alone, 1 kHz': '1000-in-turn', 'side by side, 200 Hz': '200-side-by-side',
+        'side by side, 1 kHz': '1000-side-by-side'}
 """Folders of the bench by load."""
 NODES = {'contact': 'contact node', 'soup': 'soup node', 'echo': 'echo node'}
 SOLVERS = ('mlp', 'exact')
