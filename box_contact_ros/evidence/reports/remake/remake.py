@@ -59,6 +59,7 @@ REPORTS = (
     Report(name='landing', minutes=7.0, arguments=('landing', '--out', OUT)),
     Report(name='rest', minutes=5.0, arguments=('rest', '--out', OUT)),
     Report(name='frontier', minutes=7.0, arguments=('frontier', '--out', OUT)),
+    Report(name='native', minutes=2.0, arguments=('frontier', '--native', '--out', OUT)),
     Report(name='speed', minutes=2.1, arguments=('frontier', '--speed', '--out', OUT)),
     Report(name='paper', minutes=2.7, arguments=('paper', '--out', f'{OUT}/paper_tables.md')),
     _bench(200, 30, '--side-by-side'), _bench(1000, 30, '--side-by-side'), _bench(1000, 90),
