@@ -28,7 +28,7 @@ CHOICES = {
     'mlp': ('`mlp`, the default', 'most programs: less time, a tiny error'),
     'exact': ('`exact`', 'ground truth, judging other models'),
     'paper': ("`paper`, the paper's kind of network", 'repeating the paper'),
-    'soup-8': ('`soup-8`, polygon soup', 'comparing with what the paper replaced'),
+    'soup-8': ('`soup-8`, boxes as triangles', 'comparing with what the paper replaced'),
     'fcl': ("`fcl`, FCL's deepest point", 'comparing with a common engine'),
     'mujoco': ("MuJoCo's own, deepest corner", 'programs that simulate in MuJoCo'),
 }
