@@ -46,8 +46,10 @@ class ContactSolver(native.PairSolver):
         margin = as_floats(margin, 'margin', 'a number', ()).item()
         built = build_model(model, one, other, weights)
         core = built if isinstance(built, NativeModel) else NativeModel()
-        if np.isnan(margin) or (margin and core.name is None):
-            raise ValueError(f'margin {margin:g} is not a distance that model {model!r} knows')
+        if not margin >= 0.0:
+            raise ValueError(f'margin must be 0 or more, not {margin:g}')
+        if margin and core.name is None:
+            raise ValueError(f'margin {margin:g} has no effect on model {model!r}: leave it at 0')
         # Calls are answered in C++, which calls `converted` and `converted_batch` for the rest.
         super().__init__(core.kernel or core.name, tuple(one[0]), tuple(other[0]), core.network,
                          margin)

@@ -450,7 +450,7 @@ def test_normals_within_the_margin() -> None:
     for bad in (np.nan, 'far', [1.0]):
         with pytest.raises(ValueError, match='^margin '):
             ContactSolver(poses.CUBE, poses.CUBE, margin=bad)
-    with pytest.raises(ValueError, match="^margin 1 is not a distance that model 'paper' knows"):
+    with pytest.raises(ValueError, match="^margin 1 has no effect on model 'paper'"):
         ContactSolver(poses.CUBE, poses.CUBE, model='paper', margin=1.0)
 
 

@@ -16,6 +16,9 @@ namespace {
 using force::Body;
 using force::PatchLaw;
 
+// Of a load at rest [m]. Beyond it the rate or a time is in another unit, as a period for a rate.
+constexpr double deepest_rest = 1.0;
+
 struct Law {
   PatchLaw law;
   std::vector<int64_t> pairs;  // of the contacts that are being checked
@@ -98,7 +101,7 @@ bc_status check_touch(const bc_touch& touch, const std::vector<Body>& bodies,
   if (!is_positive(contact.volume) || !is_finite(contact.covariance[0], 9))
     return fail(BC_BAD_ARGUMENT,
                 "pair %lld: the contact has no patch (volume %g), and the law needs volume and "
-                "covariance: ask a model that gives them",
+                "covariance: ask for both, of model mlp or exact",
                 pair, contact.volume);
   if (!is_finite(contact.normal, 3) || !is_finite(contact.point, 3) ||
       !is_finite(&contact.separation, 1))
@@ -147,10 +150,16 @@ bc_status bc_law_create(const bc_body* bodies, int64_t count, const bc_loop* loo
     if (loop && !read(loop, all)) return fail(BC_BAD_ABI, "loop.size is unknown");
     if (count < 1) return fail(BC_BAD_ARGUMENT, "count must be 1 or more");
     if (bc_status status = check_loop(all)) return status;
+    LawConstants constants = constants_for(all);
+    double rest = all.gravity / (constants.frequency * constants.frequency);
+    if (rest > deepest_rest)
+      return fail(BC_BAD_ARGUMENT,
+                  "with rate %g 1/s, latency %g s and step %g s a load would rest %g m deep",
+                  all.rate, all.latency, all.step, rest);
     std::vector<Body> read;
     for (int64_t place = 0; place < count; ++place)
       if (bc_status status = read_body(bodies[place], place, read)) return status;
-    *law = reinterpret_cast<bc_law*>(new Law{{std::move(read), constants_for(all)}, {}});
+    *law = reinterpret_cast<bc_law*>(new Law{{std::move(read), constants}, {}});
     return BC_OK;
   });
 }

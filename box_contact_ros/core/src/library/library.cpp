@@ -77,7 +77,8 @@ bc_status make(const bc_size* size_a, const bc_size* size_b, const bc_options& o
   std::copy_n(size_a->extent, 3, setup.size_a.begin());
   std::copy_n(size_b->extent, 3, setup.size_b.begin());
   setup.margin = options.margin;
-  if (std::isnan(options.margin)) return fail(BC_BAD_ARGUMENT, "margin is not a number");
+  if (!(options.margin >= 0.0))
+    return fail(BC_BAD_ARGUMENT, "margin must be 0 or more, not %g", options.margin);
   if (number_of(options.model) == BC_MLP) {
     setup.model = Model::mlp;
     try {
@@ -122,7 +123,9 @@ bc_status solve_rows(Solver& solver, const bc_rows& given, const bc_results& wan
   if (given.count == 0) return BC_OK;
   if (!given.poses_a || !given.poses_b) return refuse_null(given.poses_a ? "poses_b" : "poses_a");
   if (!places_are_valid(given, refused))
-    return fail(BC_BAD_ROWS, "pairs[%lld] has no pose at one of its places", (long long)refused);
+    return fail(BC_BAD_ROWS, "pairs[%lld] is (%lld, %lld), and there are %lld poses",
+                (long long)refused, (long long)given.pairs[2 * refused],
+                (long long)given.pairs[2 * refused + 1], (long long)given.pose_count);
   Rows rows{numbers(given.poses_a),
             numbers(given.poses_b),
             given.sizes_a ? numbers(given.sizes_a) : solver.setup().size_a.data(),

@@ -71,8 +71,10 @@ inline bc_status refuse_pose(const char* field, const double* p) {
     if (!(std::fabs(p[k]) <= length_max))
       return fail(BC_BAD_POSE, "%s position (%g, %g, %g) is not finite, or exceeds 1e50 m", field,
                   p[0], p[1], p[2]);
-  return fail(BC_BAD_POSE, "%s quaternion (%g, %g, %g, %g) has no length within 1e-100 to 1e100",
-              field, p[3], p[4], p[5], p[6]);
+  bool is_finite = true;
+  for (int k = 3; k < 7; ++k) is_finite &= std::isfinite(p[k]);
+  return fail(BC_BAD_POSE, "%s quaternion (%g, %g, %g, %g) %s", field, p[3], p[4], p[5], p[6],
+              is_finite ? "has no length within 1e-100 to 1e100" : "is not finite");
 }
 
 }  // namespace box_contact::detail
