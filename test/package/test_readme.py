@@ -217,6 +217,13 @@ def built(words: list[str], **_) -> None:
         assert (ROOT / words[4]).is_file()
 
 
+def cmake(words: list[str], **_) -> None:
+    """Leave the example to `test_library`, which builds it; folder and program are those it has."""
+    assert (ROOT / 'docs' / 'examples' / 'cpp' / 'CMakeLists.txt').is_file()
+    assert words[-1] == 'build/example/first_contact' or words[1:5] == [
+        '-S', 'docs/examples/cpp', '-B', 'build/example']
+
+
 def clone(words: list[str], **_) -> None:
     """Clone into the folder that the next command names, from the address of package.xml.
 
@@ -257,6 +264,7 @@ COMMANDS = {
     r'\.ci/lock( --upgrade)?': locked,
     r'git clone .+': clone,
     r'(mkdir -p build|g\+\+|build/first).*': built,
+    r'cmake .+': cmake,
     r'ln -s \S+ src/\S+': linked,
     r'export \S+': exported,
     r'(cd box_contact_ros && )?make [\w-]+( .*)?': make,

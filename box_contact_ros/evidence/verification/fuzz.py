@@ -316,7 +316,7 @@ def main(args: Sequence[str] | None = None) -> int:
         write_csv(options.out, csv_rows(tallies.values()), digits=3,
                   about=machine(native))
     broken = sum(tally.broken for tally in tallies.values())
-    print(f'\n{f"{broken} faults" if broken else "no fault"} after '
+    print(f'\n{broken} faults after '
           f'{(time.monotonic() - began) / 60:.1f} minutes, seed {options.seed}, '
           f'{machine(native)}')
     return 1 if broken else 0

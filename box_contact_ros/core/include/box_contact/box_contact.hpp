@@ -163,8 +163,9 @@ class Solver {
   std::int64_t batch(const Rows& rows, const Results& results, int threads = 1) const {
     std::size_t poses = rows.poses_a.size();
     bool fits = rows.poses_b.size() == poses && fits_poses(rows.sizes_a, poses) &&
-                fits_poses(rows.sizes_b, poses) && rows.pairs.size() % 2 == 0;
+                fits_poses(rows.sizes_b, poses);
     if (!fits) detail::raise(BC_BAD_ARGUMENT, "poses_a, poses_b and sizes must be equally many");
+    if (rows.pairs.size() % 2) detail::raise(BC_BAD_ARGUMENT, "pairs must be two indices a row");
     bool by_place = rows.pairs.data() != nullptr;
     const bc_rows plain{sizeof(bc_rows),     std::int64_t(by_place ? rows.pairs.size() / 2 : poses),
                         rows.poses_a.data(), rows.poses_b.data(),

@@ -142,7 +142,7 @@ def calls_shown(missing: list[str]) -> str:
         for part in parts:
             name, _, rest = part.partition('\n')
             code = textwrap.dedent(rest[:rest.index('// end of call')].rstrip())
-            blocks.append(f'{name}:\n\n```cpp\n{code}\n```')
+            blocks.append(f'{name}:\n\n```c++\n{code}\n```')
     return '\n\n'.join(blocks)
 
 

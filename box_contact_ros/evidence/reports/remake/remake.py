@@ -55,13 +55,14 @@ REPORTS = (
            quick=('--families', 'a1_tilted_faces')),
     Report(name='named', minutes=0.4, alone=False, arguments=('stability', '--named'), quick=(
         '--out', OUT)),
-    Report(name='fuzz', minutes=4.0, arguments=('fuzz', '--out', f'{OUT}/fuzz.csv')),
-    Report(name='landing', minutes=7.0, arguments=('landing', '--out', OUT)),
-    Report(name='rest', minutes=5.0, arguments=('rest', '--out', OUT)),
+    Report(name='fuzz', minutes=2.5, arguments=(
+        'fuzz', '--pairs', '5000000', '--out', f'{OUT}/fuzz.csv')),
+    Report(name='landing', minutes=10.0, arguments=('landing', '--out', OUT)),
+    Report(name='rest', minutes=4.5, arguments=('rest', '--out', OUT)),
     Report(name='frontier', minutes=7.0, arguments=('frontier', '--out', OUT)),
-    Report(name='native', minutes=2.0, arguments=('frontier', '--native', '--out', OUT)),
-    Report(name='speed', minutes=2.1, arguments=('frontier', '--speed', '--out', OUT)),
-    Report(name='paper', minutes=2.7, arguments=('paper', '--out', f'{OUT}/paper_tables.md')),
+    Report(name='native', minutes=1.3, arguments=('frontier', '--native', '--out', OUT)),
+    Report(name='speed', minutes=2.5, arguments=('frontier', '--speed', '--out', OUT)),
+    Report(name='paper', minutes=5.0, arguments=('paper', '--out', f'{OUT}/paper_tables.md')),
     _bench(200, 30, '--side-by-side'), _bench(1000, 30, '--side-by-side'), _bench(1000, 90),
     Report(name='soak', minutes=2.0, arguments=(
         'bench', '--soak', '--duration', '60', '--out', OUT)),
