@@ -469,7 +469,8 @@ void check_refusals() {
   check_throws<Bad>("pose_b position (0, 0, -inf)", [&] { solver(good, pose(2, -infinity)); });
   check_throws<Bad>("pose_b position (1.1e+50, 0, 0)", [&] { solver(good, pose(0, 1.1e50)); });
   check_throws<Bad>("pose_a quaternion (0, 0, 0, 0)", [&] { solver(pose(6, 0.0), good); });
-  check_throws<Bad>("pose_b quaternion (0, nan, 0, 1)", [&] { solver(good, pose(4, nan)); });
+  check_throws<Bad>("pose_b quaternion (0, nan, 0, 1) is not finite",
+                    [&] { solver(good, pose(4, nan)); });
   check_throws<Bad>("pose_a quaternion (0, 0, 0, 1e+200)", [&] { solver(pose(6, 1e200), good); });
   check_throws<Bad>("pose_a quaternion (0, 0, 0, 1e-160)", [&] { solver(pose(6, 1e-160), good); });
   check(solver(pose(6, -1e99), pose(6, 1e-99)).separation == -1.0, "exact", "any length");

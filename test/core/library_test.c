@@ -77,9 +77,13 @@ static void check_rows(void) {
   check(strstr(bc_error_text(), "row 1: pose_b quaternion (0, 0, 0, 0) has no length"),
         "its words");
   check(separation[0] == -0.5 && isnan(separation[1]) && !colliding[1], "the others are solved");
+  poses[2].quaternion[3] = NAN;
+  bc_solve_rows(solver, &rows, &results, 1, &refused);
+  check(strstr(bc_error_text(), "nan) is not finite") != NULL, "not finite");
   pairs[3] = 3;
   check(bc_solve_rows(solver, &rows, &results, 1, &refused) == BC_BAD_ROWS && refused == 1,
         "a place without a pose");
+  check(strstr(bc_error_text(), "but there are 3 poses") != NULL, "its words");
   rows.size = 0;
   check(bc_solve_rows(solver, &rows, &results, 1, NULL) == BC_BAD_ABI, "another struct");
   check(bc_solve_rows(solver, NULL, &results, 1, NULL) == BC_BAD_ARGUMENT, "no rows");

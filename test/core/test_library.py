@@ -447,7 +447,7 @@ def test_normals_within_the_margin() -> None:
     apart = np.array([0.0, 0, 3.5, 0, 0, 0, 1])
     near = ContactSolver(poses.CUBE, poses.CUBE, margin=1.5)(poses.IDENTITY, apart)
     assert not near.colliding and near.normal.tolist() == [0.0, 0.0, 1.0]
-    for bad in (np.nan, 'far', [1.0]):
+    for bad in (np.nan, -1.0, 'far', [1.0]):
         with pytest.raises(ValueError, match='^margin '):
             ContactSolver(poses.CUBE, poses.CUBE, margin=bad)
     with pytest.raises(ValueError, match="^margin 1 has no effect on model 'paper'"):
@@ -540,3 +540,15 @@ def status_with(library: ctypes.CDLL, weights: Path) -> int:
     status: int = library.bc_solver_create(byref(unit), byref(unit), byref(options), byref(solver))
     assert not solver
     return status
+
+
+def test_refusals_name_value_and_remedy() -> None:
+    """A place that there is not; a period in the place of a rate, and milliseconds for seconds."""
+    solver, twice = ContactSolver(poses.CUBE, poses.CUBE), np.array([poses.IDENTITY] * 2)
+    with pytest.raises(ValueError, match=r'pairs\[1\] is \(1, 9\), but there are 2 poses'):
+        solver.batch(twice, sizes=np.full((2, 3), 2.0), pairs=[[0, 1], [1, 9]])
+    load = Body.of_box(poses.CUBE, 1000.0)
+    for wrong in ({'rate_hz': 0.005}, {'rate_hz': 200.0, 'latency': 2.0}):
+        with pytest.raises(ValueError, match='a load would rest .* m deep'):
+            HeldPatch.for_loop(load, **wrong)
+    assert HeldPatch.for_loop(load, rate_hz=5.0, latency=0.1).frequency > 0.0

@@ -6,6 +6,7 @@
 
 #include "mlp/mlp_model.hpp"
 #include "mlp/shipped_network.hpp"
+#include "pose_refusal.hpp"
 
 namespace box_contact::BOX_CONTACT_SET {
 
@@ -64,7 +65,7 @@ class Solver {
                     &contact.volume,
                     contact.covariance[0],
                     &axis};
-    if (solve({a, b, size_a_.v, size_b_.v, 0, 0, nullptr}, 1, results) >= 0) refuse(pose_a, pose_b);
+    if (solve({a, b, size_a_.v, size_b_.v, 0, 0, nullptr}, 1, results) >= 0) refuse(a, b);
     contact.axis = axis;
     return contact;
   }
@@ -116,22 +117,10 @@ class Solver {
                   size[0], size[1], size[2]);
     throw std::invalid_argument(words);
   }
-  [[noreturn]] static void refuse(const Pose& pose_a, const Pose& pose_b) {
-    bool of_a = !pose_valid(pose_a);
-    const char* field = of_a ? "pose_a" : "pose_b";
-    const Vec<double>& p = (of_a ? pose_a : pose_b).position;
-    const double* q = (of_a ? pose_a : pose_b).quaternion;
+  [[noreturn]] static void refuse(const double* a, const double* b) {
+    bool of_a = !pose_valid(Pose{{a[0], a[1], a[2]}, {a[3], a[4], a[5], a[6]}});
     char words[300];
-    bool is_far = false;
-    for (double coordinate : p.v) is_far |= !(abs(coordinate) <= length_max);
-    if (is_far)
-      std::snprintf(words, sizeof words,
-                    "%s position (%g, %g, %g) is not finite, or exceeds 1e50 m", field, p[0], p[1],
-                    p[2]);
-    else
-      std::snprintf(words, sizeof words,
-                    "%s quaternion (%g, %g, %g, %g) has no length within 1e-100 to 1e100", field,
-                    q[0], q[1], q[2], q[3]);
+    explain_refusal(of_a ? "pose_a" : "pose_b", of_a ? a : b, words, sizeof words);
     throw std::invalid_argument(words);
   }
 

@@ -123,7 +123,7 @@ bc_status solve_rows(Solver& solver, const bc_rows& given, const bc_results& wan
   if (given.count == 0) return BC_OK;
   if (!given.poses_a || !given.poses_b) return refuse_null(given.poses_a ? "poses_b" : "poses_a");
   if (!places_are_valid(given, refused))
-    return fail(BC_BAD_ROWS, "pairs[%lld] is (%lld, %lld), and there are %lld poses",
+    return fail(BC_BAD_ROWS, "pairs[%lld] is (%lld, %lld), but there are %lld poses",
                 (long long)refused, (long long)given.pairs[2 * refused],
                 (long long)given.pairs[2 * refused + 1], (long long)given.pose_count);
   Rows rows{numbers(given.poses_a),

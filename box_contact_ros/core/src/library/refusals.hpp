@@ -11,7 +11,7 @@
 #include <new>
 
 #include "../../include/box_contact/box_contact.h"
-#include "../poses.hpp"
+#include "../pose_refusal.hpp"
 
 namespace box_contact::detail {
 
@@ -67,14 +67,8 @@ inline bool pose_is_valid(const double* p) {
 }
 
 inline bc_status refuse_pose(const char* field, const double* p) {
-  for (int k = 0; k < 3; ++k)
-    if (!(std::fabs(p[k]) <= length_max))
-      return fail(BC_BAD_POSE, "%s position (%g, %g, %g) is not finite, or exceeds 1e50 m", field,
-                  p[0], p[1], p[2]);
-  bool is_finite = true;
-  for (int k = 3; k < 7; ++k) is_finite &= std::isfinite(p[k]);
-  return fail(BC_BAD_POSE, "%s quaternion (%g, %g, %g, %g) %s", field, p[3], p[4], p[5], p[6],
-              is_finite ? "has no length within 1e-100 to 1e100" : "is not finite");
+  explain_refusal(field, p, error_text, sizeof error_text);
+  return BC_BAD_POSE;
 }
 
 }  // namespace box_contact::detail
