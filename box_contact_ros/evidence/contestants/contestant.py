@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from box_contact_ros.scene.pose import rotation_matrix
+from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.solver.models import find_model
 
@@ -42,6 +43,13 @@ def manifold(contacts: Iterable[tuple[ArrayLike, ArrayLike, float]]) -> Manifold
     """Return the answer of contacts, each a point (3,), a normal (3,) and a depth [m]."""
     columns = list(zip(*contacts))
     return Manifold(*map(np.array, columns)) if columns else APART
+
+
+class Solved(NamedTuple):
+    """What a model of this package answers for n pairs, with what a manifold does not hold."""
+
+    contacts: Contacts
+    left_to_exact: int  # contacts that the model handed to `exact`
 
 
 class Answer(NamedTuple):
@@ -69,6 +77,8 @@ class Contestant:
     """Return two poses (7,) in the engine's own form, the arguments of what answers."""
     read: Callable[[Any], Manifold]
     """Return the answer in what a call returned; to be read before the next call."""
+    solve: Callable[[Pairs], Solved] | None = None
+    """Answer for all pairs, with volume and covariance; models of this package have it."""
     prepare_batch: Callable[..., Callable[[], Any]] | None = None
     """Return a call that answers for all pairs at once, not in a loop; takes pairs, `threads`."""
     any_boxes: bool = True  # whether it answers for boxes of any sizes
@@ -89,10 +99,14 @@ def packages_of(found: Sequence[Contestant]) -> list[str]:
     return list(dict.fromkeys(['numpy', *(one.package for one in found if one.package)]))
 
 
-def ours(model: str) -> Contestant:
-    """Return a model of this package."""
+def ours(model: str, *, weights: str | None = None) -> Contestant:
+    """Return a model of this package. ValueError: there is no such model."""
     entry, _ = find_model('model', model)
-    solver = partial(ContactSolver, model=model)
+    solver = partial(ContactSolver, model=model, weights=weights)
+
+    def solve(pairs: Pairs) -> Solved:
+        one = solver(pairs.size_a[0], pairs.size_b[0])
+        return Solved(pairs.contacts(one), one.exact_answers)
 
     def prepare_batch(pairs: Pairs, threads: int = 1) -> Callable[[], Any]:
         a, b, size_a, size_b = pairs
@@ -106,7 +120,8 @@ def ours(model: str) -> Contestant:
 
     return Contestant(name=model, call='ContactSolver(…)(pose_a, pose_b)',
                       returns='one contact', patch='volume, covariance', choices=('its point',),
-                      boxes=solver, at=lambda a, b: (a, b), read=read, any_boxes=entry.any_boxes,
+                      boxes=solver, at=lambda a, b: (a, b), read=read, solve=solve,
+                      any_boxes=entry.any_boxes,
                       prepare_batch=prepare_batch if entry.native_batch else None)
 
 

@@ -30,10 +30,10 @@ from box_contact_ros.core import DEPTH_FLOOR, Stages, native, stages
 from box_contact_ros.resources import resource_path
 from box_contact_ros.solver.arguments import add_models, model_name, program_parser, within
 from box_contact_ros.solver.contact import Contacts
-from box_contact_ros.solver.contact_solver import ContactSolver
-from box_contact_ros.solver.models import ModelEntry, find_model, models
+from box_contact_ros.solver.models import ModelEntry, models
 from box_contact_ros.solver.weights_file import WeightsError, load_weights
 
+from ..contestants.contestant import Contestant, ours
 from ..pose_sets import LOADS, SETS, Pairs, drawn
 from ..training.paper_recipe import dataset
 from ..training.paper_recipe.errors import errors_of, figures, figures_by_part, wrapped
@@ -163,15 +163,12 @@ class AccuracyRow:
         return [f'{self.model}, {self.set}: {text}' for text, holds in checks.items() if not holds]
 
 
-def measure(model: str, name: str, pairs: Pairs, truth: Contacts, weights: str | None = None,
-            ) -> AccuracyRow | None:
+def measure(model: Contestant, name: str, pairs: Pairs, truth: Contacts) -> AccuracyRow | None:
     """Measure a model on a set; None where the model is not for its sizes."""
-    cube = tuple(pairs.size_a[0])
     try:
-        solver = ContactSolver(cube, cube, model=model, weights=weights)
-        found = pairs.contacts(solver)
+        found, left_to_exact = model.solve(pairs)
     except ValueError:
-        if find_model('model', model)[0].any_boxes:
+        if model.any_boxes:
             raise
         return None
     both = truth.colliding & found.colliding
@@ -180,9 +177,9 @@ def measure(model: str, name: str, pairs: Pairs, truth: Contacts, weights: str |
     errors = contact_errors(*(Contacts(*(part[both] for part in contacts))
                               for contacts in (found, truth)), touching.edge)
     return AccuracyRow(
-        model=model, set=name, errors=errors, classes=classes,
+        model=model.name, set=name, errors=errors, classes=classes,
         winners=winners, pairs=len(both),
-        exact_share=solver.exact_answers / max(1, int(found.colliding.sum())),
+        exact_share=left_to_exact / max(1, int(found.colliding.sum())),
         verdict_errors=int((found.colliding != truth.colliding).sum()),
         normal_difference=float(np.abs(found.normal[both] - truth.normal[both]).max(initial=0.0)),
         separation_difference=float(
@@ -220,6 +217,11 @@ def model_or_class(text: str) -> str:
     return text
 
 
+def _contestant(model: str, weights: str | None) -> Contestant:
+    """Return a model; weights are those of `mlp`."""
+    return ours(model, weights=weights if model == 'mlp' else None)
+
+
 def measure_all(models: Sequence[str], count: int, seed: int, weights: str | None,
                 ) -> list[AccuracyRow]:
     """Measure models on `count` pairs of every set, model by model."""
@@ -230,8 +232,7 @@ def measure_all(models: Sequence[str], count: int, seed: int, weights: str | Non
         for name, pairs, truth in drawn_pairs(count, seed):
             for model in models:
                 bar.set_postfix_str(f'{model}, {name}')
-                rows.append(measure(model, name, pairs, truth,
-                                    weights if model == 'mlp' else None))
+                rows.append(measure(_contestant(model, weights), name, pairs, truth))
                 bar.update()
     return sorted(filter(None, rows), key=lambda row: models.index(row.model))
 
@@ -259,11 +260,11 @@ def paper_errors(models: Sequence[str], weights: str | None = None, step: int = 
     normal = np.column_stack([np.cos(elevation) * np.cos(azimuth),
                               np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
     pose_b[:, :3] -= OPENED * max(size) * normal
+    sizes = np.tile(size, (len(pose_a), 1))
+    pairs = Pairs(pose_a, pose_b, sizes, sizes)
     found = {'paper': errors_of(file.networks['contact'], inputs, outputs)}
     for model in models:
-        solver = ContactSolver(size, size, model=model,
-                               weights=weights if model == 'mlp' else None)
-        contact = solver.batch(pose_a, pose_b)
+        contact, _ = _contestant(model, weights).solve(pairs)
         angles = np.concatenate([dataset.spherical(contact.point),
                                  dataset.spherical(contact.normal)], axis=1)
         found[model] = wrapped(angles - outputs)[contact.colliding]

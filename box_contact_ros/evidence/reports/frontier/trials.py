@@ -167,8 +167,8 @@ def judge(pairs: Pairs, colliding: np.ndarray, normals: np.ndarray, points: np.n
 
 def ask(engine: Contestant, pairs: Pairs, plan: Plan) -> Answers:
     """Return answers to as many pairs as there is time to ask."""
-    if engine.prepare_batch and engine.make is None:
-        found = engine.prepare_batch(pairs)()
+    if engine.solve and engine.prepare_batch:
+        found, _ = engine.solve(pairs)
         return Answers(colliding=found.colliding, normals=found.normal,
                        points={engine.choices[0]: found.point})
     pairs = pairs.rows(slice(plan.single_pairs))

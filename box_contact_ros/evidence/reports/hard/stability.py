@@ -25,10 +25,9 @@ from box_contact_ros import output
 from box_contact_ros.core import native
 from box_contact_ros.scene.pose import quaternion_multiply
 from box_contact_ros.solver.arguments import add_models, program_parser
-from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.solver.models import find_model, models, models_with_patch
 
-from ...contestants.contestant import in_subprocess
+from ...contestants.contestant import Contestant, in_subprocess, ours
 from ...pose_sets import Pairs
 from ...verification.errors import distances, point_errors
 from ...verification.hard_poses import Cases, load
@@ -68,11 +67,10 @@ class StabilityRow:
     failure: str = ''  # what ended the model before its answers, if anything
 
 
-def examine(model: str, family: str, cases: Cases) -> StabilityRow:
+def examine(contestant: Contestant, family: str, cases: Cases) -> StabilityRow:
     """Ask a model for the cases of a family."""
     pairs, gap = cases.pairs, cases.gap
-    solver = ContactSolver((1, 1, 1), (1, 1, 1), model=model)
-    found = pairs.contacts(solver)
+    found, _ = contestant.solve(pairs)
     verdict = judge(*pairs, found)
     touching = found.colliding & (gap <= verdict.unsure)
     # What the judge settles by its own gap is settled here by the stored one.
@@ -86,19 +84,18 @@ def examine(model: str, family: str, cases: Cases) -> StabilityRow:
     known = touching & np.isfinite(cases.centroid).all(axis=1)
     points = found.point - pairs.pose_a[:, :3]
     errors = point_errors(points[known], cases.centroid[known], pairs.edge[known])
-    ratio, exact_ratio = _ratios(solver, pairs)
+    ratio, exact_ratio = _ratios(contestant, pairs)
     return StabilityRow(
-        model, family, len(gap), contacts=int(found.colliding.sum()),
+        contestant.name, family, len(gap), contacts=int(found.colliding.sum()),
         **{name: int(rows.sum()) for name, rows in wrong.items()},
         depth=float((np.abs(found.separation - gap) / pairs.size)[touching].max(initial=0.0)),
         point_p99=output.percentiles(errors, 99)[0] if len(errors) else 0.0,
         point_worst=float(errors.max(initial=0.0)), ratio=ratio, exact_ratio=exact_ratio)
 
 
-def _ratios(solver: ContactSolver, pairs: Pairs) -> tuple[float, float]:
+def _ratios(contestant: Contestant, pairs: Pairs) -> tuple[float, float]:
     """Return the worst |Δpoint| by |Δpose| under small motions of B, of a model and of `exact`."""
     rng = np.random.default_rng(5)
-    exact = ContactSolver((1, 1, 1), (1, 1, 1), model='exact')
     worst = [0.0, 0.0]
     for _ in range(NUDGES):
         step, turn = rng.normal(size=(2, len(pairs.pose_a), 3))
@@ -108,8 +105,8 @@ def _ratios(solver: ContactSolver, pairs: Pairs) -> tuple[float, float]:
         nudged = pairs._replace(pose_b=np.hstack([
             pairs.pose_b[:, :3] + step, quaternion_multiply(small, pairs.pose_b[:, 3:])]))
         moved = NUDGE * pairs.size + NUDGE * 0.5 * np.linalg.norm(pairs.size_b, axis=1)
-        for k, one in enumerate((solver, exact)):
-            before, after = pairs.contacts(one), nudged.contacts(one)
+        for k, one in enumerate((contestant, ours('exact'))):
+            before, after = (one.solve(asked).contacts for asked in (pairs, nudged))
             both = before.colliding & after.colliding
             ratios = distances(after.point, before.point) / moved
             worst[k] = max(worst[k], float(ratios[both].max(initial=0.0)))
@@ -119,9 +116,13 @@ def _ratios(solver: ContactSolver, pairs: Pairs) -> tuple[float, float]:
 def examine_apart(model: str, family: str, cases: Cases) -> StabilityRow:
     """Do as `examine`, in a subprocess: its end by a signal is a row."""
     try:
-        return in_subprocess(examine, model, family, cases, patience=PATIENCE)
+        return in_subprocess(_by_name, model, family, cases, patience=PATIENCE)
     except RuntimeError as error:
         return StabilityRow(model, family, len(cases.gap), failure=str(error))
+
+
+def _by_name(model: str, family: str, cases: Cases) -> StabilityRow:
+    return examine(ours(model), family, cases)
 
 
 HEAD = ('family', 'cases', 'contacts', 'wrong verdicts', 'wrong normals', 'points outside', 'NaN',
@@ -192,7 +193,7 @@ def main(args: Sequence[str] | None = None) -> int:
             apart = find_model('model', model)[0].extra  # another's library may abort
             for name in options.families:
                 bar.set_postfix_str(f'{model}, {name}')
-                rows.append((examine_apart if apart else examine)(model, name, cases[name]))
+                rows.append((examine_apart if apart else _by_name)(model, name, cases[name]))
                 bar.update()
     output.write_csv(folder / 'stability.csv', map(asdict, rows), digits=4,
                      about=output.machine(native, PACKAGES))

@@ -9,10 +9,10 @@ import numpy as np
 from box_contact_ros import output
 from box_contact_ros.resources import resource_path
 from box_contact_ros.scene.pose import degrees_between
-from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.solver.weights_file import load_weights
 
-from ...pose_sets import CUBE
+from ...contestants.contestant import ours
+from ...pose_sets import CUBE, Pairs
 from ...training.paper_recipe import dataset
 from ...training.paper_recipe.dataset import CLASSES, Placements
 from ...verification.errors import distances
@@ -35,7 +35,8 @@ def errors(model: str, some: Placements) -> tuple[float, float]:
     """Return the mean error of the point [mm] and of the normal [deg] against the labels."""
     a, b = dataset.as_poses(some.inputs)
     b[:, :3] -= PRESSED * dataset.query(some).normal
-    found = ContactSolver(CUBE, CUBE, model=model).batch(a, b)
+    sizes = np.tile(CUBE, (len(a), 1))
+    found, _ = ours(model).solve(Pairs(a, b, sizes, sizes))
     return (1e3 * float(distances(found.point, some.point).mean()),
             float(degrees_between(found.normal, some.normal).mean()))
 

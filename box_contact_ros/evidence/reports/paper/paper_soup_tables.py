@@ -22,9 +22,9 @@ from tqdm import tqdm
 from box_contact_ros import output
 from box_contact_ros.scene.pose import degrees_between
 from box_contact_ros.solver.contact import Contacts
-from box_contact_ros.solver.contact_solver import ContactSolver
 
 from ...contestants import soup
+from ...contestants.contestant import ours
 from ...pose_sets import CUBE, Pairs, at_depth, coplanar, drawn, on_cube, stacks
 from ...timing import cpu_milliseconds, no_garbage_collection, pinned, usable_cores
 from ...training.paper_recipe.dataset import as_poses
@@ -88,11 +88,6 @@ class SoupResult:
         return self.soups[regime, min(PAPER)], self.soups[regime, max(PAPER)]
 
 
-def cubes_model(model: str) -> ContactSolver:
-    """Return a model's solver for two cubes of edge 2."""
-    return ContactSolver(CUBE, CUBE, model=model)
-
-
 def search(first: fcl.CollisionObject, second: fcl.CollisionObject) -> None:
     """Search for all pairs; FCL returns one of them, and goes on because costs are asked for."""
     fcl.collide(first, second, fcl.CollisionRequest(num_max_contacts=1, enable_contact=True,
@@ -106,11 +101,11 @@ def pair_count(contacts: Sequence[fcl.Contact]) -> int:
 
 def time_soup(divisions: int, patterns: Pairs, thin: int, bar: tqdm) -> Row:
     """Return the columns of times of the soup of N divisions, and of its pairs of triangles."""
-    boxes, solver = soup.Soup(divisions), cubes_model(f'soup-{divisions}')
+    boxes, answer = soup.Soup(divisions), ours(f'soup-{divisions}').prepare(patterns)
     poses = list(zip(patterns.pose_a, patterns.pose_b))
-    for a, b in poses[:WARM_UP]:
+    for row, (a, b) in enumerate(poses[:WARM_UP]):
         pair = boxes.place(a, b, CUBE, CUBE)
-        soup.collide(*pair), search(*pair), solver(a, b)
+        soup.collide(*pair), search(*pair), answer[row]()
     step, pairs, alone, answers = np.empty(len(poses)), np.empty(len(poses), np.int64), [], []
     for row, (a, b) in enumerate(poses):
         pair = boxes.place(a, b, CUBE, CUBE)
@@ -118,7 +113,7 @@ def time_soup(divisions: int, patterns: Pairs, thin: int, bar: tqdm) -> Row:
         pairs[row] = pair_count(contacts)
         if row % thin == 0:
             alone.append(cpu_milliseconds(search, *pair)[0])
-            answers.append(cpu_milliseconds(solver, a, b)[0])
+            answers.append(cpu_milliseconds(answer[row])[0])
         bar.update()
     most = boxes.place(*poses[int(np.argmax(pairs))], CUBE, CUBE)
     most_step, most_alone = (
@@ -157,21 +152,22 @@ def judge_soup(divisions: int, patterns: Pairs, exact: Contacts) -> SoupErrors:
         depth=np.array(depths) + exact.separation[rows])
 
 
-def time_calls(solver: ContactSolver, patterns: Pairs) -> float:
+def time_calls(model: str, patterns: Pairs) -> float:
     """Return the mean time of a call [ms]; calls are too short for a clock each."""
-    def calls() -> None:
-        for a, b in zip(patterns.pose_a, patterns.pose_b):
-            solver(a, b)
+    calls = ours(model).prepare(patterns)
 
-    calls()
-    return cpu_milliseconds(calls)[0] / len(patterns.pose_a)
+    def all_calls() -> None:
+        for call in calls:
+            call()
+
+    all_calls()
+    return cpu_milliseconds(all_calls)[0] / len(calls)
 
 
 def judge_network(model: str, patterns: Pairs, exact: Contacts) -> Row:
     """Return a network's row on touching patterns."""
-    solver = cubes_model(model)
-    found = patterns.contacts(solver)
-    return {'model': model, 'regime': 'touching', 'answer_mean_ms': time_calls(solver, patterns),
+    found, _ = ours(model).solve(patterns)
+    return {'model': model, 'regime': 'touching', 'answer_mean_ms': time_calls(model, patterns),
             'point_error_mean_m': float(distances(found.point, exact.point).mean()),
             'normal_error_mean_deg': float(degrees_between(found.normal, exact.normal).mean())}
 
@@ -226,7 +222,7 @@ def measure(inputs: np.ndarray, *, quick: bool = False) -> SoupResult:
                 bar.update(len(judged[regime].size))
         networks = {model: judge_network(model, judged['touching'], truth['touching'])
                     for model in ('paper', 'paper-continuous')}
-        exact = time_calls(cubes_model('exact'), judged['touching'])
+        exact = time_calls('exact', judged['touching'])
     return SoupResult(soups=soups, networks=networks, exact=exact, counts=counts)
 
 

@@ -27,7 +27,7 @@ from ...contestants import soup
 from ...pose_sets import CUBE, Pairs, on_cube, turned
 from ...timing import cpu_milliseconds, no_garbage_collection, pinned, usable_cores
 from ...training.paper_recipe.dataset import euler_angles, quaternion_from_euler
-from .paper_soup_tables import Row, cubes_model, pair_count, time_calls
+from .paper_soup_tables import Row, pair_count, time_calls
 from .paper_tables import PAPER_SOUP
 
 DEPTH = 0.01  # of the corner [m]
@@ -100,7 +100,6 @@ def count_tests(boxes: Leaves, pair: Pairs) -> int:
 def measure(*, quick: bool = False) -> list[Row]:
     """Return a row per angle and N: tests, pairs that meet, times of soup and network [ms]."""
     rows: list[Row] = []
-    network = cubes_model('paper')
     with pinned({usable_cores()[-1]}), no_garbage_collection():
         for divisions in QUICK_DIVISIONS if quick else DIVISIONS:
             boxes, placer = leaves(divisions), soup.Soup(divisions)
@@ -112,7 +111,7 @@ def measure(*, quick: bool = False) -> list[Row]:
                 rows.append({
                     'divisions': divisions, 'tilt_deg': tilt, 'tests': count_tests(boxes, pair),
                     'pairs': pair_count(steps[0][1]), 'step_ms': min(took for took, _ in steps),
-                    'network_ms': min(time_calls(network, many) for _ in range(REPEATS))})
+                    'network_ms': min(time_calls('paper', many) for _ in range(REPEATS))})
     return rows
 
 
