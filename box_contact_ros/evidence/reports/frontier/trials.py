@@ -41,18 +41,19 @@ class Plan:
     timed_pairs: int
     """Pairs that every round times call by call, whatever they take. Some cost fifty times as much
     as others, so the median of a round that ends by the clock depends on how many it reached."""
-    seconds: float
-    """Time that a contestant has on a set to be asked, and then to be timed; rounds are whole."""
+    seconds: float  # that a contestant has on a set to be judged
     rounds: int
+    round_seconds: float
+    """Least time of a round's single calls; a round ends with its last pair."""
     members: int  # models of a family, at most
     subprocesses: bool
     """Whether other engines are judged in subprocesses, so that an abort is a finding."""
 
 
 FULL = Plan(batch_pairs=20_000, single_pairs=1_000, timed_pairs=200, seconds=1.0, rounds=20,
-            members=99, subprocesses=True)
-QUICK = Plan(batch_pairs=1_000, single_pairs=40, timed_pairs=10, seconds=0.05, rounds=2, members=1,
-             subprocesses=False)
+            round_seconds=0.025, members=99, subprocesses=True)
+QUICK = Plan(batch_pairs=1_000, single_pairs=40, timed_pairs=10, seconds=0.05, rounds=2,
+             round_seconds=0.025, members=1, subprocesses=False)
 FEW_PAIRS = 17
 """Pairs that are prepared at once where more pairs of sizes than that are among them. Odd, so that
 a median is the time of one pair, not between two that may differ tenfold."""
@@ -225,7 +226,7 @@ class Trial:
         """Judge, and prepare the calls; an engine that failed is not timed."""
         self.name, self.set = engine.name, name
         self._engine, self._pairs, self._answers = engine, pairs, answers
-        self._seconds = plan.seconds / plan.rounds
+        self._seconds = plan.round_seconds
         self._calls: Sequence[Callable[[], object]] = ()
         self._batch: Timing | None = None
         if isinstance(answers, Answers) and not answers.exceptions:
