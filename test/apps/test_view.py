@@ -561,6 +561,7 @@ def near(picture, colour, distance):
 
 
 CANVASES = '[...document.querySelectorAll("canvas")].map(c => c.clientWidth)'
+CHARTS = 'Object.values(window.__viserTestpoints.uplots).map(one => one.chart)'
 
 
 def filled(tab):
@@ -607,6 +608,9 @@ def test_the_page_in_a_browser(program):
             scene = picture[:, :picture.shape[1] // 2]
             shares = [near(scene, colour, 0.1) for colour in (BOX_A, BOX_B)]
         assert min(shares) > 0.02
+        # Charts have the axis of times that they were given, and values along it.
+        tab.wait_for(f'{CHARTS}.every(c => c.scales.x.min == -12 && c.scales.x.max == 0'
+                     ' && c.data[0].length > 10)')
         # All at once: the next landing begins with a load in the air.
         assert tab.wait_for('document.getElementById("verdict")?.innerText.startsWith("contact, ")'
                             ' && document.getElementById("error")?.innerText.startsWith("0.0 mm")'

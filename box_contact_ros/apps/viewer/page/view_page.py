@@ -146,13 +146,11 @@ class Page:
         if not self._history:
             return
         times, depths, forces = np.array(self._history).T
-        self._depth_chart.data = times - times[-1], depths
-        self._depth_chart.scales = _scales(SHALLOW, max(DEEP, ROOM * depths.max()))
+        _plot(self._depth_chart, times - times[-1], depths, SHALLOW, DEEP)
         known = ~np.isnan(forces)
         self._force_chart.visible = bool(known.any())
         if known.any():
-            self._force_chart.data = times[known] - times[-1], forces[known]
-            self._force_chart.scales = _scales(0.0, max(1.0, ROOM * forces[known].max()))
+            _plot(self._force_chart, times[known] - times[-1], forces[known], 0.0, 1.0)
 
     def show_run(self, run: CraneRun) -> None:
         """Show which run is under way."""
@@ -170,10 +168,23 @@ class Page:
         self._server.stop()
 
 
+def _plot(chart: Any, times: np.ndarray, values: np.ndarray, low: float, least_high: float,
+          ) -> None:
+    """Show values from `low` to their largest, or to `least_high`."""
+    chart.data = times, values
+    scales = _scales(low, max(least_high, ROOM * values.max()))
+    if chart.scales != scales:  # new axes make the browser build the chart anew
+        chart.scales = scales
+
+
 def _scales(low: float, high: float) -> dict[str, Any]:
-    """Return the axes of a chart whose values run from `low` to `high`, whatever it shows."""
+    """Return the axes of a chart of the last seconds, whose values run from `low` to `high`.
+
+    uPlot's own range of times goes astray where values and axes change at once.
+    """
     bounds = ({'hard': end, 'soft': end, 'mode': 1} for end in (low, float(high)))
-    return {'x': {'time': False}, 'y': {'range': dict(zip(('min', 'max'), bounds))}}
+    return {'x': {'time': False, 'range': (-HISTORY, 0.0)},
+            'y': {'range': dict(zip(('min', 'max'), bounds))}}
 
 
 def _narrow(client: viser.ClientHandle) -> None:
