@@ -53,9 +53,10 @@ def write_named(folder: Path, command: str, models: Sequence[str]) -> int:
         'evidence/reports/pages/named_failures', command=command,
         machine=output.machine(native, packages_of(engines)), reports=reports_table(failures),
         passes=passes_table(found), skipped=''.join(f'\n\nLeft out: {line}.' for line in missing),
-        faults='\n'.join(f'- {name}: {", ".join(wrong)}.' for name, faults in found.items()
-                         if (wrong := [f'{place[one]} {text}' for one, text in faults.items()
-                                       if text])))
+        faults=output.markdown_table(['', 'report: fault'], [
+            [name, '; '.join(wrong)] for name, faults in found.items()
+            if (wrong := [f'{place[one]}: {text}' for one, text in faults.items() if text])],
+            words=2))
     print(text)
     (folder / 'named_failures.md').write_text(text, encoding='utf-8')
     return int(any(text for model in models_with_patch() for text in found[model].values()))

@@ -137,8 +137,9 @@ def page(figures: Sequence[Figure], command: str) -> str:
         'evidence/reports/pages/rest', command=command, machine=output.machine(native, PACKAGES),
         met=len(gated) - len(broken(figures)), all=len(gated),
         own_met=sum(one.is_met for one in own), own_all=len(own),
-        exact=', '.join(map(str, TIMINGS)), mlp=', '.join(map(str, SOME_TIMINGS)),
-        table=table(figures))
+        timings=output.markdown_table(['model', 'runs at'], [
+            [f'`{model}`', '; '.join(map(str, timings))] for model, timings in TIMINGS_OF.items()],
+            words=2), table=table(figures))
 
 
 def main(args: Sequence[str] | None = None) -> int:
