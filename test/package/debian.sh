@@ -3,9 +3,9 @@
 # SPDX-License-Identifier: Apache-2.0
 
 # Do what a newcomer does on a fresh Debian: install what the README names, clone, and type its first
-# two commands. The last commit is what is cloned.
+# command. The last commit is what is cloned.
 #
-# usage: debian.sh SUITE [COMMAND]     (trixie: Debian 13; default: the README's first two commands)
+# usage: debian.sh SUITE [COMMAND]     (trixie: Debian 13; default: the README's first command)
 # Needed: root, debootstrap, git, and 6 GB below TMPDIR.
 # DEBIAN_MIRROR is where packages come from; without it, where apt here has them from.
 set -euo pipefail
@@ -13,9 +13,7 @@ set -euo pipefail
 checkout=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 suite=$1
 commands=$(awk '/^```bash/ {inside = 1; next} /^```/ && inside {exit} inside' "$checkout/README.md")
-if [ -n "${2-}" ]; then
-    commands=$(head -n 1 <<<"$commands")$'\n'"cd box_contact_ros && $2"
-fi
+commands=${2:-$commands}
 
 fail() {
     echo "error: $1" >&2
@@ -40,7 +38,7 @@ debootstrap --variant=minbase --include=ca-certificates "$suite" "$debian" "$mir
 # A network may have its own names and certificates.
 cp /etc/resolv.conf /etc/hosts "$debian/etc/"
 cp /etc/ssl/certs/ca-certificates.crt "$debian/etc/ssl/certs/"
-git -c safe.directory='*' clone --quiet "$checkout" "$debian/home/newcomer/REPOSITORY"
+git -c safe.directory='*' clone --quiet "$checkout" "$debian/home/newcomer/box_contact_ros"
 
 inside=$(cat <<'INSIDE'
 mount -t proc proc "$debian/proc"
@@ -57,7 +55,7 @@ settings=$(env | grep -E '^(PIP_|https?_proxy=)' | grep -v '^PIP_FIND_LINKS=' ||
 readarray -t settings <<<"$settings"
 chroot --userspec newcomer "$debian" env -i HOME=/home/newcomer USER=newcomer LANG=C.UTF-8 \
     PATH=/usr/local/bin:/usr/bin:/bin ${settings[0]:+"${settings[@]}"} bash -euo pipefail -c '
-    cd
+    cd ~/box_contact_ros
     . /etc/os-release
     echo "$PRETTY_NAME, $(python3 --version), $(nproc) processors, as $(id -un)"
     while read -r command; do

@@ -224,21 +224,6 @@ def cmake(words: list[str], **_) -> None:
         '-S', 'docs/examples/cpp', '-B', 'build/example']
 
 
-def clone(words: list[str], **_) -> None:
-    """Clone into the folder that the next command names, from the address of package.xml.
-
-    Where package.xml has none, the reader copies it, and the page says from where.
-    """
-    assert words[2:] == [address(), 'box_contact_ros']
-    assert address() != 'REPOSITORY' or 'Replace `REPOSITORY`' in (ROOT / 'README.md').read_text()
-
-
-def address() -> str:
-    """Return the address that package.xml gives of the repository, or a placeholder."""
-    found = re.search('<url type="repository">(.+?)</url>', (ROOT / 'package.xml').read_text())
-    return found[1] if found else 'REPOSITORY'
-
-
 def locked(words: list[str], **_) -> None:
     """Remake the lock: the program is there, and knows the option; it asks PyPI."""
     assert all(word in (ROOT / '.ci' / 'lock').read_text('utf-8') for word in words[1:])
@@ -262,7 +247,6 @@ def venv(words: list[str], **_) -> None:
 
 COMMANDS = {
     r'\.ci/lock( --upgrade)?': locked,
-    r'git clone .+': clone,
     r'(mkdir -p build|g\+\+|build/first).*': built,
     r'cmake .+': cmake,
     r'ln -s \S+ src/\S+': linked,
