@@ -13,7 +13,6 @@ import functools
 import re
 import sys
 from pathlib import Path
-from statistics import median
 
 from box_contact_ros.output import markdown_table, number, read_csv
 
@@ -93,38 +92,14 @@ def mlp_errors() -> str:
     for name, words in SETS.items():
         errors = {row['quantity']: row
                   for row in rows('accuracy.csv', model='mlp', set=name, part='all')}
-        body.append([words, *(cell(errors['point'], column, digits=2)
-                              for column in ('mean', 'p99', 'worst')),
-                     *(cell(errors[quantity], column, digits=2)
-                       for quantity in ('volume', 'covariance') for column in ('mean', 'p99'))])
-    return markdown_table(['Set', 'point: mean', 'p99', 'worst', 'volume: mean', 'p99',
-                           'covariance: mean', 'p99'], body)
+        body.append([words, cell(errors['point'], 'p99', digits=2),
+                     cell(errors['point'], 'worst', digits=2),
+                     cell(errors['volume'], 'p99', digits=2),
+                     cell(errors['covariance'], 'p99', digits=2)])
+    return markdown_table(['Set', 'point: p99', 'worst', 'volume: p99', 'covariance: p99'], body)
 
 
-def network() -> str:
-    """Return what a pair costs with `mlp` and `exact`: in contact, apart, by instruction set."""
-    body = []
-    for one in dict.fromkeys(row['instruction_set'] for row in rows('frontier.csv')):
-        for name in ('mlp', 'exact'):
-            found = {row['set']: row for row in rows('frontier.csv', contestant=name,
-                                                     instruction_set=one, **{'class': 'all'})}
-            touching = [row for kind, row in found.items() if kind in SETS]
-            call = [float(row['call_p50']) for row in touching]
-            rounds: dict[str, list[float]] = {}
-            for row in rows('speed.csv', kind='batch', instruction_set=one):
-                if row['name'].startswith(f'{name}: '):
-                    rounds.setdefault(row['name'], []).append(float(row['ns']))
-            batch = [median(times) for times in rounds.values()]
-            apart = found['just apart']
-            body.append([f'`{name}`, {one}', f'{min(batch):.0f}–{max(batch):.0f}',
-                         cell(apart, 'batch_p50'), f'{min(call) / 1e3:.2f}–{max(call) / 1e3:.2f}',
-                         cell(apart, 'call_p50', 1e3)])
-    table = markdown_table(['', 'batch [ns a pair], in contact', 'just apart',
-                            'single call [µs], in contact', 'just apart'], body)
-    return f'{table}\n\nMedian times on one core: {processor()}.'
-
-
-TABLES = {'models': models, 'mlp-errors': mlp_errors, 'network': network}
+TABLES = {'models': models, 'mlp-errors': mlp_errors}
 
 
 def filled(text: str) -> str:

@@ -60,11 +60,11 @@ def main() -> None:
             law.hold(answer, asked)
         data.xfrc_applied[1:] = law.wrenches(poses, velocities_of(data))
         mujoco.mj_step(model, data)
-        if step % 1000 == 999:
+        if step % 2000 == 1999:
             fastest = np.abs(data.qvel.reshape(COUNT, 6)[:, :3]).max()
-            depths = [1e3 * max(0.0, -contact.separation) for _, contact in answer.touching]
-            print(f'{data.time:.0f} s: all slower than 1 mm/s: {fastest < 1e-3}, '
-                  f'less than 1 mm deep: {max(depths) < 1.0}')
+            deepest = max(-contact.separation for _, contact in answer.touching)
+            print(f'{data.time:.0f} s: slower than 1 mm/s: {fastest < 1e-3}, '
+                  f'less than 1 mm deep: {deepest < 1e-3}')
 
 
 if __name__ == '__main__':

@@ -303,6 +303,41 @@ def sources() -> str:
     return re.sub(r'\{[^{}]*\}', '…', re.sub(r"""['"]\s*\n\s*f?['"]""", '', text))
 
 
+def quoted_messages() -> list[str]:
+    """Return what two pages quote of the log, and of errors."""
+    troubles = (ROOT / 'docs' / 'how-to' / 'troubleshooting.md').read_text('utf-8')
+    found = [one or other for heading in re.findall(r'^[*]{2}(.+?)[*]{2}', troubles, re.M | re.S)
+             for one, other in re.findall('`([^`]+)`|"([^"]+)"', heading)]
+    lines = (ROOT / 'docs' / 'reference' / 'diagnostics.md').read_text('utf-8')
+    found += re.findall('^- `([^`]+)`', lines.partition('## What the log says')[2], re.M)
+    return sorted(set(found) - FOREIGN)
+
+
+@pytest.mark.parametrize('message', quoted_messages())
+def test_quoted_messages_exist(message):
+    """Each part between its values is in the source, so no page explains what nobody can see."""
+    parts = re.split(r"…|\b[A-Z]+\b|\b(?:box_)?[ab]\b|'[\w/]+'|(?<= )/\w+|\b\d+ s\b", message)
+    parts = [part.strip() for part in parts if len(part.strip(' ,')) > 2]
+    assert parts and all(part in sources() for part in parts), parts
+
+
+def test_blocks_with_ros2_say_what_they_need():
+    """Above each stands that the command comes with a workspace, or with ROS from apt."""
+    for page in PAGES:
+        text = page.read_text('utf-8')
+        for found in FENCE.finditer(text):
+            if found[1] and re.search('(?m)^ros2 |[$][(]ros2 ', found[2]):
+                above = ' '.join(text[:found.start()].split()[-60:])
+                assert re.search('workspace|from apt|colcon|Launch files', above), (
+                    f'{page.name}: {found[2]}')
+
+
+def test_the_load_comes_first_on_every_page():
+    """One order of boxes for README, tutorials and laws of force, which take the load as A."""
+    for page, _, text in blocks('python', 'cpp'):
+        assert not re.search(r'[(]stack, (load|asked)', text), page.name
+
+
 # --- the rest of the pages ------------------------------------------------------------------------
 
 def examples() -> Iterator[object]:
