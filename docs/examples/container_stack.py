@@ -6,6 +6,13 @@
 All of them move. MuJoCo integrates, and its own contact is off. A SceneSolver answers for the pairs
 200 times a second, and each answer comes 2 ms late. A SceneLaw holds the patches, and gives the
 wrench on every container at every physics step.
+
+It prints:
+
+    2 s: slower than 1 mm/s: True, less than 1 mm deep: True
+    4 s: slower than 1 mm/s: True, less than 1 mm deep: True
+    6 s: slower than 1 mm/s: True, less than 1 mm deep: True
+    8 s: slower than 1 mm/s: True, less than 1 mm deep: True
 """
 import mujoco
 import numpy as np

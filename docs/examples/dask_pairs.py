@@ -6,6 +6,11 @@
 SCHEDULER is the address of a Dask scheduler, such as tcp://10.0.0.5:8786 (`dask scheduler` starts
 one, `dask worker ADDRESS` a worker). Without it, two workers start on this machine. Needs the extra
 `cluster`, on every machine.
+
+It prints:
+
+    10,000,000 pairs on 2 workers: 9,370,469 contacts
+    mean volume 0.671 m³, deepest 0.689 m
 """
 import sys
 

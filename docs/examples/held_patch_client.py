@@ -6,6 +6,15 @@
 Start `contact_node` first. The client asks 200 times a second, and its answers come 2 ms late. It
 holds each answer with the poses that it was asked for. At every physics step the law then gives the
 wrench for the pose of that step.
+
+It prints:
+
+    50 ms: -6.99 mm deep, 583.4 mm/s
+    100 ms: 0.06 mm deep, 178.7 mm/s
+    200 ms: 0.05 mm deep, 1.8 mm/s
+    500 ms: 0.05 mm deep, 0.0 mm/s
+    2000 ms: 0.05 mm deep, 0.0 mm/s
+    force / weight 1.0000, slid 30 mm
 """
 import numpy as np
 import rclpy

@@ -6,6 +6,14 @@
 Start `contact_node` first. A simulator that waits for each answer loses none, however fast or slow
 it runs. It sends both poses with one stamp, and waits for the contacts of that stamp. The stamps
 are the simulator's own time.
+
+It prints:
+
+    5 ms: no contact, 0.0 mm deep
+    10 ms: no contact, 0.0 mm deep
+    15 ms: contact, 0.5 mm deep
+    20 ms: contact, 1.5 mm deep
+    25 ms: contact, 2.5 mm deep
 """
 from typing import Any
 

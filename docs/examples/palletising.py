@@ -6,6 +6,13 @@
 Each carton is lowered by a millimetre into what it stands on. The overlap's covariance gives the
 patch: a rectangle has half lengths of √3 standard deviations. The carton stands if its middle is
 above the hull of its patches. The volumes share its weight among them.
+
+It prints:
+
+    left: stands, 300 mm to spare, on pallet 100%
+    right: stands, 200 mm to spare, on pallet 100%
+    bridge: stands, 200 mm to spare, on left 44%, right 56%
+    overhanging: tips, -100 mm to spare, on left 100%
 """
 from typing import NamedTuple
 

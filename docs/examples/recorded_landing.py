@@ -6,6 +6,13 @@
 Reads the two boxes' poses from a bag, solves all of them again in one batch, and prints when the
 load touched, how deep it went, and how far model `mlp` was from the exact point. Needs the extra
 `bag`. Without a bag it takes the shipped one.
+
+It prints:
+
+    800 ticks, 700 in contact, first at tick 100
+    depth: 0.9 mm at most, 0.02 mm at the end
+    point: 0.001 mm a tick at most in the last 100 ticks
+    mlp: 2 µm off the exact point at most
 """
 import sys
 from pathlib import Path

@@ -5,6 +5,15 @@
 
 For a simulator that knows nothing of contacts. Start the node first, with the mass and the rate:
 `contact_node --ros-args -p wrench:=true -p rate:=200 -p mass_a:=20000`.
+
+It prints:
+
+    50 ms: -4.89 mm deep, 539.5 mm/s
+    100 ms: 0.12 mm deep, 57.2 mm/s
+    200 ms: 1.19 mm deep, 0.8 mm/s
+    500 ms: 1.21 mm deep, 0.0 mm/s
+    2000 ms: 1.21 mm deep, 0.0 mm/s
+    force / weight 1.0000
 """
 import numpy as np
 import rclpy

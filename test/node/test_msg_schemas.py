@@ -34,7 +34,7 @@ from sensor_msgs.msg import PointCloud2, PointField
 from std_msgs.msg import String
 
 from box_contact_ros.core import LENGTH_MAX, QUATERNION_MAX
-from box_contact_ros.node.contact_node import PARAMETERS, ContactNode
+from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import (
     CLOUD_ROW,
     PATCH_FIELDS,
@@ -592,17 +592,3 @@ def test_docs_list_the_topics():
             {'receive': 'in', 'send': 'out'}[operation['action']],
             f'{policies["reliability"].replace("_", " ")}, {operation["x-depth"]}'])
     assert [row[:4] for row in table('topics.md')] == expected
-
-
-def test_docs_list_the_parameters():
-    """Name, type, unit and default of every parameter, in the node's order."""
-    expected = []
-    for name, setting in PARAMETERS.items():
-        unit = re.search(r'\[(.+?)\]', setting.description)
-        default = setting.default
-        kind = {bool: 'bool', float: 'double'}.get(type(default), 'string')
-        if isinstance(default, tuple):
-            kind, default = f'double[{len(default)}]', f'[{",".join(map(str, default))}]'
-        default = str(default).lower() if isinstance(default, bool) else str(default) or 'none'
-        expected.append([name, kind, unit.group(1) if unit else '', default])
-    assert [row[:4] for row in table('parameters.md')] == expected

@@ -1,9 +1,10 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""The programs of docs/examples: each runs, and prints what the page shows."""
+"""The programs of docs/examples: each runs, and prints what its docstring shows."""
 from __future__ import annotations
 
+import ast
 import os
 import re
 import subprocess
@@ -14,23 +15,22 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / 'docs' / 'examples'
-PAGE = (EXAMPLES / 'README.md').read_text('utf-8')
 CLIENTS = ('lockstep_client.py', 'held_patch_client.py', 'wrench_client.py')  # of a contact node
 NEEDS = {'mujoco_loop.py': 'mujoco', 'container_stack.py': 'mujoco',
          'recorded_landing.py': 'rosbags',
          'dask_pairs.py': 'distributed'} | dict.fromkeys(CLIENTS, 'box_contact_msgs.msg')
 NODE_FOR = {'wrench_client.py': ('-p', 'wrench:=true', '-p', 'rate:=200', '-p', 'mass_a:=20000')}
-"""Parameters of the contact node that the page tells to start."""
+"""Parameters of the contact node that the docstring tells to start."""
 QUICK = {'vectorised_env.py': 'main(100)', 'dask_pairs.py': 'main(40_000, 10_000)'}
-"""Shorter runs, whose figures are not those of the page."""
+"""Shorter runs, whose figures are not those of the docstring."""
 
 
 def shown(name: str) -> list[str]:
-    """Return the lines that the page shows below the command of an example."""
-    found = re.search(rf'^\$ python docs/examples/{name}\n(.*?)^```', PAGE,
-                      re.MULTILINE | re.DOTALL)
-    assert found, f'{name} is not on the page'
-    return found[1].splitlines()
+    """Return the lines that the docstring of an example shows."""
+    words = ast.get_docstring(ast.parse((EXAMPLES / name).read_text('utf-8')))
+    lines = re.findall('^    (.+)$', words.partition('It prints:')[2], re.MULTILINE)
+    assert lines, f'{name} does not show what it prints'
+    return lines
 
 
 @pytest.mark.parametrize('name', sorted(path.name for path in EXAMPLES.glob('*.py')
