@@ -3,7 +3,7 @@
 
 """Attacks from the network on every node that reads parameters, files, poses and requests.
 
-docs/contributing/attacks.md has a table of all attacks and programs, and where each is made.
+test/package/attacks.yaml lists all attacks and programs, and where each is made.
 """
 from __future__ import annotations
 

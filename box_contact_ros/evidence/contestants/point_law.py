@@ -18,7 +18,7 @@ point and v_n = −v·n, positive while the boxes part:
 Lines 1 and 2 act at the ONE point, so the point has to be the middle of the contact region. The
 others are what a patch does and a point cannot, and act only while the boxes touch. Rocking is the
 damping c spread evenly over an upright load's bottom, twice: c·∫x²dA / A = c·L²/12.
-For the measurements behind each constant, see docs/contributing/decisions/point-law.md.
+For the measurements behind each constant, see docs/contributing/decisions/patch-law.md.
 
 Conventions: those of `pose`; SI units. A wrench (6,) is a force [N], then a torque about the load's
 centre of mass [N m]. A velocity (6,) is linear [m/s], then angular [rad/s]. Both are in the common

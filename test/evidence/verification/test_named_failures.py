@@ -72,4 +72,4 @@ def test_the_page_has_every_report() -> None:
     for one in FAILURES.values():
         assert one.link in text and one.report in text
     for model in models_with_patch():
-        assert f'| {model} |' in text and f'{len(FAILURES)} of {len(FAILURES)} |' in text
+        assert f'| {model} |  | {len(FAILURES)} |' in text

@@ -17,22 +17,29 @@ from ...verification.named_failures import NamedFailure, load, replay_apart
 
 
 def reports_table(failures: Mapping[str, NamedFailure]) -> str:
-    """Return what was reported, with the thread, its numbers and the truth."""
+    """Return what was reported, with the thread and the truth."""
     return output.markdown_table(
-        ['', 'thread', 'reported', 'numbers from', 'separation'],
-        [[place, f'[{one.repo} {one.number}]({one.link})', one.report, one.source,
+        ['', 'Report', 'What happened', 'Separation'],
+        [[place, f'[{one.repo.partition("/")[2]} {one.number}]({one.link})'
+          f'{"*" if one.source.startswith("nearest") else ""}', one.report,
           f'{one.separation:.4g}'] for place, one in enumerate(failures.values(), start=1)],
-        words=4)
+        words=3)
 
 
 def passes_table(found: Mapping[str, Mapping[str, str]]) -> str:
-    """Return a row a contestant: '·' for what it passes, else a letter."""
-    places = range(1, 1 + len(next(iter(found.values()))))
-    return output.markdown_table(
-        ['', *map(str, places), 'passed'],
-        [[name, *('·' if not text else _letter(text) for text in faults.values()),
-          f'{sum(not text for text in faults.values())} of {len(faults)}']
-         for name, faults in found.items()])
+    """Return a row a contestant: how many it passes, and the others by letter."""
+    rows = []
+    for name, faults in found.items():
+        failed: dict[str, list[int]] = {}
+        for place, text in enumerate(faults.values(), start=1):
+            if text:
+                failed.setdefault(_letter(text), []).append(place)
+        rows.append([name, '; '.join(f'{letter} {", ".join(map(str, places))}'
+                                     for letter, places in failed.items()),
+                     sum(not text for text in faults.values())])
+    count = len(next(iter(found.values())))
+    return output.markdown_table(['Model or engine', 'Faults', f'Passed of {count}'], rows,
+                                 words=2)
 
 
 def _letter(text: str) -> str:
@@ -48,15 +55,14 @@ def write_named(folder: Path, command: str, models: Sequence[str]) -> int:
     rivals, missing = installed()
     engines = [*map(ours, models), *rivals]
     found = {engine.name: replay_apart(engine, failures) for engine in engines}
-    place = {name: number for number, name in enumerate(failures, start=1)}
     text = output.page(
         'evidence/reports/pages/named_failures', command=command,
         machine=output.machine(native, packages_of(engines)), reports=reports_table(failures),
-        passes=passes_table(found), skipped=''.join(f'\n\nLeft out: {line}.' for line in missing),
-        faults=output.markdown_table(['', 'report: fault'], [
-            [name, '; '.join(wrong)] for name, faults in found.items()
-            if (wrong := [f'{place[one]}: {text}' for one, text in faults.items() if text])],
-            words=2))
+        passes=passes_table(found), skipped=''.join(f'\n\nLeft out: {line}.' for line in missing))
     print(text)
+    for name, faults in found.items():
+        for one, fault in faults.items():
+            if fault:
+                print(f'{name}, {one}: {fault}')
     (folder / 'named_failures.md').write_text(text, encoding='utf-8')
     return int(any(text for model in models_with_patch() for text in found[model].values()))
