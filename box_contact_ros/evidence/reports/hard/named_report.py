@@ -17,29 +17,33 @@ from ...verification.named_failures import NamedFailure, load, replay_apart
 
 
 def reports_table(failures: Mapping[str, NamedFailure]) -> str:
-    """Return what was reported, with the thread and the truth."""
+    """Return what was reported, with the thread."""
     return output.markdown_table(
-        ['', 'Report', 'What happened', 'Separation'],
+        ['', 'Report', 'What happened'],
         [[place, f'[{one.repo.partition("/")[2]} {one.number}]({one.link})'
-          f'{"*" if one.source.startswith("nearest") else ""}', one.report,
-          f'{one.separation:.4g}'] for place, one in enumerate(failures.values(), start=1)],
+          f'{"*" if one.source.startswith("nearest") else ""}', one.report]
+         for place, one in enumerate(failures.values(), start=1)],
         words=3)
 
 
 def passes_table(found: Mapping[str, Mapping[str, str]]) -> str:
-    """Return a row a contestant: how many it passes, and the others by letter."""
-    rows = []
+    """Return who passes all, and a row for each other contestant: its faults by letter."""
+    rows, passed = [], []
     for name, faults in found.items():
         failed: dict[str, list[int]] = {}
         for place, text in enumerate(faults.values(), start=1):
             if text:
                 failed.setdefault(_letter(text), []).append(place)
-        rows.append([name, '; '.join(f'{letter} {", ".join(map(str, places))}'
-                                     for letter, places in failed.items()),
-                     sum(not text for text in faults.values())])
+        if failed:
+            rows.append([name, '; '.join(f'{letter} {", ".join(map(str, places))}'
+                                         for letter, places in failed.items()),
+                         sum(not text for text in faults.values())])
+        else:
+            passed.append(name)
     count = len(next(iter(found.values())))
-    return output.markdown_table(['Model or engine', 'Faults', f'Passed of {count}'], rows,
-                                 words=2)
+    table = output.markdown_table(['Model or engine', 'Faults', f'Passed of {count}'], rows,
+                                  words=2)
+    return f'All {count} pass with: {"; ".join(passed)}.\n\n{table}'
 
 
 def _letter(text: str) -> str:
