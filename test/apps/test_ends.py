@@ -40,12 +40,21 @@ def ends_soon(running, number):
 
 
 def children(pid):
-    """Return the processes that a process has started, in whatever group they are."""
+    """Return the processes that a process has started, in whatever group they are.
+
+    Before a child runs its own program, it borrows its parent's memory: who stops it then stops
+    the parent too, and no signal ends that.
+    """
+    def command(of):
+        return Path(f'/proc/{of}/cmdline').read_bytes()
+
     found = []
     for stat in Path('/proc').glob('[0-9]*/stat'):
         with contextlib.suppress(FileNotFoundError, ProcessLookupError):
-            if stat.read_text().rpartition(')')[2].split()[1] == str(pid):
-                found.append(int(stat.parent.name))
+            child = stat.parent.name
+            if (stat.read_text().rpartition(')')[2].split()[1] == str(pid)
+                    and command(child) != command(pid)):
+                found.append(int(child))
     return found
 
 

@@ -332,6 +332,15 @@ def test_blocks_with_ros2_say_what_they_need():
                     f'{page.name}: {found[2]}')
 
 
+def test_the_pages_are_short():
+    """At most 150 lines of README, and 25,000 words without the reports' results."""
+    assert len((ROOT / 'README.md').read_text('utf-8').splitlines()) <= 150
+    pages = [page for page in PAGES if page.parent == ROOT and page.name == 'README.md'
+             or ROOT / 'docs' in page.parents and ROOT / 'docs' / 'results' not in page.parents]
+    assert len(pages) > 40
+    assert sum(len(page.read_text('utf-8').split()) for page in pages) <= 25_000
+
+
 def test_the_load_comes_first_on_every_page():
     """One order of boxes for README, tutorials and laws of force, which take the load as A."""
     for page, _, text in blocks('python', 'cpp'):
