@@ -4,7 +4,6 @@
 """SIGINT and SIGTERM end view, record and crane soon, whatever they are doing."""
 from __future__ import annotations
 
-import contextlib
 import os
 import signal
 import socket
@@ -18,6 +17,7 @@ pytest.importorskip('viser')
 pytest.importorskip('mujoco')
 pytest.importorskip('rosbags')
 
+from children import children
 from ros_client import Client
 
 from box_contact_ros.apps.processes import Stop, asked_to_end
@@ -37,25 +37,6 @@ def ends_soon(running, number):
     took = time.monotonic() - start
     assert 'Traceback' not in running.output, running.output
     return took
-
-
-def children(pid):
-    """Return the processes that a process has started, in whatever group they are.
-
-    Before a child runs its own program, it borrows its parent's memory: who stops it then stops
-    the parent too, and no signal ends that.
-    """
-    def command(of):
-        return Path(f'/proc/{of}/cmdline').read_bytes()
-
-    found = []
-    for stat in Path('/proc').glob('[0-9]*/stat'):
-        with contextlib.suppress(FileNotFoundError, ProcessLookupError):
-            child = stat.parent.name
-            if (stat.read_text().rpartition(')')[2].split()[1] == str(pid)
-                    and command(child) != command(pid)):
-                found.append(int(child))
-    return found
 
 
 @BOTH

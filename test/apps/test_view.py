@@ -27,6 +27,7 @@ pytest.importorskip('viser')
 pytest.importorskip('mujoco')
 
 from browser import chromium, open_page
+from children import children
 from PIL import Image
 
 from box_contact_ros import ContactSolver
@@ -481,18 +482,6 @@ def test_it_switches_the_model_of_the_running_node(view, client, contact_node):
 
 
 # --- the program ----------------------------------------------------------------------------------
-
-
-def children(pid):
-    """Return the processes that a process has started, in whatever group they are."""
-    found = []
-    for stat in Path('/proc').glob('[0-9]*/stat'):
-        try:
-            if stat.read_text().rpartition(')')[2].split()[1] == str(pid):
-                found.append(int(stat.parent.name))
-        except (FileNotFoundError, ProcessLookupError):
-            continue
-    return found
 
 
 def start_view(program, *arguments):

@@ -57,18 +57,6 @@ def test_verdicts_and_refusals_are_sats():
         CUBES(IDENTITY, [0, 0, np.nan, 0, 0, 0, 1])
 
 
-def test_batch_is_row_by_row_with_sizes_of_their_own():
-    a, b, size_a, size_b = poses.random_pairs(np.random.default_rng(3), 60)
-    many = CUBES.batch(a, b, size_a=size_a, size_b=size_b)
-    assert 10 < many.colliding.sum() < 60
-    for row in range(len(a)):
-        one = ContactSolver(size_a[row], size_b[row], model='fcl')(a[row], b[row])
-        assert one.colliding == many.colliding[row]
-        assert np.array_equal(one.point, many.point[row], equal_nan=True)
-        assert np.array_equal(one.normal, many.normal[row], equal_nan=True)
-        assert one.separation == many.separation[row]
-
-
 def test_without_python_fcl_only_this_model_is_missing():
     """The core imports without it; the model raises ModuleNotFoundError, which programs explain."""
     code = ('import sys; sys.modules["fcl"] = None\n'

@@ -144,13 +144,14 @@ def test_exact_touch_is_always_answered():
     assert 0 < found.exact_answers < touch.sum()
 
 
-def test_batch_is_row_by_row_with_sizes_of_their_own():
+@pytest.mark.parametrize('model', ['soup-4', 'fcl'])
+def test_batch_is_row_by_row_with_sizes_of_their_own(model):
     a, b, size_a, size_b = poses.random_pairs(np.random.default_rng(3), 40)
-    solver = ContactSolver(poses.CUBE, poses.CUBE, model='soup-4')
-    many = solver.batch(a, b, size_a=size_a, size_b=size_b)
+    many = ContactSolver(poses.CUBE, poses.CUBE, model=model).batch(a, b, size_a=size_a,
+                                                                    size_b=size_b)
     assert 10 < many.colliding.sum() < 40
     for row in range(len(a)):
-        one = ContactSolver(size_a[row], size_b[row], model='soup-4')(a[row], b[row])
+        one = ContactSolver(size_a[row], size_b[row], model=model)(a[row], b[row])
         assert one.colliding == many.colliding[row]
         assert np.array_equal(one.point, many.point[row], equal_nan=True)
         assert np.array_equal(one.normal, many.normal[row], equal_nan=True)
