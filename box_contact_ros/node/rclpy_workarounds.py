@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from rclpy.context import Context
 from rclpy.event_handler import EventHandler
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.lifecycle import LifecycleNode
@@ -105,6 +106,20 @@ def ends_within(seconds: float) -> Iterator[None]:
         yield
     finally:
         faulthandler.cancel_dump_traceback_later()
+
+
+def shut_down(context: Context) -> None:
+    """Shut a context down, unless it is shut down already.
+
+    Symptom: a thread of rclpy's does the same after a signal; where both do it at once,
+    `try_shutdown` raises.
+    Test: test_runtime.py::test_two_threads_shut_a_context_down.
+    """
+    try:
+        context.try_shutdown()
+    except RCLError:
+        if context.ok():
+            raise
 
 
 def keep_for_ever(executor: Any) -> None:

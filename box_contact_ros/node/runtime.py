@@ -33,7 +33,13 @@ from rclpy.timer import Timer
 
 from ..resources import resource_path
 from .parameters import reason_of
-from .rclpy_workarounds import RCLError, UnknownROSArgsError, ends_within, keep_for_ever
+from .rclpy_workarounds import (
+    RCLError,
+    UnknownROSArgsError,
+    ends_within,
+    keep_for_ever,
+    shut_down,
+)
 
 EventsExecutor: Any = None
 with contextlib.suppress(ImportError):  # rclpy before 7.1.4
@@ -198,36 +204,40 @@ def let_callbacks_finish() -> None:
 
 
 @contextlib.contextmanager
-def interrupted_once() -> Iterator[Callable[[], None]]:
-    """Let the first Ctrl-C raise KeyboardInterrupt, and ignore others until the process has ended.
+def interrupts_noted() -> Iterator[Callable[[], bool]]:
+    """Let Ctrl-C raise nothing in the block, nor later if one came; yield whether one came.
 
-    A further one would break the clean end that is under way. Yields a function that begins the
-    end: from its call on Ctrl-C is ignored. Handlers of the caller's own stay.
+    KeyboardInterrupt may fall anywhere in rclpy: where a lock is held that the clean end needs, or
+    in EventsExecutor, which then aborts the process. Handlers of the caller's own stay.
     """
     if (threading.current_thread() is not threading.main_thread()  # only that one may
             or signal.getsignal(signal.SIGINT) is not signal.default_int_handler):
-        yield lambda: None
+        yield lambda: False
         return
-    ending = heard = False
+    heard = False
 
-    def interrupt(number: int, frame: object) -> None:
-        nonlocal ending, heard
-        if not ending:
-            ending = heard = True
-            raise KeyboardInterrupt
+    def note(number: int, frame: object) -> None:
+        nonlocal heard
+        heard = True
 
-    def end() -> None:
-        nonlocal ending
-        ending = True
-
-    signal.signal(signal.SIGINT, interrupt)
+    signal.signal(signal.SIGINT, note)
     try:
-        yield end
+        yield lambda: heard
     finally:
         if not heard:
             signal.signal(signal.SIGINT, signal.default_int_handler)
-        # While the interpreter ends it takes its handlers back, and a signal would kill it.
-        atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)
+        atexit.register(_ignore_signals)
+
+
+def _ignore_signals() -> None:
+    """Let no signal disturb the interpreter's end.
+
+    It takes its handlers back, and so does rclpy: the next signal would kill the process. rclpy's
+    thread for signals would use what the end destroys.
+    """
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_IGN)
+    rclpy.signals.uninstall_signal_handlers()
 
 
 def free_read_messages() -> None:
@@ -267,13 +277,15 @@ def joined(make_node: Callable[[Context], NodeKind], args: Sequence[str] | None 
            ) -> Iterator[tuple[NodeKind, Any]]:
     """Give a node and its executor in a context of their own; end all three afterwards.
 
-    signals: which handlers of rclpy's are installed; none where the caller has its own. After a
-    signal, whatever was under way fails; that is raised as ExternalShutdownException.
+    signals: which handlers of rclpy's are installed; none where the caller has its own. They shut
+    the context down. Whatever then fails is raised as KeyboardInterrupt after Ctrl-C, and as
+    ExternalShutdownException after SIGTERM.
     """
     free_read_messages()
     context = Context()
     node = executor = None
-    with interrupted_once() as begin_end:
+    handled = signals is not SignalHandlerOptions.NO
+    with interrupts_noted() if handled else contextlib.nullcontext(lambda: False) as interrupted:
         # Handlers have to be asked for where the context is not the default one.
         try:
             rclpy.init(args=None if args is None else list(args), context=context,
@@ -282,6 +294,8 @@ def joined(make_node: Callable[[Context], NodeKind], args: Sequence[str] | None 
             raise ValueError(f'after --ros-args, ROS does not know {error}: a parameter is '
                              '-p NAME:=VALUE, a name is remapped by -r FROM:=TO') from error
         try:
+            if interrupted():  # before rclpy's handlers were installed
+                raise KeyboardInterrupt
             node = make_node(context)
             executor = make_executor(context)
             executor.add_node(node)
@@ -289,16 +303,15 @@ def joined(make_node: Callable[[Context], NodeKind], args: Sequence[str] | None 
         except Exception as error:
             if context.ok():
                 raise
-            raise ExternalShutdownException from error
+            raise (KeyboardInterrupt if interrupted() else ExternalShutdownException) from error
         finally:
-            begin_end()
-            with ends_within(END_SECONDS):
-                if executor is not None:
-                    executor.shutdown()
-                    keep_for_ever(executor)
+            with ends_within(END_SECONDS), contextlib.ExitStack() as last_first:
+                last_first.callback(shut_down, context)
                 if node is not None:
-                    node.destroy_node()
-                context.try_shutdown()
+                    last_first.callback(node.destroy_node)
+                if executor is not None:
+                    keep_for_ever(executor)
+                    last_first.callback(executor.shutdown)
 
 
 def spin(node: Node, executor: Any) -> None:

@@ -199,7 +199,7 @@ def test_ends_cleanly(program, number):
     running = program('contact_node', *arguments())
     running.wait_for_output('ready', 120)
     running.signal(number)
-    assert running.wait() == 0
+    assert running.wait() == 0, running.output
     assert 'Traceback' not in running.output
 
 
@@ -211,8 +211,19 @@ def test_interrupted_twice(program, pause):
     running.signal(signal.SIGINT)
     time.sleep(pause)
     running.signal(signal.SIGINT)
-    assert running.wait(60) == 0
+    assert running.wait(60) == 0, running.output
     assert 'Traceback' not in running.output
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_signalled_until_it_has_ended(program, number):
+    """EventsExecutor aborted where KeyboardInterrupt fell; late SIGTERMs killed the process."""
+    running = program('contact_node', *arguments())
+    running.wait_for_output('ready', 120)
+    while running.process.poll() is None:
+        running.signal(number)
+        time.sleep(0.0002)
+    assert running.wait() == 0, running.output
 
 
 def test_weights_that_nobody_reads_are_said(capfd):

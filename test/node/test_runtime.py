@@ -17,6 +17,7 @@ import poses
 import pytest
 from rclpy.event_handler import UnsupportedEventTypeError
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
@@ -25,6 +26,7 @@ from ros_client import Client, serving
 from box_contact_ros.node import contact_node, contact_program, runtime
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.parameters import answer_help
+from box_contact_ros.node.rclpy_workarounds import RCLError, shut_down
 from box_contact_ros.node.topics import scene_topics
 from box_contact_ros.node.topics.qos_events import QosEvents
 from box_contact_ros.scene.stamp_pairing import RESETS
@@ -37,7 +39,7 @@ TOUCHING = (0.5, 0.25, 1.875, 0, 0, 0, 1)
 def run(monkeypatch):
     """`run_node` with the test's own signal handlers, and its threads as they are."""
     monkeypatch.setattr(runtime, 'SignalHandlerOptions',
-                        SimpleNamespace(ALL=SignalHandlerOptions.NO))
+                        SimpleNamespace(ALL=SignalHandlerOptions.NO, NO=SignalHandlerOptions.NO))
     return lambda make_node: runtime.run_node(make_node, [], undisturbed=False)
 
 
@@ -126,20 +128,89 @@ def test_other_threads_become_batch_threads(monkeypatch):
     runtime.let_callbacks_finish()
 
 
-def test_the_first_interrupt_counts(monkeypatch):
-    """And none once the end has begun. What was there before comes back, if none was heard."""
+SIGNALLED = """
+import signal, sys
+from geometry_msgs.msg import PoseStamped
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from box_contact_ros.node import runtime
+
+number, when = int(sys.argv[1]), sys.argv[2]
+begin = runtime.rclpy.init
+
+def begin_late(**options):
+    signal.raise_signal(number)
+    begin(**options)
+
+if when == 'before':  # rclpy has its handlers
+    runtime.rclpy.init = begin_late
+try:
+    with runtime.joined(lambda context: Node('signalled', context=context), [],
+                        signals=SignalHandlerOptions.ALL) as (node, executor):
+        signal.raise_signal(number)
+        signal.raise_signal(number)
+        print('not here')
+        runtime.spin(node, executor)
+        node.create_publisher(PoseStamped, 'late', 1)
+except (KeyboardInterrupt, ExternalShutdownException) as end:
+    print(type(end).__name__)
+signal.raise_signal(number)
+"""
+
+
+@pytest.mark.parametrize('number, when, words', [
+    (signal.SIGINT, 'within', 'not here\nKeyboardInterrupt\n'),
+    (signal.SIGTERM, 'within', 'not here\nExternalShutdownException\n'),
+    (signal.SIGINT, 'before', 'KeyboardInterrupt\n')])
+def test_a_signal_falls_nowhere(number, when, words):
+    """It shuts the context down, and what fails at that tells which signal it was."""
+    done = subprocess.run([sys.executable, '-c', SIGNALLED, str(int(number)), when],
+                          capture_output=True, text=True, timeout=50)
+    assert (done.returncode, done.stdout) == (0, words), done.stderr
+
+
+def test_an_interrupt_is_noted(monkeypatch):
+    """What was there before comes back, if none was heard."""
     monkeypatch.setattr(runtime.atexit, 'register', lambda *_: None)
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
-        with runtime.interrupted_once() as begin_end:
-            begin_end()
-            signal.raise_signal(signal.SIGINT)
+        with runtime.interrupts_noted() as interrupted:
+            assert not interrupted()
         assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
-        with pytest.raises(KeyboardInterrupt), runtime.interrupted_once():
+        with runtime.interrupts_noted() as interrupted:
             signal.raise_signal(signal.SIGINT)
+            assert interrupted()
         signal.raise_signal(signal.SIGINT)
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+def test_an_end_that_fails_goes_on(monkeypatch):
+    """What an executor cannot let go of leaves neither the node nor the context behind."""
+    def fail():
+        raise RuntimeError('not now')
+
+    kept = []
+    monkeypatch.setattr(runtime, 'make_executor', lambda _: SimpleNamespace(
+        add_node=lambda _: None, shutdown=fail))
+    monkeypatch.setattr(runtime, 'keep_for_ever', kept.append)
+    with pytest.raises(RuntimeError, match='not now'), runtime.joined(
+            lambda context: Node('left', context=context), []) as (node, executor):
+        context = node.context
+    assert kept == [executor] and not context.ok()
+    with pytest.raises(rclpy_implementation.InvalidHandle):
+        node.get_name()
+
+
+def test_two_threads_shut_a_context_down():
+    """Whatever fails otherwise is raised."""
+    def fail():
+        raise RCLError('rcl_shutdown already called')
+
+    shut_down(SimpleNamespace(try_shutdown=fail, ok=lambda: False))
+    with pytest.raises(RCLError):
+        shut_down(SimpleNamespace(try_shutdown=fail, ok=lambda: True))
 
 
 def test_handlers_of_other_threads_and_callers_stay():
@@ -150,7 +221,7 @@ def test_handlers_of_other_threads_and_callers_stay():
     seen, before = [], signal.getsignal(signal.SIGINT)
 
     def look():
-        with runtime.interrupted_once():
+        with runtime.interrupts_noted():
             seen.append(signal.getsignal(signal.SIGINT))
 
     thread = Thread(target=look)
