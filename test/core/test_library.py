@@ -40,10 +40,10 @@ WEIGHTS = resource_path('weights', 'mlp.safetensors')
 STRICT = ('-Wall', '-Wextra', '-Werror', '-pedantic')
 EXAMPLE_SAYS = [
     'height 2.600 m: no contact, gap 0.009 m',
-    'height 2.590 m: contact, depth 0.001 m, normal (0.000, 0.000, 1.000), '
+    'height 2.590 m: contact, depth 0.001 m, normal (0.000, -0.000, -1.000), '
     'point (0.142, 0.044, 1.295) m',
     'batch: 1 0, volumes 0.030 0.000 m3, first refused row -1',
-    'refused: pose_b quaternion (0, 0, 0, 0) has no length within 1e-100 to 1e100']
+    'refused: pose_a quaternion (0, 0, 0, 0) has no length within 1e-100 to 1e100']
 
 
 def run(*words: object, **environment: str) -> str:
@@ -234,6 +234,9 @@ def test_by_find_package_of_pip(tmp_path: Path) -> None:
     assert places == PLACES['--cmakedir']
     configure(EXAMPLE, tmp_path, f'-Dbox_contact_ros_DIR={places}')
     assert example(tmp_path / 'first_contact') == EXAMPLE_SAYS
+    says = example(tmp_path / 'stack')
+    assert len(says) == 3
+    assert '\n'.join(f'//   {line}' for line in says) in (EXAMPLE / 'stack.cpp').read_text()
     (tmp_path / 'CMakeLists.txt').write_text(
         'cmake_minimum_required(VERSION 3.18)\nproject(one LANGUAGES CXX)\n'
         'find_package(box_contact_ros 0.1 REQUIRED)\n'
@@ -256,6 +259,47 @@ def test_by_pkg_config(tmp_path: Path) -> None:
     run(tool('g++'), '-std=c++17', EXAMPLE / 'first_contact.cpp', *found.split(), '-o',
         tmp_path / 'one')
     assert example(tmp_path / 'one') == EXAMPLE_SAYS
+
+
+ROWS = """
+#include <cstdio>
+#include <vector>
+#include "box_contact/box_contact.hpp"
+using namespace box_contact;
+
+int main() {
+  const Solver solver({1, 1, 1}, {1, 1, 1});
+  const std::vector<Pose> poses{{{0, 0, 0}, {0, 0, 0, 1}}, {{0, 0, 2.5}, {0, 0, 0, 1}}};
+  const std::vector<Size> sizes{{2, 2, 2}, {4, 4, 4}};
+  std::vector<std::int64_t> pairs{1, 0};
+  std::vector<double> separation(2, 7.0);
+  Results results;
+  results.separation = separation.data();
+  const auto refused = solver.batch({poses, poses, sizes, sizes, pairs}, results);
+  std::printf("%d %g %g\\n", int(refused), separation[0], separation[1]);
+  solver.batch({poses, poses, sizes, sizes, std::vector<std::int64_t>()}, results);
+  std::printf("%g %g\\n", separation[0], separation[1]);
+  solver.batch({poses, poses, sizes, sizes}, results);
+  std::printf("%g %g\\n", separation[0], separation[1]);
+}
+"""
+
+
+def test_rows_by_place(tmp_path: Path) -> None:
+    """Sizes go with poses; a tick without near pairs has no rows, and not all of them."""
+    (tmp_path / 'rows.cpp').write_text(ROWS)
+    run(tool('g++'), '-std=c++17', *STRICT, PLACES['--includes'], tmp_path / 'rows.cpp', LIBRARY,
+        f'-Wl,-rpath,{CORE}', '-o', tmp_path / 'rows')
+    assert run(tmp_path / 'rows') == '-1 -0.5 7\n-0.5 7\n-2 -4\n'
+
+
+def test_a_debug_build_is_as_fast(tmp_path: Path) -> None:
+    """The library is optimised whatever the simulator's configuration."""
+    run(tool('cmake'), '-S', ROOT, '-B', tmp_path, '-DCMAKE_BUILD_TYPE=Debug',
+        '-DCMAKE_EXPORT_COMPILE_COMMANDS=ON')
+    commands = json.loads((tmp_path / 'compile_commands.json').read_text())
+    assert len(commands) >= 3
+    assert all(' -O3 ' in command['command'] for command in commands)
 
 
 FORMS = """

@@ -12,11 +12,11 @@ int main() {
   const box_contact::Size container{12.192, 2.438, 2.591};
   const box_contact::Solver solver(container, container);
 
-  // A stands at the origin. B comes down on it, turned by 2 · asin(0.02) about the vertical axis.
-  const box_contact::Pose a{{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 1.0}};
-  box_contact::Pose b{{0.5, 0.1, 2.6}, {0.0, 0.0, 0.02, 0.9998}};
+  // B stands at the origin. A comes down on it, turned by 2 · asin(0.02) about the vertical axis.
+  box_contact::Pose a{{0.5, 0.1, 2.6}, {0.0, 0.0, 0.02, 0.9998}};
+  const box_contact::Pose b{{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 1.0}};
   for (double height : {2.6, 2.59}) {
-    b.position[2] = height;
+    a.position[2] = height;
     const box_contact::Contact contact = solver(a, b);
     if (!contact.colliding) {
       std::printf("height %.3f m: no contact, gap %.3f m\n", height, contact.separation);
@@ -30,8 +30,8 @@ int main() {
   }
 
   // Rows of poses are solved some at a time, into your arrays. What has no array is not computed.
-  const box_contact::Pose poses_a[2] = {a, a};
-  const box_contact::Pose poses_b[2] = {{{0, 0, 2.59}, {0, 0, 0, 1}}, {{0, 2.5, 0}, {0, 0, 0, 1}}};
+  const box_contact::Pose poses_a[2] = {{{0, 0, 2.59}, {0, 0, 0, 1}}, {{0, 2.5, 0}, {0, 0, 0, 1}}};
+  const box_contact::Pose poses_b[2] = {b, b};
   bool colliding[2];
   double volume[2];
   box_contact::Results results;
@@ -42,7 +42,7 @@ int main() {
               colliding[1], volume[0], volume[1], int(refused));
 
   try {
-    b.quaternion[2] = b.quaternion[3] = 0.0;
+    a.quaternion[2] = a.quaternion[3] = 0.0;
     solver(a, b);
   } catch (const std::invalid_argument& error) {
     std::printf("refused: %s\n", error.what());

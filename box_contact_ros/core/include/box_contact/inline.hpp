@@ -4,8 +4,8 @@
 // libbox_contact as headers alone, for those who want the compiler to inline a call.
 //
 //   #include "box_contact/inline.hpp"
-//   box_contact::Solver solver({2.0, 2.0, 2.0}, {1.0, 1.0, 1.0});  // full extents [m]
-//   box_contact::Contact contact = solver({{0, 0, 0}, {0, 0, 0, 1}}, {{0, 0, 1.49}, {0, 0, 0, 1}});
+//   box_contact::Solver solver({1.0, 1.0, 1.0}, {2.0, 2.0, 2.0});  // full extents [m]
+//   box_contact::Contact contact = solver({{0, 0, 1.49}, {0, 0, 0, 1}}, {{0, 0, 0}, {0, 0, 0, 1}});
 //
 // Most programs take box_contact.hpp, which compiles at once. A file that includes this one compiles
 // for ten seconds with -O3. Classes have the names of box_contact.hpp, so a file includes one of the
@@ -15,7 +15,9 @@
 // No flag is needed. The pragmas below keep g++ and clang++ from fusing products and sums, within
 // this header alone. All names are in a namespace of the instruction set, so that files compiled with
 // different -march can be linked. With -march=x86-64-v3 or -v4 a batch solves 4 or 8 pairs side by
-// side instead of 2. MSVC has no vector types and cannot compile it.
+// side instead of 2. Without them g++ notes that the ABI of wide vectors has changed: these vectors
+// stay within this header, and -Wno-psabi silences the note. MSVC has no vector types and cannot
+// compile it.
 #pragma once
 
 #if defined(BOX_CONTACT_HPP)
@@ -49,9 +51,6 @@
 #pragma float_control(push)
 #pragma clang fp contract(off)
 #else
-// Vectors wider than the machine's registers are passed between inlined functions only. g++ notes
-// this at the end of the file, where templates are compiled. So the note stays off.
-#pragma GCC diagnostic ignored "-Wpsabi"
 #pragma GCC push_options
 #pragma GCC optimize("fp-contract=off", "no-tree-slp-vectorize")
 #endif
