@@ -46,7 +46,7 @@ PARAMETERS = {
     'tolerance': Setting(0.0, 'with pairing stamp: stamps this far apart still belong together [s]',
                          number(0.0, LONGEST)),
     'max_age': Setting(1.0, 'a pose that is older than this at its tick, by the stamps, is '
-                            'stale: its pairs are answered with NaN; longer than the slowest '
+                            'stale: its pairs get no contact; longer than the slowest '
                             'period; 0: never [s]', number(0.0, LONGEST)),
     'deadline': Setting(0.0, 'quality of service that pose publishers must offer: longest time '
                              'between poses; 0: none [s]', number(0.0, LONGEST)),

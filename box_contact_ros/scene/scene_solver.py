@@ -347,7 +347,8 @@ class SceneSolver:
         """
         if len(poses) != len(self.scene.moving):
             raise ValueError(f'{len(poses)} poses, but {len(self.scene.moving)} boxes move: '
-                             f'{shown(list(self.scene.moving))}')
+                             f'{shown(list(self.scene.moving))}; give a list of a pose or None '
+                             'for each')
         if isinstance(poses, np.ndarray):
             rows = as_floats(poses, 'poses', 'poses (n, 7)', (None, 7))
             absent = absent_poses(rows)
@@ -370,7 +371,7 @@ class SceneSolver:
             if pose is not None:
                 if type(pose) is not np.ndarray or pose.dtype != np.float64 or pose.shape != (7,):
                     box = list(self.scene.boxes)[number]
-                    pose = as_floats(pose, f'pose of {box}', 'a pose (7,)', (7,))
+                    pose = as_floats(pose, f'pose of {box}', 'a pose (x y z qx qy qz qw)', (7,))
                 self._poses[number] = pose
         return self._tick()
 

@@ -122,7 +122,8 @@ class ModelEntry:
             if not self.extra:
                 raise
             raise ModuleNotFoundError(
-                f'{error}: model {self.name!r} needs the extra {self.extra!r} of box_contact_ros',
+                f'{error}: model {self.name!r} needs the extra {self.extra!r} of box_contact_ros: '
+                f"in the checkout, pip install -c constraints.txt -e '.[{self.extra}]'",
                 name=error.name) from None
 
     def options(self, name: str) -> dict[str, int] | None:

@@ -3,9 +3,9 @@
 
 """Hold the patches that a contact node sends: `python docs/examples/held_patch_client.py`.
 
-Start `contact_node` first. The client asks 200 times a second, and its answers come 2 ms late. It
-holds each answer with the poses that it was asked for. At every physics step the law then gives the
-wrench for the pose of that step.
+Start `box_contact_contact_node` first. The client asks 200 times a second, and its answers come 2
+ms late. It holds each answer with the poses that it was asked for. At every physics step the law
+then gives the wrench for the pose of that step.
 
 It prints:
 

@@ -3,9 +3,9 @@
 
 """Ask a contact node in lockstep: `python docs/examples/lockstep_client.py`.
 
-Start `contact_node` first. A simulator that waits for each answer loses none, however fast or slow
-it runs. It sends both poses with one stamp, and waits for the contacts of that stamp. The stamps
-are the simulator's own time.
+Start `box_contact_contact_node` first. A simulator that waits for each answer loses none, however
+fast or slow it runs. It sends both poses with one stamp, and waits for the contacts of that stamp.
+The stamps are the simulator's own time.
 
 It prints:
 
@@ -42,6 +42,7 @@ class LockstepClient(Node):
 
     def wait_for_node(self) -> None:
         """Wait until the node listens to both poses and this client hears its answers."""
+        self.get_logger().info(f'waits for a contact node that publishes {self.topic}')
         while not (all(pose.get_subscription_count() for pose in self.poses)
                    and self.count_publishers(self.topic)):
             rclpy.spin_once(self, timeout_sec=0.05)

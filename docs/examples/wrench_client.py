@@ -4,7 +4,7 @@
 """Apply the wrench that a contact node sends: `python docs/examples/wrench_client.py`.
 
 For a simulator that knows nothing of contacts. Start the node first, with the mass and the rate:
-`contact_node --ros-args -p wrench:=true -p rate:=200 -p mass_a:=20000`.
+`box_contact_contact_node --ros-args -p wrench:=true -p rate:=200 -p mass_a:=20000`.
 
 It prints:
 

@@ -217,7 +217,7 @@ def test_interrupted_twice(program, pause):
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 def test_signalled_until_it_has_ended(program, number):
-    """EventsExecutor aborted where KeyboardInterrupt fell; late SIGTERMs killed the process."""
+    """It aborted where KeyboardInterrupt fell in EventsExecutor; late SIGTERMs killed it."""
     running = program('contact_node', *arguments())
     running.wait_for_output('ready', 120)
     while running.process.poll() is None:

@@ -10,6 +10,7 @@ of fails.
 """
 from __future__ import annotations
 
+import codeop
 import contextlib
 import io
 import os
@@ -376,6 +377,19 @@ def test_python_example(text, lines, program, tmp_path, monkeypatch):
     with contextlib.redirect_stdout(io.StringIO()) as printed:
         exec(compile(text, 'example', 'exec'), {'__name__': 'example'})
     assert printed.getvalue().splitlines() == lines
+
+
+@pytest.mark.parametrize(('text', 'lines'), list(examples()))
+def test_python_example_can_be_pasted(text, lines):
+    """Into `python`, where a blank line ends a loop: without it the next line is a SyntaxError."""
+    if text.startswith(' '):
+        pytest.skip('a part of a file')
+    typed = []
+    for line in [*text.splitlines(), '']:
+        typed.append(line)
+        if codeop.compile_command('\n'.join(typed), symbol='single'):
+            typed.clear()
+    assert not any(typed), typed
 
 
 def test_extras_of_every_program():

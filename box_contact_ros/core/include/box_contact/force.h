@@ -85,7 +85,7 @@ BC_API void bc_law_destroy(bc_law* law);
 /* Forget all patches: bodies were put elsewhere. */
 BC_API void bc_law_reset(bc_law* law);
 
-/* Ω [1/s]: no body oscillates faster on its patches. It rests at the depth gravity / Ω². */
+/* Ω [1/s]: no body oscillates faster on its patches. One alone rests at the depth gravity / Ω². */
 BC_API double bc_law_frequency(const bc_law* law);
 
 /* Hold these contacts, asked for at `poses` (one for each body), in any order. Pairs that are left
