@@ -261,6 +261,17 @@ class RunningProgram:
 
 
 @pytest.fixture
+def signal_handlers() -> Iterator[None]:
+    """Give back the handlers of signals: a program that was asked to end keeps its own."""
+    before = {number: signal.getsignal(number)
+              for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    yield
+    for number, handler in before.items():
+        if handler is not None:
+            signal.signal(number, handler)
+
+
+@pytest.fixture
 def program(tmp_path: Path) -> Iterator[Callable[..., RunningProgram]]:
     """Start `python -m box_contact_ros PROGRAM ...`; it is ended with the test, however that ends.
 

@@ -8,6 +8,7 @@ Imports no rclpy: the demonstration starts and ends both its processes from outs
 from __future__ import annotations
 
 import argparse
+import atexit
 import contextlib
 import json
 import os
@@ -16,7 +17,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import IO, Any
 
 from ..solver.arguments import within
@@ -130,10 +131,18 @@ def asked_to_end() -> Iterator[Stop]:
     """Turn SIGINT, SIGTERM and SIGHUP into a flag.
 
     An exception could fall between a subprocess's start and its entry in a list, and orphan it.
+    After the first signal the process is about to end, and further ones stay without effect.
     """
-    stop = Stop()
-    with _handled_by(stop.take, signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+    stop, numbers = Stop(), (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    before = {number: signal.signal(number, stop.take) for number in numbers}
+    try:
         yield stop
+    finally:
+        for number, earlier in before.items():
+            if stop.signals:
+                atexit.register(signal.signal, number, signal.SIG_IGN)
+            else:
+                signal.signal(number, earlier)
 
 
 @contextlib.contextmanager
@@ -142,13 +151,7 @@ def left_when_asked() -> Iterator[None]:
     def leave(number: int, _frame: Any) -> None:
         sys.exit(128 + number)
 
-    with _handled_by(leave, signal.SIGTERM, signal.SIGHUP):
-        yield
-
-
-@contextlib.contextmanager
-def _handled_by(handler: Callable[[int, Any], None], *numbers: signal.Signals) -> Iterator[None]:
-    before = {number: signal.signal(number, handler) for number in numbers}
+    before = {number: signal.signal(number, leave) for number in (signal.SIGTERM, signal.SIGHUP)}
     try:
         yield
     finally:

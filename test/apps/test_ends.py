@@ -24,6 +24,8 @@ from box_contact_ros.apps.processes import Stop, asked_to_end
 from box_contact_ros.apps.recording import bag_player
 from box_contact_ros.apps.viewer import view
 
+pytestmark = pytest.mark.usefixtures('signal_handlers')
+
 END_SECONDS = 2.0
 OFFERS = 200  # answers that the crane gets only after it began to move
 BOTH = pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
@@ -86,6 +88,18 @@ def test_view_whose_node_and_clients_stand_still(program, number):
             os.kill(pid, signal.SIGSTOP)
         assert ends_soon(running, number) < END_SECONDS
     assert not [pid for pid in started if Path(f'/proc/{pid}').exists()]
+
+
+@BOTH
+def test_view_asked_again_and_again(program, number):
+    """The last of many signals fell on the interpreter's end, and gave a status of its own."""
+    running = program('view', '--no-browser', '--port', '8601', '--domain',
+                      os.environ['ROS_DOMAIN_ID'], '--model', 'exact')
+    running.wait_for_output('Ctrl-C')
+    while running.process.poll() is None:
+        running.process.send_signal(number)
+        time.sleep(0.0005)
+    assert running.wait() == (0 if number == signal.SIGINT else 143), running.output
 
 
 @pytest.fixture

@@ -15,6 +15,8 @@ import pytest
 
 from box_contact_ros.apps import processes
 
+pytestmark = pytest.mark.usefixtures('signal_handlers')
+
 STORM = """
 import os, signal, threading, time
 from box_contact_ros.apps.processes import asked_to_end
@@ -47,7 +49,6 @@ def test_signals_at_any_moment_do_not_hang():
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_ends_the_wait_and_says_the_status(number):
-    before = signal.getsignal(number)
     with processes.asked_to_end() as stop:
         assert not stop.is_set() and stop.status == 0 and not stop.wait(0.0)
         threading.Timer(0.1, os.kill, (os.getpid(), number)).start()
@@ -55,7 +56,15 @@ def test_a_signal_ends_the_wait_and_says_the_status(number):
         assert stop.wait(20.0) and stop.is_set()
         assert time.monotonic() - began < 10.0
         assert stop.status == 128 + number
-    assert signal.getsignal(number) == before
+    os.kill(os.getpid(), number)  # once more, while the process ends
+    assert len(stop.signals) == 2
+
+
+def test_without_a_signal_the_handlers_come_back():
+    before = signal.getsignal(signal.SIGINT)
+    with processes.asked_to_end():
+        assert signal.getsignal(signal.SIGINT) != before
+    assert signal.getsignal(signal.SIGINT) == before
 
 
 def test_a_child_that_does_not_listen_is_killed(monkeypatch):
