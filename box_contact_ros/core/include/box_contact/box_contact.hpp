@@ -19,9 +19,9 @@
 //       gap of the separating-axis test, at most the distance.
 //   normal: unit vector, common frame, from A to B. Moving B by depth · normal separates the boxes.
 //   axis: the winning axis. 0–2: faces of A. 3–5: faces of B. 6 + 3 i + j: the edges a_i × b_j.
-//   point [m], common frame: the centroid of A∩B, inside both boxes but for its error. The error of model `exact` is at
-//       most max(1e-9, 1e-14 · size / depth) · size. That of model `mlp` is below 0.01 % of the
-//       smaller box's longest edge in 99 of 100 contacts.
+//   point [m], common frame: the centroid of A∩B, inside both boxes but for its error. The error of
+//       model `exact` is at most max(1e-9, 1e-14 · size / depth) · size. That of model `mlp` is below
+//       0.01 % of the smaller box's longest edge in 99 of 100 contacts.
 //   volume [m³] of A∩B. The error of model `exact` is at most max(1e-9, 1e-14 · size / depth) of it.
 //       That of model `mlp` is at most 1 %, plus rounding.
 //   covariance [m²], common frame: the second central moments of A∩B divided by its volume. The
@@ -32,8 +32,8 @@
 // separation exceeds the margin, 0 by default. A contact shallower than 1e-9 · size has the point,
 // volume and covariance of boxes that were pressed in to this depth.
 //
-// No compiler flag is needed. The library contains code for every instruction set, and uses the best
-// one that the machine can run.
+// No compiler flag is needed. The library contains code for several instruction sets, and uses the
+// best one that the machine can run.
 #ifndef BOX_CONTACT_HPP
 #define BOX_CONTACT_HPP
 
