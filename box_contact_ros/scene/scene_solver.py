@@ -154,6 +154,10 @@ class Fault(ValueError):
 def _check(boxes: Mapping[str, Box], pairs: Sequence[Pair]) -> None:
     """Raise Fault for the first thing that is wrong with a scene."""
     for name, box in boxes.items():
+        for key, given, count in (('size', box.size, 3), ('pose', box.pose, 7)):
+            if given is not None and (not isinstance(given, tuple | list) or len(given) != count):
+                raise Fault(('boxes', name, key),
+                            f'must be a tuple of {count} numbers, not {shown(given)}')
         fault = size_fault(box.size)
         if fault:
             raise Fault(('boxes', name, 'size'), fault)
@@ -180,7 +184,7 @@ def _check(boxes: Mapping[str, Box], pairs: Sequence[Pair]) -> None:
             raise Fault(place, f'{shown(pair.a)} and {shown(pair.b)} are both fixed')
     for what, field, values in (
             ('id', ('id',), [pair.id for pair in pairs]),
-            ('name', ('name',), [pair.name for pair in pairs]),
+            ('name', ('name',), [pair.label for pair in pairs]),
             ('pair of boxes', (), [tuple(sorted(pair[2:])) for pair in pairs])):
         first_of: dict[object, int] = {}
         for number, value in enumerate(values):
@@ -273,7 +277,7 @@ class SceneSolver:
             self._keys = keys[self._by_key]
         pair = scene.pairs[0]
         self._solver = ContactSolver(scene.boxes[pair.a].size, scene.boxes[pair.b].size,
-                                     model=model, weights=weights)
+                                     model=model, weights=weights, margin=margin)
         # A single pair needs no test and no batch. Its sides are among the poses, then fixed ones.
         self._only = pair if len(scene.pairs) == 1 else None
         self._in_order = scene.moving == (pair.a, pair.b)

@@ -102,6 +102,8 @@ def as_floats(value: ArrayLike, name: str, shapes: str, *accepted: tuple[int | N
     """
     try:
         array = np.asarray(value)
+        if isinstance(value, np.ma.MaskedArray):
+            raise TypeError('a mask would be ignored')
         if not _holds_numbers(array):
             raise TypeError(f'{array.dtype} is no kind of number')
         with np.errstate(over='ignore', invalid='ignore'):  # infinity and NaN are refused later
@@ -121,6 +123,8 @@ def as_places(value: ArrayLike, name: str, count: int) -> np.ndarray:
         array = np.asarray(value)
     except (TypeError, ValueError, OverflowError):
         array = np.empty(0, dtype=object)
+    if array.shape == (0,):  # an empty list
+        array = array.reshape(0, 2)
     if array.dtype.kind not in 'iu' and not (array.size == 0 and array.ndim == 2):
         raise ValueError(f'{name} must be whole numbers (n, 2), not {shown(value)}')
     if array.ndim != 2 or array.shape[1] != 2:

@@ -4,6 +4,7 @@
 """The laws of force against closed forms, sums over columns, and laws that any such law keeps."""
 from __future__ import annotations
 
+import copy
 import math
 import re
 from pathlib import Path
@@ -16,6 +17,7 @@ from box_contact_ros import (
     ContactSolver,
     HeldPatch,
     PatchLaw,
+    Predictor,
     SceneLaw,
     SceneSolver,
 )
@@ -503,14 +505,48 @@ def test_a_copy_goes_its_own_way_and_reset_forgets():
     law = fresh()
     law.hold(slab(), LEVEL)
     law.wrench(LEVEL, STILL)
-    copy, pose = law.copy(), moved(LEVEL, (1e-6, 0, 0))
-    assert np.array_equal(law.wrench(pose, STILL), copy.wrench(pose, STILL))
+    other, pose = law.copy(), moved(LEVEL, (1e-6, 0, 0))
+    assert np.array_equal(law.wrench(pose, STILL), other.wrench(pose, STILL))
     law.wrench(LEVEL, STILL)
-    assert copy.wrench(pose, STILL)[0] < 0.0
+    assert other.wrench(pose, STILL)[0] < 0.0
     law.reset()
     assert not law.wrench(pose, STILL).any()
-    assert copy.wrench(pose, STILL).any()
+    assert other.wrench(pose, STILL).any()
     assert np.array_equal(wrench_of(slab(), law=law), wrench_of(slab()))
+
+
+@pytest.mark.parametrize('copied', [copy.copy, copy.deepcopy])
+def test_every_copy_goes_its_own_way(copied):
+    law = fresh()
+    law.hold(slab(), LEVEL)
+    copied(law).reset()
+    assert law.wrench(LEVEL, STILL).any()
+
+
+@pytest.mark.parametrize('load', ['A', None, 0])
+def test_a_load_that_is_neither_box_is_refused(load):
+    with pytest.raises(ValueError, match="load must be 'a' or 'b', not"):
+        fresh().hold(slab(), LEVEL, load=load)
+
+
+def test_an_answer_of_another_scene_is_refused():
+    """A box that the law does not know counted as fixed, and held the others up."""
+    known = {'ground': Box('ground', (9, 9, 1), (0, 0, -0.5, 0, 0, 0, 1)), 'b': Box('b', (1, 1, 1))}
+    law = SceneLaw.for_loop(Scene(known, (Pair.between('b', 'ground'),)), {'b': 1.0}, rate_hz=100.0)
+    more = Scene(known | {'new': Box('new', (1, 1, 1))}, (Pair.between('new', 'b'),))
+    where = np.array([[0, 0, 0.5, 0, 0, 0, 1], [0, 0, 1.499, 0, 0, 0, 1.0]])
+    with pytest.raises(ValueError, match="'new' is none of the boxes of this law"):
+        law.hold(SceneSolver(more, model='exact')(where), where[:1])
+
+
+def test_a_clock_that_pauses_teaches_a_predictor_nothing():
+    """The same time twice made all velocities NaN, for good."""
+    predictor = Predictor(Body(mass=1.0, inertia=(1.0, 1.0, 1.0)), latency=0.01)
+    for time in (0.0, 0.0, 1.0, 0.5):
+        pose, velocity = predictor.state(time, LEVEL, STILL)
+        assert np.isfinite([*pose, *velocity]).all()
+    with pytest.raises(ValueError, match='mass must be positive'):
+        Predictor(Body(mass=0.0, inertia=(1.0, 1.0, 1.0)), latency=0.01)
 
 
 @pytest.mark.parametrize('rate', [50.0, 200.0, 1000.0])

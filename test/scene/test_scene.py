@@ -108,6 +108,7 @@ def test_close_pairs_are_those_within_the_margin(swept_from, origin, monkeypatch
         answer, plain = solver(where), SceneSolver(Scene(boxes, pairs), model='exact')(where)
         assert [pair for pair, _ in answer.touching] == [pair for pair, _ in plain.touching]
         found = {pair.name: contact.separation for pair, contact in answer.close}
+        assert all(abs(np.linalg.norm(contact.normal) - 1) < 1e-12 for _, contact in answer.close)
         wanted = {}
         for pair in pairs:
             a, b = int(pair.a[1:]), int(pair.b[1:])

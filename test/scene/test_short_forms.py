@@ -302,11 +302,32 @@ def test_shipped_scenes_are_written_and_read(tmp_path):
         assert read_scene(tmp_path / 'scene.yaml') == scene
 
 
-@pytest.mark.parametrize('scene, words', [
-    (two_boxes((1, 1, 1), (1, 1, 1)), 'not all'),
-    (Scene({name: Box(name, (1, 1, 1)) for name in 'ab'}, (Pair.between('a', 'b'),)), 'not all')])
-def test_a_scene_that_no_file_can_describe(scene, words, tmp_path):
-    """The default scene, whose pair has no name, and boxes whose poses come from nowhere."""
-    with pytest.raises(ValueError, match=words):
-        write_scene(scene, tmp_path / 'scene.yaml')
+def test_a_scene_that_no_file_can_describe(tmp_path):
+    """The default scene, whose pair has no name."""
+    with pytest.raises(ValueError, match='not all'):
+        write_scene(two_boxes((1, 1, 1), (1, 1, 1)), tmp_path / 'scene.yaml')
     assert not list(tmp_path.iterdir())
+
+
+def test_boxes_without_topics_get_those_of_any_file(tmp_path):
+    """The simplest scene that a program makes was refused."""
+    scene = Scene({name: Box(name, (1, 1, 1)) for name in 'ab'}, (Pair.between('a', 'b'),))
+    write_scene(scene, tmp_path / 'scene.yaml')
+    found = read_scene(tmp_path / 'scene.yaml')
+    assert found.sources == {'a': 'a/pose', 'b': 'b/pose'} and found.pairs == scene.pairs
+
+
+@pytest.mark.parametrize('box, words', [
+    (Box('a', (1.0, 1.0)), r'boxes.a.size: must be a tuple of 3 numbers, not \(1.0, 1.0\)'),
+    (Box('a', (1.0, 1.0, 1.0), ()), 'boxes.a.pose: must be a tuple of 7 numbers'),
+    (Box('a', (1.0, 1.0, 1.0), np.eye(7)[6]), 'boxes.a.pose: must be a tuple of 7 numbers')])
+def test_a_box_of_other_shapes_is_refused(box, words):
+    with pytest.raises(ValueError, match=words):
+        Scene({'a': box, 'b': Box('b', (1.0, 1.0, 1.0))}, (Pair.between('a', 'b'),))
+
+
+def test_two_pairs_of_one_label_are_refused():
+    """Messages would call both the same, and one of them would be lost."""
+    boxes = {name: Box(name, (1.0, 1.0, 1.0)) for name in 'abc'}
+    with pytest.raises(ValueError, match='the same name'):
+        Scene(boxes, (Pair(0, '', 'a', 'b'), Pair(1, 'a_b', 'a', 'c')))

@@ -172,6 +172,21 @@ def test_empty_batch():
     assert found.normal.shape == found.point.shape == (0, 3)
 
 
+def test_no_pairs_are_no_rows():
+    """As a broad phase gives them that found nothing."""
+    assert SOLVER.batch([poses.IDENTITY, ABOVE], pairs=[]).point.shape == (0, 3)
+
+
+@pytest.mark.parametrize('mask', [False, True])
+def test_a_masked_array_is_refused(mask):
+    """A mask would be dropped, and what it hides would count."""
+    pose = np.ma.array(np.array(poses.IDENTITY, dtype=float), mask=mask)
+    with pytest.raises(ValueError, match='^pose_a must be a pose .* of numbers, not masked'):
+        SOLVER(pose, ABOVE)
+    with pytest.raises(ValueError, match='^poses_a must be poses .* of numbers, not masked'):
+        SOLVER.batch(pose[None], [ABOVE])
+
+
 def test_unknown_model():
     with pytest.raises(ValueError, match="model 'exakt' is not one of: .*exact"):
         ContactSolver(poses.CUBE, poses.CUBE, model='exakt')

@@ -70,7 +70,7 @@ const double* numbers_of_array(PyArrayObject* array, int n, double* copy) {
 // `n` numbers: an array, or a tuple or list of Python's own floats and integers. Others return
 // nullptr, without an error.
 const double* numbers_of(PyObject* object, int n, double* copy) {
-  if (PyArray_Check(object))
+  if (PyArray_CheckExact(object))
     return numbers_of_array(reinterpret_cast<PyArrayObject*>(object), n, copy);
   bool is_tuple = PyTuple_Check(object);
   if ((!is_tuple && !PyList_Check(object)) || Py_SIZE(object) != n) return nullptr;
@@ -90,7 +90,7 @@ const double* numbers_of(PyObject* object, int n, double* copy) {
 
 // Rows (count, columns) of a float64 array that lies in order, or nullptr. `count` −1: any.
 const double* plain_rows(PyObject* object, npy_intp& count, npy_intp columns) {
-  if (!PyArray_Check(object)) return nullptr;
+  if (!PyArray_CheckExact(object)) return nullptr;
   auto* array = reinterpret_cast<PyArrayObject*>(object);
   bool plain = PyArray_TYPE(array) == NPY_DOUBLE && PyArray_NDIM(array) == 2 &&
                PyArray_DIM(array, 1) == columns && PyArray_ISCARRAY_RO(array) &&

@@ -12,6 +12,7 @@ import json
 import os
 import re
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -139,13 +140,16 @@ def _scene_of(data: Any, lines: dict[Place, int], check: Callable[[Scene], None]
 def write_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
     """Write a scene to a file, which `read_scene` reads as the same scene.
 
+    A moving box without a source of poses gets the topic `<name>/pose`, as in any file.
     Raises ValueError for a scene that a file cannot describe, such as one with a name that no topic
     can have.
     """
     text = scene_text(scene)
     if len(text.encode()) > LARGEST_FILE:
         raise ValueError(f'{len(scene.pairs)} pairs need more than {LARGEST_FILE} bytes')
-    if parse_scene(text) != scene:
+    topics = {name: box if box.pose or box.frame or box.pose_topic or scene.pose_array
+              else replace(box, pose_topic=f'{name}/pose') for name, box in scene.boxes.items()}
+    if parse_scene(text) != replace(scene, boxes=topics):
         raise ValueError('not all fields of this scene can stand in a file')
     Path(path).write_text(text, 'utf-8')
 

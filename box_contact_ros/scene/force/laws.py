@@ -132,7 +132,15 @@ class _LoadLaw:
         """Return a law with the same patches and friction."""
         return type(self)(self._law.copy())
 
+    __copy__ = copy
+
+    def __deepcopy__(self, memo: object) -> Self:
+        """Return a law with the same patches and friction."""
+        return self.copy()
+
     def _hold(self, contacts: Touches, pose: ArrayLike, load: str) -> None:
+        if load not in ('a', 'b'):
+            raise ValueError(f"load must be 'a' or 'b', not {shown(load)}")
         a, b = (0, FIXED) if load == 'a' else (FIXED, 0)
         hold(self._law, [(name, id_of(name), a, b, contact)
                          for name, contact in _named(contacts).items()], pose)
@@ -214,7 +222,8 @@ class SceneLaw:
     def __init__(self, law: native.Law, scene: Scene, moving: Sequence[str]) -> None:
         """Take over a native law of the boxes `scene.moving`; see `for_loop`."""
         self._law, self._scene, self._free = law, scene, frozenset(moving)
-        self._place = {name: place for place, name in enumerate(scene.moving)}
+        self._place = dict.fromkeys(scene.boxes, FIXED) | {
+            name: place for place, name in enumerate(scene.moving)}
 
     @classmethod
     def for_loop(cls, scene: Scene, bodies: Mapping[str, Body | float], *, rate_hz: float,
@@ -247,13 +256,19 @@ class SceneLaw:
     def hold(self, answer: Answer, poses: ArrayLike) -> None:
         """Hold the answer of a `SceneSolver` to `poses` (n, 7), a row for each of `scene.moving`.
 
-        ValueError: a contact without a patch (`fcl`, `soup`, `paper`); nothing changes then.
+        Pairs that the answer does not list as touching lose patch and friction. So do stale ones:
+        an answer with `stale` pairs whose boxes are still there is better not held.
+        ValueError: a contact without a patch (`fcl`, `soup`, `paper`), or of a box that the scene
+        lacks; nothing changes then.
         """
         place = self._place
-        hold(self._law, [
-            (pair.label, pair.id, place.get(pair.a, FIXED), place.get(pair.b, FIXED), contact)
-            for pair, contact in answer.touching
-            if pair.a in self._free or pair.b in self._free], poses)
+        try:
+            touches = [(pair.label, pair.id, place[pair.a], place[pair.b], contact)
+                       for pair, contact in answer.touching
+                       if pair.a in self._free or pair.b in self._free]
+        except KeyError as error:
+            raise ValueError(f'{shown(error.args[0])} is none of the boxes of this law') from None
+        hold(self._law, touches, poses)
 
     def wrenches(self, poses: ArrayLike, velocities: ArrayLike) -> np.ndarray:
         """Return forces and torques (n, 6) at `poses` (n, 7) and `velocities` (n, 6), once a step.
@@ -269,3 +284,9 @@ class SceneLaw:
     def copy(self) -> Self:
         """Return a law with the same patches and friction."""
         return type(self)(self._law.copy(), self._scene, tuple(self._free))
+
+    __copy__ = copy
+
+    def __deepcopy__(self, memo: object) -> Self:
+        """Return a law with the same patches and friction."""
+        return self.copy()

@@ -27,9 +27,11 @@ class Predictor:
     """The state of one load ahead; it keeps the wrenches that are in flight."""
 
     def __init__(self, load: Body, *, latency: float) -> None:
-        """Predict `latency` [s] ahead. A load whose `centre` is not zero is refused: ValueError."""
+        """Predict `latency` [s] ahead. ValueError: a `centre` that is not zero, a mass that is."""
         if np.any(load.centre):
             raise ValueError(f'centre must be zero for a Predictor, not {tuple(load.centre)}')
+        if not load.mass > 0.0:
+            raise ValueError(f'mass must be positive for a Predictor, not {load.mass:g}')
         self._mass, self._inertia = load.mass, np.array(load.inertia, dtype=float)
         self._latency = latency
         self._held = HeldWrench()
@@ -38,8 +40,11 @@ class Predictor:
 
     def state(self, time: float, pose: np.ndarray, velocity: np.ndarray,
               ) -> tuple[np.ndarray, np.ndarray]:
-        """Return pose (7,) and velocity (6,) at `time` + latency from those at `time` [s]."""
-        if self._last is not None:
+        """Return pose (7,) and velocity (6,) at `time` + latency from those at `time` [s].
+
+        A time that is not later than the last one, as of a clock that pauses, teaches nothing.
+        """
+        if self._last is not None and time > self._last[0]:
             before, was = self._last
             period = time - before
             known = self._impulse(before, time) / self._mass
