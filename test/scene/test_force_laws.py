@@ -23,7 +23,7 @@ from box_contact_ros import (
 )
 from box_contact_ros.scene.force.laws import GRAVITY
 from box_contact_ros.scene.pose import quaternion_multiply, rotation_matrix
-from box_contact_ros.scene.scene_solver import Box, Pair, Scene
+from box_contact_ros.scene.scene_solver import Answer, Box, Pair, Scene
 from box_contact_ros.solver.contact import Contact
 
 PAGE = Path(__file__).resolve().parents[2] / 'docs' / 'explanation' / 'force.md'
@@ -537,6 +537,19 @@ def test_an_answer_of_another_scene_is_refused():
     where = np.array([[0, 0, 0.5, 0, 0, 0, 1], [0, 0, 1.499, 0, 0, 0, 1.0]])
     with pytest.raises(ValueError, match="'new' is none of the boxes of this law"):
         law.hold(SceneSolver(more, model='exact')(where), where[:1])
+
+
+@pytest.mark.parametrize('absent', [None, np.full(7, np.nan)])
+def test_a_box_without_a_pose_is_named(absent):
+    """A scene's solver takes such a box; a law cannot."""
+    boxes = {name: Box(name, (1.0, 1.0, 1.0)) for name in ('left', 'right')}
+    law = SceneLaw.for_loop(Scene(boxes, (Pair.between('left', 'right'),)), {'left': 1.0},
+                            rate_hz=100.0)
+    where = [np.array(LEVEL, dtype=float), absent]
+    with pytest.raises(ValueError, match="^'right' has no pose, and a law needs one for each of"):
+        law.wrenches(where, np.zeros((2, 6)))
+    with pytest.raises(ValueError, match="^'right' has no pose"):
+        law.hold(Answer([], [], 0), where)
 
 
 def test_a_clock_that_pauses_teaches_a_predictor_nothing():

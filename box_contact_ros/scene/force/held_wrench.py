@@ -13,6 +13,8 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
+from ...solver.checks import as_floats
+
 TIME_ROUNDING = 1e-9
 """Times [s] that differ by less are the same: sums of ticks and latencies are rounded, and a
 nanosecond is far below every physics step."""
@@ -58,9 +60,14 @@ class HeldWrench(InFlight[np.ndarray]):
         super().__init__()
         self.current = np.zeros(6)
 
+    def answer(self, kind: np.ndarray, *, asked: float, due: float) -> None:
+        """Note a copy of the wrench (6,), as `InFlight.answer`; ValueError for another shape."""
+        super().answer(as_floats(kind, 'wrench', 'a wrench (6,)', (6,)).copy(),
+                       asked=asked, due=due)
+
     def at(self, time: float) -> np.ndarray:
         """Return the wrench (6,) that acts at `time` [s]; times must not decrease."""
         newest = self.arrived(time)
         if newest is not None:
             self.current = newest
-        return self.current
+        return self.current.copy()

@@ -268,14 +268,32 @@ class SceneLaw:
                        if pair.a in self._free or pair.b in self._free]
         except KeyError as error:
             raise ValueError(f'{shown(error.args[0])} is none of the boxes of this law') from None
-        hold(self._law, touches, poses)
+        try:
+            hold(self._law, touches, poses)
+        except ValueError as error:
+            raise self._naming_the_box(error, poses) from None
 
     def wrenches(self, poses: ArrayLike, velocities: ArrayLike) -> np.ndarray:
         """Return forces and torques (n, 6) at `poses` (n, 7) and `velocities` (n, 6), once a step.
 
         Rows are those of `scene.moving`. Friction follows the way from one call to the next.
+        ValueError: a box without a pose. A law has all boxes of its scene: make another law for
+        fewer.
         """
-        return self._law.wrenches(poses, velocities)
+        try:
+            return self._law.wrenches(poses, velocities)
+        except ValueError as error:
+            raise self._naming_the_box(error, poses) from None
+
+    def _naming_the_box(self, error: ValueError, poses: ArrayLike) -> ValueError:
+        """Return what to raise: where a box has no pose, None or NaN, its name."""
+        rows = poses if isinstance(poses, Sequence | np.ndarray) else ()
+        for name, pose in zip(self._scene.moving, rows):
+            if pose is None or (isinstance(pose, np.ndarray) and pose.dtype.kind == 'f'
+                                and np.isnan(pose).any()):
+                return ValueError(f'{shown(name)} has no pose, and a law needs one for each of '
+                                  f'{shown(list(self._scene.moving))}')
+        return error
 
     def reset(self) -> None:
         """Forget all patches: boxes were put elsewhere."""
