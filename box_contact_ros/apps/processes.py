@@ -17,7 +17,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import IO, Any
 
 from ..solver.arguments import within
@@ -133,16 +133,9 @@ def asked_to_end() -> Iterator[Stop]:
     An exception could fall between a subprocess's start and its entry in a list, and orphan it.
     After the first signal the process is about to end, and further ones stay without effect.
     """
-    stop, numbers = Stop(), (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-    before = {number: signal.signal(number, stop.take) for number in numbers}
-    try:
+    stop = Stop()
+    with _handled_by(stop.take, signal.SIGINT, signal.SIGTERM, signal.SIGHUP, ends=stop.is_set):
         yield stop
-    finally:
-        for number, earlier in before.items():
-            if stop.signals:
-                atexit.register(signal.signal, number, signal.SIG_IGN)
-            else:
-                signal.signal(number, earlier)
 
 
 @contextlib.contextmanager
@@ -151,9 +144,20 @@ def left_when_asked() -> Iterator[None]:
     def leave(number: int, _frame: Any) -> None:
         sys.exit(128 + number)
 
-    before = {number: signal.signal(number, leave) for number in (signal.SIGTERM, signal.SIGHUP)}
+    with _handled_by(leave, signal.SIGTERM, signal.SIGHUP):
+        yield
+
+
+@contextlib.contextmanager
+def _handled_by(handler: Callable[[int, Any], None], *numbers: signal.Signals,
+                ends: Callable[[], bool] = lambda: False) -> Iterator[None]:
+    """Handle signals in the block; and afterwards, to the end of the process, where that `ends`."""
+    before = {number: signal.signal(number, handler) for number in numbers}
     try:
         yield
     finally:
         for number, earlier in before.items():
-            signal.signal(number, earlier)
+            if ends():
+                atexit.register(signal.signal, number, signal.SIG_IGN)
+            else:
+                signal.signal(number, earlier)

@@ -101,9 +101,7 @@ def as_floats(value: ArrayLike, name: str, shapes: str, *accepted: tuple[int | N
     shapes: what the error calls the accepted shapes.
     """
     try:
-        array = np.asarray(value)
-        if isinstance(value, np.ma.MaskedArray):
-            raise TypeError('a mask would be ignored')
+        array = _as_array(value)
         if not _holds_numbers(array):
             raise TypeError(f'{array.dtype} is no kind of number')
         with np.errstate(over='ignore', invalid='ignore'):  # infinity and NaN are refused later
@@ -120,9 +118,9 @@ def as_floats(value: ArrayLike, name: str, shapes: str, *accepted: tuple[int | N
 def as_places(value: ArrayLike, name: str, count: int) -> np.ndarray:
     """Return pairs of places (n, 2) among `count` rows as a contiguous int64 array."""
     try:
-        array = np.asarray(value)
+        array = _as_array(value)
     except (TypeError, ValueError, OverflowError):
-        array = np.empty(0, dtype=object)
+        array = np.empty((), dtype=object)
     if array.shape == (0,):  # an empty list
         array = array.reshape(0, 2)
     if array.dtype.kind not in 'iu' and not (array.size == 0 and array.ndim == 2):
@@ -136,6 +134,13 @@ def as_places(value: ArrayLike, name: str, count: int) -> np.ndarray:
         raise ValueError(f'{name}[{row}] is {tuple(array[row].tolist())}, but there are {count} '
                          'poses')
     return np.require(array, np.int64, ('C', 'A'))
+
+
+def _as_array(value: ArrayLike) -> np.ndarray:
+    """Return an array of anything but a masked one, whose mask NumPy would drop: TypeError."""
+    if isinstance(value, np.ma.MaskedArray):
+        raise TypeError('a mask would be ignored')
+    return np.asarray(value)
 
 
 def _holds_numbers(array: np.ndarray) -> bool:

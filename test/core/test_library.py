@@ -281,16 +281,25 @@ int main() {
   std::printf("%g %g\\n", separation[0], separation[1]);
   solver.batch({poses, poses, sizes, sizes}, results);
   std::printf("%g %g\\n", separation[0], separation[1]);
+  try {
+    solver.batch({poses, poses, sizes, std::vector<Size>()}, results);
+  } catch (const std::invalid_argument& error) {
+    std::puts(error.what());
+  }
 }
 """
 
 
 def test_rows_by_place(tmp_path: Path) -> None:
-    """Sizes go with poses; a tick without near pairs has no rows, and not all of them."""
+    """Sizes go with poses; a tick without near pairs has no rows, and not all of them.
+
+    No sizes where some were meant are refused, and are not the solver's.
+    """
     (tmp_path / 'rows.cpp').write_text(ROWS)
     run(tool('g++'), '-std=c++17', *STRICT, PLACES['--includes'], tmp_path / 'rows.cpp', LIBRARY,
         f'-Wl,-rpath,{CORE}', '-o', tmp_path / 'rows')
-    assert run(tmp_path / 'rows') == '-1 -0.5 7\n-0.5 7\n-2 -4\n'
+    assert run(tmp_path / 'rows') == (
+        '-1 -0.5 7\n-0.5 7\n-2 -4\nposes_a, poses_b and sizes must be equally many\n')
 
 
 def test_a_debug_build_is_as_fast(tmp_path: Path) -> None:

@@ -185,6 +185,8 @@ def test_a_masked_array_is_refused(mask):
         SOLVER(pose, ABOVE)
     with pytest.raises(ValueError, match='^poses_a must be poses .* of numbers, not masked'):
         SOLVER.batch(pose[None], [ABOVE])
+    with pytest.raises(ValueError, match='^pairs must be whole numbers'):
+        SOLVER.batch([poses.IDENTITY, ABOVE], pairs=np.ma.array([[0, 1]], mask=mask))
 
 
 def test_unknown_model():

@@ -112,7 +112,29 @@ def _named(contacts: Touches) -> Mapping[str, Contact]:
                      f'{type(contacts).__name__}: friction has to know each pair again')
 
 
-class _LoadLaw:
+class _Law:
+    """What all laws share."""
+
+    _law: native.Law
+
+    def reset(self) -> None:
+        """Forget all patches: bodies were put elsewhere."""
+        self._law.reset()
+
+    def copy(self) -> Self:
+        """Return a law with the same patches and friction."""
+        twin = object.__new__(type(self))
+        twin.__dict__ |= self.__dict__ | {'_law': self._law.copy()}
+        return twin
+
+    __copy__ = copy
+
+    def __deepcopy__(self, memo: object) -> Self:
+        """Return a law with the same patches and friction."""
+        return self.copy()
+
+
+class _LoadLaw(_Law):
     """What the laws of one load share; made by their `for_loop`."""
 
     def __init__(self, law: native.Law) -> None:
@@ -123,20 +145,6 @@ class _LoadLaw:
     def frequency(self) -> float:
         """Return Ω [1/s]; the load rests at the depth gravity / Ω² on a whole face."""
         return self._law.frequency
-
-    def reset(self) -> None:
-        """Forget all patches: the load was put elsewhere."""
-        self._law.reset()
-
-    def copy(self) -> Self:
-        """Return a law with the same patches and friction."""
-        return type(self)(self._law.copy())
-
-    __copy__ = copy
-
-    def __deepcopy__(self, memo: object) -> Self:
-        """Return a law with the same patches and friction."""
-        return self.copy()
 
     def _hold(self, contacts: Touches, pose: ArrayLike, load: str) -> None:
         if load not in ('a', 'b'):
@@ -212,7 +220,7 @@ class PatchLaw(_LoadLaw):
         return wrench
 
 
-class SceneLaw:
+class SceneLaw(_Law):
     """The wrenches on all bodies of a scene, at every physics step, from its last answer.
 
     Make it with `for_loop`. Boxes that move without a body in the law (a conveyor, a spreader on
@@ -294,17 +302,3 @@ class SceneLaw:
                 return ValueError(f'{shown(name)} has no pose, and a law needs one for each of '
                                   f'{shown(list(self._scene.moving))}')
         return error
-
-    def reset(self) -> None:
-        """Forget all patches: boxes were put elsewhere."""
-        self._law.reset()
-
-    def copy(self) -> Self:
-        """Return a law with the same patches and friction."""
-        return type(self)(self._law.copy(), self._scene, tuple(self._free))
-
-    __copy__ = copy
-
-    def __deepcopy__(self, memo: object) -> Self:
-        """Return a law with the same patches and friction."""
-        return self.copy()

@@ -154,7 +154,7 @@ class Solver {
   // and B are equally many. Sizes go with poses, one for each; without them all are the solver's.
   struct Rows {
     Span<const Pose> poses_a, poses_b;
-    Span<const Size> sizes_a{}, sizes_b{};
+    std::optional<Span<const Size>> sizes_a{}, sizes_b{};
     std::optional<Span<const std::int64_t>> pairs{};
   };
 
@@ -169,10 +169,10 @@ class Solver {
     if (!fits) detail::raise(BC_BAD_ARGUMENT, "poses_a, poses_b and sizes must be equally many");
     Span<const std::int64_t> pairs = rows.pairs.value_or(Span<const std::int64_t>());
     if (pairs.size() % 2) detail::raise(BC_BAD_ARGUMENT, "pairs must be two indices a row");
-    const bc_rows plain{sizeof(bc_rows),     std::int64_t(rows.pairs ? pairs.size() / 2 : poses),
-                        rows.poses_a.data(), rows.poses_b.data(),
-                        rows.sizes_a.data(), rows.sizes_b.data(),
-                        pairs.data(),        std::int64_t(poses)};
+    const bc_rows plain{sizeof(bc_rows),       std::int64_t(rows.pairs ? pairs.size() / 2 : poses),
+                        rows.poses_a.data(),   rows.poses_b.data(),
+                        data_of(rows.sizes_a), data_of(rows.sizes_b),
+                        pairs.data(),          std::int64_t(poses)};
     const bc_results wanted{sizeof(bc_results), results.colliding, results.separation,
                             results.normal,     results.point,     results.volume,
                             results.covariance, results.axis};
@@ -201,8 +201,11 @@ class Solver {
     return contact;
   }
 
-  static bool fits_poses(Span<const Size> sizes, std::size_t poses) {
-    return sizes.data() == nullptr || sizes.size() == poses;
+  static bool fits_poses(const std::optional<Span<const Size>>& sizes, std::size_t poses) {
+    return !sizes || sizes->size() == poses;
+  }
+  static const Size* data_of(const std::optional<Span<const Size>>& sizes) {
+    return sizes ? sizes->data() : nullptr;
   }
   static bool is_bad_place(const Rows& rows, std::int64_t row) {
     if (!rows.pairs) return false;
