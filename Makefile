@@ -52,7 +52,7 @@ help:
 
 demo:
 	@.ci/setup demo
-	exec $(PY) -m box_contact_ros.apps.demo $(ARGS)
+	exec $(PY) -m box_contact_ros.demo.demo $(ARGS)
 
 view:
 	@.ci/setup view
@@ -99,7 +99,7 @@ coverage:
 	@.ci/setup test
 	$(PY) -m coverage erase
 	$(PY) -m coverage run -m pytest test/solver test/scene test/node \
-	    test/evidence/contestants/test_paper_models.py test/package/test_package.py $(ARGS)
+	    test/solver/test_paper_models.py test/package/test_package.py $(ARGS)
 	$(PY) -m coverage combine -q
 	$(PY) -m coverage report --fail-under 95
 
@@ -132,4 +132,4 @@ clean:
 	rm -rf build dist install log box_contact_ros.egg-info
 	find box_contact_ros -name '*.so' -delete
 	rm -rf .pytest_cache .ruff_cache .mypy_cache .hypothesis
-	find box_contact_msgs box_contact_ros test launch -name __pycache__ -type d -prune -exec rm -rf {} + || true
+	find benchmarks box_contact_msgs box_contact_ros launch test training -name __pycache__ -type d -prune -exec rm -rf {} + || true

@@ -142,8 +142,8 @@ def extensions() -> list[Extension]:
                 'extra_compile_args': FLAGS}
     return [Extension(CORE_EXTENSION, [f'{CORE}/binding/module.cpp'],
                       extra_link_args=['-pthread'], **settings),
-            Extension(f'{NAME}.evidence.contestants.paper._networks',
-                      [f'{NAME}/evidence/contestants/paper/networks.cpp'],
+            Extension(f'{NAME}.paper._networks',
+                      [f'{NAME}/paper/networks.cpp'],
                       **settings)]
 
 
@@ -178,15 +178,13 @@ setup(
     maintainer_email='maintainers@box-contact-ros.org',
     license='Apache-2.0',
     packages=find_packages(include=[NAME, f'{NAME}.*']),
-    package_data={NAME: ['py.typed', '**/*.pyi', '**/*.md', '**/*.yaml',
-                         'evidence/verification/*.npz', 'evidence/reports/**/*.[ch]pp',
-                         'core/cmake/*', 'core/include/**/*.h*', 'core/src/**/*.hpp']},
+    package_data={NAME: ['py.typed', '**/*.pyi', 'core/cmake/*', 'core/include/**/*.h*', 'core/src/**/*.hpp']},
     ext_modules=extensions(),
     data_files=data_files(),
     entry_points={
         'console_scripts': cli['entry_points']('box_contact_' if BY_PIP else ''),
         # Models outside the core; other packages add theirs in the same way.
-        f'{NAME}.models': [f'{model} = {NAME}.evidence.contestants.entries:{entry}'
+        f'{NAME}.models': [f'{model} = {NAME}.soup.entries:{entry}'
                            for model, entry in {
                                'paper': 'PAPER', 'paper-continuous': 'CONTINUOUS',
                                'paper-committee': 'COMMITTEE', 'fcl': 'FCL', 'soup': 'SOUP'

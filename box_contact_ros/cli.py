@@ -44,52 +44,52 @@ PROGRAMS = {
         'box_contact_ros.node.contact_program', ('ros',),
         'the ROS 2 node: two box poses in, contact point and normal out'),
     'crane': Program(
-        'box_contact_ros.apps.crane.crane_node', ('ros', 'sim'),
+        'box_contact_ros.demo.crane_node', ('ros', 'sim'),
         'a MuJoCo crane that lowers one container onto another and publishes both poses'),
     'soup_node': Program(
-        'box_contact_ros.evidence.contestants.soup_node', ('ros', 'soup'),
+        'box_contact_ros.soup.soup_node', ('ros', 'soup'),
         'the same node on a polygon soup, under soup/: what the source paper compares with'),
     'view': Program(
-        'box_contact_ros.apps.viewer.view', ('ros', 'sim', 'view'),
+        'box_contact_ros.view.view', ('ros', 'sim', 'view'),
         'a page in the browser: all boxes of a scene, their contacts and figures, live'),
     'markers': Program(
-        'box_contact_ros.apps.viewer.markers', ('ros',),
+        'box_contact_ros.view.markers', ('ros',),
         'draw boxes and contacts as markers for RViz'),
     'bench': Program(
-        'box_contact_ros.evidence.bench.bench', ('ros', 'sim', 'soup', 'report'),
+        'box_contact_ros.bench.bench', ('ros', 'sim', 'soup', 'report'),
         'drive contact, soup and echo node with streams of poses: latency, losses, errors'),
     'record': Program(
-        'box_contact_ros.apps.recording.record', ('ros', 'bag'),
+        'box_contact_ros.view.recording.record', ('ros', 'bag'),
         'write poses and contacts of running nodes to a bag (MCAP) for Foxglove and ros2 bag'),
     'train': Program(
-        'box_contact_ros.evidence.training.train', ('train',),
+        'training.train', ('train',),
         'make the data sets, fit the networks, write weights/'),
     'search': Program(
-        'box_contact_ros.evidence.training.experiments.search', ('train', 'report'),
+        'benchmarks.paper.search', ('train', 'report'),
         'train thousands of networks at once to find the size and settings that they should have'),
     'accuracy': Program(
-        'box_contact_ros.evidence.reports.accuracy', ('report',),
+        'benchmarks.accuracy', ('report',),
         'point error of a model against the exact one, per set of poses and contact class'),
     'frontier': Program(
-        'box_contact_ros.evidence.reports.frontier.frontier', ('report',),
+        'benchmarks.frontier', ('report',),
         'speed against error of every model and of other engines, as table and picture'),
     'fuzz': Program(
-        'box_contact_ros.evidence.verification.fuzz', ('report', 'fuzz'),
+        'benchmarks.fuzz', ('report', 'fuzz'),
         'millions of random pairs, judged by an independent test'),
     'stability': Program(
-        'box_contact_ros.evidence.reports.hard.stability', ('report', 'soup'),
+        'benchmarks.stability', ('report', 'soup'),
         'what each model makes of families of hard poses'),
     'landing': Program(
-        'box_contact_ros.evidence.reports.landing.landing_report', ('sim', 'soup', 'report'),
+        'benchmarks.landing_report', ('sim', 'soup', 'report'),
         'whether a load comes to rest by each way of contact and force, as table and picture'),
     'rest': Program(
-        'box_contact_ros.evidence.reports.rest.rest_report', ('sim', 'report'),
+        'benchmarks.rest.rest_report', ('sim', 'report'),
         'drops, slopes, pushes and stacks against results stated beforehand, and MuJoCo beside'),
     'paper': Program(
-        'box_contact_ros.evidence.reports.paper.paper_tables', ('report',),
+        'benchmarks.paper.paper_tables', ('report',),
         "redo the source paper's tables, with its figures and ours"),
     'reports': Program(
-        'box_contact_ros.evidence.reports.remake.remake',
+        'benchmarks.remake',
         ('ros', 'sim', 'soup', 'train', 'report', 'fuzz', 'peers'),
         'remake every table and picture of docs/results, with the programs above'),
 }

@@ -75,8 +75,8 @@ def markdown_table(head: Sequence[str], rows: Iterable[Sequence[object]], *, wor
 
 
 def page(template: str, **values: object) -> str:
-    """Return a page or a part of one: a Markdown file of the package, its `{fields}` filled in."""
-    return (PACKAGE / f'{template}.md').read_text('utf-8').format(**values)
+    """Return a page or a part of one: a Markdown file of the checkout, its `{fields}` filled in."""
+    return (PACKAGE.parent / f'{template}.md').read_text('utf-8').format(**values)
 
 
 def write_csv(path: Path, rows: Iterable[Mapping[str, object]], *, digits: int = 6,

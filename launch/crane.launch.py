@@ -17,7 +17,7 @@ from launch.actions import (
 )
 from launch_ros.actions import Node
 
-from box_contact_ros.apps.crane.crane_parameters import PARAMETERS
+from box_contact_ros.demo.crane_parameters import PARAMETERS
 from box_contact_ros.node.launch_arguments import CONTACT_NODE, descriptions, given_values
 from box_contact_ros.node.parameters import Setting, flag
 from box_contact_ros.resources import resource_path

@@ -93,6 +93,8 @@ os.environ['OMP_NUM_THREADS'] = '1'
 if not sys.flags.safe_path and os.getcwd() in sys.path:
     sys.path.remove(os.getcwd())
 os.environ['PYTHONSAFEPATH'] = '1'
+# What is run from the checkout alone: benchmarks and training. Last, so that it hides nothing.
+sys.path.append(str(Path(__file__).resolve().parents[1]))
 # Options that colcon gives to this run, such as the file of results, are not for runs that tests
 # start.
 os.environ.pop('PYTEST_ADDOPTS', None)

@@ -20,8 +20,8 @@ from pathlib import Path
 import numpy as np
 
 from box_contact_ros import ContactSolver
-from box_contact_ros.apps.recording.bag_file import read_replay
 from box_contact_ros.resources import resource_path
+from box_contact_ros.view.recording.bag_file import read_replay
 
 
 def main() -> None:

@@ -15,8 +15,8 @@ from pathlib import Path
 
 PACKAGE = Path(__file__).resolve().parents[2] / 'box_contact_ros'
 PLACES = {  # column and row of a folder's box, and what it is for
-    'evidence': (0, 0, 'what proves and compares'),
-    'apps': (1, 0, 'crane, view, record, demo'),
+    'soup': (0, 0, 'polygon soup on FCL'), 'bench': (0, 1, 'A/B latency'),
+    'demo': (1, 0, 'the crane, the demo'), 'view': (2, 0, 'live page, markers'),
     'node': (1, 1, 'all rclpy of the product'), 'scene': (1, 2, 'boxes, pairs, ticks, forces'),
     'solver': (1, 3, 'ContactSolver, models'), 'core': (1, 4, 'poses → contact, C++17')}
 WIDTH, HEIGHT, COLUMN, ROW = 190, 50, 240, 90

@@ -22,11 +22,11 @@ import matplotlib.pyplot as plt
 import numpy as np
 from PIL import Image
 
-from box_contact_ros.apps.crane.landing import LandingRecord, land, landing_scenario, solvers
-from box_contact_ros.apps.crane.mujoco_crane import CraneScenario
-from box_contact_ros.apps.viewer.style import BOX_A, BOX_B, CONTACT, ROPE
+from box_contact_ros.demo.landing import LandingRecord, land, landing_scenario, solvers
+from box_contact_ros.demo.mujoco_crane import CraneScenario
 from box_contact_ros.scene.force.laws import GRAVITY
 from box_contact_ros.scene.pose import rotation_matrix
+from box_contact_ros.view.style import BOX_A, BOX_B, CONTACT, ROPE
 
 RATE = 200.0
 PICTURES = 12  # a second

@@ -17,10 +17,10 @@ import poses
 import pytest
 from gmpy2 import mpfr
 
-pytest.importorskip('box_contact_ros.evidence')
+pytest.importorskip('benchmarks')
 
+from benchmarks.pose_sets import LOADS, SETS, Pairs
 from box_contact_ros.core import Stages, native, stages
-from box_contact_ros.evidence.pose_sets import LOADS, SETS, Pairs
 
 DEEP_SETS = {name: make for name, make in {**SETS, **LOADS}.items() if name != 'touching'}
 """Those whose pairs are not pressed in."""

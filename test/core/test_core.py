@@ -181,7 +181,7 @@ def test_a_fused_multiply_add_would_be_found(tmp_path: Path) -> None:
     assert not FUSED.search('vfmadd231ps %zmm0,%zmm1,%zmm2  vfmsub213ss  vfnmadd132ps')
 
 
-LAWS = ('core/test_laws.py', 'evidence/verification/test_hard_poses.py', 'core/test_exact.py')
+LAWS = ('core/test_laws.py', 'benchmarks/test_hard_poses.py', 'core/test_exact.py')
 """Tests that every instruction set runs."""
 WITH_ORACLE = ('parts', 'truth', 'the_file', 'reach_what', 'oracle', 'thin_overlaps', 'pieces')
 """Those of them that take an oracle or clipping, which are the same for all."""

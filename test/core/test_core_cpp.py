@@ -74,7 +74,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def write_families(path: Path) -> None:
     """Write the stored families as text: a line a pair, doubles as hexadecimal numbers."""
-    stored, = (ROOT / 'box_contact_ros').glob('evidence/*/hard_poses.npz')
+    stored = ROOT / 'benchmarks' / 'hard_poses.npz'
     lines = []
     with np.load(stored) as arrays:
         for name in sorted({key.split('.')[0] for key in arrays.files}):

@@ -22,12 +22,12 @@ import numpy as np
 import pytest
 from test_library import BAD_WEIGHTS, LIBRARY, WEIGHTS, Options, Results, Rows, Size, run, tool
 
-pytest.importorskip('box_contact_ros.evidence')
+pytest.importorskip('benchmarks')
 
 import hostile_calls
 
 from box_contact_ros.core import FORCE, native
-from box_contact_ros.evidence.contestants.paper import _networks
+from box_contact_ros.paper import _networks
 
 ROOT = Path(__file__).resolve().parents[2]
 CALLS = hostile_calls.__file__

@@ -12,8 +12,8 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from box_contact_ros.evidence.pose_sets import CONTAINER as FORTY
-from box_contact_ros.evidence.pose_sets import (
+from benchmarks.pose_sets import CONTAINER as FORTY
+from benchmarks.pose_sets import (
     CUBE,
     HIGH_CUBE,
     TWENTY,

@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-FOLDERS = {'_native': 'core', '_networks': 'evidence.contestants.paper'}
+FOLDERS = {'_native': 'core', '_networks': 'paper'}
 
 
 def preload(folder: str) -> None:
@@ -39,7 +39,7 @@ if 'EXTENSIONS' in os.environ:
     preload(os.environ['EXTENSIONS'])
 
 from box_contact_ros.core import native  # noqa: E402
-from box_contact_ros.evidence.contestants.paper import _networks as networks  # noqa: E402
+from box_contact_ros.paper import _networks as networks  # noqa: E402
 
 POSE = np.array([0.0, 0, 0, 0, 0, 0, 1])
 ABOVE = np.array([0.1, 0.2, 0.9, 0, 0, 0, 1])

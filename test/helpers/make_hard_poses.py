@@ -18,7 +18,7 @@ import oracle
 from gmpy2 import mpfr
 from tqdm import tqdm
 
-from box_contact_ros.evidence.verification import hard_poses
+from benchmarks import hard_poses
 
 FLOOR = mpfr(10)**-9
 """Depth, of the size, below which the point is that of boxes pressed in: no truth for it here."""

@@ -21,7 +21,7 @@ from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
-from box_contact_ros.apps.ros_client import ANSWERS
+from box_contact_ros.demo.ros_client import ANSWERS
 from box_contact_ros.node.messages import NANOSECONDS, make_header, read_contacts
 from box_contact_ros.node.rclpy_workarounds import ends_within
 from box_contact_ros.node.runtime import make_executor

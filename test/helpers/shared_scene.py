@@ -20,8 +20,8 @@ from geometry_msgs.msg import PoseStamped
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
-from box_contact_ros.apps.answer_log import first_row
-from box_contact_ros.apps.ros_client import ANSWERS
+from box_contact_ros.demo.answer_log import first_row
+from box_contact_ros.demo.ros_client import ANSWERS
 from box_contact_ros.node.messages import make_header, read_contacts
 from box_contact_ros.node.runtime import make_executor
 from box_contact_ros.scene.files.scene_file import read_scene

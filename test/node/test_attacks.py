@@ -22,7 +22,7 @@ from ros_client import stamp_of
 from rosgraph_msgs.msg import Clock
 from stranger import ANSWER_SECONDS, Stranger
 
-from box_contact_ros.apps.ros_client import ANSWERS
+from box_contact_ros.demo.ros_client import ANSWERS
 from box_contact_ros.node.messages import make_header
 from box_contact_ros.node.named_files import LARGEST_TEXT
 
@@ -257,7 +257,7 @@ def memory(running):
 def test_floods_on_a_locked_node(attacked, name):
     """Poses that are none, names and texts of a megabyte: it answers on, and keeps none of them.
 
-    An hour of them, beside an echo node: `python -m box_contact_ros.evidence.bench.flood`.
+    An hour of them, beside an echo node: `python -m benchmarks.flood`.
     """
     running, stranger = attacked(name, 'locked:=true')
     assert stranger.spin(lambda: all(

@@ -18,7 +18,7 @@ from rclpy.parameter import Parameter
 from ros_client import PATIENCE, Client, row_of, serving
 
 from box_contact_ros import ContactSolver
-from box_contact_ros.apps.ros_client import ANSWERS
+from box_contact_ros.demo.ros_client import ANSWERS
 from box_contact_ros.node.contact_node import PARAMETERS, ContactNode
 
 ORIGIN = poses.IDENTITY

@@ -3,7 +3,7 @@
 
 """What breaks around a contact node, and that nothing is lost, wrong or leaked by it.
 
-The node runs as a process of its own. test/evidence/verification/mutants.py has a node without each
+The node runs as a process of its own. test/benchmarks/mutants.py has a node without each
 guard.
 Elsewhere: killed and restarted nodes and clients (test_contact_node.py), weights and requests that
 cannot be read (test_hygiene_ros.py), scenes replaced by garbage (test_scene_node.py).
@@ -33,7 +33,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from ros_client import PATIENCE, stamp_of
 from rosgraph_msgs.msg import Clock
 
-from box_contact_ros.apps.ros_client import ANSWERS
+from box_contact_ros.demo.ros_client import ANSWERS
 from box_contact_ros.node.messages import make_header
 from box_contact_ros.scene.stamp_pairing import AGAIN
 
@@ -255,7 +255,7 @@ def test_a_storm_of_parameters(start, client):
 
 READER = """
 import rclpy
-from box_contact_ros.apps.ros_client import ANSWERS
+from box_contact_ros.demo.ros_client import ANSWERS
 rclpy.init()
 node = rclpy.create_node('reader')
 node.create_subscription(*ANSWERS['cloud'], lambda _: print('heard', flush=True), 10)

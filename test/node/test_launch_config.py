@@ -21,8 +21,8 @@ from typing import Any
 import pytest
 import yaml
 
-from box_contact_ros.apps.crane.crane_parameters import PARAMETERS as CRANE_PARAMETERS
 from box_contact_ros.cli import PROGRAMS
+from box_contact_ros.demo.crane_parameters import PARAMETERS as CRANE_PARAMETERS
 from box_contact_ros.node.contact_node import PARAMETERS
 from box_contact_ros.node.launch_arguments import CONTACT_NODE, descriptions, value_of
 from box_contact_ros.scene.files.scene_file import read_scene

@@ -25,7 +25,7 @@ from ros_client import PATIENCE, Client, serving
 from std_msgs.msg import String
 
 from box_contact_ros import ContactSolver
-from box_contact_ros.apps.ros_client import ANSWERS
+from box_contact_ros.demo.ros_client import ANSWERS
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import PATCH_FIELDS, make_header, read_contacts
 from box_contact_ros.node.rclpy_workarounds import RCLError

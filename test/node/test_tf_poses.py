@@ -33,14 +33,14 @@ from ros_client import Client, stamp_of
 from visualization_msgs.msg import MarkerArray
 
 from box_contact_ros import ContactSolver
-from box_contact_ros.apps.ros_client import ANSWERS, pose_message
-from box_contact_ros.apps.viewer.markers import MarkersNode
-from box_contact_ros.apps.viewer.scene_driver import SceneDriver
+from box_contact_ros.demo.ros_client import ANSWERS, pose_message
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import CLOUD_ROW, make_header, read_contacts
 from box_contact_ros.node.topics import tf_poses
 from box_contact_ros.scene.files.scene_file import SceneError, read_scene
 from box_contact_ros.scene.pose import quaternion_multiply, rotation_matrix
+from box_contact_ros.view.markers import MarkersNode
+from box_contact_ros.view.scene_driver import SceneDriver
 
 SECOND, MS = 10**9, 10**6
 START = 1_000 * SECOND
@@ -422,7 +422,7 @@ def test_clients_without_tf2_draw_and_record_what_they_can(client, monkeypatch, 
             break
     else:
         pytest.fail(f'drawn: {arrays[-1:]}')
-    record = pytest.importorskip('box_contact_ros.apps.recording.record')
+    record = pytest.importorskip('box_contact_ros.view.recording.record')
     (tmp_path / 'scene.yaml').write_text(SCENE)
     recorder = record.node_of(['--out', str(tmp_path / 'run'), '--scene',
                                str(tmp_path / 'scene.yaml')])(client.context)
@@ -436,10 +436,10 @@ def test_a_recording_keeps_the_transforms(client, tmp_path):
     """As they came; /tf_static as what `ros2 bag play` is to latch."""
     if not client.real:
         pytest.skip('needs tf2_msgs')
-    record = pytest.importorskip('box_contact_ros.apps.recording.record')
+    record = pytest.importorskip('box_contact_ros.view.recording.record')
     from rosbags.rosbag2 import Reader
 
-    from box_contact_ros.apps.recording.bag_file import LATCHED, RecordingError, read_replay
+    from box_contact_ros.view.recording.bag_file import LATCHED, RecordingError, read_replay
     client.start()
     (tmp_path / 'scene.yaml').write_text(SCENE)
     recorder = record.node_of(['--out', str(tmp_path / 'run'), '--scene',

@@ -87,7 +87,7 @@ def make(words: list[str], **_) -> None:
     assert done.returncode == 0, done.stderr
     if here[0] == 'demo' and len(here) > 1:  # what ARGS hands on
         arguments = shlex.split(here[1].partition('=')[2])
-        assert all(word in help_of('box_contact_ros.apps.demo')
+        assert all(word in help_of('box_contact_ros.demo.demo')
                    for word in arguments if word.startswith('--'))
 
 

@@ -134,7 +134,7 @@ def test_the_only_pair_is_close_up_to_the_margin():
 
 def test_no_touching_pair_is_left_out():
     """All stored hard poses, exact touch included: what touches by SAT is near."""
-    hard_poses = pytest.importorskip('box_contact_ros.evidence.verification.hard_poses')
+    hard_poses = pytest.importorskip('benchmarks.hard_poses')
     touching = 0
     for entry in hard_poses.load().values():
         cases = entry.pairs

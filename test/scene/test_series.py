@@ -16,11 +16,9 @@ import numpy as np
 import poses
 import pytest
 
-pytest.importorskip('box_contact_ros.evidence')
+pytest.importorskip('benchmarks')
 
-from box_contact_ros import ContactSolver
-from box_contact_ros.core import DEPTH_FLOOR
-from box_contact_ros.evidence.pose_sets import (
+from benchmarks.pose_sets import (
     SETS,
     Pairs,
     at_depth,
@@ -28,6 +26,8 @@ from box_contact_ros.evidence.pose_sets import (
     quaternion_multiply,
     turns,
 )
+from box_contact_ros import ContactSolver
+from box_contact_ros.core import DEPTH_FLOOR
 from box_contact_ros.solver.contact import Contacts
 
 UNIT = (1.0, 1.0, 1.0)
@@ -136,8 +136,8 @@ LANDED = {f'landed, case {number}': number for number in (0, 5, 17, 31)}
 def crane_series(name: str) -> Series:
     """Return the poses of one run of the crane."""
     pytest.importorskip('mujoco')
-    from box_contact_ros.apps.crane.landing import cases, land, scenario_of
-    from box_contact_ros.apps.crane.mujoco_crane import Crane, CraneScenario
+    from box_contact_ros.demo.landing import cases, land, scenario_of
+    from box_contact_ros.demo.mujoco_crane import Crane, CraneScenario
 
     if name in LOWERED:
         crane = Crane(CraneScenario.drawn(LOWERED[name]), CRANE_RATE)

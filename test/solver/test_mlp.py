@@ -17,8 +17,13 @@ import pytest
 
 import box_contact_ros
 
-pytest.importorskip('box_contact_ros.evidence')
+pytest.importorskip('benchmarks')
 
+from benchmarks.accuracy import limit_of
+from benchmarks.errors import contact_errors
+from benchmarks.pose_sets import LOADS, SETS, Pairs
+from benchmarks.speed import flush_stacks
+from benchmarks.steps import drawn_paths, largest_steps
 from box_contact_ros import ContactSolver
 from box_contact_ros.core import (
     BRACKET_LIMIT,
@@ -29,16 +34,11 @@ from box_contact_ros.core import (
     native,
     stages,
 )
-from box_contact_ros.evidence.pose_sets import LOADS, SETS, Pairs
-from box_contact_ros.evidence.reports.accuracy import limit_of
-from box_contact_ros.evidence.reports.frontier.speed import flush_stacks
-from box_contact_ros.evidence.training.worst_case import climb, worst_start
-from box_contact_ros.evidence.verification.errors import contact_errors
-from box_contact_ros.evidence.verification.steps import drawn_paths, largest_steps
 from box_contact_ros.scene.pose import rotation_matrix
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.mlp import ACTIVATION, NETWORK, UNITS_MAX, core_numbers, load_mlp
 from box_contact_ros.solver.weights_file import WeightsError, save_weights
+from training.worst_case import climb, worst_start
 
 N = 4000
 LANES = native.lanes

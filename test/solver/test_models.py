@@ -101,7 +101,7 @@ def test_entries_say_what_their_models_do(name):
 
 def test_a_missing_library_is_named_with_its_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, 'fcl', None)
-    monkeypatch.delitem(sys.modules, 'box_contact_ros.evidence.contestants.fcl_box', raising=False)
+    monkeypatch.delitem(sys.modules, 'box_contact_ros.soup.fcl_box', raising=False)
     with pytest.raises(ModuleNotFoundError, match="fcl.*model 'fcl' needs the extra 'soup'"
                        r".*pip install -c constraints\.txt -e '\.\[soup\]'"):
         ContactSolver((1, 1, 1), (1, 1, 1), model='fcl')

@@ -1,0 +1,227 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""What a contestant is, what it answers, and the ways to make one point of its answer.
+
+Models of this package and other engines are a `Contestant`, so reports ask and time them alike. A
+call goes from two poses, in the contestant's own form, to a result that Python can read. Making
+shapes and models is preparation and is not timed. Setting both poses is timed.
+"""
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache, partial
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from box_contact_ros.scene.pose import rotation_matrix
+from box_contact_ros.solver.contact import Contacts
+from box_contact_ros.solver.contact_solver import ContactSolver
+from box_contact_ros.solver.models import find_model
+
+from .pose_sets import Pairs
+
+MOST_CONTACTS = 16  # contacts asked for; two boxes have at most eight
+
+
+class Manifold(NamedTuple):
+    """What a contestant answers for a pair: n points, none where the boxes are apart."""
+
+    points: np.ndarray  # (n, 3)
+    normals: np.ndarray  # (n, 3), unit, from A to B; NaN: none was given
+    depths: np.ndarray  # (n,) [m]
+
+
+APART = Manifold(np.empty((0, 3)), np.empty((0, 3)), np.empty(0))
+
+
+def manifold(contacts: Iterable[tuple[ArrayLike, ArrayLike, float]]) -> Manifold:
+    """Return the answer of contacts, each a point (3,), a normal (3,) and a depth [m]."""
+    columns = list(zip(*contacts))
+    return Manifold(*map(np.array, columns)) if columns else APART
+
+
+class Solved(NamedTuple):
+    """What a model of this package answers for n pairs, with what a manifold does not hold."""
+
+    contacts: Contacts
+    left_to_exact: int  # contacts that the model handed to `exact`
+
+
+class Answer(NamedTuple):
+    """One contact of a pair: normal (3,) from A to B and point (3,), NaN if apart."""
+
+    touching: bool
+    normal: np.ndarray
+    point: np.ndarray
+
+
+@dataclass(frozen=True, kw_only=True)
+class Contestant:
+    """One way to answer: a model of this package or another engine."""
+
+    name: str  # as reports show it
+    call: str  # what a user writes
+    returns: str
+    patch: str = '–'  # what it says of the patch beyond points: its volume or area
+    package: str = ''  # distribution whose version reports name
+    choices: tuple[str, ...] = ('deepest', 'mean', 'mean by depth', 'patch centroid')
+    """Ways, of `CHOICES`, in which users make one point of the answer."""
+    boxes: Callable[[np.ndarray, np.ndarray], Callable[..., Any]]
+    """Return what answers for boxes of two sizes (3,). ValueError: not for these sizes."""
+    at: Callable[[np.ndarray, np.ndarray], tuple[Any, ...]]
+    """Return two poses (7,) in the engine's own form, the arguments of what answers."""
+    read: Callable[[Any], Manifold]
+    """Return the answer in what a call returned; to be read before the next call."""
+    solve: Callable[[Pairs], Solved] | None = None
+    """Answer for all pairs, with volume and covariance; models of this package have it."""
+    prepare_batch: Callable[..., Callable[[], Any]] | None = None
+    """Return a call that answers for all pairs at once, not in a loop; takes pairs, `threads`."""
+    any_boxes: bool = True  # whether it answers for boxes of any sizes
+    causes: Mapping[str, str] = field(default_factory=dict)
+    """Why it is 'missed', 'invented' or 'normal' in a report, where that is known."""
+    make: Callable[[], Contestant] | None = None
+    """Makes the contestant again in a subprocess, where another's library may abort."""
+
+    def prepare(self, pairs: Pairs) -> list[Callable[[], Any]]:
+        """Return a call for each pair, to be timed. ValueError: not for boxes of these sizes."""
+        made = cache(lambda p, q: self.boxes(np.array(p), np.array(q)))
+        return [partial(made(tuple(p), tuple(q)), *self.at(a, b))
+                for a, b, p, q in zip(*map(np.ascontiguousarray, pairs))]
+
+
+def packages_of(found: Sequence[Contestant]) -> list[str]:
+    """Return the distributions whose versions a report of these contestants names."""
+    return list(dict.fromkeys(['numpy', *(one.package for one in found if one.package)]))
+
+
+def ours(model: str, *, weights: str | None = None) -> Contestant:
+    """Return a model of this package. ValueError: there is no such model."""
+    entry, _ = find_model('model', model)
+    solver = partial(ContactSolver, model=model, weights=weights)
+
+    def solve(pairs: Pairs) -> Solved:
+        one = solver(pairs.size_a[0], pairs.size_b[0])
+        return Solved(pairs.contacts(one), one.exact_answers)
+
+    def prepare_batch(pairs: Pairs, threads: int = 1) -> Callable[[], Any]:
+        a, b, size_a, size_b = pairs
+        return partial(solver(size_a[0], size_b[0]).batch, a, b, size_a=size_a, size_b=size_b,
+                       threads=threads)
+
+    def read(contact: Any) -> Manifold:
+        if not contact.colliding:
+            return APART
+        return manifold([(contact.point, contact.normal, -contact.separation)])
+
+    return Contestant(name=model, call='ContactSolver(…)(pose_a, pose_b)',
+                      returns='one contact', patch='volume, covariance', choices=('its point',),
+                      boxes=solver, at=lambda a, b: (a, b), read=read, solve=solve,
+                      any_boxes=entry.any_boxes,
+                      prepare_batch=prepare_batch if entry.native_batch else None)
+
+
+def _deepest(points: np.ndarray, normals: np.ndarray, depths: np.ndarray) -> np.ndarray:
+    return points[int(np.argmax(depths))]
+
+
+def _mean(points: np.ndarray, normals: np.ndarray, depths: np.ndarray) -> np.ndarray:
+    return points.mean(axis=0)
+
+
+def _mean_by_depth(points: np.ndarray, normals: np.ndarray, depths: np.ndarray) -> np.ndarray:
+    """Return the mean with the depths as weights: where springs at the points push, all alike."""
+    weights = np.maximum(depths, 0.0)
+    return weights @ points / weights.sum() if weights.sum() > 0.0 else points.mean(axis=0)
+
+
+def _patch_centroid(points: np.ndarray, normals: np.ndarray, depths: np.ndarray) -> np.ndarray:
+    """Return the centroid of the polygon of the points, seen along the deepest one's normal."""
+    middle = points.mean(axis=0)
+    normal = normals[int(np.argmax(depths))]
+    if len(points) < 3 or not np.isfinite(normal).all():
+        return middle
+    across = np.linalg.svd(normal[None])[2][1:]
+    flat = (points - middle) @ across.T
+    order = np.argsort(np.arctan2(flat[:, 1], flat[:, 0]))
+    one, two = order, np.roll(order, -1)
+    areas = flat[one, 0] * flat[two, 1] - flat[one, 1] * flat[two, 0]
+    if not areas.sum() > 0.0:
+        return middle
+    return middle + areas @ (points[one] + points[two] - 2.0 * middle) / (3.0 * areas.sum())
+
+
+def _last(points: np.ndarray, normals: np.ndarray, depths: np.ndarray) -> np.ndarray:
+    return points[-1]
+
+
+CHOICES: dict[str, Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]] = {
+    'its point': _deepest, 'deepest': _deepest, 'mean': _mean, 'mean by depth': _mean_by_depth,
+    'patch centroid': _patch_centroid, 'centre of pressure': _last}
+"""One point of n > 0 points (n, 3), with their normals (n, 3) and depths (n,)."""
+
+
+def chosen(found: Manifold, choice: str) -> Answer:
+    """Return one contact of an answer: the deepest one's normal, the point by a choice."""
+    if not len(found.points):
+        return Answer(False, np.full(3, np.nan), np.full(3, np.nan))
+    return Answer(True, found.normals[int(np.argmax(found.depths))], CHOICES[choice](*found))
+
+
+def in_subprocess(work: Callable[..., Any], *arguments: Any, patience: float) -> Any:
+    """Return what `work` returns in a subprocess. RuntimeError: what ended the subprocess."""
+    context = multiprocessing.get_context('spawn')
+    receiving, sending = context.Pipe(duplex=False)
+    process = context.Process(target=_answer_to, args=(sending, work, *arguments))
+    process.start()
+    sending.close()
+    try:
+        if receiving.poll(patience):
+            return receiving.recv()
+        raise RuntimeError(f'no answer in {patience:g} s')
+    except EOFError:
+        process.join()
+        status = process.exitcode or 0
+        raise RuntimeError(f'ended by signal {-status}' if status < 0 else
+                           f'ended with status {status}') from None
+    finally:
+        process.kill()
+        process.join()
+
+
+def part_by_part(work: Callable[..., dict[str, Any]], make: Callable[[], Contestant],
+                 parts: Mapping[str, Any], *arguments: Any, patience: float) -> dict[str, Any]:
+    """Return what `work` returns by part for a contestant in a subprocess.
+
+    Where the contestant ends the subprocess, the parts are asked one by one, and what ended the
+    subprocess is the answer, a string.
+    """
+    try:
+        return in_subprocess(_work_with, work, make, parts, *arguments, patience=patience)
+    except RuntimeError as error:
+        if len(parts) == 1:
+            return {name: str(error) for name in parts}
+    return {name: answer for part in parts.items() for name, answer in part_by_part(
+        work, make, dict([part]), *arguments, patience=patience).items()}
+
+
+def _work_with(work: Callable[..., Any], make: Callable[[], Contestant], *arguments: Any) -> Any:
+    return work(replace(make(), make=make), *arguments)
+
+
+def _answer_to(pipe: Any, work: Callable[..., Any], *arguments: Any) -> None:
+    pipe.send(work(*arguments))
+
+
+def wxyz(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Return places (3,) of both poses, then their quaternions (4,) wxyz."""
+    return a[:3], b[:3], np.roll(a[3:], 1), np.roll(b[3:], 1)
+
+
+def matrices(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Return places (3,) of both poses, then how they are turned, (3, 3) each."""
+    return a[:3], b[:3], rotation_matrix(a[3:]), rotation_matrix(b[3:])

@@ -1,0 +1,322 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""Program `fuzz`: millions of random pairs, judged by code that shares nothing with the solver.
+
+`python -m box_contact_ros fuzz` draws pairs of boxes by class of size, in poses of the kinds that
+break collision tests. Each model answers all of them. Every gate is zero: contacts missed or
+invented, wrong depths, axes that are not the shallowest, points outside, NaN, negative eigenvalues,
+volumes of `mlp` outside their brackets, and exceptions. What is too near exact touch for float64 is
+judged in 60 digits. A broken gate prints the pose, ready to be pasted into a test; the exit status
+is then 1.
+"""
+from __future__ import annotations
+
+import os
+import time
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import nullcontext
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from box_contact_ros.core import native
+from box_contact_ros.output import machine, make_room, write_csv
+from box_contact_ros.scene.pose import quaternion_multiply, rotation_matrix
+from box_contact_ros.solver.arguments import add_models, program_parser, within
+from box_contact_ros.solver.contact_solver import ContactSolver
+from box_contact_ros.solver.models import models_with_patch
+
+from .judge import GATES, exact_gap, judge
+from .patches import mlp_faults, patch_faults
+from .pose_sets import (
+    CONTAINER,
+    HIGH_CUBE,
+    TWENTY,
+    Pairs,
+    log_uniform,
+    right_angles,
+    turns,
+    unit_quaternions,
+)
+
+PAIRS, QUICK_PAIRS = 10_000_000, 60_000
+PIECE = 50_000  # pairs that are drawn and judged at a time
+SHOWN = 3  # faults of a class and model that are printed
+
+Sizes = Callable[[np.random.Generator, int], tuple[np.ndarray, np.ndarray]]
+
+
+def _cube(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray]:
+    """Draw equal cubes, 1 cm to 10 m."""
+    size = np.repeat(log_uniform(rng, 0.01, 10.0, n)[:, None], 3, axis=1)
+    return size, size.copy()
+
+
+def _container(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray]:
+    """Draw ISO containers: 20 and 40 ft, standard and high cube."""
+    kinds = np.array([TWENTY, CONTAINER, (6.058, 2.438, 2.896), HIGH_CUBE])
+    return kinds[rng.integers(0, 4, n)], kinds[rng.integers(0, 4, n)]
+
+
+def _slab(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray]:
+    """Draw boxes with two wide extents, one of a tenth to a hundredth; the other is anything."""
+    flat = np.stack([log_uniform(rng, 1, 3, n), log_uniform(rng, 1, 3, n),
+                     log_uniform(rng, 0.01, 0.1, n)], axis=1)
+    return rng.permuted(flat, axis=1), np.exp(rng.uniform(-1.5, 1.0, (n, 3)))
+
+
+def _needle(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray]:
+    """Draw boxes with one long extent and two of a twentieth to a thousandth; both boxes."""
+    sizes = []
+    for _ in range(2):
+        thin = log_uniform(rng, 1e-3, 0.05, (n, 2))
+        sizes.append(rng.permuted(np.column_stack([log_uniform(rng, 0.5, 2, n), thin]), axis=1))
+    return sizes[0], sizes[1]
+
+
+def _card(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray]:
+    """Draw sheets 0.35 mm and thicker, to 1:10,000; both boxes."""
+    sizes = []
+    for _ in range(2):
+        wide = log_uniform(rng, 0.05, 3.5, (n, 2))
+        sizes.append(rng.permuted(np.column_stack([wide, log_uniform(rng, 3.5e-4, 2e-3, n)]),
+                                  axis=1))
+    return sizes[0], sizes[1]
+
+
+def _small_on_large(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray]:
+    """Draw boxes of size ratios of 100 to 1,000,000."""
+    small = np.exp(rng.uniform(-1, 1, (n, 3)))
+    large = np.exp(rng.uniform(-1, 1, (n, 3))) * log_uniform(rng, 1e2, 1e6, n)[:, None]
+    turned = rng.random(n) < 0.5
+    return np.where(turned[:, None], large, small), np.where(turned[:, None], small, large)
+
+
+CLASSES: dict[str, Sizes] = {'cube': _cube, 'container': _container, 'slab': _slab,
+                             'needle': _needle, 'card': _card, 'small on large': _small_on_large}
+"""Size classes by name."""
+
+
+def draw(name: str, rng: np.random.Generator, n: int) -> Pairs:
+    """Draw n pairs of a class.
+
+    Orientations: a third anything; a third one of the 24 right-angled ones, tilted by 0 or 1e-16 to
+    0.1 rad; a third with one edge direction in common. A third of the places is anywhere near; the
+    others are `_brought_together`. Half of the pairs are then moved rigidly, a fifth of those far
+    from the origin.
+    """
+    size_a, size_b = CLASSES[name](rng, n)
+    turn = unit_quaternions(rng, n)
+    kind = rng.integers(0, 3, n)
+    right = np.array(right_angles())[rng.integers(0, 24, n)]
+    tilt = log_uniform(rng, 1e-16, 0.1, n) * (rng.random(n) < 0.9)
+    tilted = quaternion_multiply(turns(_axes(rng, n), tilt), right)
+    shared = quaternion_multiply(
+        right, turns(np.eye(3)[rng.integers(0, 3, n)], rng.uniform(-4, 4, n)))
+    turn = np.where((kind == 1)[:, None], tilted, np.where((kind == 2)[:, None], shared, turn))
+    place = _brought_together(rng, rotation_matrix(turn), size_a, size_b)
+    anywhere = rng.random(n) < 1.0 / 3.0
+    reach = 0.5 * (size_a + np.abs(rotation_matrix(turn) * size_b[:, None]).sum(axis=2))
+    place = np.where(anywhere[:, None], reach * rng.uniform(-1.05, 1.05, (n, 3)), place)
+
+    moved = rng.random(n) < 0.5
+    rigid = np.where(moved[:, None], unit_quaternions(rng, n), [0.0, 0.0, 0.0, 1.0])
+    far = np.where(rng.random(n) < 0.2, log_uniform(rng, 1e2, 1e7, n), 10.0) * moved
+    shift = rng.uniform(-1, 1, (n, 3)) * far[:, None]
+    a = np.concatenate([shift, rigid], axis=1)
+    b = np.concatenate([np.einsum('nij,nj->ni', rotation_matrix(rigid), place) + shift,
+                        quaternion_multiply(rigid, turn)], axis=1)
+    # Quaternions as programs send them: either sign, and a length off by rounding or by drift.
+    for pose in (a, b):
+        pose[:, 3:] *= (rng.choice([-1.0, 1.0], n) * (1.0 + rng.choice(
+            [0.0, 0.0, 1e-15, 1e-7, 1e-3], n)))[:, None]
+    return Pairs(a, b, size_a, size_b)
+
+
+def _brought_together(rng: np.random.Generator, axes: np.ndarray, size_a: np.ndarray,
+                      size_b: np.ndarray) -> np.ndarray:
+    """Draw places (n, 3) of B, turned by axes (n, 3, 3), where features of both boxes meet.
+
+    Corners, middles of edges or faces meet up to a gap or overlap of 1e-13 to 0.3 of the size. The
+    gap is along one of the fifteen axes or anywhere. Most have a smaller step across too. One in a
+    hundred has a gap of 0 or 1e-16 to 1e-13 instead, which takes 60 digits to judge.
+    """
+    n = len(axes)
+    at_a = 0.5 * rng.integers(-1, 2, (n, 3)) * size_a
+    at_b = np.einsum('nij,nj->ni', axes, 0.5 * rng.integers(-1, 2, (n, 3)) * size_b)
+    # Along: an axis of A, of B, a cross product, or anything.
+    which = rng.integers(0, 4, n)
+    along = _axes(rng, n)
+    along[which == 0] = np.eye(3)[rng.integers(0, 3, n)][which == 0]
+    of_b = np.take_along_axis(axes, rng.integers(0, 3, (n, 1, 1)), axis=2)[:, :, 0]
+    along[which == 1] = of_b[which == 1]
+    crossed = np.cross(np.eye(3)[rng.integers(0, 3, n)], of_b)
+    length = np.linalg.norm(crossed, axis=1)
+    rows = (which == 2) & (length > 1e-3)
+    along[rows] = crossed[rows] / length[rows, None]
+    size = np.maximum(size_a, size_b).max(axis=1)
+    least = np.minimum(size_a.min(axis=1), size_b.min(axis=1))
+    close = rng.random(n) < 0.01
+    step = np.where(close, log_uniform(rng, 1e-16, 1e-13, n) * (rng.random(n) < 0.5),
+                    log_uniform(rng, 1e-13, 0.3, n)) * rng.choice([-1.0, 1.0], n)
+    place = at_a - at_b + along * (step * np.where(rng.random(n) < 0.5, size, least))[:, None]
+    # A step within a plane of contact leaves it as it is: mostly another one comes across.
+    across = log_uniform(rng, 1e-12, 1e-2, n) * (rng.random(n) < 0.9) * ~close
+    return place + _axes(rng, n) * (across * least)[:, None]
+
+
+def _axes(rng: np.random.Generator, n: int) -> np.ndarray:
+    axes = rng.normal(size=(n, 3))
+    return axes / np.linalg.norm(axes, axis=1, keepdims=True)
+
+
+@dataclass
+class Tally:
+    """What was found for one class and model."""
+
+    name: str
+    model: str
+    pairs: int = 0
+    contacts: int = 0
+    near_touch: int = 0  # pairs that were judged in 60 digits
+    exact_answers: int = 0
+    worst_depth: float = 0.0  # largest depth error, by its tolerance
+    faults: Counter[str] = field(default_factory=lambda: Counter(dict.fromkeys(
+        (*GATES.values(), 'exception'), 0)))
+    poses: list[str] = field(default_factory=list)  # the first faults, as code
+
+    @property
+    def broken(self) -> int:
+        """Faults of all kinds."""
+        return self.faults.total()
+
+    def add(self, other: Tally) -> None:
+        """Take in what another piece found."""
+        for name in ('pairs', 'contacts', 'near_touch', 'exact_answers'):
+            setattr(self, name, getattr(self, name) + getattr(other, name))
+        self.worst_depth = max(self.worst_depth, other.worst_depth)
+        self.faults.update(other.faults)
+        self.poses = (self.poses + other.poses)[:SHOWN]
+
+    def __str__(self) -> str:
+        wrong = ', '.join(f'{count} {name}' for name, count in self.faults.items() if count)
+        return (f'{self.name:<15} {self.model:<10} {self.pairs:>11,} pairs {self.contacts:>11,} '
+                f'contacts {self.near_touch:>8,} near touch  worst depth error '
+                f'{self.worst_depth:.2g} of its tolerance  {wrong or "no fault"}')
+
+
+def examine(pairs: Pairs, name: str, solvers: dict[str, ContactSolver]) -> list[Tally]:
+    """Ask each model for the pairs of a class, and judge the answers."""
+    gap = cache(lambda row: exact_gap(*(part[row] for part in pairs)))  # once for all models
+    tallies = []
+    for model, solver in solvers.items():
+        tally = Tally(name, model, pairs=len(pairs.pose_a))
+        tallies.append(tally)
+        before = solver.exact_answers
+        try:
+            found = pairs.contacts(solver)
+        except Exception as error:
+            tally.faults['exception'] += 1
+            tally.poses.append(f'# {model}, exception: {error!r}')
+            continue
+        verdict = judge(*pairs, found)
+        verdict.settle(found, gap)
+        faults = verdict.faults | patch_faults(pairs, found)
+        if model == 'mlp':
+            faults |= mlp_faults(pairs, found)
+        tally.contacts = int(found.colliding.sum())
+        tally.near_touch = int(verdict.doubtful.sum())
+        tally.exact_answers = solver.exact_answers - before
+        tally.worst_depth = float(np.nanmax(verdict.depth_error, initial=0.0))
+        for bit, words in GATES.items():
+            tally.faults[words] = int(np.count_nonzero(faults & bit))
+        for row in np.flatnonzero(faults)[:SHOWN]:
+            words = ', '.join(text for bit, text in GATES.items() if faults[row] & bit)
+            tally.poses.append(_pasted(words, model, [part[row] for part in pairs]))
+    return tallies
+
+
+def _pasted(words: str, model: str, pair: Sequence[np.ndarray]) -> str:
+    """Return a pair as Python, every digit."""
+    values = [', '.join(map(repr, part.tolist())) for part in pair]
+    return (f'# {words}\nContactSolver(({values[2]}), ({values[3]}), model={model!r})(\n'
+            f'    ({values[0]}),\n    ({values[1]}))')
+
+
+def _piece(job: tuple[str, int, int, int, tuple[str, ...]]) -> list[Tally]:
+    """Draw and judge one piece of a class, for all models; the seed is the piece's own."""
+    name, seed, number, count, models = job
+    rng = np.random.default_rng([seed, list(CLASSES).index(name), number])
+    return examine(draw(name, rng, count), name, {model: _solver(model) for model in models})
+
+
+@cache
+def _solver(model: str) -> ContactSolver:
+    """Return the process's solver: loading weights takes longer than a piece."""
+    return ContactSolver((1, 1, 1), (1, 1, 1), model=model)
+
+
+def fuzz(total: int, *, seed: int = 1, classes: Sequence[str] = tuple(CLASSES),
+         models: Sequence[str] | None = None, workers: int = 1) -> dict[tuple[str, str], Tally]:
+    """Return tallies by class and model, of `total` pairs spread evenly over the classes."""
+    from tqdm import tqdm
+
+    models = models or models_with_patch()
+    each = -(-total // len(classes))
+    counts = [min(PIECE, each - drawn) for drawn in range(0, each, PIECE)]
+    jobs = [(name, seed, number, count, tuple(models))
+            for name in classes for number, count in enumerate(counts)]
+    tallies = {(name, model): Tally(name, model) for name in classes for model in models}
+    with (tqdm(total=sum(job[3] for job in jobs), desc='fuzz', unit='pair', unit_scale=True,
+               mininterval=1.0) as bar,
+          ProcessPoolExecutor(workers) if workers > 1 else nullcontext() as pool):
+        for found in pool.map(_piece, jobs) if pool else map(_piece, jobs):
+            for tally in found:
+                tallies[tally.name, tally.model].add(tally)
+            bar.set_postfix(faults=sum(t.broken for t in tallies.values()), refresh=False)
+            bar.update(found[0].pairs)
+    return tallies
+
+
+def csv_rows(tallies: Iterable[Tally]) -> list[dict[str, object]]:
+    """Return a row per class and model."""
+    return [{'class': t.name, 'model': t.model, 'pairs': t.pairs, 'contacts': t.contacts,
+             'near_touch': t.near_touch, 'exact_answers': t.exact_answers,
+             'worst_depth_by_tolerance': t.worst_depth, **t.faults} for t in tallies]
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Fuzz, print a line per class and model; 1 if a gate is broken."""
+    parser = program_parser('fuzz', __doc__, quick=f'{QUICK_PAIRS:,} pairs', seed=1)
+    parser.add_argument('--pairs', type=within(1), default=PAIRS,
+                        help='pairs in all (default: %(default)s)')
+    parser.add_argument('--classes', nargs='+', choices=list(CLASSES), default=list(CLASSES),
+                        metavar='CLASS', help=f'classes, of {", ".join(CLASSES)} (default: all)')
+    add_models(parser, '--models', models_with_patch())
+    parser.add_argument('--workers', type=within(1), default=os.cpu_count() or 1,
+                        help='processes at once')
+    parser.add_argument('--out', type=Path, metavar='FILE', help='CSV with the tallies')
+    options = parser.parse_args(args)
+    if options.out:
+        make_room(parser, options.out)
+    began = time.monotonic()
+    tallies = fuzz(QUICK_PAIRS if options.quick else options.pairs, seed=options.seed,
+                   classes=options.classes, models=options.models, workers=options.workers)
+    for tally in tallies.values():
+        print(tally)
+    for tally in tallies.values():
+        for pose in tally.poses:
+            print(f'\n{pose}')
+    if options.out:
+        write_csv(options.out, csv_rows(tallies.values()), digits=3,
+                  about=machine(native))
+    broken = sum(tally.broken for tally in tallies.values())
+    print(f'\n{broken} faults after '
+          f'{(time.monotonic() - began) / 60:.1f} minutes, seed {options.seed}, '
+          f'{machine(native)}')
+    return 1 if broken else 0

@@ -1,0 +1,111 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""Public reports about pairs of boxes, replayed: the poses are in `named_failures.yaml`.
+
+Model answers have to be right to rounding. Other engines' have the bound of their report, or what
+float32 and a usual preference for faces cost.
+"""
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import yaml
+
+from .contestant import Contestant, Manifold, part_by_part
+from .judge import PRESSED, judge, two_touches
+from .pose_sets import Pairs
+
+FILE = Path(__file__).with_suffix('.yaml')
+SINGLE = 1e-6  # error that float32 costs, of the size
+PREFERENCE = 0.06  # share of the depth by which engines may prefer a face to an edge, 5 % usually
+PATIENCE = 180.0  # for an engine's answers in a subprocess [s]
+
+
+@dataclass(frozen=True, kw_only=True)
+class NamedFailure:
+    """A pair of boxes of a public report; units are the report's."""
+
+    id: str
+    repo: str
+    number: int
+    kind: str  # 'issues' or 'pull'
+    report: str
+    source: str  # where the numbers stand
+    pose_a: list[float]
+    size_a: list[float]
+    pose_b: list[float]
+    size_b: list[float]
+    separation: float  # in 60 digits, rounded once
+    normal: list[float] | None = None  # None: apart
+    bound: float = 0.0
+    """Error of another engine's depth that passes, if larger than what it may have anyway."""
+
+    @property
+    def link(self) -> str:
+        """Return the thread's address."""
+        return f'https://github.com/{self.repo}/{self.kind}/{self.number}'
+
+    @property
+    def pairs(self) -> Pairs:
+        """Return the pair as a set of one."""
+        return Pairs(*(np.array([part], dtype=np.float64) for part in (
+            self.pose_a, self.pose_b, self.size_a, self.size_b)))
+
+    @property
+    def lenience(self) -> float:
+        """Return the error that another engine's depth may have."""
+        return max(self.bound, SINGLE * float(self.pairs.size[0]),
+                   PREFERENCE * abs(self.separation))
+
+
+def load() -> dict[str, NamedFailure]:
+    """Return the reports by id."""
+    with FILE.open(encoding='utf-8') as file:
+        return {one['id']: NamedFailure(**one) for one in yaml.safe_load(file)}
+
+
+def fault(one: NamedFailure, found: Manifold, bound: float) -> str:
+    """Return what is wrong with an answer, '' if nothing; bound: error of lengths that passes."""
+    pairs, size = one.pairs, float(one.pairs.size[0])
+    unsure = abs(one.separation) <= max(two_touches(*pairs)[0], min(bound, SINGLE * size))
+    if not len(found.points):
+        return '' if one.separation > 0.0 or unsure else 'missed'
+    if one.separation > 0.0 and not unsure:
+        return 'invented'
+    deepest = int(np.argmax(found.depths))
+    depth = float(found.depths[deepest])  # NaN: none is given
+    if abs(depth + one.separation) > bound:
+        return f'depth {depth:.3g}'
+    along = judge(*pairs, (np.array([True]), np.array([one.separation]),
+                           found.normals[[deepest]], found.points[[deepest]])).along[0]
+    if along < one.separation - bound:  # NaN: no normal is given
+        return f'depth {-along:.3g} along the normal'
+    # Models press boxes that just touch in.
+    reach = bound + max(0.0, -one.separation, depth) + PRESSED * size
+    beyond = pairs.beyond(found.points).max()
+    return '' if beyond <= reach else f'point {beyond:.3g} outside'
+
+
+def replay(engine: Contestant, failures: Mapping[str, NamedFailure], bounds: Mapping[str, float],
+           ) -> dict[str, str]:
+    """Return by id what is wrong with an engine's answer, '' if nothing."""
+    found = {}
+    for name, one in failures.items():
+        try:
+            answer = engine.read(engine.prepare(one.pairs)[0]())
+            found[name] = fault(one, answer, bounds[name])
+        except Exception as error:  # of any library; what it raised is the finding
+            found[name] = f'raised {type(error).__name__}'
+    return found
+
+
+def replay_apart(engine: Contestant, failures: Mapping[str, NamedFailure]) -> dict[str, str]:
+    """Do as `replay`, with the bounds of other engines, in a subprocess if it is another's."""
+    bounds = {name: one.lenience for name, one in failures.items()}
+    if engine.make is None:
+        return replay(engine, failures, bounds)
+    return part_by_part(replay, engine.make, failures, bounds, patience=PATIENCE)

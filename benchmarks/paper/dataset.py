@@ -1,0 +1,385 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""The data of the paper's section 3: pairs of boxes that just touch, and where they do.
+
+1. Placements. The first box stays at the origin. Its trihedron is its faces +x, +y, +z. The second
+   box's trihedron is its faces −x, −y, −z, with the corner (−, −, −) and 7 vertices. Roll, pitch
+   and yaw of the second box are drawn uniformly in [−π/2, π/2], or from a grid of values there.
+   - vertex-face: a point is drawn uniformly by area on the first trihedron. One of the 7 vertices
+     is placed on the point. The normal is the face's.
+   - edge-edge: a point is drawn uniformly by length on the 9 edges of each trihedron. The second
+     point is placed on the first. The normal is the cross product of the edges, from the first box
+     to the second.
+   The paper does not say that placements in which the boxes interpenetrate are dropped. `Drawing`
+   keeps or drops them. In all others, one plane through the point separates the boxes, so the label
+   depends on the pose alone.
+2. Patterns. Inputs are the second box's offset t [m], and its roll, pitch and yaw [rad], in the
+   first box's frame: R = Rz(yaw) Ry(pitch) Rx(roll). Outputs are azimuth and elevation [rad] of the
+   impact point's direction from the first box's centre, then of the normal.
+   - `paper`: folded into the network's domain, or left as drawn. The fold is `symmetry.OCTANT`:
+     t ≥ 0, angles in [−π/2, π/2].
+   - `committee`: for cubes, folded like `paper`. Each expert has placements of one kind. The third
+     kind is face-face: see `face_face_candidates`. The classifier has all three kinds, and an
+     output for each: 1 for the kind of the placement, 0 for the others.
+   - `continuous`: for cubes. The features that meet, by SAT, choose the subset. The fold
+     `symmetry.FEATURES` brings them to the reference features. The same pose always falls in the
+     same subset, however it was drawn.
+
+Everything is drawn from one seed, every set from a stream of its own. So any set can be made
+without the others.
+"""
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from box_contact_ros.core import Stages, stages
+from box_contact_ros.paper.symmetry import EDGE_EDGE, FEATURES, NO_FOLD, OCTANT, VERTEX_FACE
+from box_contact_ros.paper.symmetry import fold as fold_pairs
+from box_contact_ros.scene.pose import quaternion_multiply, rotation_matrix
+from box_contact_ros.solver.contact_solver import ContactSolver
+
+from ..pose_sets import CUBE, turns
+
+SETS = ('training', 'cross-validation', 'external')
+PAPER_COUNTS = (8000, 5000, 75000)  # patterns per set, with discontinuities
+CONTINUOUS_COUNTS = (10000, 6000, 50000)  # patterns per set and subset, without discontinuities
+CLASSES = ('vertex', 'edge', 'face')  # of contacts, an expert of the committee each
+SUBSETS = {'vertex_face': VERTEX_FACE, 'edge_edge': EDGE_EDGE}
+
+INPUTS = ('t_x', 't_y', 't_z', 'roll', 'pitch', 'yaw')
+OUTPUTS = ('point azimuth', 'point elevation', 'normal azimuth', 'normal elevation')
+
+INTERPENETRATION = 1e-12
+"""Depth, as a fraction of the largest extent, from which on boxes interpenetrate. Rounding gives a
+placement made to touch a depth of some 1e-16. Of the random placements that overlap, one in 1e11
+would be let through."""
+
+PARALLEL = 1e-9
+"""Sine of the angle up to which two edges are parallel and have no common normal."""
+
+POLE = 1e-12
+"""Sine of the angle to the z axis below which a direction is the pole and its azimuth is 0. It is
+far above the rounding of a unit vector, and far below anything that is drawn."""
+
+TILT = 0.02
+"""Largest angle between two faces that lie on each other [rad]."""
+AXES_IN_TURN = 0.5 * np.array([[0.0, 0, 0, 2], [1, 1, 1, 1], [-1, -1, -1, 1]])
+"""Quaternions xyzw that leave the axes of a cube, or bring each to the next or to the last."""
+PRESSED = 1e-3  # depth [m] at which the middle of two faces' overlap is measured
+
+CHUNK = 1 << 15  # candidates drawn at a time
+
+
+@dataclass(frozen=True)
+class Placements:
+    """n pairs of boxes of the same size that just touch, in the first box's frame."""
+
+    size: tuple[float, float, float]  # full extents of either box [m]
+    inputs: np.ndarray  # (n, 6) of the second box: t [m]; roll, pitch, yaw [rad]
+    point: np.ndarray  # (n, 3) impact point [m]
+    normal: np.ndarray  # (n, 3) unit normal, out of the first box
+
+    @property
+    def pose(self) -> np.ndarray:
+        """Return the poses (n, 7) of the second box, x y z qx qy qz qw."""
+        return as_poses(self.inputs)[1]
+
+    def __len__(self) -> int:
+        return len(self.inputs)
+
+    def __getitem__(self, rows: np.ndarray | slice) -> Placements:
+        return Placements(self.size, self.inputs[rows], self.point[rows], self.normal[rows])
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """How placements are drawn."""
+
+    kept: bool = False  # whether boxes that interpenetrate are kept
+    grid: int = 0
+    """Values of each angle, evenly from −π/2 to π/2; 0: any value."""
+
+    def angles(self, rng: np.random.Generator, count: int) -> np.ndarray:
+        """Return roll, pitch, yaw (count, 3) [rad]."""
+        end = 0.5 * np.pi
+        if self.grid:
+            return rng.choice(np.linspace(-end, end, self.grid), (count, 3))
+        return rng.uniform(-end, end, (count, 3))
+
+
+TOUCHING = Drawing()
+
+
+@dataclass(frozen=True)
+class Patterns:
+    """n patterns for a network: see the module's docstring, 2."""
+
+    inputs: np.ndarray  # (n, 6) t [m]; roll, pitch, yaw [rad]
+    outputs: np.ndarray
+    """(n, 4) azimuth and elevation [rad] of the impact point, then of the normal."""
+
+    def __len__(self) -> int:
+        return len(self.inputs)
+
+
+def _joined(parts: Sequence[Placements]) -> Placements:
+    return Placements(parts[0].size, *(np.concatenate([getattr(part, name) for part in parts])
+                                       for name in ('inputs', 'point', 'normal')))
+
+
+def quaternion_from_euler(angles: np.ndarray) -> np.ndarray:
+    """Quaternions (n, 4) xyzw of Rz(yaw) Ry(pitch) Rx(roll); angles (n, 3) roll, pitch, yaw."""
+    roll, pitch, yaw = (turns(axis, angle) for axis, angle in zip(np.eye(3), angles.T))
+    return quaternion_multiply(yaw, quaternion_multiply(pitch, roll))
+
+
+def as_poses(inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return poses (n, 7) of A and B of inputs (n, 6): offset [m] and roll, pitch, yaw [rad]."""
+    pose_a = np.tile([0.0, 0, 0, 0, 0, 0, 1], (len(inputs), 1))
+    return pose_a, np.concatenate([inputs[:, :3], quaternion_from_euler(inputs[:, 3:])], axis=1)
+
+
+def vertex_face_candidates(rng: np.random.Generator, count: int, half: np.ndarray,
+                           drawing: Drawing = TOUCHING) -> Placements:
+    """Put a vertex of the second trihedron on a random point of the first; most interpenetrate."""
+    area = np.prod(half) / half
+    face = rng.choice(3, count, p=area / area.sum())
+    point = rng.uniform(-half, half, (count, 3))
+    rows = np.arange(count)
+    point[rows, face] = half[face]
+    # The bits of 0 … 6 are the seven vertices; 7 would be (+, +, +), which is on none of its faces.
+    bits = rng.integers(0, 7, count)[:, None] >> np.arange(3) & 1
+    vertex = np.where(bits == 1, half, -half)
+    inputs, _ = _placed(point, vertex, drawing.angles(rng, count))
+    return Placements(tuple((2.0 * half).tolist()), inputs, point, np.eye(3)[face])
+
+
+def edge_edge_candidates(rng: np.random.Generator, count: int, half: np.ndarray,
+                         drawing: Drawing = TOUCHING) -> Placements:
+    """Put a random point of the second trihedron's edges on one of the first's.
+
+    Parallel edges, which angles of a grid make, have a normal of NaN: `touching` drops them.
+    """
+    point, along_a = _edge_points(rng, count, half)
+    on_b, along_b = _edge_points(rng, count, half)
+    inputs, rotation = _placed(point, -on_b, drawing.angles(rng, count))
+    normal = np.cross(np.eye(3)[along_a], rotation[np.arange(count), :, along_b])
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    normal /= np.where(length > PARALLEL, length, np.nan)
+    normal *= np.where(np.sum(normal * inputs[:, :3], axis=1) < 0.0, -1.0, 1.0)[:, None]
+    return Placements(tuple((2.0 * half).tolist()), inputs, point, normal)
+
+
+def _edge_points(rng: np.random.Generator, count: int, half: np.ndarray,
+                 ) -> tuple[np.ndarray, np.ndarray]:
+    """Points (count, 3) on the 9 edges of the faces +x, +y, +z, and their edges' axes (count,)."""
+    axis = rng.choice(3, count, p=half / half.sum())
+    # Three of the four edges along an axis belong to the trihedron: not the one at (−, −).
+    at = rng.integers(1, 4, count)
+    rows = np.arange(count)
+    point = np.empty((count, 3))
+    point[rows, axis] = rng.uniform(-1.0, 1.0, count)
+    point[rows, (axis + 1) % 3] = np.where(at & 1, 1.0, -1.0)
+    point[rows, (axis + 2) % 3] = np.where(at & 2, 1.0, -1.0)
+    return point * half, axis
+
+
+def _placed(point: np.ndarray, on_b: np.ndarray, angles: np.ndarray,
+            ) -> tuple[np.ndarray, np.ndarray]:
+    """Return inputs (n, 6) and rotations (n, 3, 3) of a second box with its `on_b` on `point`."""
+    rotation = rotation_matrix(quaternion_from_euler(angles))
+    offset = point - np.einsum('nij,nj->ni', rotation, on_b)
+    return np.concatenate([offset, angles], axis=1), rotation
+
+
+def face_face_candidates(rng: np.random.Generator, count: int, half: np.ndarray,
+                         drawing: Drawing = TOUCHING) -> Placements:
+    """Lay a face of the second trihedron on one of the first's, tilted by up to TILT; for cubes.
+
+    Spin and place are uniform, of faces that overlap. The impact point is the middle of the faces'
+    overlap without the tilt. `drawing` does not matter. Where they do not meet, the normal is NaN.
+    """
+    rows, axis = np.arange(count), rng.integers(0, 3, count)
+    normal = np.eye(3)[axis]
+    flat = quaternion_multiply(turns(normal, rng.uniform(-np.pi, np.pi, count)),
+                               AXES_IN_TURN[rng.integers(0, 3, count)])
+    # B's axis that lies along A's is any: its face −j on A's face +i.
+    offset = half * rng.uniform(-2.5, 2.5, (count, 3))
+    offset[rows, axis] = 2.0 * half[axis] - PRESSED
+    size = tuple((2.0 * half).tolist())
+    met = ContactSolver(size, size, model='exact').batch(
+        np.tile([0.0, 0, 0, 0, 0, 0, 1], (count, 1)), np.concatenate([offset, flat], axis=1))
+    point = np.where(normal == 1.0, half, met.point)
+    across = np.cross(normal, rng.normal(size=(count, 3)))
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    tilted = quaternion_multiply(turns(across, rng.uniform(-TILT, TILT, count)), flat)
+    inputs = np.concatenate([offset, euler_angles(rotation_matrix(tilted))], axis=1)
+    found = query(Placements(size, inputs, point, normal))
+    inputs[:, :3] -= found.separation[:, None] * found.normal
+    # Adjacent faces do not meet, nor those that the tilt has parted or made an edge meet.
+    after = query(Placements(size, inputs, point, normal))
+    meet = (met.colliding & (after.separation <= INTERPENETRATION * max(size))
+            & (np.sum(after.normal * normal, axis=1) > math.cos(2.0 * TILT)))
+    return Placements(size, inputs, point, np.where(meet[:, None], normal, np.nan))
+
+
+def euler_angles(rotation: np.ndarray) -> np.ndarray:
+    """Return roll, pitch, yaw (n, 3) [rad] of rotations (n, 3, 3)."""
+    zeros = np.zeros(len(rotation))
+    return fold_pairs(NO_FOLD, np.zeros((len(rotation), 3)), rotation, axis=zeros,
+                      normal=np.zeros((len(rotation), 3))).angles
+
+
+GENERATORS = (vertex_face_candidates, edge_edge_candidates)
+
+
+def touching(rng: np.random.Generator, count: int, size: Sequence[float],
+             candidates: Callable[[np.random.Generator, int, np.ndarray, Drawing], Placements],
+             drawing: Drawing = TOUCHING) -> Placements:
+    """Return `count` placements of one of the two kinds."""
+    half = 0.5 * np.asarray(size, dtype=np.float64)
+    found: list[Placements] = []
+    while sum(map(len, found)) < count:
+        drawn = candidates(rng, CHUNK, half, drawing)
+        wanted = np.isfinite(drawn.normal).all(axis=1)
+        if not drawing.kept:
+            wanted &= query(drawn).separation >= -INTERPENETRATION * max(size)
+        found.append(drawn[wanted])
+    return _joined(found)[:count]
+
+
+def mixed(rng: np.random.Generator, count: int, size: Sequence[float], edge_share: float,
+          drawing: Drawing = TOUCHING) -> Placements:
+    """`count` placements of both kinds in random order, `edge_share` of them edge-edge."""
+    edges = round(edge_share * count)
+    parts = [touching(rng, wanted, size, candidates, drawing)
+             for wanted, candidates in zip((count - edges, edges), GENERATORS) if wanted]
+    return _joined(parts)[rng.permutation(count)]
+
+
+def query(placements: Placements) -> Stages:
+    """Return separation, axis, normal, offset_a and rotation of every placement, by SAT."""
+    first = np.tile([0.0, 0, 0, 0, 0, 0, 1], (len(placements), 1))
+    size = [placements.size]
+    return stages(first, placements.pose, size, size,
+                  names=('separation', 'axis', 'normal', 'offset_a', 'rotation'))
+
+
+@dataclass(frozen=True)
+class Folded:
+    """n placements in a network's domain."""
+
+    inputs: np.ndarray  # (n, 6) t [m]; roll, pitch, yaw [rad]
+    point: np.ndarray  # (n, 3) impact point [m]
+    normal: np.ndarray  # (n, 3)
+    subset: np.ndarray  # (n,) VERTEX_FACE or EDGE_EDGE after FEATURES, else −1
+
+    def patterns(self, rows: np.ndarray | slice = slice(None)) -> Patterns:
+        """Return the inputs and outputs of some rows."""
+        return Patterns(self.inputs[rows], np.concatenate(
+            [spherical(self.point[rows]), spherical(self.normal[rows])], axis=1))
+
+
+def fold(placements: Placements, how: int) -> Folded:
+    """Bring placements into a network's domain by NO_FOLD, OCTANT or FEATURES."""
+    if how == NO_FOLD:  # inputs are as drawn, zeros keep the signs that tell azimuths ±π apart
+        return Folded(placements.inputs, placements.point, placements.normal,
+                      np.full(len(placements), -1))
+    if how == FEATURES and len(set(placements.size)) != 1:
+        raise ValueError(f'features are folded for cubes, not for {placements.size}')
+    sat = query(placements)
+    folds = fold_pairs(how, sat.offset_a, sat.rotation, axis=sat.axis, normal=sat.normal)
+    return Folded(np.concatenate([folds.offset, folds.angles], axis=1),
+                  folds.folded(placements.point), folds.folded(placements.normal), folds.subset)
+
+
+def spherical(direction: np.ndarray) -> np.ndarray:
+    """Azimuth in [−π, π] and elevation in [−π/2, π/2] [rad] (n, 2) of directions (n, 3).
+
+    The polar axis is z; the azimuth of the poles is 0.
+    """
+    x, y, z = direction.T
+    across = np.hypot(x, y)
+    pole = across <= POLE * np.abs(z)
+    return np.column_stack([np.where(pole, 0.0, np.arctan2(y, x)), np.arctan2(z, across)])
+
+
+def _streams(seed: int, counts: Sequence[int], sets: Sequence[str],
+             ) -> Iterator[tuple[str, int, np.random.Generator]]:
+    """Yield name, number of patterns and random stream of the sets asked for."""
+    for number, name in enumerate(SETS):
+        if name in sets:
+            yield name, counts[number], np.random.default_rng([seed, number])
+
+
+def paper(seed: int, *, size: Sequence[float] = CUBE, counts: Sequence[int] = PAPER_COUNTS,
+          folded_in: bool = True, edge_share: float = 0.5, sets: Sequence[str] = SETS,
+          drawing: Drawing = TOUCHING) -> dict[str, Patterns]:
+    """Return the sets with discontinuities, for two boxes of full extents `size` [m].
+
+    `folded_in`: in the domain of `symmetry.OCTANT`, as at inference; otherwise as drawn.
+    `edge_share` of the patterns are edge-edge.
+    """
+    how = OCTANT if folded_in else NO_FOLD
+    return {name: fold(mixed(rng, count, size, edge_share, drawing), how).patterns()
+            for name, count, rng in _streams(seed, counts, sets)}
+
+
+def continuous(seed: int, *, counts: Sequence[int] = CONTINUOUS_COUNTS, edge_share: float = 0.5,
+               sets: Sequence[str] = SETS) -> dict[str, dict[str, Patterns]]:
+    """Return the sets of each subset without discontinuities, for two cubes of edge 2."""
+    result: dict[str, dict[str, Patterns]] = {subset: {} for subset in SUBSETS}
+    for name, count, rng in _streams(seed, counts, sets):
+        found: dict[str, list[Patterns]] = {subset: [] for subset in SUBSETS}
+        # Only SAT tells a placement's subset. Placements are drawn until the smaller subset is
+        # full; the larger one is cut to the same number.
+        while min(sum(map(len, parts)) for parts in found.values()) < count:
+            some = fold(mixed(rng, 2 * count, CUBE, edge_share), FEATURES)
+            for subset, number in SUBSETS.items():
+                found[subset].append(some.patterns(some.subset == number))
+        for subset, parts in found.items():
+            result[subset][name] = Patterns(np.concatenate([p.inputs for p in parts])[:count],
+                                            np.concatenate([p.outputs for p in parts])[:count])
+    return result
+
+
+def committee(seed: int, *, counts: Sequence[int] = CONTINUOUS_COUNTS,
+              sets: Sequence[str] = SETS) -> dict[str, dict[str, Patterns]]:
+    """Return the sets of the classifier and of each expert, for two cubes of edge 2.
+
+    The classifier's patterns are a third of each kind, and none of an expert's.
+    """
+    kinds = dict(zip(CLASSES, (*GENERATORS, face_face_candidates)))
+    result: dict[str, dict[str, Patterns]] = {'classifier': {}, **{kind: {} for kind in kinds}}
+    for name, count, rng in _streams(seed, counts, sets):
+        share, inputs = -(-count // len(kinds)), []
+        for kind, candidates in kinds.items():
+            some = fold(touching(rng, count + share, CUBE, candidates), OCTANT)
+            result[kind][name] = some.patterns(slice(count))
+            inputs.append(some.inputs[count:])
+        order = rng.permutation(len(kinds) * share)[:count]
+        result['classifier'][name] = Patterns(
+            np.concatenate(inputs)[order], np.repeat(np.eye(len(kinds)), share, axis=0)[order])
+    return result
+
+
+def of_card(card: Mapping[str, Any], sets: Sequence[str] = SETS,
+            ) -> dict[str, dict[str, Patterns]]:
+    """Return the sets a model card speaks of, made again: per network, per set."""
+    data = card['data']
+    counts = [data['counts'][name] for name in SETS]
+    if card['model'] == 'paper-committee':
+        return committee(card['seed'], counts=counts, sets=sets)
+    options = {'counts': counts, 'edge_share': data['edge_share'], 'sets': sets}
+    if card['model'] == 'paper-continuous':
+        return continuous(card['seed'], **options)
+    seeds = {f'seed_{seed}': seed for seed in data.get('seeds', ())} or {'contact': card['seed']}
+    drawing = Drawing(data.get('kept', False), data.get('grid', 0))
+    return {network: paper(seed, size=card['sizes'][0], folded_in=data['folded_in'],
+                           drawing=drawing, **options) for network, seed in seeds.items()}

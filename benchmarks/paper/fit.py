@@ -1,0 +1,162 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""Backpropagation with momentum, for many of the paper's networks at once.
+
+1. Inputs are normalised to mean 0 and deviation 1; `export` folds that into the first layer.
+2. Every epoch goes through the training set once in random order. The learning rate falls from its
+   value to zero along half a cosine over the epochs.
+3. The loss is the squared error of the angles. Differences are wrapped into [−π, π), as −π and π
+   are the same direction, unless the settings leave them as they are.
+4. Cross-validation: each network keeps the weights of the epoch in which its error on the
+   cross-validation set was least.
+
+The same seed gives the same weights on the same machine with the same number of threads.
+"""
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import torch
+from torch import Tensor
+from tqdm import tqdm
+
+from .dataset import Patterns
+from .ensemble import Ensemble, Layers, Scaling, drawn
+from .errors import difference
+
+CHECKS = 200  # least number of times that the cross-validation error is looked at in a training
+
+
+@dataclass(frozen=True)
+class PaperSettings:
+    """One training of several networks. Sequences have an entry for each; numbers hold for all."""
+
+    widths: tuple[int, ...]  # units of each layer, inputs first: (6, 20, 18, 4)
+    networks: int = 12
+    epochs: int = 800
+    batch: int = 50
+    rate: float | Sequence[float] = 0.02
+    """Learning rate at the start, for the mean loss of a mini-batch."""
+    momentum: float | Sequence[float] = 0.9
+    initial: float | Sequence[float] = 1.0
+    """Range of the initial weights, times √(inputs of the layer)."""
+    hidden: Sequence[tuple[int, ...]] = ()
+    """Units of the hidden layers that each network has, if it has fewer than `widths`."""
+    wrap: bool = True  # whether differences of angles are wrapped
+    seed: int = 0
+    device: str = 'cpu'
+
+
+class Momentum(torch.optim.Optimizer):
+    """The paper's step: Δw = −α ∂J/∂w + μ Δw of the step before, α and μ those of each network.
+
+    A schedule changes `lr`, a factor of all α.
+    """
+
+    def __init__(self, networks: Ensemble, rate: Tensor, momentum: Tensor) -> None:
+        super().__init__(networks.parameters(), {'lr': 1.0})
+        self.rate, self.momentum = rate, momentum
+
+    @torch.no_grad()
+    def step(self, closure: None = None) -> None:  # type: ignore[override]
+        """Take a step."""
+        group = self.param_groups[0]
+        for p in group['params']:
+            rate, momentum = (one.view(-1, *[1] * (p.dim() - 1)) for one in (
+                group['lr'] * self.rate, self.momentum))
+            step = self.state[p].setdefault('step', torch.zeros_like(p))
+            step.mul_(momentum).sub_(rate * p.grad)
+            p.add_(step)
+
+
+@dataclass
+class Fitted:
+    """Networks in training, with their best weights by cross-validation."""
+
+    networks: Ensemble  # with the best weights
+    scaling: Scaling
+    error: Tensor  # (networks,) least root mean square cross-validation error [rad]
+    epoch: Tensor  # (networks,) epoch of the best weights
+    history: list[Tensor]
+    """Per check, cross-validation errors (networks,) [rad] in the course of the training."""
+    wrap: bool = True  # whether differences of angles are wrapped
+
+    @torch.no_grad()
+    def check(self, epoch: int, networks: Ensemble, error: Tensor) -> None:
+        """Keep the weights of networks that are better than before."""
+        self.history.append(error)
+        better = error < self.error  # False for NaN: a network that diverged keeps its best
+        self.error = torch.where(better, error, self.error)
+        self.epoch[better] = epoch
+        for kept, now in zip(self.networks.parameters(), networks.parameters()):
+            kept[better] = now[better]
+
+    def export(self) -> Layers:
+        """Return the layers of the best network, for inputs in SI units."""
+        return self.scaling.folded(self.networks.layers(int(self.error.argmin())))
+
+    def errors(self, patterns: Patterns) -> Tensor:
+        """Return the RMSE (networks,) of the best weights [rad]."""
+        return rmse(self.networks, *tensors(patterns, self.scaling, self.error.device), self.wrap)
+
+
+def perceptron(widths: Sequence[int]) -> torch.nn.Sequential:
+    """Return the paper's network: hidden units by tanh, linear outputs."""
+    parts: list[torch.nn.Module] = []
+    for n_in, n_out in pairwise(widths):
+        parts += [torch.nn.Linear(n_in, n_out), torch.nn.Tanh()]
+    return torch.nn.Sequential(*parts[:-1])
+
+
+def tensors(patterns: Patterns, scaling: Scaling, device: torch.device | str,
+            ) -> tuple[Tensor, Tensor]:
+    """Return normalised inputs and outputs."""
+    x = (patterns.inputs - scaling.mean) / scaling.deviation
+    return (torch.tensor(x, dtype=torch.float32, device=device),
+            torch.tensor(patterns.outputs, dtype=torch.float32, device=device))
+
+
+@torch.no_grad()
+def rmse(networks: Ensemble, x: Tensor, y: Tensor, wrap: bool) -> Tensor:
+    """Return the root mean square errors (networks,) [rad]."""
+    return difference(networks(x), y, wrap).square().mean((1, 2)).sqrt()
+
+
+def fit(training: Patterns, checking: Patterns, settings: PaperSettings, *, progress: str = '',
+        ) -> Fitted:
+    """Train; `progress` is the title of a progress bar, none if empty."""
+    s = settings
+    generator = torch.Generator().manual_seed(s.seed)
+    rate, momentum, initial = (torch.tensor(value, dtype=torch.float32).expand(s.networks).clone()
+                               for value in (s.rate, s.momentum, s.initial))
+    networks = Ensemble([
+        drawn(perceptron(s.widths), generator, reach=float(reach), hidden=hidden)
+        for reach, hidden in zip(initial, s.hidden or [()] * s.networks)]).to(s.device)
+    scaling = Scaling.of(training.inputs)
+    x, y = tensors(training, scaling, s.device)
+    check = tensors(checking, scaling, s.device)
+    fitted = Fitted(copy.deepcopy(networks), scaling,
+                    torch.full((s.networks,), math.inf, device=s.device),
+                    torch.zeros(s.networks, dtype=torch.int64, device=s.device), [], s.wrap)
+    optimiser = Momentum(networks, rate.to(s.device), momentum.to(s.device))
+    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, s.epochs)
+
+    epochs = tqdm(range(1, s.epochs + 1), desc=progress, unit='epoch', mininterval=1.0,
+                  disable=not progress)
+    for epoch in epochs:
+        order = torch.randperm(len(x), generator=generator).to(s.device)
+        for inputs, outputs in zip(x[order].split(s.batch), y[order].split(s.batch)):
+            loss = 0.5 * difference(networks(inputs), outputs, s.wrap).square().sum(-1).mean(-1)
+            optimiser.zero_grad()
+            loss.sum().backward()
+            optimiser.step()
+        schedule.step()
+        if epoch % max(1, s.epochs // CHECKS) == 0 or epoch == s.epochs:
+            fitted.check(epoch, networks, rmse(networks, *check, s.wrap))
+            epochs.set_postfix(rmse=f'{fitted.error.min():.4f}', refresh=False)
+    return fitted

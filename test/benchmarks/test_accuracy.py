@@ -1,0 +1,188 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""The report `accuracy`: contact classes by the definition, rows and their limits."""
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import poses
+import pytest
+
+from benchmarks import accuracy, searched
+from benchmarks.accuracy import CLASSES, AccuracyRow
+from benchmarks.errors import ContactErrors, contact_errors
+from benchmarks.pose_sets import CUBE, LOADS, SETS, Pairs
+from box_contact_ros.solver.models import models
+
+
+def on_a_cube(turn: np.ndarray, depth: float = 1e-3) -> Pairs:
+    """Return a cube, turned, that comes down on the middle of another's top face."""
+    corners = poses.rotate(turn[None], np.array(list(np.ndindex(2, 2, 2))) - 0.5)
+    height = 0.5 * CUBE[2] - CUBE[2] * corners[:, 2].min() - depth
+    b = np.concatenate([[0.1, 0.2, height], turn])
+    size = np.array([CUBE])
+    return Pairs(np.array([[0.0, 0, 0, 0, 0, 0, 1]]), b[None], size, size)
+
+
+def turned(axis: tuple[float, float, float], angle: float) -> np.ndarray:
+    unit = np.array(axis) / np.linalg.norm(axis)
+    return np.append(np.sin(0.5 * angle) * unit, np.cos(0.5 * angle))
+
+
+@pytest.mark.parametrize(('turn', 'expected'), [
+    (turned((1, 1, 0), 0.7), 'vertex-face'), (turned((1, 0, 0), 0.5), 'edge-face'),
+    (turned((0, 0, 1), 0.4), 'face-face'), (turned((1, 0, 0), 1e-5), 'face-face')])
+def test_features_that_meet_a_face(turn: np.ndarray, expected: str) -> None:
+    """Swapped, too: the reference face is then one of B's."""
+    pairs = on_a_cube(turn)
+    swapped = Pairs(pairs.pose_b, pairs.pose_a, pairs.size_b, pairs.size_a)
+    for one in (pairs, swapped):
+        classes, winners = accuracy.classify(one)
+        assert CLASSES[classes[0]] == expected
+        assert winners[0] == 0
+
+
+def test_crossing_edges() -> None:
+    """Two cubes, each on an edge, at right angles to each other."""
+    lower, upper = turned((1, 0, 0), np.pi / 4), turned((0, 1, 0), np.pi / 4)
+    size = np.array([CUBE])
+    height = 2.0 * np.sqrt(0.5) * CUBE[2] - 1e-3
+    pairs = Pairs(np.concatenate([[0, 0, 0], lower])[None],
+                  np.concatenate([[0.1, 0.2, height], upper])[None], size, size)
+    classes, winners = accuracy.classify(pairs)
+    assert CLASSES[classes[0]] == 'edge-edge' and winners[0] == 1
+
+
+# --- rows and limits ------------------------------------------------------------------------------
+
+
+def row_of(**changes: object) -> AccuracyRow:
+    """Return a row of model `mlp` on containers without an error, but for what is changed."""
+    errors = ContactErrors(**{name: np.zeros(200) for name in ContactErrors._fields})
+    common = {'model': 'mlp', 'set': 'containers', 'errors': errors, 'pairs': 200,
+              'classes': np.zeros(200, int), 'winners': np.zeros(200, int), 'exact_share': 0.0,
+              'verdict_errors': 0, 'normal_difference': 0.0, 'separation_difference': 0.0,
+              'outside': 0.0}
+    return AccuracyRow(**{**common, **changes})
+
+
+@pytest.mark.parametrize(('name', 'value'), [
+    ('exact_share', 0.021), ('verdict_errors', 1), ('normal_difference', 1e-16),
+    ('separation_difference', 1e-16), ('outside', 1e-12), ('outside', np.nan)])
+def test_a_broken_limit_is_named(name: str, value: float) -> None:
+    assert row_of().broken() == []
+    text, = row_of(**{name: value}).broken()
+    assert text.startswith('mlp, containers: ')
+    assert row_of(**{name: value, 'model': 'paper'}).broken() == []
+
+
+@pytest.mark.parametrize('quantity', ContactErrors._fields)
+@pytest.mark.parametrize('name', ['containers', 'landings', 'touching', 'random sizes'])
+def test_limits_of_errors_break(quantity: str, name: str) -> None:
+    """At the 99th percentile, and of a NaN; loads have narrower ones than boxes in any pose."""
+    limit = accuracy.limit_of(quantity, name)
+    assert limit == getattr(accuracy.ANY_POSE_LIMIT if name in accuracy.ANY_POSE
+                            else accuracy.LOAD_LIMIT, quantity)
+    for value, holds in ((0.999 * limit, True), (1.001 * limit, False), (np.nan, False)):
+        errors = row_of().errors._replace(**{quantity: np.full(200, value)})
+        broken = row_of(set=name, errors=errors).broken()
+        assert (broken == []) is holds and all(quantity in text for text in broken)
+
+
+def test_in_plane_eigenvalues_are_those_across_the_normal() -> None:
+    """A covariance that grows along the normal has no error in the plane; in the plane it has."""
+    pairs = SETS['containers'](np.random.default_rng(5), 50)
+    truth = pairs.contacts()
+    n = truth.normal
+    along = np.einsum('ni,nj->nij', n, n)
+    across = (np.eye(3) - along) @ truth.covariance @ (np.eye(3) - along)
+    trace = np.trace(truth.covariance, axis1=1, axis2=2)[:, None, None]
+    for change, expected in ((0.1 * trace * along, 0.0), (0.1 * across, 10.0)):
+        found = truth._replace(covariance=truth.covariance + change)
+        errors = contact_errors(found, truth, pairs.edge)
+        np.testing.assert_allclose(errors.in_plane, expected, atol=1e-6)
+        assert (errors.covariance > 0.1).all() and not errors.point.any()
+
+
+@pytest.fixture(scope='module')
+def quick(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    pytest.importorskip('tqdm')
+    pytest.importorskip('matplotlib')
+    folder = tmp_path_factory.mktemp('accuracy')
+    assert accuracy.main(['--quick', '--out', str(folder)]) == 0
+    return folder
+
+
+def test_quick_run(quick: Path) -> None:
+    assert 'All limits hold.' in (quick / 'accuracy.md').read_text('utf-8')
+    assert (quick / 'accuracy.png').stat().st_size > 10_000
+    with (quick / 'accuracy.csv').open() as file:
+        rows = [row for row in csv.DictReader(file) if row['part'] == 'all']
+    assert [(row['set'], row['quantity']) for row in rows] == [
+        (name, quantity) for name in SETS | LOADS for quantity in ContactErrors._fields]
+    for row in rows:
+        assert float(row['p99']) <= float(row['limit_p99'])
+        if row['quantity'] == 'point':
+            assert float(row['outside']) <= accuracy.OUTSIDE
+            assert float(row['exact_share']) <= (0.12 if row['set'] == 'crossed bars' else 0.02)
+
+
+def test_searched_for_the_worst(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """On one set with every network; a planted miss is named."""
+    pytest.importorskip('tqdm')
+    monkeypatch.setattr(searched, 'SETS', {'containers': SETS['containers']})
+    monkeypatch.setattr(searched, 'LOADS', {})
+    monkeypatch.setattr(searched, 'DRAWN', 3_000)
+    monkeypatch.setattr(searched, 'PATHS', 5)
+    assert accuracy.main(['--search', '0.02', '--out', str(tmp_path)]) == 0
+    assert 'All limits hold.' in (tmp_path / 'searched.md').read_text('utf-8')
+    with (tmp_path / 'searched.csv').open() as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 2 * 3 * 3  # seeds, networks, quantities
+    shipped = {row['quantity']: float(row['worst']) for row in rows if row['network'] == 'shipped'}
+    garbage = {row['quantity']: float(row['worst']) for row in rows
+               if row['network'] == 'least within'}
+    assert 0.0 < shipped['volume'] <= garbage['volume'] <= 3.0 * searched.LIMITS['volume']
+    monkeypatch.setitem(searched.LIMITS, 'volume', 1e-6)
+    assert accuracy.main(['--search', '0.01', '--out', str(tmp_path)]) == 1
+    assert 'Goals missed: mlp, containers' in (tmp_path / 'searched.md').read_text('utf-8')
+
+
+# --- a model of your own, and the sets as files ---------------------------------------------------
+
+
+def test_a_class_is_measured_like_a_model(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The example's middle of the bounding boxes is no centroid; its depth is the exact one."""
+    monkeypatch.syspath_prepend(Path(__file__).parents[2] / 'docs' / 'examples')
+    try:
+        status = accuracy.main(['--model', 'own_model:Middle', '--pairs', '200', '--quick',
+                                '--out', str(tmp_path)])
+    finally:
+        models().pop('own_model:Middle', None)
+    with (tmp_path / 'accuracy.csv').open() as file:
+        rows = [row for row in csv.DictReader(file) if row['part'] == 'all']
+    assert status == 0 and {row['set'] for row in rows} == set(SETS | LOADS)
+    assert {row['quantity'] for row in rows} == {'point'}
+    assert float({row['set']: row for row in rows}['tilted stacks']['mean']) > 1.0
+    assert all(float(row['separation_difference']) == 0.0 for row in rows)
+
+
+@pytest.mark.parametrize('name', ['nowhere:Class', 'json:Nothing'])
+def test_a_class_that_cannot_be_imported(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match='2'):
+        accuracy.main(['--model', name])
+    assert name in capsys.readouterr().err
+
+
+def test_exported_sets_are_those_of_the_report(tmp_path: Path) -> None:
+    """Poses, sizes and the exact contacts of every set, ready for another program."""
+    assert accuracy.main(['--export', str(tmp_path), '--pairs', '30']) == 0
+    files = {path.stem.replace('_', ' '): np.load(path) for path in tmp_path.iterdir()}
+    assert files.keys() == (SETS | LOADS).keys()
+    for file in files.values():
+        pairs = Pairs(*(file[field] for field in Pairs._fields))
+        for field, values in pairs.contacts()._asdict().items():
+            np.testing.assert_array_equal(file[field], values)

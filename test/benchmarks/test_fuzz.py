@@ -1,0 +1,228 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""The fuzz, a short run of it; and its judge, which finds every fault that is planted."""
+from __future__ import annotations
+
+import csv
+
+import numpy as np
+import oracle
+import pytest
+from gmpy2 import mpfr
+
+from benchmarks import fuzz, judge, patches
+from benchmarks.pose_sets import Pairs
+from box_contact_ros import ContactSolver
+from box_contact_ros.output import write_csv
+from box_contact_ros.solver.mlp import NETWORK, load_mlp
+from box_contact_ros.solver.models import models_with_patch
+from box_contact_ros.solver.weights_file import save_weights
+
+SEED = 20260
+
+
+def drawn(name, n=400):
+    return fuzz.draw(name, np.random.default_rng([SEED, 7]), n)
+
+
+def answers(pairs, model='exact'):
+    a, b, size_a, size_b = pairs
+    return [part.copy() for part in ContactSolver((1, 1, 1), (1, 1, 1), model=model).batch(
+        a, b, size_a=size_a, size_b=size_b)]
+
+
+def test_gates_are_at_zero(tmp_path):
+    """60,000 pairs, ten thousand a class; the CSV has a row for each class and model."""
+    tallies = fuzz.fuzz(60_000, seed=SEED)
+    for tally in tallies.values():
+        assert tally.broken == 0, '\n'.join([str(tally), *tally.poses])
+        assert tally.contacts > tally.pairs / 3
+        assert 0 < tally.near_touch < 0.05 * tally.pairs
+        assert tally.worst_depth <= 1.0
+    write_csv(tmp_path / 'fuzz.csv', fuzz.csv_rows(tallies.values()))
+    with (tmp_path / 'fuzz.csv').open() as file:
+        rows = list(csv.DictReader(file))
+    assert [(row['class'], row['model']) for row in rows] == list(tallies)
+    assert all(row[gate] == '0' for row in rows for gate in judge.GATES.values())
+
+
+FOUND = (
+    ((2.174385854802605, 1.7423444865568714, 0.018359584513697198),
+     (0.3285916961368096, 1.9737782818419705, 2.249013888475856),
+     (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.001),
+     (-0.9661190733016685, 0.7043735812224385, -0.868164791886224, 0.9379606111123887,
+      -0.07905910332264629, 0.029043985626381868, -0.33635694891354684)),
+    ((0.9027071194252946, 0.009173512037271597, 0.032544240127844196),
+     (0.001539321248840585, 1.6685102645855436, 0.012604139436660758),
+     (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0),
+     (0.5783181994663252, -0.01304447153503672, 0.5848927855700055, 0.2653662666841818,
+      0.653231693671417, 0.6584996879522708, -0.2631487409356848)),
+    ((0.030564828219958404,) * 3, (0.030564828219958404,) * 3,
+     (40447.70247700687, 187829.60454168968, -118208.32766634913, 0.7734375846689708,
+      0.6138048268957524, 0.09548148507679807, 0.12618012168500645),
+     (40447.721512345306, 187829.6003642818, -118208.28908367682, -0.5237715711153959,
+      0.47986669473710386, 0.3451475039495857, 0.6150329235827783)))
+"""Sizes and poses of which a fuzz of ten million found faults: a variance below zero, twice, and a
+needle a thousand-millionth as wide as it is long."""
+
+
+def test_found_poses_have_no_variance_below_zero():
+    size_a, size_b, pose_a, pose_b = (np.array(column) for column in zip(*FOUND))
+    pairs = Pairs(pose_a, pose_b, size_a, size_b)
+    found = pairs.contacts(ContactSolver((1, 1, 1), (1, 1, 1)))
+    assert found.colliding.all()
+    assert not patches.patch_faults(pairs, found).any()
+    assert not patches.mlp_faults(pairs, found).any()
+
+
+@pytest.mark.parametrize('name', fuzz.CLASSES)
+def test_the_judges_gap_is_the_oracles(name):
+    """In 60 digits to the bit; in float64 to its tolerance, or it says that it is not sure."""
+    pairs = drawn(name, 60)
+    found = answers(pairs)
+    verdict = judge.judge(*pairs, found)
+    for row, (a, b, size_a, size_b) in enumerate(zip(*pairs)):
+        exact = oracle.separation(oracle.make_box(a, size_a), oracle.make_box(b, size_b))
+        assert judge.exact_gap(a, b, size_a, size_b) == float(exact)
+        if found[0][row] and not verdict.doubtful[row]:
+            off = abs(mpfr(float(found[1][row])) - exact) / verdict.tolerance[row]
+            assert off <= 2.0
+
+
+def settled(pairs, found):
+    """Return the faults of a row each, by name."""
+    verdict = judge.judge(*pairs, found)
+    verdict.settle(found, lambda row: judge.exact_gap(*(part[row] for part in pairs)))
+    return [{text for bit, text in judge.GATES.items() if faults & bit}
+            for faults in verdict.faults]
+
+
+@pytest.mark.parametrize('name', fuzz.CLASSES)
+def test_planted_faults_are_found(name):
+    """Every gate, each on a row of its own."""
+    pairs = drawn(name)
+    found = answers(pairs)
+    size = np.maximum(pairs[2], pairs[3]).max(axis=1)
+    deep = np.flatnonzero(found[0] & (found[1] < -1e-6 * size)
+                          & (np.abs(pairs[0][:, :3]).max(axis=1) < 20.0))[:7]
+    apart = np.flatnonzero(~found[0] & (found[1] > 1e-6 * size))[0]
+    assert all(not faults for faults in settled(pairs, found))
+    found[0][deep[0]] = False
+    found[1][deep[0]] = 1.0
+    found[0][apart], found[2][apart], found[3][apart] = True, (0.0, 0.0, 1.0), pairs[0][apart, :3]
+    found[1][apart] = -1e-3 * size[apart]
+    found[1][deep[1]] *= 1.0 + 1e-3
+    found[1][deep[2]] *= 1.0 - 1e-3
+    found[2][deep[3]] *= -1.0
+    found[2][deep[4]] *= 1.0 + 1e-9
+    found[3][deep[5]] += 2.0 * size[deep[5]]
+    found[3][deep[6], 1] = np.nan
+    faults = settled(pairs, found)
+    for row, expected in ((deep[0], 'missed contact'), (apart, 'phantom contact'),
+                          (deep[1], 'too deep'), (deep[2], 'too shallow'),
+                          (deep[3], 'wrong axis'), (deep[4], 'normal not unit'),
+                          (deep[5], 'point outside'), (deep[6], 'NaN')):
+        assert expected in faults[row]
+    assert sum(map(bool, faults)) == 8
+
+
+def test_planted_faults_of_patches_are_found():
+    """A negative eigenvalue, a volume of 0, half a patch."""
+    pairs = drawn('container')
+    found = pairs.contacts()
+    rows = np.flatnonzero(found.colliding)[:3]
+    assert not patches.patch_faults(pairs, found).any()
+    found.covariance[rows[0]] = np.diag([1.0, 1.0, -1e-5])
+    found.volume[rows[1]] = 0.0
+    found.covariance[rows[2], 1, 1] = np.nan
+    faults = patches.patch_faults(pairs, found)
+    assert faults[rows].tolist() == [judge.NEGATIVE, judge.NEGATIVE, judge.NOT_FINITE]
+    assert np.count_nonzero(faults) == 3
+
+
+@pytest.mark.parametrize('factor', [1.0 + 1e-3, 1.0 - 1e-3, 1.02, -1.0])
+def test_planted_volumes_are_outside_their_brackets(factor):
+    """Most brackets meet; what was left to `exact` is not judged."""
+    pairs, found, own = answered_by_mlp()
+    found.volume[own] *= factor
+    faults = patches.mlp_faults(pairs, found)
+    assert np.count_nonzero(faults == judge.OUT_OF_BRACKETS) > 0.75 * own.sum()
+    assert not faults[~own].any()
+
+
+def test_a_covariance_of_mlp_is_judged_to_rounding():
+    pairs, found, own = answered_by_mlp()
+    found.covariance[own] = np.diag([1.0, 1.0, -1e-13])
+    assert (patches.mlp_faults(pairs, found)[own] == judge.NEGATIVE).all()
+    assert not patches.patch_faults(pairs, found).any()
+
+
+def answered_by_mlp():
+    """Pairs, sound contacts, and which of these `mlp` has found itself."""
+    pairs = drawn('container')
+    found = pairs.contacts(ContactSolver((1, 1, 1), (1, 1, 1)))
+    own = found.colliding & (found.volume != pairs.contacts().volume)
+    assert own.sum() > 200 and not patches.mlp_faults(pairs, found).any()
+    return pairs, found, own
+
+
+@pytest.mark.parametrize('scale', [1.0, 1e4])
+def test_garbage_weights_break_no_gate(tmp_path, scale):
+    """What model `mlp` guarantees, it does whatever its weights are."""
+    shipped = load_mlp()
+    rng = np.random.default_rng(1)
+    layers = [(rng.uniform(-scale, scale, weight.shape), rng.uniform(-scale, scale, bias.shape))
+              for weight, bias in shipped.networks[NETWORK].layers]
+    save_weights(tmp_path / 'garbage.safetensors', {NETWORK: layers}, shipped.card)
+    garbage = ContactSolver((1, 1, 1), (1, 1, 1), weights=str(tmp_path / 'garbage.safetensors'))
+    for number, name in enumerate(fuzz.CLASSES):
+        pairs = fuzz.draw(name, np.random.default_rng([SEED, number]), 5_000)
+        tally, = fuzz.examine(pairs, name, {'mlp': garbage})
+        assert tally.broken == 0, tally.poses
+        assert tally.exact_answers < 0.65 * tally.contacts
+
+
+def test_a_fault_is_printed_so_that_it_can_be_pasted(monkeypatch):
+    """The code that is printed, run, gives the answer that was judged."""
+    pairs = drawn('container', 50)
+
+    class Wrong:
+        exact_answers = 0
+
+        def batch(self, *poses, **sizes):
+            found = ContactSolver((1, 1, 1), (1, 1, 1), model='exact').batch(*poses, **sizes)
+            found.separation[found.colliding] *= 1.01
+            return found
+
+    tally = fuzz.examine(pairs, 'container', {'exact': Wrong()})[0]
+    assert tally.broken > 10 and len(tally.poses) == fuzz.SHOWN
+    comment, code = tally.poses[0].split('\n', 1)
+    contact = eval(code, {'ContactSolver': ContactSolver})
+    assert comment == '# too deep' and contact.colliding
+
+
+def test_an_exception_is_a_fault():
+    class Broken:
+        exact_answers = 0
+
+        def batch(self, *poses, **sizes):
+            raise ZeroDivisionError('planted')
+
+    tally = fuzz.examine(drawn('cube', 5), 'cube', {'exact': Broken()})[0]
+    assert tally.faults['exception'] == 1 and 'planted' in tally.poses[0]
+
+
+def test_the_program(capsys):
+    """A line for each class and model, and 0 at the end of a run without faults."""
+    assert fuzz.main(['--pairs', '600', '--workers', '1', '--seed', '3']) == 0
+    out = capsys.readouterr().out
+    assert out.count('no fault') == len(fuzz.CLASSES) * len(models_with_patch())
+    assert '\n0 faults after' in out
+
+
+def test_pieces_do_not_depend_on_who_draws_them():
+    """One worker or two: the same tallies."""
+    one, two = (fuzz.fuzz(2000, seed=5, classes=['cube', 'card'], workers=workers)
+                for workers in (1, 2))
+    assert one == two

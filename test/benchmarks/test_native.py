@@ -1,0 +1,89 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""The report `frontier --native`: the program compiles, and every engine in it answers rightly."""
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks import native
+from benchmarks.pose_sets import SETS, Pairs
+from box_contact_ros.core import instruction_sets
+
+needs_compiler = pytest.mark.skipif(shutil.which('g++') is None, reason='no compiler')
+
+
+@pytest.fixture(scope='module')
+def containers() -> Pairs:
+    return SETS['containers'](np.random.default_rng(4), 100)
+
+
+@pytest.fixture(scope='module')
+def program(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[str]]:
+    pytest.importorskip('mujoco')
+    return native.compiled(tmp_path_factory.mktemp('native'))
+
+
+@needs_compiler
+def test_all_answer_as_exact(program: tuple[Path, list[str]], containers: Pairs) -> None:
+    """No verdict differs, and depths agree to what single precision and iterations leave."""
+    path, missing = program
+    n = len(containers.pose_a)
+    pose_b = containers.pose_b.copy()
+    pose_b[::2, :3] *= 1.5  # these are apart
+    found = native.timed(path, containers._replace(pose_b=pose_b), instruction_sets()[-1],
+                         rounds=1, calls=n)
+    expected = {'mjc_BoxBox, single', 'mj_geomDistance, single', 'exact covariance, batch'}
+    expected |= {'Coal ComputeCollision, single'} if 'coal' not in missing else set()
+    expected |= {'Bullet btBoxBoxDetector, single'} if 'bullet' not in missing else set()
+    assert expected <= set(found)
+    for name, one in found.items():
+        assert (one.judged, one.missed, one.invented) == (n, 0, 0), name
+        assert one.depth_errors[2] < 0.01, name
+        assert one.nanoseconds.shape == (1,) and one.nanoseconds.min() > 0.0
+    assert max(found['exact covariance, batch'].depth_errors) == 0.0
+
+
+@pytest.mark.parametrize('planted', ['sign', 'size'])
+def test_a_wrong_call_ends_the_run(containers: Pairs, planted: str) -> None:
+    truth = containers.contacts().separation
+    wrong = {'sign': -truth, 'size': truth - 0.1}[planted]
+    native.judged('planted', np.ones(1), truth, containers)
+    with pytest.raises(RuntimeError, match='planted misses'):
+        native.judged('planted', np.ones(1), wrong, containers)
+
+
+def test_a_wrong_verdict_is_counted(containers: Pairs) -> None:
+    separation = containers.contacts().separation.copy()
+    separation[3] = np.inf
+    found = native.judged('planted', np.ones(1), separation, containers)
+    assert (found.missed, found.invented) == (1, 0)
+
+
+def test_the_code_of_each_call_is_shown() -> None:
+    text = native.calls_shown([])
+    for call in ('bc_solve(', 'bc_solve_rows(', 'mj_geomDistance(', 'box_box(', 'q.collide(',
+                 'compute_patch(', 'btBoxBoxDetector(', 'contactPairTest('):
+        assert call in text
+    assert text.count('```') % 2 == 0 and 'Coal' not in native.calls_shown(['coal'])
+
+
+@pytest.mark.skipif(shutil.which('pkg-config') is None, reason='no pkg-config')
+def test_flags_of_a_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Headers of others are system headers, and the library is found when the program starts."""
+    monkeypatch.setenv('PKG_CONFIG_PATH', str(tmp_path))
+    assert native.package_flags('planted') is None
+    (tmp_path / 'planted.pc').write_text('Name: planted\nDescription: none\nVersion: 7.1\n'
+                                         'Cflags: -I/p/include\nLibs: -L/p/lib -lplanted\n')
+    assert native.package_flags('planted') == [
+        '-isystem', '/p/include', '-L/p/lib', '-Wl,-rpath,/p/lib', '-lplanted']
+    assert native.package_config('planted', '--modversion') == '7.1'
+
+
+def test_what_is_left_out_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv('PATH', str(tmp_path))  # no pkg-config
+    assert [native.package_flags(name) for name in native.OPTIONAL] == [None, None]

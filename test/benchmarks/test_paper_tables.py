@@ -1,0 +1,186 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""Tables 3 and 4 and Figures 9 and 10: regimes, clocks, errors, and what the program writes."""
+from __future__ import annotations
+
+import csv
+import json
+
+import numpy as np
+import poses
+import pytest
+
+fcl = pytest.importorskip('fcl')
+pytest.importorskip('matplotlib')
+
+from benchmarks.paper import (
+    committee,
+    dataset,
+    paper_soup_tables,
+    paper_tables,
+    rotation,
+)
+from benchmarks.pose_sets import at_depth, on_cube
+from box_contact_ros.core import stages
+from box_contact_ros.solver.weights_file import load_weights
+from box_contact_ros.soup import soup
+
+
+@pytest.fixture
+def small(monkeypatch):
+    """Two N of the tables and one beside them, on 150 patterns."""
+    sets = {'contact': dataset.paper(5, counts=(10, 10, 150)),
+            'vertex_face': dataset.paper(5, counts=(10, 10, 150))}
+    monkeypatch.setattr(paper_tables, '_loaded', lambda path: (load_weights(path), sets))
+    few = {n: paper_soup_tables.PAPER[n] for n in (8, 10)}
+    monkeypatch.setattr(paper_soup_tables, 'PAPER', few)
+    monkeypatch.setattr(paper_soup_tables, 'ALSO', (2, 32))
+    return sets['contact']['external'].inputs
+
+
+def test_touching_poses_are_the_patterns(small):
+    """They touch to within rounding, and pressed they are as deep as was asked for."""
+    given = on_cube(dataset.as_poses(small)[1])
+    assert np.abs(given.contacts().separation).max() < 1e-14
+    pressed = at_depth(given, np.full(len(given.size), 1e-3))
+    assert len(pressed.size) > 100
+    assert pressed.contacts().separation == pytest.approx(-1e-3, abs=1e-12)
+
+
+def test_the_search_alone_finds_every_pair():
+    """Asked for one contact and for costs, FCL goes on to the end: there is a cost of every pair.
+
+    FCL keeps one of those that are equal; in poses like these few are.
+    """
+    a, b = np.array([[0, 0, 0, 0.3, -0.2, 0.1, 1], [0.5, 0.25, 1.5, 0.1, 0.2, 0.3, 1]])
+    pair = soup.Soup(8).place(a, b, poses.CUBE, poses.CUBE)
+    pairs = paper_soup_tables.pair_count(soup.collide(*pair))
+    result = fcl.CollisionResult()
+    fcl.collide(*pair, fcl.CollisionRequest(num_max_contacts=1, enable_contact=True,
+                                            enable_cost=True, num_max_cost_sources=10_000), result)
+    assert len(result.contacts) == 1
+    assert 0.9 * pairs < len(result.cost_sources) <= pairs and pairs > 20
+
+
+def test_planted_errors_show(small, monkeypatch):
+    """A point shifted by 10 mm, a normal turned round, contacts withheld: each is seen."""
+    touching = on_cube(dataset.as_poses(small[:40])[1])
+    given = at_depth(touching, np.full(40, 1e-3))
+    truth = given.contacts()
+    answer = soup.point_and_normal
+
+    def judged(planted):
+        monkeypatch.setattr(soup, 'point_and_normal', planted)
+        return paper_soup_tables.judge_soup(8, given, truth)
+
+    def planted(change):
+        return lambda *contacts: change(*answer(*contacts))
+
+    right = judged(answer)
+    assert right.point.mean() < 0.05 and right.normal.mean() < 20
+    assert len(right.point) == len(given.size)
+    assert right.depth.mean() > 0.01
+    perfect = iter(range(len(given.size)))
+
+    def exact(*_):
+        row = next(perfect)
+        return truth.point[row] - given.pose_a[row, :3] + [0, 0, 0.01], -truth.normal[row]
+
+    wrong = judged(exact)
+    assert wrong.point == pytest.approx(0.01) and wrong.normal == pytest.approx(180.0)
+    assert len(judged(lambda *_: None).point) == 0
+    turned = judged(planted(lambda point, normal: (point, -normal)))
+    assert turned.normal.mean() == pytest.approx(180 - right.normal.mean())
+
+
+def test_table_1_is_of_the_seeds() -> None:
+    """Mean and standard deviation over the trainings, by set and by output."""
+    def seed(size: float) -> dict[str, np.ndarray]:
+        return {name: np.tile([size, -size, 3 * size, 0.0], (5, 1)) for name in paper_tables.SETS}
+
+    found = {'ours': [seed(0.1), seed(0.2), seed(0.3)]}
+    table = paper_tables.table_1(found)
+    assert '| external | MAE | 0.5624 | 0.250 ± 0.125 |' in table
+    assert '| training | ME | 0.0332 | 0.150 ± 0.075 |' in table
+    assert '| ours | RMSE | 0.200 ± 0.100 | 0.200 ± 0.100 | 0.600 ± 0.300 | 0.000 ± 0.000 |' in (
+        paper_tables.by_output(found))
+
+
+@pytest.mark.parametrize('name', paper_tables.TABLE_1.values())
+def test_the_files_of_table_1_are_what_the_page_says(name: str) -> None:
+    """Five seeds; placements, angles, fold and loss of the column; data of each seed differ."""
+    card = load_weights(paper_tables.resource_path('weights', f'{name}.safetensors')).card
+    data, kept = card['data'], name in ('table-1-as-written', 'table-1-on-grid')
+    assert data['seeds'] == [1, 2, 3, 4, 5] and list(card['metrics']) == [
+        f'seed_{seed}' for seed in data['seeds']]
+    assert (data['kept'], data['wrap'], data['grid'] > 0, data['folded_in']) == (
+        kept, not kept, name.endswith('grid'), name.endswith('folded'))
+    assert len({json.dumps(card['inputs'][seed]) for seed in card['inputs']}) > 1 or data['grid']
+    assert card['data']['counts'] == dict(zip(paper_tables.SETS, dataset.PAPER_COUNTS))
+    assert all(one['epochs'] == 300 for key, one in card['training'].items() if key != 'minutes')
+
+
+def test_a_committee_is_judged_by_the_labels() -> None:
+    """A placement moved away from its label is off by as much; the label's own class is best."""
+    some = committee.placements(100)['vertex']
+    point, normal = committee.errors('exact', some)
+    assert point < 0.1 and normal < 0.01
+    moved = dataset.Placements(some.size, some.inputs, some.point + [0.0, 0.0, 0.02], some.normal)
+    assert committee.errors('exact', moved)[0] == pytest.approx(20.0, abs=0.1)
+
+
+@pytest.mark.parametrize(('tilt', 'depth'), [(0.0, 0.0), (1.0, 0.01), (54.7, 0.01)])
+def test_tests_are_the_overlapping_boxes_of_triangles(tilt: float, depth: float) -> None:
+    """Against all pairs, one by one; each box is as small as its triangle."""
+    boxes, pair = rotation.leaves(3), rotation.tilted_cube(tilt, depth)
+    assert np.allclose(np.sort(boxes.size, axis=1), [0.0, 2 / 3 / 2**0.5, 2 / 3 * 2**0.5])
+    assert pair.contacts().separation == pytest.approx(-depth, abs=1e-12)
+    n = len(boxes.size)
+    poses_a, poses_b = (np.array([np.concatenate([
+        one[:3] + rotation.rotation_matrix(one[3:]) @ centre,
+        rotation.quaternion_multiply(one[None, 3:], quaternion[None])[0]])
+        for centre, quaternion in zip(boxes.centre, boxes.quaternion)])
+        for one in (pair.pose_a[0], pair.pose_b[0]))
+    row, column = (index.ravel() for index in np.indices((n, n)))
+    expected = stages(poses_a[row], poses_b[column], boxes.size[row], boxes.size[column],
+                      names=('colliding',)).colliding.sum()
+    assert rotation.count_tests(boxes, pair) == expected > 0
+
+
+def test_every_pair_that_meets_is_tested() -> None:
+    """The boxes around two triangles overlap where the triangles do."""
+    for tilt in (0.3, 3.0, 30.0):
+        pair = rotation.tilted_cube(tilt)
+        placed = soup.Soup(8).place(pair.pose_a[0], pair.pose_b[0], poses.CUBE, poses.CUBE)
+        meet = paper_soup_tables.pair_count(soup.collide(*placed))
+        assert 0 < meet <= rotation.count_tests(rotation.leaves(8), pair)
+
+
+def test_all_is_written(small, tmp_path, capsys):
+    """One command: page, pictures, CSV; the page's numbers are the CSV's."""
+    out = tmp_path / 'new' / 'page.md'
+    arguments = [word for number in (3, 4) for word in ('--table', str(number))]
+    arguments += [word for number in (4, 9, 10) for word in ('--figure', str(number))]
+    assert paper_tables.main(['--quick', *arguments, '--out', str(out)]) == 0
+    assert sorted(path.name for path in out.parent.iterdir()) == [
+        'page.md', 'paper_figure_10.png', 'paper_figure_4.png', 'paper_figure_9.png',
+        'paper_soup.csv']
+    page = out.read_text('utf-8')
+    for heading in ('Table 3', 'Table 4', 'Figure 4', 'Figure 9', 'Figure 10'):
+        assert f'\n## {heading}: ' in page
+    assert '## Table 1' not in page and 'nan' not in page
+    with (out.parent / 'paper_soup.csv').open() as file:
+        rows = list(csv.DictReader(file))
+    timed = [row for row in rows if row['step_mean_ms']]
+    assert {(int(row['divisions']), row['regime']) for row in timed} == {
+        (n, regime) for n in (8, 10) for regime in paper_soup_tables.REGIMES}
+    for row in timed:
+        assert int(row['triangles']) == 12 * int(row['divisions'])**2
+        assert 0 < float(row['step_p50_ms']) <= float(row['step_max_ms'])
+        assert int(row['most_pairs']) > 0 and row['processor']
+    most, = (int(row['most_pairs']) for row in timed
+             if (row['divisions'], row['regime']) == ('8', 'coplanar'))
+    assert f'{most:,}' in page
+    assert '11,233' in page and '36.77' not in page  # the paper's, of the N that were run
+    assert {row['model'] for row in rows} == {'soup', 'paper', 'paper-continuous'}

@@ -1,0 +1,150 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""The paper's networks as shipped: what their cards say, and the tables made from them."""
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from test_weights_file import WIDTHS, card, layers
+
+from benchmarks.paper import dataset, paper_tables
+from benchmarks.paper.errors import (
+    errors_of,
+    figures,
+    figures_by_part,
+    predict,
+    wrapped,
+)
+from box_contact_ros.paper import _networks
+from box_contact_ros.resources import resource_path
+from box_contact_ros.solver.weights_file import load_weights, save_weights
+
+SHIPPED = ('paper', 'paper-continuous', 'paper-12.192x2.438x2.591')
+
+
+@pytest.fixture
+def good(tmp_path: Path) -> Path:
+    path = tmp_path / 'good.safetensors'
+    save_weights(path, {'n': layers()}, card())
+    return path
+
+
+def test_forward_is_the_formula(good: Path) -> None:
+    """Against float64 NumPy, to the accuracy of float32."""
+    network = load_weights(good).networks['n']
+    inputs = np.random.default_rng(1).normal(size=(200, 6))
+    value = inputs
+    for number, (weight, bias) in enumerate(layers()):
+        value = value @ weight.T.astype(np.float64) + bias
+        if number < 2:
+            value = np.tanh(value)
+    np.testing.assert_allclose(predict(network, inputs), value, rtol=0, atol=1e-5)
+    one = _networks.forward(network.packed, np.array(WIDTHS), inputs[:1].astype(np.float32))
+    np.testing.assert_allclose(one[0], value[0], rtol=0, atol=1e-5)
+
+
+@pytest.mark.parametrize('widths', [[], [6], [6, 5, 4], [6, 5, 3, 5], [6, 0, 4], [6, -5, 3, 4],
+                                    [2**62, 4, 1], [5, 6, 3, 4]])
+def test_widths_that_do_not_fit(good: Path, widths: list[int]) -> None:
+    """No number beyond the parameters is read."""
+    network = load_weights(good).networks['n']
+    with pytest.raises(ValueError, match='do not fit|wrong shape'):
+        _networks.forward(network.packed, np.array(widths, dtype=np.int64),
+                          np.zeros((1, 6), dtype=np.float32))
+
+
+def test_errors_are_wrapped() -> None:
+    """−π and π are one direction; the sign of a small error stays."""
+    errors = wrapped(np.array([0.0, 2 * np.pi, -2 * np.pi, np.pi, -np.pi, 3.0 - -3.0, -0.1, 0.1]))
+    np.testing.assert_allclose(
+        errors, [0, 0, 0, -np.pi, -np.pi, 6.0 - 2 * np.pi, -0.1, 0.1], atol=1e-15)
+    assert figures(np.array([[3.0, -4.0], [0.0, 0.0]])) == {'ME': -0.25, 'MAE': 1.75, 'RMSE': 2.5}
+
+
+# --- what is shipped ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('name', SHIPPED)
+def test_shipped_weights_are_what_their_card_says(name: str) -> None:
+    """All sets made again from the seed give the card's figures; inputs lie in its ranges."""
+    weights = load_weights(resource_path('weights', f'{name}.safetensors'))
+    assert weights.card['name'] == name
+    made = dataset.of_card(weights.card)
+    assert set(made) == set(weights.networks) == set(weights.card['metrics'])
+    for network, sets in made.items():
+        assert set(sets) == set(dataset.SETS)
+        for set_name, patterns in sets.items():
+            errors = errors_of(weights.networks[network], patterns.inputs, patterns.outputs)
+            want = weights.card['metrics'][network][set_name]
+            for part, found in figures_by_part(errors).items():
+                assert found == pytest.approx(want[part], abs=1e-6)
+            for k, entry in enumerate(weights.card['inputs'][network]):
+                assert entry['min'] - 1e-9 <= patterns.inputs[:, k].min()
+                assert patterns.inputs[:, k].max() <= entry['max'] + 1e-9
+
+
+def test_shipped_errors_meet_their_bounds() -> None:
+    """External validation, Tables 1 and 2: the bounds, and lower without discontinuities."""
+    def external(name: str) -> dict[str, dict[str, float]]:
+        metrics = load_weights(resource_path('weights', f'{name}.safetensors')).card['metrics']
+        return {network: sets['external']['all'] for network, sets in metrics.items()}
+
+    jumps = external('paper')['contact']
+    assert jumps['MAE'] <= 0.30 and jumps['RMSE'] <= 0.56
+    smooth = external('paper-continuous')
+    assert set(smooth) == set(dataset.SUBSETS)
+    for errors in smooth.values():
+        assert errors['MAE'] < 0.1 * jumps['MAE'] and errors['RMSE'] < 0.1 * jumps['RMSE']
+    boxes = external('paper-12.192x2.438x2.591')['contact']
+    assert boxes['MAE'] <= 0.30 and boxes['RMSE'] <= 0.56
+
+
+def test_shipped_sets_have_the_papers_sizes() -> None:
+    counts = {name: load_weights(resource_path('weights', f'{name}.safetensors'))
+              .card['data']['counts'] for name in SHIPPED}
+    assert list(counts['paper'].values()) == [8000, 5000, 75000]
+    assert list(counts['paper-continuous'].values()) == [10000, 6000, 50000]
+    assert counts['paper-12.192x2.438x2.591'] == counts['paper']
+
+
+# --- the tables -----------------------------------------------------------------------------------
+
+
+def cells(page: str) -> list[str]:
+    """All cells of the page's tables."""
+    return [cell.strip(' *') for line in page.splitlines() if line.startswith('|')
+            for cell in line.split('|')]
+
+
+@pytest.mark.slow
+def test_tables_in_the_docs_are_the_shipped_weights(tmp_path: Path) -> None:
+    """The first tables of docs/results/paper_tables.md, 1 and 2, are the shipped weights'.
+
+    Figures may differ by their rounding. (The other tables hold times: see test_paper_tables.)
+    """
+    docs = Path(__file__).parents[2] / 'docs' / 'results' / 'paper_tables.md'
+    assert paper_tables.main(['--table', '1', '--table', '2',
+                              '--out', str(tmp_path / 'new' / 'page.md')]) == 0
+    old, new = cells(docs.read_text()), cells((tmp_path / 'new' / 'page.md').read_text())
+    assert len(old) > len(new) > 100
+    for before, after in zip(old, new):
+        for one, other in zip(before.split(' ± '), after.split(' ± '), strict=True):
+            try:
+                last = 10.0**-len(one.partition('.')[2])
+                assert abs(float(one) - float(other)) < 1.5 * last
+            except ValueError:
+                assert one == other
+
+
+def test_paper_program(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
+                       tmp_path: Path) -> None:
+    """Quick: the paper's figures, a tenth of the patterns, said so. Without weights: one line."""
+    assert paper_tables.main(['--quick', '--table', '1', '--table', '2']) == 0
+    page = capsys.readouterr().out
+    assert '0.5624' in page and '0.4523' in page and '7,500' in page and 'every 10th' in page
+    monkeypatch.setattr(paper_tables, 'resource_path', lambda *parts: tmp_path.joinpath(*parts))
+    assert paper_tables.main([]) == 1
+    assert 'does not exist' in capsys.readouterr().err

@@ -1,0 +1,201 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""Train the network of model `mlp`: from draws, then from what a search finds hardest.
+
+Five networks from five seeds learn from the same data. The one of median error is written, and the
+spread of all five stands in its model card.
+"""
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from tqdm import tqdm
+
+from benchmarks.errors import contact_errors
+from benchmarks.pose_sets import SETS, Pairs
+from box_contact_ros.core import BRACKET_LIMIT, FEATURES, NETWORK_FORMAT, SPREAD_LIMIT, UPPER_LIMIT
+from box_contact_ros.output import percentiles
+from box_contact_ros.solver.contact_solver import ContactSolver
+from box_contact_ros.solver.mlp import ACTIVATION, FEATURE_NAMES, NETWORK, core_numbers
+from box_contact_ros.solver.weights_file import Network, save_weights
+
+from .mlp_fit import MlpErrors, ShareNetwork, errors_of, fit, tensors
+from .samples import MlpSamples, describe, draw_samples, mixture
+from .worst_case import climb, worst_start
+
+HIDDEN = 16
+"""Hidden units. Only pairs with open brackets ask them, so that they cost next to nothing."""
+HARD_START, HARD_COUNT = 200_000, 3_000
+"""Pairs drawn for each search, which climbs from the HARD_COUNT worst."""
+
+# Streams of random numbers: data, what is measured on, hard data.
+_DATA, _METRICS, _HARD = range(3)
+
+
+@dataclass(frozen=True, kw_only=True)
+class MlpRecipe:
+    """One training."""
+
+    pairs: int = 4_000_000
+    steps: int = 3_000
+    batch: int = 2048
+    rate: float = 1e-2
+    generations: int = 60  # of each search for hard contacts
+    hard_rounds: int = 2
+    metric_pairs: int = 100_000  # pairs of each set in the model card's metrics
+    networks: int = 5
+
+
+QUICK = {'pairs': 100_000, 'steps': 200, 'generations': 3, 'hard_rounds': 1, 'metric_pairs': 2_000,
+         'networks': 2}
+"""What `--quick` replaces: enough to see the error fall, in seconds."""
+
+
+def train(path: Path, *, seed: int, commit: str, quick: bool = False, hidden: int = HIDDEN,
+          steps: int | None = None) -> dict[str, Any]:
+    """Train the networks and write one to `path`; return its model card."""
+    began = time.monotonic()
+    recipe = MlpRecipe(**(QUICK if quick else {}))
+    recipe = replace(recipe, steps=steps or recipe.steps)
+    data = draw_samples(mixture, [seed, _DATA], recipe.pairs, progress=True)
+    drawn = len(data)
+    first = _trained(data, seed, hidden, recipe, 'on draws')
+    for number in range(recipe.hard_rounds):
+        hard = _hard(first, np.random.default_rng([seed, _HARD, number]), recipe)
+        data = MlpSamples.joined([data, *[hard] * max(1, drawn // (5 * len(hard)))])
+        if number + 1 < recipe.hard_rounds:
+            first = _trained(data, seed, hidden, recipe, f'with hard ones, round {number + 1}')
+    networks = [_trained(data, seed + number, hidden, recipe, f'network {number + 1}')
+                for number in range(recipe.networks)]
+    summaries = [_summary(network, data) for network in networks]
+    order = np.argsort([sum(entry['p99'] for entry in summary.values()) for summary in summaries])
+    chosen = int(order[len(order) // 2])
+    card = model_card(path, recipe, hidden, {
+        'recipe': mixture.__doc__, 'pairs': recipe.pairs, 'contacts': drawn,
+        'hard': len(data) - drawn})
+    card |= {'seed': seed + chosen, 'commit': commit, 'spread': summaries}
+    card['training']['minutes'] = round((time.monotonic() - began) / 60.0, 2)
+    layers = networks[chosen].layers()
+    # What is measured is what was written.
+    save_weights(path, {NETWORK: layers}, card)
+    card['metrics'] = measured(path, seed, recipe.metric_pairs)
+    save_weights(path, {NETWORK: layers}, card)
+    return card
+
+
+def header(layers: Any) -> str:
+    """Return the text of core/src/mlp/shipped_network.hpp for a network's layers."""
+    numbers = core_numbers(Network(layers))
+    lines = [f'    {float(numbers[0])!r}F,']
+    for unit in numbers[1:].reshape(-1, FEATURES + 2):
+        lines.append('    ' + ', '.join(f'{float(number)!r}F' for number in unit) + ',')
+    return HEADER.replace('NUMBERS', '\n'.join(lines))
+
+
+HEADER = """// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
+// The shipped network of model `mlp`. Program `train` writes it beside weights/mlp.safetensors.
+#pragma once
+
+namespace box_contact::detail {
+
+// The bias of the output, then the numbers of each unit.
+// clang-format off
+constexpr float shipped_network[] = {
+NUMBERS
+};
+// clang-format on
+
+}  // namespace box_contact::detail
+"""
+
+
+def _trained(data: MlpSamples, seed: int, hidden: int, recipe: MlpRecipe, what: str,
+             ) -> ShareNetwork:
+    torch.manual_seed(seed)
+    network = ShareNetwork(hidden)
+    losses = fit(network, data, steps=recipe.steps, batch=recipe.batch, rate=recipe.rate,
+                 generator=torch.Generator().manual_seed(seed))
+    with tqdm(losses, desc=what, total=recipe.steps, unit='step', mininterval=1.0) as bar:
+        for step, loss in enumerate(bar):
+            if step % 200 == 0:
+                bar.set_postfix(loss=f'{loss.item():.2e}', refresh=False)
+    return network
+
+
+def _hard(network: ShareNetwork, rng: np.random.Generator, recipe: MlpRecipe) -> MlpSamples:
+    """Return what a search from the worst of fresh draws finds, over poses and sizes."""
+    def score(pairs: Pairs) -> np.ndarray:
+        samples, rows = describe(pairs)
+        found = np.full(len(rows), -1.0)
+        with torch.no_grad():
+            found[rows] = torch.stack(errors_of(network, tensors(samples))).amax(0).numpy()
+        return np.nan_to_num(found, nan=-1.0)
+
+    start = worst_start(mixture(rng, HARD_START), score, HARD_COUNT)
+    return describe(climb(rng, start, score, generations=recipe.generations, free_sizes=True)[0])[0]
+
+
+@torch.no_grad()
+def _summary(network: ShareNetwork, data: MlpSamples) -> dict[str, dict[str, float]]:
+    errors = errors_of(network, tensors(data))
+    return {name: error_summary(100.0 * values.numpy())
+            for name, values in zip(MlpErrors._fields, errors)}
+
+
+def model_card(path: Path, recipe: MlpRecipe, hidden: int, data: dict[str, Any]) -> dict[str, Any]:
+    """Return the card of a network before anything is measured."""
+    return {
+        'name': path.stem, 'model': 'mlp', 'format': NETWORK_FORMAT,
+        'architecture': [FEATURES, hidden, 1], 'activation': ACTIVATION, 'sizes': [],
+        'inputs': {'description': 'what an upper face cuts off the columns, and where side faces '
+                   'cut it', 'names': FEATURE_NAMES,
+                   'range': {'brackets apart [of the volume]': BRACKET_LIMIT,
+                             'brackets apart [of the second moments]': SPREAD_LIMIT,
+                             'cut off [of the volume]': UPPER_LIMIT}},
+        'outputs': ['where between its brackets the volume is'],
+        'data': data, 'metrics': {},
+        'training': {'algorithm': 'Adam', 'steps': recipe.steps, 'batch': recipe.batch,
+                     'rate': recipe.rate, 'threads': torch.get_num_threads()}}
+
+
+def error_summary(errors: np.ndarray) -> dict[str, float]:
+    """Return mean, 99th percentile and worst of errors."""
+    p99, worst = percentiles(errors, 99, 100)
+    return {'mean': float(errors.mean()), 'p99': p99, 'worst': worst}
+
+
+def measured(path: Path, seed: int, count: int) -> dict[str, Any]:
+    """Return the errors of point, volume and covariance on each pose set."""
+    solver = ContactSolver((1, 1, 1), (1, 1, 1), model='mlp', weights=str(path))
+    found: dict[str, Any] = {}
+    for number, (name, make) in enumerate(SETS.items()):
+        pairs = make(np.random.default_rng([seed, _METRICS, number]), count)
+        errors = contact_errors(pairs.contacts(solver), pairs.contacts(), pairs.edge)
+        found[name] = {quantity: error_summary(values)
+                       for quantity, values in errors._asdict().items()}
+    return found
+
+
+def metrics_table(card: dict[str, Any]) -> str:
+    """Return the card's metrics for the terminal."""
+    def shown(f: dict[str, float]) -> str:
+        return f'{f["mean"]:.5f} / {f["p99"]:.4f} / {f["worst"]:.3f}'
+
+    lines = ["errors against exact, %: mean / p99 / worst; the point's by the smaller box's "
+             "longest edge, the covariance's by its trace"]
+    width = max(map(len, card['metrics']))
+    for name, entry in card['metrics'].items():
+        for quantity, values in entry.items():
+            lines.append(f'{name:<{width}}  {quantity:<10}  {shown(values)}')
+    lines.append('all networks, contacts of the training, p99 of point / volume / covariance')
+    lines += ['  '.join(f'{entry["p99"]:.3f}' for entry in summary.values())
+              for summary in card['spread']]
+    return '\n'.join(f'  {line}' for line in lines)
