@@ -6,7 +6,6 @@
 import copy
 import os
 import platform
-import runpy
 import shutil
 import sys
 import sysconfig
@@ -38,8 +37,10 @@ if os.environ.get('BOX_CONTACT_BUILD') == 'best' and CPU.is_file():
     INSTRUCTION_SETS = {name: flags for name, flags in INSTRUCTION_SETS.items()
                         if name in ('baseline', best)}
 
-# Not imported from the package: its __init__.py needs what is only about to be installed.
-cli = runpy.run_path(str(Path(__file__).with_name(NAME) / 'cli.py'))
+PROGRAMS = {'bench': 'bench.bench', 'contact_node': 'node.contact_node',
+            'crane': 'demo.crane_node', 'markers': 'view.markers',
+            'soup_node': 'soup.soup_node', 'view': 'view.view'}
+"""The module of each program, whose `main` starts it."""
 
 # colcon and bloom run `setup.py install` or `develop`. `ros2 run` needs programs under their bare
 # names in lib/box_contact_ros, which setup.cfg names. pip puts programs into bin/ among those of
@@ -182,7 +183,9 @@ setup(
     ext_modules=extensions(),
     data_files=data_files(),
     entry_points={
-        'console_scripts': cli['entry_points']('box_contact_' if BY_PIP else ''),
+        'console_scripts': [
+            f'{"box_contact_" if BY_PIP else ""}{program} = {NAME}.{module}:main'
+            for program, module in PROGRAMS.items()],
         # Models outside the core; other packages add theirs in the same way.
         f'{NAME}.models': [f'{model} = {NAME}.soup.entries:{entry}'
                            for model, entry in {

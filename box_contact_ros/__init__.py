@@ -11,24 +11,18 @@ from typing import TYPE_CHECKING, Any
 
 from .solver.contact import Contact, Contacts
 from .solver.contact_solver import ContactSolver
-from .solver.models import models
 
 if TYPE_CHECKING:
-    from .scene.files.scene_file import SceneError, read_scene, write_scene
-    from .scene.force.held_wrench import HeldWrench
-    from .scene.force.laws import Body, HeldPatch, PatchLaw, SceneLaw
-    from .scene.force.predictor import Predictor
+    from .scene.laws import Body, HeldPatch, SceneLaw
+    from .scene.scene_file import read_scene
     from .scene.scene_solver import Box, Pair, Scene, SceneSolver
 
-__all__ = ['Body', 'Box', 'Contact', 'ContactSolver', 'Contacts', 'HeldPatch',
-           'HeldWrench', 'Pair', 'PatchLaw', 'Predictor', 'Scene', 'SceneError', 'SceneLaw',
-           'SceneSolver', 'models', 'read_scene', 'write_scene']
+__all__ = ['Body', 'Box', 'Contact', 'ContactSolver', 'Contacts', 'HeldPatch', 'Pair', 'Scene',
+           'SceneLaw', 'SceneSolver', 'read_scene']
 
 _LOADED_WHEN_USED = {
-    'scene.files.scene_file': ('SceneError', 'read_scene', 'write_scene'),
-    'scene.force.held_wrench': ('HeldWrench',),
-    'scene.force.laws': ('Body', 'HeldPatch', 'PatchLaw', 'SceneLaw'),
-    'scene.force.predictor': ('Predictor',),
+    'scene.laws': ('Body', 'HeldPatch', 'SceneLaw'),
+    'scene.scene_file': ('read_scene',),
     'scene.scene_solver': ('Box', 'Pair', 'Scene', 'SceneSolver'),
 }
 

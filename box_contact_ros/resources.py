@@ -1,7 +1,7 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Where the data files are: weights/, msg_schemas/, recordings/, launch/, config/.
+"""Where the data files are: weights/, msg_schemas/, launch/, config/.
 
 These folders stand at the top level of the repository, next to the Python package and not inside
 it, so `importlib.resources` does not see them. Every kind of install puts them somewhere else:
@@ -18,13 +18,11 @@ from __future__ import annotations
 import contextlib
 import os
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 _PACKAGE = Path(__file__).resolve().parent
 _SHARE = Path('share', 'box_contact_ros')
-SCENES = ('config', 'scenes')
-"""Where the package's own scenes are."""
 
 
 def resource_path(*parts: str) -> Path:
@@ -47,46 +45,12 @@ def resource_path(*parts: str) -> Path:
 
 
 def find_file(name: str | os.PathLike[str]) -> Path:
-    """Return the path that a user names, of one of the package's own where it leads nowhere.
-
-    A bare name, such as `yard_bay`, is that of a scene in config/scenes/.
-    """
+    """Return the path that a user names, of one of the package's own where it leads nowhere."""
     path = Path(name)
-    if path.is_absolute() or path.exists():
-        return path
-    for parts in ([str(name)], [*SCENES, f'{name}.yaml']):
+    if not path.is_absolute() and not path.exists():
         with contextlib.suppress(FileNotFoundError):
-            return resource_path(*parts)
+            return resource_path(str(name))
     return path
-
-
-class OpenFiles:
-    """The files that anybody on a network may name.
-
-    They are those below some directories, a few by name, and the package's scenes and weights.
-    """
-
-    def __init__(self, directories: Iterable[str], files: Iterable[str]) -> None:
-        """Take both as they are now: neither a link nor the working directory moves them later."""
-        self._files = {_real(name) for name in files}
-        # A service that starts in / would open the whole disk: / counts only if it is written.
-        self._roots = [Path(os.path.realpath(name)) for name in directories
-                       if name and (name == '/' or os.path.realpath(name) != '/')]
-        for folder in ('config', 'weights'):
-            with contextlib.suppress(FileNotFoundError):
-                self._roots.append(resource_path(folder).resolve())
-
-    def find(self, name: str) -> str:
-        """Return a file's path without links and `..`, or raise ValueError. It may not exist."""
-        found = _real(name)
-        if found in self._files or any(found.is_relative_to(root) for root in self._roots):
-            return str(found)
-        raise ValueError(f'{found} is not below the directories of files_from')
-
-
-def _real(name: str) -> Path:
-    """Return where a name leads."""
-    return Path(os.path.realpath(find_file(name)))
 
 
 def _roots() -> Iterator[Path]:

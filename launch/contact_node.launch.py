@@ -1,57 +1,53 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""A contact node with all of its parameters as arguments, to start or to include.
+"""A contact node, to start or to include.
 
-    ros2 launch box_contact_ros contact_node.launch.py scene:=config/scenes/yard_bay.yaml
+    ros2 launch box_contact_ros contact_node.launch.py scene:=/path/to/yard.yaml model:=exact
 
-All arguments: ros2 launch box_contact_ros contact_node.launch.py --show-args
-
-Made for containers: the log goes to stdout alone, a line a message, and to no file of the node's.
+The parameters of the node come from params_file; an argument replaces the one of its name.
 """
 from launch import LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction
+from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
+from launch_ros.substitutions import FindPackageShare
 
-from box_contact_ros.node.contact_program import PARAMETERS
-from box_contact_ros.node.launch_arguments import CONTACT_NODE, descriptions, given_values
-from box_contact_ros.resources import resource_path
-
-RESPAWN_SECONDS = 2.0
-SHIPPED = str(resource_path('config', 'contact_node.yaml'))
+ARGUMENTS = {
+    'namespace': ('', 'namespace of the node'),
+    'use_sim_time': ('false', 'whether time comes from /clock'),
+    'autostart': ('true', 'whether the node configures and activates itself'),
+    'use_respawn': ('false', 'whether a node that has ended is started anew'),
+    'log_level': ('info', 'lowest level that is logged'),
+}
+PARAMETERS = ('scene', 'model', 'pairing')
+"""Parameters that most users set; the others are set in params_file."""
 
 
 def contact_node(context: LaunchContext) -> list[Node]:
-    """Return the node with what was given, and nothing else."""
-    given = given_values(context, CONTACT_NODE)
-    values = {name: given[name] for name in ('use_sim_time', *PARAMETERS) if name in given}
-    if given.get('use_lifecycle_manager'):
-        if given.get('autostart'):
-            raise ValueError('use_lifecycle_manager: the manager starts the node, so leave '
-                             'autostart out')
-        values['autostart'] = False
-    # The order of precedence, lowest first: the shipped file, SetParameter of a launch file that
-    # includes this one, params_file, arguments.
-    shipped = [] if 'params_file' in given else ['--params-file', SHIPPED]
-    level = ['--log-level', given['log_level']] if 'log_level' in given else []
-    files = [given['params_file']] if 'params_file' in given else []
+    """Return the node with what was given."""
+    given = {name: LaunchConfiguration(name).perform(context)
+             for name in (*ARGUMENTS, *PARAMETERS, 'params_file')}
+    values = {name: ParameterValue(given[name], value_type=str)
+              for name in PARAMETERS if given[name]}
+    values |= {name: ParameterValue(given[name], value_type=bool)
+               for name in ('use_sim_time', 'autostart')}
     return [Node(
         package='box_contact_ros', executable='contact_node', output='screen',
-        arguments=['--shared-parameters'],  # SetParameter is for all nodes
-        name=given.get('name'), namespace=given.get('namespace'),
-        ros_arguments=[*shipped, *level, '--disable-external-lib-logs'],
-        parameters=[*files, *([{name: ParameterValue(value, value_type=str)
-                                if isinstance(value, str) else value
-                                for name, value in values.items()}] if values else [])],
-        respawn=given.get('respawn', False), respawn_delay=RESPAWN_SECONDS,
-        additional_env={'RCUTILS_LOGGING_USE_STDOUT': '1', 'PYTHONUNBUFFERED': '1'})]
+        namespace=given['namespace'], ros_arguments=['--log-level', given['log_level']],
+        parameters=[given['params_file'], values],
+        respawn=given['use_respawn'] == 'true', respawn_delay=2.0)]
 
 
 def generate_launch_description() -> LaunchDescription:
     """Return what `ros2 launch` asks for."""
     return LaunchDescription([
-        *(DeclareLaunchArgument(name, default_value='', description=description)
-          for name, description in descriptions(CONTACT_NODE).items()),
+        DeclareLaunchArgument('params_file', description='file of all parameters', default_value=[
+            FindPackageShare('box_contact_ros'), '/config/contact_node.yaml']),
+        *(DeclareLaunchArgument(name, default_value=default, description=description)
+          for name, (default, description) in ARGUMENTS.items()),
+        *(DeclareLaunchArgument(name, default_value='', description=f'parameter {name}')
+          for name in PARAMETERS),
         OpaqueFunction(function=contact_node),
     ])

@@ -99,9 +99,17 @@ sys.path.append(str(Path(__file__).resolve().parents[1]))
 # start.
 os.environ.pop('PYTEST_ADDOPTS', None)
 
-from box_contact_ros.cli import MODULES_OF_EXTRA, PROGRAMS
-
-EXTRAS = {**MODULES_OF_EXTRA, 'test': ('catkin_pkg', 'gmpy2', 'hypothesis', 'mcap', 'mcap_ros2')}
+PROGRAMS = {'bench': 'bench.bench', 'contact_node': 'node.contact_node',
+            'crane': 'demo.crane_node', 'markers': 'view.markers',
+            'soup_node': 'soup.soup_node', 'view': 'view.view'}
+"""The module of each program, as setup.py has them."""
+EXTRAS = {
+    'ros': ('rclpy', 'box_contact_msgs', 'builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs',
+            'rcl_interfaces', 'std_msgs', 'visualization_msgs'),
+    'sim': ('mujoco',), 'bag': ('rosbags',), 'soup': ('fcl',), 'view': ('viser',),
+    'train': ('safetensors', 'torch', 'tqdm'), 'report': ('matplotlib', 'tqdm'),
+    'peers': ('coal', 'pybullet'), 'fuzz': ('mpmath',),
+    'test': ('catkin_pkg', 'gmpy2', 'hypothesis')}
 """The modules of each extra of setup.py that tests import."""
 
 
@@ -275,24 +283,25 @@ def signal_handlers() -> Iterator[None]:
 
 @pytest.fixture
 def program(tmp_path: Path) -> Iterator[Callable[..., RunningProgram]]:
-    """Start `python -m box_contact_ros PROGRAM ...`; it is ended with the test, however that ends.
+    """Start a program of setup.py; it is ended with the test, however that ends.
 
     `program('crane', '--ros-args', '-p', 'rate:=200.0', env={...})`: `env` is added to this
     process's environment, `within` stands before the command, such as `ip netns exec NAME`.
-    The test is skipped where the program's extras are not installed.
+    The test is skipped where an extra of the program is not installed.
     """
     started: list[RunningProgram] = []
 
     def start(*args: str, env: dict[str, str] | None = None,
               within: Sequence[str] = ()) -> RunningProgram:
-        extras = PROGRAMS[args[0]].extras if args[0] in PROGRAMS else ()
-        for module in chain(*(MODULES_OF_EXTRA[extra] for extra in extras)):
-            if importlib.util.find_spec(module) is None:
-                skip_without_extra(module)
+        for extra in {'crane': ('sim',), 'soup_node': ('soup',), 'view': ('view',)}.get(
+                args[0], ()):
+            if importlib.util.find_spec(EXTRAS[extra][0]) is None:
+                skip_without_extra(EXTRAS[extra][0])
         log = tmp_path / f'program_{len(started)}.log'
         with log.open('wb') as out:
             process = subprocess.Popen(
-                [*within, sys.executable, '-u', '-m', 'box_contact_ros', *args],
+                [*within, sys.executable, '-u', '-m', f'box_contact_ros.{PROGRAMS[args[0]]}',
+                 *args[1:]],
                 stdin=subprocess.DEVNULL,
                 stdout=out,
                 stderr=subprocess.STDOUT,

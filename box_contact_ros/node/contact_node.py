@@ -1,58 +1,92 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""The contact node: parameters, topics, evaluation and diagnostics, by states of a lifecycle."""
+"""The contact node: box poses in, contact points and normals out.
+
+Subscribes box_a/pose and box_b/pose (geometry_msgs/PoseStamped). Publishes contact/point
+(PointStamped) and contact/normal (Vector3Stamped, from A to B) while the boxes touch. On every
+evaluation it publishes contacts (box_contact_msgs/Contacts), and once a second /diagnostics.
+
+With a scene file: <box>/pose of every moving box, and <pair>/contact/point, <pair>/contact/normal.
+It is a lifecycle node that configures and activates itself, unless autostart is false. Its
+parameters are read when it is configured; model, tolerance and max_age may be set while it runs.
+"""
 from __future__ import annotations
 
 import gc
+import sys
 from collections import Counter
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
+from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockChange, JumpThreshold, TimeJump
 from rclpy.clock_type import ClockType
 from rclpy.context import Context
 from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.parameter import Parameter
 
-from ..scene.scene_solver import Scene, SceneSolver
-from ..scene.stamp_pairing import RESETS
+from ..core import LENGTH_MAX
+from ..scene.pairing import PAIRINGS, RESETS
+from ..scene.scene_file import read_scene
+from ..scene.scene_solver import CONTAINER, Scene, SceneSolver, two_boxes
 from ..solver.checks import shown
-from ..solver.models import find_model
-from .contact_program import PARAMETERS
-from .declared_parameters import CheckedParameters
-from .diagnostics import DIAGNOSTICS_SECONDS, Diagnostics
-from .evaluator import SERIALIZATIONS, Evaluator
-from .messages import ContactsMessage
-from .named_files import NamedFiles, named_scene
-from .parameters import Setting, reason_of
-from .rclpy_workarounds import lifecycle_state, refuse_transitions
-from .runtime import LOG_SECONDS, GuardedNode, give_back_memory
-from .topics.scene_topics import SceneTopics
-from .topics.tf_poses import check_frames
-from .wrench_output import make_wrenches
+from ..solver.models import find_model, model_names
+from .diagnostics import DIAGNOSTICS_SECONDS, Diagnostics, TickMonitor
+from .parameters import (
+    Setting,
+    answer_help,
+    declare,
+    flag,
+    number,
+    one_of,
+    reason_of,
+    size,
+    text,
+    warn_of_unknown,
+)
+from .rclpy_workarounds import lifecycle_state
+from .runtime import LOG_SECONDS, GuardedNode, run_node
+from .tick import TickAnswerer
+from .topics import SceneTopics
 
+LONGEST = 1e6  # s, about twelve days
 NAMED_TOPICS = 3  # how many pose topics the node names when it is ready
 
 
-def _refuse_boxes(settings: Mapping[str, Any], before: Mapping[str, Any]) -> None:
-    """Raise ValueError for sizes and masses that change although a scene replaces them.
+def model(name: str, value: Any) -> str:
+    """Check the name of a model."""
+    find_model(name, text(name, value))
+    return str(value)
 
-    One may be given again as it is: files of all parameters do so.
-    """
-    for kind in ('size', 'mass'):
-        for name in (f'{kind}_a', f'{kind}_b'):
-            if settings['scene'] and settings.get(name) != before.get(name):
-                plural = {'size': 'sizes', 'mass': 'masses'}[kind]
-                raise ValueError(f'{name} {shown(settings[name])} has no effect while scene is '
-                                 f"set: write {plural} into the scene file, or set scene to ''")
+
+PARAMETERS = {
+    'size_a': Setting(CONTAINER, 'full extents of box A, three numbers > 0 [m]', size),
+    'size_b': Setting(CONTAINER, 'full extents of box B, three numbers > 0 [m]', size),
+    'scene': Setting('', 'scene file, which replaces size_a and size_b', text),
+    'model': Setting('mlp', f'how the contact point is found: {model_names()}', model),
+    'pairing': Setting('stamp', 'stamp: answer once, when poses of equal stamp are in; latest: '
+                                "answer every pose with the other boxes' last", one_of(PAIRINGS)),
+    'tolerance': Setting(0.0, 'with pairing stamp: stamps this far apart still belong together [s]',
+                         number(0.0, LONGEST)),
+    'max_age': Setting(1.0, 'no tick waits for a box whose newest stamp is older than this; with '
+                            'pairing latest, its pairs get no contact; 0: never [s]',
+                       number(0.0, LONGEST)),
+    'margin': Setting(0.0, 'pairs apart are listed in contacts too, up to this separation [m]; '
+                           'their depth is negative', number(0.0, LENGTH_MAX)),
+    'pair_topics': Setting(True, 'whether pairs have topics of their own next to contacts', flag),
+}
+LIVE = ('model', 'tolerance', 'max_age')
+"""The parameters that may be set while the node runs; none of them touches a topic."""
+AUTOSTART = {'autostart': Setting(True, 'whether the node configures and activates itself', flag)}
 
 
 class ContactNode(GuardedNode, LifecycleNode):
-    """Wires parameters, topics, evaluation and diagnostics to the states of a lifecycle node.
+    """Wires parameters, topics, ticks and diagnostics to the states of a lifecycle node.
 
     A node on another method derives from this one. It sets `name`, the `prefix` of its contact
-    topics and its `parameters` (all of these but `model` and `weights`), and makes the solver.
+    topics and its `parameters` (all of these but `model`), and makes the solver.
     """
 
     name: ClassVar[str] = 'contact_node'
@@ -60,196 +94,171 @@ class ContactNode(GuardedNode, LifecycleNode):
     parameters: ClassVar[Mapping[str, Setting]] = PARAMETERS
 
     def __init__(self, context: Context, **options: Any) -> None:
-        """Raise ValueError where parameters do not go together."""
+        """Begin unconfigured."""
         super().__init__(self.name, context=context, **options)
+        self.autostart: bool = declare(self, AUTOSTART)['autostart']
         self.counts: Counter[str] = Counter()
-        self._evaluator: Evaluator | None = None  # from configure to cleanup
-        self._settings = CheckedParameters(self, self.parameters, self._change)
-        values = self._settings.values
-        _refuse_boxes(values, {name: one.default for name, one in self.parameters.items()})
-        if values['locked'] and not values['autostart']:
-            raise ValueError('locked: a node that does not start itself could never be started')
-        self._files = NamedFiles(self, values)
-        self._topics = SceneTopics(self, self.prefix, self.counts)
-        self._diagnostics = Diagnostics(self)
+        self.fault: Exception | None = None  # why the last transition failed
+        self._monitor = TickMonitor()
+        self._diagnostics = Diagnostics(self, self.counts, self._monitor)
+        self._values: dict[str, Any] = {}
+        self._topics: SceneTopics | None = None  # from configure to cleanup
+        self._answerer: TickAnswerer | None = None  # likewise
+        self.add_on_set_parameters_callback(self._set_live)
         # On a clock of its own: simulated time may stand still.
         self.create_timer(DIAGNOSTICS_SECONDS, self._report, clock=Clock(
             clock_type=ClockType.STEADY_TIME))
         self._jumps = self.get_clock().create_jump_callback(
             JumpThreshold(min_forward=None, min_backward=Duration(nanoseconds=-1),
                           on_clock_change=True), post_callback=self._clock_jumped)
-        self._fault: Exception | None = None
-        self._raises_faults = values['autostart']
-        if self._raises_faults:
-            for transition in (self.trigger_configure, self.trigger_activate):
-                if transition() != TransitionCallbackReturn.SUCCESS:
-                    raise self._fault or ValueError('the node did not start')
-        self._raises_faults = False
-        if values['locked']:
-            refuse_transitions(self)
-        if ContactsMessage is None:
-            self.get_logger().warning('box_contact_msgs is not installed: contacts are published '
-                                      'as contacts_cloud alone')
-        # Last: a program that waits for this line may end the node at once.
-        self._log_state('ready' if values['autostart'] else 'unconfigured')
 
     @staticmethod
-    def make_solver(settings: Mapping[str, Any], scene: Scene) -> SceneSolver:
+    def make_solver(values: Mapping[str, Any], scene: Scene) -> SceneSolver:
         """Return the solver that checked parameters ask for, or raise ValueError."""
-        entry, _ = find_model('model', settings['model'])
-        return SceneSolver(scene, model=settings['model'], weights=settings['weights'] or None,
-                           margin=settings['margin'], most_near=entry.most_near)
+        entry, _ = find_model('model', values['model'])
+        return SceneSolver(scene, model=values['model'], margin=values['margin'],
+                           most_near=entry.most_near)
+
+    def start(self) -> None:
+        """Configure and activate; raise what keeps the node from it."""
+        for transition in (self.trigger_configure, self.trigger_activate):
+            if transition() != TransitionCallbackReturn.SUCCESS:
+                raise self.fault or ValueError('the node did not start')
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Read the scene, load the weights, create the publishers.
+        """Read parameters and scene, make solver and topics.
 
         SUCCESS: inactive. FAILURE, with the reason logged: unconfigured, without topics.
         """
-        if not self._attempt(lambda: self._apply(self._settings.values)):
+        try:
+            self._configure()
+        except Exception as error:  # rclpy would swallow it
+            self.fault = error
+            self.get_logger().error(f'not configured: {reason_of(error)}')
             return TransitionCallbackReturn.FAILURE
-        self._log_state('configured')
         return super().on_configure(state)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Subscribe to poses.
-
-        SUCCESS: active. FAILURE, with the reason logged: inactive, without subscriptions.
-        """
-        if not self._attempt(self._activate):
-            return TransitionCallbackReturn.FAILURE
-        self._log_state('ready')
-        return super().on_activate(state)
-
-    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Unsubscribe, and forget the poses that wait. SUCCESS: inactive."""
-        self._topics.deactivate()
-        self._configured.reset()
-        self._log_state('inactive')
-        return super().on_deactivate(state)
-
-    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Let go of solver and publishers; counts go on. SUCCESS: unconfigured."""
-        self._configured.close()
-        self._evaluator = None
-        self._topics.close()
-        self._log_state('unconfigured')
-        return super().on_cleanup(state)
-
-    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Unsubscribe; `destroy_node` does the rest. SUCCESS: finalized."""
-        self._topics.deactivate()
-        self._log_state('finalized')
-        return super().on_shutdown(state)
-
-    def destroy_node(self) -> None:
-        """Leave the network."""
-        self._topics.events.close()
-        super().destroy_node()
-
-    @property
-    def _configured(self) -> Evaluator:
-        """Return the evaluator of a node that is configured."""
-        assert self._evaluator is not None
-        return self._evaluator
-
-    def _attempt(self, action: Callable[[], None]) -> bool:
-        """Return whether an action of a transition succeeded; keep and log its error."""
-        self._fault = None
-        try:
-            action()
-        except Exception as error:  # rclpy would swallow it
-            self._fault = error
-            if not self._raises_faults:
-                self.get_logger().error(reason_of(error), throttle_duration_sec=LOG_SECONDS)
-            return False
-        return True
-
-    def _activate(self) -> None:
+        """Answer poses. SUCCESS: active."""
         # What start-up made stays for good. No full collection (10 ms) has to look at it.
         gc.collect()
         gc.freeze()
-        self._diagnostics.watch.restart()
-        self._topics.activate(self._configured.pose_callback)
+        self._monitor.restart(self._tick.solver.scene.pairs)
+        self._tick.active = True
+        self._say_ready()
+        return super().on_activate(state)
 
-    def _change(self, settings: dict[str, Any], names: Collection[str]) -> None:
-        """Apply parameters if one differs. A scene that is set again may differ in its file."""
-        _refuse_boxes(settings, self._settings.values)
-        if self._evaluator is not None and (
-                settings != self._settings.values or 'scene' in names):
-            self._apply(settings)
-            if self.may_log('changed'):
-                self._log_scene(f'changed {", ".join(sorted(names))}', settings)
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Answer no poses, and forget those that wait. SUCCESS: inactive."""
+        self._tick.active = False
+        self._tick.pairing.reset()
+        self.get_logger().info('inactive: no pose is answered')
+        return super().on_deactivate(state)
 
-    def _apply(self, settings: dict[str, Any]) -> None:
-        """Apply parameters as a whole, or raise ValueError or RCLError and keep the old."""
-        with self._files.resolved(settings, starts=self._raises_faults) as resolved:
-            self._replace(resolved, named_scene(
-                resolved, check=check_frames, limits=self._files.limits(settings)))
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Let go of solver and topics; counts go on. SUCCESS: unconfigured."""
+        assert self._topics is not None
+        self._topics.close()
+        self._topics = self._answerer = None
+        self.get_logger().info('unconfigured: no pose is answered')
+        return super().on_cleanup(state)
 
-    def _replace(self, settings: Mapping[str, Any], scene: Scene) -> None:
-        """Replace scene, solver and topics, or raise and keep the old.
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Answer no poses; `destroy_node` does the rest. SUCCESS: finalized."""
+        if self._answerer is not None:
+            self._answerer.active = False
+        return super().on_shutdown(state)
 
-        Boxes that stay keep their subscriptions and the poses that wait.
-        """
-        solver = self.make_solver(settings, scene)
-        wrenches = make_wrenches(settings, solver)
-        covered = wrenches.pairs if wrenches else ()
-        self._topics.check(scene, pair_topics=settings['pair_topics'], wrenches=covered)
-        self._topics.set_scene(scene, pair_topics=settings['pair_topics'],
-                               cloud=settings['contacts_cloud'] or ContactsMessage is None,
-                               raw=SERIALIZATIONS[settings['serialization']].raw,
-                               deadline=settings['deadline'], wrenches=covered)
-        if self._evaluator is None:
-            self._evaluator = Evaluator(
-                solver, wrenches, settings, topics=self._topics, counts=self.counts,
-                diagnostics=self._diagnostics, logger=self.get_logger())
+    @property
+    def _tick(self) -> TickAnswerer:
+        """Return what answers the ticks of a node that is configured."""
+        assert self._answerer is not None
+        return self._answerer
+
+    def _configure(self) -> None:
+        values = declare(self, self.parameters, live=LIVE)
+        warn_of_unknown(self, {**self.parameters, **AUTOSTART})
+        if values['scene']:
+            for name in ('size_a', 'size_b'):
+                if values[name] != self.parameters[name].default:
+                    raise ValueError(f'{name} {shown(values[name])} has no effect while scene is '
+                                     'set: write sizes into the scene file')
+            scene = read_scene(values['scene'])
         else:
-            self._evaluator.set_solver(solver, wrenches, settings)
-            self._topics.tf.look_up()
+            scene = two_boxes(values['size_a'], values['size_b'])
+        solver = self.make_solver(values, scene)
+        topics = SceneTopics(self, self.prefix, scene, pair_topics=values['pair_topics'])
+        try:
+            answerer = TickAnswerer(solver, topics, values, self.counts, self._monitor)
+            topics.subscribe(scene, answerer.callback_of)
+        except Exception:
+            topics.close()
+            raise
+        self._values, self._topics, self._answerer = values, topics, answerer
 
-    def _log_state(self, what: str) -> None:
-        """Log a state that a transition has brought; the start itself logs its last one alone."""
-        if self._raises_faults:
-            return
-        if what in ('configured', 'ready'):
-            self._topics.warn_of_unused_qos()
-            self._log_scene(what, self._settings.values)
-        else:
-            self.get_logger().info(f'{what}: no pose is answered')
+    def _set_live(self, parameters: Sequence[Parameter]) -> SetParametersResult:
+        """Take new values of LIVE, all or none; rclpy refuses those that are read-only."""
+        try:
+            given = {parameter.name: self.parameters[parameter.name].check(
+                parameter.name, parameter.value)
+                for parameter in parameters if parameter.name in LIVE}
+            values = {**self._values, **given}
+            if self._answerer is not None and given:
+                if 'model' in given and given['model'] != self._values['model']:
+                    self._answerer.solver = self.make_solver(values, self._answerer.solver.scene)
+                self._answerer.set_times(values)
+        except Exception as error:  # the client would wait for ever
+            return SetParametersResult(successful=False, reason=reason_of(error))
+        self._values = values
+        return SetParametersResult(successful=True)
 
-    def _log_scene(self, what: str, settings: Mapping[str, Any]) -> None:
-        """Log what the node works on, and warn of weights that the model does not use."""
-        assert self._evaluator is not None
-        logger = self.get_logger()
-        solver, scene = self._evaluator.solver, self._evaluator.solver.scene
-        entry, _ = find_model('model', solver.model)
-        if settings.get('weights') and 'weights' not in entry.takes:
-            logger.warning(f'model {solver.model!r} uses no weights: '
-                           f'{shown(settings["weights"])} is ignored')
-        pairs, topics = len(scene.pairs), self._topics.pose_topics()
-        more = len(topics) - NAMED_TOPICS
+    def _say_ready(self) -> None:
+        """Log what the node works on."""
+        assert self._topics is not None
+        solver, topics = self._tick.solver, self._topics.pose_topics()
+        scene = solver.scene
+        pairs, more = len(scene.pairs), len(topics) - NAMED_TOPICS
         frame = f' in frame {shown(scene.frame_id)}' if scene.frame_id else ''
-        named = ', '.join(topics[:NAMED_TOPICS]) or 'nowhere, as the node is not active'
-        logger.info(f'{what}: model {solver.model!r}, pairing {settings["pairing"]!r}, '
-                    f'{pairs} {"pair" if pairs == 1 else "pairs"}; poses{frame} from '
-                    f'{named}{f" and {more} more" if more > 0 else ""}')
+        self.get_logger().info(
+            f'ready: model {solver.model!r}, pairing {self._values["pairing"]!r}, {pairs} '
+            f'{"pair" if pairs == 1 else "pairs"}; poses{frame} from '
+            f'{", ".join(topics[:NAMED_TOPICS])}{f" and {more} more" if more > 0 else ""}')
 
     def _clock_jumped(self, jump: TimeJump) -> None:
-        if self._evaluator is not None:
+        if self._answerer is not None:
             self.counts[RESETS] += 1
-            self._evaluator.reset(time_only=True)
+            self._answerer.pairing.reset()
             cause = ('/clock was set back' if jump.clock_change == ClockChange.ROS_TIME_NO_CHANGE
                      else 'use_sim_time was changed')
             self.get_logger().warning(f'time went back: {cause}; a new time begins',
                                       throttle_duration_sec=LOG_SECONDS)
 
     def _report(self) -> None:
-        """Serve QoS events, publish diagnostics and give memory back, once a second."""
-        if self._topics.serve_events() and self._evaluator is not None:
-            self._evaluator.desert()
+        """Publish diagnostics, once a second."""
         state = lifecycle_state(self)
-        if self._evaluator is None:
-            self._diagnostics.publish(self.counts, state=state, pairs=0)
+        if self._answerer is None or self._topics is None:
+            self._diagnostics.publish(state=state, pairs=0)
         else:
-            self._evaluator.report(state)
-        give_back_memory()
+            self._diagnostics.report(state, self._answerer.solver.scene, self._answerer.pairing,
+                                     self._topics)
+
+
+def run(node_type: type[ContactNode], doc: str | None, args: Sequence[str] | None) -> int:
+    """Run a node of this class until SIGINT or SIGTERM; return the exit status."""
+    answer_help(node_type.name, doc, {**node_type.parameters, **AUTOSTART}, args)
+
+    def started(context: Context) -> ContactNode:
+        node = node_type(context)
+        if node.autostart:
+            node.start()
+        return node
+    return run_node(started, args)
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the node until SIGINT or SIGTERM."""
+    return run(ContactNode, __doc__, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

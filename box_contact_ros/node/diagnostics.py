@@ -4,13 +4,15 @@
 """What a contact node reports once a second, on /diagnostics and in its log.
 
 A finding is one cause. Its message goes to /diagnostics, and with its remedy to the log.
-docs/reference/diagnostics.md lists all of them.
+`TickMonitor` notes what happens; `Diagnostics` reads it, and the state of pairing and topics.
+docs/reference/diagnostics.md lists all findings.
 """
 from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Sequence
+from itertools import islice
 from math import ceil, floor, log10
 from typing import Any, NamedTuple
 
@@ -18,12 +20,13 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 
-from ..scene.scene_solver import Pair
-from ..scene.stamp_pairing import AGAIN, AHEAD, OLD, REPEATED, RESETS, TOO_LATE, Note
+from ..scene.pairing import OLD, REPEATED, RESETS, TOO_LATE, Pairing, Rejection
+from ..scene.scene_solver import Pair, Scene
 from .messages import make_header
+from .topics import SceneTopics
 
 DIAGNOSTICS_SECONDS = 1.0
-LOOK_JITTER = 0.1  # looks may be this much less than DIAGNOSTICS_SECONDS apart [s]
+REPORT_JITTER = 0.1  # reports may be this much less than DIAGNOSTICS_SECONDS apart [s]
 UNMATCHED_SECONDS = 1.0  # a pair unanswered for this long is worth a warning
 UNANSWERED_SECONDS = 5.0
 """A pair unanswered for this long is an error; so long nobody has to publish after a start."""
@@ -31,72 +34,100 @@ REMINDER_SECONDS = 10.0  # a finding that stays is logged again after this long
 KEPT_TIMES = 4096
 """Evaluations whose computing times are kept for a report: more a second than any node makes."""
 NAMED = 3  # boxes or pairs that a message names
+COMPARED = 16  # pairs at most whose stamps are compared for a report
+MARGIN = 1.2
+"""A tolerance that is proposed is so much larger than half the period, as periods vary."""
+FEWEST_STAMPS = 5  # of a box, before its period is known, even if there is a gap among them
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 ACTIVE = 'active'
-
-
 REMEDIES = {
     'has zero length': 'set orientation.w to 1.0',
     'is not finite': 'send finite numbers',
     'exceeds': 'send metres',
 }
-"""What a sender can do, by words of a refusal. Each is a kind of its own in the log."""
-
-
-def kind_and_remedy(reason: str, text: str) -> tuple[str, str]:
-    """Return the kind of a refusal in the log, and what stands behind it there."""
-    words = next((words for words in REMEDIES if words in text), '')
-    return reason + words, f': {REMEDIES[words]}' if words else ''
-
-
-def note_line(kind: str, note: Note) -> str:
-    """Return the log line, with its remedy, of what the pairing did to a pose."""
-    stamp, newest = (f'{1e-9 * value:.12g} s' for value in (note.stamp, note.newest))
-    if kind == RESETS:
-        return (f'time went back: {note.box} has stamp {stamp} after {newest}; a new time begins '
-                '(a loop, a restart, or a second publisher)')
-    if kind == TOO_LATE:
-        return (f'{note.box}: the tick of stamp {stamp} was answered without this pose; dropped: '
-                'set a longer max_age')
-    if kind == OLD:
-        return (f'{note.box}: stamp {stamp} is older than {newest}; refused: publish in the order '
-                'of the stamps, from one publisher')
-    if kind == AHEAD:
-        return (f'{note.box}: stamp {stamp} is {1e-9 * (note.stamp - note.newest):.3g} s ahead of '
-                'the other boxes, max_age is less; refused: stamp all by the same clock')
-    assert kind == REPEATED
-    if note.stamp == note.newest:
-        return (f'{note.box}: stamp {stamp} does not advance; refused: set header.stamp (`ros2 '
-                'topic pub` does for `stamp: now`), or pairing:=latest')
-    return (f'{note.box}: stamp {stamp} has come before; refused: send each stamp once (a loop of '
-            f'more than {AGAIN} ticks begins anew), or pairing:=latest')
-
-
-def listed(names: Sequence[str]) -> str:
-    """Return the first names, and how many there are besides."""
-    more = len(names) - NAMED
-    return ', '.join(names[:NAMED]) + (f' and {more} more' if more > 0 else '')
-
-
-def rounded_up(value: float) -> float:
-    """Return a positive number rounded up to two digits."""
-    unit = 10.0 ** (floor(log10(value)) - 1)
-    return ceil(value / unit) * unit
+"""What a sender can do, by words of a refusal. Each is a line of its own in the log."""
 
 
 class Finding(NamedTuple):
     """One cause of what is wrong."""
 
-    kind: str
+    cause: str
     message: str
     remedy: str = ''  # empty: the log has it elsewhere
     level: bytes = WARN
 
 
-class Look(NamedTuple):
-    """What happened since the last look, a second ago."""
+class TickMonitor:
+    """What happened since the last report, by the steady clock [s]."""
 
-    refused: list[str]  # reasons of refusals
+    def __init__(self) -> None:
+        self.absent: list[str] = []  # the boxes that the last array had no pose of
+        self._times = np.zeros(KEPT_TIMES)  # [us], a ring
+        self._evaluations = 0
+        self._refusals: dict[str, str] = {}  # log lines of the next report, by reason
+        self.refused_boxes: set[str] = set()  # boxes of which a message was refused
+        self._pairs: Sequence[Pair] = ()
+        self._open: list[Pair] | None = None
+        """Pairs not answered since the last report; None: no tick was."""
+        self._since: dict[Pair, float] = {}  # when a report first found a pair unanswered
+        self.restart(())
+
+    def restart(self, pairs: Sequence[Pair]) -> None:
+        """Begin anew with the pairs that are asked for, as a node does when it is activated."""
+        self._began = time.monotonic()
+        self._heard: float | None = None  # when poses last came
+        self._pairs, self._open = pairs, None
+        self._since.clear()
+
+    def evaluated(self, nanoseconds: int, stale: list[Pair]) -> None:
+        """Note a tick, its time in the solver, and the pairs that could not be evaluated."""
+        self._times[self._evaluations % KEPT_TIMES] = 1e-3 * nanoseconds
+        self._evaluations += 1
+        if self._open is None:
+            self._open = stale
+        elif self._open and self._open != stale:
+            still = set(stale)
+            self._open = [pair for pair in self._open if pair in still]
+
+    def refused(self, reason: str, text: str, box: str) -> None:
+        """Note a refusal; the first of its kind is logged with the next report."""
+        words = next((words for words in REMEDIES if words in text), '')
+        remedy = f': {REMEDIES[words]}' if words else ''
+        self._refusals.setdefault(reason + words, f'{text}; refused{remedy}')
+        if box:
+            self.refused_boxes.add(box)
+
+    def take_refusals(self) -> list[str]:
+        """Return the log lines of what was refused since the last call."""
+        lines, self._refusals = list(self._refusals.values()), {}
+        return lines
+
+    def take_times(self) -> np.ndarray:
+        """Return the computing times (n,) [us] since the last call, the last KEPT_TIMES at most."""
+        count, self._evaluations = min(self._evaluations, KEPT_TIMES), 0
+        return self._times[:count]
+
+    def summary(self, *, came: bool, max_age: float) -> Summary:
+        """Return which pairs are not answered; `came`: whether any pose did."""
+        now = time.monotonic()
+        if came:
+            self._heard = now
+        quiet = now - (self._began if self._heard is None else self._heard)
+        # Without poses nothing is asked. A simulation may pause.
+        asked = self._heard is not None and quiet <= max(max_age, UNMATCHED_SECONDS)
+        missed = self._pairs if self._open is None else self._open
+        self._since = {pair: self._since.get(pair, now) for pair in missed} if asked else {}
+        self._open = None
+        unmatched, unanswered = (
+            [pair for pair, since in self._since.items()
+             if now - since + REPORT_JITTER >= max(seconds, max_age)]
+            for seconds in (UNMATCHED_SECONDS, UNANSWERED_SECONDS))
+        return Summary(unmatched if came else [], unanswered, quiet, self._heard is not None)
+
+
+class Summary(NamedTuple):
+    """What happened since the last report, a second ago."""
+
     unmatched: list[Pair]
     """Pairs unanswered for UNMATCHED_SECONDS, or max_age if that is longer, while poses come."""
     unanswered: list[Pair]  # pairs unanswered for UNANSWERED_SECONDS, or max_age
@@ -104,109 +135,175 @@ class Look(NamedTuple):
     has_heard: bool  # whether any pose came since the start
 
 
-class Watch:
-    """Which pairs are answered and when poses came, by the steady clock [s]."""
-
-    def __init__(self) -> None:
-        self._pairs: Sequence[Pair] = ()
-        self._open: list[Pair] | None = None  # not answered since the last look; None: no tick
-        self._since: dict[Pair, float] = {}  # when a look first found a pair unanswered
-        self._heard: float | None = None  # when poses last came
-        self.restart()
-
-    def restart(self) -> None:
-        """Begin anew, as a node does when it is activated."""
-        self._began, self._heard = time.monotonic(), None
-        self._since.clear()
-
-    def set_pairs(self, pairs: Sequence[Pair]) -> None:
-        """Replace the pairs that are asked for."""
-        self._pairs, self._open = pairs, None
-
-    def evaluated(self, stale: list[Pair]) -> None:
-        """Note a tick that answered all pairs but those."""
-        if self._open is None:
-            self._open = stale
-        elif self._open and self._open != stale:
-            still = set(stale)
-            self._open = [pair for pair in self._open if pair in still]
-
-    def look(self, refused: list[str], *, came: bool, max_age: float) -> Look:
-        """Return what happened since the last look; `came`: whether any pose did."""
-        now = time.monotonic()
-        if came:
-            self._heard = now
-        has_heard = self._heard is not None
-        quiet = now - (self._began if self._heard is None else self._heard)
-        # Without poses nothing is asked. A simulation may pause.
-        asked = has_heard and quiet <= max(max_age, UNMATCHED_SECONDS)
-        missed = self._pairs if self._open is None else self._open
-        self._since = {pair: self._since.get(pair, now) for pair in missed} if asked else {}
-        self._open = None
-        unmatched, unanswered = (
-            [pair for pair, since in self._since.items()
-             if now - since + LOOK_JITTER >= max(seconds, max_age)]
-            for seconds in (UNMATCHED_SECONDS, UNANSWERED_SECONDS))
-        return Look(refused, unmatched if came else [], unanswered, quiet, has_heard)
-
-
 class Diagnostics:
-    """Computing times and counts of the last second, and the message."""
+    """Publishes and logs what is wrong, and what to do."""
 
-    def __init__(self, node: Node) -> None:
-        self._node = node
+    def __init__(self, node: Node, counts: Counter[str], monitor: TickMonitor) -> None:
+        self._node, self._counts, self._monitor = node, counts, monitor
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
-        self._times = np.zeros(KEPT_TIMES)  # [us], a ring
-        self._evaluations = 0
         self._reported: Counter[str] = Counter()
-        self._logged: dict[str, float] = {}  # when a kind of finding was logged [s]
-        self.watch = Watch()
+        self._logged: dict[str, float] = {}  # when a cause was logged [s]
 
-    def computed(self, nanoseconds: int, stale: list[Pair]) -> None:
-        """Note a tick, its time in the solver, and the pairs that could not be evaluated."""
-        self._times[self._evaluations % KEPT_TIMES] = 1e-3 * nanoseconds
-        self._evaluations += 1
-        self.watch.evaluated(stale)
+    def report(self, state: str, scene: Scene, pairing: Pairing, topics: SceneTopics) -> None:
+        """Report on a node that is configured; `state` is that of the lifecycle."""
+        logger = self._node.get_logger()
+        rejections, pairing.rejections = pairing.rejections, {}
+        for line in (*self._monitor.take_refusals(),
+                     *(_rejection_line(*rejection) for rejection in rejections.items())):
+            logger.warning(line)
+        new = self._counts - self._reported
+        self._reported = Counter(self._counts)
+        summary = self._monitor.summary(came=new['poses'] > 0, max_age=1e-9 * pairing.max_age)
+        unseen = [box for box in pairing.unseen() if box not in self._monitor.refused_boxes]
+        stale = self._monitor.absent if scene.pose_array else pairing.stale()
+        findings = [] if state != ACTIVE else list(_findings(
+            summary, [name.partition(': ')[2] for name in new if name.startswith('refused')],
+            unseen, stale, scene, pairing, topics))
+        self._log(findings)
+        self.publish(findings, state=state, pairs=len(scene.pairs), stale_boxes=' '.join(stale),
+                     boxes_that_never_came=' '.join(unseen),
+                     unanswered_pairs=len(summary.unanswered))
 
-    def look(self, counts: Counter[str], max_age: float) -> Look:
-        """Return what happened since the last look."""
-        new = Counter(counts)
-        new.subtract(self._reported)
-        self._reported = Counter(counts)
-        refused = [name.partition(': ')[2] for name in new
-                   if new[name] > 0 and name.startswith('refused')]
-        return self.watch.look(refused, came=new['poses'] > 0, max_age=max_age)
-
-    def log(self, findings: Sequence[Finding]) -> None:
-        """Log each kind of finding when it comes up, and again while it stays."""
-        now = time.monotonic()
-        stay = {finding.kind for finding in findings}
-        self._logged = {kind: at for kind, at in self._logged.items()
-                        if kind in stay and now < at + REMINDER_SECONDS}
-        for finding in findings:
-            if finding.remedy and finding.kind not in self._logged:
-                self._logged[finding.kind] = now
-                self._node.get_logger().warning(f'{finding.message}: {finding.remedy}')
-
-    def publish(self, counts: Mapping[str, int], findings: Sequence[Finding] = (), *,
-                state: str, **values: Any) -> None:
+    def publish(self, findings: Sequence[Finding] = (), *, state: str, **values: Any) -> None:
         """Publish counts, findings and further `values`; `state` is that of the lifecycle."""
-        ticks, self._evaluations = self._evaluations, 0
-        pairs: dict[str, Any] = {**counts, 'lifecycle state': state}
-        pairs |= {name.replace('_', ' '): value for name, value in values.items()}
-        pairs['rate [1/s]'] = ticks
-        if ticks:
-            pairs |= {f'compute {name} [us]': f'{value:.1f}' for name, value in zip(
-                ('p50', 'p99', 'max'),
-                np.percentile(self._times[:min(ticks, KEPT_TIMES)], (50, 99, 100)))}
+        times = self._monitor.take_times()
+        entries: dict[str, Any] = {**self._counts, 'lifecycle state': state}
+        entries |= {name.replace('_', ' '): value for name, value in values.items()}
+        entries['rate [1/s]'] = len(times)
+        if len(times):
+            entries |= {f'compute {name} [us]': f'{value:.1f}' for name, value in zip(
+                ('p50', 'p99', 'max'), np.percentile(times, (50, 99, 100)))}
         if state != ACTIVE:
             findings = [Finding('state', f'{state}: no pose is answered')]
         level = max((finding.level for finding in findings), default=OK)
         message = '; '.join(finding.message for finding in findings) or (
-            'answering' if ticks else 'no poses')
+            'answering' if len(times) else 'no poses')
         status = DiagnosticStatus(
             level=level, name=f'{self._node.get_fully_qualified_name()}: contacts',
             message=message, hardware_id='none',
-            values=[KeyValue(key=key, value=str(value)) for key, value in pairs.items()])
+            values=[KeyValue(key=key, value=str(value)) for key, value in entries.items()])
         header = make_header(self._node.get_clock().now().nanoseconds, '')
         self._publisher.publish(DiagnosticArray(header=header, status=[status]))
+
+    def _log(self, findings: Sequence[Finding]) -> None:
+        """Log each cause when it comes up, and again while it stays."""
+        now = time.monotonic()
+        stay = {finding.cause for finding in findings}
+        self._logged = {cause: at for cause, at in self._logged.items()
+                        if cause in stay and now < at + REMINDER_SECONDS}
+        for finding in findings:
+            if finding.remedy and finding.cause not in self._logged:
+                self._logged[finding.cause] = now
+                self._node.get_logger().warning(f'{finding.message}: {finding.remedy}')
+
+
+def _findings(summary: Summary, refused: Sequence[str], unseen: Sequence[str],
+              stale: Sequence[str], scene: Scene, pairing: Pairing, topics: SceneTopics,
+              ) -> Iterator[Finding]:
+    """Yield why pairs are not answered, as far as it can be told."""
+    max_age = 1e-9 * pairing.max_age
+    if summary.unanswered:
+        pairs = [pair.label for pair in summary.unanswered]
+        yield Finding('unanswered', f'unanswered for {UNANSWERED_SECONDS:g} s: {_some(pairs)}',
+                      level=ERROR)
+    if refused:
+        yield Finding('refused', f'poses refused: {", ".join(refused)}')
+    if unseen and (summary.unmatched or (
+            not summary.has_heard and summary.quiet >= UNANSWERED_SECONDS)):
+        yield Finding('unseen', f'no pose ever came: {_some(unseen)}',
+                      '; '.join(map(topics.why_silent, unseen[:NAMED])))
+    if stale:
+        yield Finding('stale', f'stale boxes: {_some(stale)}', '' if (
+            scene.pose_array or not summary.unmatched) else _why_stale(stale[0], pairing, topics))
+    if summary.has_heard and 0 < max_age <= summary.quiet:
+        yield Finding('stopped', f'poses have stopped: none for {summary.quiet:.0f} s')
+    elif summary.unmatched and not (refused or unseen or stale):
+        yield _without_partner(summary.unmatched, pairing)
+
+
+def _why_stale(box: str, pairing: Pairing, topics: SceneTopics) -> str:
+    if not topics.is_heard(box):
+        return topics.why_silent(box)
+    return (f'the newest stamp of {box} is {1e-9 * pairing.behind()[box]:.3g} s behind, max_age is '
+            f'{1e-9 * pairing.max_age:g} s; does its publisher live, and stamp by the same clock?')
+
+
+def _without_partner(unmatched: Sequence[Pair], pairing: Pairing) -> Finding:
+    """Return by how much the stamps of a pair differ, and the tolerance that would do."""
+    message = 'poses without a partner'
+    for pair in islice(unmatched, COMPARED):
+        a, b = pairing.stamps(pair.a), pairing.stamps(pair.b)
+        if not len(a) or not len(b):
+            continue
+        difference, tolerance = _compare(a, b)
+        if difference <= pairing.tolerance:
+            continue
+        message += f': stamps of {pair.a} and {pair.b} differ by {1e-9 * difference:.3g} s'
+        if not tolerance:
+            return Finding('clocks', message, 'none could be answered; stamp both by one clock '
+                                              '(use_sim_time for all, or for none)')
+        return Finding('apart', message, 'none could be answered; set tolerance:='
+                       f'{_rounded_up(1e-9 * tolerance):g}, or start with pairing:=latest')
+    return Finding('alone', message, 'none could be answered, as no tick had all its boxes')
+
+
+def _compare(a: np.ndarray, b: np.ndarray) -> tuple[int, int]:
+    """Return the difference of the stamps [ns] of two boxes, and the tolerance that joins them.
+
+    Half a period of the faster box joins each pose of the slower one, wherever it falls. The
+    tolerance is 0 where none would do. Both are 0 while there are too few stamps to tell.
+    """
+    slow, fast = sorted((np.sort(a), np.sort(b)), key=_period, reverse=True)
+    if len(fast) < FEWEST_STAMPS:
+        return 0, 0
+    period = _period(fast)
+    met = slow[(slow > fast[0] - period) & (slow < fast[-1] + period)]
+    if not len(met):
+        return int(_to_nearest(slow, fast).min()), 0
+    return int(np.median(_to_nearest(met, fast))), int(0.5 * MARGIN * period)
+
+
+def _period(stamps: np.ndarray) -> float:
+    """Return the median time between stamps [ns], given in their order."""
+    return float(np.median(np.diff(stamps))) if len(stamps) > 1 else np.inf
+
+
+def _to_nearest(stamps: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """Return how far each stamp is from the nearest of others, in their order."""
+    after = np.searchsorted(others, stamps)
+    before, after = np.maximum(after - 1, 0), np.minimum(after, len(others) - 1)
+    nearest: np.ndarray = np.minimum(abs(stamps - others[before]), abs(stamps - others[after]))
+    return nearest
+
+
+def _rejection_line(reason: str, rejection: Rejection) -> str:
+    """Return the log line, with its remedy, of what the pairing did to a pose."""
+    box = rejection.box
+    stamp, newest = (f'{1e-9 * value:.12g} s' for value in (rejection.stamp, rejection.newest))
+    if reason == RESETS:
+        return (f'time went back: {box} has stamp {stamp} after {newest}; a new time begins (a '
+                'loop, a restart, or a second publisher)')
+    if reason == TOO_LATE:
+        return (f'{box}: the tick of stamp {stamp} was answered without this pose; dropped: '
+                'publish the poses of a tick together')
+    if reason == OLD:
+        return (f'{box}: stamp {stamp} is older than {newest}; refused: publish in the order of '
+                'the stamps, from one publisher')
+    assert reason == REPEATED
+    if rejection.stamp == rejection.newest:
+        return (f'{box}: stamp {stamp} does not advance; refused: set header.stamp (`ros2 topic '
+                'pub` does for `stamp: now`), or start with pairing:=latest')
+    return (f'{box}: stamp {stamp} has come before; refused: send each stamp once, or start with '
+            'pairing:=latest')
+
+
+def _some(names: Sequence[str]) -> str:
+    """Return the first names, and how many there are besides."""
+    more = len(names) - NAMED
+    return ', '.join(names[:NAMED]) + (f' and {more} more' if more > 0 else '')
+
+
+def _rounded_up(value: float) -> float:
+    """Return a positive number rounded up to two digits."""
+    unit = 10.0 ** (floor(log10(value)) - 1)
+    return ceil(value / unit) * unit

@@ -1,40 +1,30 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Node parameters as one table per node: checked, and listed by `--help`, which needs no ROS.
+"""The parameters of a node as one table: checked, declared to rclpy, and listed by `--help`.
 
-`declared_parameters` gives them to a node.
+Parameters are declared with dynamic typing, so that the check of each one refuses a value of
+another type, and not rclpy: 200 is as good as 200.0 where a double is meant.
 """
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from rcl_interfaces.msg import ParameterDescriptor
+from rclpy.node import Node
+
 from ..solver.arguments import program_parser
 from ..solver.checks import nearest_name, shown, size_fault
+from .rclpy_workarounds import parameter_overrides
 
 Check = Callable[[str, Any], Any]
 """From a parameter's name and value to the value as the node uses it; ValueError if it is wrong."""
-
-
-OF_RCLPY = ('use_sim_time', 'start_type_description_service')  # every node has them
-QOS_OVERRIDES = 'qos_overrides.'  # begins the names of those that are declared with a topic
-LONGEST_REASON = 1000  # characters: it may quote what a stranger sent
-
-
-@dataclass(frozen=True)
-class Limits:
-    """A check whose limits a parameter's descriptor shows: a range, or words."""
-
-    check: Check
-    words: str = ''
-    range: tuple[float, float] | tuple[int, int] | None = None
-
-    def __call__(self, name: str, value: Any) -> Any:
-        """Return the value as the node uses it, or raise ValueError."""
-        return self.check(name, value)
+QOS_OVERRIDES = 'qos_overrides.'  # begins the names of those that rclpy declares with a topic
+LONGEST_REASON = 1000  # characters of a refusal
 
 
 @dataclass(frozen=True)
@@ -44,7 +34,6 @@ class Setting:
     default: Any
     description: str
     check: Check
-    fixed: bool = False  # whether it is for the start only
 
 
 def _is_number(value: Any) -> bool:
@@ -59,7 +48,7 @@ def number(low: float, high: float) -> Check:
         if not low <= value <= high:
             raise ValueError(f'{name} must lie within {low:g} and {high:g}, not {value:g}')
         return float(value)
-    return Limits(check, range=(low, high))
+    return check
 
 
 def whole_number(low: int, high: int) -> Check:
@@ -69,19 +58,19 @@ def whole_number(low: int, high: int) -> Check:
             raise ValueError(f'{name} must be a whole number from {low} to {high}, '
                              f'not {shown(value)}')
         return value
-    return Limits(check, range=(low, high))
+    return check
 
 
 def numbers(count: int) -> Check:
     """Check for so many finite numbers."""
     def check(name: str, value: Any) -> tuple[float, ...]:
-        found = value if isinstance(value, Sequence) else ()
-        if len(found) != count or not all(map(_is_number, found)) or not all(
-                map(math.isfinite, found)):
+        given = value if isinstance(value, Sequence) else ()
+        if len(given) != count or not all(map(_is_number, given)) or not all(
+                map(math.isfinite, given)):
             raise ValueError(f'{name} must be {count} finite numbers, not '
-                             f'{shown(list(found) if len(found) else value)}')
-        return tuple(map(float, found))
-    return Limits(check, f'{count} finite numbers')
+                             f'{shown(list(given) if len(given) else value)}')
+        return tuple(map(float, given))
+    return check
 
 
 def size(name: str, value: Any) -> tuple[float, ...]:
@@ -108,7 +97,7 @@ def one_of(choices: Iterable[str]) -> Check:
             raise ValueError(f'{name} {shown(value)} is not one of: {", ".join(choices)}'
                              f'{nearest_name(choice, choices)}')
         return choice
-    return Limits(check, f'one of: {", ".join(choices)}')
+    return check
 
 
 def flag(name: str, value: Any) -> bool:
@@ -118,14 +107,33 @@ def flag(name: str, value: Any) -> bool:
     return value
 
 
-def unknown_name(kind: str, name: str, known: Iterable[str]) -> str:
-    """Return the refusal of a name that there is not, with the nearest name if one is near."""
-    return f'unknown {kind} {shown(name)}{nearest_name(name, known)}'
+def declare(node: Node, settings: Mapping[str, Setting], *, live: Collection[str] = (),
+            ) -> dict[str, Any]:
+    """Return the checked values of a node's parameters; declare those that are not declared yet.
+
+    live: the names that may be set while the node runs; all others are read-only.
+    Raises ValueError for the first bad value. Warns of names that no parameter has.
+    """
+    given = parameter_overrides(node)
+    values = {name: setting.check(name, node.get_parameter(name).value if node.has_parameter(name)
+                                  else given.get(name, setting.default))
+              for name, setting in settings.items()}
+    for name, setting in settings.items():
+        if not node.has_parameter(name):
+            value = values[name]  # the checked value holds the override
+            node.declare_parameter(
+                name, list(value) if isinstance(value, tuple) else value,
+                ParameterDescriptor(description=setting.description, dynamic_typing=True,
+                                    read_only=name not in live), ignore_override=True)
+    return values
 
 
-def checked(settings: Mapping[str, Setting], values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return all values as the node uses them, or raise ValueError for the first bad one."""
-    return {name: setting.check(name, values[name]) for name, setting in settings.items()}
+def warn_of_unknown(node: Node, settings: Mapping[str, Setting]) -> None:
+    """Warn of given names that no parameter has; a file may be meant for several nodes."""
+    for name in parameter_overrides(node):
+        if not node.has_parameter(name) and not name.startswith(QOS_OVERRIDES):
+            node.get_logger().warning(f'unknown parameter {shown(name)}'
+                                      f'{nearest_name(name, settings)}; it is ignored')
 
 
 def reason_of(error: Exception) -> str:
@@ -136,9 +144,9 @@ def reason_of(error: Exception) -> str:
 
 def answer_help(program: str, doc: str | None, settings: Mapping[str, Setting],
                 args: Sequence[str] | None) -> None:
-    """Serve `--help`, and refuse arguments and parameters that there are not (exit status 2).
+    """Serve `--help`, and refuse arguments that ROS does not take (exit status 2).
 
-    A parameter after `-p` is meant for this node. One from a file may be meant for another node.
+    args: what follows the program's name; None: those of this process.
     """
     width = max(map(len, settings))
     lines = [f'  {name:<{width}}  {setting.description} (default: {default_text(setting.default)})'
@@ -146,31 +154,16 @@ def answer_help(program: str, doc: str | None, settings: Mapping[str, Setting],
     parser = program_parser(
         program, doc, usage=f'{program} [-h] [--ros-args -p NAME:=VALUE ... -r FROM:=TO ...]',
         epilog='parameters (--ros-args -p NAME:=VALUE):\n' + '\n'.join(lines))
-    parser.add_argument('--shared-parameters', action='store_true',
-                        help='parameters after -p are for several nodes, as those of SetParameter '
-                        'in a launch file: log unknown ones, and start')
-    options, unknown = parser.parse_known_args(outside_ros_args(args or ()))
+    unknown = parser.parse_known_args(outside_ros_args(sys.argv[1:] if args is None else args))[1]
     if unknown:
-        hint = _as_parameter(unknown, settings)
-        parser.error(f'unrecognized arguments: {" ".join(unknown)}{hint}')
-    for rule in rules_after_p(args or ()):
-        name, given, value = rule.partition(':=')
-        if not given:
-            parser.error(f'{shown(rule)} is not NAME:=VALUE, such as rate:=200.0')
-        if value.startswith('[') and ']' not in value:  # a shell has cut it in pieces
-            parser.error(f'{shown(rule)} is half a list: write it without blanks, as in '
-                         f'{name}:=[1,2,3], or put it in quotes, as in "{name}:=[1, 2, 3]"')
-        name = name.rpartition(':')[2]
-        if not (name in settings or name in OF_RCLPY or name.startswith(QOS_OVERRIDES)
-                or options.shared_parameters):
-            parser.error(f'{unknown_name("parameter", name, settings)}. Parameters that several '
-                         'nodes share need --params-file or --shared-parameters')
+        parser.error(f'unrecognized arguments: {" ".join(unknown)}'
+                     f'{_as_parameter(unknown, settings)}')
 
 
 def _as_parameter(arguments: Sequence[str], settings: Collection[str]) -> str:
     """Return how to write the first of unknown arguments that names a parameter; '' for none."""
     for argument in arguments:
-        name = argument.lstrip('-').partition('=')[0].rstrip(':').replace('-', '_')
+        name = argument.lstrip('-').replace(':=', '=').partition('=')[0].replace('-', '_')
         if name in settings:
             return f' (parameters follow --ros-args: --ros-args -p {name}:=VALUE)'
     return ''
@@ -178,18 +171,13 @@ def _as_parameter(arguments: Sequence[str], settings: Collection[str]) -> str:
 
 def outside_ros_args(args: Sequence[str]) -> list[str]:
     """Return what is not between `--ros-args` and `--`; rclpy's function fails on a bad value."""
-    found, inside = [], False
+    outside, inside = [], False
     for arg in args:
         if arg == '--ros-args' or (inside and arg == '--'):
             inside = arg == '--ros-args'
         elif not inside:
-            found.append(arg)
-    return found
-
-
-def rules_after_p(args: Sequence[str]) -> list[str]:
-    """Return what follows each `-p`: `NAME:=VALUE` or `NODE:NAME:=VALUE`."""
-    return [rule for flag, rule in zip(args, args[1:]) if flag in ('-p', '--param')]
+            outside.append(arg)
+    return outside
 
 
 def default_text(default: Any) -> str:

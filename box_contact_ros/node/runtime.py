@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import atexit
 import contextlib
-import ctypes
 import functools
 import os
 import signal
@@ -25,13 +24,11 @@ import rclpy
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 from rclpy.subscription import Subscription
 from rclpy.task import Future
 from rclpy.timer import Timer
 
-from ..resources import resource_path
 from .parameters import reason_of
 from .rclpy_workarounds import (
     RCLError,
@@ -47,26 +44,10 @@ with contextlib.suppress(ImportError):  # rclpy before 7.1.4
 
 REFUSALS = (ValueError, rclpy.exceptions.ParameterException, RCLError)
 """What a node raises on parameters or arguments that it cannot start with."""
-POSE_QOS = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
-"""Pose inputs: best effort matches every publisher; the depth bridges a second at 1 kHz, in which a
-scene of a thousand pairs can be read."""
-ARRAY_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
-"""Pose arrays, as pose inputs: a second at 100 Hz; 1,000 poses are 56 kB."""
-CONTACT_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)  # contact outputs
-LATCHED_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE,
-                         durability=DurabilityPolicy.TRANSIENT_LOCAL)
-"""For what changes rarely: whoever subscribes later gets the last message."""
 SPIN_SECONDS = 10.0
 """EventsExecutor hangs when it spins without a timeout, so it is spun in slices. Each leaves some
 32 bytes behind in rclpy (7.1): of slices this long, 0.3 MB a day."""
 END_SECONDS = 8.0  # for a clean end; launch kills after ten
-PROFILES_FILE = 'FASTRTPS_DEFAULT_PROFILES_FILE'  # environment variables of Fast DDS and its rmw
-QOS_FROM_FILE = 'RMW_FASTRTPS_USE_QOS_FROM_XML'
-USERS_CHOICES = (PROFILES_FILE, QOS_FROM_FILE, 'FASTDDS_DEFAULT_PROFILES_FILE',
-                 'RMW_FASTRTPS_PUBLICATION_MODE')
-"""A user who sets one of these has settings of Fast DDS that a file of ours would replace."""
-USERS_FILE = 'DEFAULT_FASTRTPS_PROFILES.xml'  # which Fast DDS reads from the working directory
-FREE_LIMIT = 16 * 2**20  # bytes that are freed and not given back to the system
 NodeKind = TypeVar('NodeKind', bound=Node)
 LOG_SECONDS = 1.0  # the same complaint is logged at most this often
 
@@ -240,37 +221,6 @@ def _ignore_signals() -> None:
     rclpy.signals.uninstall_signal_handlers()
 
 
-def free_read_messages() -> None:
-    """Let Fast DDS free each message once it is read, unless the user has settings of their own.
-
-    By default a place in a queue keeps the size of its largest message: docs/how-to/security.md.
-    """
-    if os.path.exists(USERS_FILE) or not os.environ.keys().isdisjoint(USERS_CHOICES):
-        return
-    os.environ |= {PROFILES_FILE: str(resource_path('config', 'fast_dds.xml')), QOS_FROM_FILE: '1'}
-
-
-class _MallocState(ctypes.Structure):
-    """glibc's struct mallinfo2."""
-
-    _fields_ = [(name, ctypes.c_size_t) for name in (
-        'arena', 'ordblks', 'smblks', 'hblks', 'hblkhd', 'usmblks', 'fsmblks', 'uordblks',
-        'fordblks', 'keepcost')]
-
-
-def give_back_memory() -> None:
-    """Return freed memory to the system where FREE_LIMIT is exceeded; needs glibc 2.33.
-
-    glibc keeps what lies below memory in use, as after a flood that filled queues.
-    """
-    with contextlib.suppress(AttributeError, OSError):  # another C library
-        libc = ctypes.CDLL(None)
-        state = libc.mallinfo2
-        state.restype = _MallocState
-        if state().fordblks > FREE_LIMIT:
-            libc.malloc_trim(ctypes.c_size_t(0))
-
-
 @contextlib.contextmanager
 def joined(make_node: Callable[[Context], NodeKind], args: Sequence[str] | None = None, *,
            signals: SignalHandlerOptions = SignalHandlerOptions.NO,
@@ -281,7 +231,6 @@ def joined(make_node: Callable[[Context], NodeKind], args: Sequence[str] | None 
     the context down. Whatever then fails is raised as KeyboardInterrupt after Ctrl-C, and as
     ExternalShutdownException after SIGTERM.
     """
-    free_read_messages()
     context = Context()
     node = executor = None
     handled = signals is not SignalHandlerOptions.NO

@@ -8,7 +8,6 @@ bounding boxes come near each other. These go through the solver as one batch.
 """
 from __future__ import annotations
 
-import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -21,9 +20,6 @@ from ..core import LENGTH_MAX, native
 from ..solver.checks import absent_poses, as_floats, pose_fault, shown, size_fault
 from ..solver.contact import Contact
 from ..solver.contact_solver import ContactSolver
-
-LARGEST_ID = 2**32 - 1  # ids of pairs are uint32 in the cloud
-MASS_MAX = 1e12  # of a box [kg]: more than any ship
 
 POSE_ARRAY = 'poses'
 """Topic of the poses of all moving boxes, where they come as one message."""
@@ -52,14 +48,11 @@ class Box:
     size: tuple[float, ...]  # three full extents [m]
     pose: tuple[float, ...] | None = None  # `x y z qx qy qz qw` in the common frame, of a fixed box
     pose_topic: str = ''  # where a moving box's poses come from
-    frame: str = ''  # or the frame in /tf that is the box: at its centre, along its edges
-    mass: float = 0.0  # [kg], of one density, of a moving box that forces move; 0: not given
 
 
 class Pair(NamedTuple):
     """Two boxes whose contact is asked for; the normal points from a to b."""
 
-    id: int
     name: str  # prefix of its topics; empty for a scene of two boxes without a file
     a: str
     b: str
@@ -71,13 +64,8 @@ class Pair(NamedTuple):
 
     @classmethod
     def between(cls, a: str, b: str) -> Pair:
-        """Return the pair of two boxes, with the name and id that a scene file gives it."""
-        return cls(id_of(f'{a}_{b}'), f'{a}_{b}', a, b)
-
-
-def id_of(name: str) -> int:
-    """Return the id of a pair that has only a name: the CRC-32 of the name in UTF-8."""
-    return zlib.crc32(name.encode())
+        """Return the pair of two boxes, with the name that a scene file gives it."""
+        return cls(f'{a}_{b}', a, b)
 
 
 @dataclass(frozen=True)
@@ -93,7 +81,6 @@ class Scene:
 
     def __post_init__(self) -> None:
         _check(self.boxes, self.pairs)
-        _check_frames(self.boxes, self.frame_id, self.pose_array)
 
     @cached_property
     def moving(self) -> tuple[str, ...]:
@@ -103,35 +90,23 @@ class Scene:
                      if box.pose is None and (self.pose_array or name in listed))
 
     @cached_property
-    def ids(self) -> Mapping[str, int]:
-        """Ids of the pairs by what messages call them."""
-        return {pair.label: pair.id for pair in self.pairs}
-
-    @cached_property
     def streams(self) -> tuple[str, ...]:
         """Names of the streams of poses: each box of `moving`, or ALL_BOXES in their place."""
         return (ALL_BOXES,) if self.pose_array else self.moving
 
     @cached_property
     def sources(self) -> Mapping[str, str]:
-        """Topics of poses, by stream; a box with a frame has none."""
+        """Topics of poses, by stream."""
         if self.pose_array:
             return {ALL_BOXES: POSE_ARRAY}
-        return {name: self.boxes[name].pose_topic for name in self.moving
-                if not self.boxes[name].frame}
-
-    @cached_property
-    def frames(self) -> Mapping[str, str]:
-        """Frames in /tf, by box of `moving`."""
-        return {name: self.boxes[name].frame for name in self.moving if self.boxes[name].frame}
+        return {name: self.boxes[name].pose_topic or f'{name}/pose' for name in self.moving}
 
 
-def two_boxes(size_a: Sequence[float], size_b: Sequence[float], *, mass_a: float = 0.0,
-              mass_b: float = 0.0) -> Scene:
-    """Return the scene of one pair of moving boxes, box_a and box_b: extents [m], masses [kg]."""
-    boxes = {name: Box(name, tuple(map(float, size)), pose_topic=f'{name}/pose', mass=mass)
-             for name, size, mass in (('box_a', size_a, mass_a), ('box_b', size_b, mass_b))}
-    return Scene(boxes, (Pair(0, '', 'box_a', 'box_b'),))
+def two_boxes(size_a: Sequence[float], size_b: Sequence[float]) -> Scene:
+    """Return the scene of one pair of moving boxes, box_a and box_b, of full extents (3,) [m]."""
+    boxes = {name: Box(name, tuple(map(float, size)), pose_topic=f'{name}/pose')
+             for name, size in (('box_a', size_a), ('box_b', size_b))}
+    return Scene(boxes, (Pair('', 'box_a', 'box_b'),))
 
 
 Place = tuple[str | int, ...]  # A value of a scene: ('boxes', 'load', 'size') or ('pairs', 3, 'a')
@@ -161,20 +136,15 @@ def _check(boxes: Mapping[str, Box], pairs: Sequence[Pair]) -> None:
         fault = size_fault(box.size)
         if fault:
             raise Fault(('boxes', name, 'size'), fault)
+        if box.pose and box.pose_topic:
+            raise Fault(('boxes', name, 'pose_topic'), 'a box with a pose never moves')
         fault = pose_fault(box.pose) if box.pose else None
         if fault:
             raise Fault(('boxes', name, 'pose'), fault)
-        if not 0.0 <= box.mass <= MASS_MAX:
-            raise Fault(('boxes', name, 'mass'),
-                        f'{box.mass:g} is outside 0 to {MASS_MAX:g} kg')
-        if box.mass and box.pose:
-            raise Fault(('boxes', name, 'mass'), 'no force moves a box with a pose')
     if not pairs:
         raise Fault(('pairs',), 'a scene needs at least one pair')
     for number, pair in enumerate(pairs):
         place = ('pairs', number)
-        if not 0 <= pair.id <= LARGEST_ID:
-            raise Fault((*place, 'id'), f'{pair.id} is outside 0 to {LARGEST_ID}')
         for side, name in (('a', pair.a), ('b', pair.b)):
             if name not in boxes:
                 raise Fault((*place, side), f'{shown(name)} is none of the boxes')
@@ -183,34 +153,15 @@ def _check(boxes: Mapping[str, Box], pairs: Sequence[Pair]) -> None:
         if boxes[pair.a].pose and boxes[pair.b].pose:
             raise Fault(place, f'{shown(pair.a)} and {shown(pair.b)} are both fixed')
     for what, field, values in (
-            ('id', ('id',), [pair.id for pair in pairs]),
             ('name', ('name',), [pair.label for pair in pairs]),
-            ('pair of boxes', (), [tuple(sorted(pair[2:])) for pair in pairs])):
+            ('pair of boxes', (), [tuple(sorted((pair.a, pair.b))) for pair in pairs])):
         first_of: dict[object, int] = {}
         for number, value in enumerate(values):
             first = first_of.setdefault(value, number)
             if first != number:
-                a, b = pairs[first][2:]
+                a, b = pairs[first].a, pairs[first].b
                 raise Fault(('pairs', number, *field),
                             f'the same {what} as that of {shown(a)} and {shown(b)}')
-
-
-def _check_frames(boxes: Mapping[str, Box], frame_id: str, pose_array: bool) -> None:
-    """Raise Fault for a frame in /tf that can give no pose."""
-    for name, box in boxes.items():
-        place = ('boxes', name, 'frame')
-        if not box.frame:
-            continue
-        if pose_array:
-            raise Fault(place, 'with poses: array, all poses come on one topic')
-        if not frame_id:
-            raise Fault(place, 'the scene needs a frame_id, the frame that /tf is to give poses in')
-        if box.frame == frame_id:
-            raise Fault(place, f'{shown(box.frame)} is the frame_id of the scene: give the box a '
-                               'pose')
-        for where, frame in ((place, box.frame), (('frame_id',), frame_id)):
-            if frame.startswith('/'):
-                raise Fault(where, f'{shown(frame)}: names of frames in /tf begin with no slash')
 
 
 class TooManyNear(ValueError):

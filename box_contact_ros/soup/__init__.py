@@ -2,3 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """What the models are compared with: the paper's networks."""
+
+from ..extras import require
+
+require('soup')

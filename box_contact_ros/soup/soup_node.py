@@ -9,24 +9,21 @@ by side on one input.
 """
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from box_contact_ros.node.contact_node import ContactNode
-from box_contact_ros.node.contact_program import PARAMETERS as CONTACT_PARAMETERS
-from box_contact_ros.node.parameters import Setting, answer_help, whole_number
-from box_contact_ros.node.runtime import run_node
-from box_contact_ros.node.wrench_output import WRENCH_PARAMETERS
-from box_contact_ros.scene.scene_solver import Scene, SceneSolver
-
+from ..node.contact_node import PARAMETERS as CONTACT_PARAMETERS
+from ..node.contact_node import ContactNode, run
+from ..node.parameters import Setting, whole_number
+from ..scene.scene_solver import Scene, SceneSolver
 from .entries import MOST_SOUP_DIVISIONS, SOUP, SOUP_DIVISIONS
 
 PARAMETERS = {
     'divisions': Setting(
         SOUP_DIVISIONS, f'squares along each edge of a face, 1 to {MOST_SOUP_DIVISIONS}; '
         'N make 12 N² triangles a box', whole_number(1, MOST_SOUP_DIVISIONS)),
-} | {name: setting for name, setting in CONTACT_PARAMETERS.items()
-     if name not in ('model', 'weights', *WRENCH_PARAMETERS)}  # a soup gives no patch
+} | {name: setting for name, setting in CONTACT_PARAMETERS.items() if name != 'model'}
 
 
 class SoupNode(ContactNode):
@@ -37,13 +34,16 @@ class SoupNode(ContactNode):
     parameters = PARAMETERS
 
     @staticmethod
-    def make_solver(settings: Mapping[str, Any], scene: Scene) -> SceneSolver:
+    def make_solver(values: Mapping[str, Any], scene: Scene) -> SceneSolver:
         """Return the solver for a soup of so many divisions."""
-        return SceneSolver(scene, model=f'soup-{settings["divisions"]}',
-                           margin=settings['margin'], most_near=SOUP.most_near)
+        return SceneSolver(scene, model=f'soup-{values["divisions"]}', margin=values['margin'],
+                           most_near=SOUP.most_near)
 
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node until SIGINT or SIGTERM."""
-    answer_help('soup_node', __doc__, PARAMETERS, args)
-    return run_node(SoupNode, args)
+    return run(SoupNode, __doc__, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

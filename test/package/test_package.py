@@ -14,10 +14,10 @@ import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 import pytest
+from conftest import PROGRAMS
 
 import box_contact_ros
-from box_contact_ros import __main__ as command_line
-from box_contact_ros import cli, resources
+from box_contact_ros import resources
 from box_contact_ros.resources import resource_path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -88,7 +88,7 @@ def test_resource_path_outside_the_data_folders(parts: tuple[str, ...]) -> None:
         resource_path(*parts)
 
 
-@pytest.mark.skipif(Path(cli.__file__).parents[1] != ROOT, reason='the package is installed')
+@pytest.mark.skipif(Path(resources.__file__).parents[1] != ROOT, reason='the package is installed')
 def test_resources_of_this_checkout() -> None:
     """Where the checkout is what is imported, the real resolver finds the repository."""
     assert resource_path('package.xml') == ROOT / 'package.xml'
@@ -108,173 +108,34 @@ def _run(*command: str, **env: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-@pytest.mark.parametrize('name', cli.PROGRAMS)
-def test_program_table_is_complete(name: str) -> None:
-    """Every program has a module that gets installed, a description and known extras."""
-    program = cli.PROGRAMS[name]
-    path = ROOT.joinpath(*program.module.split('.')).with_suffix('.py')
-    assert path.is_file()
-    assert path.with_name('__init__.py').is_file()  # find_packages leaves out a folder without it
-    assert program.description and '\n' not in program.description
-    assert set(program.extras) <= set(cli.MODULES_OF_EXTRA)
-    assert callable(getattr(cli.start, name))
+def test_a_missing_extra_is_one_line_that_names_it() -> None:
+    """Pip's command instead of a traceback; a module of our own keeps its traceback."""
+    code = ('import importlib.util as util, sys; from box_contact_ros import extras\n'
+            'extras.find_spec = lambda name: None if name == "viser" else util.find_spec(name)\n'
+            'extras.require("view")')
+    done = _run('-c', code)
+    assert (done.returncode, done.stderr.count('\n')) == (1, 1)
+    assert "pip install -c constraints.txt -e '.[view]'" in done.stderr
+    done = _run('-c', code.replace('extras.require("view")', 'import box_contact_ros.no_such'))
+    assert 'Traceback' in done.stderr and 'no_such' in done.stderr
 
 
-@pytest.mark.parametrize('arguments', [(), ('--help',), ('-h',)])
-def test_help_lists_the_programs(arguments: tuple[str, ...]) -> None:
-    """Asking for help is not an error, and neither is typing nothing."""
-    done = _run('-m', 'box_contact_ros', *arguments)
-    assert (done.returncode, done.stderr) == (0, '')
-    for name, program in cli.PROGRAMS.items():
-        assert name in done.stdout and program.description in done.stdout
+def test_places_of_the_library_are_told() -> None:
+    for option, tail in (('--cmakedir', 'core/cmake'), ('--includes', 'core/include')):
+        done = _run('-m', 'box_contact_ros', option)
+        assert done.returncode == 0 and done.stdout.rstrip().endswith(tail)
 
 
-def test_unknown_program() -> None:
-    """A typing error is answered with what was meant, status 2 as from argparse."""
-    done = _run('-m', 'box_contact_ros', 'contactnode')
-    assert (done.returncode, done.stdout) == (2, '')
-    assert done.stderr == (
-        "box_contact_ros: there is no program 'contactnode': did you mean contact_node?\n"
-    )
-    assert 'one of contact_node, crane' in _run('-m', 'box_contact_ros', 'zzz').stderr
-
-
-@pytest.fixture
-def probe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Add a program `probe` that prints its arguments as JSON and returns their number."""
-    (tmp_path / 'probe_program.py').write_text(
-        'import json\n'
-        'def main(args=None):\n'
-        '    print(json.dumps(args))\n'
-        '    return len(args)\n'
-    )
-    monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setitem(
-        cli.PROGRAMS, 'probe', cli.Program('probe_program', (), 'a test')
-    )
-
-
-@pytest.mark.parametrize('arguments', [[], ['--ros-args', '-p', 'model:=exact', '--', '--help']])
-def test_arguments_reach_main_unchanged(
-    probe: None,
-    arguments: list[str],
-    capfd: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """`python -m` and the console scripts pass the same list, and pass on the same status."""
-    assert command_line.main(['probe', *arguments]) == len(arguments)
-    assert json.loads(capfd.readouterr().out) == arguments
-    monkeypatch.setattr(sys, 'argv', ['/usr/bin/box_contact_probe', *arguments])
-    assert cli._from_command_line('probe') == len(arguments)
-    assert json.loads(capfd.readouterr().out) == arguments
-
-
-@pytest.mark.parametrize(
-    ('name', 'module', 'extras'),
-    [
-        ('contact_node', 'rclpy', 'ros'),
-        ('contact_node', 'rclpy.node', 'ros'),
-        ('contact_node', 'torch', 'ros,train'),
-        ('crane', 'mujoco', 'ros,sim'),
-        ('record', 'rosbags.rosbag2', 'ros,bag'),
-        ('bench', 'rosbags', 'ros,sim,soup,report,bag'),
-        ('train', 'torch', 'train'),
-        ('train', 'tqdm', 'train'),
-        ('paper', 'matplotlib.pyplot', 'report'),
-        ('paper', 'fcl', 'report,soup'),
-    ],
-)
-def test_missing_extra_is_one_line_that_names_it(
-    name: str,
-    module: str,
-    extras: str,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    """A module missing at import, or only when main runs, gives pip's command, and no traceback."""
-
-    def main(args: list[str]) -> int:
-        raise ModuleNotFoundError(f'No module named {module!r}', name=module)
-
-    fake = type(sys)('fake')
-    fake.main = main
-    monkeypatch.setattr(cli.importlib, 'import_module', lambda _: fake)
-    monkeypatch.setattr(cli.importlib.util, 'find_spec', lambda _: None)
-    assert cli.run(name, []) == 1
-    message = capsys.readouterr().err
-    assert message.count('\n') == 1
-    assert f"pip install -c constraints.txt -e '.[{extras}]'" in message
-    assert ('apt install ros-jazzy-ros-base' in message) == module.startswith('rclpy')
-    # Where there is a ROS, perhaps apt's, its wheels are not recommended.
-    monkeypatch.setattr(cli.importlib.util, 'find_spec', lambda _: object())
-    cli.run(name, [])
-    assert f"'.[{extras.removeprefix('ros,')}]'" in capsys.readouterr().err
-
-
-HELP_WITHOUT_EXTRAS = """
-import contextlib, importlib.machinery, io, json, sys
-from box_contact_ros import cli
-
-absent = {name for names in cli.MODULES_OF_EXTRA.values() for name in names}
-
-class Installed(importlib.machinery.PathFinder):
-    @classmethod
-    def find_spec(cls, name, path=None, target=None):
-        if name.partition('.')[0] not in absent:
-            return importlib.machinery.PathFinder.find_spec(name, path, target)
-
-sys.meta_path = [Installed if finder is importlib.machinery.PathFinder else finder
-                 for finder in sys.meta_path]
-found = {}
-for name in cli.PROGRAMS:
-    with contextlib.redirect_stdout(io.StringIO()) as printed:
-        try:
-            status = cli.run(name, ['--help'])
-        except SystemExit as end:
-            status = end.code
-    found[name] = [status or 0, printed.getvalue()]
-print(json.dumps(found))
-"""
-
-
-def test_help_needs_no_extra() -> None:
-    """A newcomer learns of every program, before installing what it needs."""
-    done = _run('-c', HELP_WITHOUT_EXTRAS)
-    assert done.returncode == 0 and done.stderr == '', done.stderr
-    found = json.loads(done.stdout)
-    assert found.keys() == cli.PROGRAMS.keys()
-    for name, (status, text) in found.items():
-        assert status == 0 and text.startswith(f'usage: {name}'), name
-        # Either its options, or what it does and what to install for them.
-        assert 'options:' in text or (
-            cli.PROGRAMS[name].description in text and 'pip install' in text), name
-    assert '(default: [12.192,2.438,2.591])' in found['contact_node'][1]
-    assert sum('options:' in text for _, text in found.values()) >= 7
-
-
-def test_missing_module_of_our_own_keeps_its_traceback(
-    probe: None, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """No extra would help: hiding where it happened would only hide the fault."""
-    monkeypatch.setitem(
-        cli.PROGRAMS, 'probe', cli.Program('box_contact_ros.no_such', (), 'a test')
-    )
-    with pytest.raises(ModuleNotFoundError, match='no_such'):
-        cli.run('probe', [])
-
-
-def test_a_reader_that_ends_early_is_no_error() -> None:
-    """As in `| head -1`: no traceback, and the status that a shell reports for SIGPIPE."""
-    env = {name: value for name, value in os.environ.items() if name != 'PYTHONUNBUFFERED'}
-    for arguments in ('--help', 'contact_node --help'):
-        done = subprocess.run(
-            ['bash', '-c', f'set -o pipefail; "$1" -m box_contact_ros {arguments} | true', 'bash',
-             sys.executable], capture_output=True, text=True, timeout=120, check=False, env=env)
-        assert done.stderr == '' and done.returncode in (0, 141), done
+@pytest.mark.parametrize('program, module', PROGRAMS.items())
+def test_help_of_each_program(program: str, module: str) -> None:
+    done = _run('-m', f'box_contact_ros.{module}', '--help')
+    if 'pip install' in done.stderr:
+        pytest.skip(done.stderr)
+    assert done.returncode == 0 and done.stdout.startswith(f'usage: {program}'), done.stderr
 
 
 def test_parameters_before_ros_args_are_explained() -> None:
-    done = _run('-m', 'box_contact_ros', 'contact_node', '-p', 'model:=exact')
+    done = _run('-m', 'box_contact_ros.node.contact_node', '-p', 'model:=exact')
     assert done.returncode == 2
     assert '(parameters follow --ros-args: --ros-args -p model:=VALUE)' in done.stderr
 
@@ -322,10 +183,8 @@ def test_program_names_under_colcon_and_pip(env: dict[str, str], prefix: str) ->
     )
     assert done.returncode == 0, done.stderr
     scripts, develop, install = json.loads(done.stdout)
-    assert scripts == cli.entry_points(prefix)
-    assert [script.partition(' = ')[0] for script in scripts] == [
-        prefix + name for name in cli.PROGRAMS
-    ]
+    assert scripts == [f'{prefix}{program} = box_contact_ros.{module}:main'
+                       for program, module in PROGRAMS.items()]
     folder = '$base/lib/box_contact_ros'
     assert [entry and entry[1] for entry in (develop, install)] == (
         [None, None] if prefix else [folder, folder]

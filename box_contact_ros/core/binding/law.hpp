@@ -69,12 +69,10 @@ inline void law_dealloc(PyObject* self) {
 
 inline PyObject* law_new(PyTypeObject* type, PyObject* args, PyObject*) {
   PyObject *masses, *inertias, *centres;
-  int use;
   bc_loop loop = BC_DEFAULT_LOOP;
-  if (!PyArg_ParseTuple(args, "OOOiddddd:Law", &masses, &inertias, &centres, &use, &loop.rate,
+  if (!PyArg_ParseTuple(args, "OOOddddd:Law", &masses, &inertias, &centres, &loop.rate,
                         &loop.latency, &loop.step, &loop.friction, &loop.gravity))
     return nullptr;
-  std::memcpy(&loop.use, &use, sizeof use);  // the law refuses what is no use
   Array<double> mass, inertia, centre;
   if (!read(masses, "mass", {any_length}, mass)) return nullptr;
   npy_intp count = mass.length(0);
@@ -114,7 +112,8 @@ inline PyObject* law_hold(PyObject* self, PyObject* const* args, Py_ssize_t coun
     read[k].pair = pair;
     read[k].a = a;
     read[k].b = b;
-    if (!read_contact(contact, read[k].contact)) return nullptr;
+    read[k].stale = contact == Py_None;
+    if (!read[k].stale && !read_contact(contact, read[k].contact)) return nullptr;
   }
   if (bc_status status = bc_law_hold(law_of(self)->law, read.data(), int64_t(read.size()),
                                      reinterpret_cast<const bc_pose*>(poses.numbers)))
@@ -134,15 +133,6 @@ inline PyObject* law_wrenches(PyObject* self, PyObject* const* args, Py_ssize_t 
                           reinterpret_cast<const bc_velocity*>(velocities.numbers),
                           reinterpret_cast<bc_wrench*>(found.numbers)))
     return refused(status);
-  return found.object.release();
-}
-
-inline PyObject* law_pair_wrench(PyObject* self, PyObject* pair) {
-  long long number = PyLong_AsLongLong(pair);
-  if (number == -1 && PyErr_Occurred()) return nullptr;
-  Array<double> found;
-  if (!make({6}, found)) return nullptr;
-  bc_law_pair_wrench(law_of(self)->law, number, reinterpret_cast<bc_wrench*>(found.numbers));
   return found.object.release();
 }
 
@@ -169,12 +159,10 @@ inline PyObject* law_frequency(PyObject* self, void*) {
 inline PyMethodDef law_methods[] = {
     {"hold", method<law_hold>(), METH_FASTCALL,
      "hold(touches, poses)\n--\n\nHold contacts: touches (pair, a, b, Contact), asked for at "
-     "poses."},
+     "poses; None for a Contact keeps the patch of its pair."},
     {"wrenches", method<law_wrenches>(), METH_FASTCALL,
      "wrenches(poses, velocities)\n--\n\nReturn the wrenches (bodies, 6) at (bodies, 7), (bodies, "
      "6)."},
-    {"pair_wrench", method<law_pair_wrench>(), METH_O,
-     "pair_wrench(pair)\n--\n\nReturn the wrench (6,) on box A of a pair at the last evaluation."},
     {"reset", method<law_reset>(), METH_NOARGS, "reset()\n--\n\nForget all patches."},
     {"copy", method<law_copy>(), METH_NOARGS, "copy()\n--\n\nReturn a law with the same patches."},
     {nullptr, nullptr, 0, nullptr}};
@@ -185,7 +173,7 @@ inline PyGetSetDef law_attributes[] = {
 inline PyType_Slot law_slots[] = {
     {Py_tp_doc,
      const_cast<char*>(
-         "Law(mass, inertia, centre, use, rate, latency, step, friction, gravity)\n--\n\n"
+         "Law(mass, inertia, centre, rate, latency, step, friction, gravity)\n--\n\n"
          "The force law of bodies: arrays (n,), (n, 3), (n, 3). See force.h.")},
     {Py_tp_new, slot<law_new>()},
     {Py_tp_dealloc, reinterpret_cast<void*>(law_dealloc)},

@@ -37,30 +37,23 @@ typedef struct bc_body {
   bool compound;     /* of several boxes: normals are not checked against its centre of mass */
 } bc_body;
 
-/* What a program does with wrenches. */
-typedef enum bc_use {
-  BC_HELD_PATCH = 0,      /* it asks the law at every physics step: the best, at any latency */
-  BC_HELD_WRENCH = 1,     /* it applies one wrench until the next: it asks the law once a period */
-  BC_PREDICTED_WRENCH = 2 /* so too, for contacts at the poses where the wrench will begin to act */
-} bc_use;
-
 typedef struct bc_loop {
   size_t size; /* sizeof(bc_loop) */
-  bc_use use;
   double rate;     /* of questions [1/s] */
-  double latency;  /* from a question to the use of its answer [s]; what is not predicted of it */
-  double step;     /* physics step [s], of held patches */
+  double latency;  /* from a question to the use of its answer [s] */
+  double step;     /* physics step [s] */
   double friction; /* Coulomb's μ [1] */
   double gravity;  /* [m/s²] */
 } bc_loop;
 
-#define BC_DEFAULT_LOOP {sizeof(bc_loop), BC_HELD_PATCH, 200.0, 0.0, 0.001, 0.5, 9.81}
+#define BC_DEFAULT_LOOP {sizeof(bc_loop), 200.0, 0.0, 0.001, 0.5, 9.81}
 
 /* The contact of a pair of bodies, which friction knows again by the number of the pair. */
 typedef struct bc_touch {
   int64_t pair;
   int32_t a, b; /* places of the boxes' bodies; −1: a box that is fixed in the common frame */
   bc_contact contact;
+  bool stale; /* a box had no recent pose: the patch that is held stays, `contact` is not read */
 } bc_touch;
 
 typedef struct bc_velocity {
@@ -98,10 +91,6 @@ BC_API bc_status bc_law_hold(bc_law* law, const bc_touch* touches, int64_t count
  * next, so call it once a physics step. */
 BC_API bc_status bc_law_wrenches(bc_law* law, const bc_pose* poses, const bc_velocity* velocities,
                                  bc_wrench* wrenches);
-
-/* The wrench on box A of a pair alone, at the last bc_law_wrenches: about the centre of mass of A's
- * body, or about the origin where A is fixed. Zeros for a pair that is not held. */
-BC_API bc_status bc_law_pair_wrench(const bc_law* law, int64_t pair, bc_wrench* wrench);
 
 #ifdef __cplusplus
 }

@@ -34,7 +34,6 @@ struct Loop {
   double step = 0.001;    // physics step [s]
   double friction = 0.5;  // Coulomb's μ
   double gravity = 9.81;  // [m/s²]
-  bc_use use = BC_HELD_PATCH;
 };
 
 // Bodies that touch each other and boxes that are fixed. A copy has the same patches and friction.
@@ -42,7 +41,7 @@ class SceneLaw {
  public:
   SceneLaw(Span<const Body> bodies, const Loop& loop = Loop()) : count_(bodies.size()) {
     static_assert(sizeof(Body) == sizeof(bc_body), "Body is a bc_body with defaults");
-    bc_loop plain{sizeof(bc_loop), loop.use,      loop.rate,   loop.latency,
+    bc_loop plain{sizeof(bc_loop), loop.rate,     loop.latency,
                   loop.step,       loop.friction, loop.gravity};
     bc_law* made;
     check(bc_law_create(reinterpret_cast<const bc_body*>(bodies.data()),
@@ -75,13 +74,6 @@ class SceneLaw {
     check(bc_law_wrenches(law_.get(), poses.data(), velocities.data(), found.data()));
   }
 
-  // The wrench on box A of a pair alone, at the last call of `wrenches`.
-  Wrench pair_wrench(std::int64_t pair) const {
-    Wrench found;
-    check(bc_law_pair_wrench(law_.get(), pair, &found));
-    return found;
-  }
-
   void reset() { bc_law_reset(law_.get()); }
   double frequency() const { return bc_law_frequency(law_.get()); }
 
@@ -109,7 +101,7 @@ class HeldPatch {
 
   void hold(const Contact& contact, const Pose& pose, std::int64_t pair = 0, Load load = Load::a) {
     bool is_a = load == Load::a;
-    Touch touch{pair, is_a ? 0 : -1, is_a ? -1 : 0, contact};
+    Touch touch{pair, is_a ? 0 : -1, is_a ? -1 : 0, contact, false};
     law_.hold({&touch, 1}, {&pose, 1});
   }
   // Contacts of several pairs; bodies 0 and −1.

@@ -18,16 +18,8 @@ namespace box_contact::detail {
 constexpr double patch_delay_limit = 2.0;
 // Ω·step of a held patch [1], step the time between two evaluations.
 constexpr double step_limit = 0.45;
-// Ω·T of a held wrench [1]: it is that late on average, and lateness feeds energy in.
-constexpr double wrench_delay_limit = 0.45;
-// 2·ζ·Ω·h of a held wrench [1], h the period: what its damper takes out while it is held.
-constexpr double damper_limit = 1.7;
-// Least depth [m] at which a wrench that is held, or that is predicted, carries the weight on Earth.
-constexpr double least_penetration = 5e-4, least_penetration_predicted = 1e-5;
-constexpr double standard_gravity = 9.81;  // [m/s²]
-
-constexpr double damping_ratio = 1.2, damping_ratio_predicted = 0.8;
-// How many times as large as for Ω the dampers of held patches may be [1]. With 4, a load that is
+constexpr double damping_ratio = 1.2;
+// How many times as large as for Ω the dampers may be [1]. With 4, a load that is
 // pressed in at 50 Hz and 5 ms comes up with a time constant of 70 ms.
 constexpr double damping_growth_limit = 4.0;
 // Rocking is resisted by all of the turn, and so many times [1] more stiffly by the turn of the
@@ -41,54 +33,39 @@ constexpr double whole_damper_depth = 0.02;
 constexpr double recoil = 0.7;
 // Time [s] over which the force that a contact has carried is averaged.
 constexpr double carried_time = 0.1;
-// Share of Ω² that the tangential springs take [1]. 0.5 makes tall boxes jitter
-// on held wrenches.
+// Share of Ω² that the tangential springs take [1].
 constexpr double tangential_share = 0.1;
 constexpr double tangential_damping_ratio = 1.0;
-// The modulus falls at once to what the loop bears, and rises with this time constant [s], of
-// held patches with the second ...
-constexpr double rise_time = 1.0, patch_rise_time = 0.5;
+// The modulus falls at once to what the loop bears, and rises with this time constant [s] ...
+constexpr double rise_time = 0.5;
 // ... up to this share of it [1], so that at rest it is constant.
 constexpr double steady_share = 0.98;
 
 struct LawConstants {
   double frequency;  // Ω [1/s]: no oscillation on a patch is faster
   double damping_ratio, tangential_damping_ratio;
-  double held;    // H [s]: how long a wrench acts, lateness included
-  double period;  // from one evaluation to the next [s]
-  double rise;    // share of what a modulus lacks that it gains per answer [1]
+  double step;  // h [s]: from one evaluation to the next
+  double rise;  // share of what a modulus lacks that it gains per answer [1]
   double friction, gravity;
-  double lean = 0.0;    // stiffness against the turn of late, by that against all of it [1]
-  double forget = 1.0;  // share of the turn of late that is forgotten per evaluation [1]
+  double lean;    // stiffness against the turn of late, by that against all of it [1]
+  double forget;  // share of the turn of late that is forgotten per evaluation [1]
 };
 
 inline LawConstants constants_for(const bc_loop& loop) {
   double period = 1.0 / loop.rate, late = 0.5 * period + loop.latency;
-  LawConstants law{0.0,           damping_ratio, tangential_damping_ratio,
-                   period,        period,        std::min(1.0, period / rise_time),
-                   loop.friction, loop.gravity};
-  if (loop.use == BC_HELD_PATCH) {
-    law.frequency = std::min(patch_delay_limit / late, step_limit / loop.step);
-    law.held = law.period = loop.step;
-    law.rise = std::min(1.0, period / patch_rise_time);
-    double unit = law.frequency * loop.step, leaning = lean_step_limit / unit;
-    // Slow modes of a stack decay by ζ·ω²/Ω: dampers are as large as the step allows.
-    double larger = std::min(damping_growth_limit, step_limit / unit);
-    law.damping_ratio *= larger;
-    law.tangential_damping_ratio *= larger;
-    law.lean = std::min(lean_limit, leaning * leaning - 1.0);
-    law.forget = std::min(1.0, loop.step / lean_time);
-  } else if (loop.use == BC_HELD_WRENCH) {
-    law.frequency =
-        std::min({std::sqrt(standard_gravity / least_penetration), wrench_delay_limit / late,
-                  damper_limit / (2.0 * damping_ratio * period)});
-    law.held = period + loop.latency;
-  } else {
-    law.frequency = std::min(std::sqrt(standard_gravity / least_penetration_predicted),
-                             wrench_delay_limit / late);
-    law.damping_ratio = damping_ratio_predicted;
-  }
-  return law;
+  double frequency = std::min(patch_delay_limit / late, step_limit / loop.step);
+  double unit = frequency * loop.step, leaning = lean_step_limit / unit;
+  // Slow modes of a stack decay by ζ·ω²/Ω: dampers are as large as the step allows.
+  double larger = std::min(damping_growth_limit, step_limit / unit);
+  return {frequency,
+          larger * damping_ratio,
+          larger * tangential_damping_ratio,
+          loop.step,
+          std::min(1.0, period / rise_time),
+          loop.friction,
+          loop.gravity,
+          std::min(lean_limit, leaning * leaning - 1.0),
+          std::min(1.0, loop.step / lean_time)};
 }
 
 }  // namespace box_contact::detail

@@ -27,6 +27,7 @@
 #pragma once
 
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "constants.hpp"
@@ -54,7 +55,6 @@ struct Patch {
   Vec<double> lean{};             // ψ [rad]
   double anchor_stiffness = 0.0;  // k_t when they were last changed [N/m]
   double carried_force = 0.0;     // the pressing force, averaged over `carried_time` [N]
-  bc_wrench on_a{};               // at the last evaluation
 };
 
 // What two bodies do at a patch, seen from B.
@@ -86,33 +86,36 @@ class PatchLaw {
   }
 
   // Take the contacts that are in force from now on, and the poses of all bodies when they were
-  // asked for. Pairs that are missing, or apart, are forgotten.
+  // asked for. Pairs that are missing, or apart, are forgotten; a stale pair keeps its patch.
   void hold(const bc_touch* touches, int64_t count, const bc_pose* poses) {
     place(poses);
     next_.clear();
-    for (int64_t k = 0; k < count; ++k)
-      if (touches[k].contact.volume > 0.0) next_.push_back(patch_of(touches[k]));
+    for (int64_t k = 0; k < count; ++k) {
+      const bc_touch& touch = touches[k];
+      if (touch.stale) {
+        if (const Patch* old = held(touch.pair)) next_.push_back(*old);
+      } else if (touch.contact.volume > 0.0) {
+        next_.push_back(patch_of(touch));
+      }
+    }
     std::sort(next_.begin(), next_.end(),
               [](const Patch& one, const Patch& other) { return one.pair < other.pair; });
     find_moduli();
     patches_.swap(next_);
   }
 
-  // The wrenches on all bodies at these poses and motions. Call it once a physics step (or, for
-  // wrenches that are held, once a tick): friction follows the way from one call to the next.
+  // The wrenches on all bodies at these poses and motions. Call it once a physics step: friction
+  // follows the way from one call to the next.
   void wrenches(const bc_pose* poses, const bc_velocity* velocities, bc_wrench* found) {
     place(poses);
     std::fill_n(found, bodies_.size(), bc_wrench{});
     for (Patch& patch : patches_) {
       Relative relative = relative_at(patch, velocities);
-      Vec<double> force, torque, zero{0.0, 0.0, 0.0};
-      patch.on_a = {};
+      Vec<double> force, torque;
       if (!wrench_of(patch, relative, force, torque)) continue;
-      add(patch.on_a, 1.0, patch.a >= 0 ? places_[patch.a].position : zero, relative.point, force,
-          torque);
-      if (patch.a >= 0) add(found[patch.a], patch.on_a);
-      if (patch.b >= 0)
-        add(found[patch.b], -1.0, places_[patch.b].position, relative.point, force, torque);
+      for (auto [body, sign] : {std::pair{patch.a, 1.0}, {patch.b, -1.0}})
+        if (body >= 0)
+          add(found[body], sign, places_[body].position, relative.point, force, torque);
     }
     last_.swap(places_);
     has_last_ = true;
@@ -235,12 +238,12 @@ class PatchLaw {
     // No more than what stops the body while the wrench acts, and lets it go back slower than it
     // would have fallen in.
     double back = detail::recoil * std::sqrt(2.0 * gravity * std::max(0.0, depth));
-    double limit = patch.mass * ((closing + back) / law_.held) +
+    double limit = patch.mass * ((closing + back) / law_.step) +
                    std::max(patch.mass * gravity, patch.carried_force);
     double cut = push > 0.0 && push > limit ? std::max(0.0, limit) / push : 1.0;
     push *= cut;
     patch.carried_force += (std::max(0.0, push) - patch.carried_force) *
-                           std::min(1.0, law_.period / detail::carried_time);
+                           std::min(1.0, law_.step / detail::carried_time);
     double stiffness = patch.shear * shape.area;
     if (!(push > 0.0)) {
       patch.anchor = {0.0, 0.0, 0.0};
@@ -339,12 +342,6 @@ class PatchLaw {
     return std::sqrt(3.0 * std::max(0.0, dot(slope, shape.covariance * slope)));
   }
 
-  static void add(bc_wrench& sum, const bc_wrench& wrench) {
-    for (int k = 0; k < 3; ++k) {
-      sum.force[k] += wrench.force[k];
-      sum.torque[k] += wrench.torque[k];
-    }
-  }
   // Add a force at `point`, and a torque about it.
   static void add(bc_wrench& sum, double sign, const Vec<double>& centre, const Vec<double>& point,
                   const Vec<double>& force, const Vec<double>& torque) {

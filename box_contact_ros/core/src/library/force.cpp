@@ -65,8 +65,6 @@ bc_status check_loop(const bc_loop& loop) {
                        {"step", loop.step, false},
                        {"friction", loop.friction, true},
                        {"gravity", loop.gravity, true}};
-  if (number_of(loop.use) > BC_PREDICTED_WRENCH)
-    return fail(BC_BAD_ARGUMENT, "use %u is unknown", number_of(loop.use));
   for (const Number& number : numbers)
     if (!is_positive(number.value) && !(number.may_be_zero && number.value == 0.0))
       return fail(BC_BAD_ARGUMENT, "%s must be %s, not %g", number.name,
@@ -97,7 +95,7 @@ bc_status check_touch(const bc_touch& touch, const std::vector<Body>& bodies,
     return fail(BC_BAD_ARGUMENT, "pair %lld: both boxes are body %d", pair, int(touch.a));
   if (!is_free(touch.a) && !is_free(touch.b))
     return fail(BC_BAD_ARGUMENT, "pair %lld: no force moves either of its two bodies", pair);
-  if (contact.volume == 0.0) return BC_OK;
+  if (touch.stale || contact.volume == 0.0) return BC_OK;
   if (!is_positive(contact.volume) || !is_finite(contact.covariance[0], 9))
     return fail(BC_BAD_ARGUMENT,
                 "pair %lld: the contact has no patch (volume %g), and the law needs volume and "
@@ -207,15 +205,6 @@ bc_status bc_law_wrenches(bc_law* law, const bc_pose* poses, const bc_velocity* 
         return fail(BC_BAD_ARGUMENT, "velocity of body %zu is not finite", k);
     }
     law_of(law).law.wrenches(poses, velocities, wrenches);
-    return BC_OK;
-  });
-}
-
-bc_status bc_law_pair_wrench(const bc_law* law, int64_t pair, bc_wrench* wrench) {
-  return guarded([&] {
-    if (!law || !wrench) return refuse_null(law ? "wrench" : "law");
-    const box_contact::force::Patch* patch = law_of(law).law.held(pair);
-    *wrench = patch ? patch->on_a : bc_wrench{};
     return BC_OK;
   });
 }

@@ -8,10 +8,9 @@ the poses for which it was asked. Then it says which wrench acts on each body, f
 it holds and from where the bodies are by now.
 
 `HeldPatch` is for one load on boxes that are fixed. The simulator asks it at every physics step.
-`SceneLaw` is the same for all bodies of a scene. `PatchLaw` is for clients that can only apply one
-wrench until the next answer: `HeldWrench` then holds it.
+`SceneLaw` is the same for all bodies of a scene.
 
-All three are faces of the same code in libbox_contact; docs/explanation/force.md derives it. Its
+Both are faces of the same code in libbox_contact; docs/explanation/force.md derives it. Its
 source is an elastic foundation under each patch (Johnson, Contact Mechanics, section 4.3). Friction
 has an anchor and a limit surface (Goyal, Ruina and Papadopoulos, 1991).
 
@@ -21,18 +20,17 @@ force [N], then a torque [N m] about the centre of mass. All in the common frame
 """
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from enum import IntEnum
 from typing import Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core import native
-from ...solver.checks import shown
-from ...solver.contact import Contact
-from ..scene_solver import Answer, Scene, id_of
+from ..core import native
+from ..solver.checks import as_floats, shown
+from ..solver.contact import Contact
+from .scene_solver import Answer, Pair, Scene
 
 GRAVITY = 9.81
 """Gravitational acceleration [m/s²]."""
@@ -44,14 +42,6 @@ Touches = Contact | Mapping[str, Contact]
 """The contact of the only pair, or contacts by the names of their pairs."""
 
 FIXED = -1  # place of a box that does not move
-
-
-class Use(IntEnum):
-    """What a program does with wrenches: `bc_use` of force.h."""
-
-    HELD_PATCH = 0
-    HELD_WRENCH = 1
-    PREDICTED_WRENCH = 2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,32 +64,39 @@ class Body:
         return cls(mass=mass, inertia=mass / 12.0 * (squares.sum() - squares))
 
 
-def native_law(bodies: Sequence[Body], use: Use, *, rate_hz: float, latency: float, step: float,
+def native_law(bodies: Sequence[Body], *, rate_hz: float, latency: float, step: float,
                friction: float, gravity: float) -> native.Law:
     """Return the library's law of some bodies; ValueError: names the field and its value."""
-    mass, inertia, centre = (np.array([getattr(body, name) for body in bodies], dtype=float)
-                             for name in ('mass', 'inertia', 'centre'))
-    return native.Law(mass, inertia, centre, use, rate_hz, latency, step, friction, gravity)
+    mass, inertia, centre = (
+        as_floats([getattr(body, name) for body in bodies], name, shape, *accepted)
+        for name, shape, accepted in (('mass', 'a number for each body', ((None,),)),
+                                      ('inertia', 'three numbers for each body', ((None, 3),)),
+                                      ('centre', 'three numbers for each body', ((None, 3),))))
+    return native.Law(mass, inertia, centre, rate_hz, latency, step, friction, gravity)
 
 
-def hold(law: native.Law, touches: Iterable[tuple[str, int, int, int, Contact]],
-         poses: ArrayLike) -> None:
-    """Hold touches: the name and id of a pair, the places of its bodies, its contact.
+def _hold(law: native.Law, touches: Sequence[tuple[str, int, int, int, Contact | None]],
+          poses: ArrayLike) -> None:
+    """Hold touches: the name and number of a pair, the places of its bodies, its contact.
 
-    ValueError: names the pair.
+    None for a contact keeps the patch of its pair. ValueError: names the pair.
     """
-    names, rows = {}, []
-    for name, pair, a, b, contact in touches:
-        names[f'pair {pair}:'] = name
-        rows.append((pair, a, b, contact))
     try:
-        law.hold(rows, poses)
+        law.hold([(number, a, b, contact) for _, number, a, b, contact in touches],
+                 _unmasked(poses, 'poses'))
     except ValueError as error:
         start, _, words = str(error).partition(': ')
-        if f'{start}:' not in names:
+        labels = {f'pair {number}': name for name, number, *_ in touches}
+        if start not in labels:
             raise
-        label = names[f'{start}:']
-        raise ValueError(f'pair {label}: {words}' if label else words) from None
+        raise ValueError(f'pair {labels[start]}: {words}' if labels[start] else words) from None
+
+
+def _unmasked(rows: ArrayLike, name: str) -> ArrayLike:
+    """Return rows, or raise ValueError for masked ones, whose mask NumPy would drop."""
+    if isinstance(rows, np.ma.MaskedArray):
+        raise ValueError(f'{name} must be numbers without a mask, not {shown(rows)}')
+    return rows
 
 
 def _named(contacts: Touches) -> Mapping[str, Contact]:
@@ -134,32 +131,17 @@ class _Law:
         return self.copy()
 
 
-class _LoadLaw(_Law):
-    """What the laws of one load share; made by their `for_loop`."""
-
-    def __init__(self, law: native.Law) -> None:
-        """Take over a native law of one body."""
-        self._law = law
-
-    @property
-    def frequency(self) -> float:
-        """Return Ω [1/s]; the load rests at the depth gravity / Ω² on a whole face."""
-        return self._law.frequency
-
-    def _hold(self, contacts: Touches, pose: ArrayLike, load: str) -> None:
-        if load not in ('a', 'b'):
-            raise ValueError(f"load must be 'a' or 'b', not {shown(load)}")
-        a, b = (0, FIXED) if load == 'a' else (FIXED, 0)
-        hold(self._law, [(name, id_of(name), a, b, contact)
-                         for name, contact in _named(contacts).items()], pose)
-
-
-class HeldPatch(_LoadLaw):
+class HeldPatch(_Law):
     """The wrench on one load, at every physics step, from the patches of the last answer.
 
     Make it with `for_loop`. A pair is known by its name, so friction remembers it from answer to
     answer, in whichever order they come.
     """
+
+    def __init__(self, law: native.Law) -> None:
+        """Take over a native law of one body."""
+        self._law = law
+        self._numbers: dict[str, int] = {}  # of pairs, by name
 
     @classmethod
     def for_loop(cls, load: Body, *, rate_hz: float, latency: float = 0.0, step: float = 0.001,
@@ -169,54 +151,33 @@ class HeldPatch(_LoadLaw):
         latency: from a question to the use of its answer [s]. step: the physics step [s].
         ValueError: names the field and its value.
         """
-        return cls(native_law([load], Use.HELD_PATCH, rate_hz=rate_hz, latency=latency, step=step,
+        return cls(native_law([load], rate_hz=rate_hz, latency=latency, step=step,
                               friction=friction, gravity=gravity))
+
+    @property
+    def frequency(self) -> float:
+        """Return Ω [1/s]; the load rests at the depth gravity / Ω² on a whole face."""
+        return self._law.frequency
 
     def hold(self, contacts: Touches, pose: ArrayLike, *, load: Literal['a', 'b'] = 'a') -> None:
         """Hold the contacts that were asked for with the load at `pose` (7,); forget others.
 
-        load: which of its pair's boxes the load is. ValueError: a contact without a patch (`fcl`,
-        `soup`, `paper`), or a normal that cannot be meant for this load; nothing changes then.
+        load: which of its pair's boxes the load is. ValueError: a contact without a patch (of
+        `soup` or `paper`), or a normal that cannot be meant for this load; nothing changes then.
         """
-        self._hold(contacts, pose, load)
+        if load not in ('a', 'b'):
+            raise ValueError(f"load must be 'a' or 'b', not {shown(load)}")
+        a, b = (0, FIXED) if load == 'a' else (FIXED, 0)
+        _hold(self._law, [(name, self._numbers.setdefault(name, len(self._numbers)), a, b, contact)
+                          for name, contact in _named(contacts).items()], pose)
 
     def wrench(self, pose: ArrayLike, velocity: ArrayLike) -> np.ndarray:
         """Return force and torque (6,) at `pose` (7,) and `velocity` (6,), a step at a time.
 
         Friction follows the way from one call to the next.
         """
-        wrench: np.ndarray = self._law.wrenches(pose, velocity)[0]
-        return wrench
-
-
-class PatchLaw(_LoadLaw):
-    """The wrench on one load that a client holds from one answer to the next.
-
-    Make it with `for_loop`, and hold its wrenches by `HeldWrench`. `HeldPatch` is better wherever
-    the law can be asked at every physics step.
-    """
-
-    @classmethod
-    def for_loop(cls, load: Body, *, rate_hz: float, latency: float = 0.0,
-                 friction: float = FRICTION, gravity: float = GRAVITY,
-                 predicted: bool = False) -> Self:
-        """Return the law of a load whose contacts are asked for `rate_hz` times a second.
-
-        latency: from a question to the use of its answer [s]. predicted: contacts, poses and
-        velocities are those of a `Predictor`; latency is then what it may err by.
-        """
-        use = Use.PREDICTED_WRENCH if predicted else Use.HELD_WRENCH
-        return cls(native_law([load], use, rate_hz=rate_hz, latency=latency, step=1.0 / rate_hz,
-                              friction=friction, gravity=gravity))
-
-    def wrench(self, contacts: Touches, pose: ArrayLike, velocity: ArrayLike, *,
-               load: Literal['a', 'b'] = 'a') -> np.ndarray:
-        """Return force and torque (6,) of contacts at this pose and velocity, once a tick.
-
-        ValueError as `HeldPatch.hold`.
-        """
-        self._hold(contacts, pose, load)
-        wrench: np.ndarray = self._law.wrenches(pose, velocity)[0]
+        wrench: np.ndarray = self._law.wrenches(_unmasked(pose, 'pose'),
+                                                _unmasked(velocity, 'velocity'))[0]
         return wrench
 
 
@@ -230,6 +191,7 @@ class SceneLaw(_Law):
     def __init__(self, law: native.Law, scene: Scene, moving: Sequence[str]) -> None:
         """Take over a native law of the boxes `scene.moving`; see `for_loop`."""
         self._law, self._scene, self._free = law, scene, frozenset(moving)
+        self._numbers = {pair: number for number, pair in enumerate(scene.pairs)}
         self._place = dict.fromkeys(scene.boxes, FIXED) | {
             name: place for place, name in enumerate(scene.moving)}
 
@@ -253,7 +215,7 @@ class SceneLaw(_Law):
             body = bodies.get(name, unmoved)
             each.append(body if isinstance(body, Body)
                         else Body.of_box(scene.boxes[name].size, body))
-        return cls(native_law(each, Use.HELD_PATCH, rate_hz=rate_hz, latency=latency, step=step,
+        return cls(native_law(each, rate_hz=rate_hz, latency=latency, step=step,
                               friction=friction, gravity=gravity), scene, tuple(bodies))
 
     @property
@@ -264,20 +226,22 @@ class SceneLaw(_Law):
     def hold(self, answer: Answer, poses: ArrayLike) -> None:
         """Hold the answer of a `SceneSolver` to `poses` (n, 7), a row for each of `scene.moving`.
 
-        Pairs that the answer does not list as touching lose patch and friction. So do stale ones:
-        an answer with `stale` pairs whose boxes are still there is better not held.
-        ValueError: a contact without a patch (`fcl`, `soup`, `paper`), or of a box that the scene
-        lacks; nothing changes then.
+        Pairs that the answer does not list as touching lose patch and friction, but stale ones keep
+        both. ValueError: a contact without a patch (of `soup` or `paper`), or of a pair that the
+        scene lacks; nothing changes then.
         """
         place = self._place
+        contacts: list[tuple[Pair, Contact | None]] = [
+            *answer.touching, *((pair, None) for pair in answer.stale)]
         try:
-            touches = [(pair.label, pair.id, place[pair.a], place[pair.b], contact)
-                       for pair, contact in answer.touching
+            touches = [(pair.label, self._numbers[pair], place[pair.a], place[pair.b], contact)
+                       for pair, contact in contacts
                        if pair.a in self._free or pair.b in self._free]
         except KeyError as error:
-            raise ValueError(f'{shown(error.args[0])} is none of the boxes of this law') from None
+            raise ValueError(f'{shown(error.args[0])} is no pair of the scene of this law'
+                             ) from None
         try:
-            hold(self._law, touches, poses)
+            _hold(self._law, touches, poses)
         except ValueError as error:
             raise self._naming_the_box(error, poses) from None
 
@@ -289,7 +253,8 @@ class SceneLaw(_Law):
         fewer.
         """
         try:
-            return self._law.wrenches(poses, velocities)
+            return self._law.wrenches(_unmasked(poses, 'poses'),
+                                      _unmasked(velocities, 'velocities'))
         except ValueError as error:
             raise self._naming_the_box(error, poses) from None
 

@@ -1,0 +1,143 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""One way for every tick: bytes → pose → tick of all boxes → contacts → messages.
+
+`PoseReader` judges a pose, `Pairing` joins poses to ticks, `SceneSolver` answers a tick,
+`ContactWriter` makes the messages.
+"""
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from ..scene.pairing import NEVER, PAIRINGS, Pairing, StampedPose, Tick
+from ..scene.scene_solver import ALL_BOXES, SceneSolver, TooManyNear
+from ..solver.checks import absent_poses, are_poses, pose_fault, shown
+from .diagnostics import TickMonitor
+from .message_bytes import ContactWriter, PoseReader, header_bytes
+from .messages import NANOSECONDS, Refused
+from .topics import SceneTopics
+
+
+class TickAnswerer:
+    """Answers ticks of poses; every pose that is refused is counted and noted, never answered.
+
+    active: poses that arrive while the node is not active are dropped.
+    """
+
+    def __init__(self, solver: SceneSolver, topics: SceneTopics, settings: Mapping[str, Any],
+                 counts: Counter[str], monitor: TickMonitor) -> None:
+        """Begin without poses; `settings` are the checked parameters."""
+        self.solver, self._topics, self._monitor, self._counts = solver, topics, monitor, counts
+        self.pairing: Pairing = PAIRINGS[settings['pairing']](solver.scene, counts=counts)
+        self.set_times(settings)
+        self._reader, self._writer = PoseReader(), ContactWriter()
+        scene = solver.scene
+        place = {box: number for number, box in enumerate(scene.streams)}
+        self._sides = {pair: [place[box] for box in (pair.a, pair.b) if box in place]
+                       for pair in scene.pairs}
+        """Places in a tick of the moving boxes of a pair."""
+        self.active = False
+
+    def set_times(self, settings: Mapping[str, Any]) -> None:
+        """Take `tolerance` and `max_age` of checked parameters [s]."""
+        self.pairing.tolerance, self.pairing.max_age = (
+            round(NANOSECONDS * settings[name]) for name in ('tolerance', 'max_age'))
+
+    def callback_of(self, box: str, topic: str) -> Callable[[bytes], None]:
+        """Return the callback for the bytes of a box, or of all; it raises nothing at all."""
+        def callback(data: bytes) -> None:
+            if not self.active:
+                return
+            self._counts['poses'] += 1
+            try:
+                pose = (self._read_all(data) if box == ALL_BOXES else self._reader.read_pose(data))
+                ticks = self.pairing.add(box, pose)
+            except Exception as error:
+                self._refuse(error, topic, box)
+                return
+            for tick in ticks:
+                try:
+                    self._answer(tick)
+                except Exception as error:  # one tick that is refused keeps back no other
+                    self._refuse(error, topic)
+        return callback
+
+    def _read_all(self, data: bytes) -> StampedPose:
+        """Return the poses of all moving boxes; a bad one is counted, and its box absent."""
+        poses, moving = self._reader.read_poses(data), self.solver.scene.moving
+        if len(poses.numbers) != len(moving):
+            raise Refused('wrong number of poses',
+                          f'{len(poses.numbers)} poses, but {len(moving)} boxes move')
+        bad = ~are_poses(poses.numbers) & ~absent_poses(poses.numbers)
+        for row in np.flatnonzero(bad):
+            self._refuse(Refused('bad pose', f'{pose_fault(poses.numbers[row])}'), moving[row])
+        poses.numbers[bad] = np.nan
+        self._monitor.absent = [
+            box for box, absent in zip(moving, absent_poses(poses.numbers)) if absent]
+        return poses
+
+    def _answer(self, tick: Tick) -> None:
+        """Publish the contacts of a tick: those of each pair, then all of them."""
+        is_array = self.solver.scene.pose_array
+        stamp, frame_id = self._header_of(tick)
+        started = time.perf_counter_ns()
+        answer = self.solver(tick[0].numbers if is_array and tick[0] is not None
+                             else [pose and pose.numbers for pose in tick])
+        took = time.perf_counter_ns() - started
+        writer, of_pair = self._writer, self._topics.of_pair
+        header = header_bytes(stamp, frame_id)
+        for pair, contact in answer.touching:
+            publishers = of_pair.get(pair)
+            if publishers is not None:
+                own = stamp if is_array else max(
+                    [pose.stamp for side in self._sides[pair] if (pose := tick[side])])
+                head = header if own == stamp else header_bytes(own, frame_id)
+                publishers[0].publish(writer.vector(head, contact.point))
+                publishers[1].publish(writer.vector(head, contact.normal))
+        self._topics.contacts.publish(writer.contacts(header, answer))
+        # What nobody waits for comes last. A box that an array leaves out is not there: nobody
+        # asks for its pairs.
+        self._monitor.evaluated(took, [] if is_array else answer.stale)
+        counts = self._counts
+        counts['contacts'] += len(answer.touching)
+        counts['evaluations'] += 1
+        counts['stale pairs'] += len(answer.stale)
+
+    def _header_of(self, tick: Tick) -> tuple[int, str]:
+        """Return the newest stamp [ns] of a tick and its frame; raise Refused if frames differ."""
+        stamp, frame_id = NEVER, self.solver.scene.frame_id or None
+        for pose in tick:
+            if pose is not None:
+                if frame_id is None:
+                    frame_id = pose.frame_id
+                elif pose.frame_id != frame_id:
+                    raise Refused('frame_id differs', self._frames(tick, pose))
+                if pose.stamp > stamp:
+                    stamp = pose.stamp
+        return stamp, frame_id or ''
+
+    def _frames(self, tick: Tick, odd: StampedPose) -> str:
+        """Describe the frame of a tick, by the scene or the first box, and that of a pose."""
+        scene = self.solver.scene
+        known = [(box, pose) for box, pose in zip(scene.streams, tick) if pose is not None]
+        first, frame = ('the scene', scene.frame_id) if scene.frame_id else (
+            known[0][0], known[0][1].frame_id)
+        box = next(box for box, pose in known if pose is odd)
+        advice = ('the leading slash is the difference'
+                  if frame.lstrip('/') == odd.frame_id.lstrip('/')
+                  else 'publish the poses of all boxes in one frame')
+        return f'{first} is in frame {shown(frame)}, {box} in {shown(odd.frame_id)}: {advice}'
+
+    def _refuse(self, error: Exception, topic: str, box: str = '') -> None:
+        """Count what was refused, and hand it to the next report."""
+        known = isinstance(error, (Refused, TooManyNear))
+        reason = error.reason if isinstance(error, (Refused, TooManyNear)) else 'internal error'
+        text = f'{topic}: {error}' if known else f'{type(error).__name__}: {error}'
+        self._counts[f'refused: {reason}'] += 1
+        self._monitor.refused(reason, text, box)

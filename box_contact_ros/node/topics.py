@@ -1,0 +1,146 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""Topics of a scene: pose subscriptions of its moving boxes, contact publishers of its pairs."""
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from geometry_msgs.msg import PointStamped, PoseArray, PoseStamped, Vector3Stamped
+from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import QoSCompatibility, QoSProfile, ReliabilityPolicy, qos_check_compatible
+from rclpy.qos_overriding_options import QoSOverridingOptions
+from rclpy.subscription import Subscription
+
+from box_contact_msgs.msg import Contacts
+
+from ..scene.scene_solver import ALL_BOXES, Pair, Scene
+from ..solver.checks import shown
+from .rclpy_workarounds import RCLError
+
+MOST_PAIRS_WITH_TOPICS = 1000
+"""Two publishers a pair take milliseconds and memory, here and in every process that listens."""
+NODE_TOPICS = ('/diagnostics', '/parameter_events', '/rosout', '/clock', '~/transition_event')
+"""Topics of every node, of other types than poses."""
+CONTACT_DEPTH = 10
+POSE_DEPTH = 100
+"""Poses that wait: 100 ms at 1 kHz, longer than any collection of garbage."""
+ARRAY_DEPTH = 10
+"""Arrays that wait: a node that cannot keep up is late by a few ticks, never by seconds."""
+
+
+def pose_qos(source: str) -> QoSProfile:
+    """Return the quality of service of a source of poses: a box, or ALL_BOXES.
+
+    Best effort matches every publisher.
+    """
+    return QoSProfile(depth=ARRAY_DEPTH if source == ALL_BOXES else POSE_DEPTH,
+                      reliability=ReliabilityPolicy.BEST_EFFORT)
+
+
+def contact_qos() -> QoSProfile:
+    """Return the quality of service of contacts."""
+    return QoSProfile(depth=CONTACT_DEPTH, reliability=ReliabilityPolicy.RELIABLE)
+
+
+class SceneTopics:
+    """The topics of a node from configure to cleanup.
+
+    contacts: the publisher of all contacts. of_pair: those of point and normal, by pair.
+    """
+
+    def __init__(self, node: Node, prefix: str, scene: Scene, *, pair_topics: bool) -> None:
+        """Create the publishers; `prefix` stands before the names of contact topics.
+
+        Raises ValueError for a scene whose names can be no topics here.
+        """
+        self._node, self._prefix = node, prefix
+        pairs = scene.pairs if pair_topics else ()
+        if len(pairs) > MOST_PAIRS_WITH_TOPICS:
+            raise ValueError(f'scene: {len(pairs)} pairs are too many for topics of their own (at '
+                             f'most {MOST_PAIRS_WITH_TOPICS}): set pair_topics to false')
+        self._check(scene, pairs)
+        self._subscriptions: dict[str, Subscription] = {}
+        self.of_pair: dict[Pair, tuple[Publisher, Publisher]] = {}
+        self.contacts = self._publisher(
+            Contacts, f'{prefix}contacts',
+            qos_overriding_options=QoSOverridingOptions.with_default_policies())
+        for pair in pairs:
+            topic = self._topic_of(pair)
+            self.of_pair[pair] = (self._publisher(PointStamped, f'{topic}/point'),
+                                  self._publisher(Vector3Stamped, f'{topic}/normal'))
+
+    def subscribe(self, scene: Scene, callback_of: Callable[[str, str], Callable[[bytes], None]],
+                  ) -> None:
+        """Subscribe to all poses, with the callback for the bytes of a box and its topic."""
+        for box, topic in scene.sources.items():
+            self._subscriptions[box] = self._node.create_subscription(
+                PoseArray if box == ALL_BOXES else PoseStamped, topic, callback_of(box, topic),
+                pose_qos(box), raw=True,
+                event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
+                qos_overriding_options=QoSOverridingOptions.with_default_policies())
+
+    def close(self) -> None:
+        """Destroy all topics."""
+        for subscription in self._subscriptions.values():
+            self._node.destroy_subscription(subscription)
+        for publisher in (self.contacts, *(each for two in self.of_pair.values() for each in two)):
+            self._node.destroy_publisher(publisher)
+        self._subscriptions.clear()
+        self.of_pair.clear()
+
+    def pose_topics(self) -> list[str]:
+        """Return the full names of the topics that are subscribed to."""
+        return [subscription.topic_name for subscription in self._subscriptions.values()]
+
+    def is_heard(self, box: str) -> bool:
+        """Return whether somebody publishes poses of a box."""
+        return self._subscriptions[box].get_publisher_count() > 0
+
+    def why_silent(self, box: str) -> str:
+        """Return who publishes on the topic of a box that gives no pose."""
+        subscription = self._subscriptions[box]
+        topic, wanted = subscription.topic_name, subscription.msg_type.__name__  # type: ignore[attr-defined]
+        offers = self._node.get_publishers_info_by_topic(topic)
+        if not offers:
+            return f'nobody publishes {topic}'
+        for offer in offers:
+            if offer.topic_type != f'geometry_msgs/msg/{wanted}':
+                return (f'{topic} is published as {shown(offer.topic_type)}, not as '
+                        f'geometry_msgs/msg/{wanted}')
+            fits, reason = qos_check_compatible(offer.qos_profile, subscription.qos_profile)
+            if fits == QoSCompatibility.ERROR:
+                return f'{topic} is published with another quality of service: {reason}'
+        return f'{topic} has {len(offers)} of {wanted}, silent so far'
+
+    def _check(self, scene: Scene, pairs: tuple[Pair, ...]) -> None:
+        """Raise ValueError where a pose topic is one of the node's own, which have other types."""
+        own = [f'{self._prefix}contacts', *NODE_TOPICS]
+        own += [f'{self._topic_of(pair)}/{vector}' for pair in pairs
+                for vector in ('point', 'normal')]
+        taken = {self._resolved(topic) for topic in own}
+        for box, topic in scene.sources.items():
+            if self._resolved(topic) in taken:
+                raise ValueError(f'scene: pose_topic {shown(topic)} of box {box} is a topic of '
+                                 'this node that carries no poses')
+
+    def _topic_of(self, pair: Pair) -> str:
+        return f'{self._prefix}{pair.name}{"/" if pair.name else ""}contact'
+
+    def _resolved(self, topic: str) -> str:
+        """Return a topic's full name, or raise ValueError if it can have none."""
+        try:
+            return self._node.resolve_topic_name(topic)
+        except RCLError as error:
+            reason = str(error).partition(', at ')[0]
+            raise ValueError(f'scene: {shown(topic)}: {reason}') from error
+
+    def _publisher(self, message: type, topic: str, **options: Any) -> Publisher:
+        # Without events: an event that waits in EventsExecutor outlives a publisher that is
+        # destroyed, and ends the process.
+        return self._node.create_publisher(
+            message, topic, contact_qos(),
+            event_callbacks=PublisherEventCallbacks(use_default_callbacks=False), **options)

@@ -1,0 +1,346 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""Pairing: joins the streams of stamped poses of several boxes to ticks.
+
+Time is what the stamps say. No clock is asked. A recording, a paused simulation and a simulation at
+ten times real time are treated alike.
+
+A tick of policy `stamp` holds the poses of one stamp. Each stamp is answered once. A tick is whole
+once some pair has the poses of both of its boxes.
+```
+tick     event                                     next      effect
+-------  ----------------------------------------  --------  ---------------------------------
+none     first pose of a stamp                     waiting
+none     pose of a stamp answered without its box  none      TOO_LATE
+waiting  pose of a box                             waiting
+waiting  pose nearer than the one of its box       waiting   NO_PARTNER for the earlier one
+waiting  whole, and no box is awaited              answered  a tick, None for a missing box
+waiting  PATIENCE later ticks are whole            answered  a tick, None for a missing box
+waiting  WAITING_TICKS newer ticks have begun      dropped   NO_PARTNER for each pose
+waiting  time is set back                          dropped   NO_PARTNER for each pose
+```
+A tick awaits each box that has no pose in it and may still give one:
+```
+box                                                               awaited
+----------------------------------------------------------------  -------
+its newest stamp is the tick's or later                           no
+its newest stamp is more than max_age before the tick             no
+it was missing from the last PATIENCE answers                     no
+it never gave a pose, and the node has answered                   no
+any other                                                         yes
+```
+So one box that is late, silent, or stamped by another clock holds up nobody for long.
+```
+pose of a box                                      effect
+-------------------------------------------------  ------------------------------------------
+its newest stamp, or one of those remembered       REPEATED: refused
+older than all that are remembered                 OLD: refused
+RESET before its newest, as far behind the others  RESETS: time went back; all poses forgotten
+RESET before its newest, the others are not        the box alone begins anew
+```
+Policy `latest` makes a tick of every pose that is not OLD, with the last pose of each other box. A
+box is stale there if its newest stamp is more than max_age away from that of the pose.
+Why no library does this: docs/contributing/decisions/contact-node.md.
+"""
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections import Counter, deque
+from collections.abc import Container, Iterator
+from dataclasses import dataclass, field
+from itertools import islice
+from statistics import median
+from typing import NamedTuple
+
+import numpy as np
+
+from .scene_solver import ALL_BOXES, Scene
+
+PATIENCE = 5
+"""Later whole ticks for which a tick waits: a few periods, whatever the rate. Executor and
+transport let the streams of one publisher drift apart by one or two."""
+WAITING_TICKS = 128
+"""Ticks that may wait: memory stays bounded."""
+REMEMBERED_STAMPS = 1024
+"""Stamps per box that are known to have been taken, so that none is answered twice."""
+RESET = 1_000_000_000
+"""Time has been set back if a stamp lies this far [ns] before an earlier one of its box."""
+NEVER = -2**63  # before any stamp [ns]
+NO_PARTNER = 'dropped: no partner'
+TOO_LATE = 'dropped: tick answered before'
+REPEATED = 'refused: repeated stamp'
+OLD = 'refused: older than the last'
+RESETS = 'time went back'
+
+
+class StampedPose(NamedTuple):
+    """A pose as it came."""
+
+    numbers: np.ndarray  # (7,) `x y z qx qy qz qw`; of an array of poses (n, 7)
+    frame_id: str
+    stamp: int  # [ns]
+
+
+class Rejection(NamedTuple):
+    """The last pose that was refused, dropped or begins a new time, for the log."""
+
+    box: str
+    stamp: int   # [ns]
+    newest: int  # newest stamp of the box so far [ns]
+
+
+Tick = list['StampedPose | None']
+"""A pose of each of `scene.streams`, None for a box that has none recent enough."""
+
+
+def _remembered() -> deque[int]:
+    return deque(maxlen=REMEMBERED_STAMPS)
+
+
+@dataclass(slots=True)
+class BoxState:
+    """What is known of one moving box; all stamps in ns."""
+
+    newest: int = NEVER  # its latest stamp
+    taken: deque[int] = field(default_factory=_remembered)  # stamps of its poses that were taken
+    missed: deque[int] = field(default_factory=_remembered)  # ticks answered without the box
+    last: StampedPose | None = None  # its last pose, for policy `latest`
+    came: bool = False  # whether it ever gave a pose, also before time was set back
+
+
+@dataclass(slots=True)
+class WaitingTick:
+    """Poses of one stamp, by box, that wait for those of other boxes."""
+
+    poses: dict[str, StampedPose] = field(default_factory=dict)
+    passed: int = 0  # later ticks that are whole
+    settled: int = 0  # how many boxes of the scene, from the first on, are not awaited
+
+
+class Pairing(ABC):
+    """What both policies share: the state of each box, and time that is set back."""
+
+    def __init__(self, scene: Scene, *, tolerance: int = 0, max_age: int = 0,
+                 counts: Counter[str] | None = None) -> None:
+        """Begin without poses.
+
+        tolerance: Stamps this far apart [ns] still belong together (policy `stamp`).
+        max_age: A pose further than this [ns] from the tick is not used; 0: any is.
+        counts: Refused and dropped poses are counted here; a new Counter by default.
+        """
+        self.tolerance, self.max_age = tolerance, max_age
+        self.counts: Counter[str] = Counter() if counts is None else counts
+        self.rejections: dict[str, Rejection] = {}
+        """The last pose of each kind that is counted. Whoever logs them clears them."""
+        self._scene = scene
+        self._boxes = {box: BoxState() for box in scene.streams}
+        self._partners: dict[str, set[str]] = {
+            box: {box} if box == ALL_BOXES else set() for box in self._boxes}
+        for pair in scene.pairs:
+            for box, partner in ((pair.a, pair.b), (pair.b, pair.a)):
+                if box in self._boxes:
+                    self._partners[box].add(partner if partner in self._boxes else box)
+
+    @abstractmethod
+    def add(self, box: str, pose: StampedPose) -> list[Tick]:
+        """Take a pose; return the ticks that can be answered now, in their order."""
+
+    def reset(self) -> None:
+        """Forget all poses and stamps, as when time is set back."""
+        for box, state in self._boxes.items():
+            self._boxes[box] = BoxState(came=state.came)
+
+    def stale(self) -> list[str]:
+        """Return the boxes whose newest stamp is more than max_age behind that of another box."""
+        return [box for box, behind in self.behind().items() if 0 < self.max_age < behind]
+
+    def unseen(self) -> list[str]:
+        """Return the boxes that have never given a pose."""
+        return [box for box, state in self._boxes.items() if not state.came]
+
+    def behind(self) -> dict[str, int]:
+        """Return how far [ns] the newest stamp of each box that came is behind that of all."""
+        now = max(state.newest for state in self._boxes.values())
+        return {box: now - state.newest for box, state in self._boxes.items()
+                if state.newest != NEVER}
+
+    def stamps(self, box: str) -> np.ndarray:
+        """Return the stamps (n,) [ns] of a box that are remembered, in the order of arrival."""
+        return np.array(self._boxes[box].taken if box in self._boxes else (), dtype=np.int64)
+
+    def _state_at(self, box: str, stamp: int) -> BoxState:
+        """Return the state of a box, after a reset if its stamp shows that time was set back."""
+        state = self._boxes[box]
+        if stamp < state.newest - RESET:
+            others = [other.newest for other in self._boxes.values()
+                      if other is not state and other.newest != NEVER]
+            if others and median(others) - stamp <= RESET:  # its clock was wrong, theirs is not
+                self._boxes[box] = BoxState()
+            else:
+                self._count(RESETS, box, stamp)
+                self.reset()
+        state = self._boxes[box]
+        state.came = True
+        return state
+
+    def _count(self, reason: str, box: str, stamp: int) -> None:
+        """Count a pose, and note it for the log."""
+        self.counts[reason] += 1
+        self.rejections[reason] = Rejection(box, stamp, self._boxes[box].newest)
+
+    def _has_partner(self, box: str, present: Container[str]) -> bool:
+        """Return whether the other box of some pair of a box is present, or fixed."""
+        return any(partner in present for partner in self._partners[box])
+
+
+class StampPairing(Pairing):
+    """Policy `stamp`: the poses of one stamp are answered together, once, in any order.
+
+    The module's docstring has the table of states and events.
+    """
+
+    def __init__(self, scene: Scene, *, tolerance: int = 0, max_age: int = 0,
+                 counts: Counter[str] | None = None) -> None:
+        """Begin without poses, as Pairing does."""
+        super().__init__(scene, tolerance=tolerance, max_age=max_age, counts=counts)
+        self._waiting: dict[int, WaitingTick] = {}  # by stamp, as they began
+        self._whole: dict[int, WaitingTick] = {}  # those of them that could be answered
+        self._has_answered = False
+        self._newest_missed = NEVER  # tick that was answered without a box
+
+    def reset(self) -> None:
+        """Forget as Pairing does; poses that wait are dropped and counted."""
+        super().reset()
+        self.counts[NO_PARTNER] += sum(len(tick.poses) for tick in self._waiting.values())
+        self._waiting.clear()
+        self._whole.clear()
+        self._newest_missed = NEVER
+
+    def add(self, box: str, pose: StampedPose) -> list[Tick]:
+        """Take a pose; return the ticks that await nothing any more, in their order."""
+        stamp = pose.stamp
+        state = self._state_at(box, stamp)
+        if stamp <= state.newest:
+            if len(state.taken) == REMEMBERED_STAMPS and stamp < state.taken[0]:
+                self._count(OLD, box, stamp)
+                return []
+            if stamp in state.taken:
+                self._count(REPEATED, box, stamp)
+                return []
+        state.taken.append(stamp)
+        state.newest = max(state.newest, stamp)
+        key = self._tick_of(box, stamp) if self.tolerance else stamp
+        tick = self._waiting.get(key)
+        if tick is None:
+            if self._is_too_late(state, stamp):
+                self._count(TOO_LATE, box, stamp)
+                return []
+            tick = self._begin(key)
+        if box in tick.poses:  # with a tolerance: an earlier pose near the stamp of this one
+            self.counts[NO_PARTNER] += 1
+        tick.poses[box] = pose
+        if key not in self._whole and self._has_partner(box, tick.poses):
+            for earlier, waiting in self._whole.items():
+                waiting.passed += earlier < key
+            self._whole[key] = tick
+        return [self._answer(key) for key, tick in list(self._whole.items())
+                if tick.passed >= PATIENCE or not self._is_awaiting(key, tick)]
+
+    def _begin(self, key: int) -> WaitingTick:
+        """Return a new tick; drop the oldest where too many wait."""
+        if len(self._waiting) >= WAITING_TICKS:
+            oldest = next(iter(self._waiting))
+            self.counts[NO_PARTNER] += len(self._waiting.pop(oldest).poses)
+            self._whole.pop(oldest, None)
+        tick = self._waiting[key] = WaitingTick()
+        return tick
+
+    def _tick_of(self, box: str, stamp: int) -> int:
+        """Return the stamp of the waiting tick that a pose belongs to: its own, else the nearest.
+
+        A tick further than the tolerance, or that has a pose of the box, is not meant.
+        """
+        if stamp in self._waiting:
+            return stamp
+        near = [key for key, tick in self._waiting.items()
+                if box not in tick.poses and abs(key - stamp) <= self.tolerance]
+        return min(near, key=lambda key: abs(key - stamp), default=stamp)
+
+    def _is_too_late(self, state: BoxState, stamp: int) -> bool:
+        """Return whether the tick of a stamp was answered without the box."""
+        return stamp <= self._newest_missed + self.tolerance and any(
+            abs(key - stamp) <= self.tolerance for key in state.missed)
+
+    def _is_awaiting(self, key: int, tick: WaitingTick) -> bool:
+        """Return whether a box that is missing from a tick may still give its pose."""
+        names = self._scene.streams
+        while tick.settled < len(names):
+            box = names[tick.settled]
+            if box not in tick.poses and self._may_come(self._boxes[box], key):
+                return True
+            tick.settled += 1
+        return False
+
+    def _may_come(self, state: BoxState, key: int) -> bool:
+        if not state.came:
+            return not self._has_answered
+        if state.newest == NEVER:  # time was set back, for this box too
+            return True
+        if state.newest >= key or 0 < self.max_age < key - state.newest:
+            return False
+        missed = sum(stamp > state.newest for stamp in islice(reversed(state.missed), PATIENCE))
+        return missed < PATIENCE
+
+    def _answer(self, key: int) -> Tick:
+        """Remove a tick from those that wait, and return its poses."""
+        poses = self._waiting.pop(key).poses
+        del self._whole[key]
+        self._has_answered = True
+        if len(poses) < len(self._boxes):
+            self._newest_missed = max(self._newest_missed, key)
+            for box, state in self._boxes.items():
+                if box not in poses:
+                    state.missed.append(key)
+        return [poses.get(box) for box in self._boxes]
+
+
+class LatestPairing(Pairing):
+    """Policy `latest`: every pose that arrives makes a tick, with the last pose of each other box.
+
+    A pose older than the last one of its box is refused. One of the same stamp is used: there are
+    publishers that do not stamp.
+    """
+
+    _can_answer = False  # whether some pair has the poses of both of its boxes
+
+    def reset(self) -> None:
+        """Forget all poses and stamps, as when time is set back."""
+        super().reset()
+        self._can_answer = False
+
+    def add(self, box: str, pose: StampedPose) -> list[Tick]:
+        """Take a pose; return the tick that it makes, once both boxes of a pair have been seen."""
+        stamp = pose.stamp
+        state = self._state_at(box, stamp)
+        if stamp < state.newest:
+            self._count(OLD, box, stamp)
+            return []
+        state.newest, state.last = stamp, pose
+        recent = dict(self._recent(stamp))
+        if not self._can_answer:
+            given = {name for name, other in self._boxes.items() if other.last}
+            self._can_answer = any(self._has_partner(name, given) for name in given)
+        if not self._can_answer:
+            return []
+        return [[recent.get(name) for name in self._boxes]]
+
+    def _recent(self, now: int) -> Iterator[tuple[str, StampedPose]]:
+        """Yield the last pose of each box that is not stale at a stamp [ns]."""
+        for box, state in self._boxes.items():
+            if state.last and not 0 < self.max_age < abs(now - state.newest):
+                yield box, state.last
+
+
+PAIRINGS: dict[str, type[Pairing]] = {'stamp': StampPairing, 'latest': LatestPairing}
+"""Values of the node parameter `pairing`."""

@@ -1,0 +1,150 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""Scene files: YAML (or JSON, which is YAML) to a `Scene`; every refusal names file and field.
+
+msg_schemas/scene.json is the format. docs/reference/scenes.md explains it.
+"""
+from __future__ import annotations
+
+import fnmatch
+import json
+import os
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import product
+from typing import Any
+
+import yaml
+
+from ..resources import find_file, resource_path
+from ..solver.checks import shown
+from .scene_solver import Box, Fault, Pair, Scene
+
+MOST_STREAMS = 1000
+"""Boxes with a topic of their own. Each subscription takes a millisecond and 100 kB; an array has
+all poses in one message."""
+MOST_PAIRS = 2**19  # 1,000 boxes each with each
+PLAIN_INT = re.compile(r'[-+]?(0|[1-9][0-9]*)')
+PLAIN_FLOAT = re.compile(r'[-+]?[0-9]*(\.[0-9]*)?([eE][-+]?[0-9]+)?')
+_WILDCARDS = re.compile(r'[*?[]')
+_ALL = [{'a': '*', 'b': '*'}]  # what `pairs: all` stands for
+
+
+class SceneError(ValueError):
+    """A scene that is refused: where, and why."""
+
+
+class _Loader(getattr(yaml, 'CSafeLoader', yaml.SafeLoader)):  # type: ignore[misc]
+    """PyYAML's safe loader, in C where there is libyaml, without numbers that hide another one."""
+
+
+def _plain(pattern: re.Pattern[str], read: type) -> Any:
+    def construct(loader: _Loader, node: yaml.ScalarNode) -> Any:
+        if not pattern.fullmatch(node.value):
+            raise yaml.constructor.ConstructorError(
+                None, None, f'{shown(node.value)} is not a plain number', node.start_mark)
+        return read(node.value)
+    return construct
+
+
+# YAML 1.1, which PyYAML knows, reads 010 as eight and 1:30 as ninety.
+_Loader.add_constructor('tag:yaml.org,2002:int', _plain(PLAIN_INT, int))
+_Loader.add_constructor('tag:yaml.org,2002:float', _plain(PLAIN_FLOAT, float))
+
+
+def read_scene(path: str | os.PathLike[str]) -> Scene:
+    """Return the scene of a file.
+
+    A path that leads to no file from here may be one of the package's own, config/scenes/….
+    Raises SceneError, a ValueError whose words name file and field.
+    """
+    try:
+        data = yaml.load(find_file(path).read_text('utf-8'), Loader=_Loader)
+    except OSError as error:
+        raise SceneError(f'scene {shown(os.fspath(path))} cannot be read: '
+                         f'{error.strerror or error}') from error
+    except (UnicodeDecodeError, yaml.YAMLError) as error:
+        reason = ' '.join(str(error).split())
+        raise SceneError(f'{path}: {reason}') from error
+    try:
+        return _scene_of(data)
+    except Fault as error:
+        raise SceneError(f'{path}: {error}') from None
+
+
+def _scene_of(data: Any) -> Scene:
+    """Return the scene that data means, or raise Fault."""
+    _check_schema(data)
+    boxes = {name: Box(name, tuple(map(float, entry['size'])),
+                       tuple(map(float, entry['pose'])) if 'pose' in entry else None,
+                       entry.get('pose_topic', ''))
+             for name, entry in data['boxes'].items()}
+    entries = _ALL if data['pairs'] == 'all' else data['pairs']
+    scene = Scene(boxes, tuple(_pairs(entries, boxes)), data.get('frame_id', ''),
+                  data.get('poses') == 'array')
+    if len(scene.sources) > MOST_STREAMS:
+        raise Fault(('boxes',), f'{len(scene.sources)} boxes have a topic of their own, and at '
+                                f'most {MOST_STREAMS} may: set poses: array')
+    return scene
+
+
+def _check_schema(data: Any) -> None:
+    """Raise Fault for the first thing in which the data differs from the schema."""
+    from jsonschema import Draft202012Validator  # only here: it takes 0.1 s
+    from jsonschema.exceptions import best_match
+
+    schema = json.loads(resource_path('msg_schemas', 'scene.json').read_text('utf-8'))
+    error = best_match(Draft202012Validator(schema).iter_errors(data))
+    if error is not None:
+        raise Fault(tuple(error.absolute_path), error.message)
+
+
+def _pairs(entries: Sequence[Mapping[str, str]], boxes: Mapping[str, Box]) -> Iterator[Pair]:
+    """Yield the pairs of a file in its order; raise Fault.
+
+    A pattern leaves out two fixed boxes, a pair that is listed by its names, and what an earlier
+    pattern has.
+    """
+    names_of: dict[str, Sequence[str]] = {}
+    known = {frozenset((entry['a'], entry['b'])) for entry in entries if not _is_pattern(entry)}
+    count = 0
+    for number, entry in enumerate(entries):
+        if not _is_pattern(entry):
+            yield Pair(entry.get('name', f'{entry["a"]}_{entry["b"]}'), entry['a'], entry['b'])
+            continue
+        if 'name' in entry:
+            raise Fault(('pairs', number, 'name'), 'a pattern of pairs has no name')
+        sides = []
+        for side in ('a', 'b'):
+            pattern = entry[side]
+            if pattern not in names_of:
+                names_of[pattern] = _matching(pattern, boxes)
+            if not names_of[pattern]:
+                raise Fault(('pairs', number, side), f'{shown(pattern)} is the name of no box')
+            sides.append(names_of[pattern])
+        is_empty = True
+        for a, b in product(*sides):
+            if a == b or boxes[a].pose and boxes[b].pose:
+                continue
+            is_empty, both = False, frozenset((a, b))
+            if both in known:
+                continue
+            known.add(both)
+            count += 1
+            if count > MOST_PAIRS:
+                raise Fault(('pairs',), f'patterns of more than {MOST_PAIRS} pairs')
+            yield Pair.between(a, b)
+        if is_empty:
+            raise Fault(('pairs', number), 'no two boxes of this pattern are a pair of which one '
+                                           'moves')
+
+
+def _is_pattern(entry: Mapping[str, str]) -> bool:
+    return bool(_WILDCARDS.search(entry['a'] + entry['b']))
+
+
+def _matching(pattern: str, boxes: Mapping[str, Box]) -> list[str]:
+    """Return the names that a pattern matches."""
+    is_alike = re.compile(fnmatch.translate(pattern)).match
+    return [name for name in boxes if is_alike(name)]
