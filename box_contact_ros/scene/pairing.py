@@ -20,13 +20,15 @@ waiting  PATIENCE later ticks are whole            answered  a tick, None for a 
 waiting  WAITING_TICKS newer ticks have begun      dropped   NO_PARTNER for each pose
 waiting  time is set back                          dropped   NO_PARTNER for each pose
 ```
-A tick awaits each box that has no pose in it and may still give one:
+Older whole ticks are answered before it. A tick awaits each box that has no pose in it and may
+still give one:
 ```
 box                                                               awaited
 ----------------------------------------------------------------  -------
 its newest stamp is the tick's or later                           no
-its newest stamp is more than max_age before the tick             no
-it was missing from the last PATIENCE answers                     no
+its last pose was late by PATIENCE answers or more                no
+it is slower than the others, and no pose of it is due yet        no
+its pose is overdue by PATIENCE ticks                             no
 it never gave a pose, and the node has answered                   no
 any other                                                         yes
 ```
@@ -49,6 +51,7 @@ from abc import ABC, abstractmethod
 from collections import Counter, deque
 from collections.abc import Container, Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import islice
 from statistics import median
 from typing import NamedTuple
@@ -58,8 +61,8 @@ import numpy as np
 from .scene_solver import ALL_BOXES, Scene
 
 PATIENCE = 5
-"""Later whole ticks for which a tick waits: a few periods, whatever the rate. Executor and
-transport let the streams of one publisher drift apart by one or two."""
+"""Whole ticks for which a tick waits: a few periods, whatever the rate. Executor and transport let
+the streams of one publisher drift apart by one or two."""
 WAITING_TICKS = 128
 """Ticks that may wait: memory stays bounded."""
 REMEMBERED_STAMPS = 1024
@@ -105,6 +108,10 @@ class BoxState:
     newest: int = NEVER  # its latest stamp
     taken: deque[int] = field(default_factory=_remembered)  # stamps of its poses that were taken
     missed: deque[int] = field(default_factory=_remembered)  # ticks answered without the box
+    is_late: bool = False  # whether its last pose was late by PATIENCE answers or more
+    heard_at: int = 0  # number of the tick of its last pose
+    gaps: deque[int] = field(default_factory=partial(deque, maxlen=2))
+    """How many ticks its last poses are apart."""
     last: StampedPose | None = None  # its last pose, for policy `latest`
     came: bool = False  # whether it ever gave a pose, also before time was set back
 
@@ -114,6 +121,7 @@ class WaitingTick:
     """Poses of one stamp, by box, that wait for those of other boxes."""
 
     poses: dict[str, StampedPose] = field(default_factory=dict)
+    number: int = 0  # how many ticks were whole with it; 0: not whole
     passed: int = 0  # later ticks that are whole
     settled: int = 0  # how many boxes of the scene, from the first on, are not awaited
 
@@ -149,7 +157,7 @@ class Pairing(ABC):
     def reset(self) -> None:
         """Forget all poses and stamps, as when time is set back."""
         for box, state in self._boxes.items():
-            self._boxes[box] = BoxState(came=state.came)
+            self._boxes[box] = BoxState(came=state.came, heard_at=state.heard_at)
 
     def stale(self) -> list[str]:
         """Return the boxes whose newest stamp is more than max_age behind that of another box."""
@@ -176,7 +184,7 @@ class Pairing(ABC):
             others = [other.newest for other in self._boxes.values()
                       if other is not state and other.newest != NEVER]
             if others and median(others) - stamp <= RESET:  # its clock was wrong, theirs is not
-                self._boxes[box] = BoxState()
+                self._boxes[box] = BoxState(missed=state.missed)
             else:
                 self._count(RESETS, box, stamp)
                 self.reset()
@@ -206,6 +214,7 @@ class StampPairing(Pairing):
         super().__init__(scene, tolerance=tolerance, max_age=max_age, counts=counts)
         self._waiting: dict[int, WaitingTick] = {}  # by stamp, as they began
         self._whole: dict[int, WaitingTick] = {}  # those of them that could be answered
+        self._whole_so_far = 0
         self._has_answered = False
         self._newest_missed = NEVER  # tick that was answered without a box
 
@@ -228,24 +237,37 @@ class StampPairing(Pairing):
             if stamp in state.taken:
                 self._count(REPEATED, box, stamp)
                 return []
-        state.taken.append(stamp)
-        state.newest = max(state.newest, stamp)
+        state.is_late = PATIENCE == sum(
+            missed > stamp for missed in islice(reversed(state.missed), PATIENCE))
         key = self._tick_of(box, stamp) if self.tolerance else stamp
         tick = self._waiting.get(key)
+        is_too_late = tick is None and self._is_too_late(state, stamp)
+        number = (tick and tick.number) or self._whole_so_far + (not is_too_late)
+        if state.taken:
+            state.gaps.append(number - state.heard_at)
+        state.heard_at = number
+        state.taken.append(stamp)
+        state.newest = max(state.newest, stamp)
+        if is_too_late:
+            self._count(TOO_LATE, box, stamp)
+            return []
         if tick is None:
-            if self._is_too_late(state, stamp):
-                self._count(TOO_LATE, box, stamp)
-                return []
             tick = self._begin(key)
         if box in tick.poses:  # with a tolerance: an earlier pose near the stamp of this one
             self.counts[NO_PARTNER] += 1
         tick.poses[box] = pose
         if key not in self._whole and self._has_partner(box, tick.poses):
+            self._whole_so_far += 1
+            tick.number = self._whole_so_far
             for earlier, waiting in self._whole.items():
                 waiting.passed += earlier < key
             self._whole[key] = tick
-        return [self._answer(key) for key, tick in list(self._whole.items())
-                if tick.passed >= PATIENCE or not self._is_awaiting(key, tick)]
+        ready = [key for key, tick in self._whole.items()
+                 if tick.passed >= PATIENCE or not self._is_awaiting(key, tick)]
+        if not ready:
+            return []
+        newest = max(ready)
+        return [self._answer(key) for key in sorted(self._whole) if key <= newest]
 
     def _begin(self, key: int) -> WaitingTick:
         """Return a new tick; drop the oldest where too many wait."""
@@ -277,20 +299,18 @@ class StampPairing(Pairing):
         names = self._scene.streams
         while tick.settled < len(names):
             box = names[tick.settled]
-            if box not in tick.poses and self._may_come(self._boxes[box], key):
+            if box not in tick.poses and self._may_come(self._boxes[box], key, tick.number):
                 return True
             tick.settled += 1
         return False
 
-    def _may_come(self, state: BoxState, key: int) -> bool:
+    def _may_come(self, state: BoxState, key: int, number: int) -> bool:
         if not state.came:
             return not self._has_answered
-        if state.newest == NEVER:  # time was set back, for this box too
-            return True
-        if state.newest >= key or 0 < self.max_age < key - state.newest:
+        if state.newest >= key or state.is_late:
             return False
-        missed = sum(stamp > state.newest for stamp in islice(reversed(state.missed), PATIENCE))
-        return missed < PATIENCE
+        gap = min(state.gaps, default=1)
+        return gap - 1 <= number - state.heard_at < gap + PATIENCE
 
     def _answer(self, key: int) -> Tick:
         """Remove a tick from those that wait, and return its poses."""

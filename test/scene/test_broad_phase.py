@@ -4,6 +4,7 @@
 """The broad phase of scenes with many pairs: a sweep finds what a test of every pair finds."""
 from __future__ import annotations
 
+import itertools
 import subprocess
 import sys
 
@@ -14,7 +15,6 @@ import pytest
 from box_contact_ros import ContactSolver
 from box_contact_ros.core import native
 from box_contact_ros.scene import scene_solver
-from box_contact_ros.scene.files.scene_file import parse_scene
 from box_contact_ros.scene.scene_solver import Box, Pair, Scene, SceneSolver, TooManyNear
 
 NEAR = 1e-9
@@ -120,7 +120,7 @@ def test_a_sweep_answers_as_a_test_of_every_pair(kind, upright, monkeypatch):
         swept, listed = (solver(rows) for solver in solvers)
         assert told(swept) == told(listed)
     assert swept.stale
-    a, b = ([number[pair[side]] for pair in scene.pairs] for side in (2, 3))
+    a, b = ([number[pair[side]] for pair in scene.pairs] for side in (1, 2))
     size = np.array([box.size for box in scene.boxes.values()])
     colliding = ContactSolver((1, 1, 1), (1, 1, 1), model='exact').batch(
         pose[a], pose[b], size_a=size[a], size_b=size[b]).colliding
@@ -131,11 +131,13 @@ def test_a_sweep_answers_as_a_test_of_every_pair(kind, upright, monkeypatch):
 
 def test_bad_poses_are_refused_in_a_sweep(monkeypatch):
     monkeypatch.setattr(scene_solver, 'SWEPT_FROM', 0)
-    scene = parse_scene("{poses: array, boxes: {m: {size: [1, 1, 1], count: 9}}, pairs: "
-                        "[{a: '*', b: '*'}]}")
+    names = [f'm{number}' for number in range(9)]
+    scene = Scene({name: Box(name, (1.0, 1.0, 1.0)) for name in names},
+                  tuple(Pair.between(a, b) for a, b in itertools.combinations(names, 2)),
+                  pose_array=True)
     rows = np.tile(poses.IDENTITY, (9, 1))
     rows[4, 0] = np.inf
-    with pytest.raises(ValueError, match='pose of m05: position'):
+    with pytest.raises(ValueError, match='pose of m4: position'):
         SceneSolver(scene, model='exact')(rows)
 
 
@@ -146,7 +148,7 @@ from box_contact_ros.scene.scene_solver import Box, Pair, Scene, SceneSolver, To
 
 boxes = {f'b{n}': Box(f'b{n}', (1.0, 1.0, 1.0)) for n in range(8000)}
 names = list(boxes)
-pairs = tuple(Pair(n, f'p{n}', names[n % 8000], names[(n + 1 + n // 8000) % 8000])
+pairs = tuple(Pair(f'p{n}', names[n % 8000], names[(n + 1 + n // 8000) % 8000])
               for n in range(65 * 8000))
 solver = SceneSolver(Scene(boxes, pairs, pose_array=True), model='exact', most_near=1000)
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

@@ -16,12 +16,10 @@ from box_contact_ros import (
     Body,
     ContactSolver,
     HeldPatch,
-    PatchLaw,
-    Predictor,
     SceneLaw,
     SceneSolver,
 )
-from box_contact_ros.scene.force.laws import GRAVITY
+from box_contact_ros.scene.laws import GRAVITY
 from box_contact_ros.scene.pose import quaternion_multiply, rotation_matrix
 from box_contact_ros.scene.scene_solver import Answer, Box, Pair, Scene
 from box_contact_ros.solver.contact import Contact
@@ -263,7 +261,7 @@ def test_a_patch_goes_with_what_carries_it():
     """A kinematic box, and a load on it, move on together: the wrench is what it was."""
     scene = Scene({'load': Box('load', tuple(SIZE), pose_topic='load'),
                    'truck': Box('truck', tuple(SIZE), pose_topic='truck')},
-                  (Pair(5, 'p', 'load', 'truck'),))
+                  (Pair('p', 'load', 'truck'),))
     law = SceneLaw.for_loop(scene, {'load': MASS}, rate_hz=RATE)
     poses = np.array([LEVEL, LEVEL - [0.5, 0, SIZE[2] - SUNK, 0, 0, 0, 0]])
     velocity = moving(linear=(7.0, 1.0, 0.0))
@@ -446,7 +444,7 @@ def test_a_stiffer_spring_gains_no_energy():
 def two_free(mass_b=10_000.0):
     """Return the scene of a load on a free box, the law, and poses with the load `SUNK` deep."""
     scene = Scene({'a': Box('a', tuple(SIZE), pose_topic='a'),
-                   'b': Box('b', (8.0, 2.0, 2.0), pose_topic='b')}, (Pair(1, 'ab', 'a', 'b'),))
+                   'b': Box('b', (8.0, 2.0, 2.0), pose_topic='b')}, (Pair('ab', 'a', 'b'),))
     law = SceneLaw.for_loop(scene, {'a': MASS, 'b': mass_b}, rate_hz=RATE)
     b = moved(LEVEL - [0.3, 0.1, 0.5 * SIZE[2] + 1.0 - SUNK, 0, 0, 0, 0], turn=(1e-6, 2e-6, 0.3))
     return scene, law, np.array([LEVEL, b])
@@ -472,7 +470,7 @@ def test_what_acts_on_one_acts_back_on_the_other():
 def test_two_free_bodies_take_half_the_modulus_of_the_lighter():
     """κ = Ω² / w by the softer sum, and each patch counts twice: no mode is faster than Ω."""
     scene = Scene({name: Box(name, (2.0, 2.0, 2.0), pose_topic=name) for name in 'ab'},
-                  (Pair(1, 'ab', 'a', 'b'),))
+                  (Pair('ab', 'a', 'b'),))
     law = SceneLaw.for_loop(scene, {'a': MASS, 'b': 0.1 * MASS}, rate_hz=RATE)
     poses = np.array([LEVEL, LEVEL - [0, 0, 2.0 - SUNK, 0, 0, 0, 0]])
     law.hold(SceneSolver(scene, model='exact')(poses), poses)
@@ -535,8 +533,26 @@ def test_an_answer_of_another_scene_is_refused():
     law = SceneLaw.for_loop(Scene(known, (Pair.between('b', 'ground'),)), {'b': 1.0}, rate_hz=100.0)
     more = Scene(known | {'new': Box('new', (1, 1, 1))}, (Pair.between('new', 'b'),))
     where = np.array([[0, 0, 0.5, 0, 0, 0, 1], [0, 0, 1.499, 0, 0, 0, 1.0]])
-    with pytest.raises(ValueError, match="'new' is none of the boxes of this law"):
+    with pytest.raises(ValueError, match="Pair.*'new_b'.* is no pair of the scene of this law"):
         law.hold(SceneSolver(more, model='exact')(where), where[:1])
+
+
+def test_a_stale_pair_keeps_its_patch():
+    """One pose in twenty missed: a box on a slope slid 9.6 mm in 3 s."""
+    ground = Box('ground', (9, 9, 1), (0, 0, -0.5, 0, 0, 0, 1))
+    pair = Pair.between('load', 'ground')
+    scene = Scene({'ground': ground, 'load': Box('load', (1, 1, 1))}, (pair,))
+    law = SceneLaw.for_loop(scene, {'load': 1.0}, rate_hz=200.0)
+    where = np.array([[0, 0, 0.4999, 0, 0, 0, 1]])
+    law.hold(SceneSolver(scene, model='exact')(where), where)
+    law.wrenches(where, np.zeros((1, 6)))
+    shifted = where + [1e-6, 0, 0, 0, 0, 0, 0]
+    expected = law.copy().wrenches(shifted, np.zeros((1, 6)))
+    assert expected[0, 0] < 0.0 < expected[0, 2]
+    law.hold(Answer([], [pair], 0), where)
+    assert np.array_equal(law.wrenches(shifted, np.zeros((1, 6))), expected)
+    law.hold(Answer([], [], 0), where)
+    assert not law.wrenches(shifted, np.zeros((1, 6))).any()
 
 
 @pytest.mark.parametrize('absent', [None, np.full(7, np.nan)])
@@ -552,43 +568,27 @@ def test_a_box_without_a_pose_is_named(absent):
         law.hold(Answer([], [], 0), where)
 
 
-def test_a_clock_that_pauses_teaches_a_predictor_nothing():
-    """The same time twice made all velocities NaN, for good."""
-    predictor = Predictor(Body(mass=1.0, inertia=(1.0, 1.0, 1.0)), latency=0.01)
-    for time in (0.0, 0.0, 1.0, 0.5):
-        pose, velocity = predictor.state(time, LEVEL, STILL)
-        assert np.isfinite([*pose, *velocity]).all()
-    with pytest.raises(ValueError, match='mass must be positive'):
-        Predictor(Body(mass=0.0, inertia=(1.0, 1.0, 1.0)), latency=0.01)
-
-
 @pytest.mark.parametrize('rate', [50.0, 200.0, 1000.0])
 @pytest.mark.parametrize('latency', [0.0, 0.002, 0.005])
 def test_the_constants_follow_the_loop(rate, latency):
-    """Ω is what the delay, the step and the damper of a held wrench bear."""
+    """Ω is the least of what the delay and the step allow."""
     late = 0.5 / rate + latency
     loop = {'rate_hz': rate, 'latency': latency}
     assert HeldPatch.for_loop(LOAD, **loop, step=0.0005).frequency == pytest.approx(
         min(2.0 / late, 0.45 / 0.0005))
-    assert PatchLaw.for_loop(LOAD, **loop).frequency == pytest.approx(
-        min(math.sqrt(9.81 / 5e-4), 0.45 / late, 1.7 * rate / 2.4))
-    assert PatchLaw.for_loop(LOAD, **loop, predicted=True).frequency == pytest.approx(
-        min(math.sqrt(9.81 / 1e-5), 0.45 / late))
 
 
 def test_the_page_says_what_the_code_does():
     """The table of rates, latencies and depths in docs/explanation/force.md."""
-    rows = re.findall(r'^\| (\d+) \| (\d) \| (\d+) \| ([\d.]+) \| (\d+) \| ([\d.]+) \|$',
-                      PAGE.read_text(), re.MULTILINE)
+    rows = re.findall(r'^\| (\d+) \| (\d) \| (\d+) \| ([\d.]+) \|$', PAGE.read_text(),
+                      re.MULTILINE)
     assert len(rows) >= 6
-    for rate, latency, patch, patch_depth, wrench, wrench_depth in rows:
-        loop = {'rate_hz': float(rate), 'latency': 1e-3 * float(latency)}
-        for law, omega, depth in (
-                (HeldPatch.for_loop(LOAD, **loop, step=0.0005), patch, patch_depth),
-                (PatchLaw.for_loop(LOAD, **loop), wrench, wrench_depth)):
-            digits = len(depth.partition('.')[2])
-            assert f'{law.frequency:.0f}' == omega
-            assert f'{1e3 * GRAVITY / law.frequency**2:.{digits}f}' == depth
+    for rate, latency, omega, depth in rows:
+        law = HeldPatch.for_loop(LOAD, rate_hz=float(rate), latency=1e-3 * float(latency),
+                                 step=0.0005)
+        digits = len(depth.partition('.')[2])
+        assert f'{law.frequency:.0f}' == omega
+        assert f'{1e3 * GRAVITY / law.frequency**2:.{digits}f}' == depth
 
 
 # --- Refusals -------------------------------------------------------------------------------------
@@ -676,6 +676,11 @@ def test_wrong_calls_are_refused():
         law.hold(slab(), LEVEL[:6])
     with pytest.raises(ValueError, match='velocity of body 0 is not finite'):
         law.wrench(LEVEL, np.full(6, math.nan))
+    masked = np.ma.masked_array(LEVEL, mask=[0, 0, 1, 0, 0, 0, 0])
+    with pytest.raises(ValueError, match='pose must be numbers without a mask'):
+        law.wrench(masked, STILL)
+    with pytest.raises(ValueError, match='poses must be numbers without a mask'):
+        law.hold(slab(), masked)
     scene, _, _ = two_free()
     with pytest.raises(ValueError, match="bodies: 'c' is none of the boxes that move"):
         SceneLaw.for_loop(scene, {'c': 1.0}, rate_hz=RATE)

@@ -1,0 +1,152 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""Scene files: what is a scene, and the words in which the rest is refused."""
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+import yaml
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from box_contact_ros.scene import scene_file
+from box_contact_ros.scene.scene_file import SceneError, read_scene
+from box_contact_ros.scene.scene_solver import Pair, SceneSolver
+
+ROOT = Path(__file__).resolve().parents[2]
+GOOD = """\
+frame_id: map
+boxes:
+  load: {size: [12.192, 2.438, 2.591]}
+  spreader:
+    size: [6, 2.4, 0.5]
+    pose_topic: /crane/spreader
+  s1:
+    size: [12.192, 2.438, 2.591]
+    pose: [0, 0, 1.2955, 0, 0, 0, 1]
+pairs:
+  - {name: load_s1, a: load, b: s1}
+  - {name: grip, a: spreader, b: load}
+"""
+
+
+@pytest.fixture
+def scene_of(tmp_path):
+    def read(text):
+        (tmp_path / 'scene.yaml').write_text(text)
+        return read_scene(tmp_path / 'scene.yaml')
+    return read
+
+
+def test_a_good_file(scene_of):
+    """As YAML and as JSON."""
+    scene = scene_of(GOOD)
+    assert scene == scene_of(json.dumps(yaml.safe_load(GOOD)))
+    assert scene.moving == ('load', 'spreader') and scene.frame_id == 'map'
+    assert scene.sources == {'load': 'load/pose', 'spreader': '/crane/spreader'}
+    assert scene.boxes['s1'].pose == (0, 0, 1.2955, 0, 0, 0, 1)
+    assert scene.pairs[1] == Pair('grip', 'spreader', 'load')
+
+
+def test_a_box_in_no_pair_is_not_listened_to(scene_of):
+    scene = scene_of(GOOD.replace('  - {name: grip, a: spreader, b: load}\n', ''))
+    assert scene.moving == ('load',)
+
+
+def test_patterns_stand_for_pairs_of_which_one_box_moves(scene_of):
+    """In the order of the boxes; a pair that is listed by its names keeps its name."""
+    boxes = GOOD.partition('pairs:')[0] + '  s2: {size: [1, 1, 1], pose: [9, 0, 0, 0, 0, 0, 1]}\n'
+    listed = '  - {name: grip, a: spreader, b: load}\n'
+    for pairs, wanted in (
+            ('pairs: all', ['load_spreader', 'load_s1', 'load_s2', 'spreader_s1', 'spreader_s2']),
+            ("pairs:\n  - {a: load, b: 's?'}", ['load_s1', 'load_s2']),
+            ("pairs:\n  - {a: 's[1-9]', b: load}\n" + listed, ['s1_load', 's2_load', 'grip']),
+            ('pairs:\n' + listed + "  - {a: '*', b: '*'}",
+             ['grip', 'load_s1', 'load_s2', 'spreader_s1', 'spreader_s2'])):
+        assert [pair.name for pair in scene_of(boxes + pairs).pairs] == wanted
+
+
+@pytest.mark.parametrize('old, new, words', [
+    ('[6, 2.4, 0.5]', '[6, 2.4, -0.5]', 'boxes.spreader.size[2]: -0.5 is less than or equal'),
+    ('[6, 2.4, 0.5]', '[6, 2.4]', 'boxes.spreader.size: [6, 2.4] is too short'),
+    ('[6, 2.4, 0.5]', '[6, 2.4, wide]', "boxes.spreader.size[2]: 'wide' is not of type 'number'"),
+    ('[6, 2.4, 0.5]', '[6, 2.4, 1e60]', 'boxes.spreader.size'),
+    *(('[6, 2.4, 0.5]', f'[{number}, 2.4, 0.5]', f"'{number}' is not a plain number")
+      for number in ('010', '0x10', '1:30', '1_000', '.nan', '.inf', '1:30.5')),
+    ('[0, 0, 1.2955, 0, 0, 0, 1]', '[0, 0, 1, 0, 0, 0, 0]', 'boxes.s1.pose: quaternion'),
+    ('pose_topic: /crane/spreader', 'pose_topic: 2 crane', 'boxes.spreader.pose_topic: '),
+    ('pose_topic: /crane/spreader', 'colour: red', 'boxes.spreader: Additional properties'),
+    ('    pose_topic: /crane/spreader\n', '    pose_topic: a\n    pose: [0, 0, 0, 0, 0, 0, 1]\n',
+     'boxes.spreader.pose_topic: a box with a pose never moves'),
+    ('size: [6, 2.4, 0.5]', 'size: !!python/tuple [6, 2.4, 0.5]', 'could not determine a'),
+    ('a: spreader', 'a: lorry', "pairs[1].a: 'lorry' is none of the boxes"),
+    ('a: spreader', 'a: load', "pairs[1].b: 'load' is the same box as a"),
+    ('name: grip', 'name: load_s1', "pairs[1].name: the same name as that of 'load'"),
+    ('name: grip', 'name: load/s1', "pairs[1].name: 'load/s1' does not match"),
+    ('name: grip, a: spreader, b: load', "a: 'x*', b: load", "pairs[1].a: 'x*' is the name of no"),
+    ('a: spreader, b: load', "a: 's*', b: load", 'pairs[1].name: a pattern of pairs has no name'),
+    ('name: grip, a: spreader, b: load', "a: 's1', b: 's?'", 'pairs[1]: no two boxes of this'),
+    ('a: spreader, b: load', 'a: s1, b: load', 'pairs[1]: the same pair of boxes as that'),
+    ('  load: {size: [12.192, 2.438, 2.591]}', '  load: {size: [1, 1, 1], pose: '
+     '[0, 0, 9, 0, 0, 0, 1]}', "pairs[0]: 'load' and 's1' are both fixed"),
+    ('frame_id: map', 'frame_id: 7', "frame_id: 7 is not of type 'string'"),
+    ('boxes:', 'bodies:', 'bodies'), ('boxes:', 'boxes: [', 'line'),
+    (GOOD, '7\n', "7 is not of type 'object'"),
+    (GOOD, 'boxes: {b: {size: [1, 1, 1]}}\npairs: []\n', 'pairs: [] ')])
+def test_a_refusal_names_file_and_field(old, new, words, scene_of):
+    assert old in GOOD
+    with pytest.raises(SceneError) as refused:
+        scene_of(GOOD.replace(old, new, 1))
+    assert words in str(refused.value) and 'scene.yaml: ' in str(refused.value)
+
+
+def test_files_that_cannot_be_read(tmp_path):
+    (tmp_path / 'latin').write_bytes(b'boxes: \xff')
+    for path, words in ((tmp_path / 'none.yaml', 'cannot be read: No such file'),
+                        (tmp_path, 'cannot be read: Is a directory'),
+                        (tmp_path / 'latin', "codec can't decode byte")):
+        with pytest.raises(SceneError, match=words):
+            read_scene(path)
+
+
+def test_more_pairs_or_topics_than_a_scene_may_have(scene_of, monkeypatch):
+    monkeypatch.setattr(scene_file, 'MOST_PAIRS', 2)
+    monkeypatch.setattr(scene_file, 'MOST_STREAMS', 1)
+    with pytest.raises(SceneError, match='patterns of more than 2 pairs'):
+        scene_of(GOOD.partition('pairs:')[0] + 'pairs: all')
+    with pytest.raises(SceneError, match='2 boxes have a topic of their own.*set poses: array'):
+        scene_of(GOOD)
+    assert scene_of('poses: array\n' + GOOD).pose_array
+
+
+JSON = st.recursive(st.none() | st.booleans() | st.floats() | st.integers() | st.text(max_size=8),
+                    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(
+                        st.sampled_from(['boxes', 'pairs', 'size', 'pose', 'name', 'a', 'b',
+                                         'poses']), inner, max_size=4), max_leaves=12)
+
+
+@settings(deadline=None)
+@given(st.one_of(st.text(max_size=200), JSON.map(json.dumps),
+                 st.tuples(st.integers(0, len(GOOD)), st.text(max_size=5)).map(
+                     lambda edit: GOOD[:edit[0]] + edit[1] + GOOD[edit[0]:])))
+def test_any_text_is_a_scene_or_refused(tmp_path_factory, text):
+    """Nothing but SceneError comes out, and what is a scene can be computed."""
+    path = tmp_path_factory.getbasetemp() / 'any.yaml'
+    path.write_bytes(text.encode('utf-8', 'surrogatepass'))
+    try:
+        scene = read_scene(path)
+    except SceneError:
+        return
+    assert scene.pairs and set(scene.moving) <= set(scene.boxes)
+
+
+@pytest.mark.parametrize('path', sorted((ROOT / 'config' / 'scenes').glob('*.yaml')),
+                         ids=lambda path: path.stem)
+def test_shipped_scenes_are_good(path):
+    """Each can be computed, and is found by its path below the package's data."""
+    scene = read_scene(f'config/scenes/{path.name}')
+    SceneSolver(scene, model='exact')
+    assert scene == read_scene(path)
