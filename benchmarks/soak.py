@@ -22,6 +22,7 @@ from pathlib import Path
 
 import numpy as np
 
+from box_contact_ros.bench.answer_log import AnswerLog, StreamLog, StreamResult
 from box_contact_ros.bench.bench_drive import (
     Bench,
     MeasuredNode,
@@ -33,7 +34,6 @@ from box_contact_ros.bench.bench_drive import (
 )
 from box_contact_ros.bench.bench_report import bullets, write_results
 from box_contact_ros.bench.pose_streams import make_stream
-from box_contact_ros.demo.answer_log import AnswerLog, StreamLog, StreamResult
 from box_contact_ros.output import markdown_table, percentiles
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.view.recording.stream import Stream

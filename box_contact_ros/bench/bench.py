@@ -29,7 +29,7 @@ import numpy as np
 from tqdm import tqdm
 
 from benchmarks.soak import soak
-from box_contact_ros.demo.answer_log import StreamResult
+from box_contact_ros.bench.answer_log import StreamResult
 from box_contact_ros.demo.processes import add_domain
 from box_contact_ros.node.contact_program import PARAMETERS
 from box_contact_ros.node.parameters import outside_ros_args

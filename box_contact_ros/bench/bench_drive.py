@@ -28,8 +28,8 @@ from std_msgs.msg import Header
 from tqdm import tqdm
 
 from benchmarks.timing import no_garbage_collection, pinned
+from box_contact_ros.bench.answer_log import CONTACT_MESSAGES, ECHO_MESSAGES, AnswerLog
 from box_contact_ros.core import native
-from box_contact_ros.demo.answer_log import CONTACT_MESSAGES, ECHO_MESSAGES, AnswerLog
 from box_contact_ros.demo.processes import (
     Stop,
     asked_to_end,

@@ -14,7 +14,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import LogFormatter
 
-from box_contact_ros.demo.answer_log import StreamResult
+from box_contact_ros.bench.answer_log import StreamResult
 from box_contact_ros.output import log_errors, markdown_table, percentiles, subplots, write_csv
 
 ERRORS = (1e-6, 1e5)

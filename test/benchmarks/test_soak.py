@@ -16,9 +16,9 @@ pytest.importorskip('mujoco')
 
 from benchmarks.soak import by_block, mispairs, without_contact
 from box_contact_ros import ContactSolver
+from box_contact_ros.bench.answer_log import AnswerLog
 from box_contact_ros.bench.pose_streams import make_stream
 from box_contact_ros.core import native
-from box_contact_ros.demo.answer_log import AnswerLog
 
 MS = 1_000_000  # ns
 

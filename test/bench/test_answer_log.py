@@ -10,6 +10,7 @@ import math
 import numpy as np
 import pytest
 
+from box_contact_ros.bench.answer_log import ECHO_MESSAGES, AnswerLog
 from box_contact_ros.bench.bench_report import (
     columns,
     draw,
@@ -17,7 +18,6 @@ from box_contact_ros.bench.bench_report import (
     latency_table,
     write_results,
 )
-from box_contact_ros.demo.answer_log import ECHO_MESSAGES, AnswerLog
 from box_contact_ros.solver.contact import Contacts, without_patch
 
 MS = 1_000_000  # ns
