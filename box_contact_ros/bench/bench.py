@@ -26,9 +26,9 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from ..core import native
-from ..demo.processes import add_domain
 from ..node.contact_node import PARAMETERS
 from ..node.parameters import outside_ros_args
+from ..node.processes import add_domain
 from ..node.runtime import refusals_end
 from ..output import machine, make_folder
 from ..solver.arguments import add_models, program_parser, within

@@ -28,8 +28,8 @@ from rclpy.serialization import deserialize_message, serialize_message
 
 from box_contact_msgs.msg import Contacts as ContactsMessage
 
-from ..demo.processes import Stop, asked_to_end, on_this_host
 from ..node.messages import make_header
+from ..node.processes import Stop, asked_to_end, on_this_host
 from ..node.runtime import GuardedNode, joined, spin_for
 from ..solver.contact import Contacts
 from ..solver.contact_solver import ContactSolver

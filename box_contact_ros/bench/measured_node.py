@@ -9,7 +9,7 @@ import math
 import os
 import tempfile
 
-from ..demo.processes import end, parameters, printed, start
+from ..node.processes import end, parameters, printed, start
 from .pose_streams import Stream
 
 MODULES = {'echo': 'bench.echo_node', 'contact': 'node.contact_node', 'soup': 'soup.soup_node'}
