@@ -45,10 +45,10 @@ from box_contact_ros.bench.bench_drive import (
     solver_node,
 )
 from box_contact_ros.bench.pose_streams import make_stream
-from box_contact_ros.demo.processes import add_domain, end, printed, start
 from box_contact_ros.demo.ros_client import DEEP_RELIABLE, pose_message
 from box_contact_ros.node.messages import make_header
 from box_contact_ros.node.parameters import outside_ros_args
+from box_contact_ros.node.processes import add_domain, end, printed, start
 from box_contact_ros.node.runtime import GuardedNode, joined, refusals_end, spin_for, spin_once
 from box_contact_ros.output import markdown_table, percentiles
 from box_contact_ros.solver.arguments import program_parser, within

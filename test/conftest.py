@@ -28,7 +28,7 @@ from typing import Any
 import pytest
 
 CHAINS = (
-    ('test_faults.py', 'test_contact_node.py', 'test_two_hosts.py', 'test_soak.py',
+    ('test_faults.py', 'test_contact_node.py', 'test_two_hosts.py',
      'test_markers.py', 'test_processes.py'),
     ('test_bench.py', 'test_scene_node.py', 'test_landing_ros.py', 'test_hygiene_ros.py',
      'test_msg_schemas.py', 'test_view.py', 'test_record.py', 'test_scene_forms.py',

@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 from box_contact_ros import output
 from box_contact_ros.core import native
-from box_contact_ros.demo.processes import left_when_asked
+from box_contact_ros.node.processes import left_when_asked
 from box_contact_ros.solver.arguments import program_parser
 
 from .rest_cases import CASES, Gate, RestCase

@@ -1,4 +1,8 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Load for running nodes, and what is measured under it."""
+"""The bench: compares latency, losses and errors of running nodes."""
+
+from ..extras import require
+
+require('ros')

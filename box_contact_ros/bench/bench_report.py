@@ -1,145 +1,159 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""The results of the bench as tables, page, CSV file and picture. No ROS."""
+"""The results of the bench: figures, ratios, page, CSV file and picture. No ROS."""
 from __future__ import annotations
 
-import dataclasses
 import math
-import textwrap
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.ticker import LogFormatter
 
-from box_contact_ros.demo.answer_log import StreamResult
-from box_contact_ros.output import log_errors, markdown_table, percentiles, subplots, write_csv
+from ..output import figure, markdown_table, percentiles, write_csv
+from .answer_log import AnswerLog
 
-ERRORS = (1e-6, 1e5)
-"""Point errors that are drawn to scale [mm]; 0 has a band of its own below."""
+ALL = 'all streams'
+RESAMPLES = 2000  # of the bootstrap
 COLORS = {'contact': 'tab:blue', 'soup': 'tab:red', 'echo': 'tab:gray'}
-MARKERS = 'osD^vP*X<>hpd8'
-TITLE_WIDTH = 90  # characters of a title's line: a longer one is clipped
-DIGITS = 9  # significant digits of a figure in the CSV file
-COUNTS = [entry.name for entry in dataclasses.fields(StreamResult) if entry.type in ('str', 'int')]
+HEAD = ('stream', 'node', 'sent', 'lost', 'wrong', 'p50 [ms]', 'p99 [ms]', 'max [ms]',
+        'point error [mm]', 'CPU [%]', 'memory [MB]')
+NOTES = """\
+- *Latency*: from the stamp of the poses to the arrival of the later of point and normal.
+- *All streams*: percentiles over all answers of a node, not means over streams.
+- *Point error*: the largest distance from the exact point.
+- *CPU*: processor time divided by the time in which poses were sent.
+- *Memory*: growth of the resident memory in the second half of the run.
+- *Ratios*: median over blocks of the median ratio of latencies for the same poses, with a 95 %
+  interval that comes from drawing the blocks anew."""
 
 
-def bullets(lines: Iterable[str] | Mapping[str, str]) -> str:
-    """Return a Markdown list, of lines or of names with values."""
-    if isinstance(lines, Mapping):
-        lines = (f'{name}: {value}' for name, value in lines.items())
-    return '\n'.join(f'- {line}' for line in lines)
+def ratio(logs: Sequence[AnswerLog], node: str, baseline: str, *, block: int,
+          ) -> tuple[float, float, float]:
+    """Return how many times as long a node's answers take as another's, and a 95 % interval.
+
+    Latencies are paired by pose. The ratio is the median over blocks of their median ratios. The
+    interval comes from drawing the blocks anew, as neighbouring answers share what disturbs them.
+    NaN without answers.
+
+    block: pairs per block.
+    """
+    medians = []
+    for stream in dict.fromkeys(log.stream for log in logs):
+        latencies = {log.node: log.latencies for log in logs if log.stream == stream}
+        ratios = latencies[node] / latencies[baseline]
+        blocks = np.split(ratios, range(block, len(ratios), block))
+        medians += [np.nanmedian(ratios) for ratios in blocks if not np.isnan(ratios).all()]
+    if not medians:
+        return math.nan, math.nan, math.nan
+    drawn = np.random.default_rng(1).choice(medians, (RESAMPLES, len(medians)))
+    low, high = percentiles(np.median(drawn, axis=1), 2.5, 97.5)
+    return float(np.median(medians)), low, high
 
 
-def write_results(path: Path, results: Iterable[StreamResult], about: Mapping[str, str]) -> None:
-    """Write a row per node and stream, units in the column names, `about` in every row."""
-    write_csv(path, [columns(result) | dict(about) for result in results], digits=DIGITS)
+def node_figures(logs: Sequence[AnswerLog]) -> dict[str, Any]:
+    """Return the figures of one node as columns of the CSV file, pooled over the logs of streams.
+
+    Times are in s, lengths in m, NaN where nothing was answered.
+    """
+    sent = [np.count_nonzero(log.stamps) for log in logs]
+    row: dict[str, Any] = {
+        'stream': logs[0].stream if len(logs) == 1 else ALL, 'node': logs[0].node,
+        'sent': sum(sent), 'lost': sum(int(log.lost.sum()) for log in logs),
+        'wrong': sum(int(log.wrong.sum()) for log in logs)}
+    for name, unit, values in (('latency', 's', [log.latencies for log in logs]),
+                               ('lateness', 's', [log.lateness for log in logs]),
+                               ('point_error', 'm', [log.point_errors for log in logs])):
+        pooled = np.concatenate(values)
+        spread = percentiles(pooled[~np.isnan(pooled)], 50, 99, 100)
+        row |= {f'{name}_{part} [{unit}]': value
+                for part, value in zip(('p50', 'p99', 'max'), spread)}
+    return row | {'cpu': float(np.average([log.cpu for log in logs], weights=sent)),
+                  'memory_growth [B]': max(log.growth for log in logs)}
 
 
-def columns(result: StreamResult) -> dict[str, object]:
-    """Return a result as the columns of the CSV file; times in s, NaN where there is no figure."""
-    spreads = (('latency', 's', result.latency), ('point_error', 'm', result.point_error),
-               ('normal_error', 'deg', result.normal_error))
-    p99, most = percentiles(result.lateness, 99, 100)
-    return ({name: getattr(result, name) for name in COUNTS}
-            | {f'{name}_{figure} [{unit}]': value for name, unit, figures in spreads
-               for figure, value in figures.items()}
-            | {'rate [Hz]': result.rate, 'lateness_p99 [s]': p99, 'lateness_max [s]': most})
+def all_figures(logs: Sequence[AnswerLog], *, block: int) -> list[dict[str, Any]]:
+    """Return the figures of each node over all streams, then those of each stream by node.
 
-
-def latency_table(results: Sequence[StreamResult]) -> str:
-    """Return counts and latencies [ms], Markdown; in the words of `ros2 topic delay`."""
-    head = ['stream', 'node', 'sent', 'answered', 'lost', 'dupl.', 'wrong', 'mean', 'min', 'max',
-            'std dev', 'window', 'p50', 'p99', 'p99.9']
+    Each node but the first has its ratio to the node before it. A log in which nothing was sent has
+    no row. block: pairs per block.
+    """
+    logs = [log for log in logs if log.stamps.any()]
+    streams = list(dict.fromkeys(log.stream for log in logs))
     rows = []
-    for r in results:
-        *spread, p50, p99, p999 = (_cell(1e3 * value, '.3f') for value in r.latency.values())
-        wrong = '' if r.node == 'echo' else r.wrong_verdicts
-        rows.append([r.stream, r.node, r.sent, r.answered, r.lost, r.duplicates, wrong, *spread,
-                     len(r.latencies), p50, p99, p999])
-    return markdown_table(head, rows, words=2, padded=True)
+    for group in [streams] * (len(streams) > 1) + [[stream] for stream in streams]:
+        grouped = [log for log in logs if log.stream in group]
+        nodes = list(dict.fromkeys(log.node for log in grouped))
+        for place, node in enumerate(nodes):
+            rows.append(node_figures([log for log in grouped if log.node == node]))
+            if place:
+                values = ratio(grouped, node, nodes[place - 1], block=block)
+                rows[-1] |= {'ratio_to': nodes[place - 1],
+                             **dict(zip(('ratio', 'ratio_low', 'ratio_high'), values))}
+    return rows
 
 
-def error_table(results: Sequence[StreamResult]) -> str:
-    """Return errors of contacts, Markdown; points in mm, normals in degrees."""
-    head = ['stream', 'node', 'model', 'contacts', 'point median', 'p99', 'max', 'normal median',
-            'p99', 'max']
-    rows = [[r.stream, r.node, r.model, r.contacts,
-             *(_cell(1e3 * value, '.3g') for value in r.point_error.values()),
-             *(_cell(value, '.3g') for value in r.normal_error.values())]
-            for r in results if r.node != 'echo' and r.contacts]
-    return markdown_table(head, rows, words=3, padded=True)
+def ratio_line(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Return the ratios of the first group of rows in a line."""
+    return ', '.join(
+        f'{row["node"]} / {row["ratio_to"]} {row["ratio"]:.2f} '
+        f'[{row["ratio_low"]:.2f}, {row["ratio_high"]:.2f}]'
+        for row in rows if 'ratio' in row and row['stream'] == rows[0]['stream'])
 
 
-def _cell(value: float, form: str) -> str:
-    return '' if math.isnan(value) else format(value, form)
+def void_reason(rows: Sequence[Mapping[str, Any]], rate: float) -> str:
+    """Return why a run is void, '' if it is not.
+
+    It is void where the bench itself was later than a period in more than one of 100 pairs.
+    """
+    lateness = max((row['lateness_p99 [s]'] for row in rows), default=0.0)
+    if lateness <= 1.0 / rate:
+        return ''
+    return (f'void: the bench itself was late by p99 {1e3 * lateness:.2f} ms, at a period of '
+            f'{1e3 / rate:.2f} ms')
 
 
-def all_latencies(results: Iterable[StreamResult], node: str) -> np.ndarray:
-    """Return the latencies [ms] of a node in all its streams."""
-    return 1e3 * np.concatenate([r.latencies for r in results if r.node == node] or [np.zeros(0)])
+def table(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Return the figures as a Markdown table that reads well in a terminal, too."""
+    return markdown_table(HEAD, [[
+        row['stream'], row['node'], row['sent'], row['lost'],
+        '' if row['node'] == 'echo' else row['wrong'],
+        *(_cell(row[f'latency_{part} [s]'], 1e3, '.3f') for part in ('p50', 'p99', 'max')),
+        _cell(row['point_error_max [m]'], 1e3, '.3g'), _cell(row['cpu'], 100.0, '.1f'),
+        _cell(row['memory_growth [B]'], 1e-6, '.1f')] for row in rows], words=2, padded=True)
 
 
-def draw(path: Path, results: Sequence[StreamResult], title: str) -> None:
-    """Draw latency distributions, latencies by stream, and errors over latencies."""
-    figure, axes = subplots(3, 1, (8.0, 11.0))
-    nodes = list(dict.fromkeys(result.node for result in results))
-    colors = {node: COLORS.get(node, f'C{i}') for i, node in enumerate(nodes)}
-    for axis, drawn in zip(axes[:, 0], (_draw_tails, _draw_streams, _draw_errors)):
-        drawn(axis, results, colors)
-        axis.grid(alpha=0.3, axis='x' if drawn is _draw_streams else 'both')
-    figure.suptitle('\n'.join(piece for line in title.splitlines()
-                              for piece in textwrap.wrap(line, TITLE_WIDTH)))
-    figure.savefig(path)
+def _cell(value: float, factor: float, form: str) -> str:
+    return '' if math.isnan(value) else format(factor * value, form)
 
 
-# The scales are set before anything is plotted: empty axes cannot be made logarithmic any more.
+def write_report(folder: Path, logs: Sequence[AnswerLog], rows: Sequence[Mapping[str, Any]],
+                 lines: Sequence[str], about: Mapping[str, str]) -> None:
+    """Write bench.md and bench.csv, and bench.png where matplotlib is installed."""
+    listed = [f'- {name}: {value}' for name, value in about.items()]
+    (folder / 'bench.md').write_text('\n'.join([
+        '# Bench', '', 'Made by `python -m box_contact_ros.bench.bench`.', '', *listed, '',
+        table(rows), '', *(f'- {line}' for line in lines), '', NOTES, '']), 'utf-8')
+    write_csv(folder / 'bench.csv', [{**row, **about} for row in rows], digits=9)
+    try:
+        draw(folder / 'bench.png', logs)
+    except ModuleNotFoundError as error:
+        print(f'no picture: {error.name} is not installed (extra: report)')
 
-def _draw_tails(axis: Axes, results: Sequence[StreamResult], colors: Mapping[str, str]) -> None:
-    axis.set(xscale='log', yscale='log', xlabel='latency [ms]', title='all streams',
+
+def draw(path: Path, logs: Sequence[AnswerLog]) -> None:
+    """Draw, for each node, which share of its answers takes at least how long."""
+    drawing = figure((7.0, 4.5))
+    axis = drawing.subplots()
+    axis.set(xscale='log', yscale='log', xlabel='latency [ms]',
              ylabel='share of answers that take at least as long')
-    for node, color in colors.items():
-        latencies = np.sort(all_latencies(results, node))
-        if latencies.size:
-            # Share of the answers that took longer than the i-th, itself counted: never zero.
-            share = np.arange(latencies.size, 0, -1) / latencies.size
-            axis.step(latencies, share, where='post', color=color, label=node)
-    if axis.lines:
-        axis.legend()
-
-
-def _draw_streams(axis: Axes, results: Sequence[StreamResult], colors: Mapping[str, str]) -> None:
-    names = list(dict.fromkeys(result.stream for result in results))
-    axis.set(xscale='log', xlabel='latency [ms]', title='min to p99.9; dots: p50, p99',
-             yticks=[-row for row in range(len(names))], yticklabels=names)
-    for result in results:
-        if not result.answered:
-            continue
-        row = list(colors).index(result.node)
-        height = -names.index(result.stream) + 0.2 * (len(colors) / 2 - row)
-        least, p50, p99, p999 = percentiles(1e3 * result.latencies, 0, 50, 99, 99.9)
-        axis.plot([least, p999], [height] * 2, color=colors[result.node])
-        axis.plot([p50, p99], [height] * 2, 'o', markersize=4, color=colors[result.node])
-
-
-def _draw_errors(axis: Axes, results: Sequence[StreamResult], colors: Mapping[str, str]) -> None:
-    height = log_errors(axis, *ERRORS, zero='0')
-    axis.set(xscale='log', xlabel='latency, p50 [ms]', ylabel='point error, median to p99 [mm]',
-             title='error against latency')
-    markers = dict(zip(dict.fromkeys(result.stream for result in results), MARKERS))
-    for result in results:
-        if result.node == 'echo' or not result.point_errors.size:
-            continue
-        color, latency = colors[result.node], 1e3 * result.latency['p50']
-        low, high = map(height, percentiles(1e3 * result.point_errors, 50, 99))
-        axis.plot([latency] * 2, [low, high], color=color, alpha=0.4)
-        axis.plot(latency, low, markers.get(result.stream, 'o'), color=color)
-    for name, marker in markers.items():  # the shape tells the stream, whatever the node
-        axis.plot([], [], marker, color='black', label=name)
-    floor = all_latencies(results, 'echo')
-    if floor.size:
-        axis.axvline(float(np.median(floor)), color=colors['echo'], linestyle='--', label='echo')
-    axis.xaxis.set_minor_formatter(LogFormatter(minor_thresholds=(1.0, 0.4)))
-    axis.legend(fontsize='small', loc='center left', bbox_to_anchor=(1.0, 0.5))
+    for node in dict.fromkeys(log.node for log in logs):
+        latencies = np.sort(np.concatenate([log.latencies for log in logs if log.node == node]))
+        latencies = 1e3 * latencies[~np.isnan(latencies)]
+        # The i-th answer itself is counted, so the share is never zero.
+        share = np.arange(latencies.size, 0, -1) / max(1, latencies.size)
+        axis.step(latencies, share, where='post', color=COLORS[node], label=f'{node} node')
+    axis.grid(alpha=0.3)
+    axis.legend()
+    drawing.savefig(path)

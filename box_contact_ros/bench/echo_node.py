@@ -1,49 +1,46 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""The echo node: answers every pair of poses with its stamp, and computes nothing.
+"""The echo node: answers every pair of poses with a fixed point and normal, and computes nothing.
 
-It is the floor of the bench: what transport and executor alone cost. It subscribes box_a/pose and
-box_b/pose as the contact node does. It answers on echo (std_msgs/Header) once poses of equal stamp
-are in. Messages stay the bytes they come as; no faster answer can be given from Python.
+Its latency is that of transport and executor alone: the floor of the bench. It subscribes
+box_a/pose and box_b/pose as the contact node does. Once poses of equal stamp are in, it publishes
+echo/contact/point and echo/contact/normal under that stamp. Messages stay the bytes they come as.
 
-It is served as the contact node is, or, with --bare, as any node on this executor: without
-`runtime.let_callbacks_finish`.
-
-`python -m box_contact_ros.bench.echo_node [--bare]`; for the bench, not a program of
-its own.
+`python -m box_contact_ros.bench.echo_node`; for the bench, not a program of its own.
 """
 from __future__ import annotations
 
 import gc
 import struct
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import PointStamped, PoseStamped, Vector3Stamped
 from rclpy.context import Context
 from rclpy.serialization import serialize_message
-from std_msgs.msg import Header
 
-from box_contact_ros.node.message_bytes import ENCAPSULATION
-from box_contact_ros.node.messages import NANOSECONDS
-from box_contact_ros.node.runtime import CONTACT_QOS, POSE_QOS, GuardedNode, run_node
-from box_contact_ros.scene.stamp_pairing import WAITING_TICKS
+from ..node.message_bytes import ENCAPSULATION
+from ..node.messages import NANOSECONDS, make_header
+from ..node.runtime import GuardedNode, run_node
+from ..node.topics import contact_qos, pose_qos
 
-STAMP = struct.Struct('=iI')  # behind the encapsulation; sender and receiver are one machine
+FRAME = 'world'  # of all poses of the bench
+MOST_WAITING = 1000  # poses whose partner may still come
+_STAMP = struct.Struct('=iI')  # behind the encapsulation; sender and receiver are one machine
 
 
 def raw_stamp(data: bytes) -> int:
     """Return the stamp [ns] of a serialised message that begins with a header."""
-    sec, nanosec = STAMP.unpack_from(data, ENCAPSULATION)
+    sec, nanosec = _STAMP.unpack_from(data, ENCAPSULATION)
     return sec * NANOSECONDS + nanosec
 
 
 def with_stamp(data: bytes, stamp: int) -> bytes:
     """Return a serialised message that begins with a header, under another stamp [ns]."""
-    packed = STAMP.pack(*divmod(stamp, NANOSECONDS))
-    return data[:ENCAPSULATION] + packed + data[ENCAPSULATION + STAMP.size:]
+    packed = _STAMP.pack(*divmod(stamp, NANOSECONDS))
+    return data[:ENCAPSULATION] + packed + data[ENCAPSULATION + _STAMP.size:]
 
 
 class EchoNode(GuardedNode):
@@ -52,28 +49,37 @@ class EchoNode(GuardedNode):
     def __init__(self, context: Context, **options: Any) -> None:
         super().__init__('echo_node', context=context, **options)
         self._waiting: dict[int, int] = {}  # box by stamp, oldest first
-        self._echo = self.create_publisher(Header, 'echo', CONTACT_QOS)
+        self._answers = [
+            (self.create_publisher(kind, f'echo/{topic}', contact_qos()),
+             serialize_message(kind(header=make_header(0, FRAME))))
+            for kind, topic in ((PointStamped, 'contact/point'),
+                                (Vector3Stamped, 'contact/normal'))]
         gc.collect()
         gc.freeze()
         for box, topic in enumerate(('box_a/pose', 'box_b/pose')):
-            self.create_subscription(PoseStamped, topic, self._pose_callback(box), POSE_QOS,
+            self.create_subscription(PoseStamped, topic, self._pose_callback(box), pose_qos(topic),
                                      raw=True)
         self.get_logger().info('ready')
 
     def _pose_callback(self, box: int) -> Callable[[bytes], None]:
-        waiting, echo = self._waiting, serialize_message(Header())
+        waiting = self._waiting
 
         def callback(data: bytes) -> None:
             stamp = raw_stamp(data)
             if waiting.pop(stamp, box) != box:
-                self._echo.publish(with_stamp(echo, stamp))
+                for publisher, message in self._answers:
+                    publisher.publish(with_stamp(message, stamp))
                 return
             waiting[stamp] = box
-            if len(waiting) > WAITING_TICKS:
+            if len(waiting) > MOST_WAITING:
                 del waiting[next(iter(waiting))]
         return callback
 
 
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the node until SIGINT or SIGTERM."""
+    return run_node(EchoNode, args)
+
+
 if __name__ == '__main__':
-    bare = sys.argv[1:2] == ['--bare']
-    sys.exit(run_node(EchoNode, sys.argv[1 + bare:], undisturbed=not bare))
+    sys.exit(main())

@@ -1,118 +1,82 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Streams of pose pairs for the bench: named, seeded, each with the box sizes it is meant for.
+"""Streams of pose pairs for the bench: seeded, and made before they are sent. No ROS.
 
-All poses of a stream are made before it is played, so that playing one costs nothing but sending.
+In both streams box B is on top of box A. Each pair has a random depth of B's lowest corner below
+A's top face. An answer that mixes two ticks therefore has a wrong depth. Some pairs are apart.
 """
 from __future__ import annotations
 
-import zlib
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
-from benchmarks import pose_sets
-from benchmarks.pose_sets import CONTAINER, CUBE, SETS, Pairs, coplanar, drawn
-from box_contact_ros.scene.scene_solver import Box, Pair, Scene
-from box_contact_ros.view.recording.stream import Size, Stream
+from ..scene.pose import quaternion_multiply, rotation_matrix
 
-GAPS = (1e-3, 1.0)  # least and largest SAT gap of the pairs that are apart [m]
-
-
-def separated(rng: np.random.Generator, n: int) -> Pairs:
-    """Draw cubes of edge 2 in any pose, apart by a SAT gap of 1 mm to 1 m."""
-    sizes = np.tile(CUBE, (n, 1))
-    return pose_sets.any_pose(rng, sizes, sizes, -pose_sets.log_uniform(rng, *GAPS, n))
+CONTAINER = (12.192, 2.438, 2.591)  # full extents of a 40 ft container [m]
+CUBE = (2.0, 2.0, 2.0)  # of the source paper's cubes [m]
+CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+"""Of a box, as shares of its size."""
+STREAMS = 2  # how many there are
+APART = 0.1  # how far boxes are apart at most, as a share of how deep they are at most
 
 
-def crane_run(rng: np.random.Generator, n: int) -> Pairs:
-    """Lower a container onto another by a crane and lift it: the whole motion, in n poses.
+@dataclass(frozen=True, kw_only=True)
+class Stream:
+    """Pairs of poses for two boxes of one size."""
 
-    The motion takes 18 s; it is played faster or slower if n poses take another time to send.
+    name: str
+    size: tuple[float, float, float]  # full extents of both boxes [m]
+    poses_a: np.ndarray  # (n, 7), x y z qx qy qz qw
+    poses_b: np.ndarray  # (n, 7), in the same frame
+
+
+def make_streams(count: int, *, rate: float, seed: int = 1) -> list[Stream]:
+    """Return all streams, each of `count` pairs; the same for the same seed.
+
+    rate: pairs per second [Hz], by which the containers' motion is sampled.
     """
-    from box_contact_ros.demo.mujoco_crane import (  # only here: MuJoCo is an extra
-        Crane,
-        CraneScenario,
-    )
-
-    scenario = CraneScenario.drawn(int(rng.integers(1, 2**31)))
-    crane = Crane(scenario, n / scenario.duration)
-    a, b = np.empty((n, 7)), np.empty((n, 7))
-    for row in range(n):
-        a[row], b[row] = crane.load_pose, crane.stack_pose
-        crane.step()
-    return Pairs(a, b, np.tile(scenario.size, (n, 1)), np.tile(scenario.stack_size, (n, 1)))
+    return [swaying_containers(np.random.default_rng([seed, 0]), count, rate),
+            touching_cubes(np.random.default_rng([seed, 1]), count)]
 
 
-@dataclass(frozen=True)
-class StreamSource:
-    """Where a stream comes from: how it is drawn, the size of both boxes [m], what it is."""
-
-    draw: Callable[[np.random.Generator, int], Pairs]
-    size: Size
-    description: str
-
-
-STREAMS: dict[str, StreamSource] = {name: StreamSource(*source) for name, source in {
-    'random': (partial(drawn, SETS['random cubes']), CUBE,
-               'cubes in any pose, 0.1 to 10 % deep'),
-    'touching': (partial(drawn, SETS['touching']), CUBE, 'cubes in any pose that just touch'),
-    'near-parallel': (partial(drawn, SETS['stacks']), CUBE,
-                      'stacked cubes, tilt 1e-6 to 1e-3 rad, 1 mm deep'),
-    'coplanar': (coplanar, CUBE, 'stacked cubes, faces exactly coplanar'),
-    'separated': (partial(drawn, separated), CUBE, 'cubes in any pose, 1 mm to 1 m apart'),
-    'containers': (partial(drawn, SETS['containers']), CONTAINER,
-                   '40 ft containers with sway, 0.1 to 10 % deep'),
-    'crane': (crane_run, CONTAINER, 'a recorded run of the crane'),
-}.items()}
-"""The streams by name; neighbours are for boxes of the same sizes."""
+def swaying_containers(rng: np.random.Generator, count: int, rate: float) -> Stream:
+    """Sway a 40 ft container on ropes close above another one, up to 2 cm deep."""
+    periods = np.array([6.3, 5.1, 3.7, 4.3, 7.9])  # of surge, sway, roll, pitch and yaw [s]
+    swings = np.array([0.2, 0.1, 0.01, 0.005, 0.03])  # their amplitudes [m] and [rad]
+    time = np.arange(count)[:, None] / rate
+    motion = swings * np.sin(2.0 * np.pi * (time / periods + rng.random(5)))
+    turns = _unit(np.column_stack([0.5 * motion[:, 2:], np.ones(count)]))
+    lowest = _lowest_corners(CONTAINER, turns)
+    heights = CONTAINER[2] / 2.0 - _depths(rng, count, 0.02) - lowest[:, 2]
+    return Stream(name='swaying containers', size=CONTAINER,
+                  poses_a=np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (count, 1)),
+                  poses_b=np.column_stack([motion[:, :2], heights, turns]))
 
 
-def make_stream(name: str, count: int, seed: int = 1) -> Stream:
-    """Return `count` pairs of a named stream; the same for the same seed.
-
-    Raises ValueError for a name that is not one of STREAMS or a count below 1.
-    """
-    if name not in STREAMS:
-        raise ValueError(f'stream {name!r} is not one of: {", ".join(STREAMS)}')
-    if count < 1:
-        raise ValueError(f'a stream needs 1 pair or more, not {count}')
-    source = STREAMS[name]
-    rng = np.random.default_rng([seed, zlib.crc32(name.encode())])
-    pairs = source.draw(rng, count)
-    return Stream(name, source.size, source.size, pairs.pose_a, pairs.pose_b)
+def touching_cubes(rng: np.random.Generator, count: int) -> Stream:
+    """Touch a cube in any pose by the corner of another one, up to 1 mm deep."""
+    turns_a, turns_b = _unit(rng.normal(size=(2, count, 4)))
+    places = np.column_stack([rng.uniform(-0.8, 0.8, (count, 2)),  # within A's face
+                              CUBE[2] / 2.0 - _depths(rng, count, 1e-3)])
+    centres = places - _lowest_corners(CUBE, turns_b)  # of B, in the frame of A
+    origins = rng.uniform(-10.0, 10.0, (count, 3))
+    moved = origins + np.einsum('nij,nj->ni', rotation_matrix(turns_a), centres)
+    return Stream(name='touching cubes', size=CUBE, poses_a=np.column_stack([origins, turns_a]),
+                  poses_b=np.column_stack([moved, quaternion_multiply(turns_a, turns_b)]))
 
 
-def by_sizes(streams: Sequence[Stream]) -> list[list[Stream]]:
-    """Group streams for boxes of the same sizes, in the order in which they first come."""
-    groups: dict[tuple[Size, Size], list[Stream]] = {}
-    for stream in streams:
-        groups.setdefault(stream.sizes, []).append(stream)
-    return list(groups.values())
+def _depths(rng: np.random.Generator, count: int, most: float) -> np.ndarray:
+    """Draw depths (count,) of up to `most` [m]; a few are negative: apart."""
+    return rng.uniform(-APART * most, most, count)
 
 
-SWING_TICKS = 100  # of a period of the crowd's motion
-STEPS = ((1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0), (0, 1, 1), (1, 0, 1))
-"""From a box of the crowd to its neighbours, the likeliest to touch first."""
+def _unit(quaternions: np.ndarray) -> np.ndarray:
+    return quaternions / np.linalg.norm(quaternions, axis=-1, keepdims=True)
 
 
-def crowd(boxes: int, seed: int = 1) -> tuple[Scene, np.ndarray]:
-    """Return cubes that swing in a block, five pairs a box, and poses (ticks, boxes, 7).
-
-    Neighbours are 1.1 edges apart and swing by 0.08 along each axis: some touch in every tick.
-    """
-    rng = np.random.default_rng([seed, boxes])
-    side = int(np.ceil(boxes ** (1 / 3)))
-    places = np.argwhere(np.ones((side, side, side)))[:boxes]
-    names = {tuple(place): f'b{number}' for number, place in enumerate(places)}
-    pairs = [Pair.between(name, names[other]) for step in STEPS for place, name in names.items()
-             if (other := tuple(np.add(place, step))) in names]
-    swing = np.arange(SWING_TICKS)[:, None, None] / SWING_TICKS + rng.random((boxes, 3))
-    poses = np.zeros((SWING_TICKS, boxes, 7))
-    poses[..., :3] = 1.1 * places + 0.08 * np.sin(2.0 * np.pi * swing)
-    poses[..., 6] = 1.0
-    return Scene({name: Box(name, (1.0, 1.0, 1.0)) for name in names.values()},
-                 tuple(pairs[:5 * boxes]), pose_array=True), poses
+def _lowest_corners(size: tuple[float, float, float], quaternions: np.ndarray) -> np.ndarray:
+    """Return the lowest corner (n, 3) of a turned box, from its centre [m]."""
+    corners = np.einsum('nij,kj->nki', rotation_matrix(quaternions), CORNERS * size)
+    return corners[np.arange(len(corners)), corners[:, :, 2].argmin(axis=1)]

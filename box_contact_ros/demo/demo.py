@@ -25,12 +25,20 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
+from ..node import processes
+from ..node.processes import (
+    DOMAINS,
+    END_PATIENCE,
+    Stop,
+    asked_to_end,
+    on_this_host,
+    printed,
+    program,
+)
 from ..solver.arguments import WholeNames, model_name, within
 from ..solver.models import model_names, models_with_patch
-from . import processes
 from .landing import LANDING_DURATION
 from .mujoco_crane import CraneScenario
-from .processes import DOMAINS, END_PATIENCE, Stop, asked_to_end, on_this_host, printed, program
 
 DOMAIN_VARIABLE = 'BOX_CONTACT_DEMO_DOMAIN'
 

@@ -29,10 +29,10 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..demo import processes
-from ..demo.processes import DOMAINS, Stop, asked_to_end, on_this_host, printed, program
+from ..node import processes
 from ..node.contact_program import PARAMETERS
 from ..node.parameters import outside_ros_args
+from ..node.processes import DOMAINS, Stop, asked_to_end, on_this_host, printed, program
 from ..node.runtime import REFUSALS, joined, spin_once
 from ..node.topics.scene_topics import MOST_PAIRS_WITH_TOPICS
 from ..scene.files.scene_file import read_scene

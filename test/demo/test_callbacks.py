@@ -25,8 +25,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from geometry_msgs.msg import PointStamped, PoseStamped
 from rclpy.parameter import Parameter
-from std_msgs.msg import Header
-from box_contact_ros.bench.bench_drive import BenchNode, echo_node
+from box_contact_ros.bench.bench_drive import BenchNode
 from box_contact_ros.bench.echo_node import EchoNode
 from box_contact_ros.demo.crane_node import CraneNode
 from box_contact_ros.view.recording.record import RecordNode
@@ -54,7 +53,8 @@ class Source(GuardedNode):
         super().__init__('source', context=context)
         self.out = [self.create_publisher(kind, topic, CONTACT_QOS) for kind, topic in (
             (PoseStamped, 'box_a/pose'), (PoseStamped, 'box_b/pose'), (PointStamped,
-            'contact/point'), ANSWERS['cloud'], (Header, 'echo'))]
+            'contact/point'), ANSWERS['cloud'], (PointStamped,
+            'echo/contact/point'))]
         self.create_timer(0.02, self.publish)
 
     def publish(self):
@@ -66,8 +66,7 @@ class Source(GuardedNode):
                               else publisher.msg_type())
 
 def nodes(context):
-    echo = echo_node('echo', poses='for_echo/')
-    return [Source(context), BenchNode(context, [echo], time.time_ns),
+    return [Source(context), BenchNode(context, {{'echo': 'for_echo/'}}),
             CraneNode(context), EchoNode(context),
             RecordNode(context, Path(sys.argv[1]), ['box_a/pose'], {{}}),
             ContactNode(context), ViewNode(context, 'contact_node'), MarkersNode(context),
@@ -75,7 +74,7 @@ def nodes(context):
 
 with joined(Source) as (source, executor):
     others = nodes(source.context)
-    others[3]._echo = SimpleNamespace(publish=fails)
+    others[3]._answers = [(SimpleNamespace(publish=fails), bytes(16))]
     for node in others:
         executor.add_node(node)
     until = time.monotonic() + {SECONDS}
@@ -97,7 +96,7 @@ def printed(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 
 @pytest.mark.parametrize('node, what', [
-    ('bench', 'echo'), ('crane', 'contact/point'), ('echo_node', 'box_b/pose'),
+    ('bench', 'echo/contact/point'), ('crane', 'contact/point'), ('echo_node', 'box_b/pose'),
     ('record', 'box_a/pose'), ('markers', 'box_[ab]/pose'),
     ('view', 'parameters of the contact node'), ('scene_driver', 'fails'),
     ('contact_node', '')])

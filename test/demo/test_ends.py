@@ -20,7 +20,7 @@ pytest.importorskip('rosbags')
 from children import children
 from ros_client import Client
 
-from box_contact_ros.demo.processes import Stop, asked_to_end
+from box_contact_ros.node.processes import Stop, asked_to_end
 from box_contact_ros.view import view
 from box_contact_ros.view.recording import bag_player
 

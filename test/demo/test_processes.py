@@ -13,13 +13,13 @@ import time
 
 import pytest
 
-from box_contact_ros.demo import processes
+from box_contact_ros.node import processes
 
 pytestmark = pytest.mark.usefixtures('signal_handlers')
 
 STORM = """
 import os, signal, threading, time
-from box_contact_ros.demo.processes import asked_to_end
+from box_contact_ros.node.processes import asked_to_end
 
 end = time.monotonic() + 2.0
 
@@ -83,7 +83,7 @@ def test_a_child_that_does_not_listen_is_killed(monkeypatch):
 
 ASKED = """
 import os, signal, time
-from box_contact_ros.demo import processes
+from box_contact_ros.node import processes
 
 with processes.left_when_asked():
     started = processes.start(['-c', 'import time; time.sleep(100.0)'])

@@ -24,7 +24,7 @@ from stranger import ANSWER_SECONDS, Stranger
 pytest.importorskip('mujoco')
 pytest.importorskip('rosbags')
 
-from box_contact_ros.bench.bench_drive import BenchNode, echo_node
+from box_contact_ros.bench.bench_drive import BenchNode
 from box_contact_ros.demo.crane_feedback import CraneFeedback
 from box_contact_ros.demo.crane_node import CraneNode
 from box_contact_ros.demo.crane_parameters import PARAMETERS, scenario_from
@@ -51,8 +51,7 @@ CLIENTS = {
     'record': lambda context, folder: RecordNode(
         context, folder / 'run', ['box_a/pose', 'box_b/pose', 'contact/point'], {}),
     'crane': lambda context, folder: CraneNode(context),
-    'bench': lambda context, folder: BenchNode(
-        context, [echo_node('echo', poses='for_echo/')], time.time_ns),
+    'bench': lambda context, folder: BenchNode(context, {'echo': 'for_echo/'}),
 }
 FLOOD = 50
 UNKNOWN_TYPE = 77

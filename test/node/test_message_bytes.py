@@ -17,7 +17,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import PointCloud2, PointField
 
 from box_contact_ros import ContactSolver
-from box_contact_ros.demo.answer_log import first_row, touch_in
+from box_contact_ros.bench.answer_log import first_row, touch_in
 from box_contact_ros.node.message_bytes import KEPT_FRAMES, RawMessages
 from box_contact_ros.node.messages import (
     CLOUD_ROW,
