@@ -25,7 +25,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from box_contact_ros import output
 from box_contact_ros.core import DEPTH_FLOOR, Stages, native, stages
 from box_contact_ros.resources import resource_path
 from box_contact_ros.solver.arguments import add_models, model_name, program_parser, within
@@ -33,7 +32,7 @@ from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.models import ModelEntry, models
 from box_contact_ros.solver.weights_file import WeightsError, load_weights
 
-from . import searched
+from . import output, searched
 from .contestant import Contestant, ours
 from .errors import ContactErrors, contact_errors
 from .paper import dataset

@@ -15,8 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from box_contact_ros import output
-
+from . import output
 from .speed import SHARED, UNIT
 from .timing import by_round
 

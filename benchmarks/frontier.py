@@ -25,17 +25,17 @@ from contextlib import suppress
 from dataclasses import asdict
 from inspect import getdoc
 
-from box_contact_ros import output
 from box_contact_ros.core import FORCE, instruction_sets, native
-from box_contact_ros.output import markdown_table, number
 from box_contact_ros.solver.arguments import program_parser
 from box_contact_ros.solver.models import models, models_with_patch
 
+from . import output
 from .accuracy import CLASSES
 from .contestant import Contestant, ours, packages_of
 from .engines import installed
 from .frontier_picture import draw
 from .native import write_native
+from .output import markdown_table, number
 from .speed import with_instruction_set, write_speed
 from .timing import pinned, usable_cores
 from .trials import (

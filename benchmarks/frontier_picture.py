@@ -13,7 +13,7 @@ import math
 import sys
 from pathlib import Path
 
-from box_contact_ros import output
+from . import output
 
 SHOWN_SET, EDGE = 'containers', 12.192e3
 """The set of poses that is drawn, and its longest edge [mm], which errors are a share of."""

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from box_contact_ros import output
+from . import output
 
 RUNS = {'node alone, 1 kHz': '1000-in-turn', 'side by side, 200 Hz': '200-side-by-side',
         'side by side, 1 kHz': '1000-side-by-side'}

@@ -23,9 +23,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+import box_contact_ros
 from box_contact_ros.core import FORCE, instruction_sets, native
-from box_contact_ros.output import (
-    PACKAGE,
+
+from .output import (
     machine,
     markdown_table,
     number,
@@ -33,7 +34,6 @@ from box_contact_ros.output import (
     percentiles,
     write_csv,
 )
-
 from .pose_sets import LOADS, SETS, Pairs
 from .speed import flush_stacks
 from .timing import pinned, usable_cores
@@ -105,7 +105,7 @@ def compiled(folder: Path) -> tuple[Path, list[str]]:
     if spec is None or spec.origin is None:
         raise RuntimeError("MuJoCo is not installed: pip install -e '.[sim]'")
     mujoco = Path(spec.origin).parent
-    library, ours = next(mujoco.glob('libmujoco.so*')), PACKAGE / 'core'
+    library, ours = next(mujoco.glob('libmujoco.so*')), Path(box_contact_ros.__file__).parent / 'core'
     names, flags, missing = ['main', 'mujoco', 'ours'], list[str](), list[str]()
     for name in OPTIONAL:
         found = package_flags(name)

@@ -20,11 +20,11 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
 
-from box_contact_ros.output import results_folder
 from box_contact_ros.solver.arguments import program_parser
 
 from . import latency
 from .compare import compare
+from .output import results_folder
 
 OUT = '{out}'  # stands for the folder of the results
 

@@ -15,13 +15,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from box_contact_ros import output
 from box_contact_ros.core import native
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.solver.mlp import NETWORK, core_numbers, load_mlp
 from training.worst_case import RESTART, climb, worst_start
 
+from . import output
 from .errors import contact_errors
 from .pose_sets import LOADS, SETS, Pairs
 from .steps import drawn_paths, largest_steps

@@ -24,13 +24,13 @@ from typing import Any
 import numpy as np
 
 from box_contact_ros.core import FORCE, instruction_sets, native
-from box_contact_ros.output import machine, markdown_table, percentiles, write_csv
-from box_contact_ros.output import page as filled_page
 from box_contact_ros.scene.pose import quaternion_multiply
 from box_contact_ros.solver.models import models_with_patch
 
 from .contestant import in_subprocess, ours
 from .engines import installed
+from .output import machine, markdown_table, percentiles, write_csv
+from .output import page as filled_page
 from .pose_sets import CONTAINER, CUBE, SETS, Pairs, drawn, log_uniform, turns
 from .timing import Timing, nanoseconds, pinned, timed, usable_cores
 

@@ -12,12 +12,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from box_contact_ros.core import native
-from box_contact_ros.output import percentiles
 from box_contact_ros.scene.pose import degrees_between
 
 from .accuracy import CLASSES, classify
 from .contestant import APART, Contestant, chosen, part_by_part
 from .errors import point_errors
+from .output import percentiles
 from .pose_sets import (
     CONTAINER,
     SETS,

@@ -14,9 +14,11 @@ import re
 import sys
 from pathlib import Path
 
-from box_contact_ros.output import markdown_table, number, read_csv
-
 ROOT = Path(__file__).resolve().parents[1]
+sys.path.append(str(ROOT))  # where benchmarks/ is, which is not installed
+
+from benchmarks.output import markdown_table, number, read_csv  # noqa: E402
+
 RESULTS = ROOT / 'docs' / 'results'
 PAGES = [ROOT / 'README.md', *sorted((ROOT / 'docs').rglob('*.md'))]
 BLOCK = re.compile(r'(<!-- table ([\w-]+) -->\n).*?(<!-- end of table -->)', re.DOTALL)

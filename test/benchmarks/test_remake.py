@@ -12,11 +12,10 @@ import pytest
 
 pytest.importorskip('tqdm')
 
-from benchmarks import compare, latency, remake
+from benchmarks import compare, latency, output, remake
+from benchmarks.output import RESULTS
 from benchmarks.remake import REPORTS, Report
-from box_contact_ros import output
 from box_contact_ros.cli import PROGRAMS
-from box_contact_ros.output import RESULTS
 
 ROOT = Path(__file__).resolve().parents[2]
 

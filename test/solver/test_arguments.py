@@ -9,7 +9,7 @@ import importlib
 
 import pytest
 
-from box_contact_ros import output
+from benchmarks import output
 from box_contact_ros.cli import PROGRAMS
 from box_contact_ros.solver import arguments
 
