@@ -21,8 +21,7 @@ pytest.importorskip('benchmarks')
 
 from benchmarks.accuracy import limit_of
 from benchmarks.errors import contact_errors
-from benchmarks.pose_sets import LOADS, SETS, Pairs
-from benchmarks.speed import flush_stacks
+from benchmarks.pose_sets import LOADS, SETS, Pairs, flush_stacks
 from benchmarks.steps import drawn_paths, largest_steps
 from box_contact_ros import ContactSolver
 from box_contact_ros.core import (
