@@ -104,9 +104,9 @@ def packages_of(contestants: Sequence[Contestant]) -> list[str]:
     return list(dict.fromkeys(['numpy', *(one.package for one in contestants if one.package)]))
 
 
-def ours(model: Any, *, weights: str | None = None) -> Contestant:
-    """Return a model of this package by its name, or one of a user's own: see `ContactSolver`."""
-    name = model if isinstance(model, str) else type(model).__name__
+def ours(model: Any, *, weights: str | None = None, name: str = '') -> Contestant:
+    """Return a model of this package, or an object with `solve` under a name of its own."""
+    name = name or (model if isinstance(model, str) else type(model).__name__)
     solver = partial(ContactSolver, model=model, weights=weights)
 
     def solve(pairs: Pairs) -> Solved:
@@ -125,7 +125,8 @@ def ours(model: Any, *, weights: str | None = None) -> Contestant:
 
     return Contestant(
         name=name, patch='volume, covariance', choices=('its point',), boxes=solver,
-        at=lambda a, b: (a, b), read=read, solve=solve, any_boxes=not name.startswith('paper'),
+        at=lambda a, b: (a, b), read=read, solve=solve,
+        any_boxes=name != 'paper' and not hasattr(model, 'size_fault'),
         prepare_batch=None if name.startswith('soup') else prepare_batch)  # it loops over pairs
 
 

@@ -65,9 +65,9 @@ def test_every_program_is_listed() -> None:
 
 @pytest.mark.parametrize('name', listed())
 def test_a_listed_report_is_a_program(name: str) -> None:
-    """A module with `main(args)`, or a folder with such a `__main__`; it takes --quick and --out."""
-    spec = importlib.util.find_spec(name)
-    module = importlib.import_module(f'{name}.__main__' if spec.submodule_search_locations else name)
+    """A module, or a folder with `__main__`; its `main` takes --quick and --out."""
+    folder = importlib.util.find_spec(name).submodule_search_locations
+    module = importlib.import_module(f'{name}.__main__' if folder else name)
     with pytest.raises(SystemExit, match='0'):
         module.main(['--quick', '--out', 'folder', '--help'])
 

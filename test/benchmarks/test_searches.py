@@ -7,11 +7,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks import steps
+from benchmarks import steps, worst_case
 from benchmarks.errors import contact_errors
 from benchmarks.pose_sets import LOADS, SETS, Pairs
 from box_contact_ros import ContactSolver
-from training import worst_case
 
 N = 200
 
