@@ -31,14 +31,23 @@ from .contestant import CORE_MODELS, MODELS, Contestant, in_subprocess, ours, pa
 from .engines import installed
 from .output import markdown_table, number
 from .pose_sets import SETS, apart
-from .timing import pinned, usable_cores
-from .trials import FEW_PAIRS, FULL, QUICK, VERDICT, FrontierRow, Plan, measure_all
+from .timing import by_round, pinned, usable_cores
+from .trials import (
+    FEW_PAIRS,
+    FULL,
+    LONGEST_RUN,
+    QUICK,
+    VERDICT,
+    FrontierRow,
+    Plan,
+    measure_all,
+    rounds_of,
+)
 
 TIMED_SETS = {**SETS, 'just apart': apart}
 IN_SHORT = ('exact', 'mlp', 'paper', 'soup-8', 'soup-22')
 """Models in the first table, and with `--quick` all that are measured but the last."""
 ODD_NORMAL = 10.0  # error of an engine's normal that is explained [deg]
-LONGEST_RUN = 3600.0  # of a subprocess with one instruction set [s]
 
 SHOWN_SET, EDGE = 'containers', 12.192e3
 """The set of poses that is drawn, and its longest edge [mm], which errors are a share of."""
@@ -57,8 +66,13 @@ def measure_core(seed: int, plan: Plan) -> list[FrontierRow]:
     return measure_all(list(map(ours, CORE_MODELS)), TIMED_SETS, seed=seed, plan=plan)
 
 
+def by_exact(row: FrontierRow, rows: Iterable[FrontierRow]) -> list[float]:
+    """Return a call and a pair in a batch relative to `exact`: medians of the rounds' ratios."""
+    return by_round(row.rounds, rounds_of('exact', row, rows)).tolist()
+
+
 def odd_answers(rows: Sequence[FrontierRow], engines: Iterable[Contestant]) -> Iterator[str]:
-    """Yield a line with a pose and the cause for what is odd in the answers of other engines."""
+    """Yield a line with the cause for what is odd in the answers of other engines."""
     def oddness(row: FrontierRow, what: str) -> float:
         errors = row.errors
         return {'missed': errors.missed, 'invented': errors.invented,
@@ -71,11 +85,9 @@ def odd_answers(rows: Sequence[FrontierRow], engines: Iterable[Contestant]) -> I
             worst = max(mine, key=lambda row: oddness(row, what))
             amount = oddness(worst, what)
             if amount > (ODD_NORMAL if what == 'normal' else 0.0):
-                pose = worst.errors.odd.get(what)
                 yield (f'{engine.name}, {worst.set}: {worst.failure or f"{what} {amount:.3g}"}'
                        f'{"°" if what == "normal" else ""}. '
-                       f'{engine.causes.get(what) or "Cause unknown."}'
-                       + (f' First or worst: `{pose}`.' if pose else ''))
+                       f'{engine.causes.get(what) or "Cause unknown."}')
 
 
 def in_short(rows: Sequence[FrontierRow], engines: Iterable[Contestant]) -> str:
@@ -147,8 +159,9 @@ def page(rows: Sequence[FrontierRow], models: Sequence[Contestant], engines: Seq
         in_short=in_short(rows, engines), odd='\n'.join(
             f'{place}. {line}' for place, line in enumerate(odd_answers(rows, engines), start=1)
         ) or 'None.',
-        single=by['mlp', 'containers'].by_exact[0], containers=by['mlp', 'containers'].by_exact[1],
-        stacks=by['mlp', 'stacks'].by_exact[1],
+        single=by_exact(by['mlp', 'containers'], rows)[0],
+        containers=by_exact(by['mlp', 'containers'], rows)[1],
+        stacks=by_exact(by['mlp', 'stacks'], rows)[1],
         paper=by['paper', 'random cubes'].errors.points['all'][1],
         verdict=VERDICT, few_pairs=FEW_PAIRS, timed_pairs=plan.timed_pairs,
         calls=calls_table(engines), sets='\n\n'.join(
@@ -172,7 +185,7 @@ def csv_rows(rows: Sequence[FrontierRow], contestants: Sequence[Contestant],
                     **dict(zip(('point_p50', 'point_p99', 'point_worst'), point)),
                     **dict(zip(('call_p50', 'call_p99', 'call_max'), row.single)),
                     'calls': row.calls, 'batch_p50': row.batch,
-                    **dict(zip(('call_by_exact', 'batch_by_exact'), row.by_exact)),
+                    **dict(zip(('call_by_exact', 'batch_by_exact'), by_exact(row, rows))),
                     'judged': row.judged, 'normal_p99': errors.normal[0],
                     'normal_worst': errors.normal[1], 'missed': errors.missed,
                     'invented': errors.invented, 'exceptions': row.exceptions,

@@ -6,8 +6,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from .contestant import APART, Contestant, chosen, part_by_part
 from .errors import point_errors
 from .output import percentiles
 from .pose_sets import Generator, Pairs, drawn
-from .timing import Timing, by_round, each_call, take_turns
+from .timing import after_warm_up, each_call, take_turns
 
 FEW_PAIRS = 17
 """Pairs that are prepared at once where more pairs of sizes than that are among them. Odd, so that
@@ -27,6 +27,7 @@ a median is the time of one pair, not between two that may differ tenfold."""
 LEAST_PAIRS = 10  # pairs judged, whatever they take
 ROUND_SECONDS = 0.025  # least time of a round's single calls; a round ends with its last pair
 PATIENCE = 120.0  # for an engine's answers in a subprocess [s]
+LONGEST_RUN = 3600.0  # of a subprocess with one instruction set [s]
 VERDICT = 1e-9
 """Least gap or depth, of the size, at which verdicts and normals are judged. At exact touch both
 verdicts are right, and a normal may be any that keeps the boxes apart."""
@@ -61,8 +62,6 @@ class SetErrors:
     normal: tuple[float, float]  # p99 and worst of the normal's error [deg]; NaN: none was judged
     missed: int
     invented: int
-    odd: Mapping[str, str] = field(default_factory=dict)
-    """The pairs of the first missed, the first invented contact, the worst normal, in words."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,8 +85,7 @@ class FrontierRow:
     calls: int
     single: tuple[float, ...]  # p50, p99, max of a call [ns]
     batch: float  # p50 of a pair in a batch [ns]
-    by_exact: list[float]
-    """Single call and batch by those of `exact`: medians over the rounds of their own ratios."""
+    rounds: np.ndarray  # (rounds, 2): the median single call, and a pair in a batch [ns]
     choices: dict[str, SetErrors]  # by the way in which a point was made
     exceptions: int = 0
     failure: str = ''  # what ended the engine before its answers, if anything
@@ -102,6 +100,12 @@ class FrontierRow:
     def errors(self) -> SetErrors:
         """Return the errors of the best choice."""
         return self.choices[self.best]
+
+
+def rounds_of(name: str, like: FrontierRow, rows: Iterable[FrontierRow]) -> np.ndarray:
+    """Return the rounds of a contestant on the set and in the run of another's row; NaN: none."""
+    return next((row.rounds for row in rows if (row.name, row.set, row.instruction_set)
+                 == (name, like.set, like.instruction_set)), np.full((1, 2), math.nan))
 
 
 def judge(pairs: Pairs, colliding: np.ndarray, normals: np.ndarray, points: np.ndarray,
@@ -120,18 +124,9 @@ def judge(pairs: Pairs, colliding: np.ndarray, normals: np.ndarray, points: np.n
     clear = np.abs(truth.separation) > VERDICT * pairs.size
     rows = np.flatnonzero(both & clear & np.isfinite(normals).all(axis=1))
     angles = degrees_between(normals[rows], truth.normal[rows])
-    odd = {'missed': np.flatnonzero(truth.colliding & ~colliding & clear),
-           'invented': np.flatnonzero(colliding & ~truth.colliding & clear),
-           'normal': rows[np.argsort(-angles)[:1]]}
     return SetErrors(points=by_class, normal=percentiles(angles, 99, 100),
-                     missed=len(odd['missed']), invented=len(odd['invented']),
-                     odd={what: _in_words(pairs, which[0]) for what, which in odd.items()
-                          if len(which)})
-
-
-def _in_words(pairs: Pairs, row: int) -> str:
-    return '; '.join(f'{name} {tuple(part[row].tolist())}' for name, part in zip(
-        ('pose A', 'pose B', 'size A', 'size B'), pairs))
+                     missed=int((truth.colliding & ~colliding & clear).sum()),
+                     invented=int((colliding & ~truth.colliding & clear).sum()))
 
 
 def ask(engine: Contestant, pairs: Pairs, plan: Plan) -> Answers:
@@ -199,33 +194,28 @@ class Trial:
         timed = pairs.rows(slice(plan.timed_pairs))
         works = not self._failure and not self._answers.exceptions
         self._calls = engine.prepare(timed.rows(slice(_at_once(timed)))) if works else []
-        self._batch = Timing(name=engine.name, kind='batch', count=len(pairs.size),
-                             run=engine.prepare_batch(pairs)
-                             ) if works and engine.prepare_batch else None
+        self._batch = engine.prepare_batch(pairs) if works and engine.prepare_batch else None
         for call in self._calls:  # what is made at a pair's first call is not timed
             call()
         self._singles: list[np.ndarray] = []
-        self.rounds: list[tuple[float, float]] = []
-        """Of each round: the median single call, and a pair in a batch [ns]."""
+        self._batches: list[float] = []
 
     def time(self) -> None:
         """Time one round, after a warm-up: all single calls, again and again, then a batch."""
         self._singles.append(np.array(each_call(self._calls, ROUND_SECONDS), np.int64))
-        if self._batch:
-            self._batch.time()
-        self.rounds.append((percentiles(self._singles[-1], 50)[0],
-                            self._batch.rounds[-1] if self._batch else math.nan))
+        self._batches.append(after_warm_up(self._batch, len(self._pairs.size)) if self._batch
+                             else math.nan)
 
-    def row(self, exact: Trial) -> FrontierRow:
-        """Return the errors and times; times also by those of `exact` in the same rounds."""
+    def row(self) -> FrontierRow:
+        """Return the errors and times."""
         answers, singles = self._answers, np.concatenate(self._singles)
         first = self._pairs.rows(slice(len(answers.colliding)))
         return FrontierRow(
             name=self.name, set=self.set, instruction_set=native.instruction_set,
             judged=len(answers.colliding), calls=len(singles),
             single=percentiles(singles, 50, 99, 100),
-            batch=float(np.median([batch for _, batch in self.rounds])),
-            by_exact=by_round(self.rounds, exact.rounds).tolist(),
+            batch=float(np.median(self._batches)), rounds=np.column_stack([
+                [percentiles(times, 50)[0] for times in self._singles], self._batches]),
             choices={choice: judge(first, answers.colliding, answers.normals, points)
                      for choice, points in answers.points.items()},
             exceptions=answers.exceptions, failure=self._failure)
@@ -247,5 +237,4 @@ def measure_all(engines: Sequence[Contestant], generators: Mapping[str, Generato
               for engine, given in zip(engines, answers) if name in given]
     with tqdm(total=len(trials) * plan.rounds, desc='times', unit='round') as bar:
         take_turns([trial.time for trial in trials], plan.rounds, bar.update)
-    exact = {trial.set: trial for trial in trials if trial.name == 'exact'}
-    return [trial.row(exact[trial.set]) for trial in trials]
+    return [trial.row() for trial in trials]

@@ -68,7 +68,6 @@ def test_wrong_verdicts_are_counted(name: str, flipped: object, expected: tuple[
     colliding[flipped] ^= True
     found = trials.judge(pairs, colliding, normals, points)
     assert (found.missed, found.invented) == expected
-    assert [what in found.odd for what in ('missed', 'invented')] == [n > 0 for n in expected]
 
 
 # --- contestants ----------------------------------------------------------------------------------
@@ -132,17 +131,16 @@ def test_aborts_and_exceptions_are_findings() -> None:
     plan, engine, row = dataclasses.replace(trials.QUICK, subprocesses=True), aborting(), {}
     found = trials.answers_of(engine, sets, plan)
     for name, pairs in sets.items():
-        exact, trial = (trials.Trial(one, name, pairs, given, plan) for one, given in (
-            (ours('exact'), trials.ask(ours('exact'), pairs, plan)), (engine, found[name])))
-        take_turns([exact.time, trial.time], plan.rounds)
-        row[name] = trial.row(exact)
+        trial = trials.Trial(engine, name, pairs, found[name], plan)
+        take_turns([trial.time], plan.rounds)
+        row[name] = trial.row()
     assert row['random cubes'].failure == 'ended by signal 6'
     assert (row['random cubes'].judged, row['random sizes'].failure) == (0, '')
     assert row['random sizes'].errors.points['all'][1:] == (0.0, 0.0, 0.0)
-    assert row['random sizes'].by_exact[0] > 0.0 and math.isnan(row['random sizes'].by_exact[1])
+    assert (row['random sizes'].rounds[:, 0] > 0.0).all() and row['random sizes'].calls > 30
     assert row['containers'].exceptions == row['containers'].judged > 10
-    failure, missed = sorted(frontier.odd_answers(list(row.values()), [engine]), key=len)
-    assert 'ended by signal 6' in failure and 'missed' in missed and 'pose A (' in missed
+    missed, failure = frontier.odd_answers(list(row.values()), [engine])
+    assert 'ended by signal 6' in failure and 'containers: missed 30' in missed
 
 
 def test_the_centroid_of_a_polygon() -> None:

@@ -64,12 +64,16 @@ def test_every_program_is_listed() -> None:
 
 
 @pytest.mark.parametrize('name', listed())
-def test_a_listed_report_is_a_program(name: str) -> None:
+def test_a_listed_report_is_a_program(name: str, tmp_path: Path) -> None:
     """A module, or a folder with `__main__`; its `main` takes --quick and --out."""
     folder = importlib.util.find_spec(name).submodule_search_locations
     module = importlib.import_module(f'{name}.__main__' if folder else name)
     with pytest.raises(SystemExit, match='0'):
         module.main(['--quick', '--out', 'folder', '--help'])
+    (tmp_path / 'file').write_text('mine')  # is refused before the work
+    with pytest.raises(SystemExit, match='2'):
+        module.main(['--quick', '--out', str(tmp_path / 'file')])
+    assert (tmp_path / 'file').read_text() == 'mine'
 
 
 def test_numbers_are_readable() -> None:

@@ -4,15 +4,29 @@
 """The output module: tables, CSV files, percentiles, and the machine's description."""
 from __future__ import annotations
 
+import argparse
 import csv
 import math
 from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from box_contact_ros import output
 from box_contact_ros.core import native
+
+
+def test_folders_are_made_before_the_work(tmp_path: Path,
+                                          capsys: pytest.CaptureFixture[str]) -> None:
+    """Nothing is left in them; a file in the place of one is refused, and kept."""
+    parser = argparse.ArgumentParser()
+    assert not list(output.make_folder(parser, tmp_path / 'a' / 'b').iterdir())
+    (tmp_path / 'file').write_text('mine')
+    with pytest.raises(SystemExit, match='2'):
+        output.make_folder(parser, tmp_path / 'file')
+    assert f'cannot write to {tmp_path}/file (File exists)' in capsys.readouterr().err
+    assert (tmp_path / 'file').read_text() == 'mine'
 
 
 def test_a_table_has_its_words_to_the_left() -> None:
