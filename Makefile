@@ -72,24 +72,24 @@ check:
 # The reports run one after the other, as most of them measure time; each runs though one before it
 # failed. With ARGS=--quick results go to quick-results/, and docs/ stays as it is.
 RESULTS := $(if $(filter --quick,$(ARGS)),quick-results,docs/results)
-BENCH := box_contact_ros.bench.bench
+BENCH := box_contact_ros.bench.bench --duration $(if $(filter --quick,$(ARGS)),6,90)
 reports:
 	@.ci/setup reports
 	failed=
-	report() { echo "== $$*"; $(PY) -m "$$@" $(ARGS) || failed+=" $$1"; }
-	report benchmarks.accuracy
-	report benchmarks.stability
-	report benchmarks.fuzz
-	report benchmarks.landing
-	report benchmarks.rest
-	report benchmarks.frontier
-	report benchmarks.native
-	report benchmarks.speed
-	report benchmarks.paper
-	report benchmarks.paper.search
-	report $(BENCH) --rate 200 --duration 30 --side-by-side --out $(RESULTS)/bench/200-side-by-side
-	report $(BENCH) --rate 1000 --duration 30 --side-by-side --out $(RESULTS)/bench/1000-side-by-side
-	report $(BENCH) --rate 1000 --duration 90 --out $(RESULTS)/bench/1000-in-turn
+	run() { echo "== $$*"; $(PY) -m "$$@" || failed+=" $$1"; }
+	run benchmarks.accuracy $(ARGS)
+	run benchmarks.stability $(ARGS)
+	run benchmarks.fuzz $(ARGS)
+	run benchmarks.landing $(ARGS)
+	run benchmarks.rest $(ARGS)
+	run benchmarks.frontier $(ARGS)
+	run benchmarks.native $(ARGS)
+	run benchmarks.speed $(ARGS)
+	run benchmarks.paper $(ARGS)
+	run benchmarks.paper.search $(ARGS)
+	run $(BENCH) --rate 200 --side-by-side --out $(RESULTS)/bench/200-side-by-side
+	run $(BENCH) --rate 1000 --side-by-side --out $(RESULTS)/bench/1000-side-by-side
+	run $(BENCH) --rate 1000 --out $(RESULTS)/bench/1000-in-turn
 	if [ $(RESULTS) = docs/results ]; then
 	    for figures in docs/figures/make_*.py; do $(PY) $$figures || failed+=" $$figures"; done
 	    $(PY) docs/tables.py || failed+=' docs/tables.py'

@@ -65,8 +65,8 @@ PAIRS, QUICK_PAIRS = 100_000, 5_000
 CLASSES = ('vertex-face', 'edge-edge', 'edge-face', 'face-face')
 WINNERS = ('face axis', 'edge axis')
 SHOWN = (1e-6, 1.0)  # errors that are drawn [%]
-MARKS = {('o', 'half of the pairs'): 50.0, ('|', '99 %'): 99.0, ('D', 'worst pair'): 100.0}
-"""What is drawn of a set: marks, their names, and percentiles."""
+MARKS = {'o': 'half of the pairs', '|': '99 %', 'D': 'worst pair'}
+"""What is drawn of a set."""
 FACE_LIKE = math.cos(math.radians(6.0))
 """Cosine of the angle to a face's normal up to which an edge pair's axis stands for the face."""
 
@@ -112,47 +112,48 @@ def outside(pairs: Pairs, contacts: Contacts) -> float:
     return float(np.max(beyond[contacts.colliding], initial=0.0))
 
 
+class Summary(NamedTuple):
+    """Errors of some pairs, in %."""
+
+    pairs: int
+    mean: float
+    p50: float
+    p99: float
+    worst: float
+
+
+def by_part(errors: np.ndarray, classes: np.ndarray, winners: np.ndarray) -> dict[str, Summary]:
+    """Return errors (n,) of all pairs, per class and per winner; empty parts are left out."""
+    rows = {'all': np.ones(len(errors), bool)}
+    rows |= {name: classes == k for k, name in enumerate(CLASSES)}
+    rows |= {name: winners == k for k, name in enumerate(WINNERS)}
+    parts = {name: errors[chosen] for name, chosen in rows.items() if chosen.any()}
+    return {name: Summary(len(part), float(part.mean()), *output.percentiles(part, 50, 99, 100))
+            for name, part in parts.items()}
+
+
 @dataclass(frozen=True, kw_only=True)
 class AccuracyRow:
-    """One model on one set."""
+    """One model on one set. The errors are those of pairs that touch by the model and `exact`."""
 
     model: str
     set: str
-    errors: ContactErrors  # of the n pairs that touch by both
-    classes: np.ndarray  # (n,) index into CLASSES
-    winners: np.ndarray  # (n,) index into WINNERS
+    errors: Mapping[str, Mapping[str, Summary]]  # by field of `ContactErrors`, then by part
     pairs: int
     exact_share: float  # share of contacts answered by `exact`
-    verdict_errors: int
-    normal_difference: float  # largest difference of a component
-    separation_difference: float  # largest, of the size
     outside: float  # farthest point outside a box, of the size
-
-    @property
-    def quantities(self) -> tuple[str, ...]:
-        """Return the fields of `ContactErrors` that the model gives."""
-        return ContactErrors._fields if np.isfinite(self.errors.volume).all() else ('point',)
-
-    def parts(self) -> dict[str, ContactErrors]:
-        """Return errors of all pairs, per class and per winner; empty parts are left out."""
-        rows = {'all': self.classes >= 0}
-        rows |= {name: self.classes == k for k, name in enumerate(CLASSES)}
-        rows |= {name: self.winners == k for k, name in enumerate(WINNERS)}
-        return {name: self.errors.rows(chosen) for name, chosen in rows.items() if chosen.any()}
 
     def broken(self) -> list[str]:
         """Return the limits of `mlp` that do not hold, in words."""
         if self.model != 'mlp':
             return []
         share = OF_BARS if self.set == 'crossed bars' else EXACT_SHARE
-        found = {f'{quantity}, p99': (statistics(errors)[1], limit_of(quantity, self.set))
-                 for quantity, errors in self.errors._asdict().items()}
-        found |= {'verdicts that differ': (self.verdict_errors, 0),
-                  'normals off by': (self.normal_difference, 0),
-                  'separations off by': (self.separation_difference, 0),
-                  'points outside by': (self.outside, OUTSIDE),
-                  'left to exact': (self.exact_share, share)}
-        return over(f'mlp, {self.set}', found)
+        found: dict[str, tuple[float, float]] = {
+            f'{quantity}, p99': (parts['all'].p99, limit_of(quantity, self.set))
+            for quantity, parts in self.errors.items()}
+        return over(f'mlp, {self.set}', {
+            **found, 'points outside by': (self.outside, OUTSIDE),
+            'left to exact': (self.exact_share, share)})
 
 
 def over(what: str, found: Mapping[str, tuple[float, float]]) -> list[str]:
@@ -175,13 +176,10 @@ def measure(model: Contestant, name: str, pairs: Pairs, truth: Contacts) -> Accu
     errors = contact_errors(*(Contacts(*(part[both] for part in answer))
                               for answer in (contacts, truth)), touching.edge)
     return AccuracyRow(
-        model=model.name, set=name, errors=errors, classes=classes,
-        winners=winners, pairs=len(both),
+        model=model.name, set=name, pairs=len(both),
+        errors={quantity: by_part(values, classes, winners) for quantity, values
+                in errors._asdict().items() if np.isfinite(values).all()},
         exact_share=left_to_exact / max(1, int(contacts.colliding.sum())),
-        verdict_errors=int((contacts.colliding != truth.colliding).sum()),
-        normal_difference=float(np.abs(contacts.normal - truth.normal)[both].max(initial=0.0)),
-        separation_difference=float(
-            (np.abs(contacts.separation - truth.separation) / pairs.size).max(initial=0.0)),
         outside=outside(pairs, contacts))
 
 
@@ -195,11 +193,6 @@ def measure_all(models: Sequence[Contestant], count: int, seed: int) -> list[Acc
         truth = pairs.contacts()
         rows += [measure(model, name, pairs, truth) for model in models]
     return [row for model in models for row in rows if row and row.model == model.name]
-
-
-def statistics(errors: np.ndarray) -> tuple[float, float, float]:
-    """Return mean, 99th percentile, worst."""
-    return (float(errors.mean()), *output.percentiles(errors, 99, 100))
 
 
 def paper_errors(model: Contestant, step: int = 1) -> tuple[np.ndarray, int]:
@@ -235,43 +228,37 @@ def paper_table(errors: Mapping[str, np.ndarray]) -> str:
     return markdown_table(['', *PAPER[1], 'point MAE', 'normal MAE', 'patterns'], rows)
 
 
-def table(rows: Sequence[AccuracyRow]) -> str:
-    """Return what may not differ at all, and the share of contacts that `mlp` leaves to `exact`."""
-    lines = [[f'{r.model}, {r.set}', f'{r.pairs:,}', f'{100.0 * r.exact_share:.3g} %',
-              r.verdict_errors, f'{r.normal_difference:.2g}', f'{r.separation_difference:.2g}',
-              f'{r.outside:.1g}'] for r in rows]
-    return markdown_table(['model, set', 'pairs', 'left to exact', 'verdicts wrong',
-                           'normal off', 'separation off', 'outside'], lines)
-
-
 def error_table(rows: Sequence[AccuracyRow]) -> str:
-    """Return mean/p99/worst of each quantity over whole sets, with the limits of p99."""
+    """Return mean/p99/worst of each quantity over whole sets, with the limits of p99.
+
+    Then come the share of contacts left to `exact`, and the farthest point outside a box.
+    """
     def cell(row: AccuracyRow, quantity: str) -> str:
-        if quantity not in row.quantities:
+        if quantity not in row.errors:
             return ''
-        return ' / '.join(f'{value:.2g}' for value in statistics(getattr(row.errors, quantity)))
+        errors = row.errors[quantity]['all']
+        return f'{errors.mean:.2g} / {errors.p99:.2g} / {errors.worst:.2g}'
 
     lines = [[f'{r.model}, {r.set}', *(cell(r, name) for name in ContactErrors._fields),
               ' / '.join(f'{limit_of(name, r.set):g}' for name in ContactErrors._fields)
-              if r.model == 'mlp' else ''] for r in rows]
-    return markdown_table(
-        ['model, set', 'point', 'volume', 'covariance', 'in-plane eigenvalues', 'limits of p99'],
-        lines)
+              if r.model == 'mlp' else '', f'{100.0 * r.exact_share:.3g} %', f'{r.outside:.1g}']
+             for r in rows]
+    return markdown_table(['model, set', 'point', 'volume', 'covariance', 'in-plane eigenvalues',
+                           'limits of p99', 'left to exact', 'outside'], lines)
 
 
 def class_table(rows: Sequence[AccuracyRow]) -> str:
     """Return mean/p99/worst of the point per class and winner, with the share of the pairs."""
-    def cell(row: AccuracyRow, name: str) -> str:
-        part = row.parts().get(name)
-        if part is None:
+    def cell(parts: Mapping[str, Summary], name: str) -> str:
+        if name not in parts:
             return '–'
-        mean, p99, worst = statistics(part.point)
-        share = 100.0 * len(part.point) / len(row.classes)
-        return f'{mean:.3f}/{p99:.2f}/{worst:.1f} ({share:.0f} %)'
+        errors, share = parts[name], 100.0 * parts[name].pairs / parts['all'].pairs
+        return f'{errors.mean:.3f}/{errors.p99:.2f}/{errors.worst:.1f} ({share:.0f} %)'
 
     names = (*CLASSES, *WINNERS)
     return markdown_table(['model, set', *names], [
-        [f'{row.model}, {row.set}', *(cell(row, name) for name in names)] for row in rows])
+        [f'{row.model}, {row.set}', *(cell(row.errors['point'], name) for name in names)]
+        for row in rows])
 
 
 def csv_rows(rows: Sequence[AccuracyRow]) -> Iterator[dict[str, object]]:
@@ -280,19 +267,15 @@ def csv_rows(rows: Sequence[AccuracyRow]) -> Iterator[dict[str, object]]:
     A row of a whole set ends with its limits, the point's also with what is known of the set only.
     """
     for row in rows:
-        for quantity, (part, of_part) in product(row.quantities, row.parts().items()):
-            errors = getattr(of_part, quantity)
-            mean, p99, worst = statistics(errors)
-            line = {'model': row.model, 'set': row.set, 'part': part, 'quantity': quantity,
-                    'pairs': len(errors), 'mean': mean, 'p50': float(np.median(errors)),
-                    'p99': p99, 'worst': worst}
-            if part == 'all' and row.model == 'mlp':
-                line['limit_p99'] = limit_of(quantity, row.set)
-            if part == 'all' and quantity == 'point':
-                line |= {name: getattr(row, name) for name in (
-                    'exact_share', 'verdict_errors', 'normal_difference', 'separation_difference',
-                    'outside')}
-            yield line
+        for quantity, parts in row.errors.items():
+            for part, errors in parts.items():
+                line = {'model': row.model, 'set': row.set, 'part': part, 'quantity': quantity,
+                        **errors._asdict()}
+                if part == 'all' and row.model == 'mlp':
+                    line['limit_p99'] = limit_of(quantity, row.set)
+                if part == 'all' and quantity == 'point':
+                    line |= {'exact_share': row.exact_share, 'outside': row.outside}
+                yield line
 
 
 def draw(path: Path, rows: Sequence[AccuracyRow]) -> None:
@@ -301,11 +284,11 @@ def draw(path: Path, rows: Sequence[AccuracyRow]) -> None:
     figure, axes = output.subplots(1, 1, (7.5, 1.3 + 0.3 * len(rows)))
     axis = axes[0, 0]
     for place, row in enumerate(rows):
-        values = [max(value, SHOWN[0]) for value in output.percentiles(
-            row.errors.point, *MARKS.values())]
+        errors = row.errors['point']['all']
+        values = [max(value, SHOWN[0]) for value in (errors.p50, errors.p99, errors.worst)]
         colour = f'C{models.index(row.model)}'
         axis.plot(values, [place] * len(values), color=colour, linewidth=1.2)
-        for (mark, label), value in zip(MARKS, values):
+        for (mark, label), value in zip(MARKS.items(), values):
             axis.plot(value, place, mark, color=colour, markersize=7, clip_on=False,
                       label='' if place else label)
     names = [row.set if len(models) == 1 else f'{row.set}, {row.model}' for row in rows]
@@ -363,10 +346,10 @@ def main(args: Sequence[str] | None = None) -> int:
         'benchmarks/pages/accuracy', command=output.command_line('benchmarks.accuracy', args),
         machine=output.machine(native), seed=options.seed,
         verdict=f'Goals missed: {"; ".join(broken)}.' if broken else 'All limits of `mlp` hold.',
-        table=table(rows), error_table=error_table(rows), mae_limit=MAE_LIMIT,
+        error_table=error_table(rows), mae_limit=MAE_LIMIT,
         point_classes=class_table(rows), paper_table=on_paper), encoding='utf-8')
     draw(folder / 'accuracy.png', rows)
-    print(table(rows), error_table(rows), class_table(rows), on_paper, sep='\n\n')
+    print(error_table(rows), class_table(rows), on_paper, sep='\n\n')
     for text in broken:
         print(f'accuracy: goal missed: {text}', file=sys.stderr)
     return 1 if broken else 0

@@ -26,7 +26,7 @@ from box_contact_ros.core import instruction_sets, native
 from box_contact_ros.solver.arguments import program_parser
 
 from . import output
-from .accuracy import CLASSES
+from .accuracy import CLASSES, WINNERS, Summary
 from .contestant import CORE_MODELS, MODELS, Contestant, in_subprocess, ours, packages_of
 from .engines import installed
 from .output import markdown_table, number
@@ -107,7 +107,7 @@ def in_short(rows: Sequence[FrontierRow], engines: Iterable[Contestant]) -> str:
                 f'`{name}`, {instruction_set}' if name in CORE_MODELS else name,
                 f'{number(shown.single[0] / 1e3)} / {number(shown.single[1] / 1e3)}',
                 number(shown.batch), shown.best if name in rivals else '–',
-                *[number(row.errors.points['all'][2]) if row and row.errors.points else '–'
+                *[number(row.errors.points['all'].p99) if row and row.errors.points else '–'
                   for row in (shown, stack)],
                 number(max(normals, default=math.nan)),
                 f'{sum(row.errors.missed for row in mine.values())} of '
@@ -141,7 +141,7 @@ def set_table(rows: Sequence[FrontierRow], name: str) -> str:
         [[f'{row.name}, {row.instruction_set}' if row.name in CORE_MODELS else row.name,
           *[number(value / 1e3) for value in row.single], number(row.batch),
           f'{row.judged:,}', row.best if len(row.choices) > 1 else '–',
-          *[in_one(row.errors.points[label][1:]) if label in row.errors.points else '–'
+          *[in_one(row.errors.points[label][2:]) if label in row.errors.points else '–'
             for label in labels],
           in_one(row.errors.normal), row.errors.missed, row.errors.invented]
          for row in rows if row.set == name])
@@ -162,7 +162,7 @@ def page(rows: Sequence[FrontierRow], models: Sequence[Contestant], engines: Seq
         single=by_exact(by['mlp', 'containers'], rows)[0],
         containers=by_exact(by['mlp', 'containers'], rows)[1],
         stacks=by_exact(by['mlp', 'stacks'], rows)[1],
-        paper=by['paper', 'random cubes'].errors.points['all'][1],
+        paper=by['paper', 'random cubes'].errors.points['all'].p50,
         verdict=VERDICT, few_pairs=FEW_PAIRS, timed_pairs=plan.timed_pairs,
         calls=calls_table(engines), sets='\n\n'.join(
             f'### {name.capitalize()}\n\n{getdoc(make)}\n\n{set_table(rows, name)}'
@@ -177,12 +177,14 @@ def csv_rows(rows: Sequence[FrontierRow], contestants: Sequence[Contestant],
             for package in {*packages.values()}}
     for row in rows:
         for choice, errors in row.choices.items():
-            points = errors.points or {'all': (0, *[math.nan] * 3)}
-            for label, (count, *point) in points.items():
+            nothing = {'all': Summary(0, *[math.nan] * 4)}
+            for label, point in (errors.points or nothing).items():
+                if label in WINNERS:
+                    continue
                 yield {
                     'contestant': row.name, 'set': row.set, 'point': choice, 'class': label,
-                    'contacts': count,
-                    **dict(zip(('point_p50', 'point_p99', 'point_worst'), point)),
+                    'contacts': point.pairs, 'point_p50': point.p50, 'point_p99': point.p99,
+                    'point_worst': point.worst,
                     **dict(zip(('call_p50', 'call_p99', 'call_max'), row.single)),
                     'calls': row.calls, 'batch_p50': row.batch,
                     **dict(zip(('call_by_exact', 'batch_by_exact'), by_exact(row, rows))),

@@ -171,9 +171,9 @@ def judged(name: str, nanoseconds: np.ndarray, separation: np.ndarray, pairs: Pa
                  (p50, p99, worst))
 
 
-def ratio(times: OnSet, name: str, unit: str = UNIT) -> float:
-    """Return the median of the rounds' ratios."""
-    return float(by_round(times[name].nanoseconds, times[unit].nanoseconds))
+def ratio(times: OnSet, name: str) -> float:
+    """Return the median of the rounds' ratios to `UNIT`."""
+    return float(by_round(times[name].nanoseconds, times[UNIT].nanoseconds))
 
 
 def contestants_table(times: OnSet) -> str:
@@ -189,14 +189,6 @@ def sets_table(by_set: Mapping[str, OnSet]) -> str:
     return markdown_table(['', *by_set], [
         [name, *(f'{ratio(times, name):.2f}' for times in by_set.values())]
         for name in next(iter(by_set.values()))])
-
-
-def models_table(by_set: Mapping[str, OnSet]) -> str:
-    """Return what `mlp` costs relative to `exact` on each set."""
-    calls = [f'{patch}, {way}' for way in ('batch', 'single') for patch in ('covariance', 'volume')]
-    return markdown_table(['set', *calls], [
-        [name, *(f'{ratio(times, f"mlp {call}", f"exact {call}"):.2f}' for call in calls)]
-        for name, times in by_set.items()])
 
 
 def answers_table(by_set: Mapping[str, OnSet]) -> str:
@@ -255,8 +247,8 @@ def main(args: Sequence[str] | None = None) -> int:
                     found[name][of_set] = timed(program, chosen, name, rounds=rounds, calls=calls)
     tables = '\n\n'.join(
         f'## {name}\n\nContainers:\n\n{contestants_table(by_set["containers"])}\n\n'
-        f'Relative to `mjc_BoxBox`, by set:\n\n{sets_table(by_set)}\n\n'
-        f'`mlp` relative to `exact`:\n\n{models_table(by_set)}' for name, by_set in found.items())
+        f'Relative to `mjc_BoxBox`, by set:\n\n{sets_table(by_set)}'
+        for name, by_set in found.items())
     versions = [f'MuJoCo {metadata.version("mujoco")}', *(
         f'{name.capitalize()} {package_config(name, "--modversion")}' for name in OPTIONAL
         if name not in missing)]

@@ -14,7 +14,7 @@ import numpy as np
 from box_contact_ros.core import native
 from box_contact_ros.scene.pose import degrees_between
 
-from .accuracy import CLASSES, classify
+from .accuracy import Summary, by_part, classify
 from .contestant import APART, Contestant, chosen, part_by_part
 from .errors import point_errors
 from .output import percentiles
@@ -57,8 +57,7 @@ QUICK = Plan(batch_pairs=1_000, single_pairs=40, timed_pairs=10, seconds=0.05, r
 class SetErrors:
     """Answers on a set against the exact ones, with one way to make a point."""
 
-    points: dict[str, tuple[int, float, float, float]]
-    """By class, or 'all': contacts, and the point error's median, p99, worst [%]."""
+    points: Mapping[str, Summary]  # point errors by part; empty where no pair touches by both
     normal: tuple[float, float]  # p99 and worst of the normal's error [deg]; NaN: none was judged
     missed: int
     invented: int
@@ -93,8 +92,8 @@ class FrontierRow:
     @property
     def best(self) -> str:
         """Return the choice with the least p99 of the point error."""
-        return min(self.choices, key=lambda choice: self.choices[choice].points.get(
-            'all', (0, math.nan, math.inf, math.nan))[2])
+        return min(self.choices, key=lambda choice: self.choices[choice].points['all'].p99
+                   if self.choices[choice].points else math.inf)
 
     @property
     def errors(self) -> SetErrors:
@@ -113,18 +112,13 @@ def judge(pairs: Pairs, colliding: np.ndarray, normals: np.ndarray, points: np.n
     """Compare answers (n,), (n, 3), (n, 3) with the exact ones."""
     truth = pairs.contacts()
     both = colliding & truth.colliding
-    by_class: dict[str, tuple[int, float, float, float]] = {}
-    if both.any():
-        touching = pairs.rows(both)
-        errors = point_errors(points[both], truth.point[both], touching.edge)
-        classes = classify(touching)[0]
-        parts = {'all': errors, **{name: errors[classes == k] for k, name in enumerate(CLASSES)}}
-        by_class = {name: (len(part), *percentiles(part, 50, 99, 100))
-                    for name, part in parts.items() if len(part)}
+    touching = pairs.rows(both)
+    errors = point_errors(points[both], truth.point[both], touching.edge)
     clear = np.abs(truth.separation) > VERDICT * pairs.size
     rows = np.flatnonzero(both & clear & np.isfinite(normals).all(axis=1))
     angles = degrees_between(normals[rows], truth.normal[rows])
-    return SetErrors(points=by_class, normal=percentiles(angles, 99, 100),
+    return SetErrors(points=by_part(errors, *classify(touching)),
+                     normal=percentiles(angles, 99, 100),
                      missed=int((truth.colliding & ~colliding & clear).sum()),
                      invented=int((colliding & ~truth.colliding & clear).sum()))
 

@@ -43,6 +43,6 @@ def test_the_centre_of_pressure_is_nearer_than_the_centroid(name: str) -> None:
     centroid, pressure = (
         trials.judge(pairs, answers.colliding, answers.normals, answers.points[choice])
         for choice in ('its point', 'centre of pressure'))
-    assert 0.05 < centroid.points['all'][1] < 2.0  # median [%]
-    assert pressure.points['all'][1] < 0.05 and pressure.points['all'][3] < 0.5  # median, worst
+    assert 0.05 < centroid.points['all'].p50 < 2.0  # [%]
+    assert pressure.points['all'].p50 < 0.05 and pressure.points['all'].worst < 0.5
     assert centroid.missed == centroid.invented == 0
