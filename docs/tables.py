@@ -30,7 +30,7 @@ CHOICES = {
     'exact': ('`exact`', 'ground truth, judging other models'),
     'paper': ("`paper`, the paper's kind of network", 'repeating the paper'),
     'soup-8': ('`soup-8`, boxes as triangles', 'comparing with what the paper replaced'),
-    'fcl': ("`fcl`, FCL's deepest point", 'comparing with a common engine'),
+    'fcl': ("FCL's own, deepest corner", 'comparing with a common engine'),
     'mujoco': ("MuJoCo's own, deepest corner", 'programs that simulate in MuJoCo'),
 }
 MEASURED_AS = {'fcl': {'contestant': 'python-fcl collide', 'point': 'deepest'},

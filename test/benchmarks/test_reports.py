@@ -69,6 +69,7 @@ def test_a_listed_report_is_a_program(name: str, tmp_path: Path) -> None:
     """A module, or a folder with `__main__`; its `main` takes --quick and --out."""
     folder = importlib.util.find_spec(name).submodule_search_locations
     module = importlib.import_module(f'{name}.__main__' if folder else name)
+    assert "__name__ == '__main__'" in Path(module.__file__).read_text('utf-8')
     with pytest.raises(SystemExit, match='0'):
         module.main(['--quick', '--out', 'folder', '--help'])
     (tmp_path / 'file').write_text('mine')  # is refused before the work
