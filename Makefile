@@ -41,7 +41,7 @@ help:
 	echo 'make test-debian13  the first command of the README on a fresh Debian 13 (root)'
 	echo 'make dist     wheel and source distribution in dist/, both installed and tried'
 	echo 'make coverage lines of solver, scenes and nodes that their tests run'
-	echo 'make reports  every table and picture of docs, in 45 minutes'
+	echo 'make reports  every table and picture of docs, in 45 minutes; ARGS=--quick tries them out'
 	echo 'make docs     the documentation as HTML: build/docs/index.html'
 	echo 'make docs-links asks every link to another site'
 	echo 'make tables   write the figures of docs/results/ into README and docs'
@@ -69,12 +69,32 @@ check:
 	exec $(PYTEST) -m 'not slow' test/core test/solver test/scene \
 	    test/package/test_house.py test/package/test_ament.py $(ARGS)
 
+# The reports run one after the other, as most of them measure time; each runs though one before it
+# failed. With ARGS=--quick results go to quick-results/, and docs/ stays as it is.
+RESULTS := $(if $(filter --quick,$(ARGS)),quick-results,docs/results)
+BENCH := box_contact_ros.bench.bench --duration $(if $(filter --quick,$(ARGS)),6,90)
 reports:
 	@.ci/setup reports
-	$(PY) -m box_contact_ros reports $(ARGS) || status=$$?
-	for figures in docs/figures/make_*.py; do $(PY) $$figures; done
-	$(PY) docs/tables.py
-	exit $${status:-0}
+	failed=
+	run() { echo "== $$*"; $(PY) -m "$$@" || failed+=" $$1"; }
+	run benchmarks.accuracy $(ARGS)
+	run benchmarks.stability $(ARGS)
+	run benchmarks.fuzz $(ARGS)
+	run benchmarks.landing $(ARGS)
+	run benchmarks.rest $(ARGS)
+	run benchmarks.frontier $(ARGS)
+	run benchmarks.native $(ARGS)
+	run benchmarks.speed $(ARGS)
+	run benchmarks.paper $(ARGS)
+	run benchmarks.paper.search $(ARGS)
+	run $(BENCH) --rate 200 --side-by-side --out $(RESULTS)/bench/200-side-by-side
+	run $(BENCH) --rate 1000 --side-by-side --out $(RESULTS)/bench/1000-side-by-side
+	run $(BENCH) --rate 1000 --out $(RESULTS)/bench/1000-in-turn
+	if [ $(RESULTS) = docs/results ]; then
+	    for figures in docs/figures/make_*.py; do $(PY) $$figures || failed+=" $$figures"; done
+	    $(PY) docs/tables.py || failed+=' docs/tables.py'
+	fi
+	if [ -n "$$failed" ]; then echo "failed:$$failed" >&2; exit 1; fi
 
 # All tests there, which takes four times as long: make test-colcon ARGS=test
 test-colcon:

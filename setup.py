@@ -228,9 +228,9 @@ setup(
         'train': ['safetensors', 'torch==2.13.0', 'tqdm'],
         'report': ['matplotlib', 'tqdm'],
         'fuzz': ['gmpy2', 'mpmath', 'tqdm'],
-        # Engines that only reports compare with. Drake and Newton are measured where they are
-        # installed: with what they need they are 0.2 and 0.5 GB.
-        'peers': ['coal', 'dartpy', 'mujoco', 'pybullet', 'python-fcl', 'rapier3d'],
+        # Engines that only reports compare with. Drake is measured where it is installed: with what
+        # it needs it is 0.2 GB.
+        'peers': ['coal', 'mujoco', 'pybullet', 'python-fcl'],
         # `make docs`.
         'docs': DOCS,
         # The example that shares ten million pairs among machines.

@@ -5,39 +5,37 @@
 
 It measures point, volume and covariance. Every set of poses is drawn anew from `--seed`; model
 `exact` gives the truth. It writes accuracy.csv (a row per model, set, quantity and part of the
-set), accuracy.md and accuracy.png. The exit status is 1 if `mlp` misses one of its limits or
-differs from `exact` in a separation or normal. It is 1, too, for a point outside a box, and for too
-many contacts that are left to `exact`.
+set), accuracy.md and accuracy.png. The exit status is 1 if `mlp` misses one of its limits.
 
-accuracy.md defines the classes. The pose decides which features meet, not the SAT
-axis that wins. In stacks, half the winners are edge pairs although the contact is a patch.
+accuracy.md defines the classes. The pose decides which features meet, not the SAT axis that wins:
+in stacks, half the winners are edge pairs although the contact is a patch.
 """
 from __future__ import annotations
 
 import argparse
 import math
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from itertools import product
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from box_contact_ros import output
 from box_contact_ros.core import DEPTH_FLOOR, Stages, native, stages
 from box_contact_ros.resources import resource_path
-from box_contact_ros.solver.arguments import add_models, model_name, program_parser, within
+from box_contact_ros.solver.arguments import model_name, program_parser, within
 from box_contact_ros.solver.contact import Contacts
-from box_contact_ros.solver.models import ModelEntry, models
 from box_contact_ros.solver.weights_file import WeightsError, load_weights
 
-from . import searched
+from . import output
 from .contestant import Contestant, ours
 from .errors import ContactErrors, contact_errors
+from .output import markdown_table
 from .paper import dataset
-from .paper.errors import errors_of, figures, figures_by_part, wrapped
+from .paper.errors import figures_by_part, wrapped
 from .paper.paper_tables import PAPER
 from .pose_sets import LOADS, SETS, Pairs, drawn
 
@@ -59,7 +57,6 @@ EXACT_SHARE, OF_BARS = 0.02, 0.12
 MAE_LIMIT = 0.005  # mean absolute error [rad] of `mlp` on the paper's external set
 OUTSIDE = 2.0**-44
 """How far outside a box a point may be, of the size (5.7e-14), on top of the minimum depth."""
-
 OPENED = 5e-12
 """By how much boxes of the paper's set may be apart [of the size]. Near a pitch of ±90° the angles
 keep a pose to 12 digits only. Still far below the 1e-9 that boxes are pressed in."""
@@ -68,8 +65,8 @@ PAIRS, QUICK_PAIRS = 100_000, 5_000
 CLASSES = ('vertex-face', 'edge-edge', 'edge-face', 'face-face')
 WINNERS = ('face axis', 'edge axis')
 SHOWN = (1e-6, 1.0)  # errors that are drawn [%]
-MARKS = {('o', 'half of the pairs'): 50.0, ('|', '99 %'): 99.0, ('D', 'worst pair'): 100.0}
-"""What is drawn of a set: marks, their names, and percentiles."""
+MARKS = {'o': 'half of the pairs', '|': '99 %', 'D': 'worst pair'}
+"""What is drawn of a set."""
 FACE_LIKE = math.cos(math.radians(6.0))
 """Cosine of the angle to a face's normal up to which an edge pair's axis stands for the face."""
 
@@ -97,7 +94,7 @@ def _corners_through(pairs: Pairs, found: Stages) -> np.ndarray:
     rows, of_a, k = np.arange(len(found.face)), found.face < 3, found.face % 3
     rotation = np.where(of_a[:, None, None], found.rotation, found.rotation.swapaxes(1, 2))
     offset = np.where(of_a[:, None], found.pressed_offset_a, found.pressed_offset_b)
-    reference, incident = (0.5 * np.where(of_a[:, None], one, other) for one, other in (
+    reference, incident = (0.5 * np.where(of_a[:, None], mine, theirs) for mine, theirs in (
         (pairs.size_a, pairs.size_b), (pairs.size_b, pairs.size_a)))
     top = np.abs(offset[rows, k]) - reference[rows, k]
     reach = rotation[rows, k] * incident
@@ -107,272 +104,178 @@ def _corners_through(pairs: Pairs, found: Stages) -> np.ndarray:
     return through
 
 
-def outside(pairs: Pairs, found: Contacts) -> float:
+def outside(pairs: Pairs, contacts: Contacts) -> float:
     """Return the largest distance of a point from a box, of the size, beyond the pressing."""
-    pressed = np.maximum(0.0, DEPTH_FLOOR + found.separation / pairs.size)
-    beyond = pairs.beyond(found.point) / pairs.size - pressed
+    pressed = np.maximum(0.0, DEPTH_FLOOR + contacts.separation / pairs.size)
+    beyond = pairs.beyond(contacts.point) / pairs.size - pressed
     # A point inside is no distance outside; pairs apart have NaN.
-    return float(np.max(beyond[found.colliding], initial=0.0))
+    return float(np.max(beyond[contacts.colliding], initial=0.0))
+
+
+class Summary(NamedTuple):
+    """Errors of some pairs, in %."""
+
+    pairs: int
+    mean: float
+    p50: float
+    p99: float
+    worst: float
+
+
+def by_part(errors: np.ndarray, classes: np.ndarray, winners: np.ndarray) -> dict[str, Summary]:
+    """Return errors (n,) of all pairs, per class and per winner; empty parts are left out."""
+    rows = {'all': np.ones(len(errors), bool)}
+    rows |= {name: classes == k for k, name in enumerate(CLASSES)}
+    rows |= {name: winners == k for k, name in enumerate(WINNERS)}
+    parts = {name: errors[chosen] for name, chosen in rows.items() if chosen.any()}
+    return {name: Summary(len(part), float(part.mean()), *output.percentiles(part, 50, 99, 100))
+            for name, part in parts.items()}
 
 
 @dataclass(frozen=True, kw_only=True)
 class AccuracyRow:
-    """One model on one set."""
+    """One model on one set. The errors are those of pairs that touch by the model and `exact`."""
 
     model: str
     set: str
-    errors: ContactErrors  # of the n pairs that touch by both
-    classes: np.ndarray  # (n,) index into CLASSES
-    winners: np.ndarray  # (n,) index into WINNERS
+    errors: Mapping[str, Mapping[str, Summary]]  # by field of `ContactErrors`, then by part
     pairs: int
     exact_share: float  # share of contacts answered by `exact`
-    verdict_errors: int
-    normal_difference: float  # largest difference of a component
-    separation_difference: float  # largest, of the size
     outside: float  # farthest point outside a box, of the size
-
-    @property
-    def quantities(self) -> tuple[str, ...]:
-        """Return the fields of `ContactErrors` that the model gives."""
-        return ContactErrors._fields if np.isfinite(self.errors.volume).all() else ('point',)
-
-    def parts(self) -> dict[str, ContactErrors]:
-        """Return errors of all pairs, per class and per winner; empty parts are left out."""
-        rows = {'all': self.classes >= 0}
-        rows |= {name: self.classes == k for k, name in enumerate(CLASSES)}
-        rows |= {name: self.winners == k for k, name in enumerate(WINNERS)}
-        return {name: self.errors.rows(chosen) for name, chosen in rows.items() if chosen.any()}
 
     def broken(self) -> list[str]:
         """Return the limits of `mlp` that do not hold, in words."""
         if self.model != 'mlp':
             return []
-        checks = {}
-        for quantity, errors in self.errors._asdict().items():
-            p99, most = statistics(errors)[1], limit_of(quantity, self.set)
-            checks[f'{quantity}, p99 {p99:.3f} > {most:g} %'] = p99 <= most
-        checks |= {
-            f'{self.verdict_errors} verdicts differ': self.verdict_errors == 0,
-            'normals differ': self.normal_difference == 0.0,
-            'separations differ': self.separation_difference == 0.0,
-            'points outside': self.outside <= OUTSIDE,
-            f'exact answers {self.exact_share:.2%}':
-                self.exact_share <= (OF_BARS if self.set == 'crossed bars' else EXACT_SHARE),
-        }
-        # Comparisons with NaN are false, so a NaN breaks its limit.
-        return [f'{self.model}, {self.set}: {text}' for text, holds in checks.items() if not holds]
+        share = OF_BARS if self.set == 'crossed bars' else EXACT_SHARE
+        found: dict[str, tuple[float, float]] = {
+            f'{quantity}, p99': (parts['all'].p99, limit_of(quantity, self.set))
+            for quantity, parts in self.errors.items()}
+        return over(f'mlp, {self.set}', {
+            **found, 'points outside by': (self.outside, OUTSIDE),
+            'left to exact': (self.exact_share, share)})
+
+
+def over(what: str, found: Mapping[str, tuple[float, float]]) -> list[str]:
+    """Return in words which values, by name with their limits, are above them; NaN is, too."""
+    return [f'{what}: {name} {value:.3g} > {limit:.3g}'
+            for name, (value, limit) in found.items() if not value <= limit]
 
 
 def measure(model: Contestant, name: str, pairs: Pairs, truth: Contacts) -> AccuracyRow | None:
     """Measure a model on a set; None where the model is not for its sizes."""
     try:
-        found, left_to_exact = model.solve(pairs)
+        contacts, left_to_exact = model.solve(pairs)
     except ValueError:
         if model.any_boxes:
             raise
         return None
-    both = truth.colliding & found.colliding
+    both = truth.colliding & contacts.colliding
     touching = pairs.rows(both)
     classes, winners = classify(touching)
-    errors = contact_errors(*(Contacts(*(part[both] for part in contacts))
-                              for contacts in (found, truth)), touching.edge)
+    errors = contact_errors(*(Contacts(*(part[both] for part in answer))
+                              for answer in (contacts, truth)), touching.edge)
     return AccuracyRow(
-        model=model.name, set=name, errors=errors, classes=classes,
-        winners=winners, pairs=len(both),
-        exact_share=left_to_exact / max(1, int(found.colliding.sum())),
-        verdict_errors=int((found.colliding != truth.colliding).sum()),
-        normal_difference=float(np.abs(found.normal[both] - truth.normal[both]).max(initial=0.0)),
-        separation_difference=float(
-            (np.abs(found.separation - truth.separation) / pairs.size).max(initial=0.0)),
-        outside=outside(pairs, found))
+        model=model.name, set=name, pairs=len(both),
+        errors={quantity: by_part(values, classes, winners) for quantity, values
+                in errors._asdict().items() if np.isfinite(values).all()},
+        exact_share=left_to_exact / max(1, int(contacts.colliding.sum())),
+        outside=outside(pairs, contacts))
 
 
-def drawn_pairs(count: int, seed: int) -> Iterator[tuple[str, Pairs, Contacts]]:
-    """Yield name, `count` pairs and exact contacts of every set."""
-    for number, (name, make) in enumerate({**SETS, **LOADS}.items()):
-        pairs = drawn(make, np.random.default_rng([seed, number]), count)
-        yield name, pairs, pairs.contacts()
-
-
-def export(folder: Path, count: int, seed: int) -> None:
-    """Write every set to a file .npz: poses and sizes, and the fields of the exact contacts."""
-    for name, pairs, truth in drawn_pairs(count, seed):
-        path = folder / f'{name.replace(" ", "_")}.npz'
-        np.savez_compressed(path, **pairs._asdict(), **truth._asdict())
-        print(f'{path}: {len(truth.colliding)} pairs')
-
-
-def model_or_class(text: str) -> str:
-    """Return the name of a model; `package.module:Class` becomes one in this process."""
-    if ':' not in text:
-        return model_name(text)
-    sys.path.insert(0, '')  # modules of the current folder, however the program was started
-    own = ModelEntry(name=text, line='a class of your own', builder=text,
-                     takes=('size_a', 'size_b'))
-    try:
-        own.load()
-    except (ImportError, AttributeError) as error:
-        raise argparse.ArgumentTypeError(f'{text}: {error}') from error
-    models()[text] = own
-    return text
-
-
-def _contestant(model: str, weights: str | None) -> Contestant:
-    """Return a model; weights are those of `mlp`."""
-    return ours(model, weights=weights if model == 'mlp' else None)
-
-
-def measure_all(models: Sequence[str], count: int, seed: int, weights: str | None,
-                ) -> list[AccuracyRow]:
+def measure_all(models: Sequence[Contestant], count: int, seed: int) -> list[AccuracyRow]:
     """Measure models on `count` pairs of every set, model by model."""
     from tqdm import tqdm
 
     rows = []
-    with tqdm(total=len(SETS | LOADS) * len(models), desc='accuracy', unit='set') as bar:
-        for name, pairs, truth in drawn_pairs(count, seed):
-            for model in models:
-                bar.set_postfix_str(f'{model}, {name}')
-                rows.append(measure(_contestant(model, weights), name, pairs, truth))
-                bar.update()
-    return sorted(filter(None, rows), key=lambda row: models.index(row.model))
+    for place, (name, make) in enumerate(tqdm((SETS | LOADS).items(), desc='accuracy', unit='set')):
+        pairs = drawn(make, np.random.default_rng([seed, place]), count)
+        truth = pairs.contacts()
+        rows += [measure(model, name, pairs, truth) for model in models]
+    return [row for model in models for row in rows if row and row.model == model.name]
 
 
-def statistics(errors: np.ndarray) -> tuple[float, float, float]:
-    """Return mean, 99th percentile, worst."""
-    return (float(errors.mean()), *output.percentiles(errors, 99, 100))
-
-
-def paper_errors(models: Sequence[str], weights: str | None = None, step: int = 1,
-                 ) -> tuple[dict[str, np.ndarray], int]:
-    """Return wrapped errors (n, 4) [rad] on the paper's external set, per model, and n as drawn.
+def paper_errors(model: Contestant, step: int = 1) -> tuple[np.ndarray, int]:
+    """Return wrapped errors (n, 4) [rad] on the paper's external set, and the contacts missed.
 
     Azimuth and elevation of the impact point, seen from the first box's centre, and of the normal.
-    The set is that of the weights of model `paper`; `paper` is its network alone, asked as the
-    paper did.
+    The set is that of the weights of model `paper`.
     """
-    file = load_weights(resource_path('weights', 'paper.safetensors'))
-    patterns = dataset.of_card(file.card, sets=('external',))['contact']['external']
-    inputs, outputs = patterns.inputs[::step], patterns.outputs[::step]
-    pose_a, pose_b = dataset.as_poses(inputs)
-    size = file.card['sizes'][0]
+    card = load_weights(resource_path('weights', 'paper.safetensors')).card
+    patterns = dataset.of_card(card, sets=('external',))['contact']['external']
+    outputs, size = patterns.outputs[::step], card['sizes'][0]
+    pose_a, pose_b = dataset.as_poses(patterns.inputs[::step])
     # The boxes touch exactly; writing their poses as angles has opened some.
     azimuth, elevation = outputs[:, 2], outputs[:, 3]
     normal = np.column_stack([np.cos(elevation) * np.cos(azimuth),
                               np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
     pose_b[:, :3] -= OPENED * max(size) * normal
     sizes = np.tile(size, (len(pose_a), 1))
-    pairs = Pairs(pose_a, pose_b, sizes, sizes)
-    found = {'paper': errors_of(file.networks['contact'], inputs, outputs)}
-    for model in models:
-        contact, _ = _contestant(model, weights).solve(pairs)
-        angles = np.concatenate([dataset.spherical(contact.point),
-                                 dataset.spherical(contact.normal)], axis=1)
-        found[model] = wrapped(angles - outputs)[contact.colliding]
-    return found, len(outputs)
+    contact, _ = model.solve(Pairs(pose_a, pose_b, sizes, sizes))
+    angles = np.hstack([dataset.spherical(contact.point), dataset.spherical(contact.normal)])
+    return wrapped(angles - outputs)[contact.colliding], int((~contact.colliding).sum())
 
 
-def paper_table(errors: dict[str, np.ndarray], drawn: int) -> str:
+def paper_table(errors: Mapping[str, np.ndarray]) -> str:
     """Return ME, MAE and RMSE, and those of Tables 1 and 2."""
     rows = [[f"paper's Table {number}, {title} discontinuities",
              *[f'{PAPER[number][name][2]:.4f}' for name in PAPER[number]], '', '', '']
             for number, title in ((1, 'with'), (2, 'without'))]
     for model, wrong in errors.items():
         overall, point, normal = figures_by_part(wrong).values()
-        label = 'our network of Table 1, folded' if model == 'paper' else f'`{model}`'
-        rows.append([label, *[f'{overall[name] + 0.0:.3g}' for name in PAPER[1]],
-                     f'{point["MAE"]:.3g}', f'{normal["MAE"]:.3g}', f'{len(wrong):,} of {drawn:,}'])
-    return output.markdown_table(['', *PAPER[1], 'point MAE', 'normal MAE', 'patterns'], rows)
-
-
-def paper_broken(errors: dict[str, np.ndarray], drawn: int) -> list[str]:
-    """Return what `mlp` breaks of its limits on the paper's external set."""
-    if 'mlp' not in errors:
-        return []
-    mae, missed = figures(errors['mlp'])['MAE'], drawn - len(errors['mlp'])
-    checks = {f'MAE {mae:.4f} > {MAE_LIMIT:g} rad': mae <= MAE_LIMIT,
-              f'{missed} contacts missed': missed == 0}
-    return [f"mlp, the paper's external set: {text}" for text, holds in checks.items() if not holds]
-
-
-def table(rows: Sequence[AccuracyRow]) -> str:
-    """Return what may not differ at all, and the share of contacts that `mlp` leaves to `exact`."""
-    lines = [[f'{r.model}, {r.set}', f'{r.pairs:,}', f'{100.0 * r.exact_share:.3g} %',
-              r.verdict_errors, f'{r.normal_difference:.2g}', f'{r.separation_difference:.2g}',
-              f'{r.outside:.1g}'] for r in rows]
-    return output.markdown_table(['model, set', 'pairs', 'left to exact', 'verdicts wrong',
-                                  'normal off', 'separation off', 'outside'], lines)
+        rows.append([f'`{model}`', *[f'{overall[name] + 0.0:.3g}' for name in PAPER[1]],
+                     f'{point["MAE"]:.3g}', f'{normal["MAE"]:.3g}', f'{len(wrong):,}'])
+    return markdown_table(['', *PAPER[1], 'point MAE', 'normal MAE', 'patterns'], rows)
 
 
 def error_table(rows: Sequence[AccuracyRow]) -> str:
-    """Return mean/p99/worst of each quantity over whole sets, with the limits of p99."""
+    """Return mean/p99/worst of each quantity over whole sets, with the limits of p99.
+
+    Then come the share of contacts left to `exact`, and the farthest point outside a box.
+    """
     def cell(row: AccuracyRow, quantity: str) -> str:
-        if quantity not in row.quantities:
+        if quantity not in row.errors:
             return ''
-        mean, p99, worst = statistics(getattr(row.errors, quantity))
-        return f'{mean:.2g} / {p99:.2g} / {worst:.2g}'
+        errors = row.errors[quantity]['all']
+        return f'{errors.mean:.2g} / {errors.p99:.2g} / {errors.worst:.2g}'
 
     lines = [[f'{r.model}, {r.set}', *(cell(r, name) for name in ContactErrors._fields),
               ' / '.join(f'{limit_of(name, r.set):g}' for name in ContactErrors._fields)
-              if r.model == 'mlp' else ''] for r in rows]
-    return output.markdown_table(
-        ['model, set', 'point', 'volume', 'covariance', 'in-plane eigenvalues', 'limits of p99'],
-        lines)
+              if r.model == 'mlp' else '', f'{100.0 * r.exact_share:.3g} %', f'{r.outside:.1g}']
+             for r in rows]
+    return markdown_table(['model, set', 'point', 'volume', 'covariance', 'in-plane eigenvalues',
+                           'limits of p99', 'left to exact', 'outside'], lines)
 
 
-def class_table(rows: Sequence[AccuracyRow], quantity: str) -> str:
-    """Return mean/p99/worst per class and winner, with the share of the pairs."""
-    def cell(row: AccuracyRow, name: str) -> str:
-        part = row.parts().get(name)
-        if part is None:
+def class_table(rows: Sequence[AccuracyRow]) -> str:
+    """Return mean/p99/worst of the point per class and winner, with the share of the pairs."""
+    def cell(parts: Mapping[str, Summary], name: str) -> str:
+        if name not in parts:
             return '–'
-        errors = getattr(part, quantity)
-        mean, p99, worst = statistics(errors)
-        share = 100.0 * len(errors) / len(row.classes)
-        return f'{mean:.3f}/{p99:.2f}/{worst:.1f} ({share:.0f} %)'
+        errors, share = parts[name], 100.0 * parts[name].pairs / parts['all'].pairs
+        return f'{errors.mean:.3f}/{errors.p99:.2f}/{errors.worst:.1f} ({share:.0f} %)'
 
     names = (*CLASSES, *WINNERS)
-    return output.markdown_table(['model, set', *names], [
-        [f'{row.model}, {row.set}', *(cell(row, name) for name in names)]
-        for row in rows if quantity in row.quantities])
+    return markdown_table(['model, set', *names], [
+        [f'{row.model}, {row.set}', *(cell(row.errors['point'], name) for name in names)]
+        for row in rows])
 
 
-def csv_rows(rows: Sequence[AccuracyRow]) -> list[dict[str, object]]:
-    """Return a row per model, set, part and quantity: errors in %, differences of the size.
+def csv_rows(rows: Sequence[AccuracyRow]) -> Iterator[dict[str, object]]:
+    """Yield a row per model, set, part and quantity: errors in %, differences of the size.
 
     A row of a whole set ends with its limits, the point's also with what is known of the set only.
     """
-    found: list[dict[str, object]] = []
-    for row, quantity in [(one, name) for one in rows for name in one.quantities]:
-        limit = limit_of(quantity, row.set) if row.model == 'mlp' else None
-        for part, of_part in row.parts().items():
-            errors = getattr(of_part, quantity)
-            mean, p99, worst = statistics(errors)
-            found.append({'model': row.model, 'set': row.set, 'part': part, 'quantity': quantity,
-                          'pairs': len(errors), 'mean': mean, 'p50': float(np.median(errors)),
-                          'p99': p99, 'worst': worst})
-            if part == 'all':
-                found[-1]['limit_p99'] = limit
-            if part == 'all' and quantity == 'point':
-                found[-1] |= {name: getattr(row, name) for name in (
-                    'exact_share', 'verdict_errors', 'normal_difference', 'separation_difference',
-                    'outside')}
-    return found
-
-
-def page(rows: Sequence[AccuracyRow], errors: dict[str, np.ndarray], drawn: int, command: str,
-         seed: int, broken: Sequence[str]) -> str:
-    """Return the Markdown page."""
-    if broken:
-        verdict = f'Goals missed: {"; ".join(broken)}.'
-    elif any(row.model == 'mlp' for row in rows):
-        verdict = 'All limits hold.'
-    else:
-        verdict = 'A model of your own has no limits.'
-    return output.page(
-        'benchmarks/pages/accuracy',
-        command=command, machine=output.machine(native), seed=seed,
-        verdict=verdict, table=table(rows), error_table=error_table(rows), mae_limit=MAE_LIMIT,
-        point_classes=class_table(rows, 'point'), paper_table=paper_table(errors, drawn))
+    for row in rows:
+        for quantity, parts in row.errors.items():
+            for part, errors in parts.items():
+                line = {'model': row.model, 'set': row.set, 'part': part, 'quantity': quantity,
+                        **errors._asdict()}
+                if part == 'all' and row.model == 'mlp':
+                    line['limit_p99'] = limit_of(quantity, row.set)
+                if part == 'all' and quantity == 'point':
+                    line |= {'exact_share': row.exact_share, 'outside': row.outside}
+                yield line
 
 
 def draw(path: Path, rows: Sequence[AccuracyRow]) -> None:
@@ -381,11 +284,11 @@ def draw(path: Path, rows: Sequence[AccuracyRow]) -> None:
     figure, axes = output.subplots(1, 1, (7.5, 1.3 + 0.3 * len(rows)))
     axis = axes[0, 0]
     for place, row in enumerate(rows):
-        values = [max(value, SHOWN[0]) for value in output.percentiles(
-            row.errors.point, *MARKS.values())]
+        errors = row.errors['point']['all']
+        values = [max(value, SHOWN[0]) for value in (errors.p50, errors.p99, errors.worst)]
         colour = f'C{models.index(row.model)}'
         axis.plot(values, [place] * len(values), color=colour, linewidth=1.2)
-        for (mark, label), value in zip(MARKS, values):
+        for (mark, label), value in zip(MARKS.items(), values):
             axis.plot(value, place, mark, color=colour, markersize=7, clip_on=False,
                       label='' if place else label)
     names = [row.set if len(models) == 1 else f'{row.set}, {row.model}' for row in rows]
@@ -399,60 +302,58 @@ def draw(path: Path, rows: Sequence[AccuracyRow]) -> None:
     figure.savefig(path)
 
 
-def search(folder: Path, minutes: float, seeds: Sequence[int], args: Sequence[str] | None) -> int:
-    """Search for the worst cases of `mlp`, print and write them; 1 if a limit is broken."""
-    rows = searched.search(minutes, seeds)
-    broken = [text for row in rows for text in row.broken()]
-    output.write_csv(folder / 'searched.csv', searched.csv_rows(rows),
-                     about=output.machine(native))
-    (folder / 'searched.md').write_text(output.page(
-        'benchmarks/pages/searched',
-        command=output.command_line('box_contact_ros accuracy', args),
-        machine=output.machine(native), seeds=' and '.join(map(str, seeds)), minutes=minutes,
-        verdict=f'Goals missed: {"; ".join(broken)}.' if broken else 'All limits hold.',
-        table=searched.table(rows)), encoding='utf-8')
-    print(searched.table(rows))
-    for text in broken:
-        print(f'accuracy: goal missed: {text}', file=sys.stderr)
-    return 1 if broken else 0
+def model_or_class(text: str) -> Any:
+    """Return the name of a model, or an object of `package.module:Class` that answers as one."""
+    module, colon, name = text.partition(':')
+    if not colon:
+        return model_name(text)
+    sys.path.insert(0, '')  # modules of the current folder, however the program was started
+    try:
+        return getattr(import_module(module), name)()
+    except (ImportError, AttributeError) as error:
+        raise argparse.ArgumentTypeError(f'{text}: {error}') from error
 
 
 def main(args: Sequence[str] | None = None) -> int:
     """Measure, print, write; 1 if a limit is broken."""
-    parser = program_parser('accuracy', __doc__, quick=f'{QUICK_PAIRS} pairs a set', seed=2,
+    parser = program_parser('accuracy', __doc__, quick=f'{QUICK_PAIRS} pairs of each set', seed=2,
                             out='accuracy.md, accuracy.csv, accuracy.png')
-    add_models(parser, '--model', ['mlp'], model_or_class)
-    parser.add_argument('--export', type=Path, metavar='DIR',
-                        help='only write the sets with their exact contacts as .npz')
-    parser.add_argument('--search', type=within(0.0), metavar='MINUTES',
-                        help='search for the worst cases of MLP instead, with each of two seeds; '
-                             'writes searched.md and searched.csv')
+    parser.add_argument('--model', nargs='+', type=model_or_class, default=['mlp'],
+                        metavar='MODEL', help='names, or package.module:Class (default: mlp)')
     parser.add_argument('--weights', help='weights file of MLP, default: the shipped one')
     parser.add_argument('--pairs', type=within(1), default=PAIRS,
-                        help='a set, default: %(default)s')
+                        help='of each set, default: %(default)s')
     options = parser.parse_args(args)
-    count = min(options.pairs, QUICK_PAIRS) if options.quick else options.pairs
-    if options.export:
-        export(output.make_folder(parser, options.export), count, options.seed)
-        return 0
     folder = output.results_folder(parser, options)
-    if options.search is not None:
-        return search(folder, options.search, [options.seed, options.seed + 1], args)
+    count = min(options.pairs, QUICK_PAIRS) if options.quick else options.pairs
     try:
-        rows = measure_all(options.model, count, options.seed, options.weights)
-        errors, drawn = paper_errors(['exact', *(m for m in options.model if m == 'mlp')],
-                                     options.weights, 10 if options.quick else 1)
+        models = [ours(model, weights=options.weights if model == 'mlp' else None)
+                  for model in options.model]
+        rows = measure_all(models, count, options.seed)
+        judged = [ours('exact'), *(model for model in models if model.name == 'mlp')]
+        papers = {model.name: paper_errors(model, 10 if options.quick else 1) for model in judged}
     except WeightsError as error:
         print(f'accuracy: {error}', file=sys.stderr)
         return 1
-    broken = [text for row in rows for text in row.broken()] + paper_broken(errors, drawn)
+    broken = [text for row in rows for text in row.broken()]
+    if 'mlp' in papers:
+        wrong, missed = papers['mlp']
+        broken += over("mlp, the paper's external set", {
+            'MAE [rad]': (float(np.abs(wrong).mean()), MAE_LIMIT), 'missed': (missed, 0)})
+    on_paper = paper_table({name: wrong for name, (wrong, _) in papers.items()})
     output.write_csv(folder / 'accuracy.csv', csv_rows(rows), about=output.machine(native))
-    command = output.command_line('box_contact_ros accuracy', args)
-    (folder / 'accuracy.md').write_text(
-        page(rows, errors, drawn, command, options.seed, broken), encoding='utf-8')
+    (folder / 'accuracy.md').write_text(output.page(
+        'benchmarks/pages/accuracy', command=output.command_line('benchmarks.accuracy', args),
+        machine=output.machine(native), seed=options.seed,
+        verdict=f'Goals missed: {"; ".join(broken)}.' if broken else 'All limits of `mlp` hold.',
+        error_table=error_table(rows), mae_limit=MAE_LIMIT,
+        point_classes=class_table(rows), paper_table=on_paper), encoding='utf-8')
     draw(folder / 'accuracy.png', rows)
-    print(table(rows), error_table(rows), class_table(rows, 'point'),
-          paper_table(errors, drawn), sep='\n\n')
+    print(error_table(rows), class_table(rows), on_paper, sep='\n\n')
     for text in broken:
         print(f'accuracy: goal missed: {text}', file=sys.stderr)
     return 1 if broken else 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,15 +1,15 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a contestant is, what it answers, and the ways to make one point of its answer.
+"""A contestant: a model of this package or another engine, asked and timed alike by all reports.
 
-Models of this package and other engines are a `Contestant`, so reports ask and time them alike. A
-call goes from two poses, in the contestant's own form, to a result that Python can read. Making
-shapes and models is preparation and is not timed. Setting both poses is timed.
+A call goes from two poses, in the contestant's own form, to a result that Python can read. Shapes
+and models are made beforehand and are not timed. Setting both poses is timed.
 """
 from __future__ import annotations
 
 import multiprocessing
+import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
@@ -18,13 +18,18 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from box_contact_ros.core import FORCE
 from box_contact_ros.scene.pose import rotation_matrix
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
-from box_contact_ros.solver.models import find_model
 
 from .pose_sets import Pairs
 
+MODELS = ('exact', 'mlp', 'paper', *(f'soup-{n}' for n in (8, 10, 12, 14, 16, 18, 20, 22)))
+"""Our contestants; the soups are those of the paper's Table 3."""
+CORE_MODELS = ('exact', 'mlp')
+"""Models in C++ with volume and covariance: each instruction set of the machine is measured."""
+ENDING = 5.0  # time that a subprocess has to end after its answer [s]
 MOST_CONTACTS = 16  # contacts asked for; two boxes have at most eight
 
 
@@ -65,8 +70,8 @@ class Contestant:
     """One way to answer: a model of this package or another engine."""
 
     name: str  # as reports show it
-    call: str  # what a user writes
-    returns: str
+    call: str = 'ContactSolver(…)(pose_a, pose_b)'  # what a user writes
+    returns: str = 'one contact'
     patch: str = '–'  # what it says of the patch beyond points: its volume or area
     package: str = ''  # distribution whose version reports name
     choices: tuple[str, ...] = ('deepest', 'mean', 'mean by depth', 'patch centroid')
@@ -94,19 +99,19 @@ class Contestant:
                 for a, b, p, q in zip(*map(np.ascontiguousarray, pairs))]
 
 
-def packages_of(found: Sequence[Contestant]) -> list[str]:
+def packages_of(contestants: Sequence[Contestant]) -> list[str]:
     """Return the distributions whose versions a report of these contestants names."""
-    return list(dict.fromkeys(['numpy', *(one.package for one in found if one.package)]))
+    return list(dict.fromkeys(['numpy', *(one.package for one in contestants if one.package)]))
 
 
-def ours(model: str, *, weights: str | None = None) -> Contestant:
-    """Return a model of this package. ValueError: there is no such model."""
-    entry, _ = find_model('model', model)
+def ours(model: Any, *, weights: str | None = None, name: str = '') -> Contestant:
+    """Return a model of this package, or an object with `solve` under a name of its own."""
+    name = name or (model if isinstance(model, str) else type(model).__name__)
     solver = partial(ContactSolver, model=model, weights=weights)
 
     def solve(pairs: Pairs) -> Solved:
-        one = solver(pairs.size_a[0], pairs.size_b[0])
-        return Solved(pairs.contacts(one), one.exact_answers)
+        made = solver(pairs.size_a[0], pairs.size_b[0])
+        return Solved(pairs.contacts(made), made.exact_answers)
 
     def prepare_batch(pairs: Pairs, threads: int = 1) -> Callable[[], Any]:
         a, b, size_a, size_b = pairs
@@ -118,11 +123,11 @@ def ours(model: str, *, weights: str | None = None) -> Contestant:
             return APART
         return manifold([(contact.point, contact.normal, -contact.separation)])
 
-    return Contestant(name=model, call='ContactSolver(…)(pose_a, pose_b)',
-                      returns='one contact', patch='volume, covariance', choices=('its point',),
-                      boxes=solver, at=lambda a, b: (a, b), read=read, solve=solve,
-                      any_boxes=entry.any_boxes,
-                      prepare_batch=prepare_batch if entry.native_batch else None)
+    return Contestant(
+        name=name, patch='volume, covariance', choices=('its point',), boxes=solver,
+        at=lambda a, b: (a, b), read=read, solve=solve,
+        any_boxes=name != 'paper' and not hasattr(model, 'size_fault'),
+        prepare_batch=None if name.startswith('soup') else prepare_batch)  # it loops over pairs
 
 
 def _deepest(points: np.ndarray, normals: np.ndarray, depths: np.ndarray) -> np.ndarray:
@@ -148,11 +153,12 @@ def _patch_centroid(points: np.ndarray, normals: np.ndarray, depths: np.ndarray)
     across = np.linalg.svd(normal[None])[2][1:]
     flat = (points - middle) @ across.T
     order = np.argsort(np.arctan2(flat[:, 1], flat[:, 0]))
-    one, two = order, np.roll(order, -1)
-    areas = flat[one, 0] * flat[two, 1] - flat[one, 1] * flat[two, 0]
+    following = np.roll(order, -1)
+    areas = flat[order, 0] * flat[following, 1] - flat[order, 1] * flat[following, 0]
     if not areas.sum() > 0.0:
         return middle
-    return middle + areas @ (points[one] + points[two] - 2.0 * middle) / (3.0 * areas.sum())
+    corners = points[order] + points[following] - 2.0 * middle
+    return middle + areas @ corners / (3.0 * areas.sum())
 
 
 def _last(points: np.ndarray, normals: np.ndarray, depths: np.ndarray) -> np.ndarray:
@@ -165,23 +171,30 @@ CHOICES: dict[str, Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]] =
 """One point of n > 0 points (n, 3), with their normals (n, 3) and depths (n,)."""
 
 
-def chosen(found: Manifold, choice: str) -> Answer:
+def chosen(answer: Manifold, choice: str) -> Answer:
     """Return one contact of an answer: the deepest one's normal, the point by a choice."""
-    if not len(found.points):
+    if not len(answer.points):
         return Answer(False, np.full(3, np.nan), np.full(3, np.nan))
-    return Answer(True, found.normals[int(np.argmax(found.depths))], CHOICES[choice](*found))
+    return Answer(True, answer.normals[int(np.argmax(answer.depths))], CHOICES[choice](*answer))
 
 
-def in_subprocess(work: Callable[..., Any], *arguments: Any, patience: float) -> Any:
-    """Return what `work` returns in a subprocess. RuntimeError: what ended the subprocess."""
-    context = multiprocessing.get_context('spawn')
+def in_subprocess(work: Callable[..., Any], *arguments: Any, patience: float,
+                  instruction_set: str = '') -> Any:
+    """Return what `work` returns in a subprocess. RuntimeError: what ended the subprocess.
+
+    patience: the longest wait [s]. instruction_set: that of the core there, instead of the best.
+    """
+    context, before = multiprocessing.get_context('spawn'), dict(os.environ)
     receiving, sending = context.Pipe(duplex=False)
     process = context.Process(target=_answer_to, args=(sending, work, *arguments))
-    process.start()
-    sending.close()
     try:
+        os.environ |= {FORCE: instruction_set} if instruction_set else {}
+        process.start()
+        sending.close()
         if receiving.poll(patience):
-            return receiving.recv()
+            answer = receiving.recv()
+            process.join(ENDING)
+            return answer
         raise RuntimeError(f'no answer in {patience:g} s')
     except EOFError:
         process.join()
@@ -189,8 +202,14 @@ def in_subprocess(work: Callable[..., Any], *arguments: Any, patience: float) ->
         raise RuntimeError(f'ended by signal {-status}' if status < 0 else
                            f'ended with status {status}') from None
     finally:
+        os.environ.clear()
+        os.environ |= before
         process.kill()
         process.join()
+
+
+def _answer_to(pipe: Any, work: Callable[..., Any], *arguments: Any) -> None:
+    pipe.send(work(*arguments))
 
 
 def part_by_part(work: Callable[..., dict[str, Any]], make: Callable[[], Contestant],
@@ -211,10 +230,6 @@ def part_by_part(work: Callable[..., dict[str, Any]], make: Callable[[], Contest
 
 def _work_with(work: Callable[..., Any], make: Callable[[], Contestant], *arguments: Any) -> Any:
     return work(replace(make(), make=make), *arguments)
-
-
-def _answer_to(pipe: Any, work: Callable[..., Any], *arguments: Any) -> None:
-    pipe.send(work(*arguments))
 
 
 def wxyz(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, ...]:

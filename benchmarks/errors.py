@@ -1,7 +1,7 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""How wrong points, volumes and covariances are: the one place that all reports ask.
+"""Errors of points, volumes and covariances: the one place that all reports ask.
 
 Each error has the unit that its size depends on: the point's is relative to the smaller box's
 longest edge, the volume's to the exact volume, the covariance's to the exact one's trace.
@@ -70,7 +70,7 @@ def _in_plane(covariance: np.ndarray, normal: np.ndarray) -> np.ndarray:
     x /= np.linalg.norm(x, axis=1, keepdims=True)
     axes = np.stack([x, np.cross(normal, x)], axis=1)
     across = axes @ covariance @ axes.swapaxes(1, 2)
-    one, other, both = across[:, 0, 0], across[:, 1, 1], across[:, 0, 1]
-    largest = 0.5 * (one + other) + np.hypot(0.5 * (one - other), both)
-    least = (one * other - both**2) / largest
+    xx, yy, xy = across[:, 0, 0], across[:, 1, 1], across[:, 0, 1]
+    largest = 0.5 * (xx + yy) + np.hypot(0.5 * (xx - yy), xy)
+    least = (xx * yy - xy**2) / largest
     return np.stack([least, largest], axis=1)

@@ -1,255 +1,257 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Program `frontier`: speed against error of every model and of other engines.
+"""Program `frontier`: speed against error of every model and of other engines, in one run.
 
-`python -m box_contact_ros frontier` writes frontier.csv, .md and .png. One run, one pinned core,
+`python -m benchmarks.frontier` writes frontier.csv, .md and .png. It runs on one pinned core, with
 garbage collection off. Each contestant is warmed up and timed call by call. All of them on all sets
-take turns. The models with native batches run once more with each other instruction set of the
-machine, in a subprocess. Times are read as ratios within a run; the machine is named.
+take turns. The models in C++ run once more with each other instruction set of the machine, in a
+subprocess. Times are read as ratios within a run; the machine is named.
 
-Errors are against the exact model. Those of points are in % of the smaller box's longest edge, per
-contact class; those of normals in degrees. Verdicts that differ are contacts missed
-and contacts invented. An engine that returns several points is entered with the best of the ways
-to make one of them. Other engines are judged in subprocesses, where an abort is a finding.
-
-`--speed` writes the speed gates instead, speed.md and speed.csv.
+Errors are against model `exact`. Those of points are in % of the smaller box's longest edge, per
+contact class; those of normals in degrees. Verdicts that differ are contacts missed and contacts
+invented. An engine that returns several points is entered with the best of the ways to make one of
+them. Other engines are judged in subprocesses, where an abort is a finding.
 """
 from __future__ import annotations
 
 import math
-import os
 import sys
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict
 from inspect import getdoc
+from pathlib import Path
 
-from box_contact_ros import output
-from box_contact_ros.core import FORCE, instruction_sets, native
-from box_contact_ros.output import markdown_table, number
+from box_contact_ros.core import instruction_sets, native
 from box_contact_ros.solver.arguments import program_parser
-from box_contact_ros.solver.models import models, models_with_patch
 
-from .accuracy import CLASSES
-from .contestant import Contestant, ours, packages_of
+from . import output
+from .accuracy import CLASSES, WINNERS, Summary
+from .contestant import CORE_MODELS, MODELS, Contestant, in_subprocess, ours, packages_of
 from .engines import installed
-from .frontier_picture import draw
-from .native import write_native
-from .speed import with_instruction_set, write_speed
-from .timing import pinned, usable_cores
+from .output import markdown_table, number
+from .pose_sets import SETS, apart
+from .timing import by_round, pinned, usable_cores
 from .trials import (
-    ALL_SETS,
     FEW_PAIRS,
     FULL,
+    LONGEST_RUN,
     QUICK,
     VERDICT,
     FrontierRow,
     Plan,
     measure_all,
+    rounds_of,
 )
 
+TIMED_SETS = {**SETS, 'just apart': apart}
 IN_SHORT = ('exact', 'mlp', 'paper', 'soup-8', 'soup-22')
-"""Models in the table of the README that engines answer, too."""
-AS_ENGINES = ('fcl',)
-"""Models whose library is measured as an engine, by the call that its own documentation shows."""
-FAMILIES = {'soup': [f'soup-{n}' for n in (8, 10, 12, 14, 16, 18, 20, 22)]}
-"""The members of a family that are measured: those of the paper's Table 3."""
+"""Models in the first table, and with `--quick` all that are measured but the last."""
 ODD_NORMAL = 10.0  # error of an engine's normal that is explained [deg]
 
-
-def contestants(members: int = FULL.members) -> tuple[list[Contestant], list[str]]:
-    """Return all that can be measured here, and a line about each that cannot."""
-    found = []
-    for entry in (one for one in models().values() if one.name not in AS_ENGINES):
-        with suppress(ImportError):  # of an extra whose libraries `missing` names
-            entry.load()
-            found += map(ours, FAMILIES.get(entry.name, [entry.full_name])[:members])
-    rivals, missing = installed()
-    return [*found, *rivals], missing
-
-
-def measure_native(seed: int, plan: Plan) -> list[FrontierRow]:
-    """Measure the models with native batches, by the instruction set of this process."""
-    return measure_all([ours(model) for model in models_with_patch()], seed=seed, plan=plan)
+SHOWN_SET, EDGE = 'containers', 12.192e3
+"""The set of poses that is drawn, and its longest edge [mm], which errors are a share of."""
+SHOWN = {'exact': ('exact', 'C0'), 'mlp': ('mlp', 'C0'),
+         'paper': ("the paper's network", 'C4'), 'soup-8': ('polygon soup, N = 8', 'C5'),
+         'MuJoCo mj_collision': ('MuJoCo, best of its points', 'C1')}
+"""Contestant: how the picture calls it, and its colour."""
+ERRORS = (0.1, 1e4)
+"""Errors that are drawn to scale [mm]; 0 has a band of its own below."""
+TIMES = (0.3, 2e4)
+"""Times that the picture shows [µs]: names stand on the right of their points."""
 
 
-def _errors(values: Sequence[float]) -> str:
-    return '/'.join(map(number, values))
+def measure_core(seed: int, plan: Plan) -> list[FrontierRow]:
+    """Measure the models in C++, by the instruction set of this process."""
+    return measure_all(list(map(ours, CORE_MODELS)), TIMED_SETS, seed=seed, plan=plan)
 
 
-Odd = tuple[str, str]  # an engine's name, and 'missed', 'invented', 'normal' or 'failure'
+def by_exact(row: FrontierRow, rows: Iterable[FrontierRow]) -> list[float]:
+    """Return a call and a pair in a batch relative to `exact`: medians of the rounds' ratios."""
+    return by_round(row.rounds, rounds_of('exact', row, rows)).tolist()
 
 
-def odd_cells(rows: Sequence[FrontierRow], found: Sequence[Contestant]) -> dict[Odd, str]:
-    """Return what is odd in the answers of other engines: a line with a pose and the cause."""
-    lines: dict[Odd, str] = {}
-    for engine in found:
-        mine = [row for row in rows if row.name == engine.name and engine.make]
-        for kind in ('missed', 'invented', 'normal', 'failure'):
-            worst = max(mine, key=lambda row: _oddness(row, kind), default=None)
-            if worst is None or _oddness(worst, kind) <= (ODD_NORMAL if kind == 'normal' else 0.0):
-                continue
-            what = worst.failure or f'{kind} {_oddness(worst, kind):.3g}'
-            cause = engine.causes.get(kind) or 'Cause unknown.'
-            pose = '; '.join(f'{part} {tuple(values)}' for part, values in zip(
-                ('pose A', 'pose B', 'size A', 'size B'), worst.poses.get(kind, ())))
-            lines[engine.name, kind] = (
-                f'{engine.name}, {worst.set}: {what}{"°" if kind == "normal" else ""}. {cause}'
-                + (f' First or worst: `{pose}`.' if pose else ''))
-    return lines
+def odd_answers(rows: Sequence[FrontierRow], engines: Iterable[Contestant]) -> Iterator[str]:
+    """Yield a line with the cause for what is odd in the answers of other engines."""
+    def oddness(row: FrontierRow, what: str) -> float:
+        errors = row.errors
+        return {'missed': errors.missed, 'invented': errors.invented,
+                'normal': 0.0 if math.isnan(errors.normal[1]) else errors.normal[1],
+                'exceptions': math.inf if row.failure else row.exceptions}[what]
+
+    for engine in engines:
+        mine = [row for row in rows if row.name == engine.name]
+        for what in ('missed', 'invented', 'normal', 'exceptions'):
+            worst = max(mine, key=lambda row: oddness(row, what))
+            amount = oddness(worst, what)
+            if amount > (ODD_NORMAL if what == 'normal' else 0.0):
+                yield (f'{engine.name}, {worst.set}: {worst.failure or f"{what} {amount:.3g}"}'
+                       f'{"°" if what == "normal" else ""}. '
+                       f'{engine.causes.get(what) or "Cause unknown."}')
 
 
-def _oddness(row: FrontierRow, kind: str) -> float:
-    errors = row.errors
-    return {'missed': errors.missed, 'invented': errors.invented,
-            'normal': 0.0 if math.isnan(errors.normal[1]) else errors.normal[1],
-            'failure': row.exceptions + len(row.failure)}[kind]
-
-
-def in_short(rows: Sequence[FrontierRow], odd: Mapping[Odd, str]) -> str:
+def in_short(rows: Sequence[FrontierRow], engines: Iterable[Contestant]) -> str:
     """Return the short table: containers and stacks, what a crane has all day."""
-    by = {(row.name, row.instruction_set, row.set): row for row in rows}
-    best, notes, lines = native.instruction_set, list(odd), []
-    rivals = [name for name in dict.fromkeys(row.name for row in rows) if ' ' in name]
+    rivals, lines = [engine.name for engine in engines], []
     for name in (*IN_SHORT, *rivals):
-        def marked(kind: str, cell: object, name: str = name) -> str:
-            place = notes.index((name, kind)) + 1 if (name, kind) in odd else 0
-            return f'{cell} [{place}]' if place else f'{cell}'
-
-        for one in dict.fromkeys(row.instruction_set for row in rows if row.name == name):
-            mine = [row for row in rows if (row.name, row.instruction_set) == (name, one)]
-            row, stack = by.get((name, one, 'containers')), by.get((name, one, 'stacks'))
-            if row is None:
+        for instruction_set in dict.fromkeys(row.instruction_set for row in rows
+                                             if row.name == name):
+            mine = {row.set: row for row in rows
+                    if (row.name, row.instruction_set) == (name, instruction_set)}
+            if SHOWN_SET not in mine:
                 continue
-            worst = [one.errors.normal[1] for one in mine if not math.isnan(one.errors.normal[1])]
+            shown, stack = mine[SHOWN_SET], mine.get('stacks')
+            normals = [row.errors.normal[1] for row in mine.values()
+                       if not math.isnan(row.errors.normal[1])]
             lines.append([
-                name if name in rivals else f'`{name}`' + (f', {one}' if one != best or name in
-                                                           models_with_patch() else ''),
-                f'{number(row.single[0] / 1e3)} / {number(row.single[1] / 1e3)}',
-                number(row.batch), row.best if name in rivals else '–',
-                *[number(one.errors.points['all'][2]) if one and one.errors.points else '–'
-                  for one in (row, stack)],
-                marked('normal', number(max(worst, default=math.nan))),
-                marked('missed', f'{sum(one.errors.missed for one in mine)} of '
-                       f'{sum(one.judged for one in mine):,}'),
-                marked('invented', sum(one.errors.invented for one in mine)),
-                marked('failure', f'{sum(one.exceptions for one in mine)} / '
-                       f'{sum(bool(one.failure) for one in mine)}')])
+                f'`{name}`, {instruction_set}' if name in CORE_MODELS else name,
+                f'{number(shown.single[0] / 1e3)} / {number(shown.single[1] / 1e3)}',
+                number(shown.batch), shown.best if name in rivals else '–',
+                *[number(row.errors.points['all'].p99) if row and row.errors.points else '–'
+                  for row in (shown, stack)],
+                number(max(normals, default=math.nan)),
+                f'{sum(row.errors.missed for row in mine.values())} of '
+                f'{sum(row.judged for row in mine.values()):,}',
+                sum(row.errors.invented for row in mine.values()),
+                f'{sum(row.exceptions for row in mine.values())} / '
+                f'{sum(bool(row.failure) for row in mine.values())}'])
     return markdown_table(
-        ['', 'single call, p50 / p99 [µs]', 'batch [ns a pair]', 'best point',
+        ['', 'single call, p50 / p99 [µs]', 'batch [ns per pair]', 'best point',
          'point error p99, containers [%]', 'stacks [%]', 'normal, worst [°]', 'missed', 'invented',
          'exceptions / aborts'], lines)
 
 
-def calls_table(found: Sequence[Contestant]) -> str:
+def calls_table(engines: Iterable[Contestant]) -> str:
     """Return what is called of other engines, and what they return."""
-    return markdown_table(
-        ['', 'call', 'returns', 'volume or area', 'one point by', 'batch'],
-        [[engine.name, f'`{engine.call}`', engine.returns, engine.patch, ', '.join(engine.choices),
-          'yes' if engine.prepare_batch else '–'] for engine in found if engine.make], words=6)
+    return markdown_table(['', 'call', 'returns', 'volume or area', 'one point by'], [
+        [engine.name, f'`{engine.call}`', engine.returns, engine.patch, ', '.join(engine.choices)]
+        for engine in engines], words=5)
 
 
 def set_table(rows: Sequence[FrontierRow], name: str) -> str:
     """Return all contestants on one set."""
+    def in_one(values: Sequence[float]) -> str:
+        return '/'.join(map(number, values))
+
     labels = ('all', *CLASSES)
     return markdown_table(
         ['', 'call p50 [µs]', 'p99', 'max', 'batch [ns]', 'judged', 'best point',
          *[f'{label}: p50/p99/worst' for label in labels], 'normal p99/worst [°]', 'missed',
          'invented'],
-        [[f'{row.name}, {row.instruction_set}' if row.name in models_with_patch() else row.name,
+        [[f'{row.name}, {row.instruction_set}' if row.name in CORE_MODELS else row.name,
           *[number(value / 1e3) for value in row.single], number(row.batch),
           f'{row.judged:,}', row.best if len(row.choices) > 1 else '–',
-          *[_errors(row.errors.points[label][1:]) if label in row.errors.points else '–'
+          *[in_one(row.errors.points[label][2:]) if label in row.errors.points else '–'
             for label in labels],
-          _errors(row.errors.normal), row.errors.missed, row.errors.invented]
+          in_one(row.errors.normal), row.errors.missed, row.errors.invented]
          for row in rows if row.set == name])
 
 
-def honesty(rows: Sequence[FrontierRow]) -> str:
-    """Return where the network loses and what it is for, with this run's figures."""
+def page(rows: Sequence[FrontierRow], models: Sequence[Contestant], engines: Sequence[Contestant],
+         missing: Sequence[str], command: str, plan: Plan) -> str:
+    """Return the Markdown page."""
     by = {(row.name, row.set): row for row in rows
           if row.instruction_set == native.instruction_set}
-    net = by['mlp', 'containers']
-    return output.page(
-        'benchmarks/pages/frontier_honesty',
-        single=net.by_exact[0], containers=net.by_exact[1],
-        stacks=by['mlp', 'stacks'].by_exact[1],
-        paper=by['paper', 'random cubes'].errors.points['all'][1]).rstrip()
-
-
-def page(rows: Sequence[FrontierRow], found: Sequence[Contestant], missing: Sequence[str],
-         command: str, plan: Plan) -> str:
-    """Return the Markdown page."""
-    odd = odd_cells(rows, found)
     return output.page(
         'benchmarks/pages/frontier', command=command,
-        machine=output.machine(native, packages_of(found)),
+        machine=output.machine(native, packages_of([*models, *engines])),
         skipped=''.join(f'\n\nLeft out: {line}.' for line in missing),
-        in_short=in_short(rows, odd), odd='\n'.join(
-            f'{place}. {line}' for place, line in enumerate(odd.values(), start=1)) or 'None.',
-        honesty=honesty(rows), verdict=VERDICT, few_pairs=FEW_PAIRS,
-        timed_pairs=plan.timed_pairs, calls=calls_table(found),
-        sets='\n\n'.join(
-            f'### {name.capitalize()}\n\n{getdoc(ALL_SETS[name])}\n\n{set_table(rows, name)}'
-            for name in ALL_SETS))
+        in_short=in_short(rows, engines), odd='\n'.join(
+            f'{place}. {line}' for place, line in enumerate(odd_answers(rows, engines), start=1)
+        ) or 'None.',
+        single=by_exact(by['mlp', 'containers'], rows)[0],
+        containers=by_exact(by['mlp', 'containers'], rows)[1],
+        stacks=by_exact(by['mlp', 'stacks'], rows)[1],
+        paper=by['paper', 'random cubes'].errors.points['all'].p50,
+        verdict=VERDICT, few_pairs=FEW_PAIRS, timed_pairs=plan.timed_pairs,
+        calls=calls_table(engines), sets='\n\n'.join(
+            f'### {name.capitalize()}\n\n{getdoc(make)}\n\n{set_table(rows, name)}'
+            for name, make in TIMED_SETS.items()))
 
 
-def csv_rows(rows: Sequence[FrontierRow], found: Sequence[Contestant]) -> list[dict[str, object]]:
-    """Return a row per contestant, set, choice and class; times [ns], errors [%], normals [deg]."""
-    packages, lines = {engine.name: engine.package for engine in found}, []
+def csv_rows(rows: Sequence[FrontierRow], contestants: Sequence[Contestant],
+             ) -> Iterator[dict[str, object]]:
+    """Yield a row per contestant, set, choice and class; times [ns], errors [%], normals [deg]."""
+    packages = {engine.name: engine.package for engine in contestants}
     here = {package: asdict(output.machine(native, ['numpy', *filter(None, [package])]))
-            for package in {'', *packages.values()}}
+            for package in {*packages.values()}}
     for row in rows:
         for choice, errors in row.choices.items():
-            points = errors.points or {'all': (0, *[math.nan] * 3)}
-            for label, (count, *point) in points.items():
-                lines.append({
+            nothing = {'all': Summary(0, *[math.nan] * 4)}
+            for label, point in (errors.points or nothing).items():
+                if label in WINNERS:
+                    continue
+                yield {
                     'contestant': row.name, 'set': row.set, 'point': choice, 'class': label,
-                    'contacts': count,
-                    **dict(zip(('point_p50', 'point_p99', 'point_worst'), point)),
-                    **dict(zip(('call_p50', 'call_p99', 'call_max'),
-                               (round(one) if one == one else one for one in row.single))),
+                    'contacts': point.pairs, 'point_p50': point.p50, 'point_p99': point.p99,
+                    'point_worst': point.worst,
+                    **dict(zip(('call_p50', 'call_p99', 'call_max'), row.single)),
                     'calls': row.calls, 'batch_p50': row.batch,
-                    **dict(zip(('call_by_exact', 'batch_by_exact'), row.by_exact)),
-                    'judged': row.judged,
-                    'normal_p99': errors.normal[0], 'normal_worst': errors.normal[1],
-                    'missed': errors.missed, 'invented': errors.invented,
-                    'exceptions': row.exceptions, 'failure': row.failure,
-                    **here[packages[row.name]], 'instruction_set': row.instruction_set})
-    return lines
+                    **dict(zip(('call_by_exact', 'batch_by_exact'), by_exact(row, rows))),
+                    'judged': row.judged, 'normal_p99': errors.normal[0],
+                    'normal_worst': errors.normal[1], 'missed': errors.missed,
+                    'invented': errors.invented, 'exceptions': row.exceptions,
+                    'failure': row.failure, **here[packages[row.name]],
+                    'instruction_set': row.instruction_set}
+
+
+def shown_points(table: Path) -> dict[str, tuple[float, float]]:
+    """Return the time of a call [µs] and the p99 point error [mm] of each contestant of a CSV.
+
+    An engine with several ways to make one point has the best of them. Models have the fastest
+    instruction set, whose rows come first.
+    """
+    points: dict[str, tuple[float, float]] = {}
+    for row in output.read_csv(table):
+        if row['set'] == SHOWN_SET and row['class'] == 'all' and row['contestant'] in SHOWN:
+            time, error = float(row['call_p50']) / 1e3, float(row['point_p99']) * EDGE / 100.0
+            before = points.get(row['contestant'], (time, math.inf))
+            points[row['contestant']] = before[0], min(before[1], error)
+    return points
+
+
+def draw(path: Path, table: Path) -> None:
+    """Draw the point error of five contestants over the time of a call, from the CSV."""
+    figure = output.figure((6.4, 4.2))
+    axis = figure.subplots()
+    height = output.log_errors(axis, *ERRORS)
+    axis.set_xscale('log')
+    axis.xaxis.set_major_formatter('{x:g}')
+    axis.set(xlim=TIMES, xlabel='time of a call from Python [µs]',
+             ylabel='point error, p99 [mm]',
+             title='A 12 m container on another: error and time')
+    for name, (time, error) in shown_points(table).items():
+        label, colour = SHOWN[name]
+        axis.plot(time, height(error), 'o', color=colour, markersize=8)
+        axis.annotate(label, (time, height(error)), xytext=(9, 0), textcoords='offset points',
+                      va='center', color=colour, fontsize=11)
+    figure.savefig(path, metadata={'Software': None})
 
 
 def main(args: Sequence[str] | None = None) -> int:
-    """Measure, print, write; with `--speed`, 1 if a limit is broken."""
-    parser = program_parser('frontier', __doc__, quick='few pairs, to try it out', seed=3,
-                            out='frontier.md, .csv, .png')
-    parser.add_argument('--speed', action='store_true',
-                        help='the speed gates instead: speed.md, .csv')
-    parser.add_argument('--native', action='store_true',
-                        help='C against C instead, with other engines: native.md, .csv')
-    cores = usable_cores()
-    parser.add_argument('--core', type=int, default=cores[-1], choices=cores, metavar='N',
-                        help='core to run on (default: the last one)')
+    """Measure, print, write."""
+    parser = program_parser('frontier', __doc__, quick='few pairs and models, to try it out',
+                            seed=3, out='frontier.md, .csv, .png')
     options = parser.parse_args(args)
     folder = output.results_folder(parser, options)
-    command = output.command_line('box_contact_ros frontier', args)
-    if options.speed:
-        return write_speed(folder, command, core=options.core, quick=options.quick)
-    if options.native:
-        return write_native(folder, command, core=options.core, quick=options.quick)
-    plan = QUICK if options.quick else FULL
-    with pinned({options.core}):
-        found, missing = contestants(plan.members)
-        for line in missing:
-            print(f'frontier: left out: {line}', file=sys.stderr)
-        rows = measure_all(found, seed=options.seed, plan=plan)
-        here = os.environ.get(FORCE, instruction_sets()[-1])
-        for name in [one for one in reversed(instruction_sets()) if one != here]:
-            rows += with_instruction_set(name, measure_native, options.seed, plan)
-    output.write_csv(folder / 'frontier.csv', csv_rows(rows, found))
-    (folder / 'frontier.md').write_text(page(rows, found, missing, command, plan),
+    plan, names = (QUICK, IN_SHORT[:-1]) if options.quick else (FULL, MODELS)
+    models, (engines, missing) = list(map(ours, names)), installed()
+    for line in missing:
+        print(f'frontier: left out: {line}', file=sys.stderr)
+    with pinned({usable_cores()[-1]}):
+        rows = measure_all([*models, *engines], TIMED_SETS, seed=options.seed, plan=plan)
+        for name in reversed(instruction_sets()):
+            if name != native.kernel:
+                rows += in_subprocess(measure_core, options.seed, plan, patience=LONGEST_RUN,
+                                      instruction_set=name)
+    output.write_csv(folder / 'frontier.csv', csv_rows(rows, [*models, *engines]))
+    command = output.command_line('benchmarks.frontier', args)
+    (folder / 'frontier.md').write_text(page(rows, models, engines, missing, command, plan),
                                         encoding='utf-8')
     draw(folder / 'frontier.png', folder / 'frontier.csv')
-    print(in_short(rows, odd_cells(rows, found)), honesty(rows), sep='\n\n')
+    print(in_short(rows, engines))
     return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -25,13 +25,13 @@ from pathlib import Path
 import numpy as np
 
 from box_contact_ros.core import native
-from box_contact_ros.output import machine, make_room, write_csv
 from box_contact_ros.scene.pose import quaternion_multiply, rotation_matrix
 from box_contact_ros.solver.arguments import add_models, program_parser, within
 from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.solver.models import models_with_patch
 
 from .judge import GATES, exact_gap, judge
+from .output import machine, make_room, write_csv
 from .patches import mlp_faults, patch_faults
 from .pose_sets import (
     CONTAINER,

@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from box_contact_ros import output
 from box_contact_ros.demo.landing import CORNER_SPEED_LIMIT, WATCHED, LandingRecord, solvers
 from box_contact_ros.demo.mujoco_crane import CraneScenario
 from box_contact_ros.scene.pose import rotation_matrix
 
+from . import output
 from .landing_ways import WAYS, LoopTiming, MujocoSource
 
 SHOWN_WAYS = {'exact': 'held patch', 'wrench': 'held wrench', 'mujoco-deepest': 'deepest point',

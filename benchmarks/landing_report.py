@@ -21,13 +21,13 @@ from multiprocessing import Pool
 from pathlib import Path
 from typing import NamedTuple
 
-from box_contact_ros import output
 from box_contact_ros.core import native
 from box_contact_ros.demo.landing import LandingRecord, LandingResult, scenario_of
 from box_contact_ros.demo.mujoco_crane import CraneScenario
 from box_contact_ros.node.processes import left_when_asked
 from box_contact_ros.solver.arguments import program_parser
 
+from . import output
 from .landing_picture import draw
 from .landing_ways import ADDED, WAYS, HeldLimits, LoopTiming, PlannedLanding, grid
 

@@ -7,10 +7,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from box_contact_ros import output
 from box_contact_ros.core import native
 from box_contact_ros.solver.models import models_with_patch
 
+from . import output
 from .contestant import ours, packages_of
 from .engines import installed
 from .named_failures import NamedFailure, load, replay_apart

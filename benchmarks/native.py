@@ -1,11 +1,11 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""C against C: libbox_contact and other engines, through their C and C++ interfaces.
+"""Program `native`: libbox_contact and other engines, C against C.
 
-`python -m box_contact_ros frontier --native` compiles native_calls/, which calls all in turn in one
-process, and writes native.md and native.csv. MuJoCo's wheel has its headers and its library. Coal
-and Bullet are compiled in where pkg-config finds them.
+`python -m benchmarks.native` compiles native_calls/, which calls all in turn in one process, and
+writes native.md and native.csv. MuJoCo's wheel has its headers and its library. Coal and Bullet are
+compiled in where pkg-config finds them.
 """
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ import os
 import shlex
 import shutil
 import subprocess
+import sys
 import tempfile
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from importlib import metadata
 from pathlib import Path
 from typing import NamedTuple
@@ -24,25 +25,19 @@ from typing import NamedTuple
 import numpy as np
 
 from box_contact_ros.core import FORCE, instruction_sets, native
-from box_contact_ros.output import (
-    PACKAGE,
-    machine,
-    markdown_table,
-    number,
-    page,
-    percentiles,
-    write_csv,
-)
+from box_contact_ros.solver.arguments import program_parser
 
-from .pose_sets import LOADS, SETS, Pairs
-from .speed import flush_stacks
-from .timing import pinned, usable_cores
+from . import output
+from .output import markdown_table, number, percentiles
+from .pose_sets import FLUSH, LOADS, SETS, Pairs, drawn
+from .timing import by_round, pinned, usable_cores
 
 PAIRS, ROUNDS, CALLS = 20_000, 24, 2_000
 QUICK_PAIRS, QUICK_ROUNDS, QUICK_CALLS = 1_000, 2, 200
 MIXED = 'containers, 20 % touching'
 UNIT = 'mjc_BoxBox, single'
 CALLS_FOLDER = Path(__file__).with_name('native_calls')
+CORE = Path(native.__file__).parent  # with the library and its headers
 OPTIONAL = {'coal': 'pip install coal cmeel-eigen', 'bullet': 'apt install libbullet-dev'}
 """By file of native_calls/ and by name for pkg-config: what brings headers and library."""
 CLEAR = 1e-6
@@ -62,7 +57,7 @@ class Times(NamedTuple):
     depth_errors: tuple[float, float, float]  # median, p99, worst against `exact`, of the size [%]
 
 
-Found = Mapping[str, Times]  # by contestant
+OnSet = Mapping[str, Times]  # by contestant
 
 
 def package_config(name: str, *options: str) -> str | None:
@@ -82,18 +77,11 @@ def package_config(name: str, *options: str) -> str | None:
 
 def package_flags(name: str) -> list[str] | None:
     """Return a library's flags for the compiler and the linker; None where it is not installed."""
-    found = package_config(name, '--cflags', '--libs')
-    if found is None:
+    answer = package_config(name, '--cflags', '--libs')
+    if answer is None:
         return None
-    flags = []
-    for flag in shlex.split(found):
-        if flag.startswith('-I'):  # warnings in headers of others are not ours
-            flags += ['-isystem', flag[2:]]
-        elif flag.startswith('-L'):
-            flags += [flag, f'-Wl,-rpath,{flag[2:]}']
-        else:
-            flags.append(flag)
-    return flags
+    flags = shlex.split(answer)
+    return flags + [f'-Wl,-rpath,{flag[2:]}' for flag in flags if flag.startswith('-L')]
 
 
 def compiled(folder: Path) -> tuple[Path, list[str]]:
@@ -105,60 +93,44 @@ def compiled(folder: Path) -> tuple[Path, list[str]]:
     if spec is None or spec.origin is None:
         raise RuntimeError("MuJoCo is not installed: pip install -e '.[sim]'")
     mujoco = Path(spec.origin).parent
-    library, ours = next(mujoco.glob('libmujoco.so*')), PACKAGE / 'core'
-    names, flags, missing = ['main', 'mujoco', 'ours'], list[str](), list[str]()
-    for name in OPTIONAL:
-        found = package_flags(name)
-        if found is None:
-            missing.append(name)
-        else:
-            names.append(name)
-            flags += [f'-DWITH_{name.upper()}', *found]
+    options = {name: package_flags(name) for name in OPTIONAL}
+    rivals = {name: flags for name, flags in options.items() if flags is not None}
+    flags = [flag for name, more in rivals.items() for flag in (f'-DWITH_{name.upper()}', *more)]
     done = subprocess.run(
-        [os.environ.get('CXX', 'g++'), '-std=c++17', '-O2', '-Wall', '-Wextra', '-Werror',
-         f'-I{ours / "include"}', f'-I{mujoco / "include"}',
-         *[str(CALLS_FOLDER / f'{name}.cpp') for name in names], '-o', str(folder / 'native'),
-         str(ours / 'libbox_contact.so'), str(library), f'-Wl,-rpath,{ours}',
-         f'-Wl,-rpath,{mujoco}', *flags], capture_output=True, text=True)
+        [os.environ.get('CXX', 'g++'), '-std=c++17', '-O2', '-Wall', '-Wextra',
+         f'-I{CORE / "include"}', f'-I{mujoco / "include"}',
+         *[str(CALLS_FOLDER / f'{name}.cpp') for name in ('main', 'mujoco', 'ours', *rivals)],
+         '-o', str(folder / 'native'), str(CORE / 'libbox_contact.so'),
+         str(next(mujoco.glob('libmujoco.so*'))), f'-Wl,-rpath,{CORE}', f'-Wl,-rpath,{mujoco}',
+         *flags], capture_output=True, text=True)
     if done.returncode:
         raise RuntimeError(f'native_calls does not compile:\n{done.stderr}')
-    return folder / 'native', missing
+    return folder / 'native', [name for name in OPTIONAL if name not in rivals]
 
 
-def engines(missing: list[str]) -> str:
-    """Return the versions of the engines that were compiled in."""
-    return ', '.join([f'MuJoCo {metadata.version("mujoco")}', *[
-        f'{name.capitalize()} {package_config(name, "--modversion")}'
-        for name in OPTIONAL if name not in missing]])
-
-
-def calls_shown(missing: list[str]) -> str:
+def calls_shown(missing: Sequence[str]) -> str:
     """Return the code of each call, as it was compiled."""
     blocks = []
     for file in sorted(CALLS_FOLDER.glob('*.cpp')):
-        if file.stem in missing:
-            continue
         _, *parts = file.read_text(encoding='utf-8').split('// call: ')
-        for part in parts:
-            name, _, rest = part.partition('\n')
+        for name, _, rest in (part.partition('\n') for part in parts if file.stem not in missing):
             code = textwrap.dedent(rest[:rest.index('// end of call')].rstrip())
             blocks.append(f'{name}:\n\n```c++\n{code}\n```')
     return '\n\n'.join(blocks)
 
 
 def sets(count: int) -> dict[str, Pairs]:
-    """Return `count` pairs at most of each set, and containers, a fifth of them in contact."""
-    drawn = {name: make(np.random.default_rng([3, number]), count + count // 20).rows(slice(count))
-             for number, (name, make) in enumerate(
-                 {**SETS, **LOADS, 'aligned flush stacks': flush_stacks}.items())}
-    mixed = drawn['containers']
+    """Return `count` pairs of each set, and containers, a fifth of them in contact."""
+    by_name = {name: drawn(make, np.random.default_rng([3, place]), count)
+               for place, (name, make) in enumerate((SETS | LOADS | FLUSH).items())}
+    mixed = by_name['containers']
     apart = np.random.default_rng(3).random(len(mixed.pose_b)) < 0.8
     pose_b = mixed.pose_b.copy()
     pose_b[apart, :3] *= 1.5
-    return {**drawn, MIXED: mixed._replace(pose_b=pose_b)}
+    return {**by_name, MIXED: mixed._replace(pose_b=pose_b)}
 
 
-def timed(program: Path, pairs: Pairs, instruction_set: str, *, rounds: int, calls: int) -> Found:
+def timed(program: Path, pairs: Pairs, instruction_set: str, *, rounds: int, calls: int) -> OnSet:
     """Return times and errors of all contestants on one set, with one instruction set."""
     poses, answers = program.parent / 'poses', program.parent / 'answers'
     poses.write_bytes(np.int64(len(pairs.pose_a)).tobytes()
@@ -199,33 +171,37 @@ def judged(name: str, nanoseconds: np.ndarray, separation: np.ndarray, pairs: Pa
                  (p50, p99, worst))
 
 
-def ratio(times: Found, one: str, other: str) -> float:
-    """Return the median of the rounds' ratios."""
-    return float(np.median(times[one].nanoseconds / times[other].nanoseconds))
+def ratio(times: OnSet, name: str) -> float:
+    """Return the median of the rounds' ratios to `UNIT`."""
+    return float(by_round(times[name].nanoseconds, times[UNIT].nanoseconds))
 
 
-def contestants_table(times: Found) -> str:
-    """Return the times of all contestants, and their ratios to `UNIT`."""
-    lines = []
-    for name, one in times.items():
-        p50, p99 = percentiles(one.nanoseconds, 50, 99)
-        lines.append([name, f'{one.nanoseconds.min():.0f}', f'{p50:.0f}', f'{p99:.0f}',
-                      f'{ratio(times, name, UNIT):.2f}'])
-    return markdown_table(['', 'min [ns]', 'p50 [ns]', 'p99 [ns]', 'relative to `mjc_BoxBox`'],
-                          lines)
+def contestants_table(times: OnSet) -> str:
+    """Return the times of all contestants on a set, and their ratios to `UNIT`."""
+    return markdown_table(
+        ['', 'min [ns]', 'p50 [ns]', 'p99 [ns]', 'relative to `mjc_BoxBox`'],
+        [[name, *(f'{value:.0f}' for value in percentiles(one.nanoseconds, 0, 50, 99)),
+          f'{ratio(times, name):.2f}'] for name, one in times.items()])
 
 
-def answers_table(found: Mapping[str, Found]) -> str:
+def sets_table(by_set: Mapping[str, OnSet]) -> str:
+    """Return the ratio to `UNIT` of each contestant on each set."""
+    return markdown_table(['', *by_set], [
+        [name, *(f'{ratio(times, name):.2f}' for times in by_set.values())]
+        for name in next(iter(by_set.values()))])
+
+
+def answers_table(by_set: Mapping[str, OnSet]) -> str:
     """Return how the answers of other engines on all sets differ from those of `exact`."""
     lines = []
-    for name in next(iter(found.values())):
+    for name in next(iter(by_set.values())):
         if name.startswith(('exact', 'mlp')):
             continue
-        mine = {of_set: times[name] for of_set, times in found.items()}
+        mine = {of_set: times[name] for of_set, times in by_set.items()}
         worst = max(mine, key=lambda of_set: np.nan_to_num(mine[of_set].depth_errors[2]))
         lines.append([
-            name, *[f'{sum(getattr(one, kind) for one in mine.values()):,}'
-                    for kind in ('judged', 'missed', 'invented')],
+            name, *[f'{sum(getattr(one, count) for one in mine.values()):,}'
+                    for count in ('judged', 'missed', 'invented')],
             *['/'.join(map(number, mine[of_set].depth_errors))
               for of_set in ('containers', 'stacks')],
             f'{number(mine[worst].depth_errors[2])}, {worst}'])
@@ -234,74 +210,60 @@ def answers_table(found: Mapping[str, Found]) -> str:
          'on stacks [%]', 'worst of all sets [%]'], lines)
 
 
-def sets_table(found: Mapping[str, Found]) -> str:
-    """Return what `mlp` costs relative to `exact` on each set."""
-    lines = []
-    for name, times in found.items():
-        cells = [f'{ratio(times, f"mlp {patch}, {kind}", f"exact {patch}, {kind}"):.2f}'
-                 for kind in ('batch', 'single') for patch in ('covariance', 'volume')]
-        nanoseconds = [f'{np.median(times[f"{model} covariance, {kind}"].nanoseconds):.0f}'
-                       for kind in ('batch', 'single') for model in ('exact', 'mlp')]
-        lines.append([name, *cells, *nanoseconds])
-    return markdown_table(
-        ['set', 'batch', 'batch, volume alone', 'single', 'single, volume alone',
-         'batch of `exact` [ns]', 'of `mlp`', 'single `exact` [ns]', '`mlp`'], lines)
+def csv_rows(found: Mapping[str, Mapping[str, OnSet]]) -> Iterator[dict[str, object]]:
+    """Yield a row per instruction set, set and contestant."""
+    for instruction_set, by_set in found.items():
+        for name, times in by_set.items():
+            for contestant, one in times.items():
+                yield {'instruction_set': instruction_set, 'set': name, 'contestant': contestant,
+                       'min_ns': one.nanoseconds.min(), 'p50_ns': float(np.median(one.nanoseconds)),
+                       'by_unit': ratio(times, contestant), 'judged': one.judged,
+                       'missed': one.missed, 'invented': one.invented,
+                       **dict(zip(('depth_p50', 'depth_p99', 'depth_worst'), one.depth_errors))}
 
 
-def mixed_table(found: Mapping[str, Found]) -> str:
-    """Return the time of a batch with a fifth in contact, relative to one in contact."""
-    mixed, whole = ({name: float(np.median(one.nanoseconds)) for name, one in found[of_set].items()
-                     if name.endswith('batch')} for of_set in (MIXED, 'containers'))
-    return markdown_table(['', 'a fifth touches [ns]', 'relative to all'], [
-        [name, f'{time:.0f}', f'{time / whole[name]:.2f}'] for name, time in mixed.items()])
-
-
-def write_native(folder: Path, command: str, *, core: int | None, quick: bool) -> int:
+def main(args: Sequence[str] | None = None) -> int:
     """Compile, measure, print, write; 2 where the program cannot be made."""
     from tqdm import tqdm
 
-    pairs, rounds, calls = ((QUICK_PAIRS, QUICK_ROUNDS, QUICK_CALLS) if quick
+    parser = program_parser('native', __doc__, quick='few pairs and rounds, to try it out',
+                            out='native.md, native.csv')
+    options = parser.parse_args(args)
+    folder = output.results_folder(parser, options)
+    pairs, rounds, calls = ((QUICK_PAIRS, QUICK_ROUNDS, QUICK_CALLS) if options.quick
                             else (PAIRS, ROUNDS, CALLS))
-    drawn, names = sets(pairs), [name for name in instruction_sets() if name != 'baseline']
-    found: dict[str, dict[str, Found]] = {}
+    names = [name for name in instruction_sets() if name != 'baseline']
+    found: dict[str, dict[str, OnSet]] = {name: {} for name in names}
     with tempfile.TemporaryDirectory() as made:
         try:
             program, missing = compiled(Path(made))
         except RuntimeError as error:
-            print(f'frontier: {error}')
+            print(f'native: {error}', file=sys.stderr)
             return 2
-        with pinned([usable_cores()[-1] if core is None else core]), \
-                tqdm(total=len(drawn) * len(names), desc='native', unit='set') as bar:
+        with pinned({usable_cores()[-1]}):
             # Sets outside, so that instruction sets take turns.
-            for name, of_set in drawn.items():
-                for instruction_set in names:
-                    found.setdefault(instruction_set, {})[name] = timed(
-                        program, of_set, instruction_set, rounds=rounds, calls=calls)
-                    bar.update()
+            for of_set, chosen in tqdm(sets(pairs).items(), desc='native', unit='set'):
+                for name in names:
+                    found[name][of_set] = timed(program, chosen, name, rounds=rounds, calls=calls)
     tables = '\n\n'.join(
-        f'## {name}\n\nContainers:\n\n{contestants_table(times["containers"])}\n\n'
-        f'`mlp` relative to `exact`:\n\n{sets_table(times)}\n\n'
-        f'Containers, four in five of them apart:\n\n{mixed_table(times)}'
-        for name, times in found.items())
-    answers = answers_table(found[names[-1]])
-    write_csv(folder / 'native.csv', csv_rows(found), about=machine(native))
-    (folder / 'native.md').write_text(page(
-        'benchmarks/pages/native', command=command, machine=machine(native), rounds=rounds,
-        calls=calls, pairs=pairs, tables=tables, answers=answers, code=calls_shown(missing),
-        clear=CLEAR, engines=engines(missing), missing=''.join(
+        f'## {name}\n\nContainers:\n\n{contestants_table(by_set["containers"])}\n\n'
+        f'Relative to `mjc_BoxBox`, by set:\n\n{sets_table(by_set)}'
+        for name, by_set in found.items())
+    versions = [f'MuJoCo {metadata.version("mujoco")}', *(
+        f'{name.capitalize()} {package_config(name, "--modversion")}' for name in OPTIONAL
+        if name not in missing)]
+    text = output.page(
+        'benchmarks/pages/native', command=output.command_line('benchmarks.native', args),
+        machine=output.machine(native), rounds=rounds, calls=calls, pairs=pairs, tables=tables,
+        answers=answers_table(found[names[-1]]), code=calls_shown(missing), clear=CLEAR,
+        engines=', '.join(versions), missing=''.join(
             f'\n\nLeft out: {name.capitalize()} is not installed with its headers '
-            f'(`{OPTIONAL[name]}`).' for name in missing)), encoding='utf-8')
-    print(tables, answers, sep='\n\n')
+            f'(`{OPTIONAL[name]}`).' for name in missing))
+    (folder / 'native.md').write_text(text, encoding='utf-8')
+    output.write_csv(folder / 'native.csv', csv_rows(found), about=output.machine(native))
+    print(tables)
     return 0
 
 
-def csv_rows(found: Mapping[str, Mapping[str, Found]]) -> list[dict[str, object]]:
-    """Return a row per instruction set, set and contestant."""
-    return [
-        {'instruction_set': instruction_set, 'set': name, 'contestant': contestant,
-         'min_ns': one.nanoseconds.min(), 'p50_ns': float(np.median(one.nanoseconds)),
-         'by_unit': ratio(times, contestant, UNIT), 'judged': one.judged, 'missed': one.missed,
-         'invented': one.invented,
-         **dict(zip(('depth_p50', 'depth_p99', 'depth_worst'), one.depth_errors))}
-        for instruction_set, by_set in found.items() for name, times in by_set.items()
-        for contestant, one in times.items()]
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,11 +1,11 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Named sets of posed pairs of boxes: what accuracy, speed and training are measured and made on.
+"""Named sets of posed pairs of boxes: reports and training draw from them.
 
-A set is a function (rng, n) -> Pairs with about n pairs: a few draws miss and are left out. The
-depth of the overlap is drawn, too. A pair that overlaps deeply is drawn first. Then B moves out
-along SAT's normal, which changes the depth by just as much and keeps the axis.
+A set is a function (rng, n) -> Pairs with about n pairs: a few draws miss and are left out. A pair
+that overlaps deeply is drawn first, then a depth. B moves out along SAT's normal to that depth,
+which keeps the axis.
 """
 from __future__ import annotations
 
@@ -133,6 +133,11 @@ def _level(heading: np.ndarray) -> np.ndarray:
     return np.stack([np.cos(heading), np.sin(heading), np.zeros(len(heading))], axis=1)
 
 
+def _tilted(heading: np.ndarray, tilt: np.ndarray, yaw: np.ndarray) -> np.ndarray:
+    """Return orientations (n, 4): turned by yaw, then tilted about a level axis [rad]."""
+    return quaternion_multiply(turns(_level(heading), tilt), turns(Z, yaw))
+
+
 def onto(place: np.ndarray, turn: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
          depth: np.ndarray) -> Pairs:
     """Return pairs with A at the origin and B at places (n, 3), orientations (n, 4), to `depth`."""
@@ -152,7 +157,7 @@ def stacked(rng: np.random.Generator, size: tuple[float, float, float], tilt: np
     sizes = np.tile(np.array(size), (n, 1))
     heading = rng.uniform(-np.pi, np.pi, n) if about is None else (
         rng.choice([0.0, np.pi], n) + rng.choice([-1.0, 1.0], n) * about)
-    turn = quaternion_multiply(turns(_level(heading), tilt), turns(Z, yaw))
+    turn = _tilted(heading, tilt, yaw)
     place = np.concatenate([spread * rng.uniform(-1, 1, (n, 2)) * sizes[:, :2],
                             0.98 * sizes[:, 2:]], axis=1)
     return onto(place, turn, sizes, sizes, depth)
@@ -169,7 +174,7 @@ def laid(rng: np.random.Generator, size_a: np.ndarray, size_b: np.ndarray, tilt:
     size_a = np.take_along_axis(size_a, orders[rng.integers(0, 3, n)], axis=1)
     size_b = np.take_along_axis(size_b, orders[rng.integers(0, 3, n)], axis=1)
     heading, yaw = (rng.uniform(-np.pi, np.pi, n) for _ in range(2))
-    turn = quaternion_multiply(turns(_level(heading), tilt), turns(Z, yaw))
+    turn = _tilted(heading, tilt, yaw)
     # A random place of A's top meets a random place of B's bottom.
     at_b = 0.49 * rng.uniform(-2, 2, (n, 2)) * size_b[:, :2]
     across = np.stack([np.cos(yaw) * at_b[:, 0] - np.sin(yaw) * at_b[:, 1],
@@ -262,9 +267,8 @@ def size_pairs(rng: np.random.Generator, n: int) -> Pairs:
 def parcels(rng: np.random.Generator, n: int) -> Pairs:
     """Parcels of 0.4 × 0.3 × 0.2 m on a pallet, tilt to 1°, any yaw, 0.1–5 % of its height deep."""
     pallet, parcel = (np.tile(size, (n, 1)) for size in ((1.2, 0.8, 0.144), (0.4, 0.3, 0.2)))
-    turn = quaternion_multiply(
-        turns(_level(rng.uniform(-np.pi, np.pi, n)), log_uniform(rng, 1e-5, np.radians(1.0), n)),
-        turns(Z, rng.uniform(-np.pi, np.pi, n)))
+    turn = _tilted(rng.uniform(-np.pi, np.pi, n), log_uniform(rng, 1e-5, np.radians(1.0), n),
+                   rng.uniform(-np.pi, np.pi, n))
     place = np.column_stack([rng.uniform(-1, 1, (n, 2)) * (0.55, 0.38), np.full(n, 0.17)])
     return onto(place, turn, pallet, parcel, 0.144 * log_uniform(rng, 1e-3, 0.05, n))
 
@@ -273,9 +277,7 @@ def crossed_bars(rng: np.random.Generator, n: int) -> Pairs:
     """Bars of 6 × 0.3 × 0.3 m laid across each other, tilt to 2°, 0.1–5 % of their width deep."""
     sizes = np.tile((6.0, 0.3, 0.3), (n, 1))
     yaw = rng.uniform(np.radians(20.0), np.radians(160.0), n)
-    turn = quaternion_multiply(
-        turns(_level(rng.uniform(-np.pi, np.pi, n)), log_uniform(rng, 1e-5, np.radians(2.0), n)),
-        turns(Z, yaw))
+    turn = _tilted(rng.uniform(-np.pi, np.pi, n), log_uniform(rng, 1e-5, np.radians(2.0), n), yaw)
     along, across = rng.uniform(-2.8, 2.8, (2, n, 1))
     place = (np.eye(3)[0] * along - across * np.column_stack([_level(yaw)])
              + np.array([0.0, 0.0, 0.295]))
@@ -285,9 +287,8 @@ def crossed_bars(rng: np.random.Generator, n: int) -> Pairs:
 def overhang(rng: np.random.Generator, n: int) -> Pairs:
     """Containers that overhang others by 85–97 %, tilt to 1°, 1e-4–1e-2 m deep."""
     sizes = np.tile(CONTAINER, (n, 1))
-    turn = quaternion_multiply(
-        turns(_level(rng.uniform(-np.pi, np.pi, n)), log_uniform(rng, 1e-6, np.radians(1.0), n)),
-        turns(Z, np.radians(rng.uniform(-2.0, 2.0, n))))
+    turn = _tilted(rng.uniform(-np.pi, np.pi, n), log_uniform(rng, 1e-6, np.radians(1.0), n),
+                   np.radians(rng.uniform(-2.0, 2.0, n)))
     beyond, other = rng.uniform(0.85, 0.97, n), rng.uniform(-0.2, 0.2, n)
     place = np.where(rng.random((n, 1)) < 0.5, np.column_stack([beyond, other]),
                      np.column_stack([other, beyond])) * CONTAINER[:2]
@@ -301,9 +302,8 @@ def near_flush(rng: np.random.Generator, n: int) -> Pairs:
         return values * (rng.random(values.shape) < 0.7)
 
     sizes = np.tile(CONTAINER, (n, 1))
-    turn = quaternion_multiply(
-        turns(_level(rng.uniform(-np.pi, np.pi, n)), often(log_uniform(rng, 1e-9, 1e-3, n))),
-        turns(Z, often(log_uniform(rng, 1e-9, 1e-3, n))))
+    turn = _tilted(rng.uniform(-np.pi, np.pi, n), often(log_uniform(rng, 1e-9, 1e-3, n)),
+                   often(log_uniform(rng, 1e-9, 1e-3, n)))
     shift = often(log_uniform(rng, 1e-9, 1e-2, (n, 2))) * rng.choice([-1.0, 1.0], (n, 2))
     place = np.column_stack([shift, np.full(n, 0.995 * CONTAINER[2])])
     return onto(place, turn, sizes, sizes, log_uniform(rng, 1e-6, 1e-2, n))
@@ -312,12 +312,41 @@ def near_flush(rng: np.random.Generator, n: int) -> Pairs:
 def landings(rng: np.random.Generator, n: int) -> Pairs:
     """Containers set down on containers: off by 0.5 and 0.25 m, tilt to 0.02 rad, yaw to 1°."""
     sizes = np.tile(CONTAINER, (n, 1))
-    turn = quaternion_multiply(
-        turns(_level(rng.uniform(-np.pi, np.pi, n)), log_uniform(rng, 1e-5, 2e-2, n)),
-        turns(Z, np.radians(rng.uniform(-1.0, 1.0, n))))
+    turn = _tilted(rng.uniform(-np.pi, np.pi, n), log_uniform(rng, 1e-5, 2e-2, n),
+                   np.radians(rng.uniform(-1.0, 1.0, n)))
     place = np.column_stack([rng.uniform(-0.5, 0.5, n), rng.uniform(-0.25, 0.25, n),
                              np.full(n, 0.98 * CONTAINER[2])])
     return onto(place, turn, sizes, sizes, log_uniform(rng, 5e-4, 2e-2, n))
+
+
+def flush_stacks(rng: np.random.Generator, n: int) -> Pairs:
+    """Equal boxes stacked flush, sides in one plane, 1e-5 to 0.01 of the height deep.
+
+    Half are cubes and half containers. B is right above A, or displaced along x; half of all B have
+    a half turn about z. Half of the pairs are turned as a whole, which rounds their angles.
+    """
+    size = np.where(rng.random(n)[:, None] < 0.5, CUBE, CONTAINER)
+    place = np.zeros((n, 3))
+    place[:, 0] = size[:, 0] * rng.uniform(-0.5, 0.5, n) * (rng.random(n) < 0.5)
+    place[:, 2] = size[:, 2] * (1.0 - log_uniform(rng, 1e-5, 1e-2, n))
+    half_turn = turns(Z, np.pi * rng.integers(0, 2, n))
+    whole = turns(rng.normal(size=(n, 3)), rng.uniform(0.0, np.pi, n) * (rng.random(n) < 0.5))
+    above = np.einsum('nij,nj->ni', rotation_matrix(whole), place)
+    return Pairs(np.hstack([np.zeros((n, 3)), whole]),
+                 np.hstack([above, quaternion_multiply(whole, half_turn)]), size, size.copy())
+
+
+def apart(rng: np.random.Generator, n: int) -> Pairs:
+    """Boxes 1e-6 to 0.1 m apart: half containers almost stacked, half cubes in any pose."""
+    half = n // 2
+    size = np.tile(CUBE, (half, 1))
+    loose = any_pose(rng, size, size, np.full(half, 0.01))
+    yard = stacked(rng, CONTAINER, log_uniform(rng, 1e-6, 0.05, n - half),
+                   rng.uniform(-0.1, 0.1, n - half), np.full(n - half, 0.01))
+    parts = [at_depth(pairs, -log_uniform(rng, 1e-6, 0.1, len(pairs.size)))
+             for pairs in (loose, yard)]
+    both = Pairs(*(np.concatenate(columns) for columns in zip(*parts)))
+    return both.rows(rng.permutation(len(both.size)))  # the first ones are of both kinds
 
 
 SETS: dict[str, Generator] = {
@@ -328,7 +357,7 @@ SETS: dict[str, Generator] = {
     'tilted stacks': tilted,
     'containers': containers,
 }
-"""The sets of the speed report, and of the accuracy report."""
+"""The sets of all reports."""
 LOADS: dict[str, Generator] = {
     'parcels': parcels,
     'crossed bars': crossed_bars,
@@ -336,4 +365,6 @@ LOADS: dict[str, Generator] = {
     'near flush': near_flush,
     'landings': landings,
 }
-"""Loads on what they stand on: more sets of the accuracy report."""
+"""Loads on what they stand on: more sets of `accuracy` and `native`."""
+FLUSH: dict[str, Generator] = {'aligned flush stacks': flush_stacks}
+"""One more set of `speed` and `native`: the slowest for most ways to the overlap."""

@@ -21,12 +21,12 @@ from pathlib import Path
 
 import numpy as np
 
-from box_contact_ros import output
 from box_contact_ros.core import native
 from box_contact_ros.scene.pose import quaternion_multiply
 from box_contact_ros.solver.arguments import add_models, program_parser
 from box_contact_ros.solver.models import find_model, models, models_with_patch
 
+from . import output
 from .contestant import Contestant, in_subprocess, ours
 from .errors import distances, point_errors
 from .hard_poses import Cases, load

@@ -14,13 +14,10 @@ import os
 import time
 from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-
-from box_contact_ros.core import native
 
 WARM_UP = 3  # calls before those that are timed one by one
 
@@ -86,6 +83,12 @@ def cpu_milliseconds(work: Callable[..., Any], *arguments: Any) -> tuple[float, 
     return 1e-6 * took, found
 
 
+def after_warm_up(run: Callable[[], object], count: int) -> float:
+    """Return the time of a run right after an untimed one, for each of its `count` items [ns]."""
+    run()
+    return nanoseconds(run)[0] / count
+
+
 def each_call(calls: Sequence[Callable[[], object]], seconds: float) -> list[int]:
     """Return the time of each call [ns], after a warm-up: all of them, again and again."""
     clock, times = time.perf_counter_ns, list[int]()
@@ -98,30 +101,3 @@ def each_call(calls: Sequence[Callable[[], object]], seconds: float) -> list[int
             call()
             times.append(clock() - began)
     return times
-
-
-@dataclass(frozen=True, kw_only=True)
-class Timing:
-    """What is timed as a whole, once a round, and its times."""
-
-    name: str
-    kind: str  # 'single' or 'batch'; for a large batch 'one thread' or 'two threads'
-    count: int = 1  # calls or pairs of a run
-    run: Callable[[], object] | None = None  # None once all rounds are timed
-    instruction_set: str = native.instruction_set
-    rounds: list[float] = field(default_factory=list)  # of a call or pair [ns]
-
-    def time(self) -> None:
-        """Time a run right after an untimed one."""
-        self.run()
-        self.rounds.append(nanoseconds(self.run)[0] / self.count)
-
-    def by(self, other: Timing) -> float:
-        """Return the ratio to another contestant's time."""
-        return float(by_round(self.rounds, other.rounds))
-
-
-def timed(timings: Sequence[Timing], rounds: int) -> list[Timing]:
-    """Time all in turn, `rounds` times; what is returned can go to another process."""
-    take_turns([one.time for one in timings], rounds)
-    return [replace(one, run=None) for one in timings]

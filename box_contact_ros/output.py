@@ -1,7 +1,7 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""What every report is written with: folders, tables, CSV files, percentiles, the machine."""
+"""What a report is written with: its folder, tables, CSV files, figures, the machine."""
 from __future__ import annotations
 
 import argparse
@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-PACKAGE = Path(__file__).parent
-RESULTS, QUICK_RESULTS = Path('docs/results'), Path('quick-results')
 DPI = 110  # of pictures
 
 
@@ -35,25 +33,6 @@ def make_folder(parser: argparse.ArgumentParser, folder: Path) -> Path:
     except OSError as error:
         parser.error(f'cannot write to {folder} ({error.strerror}): name another place with --out')
     return folder
-
-
-def make_room(parser: argparse.ArgumentParser, path: Path) -> Path:
-    """Create the folder of a file that `--out` names, as `make_folder`."""
-    if path.is_dir():
-        parser.error(f'--out {path} is a folder: name a file')
-    make_folder(parser, path.parent)
-    return path
-
-
-def results_folder(parser: argparse.ArgumentParser, options: argparse.Namespace) -> Path:
-    """Return the folder of results; a quick run replaces a full run's only where `--out` says."""
-    return make_folder(parser, options.out or (QUICK_RESULTS if options.quick else RESULTS))
-
-
-def command_line(program: str, args: Sequence[str] | None) -> str:
-    """Return the command that a page names; `args` as `main` received them."""
-    given = sys.argv[1:] if args is None else args
-    return ' '.join(['python -m', program, *given])
 
 
 def markdown_table(head: Sequence[str], rows: Iterable[Sequence[object]], *, words: int = 1,
@@ -74,11 +53,6 @@ def markdown_table(head: Sequence[str], rows: Iterable[Sequence[object]], *, wor
     return '\n'.join('| ' + ' | '.join(line) + ' |' for line in (lines[0], rule, *lines[1:]))
 
 
-def page(template: str, **values: object) -> str:
-    """Return a page or a part of one: a Markdown file of the checkout, its `{fields}` filled in."""
-    return (PACKAGE.parent / f'{template}.md').read_text('utf-8').format(**values)
-
-
 def write_csv(path: Path, rows: Iterable[Mapping[str, object]], *, digits: int = 6,
               about: Machine | None = None) -> None:
     """Write rows by column name; the columns are those of all rows, in the order of appearance.
@@ -94,12 +68,6 @@ def write_csv(path: Path, rows: Iterable[Mapping[str, object]], *, digits: int =
         writer = csv.writer(file, lineterminator='\n')
         writer.writerow(columns)
         writer.writerows([_cell(row.get(name), digits) for name in columns] for row in listed)
-
-
-def read_csv(path: Path) -> list[dict[str, str]]:
-    """Return the rows of a CSV file by column name."""
-    with path.open(encoding='utf-8', newline='') as file:
-        return list(csv.DictReader(file))
 
 
 def _cell(value: object, digits: int) -> object:
@@ -148,19 +116,6 @@ def percentiles(values: Sequence[float] | np.ndarray, *percents: float) -> tuple
     if not len(values):
         return (math.nan,) * len(percents)
     return tuple(float(value) for value in np.percentile(values, percents))
-
-
-def number(value: float, digits: int = 3) -> str:
-    """Return a value with so many digits, never in powers of ten; NaN is a dash."""
-    if math.isnan(value):
-        return '–'
-    if value == 0.0:
-        return '0'
-    if value < 10.0 ** -digits:
-        return f'<{10.0 ** -digits:g}'
-    if value >= 1e3:
-        return f'{value:,.0f}'
-    return f'{value:.{max(0, digits - 1 - math.floor(math.log10(value)))}f}'
 
 
 class Core(Protocol):

@@ -14,9 +14,11 @@ import re
 import sys
 from pathlib import Path
 
-from box_contact_ros.output import markdown_table, number, read_csv
-
 ROOT = Path(__file__).resolve().parents[1]
+sys.path.append(str(ROOT))  # where benchmarks/ is, which is not installed
+
+from benchmarks.output import markdown_table, number, read_csv  # noqa: E402
+
 RESULTS = ROOT / 'docs' / 'results'
 PAGES = [ROOT / 'README.md', *sorted((ROOT / 'docs').rglob('*.md'))]
 BLOCK = re.compile(r'(<!-- table ([\w-]+) -->\n).*?(<!-- end of table -->)', re.DOTALL)
@@ -28,7 +30,7 @@ CHOICES = {
     'exact': ('`exact`', 'ground truth, judging other models'),
     'paper': ("`paper`, the paper's kind of network", 'repeating the paper'),
     'soup-8': ('`soup-8`, boxes as triangles', 'comparing with what the paper replaced'),
-    'fcl': ("`fcl`, FCL's deepest point", 'comparing with a common engine'),
+    'fcl': ("FCL's own, deepest corner", 'comparing with a common engine'),
     'mujoco': ("MuJoCo's own, deepest corner", 'programs that simulate in MuJoCo'),
 }
 MEASURED_AS = {'fcl': {'contestant': 'python-fcl collide', 'point': 'deepest'},

@@ -19,6 +19,7 @@ from tqdm import tqdm
 
 from benchmarks.errors import contact_errors
 from benchmarks.pose_sets import SETS, Pairs
+from benchmarks.worst_case import climb, worst_start
 from box_contact_ros.core import BRACKET_LIMIT, FEATURES, NETWORK_FORMAT, SPREAD_LIMIT, UPPER_LIMIT
 from box_contact_ros.output import percentiles
 from box_contact_ros.solver.contact_solver import ContactSolver
@@ -27,7 +28,6 @@ from box_contact_ros.solver.weights_file import Network, save_weights
 
 from .mlp_fit import MlpErrors, ShareNetwork, errors_of, fit, tensors
 from .samples import MlpSamples, describe, draw_samples, mixture
-from .worst_case import climb, worst_start
 
 HIDDEN = 16
 """Hidden units. Only pairs with open brackets ask them, so that they cost next to nothing."""

@@ -14,10 +14,7 @@ from importlib import import_module
 from ..contestant import Contestant
 
 RIVALS = {'mujoco': "extra 'sim'", 'fcl': "extra 'soup'", 'coal': "extra 'peers'",
-          'bullet': "extra 'peers'", 'rapier': "extra 'peers'",
-          'dart': "extra 'peers'",
-          'drake': 'pip install drake', 'optional.newton': 'pip install newton',
-          'manifold': 'pip install manifold3d'}
+          'bullet': "extra 'peers'", 'drake': 'pip install drake'}
 """The engines' modules, each with what brings its library."""
 
 

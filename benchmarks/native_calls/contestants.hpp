@@ -1,7 +1,7 @@
 // Copyright 2026 The box_contact_ros maintainers
 // SPDX-License-Identifier: Apache-2.0
 
-// What a contestant of `frontier --native` is. Each library has one file, which adds its contestants.
+// What a contestant of `native` is. Each library has one file, which adds its contestants.
 // The page of the report shows what lies between "// call: NAME" and "// end of call".
 #pragma once
 

@@ -6,11 +6,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from box_contact_ros import output
 from box_contact_ros.resources import resource_path
 from box_contact_ros.scene.pose import degrees_between
 from box_contact_ros.solver.weights_file import load_weights
 
+from .. import output
 from ..contestant import ours
 from ..errors import distances
 from ..pose_sets import CUBE, Pairs

@@ -19,11 +19,11 @@ import fcl
 import numpy as np
 from tqdm import tqdm
 
-from box_contact_ros import output
 from box_contact_ros.scene.pose import degrees_between
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.soup import soup
 
+from .. import output
 from ..contestant import ours
 from ..errors import distances
 from ..pose_sets import CUBE, Pairs, at_depth, coplanar, drawn, on_cube, stacks

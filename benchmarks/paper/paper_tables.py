@@ -17,12 +17,12 @@ from pathlib import Path
 
 import numpy as np
 
-from box_contact_ros import output
 from box_contact_ros.core import native
 from box_contact_ros.resources import resource_path
 from box_contact_ros.solver.arguments import program_parser
 from box_contact_ros.solver.weights_file import Weights, WeightsError, load_weights
 
+from .. import output
 from . import committee, dataset
 from .dataset import SETS, Patterns
 from .errors import PARTS, errors_of, figures, figures_by_part, predict

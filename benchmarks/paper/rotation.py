@@ -19,11 +19,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from box_contact_ros import output
 from box_contact_ros.core import stages
 from box_contact_ros.scene.pose import quaternion_multiply, rotation_matrix
 from box_contact_ros.soup import soup
 
+from .. import output
 from ..pose_sets import CUBE, Pairs, on_cube, turned
 from ..timing import cpu_milliseconds, no_garbage_collection, pinned, usable_cores
 from .dataset import euler_angles, quaternion_from_euler

@@ -21,7 +21,9 @@ import numpy as np
 import torch
 
 from box_contact_ros.core import native
-from box_contact_ros.output import (
+from box_contact_ros.solver.arguments import program_parser, within
+
+from ..output import (
     command_line,
     machine,
     make_folder,
@@ -30,8 +32,6 @@ from box_contact_ros.output import (
     subplots,
     write_csv,
 )
-from box_contact_ros.solver.arguments import program_parser, within
-
 from ..pose_sets import log_uniform
 from . import dataset
 from .fit import PaperSettings

@@ -19,11 +19,11 @@ from dataclasses import asdict
 from multiprocessing import Pool
 from typing import NamedTuple
 
-from box_contact_ros import output
 from box_contact_ros.core import native
 from box_contact_ros.node.processes import left_when_asked
 from box_contact_ros.solver.arguments import program_parser
 
+from .. import output
 from .rest_cases import CASES, Gate, RestCase
 from .simulator import Timing, held_patch, own_contact
 

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,10 +13,10 @@ import poses
 import pytest
 
 from benchmarks import accuracy, searched
-from benchmarks.accuracy import CLASSES, AccuracyRow
+from benchmarks.accuracy import CLASSES, AccuracyRow, Summary
+from benchmarks.contestant import Solved, ours
 from benchmarks.errors import ContactErrors, contact_errors
 from benchmarks.pose_sets import CUBE, LOADS, SETS, Pairs
-from box_contact_ros.solver.models import models
 
 
 def on_a_cube(turn: np.ndarray, depth: float = 1e-3) -> Pairs:
@@ -61,17 +62,13 @@ def test_crossing_edges() -> None:
 
 def row_of(**changes: object) -> AccuracyRow:
     """Return a row of model `mlp` on containers without an error, but for what is changed."""
-    errors = ContactErrors(**{name: np.zeros(200) for name in ContactErrors._fields})
-    common = {'model': 'mlp', 'set': 'containers', 'errors': errors, 'pairs': 200,
-              'classes': np.zeros(200, int), 'winners': np.zeros(200, int), 'exact_share': 0.0,
-              'verdict_errors': 0, 'normal_difference': 0.0, 'separation_difference': 0.0,
-              'outside': 0.0}
-    return AccuracyRow(**{**common, **changes})
+    none = {name: {'all': Summary(200, *[0.0] * 4)} for name in ContactErrors._fields}
+    return AccuracyRow(**{'model': 'mlp', 'set': 'containers', 'errors': none, 'pairs': 200,
+                          'exact_share': 0.0, 'outside': 0.0, **changes})
 
 
 @pytest.mark.parametrize(('name', 'value'), [
-    ('exact_share', 0.021), ('verdict_errors', 1), ('normal_difference', 1e-16),
-    ('separation_difference', 1e-16), ('outside', 1e-12), ('outside', np.nan)])
+    ('exact_share', 0.021), ('outside', 1e-12), ('outside', np.nan)])
 def test_a_broken_limit_is_named(name: str, value: float) -> None:
     assert row_of().broken() == []
     text, = row_of(**{name: value}).broken()
@@ -86,8 +83,8 @@ def test_limits_of_errors_break(quantity: str, name: str) -> None:
     limit = accuracy.limit_of(quantity, name)
     assert limit == getattr(accuracy.ANY_POSE_LIMIT if name in accuracy.ANY_POSE
                             else accuracy.LOAD_LIMIT, quantity)
-    for value, holds in ((0.999 * limit, True), (1.001 * limit, False), (np.nan, False)):
-        errors = row_of().errors._replace(**{quantity: np.full(200, value)})
+    for p99, holds in ((0.999 * limit, True), (1.001 * limit, False), (np.nan, False)):
+        errors = {**row_of().errors, quantity: {'all': Summary(200, 0.0, 0.0, p99, p99)}}
         broken = row_of(set=name, errors=errors).broken()
         assert (broken == []) is holds and all(quantity in text for text in broken)
 
@@ -117,7 +114,7 @@ def quick(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_quick_run(quick: Path) -> None:
-    assert 'All limits hold.' in (quick / 'accuracy.md').read_text('utf-8')
+    assert 'All limits of `mlp` hold.' in (quick / 'accuracy.md').read_text('utf-8')
     assert (quick / 'accuracy.png').stat().st_size > 10_000
     with (quick / 'accuracy.csv').open() as file:
         rows = [row for row in csv.DictReader(file) if row['part'] == 'all']
@@ -133,41 +130,54 @@ def test_quick_run(quick: Path) -> None:
 def test_searched_for_the_worst(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """On one set with every network; a planted miss is named."""
     pytest.importorskip('tqdm')
-    monkeypatch.setattr(searched, 'SETS', {'containers': SETS['containers']})
-    monkeypatch.setattr(searched, 'LOADS', {})
-    monkeypatch.setattr(searched, 'DRAWN', 3_000)
-    monkeypatch.setattr(searched, 'PATHS', 5)
-    assert accuracy.main(['--search', '0.02', '--out', str(tmp_path)]) == 0
-    assert 'All limits hold.' in (tmp_path / 'searched.md').read_text('utf-8')
+    for name, value in (('SETS', {'containers': SETS['containers']}), ('LOADS', {}),
+                        ('DRAWN', 3_000), ('PATHS', 5)):
+        monkeypatch.setattr(searched, name, value)
+    assert searched.main(['--minutes', '0.02', '--out', str(tmp_path)]) == 0
     with (tmp_path / 'searched.csv').open() as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 2 * 3 * 3  # seeds, networks, quantities
-    shipped = {row['quantity']: float(row['worst']) for row in rows if row['network'] == 'shipped'}
-    garbage = {row['quantity']: float(row['worst']) for row in rows
-               if row['network'] == 'least within'}
+    shipped, garbage = ({row['quantity']: float(row['worst']) for row in rows
+                         if row['network'] == network} for network in ('shipped', 'least within'))
     assert 0.0 < shipped['volume'] <= garbage['volume'] <= 3.0 * searched.LIMITS['volume']
     monkeypatch.setitem(searched.LIMITS, 'volume', 1e-6)
-    assert accuracy.main(['--search', '0.01', '--out', str(tmp_path)]) == 1
+    assert searched.main(['--minutes', '0.01', '--out', str(tmp_path)]) == 1
     assert 'Goals missed: mlp, containers' in (tmp_path / 'searched.md').read_text('utf-8')
 
 
-# --- a model of your own, and the sets as files ---------------------------------------------------
+def test_points_and_depths_of_a_known_contestant_have_known_errors() -> None:
+    """Points 1 cm off a cube of 2 m: 0.5 % of its edge, in every class."""
+    exact = ours('exact')
+
+    def shifted(pairs: Pairs) -> Solved:
+        contacts = exact.solve(pairs).contacts
+        return Solved(contacts._replace(point=contacts.point + [0.0, 0.01, 0.0]), 7)
+
+    pairs = SETS['random cubes'](np.random.default_rng(1), 100)
+    row = accuracy.measure(replace(exact, name='mlp', solve=shifted), 'random cubes', pairs,
+                           pairs.contacts())
+    for errors in row.errors['point'].values():
+        assert errors[1:] == pytest.approx((0.5,) * 4, rel=1e-9)
+    assert row.errors['point']['all'].pairs == len(pairs.size)
+    assert row.errors['volume']['all'].worst == row.errors['covariance']['all'].worst == 0.0
+    assert row.exact_share == pytest.approx(7 / len(pairs.size))
+    assert [text.split()[3] for text in row.broken()] == ['point,', 'points', 'left']
+    assert 'point, p99 0.5 > 0.15' in row.broken()[0]
+
+
+# --- a model of your own --------------------------------------------------------------------------
 
 
 def test_a_class_is_measured_like_a_model(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The example's middle of the bounding boxes is no centroid; its depth is the exact one."""
+    """The example's middle of the centres is no centroid; its depth is the exact one."""
     monkeypatch.syspath_prepend(Path(__file__).parents[2] / 'docs' / 'examples')
-    try:
-        status = accuracy.main(['--model', 'own_model:Middle', '--pairs', '200', '--quick',
-                                '--out', str(tmp_path)])
-    finally:
-        models().pop('own_model:Middle', None)
+    status = accuracy.main(['--model', 'own_model:Between', '--pairs', '200', '--quick',
+                            '--out', str(tmp_path)])
     with (tmp_path / 'accuracy.csv').open() as file:
         rows = [row for row in csv.DictReader(file) if row['part'] == 'all']
     assert status == 0 and {row['set'] for row in rows} == set(SETS | LOADS)
     assert {row['quantity'] for row in rows} == {'point'}
     assert float({row['set']: row for row in rows}['tilted stacks']['mean']) > 1.0
-    assert all(float(row['separation_difference']) == 0.0 for row in rows)
 
 
 @pytest.mark.parametrize('name', ['nowhere:Class', 'json:Nothing'])
@@ -175,14 +185,3 @@ def test_a_class_that_cannot_be_imported(name: str, capsys: pytest.CaptureFixtur
     with pytest.raises(SystemExit, match='2'):
         accuracy.main(['--model', name])
     assert name in capsys.readouterr().err
-
-
-def test_exported_sets_are_those_of_the_report(tmp_path: Path) -> None:
-    """Poses, sizes and the exact contacts of every set, ready for another program."""
-    assert accuracy.main(['--export', str(tmp_path), '--pairs', '30']) == 0
-    files = {path.stem.replace('_', ' '): np.load(path) for path in tmp_path.iterdir()}
-    assert files.keys() == (SETS | LOADS).keys()
-    for file in files.values():
-        pairs = Pairs(*(file[field] for field in Pairs._fields))
-        for field, values in pairs.contacts()._asdict().items():
-            np.testing.assert_array_equal(file[field], values)

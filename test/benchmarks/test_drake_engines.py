@@ -38,9 +38,11 @@ def test_the_centre_of_pressure(pressures: list[float], along: float) -> None:
 @pytest.mark.parametrize('name', ['containers', 'stacks'])
 def test_the_centre_of_pressure_is_nearer_than_the_centroid(name: str) -> None:
     pairs = SETS[name](np.random.default_rng(4), 150)
-    found = trials.ask(drake_engines.surface(), pairs, trials.FULL).judged(pairs)
-    centroid, pressure = (found[choice].points['all'] for choice in (
-        'its point', 'centre of pressure'))
-    assert 0.05 < centroid[1] < 2.0  # median [%]
-    assert pressure[1] < 0.05 and pressure[3] < 0.5  # median and worst
-    assert found['its point'].missed == found['its point'].invented == 0
+    answers = trials.ask(drake_engines.surface(), pairs, trials.FULL)
+    pairs = pairs.rows(slice(len(answers.colliding)))
+    centroid, pressure = (
+        trials.judge(pairs, answers.colliding, answers.normals, answers.points[choice])
+        for choice in ('its point', 'centre of pressure'))
+    assert 0.05 < centroid.points['all'].p50 < 2.0  # [%]
+    assert pressure.points['all'].p50 < 0.05 and pressure.points['all'].worst < 0.5
+    assert centroid.missed == centroid.invented == 0

@@ -62,6 +62,27 @@ def test_the_right_angles_are_all_24() -> None:
     assert np.linalg.det(matrices) == pytest.approx(1.0)
 
 
+def test_flush_stacks_are_aligned_and_flush() -> None:
+    """Right angles to rounding; of the sides, those along y in one plane; the depth is small."""
+    pairs = pose_sets.flush_stacks(np.random.default_rng(1), 2000)
+    turn = rotation_matrix(pairs.pose_a[:, 3:])
+    between = turn.swapaxes(1, 2) @ rotation_matrix(pairs.pose_b[:, 3:])
+    offset = np.einsum('nji,nj->ni', turn, pairs.pose_b[:, :3])
+    np.testing.assert_allclose(np.abs(between), np.broadcast_to(np.eye(3), (2000, 3, 3)),
+                               atol=1e-15)
+    assert np.abs(offset[:, 1]).max() < 1e-14
+    assert 0.3 < np.mean(np.abs(offset[:, 0]) < 1e-14) < 0.7
+    contacts = pairs.contacts()
+    depth = -contacts.separation / pairs.size_a[:, 2]
+    assert contacts.colliding.all()
+    assert 0.99e-5 < depth.min() < 2e-5 and 0.008 < depth.max() < 1.1e-2
+
+
+def test_boxes_just_apart_have_the_stated_gap() -> None:
+    gaps = pose_sets.apart(np.random.default_rng(1), N).contacts().separation
+    assert len(gaps) > 0.9 * N and (gaps > 0.99e-6).all() and (gaps < 0.101).all()
+
+
 def test_sizes_of_pairs_are_the_units_of_errors() -> None:
     pairs = Pairs(*np.zeros((2, 1, 7)), np.array([CUBE]), np.array([(1.0, 5.0, 0.5)]))
     assert pairs.size == 5.0 and pairs.edge == 2.0

@@ -7,11 +7,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks import steps
+from benchmarks import steps, worst_case
 from benchmarks.errors import contact_errors
 from benchmarks.pose_sets import LOADS, SETS, Pairs
 from box_contact_ros import ContactSolver
-from training import worst_case
 
 N = 200
 
@@ -145,12 +144,3 @@ def test_drawn_paths_start_at_their_pairs_and_turn() -> None:
         cosine = np.abs((end[:, 3:] * pairs.pose_b[:, 3:]).sum(axis=1))
         np.testing.assert_allclose(np.arccos(np.minimum(cosine, 1.0)), 0.15, atol=1e-6)
         assert (np.linalg.norm(end[:, :3] - pairs.pose_b[:, :3], axis=1) > 0.0).all()
-
-
-@pytest.mark.parametrize('name', ['containers', 'tilted stacks', 'landings'])
-def test_the_steps_of_mlp(name: str) -> None:
-    """Bracket limits, winners, frames: point 0.1 % of the edge, volume 1 %."""
-    paths = steps.drawn_paths(np.random.default_rng(5), drawn(name, 40), 0.2, True)
-    point, volume, _ = steps.largest_steps(
-        ContactSolver((1, 1, 1), (1, 1, 1), model='mlp'), paths)
-    assert point.max() <= 0.1 and volume.max() <= 1.0

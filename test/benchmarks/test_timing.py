@@ -35,6 +35,16 @@ def test_ratios_are_those_of_rounds() -> None:
                            [(1.0, 9.0), (10.0, 40.0), (1.0, 1.0)]).tolist() == [2.0, 2.0]
 
 
+def test_the_clock_measures_a_known_sleep() -> None:
+    """A run is timed right after an untimed one, per call; a sleeping thread takes no CPU time."""
+    took, answer = timing.nanoseconds(lambda: time.sleep(5e-3) or 'awake')
+    assert took >= 5e6 and answer == 'awake'
+    assert timing.cpu_milliseconds(time.sleep, 2e-2)[0] < 10.0
+    runs: list[None] = []
+    assert timing.after_warm_up(lambda: (runs.append(None), time.sleep(5e-3)), 5) >= 1e6
+    assert len(runs) == 2
+
+
 def test_each_call_is_timed_in_whole_rounds() -> None:
     calls = [lambda: None, lambda: time.sleep(2e-3)]
     times = timing.each_call(calls, 1e-2)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import threading
-import time
 
 import numpy as np
 import pytest
@@ -24,6 +23,8 @@ from stranger import ANSWER_SECONDS, Stranger
 pytest.importorskip('mujoco')
 pytest.importorskip('rosbags')
 
+from box_contact_ros.scene.files.scene_file import parse_scene
+
 from box_contact_ros.bench.bench_drive import BenchNode
 from box_contact_ros.demo.crane_feedback import CraneFeedback
 from box_contact_ros.demo.crane_node import CraneNode
@@ -37,7 +38,6 @@ from box_contact_ros.node.messages import (
     read_cloud,
 )
 from box_contact_ros.node.runtime import CONTACT_QOS
-from box_contact_ros.scene.files.scene_file import parse_scene
 from box_contact_ros.scene.scene_solver import Answer, Pair, SceneSolver
 from box_contact_ros.solver.contact import Contact
 from box_contact_ros.view.listener import ViewNode

@@ -4,15 +4,29 @@
 """The output module: tables, CSV files, percentiles, and the machine's description."""
 from __future__ import annotations
 
+import argparse
 import csv
 import math
 from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from box_contact_ros import output
 from box_contact_ros.core import native
+
+
+def test_folders_are_made_before_the_work(tmp_path: Path,
+                                          capsys: pytest.CaptureFixture[str]) -> None:
+    """Nothing is left in them; a file in the place of one is refused, and kept."""
+    parser = argparse.ArgumentParser()
+    assert not list(output.make_folder(parser, tmp_path / 'a' / 'b').iterdir())
+    (tmp_path / 'file').write_text('mine')
+    with pytest.raises(SystemExit, match='2'):
+        output.make_folder(parser, tmp_path / 'file')
+    assert f'cannot write to {tmp_path}/file (File exists)' in capsys.readouterr().err
+    assert (tmp_path / 'file').read_text() == 'mine'
 
 
 def test_a_table_has_its_words_to_the_left() -> None:
@@ -42,12 +56,6 @@ def test_percentiles() -> None:
     assert output.percentiles(np.arange(101.0), 0, 50, 99, 100) == (0.0, 50.0, 99.0, 100.0)
     assert output.percentiles([3.0], 50) == (3.0,)
     assert all(map(math.isnan, output.percentiles(np.array([]), 50, 99)))
-
-
-def test_numbers_are_readable() -> None:
-    values = (math.nan, 0.0, 1e-9, 0.0123, 1.2345, 98.76, 1234.5)
-    assert [output.number(value) for value in values] == [
-        '–', '0', '<0.001', '0.0123', '1.23', '98.8', '1,234']
 
 
 def test_a_machine_names_all_that_a_time_depends_on() -> None:

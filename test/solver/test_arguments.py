@@ -5,49 +5,10 @@
 from __future__ import annotations
 
 import argparse
-import importlib
 
 import pytest
 
-from box_contact_ros import output
-from box_contact_ros.cli import PROGRAMS
 from box_contact_ros.solver import arguments
-
-FOLDERS = ('accuracy', 'bench', 'frontier', 'search paper', 'stability', 'train')
-FILES = ('fuzz', 'paper')
-
-
-def main_of(name):
-    return importlib.import_module(PROGRAMS[name].module).main
-
-
-@pytest.mark.parametrize('words', FOLDERS)
-def test_a_file_in_the_place_of_the_folder_is_refused_before_the_work(words, tmp_path, capsys):
-    name, *chosen = words.split()
-    (tmp_path / 'file').write_text('mine')
-    with pytest.raises(SystemExit, match='2'):
-        main_of(name)([*chosen, '--out', str(tmp_path / 'file')])
-    assert f'cannot write to {tmp_path}/file (File exists)' in capsys.readouterr().err
-    assert (tmp_path / 'file').read_text() == 'mine'
-
-
-@pytest.mark.parametrize('name', FILES)
-def test_a_folder_in_the_place_of_the_file_is_refused_before_the_work(name, tmp_path, capsys):
-    with pytest.raises(SystemExit, match='2'):
-        main_of(name)(['--out', str(tmp_path)])
-    assert f'--out {tmp_path} is a folder: name a file' in capsys.readouterr().err
-    (tmp_path / 'file').write_text('mine')
-    with pytest.raises(SystemExit, match='2'):
-        main_of(name)(['--out', str(tmp_path / 'file' / 'below')])
-    assert f'cannot write to {tmp_path}/file' in capsys.readouterr().err
-
-
-def test_folders_are_made(tmp_path):
-    parser = argparse.ArgumentParser()
-    assert output.make_folder(parser, tmp_path / 'a' / 'b').is_dir()
-    assert not list((tmp_path / 'a' / 'b').iterdir())
-    assert output.make_room(parser, tmp_path / 'c' / 'file').parent.is_dir()
-    assert not list((tmp_path / 'c').iterdir())
 
 
 @pytest.mark.parametrize('low, high, text, wanted', [

@@ -8,8 +8,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from benchmarks.pose_sets import Pairs, log_uniform, turns
 from box_contact_ros.scene.pose import quaternion_multiply
+
+from .pose_sets import Pairs, log_uniform, turns
 
 DEPTHS = (1e-4, 0.1)
 """Depths that are searched [shortest edge of both boxes]."""
