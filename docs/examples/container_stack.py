@@ -14,22 +14,20 @@ It prints:
     6 s: slower than 1 mm/s: True, less than 1 mm deep: True
     8 s: slower than 1 mm/s: True, less than 1 mm deep: True
 """
+from itertools import combinations
+
 import mujoco
 import numpy as np
 
-from box_contact_ros import SceneLaw, SceneSolver, read_scene
+from box_contact_ros import Box, Pair, Scene, SceneLaw, SceneSolver
 
 SIZE, MASS, COUNT = (12.192, 2.438, 2.591), 20_000.0, 5  # [m], [kg]
 RATE, LATENCY, STEP, DURATION = 200.0, 0.002, 0.001, 8.0  # [Hz], [s], [s], [s]
 GAP = 0.01  # between the containers at the start [m]
 
-SCENE = read_scene(f"""
-boxes:
-  ground: {{size: [40, 40, 1], pose: [0, 0, -0.5, 0, 0, 0, 1]}}
-  container: {{size: {list(SIZE)}, count: {COUNT}}}
-pairs:
-  - {{a: 'container*', b: '*'}}
-""")
+BOXES = {'ground': Box('ground', (40.0, 40.0, 1.0), (0, 0, -0.5, 0, 0, 0, 1))} | {
+    f'container_{i}': Box(f'container_{i}', SIZE) for i in range(COUNT)}
+SCENE = Scene(BOXES, tuple(Pair.between(b, a) for a, b in combinations(BOXES, 2)))
 MODEL = '\n'.join([
     f'<mujoco><option timestep="{STEP}"><flag contact="disable"/></option><worldbody>',
     *(f'<body pos="{0.1 * (-1)**i} 0 {(i + 0.5) * SIZE[2] + (i + 1) * GAP}" euler="0.05 0 {i}">'
