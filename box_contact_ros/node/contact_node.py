@@ -8,6 +8,7 @@ Subscribes box_a/pose and box_b/pose (geometry_msgs/PoseStamped). Publishes cont
 evaluation it publishes contacts (box_contact_msgs/Contacts), and once a second /diagnostics.
 
 With a scene file: <box>/pose of every moving box, and <pair>/contact/point, <pair>/contact/normal.
+The service ~/reset (std_srvs/Trigger) forgets all poses and stamps.
 It is a lifecycle node that configures and activates itself, unless autostart is false. Its
 parameters are read when it is configured; model, tolerance and max_age may be set while it runs.
 """
@@ -26,6 +27,7 @@ from rclpy.context import Context
 from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
+from std_srvs.srv import Trigger
 
 from ..core import LENGTH_MAX
 from ..scene.pairing import PAIRINGS, RESETS
@@ -105,6 +107,7 @@ class ContactNode(GuardedNode, LifecycleNode):
         self._topics: SceneTopics | None = None  # from configure to cleanup
         self._answerer: TickAnswerer | None = None  # likewise
         self.add_on_set_parameters_callback(self._set_live)
+        self.create_service(Trigger, '~/reset', self.answered(self._reset, '~/reset'))
         # On a clock of its own: simulated time may stand still.
         self.create_timer(DIAGNOSTICS_SECONDS, self._report, clock=Clock(
             clock_type=ClockType.STEADY_TIME))
@@ -223,6 +226,15 @@ class ContactNode(GuardedNode, LifecycleNode):
             f'ready: model {solver.model!r}, pairing {self._values["pairing"]!r}, {pairs} '
             f'{"pair" if pairs == 1 else "pairs"}; poses{frame} from '
             f'{", ".join(topics[:NAMED_TOPICS])}{f" and {more} more" if more > 0 else ""}')
+
+    def _reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Forget all poses and stamps: a simulation begins anew."""
+        if self._answerer is None:
+            response.message = 'the node is not configured'
+            return response
+        self._answerer.pairing.reset()
+        response.success, response.message = True, 'all poses and stamps are forgotten'
+        return response
 
     def _clock_jumped(self, jump: TimeJump) -> None:
         if self._answerer is not None:

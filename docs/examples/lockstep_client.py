@@ -22,6 +22,7 @@ import rclpy
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseStamped
 from rclpy.node import Node
+from std_srvs.srv import Trigger
 
 from box_contact_msgs.msg import Contacts
 
@@ -34,6 +35,7 @@ class LockstepClient(Node):
         self.topic = topic
         self.poses = [self.create_publisher(PoseStamped, f'box_{name}/pose', 10) for name in 'ab']
         self.create_subscription(kind, topic, self.receive, 10)
+        self.node_reset = self.create_client(Trigger, 'contact_node/reset')
         self.answer: Any = None
 
     def receive(self, answer: Any) -> None:
@@ -46,6 +48,12 @@ class LockstepClient(Node):
         while not (all(pose.get_subscription_count() for pose in self.poses)
                    and self.count_publishers(self.topic)):
             rclpy.spin_once(self, timeout_sec=0.05)
+
+    def reset(self) -> None:
+        """Begin a new episode: the node forgets all stamps, and takes them again."""
+        self.node_reset.wait_for_service()
+        rclpy.spin_until_future_complete(self, self.node_reset.call_async(Trigger.Request()))
+        self.answer = None
 
     def ask(self, time_ns: int, *poses: np.ndarray, patience: float = 0.5) -> Any:
         """Return the answer to two poses at a time; lost poses are sent again."""
@@ -74,6 +82,7 @@ def main() -> None:
     rclpy.init()
     client = LockstepClient()
     client.wait_for_node()
+    client.reset()
     stack = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
     load = np.array([0.0, 0.0, 2.5925, 0.0, 0.0, 0.0, 1.0])
     for tick in range(1, 6):

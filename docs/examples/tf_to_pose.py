@@ -3,8 +3,8 @@
 
 """Send a frame of /tf as the pose of a box: `python docs/examples/tf_to_pose.py crane_hook map`.
 
-The origin of the frame must be the centre of the box, and its axes must be along the edges. The pose
-goes to the topic `pose`; remap it to the box's topic: `--ros-args -r pose:=/box_a/pose`.
+The origin of the frame must be the centre of the box, and its axes must be along the edges. The
+pose goes to the topic `pose`; remap it to the box's topic: `--ros-args -r pose:=/box_a/pose`.
 
 Not tested with tf2_ros from apt. PyPI has no wheel of it.
 """
