@@ -21,12 +21,12 @@ case "$0 $*" in
     *'-m venv'*) mkdir -p .venv/bin; for name in python uv; do cp "$0" .venv/bin/$name; done ;;
     *--version*) echo 'Python 3.12.0' ;;
     *uv*compile*) echo 'numpy==2.4.6' >.venv/roots.txt; exit ;;
-    *--editable*) echo built >box_contact_ros/core.so ;;
+    *' -e '*) echo built >box_contact_ros/core.so ;;
 esac
 case "$*" in *install*|*'-m venv'*) echo "$*" >>calls; sleep "${SLOW:-0}" ;; esac
 """
-NEW = ['-m venv', 'tools', 'packages', 'box-contact-msgs', 'box-contact-ros']
-"""What a first set-up asks for."""
+NEW = ['-m venv', 'tools', 'roots', 'box-contact-ros']
+"""What a first set-up asks for: an environment, tools, packages, the package itself."""
 
 
 def versions(path: str) -> list[str]:
@@ -81,8 +81,7 @@ def calls(clone: Path) -> list[str]:
         return []
     text = (clone / 'calls').read_text()
     (clone / 'calls').unlink()
-    return re.findall(r'-m venv|tools(?=.txt)|packages|box-contact-\w+',
-                      text.replace('roots.txt', 'packages'))
+    return re.findall('-m venv|tools|roots|box-contact-ros', text)
 
 
 def test_a_second_call_does_what_is_missing_alone(clone: Path) -> None:
@@ -96,11 +95,11 @@ def test_a_second_call_does_what_is_missing_alone(clone: Path) -> None:
     assert set_up(clone) == ['box-contact-ros']
     header.with_suffix('.so').unlink()
     assert set_up(clone) == ['box-contact-ros']
-    assert set_up(clone, 'test') == ['tools', 'packages']
+    assert set_up(clone, 'test') == ['tools', 'roots']
     assert set_up(clone) == set_up(clone, 'test') == []
     (clone / '.ci' / 'lock.txt').write_text('# an older lock')
-    assert set_up(clone) == ['tools', 'packages', 'box-contact-msgs']
-    assert set_up(clone, 'test') == ['tools', 'packages']
+    assert set_up(clone) == ['tools', 'roots', 'box-contact-ros']
+    assert set_up(clone, 'test') == ['tools', 'roots']
 
 
 def test_a_killed_set_up_begins_anew_and_a_second_one_waits(clone: Path) -> None:
