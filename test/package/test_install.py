@@ -19,10 +19,10 @@ import venv
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from box_contact_ros.cli import PROGRAMS
 from box_contact_ros.core import instruction_sets
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -133,10 +133,12 @@ def test_cmake_finds_the_library(installed: Installation, tmp_path: Path) -> Non
     assert 'batch: 1 0, volumes 0.030 0.000 m3' in run(tmp_path / 'first_contact', cwd=tmp_path)
 
 
-def test_the_programs_are_in_bin(installed: Installation) -> None:
+def test_the_programs_are_in_bin(installed: Installation, setup_arguments: dict[str, Any],
+                                 ) -> None:
     """Under prefixed names, where a shell finds them."""
+    programs = {line.partition(' ')[0] for line in setup_arguments['entry_points']['console_scripts']}
     assert {path.name for path in installed.bin.glob('box_contact_*')} == {
-        f'box_contact_{name}' for name in PROGRAMS}
+        f'box_contact_{name}' for name in programs}
     assert 'usage' in run(installed.bin / 'box_contact_contact_node', '--help',
                           cwd=installed.folder)
 

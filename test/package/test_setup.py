@@ -52,9 +52,10 @@ def clone(tmp_path: Path) -> Path:
     """Return a folder, with a blank in its path, that has what .ci/setup reads."""
     folder = tmp_path / 'a clone'
     for name in ('.ci/setup', '.ci/lock.txt', 'setup.py', 'setup.cfg', 'pyproject.toml',
-                 'box_contact_ros/cli.py', 'box_contact_msgs/package.xml'):
+                 'box_contact_msgs/pyproject.toml'):
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / name, folder / name)
+    (folder / 'box_contact_ros').mkdir()
     (folder / 'box_contact_ros' / 'core.hpp').write_text('header')
     (folder / 'python').write_text(PYTHON)
     (folder / 'python').chmod(0o755)
