@@ -136,9 +136,9 @@ def test_cmake_finds_the_library(installed: Installation, tmp_path: Path) -> Non
 def test_the_programs_are_in_bin(installed: Installation, setup_arguments: dict[str, Any],
                                  ) -> None:
     """Under prefixed names, where a shell finds them."""
-    programs = {line.partition(' ')[0] for line in setup_arguments['entry_points']['console_scripts']}
+    programs = setup_arguments['entry_points']['console_scripts']
     assert {path.name for path in installed.bin.glob('box_contact_*')} == {
-        f'box_contact_{name}' for name in programs}
+        f'box_contact_{line.partition(" ")[0]}' for line in programs}
     assert 'usage' in run(installed.bin / 'box_contact_contact_node', '--help',
                           cwd=installed.folder)
 
@@ -146,7 +146,7 @@ def test_the_programs_are_in_bin(installed: Installation, setup_arguments: dict[
 @pytest.mark.parametrize('editable', [True, False])
 def test_a_type_checker_finds_the_types(installed: Installation, tmp_path: Path, editable: bool,
                                         ) -> None:
-    """mypy knows that a separation is a float, also where this checkout is installed with -e."""
+    """Let mypy say that a separation is a float, also where this checkout is installed with -e."""
     pytest.importorskip('mypy')
     python = Path(sys.executable) if editable else installed.bin / 'python'
     (tmp_path / 'user.py').write_text(USER)
