@@ -28,7 +28,7 @@ endif
 
 PY := .venv/bin/python
 # Workers side by side: test/conftest.py chooses how many, and which tests belong together.
-PYTEST := $(PY) -m pytest -n auto -rs --durations 10
+PYTEST := $(PY) -m pytest -n auto --dist loadfile --no-loadscope-reorder -rs --durations 10
 LINT := echo ruff; $(PY) -m ruff check .; echo mypy; $(PY) -m mypy
 
 help:
@@ -56,7 +56,7 @@ demo:
 
 view:
 	@.ci/setup demo
-	exec $(PY) -m box_contact_ros view $(ARGS)
+	exec $(PY) -m box_contact_ros.view.view $(ARGS)
 
 test:
 	@.ci/setup test
