@@ -28,7 +28,7 @@ endif
 
 PY := .venv/bin/python
 # Workers side by side: test/conftest.py chooses how many, and which tests belong together.
-PYTEST := $(PY) -m pytest -n auto --durations 10
+PYTEST := $(PY) -m pytest -n auto --dist loadfile --no-loadscope-reorder -rs --durations 10
 LINT := echo ruff; $(PY) -m ruff check .; echo mypy; $(PY) -m mypy
 
 help:
@@ -38,7 +38,7 @@ help:
 	echo 'make check    linters, and the quick tests of core, solver and scene: a minute'
 	echo 'make test-colcon  the quick tests, as `colcon test` runs them in a workspace'
 	echo 'make test-arm the C++ test on an emulated 64-bit ARM'
-	echo 'make test-debian13  the first command of the README on a fresh Debian 13 (root)'
+	echo 'make test-debian13  make demo, then make test, on a fresh Debian 13 (root)'
 	echo 'make dist     wheel and source distribution in dist/, both installed and tried'
 	echo 'make coverage lines of solver, scenes and nodes that their tests run'
 	echo 'make reports  every table and picture of docs, in 45 minutes; ARGS=--quick tries them out'
@@ -55,8 +55,8 @@ demo:
 	exec $(PY) -m box_contact_ros.demo.demo $(ARGS)
 
 view:
-	@.ci/setup view
-	exec $(PY) -m box_contact_ros view $(ARGS)
+	@.ci/setup demo
+	exec $(PY) -m box_contact_ros.view.view $(ARGS)
 
 test:
 	@.ci/setup test
@@ -111,7 +111,7 @@ test-debian13:
 	@exec bash test/package/debian.sh $(DEBIAN) $(ARGS)
 
 dist:
-	@.ci/setup dist
+	@.ci/setup test
 	exec bash test/package/dist.sh $(PY)
 
 # Lines of solver, scenes and nodes that their own tests run, in all processes.
@@ -123,21 +123,14 @@ coverage:
 	$(PY) -m coverage combine -q
 	$(PY) -m coverage report --fail-under 95
 
-# The tools of the extra `docs`; .venv may have them already.
-DOCS_TOOLS := myst-parser sphinx sphinx-rtd-theme
-define sphinx
-	@.ci/setup demo
-	$(PY) -c 'import myst_parser, sphinx, sphinx_rtd_theme' 2>/dev/null || \
-	    $(PY) -m pip install -q -c constraints.txt $(DOCS_TOOLS)
-	$(PY) -m sphinx -q -W --keep-going -b
-endef
-
 docs:
-	$(sphinx) html docs build/docs $(ARGS)
+	@.ci/setup test
+	$(PY) -m sphinx -q -W --keep-going -b html docs build/docs $(ARGS)
 	echo 'open $(CURDIR)/build/docs/index.html'
 
 docs-links:
-	$(sphinx) linkcheck docs build/docs-links $(ARGS)
+	@.ci/setup test
+	$(PY) -m sphinx -q -W --keep-going -b linkcheck docs build/docs-links $(ARGS)
 
 tables:
 	@.ci/setup demo

@@ -29,13 +29,6 @@ INSTRUCTION_SETS = {'baseline': []}
 if platform.machine() in ('x86_64', 'AMD64'):
     INSTRUCTION_SETS |= {'avx2': ['-march=x86-64-v3'],
                          'avx512': ['-march=x86-64-v4', '-mprefer-vector-width=512']}
-CPU = Path('/proc/cpuinfo')
-if os.environ.get('BOX_CONTACT_BUILD') == 'best' and CPU.is_file():
-    # `make demo` saves the time for the others; the targets that need them build them.
-    here = CPU.read_text().split()
-    best = 'avx512' if 'avx512vl' in here else 'avx2' if 'avx2' in here else 'baseline'
-    INSTRUCTION_SETS = {name: flags for name, flags in INSTRUCTION_SETS.items()
-                        if name in ('baseline', best)}
 
 PROGRAMS = {'bench': 'bench.bench', 'contact_node': 'node.contact_node',
             'crane': 'demo.crane_node', 'markers': 'view.markers',
@@ -68,6 +61,8 @@ class BuildCore(build_ext):
     def finalize_options(self):
         super().finalize_options()
         self.parallel = self.parallel or os.cpu_count()
+        # File times, by which setuptools would leave out an extension, know no flags.
+        self.force = True
 
     def run(self):
         compiler = os.environ.get('CXX', 'g++').split()[0]
@@ -82,17 +77,6 @@ class BuildCore(build_ext):
         super().run()
 
     def build_extension(self, ext):
-        # An editable install takes over what `build_ext --inplace` has made of the same sources.
-        here, inputs = Path(self.get_ext_filename(ext.name)), [__file__, *ext.sources, *ext.depends]
-        products = [here, here.with_name(LIBRARY)] if ext.name == CORE_EXTENSION else [here]
-        if getattr(self, 'editable_mode', False) and all(
-                product.is_file() and Path(one).stat().st_mtime < product.stat().st_mtime
-                for product in products for one in inputs):
-            path = Path(self.get_ext_fullpath(ext.name))
-            self.mkpath(str(path.parent))
-            for product in products:
-                self.copy_file(str(product), str(path.with_name(product.name)))
-            return
         if ext.name == CORE_EXTENSION:
             ext.extra_objects = self.build_library(ext)
         super().build_extension(ext)
@@ -106,7 +90,7 @@ class BuildCore(build_ext):
             macros = [('BOX_CONTACT_VERSION', f'"{self.distribution.get_version()}"')]
             macros += [(f'BOX_CONTACT_{one.upper()}', '1') for one in INSTRUCTION_SETS]
             return compiler.compile([f'{CORE}/src/library/{source}'], str(folder / name), macros,
-                                    extra_postargs=[*FLAGS, *flags], depends=ext.depends)
+                                    extra_postargs=[*FLAGS, *flags])
 
         jobs = {name: ('kernel.cpp', flags) for name, flags in INSTRUCTION_SETS.items()}
         jobs |= {name: (f'{name}.cpp', []) for name in ('library', 'force')}
@@ -137,9 +121,7 @@ def extensions() -> list[Extension]:
     """Return the native modules: the core, and the paper's networks."""
     import numpy
 
-    depends = [path.as_posix() for pattern in ('*.hpp', '*.h', 'library/*.cpp', '*.map')
-               for path in sorted(Path(NAME).rglob(pattern))]
-    settings = {'depends': depends, 'include_dirs': [numpy.get_include()], 'language': 'c++',
+    settings = {'include_dirs': [numpy.get_include()], 'language': 'c++',
                 'extra_compile_args': FLAGS}
     return [Extension(CORE_EXTENSION, [f'{CORE}/binding/module.cpp'],
                       extra_link_args=['-pthread'], **settings),
@@ -179,6 +161,8 @@ setup(
     maintainer_email='maintainers@box-contact-ros.org',
     license='Apache-2.0',
     packages=find_packages(include=[NAME, f'{NAME}.*']),
+    # Said in so many words, it makes an editable install a path that type checkers follow.
+    package_dir={'': '.'},
     package_data={NAME: ['py.typed', '**/*.pyi', 'core/cmake/*', 'core/include/**/*.h*',
                          'core/src/**/*.hpp']},
     ext_modules=extensions(),

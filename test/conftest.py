@@ -9,7 +9,6 @@ first test module imports it. Every process that a test starts inherits it.
 
 from __future__ import annotations
 
-import contextlib
 import importlib.util
 import os
 import runpy
@@ -21,29 +20,18 @@ import time
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import chain, count
+from itertools import count
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-CHAINS = (
-    ('test_faults.py', 'test_contact_node.py', 'test_two_hosts.py',
-     'test_markers.py', 'test_processes.py'),
-    ('test_bench.py', 'test_scene_node.py', 'test_landing_ros.py', 'test_hygiene_ros.py',
-     'test_msg_schemas.py', 'test_view.py', 'test_record.py', 'test_scene_forms.py',
-     'test_callbacks.py', 'test_soup_node.py', 'test_ends.py'))
-"""Files whose programs lose messages or time where they have to wait for a processor. They mostly
-wait for each other. The files of a chain run one after the other, and go before all others."""
-LONGEST_FIRST = (
-    'test_core_cpp.py', 'test_library.py', 'test_install.py',
-    'test_series.py', 'test_core.py', 'test_exact.py',
-    'test_landing.py', 'test_search.py', 'test_training_mlp.py', 'test_crane.py',
-    'test_readme.py', 'test_message_package.py', 'test_ament.py', 'test_frontier.py',
-    'test_training.py')
-"""Of the others, those that take more than five seconds. Begun late, one leaves workers idle."""
-NICE = 10
-"""Niceness of the others: a share of a tenth where a program of a chain wants the processor."""
+FIRST = (
+    'test_install.py', 'test_message_package.py', 'test_core.py', 'test_core_cpp.py',
+    'test_library.py', 'test_exact.py', 'test_series.py', 'test_readme.py', 'test_frontier.py',
+    'test_training.py', 'test_training_mlp.py', 'test_contact_node.py', 'test_scene_node.py',
+    'test_view.py', 'test_bench.py', 'test_crane.py')
+"""The longest files. Begun late, one of them would leave the other workers idle."""
 
 _modules = count()
 _claims: list[int] = []
@@ -114,9 +102,8 @@ EXTRAS = {
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put the chains first, then the longest files."""
-    rank = {name: number for number, name in enumerate((*chain(*CHAINS), *LONGEST_FIRST))}
-    items.sort(key=lambda item: rank.get(item.path.name, len(rank)))
+    """Put the longest files first."""
+    items.sort(key=lambda item: item.path.name not in FIRST)
 
 
 class TestFile(pytest.Module):
@@ -154,47 +141,21 @@ def skip_without_extra(missing: str | None) -> None:
                         allow_module_level=True)
 
 
-@pytest.hookimpl(optionalhook=True)
-def pytest_xdist_auto_num_workers() -> int:
-    """Run one worker more than there are processors, as chains mostly wait; more than nine idle."""
-    return min(os.cpu_count() or 1, 8) + 1
-
-
-@pytest.hookimpl(optionalhook=True)
-def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
-    """Keep the tests of a chain, or of another file, on one worker, in the order of the items."""
-    from xdist.scheduler import LoadScopeScheduling
-
-    class ByChainOrFile(LoadScopeScheduling):
-        def _split_scope(self, nodeid: str) -> str:
-            file = nodeid.partition('::')[0]
-            chains = [str(files) for files in CHAINS if Path(file).name in files]
-            return chains[0] if chains else file
-
-    config.option.loadscopereorder = False
-    return ByChainOrFile(config, log)
-
-
 @pytest.fixture(scope='module', autouse=True)
-def own_domain(request: pytest.FixtureRequest) -> None:
-    """Give each module a ROS domain, and a module of no chain the lower priority.
+def own_domain() -> None:
+    """Give each module a ROS domain.
 
     Processes that were killed leave shared memory of theirs behind, in which later ones may wait
     for the dead.
     """
     os.environ['ROS_DOMAIN_ID'] = str(_domain_id())
-    if 'PYTEST_XDIST_WORKER' in os.environ and request.path.name not in chain(*CHAINS):
-        step_back()
 
 
-def step_back() -> None:
-    """Let the programs of the chains have the processor first."""
-    if os.nice(0) < NICE:
-        os.nice(NICE - os.nice(0))
-        # Linux may share the processor between sessions first, and programs are sessions.
-        with contextlib.suppress(OSError):
-            os.setsid()
-            Path('/proc/self/autogroup').write_text(str(NICE))
+@pytest.fixture(scope='session', autouse=True)
+def programs_end_with_their_terminal() -> None:
+    """Let `nohup` keep these tests alone: a program would inherit that SIGHUP is ignored."""
+    if signal.getsignal(signal.SIGHUP) == signal.SIG_IGN:
+        signal.signal(signal.SIGHUP, lambda number, frame: None)
 
 
 @pytest.fixture(autouse=True)

@@ -19,7 +19,7 @@ if [ $# -lt 2 ]; then arguments=("${quick[@]}"); fi
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 unset PYTHONPATH
-export PIP_DISABLE_PIP_VERSION_CHECK=1 BOX_CONTACT_BUILD=best
+export PIP_DISABLE_PIP_VERSION_CHECK=1
 
 # pip's output is shown where pip fails.
 install() {
@@ -28,7 +28,7 @@ install() {
 
 "$python" -m venv "$work/venv"
 PATH=$work/venv/bin:$PATH
-install --constraint "$root/constraints.txt" pip setuptools wheel \
+install --constraint "$root/constraints.txt" setuptools \
     colcon-common-extensions jsonschema numpy pytest pyyaml \
     ros-jazzy-common-interfaces ros-jazzy-rclpy ros-jazzy-rmw-fastrtps-cpp
 

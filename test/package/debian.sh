@@ -2,18 +2,17 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-# Do what a newcomer does on a fresh Debian: install what the README names, clone, and type its first
-# command. The last commit is what is cloned.
+# Do what a newcomer does on a fresh Debian: install what the README names, clone, and type make demo
+# and make test. The last commit is what is cloned.
 #
-# usage: debian.sh SUITE [COMMAND]     (trixie: Debian 13; default: the README's first command)
+# usage: debian.sh SUITE [COMMANDS]     (trixie: Debian 13; bookworm: Debian 12)
 # Needed: root, debootstrap, git, and 6 GB below TMPDIR.
 # DEBIAN_MIRROR is where packages come from; without it, where apt here has them from.
 set -euo pipefail
 
 checkout=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 suite=$1
-commands=$(awk '/^```bash/ {inside = 1; next} /^```/ && inside {exit} inside' "$checkout/README.md")
-commands=${2:-$commands}
+commands=${2:-$'make demo\nmake test'}
 
 fail() {
     echo "error: $1" >&2
@@ -61,7 +60,7 @@ chroot --userspec newcomer "$debian" env -i HOME=/home/newcomer USER=newcomer LA
     while read -r command; do
         echo "\$ $command"
         SECONDS=0
-        bash -c "$command"
+        bash -c "$command" </dev/null
         echo "($SECONDS s)"
     done <<<"$0"' "$commands"
 INSIDE

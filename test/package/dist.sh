@@ -13,7 +13,9 @@ cd "$root"
 python=$(realpath -s "${1:-.venv/bin/python}")
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-export PIP_CONSTRAINT=$root/constraints.txt PIP_DISABLE_PIP_VERSION_CHECK=1
+# pip splits the variable at blanks, and the path of this checkout may have some.
+cp constraints.txt "$work/"
+export PIP_CONSTRAINT=$work/constraints.txt PIP_DISABLE_PIP_VERSION_CHECK=1
 
 # From the last commit: what lies about in the checkout is in neither.
 git -c safe.directory='*' clone --quiet . "$work/checkout"

@@ -1,11 +1,10 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""The four kinds of installation: pip, pip -e, colcon build, colcon build --symlink-install.
+"""A wheel and a source distribution, each made from a copy of the tracked files.
 
-Each is made once, from a copy of the tracked files, in a temporary folder, without the network.
-Of a plain one the sources are deleted before it is looked at: nothing may reach back to them.
-All are built by one compiler, which does not optimise and compiles the same text once.
+The sources of the wheel are deleted before it is looked at: nothing may reach back to them. All
+other tests run in an editable install; `make test-colcon` runs them as colcon installs them.
 """
 from __future__ import annotations
 
@@ -17,13 +16,13 @@ import sys
 import sysconfig
 import tarfile
 import venv
-from collections.abc import Callable, Iterator
+import zipfile
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from box_contact_ros.cli import PROGRAMS
 from box_contact_ros.core import instruction_sets
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -38,55 +37,31 @@ CLEAN = {name: value for name, value in os.environ.items()
 
 pytestmark = pytest.mark.skipif(not TRACKED, reason='not a git checkout: what would be copied?')
 
-COMPILER = f"""#!{sys.executable}
-import hashlib, os, pathlib, shlex, shutil, subprocess, sys
-
-compiler, words = shlex.split({os.environ.get('CXX', 'g++')!r}), sys.argv[1:]
-if '-c' not in words:
-    os.execvp(compiler[0], compiler + words)
-at = words.index('-o')
-output = words[at + 1]
-del words[at:at + 2]
-text = subprocess.run([*compiler, *words, '-E', '-P'], stdout=subprocess.PIPE, check=True).stdout
-flags = [word for word in words if not word.startswith('-I') and not word.endswith('.cpp')]
-found = pathlib.Path(__file__).with_name(hashlib.sha256(repr(flags).encode() + text).hexdigest())
-if not found.exists():
-    subprocess.run([*compiler, *words, '-O0', '-o', found], check=True)
-shutil.copy(found, output)
+ASK = """
+import json, sys
+import box_contact_ros
+from box_contact_ros import ContactSolver, core
+from box_contact_ros.resources import resource_path
+folders = {name: resource_path(name) for name in sys.argv[1:]}
+contact = ContactSolver((2, 2, 2), (2, 2, 2), model='mlp')([0] * 6 + [1], [0, 0, 1.9, 0, 0, 0, 1])
+print(json.dumps({
+    'sets': core.instruction_sets(), 'separation': contact.separation,
+    'places': [box_contact_ros.__file__, core.native.__file__, *map(str, folders.values())],
+    'files': sorted(f'{name}/{path.relative_to(folder)}' for name, folder in folders.items()
+                    for path in folder.rglob('*') if path.is_file() and path.suffix != '.pyc')}))
 """
-"""As the compiler: an object is made once for the same flags and the same preprocessed text."""
+USER = """
+from box_contact_ros import ContactSolver
+depth: str = ContactSolver((2, 2, 2), (2, 2, 2))([0] * 6 + [1], [0] * 6 + [1]).separation
+"""
 
 
-@pytest.fixture(scope='module', autouse=True)
-def one_compiler(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Build all installations with one memory of objects."""
-    compiler = tmp_path_factory.mktemp('compiler') / 'c++'
-    compiler.write_text(COMPILER)
-    compiler.chmod(0o755)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setitem(CLEAN, 'CXX', str(compiler))
-        yield
-
-
-def run(*words: str | Path, cwd: Path, timeout: float = 180.0) -> str:
+def run(*words: str | Path, cwd: Path) -> str:
     """Output of a command in the clean environment; fails unless its status is 0."""
     done = subprocess.run([str(word) for word in words], cwd=cwd, env=CLEAN, text=True,
-                          timeout=timeout, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+                          stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
     assert done.returncode == 0, f'{words}: {done.stdout}'
     return done.stdout
-
-
-@dataclass(frozen=True)
-class Installation:
-    """One that has been made below `folder`; `enter` stands before any command run in it."""
-
-    folder: Path
-    python: Path
-    enter: tuple[str, ...] = ()
-
-    def ask(self, code: str, *args: str) -> dict:
-        """Run Python code in it, away from any sources; the JSON object that the code prints."""
-        return json.loads(run(*self.enter, self.python, '-c', code, *args, cwd=self.folder.parent))
 
 
 def copy_sources(to: Path) -> Path:
@@ -97,143 +72,88 @@ def copy_sources(to: Path) -> Path:
     return to
 
 
-def pip_install(folder: Path, *options: str) -> Installation:
-    """Into a virtual environment that borrows the dependencies, and nothing else, from this one."""
+@dataclass(frozen=True)
+class Installation:
+    """One that has been made below `folder`, and the names of the files of its wheel."""
+
+    folder: Path
+    wheel_files: list[str]
+
+    @property
+    def bin(self) -> Path:
+        """Where its Python and its programs are."""
+        return self.folder / 'venv' / 'bin'
+
+
+@pytest.fixture(scope='module')
+def installed(tmp_path_factory: pytest.TempPathFactory) -> Installation:
+    """Install a wheel into an environment that borrows the dependencies from this one.
+
+    The compiler does not optimise, which saves a minute.
+    """
+    folder = tmp_path_factory.mktemp('installed')
+    compiler = folder / 'c++'
+    compiler.write_text(f'#!/bin/sh\nexec {os.environ.get("CXX", "g++")} "$@" -O0\n')
+    compiler.chmod(0o755)
     sources = copy_sources(folder / 'sources')
+    options = ('--no-index', '--no-deps', '--no-build-isolation')
+    run('env', f'CXX={compiler}', sys.executable, '-m', 'pip', 'wheel', *options,
+        '--wheel-dir', folder, sources, cwd=folder)
+    shutil.rmtree(sources)
     venv.create(folder / 'venv', symlinks=True)
-    python = folder / 'venv' / 'bin' / 'python'
+    python, (wheel,) = folder / 'venv' / 'bin' / 'python', folder.glob('*.whl')
     site_packages = Path(run(python, '-c', 'import sysconfig; print(sysconfig.get_path("purelib"))',
                              cwd=folder).strip())
     # A .pth in a borrowed folder is not read, so an editable install of this package stays out.
     (site_packages / 'borrowed.pth').write_text(sysconfig.get_path('purelib'))
-    run(sys.executable, '-m', 'pip', '--python', python, 'install', '--no-index', '--no-deps',
-        '--no-build-isolation', *options, sources, cwd=folder)
-    if not options:
-        shutil.rmtree(sources)
-    return Installation(folder, python)
+    run(sys.executable, '-m', 'pip', '--python', python, 'install', *options, wheel, cwd=folder)
+    return Installation(folder, zipfile.ZipFile(wheel).namelist())
 
 
-def colcon(workspace: Path, *words: str) -> str:
-    pytest.importorskip('colcon_core', reason='colcon is not installed: pip install .[test]')
-    return run(Path(sys.executable).with_name('colcon'), '--log-base', workspace / 'log', *words,
-               cwd=workspace)
-
-
-def colcon_build(workspace: Path, *options: str) -> Installation:
-    """In a workspace that is then sourced, as a user does."""
-    copy_sources(workspace / 'src' / NAME)
-    colcon(workspace, 'build', *options)
-    if not options:
-        shutil.rmtree(workspace / 'src')
-        shutil.rmtree(workspace / 'build')
-    return Installation(workspace, Path(sys.executable), (
-        'bash', '-c', f'source {workspace}/install/setup.bash && exec "$@"', 'in'))
-
-
-INSTALL: dict[str, Callable[[Path], Installation]] = {
-    'pip': pip_install,
-    'pip -e': lambda folder: pip_install(folder, '-e'),
-    'colcon': colcon_build,
-    'colcon --symlink-install': lambda folder: colcon_build(folder, '--symlink-install'),
-}
-
-
-@pytest.fixture(scope='module')
-def installed(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory,
-              ) -> Installation:
-    return INSTALL[request.param](tmp_path_factory.mktemp('installed'))
-
-
-all_kinds = pytest.mark.parametrize('installed', INSTALL, indirect=True)
-under_colcon = pytest.mark.parametrize('installed', [kind for kind in INSTALL if 'colcon' in kind],
-                                       indirect=True)
-
-
-@all_kinds
-def test_data_files_are_there_and_load(installed: Installation) -> None:
-    """Every data file of the repository is found, and none of another installation.
-
-    Weights and schemas can be read.
-    """
-    found = installed.ask("""
-import json, sys
-import box_contact_ros
-from box_contact_ros.solver.weights_file import load_weights
-from box_contact_ros.resources import resource_path
-files = {}
-for folder in sys.argv[1:]:
-    top = resource_path(folder)
-    files[folder] = sorted(str(path.relative_to(top)) for path in top.rglob('*')
-                           if path.is_file() and path.suffix != '.pyc')
-for name in files['weights']:
-    if name.endswith('.safetensors'):
-        load_weights(resource_path('weights', name))
-for name in files['msg_schemas']:
-    if name.endswith('.json'):
-        json.loads(resource_path('msg_schemas', name).read_text('utf-8'))
-places = [box_contact_ros.__file__, *(str(resource_path(folder)) for folder in files)]
-print(json.dumps({'files': files, 'places': places}))
-""", *DATA)
-    assert found['files'] == {
-        folder: sorted(str(Path(name).relative_to(folder)) for name in TRACKED
-                       if Path(name).parts[0] == folder) for folder in DATA}
-    assert all(Path(place).is_relative_to(installed.folder) for place in found['places'])
-
-
-@all_kinds
-def test_contacts_can_be_asked_for(installed: Installation) -> None:
-    """The default model, with the weights of the installation."""
-    answer = installed.ask("""
-import json
-from box_contact_ros import ContactSolver
-contact = ContactSolver((2, 2, 2), (2, 2, 2))([0, 0, 0, 0, 0, 0, 1], [0, 0, 1.9, 0, 0, 0, 1])
-print(json.dumps({'separation': contact.separation, 'point': contact.point.tolist()}))
-""")
+def test_a_wheel_answers_with_files_of_its_own(installed: Installation) -> None:
+    """Every data file is there, and every instruction set that this machine can run."""
+    answer = json.loads(run(installed.bin / 'python', '-c', ASK, *DATA, cwd=installed.folder))
     assert answer['separation'] == pytest.approx(-0.1)
-    assert answer['point'] == pytest.approx([0.0, 0.0, 0.95], abs=1e-6)
+    assert tuple(answer['sets']) == instruction_sets()
+    assert answer['files'] == sorted(name for name in TRACKED if Path(name).parts[0] in DATA)
+    assert all(Path(place).is_relative_to(installed.folder) for place in answer['places'])
+    tops = {name.partition('/')[0] for name in installed.wheel_files}
+    assert {top for top in tops if not top.endswith(('.data', '.dist-info'))} == {NAME}
 
 
-@all_kinds
-def test_every_instruction_set_is_built(installed: Installation) -> None:
-    """The core's extensions are those of the installation, as many as this machine can run."""
-    found = installed.ask("""
-import json
-from box_contact_ros import core
-print(json.dumps({'sets': core.instruction_sets(), 'file': core.native.__file__}))
-""")
-    assert tuple(found['sets']) == instruction_sets()
-    assert Path(found['file']).is_relative_to(installed.folder)
-
-
-@all_kinds
 def test_cmake_finds_the_library(installed: Installation, tmp_path: Path) -> None:
-    """After colcon by the workspace's environment, after pip by `--cmakedir`; the example runs.
-
-    So do the headers alone, by `--includes`.
-    """
-    for name in ('cmake', 'g++'):
-        if not shutil.which(name):
-            pytest.skip(f'{name} is not installed')
-    enter, ask = installed.enter, (*installed.enter, installed.python, '-m', NAME)
-    folder = run(*ask, '--cmakedir', cwd=tmp_path).strip()
+    """By `--cmakedir`; the example runs."""
+    if not shutil.which('cmake'):
+        pytest.skip('cmake is not installed')
+    folder = run(installed.bin / 'python', '-m', NAME, '--cmakedir', cwd=tmp_path).strip()
     assert Path(folder).is_relative_to(installed.folder)
-    told = () if enter else (f'-D{NAME}_DIR={folder}',)
-    run(*enter, 'cmake', '-S', ROOT / 'docs' / 'examples' / 'cpp', '-B', tmp_path, *told,
+    run('cmake', '-S', ROOT / 'docs' / 'examples' / 'cpp', '-B', tmp_path, f'-D{NAME}_DIR={folder}',
         cwd=tmp_path)
     run('cmake', '--build', tmp_path, cwd=tmp_path)
     assert 'batch: 1 0, volumes 0.030 0.000 m3' in run(tmp_path / 'first_contact', cwd=tmp_path)
-    (tmp_path / 'user.cpp').write_text('#include <box_contact/inline.hpp>\n')
-    run('g++', '-std=c++17', '-fsyntax-only', run(*ask, '--includes', cwd=tmp_path).strip(),
-        tmp_path / 'user.cpp', cwd=tmp_path)
 
 
-@pytest.mark.parametrize('installed', ['pip', 'pip -e'], indirect=True)
-def test_pip_puts_the_programs_into_bin(installed: Installation) -> None:
+def test_the_programs_are_in_bin(installed: Installation, setup_arguments: dict[str, Any],
+                                 ) -> None:
     """Under prefixed names, where a shell finds them."""
-    bin_ = installed.folder / 'venv' / 'bin'
-    assert {path.name for path in bin_.glob('box_contact_*')} == {
-        f'box_contact_{name}' for name in PROGRAMS}
-    assert 'usage' in run(bin_ / 'box_contact_accuracy', '--help', cwd=installed.folder)
+    programs = setup_arguments['entry_points']['console_scripts']
+    assert {path.name for path in installed.bin.glob('box_contact_*')} == {
+        f'box_contact_{line.partition(" ")[0]}' for line in programs}
+    assert 'usage' in run(installed.bin / 'box_contact_contact_node', '--help',
+                          cwd=installed.folder)
+
+
+@pytest.mark.parametrize('editable', [True, False])
+def test_a_type_checker_finds_the_types(installed: Installation, tmp_path: Path, editable: bool,
+                                        ) -> None:
+    """Let mypy say that a separation is a float, also where this checkout is installed with -e."""
+    pytest.importorskip('mypy')
+    python = Path(sys.executable) if editable else installed.bin / 'python'
+    (tmp_path / 'user.py').write_text(USER)
+    done = subprocess.run([sys.executable, '-m', 'mypy', '--strict', '--python-executable', python,
+                           'user.py'], cwd=tmp_path, env=CLEAN, capture_output=True, text=True)
+    assert done.stdout.endswith('Found 1 error in 1 file (checked 1 source file)\n'), done.stdout
+    assert 'expression has type "float", variable has type "str"' in done.stdout
 
 
 def test_the_source_distribution_is_the_checkout(tmp_path: Path) -> None:
@@ -244,47 +164,3 @@ def test_the_source_distribution_is_the_checkout(tmp_path: Path) -> None:
     with tarfile.open(archive) as file:
         names = {member.name.partition('/')[2] for member in file if member.isfile()}
     assert names - {'PKG-INFO'} - {name for name in names if '.egg-info/' in name} == set(TRACKED)
-
-
-def test_colcon_knows_the_package_type(tmp_path: Path) -> None:
-    """What catkin_pkg rejects would be listed as plain `python`."""
-    copy_sources(tmp_path / 'src' / NAME)
-    assert colcon(tmp_path, 'list').split() == [NAME, f'src/{NAME}', '(ros.ament_python)']
-
-
-@under_colcon
-def test_ros2_run_finds_the_programs(installed: Installation) -> None:
-    """`ros2 run` and `ros2 launch` find their files by way of the ament index.
-
-    `ros2 run` asks it for the package's prefix, and takes an executable file of the program's name
-    in its lib/<package>; `ros2 launch` and others ask for the share folder.
-    """
-    pytest.importorskip('ament_index_python')
-    index = installed.ask("""
-import json
-from ament_index_python.packages import get_package_prefix, get_package_share_directory
-print(json.dumps({'prefix': get_package_prefix('box_contact_ros'),
-                  'share': get_package_share_directory('box_contact_ros')}))
-""")
-    prefix = installed.folder / 'install' / NAME
-    assert index == {'prefix': str(prefix), 'share': str(prefix / 'share' / NAME)}
-    folder = prefix / 'lib' / NAME
-    assert {path.name for path in folder.iterdir() if os.access(path, os.X_OK)} == set(PROGRAMS)
-    assert all((prefix / 'share' / NAME / data).is_dir() for data in DATA)
-    assert (prefix / 'share' / NAME / 'LICENSE').is_file()
-
-
-@under_colcon
-def test_a_node_runs(installed: Installation) -> None:
-    """The executable that `ros2 run box_contact_ros contact_node` would start says 'ready'."""
-    pytest.importorskip('rclpy')
-    node = installed.folder / 'install' / NAME / 'lib' / NAME / 'contact_node'
-    with subprocess.Popen([*installed.enter, node], cwd=installed.folder, env=CLEAN, text=True,
-                          stdout=subprocess.PIPE, stderr=subprocess.STDOUT) as process:
-        try:
-            lines: list[str] = []
-            while 'ready' not in ''.join(lines[-1:]):
-                lines.append(process.stdout.readline())
-                assert lines[-1], ''.join(lines)  # it ended
-        finally:
-            process.kill()

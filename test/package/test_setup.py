@@ -1,38 +1,134 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""The set-up behind make's targets: what it refuses, and what the demo compiles."""
+"""The set-up behind make's targets: the lock, what a second call does, and what is refused."""
 from __future__ import annotations
 
-import os
-import runpy
+import re
 import shutil
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import pytest
-
-from box_contact_ros.core import instruction_sets
+import tomllib
 
 ROOT = Path(__file__).resolve().parents[2]
 
+PYTHON = """#!/bin/bash
+# In the place of Python and uv: each writes what it is asked for into the file `calls`.
+case "$0 $*" in
+    *'-m venv'*) mkdir -p .venv/bin; for name in python uv; do cp "$0" .venv/bin/$name; done ;;
+    *--version*) echo 'Python 3.12.0' ;;
+    *uv*compile*) echo 'numpy==2.4.6' >.venv/roots.txt; exit ;;
+    *' -e '*) echo built >box_contact_ros/core.so ;;
+esac
+case "$*" in *install*|*'-m venv'*) echo "$*" >>calls; sleep "${SLOW:-0}" ;; esac
+"""
+NEW = ['-m venv', 'tools', 'roots', 'box-contact-ros']
+"""What a first set-up asks for: an environment, tools, packages, the package itself."""
 
-def test_the_demo_builds_the_best_instruction_set_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    """And the baseline, which every machine can run."""
-    monkeypatch.setenv('BOX_CONTACT_BUILD', 'best')
-    monkeypatch.setattr('setuptools.setup', lambda **given: None)
-    monkeypatch.chdir(ROOT)
-    built = list(runpy.run_path('setup.py')['INSTRUCTION_SETS'])
-    assert built == [*dict.fromkeys(['baseline', instruction_sets()[-1]])]
+
+def versions(path: str) -> list[str]:
+    """Return the lines of a lock that pin a version, each without hashes."""
+    return re.findall(r'^[a-z].*?(?= *\\?$)', (ROOT / path).read_text(), re.MULTILINE)
 
 
-def test_a_python_that_is_not_there_is_named(tmp_path: Path) -> None:
-    """With how to get one; nothing is created."""
-    (tmp_path / '.ci').mkdir()
-    shutil.copy(ROOT / '.ci' / 'setup', tmp_path / '.ci')
-    done = subprocess.run([tmp_path / '.ci' / 'setup', 'demo'], capture_output=True, text=True,
-                          env=os.environ | {'PYTHON': '/no/such/python'}, timeout=60)
-    assert done.returncode == 1
-    assert done.stderr.startswith(
-        'error: Python 3.11 to 3.14 is needed (/no/such/python: not found). Install one (apt')
-    assert not (tmp_path / '.venv').exists()
+def test_the_lock_pins_all_that_is_asked_for(setup_arguments: dict[str, Any]) -> None:
+    """Once, with hashes; constraints.txt and the tools of isolated builds have its versions."""
+    lock = versions('.ci/lock.txt')
+    assert versions('constraints.txt') == lock
+    assert (ROOT / '.ci/lock.txt').read_text().count(' \\\n    --hash=sha256:') >= len(lock) > 200
+    requires = tomllib.loads((ROOT / 'pyproject.toml').read_text())['build-system']['requires']
+    assert set(requires) <= set(lock)
+    asked = [*setup_arguments['install_requires'],
+             *sum(setup_arguments['extras_require'].values(), [])]
+    names = {line.partition('==')[0] for line in lock}
+    assert {re.match('[a-z0-9-]+', line)[0] for line in asked} <= names
+
+
+@pytest.fixture
+def clone(tmp_path: Path) -> Path:
+    """Return a folder, with a blank in its path, that has what .ci/setup reads."""
+    folder = tmp_path / 'a clone'
+    for name in ('.ci/setup', '.ci/lock.txt', 'setup.py', 'setup.cfg', 'pyproject.toml',
+                 'box_contact_msgs/pyproject.toml'):
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(ROOT / name, folder / name)
+    (folder / 'box_contact_ros').mkdir()
+    (folder / 'box_contact_ros' / 'core.hpp').write_text('header')
+    (folder / 'python').write_text(PYTHON)
+    (folder / 'python').chmod(0o755)
+    return folder
+
+
+def start(clone: Path, target: str = 'demo', python: str = './python', slow: str = '0',
+          ) -> subprocess.Popen[str]:
+    return subprocess.Popen([clone / '.ci' / 'setup', target], text=True, stderr=subprocess.STDOUT,
+                            stdout=subprocess.PIPE, start_new_session=True,
+                            env={'PATH': '/usr/bin:/bin', 'PYTHON': python, 'SLOW': slow})
+
+
+def set_up(clone: Path, target: str = 'demo') -> list[str]:
+    """Set up a target; return what was asked for since the last call."""
+    process = start(clone, target)
+    output, _ = process.communicate()
+    assert process.returncode == 0, output
+    return calls(clone)
+
+
+def calls(clone: Path) -> list[str]:
+    if not (clone / 'calls').exists():
+        return []
+    text = (clone / 'calls').read_text()
+    (clone / 'calls').unlink()
+    return re.findall('-m venv|tools|roots|box-contact-ros', text)
+
+
+def test_a_second_call_does_what_is_missing_alone(clone: Path) -> None:
+    """Contents count, not times, and a target that needs more installs more."""
+    header = clone / 'box_contact_ros' / 'core.hpp'
+    assert set_up(clone) == NEW
+    assert set_up(clone) == []
+    header.touch()
+    assert set_up(clone) == []
+    header.write_text('another header')
+    assert set_up(clone) == ['box-contact-ros']
+    header.with_suffix('.so').unlink()
+    assert set_up(clone) == ['box-contact-ros']
+    assert set_up(clone, 'test') == ['tools', 'roots']
+    assert set_up(clone) == set_up(clone, 'test') == []
+    (clone / '.ci' / 'lock.txt').write_text('# an older lock')
+    assert set_up(clone) == ['tools', 'roots', 'box-contact-ros']
+    assert set_up(clone, 'test') == ['tools', 'roots']
+
+
+def test_a_killed_set_up_begins_anew_and_a_second_one_waits(clone: Path) -> None:
+    killed = start(clone, slow='0.5')
+    while 'roots.txt' not in ((clone / 'calls').read_text() if (clone / 'calls').exists() else ''):
+        assert killed.poll() is None, killed.communicate()
+    killed.kill()
+    killed.communicate()
+    calls(clone)
+    first, second = start(clone, slow='0.1'), start(clone, slow='0.1')
+    outputs = [process.communicate()[0] for process in (first, second)]
+    assert [first.returncode, second.returncode] == [0, 0], outputs
+    assert any('another make' in output for output in outputs)
+    assert calls(clone) == NEW
+    shutil.move(clone, clone.with_name('moved'))
+    assert set_up(clone.with_name('moved')) == NEW
+
+
+def test_what_is_not_there_or_not_ours_is_named(clone: Path) -> None:
+    """Nothing is created, nor deleted."""
+    refused = start(clone, python='/no/such/python')
+    output, _ = refused.communicate()
+    assert refused.returncode == 1
+    assert output.startswith('error: Python 3.11 to 3.14 is needed, and is not here as /no/such/py')
+    assert not (clone / '.venv').exists()
+    (clone / '.venv' / 'mine').mkdir(parents=True)
+    refused = start(clone)
+    output, _ = refused.communicate()
+    assert refused.returncode == 1
+    assert output.startswith('error: .venv exists, and make did not make it')
+    assert (clone / '.venv' / 'mine').exists()
