@@ -179,7 +179,7 @@ setup(
     maintainer_email='maintainers@box-contact-ros.org',
     license='Apache-2.0',
     packages=find_packages(include=[NAME, f'{NAME}.*']),
-    package_data={NAME: ['py.typed', '**/*.pyi', 'core/cmake/*', 'core/include/**/*.h*', 'core/src/**/*.hpp']},
+    package_data={NAME: ['py.typed', '**/*.pyi', 'core/cmake/*', 'core/include/**/*.h*']},
     ext_modules=extensions(),
     data_files=data_files(),
     entry_points={

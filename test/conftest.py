@@ -36,7 +36,7 @@ CHAINS = (
 """Files whose programs lose messages or time where they have to wait for a processor. They mostly
 wait for each other. The files of a chain run one after the other, and go before all others."""
 LONGEST_FIRST = (
-    'test_core_cpp.py', 'test_library.py', 'test_install.py',
+    'test_library.py', 'test_install.py',
     'test_series.py', 'test_core.py', 'test_exact.py',
     'test_landing.py', 'test_search.py', 'test_training_mlp.py', 'test_crane.py',
     'test_readme.py', 'test_message_package.py', 'test_ament.py', 'test_frontier.py',
