@@ -37,7 +37,7 @@ help:
 	echo 'make test     ruff, mypy and all tests'
 	echo 'make check    linters, and the quick tests of core, solver and scene: a minute'
 	echo 'make test-colcon  the quick tests, as `colcon test` runs them in a workspace'
-	echo 'make test-arm the C++ test on an emulated 64-bit ARM'
+	echo 'make test-arm the library on an emulated 64-bit ARM: the same bits as here'
 	echo 'make test-debian13  the first command of the README on a fresh Debian 13 (root)'
 	echo 'make dist     wheel and source distribution in dist/, both installed and tried'
 	echo 'make coverage lines of solver, scenes and nodes that their tests run'

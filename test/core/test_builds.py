@@ -1,7 +1,7 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Other compilers, and an emulated 64-bit ARM: the library's bits, so also its laws and its truth."""
+"""Other compilers, and an emulated 64-bit ARM: the library's bits, so its laws hold there too."""
 from __future__ import annotations
 
 import shutil

@@ -76,7 +76,8 @@ def test_contacts_keep_their_promises(model: str, seed: int) -> None:
     assert np.isfinite(found.point[touching]).all()
     assert np.abs((found.normal[touching]**2).sum(axis=1) - 1.0).max() <= 1e-12
     sizes = np.hstack(pairs[2:])
-    size, reach = sizes.max(axis=1), np.abs(np.hstack([pairs[0][:, :3], pairs[1][:, :3]])).max(axis=1)
+    reach = np.abs(np.hstack([pairs.pose_a[:, :3], pairs.pose_b[:, :3]])).max(axis=1)
+    size = sizes.max(axis=1)
     pressed = np.where(separation > -1e-9 * size, 3e-9 * size, 0.0)
     rows = touching & (size <= ASPECT_KNOWN * sizes.min(axis=1))
     for pose, extents in ((pairs.pose_a, pairs.size_a), (pairs.pose_b, pairs.size_b)):

@@ -249,10 +249,10 @@ BAD_NUMBERS = np.array([np.nan, -np.nan, np.inf, -np.inf, 0.0, -0.0, 1e-320, 5e-
 
 
 def extreme_pairs(rng, n):
-    """Boxes of 1e-50 to 1e50 m that touch, pass through each other or miss; some rows are refused.
+    """Boxes of 1e-50 to 1e50 m that touch, overlap or miss; some rows are refused.
 
-    Places are as far as 1e50 m, quaternions of lengths from 1e-99 to 1e99, some numbers went through
-    float32, and one row in eight has a number of BAD_NUMBERS.
+    Places are as far as 1e50 m, quaternions have lengths of 1e-99 to 1e99, some numbers went
+    through float32, and one row in eight has a number of BAD_NUMBERS.
     """
     def log_uniform(low, high, shape=n):
         return np.exp(rng.uniform(np.log(low), np.log(high), shape))
@@ -279,7 +279,8 @@ def extreme_pairs(rng, n):
     # Along each of A's axes: the same middle, touching, flush, overlapping, some ulps, or anything.
     both, least = 0.5 * (size_a + size_b), np.minimum(size_a, size_b)
     offset = np.choose(rng.integers(0, 6, (n, 3)), [
-        np.zeros((n, 3)), both, 0.5 * (size_a - size_b), both - least * log_uniform(1e-16, 1, (n, 3)),
+        np.zeros((n, 3)), both, 0.5 * (size_a - size_b),
+        both - least * log_uniform(1e-16, 1, (n, 3)),
         both * (1.0 + rng.integers(0, 9, (n, 3)) * 2.0**-52), both * rng.random((n, 3))])
     offset *= rng.choice([-1.0, 1.0], (n, 3))
     unit_a = turn_a / np.linalg.norm(turn_a, axis=1, keepdims=True)
@@ -292,7 +293,7 @@ def extreme_pairs(rng, n):
         scaled = rng.random(n) < 1 / 16
         pose[scaled, 3:] *= log_uniform(1e-99, 1e99)[scaled, None]
     rows = np.flatnonzero(rng.random(n) < 1 / 8)
-    for row, part, place_in in zip(rows, rng.integers(0, 4, len(rows)), rng.integers(0, 21, len(rows))):
-        values = (a, b, size_a, size_b)[part][row]
-        values[place_in % len(values)] = rng.choice(BAD_NUMBERS)
+    for row in rows:
+        values = (a, b, size_a, size_b)[rng.integers(4)][row]
+        values[rng.integers(len(values))] = rng.choice(BAD_NUMBERS)
     return Pairs(a, b, size_a, size_b)
