@@ -15,7 +15,7 @@ pytest.importorskip('mujoco')
 
 from benchmarks import rest
 from benchmarks.rest import CASES, FLOOR, Log, Part, simulate
-from box_contact_ros.scene.force.laws import GRAVITY
+from box_contact_ros.scene.laws import GRAVITY
 
 USUAL = rest.TIMINGS[1]
 

@@ -100,8 +100,7 @@ def test_null_pointers(library: CLibrary) -> None:
          {0, 3}),
         (library.bc_law_copy, [library.law, byref(made)], {0, 1}),
         (library.bc_law_hold, [library.law, None, c_int64(0), pose], {0, 3}),
-        (library.bc_law_wrenches, [library.law, pose, wrench, wrench], {0, 1, 2, 3}),
-        (library.bc_law_pair_wrench, [library.law, c_int64(1), wrench], {0, 2})]
+        (library.bc_law_wrenches, [library.law, pose, wrench, wrench], {0, 1, 2, 3})]
     for call, given, needed in calls:
         assert call(*given) == 0, call.__name__
         for place in needed:
@@ -113,7 +112,7 @@ def test_null_pointers(library: CLibrary) -> None:
 
 
 def test_numbers_of_nothing(library: CLibrary) -> None:
-    """A patch, a model, a use, or a count that there is not."""
+    """A patch, a model, or a count that there is not."""
     pose, contact = (c_double * 7)(0, 0, 0, 0, 0, 0, 1), (c_double * 64)(*[7.0] * 64)
     for patch in (3, -1, 2**31 - 1):
         assert library.bc_solve(library.solver, pose, pose, None, None, patch, contact) == (
@@ -127,11 +126,6 @@ def test_numbers_of_nothing(library: CLibrary) -> None:
         assert library.bc_solve_rows(library.solver, byref(rows), byref(results), 1,
                                      byref(refused)) == BAD_ARGUMENT
         assert refused.value == -1
-    law = c_void_p()
-    for use in (3, -1):
-        loop = (ctypes.c_int64 * 7)(56, use & 0xffffffff)
-        assert library.bc_law_create((c_double * 8)(1, 1, 1, 1), c_int64(1), loop, byref(law)) == (
-            BAD_ARGUMENT) and not law
 
 
 @pytest.fixture(params=['a FIFO', 'a folder', 'zeros without end', 'too large'])

@@ -26,7 +26,6 @@ import pytest
 from poses import Pairs
 
 from box_contact_ros import Body, ContactSolver, HeldPatch
-from box_contact_ros.__main__ import PLACES
 from box_contact_ros.core import FORCE, instruction_sets, native
 from box_contact_ros.resources import resource_path
 from box_contact_ros.scene.pose import rotation_matrix
@@ -35,6 +34,7 @@ from box_contact_ros.solver.contact import Contacts
 ROOT = Path(__file__).resolve().parents[2]
 CORE = Path(native.__file__).parent
 LIBRARY = CORE / 'libbox_contact.so'
+INCLUDES = f'-I{CORE / "include"}'
 EXAMPLE = ROOT / 'docs' / 'examples' / 'cpp'
 WEIGHTS = resource_path('weights', 'mlp.safetensors')
 STRICT = ('-Wall', '-Wextra', '-Werror', '-pedantic')
@@ -67,7 +67,7 @@ def tool(name: str) -> str:
 def test_a_c_program(tmp_path: Path) -> None:
     """Contacts, rows, refusals; by every instruction set."""
     program = tmp_path / 'library_test'
-    run(tool('gcc'), '-std=c11', *STRICT, PLACES['--includes'], ROOT / 'test/core/library_test.c',
+    run(tool('gcc'), '-std=c11', *STRICT, INCLUDES, ROOT / 'test/core/library_test.c',
         LIBRARY, f'-Wl,-rpath,{CORE}', '-lm', '-o', program)
     for name in instruction_sets():
         assert run(program, WEIGHTS, **{FORCE: name}).endswith(f', {name}: 0 failures\n')
@@ -162,7 +162,7 @@ def test_the_law_has_the_bits_of_python(tmp_path: Path, source: str) -> None:
     compiler, standard = ('gcc', 'c11') if source.endswith('.c') else ('g++', 'c++17')
     program = tmp_path / 'force_test'
     run(tool(compiler), f'-std={standard}', '-O2', '-ffp-contract=off', *STRICT,
-        PLACES['--includes'], ROOT / 'test/core' / source, LIBRARY, f'-Wl,-rpath,{CORE}', '-lm',
+        INCLUDES, ROOT / 'test/core' / source, LIBRARY, f'-Wl,-rpath,{CORE}', '-lm',
         '-o', program)
     *found, failures, _ = run(program).split()
     assert failures == '0'
@@ -205,7 +205,7 @@ def example(program: Path) -> list[str]:
 def test_by_the_compiler_alone(tmp_path: Path) -> None:
     """`--includes`; without a warning, and with C++20."""
     for standard in ('c++17', 'c++20'):
-        run(tool('g++'), f'-std={standard}', *STRICT, PLACES['--includes'],
+        run(tool('g++'), f'-std={standard}', *STRICT, INCLUDES,
             EXAMPLE / 'first_contact.cpp', LIBRARY, f'-Wl,-rpath,{CORE}', '-o', tmp_path / standard)
         assert example(tmp_path / standard) == EXAMPLE_SAYS
 
@@ -217,7 +217,7 @@ def test_without_exceptions(tmp_path: Path) -> None:
                       'int main(int argc, char**) {\n'
                       '  return box_contact::Solver({1, 1, 1}, {1, 1, 2.0 - argc})'
                       '({{0, 0, 0}, {0, 0, 0, 1}}, {{0, 0, 1}, {0, 0, 0, 1}}).colliding - 1;\n}\n')
-    run(tool('g++'), '-std=c++17', *STRICT, '-fno-exceptions', '-fno-rtti', PLACES['--includes'],
+    run(tool('g++'), '-std=c++17', *STRICT, '-fno-exceptions', '-fno-rtti', INCLUDES,
         source, LIBRARY, f'-Wl,-rpath,{CORE}', '-o', program)
     assert run(program) == ''
     assert subprocess.run([program, 'flat']).returncode < 0
@@ -231,7 +231,8 @@ def configure(source: Path, folder: Path, *options: str, **environment: str) -> 
 def test_by_find_package_of_pip(tmp_path: Path) -> None:
     """`--cmakedir`, as CMake is told by hand; and a version that there is not."""
     places = run(sys.executable, '-m', 'box_contact_ros', '--cmakedir').strip()
-    assert places == PLACES['--cmakedir']
+    assert places == str(CORE / 'cmake')
+    assert run(sys.executable, '-m', 'box_contact_ros', '--includes').strip() == INCLUDES
     configure(EXAMPLE, tmp_path, f'-Dbox_contact_ros_DIR={places}')
     assert example(tmp_path / 'first_contact') == EXAMPLE_SAYS
     says = example(tmp_path / 'stack')
@@ -255,7 +256,7 @@ def test_versions_agree(setup_arguments: dict) -> None:
 
 def test_by_pkg_config(tmp_path: Path) -> None:
     found = run(tool('pkg-config'), '--cflags', '--libs', 'box_contact',
-                PKG_CONFIG_PATH=PLACES['--cmakedir'])
+                PKG_CONFIG_PATH=str(CORE / 'cmake'))
     run(tool('g++'), '-std=c++17', EXAMPLE / 'first_contact.cpp', *found.split(), '-o',
         tmp_path / 'one')
     assert example(tmp_path / 'one') == EXAMPLE_SAYS
@@ -296,7 +297,7 @@ def test_rows_by_place(tmp_path: Path) -> None:
     No sizes where some were meant are refused, and are not the solver's.
     """
     (tmp_path / 'rows.cpp').write_text(ROWS)
-    run(tool('g++'), '-std=c++17', *STRICT, PLACES['--includes'], tmp_path / 'rows.cpp', LIBRARY,
+    run(tool('g++'), '-std=c++17', *STRICT, INCLUDES, tmp_path / 'rows.cpp', LIBRARY,
         f'-Wl,-rpath,{CORE}', '-o', tmp_path / 'rows')
     assert run(tmp_path / 'rows') == (
         '-1 -0.5 7\n-0.5 7\n-2 -4\nposes_a, poses_b and sizes must be equally many\n')
@@ -400,7 +401,7 @@ def test_a_machine_without_avx_takes_the_baseline(tmp_path: Path) -> None:
     """One library runs on each: it asks the processor. A set that this one lacks is refused."""
     program = tmp_path / 'library_test'
     emulator = tool('qemu-x86_64')
-    run(tool('gcc'), '-std=c11', PLACES['--includes'], ROOT / 'test/core/library_test.c', LIBRARY,
+    run(tool('gcc'), '-std=c11', INCLUDES, ROOT / 'test/core/library_test.c', LIBRARY,
         f'-Wl,-rpath,{CORE}', '-lm', '-o', program)
     assert run(emulator, '-cpu', 'Nehalem', program, WEIGHTS).endswith(', baseline: 0 failures\n')
     done = subprocess.run([emulator, '-cpu', 'Nehalem', program, WEIGHTS], text=True,

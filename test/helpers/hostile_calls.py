@@ -49,8 +49,7 @@ def exact() -> Any:
 
 
 def a_law(n: int = 2) -> Any:
-    return native.Law(np.ones(n), np.ones((n, 3)), np.zeros((n, 3)), 0, 200.0, 0.0, 0.001, 0.5,
-                      9.81)
+    return native.Law(np.ones(n), np.ones((n, 3)), np.zeros((n, 3)), 200.0, 0.0, 0.001, 0.5, 9.81)
 
 
 def a_touch(pair: Any = 1) -> tuple[Any, ...]:
@@ -211,10 +210,10 @@ def random_calls(seed: int, rounds: int) -> None:
         (native.stages, [rows(), rows(), one, one, ['axis', 'upper_points']], {}),
         (native.near_pairs, near_arguments(), {}),
         (native.near_boxes, [0.0 * boxes, boxes, np.ones(4, bool), np.ones(4, bool), 10], {}),
-        (native.Law, [np.ones(2), np.ones((2, 3)), np.zeros((2, 3)), 0, 200.0, 0.0, 0.001, 0.5,
-                      9.81], {}),
+        (native.Law, [np.ones(2), np.ones((2, 3)), np.zeros((2, 3)), 200.0, 0.0, 0.001, 0.5, 9.81],
+         {}),
         (law.hold, [[a_touch(1), a_touch(2)], rows(2)], {}),
-        (law.wrenches, [rows(2), np.zeros((2, 6))], {}), (law.pair_wrench, [1], {})]
+        (law.wrenches, [rows(2), np.zeros((2, 6))], {})]
     answered = 0
     for _ in range(rounds):
         function, given, keywords = targets[rng.integers(len(targets))]
