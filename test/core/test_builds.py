@@ -17,23 +17,12 @@ from box_contact_ros import ContactSolver
 from box_contact_ros.core import native
 
 CORE = Path(native.__file__).parent
-HARD_POSES = Path(__file__).resolve().parents[2] / 'benchmarks' / 'hard_poses.npz'
 FLAGS = ('-std=c++17', '-O2', '-ffp-contract=off', '-Wno-psabi', '-DBOX_CONTACT_VERSION=""')
 BUILDS: dict[str, tuple[str, tuple[str, ...]]] = {
     'g++ for the baseline': ('g++', ()),
     'clang++': ('clang++', ()),
     'arm': ('aarch64-linux-gnu-g++', ('qemu-aarch64', '-L', '/usr/aarch64-linux-gnu'))}
 """By name, the compiler, and what its programs run in."""
-
-
-def some_pairs() -> poses.Pairs:
-    """Return the stored hard poses, and 7,000 drawn pairs."""
-    parts = [poses.of_all_kinds(1000, 4)]
-    if HARD_POSES.is_file():
-        with np.load(HARD_POSES) as stored:
-            parts += [poses.Pairs(*(stored[f'{name}.{part}'] for part in poses.Pairs._fields))
-                      for name in sorted({key.partition('.')[0] for key in stored})]
-    return poses.joined(*parts)
 
 
 def compile_library(compiler: str, folder: Path) -> Path:
@@ -61,7 +50,7 @@ def test_another_build_has_the_same_bits(name: str, tmp_path: Path) -> None:
     for program in (compiler, *emulator[:1]):
         if not shutil.which(program):
             pytest.skip(f'{program} is not installed')
-    pairs = some_pairs()
+    pairs = poses.joined(poses.of_all_kinds(1000, 4), poses.hard_pairs())
     (tmp_path / 'pairs.txt').write_text('\n'.join(
         ' '.join(float(number).hex() for number in row) for row in np.hstack(pairs)))
     program = compile_library(compiler, tmp_path)
