@@ -79,6 +79,7 @@ reports:
 	run() { echo "== $$*"; $(PY) -m "$$@" || failed+=" $$1"; }
 	run benchmarks.accuracy $(ARGS)
 	run benchmarks.stability $(ARGS)
+	run benchmarks.named_failures $(ARGS)
 	run benchmarks.fuzz $(ARGS)
 	run benchmarks.landing $(ARGS)
 	run benchmarks.rest $(ARGS)

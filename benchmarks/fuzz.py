@@ -28,14 +28,13 @@ from functools import cache
 
 import numpy as np
 
-from box_contact_ros import output
 from box_contact_ros.core import native
 from box_contact_ros.scene.pose import quaternion_multiply, rotation_matrix
 from box_contact_ros.solver.arguments import add_models, program_parser, within
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
 
-from . import judge
+from . import judge, output
 from .patches import mlp_faults, patch_faults
 from .pose_sets import (
     CONTAINER,

@@ -18,10 +18,10 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from box_contact_ros import output
 from box_contact_ros.core import native
 from box_contact_ros.solver.arguments import program_parser
 
+from . import output
 from .contestant import Contestant, Manifold, ours, packages_of, part_by_part
 from .engines import installed
 from .judge import PRESSED, judge, two_touches

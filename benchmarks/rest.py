@@ -25,13 +25,13 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from box_contact_ros import output
 from box_contact_ros.core import native
 from box_contact_ros.scene.laws import FRICTION, GRAVITY, Body, SceneLaw
 from box_contact_ros.scene.pose import rotation_matrix
 from box_contact_ros.scene.scene_solver import Box, Pair, Scene, SceneSolver
 from box_contact_ros.solver.arguments import add_models, program_parser
 
+from . import output
 from .pose_sets import CONTAINER
 
 # MuJoCo would write warnings to a file MUJOCO_LOG.TXT in the working directory.

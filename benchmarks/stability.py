@@ -16,12 +16,12 @@ from functools import partial
 
 import numpy as np
 
-from box_contact_ros import output
 from box_contact_ros.core import native
 from box_contact_ros.solver.arguments import add_models, program_parser
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
 
+from . import output
 from .errors import point_errors
 from .hard_poses import Cases, load
 from .judge import NOT_FINITE, NOT_UNIT, OUTSIDE, judge
