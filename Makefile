@@ -37,7 +37,7 @@ help:
 	echo 'make test     ruff, mypy and all tests'
 	echo 'make check    linters, and the quick tests of core, solver and scene: a minute'
 	echo 'make test-colcon  the quick tests, as `colcon test` runs them in a workspace'
-	echo 'make test-arm the C++ test on an emulated 64-bit ARM'
+	echo 'make test-arm the library on an emulated 64-bit ARM: the same bits as here'
 	echo 'make test-debian13  make demo, then make test, on a fresh Debian 13 (root)'
 	echo 'make dist     wheel and source distribution in dist/, both installed and tried'
 	echo 'make coverage lines of solver, scenes and nodes that their tests run'
@@ -79,6 +79,7 @@ reports:
 	run() { echo "== $$*"; $(PY) -m "$$@" || failed+=" $$1"; }
 	run benchmarks.accuracy $(ARGS)
 	run benchmarks.stability $(ARGS)
+	run benchmarks.named_failures $(ARGS)
 	run benchmarks.fuzz $(ARGS)
 	run benchmarks.landing $(ARGS)
 	run benchmarks.rest $(ARGS)

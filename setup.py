@@ -163,8 +163,7 @@ setup(
     packages=find_packages(include=[NAME, f'{NAME}.*']),
     # Said in so many words, it makes an editable install a path that type checkers follow.
     package_dir={'': '.'},
-    package_data={NAME: ['py.typed', '**/*.pyi', 'core/cmake/*', 'core/include/**/*.h*',
-                         'core/src/**/*.hpp']},
+    package_data={NAME: ['py.typed', '**/*.pyi', 'core/cmake/*', 'core/include/**/*.h*']},
     ext_modules=extensions(),
     data_files=data_files(),
     entry_points={

@@ -1,37 +1,40 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Program `fuzz`: millions of random pairs, judged by code that shares nothing with the solver.
+"""Millions of random pairs, judged by code that shares nothing with the solver.
 
-`python -m box_contact_ros fuzz` draws pairs of boxes by class of size, in poses of the kinds that
-break collision tests. Each model answers all of them. Every gate is zero: contacts missed or
-invented, wrong depths, axes that are not the shallowest, points outside, NaN, negative eigenvalues,
-volumes of `mlp` outside their brackets, and exceptions. What is too near exact touch for float64 is
-judged in 60 digits. A broken gate prints the pose, ready to be pasted into a test; the exit status
-is then 1.
+`python -m benchmarks.fuzz` draws pairs of boxes by class of size, in poses of the kinds that break
+collision tests. Each model answers all of them. Every gate is zero: contacts missed or invented,
+wrong depths, axes that are not the shallowest, points outside, NaN, negative eigenvalues, volumes
+of `mlp` outside their brackets, bits that swapping the boxes changes, rows that differ from their
+single calls, and exceptions. What is too near exact touch for float64 is judged in 60 digits.
+
+A broken gate prints the pose, ready to be pasted into a test; the exit status is then 1. fuzz.csv
+has a digest of all verdicts and separations. Runs of equal seed and number have equal digests for
+every instruction set (BOX_CONTACT_INSTRUCTION_SET), and before and after a change of the core that
+keeps these bits.
 """
 from __future__ import annotations
 
+import hashlib
 import os
-import time
+import sys
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import nullcontext
 from dataclasses import dataclass, field
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 
 from box_contact_ros.core import native
 from box_contact_ros.scene.pose import quaternion_multiply, rotation_matrix
 from box_contact_ros.solver.arguments import add_models, program_parser, within
+from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
-from box_contact_ros.solver.models import models_with_patch
 
-from .judge import GATES, exact_gap, judge
-from .output import machine, make_room, write_csv
+from . import judge, output
 from .patches import mlp_faults, patch_faults
 from .pose_sets import (
     CONTAINER,
@@ -47,6 +50,12 @@ from .pose_sets import (
 PAIRS, QUICK_PAIRS = 10_000_000, 60_000
 PIECE = 50_000  # pairs that are drawn and judged at a time
 SHOWN = 3  # faults of a class and model that are printed
+MODELS = ('mlp', 'exact')
+ALONE = 50  # one row of so many is asked once more, alone
+
+SWAP, SINGLE = 1 << 20, 1 << 21
+GATES = judge.GATES | {SWAP: 'changed by a swap', SINGLE: 'not its single call'}
+"""Faults by bit."""
 
 Sizes = Callable[[np.random.Generator, int], tuple[np.ndarray, np.ndarray]]
 
@@ -186,22 +195,19 @@ class Tally:
     near_touch: int = 0  # pairs that were judged in 60 digits
     exact_answers: int = 0
     worst_depth: float = 0.0  # largest depth error, by its tolerance
+    digest: str = ''  # of all verdicts and separations
     faults: Counter[str] = field(default_factory=lambda: Counter(dict.fromkeys(
         (*GATES.values(), 'exception'), 0)))
     poses: list[str] = field(default_factory=list)  # the first faults, as code
 
-    @property
-    def broken(self) -> int:
-        """Faults of all kinds."""
-        return self.faults.total()
-
-    def add(self, other: Tally) -> None:
-        """Take in what another piece found."""
+    def add(self, piece: Tally) -> None:
+        """Take in the next piece."""
         for name in ('pairs', 'contacts', 'near_touch', 'exact_answers'):
-            setattr(self, name, getattr(self, name) + getattr(other, name))
-        self.worst_depth = max(self.worst_depth, other.worst_depth)
-        self.faults.update(other.faults)
-        self.poses = (self.poses + other.poses)[:SHOWN]
+            setattr(self, name, getattr(self, name) + getattr(piece, name))
+        self.worst_depth = max(self.worst_depth, piece.worst_depth)
+        self.digest = hashlib.sha256((self.digest + piece.digest).encode()).hexdigest()[:16]
+        self.faults.update(piece.faults)
+        self.poses = (self.poses + piece.poses)[:SHOWN]
 
     def __str__(self) -> str:
         wrong = ', '.join(f'{count} {name}' for name, count in self.faults.items() if count)
@@ -212,7 +218,7 @@ class Tally:
 
 def examine(pairs: Pairs, name: str, solvers: dict[str, ContactSolver]) -> list[Tally]:
     """Ask each model for the pairs of a class, and judge the answers."""
-    gap = cache(lambda row: exact_gap(*(part[row] for part in pairs)))  # once for all models
+    gap = cache(lambda row: judge.exact_gap(*(part[row] for part in pairs)))  # for all models
     tallies = []
     for model, solver in solvers.items():
         tally = Tally(name, model, pairs=len(pairs.pose_a))
@@ -220,25 +226,41 @@ def examine(pairs: Pairs, name: str, solvers: dict[str, ContactSolver]) -> list[
         before = solver.exact_answers
         try:
             found = pairs.contacts(solver)
+            tally.exact_answers = solver.exact_answers - before
+            changed = changed_bits(pairs, found, solver)
         except Exception as error:
             tally.faults['exception'] += 1
             tally.poses.append(f'# {model}, exception: {error!r}')
             continue
-        verdict = judge(*pairs, found)
+        verdict = judge.judge(*pairs, found)
         verdict.settle(found, gap)
-        faults = verdict.faults | patch_faults(pairs, found)
+        faults = verdict.faults | patch_faults(pairs, found) | changed
         if model == 'mlp':
             faults |= mlp_faults(pairs, found)
         tally.contacts = int(found.colliding.sum())
         tally.near_touch = int(verdict.doubtful.sum())
-        tally.exact_answers = solver.exact_answers - before
         tally.worst_depth = float(np.nanmax(verdict.depth_error, initial=0.0))
+        tally.digest = hashlib.sha256(
+            found.colliding.tobytes() + found.separation.tobytes()).hexdigest()
         for bit, words in GATES.items():
             tally.faults[words] = int(np.count_nonzero(faults & bit))
         for row in np.flatnonzero(faults)[:SHOWN]:
             words = ', '.join(text for bit, text in GATES.items() if faults[row] & bit)
             tally.poses.append(_pasted(words, model, [part[row] for part in pairs]))
     return tallies
+
+
+def changed_bits(pairs: Pairs, found: Contacts, solver: ContactSolver) -> np.ndarray:
+    """Return SWAP and SINGLE (n,) where B against A, or a row alone, has other bits."""
+    swapped = Pairs(pairs.pose_b, pairs.pose_a, pairs.size_b, pairs.size_a).contacts(solver)
+    changed = np.where((swapped.colliding != found.colliding)
+                       | (swapped.separation != found.separation), SWAP, 0)
+    for row in range(0, len(found.colliding), ALONE):
+        alone = pairs.rows(slice(row, row + 1)).contacts(solver)
+        if not all(np.array_equal(single[0], many[row], equal_nan=True)
+                   for single, many in zip(alone, found)):
+            changed[row] |= SINGLE
+    return changed
 
 
 def _pasted(words: str, model: str, pair: Sequence[np.ndarray]) -> str:
@@ -252,21 +274,15 @@ def _piece(job: tuple[str, int, int, int, tuple[str, ...]]) -> list[Tally]:
     """Draw and judge one piece of a class, for all models; the seed is the piece's own."""
     name, seed, number, count, models = job
     rng = np.random.default_rng([seed, list(CLASSES).index(name), number])
-    return examine(draw(name, rng, count), name, {model: _solver(model) for model in models})
-
-
-@cache
-def _solver(model: str) -> ContactSolver:
-    """Return the process's solver: loading weights takes longer than a piece."""
-    return ContactSolver((1, 1, 1), (1, 1, 1), model=model)
+    return examine(draw(name, rng, count), name, {
+        model: ContactSolver((1, 1, 1), (1, 1, 1), model=model) for model in models})
 
 
 def fuzz(total: int, *, seed: int = 1, classes: Sequence[str] = tuple(CLASSES),
-         models: Sequence[str] | None = None, workers: int = 1) -> dict[tuple[str, str], Tally]:
+         models: Sequence[str] = MODELS, workers: int = 1) -> dict[tuple[str, str], Tally]:
     """Return tallies by class and model, of `total` pairs spread evenly over the classes."""
     from tqdm import tqdm
 
-    models = models or models_with_patch()
     each = -(-total // len(classes))
     counts = [min(PIECE, each - drawn) for drawn in range(0, each, PIECE)]
     jobs = [(name, seed, number, count, tuple(models))
@@ -278,45 +294,35 @@ def fuzz(total: int, *, seed: int = 1, classes: Sequence[str] = tuple(CLASSES),
         for found in pool.map(_piece, jobs) if pool else map(_piece, jobs):
             for tally in found:
                 tallies[tally.name, tally.model].add(tally)
-            bar.set_postfix(faults=sum(t.broken for t in tallies.values()), refresh=False)
             bar.update(found[0].pairs)
     return tallies
 
 
-def csv_rows(tallies: Iterable[Tally]) -> list[dict[str, object]]:
-    """Return a row per class and model."""
-    return [{'class': t.name, 'model': t.model, 'pairs': t.pairs, 'contacts': t.contacts,
-             'near_touch': t.near_touch, 'exact_answers': t.exact_answers,
-             'worst_depth_by_tolerance': t.worst_depth, **t.faults} for t in tallies]
-
-
 def main(args: Sequence[str] | None = None) -> int:
     """Fuzz, print a line per class and model; 1 if a gate is broken."""
-    parser = program_parser('fuzz', __doc__, quick=f'{QUICK_PAIRS:,} pairs', seed=1)
+    parser = program_parser('fuzz', __doc__, quick=f'{QUICK_PAIRS:,} pairs', seed=1,
+                            out='fuzz.csv')
     parser.add_argument('--pairs', type=within(1), default=PAIRS,
                         help='pairs in all (default: %(default)s)')
-    parser.add_argument('--classes', nargs='+', choices=list(CLASSES), default=list(CLASSES),
-                        metavar='CLASS', help=f'classes, of {", ".join(CLASSES)} (default: all)')
-    add_models(parser, '--models', models_with_patch())
+    add_models(parser, '--models', MODELS)
     parser.add_argument('--workers', type=within(1), default=os.cpu_count() or 1,
                         help='processes at once')
-    parser.add_argument('--out', type=Path, metavar='FILE', help='CSV with the tallies')
     options = parser.parse_args(args)
-    if options.out:
-        make_room(parser, options.out)
-    began = time.monotonic()
+    folder = output.results_folder(parser, options)
     tallies = fuzz(QUICK_PAIRS if options.quick else options.pairs, seed=options.seed,
-                   classes=options.classes, models=options.models, workers=options.workers)
-    for tally in tallies.values():
-        print(tally)
-    for tally in tallies.values():
-        for pose in tally.poses:
-            print(f'\n{pose}')
-    if options.out:
-        write_csv(options.out, csv_rows(tallies.values()), digits=3,
-                  about=machine(native))
-    broken = sum(tally.broken for tally in tallies.values())
-    print(f'\n{broken} faults after '
-          f'{(time.monotonic() - began) / 60:.1f} minutes, seed {options.seed}, '
-          f'{machine(native)}')
-    return 1 if broken else 0
+                   models=options.models, workers=options.workers).values()
+    print(*tallies, sep='\n')
+    for pose in (pose for tally in tallies for pose in tally.poses):
+        print(f'\n{pose}')
+    output.write_csv(folder / 'fuzz.csv', [
+        {'class': t.name, 'model': t.model, 'pairs': t.pairs, 'contacts': t.contacts,
+         'near_touch': t.near_touch, 'exact_answers': t.exact_answers,
+         'worst_depth_by_tolerance': t.worst_depth, 'digest': t.digest, **t.faults}
+        for t in tallies], digits=3, about=output.machine(native))
+    broken = sum(tally.faults.total() for tally in tallies)
+    print(f'\n{broken} faults, seed {options.seed}, {output.machine(native)}')
+    return int(broken > 0)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

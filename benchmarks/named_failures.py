@@ -3,21 +3,30 @@
 
 """Public reports about pairs of boxes, replayed: the poses are in `named_failures.yaml`.
 
-Model answers have to be right to rounding. Other engines' have the bound of their report, or what
-float32 and a usual preference for faces cost.
+`python -m benchmarks.named_failures` asks every model and every other engine that is installed, and
+writes named_failures.md. Answers of models have to be right to rounding. Those of other engines
+have the bound of their report, or what float32 and a usual preference for faces cost. The exit
+status is 1 if `exact` or `mlp` fails a report.
 """
 from __future__ import annotations
 
-from collections.abc import Mapping
+import sys
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import yaml
 
-from .contestant import Contestant, Manifold, part_by_part
+from box_contact_ros.core import native
+from box_contact_ros.solver.arguments import program_parser
+
+from . import output
+from .contestant import Contestant, Manifold, ours, packages_of, part_by_part
+from .engines import installed
 from .judge import PRESSED, judge, two_touches
 from .pose_sets import Pairs
+from .stability import GATED, MODELS
 
 FILE = Path(__file__).with_suffix('.yaml')
 SINGLE = 1e-6  # error that float32 costs, of the size
@@ -109,3 +118,38 @@ def replay_apart(engine: Contestant, failures: Mapping[str, NamedFailure]) -> di
     if engine.make is None:
         return replay(engine, failures, bounds)
     return part_by_part(replay, engine.make, failures, bounds, patience=PATIENCE)
+
+
+def table(failures: Mapping[str, NamedFailure], found: Mapping[str, Mapping[str, str]]) -> str:
+    """Return a row for each report: the thread, what happened, and what is wrong by whom."""
+    return output.markdown_table(
+        ['Report', 'What happened', 'Wrong with'],
+        [[f'[{one.repo.partition("/")[2]} {one.number}]({one.link})'
+          f'{"*" if one.source.startswith("nearest") else ""}', one.report,
+          '; '.join(f'{engine}: {faults[name]}' for engine, faults in found.items()
+                    if faults[name])] for name, one in failures.items()], words=3)
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Replay all for models and every other engine, print, write; 1 if a gated model fails one."""
+    parser = program_parser('named_failures', __doc__, quick='the models alone',
+                            out='named_failures.md')
+    options = parser.parse_args(args)
+    folder, failures = output.results_folder(parser, options), load()
+    rivals, missing = ([], []) if options.quick else installed()
+    engines = [*map(ours, MODELS), *rivals]
+    found = {engine.name: replay_apart(engine, failures) for engine in engines}
+    passed = '; '.join(f'{name} {sum(not fault for fault in faults.values())}'
+                       for name, faults in found.items())
+    text = output.page(
+        'benchmarks/pages/named_failures',
+        command=output.command_line('benchmarks.named_failures', args), count=len(failures),
+        machine=output.machine(native, packages_of(engines)), table=table(failures, found),
+        passed=passed, skipped=''.join(f'\n\nLeft out: {line}.' for line in missing))
+    print(text)
+    (folder / 'named_failures.md').write_text(text, encoding='utf-8')
+    return int(any(found[model][report] for model in GATED for report in failures))
+
+
+if __name__ == '__main__':
+    sys.exit(main())

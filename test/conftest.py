@@ -27,7 +27,7 @@ from typing import Any
 import pytest
 
 FIRST = (
-    'test_install.py', 'test_message_package.py', 'test_core.py', 'test_core_cpp.py',
+    'test_install.py', 'test_message_package.py', 'test_core.py', 'test_builds.py',
     'test_library.py', 'test_exact.py', 'test_series.py', 'test_readme.py', 'test_frontier.py',
     'test_training.py', 'test_training_mlp.py', 'test_contact_node.py', 'test_scene_node.py',
     'test_view.py', 'test_bench.py', 'test_crane.py')

@@ -301,8 +301,8 @@ def single_solvers() -> dict[str, Callable[..., native.PairSolver]]:
 
 @every_model
 def test_a_batch_is_its_single_calls(model: str, single_solvers: dict) -> None:
-    """Bit for bit, points too: 21,000 pairs."""
-    pairs = poses.of_all_kinds(3000, 7)
+    """Bit for bit, points too: 21,000 drawn pairs, and the hard poses."""
+    pairs = poses.joined(poses.of_all_kinds(3000, 7), poses.hard_pairs())
     many = solve(a_solver(model), pairs)
     make = single_solvers[model]
     rows = [make(size_a=tuple(size_a), size_b=tuple(size_b))(a, b)

@@ -26,7 +26,6 @@ import pytest
 from poses import Pairs
 
 from box_contact_ros import Body, ContactSolver, HeldPatch
-from box_contact_ros.__main__ import PLACES
 from box_contact_ros.core import FORCE, instruction_sets, native
 from box_contact_ros.resources import resource_path
 from box_contact_ros.scene.pose import rotation_matrix
@@ -35,6 +34,7 @@ from box_contact_ros.solver.contact import Contacts
 ROOT = Path(__file__).resolve().parents[2]
 CORE = Path(native.__file__).parent
 LIBRARY = CORE / 'libbox_contact.so'
+INCLUDES = f'-I{CORE / "include"}'
 EXAMPLE = ROOT / 'docs' / 'examples' / 'cpp'
 WEIGHTS = resource_path('weights', 'mlp.safetensors')
 STRICT = ('-Wall', '-Wextra', '-Werror', '-pedantic')
@@ -67,7 +67,7 @@ def tool(name: str) -> str:
 def test_a_c_program(tmp_path: Path) -> None:
     """Contacts, rows, refusals; by every instruction set."""
     program = tmp_path / 'library_test'
-    run(tool('gcc'), '-std=c11', *STRICT, PLACES['--includes'], ROOT / 'test/core/library_test.c',
+    run(tool('gcc'), '-std=c11', *STRICT, INCLUDES, ROOT / 'test/core/library_test.c',
         LIBRARY, f'-Wl,-rpath,{CORE}', '-lm', '-o', program)
     for name in instruction_sets():
         assert run(program, WEIGHTS, **{FORCE: name}).endswith(f', {name}: 0 failures\n')
@@ -162,7 +162,7 @@ def test_the_law_has_the_bits_of_python(tmp_path: Path, source: str) -> None:
     compiler, standard = ('gcc', 'c11') if source.endswith('.c') else ('g++', 'c++17')
     program = tmp_path / 'force_test'
     run(tool(compiler), f'-std={standard}', '-O2', '-ffp-contract=off', *STRICT,
-        PLACES['--includes'], ROOT / 'test/core' / source, LIBRARY, f'-Wl,-rpath,{CORE}', '-lm',
+        INCLUDES, ROOT / 'test/core' / source, LIBRARY, f'-Wl,-rpath,{CORE}', '-lm',
         '-o', program)
     *found, failures, _ = run(program).split()
     assert failures == '0'
@@ -205,7 +205,7 @@ def example(program: Path) -> list[str]:
 def test_by_the_compiler_alone(tmp_path: Path) -> None:
     """`--includes`; without a warning, and with C++20."""
     for standard in ('c++17', 'c++20'):
-        run(tool('g++'), f'-std={standard}', *STRICT, PLACES['--includes'],
+        run(tool('g++'), f'-std={standard}', *STRICT, INCLUDES,
             EXAMPLE / 'first_contact.cpp', LIBRARY, f'-Wl,-rpath,{CORE}', '-o', tmp_path / standard)
         assert example(tmp_path / standard) == EXAMPLE_SAYS
 
@@ -217,7 +217,7 @@ def test_without_exceptions(tmp_path: Path) -> None:
                       'int main(int argc, char**) {\n'
                       '  return box_contact::Solver({1, 1, 1}, {1, 1, 2.0 - argc})'
                       '({{0, 0, 0}, {0, 0, 0, 1}}, {{0, 0, 1}, {0, 0, 0, 1}}).colliding - 1;\n}\n')
-    run(tool('g++'), '-std=c++17', *STRICT, '-fno-exceptions', '-fno-rtti', PLACES['--includes'],
+    run(tool('g++'), '-std=c++17', *STRICT, '-fno-exceptions', '-fno-rtti', INCLUDES,
         source, LIBRARY, f'-Wl,-rpath,{CORE}', '-o', program)
     assert run(program) == ''
     assert subprocess.run([program, 'flat']).returncode < 0
@@ -231,7 +231,8 @@ def configure(source: Path, folder: Path, *options: str, **environment: str) -> 
 def test_by_find_package_of_pip(tmp_path: Path) -> None:
     """`--cmakedir`, as CMake is told by hand; and a version that there is not."""
     places = run(sys.executable, '-m', 'box_contact_ros', '--cmakedir').strip()
-    assert places == PLACES['--cmakedir']
+    assert places == str(CORE / 'cmake')
+    assert run(sys.executable, '-m', 'box_contact_ros', '--includes').strip() == INCLUDES
     configure(EXAMPLE, tmp_path, f'-Dbox_contact_ros_DIR={places}')
     assert example(tmp_path / 'first_contact') == EXAMPLE_SAYS
     says = example(tmp_path / 'stack')
@@ -255,7 +256,7 @@ def test_versions_agree(setup_arguments: dict) -> None:
 
 def test_by_pkg_config(tmp_path: Path) -> None:
     found = run(tool('pkg-config'), '--cflags', '--libs', 'box_contact',
-                PKG_CONFIG_PATH=PLACES['--cmakedir'])
+                PKG_CONFIG_PATH=str(CORE / 'cmake'))
     run(tool('g++'), '-std=c++17', EXAMPLE / 'first_contact.cpp', *found.split(), '-o',
         tmp_path / 'one')
     assert example(tmp_path / 'one') == EXAMPLE_SAYS
@@ -296,7 +297,7 @@ def test_rows_by_place(tmp_path: Path) -> None:
     No sizes where some were meant are refused, and are not the solver's.
     """
     (tmp_path / 'rows.cpp').write_text(ROWS)
-    run(tool('g++'), '-std=c++17', *STRICT, PLACES['--includes'], tmp_path / 'rows.cpp', LIBRARY,
+    run(tool('g++'), '-std=c++17', *STRICT, INCLUDES, tmp_path / 'rows.cpp', LIBRARY,
         f'-Wl,-rpath,{CORE}', '-o', tmp_path / 'rows')
     assert run(tmp_path / 'rows') == (
         '-1 -0.5 7\n-0.5 7\n-2 -4\nposes_a, poses_b and sizes must be equally many\n')
@@ -374,86 +375,33 @@ def test_a_plain_installation(tmp_path: Path, from_source: tuple[str, ...], kind
 
 # --- machines -------------------------------------------------------------------------------------
 
-INLINE = """
-#include "box_contact/inline.hpp"
-
-extern "C" bool MACHINE(double height, double* answer) {
-  box_contact::Solver solver({2, 2, 2}, {1, 2, 3});
-  box_contact::Contact contact =
-      solver({{0, 0, 0}, {0.1, 0.02, 0.3, 1}}, {{0.1, 0.2, height}, {0, 0.1, 0, 1}});
-  answer[0] = contact.separation, answer[1] = contact.normal[0], answer[2] = contact.point[1];
-  answer[3] = contact.volume, answer[4] = contact.covariance[0][1];
-  double poses[2][14] = {{0, 0, 0, 0, 0, 0, 1}, {0, 0, height, 0, 0, 0.1, 1}};
-  bool colliding;
-  solver.batch(poses[0], poses[1], 1, {&colliding, answer + 5, answer + 6, answer + 9});
-  try {
-    solver({{0, 0, 0}, {0, 0, 0, 0}}, {{0, 0, 0}, {0, 0, 0, 1}});
-  } catch (const std::invalid_argument&) {
-    return true;
-  }
-  return false;
-}
-"""
-MAIN = """
-#include <cstdio>
-#include <cstring>
-#include <initializer_list>
-extern "C" bool baseline(double, double*), avx2(double, double*), avx512(double, double*);
-
-// With an argument, compare all machines' answers; without, ask for the baseline's alone.
-int main(int argc, char**) {
-  int different = 0;
-  for (int i = 0; i < 2000; ++i) {
-    double one[12] = {}, other[12] = {};
-    different += !baseline(-3.0 + 0.003 * i, one);
-    for (auto machine : {avx2, avx512}) {
-      if (argc > 1)
-        different += !machine(-3.0 + 0.003 * i, other) || std::memcmp(one, other, sizeof one);
-    }
-  }
-  std::printf("%d different\\n", different);
-}
-"""
-MACHINES = {'baseline': 'x86-64', 'avx2': 'x86-64-v3', 'avx512': 'x86-64-v4'}
-
-
 @pytest.mark.slow
-def test_files_for_different_machines(tmp_path: Path) -> None:
-    """Header-only files with different -march share no symbol, whatever comes first in the link.
+def test_kernels_share_no_symbol(tmp_path: Path) -> None:
+    """The linker keeps one of two equal names, and a machine could run another set's code.
 
-    Every machine runs the code that was compiled for it: also one without AVX, under qemu. Without
-    optimisation, functions that are inlined otherwise are symbols.
+    Without optimisation, functions that are inlined otherwise are symbols.
     """
     if platform.machine() not in ('x86_64', 'AMD64'):
-        pytest.skip('the machines are those of x86-64')
-    (tmp_path / 'inline.cpp').write_text(INLINE)
-    (tmp_path / 'main.cpp').write_text(MAIN)
-    words = (tool('g++'), '-std=c++17', '-O0', *STRICT, PLACES['--includes'], '-c',
-             tmp_path / 'inline.cpp')
+        pytest.skip('other machines have one instruction set')
+    machines = {'baseline': 'x86-64', 'avx2': 'x86-64-v3', 'avx512': 'x86-64-v4'}
     with ThreadPoolExecutor(2) as pool:
-        list(pool.map(lambda name: run(*words, f'-march={MACHINES[name]}', f'-DMACHINE={name}',
-                                       '-o', tmp_path / f'{name}.o'), MACHINES))
+        list(pool.map(lambda name: run(
+            tool('g++'), '-std=c++17', '-O0', '-w', f'-march={machines[name]}', '-c',
+            CORE / 'src/library/kernel.cpp', '-o', tmp_path / f'{name}.o'), machines))
     symbols = {name: {line.split(maxsplit=2)[2] for line in run(
-        'nm', '--defined-only', '-g', tmp_path / f'{name}.o').splitlines()} for name in MACHINES}
+        'nm', '--defined-only', '-g', tmp_path / f'{name}.o').splitlines()} for name in machines}
     for one, other in (('baseline', 'avx2'), ('baseline', 'avx512'), ('avx2', 'avx512')):
+        assert any(f'kernel_{one}' in symbol for symbol in symbols[one])
         # Pointers that exceptions need; no code.
-        shared = {name for name in symbols[one] & symbols[other] if not name.startswith('DW.ref.')}
-        assert not shared
-    for order in (list(MACHINES), list(reversed(MACHINES))):
-        program = tmp_path / order[0]
-        run('g++', '-std=c++17', tmp_path / 'main.cpp', *(tmp_path / f'{name}.o' for name in order),
-            '-static', '-o', program)
-        if instruction_sets()[-1] == 'avx512':
-            assert run(program, 'all') == '0 different\n'
-        if shutil.which('qemu-x86_64'):
-            assert run('qemu-x86_64', '-cpu', 'Nehalem', program) == '0 different\n'
+        assert not {name for name in symbols[one] & symbols[other]
+                    if not name.startswith('DW.ref.')}
 
 
 def test_a_machine_without_avx_takes_the_baseline(tmp_path: Path) -> None:
     """One library runs on each: it asks the processor. A set that this one lacks is refused."""
     program = tmp_path / 'library_test'
     emulator = tool('qemu-x86_64')
-    run(tool('gcc'), '-std=c11', PLACES['--includes'], ROOT / 'test/core/library_test.c', LIBRARY,
+    run(tool('gcc'), '-std=c11', INCLUDES, ROOT / 'test/core/library_test.c', LIBRARY,
         f'-Wl,-rpath,{CORE}', '-lm', '-o', program)
     assert run(emulator, '-cpu', 'Nehalem', program, WEIGHTS).endswith(', baseline: 0 failures\n')
     done = subprocess.run([emulator, '-cpu', 'Nehalem', program, WEIGHTS], text=True,

@@ -1,7 +1,7 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Write the hard poses, with their truth in 60 digits: evidence/verification/hard_poses.npz.
+"""Write the hard poses, with their truth in 60 digits: benchmarks/hard_poses.npz.
 
     python test/helpers/make_hard_poses.py [FAMILY ...]
 
@@ -11,6 +11,10 @@ written, the file is what tests and reports read (see `hard_poses.py` beside it)
 from __future__ import annotations
 
 import argparse
+import sys
+from pathlib import Path
+
+sys.path.append(str(Path(__file__).resolve().parents[2]))  # for benchmarks/
 
 import hard_pose_recipes as recipes
 import numpy as np

@@ -4,6 +4,7 @@
 """Families of poses that many tests draw from. Every one is seeded and stored as doubles."""
 from __future__ import annotations
 
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 CONTAINER = (12.192, 2.438, 2.591)
 CUBE = (2.0, 2.0, 2.0)
 IDENTITY = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+HARD_POSES = Path(__file__).resolve().parents[2] / 'benchmarks' / 'hard_poses.npz'
 
 
 class Pairs(NamedTuple):
@@ -235,9 +237,74 @@ def columns_that_touch(rng, n):
             size_b), rotate(whole, at_a)
 
 
+def hard_pairs():
+    """Return all stored hard poses; none where benchmarks/ is not there."""
+    if not HARD_POSES.is_file():
+        return Pairs(*(np.empty((0, width)) for width in (7, 7, 3, 3)))
+    with np.load(HARD_POSES) as stored:
+        return joined(*([stored[f'{name}.{part}'] for part in Pairs._fields]
+                        for name in sorted({key.partition('.')[0] for key in stored})))
+
+
 def of_all_kinds(n, seed):
     """Draw n pairs of each family above, but for those that touch exactly."""
     return joined(*(family(np.random.default_rng([seed, number]), n)
                     for number, family in enumerate((
                         random_pairs, near_parallel_pairs, flush_pairs, equal_thickness, ridges,
                         cards, sharing_an_axis))))
+
+
+BAD_NUMBERS = np.array([np.nan, -np.nan, np.inf, -np.inf, 0.0, -0.0, 1e-320, 5e-324, 1e50, -1e50,
+                        1.1e50, 1e-50, 1e-51, 1e154, 1e-154, 1.7e308, -1.0, 2.2e-308])
+"""What a simulator may send when it goes wrong."""
+
+
+def extreme_pairs(rng, n):
+    """Boxes of 1e-50 to 1e50 m that touch, overlap or miss; some rows are refused.
+
+    Places are as far as 1e50 m, quaternions have lengths of 1e-99 to 1e99, some numbers went
+    through float32, and one row in eight has a number of BAD_NUMBERS.
+    """
+    def log_uniform(low, high, shape=n):
+        return np.exp(rng.uniform(np.log(low), np.log(high), shape))
+
+    def drawn_turns():
+        thirds = rng.integers(-1, 2, (n, 4)).astype(float)
+        thirds[~thirds.any(axis=1)] = IDENTITY[3:]
+        turn = np.where((rng.random(n) < 1 / 3)[:, None], thirds, rng.uniform(-1, 1, (n, 4)))
+        return np.where((rng.random(n) < 0.4)[:, None], IDENTITY[3:], turn)
+
+    ranges = np.array([(0.1, 10)] * 6 + [(1e-50, 1e50), (1e-3, 1e3), (1e-50, 1e-48), (1e48, 1e50)])
+    low, high = ranges[rng.integers(0, 10, n)].T[..., None]
+    size_a, size_b = (log_uniform(low, high, (n, 3)) for _ in range(2))
+    size_b = np.where((rng.random(n) < 1 / 3)[:, None], size_a, size_b)
+    cubes = rng.random(n) < 1 / 8
+    size_a[cubes] = size_b[cubes] = CUBE
+
+    far = np.where(rng.random(n) < 1 / 4, log_uniform(1e-50, 1e50), log_uniform(0.1, 1e7))
+    place = rng.uniform(-1, 1, (n, 3)) * (far * (rng.random(n) < 1 / 2))[:, None]
+    turn_a, turn_b = drawn_turns(), drawn_turns()
+    tilt = log_uniform(1e-17, 1.0) * (rng.random(n) < 1 / 3)
+    turn_b[:, :3] += rng.uniform(-1, 1, (n, 3)) * tilt[:, None]
+
+    # Along each of A's axes: the same middle, touching, flush, overlapping, some ulps, or anything.
+    both, least = 0.5 * (size_a + size_b), np.minimum(size_a, size_b)
+    offset = np.choose(rng.integers(0, 6, (n, 3)), [
+        np.zeros((n, 3)), both, 0.5 * (size_a - size_b),
+        both - least * log_uniform(1e-16, 1, (n, 3)),
+        both * (1.0 + rng.integers(0, 9, (n, 3)) * 2.0**-52), both * rng.random((n, 3))])
+    offset *= rng.choice([-1.0, 1.0], (n, 3))
+    unit_a = turn_a / np.linalg.norm(turn_a, axis=1, keepdims=True)
+    a = np.hstack([place, turn_a])
+    b = np.hstack([place + rotate(unit_a, offset), multiply(turn_a, turn_b)])
+    rounded = (rng.random(n) < 1 / 4) & (np.abs(place).max(axis=1) < 1e30)
+    rounded &= both.max(axis=1) < 1e30
+    for pose in (a, b):
+        pose[rounded] = pose[rounded].astype(np.float32)
+        scaled = rng.random(n) < 1 / 16
+        pose[scaled, 3:] *= log_uniform(1e-99, 1e99)[scaled, None]
+    rows = np.flatnonzero(rng.random(n) < 1 / 8)
+    for row in rows:
+        values = (a, b, size_a, size_b)[rng.integers(4)][row]
+        values[rng.integers(len(values))] = rng.choice(BAD_NUMBERS)
+    return Pairs(a, b, size_a, size_b)

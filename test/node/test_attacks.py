@@ -1,10 +1,7 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Attacks from the network on every node that reads parameters, files, poses and requests.
-
-test/package/attacks.yaml lists all attacks and programs, and where each is made.
-"""
+"""Attacks from the network on every node that reads parameters, files, poses and requests."""
 from __future__ import annotations
 
 import math
@@ -255,10 +252,7 @@ def memory(running):
 @pytest.mark.skipif(not os.path.isdir('/proc/self'), reason='no /proc: not Linux')
 @pytest.mark.parametrize('name', NODES)
 def test_floods_on_a_locked_node(attacked, name):
-    """Poses that are none, names and texts of a megabyte: it answers on, and keeps none of them.
-
-    An hour of them, beside an echo node: `python -m benchmarks.flood`.
-    """
+    """Poses that are none, names and texts of a megabyte: it answers on, and keeps none of them."""
     running, stranger = attacked(name, 'locked:=true')
     assert stranger.spin(lambda: all(
         publisher.get_subscription_count() for publisher in stranger.publishers))

@@ -3,8 +3,7 @@
 
 """What breaks around a contact node, and that nothing is lost, wrong or leaked by it.
 
-The node runs as a process of its own. test/benchmarks/mutants.py has a node without each
-guard.
+The node runs as a process of its own.
 Elsewhere: killed and restarted nodes and clients (test_contact_node.py), weights and requests that
 cannot be read (test_hygiene_ros.py), scenes replaced by garbage (test_scene_node.py).
 """

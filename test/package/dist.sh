@@ -53,7 +53,7 @@ assert read_scene('config/scenes/yard_bay.yaml').pairs
 assert (environment / 'bin' / 'box_contact_contact_node').is_file()
 libraries = list(environment.rglob('box_contact_ros/core/libbox_contact.so'))
 assert len(libraries) == 1, libraries
-assert (libraries[0].parent / 'include' / 'box_contact' / 'inline.hpp').is_file()
+assert (libraries[0].parent / 'include' / 'box_contact' / 'box_contact.hpp').is_file()
 print(f'Python {platform.python_version()}: separation {contact.separation:.6f} m, '
       f'point {contact.point.round(3)}, run {instruction_sets()}')
 CONTACT

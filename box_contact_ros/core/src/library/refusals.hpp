@@ -4,6 +4,7 @@
 // How the C interface refuses: a code to return, and words for it.
 #pragma once
 
+#include <cmath>
 #include <cstdarg>
 #include <cstdio>
 #include <cstring>
@@ -11,7 +12,7 @@
 #include <new>
 
 #include "../../include/box_contact/box_contact.h"
-#include "../pose_refusal.hpp"
+#include "../poses.hpp"
 
 namespace box_contact::detail {
 
@@ -67,8 +68,14 @@ inline bool pose_is_valid(const double* p) {
 }
 
 inline bc_status refuse_pose(const char* field, const double* p) {
-  explain_refusal(field, p, error_text, sizeof error_text);
-  return BC_BAD_POSE;
+  bool is_far = false, is_finite = true;
+  for (int k = 0; k < 3; ++k) is_far |= !(std::fabs(p[k]) <= length_max);
+  for (int k = 3; k < 7; ++k) is_finite &= __builtin_isfinite(p[k]);
+  if (is_far)
+    return fail(BC_BAD_POSE, "%s position (%g, %g, %g) is not finite, or exceeds 1e50 m", field,
+                p[0], p[1], p[2]);
+  return fail(BC_BAD_POSE, "%s quaternion (%g, %g, %g, %g) %s", field, p[3], p[4], p[5], p[6],
+              is_finite ? "has no length within 1e-100 to 1e100" : "is not finite");
 }
 
 }  // namespace box_contact::detail

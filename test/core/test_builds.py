@@ -1,0 +1,65 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""Other compilers, and an emulated 64-bit ARM: the library's bits, so its laws hold there too."""
+from __future__ import annotations
+
+import shutil
+import subprocess
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import poses
+import pytest
+
+from box_contact_ros import ContactSolver
+from box_contact_ros.core import native
+
+CORE = Path(native.__file__).parent
+FLAGS = ('-std=c++17', '-O2', '-ffp-contract=off', '-Wno-psabi', '-DBOX_CONTACT_VERSION=""')
+BUILDS: dict[str, tuple[str, tuple[str, ...]]] = {
+    'g++ for the baseline': ('g++', ()),
+    'clang++': ('clang++', ()),
+    'arm': ('aarch64-linux-gnu-g++', ('qemu-aarch64', '-L', '/usr/aarch64-linux-gnu'))}
+"""By name, the compiler, and what its programs run in."""
+
+
+def compile_library(compiler: str, folder: Path) -> Path:
+    """Return the program `answers`, with the library in it."""
+    sources = [Path(__file__).with_name('answers.cpp'), *(
+        CORE / 'src' / 'library' / f'{name}.cpp' for name in ('kernel', 'library', 'force'))]
+    objects = [folder / f'{source.stem}.o' for source in sources]
+
+    def run(*words: object) -> None:
+        subprocess.run([compiler, *map(str, words)], check=True)
+
+    with ThreadPoolExecutor(2) as pool:
+        list(pool.map(lambda source, made: run(*FLAGS, f'-I{CORE / "include"}', '-c', source, '-o',
+                                               made), sources, objects))
+    run('-pthread', *objects, '-o', folder / 'answers')
+    return folder / 'answers'
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize('name', BUILDS)
+def test_another_build_has_the_same_bits(name: str, tmp_path: Path) -> None:
+    """Verdict, separation and normal of both models; a row of a batch is its single call."""
+    compiler, emulator = BUILDS[name]
+    for program in (compiler, *emulator[:1]):
+        if not shutil.which(program):
+            pytest.skip(f'{program} is not installed')
+    pairs = poses.joined(poses.of_all_kinds(1000, 4), poses.hard_pairs())
+    (tmp_path / 'pairs.txt').write_text('\n'.join(
+        ' '.join(float(number).hex() for number in row) for row in np.hstack(pairs)))
+    program = compile_library(compiler, tmp_path)
+    printed = subprocess.run([*emulator, program, tmp_path / 'pairs.txt'], check=True, text=True,
+                             stdout=subprocess.PIPE).stdout
+    answers = np.array([list(map(float.fromhex, line.split())) for line in printed.splitlines()])
+    for model, rows in zip(('exact', 'mlp'), np.split(answers, 2)):
+        wanted = ContactSolver((1, 1, 1), (1, 1, 1), model=model).batch(
+            *pairs[:2], size_a=pairs.size_a, size_b=pairs.size_b)
+        assert 0.3 < wanted.colliding.mean() < 0.95
+        for column, field in zip((rows[:, 0], rows[:, 1], rows[:, 2:]), wanted[:3]):
+            assert np.array_equal(column, field, equal_nan=True), model

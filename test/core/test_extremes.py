@@ -1,0 +1,122 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""Numbers at both ends of what is accepted, and beyond: answers keep their promises or are refused.
+
+Model `mlp` has random weights here: what it promises, it does whatever its weights are.
+"""
+from __future__ import annotations
+
+import numpy as np
+import poses
+import pytest
+from poses import Pairs
+
+from box_contact_ros.core import BRACKET_LIMIT, LENGTH_MAX, LENGTH_MIN, native
+from box_contact_ros.solver.contact import Contacts
+
+UNIT = (1.0, 1.0, 1.0)
+N = 20_000
+ASPECT_KNOWN = 1e8
+"""Longest by shortest extent up to which points are in both boxes. From 1e9 on, the shortest extent
+nears the rounding of the longest, and points are outside by up to 1e-8 of the longest."""
+SLIVER = 1e-6
+"""Depth [of the size] below which volumes of `mlp` are not judged: one pair in a thousand overlaps
+as little along a second axis, which float32 does not resolve."""
+FLOAT32 = 3000 * 2.0**-24  # what float32 may cost a volume, of itself
+
+
+def solver(model: str, rng: np.random.Generator) -> native.PairSolver:
+    """Return a solver with random weights of up to 1 or 1e4, one in eight of them zero."""
+    if model == 'exact':
+        return native.PairSolver('exact', UNIT, UNIT)
+    most = rng.choice([1.0, 1e4])
+    network = rng.uniform(-most, most, 1 + (native.FEATURES + 2) * rng.integers(0, 9))
+    network[rng.random(len(network)) < 1 / 8] = 0.0
+    return native.PairSolver('mlp', UNIT, UNIT, network.astype(np.float32))
+
+
+def accepted(pairs: Pairs) -> np.ndarray:
+    good = np.ones(len(pairs.pose_a), bool)
+    with np.errstate(all='ignore'):
+        for pose in pairs[:2]:
+            length = np.sqrt((pose[:, 3:]**2).sum(axis=1))
+            good &= (np.abs(pose[:, :3]) <= LENGTH_MAX).all(axis=1)
+            good &= (length >= native.QUATERNION_MIN) & (length <= native.QUATERNION_MAX)
+        for size in pairs[2:]:
+            good &= ((size >= LENGTH_MIN) & (size <= LENGTH_MAX)).all(axis=1)
+    return good
+
+
+def outside(pose: np.ndarray, size: np.ndarray, point: np.ndarray) -> np.ndarray:
+    """Return by how much points (n, 3) are outside boxes (n,) [m]."""
+    turn = pose[:, 3:] / np.abs(pose[:, 3:]).max(axis=1, keepdims=True)
+    turn = turn / np.linalg.norm(turn, axis=1, keepdims=True) * (-1, -1, -1, 1)
+    return (np.abs(poses.rotate(turn, point - pose[:, :3])) - 0.5 * size).max(axis=1)
+
+
+@pytest.mark.parametrize('seed', range(2))
+@pytest.mark.parametrize('model', ['exact', 'mlp'])
+def test_contacts_keep_their_promises(model: str, seed: int) -> None:
+    """Bad rows alone are refused. Everything is finite, normals are unit, points in both boxes."""
+    rng = np.random.default_rng([17, seed])
+    pairs = poses.extreme_pairs(rng, N)
+    good = accepted(pairs)
+    assert 0.05 < 1.0 - good.mean() < 0.2
+    answers, refused = solver(model, rng).solve(*pairs, 2)
+    assert refused == np.argmin(good)
+    assert not answers[0][~good].any() and np.isnan(answers[1][~good]).all()
+    found = Contacts(*(part[good] for part in answers))
+    pairs = Pairs(*(part[good] for part in pairs))
+    touching, separation = found.colliding, found.separation
+    assert 0.4 < touching.mean() < 0.95
+    assert np.isfinite(separation).all() and (separation[~touching] > 0.0).all()
+    assert np.isnan(np.hstack([found.normal, found.point])[~touching]).all()
+    assert not found.volume[~touching].any() and np.isnan(found.covariance[~touching]).all()
+    assert np.isfinite(found.point[touching]).all()
+    assert np.abs((found.normal[touching]**2).sum(axis=1) - 1.0).max() <= 1e-12
+    sizes = np.hstack(pairs[2:])
+    reach = np.abs(np.hstack([pairs.pose_a[:, :3], pairs.pose_b[:, :3]])).max(axis=1)
+    size = sizes.max(axis=1)
+    pressed = np.where(separation > -1e-9 * size, 3e-9 * size, 0.0)
+    rows = touching & (size <= ASPECT_KNOWN * sizes.min(axis=1))
+    for pose, extents in ((pairs.pose_a, pairs.size_a), (pairs.pose_b, pairs.size_b)):
+        beyond = outside(pose[rows], extents[rows], found.point[rows])
+        assert np.all(beyond <= (2.0**-43 * (size + reach) + pressed)[rows])
+
+
+@pytest.mark.parametrize('model', ['exact', 'mlp'])
+def test_a_row_is_its_single_call(model: str) -> None:
+    """In batches of each length up to two blocks of lanes and one more."""
+    rng = np.random.default_rng(19)
+    pairs, number = poses.extreme_pairs(rng, 3000), solver(model, rng)
+    alone = [number.solve(*(part[row:row + 1] for part in pairs), 1) for row in range(3000)]
+    assert np.array_equal([refused == 0 for _, refused in alone], ~accepted(pairs))
+    first, count = 0, 1
+    while first + count <= 3000:
+        rows = slice(first, first + count)
+        many, _ = number.solve(*(part[rows] for part in pairs), 1)
+        good = accepted(Pairs(*(part[rows] for part in pairs)))
+        for field, values in enumerate(many):
+            singles = np.concatenate([answer[field] for answer, _ in alone[rows]])
+            assert np.array_equal(values[good], singles[good], equal_nan=True), (first, field)
+        first, count = first + count, count % (2 * native.lanes + 1) + 1
+
+
+@pytest.mark.parametrize('seed', range(8))
+def test_volumes_are_within_their_brackets(seed: int) -> None:
+    """Of the contacts that `mlp` does not leave to `exact`; no eigenvalue is below zero."""
+    rng = np.random.default_rng([23, seed])
+    pairs = poses.extreme_pairs(rng, N)
+    pairs = Pairs(*(part[accepted(pairs)] for part in pairs))
+    truth, found = (Contacts(*solver(model, rng).solve(*pairs, 1)[0]) for model in ('exact', 'mlp'))
+    rows = truth.colliding & (found.volume != truth.volume)
+    assert rows.mean() > 0.1
+    assert (found.volume[rows] > 0.0).all()
+    covariance = found.covariance[rows]
+    scaled = covariance / np.trace(covariance, axis1=1, axis2=2)[:, None, None]
+    assert np.array_equal(scaled, scaled.transpose(0, 2, 1))
+    assert np.linalg.eigvalsh(scaled)[:, 0].min() >= -1e-14
+    rows &= truth.separation <= -SLIVER * np.hstack(pairs[2:]).max(axis=1)
+    off = np.abs(found.volume - truth.volume)
+    assert np.all((off <= BRACKET_LIMIT * found.volume + FLOAT32 * truth.volume)[rows])
