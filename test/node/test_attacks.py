@@ -10,6 +10,7 @@ import signal
 import time
 
 import pytest
+from box_contact_ros.node.named_files import LARGEST_TEXT
 from geometry_msgs.msg import Pose, PoseArray, PoseStamped, Quaternion
 from lifecycle_msgs.msg import Transition
 from raw_client import ORIGIN, TOUCHING, cdr
@@ -21,7 +22,6 @@ from stranger import ANSWER_SECONDS, Stranger
 
 from box_contact_ros.demo.ros_client import ANSWERS
 from box_contact_ros.node.messages import make_header
-from box_contact_ros.node.named_files import LARGEST_TEXT
 
 NODES = ('contact_node', 'soup_node', 'markers')
 LIFECYCLE_NODES = NODES[:2]

@@ -20,6 +20,7 @@ from threading import Event, Thread
 
 import numpy as np
 import pytest
+from box_contact_ros.scene.stamp_pairing import AGAIN
 from geometry_msgs.msg import PointStamped, PoseStamped
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
@@ -34,7 +35,6 @@ from rosgraph_msgs.msg import Clock
 
 from box_contact_ros.demo.ros_client import ANSWERS
 from box_contact_ros.node.messages import make_header
-from box_contact_ros.scene.stamp_pairing import AGAIN
 
 CUBES = ('--ros-args', '-p', 'size_a:=[2.0, 2.0, 2.0]', '-p', 'size_b:=[2.0, 2.0, 2.0]')
 LEAK = 8.0
