@@ -180,7 +180,6 @@ class ContactNode(GuardedNode, LifecycleNode):
 
     def _configure(self) -> None:
         values = declare(self, self.parameters, live=LIVE)
-        warn_of_unknown(self, {**self.parameters, **AUTOSTART})
         if values['scene']:
             for name in ('size_a', 'size_b'):
                 if values[name] != self.parameters[name].default:
@@ -197,6 +196,7 @@ class ContactNode(GuardedNode, LifecycleNode):
         except Exception:
             topics.close()
             raise
+        warn_of_unknown(self, {**self.parameters, **AUTOSTART})
         self._values, self._topics, self._answerer = values, topics, answerer
 
     def _set_live(self, parameters: Sequence[Parameter]) -> SetParametersResult:
