@@ -73,6 +73,7 @@ class Client:
         self.keep(Contacts, 'contacts', self.contacts)
         self.node.create_subscription(DiagnosticArray, '/diagnostics',
                                       self.diagnostics.append, 10)
+        self._services: dict[str, Any] = {}
         self._stamp = 0
 
     def keep(self, message_type: type, topic: str, kept: dict[int, Any]) -> None:
@@ -156,14 +157,25 @@ class Client:
 
     def call(self, service_type: Any, name: str, request: Any) -> Any:
         """Return the response of a service."""
-        service = self.node.create_client(service_type, name)
-        assert self.spin(service.service_is_ready), f'no service {name}'
-        # It may be ready before the way back is: an answer is lost then.
-        self.spin(lambda: False, 0.2)
-        future = service.call_async(request)
+        if name not in self._services:
+            self._services[name] = self._client_of(service_type, name)
+        future = self._services[name].call_async(request)
         assert self.spin(future.done), f'{name} does not answer'
-        self.node.destroy_client(service)
         return future.result()
+
+    def _client_of(self, service_type: Any, name: str) -> Any:
+        """Return a client that has found its server.
+
+        Once in some hundred times Fast DDS finds none until the client is made again.
+        """
+        for _ in range(3):
+            service = self.node.create_client(service_type, name)
+            if self.spin(service.service_is_ready, PATIENCE / 3):
+                # It may be ready before the way back is: an answer is lost then.
+                self.spin(lambda: False, 0.2)
+                return service
+            self.node.destroy_client(service)
+        raise AssertionError(f'no service {name}')
 
     def close(self) -> None:
         """Leave the network."""
