@@ -23,14 +23,14 @@ RCLError = rclpy_implementation.RCLError
 Test: test_contact_node.py::test_a_bad_start_is_one_clear_line."""
 UnknownROSArgsError = rclpy_implementation.UnknownROSArgsError
 """Symptom: so does a word after --ros-args that is no option, and rclpy raises a RuntimeError.
-Test: test_runtime.py::test_a_word_that_ros_does_not_know_ends_the_program."""
+Test: test_parameters.py::test_a_word_that_ros_does_not_know_ends_the_program."""
 
 
 def parameter_overrides(node: Node) -> dict[str, Any]:
     """Return the parameters that were given at the start, by name.
 
     Symptom: rclpy silently ignores names that are never declared, and has no public list of them.
-    Test: test_hygiene_ros.py::test_parameters_from_a_file.
+    Test: test_parameters.py::test_an_unknown_name_is_logged_with_the_nearest_one.
     """
     return {name: parameter.value
             for name, parameter in getattr(node, '_parameter_overrides', {}).items()}
