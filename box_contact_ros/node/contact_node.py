@@ -72,8 +72,8 @@ PARAMETERS = {
                                 "answer every pose with the other boxes' last", one_of(PAIRINGS)),
     'tolerance': Setting(0.0, 'with pairing stamp: stamps this far apart still belong together [s]',
                          number(0.0, LONGEST)),
-    'max_age': Setting(1.0, 'no tick waits for a box whose newest stamp is older than this; with '
-                            'pairing latest, its pairs get no contact; 0: never [s]',
+    'max_age': Setting(1.0, 'a box whose newest stamp is older than this is reported as stale; '
+                            'with pairing latest, its pairs get no contact; 0: never [s]',
                        number(0.0, LONGEST)),
     'margin': Setting(0.0, 'pairs apart are listed in contacts too, up to this separation [m]; '
                            'their depth is negative', number(0.0, LENGTH_MAX)),
@@ -180,7 +180,6 @@ class ContactNode(GuardedNode, LifecycleNode):
 
     def _configure(self) -> None:
         values = declare(self, self.parameters, live=LIVE)
-        warn_of_unknown(self, {**self.parameters, **AUTOSTART})
         if values['scene']:
             for name in ('size_a', 'size_b'):
                 if values[name] != self.parameters[name].default:
@@ -197,6 +196,7 @@ class ContactNode(GuardedNode, LifecycleNode):
         except Exception:
             topics.close()
             raise
+        warn_of_unknown(self, {**self.parameters, **AUTOSTART})
         self._values, self._topics, self._answerer = values, topics, answerer
 
     def _set_live(self, parameters: Sequence[Parameter]) -> SetParametersResult:

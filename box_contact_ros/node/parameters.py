@@ -23,7 +23,6 @@ from .rclpy_workarounds import parameter_overrides
 
 Check = Callable[[str, Any], Any]
 """From a parameter's name and value to the value as the node uses it; ValueError if it is wrong."""
-QOS_OVERRIDES = 'qos_overrides.'  # begins the names of those that rclpy declares with a topic
 LONGEST_REASON = 1000  # characters of a refusal
 
 
@@ -112,7 +111,7 @@ def declare(node: Node, settings: Mapping[str, Setting], *, live: Collection[str
     """Return the checked values of a node's parameters; declare those that are not declared yet.
 
     live: the names that may be set while the node runs; all others are read-only.
-    Raises ValueError for the first bad value. Warns of names that no parameter has.
+    Raises ValueError for the first bad value.
     """
     given = parameter_overrides(node)
     values = {name: setting.check(name, node.get_parameter(name).value if node.has_parameter(name)
@@ -129,9 +128,12 @@ def declare(node: Node, settings: Mapping[str, Setting], *, live: Collection[str
 
 
 def warn_of_unknown(node: Node, settings: Mapping[str, Setting]) -> None:
-    """Warn of given names that no parameter has; a file may be meant for several nodes."""
+    """Warn of given names that no parameter has; a file may be meant for several nodes.
+
+    rclpy declares those of qualities of service with the topics.
+    """
     for name in parameter_overrides(node):
-        if not node.has_parameter(name) and not name.startswith(QOS_OVERRIDES):
+        if not node.has_parameter(name):
             node.get_logger().warning(f'unknown parameter {shown(name)}'
                                       f'{nearest_name(name, settings)}; it is ignored')
 

@@ -23,14 +23,14 @@ RCLError = rclpy_implementation.RCLError
 Test: test_contact_node.py::test_a_bad_start_is_one_clear_line."""
 UnknownROSArgsError = rclpy_implementation.UnknownROSArgsError
 """Symptom: so does a word after --ros-args that is no option, and rclpy raises a RuntimeError.
-Test: test_runtime.py::test_a_word_that_ros_does_not_know_ends_the_program."""
+Test: test_parameters.py::test_a_word_that_ros_does_not_know_ends_the_program."""
 
 
 def parameter_overrides(node: Node) -> dict[str, Any]:
     """Return the parameters that were given at the start, by name.
 
     Symptom: rclpy silently ignores names that are never declared, and has no public list of them.
-    Test: test_hygiene_ros.py::test_parameters_from_a_file.
+    Test: test_parameters.py::test_an_unknown_name_is_logged_with_the_nearest_one.
     """
     return {name: parameter.value
             for name, parameter in getattr(node, '_parameter_overrides', {}).items()}
@@ -43,6 +43,21 @@ def lifecycle_state(node: LifecycleNode) -> str:
     Test: test_first_run.py::test_the_state_is_told.
     """
     return str(node._state_machine.current_state[1])
+
+
+@contextmanager
+def qos_refused() -> Iterator[None]:
+    """Raise ValueError where a parameter names a quality of service that there is not.
+
+    Symptom: rclpy raises a RuntimeError, as for a fault of the program.
+    Test: test_contact_node.py::test_a_bad_start_is_one_clear_line.
+    """
+    try:
+        yield
+    except RCLError:
+        raise
+    except RuntimeError as error:
+        raise ValueError(f'qos_overrides: {error}') from error
 
 
 @contextmanager

@@ -19,7 +19,7 @@ from box_contact_msgs.msg import Contacts
 
 from ..scene.scene_solver import ALL_BOXES, Pair, Scene
 from ..solver.checks import shown
-from .rclpy_workarounds import RCLError
+from .rclpy_workarounds import RCLError, qos_refused
 
 MOST_PAIRS_WITH_TOPICS = 1000
 """Two publishers a pair take milliseconds and memory, here and in every process that listens."""
@@ -28,6 +28,7 @@ NODE_TOPICS = ('/diagnostics', '/parameter_events', '/rosout', '/clock', '~/tran
 CONTACT_DEPTH = 10
 POSE_DEPTH = 100
 """Poses that wait: 100 ms at 1 kHz, longer than any collection of garbage."""
+QOS_OVERRIDES = QoSOverridingOptions.with_default_policies()  # of poses and of `contacts`
 ARRAY_DEPTH = 10
 """Arrays that wait: a node that cannot keep up is late by a few ticks, never by seconds."""
 
@@ -65,9 +66,9 @@ class SceneTopics:
         self._check(scene, pairs)
         self._subscriptions: dict[str, Subscription] = {}
         self.of_pair: dict[Pair, tuple[Publisher, Publisher]] = {}
-        self.contacts = self._publisher(
-            Contacts, f'{prefix}contacts',
-            qos_overriding_options=QoSOverridingOptions.with_default_policies())
+        with qos_refused():
+            self.contacts = self._publisher(Contacts, f'{prefix}contacts',
+                                            qos_overriding_options=QOS_OVERRIDES)
         for pair in pairs:
             topic = self._topic_of(pair)
             self.of_pair[pair] = (self._publisher(PointStamped, f'{topic}/point'),
@@ -77,11 +78,12 @@ class SceneTopics:
                   ) -> None:
         """Subscribe to all poses, with the callback for the bytes of a box and its topic."""
         for box, topic in scene.sources.items():
-            self._subscriptions[box] = self._node.create_subscription(
-                PoseArray if box == ALL_BOXES else PoseStamped, topic, callback_of(box, topic),
-                pose_qos(box), raw=True,
-                event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
-                qos_overriding_options=QoSOverridingOptions.with_default_policies())
+            with qos_refused():
+                self._subscriptions[box] = self._node.create_subscription(
+                    PoseArray if box == ALL_BOXES else PoseStamped, topic,
+                    callback_of(box, topic), pose_qos(box), raw=True,
+                    event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
+                    qos_overriding_options=QOS_OVERRIDES)
 
     def close(self) -> None:
         """Destroy all topics."""

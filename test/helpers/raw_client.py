@@ -5,12 +5,14 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import poses
-from geometry_msgs.msg import PoseStamped
-from rclpy.qos import QoSProfile
 from ros_client import PATIENCE, Client
+
+from box_contact_ros.node.messages import NANOSECONDS, contacts_by_pair
 
 ORIGIN = poses.IDENTITY
 TOUCHING = np.array([0.5, 0.25, 1.875, 0, 0, 0, 1])  # 0.125 m deep
@@ -18,7 +20,8 @@ APART = np.array([0.5, 0.25, 2.5, 0, 0, 0, 1])
 LITTLE_ENDIAN = b'\0\1\0\0'
 
 
-def cdr(pose, stamp, frame=b'map\0'):
+def cdr(pose: Sequence[float] | np.ndarray, stamp: tuple[int, int],
+        frame: bytes = b'map\0') -> bytes:
     """Serialise a PoseStamped; `stamp` is (sec, nanosec), `frame` the string with its zero."""
     head = struct.pack('<iII', *stamp, len(frame)) + frame
     return LITTLE_ENDIAN + head + b'\0' * (-len(head) % 8) + struct.pack('<7d', *pose)
@@ -28,48 +31,33 @@ GOOD = cdr(TOUCHING, (5, 7))
 
 
 class RawClient(Client):
-    """Sends bytes, and hears what arrives on the wire."""
+    """Sends bytes to a node of two cubes of edge 2."""
 
-    def __init__(self):
-        super().__init__()
-        self.wire = []
-        self.raw_subscriptions = [
-            self.node.create_subscription(PoseStamped, f'box_{box}/pose', self.wire.append,
-                                          QoSProfile(depth=10_000), raw=True) for box in 'ab']
-
-    def send_raw(self, *payloads):
+    def send_raw(self, *payloads: bytes) -> None:
         """Publish each payload on both topics."""
         for payload in payloads:
             for publisher in self.publishers:
                 publisher.publish(payload)
 
-    def heard(self, count):
-        """Wait for so many messages on the wire; whether they came, and no more."""
-        return self.spin(lambda: len(self.wire) >= count) and len(self.wire) == count
-
-    def answered(self, stamp):
-        """Wait for the answer to a stamp [ns]; whether it came."""
-        return self.spin(lambda: stamp in self.clouds)
-
-    def send_pair(self, pose_a, pose_b, frame=b'map\0'):
-        """Publish a pair as bytes; returns its stamp [ns]."""
+    def send_pair(self, pose_a: Any, pose_b: Any, frame: bytes = b'map\0') -> int:
+        """Publish a pair as bytes; return its stamp [ns]."""
         stamp = self.next_stamp()
         for publisher, pose in zip(self.publishers, (pose_a, pose_b)):
-            publisher.publish(cdr(pose, divmod(stamp, 10**9), frame))
+            publisher.publish(cdr(pose, divmod(stamp, NANOSECONDS), frame))
         return stamp
 
-    def assert_answered(self):
+    def assert_answered(self) -> None:
         """Check that the node lives, and answers a good pair, and rightly.
 
         Best effort may lose a pair on a busy machine: others follow until one is answered.
         """
-        sent = []
-        while not any(stamp in self.clouds for stamp in sent):
+        sent: list[int] = []
+        while not any(stamp in self.contacts for stamp in sent):
             assert len(sent) < 6, 'no answer'
             sent.append(self.send(ORIGIN, TOUCHING))
-            self.spin(lambda: sent[-1] in self.clouds, PATIENCE / 6)
-        row, = self.rows(next(stamp for stamp in sent if stamp in self.clouds))
-        assert row['depth'] == 0.125
-        assert (row['normal_x'], row['normal_y'], row['normal_z']) == (0, 0, 1)
-        point = np.array([row['x'], row['y'], row['z']])
-        assert np.abs(point - (0.25, 0.125, 0.9375)).max() < 2.0**-43  # bounds are wider by 2^-46
+            self.is_answered(sent[-1], PATIENCE / 6)
+        stamp = next(stamp for stamp in sent if stamp in self.contacts)
+        contact, = contacts_by_pair(self.contacts[stamp]).values()
+        assert contact.separation == -0.125 and contact.normal.tolist() == [0, 0, 1]
+        # Bounds are wider by 2^-46.
+        assert np.abs(contact.point - (0.25, 0.125, 0.9375)).max() < 2.0**-43

@@ -3,45 +3,44 @@
 
 """What breaks around a contact node, and that nothing is lost, wrong or leaked by it.
 
-The node runs as a process of its own.
-Elsewhere: killed and restarted nodes and clients (test_contact_node.py), weights and requests that
-cannot be read (test_hygiene_ros.py), scenes replaced by garbage (test_scene_node.py).
+The node runs as a process of its own, and most poses are sent as bytes, so that nothing on this
+side repairs them. The policy: docs/reference/conventions.md, "Bad input". Elsewhere: nodes that are
+killed (test_contact_node.py), bad arrays and clocks (test_scene_node.py).
 """
 from __future__ import annotations
 
 import math
 import os
-import shutil
 import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 from threading import Event, Thread
 
 import numpy as np
+import poses
 import pytest
-from box_contact_ros.scene.stamp_pairing import AGAIN
-from geometry_msgs.msg import PointStamped, PoseStamped
+from geometry_msgs.msg import PointStamped
 from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import ChangeState, GetState
+from lifecycle_msgs.srv import ChangeState
 from raw_client import APART, GOOD, LITTLE_ENDIAN, ORIGIN, TOUCHING, RawClient, cdr
-from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
-from rcl_interfaces.srv import SetParameters
-from rclpy.duration import Duration
+from rcl_interfaces.msg import Parameter, ParameterValue
+from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from ros_client import PATIENCE, stamp_of
-from rosgraph_msgs.msg import Clock
+from ros_client import PATIENCE, Client
 
-from box_contact_ros.demo.ros_client import ANSWERS
-from box_contact_ros.node.messages import make_header
+from box_contact_msgs.msg import Contacts
+from box_contact_ros import ContactSolver
+from box_contact_ros.node.messages import contacts_by_pair
 
+HELPERS = Path(__file__).resolve().parents[1] / 'helpers'
 CUBES = ('--ros-args', '-p', 'size_a:=[2.0, 2.0, 2.0]', '-p', 'size_b:=[2.0, 2.0, 2.0]')
 LEAK = 8.0
 """Growth [MB] of a node's memory that is taken for none, as the allocator's arenas come in steps: a
-leak of 100 bytes a message in the storms below."""
-STORM_SECONDS = 180.0
-"""Time for a storm to be heard, some ten times what it takes: against hanging only."""
+leak of 200 bytes a message in the storms below."""
+UNKNOWN_TYPE = 77  # of a parameter
 
 
 @pytest.fixture
@@ -52,15 +51,12 @@ def client():
 
 
 @pytest.fixture
-def start(program, client):
-    """Start a contact node for two cubes, matched with the client."""
-    def start(*parameters, **options):
-        words = [word for parameter in parameters for word in ('-p', parameter)]
-        running = program('contact_node', *CUBES, *words, **options)
-        running.wait_for_output('ready', 120)
-        client.offer_until_answered(ORIGIN, APART)
-        return running
-    return start
+def node(program, client):
+    """Return a contact node for two cubes, matched with the client."""
+    running = program('contact_node', *CUBES, '-p', 'model:=exact')
+    running.wait_for_output('ready', 120)
+    client.offer_until_answered(ORIGIN, APART)
+    return running
 
 
 def memory(running):
@@ -68,6 +64,9 @@ def memory(running):
     with open(f'/proc/{running.process.pid}/status') as file:
         line, = (line for line in file if line.startswith('VmRSS:'))
     return int(line.split()[1]) / 1024
+
+
+needs_proc = pytest.mark.skipif(not os.path.isdir('/proc/self'), reason='no /proc: not Linux')
 
 
 def rate_limited(count, rate):
@@ -78,17 +77,17 @@ def rate_limited(count, rate):
         yield number
 
 
-def test_100_000_messages_that_are_none(start, client):
+# --- malformed messages ---------------------------------------------------------------------------
+
+
+@needs_proc
+def test_messages_that_are_none(node, client):
     """Random bytes, messages cut short and messages with changed bytes at some 10 kHz.
 
     Those that arrive are counted, none ends the node, memory does not grow, and the next pair is
-    answered. Best effort may lose some of a storm: it lasts until the node has heard 100,000.
+    answered. Best effort may lose some of a storm: it lasts until the node has heard enough.
     """
-    node = start()
     rng = np.random.default_rng(1)
-    publish = [publisher.publish for publisher in client.publishers]
-    client.node.destroy_subscription(client.raw_subscriptions[0])
-    client.node.destroy_subscription(client.raw_subscriptions[1])
 
     def payload(number):
         if number % 4 == 0:
@@ -103,62 +102,119 @@ def test_100_000_messages_that_are_none(start, client):
         return bytes(changed)
 
     def storm(heard):
-        deadline = time.monotonic() + STORM_SECONDS
-        while (missing := heard - client.counts().get('poses', 0)) > 0:
+        deadline = time.monotonic() + 3 * PATIENCE
+        while (missing := heard - int(client.diagnostic('poses') or 0)) > 0:
             assert time.monotonic() < deadline, f'{missing} of {heard} messages not heard'
             for number in rate_limited(missing, 10_000):
-                publish[number % 2](payload(number))
+                client.publishers[number % 2].publish(payload(number))
                 if number % 100 == 0:
                     client.poll()
 
-    storm(20_000)
+    storm(5_000)
     client.assert_answered()
     before = memory(node)
-    storm(100_000)
+    storm(45_000)
     client.assert_answered()
-    counts = client.counts()
     assert memory(node) - before < LEAK
     assert node.process.poll() is None and 'Traceback' not in node.output
     # Three of four kinds are almost never a PoseStamped, the fourth varies.
-    assert counts['refused: not a PoseStamped'] > 0.7 * counts['poses']
-    assert 'refused: internal error' not in counts
-    for stamp in client.clouds:
-        for row in client.rows(stamp):
-            assert math.isnan(row['depth']) or np.isfinite(list(row)[:8]).all()  # but the patch
+    heard = int(client.diagnostic('poses'))
+    assert int(client.diagnostic('refused: not a PoseStamped')) > 0.7 * heard
+    assert not client.diagnostic('refused: internal error')
+    for message in client.contacts.values():
+        for contact in contacts_by_pair(message).values():
+            assert np.isfinite([*contact.point, *contact.normal, contact.separation]).all()
 
 
-@pytest.mark.parametrize('serialization', ['raw', 'typed'])
-def test_half_of_the_poses_are_none(start, client, serialization):
+def test_headers(node, client):
+    """Any UTF-8 is a frame, and any second of int32 a stamp; the rest is refused and counted."""
+    for raw, frame in ((b'\0', ''), (b'', ''), ('Köln 港\0'.encode(), 'Köln 港'),
+                       (b'y' * 255 + b'\0', 'y' * 255)):
+        stamp = client.send_pair(ORIGIN, TOUCHING, raw)
+        assert client.is_answered(stamp), raw
+        assert client.contacts[stamp].header.frame_id == frame
+        assert client.points[stamp].header.frame_id == frame
+    answered = set(client.contacts)
+    for raw in (b'\xff\xfe\0', b'map\xc3\0', b'\xed\xa0\x80\0', b'yard', b'yard\0east\0'):
+        client.send_pair(ORIGIN, TOUCHING, raw)
+    for stamp in ((0, 10**9), (0, 2**32 - 1), (2**31 - 1, 10**9), (-2**31, 2**32 - 1)):
+        client.send_raw(cdr(ORIGIN, stamp))
+    client.assert_answered()
+    assert len(set(client.contacts) - answered) == 1
+    assert client.diagnostic('refused: bad header') == '14'
+    assert client.diagnostic('refused: not a PoseStamped') == '4'
+    assert 'is not UTF-8; refused' in node.output
+    for stamp in ((0, 1), (-1, 5), (-2**31, 0), (2**31 - 1, 10**9 - 1)):
+        client.send_raw(cdr(ORIGIN, stamp))
+        assert client.is_answered(stamp[0] * 10**9 + stamp[1])
+
+
+def test_half_of_the_poses_are_none(node, client):
     """NaN, zero quaternions, infinities and denormals in every second pair, at 500 Hz.
 
-    Each good pair is answered rightly, each bad pose counted, nothing bad is answered.
+    Each good pair is answered as the solver does, each bad pose counted, nothing bad is answered.
+    All zero bytes are what a sender of another language may publish by default.
     """
-    start(f'serialization:={serialization}')
-    bad = [[math.nan] * 7, [0] * 7, [0, 0, math.inf, 0, 0, 0, 1], [0, 0, 1.9, 0, 0, 0, 5e-324],
-           [0, 0, 1e308, 0, 0, 0, 1], [0, 0, 0, math.nan, 0, 0, 1]]
+    bad = [[0] * 7, [math.nan] * 7, [0, 0, 0, 5e-324, 0, 0, 1e-310], [0, 0, 0, 0, 0, 0, 1e308],
+           [0, math.nan, 0, 0, 0, 0, 1], [0, 0, -math.inf, 0, 0, 0, 1],
+           [0, 0, 0, 0, 0, math.inf, 1], [0, -1e308, 0, 0, 0, 0, 1], [0, 0, 2e50, 0, 0, 0, 1]]
+    odd = [[0, 0, 1.5, 5e-324, 0, 0, 1], [1e-310, 0, 1.5, 0, 0, 0, -1e-8],
+           [0, 0, 2, 0, 0, 1e8, 1e8], [1e50, -1e50, 0, 0, 0, 0, 1], [-0.0, -0.0, 1, -0.0, 0, 0, 1]]
     good, refused = {}, []
     for number in rate_limited(2000, 500):
         if number % 2:
-            height = 1.9 + 0.0001 * (number % 1900)
-            good[client.send_pair(ORIGIN, (0, 0, height, 0, 0, 0, 1))] = height
+            pose = odd[number // 2 % 5] if number % 20 == 1 else [
+                0, 0, 1.9 + 0.0001 * number, 0, 0, 0, 1]
+            pair = (ORIGIN, pose) if number % 4 == 1 else (pose, ORIGIN)
+            good[client.send_pair(*pair)] = pair
             client.keep_up(list(good))
         else:
             pair = (ORIGIN, bad[number // 2 % len(bad)])
             refused.append(client.send_pair(*(pair if number % 4 else pair[::-1])))
         client.poll()
-    assert client.spin(lambda: all(stamp in client.clouds for stamp in good)), sum(
-        stamp not in client.clouds for stamp in good)
-    for stamp, height in good.items():
-        rows = client.rows(stamp)
-        assert len(rows) == (height <= 2.0)
-        assert all(row['depth'] == pytest.approx(2.0 - height, abs=1e-14) for row in rows)
-    assert not any(stamp in client.clouds for stamp in refused)
-    assert client.counts()['refused: bad pose'] == len(refused)
+    assert client.are_answered(list(good))
+    solver = ContactSolver(poses.CUBE, poses.CUBE, model='exact')
+    for stamp, pair in good.items():
+        contacts, wanted = contacts_by_pair(client.contacts[stamp]), solver(*pair)
+        assert len(contacts) == wanted.colliding == (stamp in client.points)
+        for contact in contacts.values():
+            assert contact.separation == wanted.separation
+            assert np.array_equal(contact.point, wanted.point)
+    assert not any(stamp in client.contacts for stamp in refused)
+    assert client.diagnostic('refused: bad pose') == str(len(refused))
+    assert 'internal error' not in node.output
 
 
-def test_memory_does_not_grow(start, client):
-    """10,000 pairs of which a third lacks its partner and a third is in a frame of its own."""
-    node = start()
+def test_a_request_that_rclpy_cannot_read(node, client):
+    """A parameter of a type that there is none of, at which rclpy's own service raises.
+
+    The client is answered, without a word of success, and the node says so and goes on.
+    """
+    bad = [Parameter(name='model', value=ParameterValue(type=UNKNOWN_TYPE))]
+    assert not client.call(SetParameters, '/contact_node/set_parameters',
+                           SetParameters.Request(parameters=bad)).results
+    assert not client.call(SetParametersAtomically, '/contact_node/set_parameters_atomically',
+                           SetParametersAtomically.Request(parameters=bad)).result.successful
+    assert f'{UNKNOWN_TYPE} is not a valid Parameter.Type' in node.output
+    client.assert_answered()
+    node.end()
+    assert node.process.returncode == 0
+
+
+# --- streams --------------------------------------------------------------------------------------
+
+
+@needs_proc
+def test_nothing_is_lost_at_1_kHz_and_memory_does_not_grow(node, client):
+    """5,000 ticks of two boxes; then some of which a third lacks a partner or has its own frame."""
+    stamps = []
+    for _ in rate_limited(5000, 1000):
+        stamps.append(client.send_pair(ORIGIN, TOUCHING))
+        client.keep_up(stamps)
+        client.poll()
+    assert client.are_answered(stamps)
+    assert client.spin(lambda: all(stamp in client.points for stamp in stamps))
+    assert client.spin(lambda: all(stamp in client.normals for stamp in stamps))
 
     def play(count):
         for number in rate_limited(count, 2000):
@@ -178,251 +234,90 @@ def test_memory_does_not_grow(start, client):
     assert memory(node) - before < LEAK
 
 
-def test_a_clock_that_jumps_back(start, client):
-    """Simulated time is set back by half a second, less than the stamps alone would tell.
-
-    What was known of the old time is dropped, and the new time is answered from its first tick.
-    """
-    running = start('use_sim_time:=true')
-    clock = client.node.create_publisher(Clock, '/clock', 10)
-
-    def set_clock(stamp):
-        """Say the time until the node's diagnostics carry it."""
-        message = Clock(clock=make_header(stamp, '').stamp)
-        deadline = time.monotonic() + PATIENCE
-        while not client.diagnostics or stamp_of(client.diagnostics[-1]) != stamp:
-            assert time.monotonic() < deadline, 'the node does not take the time'
-            clock.publish(message)
-            client.spin(lambda: False, 0.1)
-
-    def tick(stamp):
-        for publisher, pose in zip(client.publishers, (ORIGIN, TOUCHING)):
-            publisher.publish(cdr(pose, divmod(stamp, 10**9)))
-
-    start_of_time = client.next_stamp() + 10**12
-    set_clock(start_of_time + 5 * 10**8)
-    stamps = [start_of_time + 10**6 * number for number in range(500)]
-    for number, stamp in enumerate(stamps):
-        tick(stamp)
-        client.keep_up(stamps[:number + 1])
-    assert client.spin(lambda: all(stamp in client.clouds for stamp in stamps))
-    client.clouds.clear()
-    set_clock(start_of_time)
-    few = stamps[:AGAIN - 1]  # of more, the stamps would tell
-    for stamp in few:
-        tick(stamp)
-    assert client.spin(lambda: all(stamp in client.clouds for stamp in few)), len(client.clouds)
-    assert client.counts()['time went back'] >= 1
-    assert 'time went back: /clock was set back' in running.output
-
-
-def test_a_storm_of_parameters(start, client):
-    """Changes, good and bad, as fast as they are served, in a stream of 200 Hz.
-
-    No tick is lost, each is answered with one of the sizes that were set, and the last one stands.
-    """
-    start()
-    service = client.service(SetParameters, '/contact_node/set_parameters')
-    futures, stamps = [], []
-
-    def change(number):
-        values = ([2.0, 2.0, 2.0], [2.0, 2.0, 2.2], [2.0, -2.0, 2.0], [math.nan] * 3)[number % 4]
-        kind = ParameterType.PARAMETER_DOUBLE_ARRAY
-        futures.append(service.call_async(SetParameters.Request(parameters=[Parameter(
-            name='size_b', value=ParameterValue(type=kind, double_array_value=values))])))
-
-    for _ in rate_limited(600, 200):
-        stamps.append(client.send_pair(ORIGIN, (0, 0, 2.05, 0, 0, 0, 1)))
-        client.keep_up(stamps)
-        # One after the other: a service that is asked more than it answers drops requests.
-        if all(future.done() for future in futures[-1:]):
-            change(len(futures))
-        client.poll()
-    assert client.spin(lambda: all(future.done() for future in futures))
-    assert client.spin(lambda: all(stamp in client.clouds for stamp in stamps)), sum(
-        stamp not in client.clouds for stamp in stamps)
-    assert len(futures) > 100
-    success = [future.result().results[0].successful for future in futures]
-    assert success == [number % 4 < 2 for number in range(len(futures))]
-    depths = {round(float(row['depth']), 9) for stamp in stamps
-              for row in client.rows(stamp)}
-    assert depths == {0.05}
-    change(0)  # the first of the four
-    assert client.spin(futures[-1].done)
-    assert not len(client.rows(client.ask(ORIGIN, (0, 0, 2.05, 0, 0, 0, 1))))
-
-
-READER = """
-import rclpy
-from box_contact_ros.demo.ros_client import ANSWERS
-rclpy.init()
-node = rclpy.create_node('reader')
-node.create_subscription(*ANSWERS['cloud'], lambda _: print('heard', flush=True), 10)
-rclpy.spin(node)
+STREAM = """
+from raw_client import ORIGIN, TOUCHING
+from ros_client import Client
+client = Client()
+client.offer_until_answered(ORIGIN, TOUCHING)
+print('answered', flush=True)
+while True:
+    client.ask(ORIGIN, TOUCHING)
 """
 
 
-def test_a_subscriber_that_stops_reading(start, client):
-    """A program is stopped in its tracks (SIGSTOP) after it has heard a contact.
-
-    Everybody else is answered as before, and the node's memory does not grow.
-    """
-    node, deadline = start(), time.monotonic() + PATIENCE
-    with subprocess.Popen([sys.executable, '-c', READER], stdout=subprocess.PIPE) as reader:
-        try:
-            os.set_blocking(reader.stdout.fileno(), False)
-            while not reader.stdout.read():  # before discovery it would be no subscriber
-                assert reader.poll() is None and time.monotonic() < deadline
-                client.ask(ORIGIN, TOUCHING)
-            reader.send_signal(signal.SIGSTOP)
-            before = memory(node)
-            stamps = []
-            for _ in rate_limited(6000, 1500):  # the middleware keeps 5,000 where all is to be kept
-                stamps.append(client.send_pair(ORIGIN, TOUCHING))
-                client.keep_up(stamps)
-                client.poll()
-            assert client.spin(lambda: all(stamp in client.points for stamp in stamps))
-            assert memory(node) - before < LEAK
-            client.assert_answered()
-        finally:
-            reader.kill()
-
-
-def set_scene(client, service, text):
-    """Ask a node for a scene, and wait until it has it."""
-    future = service.call_async(SetParameters.Request(parameters=[Parameter(
-        name='scene', value=ParameterValue(type=ParameterType.PARAMETER_STRING,
-                                           string_value=text))]))
-    assert client.spin(future.done), 'no reply'
-    assert future.result().results[0].successful
-
-
-def test_scenes_change_while_deadlines_are_missed(program, client):
-    """Topics come and go with events of their publishers under way: the node lives and answers.
-
-    Served as events of EventsExecutor these ended the process, most often at the first change.
-    """
-    node = program('contact_node', *CUBES, '-p', 'deadline:=0.002')
-    node.wait_for_output('ready', 120)
-    sparse = [client.node.create_publisher(PoseStamped, f'box_{box}/pose', QoSProfile(
-        depth=10, deadline=Duration(seconds=0.001))) for box in 'ab']
-    scenes = ('{boxes: {box_c: {size: [2, 2, 2]}, box_d: {size: [2, 2, 2]}}, '
-              'pairs: [{id: 3, name: c_d, a: box_c, b: box_d}]}', '')
-    service = client.service(SetParameters, '/contact_node/set_parameters')
-    for number in range(20):
-        set_scene(client, service, scenes[number % 2])
-        for publisher in sparse:
-            publisher.publish(GOOD)
-        client.spin(lambda: False, 0.1)
-    assert client.counts()['deadlines missed'] > 0
+def test_publishers_killed_and_started_again(node, client):
+    """Each dies in mid-stream by kill -9: the next one is answered, and so are all others."""
+    environment = {**os.environ, 'PYTHONPATH': os.pathsep.join(
+        filter(None, (str(HELPERS), os.environ.get('PYTHONPATH'))))}
+    for _ in range(2):
+        with subprocess.Popen([sys.executable, '-c', STREAM], stdout=subprocess.PIPE, text=True,
+                              env=environment) as publisher:
+            try:
+                assert publisher.stdout.readline() == 'answered\n'
+                client.spin(lambda: False, 0.5)
+            finally:
+                publisher.send_signal(signal.SIGKILL)
+        client.assert_answered()
     assert node.process.poll() is None
 
 
-def test_topics_go_while_others_ask_for_what_they_do_not_offer(start, client):
-    """Subscribers of another quality of service come and go as pairs do, and the node's contacts.
+def test_two_nodes_in_namespaces(program):
+    """Each answers its own poses, and the other one's never."""
+    clients = []
+    try:
+        for name, height in (('/north', 1.875), ('/south', 1.75)):
+            running = program('contact_node', *CUBES, '-r', f'__ns:={name}')
+            running.wait_for_output(f'poses from {name}/box_a/pose', 120)
+            clients.append((Client(name), height))
+        for client, height in clients:
+            client.offer_until_answered(ORIGIN, APART)
+            contact = client.answer(ORIGIN, (0, 0, height, 0, 0, 0, 1))['box_a_box_b']
+            assert contact.separation == height - 2.0
+        (one, _), (other, _) = clients
+        assert not one.contacts.keys() & other.contacts.keys()
+    finally:
+        for client, _ in clients:
+            client.close()
 
-    Served as events of EventsExecutor these ended the process at one of the first changes.
+
+def test_configured_again_and_again_under_a_stream(node, client):
+    """Topics go and come while messages arrive, and subscribers ask for what they do not offer.
+
+    An event that waits in EventsExecutor for a topic that goes would end the process.
     """
-    node = start()
-    boxes = ', '.join(f'b{k}: {{size: [2, 2, 2]}}' for k in range(12))
-    scenes = [f'{{boxes: {{{boxes}}}, pairs: [' + ', '.join(
-        f'{{id: {100 * n + k}, name: p{n}_{k}, a: b{k}, b: b{k + 1}}}' for k in range(11)) + ']}'
-        for n in (1, 2)]
-    kind, contacts = ANSWERS['cloud']
-    topics = [contacts] + [f'p{n}_{k}/contact/point' for n in (1, 2) for k in range(11)]
-    late = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-    others = Node('others', context=client.context)
     stop = Event()
+    others = Node('others', context=client.context)
+
+    def publish():
+        for _ in rate_limited(10**9, 1000):
+            if stop.is_set():
+                return
+            client.send_pair(ORIGIN, TOUCHING)
 
     def come_and_go():
+        late = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         while not stop.is_set():
-            subscriptions = [others.create_subscription(
-                kind if topic == contacts else PointStamped, topic, print, late)
-                for topic in topics]
+            subscriptions = [others.create_subscription(message_type, topic, print, late)
+                             for message_type, topic in ((Contacts, 'contacts'),
+                                                         (PointStamped, 'contact/point'))]
             time.sleep(0.02)
             for subscription in subscriptions:
                 others.destroy_subscription(subscription)
 
-    thread = Thread(target=come_and_go)
-    thread.start()
+    threads = [Thread(target=publish), Thread(target=come_and_go)]
+    for thread in threads:
+        thread.start()
     try:
-        service = client.service(SetParameters, '/contact_node/set_parameters')
-        for number in range(20):
-            set_scene(client, service, scenes[number % 2])
-        change = client.client_of(ChangeState, '/contact_node/change_state')
-        state = client.service(GetState, '/contact_node/get_state')
-
-        def now():
-            future = state.call_async(GetState.Request())
-            assert client.spin(future.done), node.output
-            return future.result().current_state.label
-
-        for _ in range(5):
-            for label, goal in (('deactivate', 'inactive'), ('cleanup', 'unconfigured'),
-                                ('configure', 'inactive'), ('activate', 'active')):
-                # A reply may be lost as long as the way back is not matched: the state tells.
-                change.call_async(ChangeState.Request(transition=Transition(label=label)))
-                deadline = time.monotonic() + PATIENCE
-                while now() != goal:
-                    assert time.monotonic() < deadline, label
+        for _ in range(20):
+            for label in ('deactivate', 'cleanup', 'configure', 'activate'):
+                assert client.call(ChangeState, '/contact_node/change_state', ChangeState.Request(
+                    transition=Transition(label=label))).success, node.output
+            client.contacts.clear()
+            assert client.spin(lambda: len(client.contacts) > 10), node.output
     finally:
         stop.set()
-        thread.join()
+        for thread in threads:
+            thread.join()
         others.destroy_node()
-    set_scene(client, service, '')
-    client.offer_until_answered(ORIGIN, APART)
     client.assert_answered()
-
-
-FILL = ('mount -t tmpfs -o size=8m none /dev/shm && head -c {} /dev/zero > /dev/shm/full; '
-        'exec "$@"')
-
-
-def with_full_memory(filled):
-    """Command prefix: a mount namespace with 8 MB of shared memory, of which so many are taken."""
-    within = ['unshare', '--mount', 'sh', '-c', FILL.format(filled), 'sh']
-    if not shutil.which('unshare') or subprocess.run([*within, 'true'],
-                                                     capture_output=True).returncode:
-        pytest.skip('mount namespaces are not permitted here')
-    return within
-
-
-def test_shared_memory_is_almost_full(program):
-    """Less room in /dev/shm than Fast DDS takes, which would be killed by SIGBUS.
-
-    Node and crane talk without it, say so, and no message is lost (else the crane's status is not
-    0).
-    """
-    within = with_full_memory(8 * 2**20 - 200_000)
-    node = program('contact_node', *CUBES, within=within)
-    assert 'going without shared memory' in node.wait_for_output('ready', 120)
-    crane = program('crane', *CUBES, '-p', 'duration:=5', '-p', 'wait:=10', within=within)
-    assert crane.wait(120) == 0, crane.output
-    node.signal(signal.SIGINT)
-    assert node.wait() == 0 and 'Traceback' not in node.output
-
-
-def test_shared_memory_is_full(program):
-    """No page left: ROS 2's libraries would be killed as they are loaded; a clear line instead."""
-    node = program('contact_node', *CUBES, within=with_full_memory(8 * 2**20))
-    assert node.wait(60) == 1
-    assert node.output.splitlines()[-1].startswith('error: /dev/shm is full')
-
-
-def test_no_shared_memory_is_left_behind(start, client):
-    """A node that ends by itself leaves no segment of its own in /dev/shm.
-
-    Ports are shared with others. One that is killed does leave segments, which
-    docs/how-to/troubleshooting.md tells how to clear.
-    """
-    before = set(os.listdir('/dev/shm')) if os.path.isdir('/dev/shm') else set()
-    node = start()
-    with open(f'/proc/{node.process.pid}/maps') as file:
-        mapped = {line.split()[-1] for line in file if '/dev/shm/fastrtps_' in line}
-    segments = {path for path in mapped
-                if 'port' not in path and os.path.basename(path) not in before}
-    if not segments:
-        pytest.skip('Fast DDS uses no shared memory here')
-    node.signal(signal.SIGTERM)
-    assert node.wait() == 0
-    assert not any(os.path.exists(path) for path in segments)
+    assert node.process.poll() is None and 'Traceback' not in node.output

@@ -1,104 +1,95 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""What is accepted as a parameter's value, without a node."""
+"""What is accepted as a parameter's value, and on a node's command line."""
 from __future__ import annotations
 
-from collections import Counter
-from types import SimpleNamespace
+import math
 
 import pytest
+from rclpy.parameter import Parameter
+from ros_client import serving
 
-pytest.importorskip('rclpy')
+from box_contact_ros.node import contact_node, parameters
+from box_contact_ros.node.contact_node import ContactNode
 
-from box_contact_ros.node import declared_parameters, parameters
-from box_contact_ros.node.topics.qos_events import QosEvents
+SETTINGS = {'model': parameters.Setting('mlp', 'a test', parameters.text),
+            'size_a': parameters.Setting((1.0, 2.5), 'a test', parameters.numbers(2))}
 
 
 @pytest.mark.parametrize('check, value, words', [
     (parameters.number(0.0, 1.0), 'fast', "p must be a number, not 'fast'"),
     (parameters.number(0.0, 1.0), True, 'p must be a number, not True'),
     (parameters.number(0.0, 1.0), 1.5, 'p must lie within 0 and 1, not 1.5'),
+    (parameters.number(0.0, 1.0), math.nan, 'p must lie within 0 and 1, not nan'),
     (parameters.whole_number(1, 9), 2.0, 'p must be a whole number from 1 to 9, not 2.0'),
     (parameters.flag, 1, 'p must be true or false, not 1'),
     (parameters.text, 7, 'p must be a string, not 7'),
     (parameters.one_of(['a', 'b']), 'c', "p 'c' is not one of: a, b"),
-    (parameters.numbers(2), [1.0, float('nan')], 'p must be 2 finite numbers'),
-    (parameters.size, [1.0, 0.0, 1.0], r'p \(1, 0, 1\) is not positive')])
+    (parameters.numbers(2), [1.0, math.nan], 'p must be 2 finite numbers'),
+    (parameters.numbers(2), [True, True], 'p must be 2 finite numbers'),
+    (parameters.size, '222', "p must be 3 finite numbers, not \\['2', '2', '2'\\]"),
+    (parameters.size, [1.0, 2.0], 'p must be 3 finite numbers'),
+    (parameters.size, None, 'p must be 3 finite numbers, not None'),
+    (parameters.size, [1.0, 0.0, 1.0], r'p \(1, 0, 1\) is not positive'),
+    (parameters.size, [2.0, 2.0, 1e200], 'p .* is outside')])
 def test_a_refusal_names_the_parameter_and_the_value(check, value, words):
     with pytest.raises(ValueError, match=words):
         check('p', value)
 
 
-def test_only_a_near_name_is_proposed():
-    """A file for several nodes has names that are none of this one's."""
-    known = ('size_a', 'serialization', 'files_from')
-    assert parameters.unknown_name('parameter', 'sizea', known).endswith('(did you mean size_a?)')
-    for name in ('robot_description', 'robot', ''):
-        assert parameters.unknown_name('parameter', name, known) == f'unknown parameter {name!r}'
-
-
 def test_integers_are_as_good_as_floats():
     assert parameters.number(0.0, 3.0)('p', 2) == 2.0
     assert parameters.numbers(2)('p', [1, 2.5]) == (1.0, 2.5)
+    assert parameters.size('p', (1, 2, 3)) == (1.0, 2.0, 3.0)
 
 
-def test_a_descriptor_shows_range_choices_and_what_is_for_the_start():
-    """Doubles and whole numbers have ranges of their own; choices and counts are words."""
-    def described(default, check, fixed=False):
-        setting = parameters.Setting(default, 'a test', check)
-        return declared_parameters._descriptor(setting, read_only=fixed)
-    one, = described(0.5, parameters.number(0, 3)).floating_point_range
-    assert (one.from_value, one.to_value) == (0.0, 3.0)
-    one, = described(5, parameters.whole_number(1, 9)).integer_range
-    assert (one.from_value, one.to_value) == (1, 9)
-    found = described('a', parameters.one_of(['a', 'b']), fixed=True)
-    assert found.additional_constraints == 'one of: a, b' and found.read_only
-    assert described((1.0, 2.0), parameters.numbers(2)).additional_constraints == '2 finite numbers'
-    assert not described('a', parameters.text).floating_point_range
+def test_an_unknown_name_is_logged_with_the_nearest_one(capfd):
+    """And ignored: a file may be meant for several nodes, with names that are none of this one's.
+
+    So is a quality of service of a topic that the node does not have, but not those that it has.
+    """
+    given = {'size_a': [1, 2, 3], 'sizea': 1.0, 'robot_description': '', 'use_sim_time': False,
+             'qos_overrides./contacts.publisher.depth': 5,
+             'qos_overrides./contact.publisher.depth': 5}
+    with serving(lambda context: ContactNode(context, parameter_overrides=[
+            Parameter(name, value=value) for name, value in given.items()])) as node:
+        told = capfd.readouterr().err
+        assert node.get_parameter('qos_overrides./contacts.publisher.depth').value == 5
+        node.trigger_deactivate()
+        node.trigger_cleanup()
+        node.trigger_configure()  # again, with parameters that are declared
+    assert "unknown parameter 'sizea' (did you mean size_a?)" in told
+    assert "unknown parameter 'robot_description'; it is ignored" in told
+    assert "unknown parameter 'qos_overrides./contact.publisher.depth'" in told
+    assert told.count('unknown parameter') == 3
 
 
-@pytest.mark.parametrize('args, refused', [
-    (['-p', 'modle:=exact'], 'modle'), (['--param', 'contact:modle:=exact'], 'modle'),
-    (['-p', 'model:=a:=b', '-p', 'use_sim_time:=true'], ''),
-    (['-p', 'qos_overrides./a.publisher.depth:=5'], ''),
-    (['-p', 'modle:=exact', '--', '--shared-parameters'], ''),
-    (['--params-file', 'modle:=exact'], '')])
-def test_an_unknown_parameter_after_p_ends_the_program(args, refused, capsys):
-    """With status 2 and the nearest name, unless the caller shares its parameters among nodes."""
-    settings = {'model': parameters.Setting('mlp', 'a test', parameters.text)}
-    if not refused:
-        return parameters.answer_help('node', 'Test.', settings, ['--ros-args', *args])
-    with pytest.raises(SystemExit, match='2'):
-        parameters.answer_help('node', 'Test.', settings, ['--ros-args', *args])
-    assert f"unknown parameter '{refused}' (did you mean model?)" in capsys.readouterr().err
+def test_help_lists_all_parameters_with_their_defaults(capsys):
+    with pytest.raises(SystemExit) as ended:
+        contact_node.main(['--help'])
+    assert ended.value.code == 0
+    printed = capsys.readouterr().out
+    for name in (*contact_node.PARAMETERS, 'autostart'):
+        assert f'\n  {name} ' in printed
+    assert '[12.192,2.438,2.591]' in printed and 'default: none' in printed
 
 
 @pytest.mark.parametrize('args, words', [
     (['--model', 'exact'], 'parameters follow --ros-args: --ros-args -p model:=VALUE'),
-    (['--ros-args', '-p', 'model=exact'], "'model=exact' is not NAME:=VALUE")])
-def test_a_parameter_that_is_typed_in_another_way_gets_a_hint(args, words, capsys):
-    settings = {'model': parameters.Setting('mlp', 'a test', parameters.text)}
-    with pytest.raises(SystemExit, match='2'):
-        parameters.answer_help('node', 'Test.', settings, args)
-    assert words in capsys.readouterr().err
+    (['-p', 'rate:=1'], 'unrecognized arguments: -p rate:=1'),
+    (['--ros-args', '-p', 'model:=exact', '--', '--fast'], 'unrecognized arguments: --fast')])
+def test_options_outside_ros_args_are_refused(args, words, capsys):
+    """With status 2 and a hint."""
+    with pytest.raises(SystemExit) as ended:
+        parameters.answer_help('node', 'Test.', SETTINGS, args)
+    assert ended.value.code == 2 and words in capsys.readouterr().err
 
 
-def test_a_list_with_blanks_gets_a_hint(capsys):
-    """A shell cuts `-p size_a:=[1, 2, 3]` in three."""
-    settings = {'size_a': parameters.Setting((1.0,), 'a test', parameters.size)}
-    with pytest.raises(SystemExit, match='2'):
-        parameters.answer_help('node', 'Test.', settings,
-                               ['--ros-args', '-p', 'size_a:=[1,', '2,', '3]'])
-    assert 'write it without blanks, as in size_a:=[1,2,3]' in capsys.readouterr().err
-
-
-@pytest.mark.parametrize('change, lost', [(2, 2), (0, 0), (-1, 0)])
-def test_publishers_that_show_no_life_are_counted(change, lost):
-    """Publishers that came back are none that are lost."""
-    said, counts = [], Counter()
-    node = SimpleNamespace(get_logger=lambda: SimpleNamespace(warning=said.append))
-    event = QosEvents(node, counts).callbacks('load', deadline=False).liveliness
-    event(SimpleNamespace(not_alive_count_change=change))
-    assert counts['liveliness lost'] == lost
-    assert said == ['load: a publisher of its poses shows no life'] * bool(lost)
+def test_a_word_that_ros_does_not_know_ends_the_program(capsys, signal_handlers):
+    """With one line and status 1: -p is easily forgotten."""
+    parameters.answer_help('node', 'Test.', SETTINGS, ['--ros-args', '-p', 'model:=exact'])
+    assert contact_node.main(['--ros-args', 'model:=exact']) == 1
+    assert capsys.readouterr().err == (
+        "error: after --ros-args, ROS does not know ['model:=exact']: a parameter is "
+        '-p NAME:=VALUE, a name is remapped by -r FROM:=TO\n')

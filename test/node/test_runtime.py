@@ -1,21 +1,20 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""How a node starts, is served and ends; its QoS events and its options: all in this process."""
+"""How a node is served and ends, and what its callbacks may raise: without DDS where possible."""
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
-from collections import Counter
-from pathlib import Path
 from threading import Event, Thread, get_native_id
 from types import SimpleNamespace
 
-import poses
 import pytest
-from rclpy.event_handler import UnsupportedEventTypeError
+from geometry_msgs.msg import PoseStamped
+from rcl_interfaces.srv import ListParameters
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
@@ -23,16 +22,10 @@ from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 from ros_client import Client, serving
 
-from box_contact_ros.node import contact_node, contact_program, runtime
+from box_contact_ros.node import contact_node, runtime
 from box_contact_ros.node.contact_node import ContactNode
-from box_contact_ros.node.parameters import answer_help
 from box_contact_ros.node.rclpy_workarounds import RCLError, shut_down
-from box_contact_ros.node.topics import scene_topics
-from box_contact_ros.node.topics.qos_events import QosEvents
-from box_contact_ros.scene.stamp_pairing import RESETS
-
-CUBES = {'size_a': [2.0, 2.0, 2.0], 'size_b': [2.0, 2.0, 2.0], 'model': 'exact'}
-TOUCHING = (0.5, 0.25, 1.875, 0, 0, 0, 1)
+from box_contact_ros.scene.pairing import RESETS
 
 
 @pytest.fixture
@@ -243,160 +236,64 @@ def test_rclpy_without_events_executor(monkeypatch):
     client.close()
 
 
-def test_options_outside_ros_args_are_refused(capsys):
-    """With status 2 and a hint; help lists all parameters with their defaults, with status 0."""
-    for arguments, status in ((['--help'], 0), (['-p', 'rate:=1'], 2),
-                              (['--ros-args', '-p', 'model:=exact', '--', '--fast'], 2)):
-        with pytest.raises(SystemExit) as ended:
-            contact_program.main(arguments)
-        assert ended.value.code == status
-    printed = capsys.readouterr()
-    assert '--ros-args -p ' in printed.err
-    assert 'unrecognized arguments: --fast' in printed.err
-    for name in contact_program.PARAMETERS:
-        assert f'\n  {name} ' in printed.out
-    assert '[12.192,2.438,2.591]' in printed.out and 'default: none' in printed.out
-    answer_help('contact_node', '', contact_program.PARAMETERS,
-                ['--ros-args', '-p', 'pairing:=stamp'])
-
-
-def test_a_word_that_ros_does_not_know_ends_the_program(capsys):
-    """With one line and status 1: -p is easily forgotten."""
-    assert contact_program.main(['--ros-args', 'model:=exact']) == 1
-    assert capsys.readouterr().err == (
-        "error: after --ros-args, ROS does not know ['model:=exact']: a parameter is "
-        '-p NAME:=VALUE, a name is remapped by -r FROM:=TO\n')
-
-
-@pytest.mark.parametrize('choice', ['', *runtime.USERS_CHOICES])
-def test_settings_of_fast_dds_are_the_users_where_there_are_any(monkeypatch, tmp_path, choice):
-    """A file of ours, to free messages that are read, would replace them."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(os, 'environ', {choice: 'of a user'} if choice else {})
-    runtime.free_read_messages()
-    if choice:
-        assert os.environ == {choice: 'of a user'}
-        return
-    assert Path(os.environ.pop(runtime.PROFILES_FILE)).is_file()
-    assert os.environ.pop(runtime.QOS_FROM_FILE) == '1' and not os.environ
-    (tmp_path / runtime.USERS_FILE).touch()
-    runtime.free_read_messages()
-    assert not os.environ
-
-
-QUEUED = """
-import sys
-from geometry_msgs.msg import PoseStamped
-from rclpy.node import Node
-from box_contact_ros.node.runtime import POSE_QOS, give_back_memory, joined, spin_once
-
-def resident():  # memory [MB]
-    return int(open('/proc/self/statm').read().split()[1]) * 4096 / 2**20
-
-with joined(lambda context: Node('queued', context=context), []) as (node, executor):
-    read = []
-    node.create_subscription(PoseStamped, 'pose', lambda data: read.append(len(data)), POSE_QOS,
-                             raw=True)
-    publisher = node.create_publisher(PoseStamped, 'pose', POSE_QOS)
-    message = bytes(2**20)
-    before = resident()
-    for _ in range(60):
-        publisher.publish(message)
-    queued = resident() - before
-    while executor and len(read) < 60:
-        spin_once(node, executor, 1.0)
-    give_back_memory()
-    print(len(read), queued, resident() - before)
-"""
-
-
-@pytest.mark.skipif(not os.path.isdir('/proc/self'), reason='no /proc: not Linux')
-@pytest.mark.parametrize('choice, kept', [({}, False), ({runtime.QOS_FROM_FILE: '0'}, True)])
-def test_messages_that_are_read_are_freed(monkeypatch, choice, kept):
-    """By default Fast DDS keeps the size of the largest message for each place in a queue."""
-    for name in runtime.USERS_CHOICES:
-        monkeypatch.delenv(name, raising=False)
-    done = subprocess.run([sys.executable, '-c', QUEUED], env={**os.environ, **choice},
-                          capture_output=True, text=True, timeout=120)
-    assert done.returncode == 0, done.stderr
-    read, queued, left = map(float, done.stdout.split())
-    assert read == 60 and queued > 50.0 and (left > 50.0) is kept
-
-
 def test_main_serves_its_node(monkeypatch):
     """With the arguments that it was given."""
-    seen = []
-    monkeypatch.setattr(runtime, 'run_node', lambda *call: seen.append(call) or 0)
-    assert contact_program.main(['--ros-args']) == 0
-    (kind, args), = seen
-    assert issubclass(kind, ContactNode) and args == ['--ros-args']
+    calls = []
+    monkeypatch.setattr(contact_node, 'run_node', lambda *call: calls.append(call) or 0)
+    assert contact_node.main(['--ros-args']) == 0
+    (_, args), = calls
+    assert args == ['--ros-args']
 
 
-# --- QoS events -----------------------------------------------------------------------------------
+# --- GuardedNode ----------------------------------------------------------------------------------
 
 
-def test_events_are_counted_and_told():
-    """Liveliness counts what is lost, not what is back; deadlines and losses count each."""
-    told: list[str] = []
-    logger = SimpleNamespace(warning=lambda text, **_: told.append(text), info=told.append)
-    counts: Counter[str] = Counter()
-    callbacks = QosEvents(SimpleNamespace(get_logger=lambda: logger), counts).callbacks(
-        'load', deadline=True)
-    for lost in (1, -1, 0):
-        callbacks.liveliness(SimpleNamespace(not_alive_count_change=lost))
-    callbacks.deadline(SimpleNamespace(total_count_change=2))
-    callbacks.message_lost(SimpleNamespace(total_count_change=3))
-    assert counts == {'liveliness lost': 1, 'deadlines missed': 2, 'lost in transport': 3}
-    assert told == ['load: a publisher of its poses shows no life',
-                    'load: no pose within the deadline']
-    assert QosEvents(SimpleNamespace(), counts).callbacks('load', deadline=False).deadline is None
+class Failing(runtime.GuardedNode):
+    """Raises in every callback."""
+
+    def __init__(self, context):
+        super().__init__('failing', context=context)
+        self.failures = 0
+        self.create_subscription(PoseStamped, 'pose', self.fail, 10)
+        self.create_timer(0.01, self.fail)
+
+    def fail(self, *_):
+        self.failures += 1
+        raise (ValueError if self.failures % 2 else KeyError)('planted')
 
 
-@pytest.fixture
-def client():
+def test_what_a_callback_raises_is_logged_and_the_node_goes_on(capfd):
+    """Under the topic or the callback's name, each kind once a second; a service answers empty."""
     client = Client()
-    yield client
-    client.close()
+    publisher = client.node.create_publisher(PoseStamped, 'pose', 10)
+    try:
+        with serving(Failing) as node:
+            assert client.spin(publisher.get_subscription_count)
+            list_parameters = node.answered(lambda *_: node.fail(), 'list_parameters')
+            assert not list_parameters(None, ListParameters.Response()).result.names
+            for _ in range(10):
+                publisher.publish(PoseStamped())
+            assert client.spin(lambda: node.failures > 40)
+    finally:
+        client.close()
+    lines = [line for line in capfd.readouterr().err.splitlines() if '; ignored' in line]
+    assert 2 <= len(lines) < 20
+    assert any('[WARN]' in line and line.endswith(': planted; ignored') for line in lines)
+    assert any('[ERROR]' in line and line.endswith(": KeyError: 'planted'; ignored")
+               for line in lines)
+    assert all(re.search(r'\[failing\]: (list_parameters|pose|fail): ', line) for line in lines)
 
 
-class WithoutEvents(ContactNode):
-    """On a middleware that has no such events."""
-
-    def create_subscription(self, *arguments, event_callbacks=None, **options):
-        if event_callbacks is not None:
-            raise UnsupportedEventTypeError('no events here')
-        return super().create_subscription(*arguments, **options)
-
-
-def test_a_middleware_without_events_is_answered(client):
-    """A node without them subscribes without them."""
-    with serving(lambda context: WithoutEvents(context, parameter_overrides=[
-            Parameter(name, value=value) for name, value in CUBES.items()])):
-        client.offer_until_answered(poses.IDENTITY, TOUCHING)
-
-
-def test_a_node_without_the_messages_of_contacts(monkeypatch, capfd):
-    """The log tells where contacts are instead, as `ros2 topic echo /contacts` would wait."""
-    for module in (contact_node, scene_topics):
-        monkeypatch.setattr(module, 'ContactsMessage', None)
+def test_a_clock_that_is_changed_begins_a_new_time(capfd):
+    """`use_sim_time` set while the node runs; then the node is shut down."""
+    client = Client()
     with serving(lambda context: ContactNode(context, parameter_overrides=[
-            Parameter(name, value=value) for name, value in CUBES.items()])) as node:
-        assert 'contacts are published as contacts_cloud alone' in capfd.readouterr().err
-        topics = {publisher.topic_name for publisher in node.publishers}
-        assert '/contacts_cloud' in topics and '/contacts' not in topics
-
-
-def test_a_node_is_told_of_its_clock_and_of_names_that_are_none(client, capfd):
-    """A misspelt parameter is named at the start, a clock that changes is counted; then it ends."""
-    given = CUBES | {'modle': 'mlp', 'autostart': True}
-    with serving(lambda context: ContactNode(context, parameter_overrides=[
-            Parameter(name, value=value) for name, value in given.items()])) as node:
-        assert "unknown parameter 'modle'" in (told := capfd.readouterr().err)
-        assert 'did you mean model?' in told
-        result, = node.set_parameters([Parameter('pair_topics', value='yes')])
-        assert result.reason == "pair_topics must be true or false, not 'yes'"
+            Parameter('model', value='exact')])) as node:
         node.set_parameters([Parameter('use_sim_time', value=True)])
         assert client.spin(lambda: node.counts[RESETS] == 1)
         assert 'use_sim_time was changed' in capfd.readouterr().err
         node.trigger_shutdown()
-        assert not any('pose' in entity.topic_name for entity in node.subscriptions)
+        assert client.spin(lambda: any(
+            message.status[0].message == 'finalized: no pose is answered'
+            for message in client.diagnostics))
+    client.close()

@@ -20,17 +20,17 @@ def name_of(requirement):
     return re.match(r'[A-Za-z0-9._-]+', requirement)[0].lower().replace('_', '-')
 
 
-found, open_ = set(), [name_of(requirement) for requirement in NEEDED]
+installed, open_ = set(), [name_of(requirement) for requirement in NEEDED]
 while open_:
     name = open_.pop()
-    if name not in found:
-        found.add(name)
+    if name not in installed:
+        installed.add(name)
         try:
             open_ += [name_of(r) for r in requires(name) or () if 'extra ==' not in r]
         except PackageNotFoundError:  # of another platform
             pass
 refused = {{module for module, names in packages_distributions().items()
-           if not found & {{name.lower().replace('_', '-') for name in names}}}}
+           if not installed & {{name.lower().replace('_', '-') for name in names}}}}
 refused -= {{'box_contact_ros', '_ros_wheels_bootstrap'}}
 
 
@@ -46,7 +46,7 @@ exec(PROGRAM)
 SOLVER = """
 from box_contact_ros import ContactSolver
 from box_contact_ros.scene.scene_solver import SceneSolver
-from box_contact_ros.scene.files.scene_file import read_scene
+from box_contact_ros.scene.scene_file import read_scene
 for model in ('exact', 'mlp', 'paper'):
     ContactSolver((2, 2, 2), (2, 2, 2), model=model)([0] * 6 + [1], [0] * 6 + [1])
 SceneSolver(read_scene('config/scenes/yard_bay.yaml'))
@@ -57,18 +57,23 @@ from rclpy.parameter import Parameter
 from box_contact_ros.node.contact_node import ContactNode
 context = rclpy.Context()
 rclpy.init(context=context)
-ContactNode(context, parameter_overrides=[
-    Parameter('scene', value='config/scenes/yard_bay.yaml')]).destroy_node()
+node = ContactNode(context, parameter_overrides=[
+    Parameter('scene', value='config/scenes/yard_bay.yaml')])
+node.start()
+node.destroy_node()
 context.try_shutdown()
 """
 
 
-@pytest.mark.parametrize('names, program', [((), SOLVER), (('ros',), NODE)],
-                         ids=['solver', 'node'])
-def test_installed_without_extras(names, program, setup_arguments, tmp_path):
-    """From another folder than the checkout, too: scenes of the package's own are found."""
-    needed = setup_arguments['install_requires'] + [
-        one for name in names for one in setup_arguments['extras_require'][name]]
+@pytest.mark.parametrize('names, beside, program', [
+    ((), [], SOLVER), (('ros',), ['box_contact_msgs'], NODE)], ids=['solver', 'node'])
+def test_installed_without_extras(names, beside, program, setup_arguments, tmp_path):
+    """From another folder than the checkout, too: scenes of the package's own are found.
+
+    beside: the package of messages, which is installed from the checkout with the extra ros.
+    """
+    needed = [*setup_arguments['install_requires'], *beside, *(
+        requirement for name in names for requirement in setup_arguments['extras_require'][name])]
     script = RUN.format(needed=needed, program=program)
     done = subprocess.run([sys.executable, '-c', script], cwd=tmp_path, capture_output=True,
                           text=True, timeout=300)

@@ -13,15 +13,14 @@ import pytest
 import yaml
 from geometry_msgs.msg import PointStamped, Vector3Stamped
 from rclpy.parameter import Parameter
-from rclpy.qos import QoSProfile
-from ros_client import Client, serving, stamp_of
+from ros_client import Client, serving
 
 pytest.importorskip('fcl')
 
+from box_contact_msgs.msg import Contacts
 from box_contact_ros import ContactSolver
-from box_contact_ros.demo.ros_client import ANSWERS
 from box_contact_ros.node.contact_node import ContactNode
-from box_contact_ros.node.messages import PATCH_FIELDS, read_contacts
+from box_contact_ros.node.messages import contacts_by_pair
 from box_contact_ros.resources import resource_path
 from box_contact_ros.soup.soup_node import SoupNode
 
@@ -29,6 +28,8 @@ ORIGIN = poses.IDENTITY
 TOUCHING = np.array([0.5, 0.25, 1.875, 0.1, 0.2, 0, 1])
 APART = np.array([0.5, 0.25, 4.0, 0, 0, 0, 1])
 SIZES = {'size_a': [2.0, 2.0, 2.0], 'size_b': [2.0, 2.0, 2.0]}
+PAIR = 'box_a_box_b'
+TOPICS = {'contact/point': PointStamped, 'contact/normal': Vector3Stamped, 'contacts': Contacts}
 
 
 class BothClient(Client):
@@ -36,23 +37,13 @@ class BothClient(Client):
 
     def __init__(self):
         super().__init__()
-        self.soup = {'point': {}, 'normal': {}, 'contacts': {}}
-        for kind, topic in ((PointStamped, 'contact/point'), (Vector3Stamped, 'contact/normal'),
-                            ANSWERS['cloud']):
-            kept = self.soup[topic.rpartition('/')[2].removesuffix('_cloud')]
-            self.node.create_subscription(
-                kind, f'soup/{topic}', self._keep_soup(f'soup/{topic}', kept),
-                QoSProfile(depth=10_000))
+        self.soup = {topic: {} for topic in TOPICS}
+        for topic, message_type in TOPICS.items():
+            self.keep(message_type, f'soup/{topic}', self.soup[topic])
 
-    def _keep_soup(self, topic, kept):
-        def callback(message):
-            kept[stamp_of(message)] = message
-            self.order.append((topic, stamp_of(message)))
-        return callback
-
-    def ask_both(self, pose_a, pose_b, **options):
-        """Send a pair and wait for both clouds; the stamp."""
-        stamp = self.ask(pose_a, pose_b, **options)
+    def ask_soup(self, *poses, **options):
+        """Send a pair and wait for the contacts of the soup node; return the stamp."""
+        stamp = self.send(*poses, **options)
         assert self.spin(lambda: stamp in self.soup['contacts']), 'no answer under soup/'
         return stamp
 
@@ -61,79 +52,75 @@ def overrides(**values):
     return [Parameter(name, value=value) for name, value in (SIZES | values).items()]
 
 
-@pytest.fixture(scope='module')
-def soup_node():
-    with serving(lambda context: SoupNode(
-            context, parameter_overrides=overrides(divisions=4))) as node:
-        yield node
+def offer_until_the_soup_answers(client):
+    assert client.spin(lambda: client.soup['contacts'] or not client.send(ORIGIN, APART))
 
 
-@pytest.fixture(scope='module')
-def client(soup_node):
-    """With a contact node beside the soup node; both have answered."""
+@pytest.fixture
+def client():
     client = BothClient()
-    with serving(lambda context: ContactNode(
-            context, parameter_overrides=overrides(model='exact'))):
-        client.offer_until_answered(ORIGIN, APART)
-        assert client.spin(lambda: client.soup['contacts'] or not client.send(ORIGIN, APART))
-        yield client
+    yield client
     client.close()
 
 
-def test_both_nodes_answer_one_input(client):
-    """The same header; each with its own solver's numbers, point and normal before the cloud."""
-    stamp = client.ask_both(ORIGIN, TOUCHING, frames=('yard', 'yard'))
+@pytest.fixture
+def soup_node(client):
+    with serving(lambda context: SoupNode(
+            context, parameter_overrides=overrides(divisions=4))) as node:
+        offer_until_the_soup_answers(client)
+        yield node
+
+
+def test_both_nodes_answer_one_input(client, soup_node):
+    """The same header; each with its own solver's numbers, point and normal before contacts."""
+    with serving(lambda context: ContactNode(
+            context, parameter_overrides=overrides(model='exact'))):
+        client.offer_until_answered(ORIGIN, APART)
+        stamp = client.ask_soup(ORIGIN, TOUCHING, frames=('yard', 'yard'))
+        assert client.is_answered(stamp)
     wanted = ContactSolver(poses.CUBE, poses.CUBE, model='soup-4')(ORIGIN, TOUCHING)
-    point, normal, cloud = (client.soup[name][stamp] for name in ('point', 'normal', 'contacts'))
-    assert point.header == normal.header == cloud.header == client.points[stamp].header
+    point, normal, contacts = (client.soup[topic][stamp] for topic in TOPICS)
+    assert point.header == normal.header == contacts.header == client.points[stamp].header
     assert point.header.frame_id == 'yard'
     assert (point.point.x, point.point.y, point.point.z) == tuple(wanted.point)
     assert (normal.vector.x, normal.vector.y, normal.vector.z) == tuple(wanted.normal)
-    row, = read_contacts(cloud, client.ids)
-    assert tuple(row)[3:11] == (0, *wanted.point, *wanted.normal, -wanted.separation)
-    assert all(math.isnan(row[name]) for name in PATCH_FIELDS)  # a soup gives the point alone
+    soup = contacts_by_pair(contacts)[PAIR]
+    assert soup.separation == wanted.separation and np.array_equal(soup.point, wanted.point)
+    assert math.isnan(soup.volume)  # a soup gives the point alone
     assert [topic for topic, at in client.order if at == stamp and topic.startswith('soup/')] == [
-        'soup/contact/point', 'soup/contact/normal', f'soup/{ANSWERS["cloud"][1]}']
-    exact, = client.rows(stamp)
-    assert row['depth'] == exact['depth'] and row['point_x'] != exact['point_x']
+        f'soup/{topic}' for topic in TOPICS]
+    exact = contacts_by_pair(client.contacts[stamp])[PAIR]
+    assert soup.separation == exact.separation and soup.point[0] != exact.point[0]
 
 
-def test_a_contained_box_is_answered(client, soup_node):
+def test_a_contained_box_is_answered(client):
     """The soup's surfaces may not meet: an answer with finite numbers all the same."""
-    result, = soup_node.set_parameters([Parameter('size_b', value=[0.5, 0.5, 0.5])])
-    assert result.successful
-    row, = read_contacts(client.soup['contacts'][client.ask_both(ORIGIN, (0.2, 0, 0, 0, 0, 0, 1))])
-    assert all(math.isfinite(row[name]) for name in row.dtype.names if name not in PATCH_FIELDS)
-    result, = soup_node.set_parameters([Parameter('size_b', value=[2.0, 2.0, 2.0])])
-    assert result.successful
+    with serving(lambda context: SoupNode(
+            context, parameter_overrides=overrides(divisions=4, size_b=[0.5, 0.5, 0.5]))):
+        offer_until_the_soup_answers(client)
+        stamp = client.ask_soup(ORIGIN, (0.2, 0, 0, 0, 0, 0, 1))
+    contact = contacts_by_pair(client.soup['contacts'][stamp])[PAIR]
+    assert np.isfinite([*contact.point, *contact.normal, contact.separation]).all()
 
 
 def test_its_topics_are_the_documents(client, soup_node):
-    """Those of the contact node, with soup/ before what is sent; the same types and QoS."""
+    """Those of the contact node, with soup/ before what is sent; the same QoS."""
     document = yaml.safe_load(resource_path('msg_schemas', 'asyncapi.yaml').read_text('utf-8'))
-    addresses = {channel['address'] for channel in document['channels'].values()} - {
-        'poses', 'contact_node/scene', 'contact/wrench',  # a soup has no patch
-        *({'contacts', 'contacts_cloud'} - {ANSWERS['cloud'][1]})}
+    addresses = {channel['address'] for channel in document['channels'].values()} - {'poses'}
     inputs = {'box_a/pose', 'box_b/pose', '/diagnostics'}
     expected = {f'/{name.lstrip("/")}' if name in inputs else f'/soup/{name}'
                 for name in addresses}
-    own = {'/parameter_events', '/rosout', '/soup_node/scene'}
     assert {entity.topic_name for entity in (*soup_node.publishers, *soup_node.subscriptions)
-            } - own == expected
-    for name in ('contact/point', 'contact/normal', ANSWERS['cloud'][1]):
-        def publishers(topic=name):
-            return [client.node.get_publishers_info_by_topic(prefix + topic)
-                    for prefix in ('', 'soup/')]
-
-        # A node of another test may still be leaving.
-        assert client.spin(lambda: [len(found) for found in publishers()] == [1, 1])
-        (one,), (other,) = publishers()
-        assert one.topic_type == other.topic_type
-        assert one.qos_profile.reliability == other.qos_profile.reliability
-        assert one.qos_profile.durability == other.qos_profile.durability
+            } - {'/parameter_events', '/rosout'} == expected
+    with serving(lambda context: ContactNode(context, parameter_overrides=overrides())) as node:
+        qos_of, qos_of_soup = (
+            {publisher.topic_name.removeprefix('/soup'): publisher.qos_profile
+             for publisher in each.publishers} for each in (node, soup_node))
+        for topic in TOPICS:
+            assert qos_of[f'/{topic}'] == qos_of_soup[f'/{topic}']
 
 
-def test_the_contact_node_knows_the_soup_too(client):
+def test_the_contact_node_knows_the_soup_too():
     """model:=soup-2 is a model like any other."""
     with serving(lambda context: ContactNode(context, parameter_overrides=overrides(
             model='soup-2'))) as node:

@@ -1,0 +1,103 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""The oracle of messages: what the node reads and writes as bytes, by rclpy's message objects."""
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from geometry_msgs.msg import (
+    Point,
+    PointStamped,
+    Pose,
+    PoseArray,
+    PoseStamped,
+    Quaternion,
+    Vector3,
+    Vector3Stamped,
+)
+from std_msgs.msg import Header
+
+from box_contact_msgs.msg import Contact as ContactMessage
+from box_contact_msgs.msg import Contacts
+from box_contact_ros.node.messages import NANOSECONDS, UPPER, Refused, make_header
+from box_contact_ros.scene.pairing import StampedPose
+from box_contact_ros.scene.scene_solver import Answer
+from box_contact_ros.solver.checks import pose_fault
+from box_contact_ros.solver.contact import Contact, patch_area
+
+
+def pose_stamped(numbers: Iterable[float], frame_id: str, stamp: int) -> PoseStamped:
+    """Return the message of a pose `x y z qx qy qz qw`; stamp [ns]."""
+    return PoseStamped(header=make_header(stamp, frame_id), pose=_pose(numbers))
+
+
+def pose_array(rows: Iterable[Iterable[float]], frame_id: str, stamp: int) -> PoseArray:
+    """Return the message of poses (n, 7); stamp [ns]."""
+    return PoseArray(header=make_header(stamp, frame_id), poses=[_pose(row) for row in rows])
+
+
+def _pose(numbers: Iterable[float]) -> Pose:
+    x, y, z, qx, qy, qz, qw = map(float, numbers)
+    return Pose(position=Point(x=x, y=y, z=z), orientation=Quaternion(x=qx, y=qy, z=qz, w=qw))
+
+
+def read_pose(message: PoseStamped) -> StampedPose:
+    """Return the pose of a message, or raise Refused."""
+    numbers = _numbers(message.pose)
+    pose = _stamped(np.array(numbers), message.header)
+    fault = pose_fault(numbers)
+    if fault:
+        raise Refused('bad pose', fault)
+    return pose
+
+
+def read_poses(message: PoseArray) -> StampedPose:
+    """Return all poses of a message, numbers (n, 7) as they are, or raise Refused."""
+    numbers = np.array([_numbers(pose) for pose in message.poses], dtype=float).reshape(-1, 7)
+    return _stamped(numbers, message.header)
+
+
+def _numbers(pose: Pose) -> Sequence[float]:
+    p, q = pose.position, pose.orientation
+    return p.x, p.y, p.z, q.x, q.y, q.z, q.w
+
+
+def _stamped(numbers: np.ndarray, header: Header) -> StampedPose:
+    if header.stamp.nanosec >= NANOSECONDS:
+        raise Refused('bad header', 'a second or more of nanoseconds')
+    if '\N{REPLACEMENT CHARACTER}' in header.frame_id:  # what rclpy makes of other bytes
+        raise Refused('bad header', 'frame_id is not UTF-8')
+    return StampedPose(numbers, header.frame_id,
+                       header.stamp.sec * NANOSECONDS + header.stamp.nanosec)
+
+
+def make_point(header: Header, contact: Contact) -> PointStamped:
+    """Return `contact/point`."""
+    return PointStamped(header=header, point=_point(contact.point))
+
+
+def make_normal(header: Header, contact: Contact) -> Vector3Stamped:
+    """Return `contact/normal`."""
+    return Vector3Stamped(header=header, vector=_vector(contact.normal))
+
+
+def make_contacts(header: Header, answer: Answer) -> Contacts:
+    """Return `contacts`: the pairs in contact, then the close ones, and the names of the stale."""
+    return Contacts(
+        header=header, stale=[pair.label for pair in answer.stale],
+        contacts=[ContactMessage(
+            pair=pair.label, box_a=pair.a, box_b=pair.b, point=_point(c.point),
+            normal=_vector(c.normal), depth=-float(c.separation), volume=float(c.volume),
+            area=patch_area(c), covariance=c.covariance[UPPER]) for pair, c in answer.listed])
+
+
+def _point(numbers: np.ndarray) -> Point:
+    x, y, z = map(float, numbers)
+    return Point(x=x, y=y, z=z)
+
+
+def _vector(numbers: np.ndarray) -> Vector3:
+    x, y, z = map(float, numbers)
+    return Vector3(x=x, y=y, z=z)
