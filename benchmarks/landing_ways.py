@@ -19,6 +19,7 @@ from functools import partial
 from typing import Any, NamedTuple, Self
 
 import numpy as np
+from box_contact_ros.scene.force.laws import Body
 
 from box_contact_ros.demo.landing import (
     TILT_LIMIT,
@@ -38,7 +39,6 @@ from box_contact_ros.demo.load_laws import (
     predicted_wrench,
 )
 from box_contact_ros.demo.mujoco_crane import Crane, CraneScenario
-from box_contact_ros.scene.force.laws import Body
 from box_contact_ros.solver.contact import Contact
 
 from .contestant import Manifold, chosen
@@ -257,7 +257,6 @@ WAYS = {
     'point': _point('exact', _exact),
     'mujoco-mean': _point('MuJoCo, mean point', partial(mujoco_sources, choice='mean')),
     'mujoco-deepest': _point('MuJoCo, deepest point', partial(mujoco_sources, choice='deepest')),
-    'fcl': _point('fcl', partial(solvers, model='fcl')),
-    'soup': _point('soup', partial(solvers, model='soup'), every=13),
+    'soup': _point('soup-8', partial(solvers, model='soup-8'), every=13),
 }
 """By name: the ways that the table has."""

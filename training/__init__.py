@@ -1,4 +1,7 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Data sets, fitting and the program `train`. Drawing and folding samples needs no PyTorch."""
+"""Samples, fit and recipe of the network of `mlp`; `python -m training` makes all weights.
+
+The data and the fit of the paper's networks are in `benchmarks.paper`.
+"""

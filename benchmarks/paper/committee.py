@@ -4,20 +4,21 @@
 """The committee of the source paper's section 7: errors of its models by kind of contact."""
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from box_contact_ros.resources import resource_path
 from box_contact_ros.scene.pose import degrees_between
 from box_contact_ros.solver.weights_file import load_weights
 
 from .. import output
-from ..contestant import ours
+from ..contestant import Contestant, ours
 from ..errors import distances
 from ..pose_sets import CUBE, Pairs
 from . import dataset
-from .dataset import CLASSES, Placements
+from .dataset import Placements
+from .models import EXPERTS, committee, continuous, weights_path
 
-MODELS = ('paper', 'paper-committee', 'paper-continuous')
 COUNT = 20_000  # placements of each kind
 SEED = 37  # other placements than any training's
 PRESSED = 1e-9  # by which they are made to overlap, so that rounding parts none [m]
@@ -26,17 +27,17 @@ PRESSED = 1e-9  # by which they are made to overlap, so that rounding parts none
 def placements(step: int) -> dict[str, Placements]:
     """Return placements by kind of contact, new ones for every network."""
     rng = np.random.default_rng(SEED)
-    kinds = zip(CLASSES, (*dataset.GENERATORS, dataset.face_face_candidates))
+    kinds = zip(EXPERTS, (*dataset.GENERATORS, dataset.face_face_candidates))
     return {kind: dataset.touching(rng, COUNT // step, CUBE, candidates)
             for kind, candidates in kinds}
 
 
-def errors(model: str, some: Placements) -> tuple[float, float]:
+def errors(model: Contestant, some: Placements) -> tuple[float, float]:
     """Return the mean error of the point [mm] and of the normal [deg] against the labels."""
     a, b = dataset.as_poses(some.inputs)
     b[:, :3] -= PRESSED * dataset.query(some).normal
     sizes = np.tile(CUBE, (len(a), 1))
-    found, _ = ours(model).solve(Pairs(a, b, sizes, sizes))
+    found, _ = model.solve(Pairs(a, b, sizes, sizes))
     return (1e3 * float(distances(found.point, some.point).mean()),
             float(degrees_between(found.normal, some.normal).mean()))
 
@@ -45,14 +46,15 @@ def section(step: int) -> str:
     """Return the section: errors by model and kind, and how often the classifier is wrong."""
     kinds = placements(step)
     rows = []
-    for model in MODELS:
-        row: list[object] = [f'`{model}`']
+    for model in (ours('paper'), *(replace(ours(one), name=one.name)
+                                   for one in (committee(), continuous()))):
+        row: list[object] = [f'`{model.name}`']
         for some in kinds.values():
             point, normal = errors(model, some)
             row += [f'{point:.0f}', f'{normal:.1f}']
         rows.append(row)
     head = [f'{kind}: {what}' for kind in kinds for what in ('point [mm]', 'normal [°]')]
-    card = load_weights(resource_path('weights', 'paper-committee.safetensors')).card
+    card = load_weights(weights_path('paper-committee')).card
     return output.page('benchmarks/paper/pages/committee', table=output.markdown_table(
         ['', *head], rows), wrong=100 * card['metrics']['classifier']['external']['wrong'],
         count=COUNT // step)

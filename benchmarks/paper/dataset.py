@@ -17,14 +17,14 @@
 2. Patterns. Inputs are the second box's offset t [m], and its roll, pitch and yaw [rad], in the
    first box's frame: R = Rz(yaw) Ry(pitch) Rx(roll). Outputs are azimuth and elevation [rad] of the
    impact point's direction from the first box's centre, then of the normal.
-   - `paper`: folded into the network's domain, or left as drawn. The fold is `symmetry.OCTANT`:
-     t ≥ 0, angles in [−π/2, π/2].
+   - `paper`: folded into the network's domain, or left as drawn. The fold is
+     `solver.paper.to_octant`: t ≥ 0, angles in [−π/2, π/2].
    - `committee`: for cubes, folded like `paper`. Each expert has placements of one kind. The third
      kind is face-face: see `face_face_candidates`. The classifier has all three kinds, and an
      output for each: 1 for the kind of the placement, 0 for the others.
    - `continuous`: for cubes. The features that meet, by SAT, choose the subset. The fold
-     `symmetry.FEATURES` brings them to the reference features. The same pose always falls in the
-     same subset, however it was drawn.
+     `features.to_features` brings them to the reference features. The same pose always falls in
+     the same subset, however it was drawn.
 
 Everything is drawn from one seed, every set from a stream of its own. So any set can be made
 without the others.
@@ -39,18 +39,19 @@ from typing import Any
 import numpy as np
 
 from box_contact_ros.core import Stages, stages
-from box_contact_ros.paper.symmetry import EDGE_EDGE, FEATURES, NO_FOLD, OCTANT, VERTEX_FACE
-from box_contact_ros.paper.symmetry import fold as fold_pairs
 from box_contact_ros.scene.pose import quaternion_multiply, rotation_matrix
 from box_contact_ros.solver.contact_solver import ContactSolver
+from box_contact_ros.solver.paper import TouchingPairs, euler_angles, to_octant
 
 from ..pose_sets import CUBE, turns
+from .features import to_features
+from .models import EXPERTS, SUBSETS
 
 SETS = ('training', 'cross-validation', 'external')
 PAPER_COUNTS = (8000, 5000, 75000)  # patterns per set, with discontinuities
 CONTINUOUS_COUNTS = (10000, 6000, 50000)  # patterns per set and subset, without discontinuities
-CLASSES = ('vertex', 'edge', 'face')  # of contacts, an expert of the committee each
-SUBSETS = {'vertex_face': VERTEX_FACE, 'edge_edge': EDGE_EDGE}
+NO_FOLD, OCTANT, FEATURES = 'as drawn', 'to the octant', 'to reference features'
+"""Ways into a network's domain."""
 
 INPUTS = ('t_x', 't_y', 't_z', 'roll', 'pitch', 'yaw')
 OUTPUTS = ('point azimuth', 'point elevation', 'normal azimuth', 'normal elevation')
@@ -229,13 +230,6 @@ def face_face_candidates(rng: np.random.Generator, count: int, half: np.ndarray,
     return Placements(size, inputs, point, np.where(meet[:, None], normal, np.nan))
 
 
-def euler_angles(rotation: np.ndarray) -> np.ndarray:
-    """Return roll, pitch, yaw (n, 3) [rad] of rotations (n, 3, 3)."""
-    zeros = np.zeros(len(rotation))
-    return fold_pairs(NO_FOLD, np.zeros((len(rotation), 3)), rotation, axis=zeros,
-                      normal=np.zeros((len(rotation), 3))).angles
-
-
 GENERATORS = (vertex_face_candidates, edge_edge_candidates)
 
 
@@ -278,7 +272,7 @@ class Folded:
     inputs: np.ndarray  # (n, 6) t [m]; roll, pitch, yaw [rad]
     point: np.ndarray  # (n, 3) impact point [m]
     normal: np.ndarray  # (n, 3)
-    subset: np.ndarray  # (n,) VERTEX_FACE or EDGE_EDGE after FEATURES, else −1
+    subset: np.ndarray  # (n,) number of `SUBSETS` after FEATURES, else −1
 
     def patterns(self, rows: np.ndarray | slice = slice(None)) -> Patterns:
         """Return the inputs and outputs of some rows."""
@@ -286,17 +280,21 @@ class Folded:
             [spherical(self.point[rows]), spherical(self.normal[rows])], axis=1))
 
 
-def fold(placements: Placements, how: int) -> Folded:
+def fold(placements: Placements, how: str) -> Folded:
     """Bring placements into a network's domain by NO_FOLD, OCTANT or FEATURES."""
+    subset = np.full(len(placements), -1)
     if how == NO_FOLD:  # inputs are as drawn, zeros keep the signs that tell azimuths ±π apart
-        return Folded(placements.inputs, placements.point, placements.normal,
-                      np.full(len(placements), -1))
-    if how == FEATURES and len(set(placements.size)) != 1:
-        raise ValueError(f'features are folded for cubes, not for {placements.size}')
+        return Folded(placements.inputs, placements.point, placements.normal, subset)
     sat = query(placements)
-    folds = fold_pairs(how, sat.offset_a, sat.rotation, axis=sat.axis, normal=sat.normal)
-    return Folded(np.concatenate([folds.offset, folds.angles], axis=1),
-                  folds.folded(placements.point), folds.folded(placements.normal), folds.subset)
+    if how == OCTANT:
+        folds = to_octant(sat.offset_a, sat.rotation)
+    elif len(set(placements.size)) == 1:
+        folds, subset = to_features(TouchingPairs(
+            np.zeros(len(placements), bool), sat.axis, sat.normal, sat.offset_a, sat.rotation))
+    else:
+        raise ValueError(f'features are folded for cubes, not for {placements.size}')
+    return Folded(folds.inputs, folds.folded(placements.point), folds.folded(placements.normal),
+                  subset)
 
 
 def spherical(direction: np.ndarray) -> np.ndarray:
@@ -323,7 +321,7 @@ def paper(seed: int, *, size: Sequence[float] = CUBE, counts: Sequence[int] = PA
           drawing: Drawing = TOUCHING) -> dict[str, Patterns]:
     """Return the sets with discontinuities, for two boxes of full extents `size` [m].
 
-    `folded_in`: in the domain of `symmetry.OCTANT`, as at inference; otherwise as drawn.
+    `folded_in`: in the domain of `to_octant`, as at inference; otherwise as drawn.
     `edge_share` of the patterns are edge-edge.
     """
     how = OCTANT if folded_in else NO_FOLD
@@ -355,7 +353,7 @@ def committee(seed: int, *, counts: Sequence[int] = CONTINUOUS_COUNTS,
 
     The classifier's patterns are a third of each kind, and none of an expert's.
     """
-    kinds = dict(zip(CLASSES, (*GENERATORS, face_face_candidates)))
+    kinds = dict(zip(EXPERTS, (*GENERATORS, face_face_candidates)))
     result: dict[str, dict[str, Patterns]] = {'classifier': {}, **{kind: {} for kind in kinds}}
     for name, count, rng in _streams(seed, counts, sets):
         share, inputs = -(-count // len(kinds)), []

@@ -3,7 +3,7 @@
 
 """How far a network's angles are off: the paper's figures ME, MAE and RMSE.
 
-Networks run as the models run them: by the extension, on float32 weights, without PyTorch.
+Networks run as the models run them: on float32 weights, without PyTorch.
 """
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from box_contact_ros.paper import _networks
+from box_contact_ros.solver.paper import forward
 from box_contact_ros.solver.weights_file import Network
 
 PARTS = {'all': slice(0, 4), 'point': slice(0, 2), 'normal': slice(2, 4)}
@@ -20,9 +20,7 @@ PARTS = {'all': slice(0, 4), 'point': slice(0, 2), 'normal': slice(2, 4)}
 
 def predict(network: Network, inputs: np.ndarray) -> np.ndarray:
     """Return the outputs (n, outputs) float64 of a network for inputs (n, inputs)."""
-    outputs = _networks.forward(network.packed, np.array(network.widths, dtype=np.int64),
-                                np.asarray(inputs, dtype=np.float32))
-    return outputs.astype(np.float64)
+    return forward(network, inputs).astype(np.float64)
 
 
 def wrapped(angle: Any) -> Any:

@@ -17,16 +17,20 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
+import numpy as np
 import torch
 from torch import Tensor
+from torch.func import functional_call, stack_module_state, vmap
 from tqdm import tqdm
 
+from box_contact_ros.solver.weights_file import Layers
+
 from .dataset import Patterns
-from .ensemble import Ensemble, Layers, Scaling, drawn
 from .errors import difference
 
 CHECKS = 200  # least number of times that the cross-validation error is looked at in a training
@@ -50,6 +54,79 @@ class PaperSettings:
     wrap: bool = True  # whether differences of angles are wrapped
     seed: int = 0
     device: str = 'cpu'
+
+
+class Ensemble(torch.nn.Module):
+    """Networks of the same shape as one module: answers have a first dimension more, `networks`.
+
+    The networks see the same inputs and learn apart from each other.
+    """
+
+    def __init__(self, networks: Sequence[torch.nn.Module]) -> None:
+        super().__init__()
+        self._shape = [networks[0]]  # in a list: its own parameters are not the ensemble's
+        stacked, _ = stack_module_state(list(networks))
+        self._names = list(stacked)
+        self._stacked = torch.nn.ParameterList(
+            torch.nn.Parameter(value.detach()) for value in stacked.values())
+
+    def forward(self, inputs: Tensor) -> Tensor:
+        """Return the answers (networks, …) of all networks to the same inputs."""
+        state = dict(zip(self._names, self._stacked))
+        return vmap(lambda one: functional_call(self._shape[0], one, inputs))(state)
+
+    def layers(self, network: int) -> Layers:
+        """Return the layers of one network."""
+        return as_layers(value[network] for value in self._stacked)
+
+
+def as_layers(parameters: Iterable[Tensor]) -> Layers:
+    """Return the parameters of one network as arrays, layer by layer."""
+    arrays = [value.detach().cpu().numpy() for value in parameters]
+    return list(zip(arrays[::2], arrays[1::2]))
+
+
+@torch.no_grad()
+def drawn(network: Any, generator: torch.Generator, *, reach: float,
+          hidden: Sequence[int] = ()) -> Any:
+    """Return the network with weights uniform in ± reach / √(inputs of the layer), biases 0.
+
+    hidden: units of the hidden layers that are used. The weights of all others are zero, and stay
+    so: such a unit's activation is zero, and with it each of its gradients.
+    """
+    layers = [part for part in network.modules() if isinstance(part, torch.nn.Linear)]
+    inputs = [layers[0].in_features, *(hidden or [layer.out_features for layer in layers[:-1]])]
+    for layer, count in zip(layers, inputs):
+        bound = reach / math.sqrt(count)
+        torch.nn.init.uniform_(layer.weight, -bound, bound, generator=generator)
+        torch.nn.init.zeros_(layer.bias)
+    for width, layer, following in zip(hidden, layers, layers[1:]):
+        layer.weight[width:] = 0.0
+        following.weight[:, width:] = 0.0
+    return network
+
+
+@dataclass(frozen=True)
+class Scaling:
+    """Mean and deviation (inputs,) by which inputs are normalised."""
+
+    mean: np.ndarray
+    deviation: np.ndarray
+
+    @staticmethod
+    def of(inputs: np.ndarray) -> Scaling:
+        """Return the scaling that gives inputs (…, inputs) mean 0 and deviation 1."""
+        # Summed in float64: there are tens of millions. An input that never varies stays as it is.
+        axes = tuple(range(inputs.ndim - 1))
+        mean = inputs.mean(axes, dtype=np.float64)
+        deviation = inputs.std(axes, dtype=np.float64)
+        return Scaling(mean.astype(np.float32), (deviation + 1e-6).astype(np.float32))
+
+    def folded(self, layers: Layers) -> Layers:
+        """Return the network that takes raw inputs, from one that takes normalised inputs."""
+        weight = layers[0][0].astype(np.float64) / self.deviation
+        bias = layers[0][1] - weight @ self.mean
+        return [(weight.astype(np.float32), bias.astype(np.float32)), *layers[1:]]
 
 
 class Momentum(torch.optim.Optimizer):

@@ -21,14 +21,15 @@ import numpy as np
 
 from box_contact_ros.core import stages
 from box_contact_ros.scene.pose import quaternion_multiply, rotation_matrix
+from box_contact_ros.solver.paper import euler_angles
 from box_contact_ros.soup import soup
 
 from .. import output
+from ..contestant import ours
 from ..pose_sets import CUBE, Pairs, on_cube, turned
 from ..timing import cpu_milliseconds, no_garbage_collection, pinned, usable_cores
-from .dataset import euler_angles, quaternion_from_euler
-from .paper_soup_tables import Row, pair_count, time_calls
-from .paper_tables import PAPER_SOUP
+from .dataset import quaternion_from_euler
+from .soup_tables import PAPER, Row, pair_count, time_calls
 
 DEPTH = 0.01  # of the corner [m]
 SPIN = 20.0   # about the vertical [deg]: grids that line up would be a special case
@@ -100,6 +101,7 @@ def count_tests(boxes: Leaves, pair: Pairs) -> int:
 def measure(*, quick: bool = False) -> list[Row]:
     """Return a row per angle and N: tests, pairs that meet, times of soup and network [ms]."""
     rows: list[Row] = []
+    network = ours('paper')
     with pinned({usable_cores()[-1]}), no_garbage_collection():
         for divisions in QUICK_DIVISIONS if quick else DIVISIONS:
             boxes, placer = leaves(divisions), soup.Soup(divisions)
@@ -111,7 +113,7 @@ def measure(*, quick: bool = False) -> list[Row]:
                 rows.append({
                     'divisions': divisions, 'tilt_deg': tilt, 'tests': count_tests(boxes, pair),
                     'pairs': pair_count(steps[0][1]), 'step_ms': min(took for took, _ in steps),
-                    'network_ms': min(time_calls('paper', many) for _ in range(REPEATS))})
+                    'network_ms': min(time_calls(network, many) for _ in range(REPEATS))})
     return rows
 
 
@@ -126,7 +128,7 @@ def section(rows: Sequence[Row]) -> str:
         flush = count_tests(leaves(divisions), tilted_cube(0.0, 0.0))
         chosen.append([divisions, *[f'{one["tests"]:,} at {one["tilt_deg"]:g}°' for one in (
             most, least)], f'{most["tests"] / least["tests"]:.0f}', f'{most["pairs"]:,}',
-            f'{max(steps) / min(steps):.0f}', f'{flush:,}', f'{PAPER_SOUP[divisions][1]:,}'])
+            f'{max(steps) / min(steps):.0f}', f'{flush:,}', f'{PAPER[divisions][1]:,}'])
     table = output.markdown_table(
         ['N', 'most tests', 'fewest', 'ratio', 'of the most: pairs that meet',
          'longest step / shortest', 'tests in one plane', 'paper: most tests'], chosen, words=0)

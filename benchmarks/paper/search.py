@@ -1,7 +1,7 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Program `search`: the paper's search for its two networks, by training thousands at once.
+"""The paper's search for its two networks, by training thousands at once.
 
 It searches learning rate, momentum, hidden units and range of the initial weights, by successive
 halving, and ranks the settings in use, too. It writes a page of Markdown, a CSV of all candidates
@@ -26,9 +26,9 @@ from box_contact_ros.solver.arguments import program_parser, within
 from ..output import (
     command_line,
     machine,
-    make_folder,
     markdown_table,
     page,
+    results_folder,
     subplots,
     write_csv,
 )
@@ -36,8 +36,8 @@ from ..pose_sets import log_uniform
 from . import dataset
 from .fit import PaperSettings
 from .fit import fit as fit_paper
-from .paper_jobs import JOBS, PaperJob
-from .successive_halving import Candidate, CheckpointError, Rung, Rungs, Scores, Search, ranking
+from .halving import Candidate, CheckpointError, Rung, Rungs, Scores, Search, ranking
+from .jobs import JOBS, PaperJob
 
 PACKAGES = ('numpy', 'torch')  # whose versions are named
 
@@ -171,23 +171,22 @@ def device_of(name: str) -> str:
 
 def _options(args: Sequence[str] | None) -> argparse.Namespace:
     parser = program_parser(
-        'search', 'Train thousands of networks at once, keep the best, train those longer.\n\n'
+        'python -m benchmarks.paper.search',
+        'Train thousands of networks at once, keep the best, train those longer.\n\n'
         'Measured on one core, without a GPU: 8 minutes.\n\n'
         'Stopped, it goes on from its checkpoint file when it is started again with the same\n'
         'options, and ends with the same result.', seed=1,
+        out='page, table, plot and, until the end, the checkpoint',
         quick='little data and two short rungs, to try it out in seconds')
     add = parser.add_argument
-    add('what', choices=('paper',), help='what is searched for')
     add('--candidates', type=within(16), default=2048, metavar='N', help='networks to begin with '
         '(default 2048); the time grows with them')
-    add('--out', type=Path, default=Path(), help='folder for the page, the table, the plot and, '
-        'until the end, the checkpoint (default: the current one)')
     add('--device', choices=('auto', 'cpu', 'cuda'), type=device_of, default='auto',
         help='auto: a GPU where there is one (default)')
     add('--threads', type=within(1), default=1, help='threads of PyTorch (default 1; matrices '
         'this small gain little from more)')
     options = parser.parse_args(args)
-    make_folder(parser, options.out)
+    options.out = results_folder(parser, options)
     return options
 
 
@@ -211,10 +210,10 @@ def main(args: Sequence[str] | None = None) -> int:
         except CheckpointError as error:
             print(f'search: {error}', file=sys.stderr)
             return 1
-    made = (f'Made by `{command_line("box_contact_ros search", args)}` in '
+    made = (f'Made by `{command_line("benchmarks.paper.search", args)}` in '
             f'{(time.monotonic() - began) / 60.0:.1f} minutes ({options.device}) on '
             f'{machine(native, PACKAGES)}.')
-    text = page('benchmarks/paper/search_paper', made=made,
+    text = page('benchmarks/paper/pages/search', made=made,
                 total=sum(len(done[0]) for _, done in results))
     text += f'\n![Settings and errors]({name}.png)\n' + ''.join(
         section(*result) for result in results)
@@ -226,3 +225,7 @@ def main(args: Sequence[str] | None = None) -> int:
         path.unlink()
     print(text)
     return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -27,7 +27,7 @@ lanes: int
 compiler: str
 
 class PairSolver:
-    def __init__(self, model: object, size_a: tuple[float, float, float],
+    def __init__(self, model: str | None, size_a: tuple[float, float, float],
                  size_b: tuple[float, float, float], network: np.ndarray | None = None,
                  margin: float = 0.0) -> None: ...
     def __call__(self, pose_a: ArrayLike, pose_b: ArrayLike) -> Any: ...

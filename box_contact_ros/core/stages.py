@@ -32,6 +32,7 @@ class Stages(NamedTuple):
     normal: np.ndarray  # (n, 3) unit vector along the winning axis, from A to B
     touch: np.ndarray  # (n,) separation up to which the boxes touch
     size: np.ndarray  # (n,) largest full extent of both boxes
+    axes_a: np.ndarray  # (n, 3, 3) A's axes as columns, common frame
     rotation: np.ndarray  # (n, 3, 3) B's axes as columns
     offset_a: np.ndarray  # (n, 3) B − A
     offset_b: np.ndarray  # (n, 3) B − A in B's frame

@@ -36,7 +36,7 @@ from ..node.processes import (
     program,
 )
 from ..solver.arguments import WholeNames, model_name, within
-from ..solver.models import model_names, models_with_patch
+from ..solver.models import MODELS, NATIVE
 from .landing import LANDING_DURATION
 from .mujoco_crane import CraneScenario
 
@@ -103,7 +103,7 @@ def _announcement(options: argparse.Namespace) -> str:
              f'{options.domain} on this host.',
              'It passes if contacts come and none is lost'
              f'{", and if the load comes to rest" if options.closed_loop else ""}.']
-    if options.closed_loop and options.model not in models_with_patch():
+    if options.closed_loop and options.model not in NATIVE:
         lines.append(f'Model {options.model} gives points without a patch. The law of force then '
                      'takes the whole bottom of the load as the patch. The load may not come to '
                      'rest, and the demo then ends with FAIL. With --open-loop, contacts are only '
@@ -125,7 +125,7 @@ def _options(args: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument('--open-loop', dest='closed_loop', action='store_false',
                         help='only record the contacts')
     parser.add_argument('--model', type=model_name, default='mlp', metavar='MODEL',
-                        help=f'one of {model_names()}; the closed loop needs volume and '
+                        help=f'one of {", ".join(MODELS)}; the closed loop needs volume and '
                              'covariance: mlp or exact (default: %(default)s)')
     parser.add_argument('--rate', type=within(1.0, 2000.0), default=200.0, metavar='HZ',
                         help='pairs of poses per second (default: %(default)g)')

@@ -34,7 +34,7 @@ from ..scene.pairing import PAIRINGS, RESETS
 from ..scene.scene_file import read_scene
 from ..scene.scene_solver import CONTAINER, Scene, SceneSolver, two_boxes
 from ..solver.checks import shown
-from ..solver.models import find_model, model_names
+from ..solver.models import MODELS, check_model, most_near
 from .diagnostics import DIAGNOSTICS_SECONDS, Diagnostics, TickMonitor
 from .parameters import (
     Setting,
@@ -59,7 +59,7 @@ NAMED_TOPICS = 3  # how many pose topics the node names when it is ready
 
 def model(name: str, value: Any) -> str:
     """Check the name of a model."""
-    find_model(name, text(name, value))
+    check_model(name, text(name, value))
     return str(value)
 
 
@@ -67,7 +67,7 @@ PARAMETERS = {
     'size_a': Setting(CONTAINER, 'full extents of box A, three numbers > 0 [m]', size),
     'size_b': Setting(CONTAINER, 'full extents of box B, three numbers > 0 [m]', size),
     'scene': Setting('', 'scene file, which replaces size_a and size_b', text),
-    'model': Setting('mlp', f'how the contact point is found: {model_names()}', model),
+    'model': Setting('mlp', f'how the contact point is found: {", ".join(MODELS)}', model),
     'pairing': Setting('stamp', 'stamp: answer once, when poses of equal stamp are in; latest: '
                                 "answer every pose with the other boxes' last", one_of(PAIRINGS)),
     'tolerance': Setting(0.0, 'with pairing stamp: stamps this far apart still belong together [s]',
@@ -118,9 +118,8 @@ class ContactNode(GuardedNode, LifecycleNode):
     @staticmethod
     def make_solver(values: Mapping[str, Any], scene: Scene) -> SceneSolver:
         """Return the solver that checked parameters ask for, or raise ValueError."""
-        entry, _ = find_model('model', values['model'])
         return SceneSolver(scene, model=values['model'], margin=values['margin'],
-                           most_near=entry.most_near)
+                           most_near=most_near(values['model']))
 
     def start(self) -> None:
         """Configure and activate; raise what keeps the node from it."""

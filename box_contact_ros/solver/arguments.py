@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from .checks import shown
-from .models import find_model, model_names
+from .models import MODELS, check_model
 
 Number = TypeVar('Number', int, float)
 
@@ -54,13 +54,13 @@ def add_models(parser: argparse.ArgumentParser, flag: str, default: str | Sequen
     shown_default = default if isinstance(default, str) else ' '.join(default)
     parser.add_argument(flag, nargs=None if isinstance(default, str) else '+',
                         type=kind or model_name, default=default, metavar='MODEL',
-                        help=f'one of {model_names()}{more} (default: {shown_default})')
+                        help=f'one of {", ".join(MODELS)}{more} (default: {shown_default})')
 
 
 def model_name(text: str) -> str:
     """Return the name of a model, as a program's argument."""
     try:
-        find_model('model', text)
+        check_model('model', text)
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from error
     return text

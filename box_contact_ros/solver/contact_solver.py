@@ -4,6 +4,7 @@
 """ContactSolver: SAT first, then the contact point by the chosen model."""
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -14,7 +15,8 @@ from numpy.typing import ArrayLike
 from ..core import native
 from .checks import as_floats, as_places, as_size, pose_fault, shown, size_fault
 from .contact import Contact, Contacts, without_patch
-from .models import Model, NativeModel, build_model
+from .mlp import NETWORK, core_numbers, load_mlp
+from .models import NATIVE, Model, check_model, make_model
 
 Names = tuple[str, str, str, str]  # of poses and sizes of A and B, in a refusal
 _SINGLE: Names = ('pose_a', 'pose_b', 'size_a', 'size_b')
@@ -35,28 +37,40 @@ class ContactSolver(native.PairSolver):
     `ValueError`, with the field and the value, for anything that is not a size or a pose. A solver
     may be called from several threads.
 
-    model: a name of the registry, `models.models()`.
-    weights: a file to use instead of the shipped weights.
+    model: one of `models.MODELS`, or an object with `solve` as `models.Model` describes it.
+    weights: a file to use instead of the shipped weights, for `mlp` and `paper`.
     margin: separation up to which pairs apart have a normal too [m]; infinity: all.
     """
 
-    def __init__(self, size_a: ArrayLike, size_b: ArrayLike, *, model: str = 'mlp',
+    def __init__(self, size_a: ArrayLike, size_b: ArrayLike, *, model: str | Model = 'mlp',
                  weights: str | None = None, margin: float = 0.0) -> None:
         one, other = as_size(size_a, 'size_a'), as_size(size_b, 'size_b')
         margin = as_floats(margin, 'margin', 'a number', ()).item()
-        built = build_model(model, one, other, weights)
-        core = built if isinstance(built, NativeModel) else NativeModel()
         if not margin >= 0.0:
             raise ValueError(f'margin must be 0 or more, not {margin:g}')
-        if margin and core.name is None:
-            raise ValueError(f'margin {margin:g} has no effect on model {model!r}: leave it at 0')
+        if weights is not None and not isinstance(weights, (str, os.PathLike)):
+            raise ValueError(f'weights must be the path of a file, not {shown(weights)}')
+        core: str | None = None  # the model in C++, or
+        self._model: Model | None = None  # the object that answers
+        if isinstance(model, (str, type)) or not hasattr(model, 'solve'):
+            check_model('model', model)
+            core = str(model) if model in NATIVE else None
+            self._model = None if core else make_model(str(model), one, other, weights)
+        else:
+            self._model = model
+        if margin and self._model is not None:
+            raise ValueError(f'margin {margin:g} has no effect on model {shown(model)}: leave it '
+                             'at 0')
+        self._size_fault = getattr(self._model, 'size_fault', lambda a, b: None)
+        if fault := self._size_fault(one[0], other[0]):
+            raise ValueError(fault)
+        network = None
+        if core == 'mlp' and weights is not None:
+            network = core_numbers(load_mlp(weights).networks[NETWORK])
         # Calls are answered in C++, which calls `converted` and `converted_batch` for the rest.
-        super().__init__(core.kernel or core.name, tuple(one[0]), tuple(other[0]), core.network,
-                         margin)
+        super().__init__(core, tuple(one[0]), tuple(other[0]), network, margin)
         self.model = model
         self._size_a, self._size_b, self._weights, self._margin = one, other, weights, margin
-        self._model: Model | None = None if isinstance(built, NativeModel) else built
-        self._size_fault = core.size_fault
 
     if TYPE_CHECKING:  # the core, which does it, knows no type of ours
         def __call__(self, pose_a: ArrayLike, pose_b: ArrayLike) -> Contact: ...  # noqa: D102
@@ -152,7 +166,7 @@ class ContactSolver(native.PairSolver):
                  at: tuple[int, int], names: Names) -> str:
         """Return why a pair is refused, by anyone or by the model; at: places of A and of B."""
         fault = _fault(a, b, size_a, size_b, at, names)
-        if not fault and self._size_fault:
+        if not fault:
             fault = self._size_fault(size_a[at[0] % len(size_a)], size_b[at[1] % len(size_b)])
         if not fault:
             raise AssertionError(f'row {at} was refused without a fault')

@@ -1,19 +1,18 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Model `mlp`: SAT, columns under the contact face, and a network between proven brackets.
+"""Weights files of model `mlp`, whose algorithm is that of core/src/mlp/.
 
-The algorithm is that of core/src/mlp/. Here its weights are read and checked. Pairs whose brackets
-are too far apart are left to `exact`, and counted.
+The shipped weights are compiled into the core, so only the option `weights` reads a file.
 """
 from __future__ import annotations
 
 import numpy as np
 
 from ..core import FEATURES, NETWORK_FORMAT
+from ..resources import resource_path
 from .checks import shown
-from .models import NativeModel
-from .weights_file import Network, Weights, WeightsError, weights_for
+from .weights_file import Network, Weights, WeightsError, load_weights
 
 FEATURE_NAMES = (
     "largest share of the body's extent beyond a side face", 'sum of these shares',
@@ -36,27 +35,19 @@ def core_numbers(network: Network) -> np.ndarray:
     return np.concatenate([last_bias, units.ravel()]).astype(np.float32)
 
 
-def mlp(weights: str | None = None) -> NativeModel:
-    """Return model `mlp` with the weights of a file, or for None the shipped ones.
-
-    Raises `WeightsError` for a file that does not fit.
-    """
-    found = load_mlp(weights)
-    return NativeModel(name='mlp', weights=found, network=core_numbers(found.networks[NETWORK]))
-
-
-def load_mlp(weights: str | None = None) -> Weights:
-    """Read the weights of an MLP, the shipped ones for None; raises `WeightsError`."""
-    found = weights_for('mlp', weights, shipped='mlp')
+def load_mlp(path: str | None = None) -> Weights:
+    """Read the weights of an MLP, for None the shipped file's; raises `WeightsError`."""
+    found = load_weights(path or resource_path('weights', 'mlp.safetensors'))
+    file = f'weights file {shown(str(found.path))}'
     number = found.card.get('format')  # a card may say anything
     if type(number) is not int or number != NETWORK_FORMAT:
-        raise WeightsError(f'weights file {found.path} has format {shown(number)}; this version '
-                           f'reads {NETWORK_FORMAT}')
+        raise WeightsError(f'{file} has format {shown(number)}; this version reads '
+                           f'{NETWORK_FORMAT}')
     network = found.network(NETWORK, FEATURES, 1, model='mlp')
     if len(network.widths) != 3 or network.widths[1] > UNITS_MAX:
-        raise WeightsError(f'weights file {found.path}: network {NETWORK!r} must have one hidden '
-                           f'layer, of at most {UNITS_MAX} units')
+        raise WeightsError(f'{file}: network {NETWORK!r} must have one hidden layer, of at most '
+                           f'{UNITS_MAX} units')
     if found.card.get('activation') != ACTIVATION:
-        raise WeightsError(f"weights file {found.path}: this version's units are {ACTIVATION!r}, "
-                           f"not {found.card.get('activation')!r}")
+        raise WeightsError(f"{file}: this version's units are {ACTIVATION!r}, not "
+                           f"{shown(found.card.get('activation'))}")
     return found

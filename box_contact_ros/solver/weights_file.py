@@ -3,27 +3,25 @@
 
 """Weights files: the perceptrons of a model and its card, in the format safetensors.
 
-A file begins with 8 bytes, the little-endian length of a JSON header. The header gives dtype, shape
-and place of each tensor, and the tensors follow without gaps. Reading it needs no library; the
-extra `train` brings the one that writes.
-
 Tensors are float32: `<network>.<layer>.weight` (outputs × inputs) and `<network>.<layer>.bias`.
 Layers are counted from 0. Hidden units are rectified, in the paper's networks tanh, and the output
 is linear. Inputs and outputs are in SI units: any scaling is folded into the weights.
 The metadata entry `card` is the model card, a JSON object with `CARD_FIELDS`.
+
+The library safetensors is imported where a file is read or written, and nowhere else.
 """
 from __future__ import annotations
 
 import hashlib
 import json
-import math
+from collections import defaultdict
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..resources import resource_path
+from .checks import shown
 
 CARD_FIELDS = ('name', 'model', 'architecture', 'inputs', 'outputs', 'sizes', 'data', 'seed',
                'commit', 'metrics', 'sha256')
@@ -56,11 +54,6 @@ class Network:
         """Return the units per layer, inputs first: (6, 20, 18, 4)."""
         return (self.layers[0][0].shape[1], *(len(bias) for _, bias in self.layers))
 
-    @property
-    def packed(self) -> np.ndarray:
-        """Return for each layer its weights, row-major, then its biases, in one array."""
-        return np.concatenate([part.ravel() for layer in self.layers for part in layer])
-
 
 @dataclass(frozen=True)
 class Weights:
@@ -75,8 +68,8 @@ class Weights:
         found = self.networks.get(name)
         if found is None or (found.widths[0], found.widths[-1]) != (inputs, outputs):
             raise WeightsError(
-                f'weights file {self.path} has no network {name!r} with {inputs} inputs and '
-                f'{outputs} outputs, which model {model!r} needs')
+                f'weights file {_name(self.path)} has no network {name!r} with {inputs} inputs '
+                f'and {outputs} outputs, which model {model!r} needs')
         return found
 
 
@@ -92,7 +85,7 @@ def tensors_digest(tensors: dict[str, np.ndarray]) -> str:
 
 def save_weights(path: Path, networks: dict[str, Layers], card: dict[str, Any]) -> None:
     """Write networks, each a list of (weight, bias) per layer, and their model card."""
-    from safetensors.numpy import save  # only here: it is an extra
+    from safetensors.numpy import save
 
     tensors = {}
     for name, layers in networks.items():
@@ -112,71 +105,52 @@ def _check_complete(card: dict[str, Any]) -> None:
         raise ValueError(f'the model card lacks {", ".join(missing)}')
 
 
-def read_tensors(data: bytes) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-    """Return the tensors and the metadata of a safetensors file.
-
-    Raises ValueError, TypeError or LookupError for a damaged file and for other types than float32.
-    """
-    start = 8 + int.from_bytes(data[:8], 'little')
-    header = json.loads(data[8:start].decode('utf-8'))
-    metadata = header.pop('__metadata__', {})
-    tensors, place = {}, start
-    for name, entry in sorted(header.items(), key=lambda item: item[1]['data_offsets']):
-        shape, (begin, end) = entry['shape'], entry['data_offsets']
-        if entry['dtype'] != 'F32':
-            raise ValueError(f'{name} is {entry["dtype"]}, not F32')
-        if len(shape) > 2:
-            raise ValueError(f'{name} has {len(shape)} dimensions, not 1 or 2')
-        if start + begin != place or end - begin != 4 * math.prod(shape):
-            raise ValueError(f'{name} has no place of its own')
-        # NumPy refuses shapes and places that are not whole numbers within the data.
-        tensors[name] = np.ndarray(shape, '<f4', data, place).astype(np.float32)
-        place = start + end
-    if place != len(data):
-        raise ValueError('it does not end with the last tensor')
-    return tensors, metadata
-
-
-def weights_for(model: str, path: str | None, shipped: str, boxes: str = '') -> Weights:
-    """Read the weights of a model from `path`, or for None the shipped ones of that name.
-
-    boxes: what the error calls the boxes that have none. Raises `WeightsError`.
-    """
-    try:
-        return load_weights(path or resource_path('weights', f'{shipped}.safetensors'))
-    except FileNotFoundError as error:
-        raise WeightsError(
-            f'model {model!r} has no weights{boxes}: train them, name a file with `weights`, or '
-            f"use model 'exact', which needs none") from error
-
-
 def load_weights(path: Path | str) -> Weights:
     """Read and check a weights file; raises `WeightsError` that says what is wrong with it."""
+    try:
+        from safetensors import SafetensorError
+    except ModuleNotFoundError as error:
+        raise ModuleNotFoundError(f'{error}: weights files need it; pip install safetensors',
+                                  name=error.name) from None
     path = Path(path)
     try:
-        return Weights(path, *_checked(*read_tensors(_read(path))))
+        return Weights(path, *_checked(*_read(path)))
     except FileNotFoundError as error:
-        raise WeightsError(f'weights file {path} does not exist') from error
-    except (OSError, ValueError, TypeError, LookupError, AttributeError, RecursionError) as error:
-        raise WeightsError(f'weights file {path} cannot be read: {error}') from error
+        raise WeightsError(f'weights file {_name(path)} does not exist') from error
+    except (OSError, ValueError, SafetensorError) as error:
+        reason = shown(str(error)) if isinstance(error, SafetensorError) else error
+        raise WeightsError(f'weights file {_name(path)} cannot be read: {reason}') from error
 
 
-def _read(path: Path) -> bytes:
+def _name(path: Path) -> str:
+    """Return a path as refusals show it: nothing in its name starts a line or a terminal code."""
+    return shown(str(path))
+
+
+def _read(path: Path) -> tuple[dict[str, np.ndarray], dict[str, str]]:
+    """Return the tensors and the metadata of a file; raises ValueError for other tensors."""
+    from safetensors import safe_open
+
     if path.exists() and not path.is_file():
-        raise OSError('it is no regular file')  # opening a FIFO would wait for its writer
-    with path.open('rb') as file:
-        data = file.read(FILE_LIMIT + 1)
-    if len(data) > FILE_LIMIT:
+        raise OSError('it is not a regular file')  # opening a FIFO would wait for its writer
+    if path.stat().st_size > FILE_LIMIT:
         raise ValueError(f'it is larger than {FILE_LIMIT} bytes')
-    return data
+    tensors = {}
+    with safe_open(path, framework='numpy') as file:
+        for name in file.keys():
+            part = file.get_slice(name)
+            if part.get_dtype() != 'F32':
+                raise ValueError(f'{shown(name)} is {part.get_dtype()}, not F32')
+            tensors[name] = file.get_tensor(name)
+        return tensors, file.metadata() or {}
 
 
-def _checked(tensors: dict[str, np.ndarray], metadata: dict[str, Any],
+def _checked(tensors: dict[str, np.ndarray], metadata: dict[str, str],
              ) -> tuple[dict[str, Network], dict[str, Any]]:
     """Return the networks and the card of a file; raises ValueError where they do not fit."""
     try:
         card = json.loads(metadata['card'])
-    except (LookupError, TypeError, ValueError, RecursionError):
+    except (LookupError, ValueError, RecursionError):
         card = None
     if not isinstance(card, dict):
         raise ValueError('it has no readable model card')
@@ -185,32 +159,36 @@ def _checked(tensors: dict[str, np.ndarray], metadata: dict[str, Any],
         raise ValueError('inputs of the model card is no object')
     for name, array in tensors.items():
         if not np.all(np.abs(array) <= WEIGHT_LIMIT):  # nor is NaN
-            raise ValueError(
-                f'{name} holds values that are not finite or beyond ±{WEIGHT_LIMIT:g}')
+            raise ValueError(f'{shown(name)} holds values that are not finite or beyond '
+                             f'±{WEIGHT_LIMIT:g}')
     if tensors_digest(tensors) != card['sha256']:
         raise ValueError('checksum differs from its model card')
-    networks = {name: _network(name, tensors)
-                for name in sorted({key.split('.')[0] for key in tensors})}
+    parts: defaultdict[str, dict[str, np.ndarray]] = defaultdict(dict)
+    for key in sorted(tensors):
+        name, _, part = key.partition('.')
+        parts[name][part] = tensors[key]
+    networks = {name: _network(name, own) for name, own in parts.items()}
     for name, network in networks.items():
         wanted = card['architecture']
         wanted = wanted.get(name) if isinstance(wanted, dict) else wanted
         if list(network.widths) != wanted:
-            raise ValueError(f'{name} is {network.widths}, the model card says {wanted}')
+            raise ValueError(f'{shown(name)} is {shown(network.widths)}, the model card says '
+                             f'{shown(wanted)}')
     if not networks:
         raise ValueError('it holds no network')
     return networks, card
 
 
-def _network(name: str, tensors: dict[str, np.ndarray]) -> Network:
-    own = {key: array for key, array in tensors.items() if key.split('.')[0] == name}
+def _network(name: str, parts: dict[str, np.ndarray]) -> Network:
+    """Return the network of parts by `<layer>.weight` and `<layer>.bias`, or raise ValueError."""
     layers: Layers = []
-    while f'{name}.{len(layers)}.weight' in own:
-        layer = f'{name}.{len(layers)}'
-        weight, bias = own.pop(f'{layer}.weight'), own.pop(f'{layer}.bias', None)
+    while f'{len(layers)}.weight' in parts:
+        number = len(layers)
+        weight, bias = parts.pop(f'{number}.weight'), parts.pop(f'{number}.bias', None)
         fits = weight.ndim == 2 and (not layers or weight.shape[1] == len(layers[-1][1]))
         if not fits or bias is None or bias.shape != weight.shape[:1]:
-            raise ValueError(f'{layer} does not fit its neighbours')
+            raise ValueError(f'layer {number} of {shown(name)} does not fit its neighbours')
         layers.append((weight, bias))
-    if own:
-        raise ValueError(f'{name} has tensors that belong to no layer')
+    if parts:
+        raise ValueError(f'{shown(name)} has tensors that belong to no layer')
     return Network(layers)

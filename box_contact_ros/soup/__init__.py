@@ -1,7 +1,7 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""What the models are compared with: the paper's networks."""
+"""The polygon soup on FCL, which the source paper compares itself with, and its node."""
 
 from ..extras import require
 

@@ -1,9 +1,9 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Model `soup`: polygon soup, the method that the source paper compares itself with (section 5).
+"""Model `soup-N`: polygon soup, the method that the source paper compares itself with (section 5).
 
-Each face is split in N × N rectangles of two triangles: 12 N² triangles a box, the paper's column
+Each face is split in N × N rectangles of two triangles: 12 N² triangles per box, the paper's column
 "triangles/face". FCL stands for the paper's RAPID and finds all pairs of triangles that meet, with
 a bounding volume tree per box. The rest replaces the paper's "additional algorithm":
 
@@ -11,7 +11,6 @@ a bounding volume tree per box. The rest replaces the paper's "additional algori
   normal is the outward one of A's triangle, or the reverse of B's, of the less deeply crossed.
 - Point: the mean of the contacts' positions. A weight is the smaller area of the two triangles
   [m²], the most in which they can meet.
-
 - Normal: the mean of the contacts' normals with the same weights, made unit.
 - Separation and verdict: SAT's. FCL's depths are those of the triangles' far corners and are off
   by a triangle's size: `docs/results/paper_tables.md` has figures.
@@ -29,8 +28,12 @@ from typing import NamedTuple
 import fcl
 import numpy as np
 
-from .fcl_box import KEPT_SIZES, FclModel, Size
+from box_contact_ros.solver.contact import Contacts, without_patch
+from box_contact_ros.solver.models import Exact
 
+Size = tuple[float, ...]  # three full extents [m], as a key of what is kept
+
+KEPT_SIZES = 64  # of which a solver keeps what it has made; a scene has few
 MOST_CONTACTS = 1 << 15
 """Contacts that are asked for, in a third of a second. Two cubes exactly on top of each other have
 more from N = 12 on, and took 23 s with N = 64."""
@@ -48,7 +51,7 @@ class Mesh(NamedTuple):
 
 
 def triangles(size: Sequence[float] | np.ndarray, divisions: int) -> np.ndarray:
-    """Corners (12 N², 3, 3) [m] of a box's triangles, counter-clockwise as seen from outside.
+    """Return corners (12 N², 3, 3) [m] of a box's triangles, counter-clockwise from outside.
 
     They are in the box's own frame. size: three full extents [m].
     """
@@ -84,7 +87,7 @@ def mesh(size: Size, divisions: int) -> Mesh:
 
 
 def collide(first: fcl.CollisionObject, second: fcl.CollisionObject) -> list[fcl.Contact]:
-    """Contacts of two soups; of MOST_CONTACTS, there are more.
+    """Return the contacts of two soups; of MOST_CONTACTS, there are more.
 
     `b1`, `b2` number the triangles, `pos` [m] is in the frame in which the soups were placed,
     `normal` points from the first to the second.
@@ -97,7 +100,7 @@ def collide(first: fcl.CollisionObject, second: fcl.CollisionObject) -> list[fcl
 
 def point_and_normal(contacts: Sequence[fcl.Contact], areas_a: np.ndarray, areas_b: np.ndarray,
                      ) -> tuple[np.ndarray, np.ndarray] | None:
-    """Area-weighted mean point (3,) [m] and normal (3,) of contacts, in their frame.
+    """Return the area-weighted mean point (3,) [m] and normal (3,) of contacts, in their frame.
 
     None where there are no contacts or the normals cancel.
     """
@@ -112,26 +115,50 @@ def point_and_normal(contacts: Sequence[fcl.Contact], areas_a: np.ndarray, areas
     return None if length <= CANCELLED else (point, normal / length)
 
 
-class Soup(FclModel):
+class Soup:
     """Polygon soup of N divisions per edge, for any sizes.
 
     exact_answers: pairs in contact so far that the soup could not answer, and `exact` did.
     """
 
     def __init__(self, divisions: int) -> None:
-        super().__init__(lambda size: fcl.CollisionObject(mesh(size, divisions).model))
-        # Not from `mesh` at every answer: other solvers' meshes may have displaced it there.
-        self._areas = functools.lru_cache(maxsize=KEPT_SIZES)(
-            lambda size: mesh(size, divisions).areas)
         self.exact_answers = 0
+        self._exact = Exact()
 
-    def ask(self, first: fcl.CollisionObject, second: fcl.CollisionObject, size_a: Size,
-            size_b: Size) -> tuple[np.ndarray, np.ndarray, float | None] | None:
-        """Return the weighted mean of the contacts; the depth is SAT's."""
-        contacts = collide(first, second)
-        answer = None if len(contacts) >= MOST_CONTACTS else point_and_normal(
-            contacts, self._areas(size_a), self._areas(size_b))
-        if answer is None:
-            self.exact_answers += 1
-            return None
-        return (*answer, None)
+        # Each solver keeps objects of its own, one for A and one for B: placing moves them. Their
+        # meshes are kept with them, as other solvers' may displace them in `mesh`.
+        @functools.lru_cache(maxsize=KEPT_SIZES)
+        def made(size: Size, box: int) -> tuple[Mesh, fcl.CollisionObject]:
+            soup = mesh(size, divisions)
+            return soup, fcl.CollisionObject(soup.model)
+        self._made = made
+
+    def place(self, a: np.ndarray, b: np.ndarray, size_a: Size, size_b: Size,
+              ) -> tuple[fcl.CollisionObject, fcl.CollisionObject]:
+        """Return objects of these sizes at poses (7,), about A's centre; until the next call.
+
+        Directions are the common frame's. B − A is formed in float64 here, so that FCL adds no
+        rounding far from the origin.
+        """
+        first, second = self._made(size_a, 0)[1], self._made(size_b, 1)[1]
+        for placed, position, quaternion in ((first, np.zeros(3), a[3:]),
+                                             (second, b[:3] - a[:3], b[3:])):
+            x, y, z, w = quaternion / np.linalg.norm(quaternion)
+            placed.setTransform(fcl.Transform(np.array([w, x, y, z]), position))
+        return first, second
+
+    def solve(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
+              threads: int = 1) -> tuple[Contacts, int]:
+        """Return contacts for poses (n, 7), sizes (n or 1, 3), and the first refused row or −1."""
+        exact, refused = self._exact.solve(a, b, size_a, size_b, threads)
+        found = without_patch(*exact[:4])
+        for row in np.flatnonzero(found.colliding) if refused < 0 else ():
+            sizes = tuple(size_a[row % len(size_a)]), tuple(size_b[row % len(size_b)])
+            contacts = collide(*self.place(a[row], b[row], *sizes))
+            answer = None if len(contacts) >= MOST_CONTACTS else point_and_normal(
+                contacts, self._made(sizes[0], 0)[0].areas, self._made(sizes[1], 1)[0].areas)
+            if answer is None:
+                self.exact_answers += 1
+            else:
+                found.point[row], found.normal[row] = a[row, :3] + answer[0], answer[1]
+        return found, refused

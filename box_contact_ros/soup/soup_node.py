@@ -17,7 +17,7 @@ from ..node.contact_node import PARAMETERS as CONTACT_PARAMETERS
 from ..node.contact_node import ContactNode, run
 from ..node.parameters import Setting, whole_number
 from ..scene.scene_solver import Scene, SceneSolver
-from .entries import MOST_SOUP_DIVISIONS, SOUP, SOUP_DIVISIONS
+from ..solver.models import MOST_SOUP_DIVISIONS, SOUP_DIVISIONS, most_near
 
 PARAMETERS = {
     'divisions': Setting(
@@ -27,7 +27,7 @@ PARAMETERS = {
 
 
 class SoupNode(ContactNode):
-    """ContactNode on model `soup`."""
+    """ContactNode on model `soup-N`."""
 
     name = 'soup_node'
     prefix = 'soup/'
@@ -36,8 +36,9 @@ class SoupNode(ContactNode):
     @staticmethod
     def make_solver(values: Mapping[str, Any], scene: Scene) -> SceneSolver:
         """Return the solver for a soup of so many divisions."""
-        return SceneSolver(scene, model=f'soup-{values["divisions"]}', margin=values['margin'],
-                           most_near=SOUP.most_near)
+        model = f'soup-{values["divisions"]}'
+        return SceneSolver(scene, model=model, margin=values['margin'],
+                           most_near=most_near(model))
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -17,10 +17,12 @@ from benchmarks.paper.dataset import (
     OCTANT,
     Placements,
 )
+from benchmarks.paper.features import to_features
+from benchmarks.paper.models import EXPERTS, SUBSETS
 from benchmarks.pose_sets import CONTAINER, CUBE
 from box_contact_ros import ContactSolver
-from box_contact_ros.paper.symmetry import fold
 from box_contact_ros.scene.pose import rotation_matrix
+from box_contact_ros.solver.paper import TouchingPairs, to_octant
 
 COUNT = 4000
 SMALL = (300, 200, 400)
@@ -133,7 +135,7 @@ def test_a_committee_shares_out_the_classes() -> None:
     """Each expert has its class alone; the classifier a third of each, and none of an expert's."""
     sets = dataset.committee(5, counts=(300, 30, 30))
     classes = sets.pop('classifier')['training']
-    assert tuple(sets) == dataset.CLASSES
+    assert tuple(sets) == EXPERTS
     assert np.array_equal(classes.outputs.sum(axis=0), [100, 100, 100])
     assert set(np.unique(classes.outputs)) == {0.0, 1.0}
     for kind, (name, expert) in enumerate(sets.items()):
@@ -154,7 +156,7 @@ def direction(angles: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize('how', [NO_FOLD, OCTANT, FEATURES])
-def test_folded_boxes_touch_where_the_folded_label_says(how: int, cubes: Placements) -> None:
+def test_folded_boxes_touch_where_the_folded_label_says(how: str, cubes: Placements) -> None:
     """What a network is taught is a touching pose with its right answer."""
     result = dataset.fold(cubes, how)
     patterns = result.patterns()
@@ -174,7 +176,7 @@ def test_folded_boxes_touch_where_the_folded_label_says(how: int, cubes: Placeme
 def test_reference_features(cubes: Placements) -> None:
     """vertex_face: on face +x. edge_edge: on the edge along z at (+, +); normals across."""
     result = dataset.fold(cubes, FEATURES)
-    face = result.subset == dataset.SUBSETS['vertex_face']
+    face = result.subset == SUBSETS['vertex_face']
     np.testing.assert_array_equal(result.normal[face], np.tile([1.0, 0.0, 0.0], (face.sum(), 1)))
     np.testing.assert_allclose(result.point[face, 0], 1.0, atol=1e-12)
     assert np.all(np.abs(result.point[~face, :2] - 1.0) < 1e-12)
@@ -188,7 +190,8 @@ def test_labels_unfold(cubes: Placements) -> None:
     sat = dataset.query(cubes)
     results = {how: dataset.fold(cubes, how) for how in (OCTANT, FEATURES)}
     for how, result in results.items():
-        folds = fold(how, sat.offset_a, sat.rotation, axis=sat.axis, normal=sat.normal)
+        pairs = TouchingPairs(sat.axis < 0, sat.axis, sat.normal, sat.offset_a, sat.rotation)
+        folds = to_octant(*pairs[3:]) if how == OCTANT else to_features(pairs)[0]
         for found, label in ((result.point, cubes.point), (result.normal, cubes.normal)):
             np.testing.assert_allclose(folds.unfolded(found), label, rtol=0, atol=1e-15)
             np.testing.assert_allclose(folds.folded(label), found, rtol=0, atol=1e-15)
@@ -220,16 +223,13 @@ def test_subset_is_what_the_oracle_says() -> None:
     for pose, number in zip(some.pose, subset):
         gaps = oracle.axis_gaps(a, oracle.make_box(pose, CUBE))
         axis = max(gaps, key=lambda entry: entry[2])[0]
-        assert (axis < 3) == (number == dataset.SUBSETS['vertex_face'])
+        assert (axis < 3) == (number == SUBSETS['vertex_face'])
         assert axis < 3 or axis >= 6
 
 
 def test_features_are_for_cubes() -> None:
     with pytest.raises(ValueError, match='for cubes, not for'):
         dataset.fold(draw(CONTAINER, count=5), FEATURES)
-
-
-# --- angles ---------------------------------------------------------------------------------------
 
 
 # --- sets -----------------------------------------------------------------------------------------

@@ -132,7 +132,7 @@ def test_each_way_has_its_timings():
     timings = [LoopTiming(rate, latency) for rate in (50.0, 200.0) for latency in (0.002, 0.005)]
     assert WAYS['exact'].timings(timings) == WAYS['wrench'].timings(timings) == timings
     assert WAYS['manifold'].timings(timings) == timings[-1:]
-    assert WAYS['fcl'].timings(timings) == timings[::2]
+    assert WAYS['point'].timings(timings) == timings[::2]
 
 
 def _diverged(landing):

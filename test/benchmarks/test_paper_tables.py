@@ -14,13 +14,10 @@ import pytest
 fcl = pytest.importorskip('fcl')
 pytest.importorskip('matplotlib')
 
-from benchmarks.paper import (
-    committee,
-    dataset,
-    paper_soup_tables,
-    paper_tables,
-    rotation,
-)
+from benchmarks.contestant import ours
+from benchmarks.paper import __main__ as program
+from benchmarks.paper import committee, dataset, rotation, soup_tables, tables
+from benchmarks.paper.models import weights_path
 from benchmarks.pose_sets import at_depth, on_cube
 from box_contact_ros.core import stages
 from box_contact_ros.solver.weights_file import load_weights
@@ -32,10 +29,10 @@ def small(monkeypatch):
     """Two N of the tables and one beside them, on 150 patterns."""
     sets = {'contact': dataset.paper(5, counts=(10, 10, 150)),
             'vertex_face': dataset.paper(5, counts=(10, 10, 150))}
-    monkeypatch.setattr(paper_tables, '_loaded', lambda path: (load_weights(path), sets))
-    few = {n: paper_soup_tables.PAPER[n] for n in (8, 10)}
-    monkeypatch.setattr(paper_soup_tables, 'PAPER', few)
-    monkeypatch.setattr(paper_soup_tables, 'ALSO', (2, 32))
+    monkeypatch.setattr(tables, 'with_sets', lambda name: (load_weights(weights_path(name)), sets))
+    few = {n: soup_tables.PAPER[n] for n in (8, 10)}
+    monkeypatch.setattr(soup_tables, 'PAPER', few)
+    monkeypatch.setattr(soup_tables, 'ALSO', (2, 32))
     return sets['contact']['external'].inputs
 
 
@@ -55,7 +52,7 @@ def test_the_search_alone_finds_every_pair():
     """
     a, b = np.array([[0, 0, 0, 0.3, -0.2, 0.1, 1], [0.5, 0.25, 1.5, 0.1, 0.2, 0.3, 1]])
     pair = soup.Soup(8).place(a, b, poses.CUBE, poses.CUBE)
-    pairs = paper_soup_tables.pair_count(soup.collide(*pair))
+    pairs = soup_tables.pair_count(soup.collide(*pair))
     result = fcl.CollisionResult()
     fcl.collide(*pair, fcl.CollisionRequest(num_max_contacts=1, enable_contact=True,
                                             enable_cost=True, num_max_cost_sources=10_000), result)
@@ -72,7 +69,7 @@ def test_planted_errors_show(small, monkeypatch):
 
     def judged(planted):
         monkeypatch.setattr(soup, 'point_and_normal', planted)
-        return paper_soup_tables.judge_soup(8, given, truth)
+        return soup_tables.judge_soup(8, given, truth)
 
     def planted(change):
         return lambda *contacts: change(*answer(*contacts))
@@ -97,37 +94,37 @@ def test_planted_errors_show(small, monkeypatch):
 def test_table_1_is_of_the_seeds() -> None:
     """Mean and standard deviation over the trainings, by set and by output."""
     def seed(size: float) -> dict[str, np.ndarray]:
-        return {name: np.tile([size, -size, 3 * size, 0.0], (5, 1)) for name in paper_tables.SETS}
+        return {name: np.tile([size, -size, 3 * size, 0.0], (5, 1)) for name in tables.SETS}
 
     found = {'ours': [seed(0.1), seed(0.2), seed(0.3)]}
-    table = paper_tables.table_1(found)
+    table = tables.table_1(found)
     assert '| external | MAE | 0.5624 | 0.250 ± 0.125 |' in table
     assert '| training | ME | 0.0332 | 0.150 ± 0.075 |' in table
     assert '| ours | RMSE | 0.200 ± 0.100 | 0.200 ± 0.100 | 0.600 ± 0.300 | 0.000 ± 0.000 |' in (
-        paper_tables.by_output(found))
+        tables.by_output(found))
 
 
-@pytest.mark.parametrize('name', paper_tables.TABLE_1.values())
+@pytest.mark.parametrize('name', tables.TABLE_1.values())
 def test_the_files_of_table_1_are_what_the_page_says(name: str) -> None:
     """Five seeds; placements, angles, fold and loss of the column; data of each seed differ."""
-    card = load_weights(paper_tables.resource_path('weights', f'{name}.safetensors')).card
+    card = load_weights(weights_path(name)).card
     data, kept = card['data'], name in ('table-1-as-written', 'table-1-on-grid')
     assert data['seeds'] == [1, 2, 3, 4, 5] and list(card['metrics']) == [
         f'seed_{seed}' for seed in data['seeds']]
     assert (data['kept'], data['wrap'], data['grid'] > 0, data['folded_in']) == (
         kept, not kept, name.endswith('grid'), name.endswith('folded'))
     assert len({json.dumps(card['inputs'][seed]) for seed in card['inputs']}) > 1 or data['grid']
-    assert card['data']['counts'] == dict(zip(paper_tables.SETS, dataset.PAPER_COUNTS))
+    assert card['data']['counts'] == dict(zip(tables.SETS, dataset.PAPER_COUNTS))
     assert all(one['epochs'] == 300 for key, one in card['training'].items() if key != 'minutes')
 
 
 def test_a_committee_is_judged_by_the_labels() -> None:
     """A placement moved away from its label is off by as much; the label's own class is best."""
     some = committee.placements(100)['vertex']
-    point, normal = committee.errors('exact', some)
+    point, normal = committee.errors(ours('exact'), some)
     assert point < 0.1 and normal < 0.01
     moved = dataset.Placements(some.size, some.inputs, some.point + [0.0, 0.0, 0.02], some.normal)
-    assert committee.errors('exact', moved)[0] == pytest.approx(20.0, abs=0.1)
+    assert committee.errors(ours('exact'), moved)[0] == pytest.approx(20.0, abs=0.1)
 
 
 @pytest.mark.parametrize(('tilt', 'depth'), [(0.0, 0.0), (1.0, 0.01), (54.7, 0.01)])
@@ -153,28 +150,28 @@ def test_every_pair_that_meets_is_tested() -> None:
     for tilt in (0.3, 3.0, 30.0):
         pair = rotation.tilted_cube(tilt)
         placed = soup.Soup(8).place(pair.pose_a[0], pair.pose_b[0], poses.CUBE, poses.CUBE)
-        meet = paper_soup_tables.pair_count(soup.collide(*placed))
+        meet = soup_tables.pair_count(soup.collide(*placed))
         assert 0 < meet <= rotation.count_tests(rotation.leaves(8), pair)
 
 
 def test_all_is_written(small, tmp_path, capsys):
     """One command: page, pictures, CSV; the page's numbers are the CSV's."""
-    out = tmp_path / 'new' / 'page.md'
+    out = tmp_path / 'new'
     arguments = [word for number in (3, 4) for word in ('--table', str(number))]
     arguments += [word for number in (4, 9, 10) for word in ('--figure', str(number))]
-    assert paper_tables.main(['--quick', *arguments, '--out', str(out)]) == 0
-    assert sorted(path.name for path in out.parent.iterdir()) == [
-        'page.md', 'paper_figure_10.png', 'paper_figure_4.png', 'paper_figure_9.png',
-        'paper_soup.csv']
-    page = out.read_text('utf-8')
+    assert program.main(['--quick', *arguments, '--out', str(out)]) == 0
+    assert sorted(path.name for path in out.iterdir()) == [
+        'paper_figure_10.png', 'paper_figure_4.png', 'paper_figure_9.png', 'paper_soup.csv',
+        'paper_tables.md']
+    page = (out / 'paper_tables.md').read_text('utf-8')
     for heading in ('Table 3', 'Table 4', 'Figure 4', 'Figure 9', 'Figure 10'):
         assert f'\n## {heading}: ' in page
     assert '## Table 1' not in page and 'nan' not in page
-    with (out.parent / 'paper_soup.csv').open() as file:
+    with (out / 'paper_soup.csv').open() as file:
         rows = list(csv.DictReader(file))
     timed = [row for row in rows if row['step_mean_ms']]
     assert {(int(row['divisions']), row['regime']) for row in timed} == {
-        (n, regime) for n in (8, 10) for regime in paper_soup_tables.REGIMES}
+        (n, regime) for n in (8, 10) for regime in soup_tables.REGIMES}
     for row in timed:
         assert int(row['triangles']) == 12 * int(row['divisions'])**2
         assert 0 < float(row['step_p50_ms']) <= float(row['step_max_ms'])

@@ -1,7 +1,7 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""The search: successive halving, its checkpoint, and the program `search`."""
+"""The search: successive halving, its checkpoint, and the program."""
 from __future__ import annotations
 
 import csv
@@ -18,8 +18,8 @@ import pytest
 torch = pytest.importorskip('torch')
 pytest.importorskip('matplotlib')
 
-from benchmarks.paper import search, successive_halving
-from benchmarks.paper.successive_halving import (
+from benchmarks.paper import halving, search
+from benchmarks.paper.halving import (
     Candidate,
     CheckpointError,
     Rung,
@@ -28,7 +28,7 @@ from benchmarks.paper.successive_halving import (
 QUICK = ['--quick', '--candidates', '48', '--seed', '2', '--device', 'cpu']
 
 
-class Toy(successive_halving.Search):
+class Toy(halving.Search):
     """Error: |rate − 0.3| + 1 / effort; number 6 diverges."""
 
     name = 'toy'
@@ -72,7 +72,7 @@ def test_the_better_part_goes_on(tmp_path: Path) -> None:
 @pytest.mark.parametrize('stop_after', range(8))
 def test_stopped_anywhere_it_ends_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
                                            stop_after: int) -> None:
-    monkeypatch.setattr(successive_halving, 'SAVE_EVERY', 0.0)
+    monkeypatch.setattr(halving, 'SAVE_EVERY', 0.0)
     whole = Toy().run(tmp_path / 'whole')
     path = tmp_path / 'stopped'
     first = Toy(stop_after)
@@ -105,13 +105,13 @@ def test_killed_and_started_again_it_ends_the_same(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The program, killed when its first checkpoint is there; then the page, table and plot."""
     whole, killed, name = tmp_path / 'whole', tmp_path / 'killed', 'search_paper'
-    assert search.main(['paper', *QUICK, '--out', str(whole)]) == 0
+    assert search.main([*QUICK, '--out', str(whole)]) == 0
     # A checkpoint after every group.
     process = subprocess.Popen(
         [sys.executable, '-c', 'import sys\n'
-         'from benchmarks.paper import search, successive_halving\n'
-         'successive_halving.SAVE_EVERY = 0.0\n'
-         'sys.exit(search.main(sys.argv[1:]))', 'paper', *QUICK, '--out', str(killed)],
+         'from benchmarks.paper import search, halving\n'
+         'halving.SAVE_EVERY = 0.0\n'
+         'sys.exit(search.main(sys.argv[1:]))', *QUICK, '--out', str(killed)],
         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     deadline = time.monotonic() + 150
     while not list(killed.glob('*.checkpoint')) and process.poll() is None:
@@ -121,7 +121,7 @@ def test_killed_and_started_again_it_ends_the_same(
     process.wait()
     if (killed / f'{name}.csv').exists():
         pytest.skip('it was faster than the signal')
-    assert search.main(['paper', *QUICK, '--out', str(killed)]) == 0
+    assert search.main([*QUICK, '--out', str(killed)]) == 0
     assert 'going on from' in capsys.readouterr().out
     assert table(killed, name) == table(whole, name)
     rows = list(csv.DictReader(table(whole, name).splitlines()))
@@ -135,9 +135,9 @@ def test_killed_and_started_again_it_ends_the_same(
 
 
 @pytest.mark.parametrize(('arguments', 'message'), [
-    (['mlp'], 'invalid choice'),
-    (['paper', '--candidates', '3'], '--candidates: must be at least 16, got 3'),
-    (['paper', '--seed', '-1'], "'-1' is not a whole number from 0"),
+    (['mlp'], 'unrecognized arguments: mlp'),
+    (['--candidates', '3'], '--candidates: must be at least 16, got 3'),
+    (['--seed', '-1'], "'-1' is not a whole number from 0"),
 ])
 def test_refused_arguments(arguments: list[str], message: str,
                            capsys: pytest.CaptureFixture[str]) -> None:
@@ -150,5 +150,5 @@ def test_refused_arguments(arguments: list[str], message: str,
 def test_a_checkpoint_of_other_options_is_said_in_one_line(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / 'search_paper_0.checkpoint').write_bytes(b'x')
-    assert search.main(['paper', *QUICK, '--out', str(tmp_path)]) == 1
+    assert search.main([*QUICK, '--out', str(tmp_path)]) == 1
     assert 'search_paper_0.checkpoint cannot be read, remove it' in capsys.readouterr().err

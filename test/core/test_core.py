@@ -312,10 +312,10 @@ def test_a_batch_is_its_single_calls(model: str, single_solvers: dict) -> None:
     assert many.colliding.sum() > 10_000
 
 
-@pytest.mark.parametrize('model', ['paper', 'fcl', 'soup-2'])
+@pytest.mark.parametrize('model', ['paper', 'soup-2'])
 def test_models_that_give_the_point_alone(model: str) -> None:
     """Volume and covariance are NaN in contact. Without contact the volume is zero, as of all."""
-    if model in ('fcl', 'soup-2'):
+    if model == 'soup-2':
         pytest.importorskip('fcl')
     solver = ContactSolver(poses.CUBE, poses.CUBE, model=model)
     apart = poses.IDENTITY + (0, 0, 3, 0, 0, 0, 0)
@@ -402,7 +402,7 @@ def test_a_solver_is_made_once() -> None:
     """A second __init__ is refused, and leaves all of the first."""
     solver = ContactSolver((2, 2, 2), poses.CUBE, model='exact')
     wanted = solver(poses.IDENTITY, ABOVE)
-    for model in ('exact', 'mlp', 'fcl'):
+    for model in ('exact', 'mlp'):
         with pytest.raises(RuntimeError, match='a solver is made once'):
             solver.__init__((1, 2, 3), poses.CUBE, model=model)
     assert_same_bits(solver(poses.IDENTITY, ABOVE), wanted)

@@ -18,9 +18,9 @@ from box_contact_ros.demo.landing import LandingResult
 
 def test_a_model_without_a_patch_is_told_before_the_start():
     """A load may not come to rest on its contacts."""
-    words = 'Model fcl gives points without a patch'
-    assert words in demo._announcement(demo._options(['--model', 'fcl']))
-    assert words not in demo._announcement(demo._options(['--model', 'fcl', '--open-loop']))
+    words = 'Model soup-8 gives points without a patch'
+    assert words in demo._announcement(demo._options(['--model', 'soup-8']))
+    assert words not in demo._announcement(demo._options(['--model', 'soup-8', '--open-loop']))
     told = demo._announcement(demo._options([]))
     assert 'without a patch' not in told and 'if the load comes to rest' in told
 
@@ -51,4 +51,4 @@ def test_the_verdict_is_one_line_with_its_reasons(faults, landing, words):
 def test_help_breaks_no_name_at_its_hyphen(capsys):
     with pytest.raises(SystemExit, match='0'):
         demo.main(['--help'])
-    assert 'paper-continuous' in capsys.readouterr().out
+    assert 'soup-N' in capsys.readouterr().out

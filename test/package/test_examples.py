@@ -33,8 +33,7 @@ def shown(name: str) -> list[str]:
     return lines
 
 
-@pytest.mark.parametrize('name', sorted(path.name for path in EXAMPLES.glob('*.py')
-                                        if path.name != 'own_model.py'))  # test_accuracy.py
+@pytest.mark.parametrize('name', sorted(path.name for path in EXAMPLES.glob('*.py')))
 def test_example(name: str, program, tmp_path: Path) -> None:
     """Figures agree to the printed digits; shorter runs print as many lines in the same words."""
     pytest.importorskip(NEEDS.get(name, 'numpy'))

@@ -17,12 +17,12 @@ import numpy as np
 import poses
 import pytest
 import yaml
+from box_contact_ros.scene.files.scene_file import SceneError, read_scene
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.core import LENGTH_MAX, LENGTH_MIN, QUATERNION_MAX, QUATERNION_MIN
-from box_contact_ros.scene.files.scene_file import SceneError, read_scene
 from box_contact_ros.solver.checks import absent_poses, are_poses, pose_fault, size_fault
 
 MODELS = ('exact', 'mlp')

@@ -17,7 +17,6 @@ from hypothesis import strategies as st
 from box_contact_ros import Contact, ContactSolver
 from box_contact_ros.solver.checks import pose_fault
 from box_contact_ros.solver.contact import patch_area
-from box_contact_ros.solver.models import models
 
 SOLVER = ContactSolver(poses.CUBE, poses.CUBE, model='exact')
 ABOVE = [0.5, 0.25, 1.875, 0, 0, 0, 1]
@@ -57,11 +56,12 @@ def test_results_are_not_shared():
     assert np.array_equal(one.point, kept)
 
 
-@pytest.mark.parametrize('model', models())
+@pytest.mark.parametrize('model', ['mlp', 'exact', 'paper', 'soup-2'])
 def test_a_solver_goes_to_other_processes(model):
     """Pickled and back, for a pool of processes, it answers the same."""
-    solver = ContactSolver((1, 2, 3), poses.CUBE, model=model) if 'paper' not in model else (
-        ContactSolver(poses.CUBE, poses.CUBE, model=model))
+    if model == 'soup-2':
+        pytest.importorskip('fcl')
+    solver = ContactSolver((1, 2, 3) if model != 'paper' else poses.CUBE, poses.CUBE, model=model)
     other = pickle.loads(pickle.dumps(solver))
     assert other.model == model
     above = [0.1, 0.05, 1.9, 0.02, 0.01, 0, 1]

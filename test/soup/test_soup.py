@@ -1,7 +1,7 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Model `soup`: the triangles, what is made of FCL's contacts, and what stays SAT's."""
+"""Model `soup-N`: the triangles, what is made of FCL's contacts, and what stays SAT's."""
 from __future__ import annotations
 
 import collections
@@ -124,7 +124,7 @@ def test_a_box_inside_another_is_counted_and_answered():
     """Surfaces that do not meet: SAT's normal and the exact point, never NaN."""
     sizes = (poses.CUBE, (0.5, 0.5, 0.5))
     inside = np.array([0.2, 0.1, 0.5, 0, 0, 0, 1])
-    model, exact = (ContactSolver(*sizes, model=name) for name in ('soup', 'exact'))
+    model, exact = (ContactSolver(*sizes, model=name) for name in ('soup-8', 'exact'))
     found, wanted = model(IDENTITY, inside), exact(IDENTITY, inside)
     assert found.colliding and model.exact_answers == 1
     assert np.array_equal(found.point, wanted.point)
@@ -144,34 +144,16 @@ def test_exact_touch_is_always_answered():
     assert 0 < found.exact_answers < touch.sum()
 
 
-@pytest.mark.parametrize('model', ['soup-4', 'fcl'])
-def test_batch_is_row_by_row_with_sizes_of_their_own(model):
+def test_batch_is_row_by_row_with_sizes_of_their_own():
     a, b, size_a, size_b = poses.random_pairs(np.random.default_rng(3), 40)
-    many = ContactSolver(poses.CUBE, poses.CUBE, model=model).batch(a, b, size_a=size_a,
-                                                                    size_b=size_b)
+    many = cubes(4).batch(a, b, size_a=size_a, size_b=size_b)
     assert 10 < many.colliding.sum() < 40
     for row in range(len(a)):
-        one = ContactSolver(size_a[row], size_b[row], model=model)(a[row], b[row])
+        one = ContactSolver(size_a[row], size_b[row], model='soup-4')(a[row], b[row])
         assert one.colliding == many.colliding[row]
         assert np.array_equal(one.point, many.point[row], equal_nan=True)
         assert np.array_equal(one.normal, many.normal[row], equal_nan=True)
         assert one.separation == many.separation[row]
-
-
-@pytest.mark.parametrize('name, divisions', [('soup', 8), ('soup-1', 1), ('soup-16', 16)])
-def test_names(name, divisions):
-    """`soup` is soup-8."""
-    b, _ = corner_on_top(1e-3)
-    wanted, found = cubes(divisions)(IDENTITY, b), ContactSolver(
-        poses.CUBE, poses.CUBE, model=name)(IDENTITY, b)
-    assert np.array_equal(found.point, wanted.point)
-
-
-@pytest.mark.parametrize('name', ['soup-0', 'soup-65', 'soup-', 'soup-x', 'soup-8.0', 'soup--8',
-                                  'soup-²'])
-def test_wrong_names(name):
-    with pytest.raises(ValueError, match='a whole number from 1 to 64'):
-        ContactSolver(poses.CUBE, poses.CUBE, model=name)
 
 
 def test_boxes_in_one_place_are_left_to_exact():

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_weights_file import WIDTHS, card, layers
+from test_weights_file import card, layers
 
-from benchmarks.paper import dataset, paper_tables
+from benchmarks.paper import __main__ as program
+from benchmarks.paper import dataset
 from benchmarks.paper.errors import (
     errors_of,
     figures,
@@ -18,8 +19,7 @@ from benchmarks.paper.errors import (
     predict,
     wrapped,
 )
-from box_contact_ros.paper import _networks
-from box_contact_ros.resources import resource_path
+from benchmarks.paper.models import SUBSETS, weights_path
 from box_contact_ros.solver.weights_file import load_weights, save_weights
 
 SHIPPED = ('paper', 'paper-continuous', 'paper-12.192x2.438x2.591')
@@ -42,18 +42,9 @@ def test_forward_is_the_formula(good: Path) -> None:
         if number < 2:
             value = np.tanh(value)
     np.testing.assert_allclose(predict(network, inputs), value, rtol=0, atol=1e-5)
-    one = _networks.forward(network.packed, np.array(WIDTHS), inputs[:1].astype(np.float32))
-    np.testing.assert_allclose(one[0], value[0], rtol=0, atol=1e-5)
-
-
-@pytest.mark.parametrize('widths', [[], [6], [6, 5, 4], [6, 5, 3, 5], [6, 0, 4], [6, -5, 3, 4],
-                                    [2**62, 4, 1], [5, 6, 3, 4]])
-def test_widths_that_do_not_fit(good: Path, widths: list[int]) -> None:
-    """No number beyond the parameters is read."""
-    network = load_weights(good).networks['n']
-    with pytest.raises(ValueError, match='do not fit|wrong shape'):
-        _networks.forward(network.packed, np.array(widths, dtype=np.int64),
-                          np.zeros((1, 6), dtype=np.float32))
+    many = predict(network, inputs)
+    for row in (0, 7, 199):  # alone, to the bit
+        assert np.array_equal(predict(network, inputs[row:row + 1])[0], many[row])
 
 
 def test_errors_are_wrapped() -> None:
@@ -70,7 +61,7 @@ def test_errors_are_wrapped() -> None:
 @pytest.mark.parametrize('name', SHIPPED)
 def test_shipped_weights_are_what_their_card_says(name: str) -> None:
     """All sets made again from the seed give the card's figures; inputs lie in its ranges."""
-    weights = load_weights(resource_path('weights', f'{name}.safetensors'))
+    weights = load_weights(weights_path(name))
     assert weights.card['name'] == name
     made = dataset.of_card(weights.card)
     assert set(made) == set(weights.networks) == set(weights.card['metrics'])
@@ -89,13 +80,13 @@ def test_shipped_weights_are_what_their_card_says(name: str) -> None:
 def test_shipped_errors_meet_their_bounds() -> None:
     """External validation, Tables 1 and 2: the bounds, and lower without discontinuities."""
     def external(name: str) -> dict[str, dict[str, float]]:
-        metrics = load_weights(resource_path('weights', f'{name}.safetensors')).card['metrics']
+        metrics = load_weights(weights_path(name)).card['metrics']
         return {network: sets['external']['all'] for network, sets in metrics.items()}
 
     jumps = external('paper')['contact']
     assert jumps['MAE'] <= 0.30 and jumps['RMSE'] <= 0.56
     smooth = external('paper-continuous')
-    assert set(smooth) == set(dataset.SUBSETS)
+    assert set(smooth) == set(SUBSETS)
     for errors in smooth.values():
         assert errors['MAE'] < 0.1 * jumps['MAE'] and errors['RMSE'] < 0.1 * jumps['RMSE']
     boxes = external('paper-12.192x2.438x2.591')['contact']
@@ -103,7 +94,7 @@ def test_shipped_errors_meet_their_bounds() -> None:
 
 
 def test_shipped_sets_have_the_papers_sizes() -> None:
-    counts = {name: load_weights(resource_path('weights', f'{name}.safetensors'))
+    counts = {name: load_weights(weights_path(name))
               .card['data']['counts'] for name in SHIPPED}
     assert list(counts['paper'].values()) == [8000, 5000, 75000]
     assert list(counts['paper-continuous'].values()) == [10000, 6000, 50000]
@@ -126,9 +117,8 @@ def test_tables_in_the_docs_are_the_shipped_weights(tmp_path: Path) -> None:
     Figures may differ by their rounding. (The other tables hold times: see test_paper_tables.)
     """
     docs = Path(__file__).parents[2] / 'docs' / 'results' / 'paper_tables.md'
-    assert paper_tables.main(['--table', '1', '--table', '2',
-                              '--out', str(tmp_path / 'new' / 'page.md')]) == 0
-    old, new = cells(docs.read_text()), cells((tmp_path / 'new' / 'page.md').read_text())
+    assert program.main(['--table', '1', '--table', '2', '--out', str(tmp_path)]) == 0
+    old, new = cells(docs.read_text()), cells((tmp_path / 'paper_tables.md').read_text())
     assert len(old) > len(new) > 100
     for before, after in zip(old, new):
         for one, other in zip(before.split(' ± '), after.split(' ± '), strict=True):
@@ -139,12 +129,8 @@ def test_tables_in_the_docs_are_the_shipped_weights(tmp_path: Path) -> None:
                 assert one == other
 
 
-def test_paper_program(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
-                       tmp_path: Path) -> None:
-    """Quick: the paper's figures, a tenth of the patterns, said so. Without weights: one line."""
-    assert paper_tables.main(['--quick', '--table', '1', '--table', '2']) == 0
-    page = capsys.readouterr().out
+def test_paper_program(tmp_path: Path) -> None:
+    """Quick: the paper's figures, a tenth of the patterns, said so."""
+    assert program.main(['--quick', '--table', '1', '--table', '2', '--out', str(tmp_path)]) == 0
+    page = (tmp_path / 'paper_tables.md').read_text('utf-8')
     assert '0.5624' in page and '0.4523' in page and '7,500' in page and 'every 10th' in page
-    monkeypatch.setattr(paper_tables, 'resource_path', lambda *parts: tmp_path.joinpath(*parts))
-    assert paper_tables.main([]) == 1
-    assert 'does not exist' in capsys.readouterr().err

@@ -1,7 +1,7 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Backpropagation with momentum for many networks at once, and the program `train`."""
+"""Backpropagation with momentum for many networks at once, and the program."""
 from __future__ import annotations
 
 import dataclasses
@@ -13,17 +13,16 @@ import pytest
 torch = pytest.importorskip('torch')
 
 from benchmarks.paper import dataset
-from benchmarks.paper.ensemble import Ensemble, Scaling
 from benchmarks.paper.errors import (
     errors_of,
     figures,
     predict,
     wrapped,
 )
-from benchmarks.paper.fit import PaperSettings, fit, tensors
-from benchmarks.paper.paper_jobs import JOBS, PaperJob
+from benchmarks.paper.fit import Ensemble, PaperSettings, Scaling, fit, tensors
+from benchmarks.paper.jobs import JOBS, SHIPPED, PaperJob
 from box_contact_ros.solver.weights_file import load_weights
-from training import train
+from training import __main__ as train
 
 SMALL = PaperSettings((6, 9, 7, 4), networks=3, epochs=12, batch=50, rate=0.05)
 
@@ -138,14 +137,12 @@ def test_quick_training(quick: Path, job: PaperJob) -> None:
 
 
 @pytest.mark.parametrize(('job', 'folded'), [('containers', True), ('table-1-dropped', False)])
-def test_one_job_is_folded_and_one_as_drawn(job: str, folded: bool, tmp_path: Path) -> None:
-    arguments = [job, '--quick', '--epochs', '2', '--starts', '1', '--out', str(tmp_path)]
-    assert train.main(arguments) == 0
-    card = load_weights(tmp_path / f'{JOBS[job].name}.safetensors').card
+def test_one_job_is_folded_and_one_as_drawn(job: str, folded: bool, quick: Path) -> None:
+    card = load_weights(quick / f'{JOBS[job].name}.safetensors').card
     assert card['data']['folded_in'] is folded
     network, = card['inputs']
     assert all((entry['min'] >= 0.0) is folded for entry in card['inputs'][network][:3])
-    assert card['training'][network]['starts'] == 1
+    assert card['training'][network]['starts'] == train.QUICK_STARTS
 
 
 def test_a_loss_that_is_not_wrapped_sees_the_turn(sets: dict[str, dataset.Patterns]) -> None:
@@ -160,13 +157,18 @@ def test_a_loss_that_is_not_wrapped_sees_the_turn(sets: dict[str, dataset.Patter
     assert far - near == pytest.approx(2 * np.pi, abs=1.0)
 
 
+def test_each_file_has_its_folder() -> None:
+    """What the package ships is in weights/, what the tables alone need beside them."""
+    assert {job.name for job in JOBS.values() if job.folder == SHIPPED} == {
+        path.stem for path in SHIPPED.iterdir()} - {train.MLP}
+    for job in JOBS.values():
+        assert (job.folder / f'{job.name}.safetensors').exists()
+
+
 @pytest.mark.parametrize(('arguments', 'message'), [
-    (['--quick'], 'name a folder with --out'),
-    (['mlp', '--hidden', '65', '--out', '.'], '--hidden: must lie in 1 to 64'),
-    (['mlp', '--scene', 'yard.yaml'], 'unrecognized arguments: --scene'),
-    (['papers'], "'papers' is not one of paper, paper-continuous, paper-committee, containers, "
-     'table-1-as-written, table-1-on-grid, table-1-dropped, table-1-folded, mlp, all'),
-    (['paper', '--starts', '0'], '--starts: must be at least 1, got 0'),
+    ([], 'required: WHAT'),
+    (['mlp', '--hidden', '65'], '--hidden: must lie in 1 to 64'),
+    (['papers'], "invalid choice: 'papers'"),
     (['paper', '--seed', '-1'], "'-1' is not a whole number from 0"),
 ])
 def test_refused_arguments(arguments: list[str], message: str,

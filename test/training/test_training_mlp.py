@@ -17,8 +17,9 @@ from box_contact_ros import ContactSolver
 from box_contact_ros.core import BRACKET_LIMIT, FEATURES, SPREAD_LIMIT, UPPER_LIMIT
 from box_contact_ros.solver.mlp import NETWORK, load_mlp
 from box_contact_ros.solver.weights_file import load_weights, save_weights
-from training import mlp_recipe, samples, train
-from training.mlp_fit import ShareNetwork, errors_of, fit, loss_of, tensors
+from training import __main__ as train
+from training import recipe, samples
+from training.fit import ShareNetwork, errors_of, fit, loss_of, tensors
 from training.samples import BEYOND, OPEN, MlpSamples, describe
 
 PAIRS = 40_000
@@ -146,8 +147,8 @@ def test_the_fit_lowers_the_loss_and_follows_the_seed(data: MlpSamples) -> None:
 def quick(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp('quick')
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(mlp_recipe, 'HARD_START', 20_000)
-        patch.setattr(mlp_recipe, 'HARD_COUNT', 500)
+        patch.setattr(recipe, 'HARD_START', 20_000)
+        patch.setattr(recipe, 'HARD_COUNT', 500)
         assert train.main(['mlp', '--quick', '--hidden', '6', '--seed', '3', '--out',
                            str(folder)]) == 0
     return folder / 'mlp-6.safetensors'
@@ -159,7 +160,7 @@ def test_quick_training(quick: Path) -> None:
     assert [path.name for path in quick.parent.iterdir()] == ['mlp-6.safetensors']
     assert card['architecture'] == [FEATURES, 6, 1] and card['sizes'] == []
     assert card['data']['hard'] > 0 < card['data']['contacts']
-    assert len(card['spread']) == mlp_recipe.QUICK['networks'] == 2
+    assert len(card['spread']) == recipe.QUICK['networks'] == 2
     assert card['spread'][0] != card['spread'][1]
     assert card['seed'] in (3, 4)  # that of the network which is written
     medians = [sum(entry['p99'] for entry in one.values()) for one in card['spread']]
@@ -168,7 +169,7 @@ def test_quick_training(quick: Path) -> None:
         assert 0.0 < one['volume']['mean'] < one['volume']['p99'] < one['volume']['worst'] <= (
             100.0 * BEYOND * BRACKET_LIMIT * 1.1)
     assert card['metrics'].keys() == SETS.keys()
-    assert card['metrics'] == mlp_recipe.measured(quick, 3, mlp_recipe.QUICK['metric_pairs'])
+    assert card['metrics'] == recipe.measured(quick, 3, recipe.QUICK['metric_pairs'])
     assert all(entry['point']['worst'] < 1.0 for entry in card['metrics'].values())
 
 

@@ -15,10 +15,10 @@
 
 #include "../src/library/solver.hpp"
 #include "../src/mlp/mlp_model.hpp"
+#include "../src/mlp/shipped_network.hpp"
 #include "arrays.hpp"  // first, as Python.h wants
 #include "bounding_boxes.hpp"
 #include "law.hpp"
-#include "other_kernel.hpp"
 
 namespace {
 
@@ -332,8 +332,7 @@ bool fits(Model model, const std::vector<float>& network) {
   return !network.empty() && (network.size() - 1) % detail::unit_numbers == 0;
 }
 
-// Sizes, model and network, as `PairSolver` takes them. A capsule is the kernel of another extension,
-// whose only model takes the place of `exact` and knows what its network means.
+// Sizes, model and network, as `PairSolver` takes them. No network: the shipped one.
 bool read_setup(PyObject* args, PyObject* keywords, Solver::Setup& setup, bool& has_model) {
   PyObject *name, *weights = Py_None;
   double *a = setup.size_a.data(), *b = setup.size_b.data();
@@ -349,15 +348,11 @@ bool read_setup(PyObject* args, PyObject* keywords, Solver::Setup& setup, bool& 
   has_model = name != Py_None;
   setup.model = is("mlp") ? Model::mlp : Model::exact;
   setup.kernel = kernel;
-  if (PyCapsule_IsValid(name, kernel_capsule)) {
-    auto* other = static_cast<const OtherKernel*>(PyCapsule_GetPointer(name, kernel_capsule));
-    setup.kernel = &other->kernel;
-    if (other->reads({setup.network.data(), long(setup.network.size())})) return true;
-    return fail(PyExc_ValueError, "the network is not one of this kernel's");
-  }
+  if (setup.model == Model::mlp && weights == Py_None)
+    setup.network.assign(std::begin(detail::shipped_network), std::end(detail::shipped_network));
   if ((is("mlp") || is("exact") || !has_model) && fits(setup.model, setup.network))
     return has_kernel();
-  return fail(PyExc_ValueError, "model is 'exact', 'mlp' with a network, a kernel, or None");
+  return fail(PyExc_ValueError, "model is 'exact', 'mlp', or None; the network fits");
 }
 
 int solver_init(PyObject* self, PyObject* args, PyObject* keywords) {
@@ -445,8 +440,7 @@ PyType_Slot solver_slots[] = {
     {Py_tp_doc,
      const_cast<char*>(
          "PairSolver(model, size_a, size_b, network=None, margin=0.0)\n--\n\n"
-         "Solve pairs of boxes by model 'exact' or 'mlp', or by another extension's kernel; None "
-         "leaves all to Python.\n\n"
+         "Solve pairs of boxes by model 'exact' or 'mlp'; None leaves all to Python.\n\n"
          "A call with two poses (7,) returns a Contact, and batch(poses_a, poses_b) returns "
          "Contacts. What is no plain array, tuple or list of numbers, and what is refused, goes to "
          "self.converted(pose_a, pose_b) and self.converted_batch(...).")},

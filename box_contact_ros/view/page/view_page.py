@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import viser
 
-from ...solver.models import models
+from ...solver.models import NATIVE, SOUP_DIVISIONS
 from ..style import CONTACT
 from ..view_log import Snapshot, ViewFigures
 from .read_outs import Html, deepest_contacts, highlight, legend, line, read_out, report
@@ -24,6 +24,8 @@ from .stage import Stage
 SHALLOW, DEEP = -10.0, 5.0
 """Of the depth [mm]: the chart begins at the first, around the touch, and shows at least the
 second, so that it does not magnify noise."""
+CHOICES = (*NATIVE, 'paper', f'soup-{SOUP_DIVISIONS}')
+"""Models among which the page switches."""
 READ_OUT_PERIOD = 0.2  # time [s] between new figures: faster, nobody can read them
 ROOM = 1.1  # how much higher than its largest value a chart is
 HISTORY = 12.0  # length [s] of the chart
@@ -63,7 +65,7 @@ class Page:
         self._next_read_out = 0.0
         self._highlight = server.gui.add_html('')  # styles what comes next
         if on_model is not None:
-            self._model = server.gui.add_button_group('model', tuple(models()))
+            self._model = server.gui.add_button_group('model', CHOICES)
             self._model.on_click(lambda event: on_model(event.target.value))
         self._status = server.gui.add_html('')
         if run is not None and on_land is not None:
@@ -130,7 +132,7 @@ class Page:
         self._figures, self._running = figures, model
         self._read(snapshot)
         self._draw_charts()
-        _put(self._highlight, highlight(list(models()).index(model) if model in models() else None))
+        _put(self._highlight, highlight(CHOICES.index(model) if model in CHOICES else None))
         text, bad = f'running: {model}', False
         if not model:
             text = 'waiting for the contact node …'

@@ -12,7 +12,8 @@ namespace box_contact::detail {
 struct StageArrays {
   bool *colliding{}, *certain{}, *accurate{};
   int64_t *axis{}, *face{};
-  double *separation{}, *touch{}, *size{}, *normal{}, *rotation{}, *offset_a{}, *offset_b{};
+  double *separation{}, *touch{}, *size{}, *normal{}, *axes_a{}, *rotation{};
+  double *offset_a{}, *offset_b{};
   double *pressed_offset_a{}, *pressed_offset_b{}, *centroid{}, *clipped_centroid{};
   double *volume{}, *clipped_volume{}, *covariance{}, *clipped_covariance{};
   double *unit{}, *true_volume{}, *true_mean{}, *true_covariance{};
@@ -31,6 +32,7 @@ struct StageArrays {
     visit("touch", touch, {});
     visit("size", size, {});
     visit("normal", normal, {3});
+    visit("axes_a", axes_a, {3, 3});
     visit("rotation", rotation, {3, 3});
     visit("offset_a", offset_a, {3});
     visit("offset_b", offset_b, {3});

@@ -85,6 +85,7 @@ inline bool fill_stages(const Rows& rows, long row, const StageArrays& arrays) {
   put(arrays.touch, row, q.pair.touch);
   put(arrays.size, row, q.pair.size);
   put(arrays.normal, row, q.axis.normal);
+  put(arrays.axes_a, row, q.pair.axes_a);
   put(arrays.rotation, row, q.pair.rotation);
   put(arrays.offset_a, row, q.pair.offset_a);
   put(arrays.offset_b, row, q.pair.offset_b);

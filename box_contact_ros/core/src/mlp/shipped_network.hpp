@@ -1,7 +1,7 @@
 // Copyright 2026 The box_contact_ros maintainers
 // SPDX-License-Identifier: Apache-2.0
 
-// The shipped network of model `mlp`. Program `train` writes it beside weights/mlp.safetensors.
+// The shipped network of model `mlp`. `python -m training mlp` writes it with the weights file.
 #pragma once
 
 namespace box_contact::detail {

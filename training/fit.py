@@ -15,7 +15,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from benchmarks.paper.ensemble import as_layers
+from benchmarks.paper.fit import as_layers
 from box_contact_ros.core import FEATURES
 from box_contact_ros.solver.weights_file import Layers
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -24,14 +24,19 @@ from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.soup import soup
 
 from .. import output
-from ..contestant import ours
+from ..contestant import Contestant, ours
 from ..errors import distances
 from ..pose_sets import CUBE, Pairs, at_depth, coplanar, drawn, on_cube, stacks
 from ..timing import cpu_milliseconds, no_garbage_collection, pinned, usable_cores
 from .dataset import as_poses
-from .paper_tables import PAPER_NETWORK
-from .paper_tables import PAPER_SOUP as PAPER
+from .models import continuous
 
+PAPER = {8: (1.10, 11233, 11.52), 10: (1.47, 14323, 15.47), 12: (1.85, 17911, 19.2),
+         14: (1.94, 21789, 23.13), 16: (2.13, 24667, 24.63), 18: (2.31, 26517, 28.0),
+         20: (2.72, 30475, 32.44), 22: (2.90, 35411, 36.77)}
+"""The paper's figures by N: Table 3's mean time [ms]; Table 4's largest number of tests, and its
+time [ms]."""
+PAPER_NETWORK = 0.5  # the paper's time of its network [ms]
 ALSO = (1, 2, 4, 32, 64)  # divisions at which only the accuracy is measured, on touching boxes
 
 OVERLAP = 1e-3
@@ -152,9 +157,9 @@ def judge_soup(divisions: int, patterns: Pairs, exact: Contacts) -> SoupErrors:
         depth=np.array(depths) + exact.separation[rows])
 
 
-def time_calls(model: str, patterns: Pairs) -> float:
+def time_calls(model: Contestant, patterns: Pairs) -> float:
     """Return the mean time of a call [ms]; calls are too short for a clock each."""
-    calls = ours(model).prepare(patterns)
+    calls = model.prepare(patterns)
 
     def all_calls() -> None:
         for call in calls:
@@ -164,10 +169,11 @@ def time_calls(model: str, patterns: Pairs) -> float:
     return cpu_milliseconds(all_calls)[0] / len(calls)
 
 
-def judge_network(model: str, patterns: Pairs, exact: Contacts) -> Row:
+def judge_network(model: Contestant, patterns: Pairs, exact: Contacts) -> Row:
     """Return a network's row on touching patterns."""
-    found, _ = ours(model).solve(patterns)
-    return {'model': model, 'regime': 'touching', 'answer_mean_ms': time_calls(model, patterns),
+    found, _ = model.solve(patterns)
+    return {'model': model.name, 'regime': 'touching',
+            'answer_mean_ms': time_calls(model, patterns),
             'point_error_mean_m': float(distances(found.point, exact.point).mean()),
             'normal_error_mean_deg': float(degrees_between(found.normal, exact.normal).mean())}
 
@@ -220,9 +226,10 @@ def measure(inputs: np.ndarray, *, quick: bool = False) -> SoupResult:
                     'normal_error_mean_deg': float(errors.normal.mean()),
                     'depth_error_mean_m': float(errors.depth.mean())}
                 bar.update(len(judged[regime].size))
-        networks = {model: judge_network(model, judged['touching'], truth['touching'])
-                    for model in ('paper', 'paper-continuous')}
-        exact = time_calls('exact', judged['touching'])
+        networks = {model.name: judge_network(model, judged['touching'], truth['touching'])
+                    for model in (ours('paper'), replace(ours(continuous()),
+                                                         name='paper-continuous'))}
+        exact = time_calls(ours('exact'), judged['touching'])
     return SoupResult(soups=soups, networks=networks, exact=exact, counts=counts)
 
 

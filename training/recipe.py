@@ -9,7 +9,7 @@ spread of all five stands in its model card.
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,15 +18,15 @@ import torch
 from tqdm import tqdm
 
 from benchmarks.errors import contact_errors
+from benchmarks.output import percentiles
 from benchmarks.pose_sets import SETS, Pairs
 from benchmarks.worst_case import climb, worst_start
 from box_contact_ros.core import BRACKET_LIMIT, FEATURES, NETWORK_FORMAT, SPREAD_LIMIT, UPPER_LIMIT
-from box_contact_ros.output import percentiles
 from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.solver.mlp import ACTIVATION, FEATURE_NAMES, NETWORK, core_numbers
 from box_contact_ros.solver.weights_file import Network, save_weights
 
-from .mlp_fit import MlpErrors, ShareNetwork, errors_of, fit, tensors
+from .fit import MlpErrors, ShareNetwork, errors_of, fit, tensors
 from .samples import MlpSamples, describe, draw_samples, mixture
 
 HIDDEN = 16
@@ -58,11 +58,10 @@ QUICK = {'pairs': 100_000, 'steps': 200, 'generations': 3, 'hard_rounds': 1, 'me
 
 
 def train(path: Path, *, seed: int, commit: str, quick: bool = False, hidden: int = HIDDEN,
-          steps: int | None = None) -> dict[str, Any]:
+          ) -> dict[str, Any]:
     """Train the networks and write one to `path`; return its model card."""
     began = time.monotonic()
     recipe = MlpRecipe(**(QUICK if quick else {}))
-    recipe = replace(recipe, steps=steps or recipe.steps)
     data = draw_samples(mixture, [seed, _DATA], recipe.pairs, progress=True)
     drawn = len(data)
     first = _trained(data, seed, hidden, recipe, 'on draws')
@@ -101,7 +100,7 @@ def header(layers: Any) -> str:
 HEADER = """// Copyright 2026 The box_contact_ros maintainers
 // SPDX-License-Identifier: Apache-2.0
 
-// The shipped network of model `mlp`. Program `train` writes it beside weights/mlp.safetensors.
+// The shipped network of model `mlp`. `python -m training mlp` writes it with the weights file.
 #pragma once
 
 namespace box_contact::detail {

@@ -19,6 +19,7 @@ from . import dataset
 from .dataset import TOUCHING, Drawing
 from .errors import errors_of, figures, figures_by_part
 from .fit import PaperSettings, fit
+from .models import EXPERTS
 
 _DRAWN = ('Boxes that just touch, one fixed: impact points uniform by area on its trihedron +x +y '
           '+z, each of the 7 vertices of the other trihedron −x −y −z placed there; points '
@@ -35,6 +36,8 @@ _COMMITTEE = (_FOLDED.replace('half of the patterns vertex-face, half edge-edge'
               + ' Expert face: a face of one trihedron on a face of the other, spin and place '
               'uniform, tilted by up to 0.02 rad; the point is the middle of the overlap. '
               'Classifier: a third of each kind.')
+SHIPPED = Path(__file__).parents[2] / 'weights'
+SHIPPED_NAMES = ('paper', 'paper-12.192x2.438x2.591')
 SEEDS = (1, 2, 3, 4, 5)
 GRID = 7  # angles every 30°
 
@@ -44,7 +47,7 @@ class PaperJob:
     """One weights file."""
 
     name: str  # of the file, without its ending
-    model: str  # the solver's model that it serves
+    model: str  # the model that it serves
     size: tuple[float, float, float]  # full extents [m] of either box
     settings: PaperSettings
     recipe: str = _FOLDED  # the data in words, for the model card
@@ -54,6 +57,11 @@ class PaperJob:
     drawing: Drawing = TOUCHING
     seeds: tuple[int, ...] = ()
     """Of Table 1: trainings of the file, a network `seed_N` each. Each draws its own data."""
+
+    @property
+    def folder(self) -> Path:
+        """Return where the file is: with the package, or with the tables that alone need it."""
+        return SHIPPED if self.name in SHIPPED_NAMES else Path(__file__).parent / 'weights'
 
 
 # Learning rate, initial range, batch and epochs were compared on seed 1, by the cross-validation
@@ -99,7 +107,7 @@ def train_paper(job: PaperJob, *, seed: int, commit: str, folder: Path) -> dict[
     began = time.monotonic()
     networks, data = {}, dataset.of_card(card)
     for number, (network, sets) in enumerate(data.items()):
-        names = dataset.CLASSES if network == 'classifier' else dataset.OUTPUTS
+        names = EXPERTS if network == 'classifier' else dataset.OUTPUTS
         settings = replace(job.settings, widths=(*job.settings.widths[:-1], len(names)),
                            seed=job.seeds[number] if job.seeds else seed)
         card['architecture'][network] = list(settings.widths)
@@ -138,7 +146,7 @@ def _metrics(network: Network, patterns: dataset.Patterns, wrap: bool) -> dict[s
 def _ranges(names: Sequence[str], sets: dict[str, dataset.Patterns], what: str) -> list[dict]:
     """Return least and largest value of every input or output over all sets, with its unit."""
     values = [getattr(patterns, what) for patterns in sets.values()]
-    return [{'name': name, 'unit': 'm' if name.startswith('t_') else '1' if name in dataset.CLASSES
+    return [{'name': name, 'unit': 'm' if name.startswith('t_') else '1' if name in EXPERTS
              else 'rad',
              'min': float(min(v[:, k].min() for v in values)),
              'max': float(max(v[:, k].max() for v in values))} for k, name in enumerate(names)]

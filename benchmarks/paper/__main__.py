@@ -1,0 +1,75 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""The source paper's Tables 1 to 4 and Figures 4, 9 and 10, redone: paper_tables.md.
+
+Tables 3 and 4 and Figures 4 and 10 need python-fcl. All are made, unless some are chosen.
+"""
+from __future__ import annotations
+
+import sys
+from collections.abc import Collection, Sequence
+from pathlib import Path
+
+from box_contact_ros.core import native
+from box_contact_ros.solver.arguments import program_parser
+
+from .. import output
+from . import tables
+
+TABLES, FIGURES = (1, 2, 3, 4), (4, 9, 10)
+QUICK = 10  # `--quick` looks at every tenth pattern
+
+
+def report(numbers: Collection[int], drawn: Collection[int], folder: Path, *, quick: bool) -> str:
+    """Return the page with some of the tables and figures; pictures and CSV go to `folder`."""
+    note = f' Quick run: every {QUICK}th pattern only, and fewer for the soup.' if quick else ''
+    sections = [output.page('benchmarks/paper/pages/page', machine=output.machine(native),
+                            note=note)]
+    if {1, 2} & set(numbers):
+        sections += tables.sections_1_and_2(numbers, QUICK if quick else 1)
+    if 9 in drawn:
+        tables.draw_figure_9(folder / 'paper_figure_9.png')
+        sections.append(output.page('benchmarks/paper/pages/figure_9', shown=tables.SHOWN))
+    if 4 in drawn:
+        from . import rotation  # only here: python-fcl is an extra
+
+        rows = rotation.measure(quick=quick)
+        rotation.draw(rows, folder / 'paper_figure_4.png')
+        sections.append(rotation.section(rows))
+    if {3, 4} & set(numbers) or 10 in drawn:
+        from . import soup_tables  # only here: python-fcl is an extra
+
+        _, sets = tables.with_sets('paper')
+        result = soup_tables.measure(sets['contact']['external'].inputs, quick=quick)
+        output.write_csv(folder / 'paper_soup.csv', result.rows,
+                         about=output.machine(native, ('numpy', 'python-fcl')))
+        if 10 in drawn:
+            soup_tables.draw_figure_10(result, folder / 'paper_figure_10.png')
+        sections += [section(result) for number, section in soup_tables.SECTIONS.items()
+                     if number in {*numbers, *drawn}]
+        sections.append(soup_tables.section_errors(result))
+    return '\n'.join(sections)
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Write the page and its pictures."""
+    parser = program_parser('python -m benchmarks.paper', __doc__, out='page, pictures and CSV',
+                            quick=f'look at every {QUICK}th pattern only, and at fewer for the '
+                            'soup')
+    parser.add_argument('--table', type=int, action='append', choices=TABLES,
+                        help='only this table; may be given several times')
+    parser.add_argument('--figure', type=int, action='append', choices=FIGURES,
+                        help='only this figure; may be given several times')
+    options = parser.parse_args(args)
+    chosen = options.table or options.figure
+    folder = output.results_folder(parser, options)
+    page = report(options.table or (() if chosen else TABLES),
+                  options.figure or (() if chosen else FIGURES), folder, quick=options.quick)
+    (folder / 'paper_tables.md').write_text(page, encoding='utf-8')
+    print(f'written to {folder / "paper_tables.md"}')
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

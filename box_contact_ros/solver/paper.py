@@ -1,0 +1,262 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""Model `paper`: contact point and normal of two equal boxes from the source paper's network.
+
+The separating-axis test decides whether the boxes collide and gives the separation. Then:
+
+1. `touching_pairs`: the box whose face wins is the first box (on an edge axis, A). The boxes
+   are moved apart along the normal until they touch: the network knows touching boxes only.
+2. `to_octant`: symmetries bring the pair into the network's domain, t ≥ 0 and roll, pitch and yaw
+   in [−π/2, π/2]. A box stays the same when an axis changes its sign, and the whole pair may be
+   reflected. Let t be the second box's offset and R its orientation, in the first box's frame:
+   t' = M t, R' = M R Nᵀ, det M · det N = 1, with M and N signed permutations chosen from the pose
+   alone. Points and directions of the contact go back by Mᵀ.
+3. `forward`: offset, roll, pitch and yaw → azimuth and elevation of the impact point, seen from the
+   first box's centre, and of the normal. Only this runs in float32.
+4. The impact point is where that direction leaves the first box. It goes back to the common frame,
+   to the middle of the overlap's depth.
+
+Weights are for cubes of any edge, or for the very size that they were trained for.
+"""
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..core import native
+from ..resources import resource_path
+from .checks import as_size, shown
+from .contact import Contacts, without_patch
+from .weights_file import Network, Weights, WeightsError, load_weights
+
+INPUTS, OUTPUTS = 6, 4
+"""Of a network: t_x t_y t_z roll pitch yaw → azimuth, elevation of the point, of the normal."""
+SAME_SIZE = 1e-6
+"""Relative difference of extents up to which two sizes are one, and a size that of the weights."""
+STAGES = ('colliding', 'separation', 'axis', 'normal', 'axes_a', 'rotation', 'offset_a',
+          'offset_b')
+
+
+class TouchingPairs(NamedTuple):
+    """n pairs in the frames of their first boxes, moved apart until they touch."""
+
+    first_is_b: np.ndarray  # (n,) bool
+    axis: np.ndarray  # (n,) winning axis: 0–2 face of the first box, 6–14 edges
+    normal: np.ndarray  # (n, 3) from the first to the second box
+    offset: np.ndarray  # (n, 3) t of the second box [m], or in half edges for weights of cubes
+    rotation: np.ndarray  # (n, 3, 3) R, the second box's axes as columns
+
+
+class Folds(NamedTuple):
+    """n pairs in a network's domain: t' = M t, R' = M R Nᵀ."""
+
+    map_first: np.ndarray  # (n, 3, 3) M, a signed permutation of the first box's axes
+    offset: np.ndarray  # (n, 3) t' of the second box
+    rotation: np.ndarray  # (n, 3, 3) R'
+
+    @property
+    def inputs(self) -> np.ndarray:
+        """Return a network's inputs (n, 6): t', and roll, pitch and yaw of R'."""
+        return np.concatenate([self.offset, euler_angles(self.rotation)], axis=1)
+
+    def folded(self, vectors: np.ndarray) -> np.ndarray:
+        """Return points or directions (n, 3) of the first box's frame, folded."""
+        return turned(self.map_first, vectors)
+
+    def unfolded(self, vectors: np.ndarray) -> np.ndarray:
+        """Return folded points or directions (n, 3) in the first box's frame."""
+        return turned(self.map_first.swapaxes(1, 2), vectors)
+
+
+def turned(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Return the products (n, 3) of matrices (n, 3, 3) and vectors (n, 3)."""
+    return (matrices @ vectors[:, :, None])[:, :, 0]
+
+
+def sign(values: np.ndarray) -> np.ndarray:
+    """Return 1 where values are 0 or more, else −1."""
+    return np.where(values >= 0.0, 1.0, -1.0)
+
+
+def fold_by(map_first: np.ndarray, map_second: np.ndarray, offset: np.ndarray,
+            rotation: np.ndarray) -> Folds:
+    """Return pairs folded by M and N (n, 3, 3)."""
+    turn = map_first @ rotation @ map_second.swapaxes(1, 2)
+    return Folds(map_first, turned(map_first, offset), turn + 0.0)  # no −0, which atan2 tells apart
+
+
+def to_octant(offset: np.ndarray, rotation: np.ndarray) -> Folds:
+    """Fold n boxes of any shape to t' ≥ 0, and roll, pitch and yaw in [−π/2, π/2]."""
+    m = sign(offset)
+    n = np.empty_like(m)
+    n[:, 0] = sign(m[:, 0] * rotation[:, 0, 0])  # cos(yaw) cos(pitch) ≥ 0
+    n[:, 2] = sign(m[:, 2] * rotation[:, 2, 2])  # cos(pitch) cos(roll) ≥ 0
+    n[:, 1] = m.prod(axis=1) * n[:, 0] * n[:, 2]
+    return fold_by(np.eye(3) * m[:, None], np.eye(3) * n[:, None], offset, rotation)
+
+
+def euler_angles(rotation: np.ndarray) -> np.ndarray:
+    """Return roll, pitch, yaw (n, 3) [rad] of rotations (n, 3, 3) = Rz(yaw) Ry(pitch) Rx(roll)."""
+    return np.stack([np.arctan2(rotation[:, 2, 1], rotation[:, 2, 2]),
+                     np.arcsin(np.clip(-rotation[:, 2, 0], -1.0, 1.0)),
+                     np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])], axis=1)
+
+
+def forward(network: Network, inputs: np.ndarray) -> np.ndarray:
+    """Return the outputs (n, outputs) float32 of a network, hidden units tanh.
+
+    A row is a product of its own, so its bits do not depend on the other rows.
+    """
+    values = inputs.astype(np.float32)
+    for weight, bias in network.layers[:-1]:
+        values = np.tanh((values[:, None] @ weight.T)[:, 0] + bias)
+    weight, bias = network.layers[-1]
+    return (values[:, None] @ weight.T)[:, 0] + bias
+
+
+def directions(angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return unit vectors (n, 3) to the point and along the normal, of a network's outputs (n, 4).
+
+    An azimuth runs from x towards y, an elevation towards z [rad].
+    """
+    angles = angles.astype(np.float64)
+    azimuth, elevation = angles[:, 0::2], angles[:, 1::2]
+    level = np.cos(elevation)
+    vectors = np.stack([level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)],
+                       axis=2)
+    return vectors[:, 0], vectors[:, 1]
+
+
+class Paper:
+    """The paper's network 6-20-18-4 behind `ContactSolver`."""
+
+    name = 'paper'
+    networks = {'contact': OUTPUTS}
+    """Outputs of each network in the weights file."""
+
+    def __init__(self, weights: Weights) -> None:
+        self._networks = {name: weights.network(name, INPUTS, outputs, self.name)
+                          for name, outputs in self.networks.items()}
+        self._file = weights.path.name
+        try:
+            self._size = as_size(weights.card['sizes'][0], 'size')[0]
+        except (LookupError, TypeError, ValueError) as error:
+            raise WeightsError(f'weights file {shown(str(weights.path))}: the sizes in its card '
+                               'are no list of three extents') from error
+        self._cubes = is_cube(self._size)
+
+    def answer(self, pairs: TouchingPairs) -> tuple[np.ndarray, np.ndarray]:
+        """Return directions (n, 3) to the impact point and of the normal, first box's frame.
+
+        Models with other networks replace this.
+        """
+        fold = to_octant(pairs.offset, pairs.rotation)
+        point, normal = directions(forward(self._networks['contact'], fold.inputs))
+        return fold.unfolded(point), fold.unfolded(normal)
+
+    def solve(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
+              threads: int = 1) -> tuple[Contacts, int]:
+        """Return contacts for poses (n, 7), sizes (n or 1, 3), and the first refused row or −1."""
+        stages, refused = native.stages(a, b, size_a, size_b, STAGES)
+        sizes_a, sizes_b = (np.broadcast_to(size, (len(a), 3)) for size in (size_a, size_b))
+        misfits = np.flatnonzero(~self._fits(sizes_a, sizes_b))
+        if len(misfits) and (refused < 0 or misfits[0] < refused):
+            refused = int(misfits[0])
+        touching = stages['colliding']
+        nowhere = np.full((2, len(a), 3), np.nan)
+        found = without_patch(touching, stages['separation'], *nowhere)._replace(
+            axis=stages['axis'].astype(np.int32))
+        if refused < 0 and touching.any():
+            rows = {name: values[touching] for name, values in stages.items()}
+            found.point[touching], found.normal[touching] = self._contacts(
+                a[touching, :3], 0.5 * sizes_a[touching], rows)
+        return found, refused
+
+    def _contacts(self, place_a: np.ndarray, half: np.ndarray, stages: dict[str, np.ndarray],
+                  ) -> tuple[np.ndarray, np.ndarray]:
+        """Return points and normals (n, 3) in the common frame of n pairs that collide.
+
+        place_a: centres (n, 3) of A [m]; half: half extents (n, 3) of either box [m].
+        """
+        depth, normal = -stages['separation'][:, None], stages['normal']
+        pairs = touching_pairs(stages)
+        if self._cubes:
+            pairs = pairs._replace(offset=pairs.offset / half[:, :1])
+        way, answer = self.answer(pairs)
+        # The ray leaves the first box at the impact point. Its surface lies half the depth beyond
+        # the middle of the overlap.
+        point = way / np.max(np.abs(way) / half, axis=1, keepdims=True)
+        in_b = pairs.first_is_b[:, None]
+        rotation = stages['rotation']
+        point = np.where(in_b, stages['offset_a'] + 0.5 * depth * normal + turned(rotation, point),
+                         point - 0.5 * depth * normal)
+        answer = np.where(in_b, -turned(rotation, answer), answer)
+        axes = stages['axes_a']
+        return place_a + turned(axes, point), turned(axes, answer)
+
+    def _fits(self, size_a: np.ndarray, size_b: np.ndarray) -> np.ndarray:
+        """Return which rows of full extents (n, 3) the weights are for, (n,)."""
+        wanted = size_a[:, :1] if self._cubes else self._size
+        return np.all((np.abs(size_a - size_b) <= SAME_SIZE * size_a)
+                      & (np.abs(size_a - wanted) <= SAME_SIZE * wanted), axis=1)
+
+    def size_fault(self, size_a: np.ndarray, size_b: np.ndarray) -> str | None:
+        """Return why the weights are not for two full extents (3,) [m], or None."""
+        if self._fits(size_a[None], size_b[None])[0]:
+            return None
+        known = 'cubes' if self._cubes else in_words(self._size)
+        return pair_fault(self.name, size_a, size_b) or (
+            f'the weights {shown(self._file)} of model {self.name!r} are for {known}, not for size '
+            f"{in_words(size_a)}; any size works with model 'exact'")
+
+
+def touching_pairs(stages: dict[str, np.ndarray]) -> TouchingPairs:
+    """Return n pairs that collide as seen from their first boxes, from `STAGES`."""
+    axis, rotation, normal = stages['axis'], stages['rotation'], stages['normal']
+    depth = -stages['separation'][:, None]
+    of_b = (3 <= axis) & (axis < 6)
+    back = rotation.swapaxes(1, 2)
+    normal_b = -turned(back, normal)
+    wide = of_b[:, None]
+    return TouchingPairs(
+        of_b, np.where(of_b, axis - 3, axis), np.where(wide, normal_b, normal),
+        np.where(wide, -stages['offset_b'] + depth * normal_b, stages['offset_a'] + depth * normal),
+        np.where(wide[..., None], back, rotation))
+
+
+def is_cube(size: np.ndarray) -> bool:
+    """Return whether full extents (3,) are those of a cube."""
+    return bool(np.ptp(size) <= SAME_SIZE * size.max())
+
+
+def pair_fault(model: str, size_a: np.ndarray, size_b: np.ndarray) -> str | None:
+    """Return why no weights are for two boxes of different full extents (3,) [m], or None."""
+    if np.all(np.abs(size_a - size_b) <= SAME_SIZE * size_a):
+        return None
+    return (f'model {model!r} is for two boxes of one size, not {in_words(size_a)} and '
+            f"{in_words(size_b)}; any sizes work with model 'exact'")
+
+
+def in_words(size: np.ndarray) -> str:
+    """Return full extents (3,) [m] for a refusal."""
+    return ' × '.join(f'{extent:g}' for extent in size) + ' m'
+
+
+def paper(size_a: np.ndarray, size_b: np.ndarray, path: str | None) -> Paper:
+    """Return model `paper` for full extents (3,) [m], with the weights of a file.
+
+    path: None is the shipped file for these boxes. Raises ValueError for sizes without weights.
+    """
+    if fault := pair_fault('paper', size_a, size_b):
+        raise ValueError(fault)
+    if path is None:
+        suffix = '' if is_cube(size_a) else '-' + 'x'.join(f'{extent:g}' for extent in size_a)
+        try:
+            path = str(resource_path('weights', f'paper{suffix}.safetensors'))
+        except FileNotFoundError as error:
+            raise WeightsError(
+                f"model 'paper' has no weights for boxes of size {in_words(size_a)}: train them, "
+                "name a file with `weights`, or use model 'exact', which needs none") from error
+    return Paper(load_weights(path))

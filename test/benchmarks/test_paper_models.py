@@ -1,0 +1,88 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""Models `paper-continuous` and `paper-committee`: errors, and what chooses among networks."""
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import poses
+import pytest
+from test_paper import touching
+
+from benchmarks.paper.models import Committee, committee, continuous, weights_path
+from box_contact_ros import ContactSolver
+from box_contact_ros.resources import resource_path
+from box_contact_ros.scene.pose import rotation_matrix
+from box_contact_ros.solver.paper import Paper
+from box_contact_ros.solver.weights_file import WeightsError, load_weights, save_weights
+
+EXACT = ContactSolver(poses.CUBE, poses.CUBE, model='exact')
+MODELS = {'continuous': (continuous, 0.008, 0.15), 'committee': (committee, 0.55, 10.0)}
+"""Bounds of the mean point error [m] and of the mean normal error [deg]. The weights reach 0.006 m
+and 0.11°, 0.49 m and 6.4°."""
+
+
+def solver_of(model: Paper) -> ContactSolver:
+    return ContactSolver(poses.CUBE, poses.CUBE, model=model)
+
+
+@pytest.mark.parametrize('name', MODELS)
+def test_error_on_touching_boxes(name: str) -> None:
+    """Against `exact`; rows are as single calls."""
+    make, metres, degrees = MODELS[name]
+    solver = solver_of(make())
+    a, b = touching(np.array(poses.CUBE), depth=1e-9)
+    truth, found = EXACT.batch(a, b), solver.batch(a, b)
+    cosine = np.clip(np.sum(found.normal * truth.normal, axis=1), -1, 1)
+    assert np.linalg.norm(found.point - truth.point, axis=1).mean() < metres
+    assert np.degrees(np.arccos(cosine)).mean() < degrees
+    assert np.array_equal(found.separation, truth.separation)
+    for row in range(0, len(a), 50):
+        one = solver(a[row], b[row])
+        assert np.array_equal(one.point, found.point[row])
+        assert np.array_equal(one.normal, found.normal[row])
+
+
+def test_continuous_covers_both_subsets() -> None:
+    """The sweep above reaches faces of A, faces of B and edges."""
+    a, b = touching(np.array(poses.CUBE), n=500)
+    normals = EXACT.batch(a, b).normal
+    cosines = [np.einsum('nij,ni->nj', rotation_matrix(p[:, 3:]), normals) for p in (a, b)]
+    face = [np.abs(cosine).max(axis=1) > 1 - 1e-9 for cosine in cosines]
+    shares = face[0].mean(), face[1].mean(), (~(face[0] | face[1])).mean()
+    assert min(shares) > 0.1
+
+
+def test_a_committee_is_the_weighted_mean_of_its_experts(tmp_path: Path) -> None:
+    """Experts that point along ±x, y and z on top, and a classifier of constants.
+
+    The mean's direction leaves the box; a negative weight counts as none; where all are negative,
+    the likeliest expert answers alone.
+    """
+    card = load_weights(weights_path('paper-committee')).card
+    a, b = poses.IDENTITY, np.array([0.2, 0.1, 1.99, 0.01, 0.02, 0.3, 1.0])
+
+    def constant(*outputs: float) -> list[tuple[np.ndarray, np.ndarray]]:
+        widths = (6, 20, 18, len(outputs))
+        layers = [(np.zeros((n, m)), np.zeros(n)) for m, n in zip(widths, widths[1:])]
+        return [*layers[:-1], (layers[-1][0], np.array(outputs))]
+
+    def answer(*weights: float) -> np.ndarray:
+        path = tmp_path / 'committee.safetensors'
+        up = np.pi / 2
+        save_weights(path, {'classifier': constant(*weights), 'vertex': constant(0, 0, 0, 0),
+                            'edge': constant(up, 0, up, 0), 'face': constant(0, up, 0, up)}, card)
+        return solver_of(Committee(load_weights(path)))(a, b).normal
+
+    assert answer(0.6, 0.0, 0.8) == pytest.approx([0.6, 0.0, 0.8], abs=1e-6)
+    assert answer(-5.0, 0.3, 0.4) == pytest.approx([0.0, 0.6, 0.8], abs=1e-6)
+    assert answer(-5.0, -3.0, -4.0) == pytest.approx([0.0, 1.0, 0.0], abs=1e-6)
+
+
+def test_they_are_for_cubes_and_need_their_networks() -> None:
+    with pytest.raises(ValueError, match='are for cubes, not for size 1 × 2 × 3 m'):
+        ContactSolver((1, 2, 3), (1, 2, 3), model=continuous())
+    with pytest.raises(WeightsError, match="has no network 'classifier'"):
+        Committee(load_weights(resource_path('weights', 'paper.safetensors')))

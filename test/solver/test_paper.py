@@ -1,0 +1,178 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""Model `paper` on whole boxes, in any pose."""
+from __future__ import annotations
+
+import numpy as np
+import poses
+import pytest
+
+from box_contact_ros import ContactSolver
+from box_contact_ros.resources import resource_path
+from box_contact_ros.solver.weights_file import WeightsError
+
+EDGE = 2.0
+MODELS = {'cubes': (poses.CUBE, 0.6, 12.0), 'containers': (poses.CONTAINER, 1.4, 12.0)}
+"""Sizes, and bounds of the mean point error [m] and of the mean normal error [deg]. The shipped
+weights reach 0.53 m and 7.4°, 1.27 m and 7.7°."""
+
+
+def make(name):
+    size = MODELS[name][0]
+    return ContactSolver(size, size, model='paper'), ContactSolver(size, size, model='exact'), size
+
+
+def touching(size, n=4000, depth=0.0, seed=9):
+    """Pairs of equal boxes in any orientation, `depth` [m] deep along SAT's normal."""
+    rng = np.random.default_rng(seed)
+    exact = ContactSolver(size, size, model='exact')
+    a = np.concatenate([rng.uniform(-9, 9, (n, 3)), poses.unit_quaternions(rng, n)], axis=1)
+    within = poses.rotate(a[:, 3:], rng.uniform(-0.5, 0.5, (n, 3)) * size)
+    turn = poses.unit_quaternions(rng, n)
+    within_b = poses.rotate(turn, rng.uniform(-0.5, 0.5, (n, 3)) * size)
+    b = np.concatenate([a[:, :3] + within - within_b, turn], axis=1)
+    found = exact.batch(a, b)
+    assert found.colliding.all()
+    b[:, :3] += (-found.separation - depth)[:, None] * found.normal
+    return a, b
+
+
+@pytest.mark.parametrize('name', MODELS)
+def test_error_on_touching_boxes(name):
+    """Against `exact`, whose point at touch is the paper's impact point."""
+    solver, exact, size = make(name)
+    a, b = touching(np.array(size), depth=1e-9)
+    truth, found = exact.batch(a, b), solver.batch(a, b)
+    error = np.linalg.norm(found.point - truth.point, axis=1)
+    cosine = np.clip(np.sum(found.normal * truth.normal, axis=1), -1, 1)
+    _, metres, degrees = MODELS[name]
+    assert error.mean() < metres
+    assert np.degrees(np.arccos(cosine)).mean() < degrees
+    assert np.array_equal(found.separation, truth.separation)
+
+
+@pytest.mark.parametrize('name', MODELS)
+def test_contracts(name):
+    """Finite, unit normal, verdict and separation of SAT, point on the touching box's surface.
+
+    Rows are as single calls.
+    """
+    solver, exact, size = make(name)
+    a, b = touching(np.array(size), n=300, depth=0.05)
+    b[::3, :3] += 20.0
+    truth, found = exact.batch(a, b), solver.batch(a, b)
+    assert np.array_equal(found.colliding, truth.colliding)
+    assert np.array_equal(found.separation, truth.separation)
+    touch = found.colliding
+    assert 0.5 < touch.mean() < 0.8
+    assert np.isfinite(found.point[touch]).all() and np.isnan(found.point[~touch]).all()
+    assert np.abs(np.linalg.norm(found.normal[touch], axis=1) - 1).max() < 1e-12
+    for i in range(0, 300, 5):
+        one = solver(a[i], b[i])
+        assert np.array_equal(one.point, found.point[i], equal_nan=True)
+        assert np.array_equal(one.normal, found.normal[i], equal_nan=True)
+
+
+@pytest.mark.parametrize('name', MODELS)
+def test_point_is_in_the_middle_of_the_depth(name):
+    """|point(δ) − (point(0) − δ/2 · normal)| ≤ 1e-4 of the size, where B has moved by −δ · normal.
+
+    The networks know touching boxes only, so the depth δ changes neither the normal nor the rest.
+    """
+    solver, exact, size = make(name)
+    a, b = touching(np.array(size), n=2000, depth=1e-9)
+    deep, delta = b.copy(), 0.05
+    before = exact.batch(a, b)
+    deep[:, :3] -= delta * before.normal
+    after = exact.batch(a, deep)
+    same = np.sum(before.normal * after.normal, axis=1) > 1 - 1e-12  # no other axis has won
+    assert same.mean() > 0.9
+    first, second = solver.batch(a, b), solver.batch(a, deep)
+    error = np.linalg.norm(second.point - (first.point - 0.5 * delta * before.normal), axis=1)
+    # A fold may choose the other side when an offset or an angle is zero but for rounding.
+    assert np.quantile(error[same], 0.99) < 1e-4 * max(size)
+    assert np.quantile(np.linalg.norm(second.normal - first.normal, axis=1)[same], 0.99) < 1e-4
+
+
+@pytest.mark.parametrize('name', MODELS)
+def test_the_first_refused_row_is_named(name):
+    """And other rows do not matter."""
+    solver, _, size = make(name)
+    a, b = touching(np.array(size), n=6, depth=0.05)
+    b[2, 3:] = 0.0
+    a[4, 0] = np.nan
+    with pytest.raises(ValueError, match=r'poses_b\[2\] quaternion .* has zero length'):
+        solver.batch(a, b)
+
+
+@pytest.mark.parametrize('name', MODELS)
+def test_covariance(name):
+    """Moved rigidly, the answer moves along (float32 network: 1e-4 of the size)."""
+    solver, _, size = make(name)
+    a, b = touching(np.array(size), n=500, depth=0.05)
+    rng = np.random.default_rng(1)
+    turn, shift = poses.unit_quaternions(rng, 500), rng.uniform(-5, 5, (500, 3))
+    one = solver.batch(a, b)
+    two = solver.batch(poses.moved(a, shift, turn), poses.moved(b, shift, turn))
+    error = np.linalg.norm(poses.rotate(turn, one.point) + shift - two.point, axis=1)
+    # A fold may choose the other side when an offset or an angle is zero but for rounding.
+    assert np.quantile(error, 0.99) < 1e-4 * max(size)
+
+
+def test_cubes_of_any_edge():
+    """Scaled by 2^k, so is the point, to the bit."""
+    solver, _, size = make('cubes')
+    a, b = touching(np.array(size), n=200, depth=0.05)
+    for factor in (2.0**-6, 2.0**6):
+        other = ContactSolver([EDGE * factor] * 3, [EDGE * factor] * 3, model='paper')
+        scaling = np.array([factor] * 3 + [1] * 4)
+        one, two = solver.batch(a, b), other.batch(a * scaling, b * scaling)
+        assert np.array_equal(one.point * factor, two.point)
+        assert np.array_equal(one.normal, two.normal)
+
+
+@pytest.mark.parametrize('name', MODELS)
+def test_sizes_and_places_of_rows(name):
+    """Rows with sizes, or by their places among the boxes, are as rows without; axes are SAT's."""
+    solver, exact, size = make(name)
+    a, b = touching(np.array(size), n=200, depth=0.05)
+    sizes = np.tile(size, (200, 1))
+    many = solver.batch(a, b)
+    assert np.array_equal(many.axis, exact.batch(a, b).axis)
+    listed = solver.batch(np.concatenate([a, b]), sizes=np.tile(size, (400, 1)),
+                          pairs=np.arange(400).reshape(2, 200).T)
+    for other in (solver.batch(a, b, size_a=sizes, size_b=sizes, threads=2), listed):
+        assert np.array_equal(other.point, many.point)
+        assert np.array_equal(other.normal, many.normal)
+
+
+@pytest.mark.parametrize('sizes, words', [
+    (((2, 2, 2), (3, 3, 3)), 'two boxes of one size'),
+    (((1, 2, 3), (1, 2, 3)), "no weights for boxes of size 1 × 2 × 3 m.*model 'exact'")])
+def test_other_sizes_are_refused(sizes, words):
+    with pytest.raises(ValueError, match=words):
+        ContactSolver(*sizes, model='paper')
+
+
+def test_other_sizes_in_a_batch_are_refused():
+    """The first row that is refused is named, whether for its pose or for its size."""
+    solver = ContactSolver(poses.CUBE, poses.CUBE, model='paper')
+    two = np.tile(poses.IDENTITY, (2, 1))
+    for sizes, words in ((([2, 2, 2], [2, 2, 3]), 'for two boxes of one size'),
+                         (([1, 2, 3], [1, 2, 3]), 'are for cubes, not for size 1 × 2 × 3 m')):
+        with pytest.raises(ValueError, match=words):
+            solver.batch(two, two, size_a=sizes[0], size_b=sizes[1])
+    rows = np.array([[2.0, 2, 2], [2, 2, 3]])
+    with pytest.raises(ValueError, match=r'2 × 2 × 2 m and 2 × 2 × 3 m'):
+        solver.batch(two, two, size_b=rows)
+    with pytest.raises(ValueError, match=r'poses_a\[0\]'):
+        solver.batch(two * [[0], [1]], two, size_b=rows)
+
+
+def test_weights_for_something_else_are_refused():
+    cubes = str(resource_path('weights', 'paper.safetensors'))
+    with pytest.raises(ValueError, match='are for cubes, not for size'):
+        ContactSolver(poses.CONTAINER, poses.CONTAINER, model='paper', weights=cubes)
+    with pytest.raises(WeightsError, match='does not exist'):
+        ContactSolver(poses.CUBE, poses.CUBE, model='paper', weights='nowhere.safetensors')
