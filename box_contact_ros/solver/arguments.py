@@ -29,7 +29,7 @@ def program_parser(program: str, doc: str | None, *, quick: str = '', seed: int 
     """Return the parser of a program, whose help begins with `doc`.
 
     quick: help of `--quick`; seed: default of `--seed`; out: the files that go to the folder of
-    `--out`, which `output.results_folder` reads. The program has those of them that are given.
+    `--out`. The program has those of them that are given.
     """
     parser = argparse.ArgumentParser(
         prog=program, description=doc, formatter_class=WholeNames, **options)
@@ -44,17 +44,12 @@ def program_parser(program: str, doc: str | None, *, quick: str = '', seed: int 
     return parser
 
 
-def add_models(parser: argparse.ArgumentParser, flag: str, default: str | Sequence[str],
-               kind: Callable[[str], str] | None = None) -> None:
-    """Add an option of one model, or of several where the default is a list.
-
-    kind: the type of its arguments, a function that takes more than the names of models.
-    """
-    more = ', or package.module:Class' if kind else ''
+def add_models(parser: argparse.ArgumentParser, flag: str, default: str | Sequence[str]) -> None:
+    """Add an option of one model, or of several where the default is a list."""
     shown_default = default if isinstance(default, str) else ' '.join(default)
-    parser.add_argument(flag, nargs=None if isinstance(default, str) else '+',
-                        type=kind or model_name, default=default, metavar='MODEL',
-                        help=f'one of {", ".join(MODELS)}{more} (default: {shown_default})')
+    parser.add_argument(flag, nargs=None if isinstance(default, str) else '+', type=model_name,
+                        default=default, metavar='MODEL',
+                        help=f'one of {", ".join(MODELS)} (default: {shown_default})')
 
 
 def model_name(text: str) -> str:

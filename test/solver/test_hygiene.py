@@ -1,7 +1,7 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Bad input at the doors without ROS: the Python API, weights and scene files.
+"""Bad input at the doors without ROS: the Python API and weights files.
 
 The policy: docs/reference/conventions.md, "Bad input". test_hygiene_ros.py has the node's.
 """
@@ -16,8 +16,6 @@ from fractions import Fraction
 import numpy as np
 import poses
 import pytest
-import yaml
-from box_contact_ros.scene.files.scene_file import SceneError, read_scene
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
@@ -354,108 +352,6 @@ def test_weights_that_are_no_file(tmp_path):
     for path in (tmp_path, fifo, '/dev/null', 'x' * 5000, 'a\0b', tmp_path / 'nothing'):
         with pytest.raises(ValueError, match='weights file .* (cannot be read|does not exist)'):
             ContactSolver(poses.CUBE, poses.CUBE, weights=str(path))
-
-
-def scene_of(path, content):
-    """Check that `read_scene` makes a scene of a file, or a SceneError that names it briefly."""
-    path.write_bytes(content.encode('utf-8', 'surrogatepass') if isinstance(content, str)
-                     else content)
-    try:
-        found = read_scene(path)
-    except SceneError as error:
-        assert str(error).startswith(f'{path}:') and '\n' not in str(error)
-        assert len(str(error)) < 1000
-        return str(error).removeprefix(f'{path}')
-    assert found.pairs and not any(size_fault(box.size) for box in found.boxes.values())
-    return found
-
-
-CUBES = 'boxes: {a: {size: [1, 1, 1]}, b: {size: [1, 1, 1]}}\n'
-PAIR = 'pairs: [{id: 0, name: p, a: a, b: b}]'
-
-
-@pytest.mark.parametrize(('text', 'words'), [
-    ('', ':1: is empty'), ('7', ':1: 7 is not a mapping'), ('[]', ':1: [] is not a mapping'),
-    ('boxes: {}\npairs: []', ':1: boxes: {} should be non-empty'),
-    (f'{CUBES}pairs: []', ':2: pairs: [] should be non-empty'),
-    (f'{CUBES}pairs: {{}}', ':2: pairs: {} is not a list'),
-    ('boxes: [1, 2]', ':1: boxes: [1, 2] is not a mapping'),
-    ('boxes: {a: 3}', ':1: boxes.a: 3 is not a mapping'),
-    ('boxes: {a: {size: 3}}', ':1: boxes.a.size: 3 is not a list'),
-    *((CUBES.replace('1]', f'{number}]', 1) + PAIR, f':1: boxes.a{words}') for number, words in (
-        ('"3"', ".size[2]: '3' is not a number"), ('yes', ".size[2]: 'yes' is not a number"),
-        ('.nan', '.size: (1, 1, nan) is not finite'), ('-.inf', '.size[2]: -inf is not positive'),
-        ('-0.0', '.size[2]: -0.0 is not positive'),
-        ('5.0e-324', '.size: (1, 1, 4.94066e-324) is outside'),
-        ('1' + 400 * '0', ': a number is too large'), ('1' + 5000 * '0', ".size[2]: '1000"))),
-    *((f'{CUBES}pairs: [{pair}]', f':2: pairs[0]{words}') for pair, words in (
-        ('3', ': 3 is not a mapping'),
-        ('{id: 0, name: p, a: a, b: [a]}', ".b: ['a'] is not a string"),
-        ('{id: 0, name: p, a: a, b: c}', ".b: 'c' is none of the boxes"))),
-    ('boxes: {a: {size: [1, 1, 1]}, a: {size: [2, 2, 2]}}', ':1: boxes.a: is there twice'),
-    ('boxes: {}\nboxes: {}', ':2: boxes: is there twice'),
-    ('boxes: {a: {size: [1, 1, 1], size: [2, 2, 2]}}', ':1: boxes.a.size: is there twice'),
-    ('boxes: {? [1] : 2}', ':1: boxes: a key must be a name'),
-    ('a: 2026-02-30', ':1: Additional properties are not allowed'),
-    ('a: !!timestamp x', ":1: tag 'tag:yaml.org,2002:timestamp' is not accepted"),
-    ('a: !!int x', ":1: tag 'tag:yaml.org,2002:int' is not accepted"),
-    ('a: !!python/object/apply:os.getcwd []', ":1: tag 'tag:yaml.org,2002:python/object"),
-    ('[' * 5000, ':1: nested too deeply'), ('a: \x07', ':1: not YAML'),
-    ('a: \udc80', ': not UTF-8 at byte 3'), (b'\xff\xfe\xff', ': not UTF-8 at byte 0')])
-def test_a_bad_scene(tmp_path, text, words):
-    """File, line and field are named, whatever is wrong.
-
-    PyYAML itself raises ten kinds of exceptions, and takes the last of two boxes of one name.
-    """
-    assert scene_of(tmp_path / 'scene.yaml', text).startswith(words)
-
-
-def test_a_maze_of_yaml(tmp_path):
-    """Lists of lists of lists, ten of each in the next, by reference.
-
-    They are 10^12 numbers, if one were to print them. The error is short, and takes no time.
-    """
-    maze = '\n'.join(f'l{i + 1}: &l{i + 1} [{", ".join([f"*l{i}"] * 10)}]' for i in range(12))
-    assert scene_of(tmp_path / 'scene.yaml', f'l0: &l0 1.0\n{maze}\nboxes: *l12') == (
-        ':1: anchors and aliases are not accepted')
-
-
-def test_a_scene_that_is_no_file(tmp_path):
-    for path in (tmp_path, tmp_path / 'nothing.yaml'):
-        with pytest.raises(SceneError, match='cannot be read'):
-            read_scene(path)
-
-
-scalars = st.one_of(st.none(), st.booleans(), st.integers(), st.floats(), st.text(max_size=3),
-                    st.dates(), st.binary(max_size=3), st.sampled_from(['a', 'b', 'size', 10**400]))
-anything = st.recursive(scalars, lambda inner: st.one_of(
-    st.lists(inner, max_size=4), st.dictionaries(st.sampled_from(['a', 'b', 'size', 1]), inner)),
-    max_leaves=8)
-scenes = st.fixed_dictionaries({}, optional={
-    'boxes': st.one_of(anything, st.dictionaries(
-        st.one_of(st.sampled_from(['a', 'b']), scalars),
-        st.one_of(anything, st.fixed_dictionaries({'size': st.one_of(
-            anything, numbers(st.one_of(scalars, st.floats(0.5, 4)), 3),
-            numbers(st.floats(0.5, 4), 3))})), max_size=3)),
-    'pairs': st.one_of(anything, st.lists(st.one_of(anything, st.fixed_dictionaries({
-        'id': st.integers(0, 9), 'name': st.sampled_from('pqr'),
-        'a': st.one_of(st.just('a'), anything), 'b': st.one_of(st.just('b'), anything)})),
-        max_size=3))})
-
-
-@few
-@given(st.one_of(anything, scenes))
-def test_scenes_of_wrong_things(tmp_path_factory, scene):
-    """What YAML can say, in the places of boxes, sizes and names: SceneError, or a scene."""
-    scene_of(tmp_path_factory.getbasetemp() / 'scene.yaml', yaml.safe_dump(scene))
-
-
-@few
-@given(st.one_of(st.text(), st.binary(),
-                 st.text(alphabet='{}[]:,-?&*!|>%@#\'" \n\tab01.', max_size=60)))
-def test_scenes_of_garbage(tmp_path_factory, content):
-    """Any text, any bytes, and what looks like YAML: SceneError."""
-    assert isinstance(scene_of(tmp_path_factory.getbasetemp() / 'scene.yaml', content), str)
 
 
 def test_warnings_would_fail_here():

@@ -467,16 +467,8 @@ def test_the_compiled_network_is_the_shipped_file() -> None:
     body = header.read_text('utf-8').partition('{\n')[2].partition('};')[0]
     numbers = np.array([float(text) for text in re.findall(r'([-\d.e]+)F', body)], np.float32)
     assert np.array_equal(numbers, SHIPPED)
-
-
-def test_missing_weights_name_the_model_that_needs_none(monkeypatch: pytest.MonkeyPatch) -> None:
-    """`exact` is what a user without weights can go on with."""
-    def nowhere(*parts: str) -> Path:
-        raise FileNotFoundError(parts)
-
-    monkeypatch.setattr('box_contact_ros.solver.weights_file.resource_path', nowhere)
-    with pytest.raises(WeightsError, match="'exact'"):
-        ContactSolver(UNIT, UNIT)
+    pairs = drawn('crossed bars', 200)
+    assert_same_bits(pairs.contacts(ContactSolver(UNIT, UNIT)), with_numbers(pairs, SHIPPED))
 
 
 def written(path: Path, widths: tuple[int, ...] = (FEATURES, 4, 1), name: str = NETWORK,
