@@ -4,8 +4,6 @@
 """The committee of the source paper's section 7: errors of its models by kind of contact."""
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from box_contact_ros.scene.pose import degrees_between
@@ -46,7 +44,7 @@ def section(step: int) -> str:
     """Return the section: errors by model and kind, and how often the classifier is wrong."""
     kinds = placements(step)
     rows = []
-    for model in (ours('paper'), *(replace(ours(one), name=one.name)
+    for model in (ours('paper'), *(ours(one, name=one.name)
                                    for one in (committee(), continuous()))):
         row: list[object] = [f'`{model.name}`']
         for some in kinds.values():

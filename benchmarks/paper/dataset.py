@@ -248,10 +248,10 @@ def touching(rng: np.random.Generator, count: int, size: Sequence[float],
     return _joined(found)[:count]
 
 
-def mixed(rng: np.random.Generator, count: int, size: Sequence[float], edge_share: float,
+def mixed(rng: np.random.Generator, count: int, size: Sequence[float],
           drawing: Drawing = TOUCHING) -> Placements:
-    """`count` placements of both kinds in random order, `edge_share` of them edge-edge."""
-    edges = round(edge_share * count)
+    """Return `count` placements in random order, half of them of each kind."""
+    edges = round(count / 2)
     parts = [touching(rng, wanted, size, candidates, drawing)
              for wanted, candidates in zip((count - edges, edges), GENERATORS) if wanted]
     return _joined(parts)[rng.permutation(count)]
@@ -317,19 +317,18 @@ def _streams(seed: int, counts: Sequence[int], sets: Sequence[str],
 
 
 def paper(seed: int, *, size: Sequence[float] = CUBE, counts: Sequence[int] = PAPER_COUNTS,
-          folded_in: bool = True, edge_share: float = 0.5, sets: Sequence[str] = SETS,
+          folded_in: bool = True, sets: Sequence[str] = SETS,
           drawing: Drawing = TOUCHING) -> dict[str, Patterns]:
     """Return the sets with discontinuities, for two boxes of full extents `size` [m].
 
     `folded_in`: in the domain of `to_octant`, as at inference; otherwise as drawn.
-    `edge_share` of the patterns are edge-edge.
     """
     how = OCTANT if folded_in else NO_FOLD
-    return {name: fold(mixed(rng, count, size, edge_share, drawing), how).patterns()
+    return {name: fold(mixed(rng, count, size, drawing), how).patterns()
             for name, count, rng in _streams(seed, counts, sets)}
 
 
-def continuous(seed: int, *, counts: Sequence[int] = CONTINUOUS_COUNTS, edge_share: float = 0.5,
+def continuous(seed: int, *, counts: Sequence[int] = CONTINUOUS_COUNTS,
                sets: Sequence[str] = SETS) -> dict[str, dict[str, Patterns]]:
     """Return the sets of each subset without discontinuities, for two cubes of edge 2."""
     result: dict[str, dict[str, Patterns]] = {subset: {} for subset in SUBSETS}
@@ -338,7 +337,7 @@ def continuous(seed: int, *, counts: Sequence[int] = CONTINUOUS_COUNTS, edge_sha
         # Only SAT tells a placement's subset. Placements are drawn until the smaller subset is
         # full; the larger one is cut to the same number.
         while min(sum(map(len, parts)) for parts in found.values()) < count:
-            some = fold(mixed(rng, 2 * count, CUBE, edge_share), FEATURES)
+            some = fold(mixed(rng, 2 * count, CUBE), FEATURES)
             for subset, number in SUBSETS.items():
                 found[subset].append(some.patterns(some.subset == number))
         for subset, parts in found.items():
@@ -372,12 +371,11 @@ def of_card(card: Mapping[str, Any], sets: Sequence[str] = SETS,
     """Return the sets a model card speaks of, made again: per network, per set."""
     data = card['data']
     counts = [data['counts'][name] for name in SETS]
-    if card['model'] == 'paper-committee':
-        return committee(card['seed'], counts=counts, sets=sets)
-    options = {'counts': counts, 'edge_share': data['edge_share'], 'sets': sets}
-    if card['model'] == 'paper-continuous':
-        return continuous(card['seed'], **options)
+    if card['model'] in ('paper-committee', 'paper-continuous'):
+        make = committee if card['model'] == 'paper-committee' else continuous
+        return make(card['seed'], counts=counts, sets=sets)
     seeds = {f'seed_{seed}': seed for seed in data.get('seeds', ())} or {'contact': card['seed']}
     drawing = Drawing(data.get('kept', False), data.get('grid', 0))
-    return {network: paper(seed, size=card['sizes'][0], folded_in=data['folded_in'],
-                           drawing=drawing, **options) for network, seed in seeds.items()}
+    return {network: paper(seed, size=card['sizes'][0], counts=counts, sets=sets,
+                           folded_in=data['folded_in'], drawing=drawing)
+            for network, seed in seeds.items()}

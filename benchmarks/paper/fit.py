@@ -53,7 +53,6 @@ class PaperSettings:
     """Units of the hidden layers that each network has, if it has fewer than `widths`."""
     wrap: bool = True  # whether differences of angles are wrapped
     seed: int = 0
-    device: str = 'cpu'
 
 
 class Ensemble(torch.nn.Module):
@@ -179,7 +178,7 @@ class Fitted:
 
     def errors(self, patterns: Patterns) -> Tensor:
         """Return the RMSE (networks,) of the best weights [rad]."""
-        return rmse(self.networks, *tensors(patterns, self.scaling, self.error.device), self.wrap)
+        return rmse(self.networks, *tensors(patterns, self.scaling), self.wrap)
 
 
 def perceptron(widths: Sequence[int]) -> torch.nn.Sequential:
@@ -190,12 +189,11 @@ def perceptron(widths: Sequence[int]) -> torch.nn.Sequential:
     return torch.nn.Sequential(*parts[:-1])
 
 
-def tensors(patterns: Patterns, scaling: Scaling, device: torch.device | str,
-            ) -> tuple[Tensor, Tensor]:
+def tensors(patterns: Patterns, scaling: Scaling) -> tuple[Tensor, Tensor]:
     """Return normalised inputs and outputs."""
     x = (patterns.inputs - scaling.mean) / scaling.deviation
-    return (torch.tensor(x, dtype=torch.float32, device=device),
-            torch.tensor(patterns.outputs, dtype=torch.float32, device=device))
+    return (torch.tensor(x, dtype=torch.float32),
+            torch.tensor(patterns.outputs, dtype=torch.float32))
 
 
 @torch.no_grad()
@@ -213,20 +211,19 @@ def fit(training: Patterns, checking: Patterns, settings: PaperSettings, *, prog
                                for value in (s.rate, s.momentum, s.initial))
     networks = Ensemble([
         drawn(perceptron(s.widths), generator, reach=float(reach), hidden=hidden)
-        for reach, hidden in zip(initial, s.hidden or [()] * s.networks)]).to(s.device)
+        for reach, hidden in zip(initial, s.hidden or [()] * s.networks)])
     scaling = Scaling.of(training.inputs)
-    x, y = tensors(training, scaling, s.device)
-    check = tensors(checking, scaling, s.device)
-    fitted = Fitted(copy.deepcopy(networks), scaling,
-                    torch.full((s.networks,), math.inf, device=s.device),
-                    torch.zeros(s.networks, dtype=torch.int64, device=s.device), [], s.wrap)
-    optimiser = Momentum(networks, rate.to(s.device), momentum.to(s.device))
+    x, y = tensors(training, scaling)
+    check = tensors(checking, scaling)
+    fitted = Fitted(copy.deepcopy(networks), scaling, torch.full((s.networks,), math.inf),
+                    torch.zeros(s.networks, dtype=torch.int64), [], s.wrap)
+    optimiser = Momentum(networks, rate, momentum)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, s.epochs)
 
     epochs = tqdm(range(1, s.epochs + 1), desc=progress, unit='epoch', mininterval=1.0,
                   disable=not progress)
     for epoch in epochs:
-        order = torch.randperm(len(x), generator=generator).to(s.device)
+        order = torch.randperm(len(x), generator=generator)
         for inputs, outputs in zip(x[order].split(s.batch), y[order].split(s.batch)):
             loss = 0.5 * difference(networks(inputs), outputs, s.wrap).square().sum(-1).mean(-1)
             optimiser.zero_grad()

@@ -78,10 +78,6 @@ class Search(ABC):
     def train(self, rung: Rung, group: Sequence[Candidate], seed: int) -> list[Scores]:
         """Train a group."""
 
-    def keep(self, ranked: Sequence[Candidate], count: int) -> list[Candidate]:
-        """Return those that go on, of candidates in the order of their errors."""
-        return list(ranked[:count])
-
     def groups(self, candidates: Sequence[Candidate], size: int) -> list[list[Candidate]]:
         """Return groups of like cost, so that little is padded."""
         ordered = sorted(candidates, key=lambda one: (self.cost(one), one.number))
@@ -96,7 +92,7 @@ class Search(ABC):
             if number:
                 shipped = [one for one in alive if one.shipped]
                 others = ranking([one for one in alive if not one.shipped], done[number - 1])
-                alive = shipped + self.keep(others, rung.candidates - len(shipped))
+                alive = shipped + others[:rung.candidates - len(shipped)]
             if number == len(done):
                 done.append({})
             for place, group in enumerate(tqdm(

@@ -100,7 +100,7 @@ def train_paper(job: PaperJob, *, seed: int, commit: str, folder: Path) -> dict[
         'name': job.name, 'model': job.model, 'architecture': {},
         'sizes': [list(job.size), list(job.size)],
         'data': {'recipe': job.recipe, 'counts': dict(zip(dataset.SETS, job.counts)),
-                 'folded_in': job.folded_in, 'edge_share': 0.5, 'seeds': list(job.seeds),
+                 'folded_in': job.folded_in, 'seeds': list(job.seeds),
                  'kept': job.drawing.kept, 'grid': job.drawing.grid, 'wrap': job.settings.wrap},
         'seed': seed, 'commit': commit,
         **{name: {} for name in ('inputs', 'outputs', 'metrics', 'training')}}

@@ -48,15 +48,14 @@ class PaperSearch(Search):
     """The paper's search, for one of its networks."""
 
     def __init__(self, name: str, job: PaperJob, sets: dict[str, dataset.Patterns], *, seed: int,
-                 count: int, quick: bool, device: str) -> None:
-        self.name, self.sets, self.device = name, sets, device
+                 count: int, quick: bool) -> None:
+        self.name, self.sets = name, sets
         # Other candidates for every network.
         self.seed = int(np.random.SeedSequence([seed, *name.encode()]).generate_state(1)[0])
         self.settings = job.settings
         plan = ([(count, 1), (max(count // 4, 4), 2)] if quick else
                 [(count, 8), (max(count // 4, 16), 32), (max(count // 16, 8), 120)])
-        self.rungs = [Rung(*entry, job.settings.batch, group=64 if device == 'cpu' else 1024)
-                      for entry in plan]
+        self.rungs = [Rung(*entry, job.settings.batch, group=64) for entry in plan]
 
     def cost(self, candidate: Candidate) -> int:
         """Return the multiply-adds of its network."""
@@ -83,19 +82,19 @@ class PaperSearch(Search):
             networks=len(group), epochs=rung.effort, batch=rung.batch,
             rate=[one.rate for one in group], momentum=[one.momentum for one in group],
             initial=[one.initial for one in group], hidden=[one.hidden for one in group],
-            seed=seed, device=self.device))
+            seed=seed))
         return [{'error': inside, 'external': beyond} for inside, beyond in zip(
             fitted.error.tolist(), fitted.errors(self.sets['external']).tolist())]
 
 
-def paper_searches(*, seed: int, count: int, quick: bool, device: str) -> list[PaperSearch]:
+def paper_searches(*, seed: int, count: int, quick: bool) -> list[PaperSearch]:
     """Return one for the network with discontinuities, one for each subset of that without.
 
     Half of the candidates are the first's. External sets are cut to what ranks a few finalists.
     """
     counts, subset_counts = (((400, 200, 200),) * 2 if quick else
                              ((8000, 5000, 5000), (10000, 6000, 5000)))
-    common: dict[str, Any] = {'seed': seed, 'quick': quick, 'device': device}
+    common: dict[str, Any] = {'seed': seed, 'quick': quick}
     subsets = dataset.continuous(seed, counts=subset_counts)
     return [PaperSearch('paper', JOBS['paper'], dataset.paper(seed, counts=counts),
                         count=count - 2 * (count // 4), **common),
@@ -162,29 +161,17 @@ def plot(path: Path, results: Sequence[tuple[Search, Rungs]]) -> None:
     figure.savefig(path)
 
 
-def device_of(name: str) -> str:
-    """Return what the argument --device names; `auto` is a GPU where PyTorch finds one."""
-    if name == 'cuda' and not torch.cuda.is_available():
-        raise argparse.ArgumentTypeError('cuda: PyTorch finds no GPU here')
-    return ('cuda' if torch.cuda.is_available() else 'cpu') if name == 'auto' else name
-
-
 def _options(args: Sequence[str] | None) -> argparse.Namespace:
     parser = program_parser(
         'python -m benchmarks.paper.search',
         'Train thousands of networks at once, keep the best, train those longer.\n\n'
-        'Measured on one core, without a GPU: 8 minutes.\n\n'
+        'Measured on one core: 8 minutes.\n\n'
         'Stopped, it goes on from its checkpoint file when it is started again with the same\n'
         'options, and ends with the same result.', seed=1,
         out='page, table, plot and, until the end, the checkpoint',
         quick='little data and two short rungs, to try it out in seconds')
-    add = parser.add_argument
-    add('--candidates', type=within(16), default=2048, metavar='N', help='networks to begin with '
-        '(default 2048); the time grows with them')
-    add('--device', choices=('auto', 'cpu', 'cuda'), type=device_of, default='auto',
-        help='auto: a GPU where there is one (default)')
-    add('--threads', type=within(1), default=1, help='threads of PyTorch (default 1; matrices '
-        'this small gain little from more)')
+    parser.add_argument('--candidates', type=within(16), default=2048, metavar='N',
+                        help='networks to begin with (default 2048); the time grows with them')
     options = parser.parse_args(args)
     options.out = results_folder(parser, options)
     return options
@@ -194,11 +181,9 @@ def main(args: Sequence[str] | None = None) -> int:
     """Search, and write what was found."""
     options = _options(args)
     import matplotlib  # noqa: F401  (if it is missing, that is said now)
-    torch.set_num_threads(options.threads)
-    common = {'seed': options.seed, 'count': options.candidates, 'quick': options.quick,
-              'device': options.device}
+    torch.set_num_threads(1)  # matrices this small gain little from more
     began = time.monotonic()
-    searches = paper_searches(**common)
+    searches = paper_searches(seed=options.seed, count=options.candidates, quick=options.quick)
     name = 'search_paper'
     checkpoints = [options.out / f'{name}_{k}.checkpoint' for k in range(len(searches))]
     results: list[tuple[Search, Rungs]] = []
@@ -211,7 +196,7 @@ def main(args: Sequence[str] | None = None) -> int:
             print(f'search: {error}', file=sys.stderr)
             return 1
     made = (f'Made by `{command_line("benchmarks.paper.search", args)}` in '
-            f'{(time.monotonic() - began) / 60.0:.1f} minutes ({options.device}) on '
+            f'{(time.monotonic() - began) / 60.0:.1f} minutes on '
             f'{machine(native, PACKAGES)}.')
     text = page('benchmarks/paper/pages/search', made=made,
                 total=sum(len(done[0]) for _, done in results))

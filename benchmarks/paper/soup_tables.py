@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -227,8 +227,7 @@ def measure(inputs: np.ndarray, *, quick: bool = False) -> SoupResult:
                     'depth_error_mean_m': float(errors.depth.mean())}
                 bar.update(len(judged[regime].size))
         networks = {model.name: judge_network(model, judged['touching'], truth['touching'])
-                    for model in (ours('paper'), replace(ours(continuous()),
-                                                         name='paper-continuous'))}
+                    for model in (ours('paper'), ours(continuous(), name='paper-continuous'))}
         exact = time_calls(ours('exact'), judged['touching'])
     return SoupResult(soups=soups, networks=networks, exact=exact, counts=counts)
 

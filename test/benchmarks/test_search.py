@@ -25,7 +25,7 @@ from benchmarks.paper.halving import (
     Rung,
 )
 
-QUICK = ['--quick', '--candidates', '48', '--seed', '2', '--device', 'cpu']
+QUICK = ['--quick', '--candidates', '48', '--seed', '2']
 
 
 class Toy(halving.Search):

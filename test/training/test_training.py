@@ -37,7 +37,7 @@ def run(sets: dict[str, dataset.Patterns], **changes: object):
 
 
 def outputs_of(networks: Ensemble, patterns: dataset.Patterns, scaling: Scaling) -> torch.Tensor:
-    x, _ = tensors(patterns, scaling, 'cpu')
+    x, _ = tensors(patterns, scaling)
     return networks(x)
 
 
