@@ -31,16 +31,7 @@ from visualization_msgs.msg import MarkerArray
 from ..node.declared_parameters import declare
 from ..node.messages import make_header
 from ..node.parameters import answer_help
-from ..node.runtime import CONTACT_QOS, REFUSALS, GuardedNode, joined, spin_once
-from ..output import percentiles
-from ..solver.contact_solver import ContactSolver
-from ..view.style import ROPE
-from .crane_feedback import CraneFeedback
-from .crane_log import CraneLog, CraneSummary, Screen
-from .crane_parameters import PARAMETERS, scenario_from
-from .landing import LandingResult, Progress
-from .mujoco_crane import Crane
-from .ros_client import (
+from ..node.ros_client import (
     ANSWERS,
     CRANE_MARKERS,
     CRANE_WRENCH,
@@ -50,6 +41,15 @@ from .ros_client import (
     pose_message,
     stamp_of,
 )
+from ..node.runtime import CONTACT_QOS, REFUSALS, GuardedNode, joined, spin_once
+from ..output import percentiles
+from ..solver.contact_solver import ContactSolver
+from ..view.style import ROPE
+from .crane_feedback import CraneFeedback
+from .crane_log import CraneLog, CraneSummary, Screen
+from .crane_parameters import PARAMETERS, scenario_from
+from .landing import LandingResult, Progress
+from .mujoco_crane import Crane
 
 OFFER_PERIOD = 0.1  # s between the pairs that only ask whether anyone answers
 POINTS_ALONE = ("the contact node's model gives contacts without a patch: the whole load stands "

@@ -29,7 +29,7 @@ from box_contact_ros.bench.bench_drive import BenchNode
 from box_contact_ros.bench.echo_node import EchoNode
 from box_contact_ros.demo.crane_node import CraneNode
 from box_contact_ros.view.recording.record import RecordNode
-from box_contact_ros.demo.ros_client import ANSWERS
+from box_contact_ros.node.ros_client import ANSWERS
 from box_contact_ros.view.listener import ViewNode
 from box_contact_ros.view.markers import MarkersNode
 from box_contact_ros.view.scene_driver import SceneDriver

@@ -29,7 +29,6 @@ from box_contact_ros.bench.bench_drive import BenchNode
 from box_contact_ros.demo.crane_feedback import CraneFeedback
 from box_contact_ros.demo.crane_node import CraneNode
 from box_contact_ros.demo.crane_parameters import PARAMETERS, scenario_from
-from box_contact_ros.demo.ros_client import ANSWERS
 from box_contact_ros.node.messages import (
     MOST_ROWS,
     TypedMessages,
@@ -37,6 +36,7 @@ from box_contact_ros.node.messages import (
     make_header,
     read_cloud,
 )
+from box_contact_ros.node.ros_client import ANSWERS
 from box_contact_ros.node.runtime import CONTACT_QOS
 from box_contact_ros.scene.scene_solver import Answer, Pair, SceneSolver
 from box_contact_ros.solver.contact import Contact

@@ -17,15 +17,14 @@ from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
 from ..core import LENGTH_MAX
-from ..node.message_bytes import RawMessages
-from ..node.messages import NANOSECONDS, ContactsMessage, Refused, read_contacts
-from ..node.topics.scene_topics import pose_input
 from ..resources import find_file
 from ..scene.files.scene_file import read_scene
 from ..scene.scene_solver import ALL_BOXES, Scene
 from ..scene.stamp_pairing import StampedPose
 from ..solver.checks import are_poses
-from .answer_log import first_row
+from .message_bytes import RawMessages
+from .messages import NANOSECONDS, ContactsMessage, Refused, read_contacts
+from .topics.scene_topics import pose_input
 
 ANSWERS: dict[str, tuple[type, str]] = {
     'point': (PointStamped, 'contact/point'),
@@ -102,6 +101,16 @@ def subscribe_contacts(node: Node, callback: Callable[[Any], None], qos: QoSProf
     if ContactsMessage is not None:
         node.create_subscription(ContactsMessage, 'contacts', on_contacts, qos)
     node.create_subscription(PointCloud2, 'contacts_cloud', on_cloud, qos)
+
+
+def first_row(rows: np.ndarray) -> np.ndarray:
+    """Return the numbers of the first row (messages.CLOUD_ROW); none without rows.
+
+    Point and normal are columns 0 to 5, the depth 6, the volume 7, the covariance 8 to 13.
+    """
+    names = rows.dtype.names or ()
+    of_float64 = names[names.index('pair') + 1:]
+    return np.array([rows[0][name] for name in of_float64] if len(rows) else [])
 
 
 def answer_values(kind: str, message: Any) -> Sequence[float] | np.ndarray:
