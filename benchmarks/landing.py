@@ -22,7 +22,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from tqdm import tqdm
 
-from box_contact_ros import output
 from box_contact_ros.core import native
 from box_contact_ros.demo.crane import CraneScenario
 from box_contact_ros.demo.landing import CORNER_SPEED_LIMIT, WATCHED, LandingRecord, solvers
@@ -30,6 +29,7 @@ from box_contact_ros.node.processes import left_when_asked
 from box_contact_ros.scene.pose import rotation_matrix
 from box_contact_ros.solver.arguments import program_parser
 
+from . import output
 from .landing_ways import (
     ADDED,
     MUJOCO,

@@ -32,7 +32,7 @@ from box_contact_ros.demo.landing import (
     land,
     solvers,
 )
-from box_contact_ros.scene.force.laws import HeldPatch
+from box_contact_ros.scene.laws import HeldPatch
 from box_contact_ros.scene.scene_solver import CONTAINER
 from box_contact_ros.solver.contact import Contact
 

@@ -31,7 +31,7 @@ from typing import Self
 
 import numpy as np
 
-from box_contact_ros.scene.force.laws import FRICTION, GRAVITY, Body
+from box_contact_ros.scene.laws import FRICTION, GRAVITY, Body
 from box_contact_ros.scene.pose import cross, rotation_matrix
 from box_contact_ros.solver.contact import Contact
 

@@ -40,9 +40,8 @@ def generate_launch_description() -> LaunchDescription:
         *(DeclareLaunchArgument(name, default_value=default, description=description)
           for name, (default, description) in ARGUMENTS.items()),
         node('crane', parameters=[values | {'wait': PATIENCE}], emulate_tty=True,
-             arguments=['--shared-parameters'], on_exit=Shutdown(reason='the crane has ended')),
-        node('soup_node', arguments=['--shared-parameters'],
-             condition=IfCondition(LaunchConfiguration('soup'))),
+             on_exit=Shutdown(reason='the crane has ended')),
+        node('soup_node', condition=IfCondition(LaunchConfiguration('soup'))),
         node('view', arguments=['--attach'], condition=IfCondition(LaunchConfiguration('view'))),
         IncludeLaunchDescription(str(Path(__file__).with_name('contact_node.launch.py'))),
     ])

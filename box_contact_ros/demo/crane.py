@@ -24,7 +24,7 @@ from dataclasses import dataclass, fields
 import mujoco
 import numpy as np
 
-from ..scene.force.laws import FRICTION, GRAVITY, Body
+from ..scene.laws import FRICTION, GRAVITY, Body
 from ..scene.pose import cross, rotation_matrix
 from ..scene.scene_solver import CONTAINER
 

@@ -30,9 +30,18 @@ from visualization_msgs.msg import MarkerArray
 
 from box_contact_msgs.msg import Contacts
 
-from ..node.declared_parameters import declare
 from ..node.messages import contacts_by_pair, make_header
-from ..node.parameters import Setting, answer_help, flag, number, numbers, size, text
+from ..node.parameters import (
+    Setting,
+    answer_help,
+    declare,
+    flag,
+    number,
+    numbers,
+    size,
+    text,
+    warn_of_unknown,
+)
 from ..node.ros_client import (
     CRANE_MARKERS,
     CRANE_WRENCH,
@@ -41,7 +50,8 @@ from ..node.ros_client import (
     pose_message,
     stamp_of,
 )
-from ..node.runtime import CONTACT_QOS, REFUSALS, GuardedNode, joined, spin_once
+from ..node.runtime import REFUSALS, GuardedNode, joined, spin_once
+from ..node.topics import contact_qos
 from .crane import LIMITS, CraneScenario
 from .landing import CORNER_SPEED_LIMIT, ClosedLoop, Landing, LandingRecord, LoopState, with_patch
 
@@ -92,7 +102,8 @@ class CraneNode(GuardedNode):
     def __init__(self, context: Context, **options: Any) -> None:
         """Read the parameters and make the crane; `options` go to Node."""
         super().__init__('crane', context=context, **options)
-        values = declare(self, PARAMETERS, fixed=True)
+        values = declare(self, PARAMETERS)
+        warn_of_unknown(self, PARAMETERS)
         self._rate, self._wait, self._frame = (
             values[name] for name in ('rate', 'wait', 'frame_id'))
         self._lockstep = values['lockstep']
@@ -109,8 +120,8 @@ class CraneNode(GuardedNode):
                        for box in ('box_a', 'box_b')]
         self._contacts = self.create_subscription(
             Contacts, 'contacts', self._on_contacts, DEEP_RELIABLE)
-        self._markers = self.create_publisher(MarkerArray, CRANE_MARKERS, CONTACT_QOS)
-        self._force = self.create_publisher(WrenchStamped, CRANE_WRENCH, CONTACT_QOS)
+        self._markers = self.create_publisher(MarkerArray, CRANE_MARKERS, contact_qos())
+        self._force = self.create_publisher(WrenchStamped, CRANE_WRENCH, contact_qos())
 
     @property
     def lost(self) -> int:

@@ -39,7 +39,7 @@ LOOK_PERIOD = 0.05  # between looks at the two processes [s]
 
 NEXT = """
 Next, after `source .venv/bin/activate`:
-  box_contact_contact_node --ros-args -p size_a:=[12.192,2.438,2.591] -p size_b:=[12.192,2.438,2.591]
+  box_contact_contact_node --ros-args -p size_a:=[6.058,2.438,2.591]
       starts the node for your own box_a/pose, box_b/pose
   docs/README.md
       tutorials, topics, parameters, figures"""
@@ -50,8 +50,8 @@ def main(args: Sequence[str] | None = None) -> int:
     options = _options(args)
     os.environ |= on_this_host(options.domain)
     # Both take a container for each box, unless they are told otherwise.
-    node = program('contact_node', model=options.model)
-    crane = program('crane', rate=options.rate, wait=WAIT)
+    node = program('node.contact_node', model=options.model)
+    crane = program('demo.crane_node', rate=options.rate, wait=WAIT)
     print(f'A crane sets one container down on another. It publishes both poses at '
           f'{options.rate:g} Hz.\nA contact node answers with model {options.model}; its contacts '
           f'hold the load up.\nThe two processes are in ROS domain {options.domain}, on this host '

@@ -23,7 +23,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from ..scene.force.laws import GRAVITY, HeldPatch
+from ..scene.laws import GRAVITY, HeldPatch
 from ..scene.pose import rotation_matrix
 from ..solver.contact import Contact
 from ..solver.contact_solver import ContactSolver

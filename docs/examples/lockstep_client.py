@@ -53,7 +53,7 @@ class LockstepClient(Node):
         self.answer = None
 
     def ask(self, time_ns: int, *poses: np.ndarray, patience: float = 0.5) -> Contacts:
-        """Return the answer to two poses at a time; lost poses are sent again."""
+        """Return the answer to two poses at a time [ns]; lost poses are sent again."""
         stamp = Time(sec=time_ns // 10**9, nanosec=time_ns % 10**9)
         while self.answer is None or self.answer.header.stamp != stamp:
             for publisher, pose in zip(self.poses, poses):

@@ -14,7 +14,7 @@ from benchmarks.point_law import (
     PointLaw,
     effective_mass,
 )
-from box_contact_ros.scene.force.laws import GRAVITY, Body
+from box_contact_ros.scene.laws import GRAVITY, Body
 from box_contact_ros.solver.contact import Contact
 
 CONTAINER = (12.192, 2.438, 2.591)

@@ -22,7 +22,7 @@ PROGRAM = f"""
 import time
 from box_contact_msgs.msg import Contacts
 from box_contact_ros.demo.crane_node import CraneNode
-from box_contact_ros.node.runtime import CONTACT_QOS, GuardedNode, joined, spin_for
+from box_contact_ros.node.runtime import GuardedNode, joined, spin_for
 
 def fails(*_):
     raise KeyError('planted')
@@ -30,7 +30,7 @@ def fails(*_):
 class Source(GuardedNode):
     def __init__(self, context):
         super().__init__('source', context=context)
-        self.out = self.create_publisher(Contacts, 'contacts', CONTACT_QOS)
+        self.out = self.create_publisher(Contacts, 'contacts', 10)
         self.create_timer(0.02, self.publish)
         self.create_timer(0.02, fails)
 

@@ -49,11 +49,11 @@ def test_a_signal_ends_the_demo_and_both_processes(number):
     assert not [pid for pid in started if Path(f'/proc/{pid}').exists()]
 
 
-@pytest.mark.parametrize(('status', 'words'), [(0, 'Next:'), (3, 'failed with status 3')])
+@pytest.mark.parametrize(('status', 'words'), [(0, 'Next, after'), (3, 'failed with status 3')])
 def test_its_status_is_that_of_the_crane(status, words, monkeypatch, capfd):
     """And a failure shows what the contact node printed."""
-    programs = {'contact_node': 'print("node", flush=True); import time; time.sleep(100)',
-                'crane': f'import sys, time; time.sleep(2.0); sys.exit({status})'}
+    programs = {'node.contact_node': 'print("node", flush=True); import time; time.sleep(100)',
+                'demo.crane_node': f'import sys, time; time.sleep(2.0); sys.exit({status})'}
     monkeypatch.setattr(demo, 'program', lambda name, **_: ['-c', programs[name]])
     assert demo.main(['--domain', os.environ['ROS_DOMAIN_ID']]) == status
     shown = capfd.readouterr()
@@ -62,8 +62,8 @@ def test_its_status_is_that_of_the_crane(status, words, monkeypatch, capfd):
 
 
 def test_an_early_end_of_the_node_ends_the_demo(monkeypatch, capfd):
-    programs = {'contact_node': 'import sys; sys.exit("no room")',
-                'crane': 'import time; time.sleep(100)'}
+    programs = {'node.contact_node': 'import sys; sys.exit("no room")',
+                'demo.crane_node': 'import time; time.sleep(100)'}
     monkeypatch.setattr(demo, 'program', lambda name, **_: ['-c', programs[name]])
     assert demo.main(['--domain', os.environ['ROS_DOMAIN_ID']]) == 1
     error = capfd.readouterr().err
