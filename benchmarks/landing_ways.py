@@ -1,71 +1,121 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Which landings are run, and by which ways of contact and force.
+"""Which landings are run, what is measured of each, and by which ways of contact and force.
 
-A `Way` is a law and what gives its contacts. Held patches and held wrenches ask this package's
-models. Engines give a point, so theirs go to the point law, which knows the load's footprint.
-MuJoCo's own manifold is the bar to reach: forces of several points, implicit, within the simulator,
-at every physics step.
+A `Way` is a law and what gives its contacts. Held patches ask this package's models. Engines give a
+point, so theirs go to the point law, which knows the load's footprint. MuJoCo's own manifold is the
+reference to reach: forces of several points, implicit, within the simulator, at every physics step.
 
-`ADDED` are landings outside the grid of `landing.cases`, each with what it is expected to do.
+`ADDED` are landings outside the grid, each with what it is expected to do.
 """
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, replace
 from functools import partial
+from itertools import product
 from typing import Any, NamedTuple, Self
 
+import mujoco
 import numpy as np
-from box_contact_ros.scene.force.laws import Body
 
+from box_contact_ros.demo.crane import Crane, CraneScenario
 from box_contact_ros.demo.landing import (
+    DURATION,
     TILT_LIMIT,
+    WINDOW,
     ContactSource,
-    LandingCase,
+    Landing,
     LandingRecord,
-    LandingResult,
-    cases,
     land,
     solvers,
 )
-from box_contact_ros.demo.load_laws import (
-    MakeLaw,
-    WrenchesHeld,
-    held_patch,
-    held_wrench,
-    predicted_wrench,
-)
-from box_contact_ros.demo.mujoco_crane import Crane, CraneScenario
+from box_contact_ros.scene.laws import HeldPatch
+from box_contact_ros.scene.scene_solver import CONTAINER
 from box_contact_ros.solver.contact import Contact
 
-from .contestant import Manifold, chosen
-from .engines.mujoco_engines import box_geoms, collision
 from .point_law import PointLaw
-from .pose_sets import CONTAINER
 
 # --- cases ----------------------------------------------------------------------------------------
 
+CASTING = (0.178, 0.162, 0.118)  # full extents of a corner casting, ISO 1161 [m]
+AIMING_RATE = 100.0  # ticks a second while the trolley is placed; the load moves 5 mm at most
+
 
 @dataclass(frozen=True, kw_only=True)
-class PlannedLanding:
-    """One landing and what is expected of it beforehand."""
+class OnCastings(CraneScenario):
+    """The load meets four corner castings, flush with the stack's top, and not the rest."""
 
-    name: str
-    case: LandingCase
-    fields: dict[str, Any] = field(default_factory=dict)
-    """Further fields of CraneScenario."""
-    falls: bool = False
-    """Whether the load must fall; else it must come to rest within all limits."""
-    tilt_limit: float = TILT_LIMIT
+    @property
+    def stack_boxes(self) -> dict[str, tuple[np.ndarray, tuple[float, float, float]]]:
+        """Return pose (7,) and full extents [m] of each casting, by name."""
+        inset = 0.5 * (np.array(self.stack_size) - CASTING)[:2]
+        boxes = {}
+        for x, y in product((1, -1), repeat=2):
+            pose = self.stack_pose
+            pose[:3] = x * inset[0], y * inset[1], self.stack_size[2] - 0.5 * CASTING[2]
+            boxes[f'casting {x:+} {y:+}'] = (pose, CASTING)
+        return boxes
 
-    def as_expected(self, result: LandingResult) -> bool:
-        """Return whether a landing did what it was expected to do."""
-        if self.falls:
-            return not result.at_rest and result.drop > LEAST_DROP
-        return result.at_rest
+
+def aimed(scenario: CraneScenario, overhang: tuple[float, float]) -> CraneScenario:
+    """Return the scenario with its trolley where the swaying load first touches at `overhang`.
+
+    overhang: x, y [m] of the load's centre from the stack's.
+
+    Moving the trolley moves the whole motion before the touch, so the trolley is shifted by what
+    was missed. It is shifted twice: the first shift may change which corner touches.
+    """
+    scenario = replace(scenario, offset=overhang)
+    exact = solvers(scenario, 'exact')
+    boxes = [pose for pose, _ in scenario.stack_boxes.values()]
+    for _ in range(2):
+        crane = Crane(scenario, AIMING_RATE)
+        while not any(solver(crane.load_pose, pose).colliding
+                      for solver, pose in zip(exact, boxes)):
+            if crane.time > DURATION:
+                raise ValueError(f'the load never touches: {scenario}')
+            crane.step()
+        missed = overhang - crane.load_pose[:2]
+        scenario = replace(scenario, offset=tuple(scenario.offset + missed))
+    return scenario
+
+
+# --- what is measured -----------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, kw_only=True)
+class Landed(Landing):
+    """Further figures of one landing. SI units; NaN where nothing was measured."""
+
+    overhang: float = math.nan  # lateral distance of the two centres at the first touch [m]
+    drop: float = math.nan  # how far the load's centre ends below its place on the stack [m]
+    creep: float = math.nan  # mean lateral speed of the load's centre over the window [m/s]
+    point_step: float = math.nan  # largest |Δpoint| between neighbouring ticks in the window [m]
+
+    @classmethod
+    def of(cls, record: LandingRecord, tilt_limit: float = TILT_LIMIT) -> Self:
+        """Measure a landing; tilt_limit: of the static tilt [rad]."""
+        landing, scenario = record.judge(tilt_limit=tilt_limit), record.scenario
+        if math.isnan(landing.touched):
+            return cls()
+        first = round(landing.touched * record.rate_hz)
+        window = record.window(first)
+        poses = np.array(record.poses)[:window.stop]
+        figures = {'overhang': float(np.hypot(*poses[first, :2])),
+                   'drop': scenario.stack_size[2] + 0.5 * scenario.size[2] - float(poses[-1, 2])}
+        if len(poses) == window.stop:
+            way = poses[-1, :2] - poses[window.start, :2]
+            nowhere = np.full(3, math.nan)
+            path = [record.points.get(tick, nowhere) for tick in range(window.start - 1,
+                                                                       window.stop)]
+            steps = np.linalg.norm(np.diff(path, axis=0), axis=1)
+            figures['creep'] = float(np.hypot(*way)) / WINDOW
+            if np.isfinite(steps).any():
+                figures['point_step'] = float(np.nanmax(steps))
+        return cls(**asdict(landing), **figures)
 
 
 class HeldLimits(NamedTuple):
@@ -82,65 +132,105 @@ class HeldLimits(NamedTuple):
         degrees = 0.003 if rate_hz >= 1000.0 else 0.01 if rate_hz >= 200.0 else 0.06
         return cls(static_tilt=math.radians(degrees))
 
-    def are_met(self, result: LandingResult) -> bool:
+    def are_met(self, result: Landed) -> bool:
         """Return whether a landing is within all limits."""
         return all(getattr(result, name) <= limit for name, limit in self._asdict().items())
 
+
+# --- landings -------------------------------------------------------------------------------------
 
 LEAST_DROP = 0.05
 """A load has fallen if its centre ends so far below its place on the stack [m]. The ropes, paid
 out by 0.8 m, catch it then."""
 
 
-def _aimed(overhang: float = 0.05, heading: float = 160.0, **fields: float) -> LandingCase:
-    values: dict[str, float] = {'rope_angle': 0.5, 'rope_heading': 70.0, 'tilt': 1.0,
-                                'tilt_heading': 30.0, 'yaw': 0.1}
-    return LandingCase(**values | fields, overhang=overhang, overhang_heading=heading)
+@dataclass(frozen=True, kw_only=True)
+class PlannedLanding:
+    """One landing and what is expected of it beforehand."""
+
+    name: str
+    scenario: CraneScenario
+    overhang: tuple[float, float]
+    """x, y [m] of the load's centre from the stack's at the first touch; see `aimed`."""
+    falls: bool = False
+    """Whether the load must fall; else it must come to rest within all limits."""
+    tilt_limit: float = TILT_LIMIT
+
+    @property
+    def of_grid(self) -> bool:
+        """Return whether it is a landing of the grid."""
+        return self.name.startswith('grid')
+
+    def as_expected(self, result: Landed) -> bool:
+        """Return whether a landing did what it was expected to do."""
+        if self.falls:
+            return not result.at_rest and result.drop > LEAST_DROP
+        return result.at_rest
+
+
+def _tilted(tilt: float, heading: float) -> dict[str, float]:
+    """Return pitch and roll [deg] of a tilt whose heading is 0° for pitch and 90° for roll."""
+    return {'pitch': tilt * math.cos(math.radians(heading)),
+            'roll': tilt * math.sin(math.radians(heading))}
+
+
+def _along(overhang: float, heading: float) -> tuple[float, float]:
+    """Return x, y [m] of an overhang in a direction [deg]."""
+    return (overhang * math.cos(math.radians(heading)), overhang * math.sin(math.radians(heading)))
+
+
+def grid(seed: int = 1) -> list[PlannedLanding]:
+    """Return 36 landings: each combination of rope angle, tilt and overhang.
+
+    Headings and the yaw, up to 1°, are drawn.
+    """
+    random = np.random.default_rng(seed)
+    planned = []
+    for rope_angle, tilt, overhang in product((0.5, 1.25, 2.0, 3.0), (0.5, 1.5, 3.0),
+                                              (0.0, 0.3, 0.6)):
+        rope, tilted, hanging = random.uniform(-180.0, 180.0, 3)
+        planned.append(PlannedLanding(
+            name=f'grid {len(planned)}', overhang=_along(overhang, hanging), scenario=CraneScenario(
+                rope_angle=rope_angle, rope_heading=rope, yaw=random.uniform(-1.0, 1.0),
+                **_tilted(tilt, tilted))))
+    return planned
+
+
+def _added(name: str, overhang: float = 0.05, heading: float = 160.0, *, tilt: float = 1.0,
+           rope_angle: float = 0.5, yaw: float = 0.1, falls: bool = False,
+           tilt_limit: float = TILT_LIMIT, kind: type[CraneScenario] = CraneScenario,
+           **fields: Any) -> PlannedLanding:
+    return PlannedLanding(
+        name=name, overhang=_along(overhang, heading), falls=falls, tilt_limit=tilt_limit,
+        scenario=kind(rope_angle=rope_angle, rope_heading=70.0, yaw=yaw, **_tilted(tilt, 30.0),
+                      **fields))
 
 
 _LENGTH, _WIDTH, _ = CONTAINER
-_SMALL = (6.058, 2.438, 2.591)
-_SPREADER = {'size': (_LENGTH, _WIDTH, 1.5), 'mass': 15_000.0, 'castings': True}
+_SMALL = {'size': (6.058, 2.438, 2.591), 'mass': 12_000.0}
+_SPREADER = {'size': (_LENGTH, _WIDTH, 1.5), 'mass': 15_000.0, 'kind': OnCastings}
 ADDED = [
-    PlannedLanding(name='mass 10 % of the length off the middle', case=_aimed(),
-                   fields={'mass_offset': (0.1 * _LENGTH, 0.0, 0.0)}),
-    PlannedLanding(name='mass 10 % of length and width off', case=_aimed(tilt=2.0, yaw=-0.8),
-                   fields={'mass_offset': (-0.1 * _LENGTH, 0.1 * _WIDTH, 0.0)}),
-    PlannedLanding(name='on a pedestal, 6 × 2 m', case=_aimed(tilt=2.0),
-                   fields={'stack_size': (6.0, 2.0, 1.0)}),
-    PlannedLanding(name='on a platform, 14 × 4 m', case=_aimed(overhang=0.3, rope_angle=2.0),
-                   fields={'stack_size': (14.0, 4.0, 1.0)}),
-    PlannedLanding(name='20 ft on 40 ft', case=_aimed(overhang=0.3, heading=0.0, tilt=2.0),
-                   fields={'size': _SMALL, 'mass': 12_000.0}),
-    PlannedLanding(name='20 ft at the end of 40 ft', case=_aimed(overhang=3.0, heading=0.0),
-                   fields={'size': _SMALL, 'mass': 12_000.0}),
-    PlannedLanding(name='a cube of 0.5 m, 300 kg', case=_aimed(overhang=0.02),
-                   fields={'size': (0.5, 0.5, 0.5), 'mass': 300.0}),
-    PlannedLanding(name='overhanging by 40 % of the length',
-                   case=_aimed(overhang=0.4 * _LENGTH, heading=0.0)),
-    PlannedLanding(name='overhanging by 30 % of the width',
-                   case=_aimed(overhang=0.3 * _WIDTH, heading=90.0), tilt_limit=math.radians(0.1)),
-    PlannedLanding(name='spreader on four corner castings', case=_aimed(), fields=_SPREADER),
-    PlannedLanding(name='the same, tilted by 2°', case=_aimed(tilt=2.0, yaw=-0.3),
-                   fields=_SPREADER),
-    PlannedLanding(name='overhanging by 55 % of the width',
-                   case=_aimed(overhang=0.55 * _WIDTH, heading=90.0), falls=True),
-    PlannedLanding(name='overhanging by 55 % of the length',
-                   case=_aimed(overhang=0.55 * _LENGTH, heading=180.0), falls=True),
+    _added('mass 10 % of the length off the middle', mass_offset=(0.1 * _LENGTH, 0.0, 0.0)),
+    _added('mass 10 % of length and width off', tilt=2.0, yaw=-0.8,
+           mass_offset=(-0.1 * _LENGTH, 0.1 * _WIDTH, 0.0)),
+    _added('on a pedestal, 6 × 2 m', tilt=2.0, stack_size=(6.0, 2.0, 1.0)),
+    _added('on a platform, 14 × 4 m', 0.3, rope_angle=2.0, stack_size=(14.0, 4.0, 1.0)),
+    _added('20 ft on 40 ft', 0.3, 0.0, tilt=2.0, **_SMALL),
+    _added('20 ft at the end of 40 ft', 3.0, 0.0, **_SMALL),
+    _added('a cube of 0.5 m, 300 kg', 0.02, size=(0.5, 0.5, 0.5), mass=300.0),
+    _added('overhanging by 40 % of the length', 0.4 * _LENGTH, 0.0),
+    _added('overhanging by 30 % of the width', 0.3 * _WIDTH, 90.0, tilt_limit=math.radians(0.1)),
+    _added('spreader on four corner castings', **_SPREADER),
+    _added('the same, tilted by 2°', tilt=2.0, yaw=-0.3, **_SPREADER),
+    _added('overhanging by 55 % of the width', 0.55 * _WIDTH, 90.0, falls=True),
+    _added('overhanging by 55 % of the length', 0.55 * _LENGTH, 180.0, falls=True),
 ]
 """Landings outside the grid. Where the load's middle is a fifth of the width within the edge, its
 weight rests on a strip of three fifths. The other end is bare, so it cannot lie as flat."""
 
-
-def grid(seed: int = 1) -> list[PlannedLanding]:
-    """Return the 36 landings of the grid."""
-    return [PlannedLanding(name=f'grid {number}', case=case)
-            for number, case in enumerate(cases(seed=seed))]
-
-
 # --- ways -----------------------------------------------------------------------------------------
 
-
+HELD_PATCH, POINT, MUJOCO = 'held patch', 'point', 'MuJoCo'
 SAMPLE = 5
 """Ways that are not compared at length run one of so many landings. Prime to three: every third
 landing of the grid has the same overhang."""
@@ -153,110 +243,112 @@ class LoopTiming(NamedTuple):
     latency: float
 
 
-@dataclass(frozen=True, kw_only=True)
-class Way:
+class Way(NamedTuple):
     """A law and what gives its contacts."""
 
     law: str
     contacts: str
-    sources: Callable[[CraneScenario], Sequence[ContactSource]] | None = None
-    """What gives the contacts, for each box of the stack; None for MuJoCo, in the simulator."""
-    make_law: Callable[[CraneScenario], MakeLaw] = lambda _: held_patch
-    every: int = 1
-    """One of so many landings of the grid is run."""
-    added: bool = False
-    """Whether the added landings are run too."""
-    late: bool = True
-    """Whether it is run with each latency, or with the least alone."""
+    sources: Callable[[CraneScenario], Sequence[ContactSource]] = lambda _: ()
+    """What gives the contacts, for each box of the stack; nothing for MuJoCo, in the simulator."""
+    every: int = SAMPLE  # one of so many landings of the grid is run
 
     @property
-    def timed(self) -> bool:
-        """Whether rate and latency matter."""
-        return self.sources is not None
+    def added(self) -> bool:
+        """Return whether the added landings are run too."""
+        return self.law != POINT
 
     def timings(self, timings: Sequence[LoopTiming]) -> list[LoopTiming]:
-        """Return those at which it is run."""
+        """Return those at which it is run: all, the least latency of a baseline, one of MuJoCo."""
         least = min(timing.latency for timing in timings)
-        return (list(timings[-1:]) if not self.timed else
-                [timing for timing in timings if self.late or timing.latency == least])
+        return (list(timings[-1:]) if self.law == MUJOCO else
+                [timing for timing in timings if self.law == HELD_PATCH or timing.latency == least])
 
-    def fly(self, scenario: CraneScenario, timing: LoopTiming) -> LandingRecord:
+    def run(self, scenario: CraneScenario, timing: LoopTiming) -> LandingRecord:
         """Run one landing."""
-        if self.sources is None:
-            return own_contact(scenario, timing)
-        return land(scenario, self.sources(scenario), law=self.make_law(scenario),
-                    **timing._asdict())
-
-
-def point_law(scenario: CraneScenario) -> MakeLaw:
-    """Return what makes the point law, which knows the footprint of a scenario's load."""
-    def made(load: Body, *, rate_hz: float, latency: float, step: float) -> WrenchesHeld:
-        return WrenchesHeld(PointLaw.for_load(load.mass, scenario.size, rate_hz))
-
-    return made
+        if self.law == MUJOCO:
+            return own_contact(scenario, timing.rate_hz)
+        law = (HeldPatch.for_loop if self.law == HELD_PATCH
+               else partial(PointLaw.for_loop, size=scenario.size))
+        return land(scenario, self.sources(scenario), law=law, **timing._asdict())
 
 
 class MujocoSource:
     """One point of the contacts of two boxes that `mj_collision` finds."""
 
     def __init__(self, size_a: Sequence[float], size_b: Sequence[float], choice: str) -> None:
-        """Make the two boxes; `choice` is one of the engines' `CHOICES`."""
-        self._engine = collision('', box_geoms, '')
-        self._ask = self._engine.boxes(np.array(size_a), np.array(size_b))
-        self._choice = choice
+        """Make the two boxes; `choice` is the point: 'mean', or that of the 'deepest' contact."""
+        spec = mujoco.MjSpec()
+        for size in (size_a, size_b):
+            body = spec.worldbody.add_body()
+            body.add_freejoint()
+            body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=np.array(size) / 2.0)
+        self._model = spec.compile()
+        self._data, self._choice = mujoco.MjData(self._model), choice
 
     def __call__(self, pose_a: np.ndarray, pose_b: np.ndarray) -> Contact:
         """Return the contact, without a patch; its depth is the deepest one's."""
-        found = self.manifold(pose_a, pose_b)
-        touching, normal, point = chosen(found, self._choice)
-        return Contact(touching, -float(found.depths.max()) if touching else math.nan, normal,
-                       point, math.nan if touching else 0.0, np.full((3, 3), math.nan))
+        points, normals, depths = self.manifold(pose_a, pose_b)
+        nothing = np.full((3, 3), math.nan)
+        if not len(points):
+            return Contact(False, math.nan, nothing[0], nothing[0], 0.0, nothing)
+        deepest = int(np.argmax(depths))
+        point = points.mean(axis=0) if self._choice == 'mean' else points[deepest]
+        return Contact(True, -float(depths[deepest]), normals[deepest], point, math.nan, nothing)
 
-    def manifold(self, pose_a: np.ndarray, pose_b: np.ndarray) -> Manifold:
-        """Return all of MuJoCo's contacts."""
-        return self._engine.read(self._ask(*self._engine.at(pose_a, pose_b)))
+    def manifold(self, pose_a: np.ndarray, pose_b: np.ndarray,
+                 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return points (n, 3), normals (n, 3) from A to B and depths (n,) of all contacts."""
+        # MuJoCo's quaternions are w x y z.
+        self._data.qpos = np.array([pose_a, pose_b])[:, [0, 1, 2, 6, 3, 4, 5]].ravel()
+        mujoco.mj_kinematics(self._model, self._data)
+        mujoco.mj_collision(self._model, self._data)
+        contacts = self._data.contact
+        # A frame's first row is the normal, from the geom of lower number to the other.
+        return np.array(contacts.pos), np.array(contacts.frame)[:, :3], -np.array(contacts.dist)
 
 
 def mujoco_sources(scenario: CraneScenario, choice: str) -> list[MujocoSource]:
     """Return what makes one point of MuJoCo's contacts, for each box of the stack."""
-    return [MujocoSource(scenario.size, size, choice) for _, size in scenario.stack_boxes]
+    return [MujocoSource(scenario.size, size, choice)
+            for _, size in scenario.stack_boxes.values()]
 
 
-def own_contact(scenario: CraneScenario, timing: LoopTiming) -> LandingRecord:
+def own_contact(scenario: CraneScenario, rate_hz: float) -> LandingRecord:
     """Run one landing on MuJoCo's own contacts; it ends when all that is judged was seen."""
-    crane = Crane(scenario, timing.rate_hz, own_contact=True)
-    record = LandingRecord(scenario, timing.rate_hz)
+    crane, record = Crane(scenario, rate_hz, own_contact=True), LandingRecord(scenario, rate_hz)
     while not record.ended:
         record.poses.append(crane.load_pose)
         record.velocities.append(crane.load_velocity)
         crane.step()
         record.tensions.append(crane.rope_tensions)
-        record.forces.append(crane.own_contact_force)
+        record.forces.append(own_force(crane))
         if record.forces[-1].any():
             record.points[len(record.forces) - 1] = np.full(3, math.nan)
     return record
 
 
-def _point(contacts: str, sources: Callable[[CraneScenario], Sequence[ContactSource]],
-           every: int = SAMPLE) -> Way:
-    """Return the way of a baseline, which is run without latency."""
-    return Way(law='point', contacts=contacts, sources=sources, every=every, make_law=point_law,
-               late=False)
+def own_force(crane: Crane) -> np.ndarray:
+    """Return the force (3,) [N] of MuJoCo's own contacts on the load in the last physics step."""
+    total, force = np.zeros(3), np.zeros(6)
+    for number in range(crane.data.ncon):
+        mujoco.mj_contactForce(crane.model, crane.data, number, force)
+        # Rows of a frame are axes; its normal points to the load, the body of higher number.
+        total += crane.data.contact[number].frame.reshape(3, 3).T @ force[:3]
+    return total
 
 
-_exact = partial(solvers, model='exact')
+def _of_model(model: str) -> Callable[[CraneScenario], Sequence[ContactSource]]:
+    return partial(solvers, model=model)
+
+
 WAYS = {
-    'exact': Way(law='held patch', contacts='exact', sources=_exact, added=True),
-    'mlp': Way(law='held patch', contacts='mlp', sources=partial(solvers, model='mlp'), added=True,
-               every=SAMPLE),
-    'manifold': Way(law='MuJoCo', contacts='its manifold, in the simulator', added=True),
-    'wrench': Way(law='held wrench', contacts='exact', sources=_exact, every=SAMPLE,
-                  make_law=lambda _: held_wrench),
-    'predicted': Way(law='predicted wrench', contacts='exact', sources=_exact, every=2 * SAMPLE,
-                     make_law=lambda _: predicted_wrench),
-    'point': _point('exact', _exact),
-    'mujoco-mean': _point('MuJoCo, mean point', partial(mujoco_sources, choice='mean')),
-    'mujoco-deepest': _point('MuJoCo, deepest point', partial(mujoco_sources, choice='deepest')),
-    'soup': _point('soup-8', partial(solvers, model='soup-8'), every=13),
+    'exact': Way(HELD_PATCH, 'exact', _of_model('exact'), every=1),
+    'mlp': Way(HELD_PATCH, 'mlp', _of_model('mlp')),
+    'manifold': Way(MUJOCO, 'its manifold, in the simulator', every=1),
+    'point': Way(POINT, 'exact', _of_model('exact')),
+    'mujoco-mean': Way(POINT, 'MuJoCo, mean point', partial(mujoco_sources, choice='mean')),
+    'mujoco-deepest': Way(POINT, 'MuJoCo, deepest point',
+                          partial(mujoco_sources, choice='deepest')),
+    'soup': Way(POINT, 'soup-8', _of_model('soup-8'), every=13),
 }
 """By name: the ways that the table has."""

@@ -26,12 +26,12 @@ frame.
 """
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from typing import Self
 
 import numpy as np
 
-from box_contact_ros.scene.force.laws import FRICTION, GRAVITY
+from box_contact_ros.scene.laws import FRICTION, GRAVITY, Body
 from box_contact_ros.scene.pose import cross, rotation_matrix
 from box_contact_ros.solver.contact import Contact
 
@@ -56,7 +56,7 @@ DAMPING_LIMIT = 0.35
 damper takes this share of the speed away per tick; the rest of the 1 is for latency."""
 
 
-def effective_mass(mass: float, size: tuple[float, float, float]) -> float:
+def effective_mass(mass: float, size: Sequence[float]) -> float:
     """Mass [kg] that a vertical push at a bottom corner of a box of full extents `size` [m] feels.
 
     1 / m_eff = 1 / m + (L/2)² / I_pitch + (W/2)² / I_roll, I = m (extent² + H²) / 12: 0.19 m for a
@@ -69,48 +69,56 @@ def effective_mass(mass: float, size: tuple[float, float, float]) -> float:
     return mass / (1.0 + pitch + roll)
 
 
-@dataclass(frozen=True, kw_only=True)
 class PointLaw:
-    """The law's constants for one load at one rate; make them with `for_load`.
+    """The law of one load, whose mass is in its middle; made by `for_loop`.
 
-    The torsion radius is the footprint's radius of gyration, 3.6 m for a 40-ft container.
+    It is called as `HeldPatch` is, but the wrench of an answer acts until the next answer.
     """
 
-    stiffness: float  # k [N/m]
-    damping: float  # c [N s/m]
-    torsion_radius: float  # r [m]
-    rocking: tuple[float, float]  # dampers on roll and on pitch [N m s]
+    def __init__(self, *, stiffness: float, damping: float, torsion_radius: float,
+                 rocking: tuple[float, float]) -> None:
+        """Take k [N/m], c [N s/m], r [m], and the dampers on roll and on pitch [N m s]."""
+        self.stiffness, self.damping = stiffness, damping
+        self.torsion_radius, self.rocking = torsion_radius, rocking
+        self._answer: Mapping[str, Contact] | None = None  # whose wrench is not computed yet
+        self._wrench = np.zeros(6)
 
     @classmethod
-    def for_load(cls, mass: float, size: tuple[float, float, float], rate_hz: float) -> PointLaw:
-        """Constants for a load of `mass` [kg] and `size` [m] that asks `rate_hz` times a second.
+    def for_loop(cls, load: Body, *, size: Sequence[float], rate_hz: float, **_: float) -> Self:
+        """Return the law of a load of full extents `size` [m] that asks `rate_hz` times a second.
 
-        `size` is its full extents. The constants grow with the mass and shrink where the rate
-        demands it. For 40 ft, 20 t, 200 Hz they are k = 1.9e7 N/m, c = 2.7e5 N s/m.
+        The constants grow with the mass and shrink where the rate demands it. For 40 ft, 20 t,
+        200 Hz they are k = 1.9e7 N/m, c = 2.7e5 N s/m. The torsion radius is the footprint's radius
+        of gyration, 3.6 m for a 40 ft container.
         """
-        length, width, height = size
+        (length, width, height), mass = size, load.mass
         corner = effective_mass(mass, size)
         stiffness = mass * GRAVITY / STATIC_PENETRATION
         damping = 2.0 * DAMPING_RATIO * (stiffness * mass)**0.5
         # (damper's spread², inertia's radius²) about the load's x and y; see the module's 4.
         axes = ((width**2, width**2 + height**2), (length**2, length**2 + height**2))
-        rocking = [min(2.0 * damping * spread / 12.0,
-                       DAMPING_LIMIT * mass * radius / 12.0 * rate_hz) for spread, radius in axes]
+        roll, pitch = (min(2.0 * damping * spread / 12.0,
+                           DAMPING_LIMIT * mass * radius / 12.0 * rate_hz)
+                       for spread, radius in axes)
         return cls(stiffness=min(stiffness, STIFFNESS_LIMIT * corner * rate_hz**2),
                    damping=min(damping, DAMPING_LIMIT * corner * rate_hz),
-                   torsion_radius=((length**2 + width**2) / 12.0)**0.5,
-                   rocking=(rocking[0], rocking[1]))
+                   torsion_radius=((length**2 + width**2) / 12.0)**0.5, rocking=(roll, pitch))
 
-    def wrench(self, contacts: Mapping[str, Contact], pose: np.ndarray, velocity: np.ndarray,
-               ) -> np.ndarray:
-        """Return force and torque (6,) on the load at `pose` (7,) with `velocity` (6,).
+    def hold(self, contacts: Mapping[str, Contact], pose: np.ndarray) -> None:
+        """Take the contacts of an answer."""
+        self._answer = contacts
 
-        Its mass is in the middle of its box. The law is made for one contact; those of several add
-        up.
+    def wrench(self, pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+        """Return force and torque (6,), of the pose (7,) and velocity (6,) at the last answer.
+
+        The law is made for one contact; the wrenches of several add up.
         """
-        touches = [contact for contact in contacts.values() if contact.colliding]
-        return np.sum([np.zeros(6), *(self._of(touch, pose, velocity) for touch in touches)],
-                      axis=0)
+        if self._answer is not None:
+            touches = [contact for contact in self._answer.values() if contact.colliding]
+            self._wrench = np.sum([np.zeros(6), *(self._of(touch, pose, velocity)
+                                                  for touch in touches)], axis=0)
+            self._answer = None
+        return self._wrench
 
     def _of(self, touch: Contact, pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:
         """Return the wrench (6,) of one contact."""

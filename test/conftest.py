@@ -30,7 +30,7 @@ FIRST = (
     'test_install.py', 'test_message_package.py', 'test_core.py', 'test_builds.py',
     'test_library.py', 'test_exact.py', 'test_series.py', 'test_readme.py', 'test_frontier.py',
     'test_training.py', 'test_training_mlp.py', 'test_contact_node.py', 'test_scene_node.py',
-    'test_view.py', 'test_bench.py', 'test_crane.py')
+    'test_view.py', 'test_bench.py', 'test_crane_node.py', 'test_crane.py')
 """The longest files. Begun late, one of them would leave the other workers idle."""
 
 _modules = count()

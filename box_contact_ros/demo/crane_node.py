@@ -1,24 +1,24 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""The crane client: publishes both poses in real time and measures the contacts that come back.
+"""The crane: publishes the poses of a load and a stack, and lands the load on their contacts.
 
-`box_a` is the load on the ropes, `box_b` the stack. Open loop, contacts are recorded, not fed back;
-closed loop, they push the load, which is set down and comes to rest. One thread simulates and
-publishes on an absolute schedule; the executor receives in the main thread. The exit status is 0
-only if contacts came through, nothing was lost, and, closed loop, the stack carries the load.
+`box_a` is the load on the ropes, `box_b` the stack. Each tick publishes both poses under one stamp.
+The node then waits for the answer to them on `contacts`, at most for most of the tick, and
+simulates the tick under the patch of the newest answer. A contact acts from the time at which it
+really came. In lockstep simulated time waits for each answer instead.
+
+The landing ends 15 s after the first touch. The exit status is 0 only if the stack carries the load
+and no answer was lost.
 """
-
 from __future__ import annotations
 
 import gc
 import math
 import sys
-import threading
 import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from functools import partial
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -28,235 +28,264 @@ from rclpy.executors import ExternalShutdownException
 from rclpy.signals import SignalHandlerOptions
 from visualization_msgs.msg import MarkerArray
 
-from ..node.declared_parameters import declare
-from ..node.messages import make_header
-from ..node.parameters import answer_help
-from ..node.runtime import CONTACT_QOS, REFUSALS, GuardedNode, joined, spin_once
-from ..output import percentiles
-from ..solver.contact_solver import ContactSolver
-from ..view.style import ROPE
-from .crane_feedback import CraneFeedback
-from .crane_log import CraneLog, CraneSummary, Screen
-from .crane_parameters import PARAMETERS, scenario_from
-from .landing import LandingResult, Progress
-from .mujoco_crane import Crane
-from .ros_client import (
-    ANSWERS,
+from box_contact_msgs.msg import Contacts
+
+from ..node.messages import contacts_by_pair, make_header
+from ..node.parameters import (
+    Setting,
+    answer_help,
+    declare,
+    flag,
+    number,
+    numbers,
+    size,
+    text,
+    warn_of_unknown,
+)
+from ..node.ros_client import (
     CRANE_MARKERS,
     CRANE_WRENCH,
     DEEP_RELIABLE,
-    answer_values,
     line_marker,
     pose_message,
     stamp_of,
 )
+from ..node.runtime import REFUSALS, GuardedNode, joined, spin_once
+from ..node.topics import contact_qos
+from .crane import LIMITS, CraneScenario
+from .landing import CORNER_SPEED_LIMIT, ClosedLoop, Landing, LandingRecord, LoopState, with_patch
 
-OFFER_PERIOD = 0.1  # s between the pairs that only ask whether anyone answers
+OFFER_PERIOD = 0.1  # time between the pairs that only ask whether anyone answers [s]
+ANSWER_SHARE = 0.8  # share of a tick that waits for its answer; the rest is for simulating it
+LOCKSTEP_PATIENCE = 1.0  # time after which lockstep takes an answer for lost [s]
+LOST_MOST = 5  # so many lost answers in a row end a run in lockstep: nobody answers any more
+DRAIN = 1.0  # patience for the last answers [s]
+LOOK_PERIOD = 0.05  # time after which a signal is noticed, at most [s]
+DRAW_RATE = 30.0  # drawings and looks at the landing's stage per second, at most [Hz]
+ROPE = (60, 60, 60)  # colour of the lines that are drawn
+STAGES = ('hanging', 'first touch', 'settling', 'at rest')
 POINTS_ALONE = ("the contact node's model gives contacts without a patch: the whole load stands "
                 'for it, and may not come to rest')
-DRAW_RATE = 30.0  # Hz at most
-DRAIN = 1.0  # s of patience for the last answers
+
+
+def _of_scenario(field: str, description: str) -> Setting:
+    """Return the setting of a field of `CraneScenario`."""
+    default = getattr(CraneScenario, field)
+    return Setting(default, description, size if field.endswith('size') else
+                   number(*LIMITS[field]) if field in LIMITS else numbers(len(default)))
+
+
+SCENARIO = {
+    'size_a': ('size', 'full extents of the load [m]'),
+    'size_b': ('stack_size', 'full extents of the stack [m]'),
+    'mass': ('mass', 'mass of the load [kg]'),
+    'mass_offset': ('mass_offset', "centre of mass from the load's centre, in its own axes [m]"),
+    'offset': ('offset', 'x, y of the trolley from the centre of the stack [m]'),
+    'rope_angle': ('rope_angle', 'ropes from the plumb line at the start [deg]'),
+    'rope_heading': ('rope_heading', 'whereto, counter-clockwise from x [deg]'),
+    'pitch': ('pitch', 'tilt of the load about y at the start [deg]'),
+    'roll': ('roll', 'tilt of the load about x at the start [deg]'),
+    'yaw': ('yaw', 'turn of the load about the plumb line at the start [deg]'),
+}
+"""Parameter: the field of CraneScenario that it sets, and what it means."""
+PARAMETERS = {
+    'rate': Setting(200.0, 'pairs of poses published per second [Hz]', number(1, 2000)),
+    'wait': Setting(10.0, 'patience for a contact node to answer [s]', number(0, 600)),
+    'frame_id': Setting('world', 'frame of the published poses', text),
+    'lockstep': Setting(False, 'no real time: every tick waits for its answer', flag),
+} | {name: _of_scenario(*field) for name, field in SCENARIO.items()}
 
 
 class CraneNode(GuardedNode):
-    """Publishes the crane's poses and gathers the answers in a `CraneLog`."""
+    """Publishes the poses of a crane, and lands it on the answers."""
 
     def __init__(self, context: Context, **options: Any) -> None:
-        """Read the parameters, make the reference; `options` go to Node."""
+        """Read the parameters and make the crane; `options` go to Node."""
         super().__init__('crane', context=context, **options)
-        values = declare(self, PARAMETERS, fixed=True)
-        self.rate, self.wait = values['rate'], values['wait']
-        self.report, self.frame_id = values['report'], values['frame_id']
-        self.scenario = scenario_from(values)
-        self._draw_every = math.ceil(self.rate / DRAW_RATE)
-        self.ticks = round(self.scenario.duration * self.rate)
-        self.log = CraneLog(self.ticks)
-        self.stop = threading.Event()
-        self.in_real_time = not (values['closed_loop'] and values['lockstep'])
-        self.feedback = CraneFeedback(
-            self.scenario, self.rate, latency=values['latency'], lockstep=values['lockstep'],
-            stop=self.stop) if values['closed_loop'] else None
-        self.crane = (self.feedback.loop.crane if self.feedback else
-                      Crane(self.scenario, self.rate))
-        self.solver = ContactSolver(self.scenario.size, self.scenario.stack_size, model='exact')
+        values = declare(self, PARAMETERS)
+        warn_of_unknown(self, PARAMETERS)
+        self._rate, self._wait, self._frame = (
+            values[name] for name in ('rate', 'wait', 'frame_id'))
+        self._lockstep = values['lockstep']
+        self._look_every = math.ceil(self._rate / DRAW_RATE)
+        scenario = CraneScenario(**{field: values[name] for name, (field, _) in SCENARIO.items()})
+        # In real time answers are late or lost, so the law's constants are for a period's latency.
+        self.loop = ClosedLoop(scenario, self._rate,
+                               latency=0.0 if self._lockstep else 1.0 / self._rate)
+        self._asked: dict[int, LoopState | None] = {}
+        """What was published and not answered yet, by stamp [ns]; None for an offer."""
+        self._matched = False  # whether an offer was answered
+        self.latencies: list[float] = []  # from the poses' stamp to each contact [s]
+        self._poses = [self.create_publisher(PoseStamped, f'{box}/pose', DEEP_RELIABLE)
+                       for box in ('box_a', 'box_b')]
+        self._contacts = self.create_subscription(
+            Contacts, 'contacts', self._on_contacts, DEEP_RELIABLE)
+        self._markers = self.create_publisher(MarkerArray, CRANE_MARKERS, contact_qos())
+        self._force = self.create_publisher(WrenchStamped, CRANE_WRENCH, contact_qos())
 
-        self._crane_markers = self.create_publisher(MarkerArray, CRANE_MARKERS, CONTACT_QOS)
-        self._crane_wrench = self.create_publisher(WrenchStamped, CRANE_WRENCH, CONTACT_QOS)
-        self._publishers_ab = [self.create_publisher(PoseStamped, f'{box}/pose', DEEP_RELIABLE)
-                               for box in ('box_a', 'box_b')]
-        self._answers = [
-            self.create_subscription(message, topic, partial(self._on_answer, kind), DEEP_RELIABLE)
-            for kind, (message, topic) in ANSWERS.items()]
+    @property
+    def lost(self) -> int:
+        """Return how many published pairs have no answer yet."""
+        return len(self._asked)
 
-    def unmatched(self) -> list[str]:
-        """Return the topics that have no counterpart yet."""
-        return [p.topic_name for p in self._publishers_ab if not p.get_subscription_count()] + [
-            s.topic_name for s in self._answers if not s.get_publisher_count()]
-
-    def await_answers(self) -> None:
+    def await_node(self, executor: Any) -> None:
         """Offer the start poses until one pair is answered; raise TimeoutError after `wait` s.
 
         Matched endpoints alone do not say that the other side has matched too, or spins already.
         """
-        deadline = time.monotonic() + self.wait
-        while not self.log.offers_answered and not self.stop.is_set():
+        deadline = time.monotonic() + self._wait
+        while not self._matched:
             if time.monotonic() > deadline:
-                unmatched = ', '.join(self.unmatched())
-                what = f'nobody at the other end of {unmatched}' if unmatched else 'no answer'
-                raise TimeoutError(f'{what} within {self.wait:g} s; is a contact_node running?')
-            if not self.unmatched():
-                self._publish(offer=True)
-            self.stop.wait(OFFER_PERIOD)
+                raise TimeoutError(f'no answer within {self._wait:g} s on '
+                                   f'{self._contacts.topic_name}; is a contact_node running?')
+            self._publish(None)
+            self._serve(executor, OFFER_PERIOD, lambda: self._matched)
+        self._asked.clear()  # late answers to offers are nobody's
 
-    def lower(self) -> None:
-        """Run the motion, then wait a moment for the last answers.
+    def lower(self, executor: Any) -> None:
+        """Run the landing in real time or in lockstep, then wait a moment for the last answers.
 
-        A landing ends when all that is judged was seen.
+        Raises TimeoutError in lockstep when answers stay away altogether.
         """
         gc.collect()
         gc.freeze()  # a full collection would hold up the poses for milliseconds
-        start = time.perf_counter()
-        for tick in range(self.ticks):
-            # The schedule is absolute: lateness of one tick is not handed on to the next.
-            early = start + tick / self.rate - time.perf_counter() if self.in_real_time else 0.0
-            if self.stop.wait(max(0.0, early)):
-                return
-            stamp = self._publish()
-            if tick % self._draw_every == 0:
+        patience = LOCKSTEP_PATIENCE if self._lockstep else ANSWER_SHARE / self._rate
+        start, lost_in_a_row = time.perf_counter(), 0
+        stages = Stages(self.loop.record)
+        for tick in count():
+            if not self._lockstep:
+                # The schedule is absolute: one tick's lateness is not handed on to the next.
+                self._serve(executor, start + tick / self._rate - time.perf_counter())
+            stamp = self._publish(self.loop.ask())
+            if tick % self._look_every == 0:
                 self._draw(stamp)
-                self._tell_force(stamp)
-            if self.feedback is None:
-                self.crane.step()
-            else:
-                self.feedback.step(stamp)
-                if self.feedback.points_alone:
-                    self.get_logger().warning(POINTS_ALONE, once=True)
-                if self.feedback.loop.record.ended:
-                    break
-        deadline = time.monotonic() + DRAIN
-        while self.log.outstanding and time.monotonic() < deadline:
-            if self.stop.wait(0.02):
-                return
+                for line in stages.lines():
+                    print(line, flush=True)
+            self._serve(executor, patience, lambda: stamp not in self._asked)  # noqa: B023
+            lost_in_a_row = lost_in_a_row + 1 if stamp in self._asked else 0
+            if self._lockstep and lost_in_a_row >= LOST_MOST:
+                raise TimeoutError(f'no answer to {LOST_MOST} pairs in a row, each awaited for '
+                                   f'{LOCKSTEP_PATIENCE:g} s')
+            self.loop.step()
+            if self.loop.record.ended:
+                break
+        self._serve(executor, DRAIN, lambda: not self._asked)
 
-    def summary(self) -> CraneSummary | None:
-        """Return how good the answers were, None if nothing was sent."""
-        return self.log.summary(self.solver, min(max(self.scenario.size),
-                                                 max(self.scenario.stack_size)))
+    def _serve(self, executor: Any, seconds: float, done: Callable[[], bool] = lambda: False,
+               ) -> None:
+        """Serve callbacks for so long, or until `done`; raise what ends the program on a signal."""
+        deadline = time.perf_counter() + seconds
+        while not done() and (left := deadline - time.perf_counter()) > 0.0:
+            spin_once(self, executor, min(left, LOOK_PERIOD))
+        if not self.context.ok():
+            raise ExternalShutdownException
 
-    def landing(self) -> LandingResult | None:
-        """Return how the landing went, None in an open loop."""
-        return self.feedback.loop.record.judge() if self.feedback else None
-
-    def _publish(self, *, offer: bool = False) -> int:
-        """Publish both poses under one stamp [ns], the node's clock now; note them beforehand."""
+    def _publish(self, state: LoopState | None) -> int:
+        """Publish both poses under one stamp [ns], the node's clock now; None: as an offer."""
         stamp = self._now()
-        poses = self.crane.load_pose, self.crane.stack_pose
-        if offer:
-            self.log.offers.add(stamp)
-        else:
-            self.log.sent_poses(stamp, *poses)
-            if self.feedback:
-                self.feedback.ask(stamp)
-        header = make_header(stamp, self.frame_id)
-        for publisher, pose in zip(self._publishers_ab, poses):
+        self._asked[stamp] = state  # before they are published: answers may be fast
+        header, crane = make_header(stamp, self._frame), self.loop.crane
+        for publisher, pose in zip(self._poses, (crane.load_pose, crane.scenario.stack_pose)):
             publisher.publish(pose_message(header, pose))
         return stamp
 
-    def _draw(self, stamp: int) -> None:
-        """Publish ropes, and the spreader's frame between their lower ends, if anyone looks."""
-        if not self._crane_markers.get_subscription_count():
+    def _on_contacts(self, message: Contacts) -> None:
+        """Take the answer to a pair that was asked for; a stale pair is no answer."""
+        received, stamp = self._now(), stamp_of(message.header)
+        if stamp not in self._asked or message.stale:
             return
-        header, ropes = make_header(stamp, self.frame_id), self.crane.ropes
+        contacts = contacts_by_pair(message)
+        state = self._asked.pop(stamp)
+        if state is None:
+            self._matched = True
+            return
+        latency = (received - stamp) * 1e-9
+        touches = {name: contact for name, contact in contacts.items() if contact.colliding}
+        if touches:
+            self.latencies.append(latency)
+        if not all(math.isfinite(contact.volume) for contact in touches.values()):
+            self.get_logger().warning(POINTS_ALONE, once=True)
+        scenario = self.loop.crane.scenario
+        self.loop.answer(state, {name: with_patch(contact, state.pose, scenario.size)
+                                 for name, contact in touches.items()},
+                         latency=0.0 if self._lockstep else latency)
+
+    def _draw(self, stamp: int) -> None:
+        """Publish ropes, spreader, and the force on the load of the last physics step."""
+        header, ropes = make_header(stamp, self._frame), self.loop.crane.ropes
         corners = ropes[[0, 1, 3, 2], 1]  # once around
         spreader = np.stack([corners, np.roll(corners, 1, axis=0)], axis=1)
-        self._crane_markers.publish(MarkerArray(markers=[
+        self._markers.publish(MarkerArray(markers=[
             line_marker(header, name, lines, width=width, colour=ROPE)
             for name, lines, width in (('ropes', ropes, 0.04), ('spreader', spreader, 0.15))]))
-
-    def _tell_force(self, stamp: int) -> None:
-        """Publish the contacts' force on the load, of the last physics step before a tick."""
-        if self.feedback and self.feedback.loop.record.forces:
-            message = WrenchStamped(header=make_header(stamp, self.frame_id))
-            x, y, z = map(float, self.feedback.loop.record.forces[-1])
+        if self.loop.record.forces:
+            message = WrenchStamped(header=header)
+            x, y, z = map(float, self.loop.record.forces[-1])
             message.wrench.force = Vector3(x=x, y=y, z=z)
-            self._crane_wrench.publish(message)
+            self._force.publish(message)
 
     def _now(self) -> int:
         return int(self.get_clock().now().nanoseconds)
 
-    def _on_answer(self, kind: str, message: Any) -> None:
-        received, stamp = self._now(), stamp_of(message.header)
-        values = answer_values(kind, message)
-        if kind == 'cloud' and self.feedback:  # before the log: here somebody waits
-            self.feedback.answer(stamp, np.asarray(values), received)
-        self.log.answer(kind, stamp, received, values)
+
+class Stages:
+    """The landing's stages as they come, a line each, for people who watch."""
+
+    def __init__(self, record: LandingRecord) -> None:
+        """Follow a record while it grows."""
+        self._record, self._reached = record, -1
+
+    def lines(self) -> list[str]:
+        """Return a line for each stage that was reached since the last call."""
+        record = self._record
+        if not record.forces:
+            return []
+        tick, speed = len(record.forces), float(record.corner_speeds(-1)[-1])
+        reached = (0 if not record.points else 1 if record.tensions[-1].any() else
+                   2 if speed > CORNER_SPEED_LIMIT else 3)
+        lines = [f'{tick / record.rate_hz:7.2f} s  {stage:<12} fastest corner '
+                 f'{1e3 * speed:8.3g} mm/s, contact force {record.forces[-1][2] / 1e3:5.1f} kN'
+                 for stage in STAGES[self._reached + 1:reached + 1]]
+        self._reached = max(self._reached, reached)
+        return lines
 
 
-def receive_while(node: CraneNode, executor: Any, work: Callable[[], None],
-                  screen: Screen | None = None) -> None:
-    """Receive while `work` runs in a thread of its own; raise what it raises."""
-    progress = Progress(node.feedback.loop.record) if node.report and node.feedback else None
-    with ThreadPoolExecutor(max_workers=1) as pool:
-        future = pool.submit(work)
-        try:
-            while not future.done():
-                spin_once(node, executor, 0.05)
-                if not node.context.ok():  # SIGTERM; the executor may return without a word
-                    raise ExternalShutdownException
-                if screen:
-                    screen.progress(node.log.sent_pairs / node.rate)
-                    for line in progress.lines() if progress else ():
-                        screen.line(line)
-        except BaseException:
-            node.stop.set()
-            raise
-    future.result()
+def verdict(landing: Landing, latencies: Sequence[float], lost: int) -> tuple[bool, str]:
+    """Return whether a landing passed, and that in one line with the reasons.
+
+    latencies: of each contact [s]; lost: how many answers did not come.
+    """
+    faults = ([] if latencies else ['no contacts came']) + (
+        [f'{lost} lost answers'] if lost else []) + (
+        [] if landing.carried else ['the load did not come to rest on the stack'])
+    if faults:
+        return False, f'FAIL: {", ".join(faults)}'
+    state = 'is at rest' if landing.at_rest else 'lies on the stack, not within all limits'
+    p50, p99 = 1e3 * np.percentile(latencies, (50, 99))
+    return True, (f'PASS: the load {state}, settled {landing.settled:.1f} s after the first touch; '
+                  f'{len(latencies)} contacts, none lost; latency p50 {p50:.2f} ms, '
+                  f'p99 {p99:.2f} ms')
 
 
 def main(args: Sequence[str] | None = None) -> int:
-    """Run the crane once; 0 only if contacts came through, none was lost, and the stack carries."""
+    """Land once; 0 only if the stack carries the load and no answer was lost."""
     answer_help('crane', __doc__, PARAMETERS, args)
-    node, signalled = None, 0
     try:
         with joined(CraneNode, args, signals=SignalHandlerOptions.ALL) as (node, executor):
-            screen = Screen('the crane moves', node.scenario.duration)
-            receive_while(node, executor, node.await_answers)
-            with screen:
-                receive_while(node, executor, node.lower, screen)
+            node.await_node(executor)
+            node.lower(executor)
+            landing = node.loop.record.judge()
+            passed, words = verdict(landing, node.latencies, node.lost)
     except KeyboardInterrupt:
-        signalled = 130  # 128 + SIGINT, as shells report it
+        return 130  # 128 + SIGINT, as shells report it
     except ExternalShutdownException:
-        signalled = 143  # 128 + SIGTERM, which shuts the context down under whatever runs
+        return 143  # 128 + SIGTERM, which shuts the context down under whatever runs
     except (*REFUSALS, TimeoutError) as error:
         print(f'error: {error}', file=sys.stderr)
         return 1
-    summary, landing = (node.summary(), node.landing()) if node else (None, None)
-    if node is None or summary is None:
-        return signalled
-    passed, words = verdict(summary, landing)
-    if not signalled:
-        screen.verdict(passed, words)
-    screen.tables(
-        f'crane: {"interrupted" if signalled else "done"} after '
-        f'{summary.result.sent / node.rate:g} s of motion at {node.rate:g} Hz',
-        *filter(None, (summary, landing)))
-    return signalled or (0 if passed else 1)
+    print(f'{words}\n{landing}', flush=True)
+    return 0 if passed else 1
 
 
-def verdict(summary: CraneSummary, landing: LandingResult | None) -> tuple[bool, str]:
-    """Return whether a run passed, and that in one line with the reasons.
-
-    landing: None for an open loop.
-    """
-    faults = summary.faults
-    if landing is not None and not landing.carried:
-        faults.append('the load did not come to rest on the stack')
-    if faults:
-        return False, f'FAIL: {", ".join(faults)}'
-    figures = [f'{summary.result.contacts} contacts, none lost',
-               f'median latency {1e3 * percentiles(summary.latencies, 50)[0]:.2f} ms']
-    if landing is not None:
-        state = 'is at rest' if landing.at_rest else 'lies on the stack, not within all limits'
-        figures.insert(0, f'the load {state}, settled {landing.settled:.1f} s after the first '
-                          'touch')
-    return True, f'PASS: {"; ".join(figures)}'
+if __name__ == '__main__':
+    sys.exit(main())

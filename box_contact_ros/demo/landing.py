@@ -1,57 +1,69 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""A container set down by its contacts, one per box of the stack and tick. No ROS.
+"""A container set down by its contacts, one per tick, and the judgement whether it rests. No ROS.
 
 A `ClosedLoop` steps a crane under a law of force, wherever the contacts come from, and records what
-happened; `land` closes it with any function of the two poses. `LandingRecord.judge` measures the
-record. The load settles if, from some time on, no corner moves faster than `SETTLED_SPEED`, until
-`WATCHED` s after the first touch. It is at rest if it meets every limit of `LandingResult.limits`.
-The window is the last `WINDOW` s of the time that is watched.
+happened. `land` closes the loop with any function of the two poses. `LandingRecord.judge` measures
+the record. The load settles if, from some time on, no corner moves faster than `SETTLED_SPEED`. It
+is at rest if it meets every limit of `Landing.limits`. The window is the last `WINDOW` s of the
+`WATCHED` s after the first touch.
 
 Depth, gap and first touch are those of the exact solver on the recorded poses, whatever model gave
-the contacts. Conventions: those of `laws` and `mujoco_crane`.
+the contacts. Conventions: those of `laws` and `crane`.
 """
 from __future__ import annotations
 
-import dataclasses
 import math
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import product
-from typing import Any
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from ..output import percentiles
-from ..scene.force.laws import GRAVITY
+from ..scene.laws import GRAVITY, HeldPatch
 from ..scene.pose import rotation_matrix
 from ..solver.contact import Contact
 from ..solver.contact_solver import ContactSolver
-from .crane_log import table
-from .load_laws import LoopState, MakeLaw, NamedContacts, held_patch
-from .mujoco_crane import LANDING_OVERLAP, Crane, CraneScenario
+from .crane import Crane, CraneScenario
 
-SETTLING, WINDOW = 10.0, 5.0
-"""The load has to be at rest from `SETTLING` s after the first touch on, for `WINDOW` s."""
-WATCHED = SETTLING + WINDOW
-AHEAD = 0.05
-"""A predictor's first contact may come so much before the first touch [s]."""
-SETTLED_SPEED = 0.010  # speed of the load's fastest corner [m/s] below which it has settled
+DURATION = 25.0  # longest landing [s]; the first touch comes after 5 to 8 s
+WATCHED, WINDOW = 15.0, 5.0  # time that is judged after the first touch, and its last part [s]
+TIME_ROUNDING = 1e-9  # times that differ by less are the same: sums of ticks are rounded [s]
+SETTLED_SPEED = 0.010  # speed of the load's fastest corner below which it has settled [m/s]
 SETTLED_LIMIT = 3.0  # time from the first touch until then [s]
 CORNER_SPEED_LIMIT = 0.3e-3  # speed of the fastest corner in the window [m/s]
-FORCE_LIMIT = 1e-6
-"""Deviation of the contact force's vertical part from the weight, as a share of the weight."""
-TILT_LIMIT = math.radians(0.06)
-"""Mean angle between the load's and the world's vertical in the window [rad]."""
+FORCE_LIMIT = 1e-6  # vertical contact force off the weight, as a share of the weight
+TILT_LIMIT = math.radians(0.06)  # mean angle between the load's and the world's vertical [rad]
 DEPTH_LIMIT = 0.01  # depth as a share of the load's height, always
 GAP_LIMIT = 0.020  # gap after the first touch [m]: how high it may bounce
 
-LANDING_DURATION = 25.0
-"""Length of a landing [s]. The first touch comes after 5 to 8 s, and 15 s more are looked at."""
+Contacts = Mapping[str, Contact]
+"""The contacts of one question, by the names of their pairs."""
+ContactSource = Callable[[np.ndarray, np.ndarray], Contact]
+"""From pose_a and pose_b (7,) to their contact."""
+MakeLaw = Callable[..., 'LoadLaw']
+"""What makes the law of a load, called as `HeldPatch.for_loop` is."""
 
-ContactSource = Callable[[np.ndarray, np.ndarray], Contact | None]
-"""From pose_a and pose_b (7,) to their contact; None stands for an answer that was lost."""
+
+class LoopState(NamedTuple):
+    """The state of the load at which contacts are asked for."""
+
+    tick: int
+    time: float  # [s]
+    pose: np.ndarray  # of the load's box (7,)
+
+
+class LoadLaw(Protocol):
+    """The wrench on a load, from the answer that it holds."""
+
+    def hold(self, contacts: Contacts, pose: np.ndarray) -> None:
+        """Hold the contacts that were asked for with the load at `pose` (7,)."""
+
+    def wrench(self, pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+        """Return force and torque (6,) at `pose` (7,) and `velocity` (6,), a physics step each."""
 
 
 def with_patch(touch: Contact, pose: np.ndarray, size: Sequence[float]) -> Contact:
@@ -70,104 +82,31 @@ def with_patch(touch: Contact, pose: np.ndarray, size: Sequence[float]) -> Conta
                           covariance=(axes * np.square(size) / 12.0) @ axes.T)
 
 
-def landing_scenario(seed: int = 0, **fields: Any) -> CraneScenario:
-    """Return a scenario that sets the load down: `CraneScenario.drawn` with further fields."""
-    landing = {'land': True, 'overlap': LANDING_OVERLAP, 'duration': LANDING_DURATION}
-    return CraneScenario.drawn(seed, **landing | fields)
-
-
 @dataclass(frozen=True, kw_only=True)
-class LandingCase:
-    """What is varied from landing to landing. Angles in degrees, lengths in m."""
-
-    rope_angle: float  # of the ropes at the start, from the plumb line
-    rope_heading: float
-    tilt: float  # of the load at the start
-    tilt_heading: float  # the share of pitch (its cosine) and roll (its sine)
-    overhang: float  # lateral distance of the two centres at the first touch
-    overhang_heading: float
-    yaw: float  # of the load at the start
-
-
-def cases(*, rope_angles: Sequence[float] = (0.5, 1.25, 2.0, 3.0),
-          tilts: Sequence[float] = (0.5, 1.5, 3.0), overhangs: Sequence[float] = (0.0, 0.3, 0.6),
-          seed: int = 1) -> Iterator[LandingCase]:
-    """Yield each combination of rope angle, tilt and overhang; draw headings and yaw (to 1°)."""
-    random = np.random.default_rng(seed)
-    for rope_angle, tilt, overhang in product(rope_angles, tilts, overhangs):
-        rope, tilted, hanging = random.uniform(-180.0, 180.0, 3)
-        yield LandingCase(
-            rope_angle=rope_angle, rope_heading=rope, tilt=tilt, tilt_heading=tilted,
-            overhang=overhang, overhang_heading=hanging, yaw=random.uniform(-1.0, 1.0))
-
-
-AIMING_RATE = 100.0
-"""Ticks a second while the trolley is placed; the load moves 5 mm a tick at most."""
-
-
-def scenario_of(case: LandingCase, **fields: Any) -> CraneScenario:
-    """Return the scenario of a case: the trolley stands where the load sways to its overhang.
-
-    fields: further ones of CraneScenario.
-
-    Moving the trolley moves the whole motion before the touch, so the trolley is shifted by what
-    was missed. It is shifted twice: the first shift may change which corner touches.
-    """
-    tilt, heading = case.tilt, math.radians(case.tilt_heading)
-    hanging = math.radians(case.overhang_heading)
-    wanted = case.overhang * np.array([math.cos(hanging), math.sin(hanging)])
-    scenario = landing_scenario(
-        offset=tuple(wanted), rope_angle=case.rope_angle, rope_heading=case.rope_heading,
-        pitch=tilt * math.cos(heading), roll=tilt * math.sin(heading), yaw=case.yaw, **fields)
-    exact = solvers(scenario, 'exact')
-    boxes = [pose for pose, _ in scenario.stack_boxes]
-    for _ in range(2):
-        crane = Crane(scenario, AIMING_RATE)
-        while not any(solver(crane.load_pose, pose).colliding
-                      for solver, pose in zip(exact, boxes)):
-            if crane.time > scenario.duration:
-                raise ValueError(f'the load never touches: {case}')
-            crane.step()
-        missed = wanted - (crane.load_pose - crane.stack_pose)[:2]
-        scenario = dataclasses.replace(scenario, offset=tuple(scenario.offset + missed))
-    return scenario
-
-
-@dataclass(frozen=True, kw_only=True)
-class LandingResult:
+class Landing:
     """Figures of one landing. SI units, angles in rad; NaN where nothing was measured."""
 
     touched: float = math.nan  # time of the first touch [s], NaN for never
-    overhang: float = math.nan  # lateral distance of the two centres then [m]
     settled: float = math.nan
     """Time from the first touch until corners stay below `SETTLED_SPEED` [s], NaN for never."""
     corner_speed: float = math.nan  # of the fastest corner in the window [m/s]
     rope_tension: float = math.nan  # of the tautest rope in the window [N]
-    force_error: float = math.nan  # |mean contact force − weight| / weight over the window
-    force_worst: float = math.nan  # the same of the window's worst tick
-    tilt: float = math.nan  # largest in the window [rad]
+    force_worst: float = math.nan  # |vertical contact force − weight| / weight, worst in the window
     static_tilt: float = math.nan  # mean over the window [rad]
-    tilt_limit: float = TILT_LIMIT  # what the scenario's static tilt is held to [rad]
-    creep: float = math.nan  # mean lateral speed of the load's centre over the window [m/s]
-    energy_gain: float = math.nan
-    """Largest gain of kinetic and potential energy over the window's start [J]."""
+    tilt_limit: float = TILT_LIMIT  # [rad]
     depth: float = math.nan  # largest ever, as a share of the load's height
     gap: float = math.nan  # largest after the first touch [m]
-    drop: float = math.nan  # how far the load's centre ends below its place on the stack [m]
-    point_step: float = math.nan  # largest |Δpoint| between neighbouring ticks in the window [m]
-    exact_point_step: float = math.nan  # the same of the exact point on the same poses
-    point_step_ever: float = math.nan  # largest |Δpoint| over the whole contact [m]
-    exact_point_step_ever: float = math.nan
 
     @property
     def limits(self) -> dict[str, tuple[bool, str]]:
-        """Whether each limit is met, by name, and figure and limit in words.
+        """Return by name whether each limit is met, and figure and limit in words.
 
         What was not measured is not met.
         """
+        settled = 'never' if math.isnan(self.settled) else f'{self.settled:.2f} s'
         return {
             'settled': (self.settled <= SETTLED_LIMIT,
-                        f'{self.settled:.2f} s after the first touch (limit {SETTLED_LIMIT:g})'),
+                        f'{settled} after the first touch (limit {SETTLED_LIMIT:g} s)'),
             'corner speed': (self.corner_speed <= CORNER_SPEED_LIMIT,
                              f'{1e3 * self.corner_speed:.3g} mm/s at most '
                              f'(limit {1e3 * CORNER_SPEED_LIMIT:g})'),
@@ -185,12 +124,12 @@ class LandingResult:
 
     @property
     def at_rest(self) -> bool:
-        """Whether all limits are met."""
+        """Return whether all limits are met."""
         return all(met for met, _ in self.limits.values())
 
     @property
     def carried(self) -> bool:
-        """Whether the stack carries the load, still for good, though perhaps not flat.
+        """Return whether the stack carries the load, still for good, though perhaps not flat.
 
         A load that overhangs a lot cannot lie flat on an elastic stack.
         """
@@ -198,20 +137,11 @@ class LandingResult:
             self.limits[name][0] for name in ('ropes slack', 'depth', 'gap'))
 
     def __str__(self) -> str:
-        """Return a few lines for people: every figure with its limit."""
+        """Return a line for each figure, with its limit."""
         if math.isnan(self.corner_speed):
-            return f'  landing ................ not judged: it takes a touch and {WATCHED:g} s more'
-        state = ('at rest' if self.at_rest else 'settled, not within all limits' if self.carried
-                 else 'NOT AT REST')
-        rows = [('landing', f'{state} (first touch at {self.touched:.2f} s)')]
-        rows += [(name, figure + ('' if met else '  <-- not met'))
-                 for name, (met, figure) in self.limits.items()]
-        rows += [('creep', f'{1e3 * self.creep:.2g} mm/s'),
-                 ('point steps', f'{1e3 * self.point_step:.2g} mm at most between ticks (exact: '
-                                 f'{1e3 * self.exact_point_step:.2g}), while settling '
-                                 f'{1e3 * self.point_step_ever:,.0f} mm (exact: '
-                                 f'{1e3 * self.exact_point_step_ever:,.0f})')]
-        return table(rows)
+            return f'  not judged: that takes a touch and {WATCHED:g} s more'
+        return '\n'.join(f'  {name:<13} {figure}{"" if met else "  <-- not met"}'
+                         for name, (met, figure) in self.limits.items())
 
 
 @dataclass
@@ -229,10 +159,9 @@ class LandingRecord:
 
     @property
     def ended(self) -> bool:
-        """Whether all that is judged has been recorded, or the scenario's time is over."""
+        """Return whether all that is judged has been recorded, or the time is over."""
         ticks, first = len(self.forces), next(iter(self.points), len(self.poses))
-        return (ticks - first > (WATCHED + AHEAD) * self.rate_hz
-                or ticks >= round(self.scenario.duration * self.rate_hz))
+        return ticks - first > (WATCHED * self.rate_hz) + 1 or ticks >= DURATION * self.rate_hz
 
     def corner_speeds(self, first: int = 0) -> np.ndarray:
         """Return the speed [m/s] of the fastest of the load's eight corners, per tick (n,).
@@ -251,116 +180,78 @@ class LandingRecord:
         up = rotation_matrix(np.array(self.poses)[:, 3:])[:, :, 2]
         return np.arctan2(np.hypot(up[:, 0], up[:, 1]), up[:, 2])
 
-    def energies(self) -> np.ndarray:
-        """Return kinetic and potential energy [J] per tick (n,)."""
-        scenario = self.scenario
-        poses, velocities = np.array(self.poses), np.array(self.velocities)
-        axes = rotation_matrix(poses[:, 3:])
-        spins = np.einsum('nij,ni->nj', axes, velocities[:, 3:])
-        height = poses[:, 2] + axes[:, 2] @ scenario.mass_offset
-        energies: np.ndarray = 0.5 * (
-            scenario.mass * np.square(velocities[:, :3]).sum(axis=1)
-            + np.square(spins) @ scenario.inertia) + scenario.mass * GRAVITY * height
-        return energies
+    def separations(self) -> np.ndarray:
+        """Return the exact separation [m] of load and stack, per tick (n,)."""
+        poses = np.reshape(self.poses, (-1, 7))
+        return np.min([solver.batch(poses, np.broadcast_to(pose, poses.shape)).separation
+                       for solver, (pose, _) in zip(solvers(self.scenario, 'exact'),
+                                                    self.scenario.stack_boxes.values())], axis=0)
 
-    def point_path(self) -> np.ndarray:
-        """Return contact points (n, 3) [m], NaN where there was no contact or no answer."""
-        path = np.full((len(self.poses), 3), math.nan)
-        for tick, point in self.points.items():
-            path[tick] = point
-        return path
+    def window(self, touched: int) -> slice:
+        """Return the ticks of the window, where the first touch came in the tick `touched`."""
+        return slice(touched + round((WATCHED - WINDOW) * self.rate_hz),
+                     touched + round(WATCHED * self.rate_hz))
 
-    def judge(self, *, tilt_limit: float = TILT_LIMIT) -> LandingResult:
+    def judge(self, *, tilt_limit: float = TILT_LIMIT) -> Landing:
         """Measure the landing; what would have to be measured later than its end is NaN.
 
         tilt_limit: of the static tilt [rad], for a scenario in which the load cannot lie flatter.
         """
-        scenario, ticks = self.scenario, len(self.forces)
-        if not ticks:
-            return LandingResult()
-        poses = np.array(self.poses)[:ticks]
-        colliding, separation, exact_points = _exact(scenario, poses)
-        if not colliding.any():
-            return LandingResult()
-        first = int(np.argmax(colliding))
-        window = slice(first + round(SETTLING * self.rate_hz),
-                       first + round(WATCHED * self.rate_hz))
-        seen, ticks = ticks, min(ticks, window.stop)  # what comes later is not looked at
-        separation, poses = separation[:ticks], poses[:ticks]
-        speeds = self.corner_speeds()[:ticks]
-        fast = np.flatnonzero(speeds[first:] >= SETTLED_SPEED)
-        still = fast[-1] + 1 if len(fast) else 0
-        steps, exact_steps = (_steps(points[:ticks])
-                              for points in (self.point_path(), exact_points))
-        place = scenario.stack_size[2] + 0.5 * scenario.size[2]
-        figures = {
-            'touched': first / self.rate_hz,
-            'overhang': float(np.hypot(*(poses[first, :2] - scenario.drop_position))),
-            'settled': still / self.rate_hz if first + still < ticks else math.nan,
-            'tilt_limit': tilt_limit,
-            'depth': float(np.max(-separation)) / scenario.size[2],
-            'gap': float(max(0.0, np.max(separation[first:]))),
-            'drop': place - float(poses[-1, 2]),
-            'point_step_ever': _largest(steps[first:]),
-            'exact_point_step_ever': _largest(exact_steps[first:]),
-        }
-        if window.stop <= seen:
-            figures |= self._in(window) | {'point_step': _largest(steps[window]),
-                                           'exact_point_step': _largest(exact_steps[window])}
-        return LandingResult(**figures)
-
-    def _in(self, window: slice) -> dict[str, float]:
-        """Return the figures of a window of ticks."""
-        weight = self.scenario.mass * GRAVITY
-        forces, energies = np.array(self.forces)[window, 2], self.energies()[window]
-        tilts, places = self.tilts()[window], np.array(self.poses)[window, :2]
-        return {
-            'corner_speed': float(self.corner_speeds()[window].max()),
-            'rope_tension': float(np.array(self.tensions)[window].max()),
-            'force_error': abs(float(forces.mean()) / weight - 1.0),
-            'force_worst': float(np.abs(forces / weight - 1.0).max()),
-            'tilt': float(tilts.max()), 'static_tilt': float(tilts.mean()),
-            'creep': float(np.hypot(*(places[-1] - places[0]))) / WINDOW,
-            'energy_gain': float(energies.max() - energies[0]),
-        }
-
-
-def _exact(scenario: CraneScenario, poses: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Return of the load's poses (n, 7): touching (n,), separation (n,), exact points (n, 3).
-
-    The least separation of the stack's boxes, and the point on the first of them.
-    """
-    found = [ContactSolver(scenario.size, size, model='exact').batch(
-        poses, np.broadcast_to(pose, poses.shape)) for pose, size in scenario.stack_boxes]
-    return (np.any([one.colliding for one in found], axis=0),
-            np.min([one.separation for one in found], axis=0), found[0].point)
+        separations = self.separations()
+        touching = np.flatnonzero(separations <= 0.0)
+        if not len(touching):
+            return Landing()
+        first = int(touching[0])
+        window = self.window(first)
+        ticks = min(len(self.forces), window.stop)  # what comes later is not judged
+        separations = separations[:ticks]
+        fast = np.flatnonzero(self.corner_speeds(first)[:ticks - first] >= SETTLED_SPEED)
+        still = int(fast[-1]) + 1 if len(fast) else 0
+        seen = Landing(
+            touched=first / self.rate_hz, tilt_limit=tilt_limit,
+            settled=still / self.rate_hz if first + still < ticks else math.nan,
+            depth=float(np.max(-separations)) / self.scenario.size[2],
+            gap=float(max(0.0, np.max(separations[first:]))))
+        if ticks < window.stop:
+            return seen
+        forces = np.array(self.forces)[window, 2] / (self.scenario.mass * GRAVITY)
+        return replace(
+            seen, corner_speed=float(self.corner_speeds()[window].max()),
+            rope_tension=float(np.array(self.tensions)[window].max()),
+            force_worst=float(np.abs(forces - 1.0).max()),
+            static_tilt=float(self.tilts()[window].mean()))
 
 
 class ClosedLoop:
     """A crane under the wrench of a law, recorded tick by tick, wherever contacts come from."""
 
     def __init__(self, scenario: CraneScenario, rate_hz: float, *, latency: float = 0.0,
-                 law: MakeLaw = held_patch) -> None:
+                 law: MakeLaw = HeldPatch.for_loop) -> None:
         """Make the crane, and the law for its load, this rate and latency [s]."""
         self.crane, self.record = Crane(scenario, rate_hz), LandingRecord(scenario, rate_hz)
         self._law = law(scenario.load, rate_hz=rate_hz, latency=latency,
                         step=self.crane.physics_step)
+        self._under_way: deque[tuple[float, Contacts, np.ndarray]] = deque()
+        """Answers that do not act yet: when they will [s], and the pose that they are for."""
         self._wrench = np.zeros(6)
 
     def ask(self) -> LoopState:
         """Begin a tick; return the state whose contacts are asked for."""
         crane = self.crane
-        state = LoopState(len(self.record.poses), crane.time, crane.load_pose, crane.load_velocity)
+        state = LoopState(len(self.record.poses), crane.time, crane.load_pose)
         self.record.poses.append(state.pose)
-        self.record.velocities.append(state.velocity)
-        return self._law.asked_for(state)
+        self.record.velocities.append(crane.load_velocity)
+        return state
 
-    def answer(self, state: LoopState, contacts: NamedContacts, *, latency: float) -> None:
-        """Take the contacts of a state; they act `latency` [s] after they were asked for."""
+    def answer(self, state: LoopState, contacts: Contacts, *, latency: float) -> None:
+        """Take the contacts of a state; they act `latency` [s] after they were asked for.
+
+        An answer must neither come nor act before those to earlier questions.
+        """
         touches = [contact for contact in contacts.values() if contact.colliding]
         if touches:
             self.record.points[state.tick] = np.array(touches[0].point)
-        self._law.answer(contacts, state, due=state.time + latency)
+        self._under_way.append((state.time + latency, contacts, state.pose))
 
     def step(self) -> None:
         """End the tick: advance the crane under what is due.
@@ -373,68 +264,30 @@ class ClosedLoop:
 
     def _at(self, time: float) -> np.ndarray:
         """Return the wrench (6,) of the physics step that starts at `time` [s]."""
-        self._wrench = self._law.wrench(time, self.crane.load_pose, self.crane.load_velocity)
+        while self._under_way and self._under_way[0][0] <= time + TIME_ROUNDING:
+            _, contacts, pose = self._under_way.popleft()
+            self._law.hold(contacts, pose)
+        self._wrench = self._law.wrench(self.crane.load_pose, self.crane.load_velocity)
         return self._wrench
-
-
-class Progress:
-    """The landing's stages as they come: a line a change, for people who watch."""
-
-    STAGES = ('hanging', 'first touch', 'settling', 'at rest')
-
-    def __init__(self, record: LandingRecord) -> None:
-        """Follow a record while it grows."""
-        self._record, self._seen = record, -1
-
-    def lines(self) -> Iterator[str]:
-        """Yield a line for each stage that was reached since the last call."""
-        record = self._record
-        if not record.forces:
-            return
-        tick, speed = len(record.forces), float(record.corner_speeds(-1)[-1])
-        slack = not record.tensions[-1].any()
-        reached = (0 if not record.points else 1 if not slack else
-                   2 if speed > CORNER_SPEED_LIMIT else 3)
-        for stage in range(self._seen + 1, reached + 1):
-            yield (f'{tick / record.rate_hz:7.2f} s  {self.STAGES[stage]:<12} '
-                   f'fastest corner {1e3 * speed:8.3g} mm/s, '
-                   f'contact force {record.forces[-1][2] / 1e3:5.1f} kN')
-        self._seen = max(self._seen, reached)
 
 
 def solvers(scenario: CraneScenario, model: str) -> list[ContactSolver]:
     """Return a solver of that model for each box of the stack."""
-    return [ContactSolver(scenario.size, size, model=model) for _, size in scenario.stack_boxes]
+    return [ContactSolver(scenario.size, size, model=model)
+            for _, size in scenario.stack_boxes.values()]
 
 
-def land(scenario: CraneScenario, sources: ContactSource | Sequence[ContactSource], *,
-         rate_hz: float = 200.0, latency: float = 0.0, law: MakeLaw = held_patch) -> LandingRecord:
-    """Run one landing with contacts that act `latency` s after they were asked for.
+def land(scenario: CraneScenario, sources: Sequence[ContactSource], *, rate_hz: float = 200.0,
+         latency: float = 0.0, law: MakeLaw = HeldPatch.for_loop) -> LandingRecord:
+    """Run one landing with contacts that act `latency` [s] after they were asked for.
 
-    sources: for each box of the stack, such as `solvers`; where one gives None, the answer is lost.
-    ValueError: a contact lacks what the law needs; its source's model is named.
+    sources: for each box of the stack, such as `solvers`. ValueError: a contact lacks what the law
+    needs.
     """
-    each = [sources] if callable(sources) else list(sources)
     loop = ClosedLoop(scenario, rate_hz, latency=latency, law=law)
-    pairs = [(name, source, pose) for (name, (pose, _)), source in zip(
-        scenario.pairs.items(), each)]
     while not loop.record.ended:
         state = loop.ask()
-        contacts = {name: found for name, source, pose in pairs
-                    if (found := source(state.pose, pose)) is not None}
-        try:
-            if len(contacts) == len(pairs):
-                loop.answer(state, contacts, latency=latency)
-            loop.step()
-        except ValueError as error:
-            raise ValueError(f'model {getattr(each[0], "model", "unknown")}: {error}') from None
+        loop.answer(state, {name: source(state.pose, pose) for (name, (pose, _)), source in zip(
+            scenario.stack_boxes.items(), sources)}, latency=latency)
+        loop.step()
     return loop.record
-
-
-def _steps(points: np.ndarray) -> np.ndarray:
-    """Return |Δpoint| [m] to the row before (n,), NaN where one of the two is missing."""
-    return np.linalg.norm(np.diff(points, axis=0, prepend=math.nan), axis=1)
-
-
-def _largest(values: np.ndarray) -> float:
-    return percentiles(values[~np.isnan(values)], 100)[0]

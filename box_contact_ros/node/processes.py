@@ -47,8 +47,11 @@ def parameters(**values: object) -> list[str]:
 
 
 def program(name: str, **values: object) -> list[str]:
-    """Return Python's arguments for a program of this package with ROS parameters."""
-    return ['-m', 'box_contact_ros', name, '--ros-args', *parameters(**values)]
+    """Return Python's arguments for a program with ROS parameters, by its module's name here.
+
+    name: such as `node.contact_node`.
+    """
+    return ['-m', f'box_contact_ros.{name}', '--ros-args', *parameters(**values)]
 
 
 def start(arguments: Sequence[str], output: IO[bytes] | int | None = subprocess.DEVNULL,

@@ -26,7 +26,8 @@ from rclpy.task import Future
 from std_msgs.msg import String
 from visualization_msgs.msg import MarkerArray
 
-from ..demo.ros_client import (
+from ..node.messages import Refused, read_contacts
+from ..node.ros_client import (
     CRANE_MARKERS,
     CRANE_WRENCH,
     PoseTopic,
@@ -35,7 +36,6 @@ from ..demo.ros_client import (
     stamp_of,
     subscribe_contacts,
 )
-from ..node.messages import Refused, read_contacts
 from ..node.runtime import LATCHED_QOS, POSE_QOS, GuardedNode
 from ..node.topics.scene_topics import LARGEST_SCENE_TEXT
 from ..node.topics.tf_poses import TfPoses, has_tf2

@@ -19,12 +19,12 @@ from rclpy.context import Context
 from std_msgs.msg import Header
 from visualization_msgs.msg import Marker, MarkerArray
 
-from ..demo.ros_client import line_marker, make_marker, set_pose
 from ..node.contact_program import PARAMETERS as CONTACT_PARAMETERS
 from ..node.declared_parameters import CheckedParameters
 from ..node.messages import NANOSECONDS, make_header
 from ..node.named_files import FIXED_PARAMETERS, NamedFiles, named_scene
 from ..node.parameters import Setting, answer_help, number
+from ..node.ros_client import line_marker, make_marker, set_pose
 from ..node.runtime import CONTACT_QOS, run_node
 from . import style
 from .listener import Listener

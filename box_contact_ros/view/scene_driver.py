@@ -16,9 +16,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from rclpy.context import Context
 
-from ..demo.ros_client import array_message, pose_message, pose_topics
 from ..node.messages import make_header
 from ..node.parameters import outside_ros_args
+from ..node.ros_client import array_message, pose_message, pose_topics
 from ..node.runtime import CONTACT_QOS, GuardedNode, refusals_end, run_node
 from ..scene.files.scene_file import read_scene
 from ..scene.pose import quaternion_multiply, rotation_matrix

@@ -15,8 +15,6 @@ It prints:
     20 ms: contact, 1.5 mm deep
     25 ms: contact, 2.5 mm deep
 """
-from typing import Any
-
 import numpy as np
 import rclpy
 from builtin_interfaces.msg import Time
@@ -30,23 +28,22 @@ from box_contact_msgs.msg import Contacts
 class LockstepClient(Node):
     """Sends poses `x y z qx qy qz qw` of box_a and box_b, and waits for the answer to them."""
 
-    def __init__(self, kind: type = Contacts, topic: str = 'contacts') -> None:
+    def __init__(self) -> None:
         super().__init__('lockstep_client')
-        self.topic = topic
         self.poses = [self.create_publisher(PoseStamped, f'box_{name}/pose', 10) for name in 'ab']
-        self.create_subscription(kind, topic, self.receive, 10)
+        self.create_subscription(Contacts, 'contacts', self.receive, 10)
         self.node_reset = self.create_client(Trigger, 'contact_node/reset')
-        self.answer: Any = None
+        self.answer: Contacts | None = None
 
-    def receive(self, answer: Any) -> None:
+    def receive(self, answer: Contacts) -> None:
         """Keep the newest answer."""
         self.answer = answer
 
     def wait_for_node(self) -> None:
         """Wait until the node listens to both poses and this client hears its answers."""
-        self.get_logger().info(f'waits for a contact node that publishes {self.topic}')
+        self.get_logger().info('waits for a contact node')
         while not (all(pose.get_subscription_count() for pose in self.poses)
-                   and self.count_publishers(self.topic)):
+                   and self.count_publishers('contacts')):
             rclpy.spin_once(self, timeout_sec=0.05)
 
     def reset(self) -> None:
@@ -55,8 +52,8 @@ class LockstepClient(Node):
         rclpy.spin_until_future_complete(self, self.node_reset.call_async(Trigger.Request()))
         self.answer = None
 
-    def ask(self, time_ns: int, *poses: np.ndarray, patience: float = 0.5) -> Any:
-        """Return the answer to two poses at a time; lost poses are sent again."""
+    def ask(self, time_ns: int, *poses: np.ndarray, patience: float = 0.5) -> Contacts:
+        """Return the answer to two poses at a time [ns]; lost poses are sent again."""
         stamp = Time(sec=time_ns // 10**9, nanosec=time_ns % 10**9)
         while self.answer is None or self.answer.header.stamp != stamp:
             for publisher, pose in zip(self.poses, poses):

@@ -4,7 +4,7 @@
 """Make docs/figures/landing.gif: one landing from the side, with contact point, patch and forces.
 
 Run as `python docs/figures/make_landing_gif.py [--out FILE]`. The crane lands by the exact contact,
-offline, as `landing` does it. Tilt and gap are drawn larger, and the picture says so.
+offline, as `demo.landing.land` does it. Tilt and gap are drawn larger, and the picture says so.
 """
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 from PIL import Image
 
-from box_contact_ros.demo.landing import LandingRecord, land, landing_scenario, solvers
-from box_contact_ros.demo.mujoco_crane import CraneScenario
-from box_contact_ros.scene.force.laws import GRAVITY
+from box_contact_ros.demo.crane import CraneScenario
+from box_contact_ros.demo.landing import LandingRecord, land, solvers
+from box_contact_ros.scene.laws import GRAVITY
 from box_contact_ros.scene.pose import rotation_matrix
 from box_contact_ros.view.style import BOX_A, BOX_B, CONTACT, ROPE
 
@@ -78,7 +78,7 @@ def draw(axes: Any, record: LandingRecord, tick: int, touched: int) -> None:
     axes.text(*left, f'{scenario.mass / 1000:g} t', ha='center', va='center', fontsize=13)
     axes.text(0.0, 0.5 * height, 'stack', ha='center', va='center', fontsize=13)
     weight = scenario.mass * GRAVITY
-    contact = solvers(scenario, 'exact')[0](pose, scenario.stack_boxes[0][0])
+    contact = solvers(scenario, 'exact')[0](pose, scenario.stack_pose)
     carried = float(record.forces[tick][2])
     if contact.colliding:
         half = math.sqrt(3.0 * contact.covariance[0, 0])
@@ -115,7 +115,7 @@ def main() -> None:
     parser.add_argument('--out', type=Path, default=Path(__file__).with_name('landing.gif'))
     parser.add_argument('--picture', type=Path, help='folder for each picture, to look at')
     options = parser.parse_args()
-    scenario = landing_scenario(pitch=1.2, roll=0.4, offset=(-0.15, 0.1))
+    scenario = CraneScenario(pitch=1.2, roll=0.4, offset=(-0.15, 0.1))
     record = land(scenario, solvers(scenario, 'exact'), rate_hz=RATE, latency=0.002)
     touched = min(record.points)
     ticks = np.arange(touched - BEFORE * RATE, touched + AFTER * RATE, RATE / PICTURES).astype(int)

@@ -1,7 +1,7 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""The landing report: a short run, what is counted, and what ends it."""
+"""The landing report: its landings, what is counted, and what ends it."""
 from __future__ import annotations
 
 import csv
@@ -14,28 +14,78 @@ import pytest
 pytest.importorskip('mujoco')
 pytest.importorskip('matplotlib')
 
-from benchmarks import landing_report, landing_ways
+from benchmarks import landing
 from benchmarks.landing_ways import (
     ADDED,
     WAYS,
+    HeldLimits,
+    Landed,
     LoopTiming,
     MujocoSource,
+    PlannedLanding,
+    aimed,
+    grid,
 )
-from box_contact_ros.demo.landing import LandingCase, LandingResult, scenario_of
+from box_contact_ros.demo.crane import CraneScenario
 from box_contact_ros.solver.contact_solver import ContactSolver
 
-RESTS = LandingResult(settled=1.0, corner_speed=1e-4, rope_tension=0.0, force_worst=1e-9,
-                      static_tilt=1e-4, depth=1e-3, gap=0.0)
+RESTS = Landed(settled=1.0, corner_speed=1e-4, rope_tension=0.0, force_worst=1e-9,
+               static_tilt=1e-4, depth=1e-3, gap=0.0)
+WELL_AIMED = PlannedLanding(name='grid: well aimed', overhang=(0.1, 0.0), scenario=CraneScenario(
+    rope_angle=0.5, rope_heading=0.0, pitch=0.5, roll=0.0, yaw=0.0))
+HANGING_OVER = 17
+"""Tilt of 3°, 0.6 m of overhang: the patch is about to lift off on one side."""
+
+
+def test_the_grid_covers_what_is_asked_for():
+    """36 landings: ropes and tilt 0.5 to 3°, overhang 0 to 0.6 m, yaw to 1° either way."""
+    scenarios = [planned.scenario for planned in grid()]
+    assert len(scenarios) == 36
+    for values, low, high in (
+            ([scenario.rope_angle for scenario in scenarios], 0.5, 3.0),
+            ([math.hypot(scenario.pitch, scenario.roll) for scenario in scenarios], 0.5, 3.0),
+            ([math.hypot(*planned.overhang) for planned in grid()], 0.0, 0.6)):
+        assert (min(values), max(values)) == pytest.approx((low, high))
+    yaws = [scenario.yaw for scenario in scenarios]
+    assert -1.0 <= min(yaws) < -0.8 and 0.8 < max(yaws) <= 1.0
 
 
 def test_expectations_are_stated_for_each_landing():
-    names = [planned.name for planned in [*landing_ways.grid(), *ADDED]]
+    names = [planned.name for planned in [*grid(), *ADDED]]
     assert len(set(names)) == len(names) == 36 + len(ADDED)
     assert any(planned.falls for planned in ADDED)
     for planned in ADDED:
         assert planned.as_expected(RESTS) is not planned.falls
-        assert planned.as_expected(LandingResult(drop=0.2)) is planned.falls
-        assert not planned.as_expected(LandingResult(drop=0.0))
+        assert planned.as_expected(Landed(drop=0.2)) is planned.falls
+        assert not planned.as_expected(Landed(drop=0.0))
+
+
+@pytest.mark.parametrize(('number', 'rate_hz', 'latency'), [
+    (5, 200.0, 0.002), (HANGING_OVER, 200.0, 0.002), (31, 200.0, 0.002), (31, 200.0, 0.005),
+    (HANGING_OVER, 50.0, 0.005), (HANGING_OVER, 1000.0, 0.0), (HANGING_OVER, 1000.0, 0.005)])
+def test_the_hardest_of_the_grid_are_within_the_limits_of_held_patches(number, rate_hz, latency):
+    """The patch all but lifts off on one side."""
+    planned = landing.aim(grid()[number])
+    result = landing.run('exact', LoopTiming(rate_hz, latency), planned).result
+    assert result.at_rest and HeldLimits.at(rate_hz).are_met(result), f'\n{result}'
+    assert result.overhang == pytest.approx(math.hypot(*planned.overhang), abs=0.01)
+    assert result.point_step < 1e-7
+
+
+@pytest.mark.parametrize('planned', ADDED, ids=[planned.name for planned in ADDED])
+def test_other_loads_and_stacks_do_what_is_expected(planned):
+    """One law, whose constants know the load's mass and inertia and no size."""
+    outcome = landing.run('exact', LoopTiming(200.0, 0.002), landing.aim(planned))
+    assert outcome.as_expected, f'\n{outcome.result}'
+
+
+@pytest.mark.parametrize('rate_hz', [200.0, 1000.0])
+def test_the_deepest_point_does_not_land(rate_hz):
+    """MuJoCo's deepest contact jumps between corners, metres a tick, and the load rattles."""
+    planned = landing.aim(grid()[HANGING_OVER])
+    result = landing.run('mujoco-deepest', LoopTiming(rate_hz, 0.0), planned).result
+    assert math.isnan(result.settled) and not result.limits['force'][0]
+    assert result.corner_speed > 0.04 and result.point_step > 5.0
 
 
 def test_one_point_of_mujocos_contacts():
@@ -56,51 +106,34 @@ def test_one_point_of_mujocos_contacts():
 
 def test_mujocos_own_contact_carries_the_load():
     """The force is the weight, upward, and the load lies flat."""
-    scenario = scenario_of(LandingCase(
-        rope_angle=0.5, rope_heading=0.0, tilt=0.5, tilt_heading=0.0, overhang=0.1,
-        overhang_heading=0.0, yaw=0.0))
-    result = WAYS['manifold'].fly(scenario, LoopTiming(200.0, 0.0)).judge()
+    scenario = aimed(WELL_AIMED.scenario, WELL_AIMED.overhang)
+    result = WAYS['manifold'].run(scenario, LoopTiming(200.0, 0.0)).judge()
     assert result.at_rest, f'\n{result}'
     assert result.static_tilt < 1e-5
 
 
-@pytest.fixture
-def one_case(monkeypatch):
-    """One landing of the grid, short, and one added."""
-    plans = landing_ways.grid()[4:5], ADDED[9:10]
-    monkeypatch.setattr(landing_report, 'grid', lambda seed: plans[0])
-    monkeypatch.setattr(landing_report, 'ADDED', plans[1])
-    monkeypatch.setattr(landing_report, 'draw', lambda path, scenario: path.touch())
-
-
-def test_a_run_writes_table_and_rows(tmp_path, one_case, capsys):
-    status = landing_report.main(['--quick', '--ways', 'exact', 'manifold', '--rates', '200',
-                                  '--latency', '0.002', '--workers', '1', '--out', str(tmp_path)])
-    assert status == 0
+def test_a_run_writes_table_and_rows(tmp_path, monkeypatch, capsys):
+    """One landing of the grid, and one added."""
+    monkeypatch.setattr(landing, 'grid', lambda: [
+        *[None] * (landing.SHOWN % landing.QUICK),
+        dataclasses.replace(WELL_AIMED, name=f'grid {landing.SHOWN}')])
+    monkeypatch.setattr(landing, 'ADDED', ADDED[9:10])
+    assert landing.main(['--quick', '--ways', 'exact', 'manifold', '--out', str(tmp_path)]) == 0
     page = (tmp_path / 'landing.md').read_text()
-    assert '**2 of 2** landings by held patches' in page and 'No goal was missed.' in page
-    assert '| 200 | 2 | 1 of 1 |' in page and "| MuJoCo's manifold |  | 1 of 1 |" in page
+    assert '**2 of 2** landings by held patches' in page
+    assert '| held patch | exact | 200 | 2 | 1 of 1 | 1 of 1 | 1 of 1 |' in page
     with (tmp_path / 'landing.csv').open() as file:
         rows = list(csv.DictReader(file))
     assert [(row['way'], row['as_expected']) for row in rows] == [
         ('exact', '1'), ('exact', '1'), ('manifold', '1'), ('manifold', '1')]
+    assert (tmp_path / 'landing.png').stat().st_size > 10_000
     assert '| held patch | exact | 200 | 2 | 1 of 1 | 1 of 1 |' in capsys.readouterr().out
-
-
-def test_what_is_not_as_expected_ends_with_status_1(tmp_path, one_case, monkeypatch, capsys):
-    monkeypatch.setattr(landing_report, 'run', _diverged)
-    monkeypatch.setattr(landing_report, 'Pool', _Here)
-    assert landing_report.main(['--quick', '--ways', 'exact', '--rates', '200', '--latency', '0',
-                                '--out', str(tmp_path)]) == 1
-    assert 'exact at 200 Hz, grid 4: not as expected' in capsys.readouterr().err
-    page = (tmp_path / 'landing.md').read_text()
-    assert 'never' in page and 'goal missed: `exact` at 200 Hz and 0 ms, in 2 of 2 landings' in page
 
 
 def test_held_patches_have_limits_of_their_own():
     """By rate, on the grid alone; other ways are at rest within wider ones."""
     still = dataclasses.replace(RESTS, corner_speed=1e-7, creep=1e-8, depth=3e-3)
-    of_grid, added = landing_ways.grid()[0], ADDED[0]
+    of_grid, added = grid()[0], ADDED[0]
     for rate_hz, degrees in ((50.0, 0.06), (200.0, 0.01), (1000.0, 0.003)):
         timing = LoopTiming(rate_hz, 0.005)
         for field, limit in {'static_tilt': math.radians(degrees), 'corner_speed': 1e-7,
@@ -110,43 +143,41 @@ def test_held_patches_have_limits_of_their_own():
                     still, **{'static_tilt': math.radians(0.003), field: factor * limit})
                 for way, planned, expected in (('exact', of_grid, met), ('mlp', of_grid, met),
                                                ('exact', added, result.at_rest),
-                                               ('wrench', of_grid, result.at_rest)):
-                    landing = landing_report.Landing(way, timing, planned, None)
-                    assert landing_report.Landed(landing, result).as_expected is expected
+                                               ('point', of_grid, result.at_rest)):
+                    outcome = landing.Outcome(way, timing, planned, result)
+                    assert outcome.as_expected is expected
 
 
 def test_figures_worse_than_the_manifolds_are_bold():
-    timing, planned = LoopTiming(200.0, 0.002), landing_ways.grid()[0]
+    """And what was never reached has no worst."""
+    timing, planned = LoopTiming(200.0, 0.002), grid()[0]
     manifold = dataclasses.replace(RESTS, creep=1e-9, gap=0.001)
     ours = dataclasses.replace(manifold, corner_speed=5e-5, static_tilt=2e-4)
-    table = landing_report.against_manifold([
-        landing_report.Landed(landing_report.Landing(way, timing, planned, None), result)
-        for way, result in (('exact', ours), ('manifold', manifold))])
+    table = landing.grid_table([
+        landing.Outcome(way, timing, planned, result)
+        for way, result in (('exact', ours), ('manifold', manifold), ('point', Landed()))])
     assert table.splitlines()[2:] == [
-        '| 200 | 2 | 0 of 1 | 0.05 | 1e-06 | **0.011** | 0.1 | 1 | 1e-09 | 1 | 0.01 |',
-        "| MuJoCo's manifold |  | 1 of 1 | 0.1 | 1e-06 | 0.0057 | 0.1 | 1 | 1e-09 | 1 |  |"]
+        '| held patch | exact | 200 | 2 | 1 of 1 | 1 of 1 | 0 of 1 | 1 | 0.05 | 1e-06 | 1e-09 | '
+        '**0.011** | 0.1 | 1 | – |',
+        '| MuJoCo | its manifold, in the simulator | – | – | 1 of 1 | 1 of 1 | – | 1 | 0.1 | 1e-06 '
+        '| 1e-09 | 0.0057 | 0.1 | 1 | – |',
+        '| point | exact | 200 | 2 | 0 of 1 | 0 of 1 | – | never | – | – | – | – | – | – | – |']
 
 
 def test_each_way_has_its_timings():
     """All of them, one for MuJoCo within the simulator, and the least latency for baselines."""
     timings = [LoopTiming(rate, latency) for rate in (50.0, 200.0) for latency in (0.002, 0.005)]
-    assert WAYS['exact'].timings(timings) == WAYS['wrench'].timings(timings) == timings
+    assert WAYS['exact'].timings(timings) == timings
     assert WAYS['manifold'].timings(timings) == timings[-1:]
-    assert WAYS['point'].timings(timings) == timings[::2]
+    assert WAYS['soup'].timings(timings) == timings[::2]
 
 
-def _diverged(landing):
-    return landing_report.Landed(landing, LandingResult())
-
-
-class _Here:
-    """A pool that works in this process."""
-
-    def __init__(self, workers):
-        self.imap = map
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        return None
+def test_what_is_not_as_expected_ends_with_status_1(tmp_path, monkeypatch, capsys):
+    """A load that must rest falls."""
+    falls = dataclasses.replace(ADDED[-1], falls=False, name=f'grid {landing.SHOWN}')
+    monkeypatch.setattr(landing, 'grid', lambda: [*[None] * (landing.SHOWN % landing.QUICK), falls])
+    monkeypatch.setattr(landing, 'ADDED', [])
+    monkeypatch.setattr(landing, 'draw', lambda path, scenario: path.touch())
+    assert landing.main(['--quick', '--ways', 'exact', '--out', str(tmp_path)]) == 1
+    assert 'exact at 200 Hz and 2 ms, grid 17: not as expected' in capsys.readouterr().err
+    assert '**0 of 1** landings by held patches' in (tmp_path / 'landing.md').read_text()

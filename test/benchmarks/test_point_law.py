@@ -14,7 +14,7 @@ from benchmarks.point_law import (
     PointLaw,
     effective_mass,
 )
-from box_contact_ros.scene.force.laws import GRAVITY
+from box_contact_ros.scene.laws import GRAVITY, Body
 from box_contact_ros.solver.contact import Contact
 
 CONTAINER = (12.192, 2.438, 2.591)
@@ -24,11 +24,22 @@ DOWN = np.array([0.0, 0.0, -1.0])
 LEVEL = np.array([1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0])
 UNDER = LEVEL[:3] + [0.0, 0.0, -CONTAINER[2] / 2]
 STILL = np.zeros(6)
-FAST = PointLaw.for_load(MASS, CONTAINER, 1000.0)
+
+
+def law_of(mass, size, rate_hz):
+    return PointLaw.for_loop(Body.of_box(size, mass), size=size, rate_hz=rate_hz, latency=0.0)
+
+
+FAST = law_of(MASS, CONTAINER, 1000.0)
 
 
 def moving(*, linear=(0, 0, 0), angular=(0, 0, 0)):
     return np.array([*linear, *angular], dtype=float)
+
+
+def wrench_of(law, contacts, pose, velocity):
+    law.hold(contacts, pose)
+    return law.wrench(pose, velocity)
 
 
 def touch(point, normal, depth):
@@ -40,14 +51,14 @@ def test_static_penetration_carries_the_weight():
     """Depth at rest is F_n/k = m g/k, 5 mm where the rate allows it; no torque under the centre."""
     depth = WEIGHT / FAST.stiffness
     assert depth == pytest.approx(STATIC_PENETRATION, rel=1e-12)
-    wrench = FAST.wrench({'': touch(UNDER, DOWN, depth)}, LEVEL, STILL)
+    wrench = wrench_of(FAST, {'': touch(UNDER, DOWN, depth)}, LEVEL, STILL)
     assert wrench == pytest.approx([0, 0, WEIGHT, 0, 0, 0], rel=1e-12, abs=1e-6)
 
 
 @pytest.mark.parametrize('speed', [-0.1, 0.05, 0.3])
 def test_damping_acts_on_the_speed_along_the_normal(speed):
     """Parting at v_n: F_n = max(0, k·depth − c·v_n); never a pull."""
-    wrench = FAST.wrench({'': touch(UNDER, DOWN, 1e-3)}, LEVEL, moving(linear=(0, 0, speed)))
+    wrench = wrench_of(FAST, {'': touch(UNDER, DOWN, 1e-3)}, LEVEL, moving(linear=(0, 0, speed)))
     expected = max(0.0, FAST.stiffness * 1e-3 - FAST.damping * speed)
     assert wrench[2] == pytest.approx(expected)
     assert (expected == 0.0) == (speed > 0.04)
@@ -66,7 +77,7 @@ def test_a_bounce_never_gains_energy():
     last = first = energy()
     for _ in range(30_000):
         touches = {'': touch(UNDER, DOWN, -height)} if height <= 0.0 else {}
-        force = FAST.wrench(touches, LEVEL, moving(linear=(0, 0, speed)))[2]
+        force = wrench_of(FAST, touches, LEVEL, moving(linear=(0, 0, speed)))[2]
         speed += step * (force / MASS - GRAVITY)
         height += step * speed
         # A symplectic step keeps an oscillator's energy to ω·step: 44 rad/s · 2e-5 s.
@@ -81,7 +92,7 @@ def test_a_bounce_never_gains_energy():
                                         (4000.0, (6.0, 2.4, 0.5))])
 def test_the_rate_limits_the_constants(rate, mass, size):
     """At most nominal, k < 0.25 m_eff/Δt² and c ≤ 0.35 m_eff/Δt, rocking by its own inertia."""
-    law, corner = PointLaw.for_load(mass, size, rate), effective_mass(mass, size)
+    law, corner = law_of(mass, size, rate), effective_mass(mass, size)
     nominal = mass * GRAVITY / STATIC_PENETRATION
     assert law.stiffness < 0.25 * corner * rate**2
     assert law.damping <= 0.35 * corner * rate * (1 + 1e-12)
@@ -90,3 +101,11 @@ def test_the_rate_limits_the_constants(rate, mass, size):
     length, width, height = size
     for damper, extent in zip(law.rocking, (width, length)):
         assert damper <= 0.35 * mass * (extent**2 + height**2) / 12 * rate * (1 + 1e-12)
+
+
+def test_a_wrench_acts_until_the_next_answer():
+    """Wherever the load goes; an answer without contacts ends it."""
+    first = wrench_of(FAST, {'': touch(UNDER, DOWN, 1e-3)}, LEVEL, STILL)
+    moved, fast = LEVEL + [0, 0, 1, 0, 0, 0, 0], moving(linear=(1, 0, 0))
+    assert first[2] > 0.0 and FAST.wrench(moved, fast).tolist() == first.tolist()
+    assert not wrench_of(FAST, {}, moved, fast).any()

@@ -1,28 +1,22 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""What the demonstration says before it starts, and its verdict; `make demo` runs it."""
+"""The demonstration: what it refuses, and that it ends both of its processes; see `make demo`."""
 from __future__ import annotations
 
-from types import SimpleNamespace
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
 
-import numpy as np
 import pytest
 
 pytest.importorskip('mujoco')
 
+from children import children
+
 from box_contact_ros.demo import demo
-from box_contact_ros.demo.crane_node import verdict
-from box_contact_ros.demo.landing import LandingResult
-
-
-def test_a_model_without_a_patch_is_told_before_the_start():
-    """A load may not come to rest on its contacts."""
-    words = 'Model soup-8 gives points without a patch'
-    assert words in demo._announcement(demo._options(['--model', 'soup-8']))
-    assert words not in demo._announcement(demo._options(['--model', 'soup-8', '--open-loop']))
-    told = demo._announcement(demo._options([]))
-    assert 'without a patch' not in told and 'if the load comes to rest' in told
 
 
 def test_an_unknown_model_ends_the_demo_before_it_starts(capsys):
@@ -31,24 +25,46 @@ def test_an_unknown_model_ends_the_demo_before_it_starts(capsys):
     assert 'did you mean exact?' in capsys.readouterr().err
 
 
-AT_REST = {'settled': 1.234, 'corner_speed': 0.0, 'rope_tension': 0.0, 'force_worst': 0.0,
-           'static_tilt': 0.0, 'depth': 0.001, 'gap': 0.0}
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_the_demo_and_both_processes(number):
+    """In the middle of the motion; the status is what a shell reports."""
+    command = [sys.executable, '-m', 'box_contact_ros.demo.demo', '--model', 'exact',
+               '--domain', os.environ['ROS_DOMAIN_ID']]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+                          start_new_session=True) as running:
+        try:
+            told = ''
+            for line in running.stdout:
+                told += line
+                if 'hanging' in line:
+                    break
+            started = children(running.pid)
+            assert len(started) == 2, told
+            running.send_signal(number)
+            told += running.communicate(timeout=60)[0]
+        finally:
+            if running.poll() is None:
+                running.kill()
+    assert running.returncode == 128 + number and 'Traceback' not in told, told
+    assert not [pid for pid in started if Path(f'/proc/{pid}').exists()]
 
 
-@pytest.mark.parametrize('faults, landing, words', [
-    ([], None, 'PASS: 7 contacts, none lost; median latency 0.50 ms'),
-    ([], AT_REST, 'PASS: the load is at rest, settled 1.2 s after the first touch; 7 contacts, '),
-    ([], AT_REST | {'static_tilt': 1.0}, 'PASS: the load lies on the stack, not within all limits'),
-    (['3 lost answers'], AT_REST, 'FAIL: 3 lost answers'),
-    (['no contacts came'], {}, 'FAIL: no contacts came, the load did not come to rest on the st')])
-def test_the_verdict_is_one_line_with_its_reasons(faults, landing, words):
-    summary = SimpleNamespace(faults=list(faults), latencies=np.full(7, 0.5e-3),
-                              result=SimpleNamespace(contacts=7))
-    passed, line = verdict(summary, landing if landing is None else LandingResult(**landing))
-    assert line.startswith(words) and passed == (not faults)
+@pytest.mark.parametrize(('status', 'words'), [(0, 'Next, after'), (3, 'failed with status 3')])
+def test_its_status_is_that_of_the_crane(status, words, monkeypatch, capfd):
+    """And a failure shows what the contact node printed."""
+    programs = {'node.contact_node': 'print("node", flush=True); import time; time.sleep(100)',
+                'demo.crane_node': f'import sys, time; time.sleep(2.0); sys.exit({status})'}
+    monkeypatch.setattr(demo, 'program', lambda name, **_: ['-c', programs[name]])
+    assert demo.main(['--domain', os.environ['ROS_DOMAIN_ID']]) == status
+    shown = capfd.readouterr()
+    assert words in shown.out + shown.err
+    assert ('contact_node printed:\nnode' in shown.err) is bool(status)
 
 
-def test_help_breaks_no_name_at_its_hyphen(capsys):
-    with pytest.raises(SystemExit, match='0'):
-        demo.main(['--help'])
-    assert 'soup-N' in capsys.readouterr().out
+def test_an_early_end_of_the_node_ends_the_demo(monkeypatch, capfd):
+    programs = {'node.contact_node': 'import sys; sys.exit("no room")',
+                'demo.crane_node': 'import time; time.sleep(100)'}
+    monkeypatch.setattr(demo, 'program', lambda name, **_: ['-c', programs[name]])
+    assert demo.main(['--domain', os.environ['ROS_DOMAIN_ID']]) == 1
+    error = capfd.readouterr().err
+    assert 'contact_node ended early, status 1' in error and 'no room' in error

@@ -15,12 +15,10 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / 'docs' / 'examples'
-CLIENTS = ('lockstep_client.py', 'held_patch_client.py', 'wrench_client.py')  # of a contact node
+CLIENTS = ('lockstep_client.py', 'held_patch_client.py')  # of a contact node
 NEEDS = {'mujoco_loop.py': 'mujoco', 'container_stack.py': 'mujoco',
          'recorded_landing.py': 'rosbags',
          'dask_pairs.py': 'distributed'} | dict.fromkeys(CLIENTS, 'box_contact_msgs.msg')
-NODE_FOR = {'wrench_client.py': ('-p', 'wrench:=true', '-p', 'rate:=200', '-p', 'mass_a:=20000')}
-"""Parameters of the contact node that the docstring tells to start."""
 QUICK = {'vectorised_env.py': 'main(100)', 'dask_pairs.py': 'main(40_000, 10_000)'}
 """Shorter runs, whose figures are not those of the docstring."""
 
@@ -38,8 +36,7 @@ def test_example(name: str, program, tmp_path: Path) -> None:
     """Figures agree to the printed digits; shorter runs print as many lines in the same words."""
     pytest.importorskip(NEEDS.get(name, 'numpy'))
     if name in CLIENTS:
-        program('contact_node', '--ros-args', '-p', 'model:=exact',
-                *NODE_FOR.get(name, ())).wait_for_output('ready', 120)
+        program('contact_node', '--ros-args', '-p', 'model:=exact').wait_for_output('ready', 120)
     command = [str(EXAMPLES / name)]
     if name in QUICK:
         module = name.removesuffix('.py')

@@ -99,7 +99,7 @@ def program_and_arguments(words: list[str]) -> tuple[str, list[str]]:
 
 
 def start(words: list[str], program, **_) -> None:
-    """Check that a node starts and says 'ready', and that a shortened crane gets its answers.
+    """Check that a node starts and says 'ready', and that a crane lands.
 
     Others know the options (their work takes minutes, and other tests do a little of it).
     """
@@ -109,8 +109,8 @@ def start(words: list[str], program, **_) -> None:
         program(name, *arguments).wait_for_output('ready', 120)
     elif name == 'crane' and '--help' not in arguments:
         program('contact_node', '--ros-args', '-p', 'model:=exact').wait_for_output('ready', 120)
-        crane = program(name, *arguments, '-p', 'duration:=2.0', '-p', 'rate:=100')
-        assert crane.wait(120) == 0, crane.output
+        crane = program(name, *arguments, '-p', 'lockstep:=true', '-p', 'rate:=100')
+        assert crane.wait(200) == 0, crane.output
     else:
         known = help_of(f'box_contact_ros.{PROGRAMS[name]}')
         for word in arguments:

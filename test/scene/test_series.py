@@ -127,31 +127,21 @@ def frames(whole: tuple, motions: int) -> tuple:
 # --- the series -----------------------------------------------------------------------------------
 
 CRANE_RATE = 1000.0
-LOWERED = {f'lowered, seed {seed}': seed for seed in range(6)}
-"""Runs by seed of `CraneScenario.drawn`: lowered into the stack without force, and lifted."""
 LANDED = {f'landed, case {number}': number for number in (0, 5, 17, 31)}
-"""Closed loop by number of `landing.cases`: among them the hardest, see test_landing.py."""
+"""Landings of the crane by number of `landing_ways.grid`, the hardest among them."""
 
 
 def crane_series(name: str) -> Series:
     """Return the poses of one run of the crane."""
     pytest.importorskip('mujoco')
-    from box_contact_ros.demo.landing import cases, land, scenario_of
-    from box_contact_ros.demo.mujoco_crane import Crane, CraneScenario
+    from benchmarks.landing_ways import aimed, grid
+    from box_contact_ros.demo.landing import land, solvers
 
-    if name in LOWERED:
-        crane = Crane(CraneScenario.drawn(LOWERED[name]), CRANE_RATE)
-        scenario, load = crane.scenario, []
-        for _ in range(round(scenario.duration * CRANE_RATE)):
-            load.append(crane.load_pose)
-            crane.step()
-    else:
-        scenario = scenario_of(list(cases())[LANDED[name]])
-        crane = Crane(scenario, CRANE_RATE)
-        load = land(scenario, ContactSolver(scenario.size, scenario.stack_size, model='mlp'),
-                    rate_hz=CRANE_RATE, latency=0.002).poses
+    planned = grid()[LANDED[name]]
+    scenario = aimed(planned.scenario, planned.overhang)
+    load = land(scenario, solvers(scenario, 'mlp'), rate_hz=CRANE_RATE, latency=0.002).poses
     n = len(load)
-    return Series(Pairs(np.tile(crane.stack_pose, (n, 1)), np.array(load), np.tile(
+    return Series(Pairs(np.tile(scenario.stack_pose, (n, 1)), np.array(load), np.tile(
         scenario.stack_size, (n, 1)), np.tile(scenario.size, (n, 1))), 1, {})
 
 
@@ -191,7 +181,7 @@ def approaches(name: str, turning: bool) -> Series:
     return Series(Pairs(repeated(met.pose_a), b, repeated(met.size_a), repeated(met.size_b)), n, {})
 
 
-CRANES = {name: (crane_series, name) for name in (*LOWERED, *LANDED)}
+CRANES = {name: (crane_series, name) for name in LANDED}
 SERIES = CRANES | {f'{name}, {"turning" if turning else "fixed"}': (approaches, name, turning)
                    for name in SETS for turning in (False, True)}
 
@@ -269,7 +259,7 @@ def beyond_exact(model: str, series: Series) -> tuple[float, float]:
 
 
 def test_how_far_the_point_of_mlp_steps(series):
-    """While the crane lowers and lifts: no farther than the exact point plus 1 % of the width.
+    """No farther than the exact point plus 1 % of the width, but for the shares of steps below.
 
     Where the exact point itself crosses much of the box in one frame, the errors before and after
     may differ by more than that. The bounds leave room for other weights.
@@ -277,8 +267,7 @@ def test_how_far_the_point_of_mlp_steps(series):
     name, motion = series
     share, worst = beyond_exact('mlp', motion)
     print(f'{name}: {100 * share:.3f} % of the steps, worst {100 * worst:.2f} % of the edge')
-    least, most = ((1.0, 0.002) if name in LOWERED else
-                   (0.9995, 0.02) if name in LANDED else (0.998, 0.025))
+    least, most = (0.9995, 0.02) if name in LANDED else (0.998, 0.025)
     assert share >= least
     assert worst <= most
 

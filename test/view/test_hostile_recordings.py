@@ -17,8 +17,8 @@ pytest.importorskip('viser')
 
 from rclpy.serialization import serialize_message
 
-from box_contact_ros.demo.ros_client import pose_message
 from box_contact_ros.node.messages import make_header
+from box_contact_ros.node.ros_client import pose_message
 from box_contact_ros.resources import resource_path
 from box_contact_ros.view.recording.bag_file import Recorder, RecordingError, read_replay
 from box_contact_ros.view.recording.bag_player import STEP_SECONDS, BagPlayer

@@ -19,9 +19,9 @@ from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import Marker, MarkerArray
 
 from box_contact_ros import ContactSolver
-from box_contact_ros.demo.ros_client import ANSWERS, CRANE_MARKERS
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import make_cloud, make_contacts, make_header, read_cloud
+from box_contact_ros.node.ros_client import ANSWERS, CRANE_MARKERS
 from box_contact_ros.resources import resource_path
 from box_contact_ros.scene.scene_solver import Answer, Box, Pair, Scene
 from box_contact_ros.solver.contact import Contact

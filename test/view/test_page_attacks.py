@@ -25,7 +25,6 @@ from visualization_msgs.msg import Marker, MarkerArray
 from websockets.datastructures import Headers
 from websockets.sync.client import connect
 
-from box_contact_ros.demo.ros_client import MOST_ENDS, lines_of
 from box_contact_ros.node.messages import (
     CLOUD_ROW,
     NANOSECONDS,
@@ -34,6 +33,7 @@ from box_contact_ros.node.messages import (
     make_header,
     read_cloud,
 )
+from box_contact_ros.node.ros_client import MOST_ENDS, lines_of
 from box_contact_ros.node.runtime import LATCHED_QOS, GuardedNode
 from box_contact_ros.scene.files.scene_file import scene_text
 from box_contact_ros.scene.scene_solver import Box, Pair, Scene, SceneSolver, two_boxes

@@ -28,9 +28,14 @@ from visualization_msgs.msg import MarkerArray
 
 from benchmarks.accuracy import limit_of
 from box_contact_ros import ContactSolver
-from box_contact_ros.demo.answer_log import first_row
-from box_contact_ros.demo.ros_client import ANSWERS, array_message, line_marker, pose_message
 from box_contact_ros.node.messages import make_cloud, make_header, read_cloud
+from box_contact_ros.node.ros_client import (
+    ANSWERS,
+    array_message,
+    first_row,
+    line_marker,
+    pose_message,
+)
 from box_contact_ros.resources import resource_path
 from box_contact_ros.scene.files.scene_file import read_scene
 from box_contact_ros.scene.scene_solver import SceneSolver

@@ -31,13 +31,6 @@ from children import children
 from PIL import Image
 
 from box_contact_ros import ContactSolver
-from box_contact_ros.demo.ros_client import (
-    CRANE_MARKERS,
-    CRANE_WRENCH,
-    array_message,
-    line_marker,
-    pose_topics,
-)
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import (
     CLOUD_ROW,
@@ -46,6 +39,13 @@ from box_contact_ros.node.messages import (
     make_cloud,
     make_header,
     read_cloud,
+)
+from box_contact_ros.node.ros_client import (
+    CRANE_MARKERS,
+    CRANE_WRENCH,
+    array_message,
+    line_marker,
+    pose_topics,
 )
 from box_contact_ros.scene.files.scene_file import read_scene
 from box_contact_ros.scene.pose import rotation_matrix

@@ -15,7 +15,8 @@ import numpy as np
 from rclpy.serialization import deserialize_message
 from visualization_msgs.msg import MarkerArray
 
-from ...demo.ros_client import (
+from ...node.messages import read_contacts
+from ...node.ros_client import (
     CONTACT_TYPES,
     CRANE_MARKERS,
     PoseTopic,
@@ -23,7 +24,6 @@ from ...demo.ros_client import (
     pose_topics,
     stamp_of,
 )
-from ...node.messages import read_contacts
 from ...solver.checks import shown
 from ..view_log import ViewLog
 from .bag_file import NANOSECONDS, RecordingError, read_recording

@@ -22,9 +22,9 @@ from rclpy.context import Context
 from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import MarkerArray
 
-from ...demo.ros_client import DEEP_RELIABLE, pose_topics, read_scene_text
 from ...node.messages import ContactsMessage
 from ...node.parameters import outside_ros_args
+from ...node.ros_client import DEEP_RELIABLE, pose_topics, read_scene_text
 from ...node.runtime import ARRAY_QOS, POSE_QOS, GuardedNode, refusals_end, run_node
 from ...node.topics.tf_poses import STATIC_QOS, TF, TF_STATIC, tf_message
 from ...solver.arguments import program_parser

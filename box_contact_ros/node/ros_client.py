@@ -10,37 +10,25 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from geometry_msgs.msg import Point, PointStamped, PoseArray, PoseStamped, Vector3Stamped
-from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
-from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import ColorRGBA, Header
-from visualization_msgs.msg import Marker, MarkerArray
+from visualization_msgs.msg import Marker
 
-from ..core import LENGTH_MAX
-from ..node.message_bytes import RawMessages
-from ..node.messages import NANOSECONDS, ContactsMessage, Refused, read_contacts
-from ..node.topics.scene_topics import pose_input
-from ..resources import find_file
-from ..scene.files.scene_file import read_scene
+from box_contact_msgs.msg import Contacts
+
+from ..scene.pairing import StampedPose
 from ..scene.scene_solver import ALL_BOXES, Scene
-from ..scene.stamp_pairing import StampedPose
 from ..solver.checks import are_poses
-from .answer_log import first_row
+from .message_bytes import PoseReader
+from .messages import NANOSECONDS, Refused
+from .topics import pose_qos
 
 ANSWERS: dict[str, tuple[type, str]] = {
-    'point': (PointStamped, 'contact/point'),
-    'normal': (Vector3Stamped, 'contact/normal'),
-    'cloud': ((PointCloud2, 'contacts_cloud') if ContactsMessage is None else
-              (ContactsMessage, 'contacts')),
-}
-"""Type and topic of what a contact node answers with, by the kinds of an `AnswerLog`."""
-CONTACT_TYPES: dict[str, type] = {'sensor_msgs/msg/PointCloud2': PointCloud2} | (
-    {} if ContactsMessage is None else {'box_contact_msgs/msg/Contacts': ContactsMessage})
-"""Messages of all contacts that can be read here, by the names of their types."""
-CRANE_MARKERS = 'crane/markers'
-CRANE_WRENCH = 'crane/wrench'
-"""Where the crane publishes its ropes and its spreader, as lines."""
-MOST_ENDS = 10_000  # of lines that are drawn of a crane
+    'point': (PointStamped, 'contact/point'), 'normal': (Vector3Stamped, 'contact/normal'),
+    'cloud': (Contacts, 'contacts')}
+"""Type and topic of what a contact node answers with."""
+CRANE_MARKERS = 'crane/markers'  # where the crane publishes its ropes and its spreader, as lines
+CRANE_WRENCH = 'crane/wrench'  # and the force of the contacts on its load
 DEEP_RELIABLE = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
 """What the DDS layer delivers while Python is busy must not push out the rest."""
 
@@ -58,65 +46,29 @@ class PoseTopic(NamedTuple):
 
 def pose_topics(scene: Scene) -> list[PoseTopic]:
     """Return how the poses of all moving boxes come, in the scene's order."""
-    found = []
+    topics = []
     for source, topic in scene.sources.items():
         is_array = source == ALL_BOXES
         boxes, read = (scene.moving, _read_array) if is_array else ((source,), _read_one)
         # Each topic has a reader of its own, which knows the topic's frame.
-        found.append(PoseTopic(topic, *pose_input(source), boxes,
-                               partial(read, RawMessages(), len(boxes))))
-    return found
+        topics.append(PoseTopic(topic, PoseArray if is_array else PoseStamped, pose_qos(source),
+                                boxes, partial(read, PoseReader(), len(boxes))))
+    return topics
 
 
-def _read_one(messages: RawMessages, _: int, data: bytes) -> StampedPose:
-    pose = messages.read_pose(data)
+def _read_one(reader: PoseReader, _: int, data: bytes) -> StampedPose:
+    pose = reader.read_pose(data)
     return pose._replace(numbers=pose.numbers[None])
 
 
-def _read_array(messages: RawMessages, count: int, data: bytes) -> StampedPose:
+def _read_array(reader: PoseReader, count: int, data: bytes) -> StampedPose:
     """Return the poses of so many boxes. A bad pose becomes NaN: the contact node reports it."""
-    poses = messages.read_poses(data)
+    poses = reader.read_poses(data)
     if len(poses.numbers) != count:
         raise Refused('wrong number of poses',
                       f'{len(poses.numbers)} poses, but {count} boxes of the scene move')
     poses.numbers[~are_poses(poses.numbers)] = np.nan
     return poses
-
-
-def subscribe_contacts(node: Node, callback: Callable[[Any], None], qos: QoSProfile) -> None:
-    """Subscribe to all contacts, `Contacts` or the point cloud: whichever the contact node sends.
-
-    Where it sends both, `callback` gets `Contacts` alone.
-    """
-    named = False
-
-    def on_contacts(message: Any) -> None:
-        nonlocal named
-        named = True
-        callback(message)
-
-    def on_cloud(message: PointCloud2) -> None:
-        if not named:
-            callback(message)
-
-    if ContactsMessage is not None:
-        node.create_subscription(ContactsMessage, 'contacts', on_contacts, qos)
-    node.create_subscription(PointCloud2, 'contacts_cloud', on_cloud, qos)
-
-
-def answer_values(kind: str, message: Any) -> Sequence[float] | np.ndarray:
-    """Return the numbers of an answer of two boxes; of contacts those of their `first_row`."""
-    if kind == 'cloud':
-        return first_row(read_contacts(message))
-    vector = message.point if kind == 'point' else message.vector
-    return vector.x, vector.y, vector.z
-
-
-def read_scene_text(source: str) -> tuple[str, Scene]:
-    """Return the text of a scene that is a file, or a text itself, and the scene; SceneError."""
-    scene = read_scene(source)
-    path = find_file(source)
-    return path.read_text('utf-8') if path.is_file() else source, scene
 
 
 def make_marker(header: Header, name: str, kind: int, colour: tuple[int, int, int],
@@ -134,18 +86,6 @@ def line_marker(header: Header, name: str, lines: np.ndarray, *, width: float,
     marker.scale.x = float(width)
     marker.points = [Point(x=x, y=y, z=z) for x, y, z in lines.reshape(-1, 3).tolist()]
     return marker
-
-
-def lines_of(message: MarkerArray) -> np.ndarray:
-    """Return the ends (n, 2, 3) [m] of all lines of a `line_marker`, or raise Refused."""
-    lines = [marker.points for marker in message.markers if marker.type == Marker.LINE_LIST]
-    count = sum(map(len, lines))
-    if count > MOST_ENDS:
-        raise Refused('bad lines', f'{count} ends of lines; at most {MOST_ENDS}')
-    ends = np.array([(point.x, point.y, point.z) for points in lines for point in points])
-    if count % 2 or not (np.abs(ends) <= LENGTH_MAX).all():
-        raise Refused('bad lines', 'a line has one end, or ends nowhere')
-    return ends.reshape(-1, 2, 3)
 
 
 def stamp_of(header: Header) -> int:

@@ -1,7 +1,7 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""SIGINT and SIGTERM end view, record and crane soon, whatever they are doing."""
+"""SIGINT and SIGTERM end view and record soon, whatever they are doing."""
 from __future__ import annotations
 
 import os
@@ -18,16 +18,13 @@ pytest.importorskip('mujoco')
 pytest.importorskip('rosbags')
 
 from children import children
-from ros_client import Client
 
-from box_contact_ros.node.processes import Stop, asked_to_end
 from box_contact_ros.view import view
 from box_contact_ros.view.recording import bag_player
 
 pytestmark = pytest.mark.usefixtures('signal_handlers')
 
 END_SECONDS = 2.0
-OFFERS = 200  # answers that the crane gets only after it began to move
 BOTH = pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 
 
@@ -54,23 +51,6 @@ def test_view_while_it_reads_a_recording(monkeypatch, number):
     status = view.main(['--replay', 'run'])
     assert time.monotonic() - start < END_SECONDS
     assert status == (0 if number == signal.SIGINT else 143)
-
-
-def test_a_signal_before_what_it_would_interrupt():
-    with asked_to_end() as stop:
-        os.kill(os.getpid(), signal.SIGTERM)
-        assert stop.wait(1.0)
-        with pytest.raises(KeyboardInterrupt), stop.interrupting():
-            raise AssertionError('it went on')
-    assert stop.status == 143
-
-
-def test_a_flag_interrupts_nothing_outside():
-    stop = Stop()
-    with stop.interrupting():
-        pass
-    stop.take(signal.SIGTERM, None)
-    assert stop.is_set()
 
 
 @BOTH
@@ -100,36 +80,6 @@ def test_view_asked_again_and_again(program, number):
         running.process.send_signal(number)
         time.sleep(0.0005)
     assert running.wait() == (0 if number == signal.SIGINT else 143), running.output
-
-
-@pytest.fixture
-def client():
-    client = Client()
-    yield client
-    client.close()
-
-
-@BOTH
-@pytest.mark.parametrize('arguments', [(), ('--ros-args', '-p', 'closed_loop:=true', '-p',
-                                            'lockstep:=true')], ids=['open', 'lockstep'])
-@pytest.mark.parametrize('state', ['alone', 'answered', 'deserted'])
-def test_crane(client, program, number, arguments, state):
-    """While it waits for a node, moves, or waits for the answers of a node that stands still."""
-    node = program('contact_node', '--ros-args', '-p', 'model:=exact') if state != 'alone' else None
-    running = program('crane', *(arguments or ('--ros-args',)), '-p', 'wait:=60.0')
-    if node is None:
-        time.sleep(3.0)
-    else:
-        assert client.spin(lambda: len(client.clouds) > OFFERS)
-        if state == 'deserted':
-            node.signal(signal.SIGSTOP)
-            time.sleep(0.5)
-    try:
-        assert running.process.poll() is None, running.output
-        assert ends_soon(running, number) < END_SECONDS
-    finally:
-        if node is not None:
-            node.signal(signal.SIGCONT)
 
 
 @BOTH

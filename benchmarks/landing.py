@@ -1,0 +1,285 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""Landings by the way of contact and force: whether the container comes to rest, and how flat.
+
+It runs a grid of 36 landings by every way (some by a sample), rate and latency. It also lands other
+loads and stacks, with an outcome that is stated beforehand (`landing_ways`). It writes landing.csv
+(a row per landing), landing.md (tables) and landing.png (one landing, four ways). The exit status
+is 1 if held patches of `exact` or `mlp` do not do all that is expected.
+"""
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, replace
+from itertools import groupby, product
+from multiprocessing import Pool
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from tqdm import tqdm
+
+from box_contact_ros.core import native
+from box_contact_ros.demo.crane import CraneScenario
+from box_contact_ros.demo.landing import CORNER_SPEED_LIMIT, WATCHED, LandingRecord, solvers
+from box_contact_ros.node.processes import left_when_asked
+from box_contact_ros.scene.pose import rotation_matrix
+from box_contact_ros.solver.arguments import program_parser
+
+from . import output
+from .landing_ways import (
+    ADDED,
+    MUJOCO,
+    WAYS,
+    HeldLimits,
+    Landed,
+    LoopTiming,
+    MujocoSource,
+    PlannedLanding,
+    aimed,
+    grid,
+)
+
+TIMINGS = [LoopTiming(*timing) for timing in product((50.0, 200.0, 1000.0), (0.0, 0.002, 0.005))]
+QUICK = 10
+"""`--quick` runs every tenth landing of the grid, and every third of the added ones."""
+SHOWN = 17
+"""The landing that is drawn: sway of 1.25°, tilt of 3°, 0.6 m of overhang."""
+PACKAGES = ('numpy', 'mujoco')  # whose versions are named
+GATED = ('exact', 'mlp')
+"""Ways that have to do all that is expected."""
+
+
+class Outcome(NamedTuple):
+    """One landing that was run."""
+
+    way: str
+    timing: LoopTiming
+    planned: PlannedLanding
+    result: Landed
+
+    @property
+    def as_expected(self) -> bool:
+        """Return whether the load did what it was expected to do; held patches have own limits."""
+        held = self.way in GATED and self.planned.of_grid
+        return self.planned.as_expected(self.result) and (
+            not held or HeldLimits.at(self.timing.rate_hz).are_met(self.result))
+
+
+def aim(planned: PlannedLanding) -> PlannedLanding:
+    """Return the landing with its trolley in place."""
+    return replace(planned, scenario=aimed(planned.scenario, planned.overhang))
+
+
+def run(way: str, timing: LoopTiming, planned: PlannedLanding) -> Outcome:
+    """Run and judge one landing, by its own limit of the tilt."""
+    record = WAYS[way].run(planned.scenario, timing)
+    return Outcome(way, timing, planned, Landed.of(record, planned.tilt_limit))
+
+
+def landings(ways: Sequence[str], timings: Sequence[LoopTiming], planned: Sequence[PlannedLanding],
+             *, step: int = 1) -> Iterator[tuple[str, LoopTiming, PlannedLanding]]:
+    """Yield the landings of a sweep; `planned` has one of `step` of the grid."""
+    of_grid = [landing for landing in planned if landing.of_grid]
+    added = [landing for landing in planned if not landing.of_grid]
+    for name in ways:
+        way = WAYS[name]
+        for timing in way.timings(timings):
+            for landing in [*of_grid[::max(1, way.every // step)], *(added if way.added else ())]:
+                yield name, timing, landing
+
+
+def csv_row(outcome: Outcome) -> dict[str, object]:
+    """Return what was run, whether it did what was expected, and every figure.
+
+    SI units; angles of scenarios in degrees, their columns begin with case_.
+    """
+    way, timing, planned, result = outcome
+    return {'way': way, 'law': WAYS[way].law, 'contacts': WAYS[way].contacts,
+            **timing._asdict(), 'landing': planned.name,
+            **{f'case_{name}': value for name, value in asdict(planned.scenario).items()},
+            'at_rest': int(result.at_rest), 'as_expected': int(outcome.as_expected),
+            **asdict(result)}
+
+
+# --- tables ---------------------------------------------------------------------------------------
+
+SHOWN_WORST = {
+    'settled [s]': ('settled', 1.0), 'corner [mm/s]': ('corner_speed', 1e3),
+    'creep [mm/s]': ('creep', 1e3), 'force [of weight]': ('force_worst', 1.0),
+    'static tilt [°]': ('static_tilt', 180.0 / math.pi), 'depth [%]': ('depth', 100.0),
+    'gap [mm]': ('gap', 1e3), 'point step [mm]': ('point_step', 1e3)}
+"""By column: a figure of `Landed`, whose worst value the table shows, and its factor."""
+
+
+def worst(results: Sequence[Landed], name: str, factor: float) -> str:
+    """Return the worst value of a figure for the table."""
+    values = [getattr(result, name) for result in results]
+    if any(map(math.isnan, values)):
+        # What was never reached has no worst; the word is clearer than a NaN.
+        return 'never' if name == 'settled' else '–'
+    return f'{factor * max(values):.2g}'
+
+
+def grid_table(outcomes: Sequence[Outcome]) -> str:
+    """Return a row per way, rate and latency: how many rest, and the worst of each figure.
+
+    Of held patches, figures that are worse than those of MuJoCo's manifold are bold.
+    """
+    of_grid = [outcome for outcome in outcomes if outcome.planned.of_grid]
+    manifold = [outcome.result for outcome in of_grid if outcome.way == 'manifold']
+    rows = []
+    for (name, timing), group in groupby(of_grid, key=lambda outcome: outcome[:2]):
+        way, landed = WAYS[name], list(group)
+        results = [outcome.result for outcome in landed]
+        figures = []
+        for figure, factor in SHOWN_WORST.values():
+            text = worst(results, figure, factor)
+            is_worse = name in GATED and manifold and max(
+                getattr(result, figure) for result in results) > max(
+                getattr(result, figure) for result in manifold)
+            figures.append(f'**{text}**' if is_worse else text)
+        settled = sum(not math.isnan(result.settled) for result in results)
+        rows.append([way.law, way.contacts,
+                     *((f'{timing.rate_hz:g}', f'{1e3 * timing.latency:g}') if way.law != MUJOCO
+                       else ('–', '–')), f'{settled} of {len(results)}',
+                     f'{sum(result.at_rest for result in results)} of {len(results)}',
+                     f'{sum(outcome.as_expected for outcome in landed)} of {len(results)}'
+                     if name in GATED else '–', *figures])
+    return output.markdown_table(['law', 'contacts', 'rate [Hz]', 'latency [ms]', 'settle',
+                                  'at rest', 'within limits', *SHOWN_WORST], rows, words=2)
+
+
+def added_table(outcomes: Sequence[Outcome]) -> str:
+    """Return a row per added landing: what was expected, and what each way did."""
+    ways = [name for name in WAYS if WAYS[name].added
+            and any(outcome.way == name for outcome in outcomes)]
+    shown = {'corner_speed': 1e3, 'static_tilt': 180.0 / math.pi, 'depth': 100.0}
+    added = {outcome.planned.name: outcome.planned for outcome in outcomes
+             if not outcome.planned.of_grid}
+    rows = []
+    for name, planned in added.items():
+        row = [name, 'falls' if planned.falls else
+               f'rests, tilt ≤ {math.degrees(planned.tilt_limit):.2g}°']
+        for way in ways:
+            landed = [outcome for outcome in outcomes
+                      if (outcome.way, outcome.planned.name) == (way, name)]
+            row.append(f'{sum(outcome.as_expected for outcome in landed)} of {len(landed)}')
+            row.append('' if planned.falls else ' / '.join(
+                worst([outcome.result for outcome in landed], *figure)
+                for figure in shown.items()))
+        rows.append(row)
+    head = [cell for name in ways for cell in (WAYS[name].contacts, 'corner / tilt / depth')]
+    return output.markdown_table(['landing', 'expected', *head], rows, words=2)
+
+
+def page(outcomes: Sequence[Outcome], command: str) -> str:
+    """Return the Markdown page."""
+    gated = [outcome for outcome in outcomes if outcome.way in GATED]
+    return output.page(
+        'benchmarks/pages/landing', command=command, machine=output.machine(native, PACKAGES),
+        all=len(gated), good=sum(outcome.as_expected for outcome in gated),
+        grid=grid_table(outcomes), added=added_table(outcomes))
+
+
+# --- picture --------------------------------------------------------------------------------------
+
+SHOWN_WAYS = {'exact': 'held patch', 'point': 'point law', 'mujoco-deepest': 'deepest point',
+              'manifold': "MuJoCo's manifold"}
+SHOWN_TIMING = LoopTiming(200.0, 0.002)
+EXAGGERATION = 15.0  # of the tilt: a third of a degree would not be seen
+LATEST = 1.0  # so long are contacts shown [s]
+COLOURS = {'load': '#9aa7b5', 'stack': '#d9dde2', 'contact': '#d1495b', 'speed': '#00798c'}
+
+
+def draw(path: Path, scenario: CraneScenario) -> None:
+    """Draw one landing by four ways: the load from its end, and the speed of its fastest corner."""
+    figure, axes = output.subplots(2, len(SHOWN_WAYS), (8.0, 4.6), sharey='row')
+    for (side, speed), (way, title) in zip(axes.T, SHOWN_WAYS.items()):
+        record = WAYS[way].run(scenario, SHOWN_TIMING)
+        result = record.judge()
+        settled = ('never settles' if math.isnan(result.settled) else
+                   f'settles in {result.settled:.1f} s')
+        side.set_title(f'{title}\n{settled}\ntilt {math.degrees(result.static_tilt):.2g}°',
+                       fontsize=10)
+        _draw_from_the_end(side, way, record)
+        time = np.arange(len(record.poses)) / record.rate_hz - result.touched
+        shown = (time > -1.0) & (time < WATCHED)
+        speed.semilogy(time[shown], 1e3 * record.corner_speeds()[shown], linewidth=0.8,
+                       color=COLOURS['speed'])
+        speed.axhline(1e3 * CORNER_SPEED_LIMIT, color='black', linewidth=0.8, linestyle=':')
+        speed.set_xlabel('s after the touch', fontsize=9)
+        speed.set_ylim(1e-7, 3e3)
+    axes[1, 0].set_ylabel('fastest corner [mm/s]', fontsize=9)
+    axes[1, 0].text(WATCHED, 1.4e3 * CORNER_SPEED_LIMIT, 'limit', fontsize=8, ha='right')
+    figure.suptitle(f'One landing, one contact each {1e3 / SHOWN_TIMING.rate_hz:g} ms, '
+                    f'{1e3 * SHOWN_TIMING.latency:g} ms late (tilt drawn × {EXAGGERATION:g}; '
+                    'red: where it pushes)', fontsize=10)
+    figure.savefig(path)
+
+
+def _draw_from_the_end(axis: Any, way: str, record: LandingRecord) -> None:
+    """Draw stack and load as seen along the stack's length, and the contacts of the end."""
+    scenario, pose = record.scenario, record.poses[-1]
+    width, top = scenario.stack_size[1], scenario.stack_size[2]
+    stack = np.array([[-0.5, -1.0], [0.5, -1.0], [0.5, 0.0], [-0.5, 0.0]]) * [width, top]
+    roll = -math.asin(float(rotation_matrix(pose[3:])[1, 2])) * EXAGGERATION
+    turn = np.array([[math.cos(roll), -math.sin(roll)], [math.sin(roll), math.cos(roll)]])
+    load = np.array([[-0.5, 0.0], [0.5, 0.0], [0.5, 1.0], [-0.5, 1.0]]) * scenario.size[1:]
+    load = load @ turn.T + [pose[1], 0.0]
+    for corners, colour in ((stack, 'stack'), (load, 'load')):
+        axis.fill(*corners.T, facecolor=COLOURS[colour], edgecolor='black', linewidth=0.8)
+    if way == 'manifold':
+        points = MujocoSource(scenario.size, scenario.stack_size, 'mean').manifold(
+            pose, scenario.stack_pose)[0]
+    else:
+        first = len(record.poses) - round(LATEST * record.rate_hz)
+        points = np.array([point for tick, point in record.points.items() if tick >= first])
+    axis.plot(points[:, 1], points[:, 2] - top, 'o', markersize=6, color=COLOURS['contact'],
+              zorder=3, clip_on=False)
+    if way == 'exact':
+        contact = solvers(scenario, 'exact')[0](pose, scenario.stack_pose)
+        half = math.sqrt(3.0 * contact.covariance[1, 1])
+        axis.plot(contact.point[1] + np.array([-half, half]), [0.0, 0.0], linewidth=4,
+                  color=COLOURS['contact'], solid_capstyle='butt')
+    axis.set(xlim=(-2.2, 2.2), ylim=(-0.9, 1.6), aspect='equal', xticks=[], yticks=[])
+
+
+# --- program --------------------------------------------------------------------------------------
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the sweep and write its files; 1 if a gated way fails an expectation."""
+    parser = program_parser(
+        'landing', __doc__, out='page, table and picture',
+        quick=f'every {QUICK}th landing of the grid, every third of the others, at 200 Hz and 2 ms')
+    parser.add_argument('--ways', nargs='+', choices=list(WAYS), default=list(WAYS),
+                        metavar='WAY', help=f'ways to land, of {", ".join(WAYS)} (default: all)')
+    options = parser.parse_args(args)
+    folder = output.results_folder(parser, options)
+    step, timings = (QUICK, [SHOWN_TIMING]) if options.quick else (1, TIMINGS)
+    planned = [*grid()[SHOWN % step::step], *(ADDED[::3] if options.quick else ADDED)]
+    with left_when_asked(), Pool() as pool:
+        planned = list(tqdm(pool.imap(aim, planned), 'aiming', len(planned), unit=''))
+        jobs = list(landings(options.ways, timings, planned, step=step))
+        results = [pool.apply_async(run, job) for job in jobs]
+        outcomes = [result.get() for result in tqdm(results, 'landings', unit='')]
+    shown, = (landing.scenario for landing in planned if landing.name == f'grid {SHOWN}')
+    draw(folder / 'landing.png', shown)
+    output.write_csv(folder / 'landing.csv', map(csv_row, outcomes),
+                     about=output.machine(native, PACKAGES))
+    command = output.command_line('benchmarks.landing', args)
+    (folder / 'landing.md').write_text(page(outcomes, command), encoding='utf-8')
+    print(f'{grid_table(outcomes)}\n\n{added_table(outcomes)}')
+    broken = [outcome for outcome in outcomes if outcome.way in GATED and not outcome.as_expected]
+    for way, timing, landing, _ in broken:
+        print(f'landing: {way} at {timing.rate_hz:g} Hz and {1e3 * timing.latency:g} ms, '
+              f'{landing.name}: not as expected', file=sys.stderr)
+    return 1 if broken else 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,218 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""The crane over DDS: it lands on the answers of a contact node in another process."""
+from __future__ import annotations
+
+import signal
+import time
+
+import numpy as np
+import pytest
+
+pytest.importorskip('mujoco')
+
+import rclpy
+from rclpy.context import Context
+from rclpy.parameter import Parameter
+
+from box_contact_msgs.msg import Contact, Contacts
+from box_contact_ros.demo import crane_node
+from box_contact_ros.demo.landing import Landing
+from box_contact_ros.node.messages import make_header
+from box_contact_ros.node.runtime import make_executor
+
+HARD = {'rope_angle': 3.0, 'rope_heading': 100.0, 'pitch': 2.0, 'roll': -2.0, 'yaw': 1.0,
+        'offset': [0.2, 0.4]}
+"""A landing at the ends of what is asked for."""
+END_SECONDS = 2.0
+BOTH = pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+
+
+def arguments(**values):
+    texts = [f'{name}:={str(value).lower()}' for name, value in values.items()]
+    return ['--ros-args', *(word for text in texts for word in ('-p', text))]
+
+
+@pytest.fixture
+def contact_node(program):
+    running = program('contact_node', '--ros-args', '-p', 'model:=exact')
+    running.wait_for_output('ready', 120)
+    return running
+
+
+def test_it_lands(program, contact_node):
+    """In lockstep: at rest, no answer lost, exit status 0, and every stage was told."""
+    crane = program('crane', *arguments(lockstep=True, **HARD))
+    assert crane.wait(200) == 0, crane.output
+    assert 'PASS: the load is at rest, settled ' in crane.output
+    assert ' contacts, none lost; latency p50 ' in crane.output
+    assert 'not met' not in crane.output
+    stages = [line.split(' s  ')[1][:12].strip() for line in crane.output.splitlines()
+              if 'fastest corner' in line]
+    assert stages == ['hanging', 'first touch', 'settling', 'at rest']
+
+
+def test_a_load_that_falls_ends_with_status_1(program, contact_node):
+    """The stack is far to the side: the load tips off its edge."""
+    crane = program('crane', *arguments(lockstep=True, rate=50, offset=[0.0, 1.5]))
+    assert crane.wait(200) == 1, crane.output
+    assert 'FAIL: the load did not come to rest on the stack' in crane.output
+
+
+def test_a_model_without_a_patch_does_not_end_the_crane(program):
+    """The whole load stands for the patch: the landing goes to its end, is judged, and says so."""
+    program('contact_node', '--ros-args', '-p', 'model:=paper').wait_for_output('ready', 120)
+    crane = program('crane', *arguments(lockstep=True, rate=100))
+    crane.wait(200)
+    assert 'PASS: ' in crane.output or 'FAIL: the load did not come to rest' in crane.output
+    assert crane.output.count('without a patch: the whole load stands for it') == 1
+
+
+def test_without_a_contact_node_it_says_so(program):
+    crane = program('crane', *arguments(wait=0.5))
+    assert crane.wait() == 1
+    assert 'error: no answer within 0.5 s on /contacts; is a contact_node running?' in crane.output
+
+
+@pytest.mark.parametrize(('values', 'status', 'words'), [
+    ({'mass': 0.0}, 1, 'error: mass must lie within 1 and 1e+06, not 0'),
+    ({'rate': 'fast'}, 1, "error: rate must be a number, not 'fast'"),
+    ({'offset': [1.0]}, 1, 'error: offset must be 2 finite numbers'),
+    ({'rope_angel': 1.0, 'wait': 0.1}, 1, "unknown parameter 'rope_angel' (did you mean rope_an")])
+def test_bad_parameters_are_refused_by_name_and_value(program, values, status, words):
+    """Unknown ones are named and ignored: a file may be meant for several nodes."""
+    crane = program('crane', *arguments(**values))
+    assert crane.wait() == status
+    assert words in crane.output and 'Traceback' not in crane.output
+
+
+# --- signals --------------------------------------------------------------------------------------
+
+
+@BOTH
+@pytest.mark.parametrize('lockstep', [False, True])
+@pytest.mark.parametrize('state', ['alone', 'answered', 'deserted'])
+def test_a_signal_ends_it_soon(program, number, lockstep, state):
+    """While it waits for a node, moves, or waits for the answers of a node that stands still."""
+    node = program('contact_node', '--ros-args', '-p', 'model:=exact') if state != 'alone' else None
+    running = program('crane', *arguments(lockstep=lockstep, wait=60.0))
+    if node is None:
+        time.sleep(3.0)
+    else:
+        running.wait_for_output('hanging', 120)
+        if state == 'deserted':
+            node.signal(signal.SIGSTOP)
+            time.sleep(0.5)
+    try:
+        assert running.process.poll() is None, running.output
+        start = time.monotonic()
+        running.process.send_signal(number)
+        assert running.wait() == 128 + number
+        assert time.monotonic() - start < END_SECONDS
+        assert 'Traceback' not in running.output, running.output
+    finally:
+        if node is not None:
+            node.signal(signal.SIGCONT)
+
+
+# --- answers --------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def crane():
+    """Return a crane node in this process, in lockstep, with its executor."""
+    context = Context()
+    rclpy.init(context=context)
+    values = {'lockstep': True} | HARD
+    node = crane_node.CraneNode(
+        context, parameter_overrides=[Parameter(name, value=v) for name, v in values.items()])
+    executor = make_executor(context)
+    executor.add_node(node)
+    yield node, executor
+    executor.shutdown()
+    node.destroy_node()
+    context.try_shutdown()
+
+
+def answer_to(stamp, *, volume=0.03, stale=()):
+    """Return the answer of a load 1 mm deep on its whole bottom; NaN: by a model without patch."""
+    contact = Contact(pair='box_a_box_b', box_a='box_a', box_b='box_b', depth=1e-3, volume=volume,
+                      covariance=[12.0, 0.0, 0.0, 0.5, 0.0, 1e-7])
+    contact.point.z, contact.normal.z = 2.6, -1.0
+    if np.isnan(volume):
+        contact.covariance = [volume] * 6
+    return Contacts(header=make_header(stamp, 'world'), stale=stale,
+                    contacts=[] if stale or volume == 0.0 else [contact])
+
+
+def test_answers_that_say_nothing_are_held_over(crane):
+    """Stale pairs are no answer: the patch is still held. An answer without contacts is one."""
+    node, _ = crane
+    pushes, lost = [], []
+    for message in ({}, {'stale': ['box_a_box_b']}, {'volume': 0.0}, {'volume': np.nan}):
+        stamp = node._publish(node.loop.ask())
+        node._on_contacts(answer_to(stamp, **message))
+        node._on_contacts(answer_to(stamp))  # came twice: nobody asked for it any more
+        node.loop.step()
+        pushes.append(node.loop.record.forces[-1][2])
+        lost.append(node.lost)
+    assert [push > 0.0 for push in pushes] == [True, True, False, True]
+
+
+def test_answers_to_nobody_are_not_kept(crane):
+    """The crane takes answers to its own stamps; what is kept for a stranger would only grow."""
+    node, _ = crane
+    stamp = node._publish(node.loop.ask())
+    for number in range(1000):
+        node._on_contacts(answer_to(stamp + 1 + number))
+    assert node.lost == 1 and not node.latencies and not node.loop._under_way
+
+
+def test_lockstep_ends_when_nobody_answers(crane, monkeypatch):
+    """A lost answer is waited for, within bounds, and so is a node that is gone."""
+    monkeypatch.setattr(crane_node, 'LOCKSTEP_PATIENCE', 0.01)
+    node, executor = crane
+    with pytest.raises(TimeoutError, match='no answer to 5 pairs in a row'):
+        node.lower(executor)
+    assert node.lost == 5
+
+
+def test_lost_ticks_are_bridged(contact_node, crane, monkeypatch):
+    """Every eleventh answer is thrown away on arrival: the last patch is held, and it lands."""
+    node, executor = crane
+    # As in real time, the law is made for a period's latency.
+    node.loop = crane_node.ClosedLoop(node.loop.crane.scenario, 200.0, latency=0.005)
+    monkeypatch.setattr(crane_node, 'LOCKSTEP_PATIENCE', 0.01)
+    monkeypatch.setattr(crane_node, 'LOST_MOST', 100)  # a busy machine pauses for a second
+    take, count = node.loop.answer, 0
+
+    def lossy(*arguments, **options):
+        nonlocal count
+        count += 1
+        if count % 11:
+            take(*arguments, **options)
+
+    monkeypatch.setattr(node.loop, 'answer', lossy)
+    node.await_node(executor)
+    node.lower(executor)
+    result = node.loop.record.judge()
+    assert count > 3500
+    assert result.carried and result.force_worst < 1e-3, f'\n{result}'
+
+
+# --- the verdict ----------------------------------------------------------------------------------
+
+AT_REST = {'settled': 1.234, 'corner_speed': 0.0, 'rope_tension': 0.0, 'force_worst': 0.0,
+           'static_tilt': 0.0, 'depth': 0.001, 'gap': 0.0}
+
+
+@pytest.mark.parametrize(('contacts', 'lost', 'landing', 'words'), [
+    (7, 0, AT_REST, 'PASS: the load is at rest, settled 1.2 s after the first touch; 7 contacts, '
+                    'none lost; latency p50 0.50 ms, p99 0.50 ms'),
+    (7, 0, AT_REST | {'static_tilt': 1.0}, 'PASS: the load lies on the stack, not within all lim'),
+    (7, 3, AT_REST, 'FAIL: 3 lost answers'),
+    (0, 0, {}, 'FAIL: no contacts came, the load did not come to rest on the stack')])
+def test_the_verdict_is_one_line_with_its_reasons(contacts, lost, landing, words):
+    passed, line = crane_node.verdict(Landing(**landing), [0.5e-3] * contacts, lost)
+    assert line.startswith(words) and passed == line.startswith('PASS')
