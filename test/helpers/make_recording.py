@@ -14,11 +14,11 @@ import argparse
 import shutil
 from pathlib import Path
 
+from box_contact_ros.demo.mujoco_crane import Crane
 from rclpy.serialization import serialize_message
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.demo.landing import LandingCase, land, scenario_of
-from box_contact_ros.demo.mujoco_crane import Crane
 from box_contact_ros.node.messages import NANOSECONDS, TypedMessages, make_header
 from box_contact_ros.node.ros_client import pose_message
 from box_contact_ros.scene.scene_solver import Answer, two_boxes

@@ -18,6 +18,7 @@ import pytest
 pytest.importorskip('viser')
 
 import viser
+from box_contact_ros.scene.files.scene_file import scene_text
 from browser import chromium, open_page
 from ros_client import PATIENCE, Client, serving
 from std_msgs.msg import String
@@ -35,7 +36,6 @@ from box_contact_ros.node.messages import (
 )
 from box_contact_ros.node.ros_client import MOST_ENDS, lines_of
 from box_contact_ros.node.runtime import LATCHED_QOS, GuardedNode
-from box_contact_ros.scene.files.scene_file import scene_text
 from box_contact_ros.scene.scene_solver import Box, Pair, Scene, SceneSolver, two_boxes
 from box_contact_ros.view import view_log
 from box_contact_ros.view.listener import ASKED, ViewNode

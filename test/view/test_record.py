@@ -18,6 +18,7 @@ from ros_client import PATIENCE, Client, stamp_of
 
 pytest.importorskip('rosbags')
 
+from box_contact_ros.scene.files.scene_file import read_scene
 from geometry_msgs.msg import PoseStamped
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
@@ -37,7 +38,6 @@ from box_contact_ros.node.ros_client import (
     pose_message,
 )
 from box_contact_ros.resources import resource_path
-from box_contact_ros.scene.files.scene_file import read_scene
 from box_contact_ros.scene.scene_solver import SceneSolver
 from box_contact_ros.view.recording import bag_player
 from box_contact_ros.view.recording.bag_file import (

@@ -26,6 +26,7 @@ from visualization_msgs.msg import MarkerArray
 pytest.importorskip('viser')
 pytest.importorskip('mujoco')
 
+from box_contact_ros.scene.files.scene_file import read_scene
 from browser import chromium, open_page
 from children import children
 from PIL import Image
@@ -47,7 +48,6 @@ from box_contact_ros.node.ros_client import (
     line_marker,
     pose_topics,
 )
-from box_contact_ros.scene.files.scene_file import read_scene
 from box_contact_ros.scene.pose import rotation_matrix
 from box_contact_ros.scene.scene_solver import Box, Pair, Scene, SceneSolver, two_boxes
 from box_contact_ros.view.listener import ViewNode
