@@ -9,12 +9,10 @@ from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
-from geometry_msgs.msg import Point, PointStamped, PoseArray, PoseStamped, Vector3Stamped
+from geometry_msgs.msg import Point, PoseArray, PoseStamped
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker
-
-from box_contact_msgs.msg import Contacts
 
 from ..scene.pairing import StampedPose
 from ..scene.scene_solver import ALL_BOXES, Scene
@@ -23,10 +21,6 @@ from .message_bytes import PoseReader
 from .messages import NANOSECONDS, Refused
 from .topics import pose_qos
 
-ANSWERS: dict[str, tuple[type, str]] = {
-    'point': (PointStamped, 'contact/point'), 'normal': (Vector3Stamped, 'contact/normal'),
-    'cloud': (Contacts, 'contacts')}
-"""Type and topic of what a contact node answers with."""
 CRANE_MARKERS = 'crane/markers'  # where the crane publishes its ropes and its spreader, as lines
 CRANE_WRENCH = 'crane/wrench'  # and the force of the contacts on its load
 DEEP_RELIABLE = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
