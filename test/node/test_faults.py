@@ -273,8 +273,8 @@ def test_two_nodes_in_namespaces(program):
             client.offer_until_answered(ORIGIN, APART)
             contact = client.answer(ORIGIN, (0, 0, height, 0, 0, 0, 1))['box_a_box_b']
             assert contact.separation == height - 2.0
-        (one, _), (other, _) = clients
-        assert not one.contacts.keys() & other.contacts.keys()
+        (north, _), (south, _) = clients
+        assert not north.contacts.keys() & south.contacts.keys()
     finally:
         for client, _ in clients:
             client.close()

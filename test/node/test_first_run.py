@@ -187,22 +187,22 @@ def runs(tmp_path_factory):
     runs.match()
     runs.began = time.time()
     runs.play(CASES, WATCHED)
-    runs.found = {case: seen[-1] for case, seen in runs.diagnostics.items()}
+    runs.last = {case: seen[-1] for case, seen in runs.diagnostics.items()}
     yield runs
     runs.close()
 
 
 def told(runs, case, pattern):
     """Return what the log of a case says, once a second at most."""
-    found = [match for line in runs.lines[case] if (match := re.search(pattern, line))]
-    assert found, runs.lines[case]
-    assert len(found) <= WATCHED + 1
-    return found[0]
+    matches = [match for line in runs.lines[case] if (match := re.search(pattern, line))]
+    assert matches, runs.lines[case]
+    assert len(matches) <= WATCHED + 1
+    return matches[0]
 
 
 def test_a_good_run_is_told_nothing(runs):
     assert not runs.lines['good']
-    assert runs.found['good'][:2] == (0, 'answering')
+    assert runs.last['good'][:2] == (0, 'answering')
     assert all(level == 0 for level, *_ in runs.diagnostics['good'])
 
 
@@ -214,11 +214,11 @@ def test_stamps_of_zero(runs):
     told(runs, 'zero', r'stamp 0 s does not advance; refused: set header\.stamp .*, or start with '
                        'pairing:=latest')
     assert runs.first_line['zero'] < runs.began + 5.0
-    assert runs.found['zero'][:2] == (
+    assert runs.last['zero'][:2] == (
         2, 'unanswered for 5 s: box_a_box_b; poses refused: repeated stamp')
     assert runs.points['zero'] == {0}
     assert not runs.lines['zero_latest']
-    assert runs.found['zero_latest'][:2] == (0, 'answering')
+    assert runs.last['zero_latest'][:2] == (0, 'answering')
 
 
 def test_stamps_that_never_agree(runs):
@@ -226,7 +226,7 @@ def test_stamps_that_never_agree(runs):
     line = told(runs, 'apart', r'stamps of box_a and box_b differ by ([\d.]+) s: none could be '
                                r'answered; set tolerance:=([\d.]+), or start with pairing:=latest')
     assert float(line[1]) == pytest.approx(1 / 64, abs=2e-3)
-    level, message, _ = runs.found['apart']
+    level, message, _ = runs.last['apart']
     assert level == 2 and 'poses without a partner: stamps of box_a and box_b' in message
     assert not runs.points['apart']
     runs.follow('apart', tolerance=float(line[2]))
@@ -236,7 +236,7 @@ def test_two_clocks(runs):
     """Where boxes are never stale (max_age 0), and where they are."""
     told(runs, 'clocks', r'differ by \d.* s: .*stamp both by one clock \(use_sim_time')
     told(runs, 'latest_clocks', r'stale boxes: box_b: .* is 5(\.\d+)? s behind, max_age is 1 s')
-    assert runs.found['latest_clocks'][:2] == (
+    assert runs.last['latest_clocks'][:2] == (
         2, 'unanswered for 5 s: box_a_box_b; stale boxes: box_b')
 
 
@@ -248,20 +248,20 @@ def test_a_box_that_never_came(runs):
     told(runs, 'unreliable', 'no pose ever came: box_a: /unreliable/box_a/pose is published with '
                              'another quality of service: .*[Bb]est effort')
     for case in ('alone', 'mistyped'):
-        level, message, values = runs.found[case]
+        level, message, values = runs.last[case]
         assert (level, message) == (
             2, 'unanswered for 5 s: box_a_box_b; no pose ever came: box_b')
         assert values['boxes that never came'] == 'box_b' and values['stale boxes'] == ''
         assert values['unanswered pairs'] == '1'
     # One pair of three boxes is answered, the other is not.
-    level, message, _ = runs.found['three']
+    level, message, _ = runs.last['three']
     assert (level, message) == (2, 'unanswered for 5 s: b_c; no pose ever came: c')
 
 
 def test_frames_that_differ(runs):
     told(runs, 'slash', r"box_a is in frame 'map', box_b in '/map': the leading slash is the "
                         r'difference; refused')
-    assert runs.found['slash'][1].endswith('poses refused: frame_id differs')
+    assert runs.last['slash'][1].endswith('poses refused: frame_id differs')
     assert not runs.points['slash']
 
 
@@ -269,14 +269,14 @@ def test_one_kind_of_refusal_hides_no_other(runs):
     """A quaternion of zeros and NaN at the same rate: both are logged, with their remedies."""
     told(runs, 'bad', r'w=0\) has zero length; refused: set orientation\.w to 1\.0')
     told(runs, 'bad', r'position \(0, 0, nan\) is not finite; refused: send finite numbers')
-    level, message, values = runs.found['bad']
+    level, message, values = runs.last['bad']
     assert level == 2 and message.endswith('poses refused: bad pose')
     assert values['boxes that never came'] == ''
 
 
 def test_a_box_of_which_each_pose_is_refused_is_not_called_stale(runs):
     told(runs, 'latest_bad', r'w=0\) has zero length; refused')
-    assert runs.found['latest_bad'][2]['stale boxes'] == ''
+    assert runs.last['latest_bad'][2]['stale boxes'] == ''
     assert not any('behind' in line for line in runs.lines['latest_bad'])
 
 
@@ -284,14 +284,14 @@ def test_a_bag_in_a_loop(runs):
     """Half a second, again and again: its stamps are answered once, then refused and logged."""
     told(runs, 'loop', r'stamp [\d.]+ s (has come before|does not advance); refused: .*start with '
                        'pairing:=latest')
-    level, message, values = runs.found['loop']
+    level, message, values = runs.last['loop']
     assert level == 2 and message.endswith('poses refused: repeated stamp')
     assert values['evaluations'] == '10'
 
 
 def test_poses_that_stop(runs):
     """Publishers that have gone: by the steady clock, whatever the stamps."""
-    level, message, _ = runs.found['stopped']
+    level, message, _ = runs.last['stopped']
     assert level == 1 and re.fullmatch(r'poses have stopped: none for [5-7] s', message)
 
 
@@ -311,7 +311,7 @@ def test_a_box_that_falls_silent(runs):
 
 def test_nobody_publishes(runs):
     """Five seconds after the start."""
-    assert runs.found['silent'][:2] == (1, 'no pose ever came: box_a, box_b')
+    assert runs.last['silent'][:2] == (1, 'no pose ever came: box_a, box_b')
     told(runs, 'silent', 'nobody publishes /silent/box_a/pose; nobody publishes /silent/box_b/pose')
 
 
@@ -320,7 +320,7 @@ def test_the_state_is_told(runs):
         assert {(level, message, values['lifecycle state'])
                 for level, message, values in runs.diagnostics[state]} == {
             (1, f'{state}: no pose is answered', state)}
-    assert runs.found['good'][2]['lifecycle state'] == 'active'
+    assert runs.last['good'][2]['lifecycle state'] == 'active'
     node = runs.nodes['inactive']
     node.trigger_activate()
     heard = len(runs.diagnostics['inactive'])

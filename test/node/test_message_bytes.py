@@ -198,9 +198,9 @@ def test_what_a_client_reads_is_the_contact_again():
     """Every number to the bit, the covariance symmetric again; the answer of the scene, too."""
     scene = two_boxes((2, 3, 1), (1, 2, 2))
     pair, = scene.pairs
-    contact = ContactSolver((2, 3, 1), (1, 2, 2), model='exact')(
+    overlap = ContactSolver((2, 3, 1), (1, 2, 2), model='exact')(
         (0, 0, 0, 0, 0, 0, 1), (0.3, 0.4, 1.2, 0.1, 0.2, 0.3, 0.9))
-    for answer in (Answer([(pair, contact)], [], 1), Answer([], [], 1, [(pair, APART)]),
+    for answer in (Answer([(pair, overlap)], [], 1), Answer([], [], 1, [(pair, APART)]),
                    Answer([], [pair], 0)):
         message = deserialize_message(
             ContactWriter().contacts(header_bytes(0, 'map'), answer), Contacts)
@@ -208,11 +208,11 @@ def test_what_a_client_reads_is_the_contact_again():
         assert read.stale == answer.stale
         for entries, wanted in ((read.touching, answer.touching), (read.close, answer.close)):
             assert [entry[0] for entry in entries] == [entry[0] for entry in wanted]
-            for (_, found), (_, c) in zip(entries, wanted):
-                assert (found.separation, found.volume) == (c.separation, c.volume)
+            for (_, contact), (_, c) in zip(entries, wanted):
+                assert (contact.separation, contact.volume) == (c.separation, c.volume)
                 for name in ('point', 'normal', 'covariance'):
-                    assert np.array_equal(getattr(found, name), getattr(c, name), equal_nan=True)
-    message = make_contacts(make_header(0, 'map'), Answer([(Pair('p', 'a', 'b'), contact)], [], 1))
+                    assert np.array_equal(getattr(contact, name), getattr(c, name), equal_nan=True)
+    message = make_contacts(make_header(0, 'map'), Answer([(Pair('p', 'a', 'b'), overlap)], [], 1))
     assert list(contacts_by_pair(message)) == ['p']
     with pytest.raises(Refused, match="'p' is no pair of the scene"):
         read_answer(message, scene)

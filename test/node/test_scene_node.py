@@ -19,6 +19,7 @@ from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.parameter import Parameter
 from ros_client import DEEP, PATIENCE, Client, serving, stamp_of
 from rosgraph_msgs.msg import Clock
+from std_srvs.srv import Trigger
 from typed_messages import pose_array
 
 from box_contact_ros import ContactSolver
@@ -290,6 +291,19 @@ def test_time_that_goes_back_begins_anew(node, client):
     assert not client.is_answered(5 * MS, 0.5)
     assert BESIDE in client.answer(None, LORRY, stamps=(0, 5 * MS))
     assert client.diagnostic('time went back') == '1'
+
+
+def test_the_service_reset_begins_a_new_time(node, client):
+    """A simulation that is reset may send the stamps that it had, however few they are."""
+    stamp = client.ask(ON_LORRY, LORRY)
+    client.send(ON_LORRY, LORRY, stamps=(stamp,) * 2)
+    assert client.spin(lambda: node.counts['refused: repeated stamp'] == 2)
+    assert client.call(Trigger, '/contact_node/reset', Trigger.Request()).success
+    client.contacts.clear()
+    assert BESIDE in client.answer(ON_LORRY, LORRY, stamps=(stamp,) * 2)
+    node.trigger_deactivate()
+    node.trigger_cleanup()
+    assert not client.call(Trigger, '/contact_node/reset', Trigger.Request()).success
 
 
 def test_a_clock_that_is_set_back(client, scene_node, capfd):

@@ -3,7 +3,7 @@
 
 """Bad input at the doors without ROS: the Python API and weights files.
 
-The policy: docs/reference/conventions.md, "Bad input". test_hygiene_ros.py has the node's.
+The policy: docs/reference/conventions.md, "Bad input". test_faults.py has the node's.
 """
 from __future__ import annotations
 
