@@ -144,7 +144,8 @@ class Diagnostics:
         self._reported: Counter[str] = Counter()
         self._logged: dict[str, float] = {}  # when a cause was logged [s]
 
-    def report(self, state: str, solver: SceneSolver, pairing: Pairing, topics: SceneTopics) -> None:
+    def report(self, state: str, solver: SceneSolver, pairing: Pairing, topics: SceneTopics,
+               ) -> None:
         """Report on a node that is configured; `state` is that of the lifecycle."""
         logger, scene = self._node.get_logger(), solver.scene
         rejections, pairing.rejections = pairing.rejections, {}

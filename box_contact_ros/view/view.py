@@ -20,8 +20,9 @@ import time
 from collections.abc import Sequence
 from contextlib import ExitStack, closing
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from ..extras import require
 from ..node import processes
 from ..node.parameters import outside_ros_args
 from ..node.processes import Stop, asked_to_end, on_this_host, printed, program
@@ -30,7 +31,9 @@ from ..scene.scene_file import read_scene
 from ..scene.scene_solver import CONTAINER, two_boxes
 from ..solver.arguments import model_name, program_parser, within
 from .listener import ViewNode
-from .page import Page
+
+if TYPE_CHECKING:
+    from .page import Page
 
 FRAME_PERIOD = 1 / 30
 FIGURES_PERIOD = 0.1  # time [s] between new figures: faster, nobody can read them
@@ -85,6 +88,8 @@ def watch(node: ViewNode, executor: Any, page: Page, landings: Landings | None, 
 
 def serve(options: argparse.Namespace, args: Sequence[str], stop: Stop) -> None:
     """Serve the page until `stop` is set. Raises RuntimeError if the contact node ends."""
+    from .page import Page  # only here: viser is an extra
+
     scene = read_scene(options.scene) if options.scene else two_boxes(CONTAINER, CONTAINER)
     with ExitStack() as ending:
         node, executor = ending.enter_context(joined(partial(ViewNode, scene=scene), args))
@@ -102,6 +107,7 @@ def main(args: Sequence[str] | None = None) -> int:
     """Serve the page until SIGINT (0), SIGTERM or SIGHUP (128 + number); 1 if the node ends."""
     args = list(sys.argv[1:] if args is None else args)
     options = _options(outside_ros_args(args))
+    require(*(('view',) if options.scene else ('sim', 'view')))
     if not options.scene:  # nothing else on this network hears what is started here
         os.environ |= on_this_host(options.domain)
     with asked_to_end() as stop:

@@ -12,14 +12,13 @@ import numpy as np
 import poses
 import pytest
 import yaml
-from contact_messages import contacts_message
+from contact_messages import answering_node, contacts_message
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from ros_client import PATIENCE, Client, serving
 from visualization_msgs.msg import Marker, MarkerArray
 
 from box_contact_ros import ContactSolver
-from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import make_header
 from box_contact_ros.node.ros_client import CRANE_MARKERS
 from box_contact_ros.resources import resource_path
@@ -34,7 +33,7 @@ HEADER = make_header(STAMP, 'yard')
 YARD = Scene({'slab': Box('slab', SLAB, pose_topic='slab/pose'),
               's1': Box('s1', CUBE, (1.0, 2.0, 3.0, 0.0, 0.0, 1.2, 1.6)),
               's2': Box('s2', CUBE, (9.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0))},
-             (Pair(4, 'slab_s1', 'slab', 's1'), Pair(7, 'slab_s2', 'slab', 's2')))
+             (Pair.between('slab', 's1'), Pair.between('slab', 's2')))
 CONTACT = Contact(True, -0.0125, np.array([0.0, 0.6, 0.8]), np.array([1.0, 2.0, 3.0]), 0.05,
                   np.eye(3) / 12)
 TOUCHING = np.array([0.5, 0.25, 1.875, 0, 0, 0, 1])
@@ -97,7 +96,7 @@ def test_all_contacts_are_drawn_and_the_deepest_labelled():
     """With normals of their own; ids count from the deepest on."""
     boxes = {f's{n}': Box(f's{n}', CUBE, (n, 0, 0, 0, 0, 0, 1)) for n in range(30)}
     boxes['load'] = Box('load', CUBE, pose_topic='load/pose')
-    pairs = tuple(Pair(n, f'p{n}', 'load', f's{n}') for n in range(30))
+    pairs = tuple(Pair(f'p{n}', 'load', f's{n}') for n in range(30))
     touching = {f'p{n}': CONTACT._replace(separation=-1e-3 * n, point=np.full(3, n))
                 for n in range(30)}
     _, found = drawing(touching, Scene(boxes, pairs))
@@ -170,8 +169,8 @@ def node():
 
 @pytest.fixture
 def contact_node():
-    with serving(lambda context: ContactNode(context, parameter_overrides=[
-            *SETTINGS, Parameter('model', value='exact')])) as node:
+    with serving(lambda context: answering_node(
+            context, size_a=CUBE, size_b=CUBE, model='exact')) as node:
         yield node
 
 
@@ -224,7 +223,7 @@ def test_bad_poses_are_not_drawn(client, node):
 
 def test_program(program):
     """As a process, with a scene from the command line; ends with status 0 on SIGINT."""
-    running = program('markers', '--ros-args', '-p', 'scene:=two_boxes')
+    running = program('markers', '--ros-args', '-p', 'scene:=config/scenes/two_boxes.yaml')
     running.wait_for_output('ready')
     running.signal(2)
     assert running.wait() == 0, running.output

@@ -19,7 +19,6 @@ import poses
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import WrenchStamped
-from rclpy.parameter import Parameter
 from rclpy.serialization import serialize_message
 from ros_client import PATIENCE, Client, serving
 
@@ -30,12 +29,11 @@ import msgspec
 import viser
 from browser import chromium, open_page
 from children import children
-from contact_messages import contacts_message
+from contact_messages import answering_node, contacts_message
 from PIL import Image
 from websockets.sync.client import connect
 
 from box_contact_ros import ContactSolver
-from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import NANOSECONDS, Refused, make_header
 from box_contact_ros.node.ros_client import array_message, pose_message
 from box_contact_ros.scene.pose import rotation_matrix
@@ -208,10 +206,8 @@ def test_the_model_is_that_of_the_contact_node(make_node):
 
 def test_it_hears_a_contact_node():
     """Over DDS: poses, contacts, and which model answers."""
-    with serving(lambda context: ContactNode(context, parameter_overrides=[
-            Parameter(name, value=value) for name, value in
-            {'size_a': CUBE, 'size_b': CUBE, 'model': 'exact'}.items()])), serving(
-            lambda context: ViewNode(context, BOTH)) as node:
+    with (serving(lambda context: answering_node(context, size_a=CUBE, size_b=CUBE, model='exact')),
+          serving(lambda context: ViewNode(context, BOTH)) as node):
         client = Client()
         try:
             client.offer_until_answered(ORIGIN, TOUCHING)
@@ -326,11 +322,16 @@ def started_by(running):
 
 
 @pytest.mark.parametrize('number, status', [(signal.SIGINT, 0), (signal.SIGTERM, 143)])
-def test_no_process_is_left(program, number, status):
-    """Node and crane have groups of their own; the view alone gets the signal."""
+@pytest.mark.parametrize('stopped', [False, True])
+def test_no_process_is_left(program, number, status, stopped):
+    """Also where node and crane stand still, and whoever asks asks again and again."""
     running, _ = start_view(program)
     started = started_by(running)
-    running.process.send_signal(number)
+    for pid in started if stopped else ():
+        os.kill(pid, signal.SIGSTOP)
+    while running.process.poll() is None:
+        running.process.send_signal(number)
+        time.sleep(0.001)
     assert running.wait() == status, running.output
     assert not [pid for pid in started if Path(f'/proc/{pid}').exists()]
     assert 'Traceback' not in running.output
@@ -356,7 +357,7 @@ def is_running(pid):
 
 
 def test_with_a_scene_it_starts_nothing(program):
-    running, _ = start_view(program, '--scene', 'yard_bay')
+    running, _ = start_view(program, '--scene', 'config/scenes/yard_bay.yaml')
     time.sleep(1.0)
     assert children(running.process.pid) == []
 
@@ -381,7 +382,7 @@ def test_a_contact_node_that_ends_is_an_error(monkeypatch):
 
 @pytest.mark.parametrize('arguments', [
     ('--model', 'crystal-ball'), ('--port', '0'), ('--domain', '500'), ('--spin',),
-    ('--model', 'exact', '--scene', 'yard_bay')])
+    ('--model', 'exact', '--scene', 'config/scenes/yard_bay.yaml')])
 def test_bad_arguments(arguments, capsys):
     with pytest.raises(SystemExit, match='2'):
         view.main(arguments)
