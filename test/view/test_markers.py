@@ -12,13 +12,14 @@ import numpy as np
 import poses
 import pytest
 import yaml
-from contact_messages import answering_node, contacts_message
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from ros_client import PATIENCE, Client, serving
+from typed_messages import named_contacts
 from visualization_msgs.msg import Marker, MarkerArray
 
 from box_contact_ros import ContactSolver
+from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import make_header
 from box_contact_ros.node.ros_client import CRANE_MARKERS
 from box_contact_ros.resources import resource_path
@@ -48,7 +49,7 @@ def drawing(touching, scene=YARD):
     """Return the markers of a scene, and those of each namespace."""
     rows = SceneRows(scene)
     poses = np.where(np.isnan(rows.poses), [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 2.0], rows.poses)
-    contacts = read_contacts(contacts_message(touching, stamp=STAMP), rows)
+    contacts = read_contacts(named_contacts(touching, stamp=STAMP), rows)
     markers = scene_markers(Tick(rows, STAMP, 'yard', poses, contacts, 0.0))
     return markers, {name: [m for m in markers if m.ns == name] for name in NAMESPACES}
 
@@ -169,8 +170,8 @@ def node():
 
 @pytest.fixture
 def contact_node():
-    with serving(lambda context: answering_node(
-            context, size_a=CUBE, size_b=CUBE, model='exact')) as node:
+    with serving(lambda context: ContactNode(context, parameter_overrides=[
+            *SETTINGS, Parameter('model', value='exact')])) as node:
         yield node
 
 
@@ -191,7 +192,7 @@ def test_draws_what_the_contact_node_answers(client, node, contact_node):
     """In contact with its point; apart, taken away; the boxes in both cases."""
     offer_until_drawn(client, 6)
     stamp = client.ask(poses.IDENTITY, TOUCHING, frames=('yard', 'yard'))
-    assert client.spin(lambda: client.arrays[-1].markers[0].header == client.clouds[stamp].header)
+    assert client.spin(lambda: client.arrays[-1].markers[0].header == client.contacts[stamp].header)
     markers = {marker.ns: marker for marker in client.arrays[-1].markers}
     assert set(markers) == set(NAMESPACES)
     wanted = ContactSolver(CUBE, CUBE, model='exact')(poses.IDENTITY, TOUCHING)

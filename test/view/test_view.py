@@ -19,6 +19,7 @@ import poses
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import WrenchStamped
+from rclpy.parameter import Parameter
 from rclpy.serialization import serialize_message
 from ros_client import PATIENCE, Client, serving
 
@@ -29,13 +30,13 @@ import msgspec
 import viser
 from browser import chromium, open_page
 from children import children
-from contact_messages import answering_node, contacts_message
 from PIL import Image
+from typed_messages import named_contacts, pose_array, pose_stamped
 from websockets.sync.client import connect
 
 from box_contact_ros import ContactSolver
+from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import NANOSECONDS, Refused, make_header
-from box_contact_ros.node.ros_client import array_message, pose_message
 from box_contact_ros.scene.pose import rotation_matrix
 from box_contact_ros.scene.scene_solver import Box, Pair, Scene, two_boxes
 from box_contact_ros.view import listener, view
@@ -79,7 +80,7 @@ def send(node, stamp, *poses_of_boxes):
     for topic, track, pose in zip(node.topics, node._tracks, poses_of_boxes, strict=True):
         if pose is not None:
             node._on_poses(topic, track,
-                           serialize_message(pose_message(make_header(stamp, 'yard'), pose)))
+                           serialize_message(pose_stamped(pose, 'yard', stamp)))
 
 
 @pytest.mark.parametrize('answer_at', [0, 1, 2])
@@ -89,7 +90,7 @@ def test_contacts_are_drawn_with_the_poses_that_they_answer(make_node, answer_at
     send(node, START - MS, None, TOUCHING)
     news = [lambda: send(node, START, ORIGIN, None), lambda: send(node, START + MS, APART, APART)]
     news.insert(answer_at, lambda: node._on_contacts(
-        contacts_message({PAIR: EXACT}, stamp=START)))
+        named_contacts({PAIR: EXACT}, stamp=START)))
     for deliver in news:
         deliver()
     tick = node.tick()
@@ -106,7 +107,7 @@ def test_latency_is_the_time_from_the_stamp_to_the_contacts(make_node):
     node = make_node()
     stamp = node.get_clock().now().nanoseconds - 3 * MS
     send(node, stamp, ORIGIN, TOUCHING)
-    node._on_contacts(contacts_message({PAIR: EXACT}, stamp=stamp))
+    node._on_contacts(named_contacts({PAIR: EXACT}, stamp=stamp))
     assert 3e-3 <= node.tick().latency < 1.0
 
 
@@ -115,7 +116,7 @@ def test_no_contact_stays_where_nobody_answers(make_node, monkeypatch):
     node = make_node()
     assert node.tick() is None and node.quiet
     send(node, START, ORIGIN, TOUCHING)
-    node._on_contacts(contacts_message({PAIR: EXACT}, stamp=START))
+    node._on_contacts(named_contacts({PAIR: EXACT}, stamp=START))
     monkeypatch.setattr(listener, 'UNANSWERED', 0.01)
     send(node, START + MS, ORIGIN, APART)
     time.sleep(0.02)
@@ -132,7 +133,7 @@ def test_time_that_goes_back(make_node):
     node = make_node()
     for stamp, pose in ((START, APART), (START - 10 * NANOSECONDS, TOUCHING)):
         send(node, stamp, ORIGIN, pose)
-        node._on_contacts(contacts_message({}, stamp=stamp))
+        node._on_contacts(named_contacts({}, stamp=stamp))
         assert np.array_equal(node.tick().poses, (ORIGIN, pose))
 
 
@@ -143,7 +144,7 @@ def test_boxes_that_an_array_lacks_stay_where_they_were(make_node):
     for stamp, rows in ((START, [ORIGIN] * 4),
                         (START + MS, [ORIGIN, TOUCHING, [math.nan] * 7, [0.0] * 7])):
         node._on_poses(node.topics[0], node._tracks[0], serialize_message(
-            array_message(make_header(stamp, 'yard'), [np.array(row) for row in rows])))
+            pose_array(rows, 'yard', stamp)))
     assert np.array_equal(node.tick().poses, [ORIGIN, TOUCHING, ORIGIN, ORIGIN])
 
 
@@ -156,15 +157,15 @@ def test_contacts_that_none_can_be_are_refused(make_node, numbers):
     """And what came before stays."""
     node = make_node()
     send(node, START, ORIGIN, TOUCHING)
-    node._on_contacts(contacts_message({PAIR: EXACT}, stamp=START))
+    node._on_contacts(named_contacts({PAIR: EXACT}, stamp=START))
     with pytest.raises(Refused, match='among the numbers of a contact'):
-        node._on_contacts(contacts_message({PAIR: EXACT._replace(**numbers)}, stamp=START + MS))
+        node._on_contacts(named_contacts({PAIR: EXACT._replace(**numbers)}, stamp=START + MS))
     assert node.tick().stamp == START
 
 
 def test_contacts_of_another_scene_are_refused():
-    for message in (contacts_message({'a_c': EXACT}, stamp=1),
-                    contacts_message({}, ['a_c'], stamp=1)):
+    for message in (named_contacts({'a_c': EXACT}, stamp=1),
+                    named_contacts({}, ['a_c'], stamp=1)):
         with pytest.raises(Refused, match="'a_c', which the scene that is drawn has not"):
             read_contacts(message, ROWS)
 
@@ -174,7 +175,7 @@ def test_the_deepest_contact_comes_first():
     scene = Scene({name: Box(name, CUBE, pose_topic=name) for name in 'abcd'},
                   tuple(Pair.between('a', b) for b in 'bcd'))
     nothing = EXACT._replace(volume=math.nan, covariance=np.full((3, 3), math.nan))
-    found = read_contacts(contacts_message({
+    found = read_contacts(named_contacts({
         'a_b': EXACT, 'a_c': nothing._replace(separation=-1.0),
         'a_d': EXACT._replace(point=np.full(3, math.nan), separation=0.1)}, stamp=1),
         SceneRows(scene))
@@ -206,8 +207,10 @@ def test_the_model_is_that_of_the_contact_node(make_node):
 
 def test_it_hears_a_contact_node():
     """Over DDS: poses, contacts, and which model answers."""
-    with (serving(lambda context: answering_node(context, size_a=CUBE, size_b=CUBE, model='exact')),
-          serving(lambda context: ViewNode(context, BOTH)) as node):
+    settings = {'size_a': CUBE, 'size_b': CUBE, 'model': 'exact'}
+    with serving(lambda context: ContactNode(context, parameter_overrides=[
+            Parameter(name, value=value) for name, value in settings.items()])), serving(
+            lambda context: ViewNode(context, BOTH)) as node:
         client = Client()
         try:
             client.offer_until_answered(ORIGIN, TOUCHING)
@@ -269,7 +272,7 @@ def test_all_corners_are_in_view_whatever_its_shape(aspect, extents):
 def tick_of(stamp, pose_b, contacts):
     """Return a tick of two boxes with contacts by pair, box a at the origin."""
     return Tick(ROWS, stamp, 'yard', np.array([ORIGIN, pose_b], dtype=float),
-                read_contacts(contacts_message(contacts, stamp=stamp), ROWS), 2e-3)
+                read_contacts(named_contacts(contacts, stamp=stamp), ROWS), 2e-3)
 
 
 def shown(text):
@@ -499,7 +502,7 @@ def test_two_hundred_boxes_in_a_browser(page):
     solver = ContactSolver(CUBE, CUBE, model='exact')
     rows = SceneRows(scene)
     contacts = {f'load_{n}_s{n}': solver(placed[n], boxes[f's{n}'].pose) for n in range(99)}
-    message = contacts_message(contacts, ['load_99_s99'], stamp=START)
+    message = named_contacts(contacts, ['load_99_s99'], stamp=START)
     bring(page, Tick(rows, START, 'yard', np.where(np.isnan(rows.poses), np.r_[placed, placed],
                                                    rows.poses),
                      read_contacts(message, rows), 1e-3))
