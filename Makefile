@@ -33,7 +33,7 @@ LINT := echo ruff; $(PY) -m ruff check .; echo mypy; $(PY) -m mypy
 
 help:
 	@echo 'make demo     the crane, the contact node, and contacts live in this terminal'
-	echo 'make view     the same in the browser, with models to switch and runs to repeat'
+	echo 'make view     the same in the browser, again and again'
 	echo 'make test     ruff, mypy and all tests'
 	echo 'make check    linters, and the quick tests of core, solver and scene: a minute'
 	echo 'make test-colcon  the quick tests, as `colcon test` runs them in a workspace'

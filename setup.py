@@ -134,7 +134,7 @@ def data_files() -> list[tuple[str, list[str]]]:
         'share/ament_index/resource_index/packages': [f'resource/{NAME}'],
         share: ['LICENSE', 'package.xml'],
     }
-    for folder in ('weights', 'msg_schemas', 'launch', 'config', 'recordings'):
+    for folder in ('weights', 'msg_schemas', 'launch', 'config'):
         for path in sorted(Path(folder).rglob('*')):
             # is_file() also drops links that colcon --symlink-install left to deleted files.
             if path.is_file() and '__pycache__' not in path.parts:
@@ -221,9 +221,6 @@ setup(
             'flake8',
             'gmpy2',
             'hypothesis',
-            # Foxglove's own reader, for what `record` writes.
-            'mcap',
-            'mcap-ros2-support',
             'mpmath',
             'mypy',
             *DOCS,

@@ -42,6 +42,7 @@ def generate_launch_description() -> LaunchDescription:
         node('crane', parameters=[values | {'wait': PATIENCE}], emulate_tty=True,
              on_exit=Shutdown(reason='the crane has ended')),
         node('soup_node', condition=IfCondition(LaunchConfiguration('soup'))),
-        node('view', arguments=['--attach'], condition=IfCondition(LaunchConfiguration('view'))),
+        node('view', arguments=['--scene=config/scenes/two_boxes.yaml'],
+             condition=IfCondition(LaunchConfiguration('view'))),
         IncludeLaunchDescription(str(Path(__file__).with_name('contact_node.launch.py'))),
     ])

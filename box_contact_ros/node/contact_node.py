@@ -250,7 +250,7 @@ class ContactNode(GuardedNode, LifecycleNode):
         if self._answerer is None or self._topics is None:
             self._diagnostics.publish(state=state, pairs=0)
         else:
-            self._diagnostics.report(state, self._answerer.solver.scene, self._answerer.pairing,
+            self._diagnostics.report(state, self._answerer.solver, self._answerer.pairing,
                                      self._topics)
 
 

@@ -21,7 +21,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 
 from ..scene.pairing import OLD, REPEATED, RESETS, TOO_LATE, Pairing, Rejection
-from ..scene.scene_solver import Pair, Scene
+from ..scene.scene_solver import Pair, Scene, SceneSolver
 from .messages import make_header
 from .topics import SceneTopics
 
@@ -144,9 +144,10 @@ class Diagnostics:
         self._reported: Counter[str] = Counter()
         self._logged: dict[str, float] = {}  # when a cause was logged [s]
 
-    def report(self, state: str, scene: Scene, pairing: Pairing, topics: SceneTopics) -> None:
+    def report(self, state: str, solver: SceneSolver, pairing: Pairing, topics: SceneTopics,
+               ) -> None:
         """Report on a node that is configured; `state` is that of the lifecycle."""
-        logger = self._node.get_logger()
+        logger, scene = self._node.get_logger(), solver.scene
         rejections, pairing.rejections = pairing.rejections, {}
         for line in (*self._monitor.take_refusals(),
                      *(_rejection_line(*rejection) for rejection in rejections.items())):
@@ -160,8 +161,8 @@ class Diagnostics:
             summary, [name.partition(': ')[2] for name in new if name.startswith('refused')],
             unseen, stale, scene, pairing, topics))
         self._log(findings)
-        self.publish(findings, state=state, pairs=len(scene.pairs), stale_boxes=' '.join(stale),
-                     boxes_that_never_came=' '.join(unseen),
+        self.publish(findings, state=state, model=solver.model, pairs=len(scene.pairs),
+                     stale_boxes=' '.join(stale), boxes_that_never_came=' '.join(unseen),
                      unanswered_pairs=len(summary.unanswered))
 
     def publish(self, findings: Sequence[Finding] = (), *, state: str, **values: Any) -> None:

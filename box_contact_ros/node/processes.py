@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import atexit
 import contextlib
+import ctypes
 import json
 import os
 import random
@@ -25,6 +26,7 @@ from ..solver.arguments import within
 DOMAINS = range(1, 102)
 """Domains to draw from: 0 is everybody's; beyond 101, ports run into those that Linux assigns."""
 END_PATIENCE = 1.0  # time [s] between asking a process group to end and killing it
+PR_SET_PDEATHSIG = 1  # of <linux/prctl.h>
 LOOK_PERIOD = 0.05  # time [s] after which a signal is noticed, at most
 
 
@@ -56,9 +58,20 @@ def program(name: str, **values: object) -> list[str]:
 
 def start(arguments: Sequence[str], output: IO[bytes] | int | None = subprocess.DEVNULL,
           ) -> subprocess.Popen[bytes]:
-    """Start Python in a process group of its own; `output` None passes its output on."""
+    """Start Python in a process group of its own; `output` None passes its output on.
+
+    On Linux it ends with the thread that starts it, also where that one is killed.
+    """
     return subprocess.Popen([sys.executable, *arguments], stdin=subprocess.DEVNULL, stdout=output,
-                            stderr=subprocess.STDOUT if output else None, start_new_session=True)
+                            stderr=subprocess.STDOUT if output else None, start_new_session=True,
+                            preexec_fn=_end_with_parent if sys.platform == 'linux' else None)
+
+
+_LIBC = ctypes.CDLL(None)  # loaded before a fork, after which little is safe
+
+
+def _end_with_parent() -> None:
+    _LIBC.prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
 
 
 def printed(output: IO[bytes]) -> str:

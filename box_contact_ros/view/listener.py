@@ -1,215 +1,213 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Nodes that hear what is drawn: poses of all boxes of a scene, and contacts.
+"""What is drawn of a scene: the poses of its boxes and the contacts of one evaluation, over ROS.
 
-`ViewNode` learns from the contact node what it is set to, and sets its model. A path that the node
-names is one of the node's machine: it is not opened here. The node tells the scene as text.
+A `Listener` subscribes to the poses and the contacts of a scene and keeps the last of each. Its
+`tick` puts together what belongs together: the last contacts, and the poses that they answer.
 """
 from __future__ import annotations
 
 import math
 import time
-from collections import Counter
-from collections.abc import Callable, Mapping
+from collections import deque
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import WrenchStamped
 from rclpy.context import Context
-from rclpy.parameter import Parameter, parameter_value_to_python
-from rclpy.parameter_client import AsyncParameterClient
-from rclpy.qos import QoSProfile
-from rclpy.subscription import Subscription
-from rclpy.task import Future
-from std_msgs.msg import String
-from visualization_msgs.msg import MarkerArray
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 
-from ..node.messages import Refused, read_contacts
-from ..node.ros_client import (
-    CRANE_MARKERS,
-    CRANE_WRENCH,
-    PoseTopic,
-    lines_of,
-    pose_topics,
-    stamp_of,
-    subscribe_contacts,
-)
-from ..node.runtime import LATCHED_QOS, POSE_QOS, GuardedNode
-from ..node.topics.scene_topics import LARGEST_SCENE_TEXT
-from ..node.topics.tf_poses import TfPoses, has_tf2
-from ..scene.files.limits import FOREIGN
-from ..scene.files.scene_file import SceneError, parse_scene
-from ..scene.scene_solver import Scene, two_boxes
-from ..scene.stamp_pairing import NEVER, StampedPose
-from .view_log import ViewLog
+from box_contact_msgs.msg import Contacts
 
-ASK_PERIOD = 0.5
-"""Time [s] between looks at the contact node's parameters: somebody else may change them too."""
-ANSWER_PATIENCE = 3.0
-"""Without an answer for so long [s], the contact node is not there, or is busy."""
-ASKED = ('size_a', 'size_b', 'scene', 'pairing', 'tolerance', 'model')
-MOST_FORCE = 1e12  # N: a chart of more shows nothing else
-OF_SCENE = ASKED[:-1]
-"""With another value of one of these, what came before is forgotten."""
+from ..core import LENGTH_MAX
+from ..node.messages import Refused
+from ..node.ros_client import CRANE_WRENCH, PoseTopic, pose_topics, stamp_of
+from ..node.runtime import GuardedNode
+from ..scene.scene_solver import Scene
+
+KEPT = 1000  # poses kept per topic: a second at 1 kHz
+UNANSWERED = 0.5
+"""Time [s] for which poses may come without contacts; then nobody answers, and none are drawn."""
+QUIET = 1.0  # time [s] without a pose, after which nobody moves the boxes any more
+FORCE_AGE = 100_000_000  # [ns] between a force and a tick: the crane publishes every 33 ms
+MOST_FORCE = 1e12  # [N]: a chart of more shows nothing else
+LARGEST = np.array([*[LENGTH_MAX] * 3, *[1.0 + 1e-6] * 3, LENGTH_MAX, LENGTH_MAX**3,
+                    *[LENGTH_MAX**2] * 6])
+"""Largest numbers of a contact: point, normal (rounded unit vector), depth, volume, covariance."""
+PATCH = slice(7, None)  # those of LARGEST that are NaN from models that give the point alone
+
+
+class SceneRows:
+    """A scene as arrays: one row per box, in the scene's order."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.row_of = {name: row for row, name in enumerate(scene.boxes)}
+        self.sizes = np.array([box.size for box in scene.boxes.values()], dtype=float)
+        self.poses = np.array([box.pose or [np.nan] * 7 for box in scene.boxes.values()])
+        """Poses (n, 7) of the fixed boxes, NaN for boxes that move."""
+        self.boxes_of = {pair.label: (self.row_of[pair.a], self.row_of[pair.b])
+                         for pair in scene.pairs}
+        self.is_a = np.isin(np.arange(len(self.sizes)), [a for a, _ in self.boxes_of.values()])
+        """Which boxes (n,) are box a of a pair: normals point away from them."""
+        longest = self.sizes.max(axis=1)
+        self.edge_of = {pair: float(longest[list(rows)].min())
+                        for pair, rows in self.boxes_of.items()}
+        """Longest edge [m] of each pair's smaller box, by the pair's name."""
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnContacts:
+    """The contacts of one evaluation as arrays, the deepest first; SI units, common frame."""
+
+    pairs: list[str]
+    stale: list[str]  # names of the pairs that could not be evaluated
+    points: np.ndarray  # (k, 3)
+    normals: np.ndarray  # (k, 3), unit vectors from a to b
+    depths: np.ndarray  # (k,)
+    volumes: np.ndarray  # (k,), NaN from models that give the point alone
+    covariances: np.ndarray  # (k, 3, 3), NaN there too
+
+
+@dataclass(frozen=True, eq=False)
+class Tick:
+    """The poses of all boxes at one stamp, and the contacts that answer them."""
+
+    rows: SceneRows
+    stamp: int  # [ns]
+    frame_id: str
+    poses: np.ndarray  # (n, 7), NaN for a box that has none
+    contacts: DrawnContacts | None  # None if nobody answers
+    latency: float  # time [s] from the stamp to the contacts, NaN if nobody answers
+
+
+def read_contacts(message: Any, rows: SceneRows) -> DrawnContacts:
+    """Return the contacts of a box_contact_msgs/Contacts; pairs apart are left out.
+
+    Raises Refused for a pair that is not in the scene, and for numbers that no contact has.
+    """
+    touching = [c for c in message.contacts if not math.isnan(c.point.x)]
+    touching.sort(key=lambda c: -c.depth)
+    pairs, stale = [c.pair for c in touching], list(message.stale)
+    unknown = [pair for pair in (*pairs, *stale) if pair not in rows.boxes_of]
+    if unknown:
+        raise Refused('other scene', f'the contacts have the pair {unknown[0][:100]!r}, which the '
+                                     'scene that is drawn has not')
+    numbers = np.array([(c.point.x, c.point.y, c.point.z, c.normal.x, c.normal.y, c.normal.z,
+                         c.depth, c.volume, *c.covariance) for c in touching])
+    numbers = numbers.reshape(-1, len(LARGEST))
+    good = np.abs(numbers) <= LARGEST
+    good[:, PATCH] |= np.isnan(numbers[:, PATCH])  # models that give the point alone
+    if not good.all():
+        raise Refused('bad contacts', f'{numbers[~good][0]:g} is among the numbers of a contact')
+    return DrawnContacts(pairs, stale, points=numbers[:, :3], normals=numbers[:, 3:6],
+                         depths=numbers[:, 6], volumes=numbers[:, 7],
+                         covariances=numbers[:, [[8, 9, 10], [9, 11, 12], [10, 12, 13]]])
+
+
+class Track:
+    """The last poses of the boxes of one topic, by stamp."""
+
+    def __init__(self, boxes: list[int]) -> None:
+        self.boxes = boxes  # their rows in the scene
+        self.kept: deque[tuple[int, np.ndarray]] = deque(maxlen=KEPT)
+
+    def append(self, stamp: int, poses: np.ndarray) -> None:
+        """Take poses (m, 7); a box without one, NaN, stays where it was."""
+        last = self.kept[-1][1] if self.kept else poses
+        self.kept.append((stamp, np.where(np.isnan(poses[:, :1]), last, poses)))
+
+    def at(self, stamp: int) -> np.ndarray:
+        """Return the last poses (m, 7) up to a stamp, the first ones where all are newer."""
+        return next((poses for at, poses in reversed(self.kept) if at <= stamp), self.kept[0][1])
 
 
 class Listener(GuardedNode):
-    """Writes what it hears to `log`; what the contact node refuses or another scene sends, drops.
+    """Keeps the last poses and contacts that it hears of a scene."""
 
-    log: of the scene that is listened to; None before the first.
-    """
+    def listen_to(self, scene: Scene, contacts_qos: QoSProfile) -> None:
+        """Subscribe to the topics of a scene."""
+        self._rows = SceneRows(scene)
+        self._tracks: list[Track] = []
+        self._frame_id = ''
+        self._answer: tuple[int, DrawnContacts, float] | None = None  # stamp, contacts, latency
+        self._heard = -math.inf  # when a pose last came, by the steady clock [s]
+        self._unanswered = math.inf  # since when poses come without contacts [s]
+        self.topics = pose_topics(scene)
+        for topic in self.topics:
+            self._tracks.append(Track([self._rows.row_of[box] for box in topic.boxes]))
+            self.create_subscription(topic.kind, topic.name,
+                                     partial(self._on_poses, topic, self._tracks[-1]), topic.qos,
+                                     raw=True)
+        self.create_subscription(Contacts, 'contacts', self._on_contacts, contacts_qos)
 
-    def __init__(self, name: str, context: Context, contacts_qos: QoSProfile,
-                 **options: Any) -> None:
-        super().__init__(name, context=context, **options)
-        self.log: ViewLog | None = None
-        self._poses_of: list[Subscription] = []
-        self._tf = TfPoses(self, Counter())
-        subscribe_contacts(self, self._on_contacts, contacts_qos)
+    @property
+    def quiet(self) -> bool:
+        """Whether no pose has come for QUIET seconds."""
+        return time.monotonic() - self._heard > QUIET
 
-    def listen_to(self, scene: Scene, **options: Any) -> None:
-        """Replace the scene; options go to `ViewLog`."""
-        for subscription in self._poses_of:
-            self.destroy_subscription(subscription)
-        self.log = log = ViewLog(scene, **options)
-        self._poses_of = [
-            self.create_subscription(topic.kind, topic.name, self._pose_callback(log, topic),
-                                     topic.qos, raw=True)
-            for topic in pose_topics(scene)]
-        self._tf.close()
-        if scene.frames and has_tf2():
-            self._tf.listen(scene.frame_id, scene.frames, partial(self._frame_callback, log))
-        elif scene.frames:
-            self.get_logger().warning(f'not drawn, as tf2_ros is not installed here: '
-                                      f'{", ".join(scene.frames)}')
-
-    def heard(self) -> None:
-        """Do what is to be done when something was written to `log`."""
-
-    def _pose_callback(self, log: ViewLog, topic: PoseTopic) -> Callable[[bytes], None]:
-        def callback(data: bytes) -> None:
-            poses = topic.read(data)
-            log.poses(topic.boxes, poses.stamp, poses.numbers, poses.frame_id)
-            self.heard()
-        return callback
-
-    def _frame_callback(self, log: ViewLog, box: str, _: str) -> Callable[[StampedPose], None]:
-        def callback(pose: StampedPose) -> None:
-            if pose.stamp == NEVER:
-                log.fix(box, pose.numbers)
-            else:
-                log.pose(box, pose.stamp, pose.numbers, pose.frame_id)
-            self.heard()
-        return callback
+    def _on_poses(self, topic: PoseTopic, track: Track, data: bytes) -> None:
+        poses = topic.read(data)
+        track.append(poses.stamp, poses.numbers)
+        self._frame_id, self._heard = poses.frame_id, time.monotonic()
+        self._unanswered = min(self._unanswered, self._heard)
 
     def _on_contacts(self, message: Any) -> None:
-        if self.log is None:
-            return
-        header = message.header
-        self.log.contacts(stamp_of(header), read_contacts(message, self.log.scene.scene.ids),
-                          self.get_clock().now().nanoseconds, header.frame_id)
-        self.heard()
+        stamp = stamp_of(message.header)
+        latency = 1e-9 * (self.get_clock().now().nanoseconds - stamp)
+        self._answer = stamp, read_contacts(message, self._rows), latency
+        self._unanswered = math.inf
+
+    def tick(self) -> Tick | None:
+        """Return the last contacts with their poses, or the last poses if nobody answers.
+
+        Return None before the first pose.
+        """
+        tracks = [track for track in self._tracks if track.kept]
+        if not tracks:
+            return None
+        stamp, contacts, latency = max(track.kept[-1][0] for track in tracks), None, math.nan
+        if self._answer is not None and time.monotonic() - self._unanswered <= UNANSWERED:
+            stamp, contacts, latency = self._answer
+        poses = self._rows.poses.copy()
+        for track in tracks:
+            poses[track.boxes] = track.at(stamp)
+        return Tick(self._rows, stamp, self._frame_id, poses, contacts, latency)
 
 
 class ViewNode(Listener):
-    """Listens to the scene that the contact node is set to, or to a given one."""
+    """Hears, besides a scene, which model the contact node runs, and the force on a crane's load.
 
-    def __init__(self, context: Context, target: str, scene: Scene | None = None,
-                 **options: Any) -> None:
-        """`target` is the name of the contact node; `scene` replaces the one that it tells."""
-        self.settings: Mapping[str, Any] = {}  # the contact node's parameters, those of ASKED
-        self.wish = ''  # the model that was asked for last, until it is granted
-        self.refusal = ''  # why the last wish was refused, or the scene cannot be read
-        self.lines = np.zeros((0, 2, 3))  # ends of the crane's lines, where a crane runs
-        self.force = math.nan  # upward part of the force on the crane's load [N]
-        self._scene, self._told = scene, ''
-        self._answered = 0.0
-        self._question: Future | None = None
-        # Contacts best effort: the view must never hold up the contact node.
-        super().__init__('view', context, POSE_QOS, **options)
-        self._target = AsyncParameterClient(self, target)
-        self.create_timer(ASK_PERIOD, self._ask)
-        self.create_subscription(MarkerArray, CRANE_MARKERS, self._on_crane, POSE_QOS)
-        self.create_subscription(WrenchStamped, CRANE_WRENCH, self._on_force, POSE_QOS)
-        self.create_subscription(String, f'{target}/scene', self._on_scene, LATCHED_QOS)
+    model: as /diagnostics tells it; empty before.
+    """
 
-    @property
-    def connected(self) -> bool:
-        """Whether the contact node answers questions."""
-        return time.monotonic() - self._answered < ANSWER_PATIENCE
+    def __init__(self, context: Context, scene: Scene, **options: Any) -> None:
+        super().__init__('view', context=context, **options)
+        self.model = ''
+        self._force = (0, math.nan)  # stamp [ns], upward part [N]
+        # Best effort: the view must never hold up the contact node.
+        qos = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
+        self.listen_to(scene, qos)
+        self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 10)
+        self.create_subscription(WrenchStamped, CRANE_WRENCH, self._on_force, qos)
 
-    @property
-    def model(self) -> str:
-        """Return the contact node's model; empty before it is known."""
-        return str(self.settings.get('model', ''))
+    def force(self, stamp: int) -> float:
+        """Return the upward force [N] of the contacts on a crane's load at a stamp [ns], or NaN."""
+        at, force = self._force
+        return force if abs(stamp - at) <= FORCE_AGE else math.nan
 
-    def now(self) -> int:
-        """Return the clock's time [ns]."""
-        return int(self.get_clock().now().nanoseconds)
-
-    def set_model(self, name: str) -> None:
-        """Ask the contact node for another model; `wish`, then `settings` or `refusal`, tell."""
-        self.wish, self.refusal = name, ''
-        future = self._target.set_parameters([Parameter('model', value=name)])
-
-        def done(future: Future) -> None:
-            result, = future.result().results
-            if self.wish == name:
-                self.wish, self.refusal = '', '' if result.successful else result.reason
-            if result.successful:
-                self.settings = {**self.settings, 'model': name}
-        future.add_done_callback(self.guarded(done, f'model {name}'))
-
-    def _on_crane(self, message: MarkerArray) -> None:
-        self.lines = lines_of(message)
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        name = f'{self.get_namespace().rstrip("/")}/contact_node: contacts'
+        for status in message.status:
+            if status.name == name:
+                self.model = next((value.value for value in status.values if value.key == 'model'),
+                                  '')
 
     def _on_force(self, message: WrenchStamped) -> None:
         force = message.wrench.force.z
         if not abs(force) <= MOST_FORCE:
             raise Refused('bad force', f'a force of {force:g} N')
-        self.force = force
-
-    def _ask(self) -> None:
-        if self._question is not None and not self.connected:
-            self._question = None  # lost with a node that has ended
-            self.wish = '' if self._answered else self.wish
-        if self._question is None and self._target.services_are_ready():
-            self._question = self._target.get_parameters(list(ASKED))
-            self._question.add_done_callback(
-                self.guarded(self._on_parameters, 'parameters of the contact node'))
-
-    def _on_parameters(self, future: Future) -> None:
-        self._question, self._answered = None, time.monotonic()
-        settings = dict(zip(ASKED, map(parameter_value_to_python, future.result().values)))
-        old, self.settings = self.settings, settings
-        if any(str(settings[name]) != str(old.get(name)) for name in OF_SCENE):
-            self._draw_anew()
-
-    def _on_scene(self, message: String) -> None:
-        if len(message.data) > LARGEST_SCENE_TEXT:
-            raise Refused('bad scene', f'a text of {len(message.data)} characters; at most '
-                                       f'{LARGEST_SCENE_TEXT}')
-        if message.data != self._told:
-            self._told = message.data
-            if self.settings.get('scene'):
-                self._draw_anew()
-
-    def _draw_anew(self) -> None:
-        """Listen to what the contact node is set to; a scene that is not told yet comes later."""
-        settings = self.settings
-        try:
-            if self._scene is not None:
-                scene = self._scene
-            elif not settings['scene']:
-                scene = two_boxes(settings['size_a'], settings['size_b'])
-            elif self._told:
-                scene = parse_scene(self._told, 'scene of the contact node', limits=FOREIGN)
-            else:
-                return
-            self.listen_to(scene, pairing=settings['pairing'],
-                           tolerance=float(settings['tolerance']))
-            self.refusal = ''
-        except SceneError as error:
-            self.refusal = f'{error} (--scene names the scene)'
+        self._force = stamp_of(message.header), force

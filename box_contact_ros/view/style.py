@@ -12,18 +12,12 @@ Colour = tuple[int, int, int]  # red, green, blue, 0 to 255
 
 BOX_A: Colour = (238, 150, 50)
 BOX_B: Colour = (70, 120, 170)
-STALE_BOX: Colour = (150, 150, 150)
 CONTACT: Colour = (230, 20, 110)
-EXACT: Colour = (0, 130, 110)
 ROPE: Colour = (60, 60, 70)
-LEGEND = ((BOX_A, 'box a of a pair'), (BOX_B, 'box b of a pair'), (STALE_BOX, 'no recent pose'),
-          (CONTACT, 'contact: point, normal from a to b, patch'), (EXACT, 'exact point'))
-LISTED = 10  # contacts that are listed and labelled, the deepest
-PATCH_OPACITY = 0.35
+LEGEND = ((BOX_A, 'box a of a pair'), (BOX_B, 'box b of a pair'),
+          (CONTACT, 'contact: point, normal from a to b, patch'))
 BOX_OPACITY = 0.4  # the contact is inside the boxes, so they are translucent
-STALE = 500_000_000
-"""Poses newer than the last answer by more than this [ns]: nobody answers, no contact is drawn."""
-POINT_RADIUS, NORMAL_LENGTH, TEXT_HEIGHT = 0.015, 0.15, 0.04
+POINT_RADIUS, NORMAL_LENGTH = 0.015, 0.15
 """Lengths of what has no size of its own, as shares of the box's longest edge."""
 ELLIPSE_SIGMAS = math.sqrt(3.0)
 """Semi-axes of a patch's ellipse in standard deviations. A uniform rectangle l × w has l/√12 and
@@ -45,26 +39,14 @@ def patch_axes(normals: np.ndarray, covariances: np.ndarray) -> np.ndarray:
     return np.where(known[:, None, None], semi_axes, math.nan)
 
 
-def patch_areas(semi_axes: np.ndarray) -> np.ndarray:
-    """Return the areas (k,) [m²] of the rectangles around ellipses, exact for rectangular patches.
+def patch_sides(points: np.ndarray, normals: np.ndarray, covariances: np.ndarray) -> np.ndarray:
+    """Return the ends (n, 2, 3) [m] of the short lines that draw the ellipses of patches.
 
-    semi_axes: those of `patch_axes`.
+    points, normals: (k, 3) of the contacts; those without a patch are left out.
     """
-    areas: np.ndarray = 4.0 * np.prod(np.linalg.norm(semi_axes, axis=2), axis=1)
-    return areas
-
-
-def patch_outlines(points: np.ndarray, semi_axes: np.ndarray) -> np.ndarray:
-    """Return points (m, 49, 3) [m] once around each patch; the last is the first.
-
-    points: (k, 3) of the contacts; those without a patch are left out.
-    """
-    outlines = points[:, None] + np.stack([np.cos(_CIRCLE), np.sin(_CIRCLE)], axis=1) @ semi_axes
-    return outlines[~np.isnan(outlines[:, 0, 0])]
-
-
-def sides(outlines: np.ndarray) -> np.ndarray:
-    """Return the ends (n, 2, 3) of the straight lines of outlines."""
+    axes = patch_axes(normals, covariances)
+    outlines = points[:, None] + np.stack([np.cos(_CIRCLE), np.sin(_CIRCLE)], axis=1) @ axes
+    outlines = outlines[~np.isnan(outlines[:, 0, 0])]
     return np.stack([outlines[:, :-1], outlines[:, 1:]], axis=2).reshape(-1, 2, 3)
 
 

@@ -4,7 +4,7 @@
 """The oracle of messages: what the node reads and writes as bytes, by rclpy's message objects."""
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from geometry_msgs.msg import (
@@ -23,7 +23,7 @@ from box_contact_msgs.msg import Contact as ContactMessage
 from box_contact_msgs.msg import Contacts
 from box_contact_ros.node.messages import NANOSECONDS, UPPER, Refused, make_header
 from box_contact_ros.scene.pairing import StampedPose
-from box_contact_ros.scene.scene_solver import Answer
+from box_contact_ros.scene.scene_solver import Answer, Pair
 from box_contact_ros.solver.checks import pose_fault
 from box_contact_ros.solver.contact import Contact, patch_area
 
@@ -91,6 +91,14 @@ def make_contacts(header: Header, answer: Answer) -> Contacts:
             pair=pair.label, box_a=pair.a, box_b=pair.b, point=_point(c.point),
             normal=_vector(c.normal), depth=-float(c.separation), volume=float(c.volume),
             area=patch_area(c), covariance=c.covariance[UPPER]) for pair, c in answer.listed])
+
+
+def named_contacts(touching: Mapping[str, Contact], stale: Sequence[str] = (), *, stamp: int,
+                   frame_id: str = 'yard') -> Contacts:
+    """Return `contacts` of contacts by the names of their pairs; stamp [ns]."""
+    return make_contacts(make_header(stamp, frame_id), Answer(
+        [(Pair(name, 'a', 'b'), contact) for name, contact in touching.items()],
+        [Pair(name, 'a', 'b') for name in stale], len(touching)))
 
 
 def _point(numbers: np.ndarray) -> Point:

@@ -47,7 +47,7 @@ container = (12.192, 2.438, 2.591)
 contact = ContactSolver(container, container)([0, 0, 0, 0, 0, 0, 1], [0.5, 0.25, 2.581, 0, 0, 0, 1])
 assert contact.colliding and abs(contact.separation + 0.01) < 1e-12, contact
 environment = Path(sys.argv[1])
-for folder in ('weights', 'msg_schemas', 'config', 'launch', 'recordings'):
+for folder in ('weights', 'msg_schemas', 'config', 'launch'):
     assert resource_path(folder).is_relative_to(environment), folder
 assert read_scene('config/scenes/yard_bay.yaml').pairs
 assert (environment / 'bin' / 'box_contact_contact_node').is_file()

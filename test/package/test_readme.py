@@ -265,7 +265,7 @@ COMMANDS = {
     r'ros2 topic pub -r 10 .+': published,
     r'ros2 param set \S+ \S+ \S+': parameter,
     r'ros2 launch \S+ \S+( .*)?': launch,
-    r'python (docs/examples|test/helpers)/\w+\.py': example,
+    r'python (docs/examples|test/helpers)/\w+\.py( /tmp/\w+)?': example,
     r'rviz2 -d .+': rviz,
     r'pip install .+': pip,
     r'rosdep install .+': rosdep,

@@ -1,7 +1,7 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Markers: what is drawn of poses and contacts, at what rate, and that it is taken away again."""
+"""Markers: what is drawn of poses and contacts, and that it is taken away again."""
 from __future__ import annotations
 
 import json
@@ -15,23 +15,18 @@ import yaml
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from ros_client import PATIENCE, Client, serving
-from sensor_msgs.msg import PointCloud2
+from typed_messages import named_contacts
 from visualization_msgs.msg import Marker, MarkerArray
 
 from box_contact_ros import ContactSolver
 from box_contact_ros.node.contact_node import ContactNode
-from box_contact_ros.node.messages import make_cloud, make_contacts, make_header, read_cloud
-from box_contact_ros.node.ros_client import ANSWERS, CRANE_MARKERS
+from box_contact_ros.node.messages import make_header
+from box_contact_ros.node.ros_client import CRANE_MARKERS
 from box_contact_ros.resources import resource_path
-from box_contact_ros.scene.scene_solver import Answer, Box, Pair, Scene
+from box_contact_ros.scene.scene_solver import Box, Pair, Scene
 from box_contact_ros.solver.contact import Contact
-from box_contact_ros.view.markers import (
-    NAMESPACES,
-    MarkersNode,
-    scene_markers,
-)
-from box_contact_ros.view.style import LISTED
-from box_contact_ros.view.view_log import ViewLog
+from box_contact_ros.view.listener import SceneRows, Tick, read_contacts
+from box_contact_ros.view.markers import LABELLED, NAMESPACES, MarkersNode, scene_markers
 
 SLAB, CUBE = (2.0, 4.0, 1.0), (2.0, 2.0, 2.0)
 STAMP = 1_500_000_000
@@ -39,7 +34,7 @@ HEADER = make_header(STAMP, 'yard')
 YARD = Scene({'slab': Box('slab', SLAB, pose_topic='slab/pose'),
               's1': Box('s1', CUBE, (1.0, 2.0, 3.0, 0.0, 0.0, 1.2, 1.6)),
               's2': Box('s2', CUBE, (9.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0))},
-             (Pair(4, 'slab_s1', 'slab', 's1'), Pair(7, 'slab_s2', 'slab', 's2')))
+             (Pair.between('slab', 's1'), Pair.between('slab', 's2')))
 CONTACT = Contact(True, -0.0125, np.array([0.0, 0.6, 0.8]), np.array([1.0, 2.0, 3.0]), 0.05,
                   np.eye(3) / 12)
 TOUCHING = np.array([0.5, 0.25, 1.875, 0, 0, 0, 1])
@@ -50,20 +45,18 @@ def xyz(values):
     return values.x, values.y, values.z
 
 
-def drawing(touching=(), stale=(), scene=YARD):
+def drawing(touching, scene=YARD):
     """Return the markers of a scene, and those of each namespace."""
-    log = ViewLog(scene)
-    for box in scene.moving:
-        log.pose(box, STAMP, np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 2.0]), 'yard')
-    cloud = make_cloud(HEADER, Answer(list(touching), list(stale), 1))
-    log.contacts(STAMP, read_cloud(cloud), STAMP, 'yard')
-    markers = scene_markers(log.snapshot())
+    rows = SceneRows(scene)
+    poses = np.where(np.isnan(rows.poses), [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 2.0], rows.poses)
+    contacts = read_contacts(named_contacts(touching, stamp=STAMP), rows)
+    markers = scene_markers(Tick(rows, STAMP, 'yard', poses, contacts, 0.0))
     return markers, {name: [m for m in markers if m.ns == name] for name in NAMESPACES}
 
 
 def test_a_box_is_a_cube_of_its_full_extents_at_its_pose():
     """Of every box of the scene; a quaternion of length 2 is made one of length 1."""
-    markers, found = drawing()
+    markers, found = drawing({})
     assert markers == found['boxes'] and [m.id for m in markers] == [0, 1, 2]
     assert all((m.type, m.action, m.header) == (Marker.CUBE, Marker.ADD, HEADER) for m in markers)
     assert [xyz(m.scale) for m in markers] == [SLAB, CUBE, CUBE]
@@ -79,7 +72,7 @@ def test_a_contact_is_point_normal_depth_and_patch():
 
     The patch is a closed line in the contact plane: of a square of 1 m the circle in it.
     """
-    _, found = drawing([(YARD.pairs[0], CONTACT)])
+    _, found = drawing({'slab_s1': CONTACT})
     (point,), (normal,), (depth,), (patch,) = (found[name] for name in (
         'points', 'normals', 'depths', 'patches'))
     assert [m.type for m in (point, normal, depth, patch)] == [
@@ -101,27 +94,18 @@ def test_a_contact_is_point_normal_depth_and_patch():
 
 
 def test_all_contacts_are_drawn_and_the_deepest_labelled():
-    """With normals of their own; ids count from the deepest on, so that they stay the same."""
+    """With normals of their own; ids count from the deepest on."""
     boxes = {f's{n}': Box(f's{n}', CUBE, (n, 0, 0, 0, 0, 0, 1)) for n in range(30)}
     boxes['load'] = Box('load', CUBE, pose_topic='load/pose')
-    pairs = tuple(Pair(n, f'p{n}', 'load', f's{n}') for n in range(30))
-    touching = [(pair, CONTACT._replace(separation=-1e-3 * (pair.id % 7),
-                                        point=np.full(3, pair.id)))
-                for pair in pairs]
-    _, found = drawing(touching, scene=Scene(boxes, pairs))
-    assert [xyz(place)[0] for place in found['points'][0].points] == list(range(30))
+    pairs = tuple(Pair(f'p{n}', 'load', f's{n}') for n in range(30))
+    touching = {f'p{n}': CONTACT._replace(separation=-1e-3 * n, point=np.full(3, n))
+                for n in range(30)}
+    _, found = drawing(touching, Scene(boxes, pairs))
+    assert [xyz(place)[0] for place in found['points'][0].points] == list(range(29, -1, -1))
     assert [m.id for m in found['normals']] == list(range(30))
     assert [m.text for m in found['depths']] == [
-        f'depth {n:.2f} mm' for n in sorted((n % 7 for n in range(30)), reverse=True)[:LISTED]]
+        f'depth {n:.2f} mm' for n in range(29, 29 - LABELLED, -1)]
     assert len(found['patches'][0].points) == 30 * 48 * 2
-
-
-def test_a_stale_box_is_grey():
-    """Its pair has no contact; the fixed box keeps its colour."""
-    _, found = drawing(stale=YARD.pairs)
-    colours = [m.color for m in found['boxes']]
-    assert colours[0].r == colours[0].g == colours[0].b
-    assert colours[1] == drawing()[1]['boxes'][1].color
 
 
 def test_the_rviz_config_names_topics_and_namespaces_that_exist():
@@ -164,7 +148,7 @@ def test_the_foxglove_layout_names_topics_and_fields_that_exist():
 
 # --- the node -------------------------------------------------------------------------------------
 
-SETTINGS = {'size_a': list(CUBE), 'size_b': list(CUBE)}
+SETTINGS = [Parameter(name, value=list(CUBE)) for name in ('size_a', 'size_b')]
 
 
 @pytest.fixture
@@ -180,16 +164,14 @@ def client():
 
 @pytest.fixture
 def node():
-    with serving(lambda context: MarkersNode(context, parameter_overrides=[
-            Parameter(name, value=value) for name, value in SETTINGS.items()])) as node:
+    with serving(lambda context: MarkersNode(context, parameter_overrides=SETTINGS)) as node:
         yield node
 
 
 @pytest.fixture
 def contact_node():
     with serving(lambda context: ContactNode(context, parameter_overrides=[
-            Parameter(name, value=value)
-            for name, value in (SETTINGS | {'model': 'exact'}).items()])) as node:
+            *SETTINGS, Parameter('model', value='exact')])) as node:
         yield node
 
 
@@ -206,108 +188,26 @@ def offer_until_drawn(client, count):
         client.spin(lambda: False, 0.1)
 
 
-def drawn(client, wanted):
-    """Wait until what shows the contact has this action in the last array."""
-    names = 'points', 'normals', 'patches', 'depths'
-    return client.spin(lambda: [actions(client.arrays[-1]).get((name, 0)) for name in names] == [
-        wanted] * len(names))
-
-
 def test_draws_what_the_contact_node_answers(client, node, contact_node):
     """In contact with its point; apart, taken away; the boxes in both cases."""
     offer_until_drawn(client, 6)
     stamp = client.ask(poses.IDENTITY, TOUCHING, frames=('yard', 'yard'))
-    assert client.spin(lambda: client.arrays[-1].markers[0].header == client.clouds[stamp].header)
-    assert drawn(client, Marker.ADD)
+    assert client.spin(lambda: client.arrays[-1].markers[0].header == client.contacts[stamp].header)
     markers = {marker.ns: marker for marker in client.arrays[-1].markers}
     assert set(markers) == set(NAMESPACES)
-    assert {marker.header.frame_id for marker in markers.values()} == {'yard'}
     wanted = ContactSolver(CUBE, CUBE, model='exact')(poses.IDENTITY, TOUCHING)
     assert xyz(markers['points'].points[0]) == tuple(wanted.point)
     client.arrays.clear()
     client.ask(poses.IDENTITY, APART)
     # Once taken away: the next arrays need not say so again.
-    assert client.spin(lambda: any(actions(array).get(('points', 0)) == Marker.DELETE
-                                   for array in client.arrays))
-    assert actions(client.arrays[-1])['boxes', 1] == Marker.ADD
+    names = 'points', 'normals', 'patches', 'depths'
+    assert client.spin(lambda: any(
+        [actions(array).get((name, 0)) for name in names] == [Marker.DELETE] * len(names)
+        for array in client.arrays))
     assert client.spin(lambda: xyz(client.arrays[-1].markers[1].pose.position) == (0.5, 0.25, 2.5))
-
-
-def test_nobody_answers_any_more(client, node):
-    """A contact does not stay in the air while the boxes move on."""
-    with serving(lambda context: ContactNode(context, parameter_overrides=[
-            Parameter(name, value=value)
-            for name, value in (SETTINGS | {'model': 'exact'}).items()])):
-        offer_until_drawn(client, 6)
-        client.ask(poses.IDENTITY, TOUCHING)
-        assert drawn(client, Marker.ADD)
-    client.spin(lambda: False, 0.7)
-    client.send(poses.IDENTITY, TOUCHING)
-    assert drawn(client, Marker.DELETE)
-
-
-def test_contacts_of_another_scene_are_not_drawn(client, node, capfd):
-    """A row of a pair that the scene has not: said, and no point put anywhere."""
-    offer_until_drawn(client, 2)
-    kind, topic = ANSWERS['cloud']
-    make = make_cloud if kind is PointCloud2 else make_contacts
-    publisher = client.node.create_publisher(kind, topic, 10)
-    assert client.spin(lambda: publisher.get_subscription_count() > 1)  # ours, and markers'
-    said, deadline = '', time.monotonic() + PATIENCE
-    for pairs in ([Pair(3, 'p', 'a', 'b')], [Pair(0, 'p', 'a', 'b'), Pair(1, 'q', 'a', 'c')]):
-        while True:
-            publisher.publish(make(make_header(client.next_stamp(), 'map'), Answer(
-                [(pair, CONTACT) for pair in pairs], [], len(pairs))))
-            client.spin(lambda: False, 0.2)
-            if 'which the scene that is drawn has not' in (said := said + capfd.readouterr().err):
-                break  # the node has matched
-            assert time.monotonic() < deadline, 'nothing said'
-        client.arrays.clear()
-        client.send(poses.IDENTITY, TOUCHING)
-        assert client.spin(lambda: client.arrays)
-        assert not any(marker.ns == 'points' for array in client.arrays for marker in array.markers)
-
-
-def test_another_scene(client, node):
-    """Set while it runs: its boxes are subscribed to and drawn, a bad one is refused."""
-    result, = node.set_parameters([Parameter('scene', value='no_such_scene')])
-    assert not result.successful and 'no_such_scene' in result.reason
-    offer_until_drawn(client, 2)
-    result, = node.set_parameters([Parameter('scene', value='two_boxes')])
-    assert result.successful
-    client.arrays.clear()
-    offer_until_drawn(client, 2)
-    assert client.spin(lambda: xyz(client.arrays[-1].markers[0].scale) == (12.192, 2.438, 2.591))
-
-
-def test_no_more_often_than_asked(client, node, contact_node):
-    """Poses at some 500 Hz for a second: markers at the rate, and none while nothing is new."""
-    result, = node.set_parameters([Parameter('rate', value=20)])
-    assert result.successful
-    offer_until_drawn(client, 6)
-    client.arrays.clear()
-    started = time.monotonic()
-    while time.monotonic() - started < 1.0:
-        client.send(poses.IDENTITY, TOUCHING)
-        client.spin(lambda: False, 0.002)
-
-    def quiet():
-        """Whether half a second, ten periods, brings nothing."""
-        count = len(client.arrays)
-        return not client.spin(lambda: len(client.arrays) > count, 0.5)
-
-    assert client.spin(quiet)
-    lasted = time.monotonic() - started - 0.5
-    assert 2 <= len(client.arrays) <= 20.0 * lasted + 2  # and a timer that catches up
-
-
-def test_program(program, client):
-    """As a process, with parameters from the command line; ends with status 0 on SIGINT."""
-    running = program('markers', '--ros-args', '-p', 'rate:=10', '-p', 'size_b:=[1.0,1.0,1.0]')
-    running.wait_for_output('ready', 60)
-    running.signal(2)
-    assert running.wait() == 0, running.output
-    assert 'rate' in program('markers', '--help').wait_for_output('most marker arrays')
+    assert client.spin(lambda: node.quiet)
+    count = len(client.arrays)
+    assert not client.spin(lambda: len(client.arrays) > count + 1, 0.5)  # nothing moves any more
 
 
 def test_bad_poses_are_not_drawn(client, node):
@@ -320,3 +220,14 @@ def test_bad_poses_are_not_drawn(client, node):
         client.send(poses.IDENTITY, bad)
     assert client.spin(lambda: client.arrays)
     assert xyz(client.arrays[-1].markers[1].pose.position) == (0.5, 0.25, 2.5)
+
+
+def test_program(program):
+    """As a process, with a scene from the command line; ends with status 0 on SIGINT."""
+    running = program('markers', '--ros-args', '-p', 'scene:=config/scenes/two_boxes.yaml')
+    running.wait_for_output('ready')
+    running.signal(2)
+    assert running.wait() == 0, running.output
+    assert 'scene' in program('markers', '--help').wait_for_output('size_a')
+    bad = program('markers', '--ros-args', '-p', 'scene:=no_such_scene')
+    assert bad.wait() == 1 and 'no_such_scene' in bad.output

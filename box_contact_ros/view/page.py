@@ -1,0 +1,280 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""The page in the browser: a drawing, figures and charts, served by viser. No ROS.
+
+Nothing on the page can be set. The origin of the drawing is where boxes were first seen: browsers
+draw in float32, which is half a metre coarse in map coordinates.
+"""
+from __future__ import annotations
+
+import contextlib
+import html
+import io
+import logging
+import math
+import socket
+from collections import deque
+from typing import Any
+
+import numpy as np
+import viser
+
+from ..node.messages import NANOSECONDS
+from ..scene.pose import rotation_matrix
+from . import style
+from .listener import DrawnContacts, SceneRows, Tick
+
+HISTORY = 12.0  # length [s] of the charts
+ROOM = 0.1  # above the values of a chart, as a share of them
+LEAST_DEPTH, LEAST_FORCE = 1.0, 1.0
+"""[mm], [kN]: what charts show at least, not to magnify noise."""
+PANEL_WIDTH = 300  # pixels
+LONGEST = 100  # characters that are shown of a model's name, which may have megabytes
+GROUND, LINES, SECTIONS = (236, 238, 241), (206, 211, 217), (176, 183, 191)
+GROUND_SIZE = 60.0  # length [m] of the ground at least
+VIEWPOINT = np.array([-0.55, -0.78, 0.42])
+"""Direction from the boxes to the camera at first."""
+NARROW = 0.85  # width divided by height of the view that all boxes are in, however they lie
+CUBE = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+CUBE_FACES = np.array([[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],
+                       [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]])
+_ENDS = np.array([(i, i | bit) for i in range(8) for bit in (1, 2, 4) if not i & bit])
+CUBE_EDGES = np.concatenate([CUBE[_ENDS], 1.0001 * CUBE[_ENDS[:, :1]]], axis=1)
+"""Corners (12, 3, 3) of a triangle an edge, so thin that its wireframe is the edge."""
+GAMMA = 2.2  # of the colours of screens
+LEGEND = ''.join(f'<span style="white-space:nowrap;color:rgb{colour}">■</span> {text} &ensp;'
+                 for colour, text in style.LEGEND)
+TITLE = """<img src="data:," hidden onerror="document.title = 'box_contact_ros'">"""
+"""Names the browser's tab, which viser calls after itself."""
+
+
+class Server(viser.ViserServer):
+    """A viser server that opens no public tunnel, which any browser could ask for."""
+
+    def __init__(self, host: str, port: int) -> None:
+        """Serve at a port, or the next that is free. Raises OSError."""
+        # viser would wait for ever for a server that cannot start.
+        with socket.create_server((host, 0), family=socket.getaddrinfo(host, 0)[0][0]):
+            pass
+        # Browsers open connections on suspicion, and close them unused; that is no error.
+        logging.getLogger('websockets').setLevel(logging.CRITICAL)
+        with contextlib.redirect_stdout(io.StringIO()):  # viser greets
+            super().__init__(host, port, 'box_contact_ros', verbose=False)
+
+    def request_share_url(self, verbose: bool = True) -> None:
+        """Do nothing."""
+
+
+class Page:
+    """`draw` moves what is drawn to a tick; `show` brings figures and charts to the same tick."""
+
+    def __init__(self, host: str, port: int) -> None:
+        """Serve at a port, or the next that is free. Raises OSError."""
+        self._server = Server(host, port)
+        self.url = f'http://{host}:{self._server.get_port()}'
+        gui = self._server.gui
+        gui.configure_theme(show_logo=False, show_share_button=False, control_width='large')
+        gui.main_panel.dock_right()
+        gui.main_panel.set_width(PANEL_WIDTH)
+        self._figures = gui.add_html('')
+        self._history: deque[tuple[float, float, float]] = deque()  # time [s], depth, force
+        self._charts: dict[str, Any] = {}
+        gui.add_html('<div id="legend" style="padding:0 0.7em 0.6em;font-size:0.78em">'
+                     f'{LEGEND}{TITLE}</div>')
+        self._rows: SceneRows | None = None
+        self._seen = 0  # boxes; each that joins brings all of them into view
+        self._origin = np.zeros(3)
+        self._add_drawing()
+
+    def close(self) -> None:
+        """End the server."""
+        with contextlib.redirect_stdout(io.StringIO()):
+            self._server.stop()
+
+    # --- the drawing ------------------------------------------------------------------------------
+
+    def draw(self, tick: Tick) -> None:
+        """Show boxes and contacts."""
+        with self._server.atomic():
+            if tick.rows is not self._rows:
+                self._add_boxes(tick.rows)
+            known = ~np.isnan(tick.poses[:, 0])
+            if known.sum() > self._seen:
+                self._look_at(tick, known)
+            self._draw_boxes(tick, known)
+            self._draw_contacts(tick.contacts)
+
+    def _add_drawing(self) -> None:
+        scene, place = self._server.scene, np.zeros((1, 2, 3))
+        self._ground = scene.add_grid('/ground', GROUND_SIZE, GROUND_SIZE, cell_size=1.0,
+                                      section_size=5.0, cell_color=LINES, section_color=SECTIONS,
+                                      plane_color=GROUND, plane_opacity=1.0, shadow_opacity=0.0,
+                                      visible=False)
+        self._points = scene.add_point_cloud('/contact/points', place[:, 0], style.CONTACT,
+                                             point_shape='circle', precision='float32',
+                                             visible=False)
+        self._normals = scene.add_arrows('/contact/normals', place, style.CONTACT, visible=False)
+        self._patches = scene.add_line_segments('/contact/patches', place, style.CONTACT,
+                                                thickness=3.0, thickness_units='screen',
+                                                visible=False)
+
+    def _add_boxes(self, rows: SceneRows) -> None:
+        """Add the boxes as instances of one cube: a tick moves all of them together."""
+        self._rows = rows
+        edge = float(np.median(list(rows.edge_of.values())))
+        radius = style.POINT_RADIUS * edge
+        self._points.point_size = 2.0 * radius
+        self._normals.shaft_radius = 0.45 * radius
+        self._normals.head_radius = 1.1 * radius
+        self._normals.head_length = 2.6 * radius
+        self._normal_length = style.NORMAL_LENGTH * edge
+        colours = np.where(rows.is_a[:, None], style.BOX_A, style.BOX_B)
+        count = len(rows.sizes)
+        no_turn, nothing = np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)), np.zeros((count, 3))
+
+        def add(path: str, corners: np.ndarray, triangles: np.ndarray, shades: np.ndarray,
+                **look: Any) -> Any:
+            # viser takes the colours of single instances as light.
+            light = (255.0 * (shades / 255.0) ** GAMMA).astype(np.uint8)
+            return self._server.scene.add_batched_meshes_simple(
+                path, corners, triangles, no_turn, nothing, batched_scales=nothing,
+                batched_colors=light, lod='off', cast_shadow=False, receive_shadow=False, **look)
+
+        # Flat faces look the same as toons, and cost a browser without a GPU some 10 % less.
+        self._faces = add('/boxes', CUBE, CUBE_FACES, colours, opacity=style.BOX_OPACITY,
+                          flat_shading=True, material='toon5')
+        self._edges = add('/edges', CUBE_EDGES.reshape(-1, 3), np.arange(36).reshape(12, 3),
+                          colours // 2, wireframe=True)
+
+    def _draw_boxes(self, tick: Tick, known: np.ndarray) -> None:
+        """Move the boxes; those without a pose shrink to nothing."""
+        poses = style.unit_poses(np.where(known[:, None], tick.poses, [0, 0, 0, 0, 0, 0, 1]))
+        for mesh in (self._faces, self._edges):
+            mesh.batched_positions = poses[:, :3] - self._origin
+            mesh.batched_wxyzs = np.roll(poses[:, 3:], 1, axis=1)
+            mesh.batched_scales = np.where(known[:, None], tick.rows.sizes, 0.0)
+
+    def _draw_contacts(self, contacts: DrawnContacts | None) -> None:
+        points = sides = np.zeros((0, 3))
+        if contacts is not None:
+            points = contacts.points - self._origin
+            tips = points + self._normal_length * contacts.normals
+            sides = style.patch_sides(points, contacts.normals, contacts.covariances)
+        self._points.visible = self._normals.visible = len(points) > 0
+        self._patches.visible = len(sides) > 0
+        if len(points):
+            self._points.points = points.astype(np.float32)
+            self._normals.points = np.stack([points, tips], axis=1)
+        if len(sides):
+            self._patches.points = sides
+
+    # --- the camera -------------------------------------------------------------------------------
+
+    def _look_at(self, tick: Tick, known: np.ndarray) -> None:
+        """Put origin, ground and the first camera where the boxes `known` (n,) are."""
+        self._seen = known.sum()
+        poses, sizes = tick.poses[known], tick.rows.sizes[known]
+        # Half the extents along the frame's axes.
+        half = 0.5 * np.einsum('nij,nj->ni', np.abs(rotation_matrix(poses[:, 3:])), sizes)
+        low, high = (poses[:, :3] - half).min(axis=0), (poses[:, :3] + half).max(axis=0)
+        self._origin, radius = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
+        self._ground.position = (0.0, 0.0, 0.5 * float((low - high)[2]))
+        for name in ('width', 'height', 'fade_distance'):
+            setattr(self._ground, name, max(GROUND_SIZE, 6.0 * radius))
+        self._ground.visible = True
+        camera = self._server.initial_camera  # viser moves open pages the first time alone
+        camera.position = camera_position(radius, camera.fov, NARROW)
+        camera.look_at = np.zeros(3)
+
+    # --- figures and charts -----------------------------------------------------------------------
+
+    def show(self, tick: Tick | None, force: float, *, model: str, awaited: str) -> None:
+        """Show figures and charts of a tick; where there is none, what is awaited.
+
+        The charts then stay as they are until the next tick begins them anew.
+
+        force: upward part of the force on the crane's load [N], NaN where none is known.
+        """
+        if tick is None:
+            self._history.clear()
+        else:
+            time, depths = tick.stamp / NANOSECONDS, tick.contacts.depths if tick.contacts else ()
+            if self._history and time < self._history[-1][0]:
+                self._history.clear()
+            self._history.append((time, 1e3 * max(depths, default=0.0), 1e-3 * force))
+            while time - self._history[0][0] > HISTORY:
+                self._history.popleft()
+        with self._server.atomic():
+            self._figures.content = figures(tick, force, model=model, awaited=awaited)
+            if self._history:
+                times, depths, forces = np.array(self._history).T
+                self._plot('depth [mm]', LEAST_DEPTH, times, depths)
+                self._plot('force [kN]', LEAST_FORCE, times, forces)
+
+    def _plot(self, label: str, least: float, times: np.ndarray, values: np.ndarray) -> None:
+        """Show values over times [s]; what is NaN is left out, and a chart of nothing stays away.
+
+        The chart goes from zero to `least`, or as far as the values go.
+        """
+        known = ~np.isnan(values)
+        if known.sum() < 2:  # which make no axis of times
+            return
+        # Axes are those of the data, which have a line at zero: axes that are set lose their labels
+        # where the browser gives the chart its width later, or builds it anew.
+        data = times[known] - times[-1], values[known], np.zeros(known.sum())
+        if label in self._charts:
+            self._charts[label].data = data
+            return
+        high = {'pad': ROOM, 'soft': least, 'mode': 1}
+        self._charts[label] = self._server.gui.add_uplot(
+            data, ({'label': 's'}, {'label': label, 'stroke': f'rgb{style.CONTACT}', 'width': 2},
+                   {'label': 'zero', 'stroke': f'rgb{SECTIONS}'}),
+            scales={'x': {'time': False},
+                    'y': {'range': {'min': {'pad': 0.0, 'soft': 0.0, 'mode': 1}, 'max': high}}},
+            axes=({'label': 'time [s]', 'size': 30, 'labelSize': 18},
+                  {'label': label, 'size': 56, 'labelSize': 18}),
+            legend={'show': False}, padding=(10, 24, 0, 0), height=145)
+
+
+def figures(tick: Tick | None, force: float, *, model: str, awaited: str) -> str:
+    """Return a line in plain words and a table, as HTML; each value has its name as id."""
+    words, rows = awaited, [('model', 'model', model[:LONGEST] or '–')]
+    if tick is not None:
+        contacts = tick.contacts
+        words = in_words(contacts)
+        if contacts is not None and len(tick.rows.boxes_of) > 1:
+            rows.append(('pairs', 'pairs in contact',
+                         f'{len(contacts.pairs)} of {len(tick.rows.boxes_of)}'))
+            rows.append(('stale', 'pairs not evaluated', f'{len(contacts.stale)}'))
+        volume = contacts.volumes.sum() if contacts is not None else math.nan
+        rows += [('volume', 'volume of the overlap', _text(1e3 * volume, '.3g', 'L')),
+                 ('force', 'force on the load', _text(1e-3 * force, '.1f', 'kN')),
+                 ('latency', 'latency', _text(1e3 * tick.latency, '.2f', 'ms'))]
+    lines = ''.join(f'<tr><td style="opacity:0.7">{label}</td><td style="text-align:right"><b '
+                    f'id="{name}">{html.escape(text)}</b></td></tr>' for name, label, text in rows)
+    return (f'<div id="verdict" style="padding:0.5em 0.6em 0;font-size:1.15em;font-weight:600">'
+            f'{words}</div><table style="width:100%;padding:0.6em;font-size:0.9em;'
+            f'font-variant-numeric:tabular-nums">{lines}</table>')
+
+
+def in_words(contacts: DrawnContacts | None) -> str:
+    """Return in words whether there is contact, and how deep; of several contacts the deepest."""
+    if contacts is None:
+        return 'poses come, but no contacts'
+    if contacts.pairs:
+        return f'contact, {1e3 * contacts.depths[0]:.2f} mm deep'
+    return 'not evaluated' if contacts.stale else 'no contact'
+
+
+def camera_position(radius: float, fov: float, aspect: float) -> np.ndarray:
+    """Return where a camera (3,) towards the origin has a sphere about it in view, from VIEWPOINT.
+
+    radius: [m]; fov: vertical angle of view [rad]; aspect: width of the view divided by its height.
+    """
+    half_angle = math.atan(min(1.0, aspect) * math.tan(0.5 * fov))
+    return radius / math.sin(half_angle) * VIEWPOINT / np.linalg.norm(VIEWPOINT)
+
+
+def _text(value: float, form: str, unit: str) -> str:
+    return '–' if math.isnan(value) else f'{value:{form}} {unit}'

@@ -1,4 +1,0 @@
-# Copyright 2026 The box_contact_ros maintainers
-# SPDX-License-Identifier: Apache-2.0
-
-"""Recordings of running nodes, as bags."""
