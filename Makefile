@@ -106,7 +106,7 @@ test-arm:
 	@.ci/setup test
 	exec bash test/core/arm.sh $(PY)
 
-# Another release, another command: make test-debian13 DEBIAN=forky ARGS='"make demo"'
+# Another release, other commands: make test-debian13 DEBIAN=forky ARGS='"make demo"'
 DEBIAN ?= trixie
 test-debian13:
 	@exec bash test/package/debian.sh $(DEBIAN) $(ARGS)

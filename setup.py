@@ -181,6 +181,7 @@ setup(
             'ros-jazzy-rclpy',
             'ros-jazzy-rmw-fastrtps-cpp',
             # What builds box_contact_msgs. The wheels do not ask for all that they need.
+            'catkin-pkg',
             'cmake',
             'empy==3.3.4',
             'ninja',
@@ -205,7 +206,9 @@ setup(
         'fuzz': ['gmpy2', 'mpmath', 'tqdm'],
         # Engines that only reports compare with. Drake is measured where it is installed: with what
         # it needs it is 0.2 GB.
-        'peers': ['coal', 'mujoco', 'pybullet', 'python-fcl'],
+        # Bullet has no wheel elsewhere, and compiles for ten minutes.
+        'peers': ['coal', 'mujoco', 'python-fcl',
+                  'pybullet; python_version < "3.12" and platform_machine == "x86_64"'],
         # `make docs`.
         'docs': DOCS,
         # The example that shares ten million pairs among machines.

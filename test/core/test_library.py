@@ -12,6 +12,7 @@ import ctypes
 import json
 import os
 import platform
+import shlex
 import shutil
 import subprocess
 import sys
@@ -257,7 +258,7 @@ def test_versions_agree(setup_arguments: dict) -> None:
 def test_by_pkg_config(tmp_path: Path) -> None:
     found = run(tool('pkg-config'), '--cflags', '--libs', 'box_contact',
                 PKG_CONFIG_PATH=str(CORE / 'cmake'))
-    run(tool('g++'), '-std=c++17', EXAMPLE / 'first_contact.cpp', *found.split(), '-o',
+    run(tool('g++'), '-std=c++17', EXAMPLE / 'first_contact.cpp', *shlex.split(found), '-o',
         tmp_path / 'one')
     assert example(tmp_path / 'one') == EXAMPLE_SAYS
 
@@ -320,9 +321,9 @@ add_executable(first_contact {example}/first_contact.cpp)
 target_link_libraries(first_contact PRIVATE box_contact_ros::box_contact)
 """
 TAKE_IN = {
-    'add_subdirectory': f'add_subdirectory({ROOT} core)',
+    'add_subdirectory': f'add_subdirectory("{ROOT}" core)',
     'FetchContent': 'include(FetchContent)\n'
-                    f'FetchContent_Declare(box_contact_ros SOURCE_DIR {ROOT})\n'
+                    f'FetchContent_Declare(box_contact_ros SOURCE_DIR "{ROOT}")\n'
                     'FetchContent_MakeAvailable(box_contact_ros)'}
 LAUNCHER = """#!/bin/sh
 # Compile, or copy what the first project has compiled: sources and flags are the same.
@@ -369,7 +370,8 @@ def test_a_plain_installation(tmp_path: Path, from_source: tuple[str, ...], kind
     assert example(tmp_path / 'example' / 'first_contact') == EXAMPLE_SAYS
     found = run(tool('pkg-config'), '--cflags', '--libs', 'box_contact',
                 PKG_CONFIG_PATH=str(prefix / 'lib' / 'pkgconfig'))
-    run('g++', '-std=c++17', EXAMPLE / 'first_contact.cpp', *found.split(), '-o', tmp_path / 'one')
+    run('g++', '-std=c++17', EXAMPLE / 'first_contact.cpp', *shlex.split(found), '-o',
+        tmp_path / 'one')
     assert run(tmp_path / 'one', LD_LIBRARY_PATH=str(prefix / 'lib')).splitlines() == EXAMPLE_SAYS
 
 

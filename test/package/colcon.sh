@@ -27,34 +27,32 @@ install() {
 }
 
 "$python" -m venv "$work/venv"
+cd "$root"
+"$python" setup.py -q egg_info --egg-base "$work"
+# Before the first section are those that everybody needs.
+awk '/^\[/ {other = $0 != "[ros]"; next} !other' "$work"/*.egg-info/requires.txt >"$work/needs.txt"
 PATH=$work/venv/bin:$PATH
-install --constraint "$root/constraints.txt" setuptools \
-    colcon-common-extensions jsonschema numpy pytest pyyaml \
-    ros-jazzy-common-interfaces ros-jazzy-rclpy ros-jazzy-rmw-fastrtps-cpp
+install --constraint constraints.txt --requirement "$work/needs.txt" \
+    setuptools colcon-common-extensions pytest
+# Where the wheels' CMake packages are.
+export AMENT_PREFIX_PATH=$work/venv CMAKE_PREFIX_PATH=$work/venv
 
 # The working tree: all that git tracks, and what is about to be added.
 sources=$work/box_contact_ros
 mkdir "$sources"
-cd "$root"
 git -c safe.directory='*' ls-files -z --cached --others --exclude-standard |
     while IFS= read -r -d '' file; do if [ -e "$file" ]; then printf '%s\0' "$file"; fi; done |
     xargs -0 cp --parents --target-directory "$sources"
-
-messages=
-if [ -d "$work/venv/share/ament_cmake" ]; then
-    messages=colcon
-else
-    echo 'box_contact_msgs is built with pip, as no wheel has ament_cmake'
-    install --no-build-isolation "$sources/box_contact_msgs"
-fi
 
 # Build and test in a workspace; $1 is its name, the others are options of the build.
 workspace() {
     mkdir -p "$work/$1/src"
     cp -r "$sources" "$work/$1/src/"
     cd "$work/$1"
-    if [ "$messages" ]; then ln -s box_contact_ros/box_contact_msgs src/box_contact_msgs; fi
+    ln -s box_contact_ros/box_contact_msgs src/box_contact_msgs
     colcon build "${@:2}"
+    # Where `ros2 run` and `ros2 launch` look.
+    ls install/box_contact_ros/{lib/box_contact_ros/contact_node,share/box_contact_ros/package.xml}
     colcon test --packages-select box_contact_ros --pytest-args "${arguments[@]}"
     colcon test-result --verbose
 }
