@@ -94,11 +94,6 @@ def pose_message(header: Header, pose: np.ndarray) -> PoseStamped:
     return message
 
 
-def array_message(header: Header, poses: Sequence[np.ndarray]) -> PoseArray:
-    """Return the message of many poses `x y z qx qy qz qw`."""
-    return PoseArray(header=header, poses=[pose_message(header, pose).pose for pose in poses])
-
-
 def set_pose(pose: Any, numbers: np.ndarray) -> None:
     """Write a pose `x y z qx qy qz qw` into a geometry_msgs/Pose."""
     p, q = pose.position, pose.orientation
