@@ -28,13 +28,9 @@ Row = dict[str, str]
 CHOICES = {
     'mlp': ('`mlp`, the default', 'most programs: less time, a tiny error'),
     'exact': ('`exact`', 'ground truth, judging other models'),
-    'paper': ("`paper`, the paper's kind of network", 'repeating the paper'),
-    'soup-8': ('`soup-8`, boxes as triangles', 'comparing with what the paper replaced'),
-    'fcl': ("FCL's own, deepest corner", 'comparing with a common engine'),
     'mujoco': ("MuJoCo's own, deepest corner", 'programs that simulate in MuJoCo'),
 }
-MEASURED_AS = {'fcl': {'contestant': 'python-fcl collide', 'point': 'deepest'},
-               'mujoco': {'contestant': 'MuJoCo mj_collision', 'point': 'deepest'}}
+MEASURED_AS = {'mujoco': {'contestant': 'MuJoCo mj_collision', 'point': 'deepest'}}
 """Rows of the frontier for a contestant that is measured by its library's own call."""
 SHOWN = ('AVX-512', 'AVX2')  # instruction sets, the one of the README first
 CONTAINER = 12_192.0  # longest edge [mm]
