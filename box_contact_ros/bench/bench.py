@@ -33,7 +33,7 @@ from ..node.contact_node import PARAMETERS
 from ..node.parameters import outside_ros_args
 from ..node.processes import add_domain, asked_to_end, on_this_host
 from ..node.runtime import joined, refusals_end
-from ..solver.arguments import add_models, program_parser, within
+from ..solver.arguments import add_model, program_parser, within
 from .drive import NODES, Bench, BenchNode, MeasuredNode
 from .poses import swaying_containers
 from .report import figures, table, void_reason, write_report
@@ -85,7 +85,7 @@ def _options(args: Sequence[str]) -> argparse.Namespace:
     parser.add_argument('--duration', type=within(1.0, LONGEST), default=SECONDS, metavar='S',
                         help='time in which poses are sent, split evenly over the nodes (default: '
                              '%(default)g)')
-    add_models(parser, '--model', PARAMETERS['model'].default)
+    add_model(parser, PARAMETERS['model'].default)
     parser.add_argument('--out', type=Path, metavar='DIR',
                         help='folder for bench.md, bench.csv and bench.png (default: none)')
     add_domain(parser)

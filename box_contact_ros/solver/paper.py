@@ -7,8 +7,8 @@ The separating-axis test decides whether the boxes collide and gives the separat
 
 1. `touching_pairs`: the box whose face wins is the first box (on an edge axis, A). The boxes
    are moved apart along the normal until they touch: the network knows touching boxes only.
-2. `octant_signs`: symmetries bring the pair into the network's domain, t ≥ 0 and roll, pitch and yaw
-   in [−π/2, π/2]. A box stays the same when an axis changes its sign, and the whole pair may be
+2. `octant_signs`: symmetries bring the pair into the network's domain, t ≥ 0 and roll, pitch and
+   yaw in [−π/2, π/2]. A box stays the same when an axis changes its sign, and the whole pair may be
    reflected. Let t be the second box's offset and R its orientation, in the first box's frame:
    t' = M t, R' = M R Nᵀ, det M · det N = 1, with M and N signed permutations chosen from the pose
    alone. Points and directions of the contact go back by Mᵀ.
