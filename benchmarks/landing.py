@@ -24,7 +24,7 @@ from tqdm import tqdm
 
 from box_contact_ros.core import native
 from box_contact_ros.demo.crane import CraneScenario
-from box_contact_ros.demo.landing import CORNER_SPEED_LIMIT, WATCHED, LandingRecord, solvers
+from box_contact_ros.demo.landing import CORNER_SPEED_LIMIT, WATCHED, LandingRecord
 from box_contact_ros.node.processes import left_when_asked
 from box_contact_ros.scene.pose import rotation_matrix
 
@@ -41,6 +41,7 @@ from .landing_ways import (
     PlannedLanding,
     aimed,
     grid,
+    solvers,
 )
 
 TIMINGS = [LoopTiming(*timing) for timing in product((50.0, 200.0, 1000.0), (0.0, 0.002, 0.005))]
