@@ -26,11 +26,12 @@ import numpy as np
 
 from box_contact_ros.core import DEPTH_FLOOR, Stages, native, stages
 from box_contact_ros.resources import resource_path
-from box_contact_ros.solver.arguments import model_name, program_parser, within
+from box_contact_ros.solver.arguments import model_name, within
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.weights_file import WeightsError, load_weights
 
 from . import output
+from .arguments import report_parser
 from .contestant import Contestant, ours
 from .errors import ContactErrors, contact_errors
 from .output import markdown_table
@@ -316,8 +317,8 @@ def model_or_class(text: str) -> Any:
 
 def main(args: Sequence[str] | None = None) -> int:
     """Measure, print, write; 1 if a limit is broken."""
-    parser = program_parser('accuracy', __doc__, quick=f'{QUICK_PAIRS} pairs of each set', seed=2,
-                            out='accuracy.md, accuracy.csv, accuracy.png')
+    parser = report_parser('accuracy', __doc__, quick=f'{QUICK_PAIRS} pairs of each set', seed=2,
+                           out='accuracy.md, accuracy.csv, accuracy.png')
     parser.add_argument('--model', nargs='+', type=model_or_class, default=['mlp'],
                         metavar='MODEL', help='names, or package.module:Class (default: mlp)')
     parser.add_argument('--weights', help='weights file of MLP, default: the shipped one')

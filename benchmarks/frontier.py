@@ -23,10 +23,10 @@ from inspect import getdoc
 from pathlib import Path
 
 from box_contact_ros.core import instruction_sets, native
-from box_contact_ros.solver.arguments import program_parser
 
 from . import output
 from .accuracy import CLASSES, WINNERS, Summary
+from .arguments import report_parser
 from .contestant import CORE_MODELS, MODELS, Contestant, in_subprocess, ours, packages_of
 from .engines import installed
 from .output import markdown_table, number
@@ -230,8 +230,8 @@ def draw(path: Path, table: Path) -> None:
 
 def main(args: Sequence[str] | None = None) -> int:
     """Measure, print, write."""
-    parser = program_parser('frontier', __doc__, quick='few pairs and models, to try it out',
-                            seed=3, out='frontier.md, .csv, .png')
+    parser = report_parser('frontier', __doc__, quick='few pairs and models, to try it out',
+                           seed=3, out='frontier.md, .csv, .png')
     options = parser.parse_args(args)
     folder = output.results_folder(parser, options)
     plan, names = (QUICK, IN_SHORT[:-1]) if options.quick else (FULL, MODELS)

@@ -30,11 +30,12 @@ import numpy as np
 
 from box_contact_ros.core import native
 from box_contact_ros.scene.pose import quaternion_multiply, rotation_matrix
-from box_contact_ros.solver.arguments import add_models, program_parser, within
+from box_contact_ros.solver.arguments import within
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
 
 from . import judge, output
+from .arguments import add_models, report_parser
 from .patches import mlp_faults, patch_faults
 from .pose_sets import (
     CONTAINER,
@@ -300,11 +301,11 @@ def fuzz(total: int, *, seed: int = 1, classes: Sequence[str] = tuple(CLASSES),
 
 def main(args: Sequence[str] | None = None) -> int:
     """Fuzz, print a line per class and model; 1 if a gate is broken."""
-    parser = program_parser('fuzz', __doc__, quick=f'{QUICK_PAIRS:,} pairs', seed=1,
-                            out='fuzz.csv')
+    parser = report_parser('fuzz', __doc__, quick=f'{QUICK_PAIRS:,} pairs', seed=1,
+                           out='fuzz.csv')
     parser.add_argument('--pairs', type=within(1), default=PAIRS,
                         help='pairs in all (default: %(default)s)')
-    add_models(parser, '--models', MODELS)
+    add_models(parser, MODELS)
     parser.add_argument('--workers', type=within(1), default=os.cpu_count() or 1,
                         help='processes at once')
     options = parser.parse_args(args)

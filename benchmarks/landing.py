@@ -24,12 +24,12 @@ from tqdm import tqdm
 
 from box_contact_ros.core import native
 from box_contact_ros.demo.crane import CraneScenario
-from box_contact_ros.demo.landing import CORNER_SPEED_LIMIT, WATCHED, LandingRecord, solvers
+from box_contact_ros.demo.landing import CORNER_SPEED_LIMIT, WATCHED, LandingRecord
 from box_contact_ros.node.processes import left_when_asked
 from box_contact_ros.scene.pose import rotation_matrix
-from box_contact_ros.solver.arguments import program_parser
 
 from . import output
+from .arguments import report_parser
 from .landing_ways import (
     ADDED,
     MUJOCO,
@@ -41,6 +41,7 @@ from .landing_ways import (
     PlannedLanding,
     aimed,
     grid,
+    solvers,
 )
 
 TIMINGS = [LoopTiming(*timing) for timing in product((50.0, 200.0, 1000.0), (0.0, 0.002, 0.005))]
@@ -253,7 +254,7 @@ def _draw_from_the_end(axis: Any, way: str, record: LandingRecord) -> None:
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the sweep and write its files; 1 if a gated way fails an expectation."""
-    parser = program_parser(
+    parser = report_parser(
         'landing', __doc__, out='page, table and picture',
         quick=f'every {QUICK}th landing of the grid, every third of the others, at 200 Hz and 2 ms')
     parser.add_argument('--ways', nargs='+', choices=list(WAYS), default=list(WAYS),

@@ -26,17 +26,45 @@ from box_contact_ros.demo.landing import (
     DURATION,
     TILT_LIMIT,
     WINDOW,
-    ContactSource,
+    ClosedLoop,
     Landing,
     LandingRecord,
-    land,
-    solvers,
+    MakeLaw,
 )
 from box_contact_ros.scene.laws import HeldPatch
 from box_contact_ros.scene.scene_solver import CONTAINER
 from box_contact_ros.solver.contact import Contact
+from box_contact_ros.solver.contact_solver import ContactSolver
 
 from .point_law import PointLaw
+
+# --- one landing ----------------------------------------------------------------------------------
+
+ContactSource = Callable[[np.ndarray, np.ndarray], Contact]
+"""From pose_a and pose_b (7,) to their contact."""
+
+
+def solvers(scenario: CraneScenario, model: str) -> list[ContactSolver]:
+    """Return a solver of that model for each box of the stack."""
+    return [ContactSolver(scenario.size, size, model=model)
+            for _, size in scenario.stack_boxes.values()]
+
+
+def land(scenario: CraneScenario, sources: Sequence[ContactSource], *, rate_hz: float = 200.0,
+         latency: float = 0.0, law: MakeLaw = HeldPatch.for_loop) -> LandingRecord:
+    """Run one landing with contacts that act `latency` [s] after they were asked for.
+
+    sources: for each box of the stack, such as `solvers`. ValueError: a contact lacks what the law
+    needs.
+    """
+    loop = ClosedLoop(scenario, rate_hz, latency=latency, law=law)
+    while not loop.record.ended:
+        state = loop.ask()
+        loop.answer(state, {name: source(state.pose, pose) for (name, (pose, _)), source in zip(
+            scenario.stack_boxes.items(), sources)}, latency=latency)
+        loop.step()
+    return loop.record
+
 
 # --- cases ----------------------------------------------------------------------------------------
 
@@ -90,15 +118,25 @@ def aimed(scenario: CraneScenario, overhang: tuple[float, float]) -> CraneScenar
 class Landed(Landing):
     """Further figures of one landing. SI units; NaN where nothing was measured."""
 
+    tilt_limit: float = TILT_LIMIT
+    """Limit of the static tilt [rad]; higher in a scenario in which the load cannot lie flatter."""
     overhang: float = math.nan  # lateral distance of the two centres at the first touch [m]
     drop: float = math.nan  # how far the load's centre ends below its place on the stack [m]
     creep: float = math.nan  # mean lateral speed of the load's centre over the window [m/s]
     point_step: float = math.nan  # largest |Δpoint| between neighbouring ticks in the window [m]
 
+    @property
+    def limits(self) -> dict[str, tuple[bool, str]]:
+        """Return the limits of `Landing`, with the tilt limit of this landing."""
+        return super().limits | {'static tilt': (
+            self.static_tilt <= self.tilt_limit,
+            f'{math.degrees(self.static_tilt):.2g} deg '
+            f'(limit {math.degrees(self.tilt_limit):g})')}
+
     @classmethod
     def of(cls, record: LandingRecord, tilt_limit: float = TILT_LIMIT) -> Self:
         """Measure a landing; tilt_limit: of the static tilt [rad]."""
-        landing, scenario = record.judge(tilt_limit=tilt_limit), record.scenario
+        landing, scenario = record.judge(), record.scenario
         if math.isnan(landing.touched):
             return cls()
         first = round(landing.touched * record.rate_hz)
@@ -115,7 +153,7 @@ class Landed(Landing):
             figures['creep'] = float(np.hypot(*way)) / WINDOW
             if np.isfinite(steps).any():
                 figures['point_step'] = float(np.nanmax(steps))
-        return cls(**asdict(landing), **figures)
+        return cls(**asdict(landing), **figures, tilt_limit=tilt_limit)
 
 
 class HeldLimits(NamedTuple):

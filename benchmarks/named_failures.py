@@ -19,9 +19,9 @@ import numpy as np
 import yaml
 
 from box_contact_ros.core import native
-from box_contact_ros.solver.arguments import program_parser
 
 from . import output
+from .arguments import report_parser
 from .contestant import Contestant, Manifold, ours, packages_of, part_by_part
 from .engines import installed
 from .judge import PRESSED, judge, two_touches
@@ -132,8 +132,8 @@ def table(failures: Mapping[str, NamedFailure], found: Mapping[str, Mapping[str,
 
 def main(args: Sequence[str] | None = None) -> int:
     """Replay all for models and every other engine, print, write; 1 if a gated model fails one."""
-    parser = program_parser('named_failures', __doc__, quick='the models alone',
-                            out='named_failures.md')
+    parser = report_parser('named_failures', __doc__, quick='the models alone',
+                           out='named_failures.md')
     options = parser.parse_args(args)
     folder, failures = output.results_folder(parser, options), load()
     rivals, missing = ([], []) if options.quick else installed()

@@ -1,36 +1,40 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""What reports are written with: what the installed bench has, pages from templates, numbers."""
+"""What a report is written with: its folder, tables, CSV files, figures, pages, the machine."""
 from __future__ import annotations
 
 import argparse
 import csv
 import math
+import platform
 import sys
-from collections.abc import Sequence
+import tempfile
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict, astuple, dataclass
+from importlib import metadata
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
-from box_contact_ros.output import (
-    figure,
-    log_errors,
-    machine,
-    make_folder,
-    markdown_table,
-    percentiles,
-    processor,
-    subplots,
-    versions,
-    write_csv,
-)
+import numpy as np
 
-__all__ = [
-    'command_line', 'figure', 'log_errors', 'machine', 'make_folder', 'make_room', 'markdown_table',
-    'number', 'page', 'percentiles', 'processor', 'read_csv', 'results_folder', 'subplots',
-    'versions', 'write_csv']
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 ROOT = Path(__file__).resolve().parents[1]
 RESULTS, QUICK_RESULTS = Path('docs/results'), Path('quick-results')
+DPI = 110  # of pictures
+
+
+def make_folder(parser: argparse.ArgumentParser, folder: Path) -> Path:
+    """Create the folder of `--out`, or refuse, before the work, one that cannot be written to."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=folder).close()
+    except OSError as error:
+        parser.error(f'cannot write to {folder} ({error.strerror}): name another place with --out')
+    return folder
 
 
 def make_room(parser: argparse.ArgumentParser, path: Path) -> Path:
@@ -74,3 +78,134 @@ def number(value: float, digits: int = 3) -> str:
     if value >= 1e3:
         return f'{value:,.0f}'
     return f'{value:.{max(0, digits - 1 - math.floor(math.log10(value)))}f}'
+
+
+def markdown_table(head: Sequence[str], rows: Iterable[Sequence[object]], *, words: int = 1) -> str:
+    """Return a Markdown table; the first `words` columns are set to the left, the others right."""
+    lines = [[str(cell) for cell in line] for line in (head, *rows)]
+    rule = ['---' if column < words else '---:' for column in range(len(head))]
+    return '\n'.join('| ' + ' | '.join(line) + ' |' for line in (lines[0], rule, *lines[1:]))
+
+
+def write_csv(path: Path, rows: Iterable[Mapping[str, object]], *, digits: int = 6,
+              about: Machine | None = None) -> None:
+    """Write rows by column name; the columns are those of all rows, in the order of appearance.
+
+    about: the machine, whose columns every row gets at its end, but for those that it has itself.
+    A float has `digits` significant digits. A missing value, None and NaN are empty cells.
+    """
+    here = asdict(about) if about else {}
+    # A row stands first for the order of the columns, and last as its own values count.
+    listed = [{**row, **here, **row} for row in rows]
+    columns = list(dict.fromkeys(name for row in listed for name in row))
+    with path.open('w', newline='', encoding='utf-8') as file:
+        writer = csv.writer(file, lineterminator='\n')
+        writer.writerow(columns)
+        writer.writerows([_cell(row.get(name), digits) for name in columns] for row in listed)
+
+
+def _cell(value: object, digits: int) -> object:
+    if isinstance(value, float):
+        return '' if math.isnan(value) else f'{value:.{digits}g}'
+    return value  # the writer leaves a None empty
+
+
+def figure(size: tuple[float, float], layout: Literal['constrained'] | None = 'constrained',
+           ) -> Figure:
+    """Return an empty figure of a size [inch]; no display is needed."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=size, layout=layout, dpi=DPI)
+
+
+def subplots(rows: int, columns: int, size: tuple[float, float], **shared: Any,
+             ) -> tuple[Figure, np.ndarray]:
+    """Return a figure of a size [inch], and its axes (rows, columns)."""
+    empty = figure(size)
+    return empty, empty.subplots(rows, columns, squeeze=False, **shared)
+
+
+def log_errors(axis: Axes, least: float, most: float, zero: str = 'exact (0)',
+               ) -> Callable[[float], float]:
+    """Make the y axis logarithmic, with a band for 0 below; return where an error is drawn.
+
+    Errors between 0 and `least` are drawn at `least`.
+    """
+    band = max(0.7, 0.1 * math.log10(most / least))  # its height in decades
+    bottom, middle = least / 10.0**band, least / 10.0**(0.5 * band)
+    ticks = [10.0**power for power in range(math.ceil(math.log10(least)),
+                                            math.floor(math.log10(most)) + 1)]
+    axis.set_yscale('log')
+    axis.set_ylim(bottom, most)
+    axis.set_yticks([middle, *ticks], [zero, *(f'{tick:g}' for tick in ticks)])
+    axis.minorticks_off()
+    axis.axhspan(bottom, least / 1.1, color='0.92', zorder=0)
+    axis.grid(color='0.9', linewidth=0.5)
+    axis.set_axisbelow(True)
+    return lambda error: middle if error == 0.0 else min(max(error, least), most)
+
+
+def percentiles(values: Sequence[float] | np.ndarray, *percents: float) -> tuple[float, ...]:
+    """Return percentiles of values (n,), 0 being the least and 100 the largest; NaN of none."""
+    if not len(values):
+        return (math.nan,) * len(percents)
+    return tuple(float(value) for value in np.percentile(values, percents))
+
+
+class Core(Protocol):
+    """What the machine's description asks the native core: `box_contact_ros.core.native`."""
+
+    instruction_set: str
+    compiler: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Machine:
+    """What a figure was measured on; `dataclasses.asdict` gives the columns of a CSV file."""
+
+    processor: str  # name, CPU family and model
+    instruction_set: str
+    compiler: str
+    versions: str  # versions of Python and of packages
+
+    def __str__(self) -> str:
+        return ', '.join(astuple(self))
+
+
+def machine(core: Core, packages: Sequence[str] = ('numpy',)) -> Machine:
+    """Return this machine's description."""
+    compiler = core.compiler
+    return Machine(
+        processor=processor(), instruction_set=core.instruction_set,
+        compiler=f'GCC {compiler}' if compiler[:1].isdigit() else compiler,
+        versions=versions(packages))
+
+
+def processor() -> str:
+    """Return name, CPU family and model of the processor, as the system tells them."""
+    found = _cpu_fields()
+    name = found.get('model name') or platform.processor() or platform.machine()
+    if not {'cpu family', 'model'} <= found.keys():
+        return name
+    return f'{name} (family {found["cpu family"]}, model {found["model"]})'
+
+
+def _cpu_fields(path: Path = Path('/proc/cpuinfo')) -> dict[str, str]:
+    """Return the fields of the first processor, none on another system than Linux."""
+    try:
+        text = path.read_text().split('\n\n')[0]
+    except OSError:
+        return {}
+    pairs = (line.partition(':') for line in text.splitlines())
+    return {name.strip(): value.strip() for name, _, value in pairs}
+
+
+def versions(packages: Sequence[str] = ('numpy',)) -> str:
+    """Return the versions of Python and of packages that are installed."""
+    found = [f'Python {platform.python_version()}']
+    for package in packages:
+        try:
+            found.append(f'{package} {metadata.version(package)}')
+        except metadata.PackageNotFoundError:
+            print(f'{package} is not installed', file=sys.stderr)
+    return ', '.join(found)

@@ -29,9 +29,10 @@ from box_contact_ros.core import native
 from box_contact_ros.scene.laws import FRICTION, GRAVITY, Body, SceneLaw
 from box_contact_ros.scene.pose import rotation_matrix
 from box_contact_ros.scene.scene_solver import Box, Pair, Scene, SceneSolver
-from box_contact_ros.solver.arguments import add_models, program_parser
+from box_contact_ros.solver.arguments import add_model
 
 from . import output
+from .arguments import report_parser
 from .pose_sets import CONTAINER
 
 # MuJoCo would write warnings to a file MUJOCO_LOG.TXT in the working directory.
@@ -343,9 +344,9 @@ CASES = (*drops(), *slopes(), *pushes(), *belts(), *stacks())
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run all cases, print and write; 1 if the law misses a limit."""
-    parser = program_parser('rest', __doc__, out='rest.md and rest.csv',
-                            quick=f'every {QUICK}th case')
-    add_models(parser, '--model', 'exact')
+    parser = report_parser('rest', __doc__, out='rest.md and rest.csv',
+                           quick=f'every {QUICK}th case')
+    add_model(parser, 'exact')
     options = parser.parse_args(args)
     folder = output.results_folder(parser, options)
     cases = CASES[::QUICK] if options.quick else CASES

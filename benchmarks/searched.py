@@ -18,13 +18,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from box_contact_ros.core import native
-from box_contact_ros.solver.arguments import program_parser, within
+from box_contact_ros.solver.arguments import within
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.solver.mlp import NETWORK, core_numbers, load_mlp
 
 from . import output
 from .accuracy import over
+from .arguments import report_parser
 from .errors import contact_errors
 from .pose_sets import LOADS, SETS, Generator, Pairs
 from .steps import drawn_paths, largest_steps
@@ -131,8 +132,8 @@ def main(args: Sequence[str] | None = None) -> int:
     """Search, print, write; 1 if a limit is broken."""
     from tqdm import tqdm
 
-    parser = program_parser('searched', __doc__, quick=f'{QUICK_MINUTES:g} minutes for each seed',
-                            seed=2, out='searched.md, searched.csv')
+    parser = report_parser('searched', __doc__, quick=f'{QUICK_MINUTES:g} minutes for each seed',
+                           seed=2, out='searched.md, searched.csv')
     parser.add_argument('--minutes', type=within(0.0), default=MINUTES,
                         help='for each of two seeds (default: %(default)g)')
     options = parser.parse_args(args)

@@ -17,9 +17,9 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from box_contact_ros.core import instruction_sets, native
-from box_contact_ros.solver.arguments import program_parser
 
 from . import output
+from .arguments import report_parser
 from .contestant import CORE_MODELS, in_subprocess, ours
 from .engines import installed
 from .output import markdown_table, number
@@ -123,8 +123,8 @@ def csv_rows(rows: Sequence[FrontierRow]) -> Iterator[dict[str, object]]:
 
 def main(args: Sequence[str] | None = None) -> int:
     """Measure, print, write."""
-    parser = program_parser('speed', __doc__, quick='few calls and rounds, to try it out', seed=1,
-                            out='speed.md, speed.csv')
+    parser = report_parser('speed', __doc__, quick='few calls and rounds, to try it out', seed=1,
+                           out='speed.md, speed.csv')
     options = parser.parse_args(args)
     folder, machine = output.results_folder(parser, options), output.machine(native, PACKAGES)
     plan, pairs, count = ((QUICK, QUICK_BATCH, QUICK_STARTS) if options.quick

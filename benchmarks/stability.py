@@ -17,11 +17,11 @@ from functools import partial
 import numpy as np
 
 from box_contact_ros.core import native
-from box_contact_ros.solver.arguments import add_models, program_parser
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.contact_solver import ContactSolver
 
 from . import output
+from .arguments import add_models, report_parser
 from .errors import point_errors
 from .hard_poses import Cases, load
 from .judge import NOT_FINITE, NOT_UNIT, OUTSIDE, judge
@@ -99,9 +99,9 @@ def gates(rows: Sequence[StabilityRow]) -> list[str]:
 
 def main(args: Sequence[str] | None = None) -> int:
     """Ask all, print, write; 1 if a gate is broken."""
-    parser = program_parser('stability', __doc__, quick=f'every {QUICK}th family',
-                            out='stability.md and stability.csv')
-    add_models(parser, '--models', MODELS)
+    parser = report_parser('stability', __doc__, quick=f'every {QUICK}th family',
+                           out='stability.md and stability.csv')
+    add_models(parser, MODELS)
     options = parser.parse_args(args)
     folder = output.results_folder(parser, options)
     cases = load()

@@ -24,9 +24,10 @@ from pathlib import Path
 
 import torch
 
+from benchmarks.arguments import report_parser
 from benchmarks.output import QUICK_RESULTS, make_folder
 from benchmarks.paper import jobs
-from box_contact_ros.solver.arguments import program_parser, within
+from box_contact_ros.solver.arguments import within
 from box_contact_ros.solver.mlp import NETWORK, UNITS_MAX
 from box_contact_ros.solver.weights_file import load_weights
 
@@ -42,8 +43,8 @@ QUICK_COUNTS, QUICK_STARTS, QUICK_EPOCHS = (1000, 500, 2000), 3, 70
 
 
 def _options(args: Sequence[str] | None) -> argparse.Namespace:
-    parser = program_parser('python -m training', __doc__, seed=1,
-                            quick='small sets and few epochs, to try it out in seconds')
+    parser = report_parser('python -m training', __doc__, seed=1,
+                           quick='small sets and few epochs, to try it out in seconds')
     parser.add_argument('what', nargs='+', choices=(*NAMES, 'all'), metavar='WHAT',
                         help=f'{", ".join(NAMES)}, or all')
     parser.add_argument('--hidden', type=within(1, UNITS_MAX), metavar='UNITS', help='units of the '

@@ -20,11 +20,12 @@ from tqdm import tqdm
 from benchmarks.errors import contact_errors
 from benchmarks.output import percentiles
 from benchmarks.pose_sets import SETS, Pairs
+from benchmarks.weights import save_weights
 from benchmarks.worst_case import climb, worst_start
 from box_contact_ros.core import BRACKET_LIMIT, FEATURES, NETWORK_FORMAT, SPREAD_LIMIT, UPPER_LIMIT
 from box_contact_ros.solver.contact_solver import ContactSolver
 from box_contact_ros.solver.mlp import ACTIVATION, FEATURE_NAMES, NETWORK, core_numbers
-from box_contact_ros.solver.weights_file import Network, save_weights
+from box_contact_ros.solver.weights_file import Network
 
 from .fit import MlpErrors, ShareNetwork, errors_of, fit, tensors
 from .samples import MlpSamples, describe, draw_samples, mixture

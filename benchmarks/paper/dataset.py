@@ -18,7 +18,7 @@
    first box's frame: R = Rz(yaw) Ry(pitch) Rx(roll). Outputs are azimuth and elevation [rad] of the
    impact point's direction from the first box's centre, then of the normal.
    - `paper`: folded into the network's domain, or left as drawn. The fold is
-     `solver.paper.to_octant`: t ≥ 0, angles in [−π/2, π/2].
+     `features.to_octant`: t ≥ 0, angles in [−π/2, π/2].
    - `committee`: for cubes, folded like `paper`. Each expert has placements of one kind. The third
      kind is face-face: see `face_face_candidates`. The classifier has all three kinds, and an
      output for each: 1 for the kind of the placement, 0 for the others.
@@ -41,10 +41,10 @@ import numpy as np
 from box_contact_ros.core import Stages, stages
 from box_contact_ros.scene.pose import quaternion_multiply, rotation_matrix
 from box_contact_ros.solver.contact_solver import ContactSolver
-from box_contact_ros.solver.paper import TouchingPairs, euler_angles, to_octant
+from box_contact_ros.solver.paper import TouchingPairs, euler_angles
 
 from ..pose_sets import CUBE, turns
-from .features import to_features
+from .features import to_features, to_octant
 from .models import EXPERTS, SUBSETS
 
 SETS = ('training', 'cross-validation', 'external')

@@ -1,21 +1,65 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Fold touching cubes so that the features that meet become reference features.
+"""Fold touching boxes by their symmetries, into the octant or so that reference features meet.
 
-On each of the two subsets the map from pose to contact has no discontinuity. A cube also stays the
-same when two of its axes change places, so M and N (see `solver.paper`) may permute axes.
+`to_octant` is for boxes of any shape, as model `paper` folds them. `to_features` is for cubes, and
+folds the features that meet onto reference features. On each of the two subsets the map from pose
+to contact has no discontinuity. A cube also stays the same when two of its axes change places, so M
+and N (see `solver.paper`) may permute axes.
 
 - VERTEX_FACE: face +x of the first cube, vertex (−, −, −) of the second.
 - EDGE_EDGE: the first cube's edge along z at (+, +), the second's along y at (−, −).
 """
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from box_contact_ros.solver.paper import Folds, TouchingPairs, fold_by, sign, turned
+from box_contact_ros.solver.paper import (
+    TouchingPairs,
+    network_inputs,
+    octant_signs,
+    sign,
+    turned,
+)
 
 VERTEX_FACE, EDGE_EDGE = 0, 1
+
+
+class Folds(NamedTuple):
+    """n pairs in a network's domain: t' = M t, R' = M R Nᵀ."""
+
+    map_first: np.ndarray  # (n, 3, 3) M, a signed permutation of the first box's axes
+    offset: np.ndarray  # (n, 3) t' of the second box
+    rotation: np.ndarray  # (n, 3, 3) R'
+
+    @property
+    def inputs(self) -> np.ndarray:
+        """Return a network's inputs (n, 6): t', and roll, pitch and yaw of R'."""
+        return network_inputs(self.offset, self.rotation)
+
+    def folded(self, vectors: np.ndarray) -> np.ndarray:
+        """Return points or directions (n, 3) of the first box's frame, folded."""
+        return turned(self.map_first, vectors)
+
+    def unfolded(self, vectors: np.ndarray) -> np.ndarray:
+        """Return folded points or directions (n, 3) in the first box's frame."""
+        return turned(self.map_first.swapaxes(1, 2), vectors)
+
+
+def fold_by(map_first: np.ndarray, map_second: np.ndarray, offset: np.ndarray,
+            rotation: np.ndarray) -> Folds:
+    """Return pairs folded by M and N (n, 3, 3)."""
+    turn = map_first @ rotation @ map_second.swapaxes(1, 2)
+    return Folds(map_first, turned(map_first, offset), turn)
+
+
+def to_octant(offset: np.ndarray, rotation: np.ndarray) -> Folds:
+    """Fold n boxes of any shape to t' ≥ 0, and roll, pitch and yaw in [−π/2, π/2]."""
+    m, n = octant_signs(offset, rotation)
+    return fold_by(np.eye(3) * m[:, None], np.eye(3) * n[:, None], offset, rotation)
 
 
 def to_features(pairs: TouchingPairs) -> tuple[Folds, np.ndarray]:

@@ -12,9 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from box_contact_ros.solver.weights_file import Network, load_weights, save_weights
+from box_contact_ros.solver.weights_file import Network, load_weights
 
 from ..pose_sets import CONTAINER, CUBE
+from ..weights import save_weights
 from . import dataset
 from .dataset import TOUCHING, Drawing
 from .errors import errors_of, figures, figures_by_part

@@ -23,11 +23,10 @@ from box_contact_ros.solver.paper import (
     TouchingPairs,
     directions,
     forward,
-    to_octant,
 )
 from box_contact_ros.solver.weights_file import load_weights
 
-from .features import EDGE_EDGE, VERTEX_FACE, to_features
+from .features import EDGE_EDGE, VERTEX_FACE, to_features, to_octant
 
 EXPERTS = ('vertex', 'edge', 'face')  # of the committee, in the order of the classifier's outputs
 SUBSETS = {'vertex_face': VERTEX_FACE, 'edge_edge': EDGE_EDGE}

@@ -21,8 +21,9 @@ import numpy as np
 import torch
 
 from box_contact_ros.core import native
-from box_contact_ros.solver.arguments import program_parser, within
+from box_contact_ros.solver.arguments import within
 
+from ..arguments import report_parser
 from ..output import (
     command_line,
     machine,
@@ -162,7 +163,7 @@ def plot(path: Path, results: Sequence[tuple[Search, Rungs]]) -> None:
 
 
 def _options(args: Sequence[str] | None) -> argparse.Namespace:
-    parser = program_parser(
+    parser = report_parser(
         'python -m benchmarks.paper.search',
         'Train thousands of networks at once, keep the best, train those longer.\n\n'
         'Measured on one core: 8 minutes.\n\n'

@@ -4,13 +4,11 @@
 """The bench: compares the latency of contact node, soup node and echo node on the same poses.
 
 Each node is a process of its own, in a ROS domain of its own on this host. The bench sends pairs of
-poses of equal stamp: swaying containers, then touching cubes. Blocks of half a second go to one
-node after the other, in an order that is drawn for each block. With --side-by-side all nodes answer
-the same poses at the same time, and compete for the cores.
+poses of equal stamp: a container that sways on top of another one. Blocks of half a second go to
+one node after the other, in an order that is drawn for each block.
 
-Reports latencies, their ratios with 95 % intervals, lost and wrong answers by comparison with the
-exact contacts, and what the nodes take of processor and memory. A long run finds memory that grows:
---rate 1000 --duration 600.
+Reports latencies, their ratios to the echo node with 95 % intervals, lost and wrong answers by
+comparison with the exact contacts, and each node's share of a core.
 
 The exit status is 0 only if contact and echo node lost nothing, no answer was wrong, and the run is
 not void. It is void if the bench itself was late by more than a period in over 1 % of the pairs.
@@ -18,27 +16,29 @@ not void. It is void if the bench itself was late by more than a period in over 
 from __future__ import annotations
 
 import argparse
+import contextlib
+import gc
 import os
 import platform
+import re
 import sys
+import tempfile
 from collections.abc import Sequence
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 
 from ..core import native
 from ..node.contact_node import PARAMETERS
 from ..node.parameters import outside_ros_args
-from ..node.processes import add_domain
-from ..node.runtime import refusals_end
-from ..output import machine, make_folder
-from ..solver.arguments import add_models, program_parser, within
-from .bench_drive import open_bench
-from .bench_report import all_figures, ratio_line, table, void_reason, write_report
-from .measured_node import PREFIXES
-from .pose_streams import STREAMS, make_streams
+from ..node.processes import add_domain, asked_to_end, on_this_host
+from ..node.runtime import joined, refusals_end
+from ..solver.arguments import add_model, program_parser, within
+from .drive import NODES, Bench, BenchNode, MeasuredNode
+from .poses import swaying_containers
+from .report import figures, table, void_reason, write_report
 
 RATE, SECONDS, LONGEST = 200.0, 60.0, 3600.0  # [Hz], [s], [s]
-PACKAGES = ('numpy', 'rclpy', 'ros-fastrtps')  # whose versions are named
 
 
 @refusals_end
@@ -46,66 +46,71 @@ def main(args: Sequence[str] | None = None) -> int:
     """Run the bench; return its exit status."""
     args = sys.argv[1:] if args is None else list(args)
     options = _options(outside_ros_args(args))
-    names = [name for name in PREFIXES if name in options.nodes]
-    if 'soup' in names and not find_spec('fcl'):
+    names = list(NODES)
+    if not find_spec('fcl'):
         print('without the soup node: python-fcl is not installed (extra: soup)')
         names.remove('soup')
-    if not names:
-        return 1
-    inputs = {name: '' if options.side_by_side else f'for_{name}/' for name in names}
-    with open_bench(inputs, args, domain=options.domain, model=options.model, rate=options.rate,
-                    seed=options.seed) as bench:
-        about = _about(options, bench.cores)
-        print('\n'.join(f'{name}: {value}' for name, value in about.items()), flush=True)
-        turns = len(set(inputs.values()))
-        count = max(2, round(options.rate * options.duration / (STREAMS * turns)))
-        logs = [log for stream in make_streams(count, rate=options.rate, seed=options.seed)
-                if not bench.stop.is_set() for log in bench.run(stream)]
-    rows = all_figures(logs, block=bench.block)
+    os.environ |= on_this_host(options.domain)  # inherited by the nodes
+    cores = os.sched_getaffinity(0)
+    own = {max(cores)} if len(cores) > 1 else cores
+    os.sched_setaffinity(0, own)  # before rclpy starts its threads, which inherit it
+    gc.disable()  # `Bench` collects between blocks
+    about = _about(options, own, cores - own or cores)
+    print(about, flush=True)
+    poses = swaying_containers(max(2, round(options.rate * options.duration / len(names))),
+                               rate=options.rate)
+    with contextlib.ExitStack() as ended:
+        stop = ended.enter_context(asked_to_end())
+        client, executor = ended.enter_context(joined(partial(BenchNode, names=names), args))
+        bench = Bench(client, executor, poses, rate=options.rate, stop=stop)
+        nodes = [ended.enter_context(contextlib.closing(MeasuredNode(
+            name, model=options.model, cores=cores - own or cores))) for name in names]
+        logs = bench.run(nodes)
+        faults = [node.fault for node in nodes if node.fault]
+    rows = figures(logs, block=bench.block)
     void = void_reason(rows, options.rate)
-    stopped = 'interrupted: figures are of what was sent before' if bench.stop.is_set() else ''
-    lines = [line for line in (ratio_line(rows), *bench.faults, void, stopped) if line]
-    print(f'\n{table(rows)}\n')
-    print('\n'.join(lines), flush=True)
-    if options.out and rows:
-        write_report(options.out, logs, rows, lines, about)
+    stopped = 'interrupted: figures are of what was sent before' if stop.is_set() else ''
+    results = '\n\n'.join(filter(None, (table(rows), *faults, void, stopped)))
+    print(f'\n{results}', flush=True)
+    if options.out:
+        write_report(options.out, logs, rows, f'{about}\n\n{results}')
     faulty = any(row['wrong'] or row['lost'] and row['node'] != 'soup' for row in rows)
-    return bench.stop.status or int(faulty or bool(bench.faults) or bool(void))
+    return stop.status or int(faulty or bool(faults) or bool(void))
 
 
 def _options(args: Sequence[str]) -> argparse.Namespace:
-    parser = program_parser('bench', __doc__, seed=1)
+    parser = program_parser('bench', __doc__)
     parser.add_argument('--rate', type=within(1.0, 4000.0), default=RATE, metavar='HZ',
                         help='pairs of poses sent per second (default: %(default)g)')
     parser.add_argument('--duration', type=within(1.0, LONGEST), default=SECONDS, metavar='S',
-                        help='time in which poses are sent, split evenly over streams, and over '
-                             'nodes unless they are side by side (default: %(default)g)')
-    parser.add_argument('--nodes', nargs='+', choices=PREFIXES, default=list(PREFIXES),
-                        metavar='NODE',
-                        help=f'nodes to drive, of {", ".join(PREFIXES)} (default: all)')
-    add_models(parser, '--model', PARAMETERS['model'].default)
-    parser.add_argument('--side-by-side', action='store_true',
-                        help='send all nodes the same poses at the same time')
+                        help='time in which poses are sent, split evenly over the nodes (default: '
+                             '%(default)g)')
+    add_model(parser, PARAMETERS['model'].default)
     parser.add_argument('--out', type=Path, metavar='DIR',
                         help='folder for bench.md, bench.csv and bench.png (default: none)')
     add_domain(parser)
     options = parser.parse_args(list(args))
     if options.out:
-        make_folder(parser, options.out)
+        try:
+            options.out.mkdir(parents=True, exist_ok=True)
+            tempfile.TemporaryFile(dir=options.out).close()
+        except OSError as error:
+            parser.error(f'cannot write to {options.out} ({error.strerror})')
     return options
 
 
-def _about(options: argparse.Namespace, node_cores: set[int]) -> dict[str, str]:
-    """Return where and how the bench runs, for the page and each row of the CSV file."""
-    own = ' '.join(map(str, sorted(os.sched_getaffinity(0))))
-    cores = ' '.join(map(str, sorted(node_cores)))
-    return {'machine': f'{platform.node()}: {machine(native, PACKAGES)}, {os.cpu_count()} cores',
-            'cores': f'bench on {own}, nodes on {cores}',
-            'load at start': f'{os.getloadavg()[0]:.2f}',
-            'nodes run': 'side by side' if options.side_by_side else 'in turn',
-            'model': options.model,
-            'set rate [Hz]': f'{options.rate:g}',
-            'sending [s]': f'{options.duration:g}'}
+def _about(options: argparse.Namespace, own: set[int], nodes: set[int]) -> str:
+    """Return where and how the bench runs, a line of a Markdown list for each fact."""
+    name = re.search(r'model name\s*: (.*)', Path('/proc/cpuinfo').read_text())
+    processor = name[1] if name else platform.machine()
+    return '\n'.join([
+        f'- machine: {processor}, {native.instruction_set}, {os.cpu_count()} cores, '
+        f'Python {platform.python_version()}',
+        f'- cores: bench on {" ".join(map(str, sorted(own)))}, '
+        f'nodes on {" ".join(map(str, sorted(nodes)))}',
+        f'- load at start: {os.getloadavg()[0]:.2f}',
+        f'- model of the contact node: {options.model}',
+        f'- {options.rate:g} pairs per second for {options.duration:g} s'])
 
 
 if __name__ == '__main__':

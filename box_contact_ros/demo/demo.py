@@ -31,7 +31,7 @@ from ..node.processes import (
     program,
     start,
 )
-from ..solver.arguments import add_models, program_parser, within
+from ..solver.arguments import add_model, program_parser, within
 
 TIME_LIMIT = 60.0 - END_PATIENCE  # a demo ends within a minute [s]
 WAIT = 26.0  # patience of the crane for the node [s]; the rest is for landing and judging
@@ -76,7 +76,7 @@ def main(args: Sequence[str] | None = None) -> int:
 
 def _options(args: Sequence[str] | None) -> argparse.Namespace:
     parser = program_parser('demo', __doc__)
-    add_models(parser, '--model', 'mlp')
+    add_model(parser, 'mlp')
     parser.add_argument('--rate', type=within(1.0, 2000.0), default=200.0, metavar='HZ',
                         help='pairs of poses per second (default: %(default)g)')
     add_domain(parser)

@@ -4,10 +4,9 @@
 """A container set down by its contacts, one per tick, and the judgement whether it rests. No ROS.
 
 A `ClosedLoop` steps a crane under a law of force, wherever the contacts come from, and records what
-happened. `land` closes the loop with any function of the two poses. `LandingRecord.judge` measures
-the record. The load settles if, from some time on, no corner moves faster than `SETTLED_SPEED`. It
-is at rest if it meets every limit of `Landing.limits`. The window is the last `WINDOW` s of the
-`WATCHED` s after the first touch.
+happened. `LandingRecord.judge` measures the record. The load settles if, from some time on, no
+corner moves faster than `SETTLED_SPEED`. It is at rest if it meets every limit of `Landing.limits`.
+The window is the last `WINDOW` s of the `WATCHED` s after the first touch.
 
 Depth, gap and first touch are those of the exact solver on the recorded poses, whatever model gave
 the contacts. Conventions: those of `laws` and `crane`.
@@ -42,8 +41,6 @@ GAP_LIMIT = 0.020  # gap after the first touch [m]: how high it may bounce
 
 Contacts = Mapping[str, Contact]
 """The contacts of one question, by the names of their pairs."""
-ContactSource = Callable[[np.ndarray, np.ndarray], Contact]
-"""From pose_a and pose_b (7,) to their contact."""
 MakeLaw = Callable[..., 'LoadLaw']
 """What makes the law of a load, called as `HeldPatch.for_loop` is."""
 
@@ -93,7 +90,6 @@ class Landing:
     rope_tension: float = math.nan  # of the tautest rope in the window [N]
     force_worst: float = math.nan  # |vertical contact force − weight| / weight, worst in the window
     static_tilt: float = math.nan  # mean over the window [rad]
-    tilt_limit: float = TILT_LIMIT  # [rad]
     depth: float = math.nan  # largest ever, as a share of the load's height
     gap: float = math.nan  # largest after the first touch [m]
 
@@ -113,9 +109,9 @@ class Landing:
             'ropes slack': (self.rope_tension == 0.0, f'{self.rope_tension:.3g} N at most'),
             'force': (self.force_worst <= FORCE_LIMIT,
                       f'{self.force_worst:.1g} of the weight off it (limit {FORCE_LIMIT:g})'),
-            'static tilt': (self.static_tilt <= self.tilt_limit,
+            'static tilt': (self.static_tilt <= TILT_LIMIT,
                             f'{math.degrees(self.static_tilt):.2g} deg '
-                            f'(limit {math.degrees(self.tilt_limit):g})'),
+                            f'(limit {math.degrees(TILT_LIMIT):g})'),
             'depth': (self.depth < DEPTH_LIMIT, f'{100 * self.depth:.2g} % of the height '
                                                 f'(limit {100 * DEPTH_LIMIT:g})'),
             'gap': (self.gap < GAP_LIMIT, f'{1e3 * self.gap:.2g} mm after the first touch '
@@ -183,20 +179,18 @@ class LandingRecord:
     def separations(self) -> np.ndarray:
         """Return the exact separation [m] of load and stack, per tick (n,)."""
         poses = np.reshape(self.poses, (-1, 7))
-        return np.min([solver.batch(poses, np.broadcast_to(pose, poses.shape)).separation
-                       for solver, (pose, _) in zip(solvers(self.scenario, 'exact'),
-                                                    self.scenario.stack_boxes.values())], axis=0)
+        return np.min([
+            ContactSolver(self.scenario.size, size, model='exact').batch(
+                poses, np.broadcast_to(pose, poses.shape)).separation
+            for pose, size in self.scenario.stack_boxes.values()], axis=0)
 
     def window(self, touched: int) -> slice:
         """Return the ticks of the window, where the first touch came in the tick `touched`."""
         return slice(touched + round((WATCHED - WINDOW) * self.rate_hz),
                      touched + round(WATCHED * self.rate_hz))
 
-    def judge(self, *, tilt_limit: float = TILT_LIMIT) -> Landing:
-        """Measure the landing; what would have to be measured later than its end is NaN.
-
-        tilt_limit: of the static tilt [rad], for a scenario in which the load cannot lie flatter.
-        """
+    def judge(self) -> Landing:
+        """Measure the landing; what would have to be measured later than its end is NaN."""
         separations = self.separations()
         touching = np.flatnonzero(separations <= 0.0)
         if not len(touching):
@@ -208,7 +202,7 @@ class LandingRecord:
         fast = np.flatnonzero(self.corner_speeds(first)[:ticks - first] >= SETTLED_SPEED)
         still = int(fast[-1]) + 1 if len(fast) else 0
         seen = Landing(
-            touched=first / self.rate_hz, tilt_limit=tilt_limit,
+            touched=first / self.rate_hz,
             settled=still / self.rate_hz if first + still < ticks else math.nan,
             depth=float(np.max(-separations)) / self.scenario.size[2],
             gap=float(max(0.0, np.max(separations[first:]))))
@@ -269,25 +263,3 @@ class ClosedLoop:
             self._law.hold(contacts, pose)
         self._wrench = self._law.wrench(self.crane.load_pose, self.crane.load_velocity)
         return self._wrench
-
-
-def solvers(scenario: CraneScenario, model: str) -> list[ContactSolver]:
-    """Return a solver of that model for each box of the stack."""
-    return [ContactSolver(scenario.size, size, model=model)
-            for _, size in scenario.stack_boxes.values()]
-
-
-def land(scenario: CraneScenario, sources: Sequence[ContactSource], *, rate_hz: float = 200.0,
-         latency: float = 0.0, law: MakeLaw = HeldPatch.for_loop) -> LandingRecord:
-    """Run one landing with contacts that act `latency` [s] after they were asked for.
-
-    sources: for each box of the stack, such as `solvers`. ValueError: a contact lacks what the law
-    needs.
-    """
-    loop = ClosedLoop(scenario, rate_hz, latency=latency, law=law)
-    while not loop.record.ended:
-        state = loop.ask()
-        loop.answer(state, {name: source(state.pose, pose) for (name, (pose, _)), source in zip(
-            scenario.stack_boxes.items(), sources)}, latency=latency)
-        loop.step()
-    return loop.record

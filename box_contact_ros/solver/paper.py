@@ -7,8 +7,8 @@ The separating-axis test decides whether the boxes collide and gives the separat
 
 1. `touching_pairs`: the box whose face wins is the first box (on an edge axis, A). The boxes
    are moved apart along the normal until they touch: the network knows touching boxes only.
-2. `to_octant`: symmetries bring the pair into the network's domain, t ≥ 0 and roll, pitch and yaw
-   in [−π/2, π/2]. A box stays the same when an axis changes its sign, and the whole pair may be
+2. `octant_signs`: symmetries bring the pair into the network's domain, t ≥ 0 and roll, pitch and
+   yaw in [−π/2, π/2]. A box stays the same when an axis changes its sign, and the whole pair may be
    reflected. Let t be the second box's offset and R its orientation, in the first box's frame:
    t' = M t, R' = M R Nᵀ, det M · det N = 1, with M and N signed permutations chosen from the pose
    alone. Points and directions of the contact go back by Mᵀ.
@@ -49,27 +49,6 @@ class TouchingPairs(NamedTuple):
     rotation: np.ndarray  # (n, 3, 3) R, the second box's axes as columns
 
 
-class Folds(NamedTuple):
-    """n pairs in a network's domain: t' = M t, R' = M R Nᵀ."""
-
-    map_first: np.ndarray  # (n, 3, 3) M, a signed permutation of the first box's axes
-    offset: np.ndarray  # (n, 3) t' of the second box
-    rotation: np.ndarray  # (n, 3, 3) R'
-
-    @property
-    def inputs(self) -> np.ndarray:
-        """Return a network's inputs (n, 6): t', and roll, pitch and yaw of R'."""
-        return np.concatenate([self.offset, euler_angles(self.rotation)], axis=1)
-
-    def folded(self, vectors: np.ndarray) -> np.ndarray:
-        """Return points or directions (n, 3) of the first box's frame, folded."""
-        return turned(self.map_first, vectors)
-
-    def unfolded(self, vectors: np.ndarray) -> np.ndarray:
-        """Return folded points or directions (n, 3) in the first box's frame."""
-        return turned(self.map_first.swapaxes(1, 2), vectors)
-
-
 def turned(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     """Return the products (n, 3) of matrices (n, 3, 3) and vectors (n, 3)."""
     return (matrices @ vectors[:, :, None])[:, :, 0]
@@ -80,21 +59,22 @@ def sign(values: np.ndarray) -> np.ndarray:
     return np.where(values >= 0.0, 1.0, -1.0)
 
 
-def fold_by(map_first: np.ndarray, map_second: np.ndarray, offset: np.ndarray,
-            rotation: np.ndarray) -> Folds:
-    """Return pairs folded by M and N (n, 3, 3)."""
-    turn = map_first @ rotation @ map_second.swapaxes(1, 2)
-    return Folds(map_first, turned(map_first, offset), turn + 0.0)  # no −0, which atan2 tells apart
+def octant_signs(offset: np.ndarray, rotation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the diagonals (n, 3) of M and N that fold n boxes of any shape.
 
-
-def to_octant(offset: np.ndarray, rotation: np.ndarray) -> Folds:
-    """Fold n boxes of any shape to t' ≥ 0, and roll, pitch and yaw in [−π/2, π/2]."""
+    Then t' ≥ 0, and roll, pitch and yaw are in [−π/2, π/2].
+    """
     m = sign(offset)
     n = np.empty_like(m)
     n[:, 0] = sign(m[:, 0] * rotation[:, 0, 0])  # cos(yaw) cos(pitch) ≥ 0
     n[:, 2] = sign(m[:, 2] * rotation[:, 2, 2])  # cos(pitch) cos(roll) ≥ 0
     n[:, 1] = m.prod(axis=1) * n[:, 0] * n[:, 2]
-    return fold_by(np.eye(3) * m[:, None], np.eye(3) * n[:, None], offset, rotation)
+    return m, n
+
+
+def network_inputs(offset: np.ndarray, rotation: np.ndarray) -> np.ndarray:
+    """Return a network's inputs (n, 6): t' (n, 3), and roll, pitch and yaw of R' (n, 3, 3)."""
+    return np.concatenate([offset, euler_angles(rotation + 0.0)], axis=1)  # atan2 knows −0
 
 
 def euler_angles(rotation: np.ndarray) -> np.ndarray:
@@ -152,9 +132,10 @@ class Paper:
 
         Models with other networks replace this.
         """
-        fold = to_octant(pairs.offset, pairs.rotation)
-        point, normal = directions(forward(self._networks['contact'], fold.inputs))
-        return fold.unfolded(point), fold.unfolded(normal)
+        m, n = octant_signs(pairs.offset, pairs.rotation)
+        inputs = network_inputs(m * pairs.offset, m[:, :, None] * pairs.rotation * n[:, None])
+        point, normal = directions(forward(self._networks['contact'], inputs))
+        return m * point, m * normal
 
     def solve(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
               threads: int = 1) -> tuple[Contacts, int]:

@@ -6,13 +6,13 @@
 Tensors are float32: `<network>.<layer>.weight` (outputs × inputs) and `<network>.<layer>.bias`.
 Layers are counted from 0. Hidden units are rectified, in the paper's networks tanh, and the output
 is linear. Inputs and outputs are in SI units: any scaling is folded into the weights.
-The metadata entry `card` is the model card, a JSON object with `CARD_FIELDS`.
+The metadata entry `card` is the model card, a JSON object. Its entry `architecture` holds the units
+of each layer, of all networks or by network.
 
-The library safetensors is imported where a file is read or written, and nowhere else.
+The library safetensors is imported where a file is read, and nowhere else.
 """
 from __future__ import annotations
 
-import hashlib
 import json
 from collections import defaultdict
 from dataclasses import dataclass
@@ -22,11 +22,6 @@ from typing import Any
 import numpy as np
 
 from .checks import shown
-
-CARD_FIELDS = ('name', 'model', 'architecture', 'inputs', 'outputs', 'sizes', 'data', 'seed',
-               'commit', 'metrics', 'sha256')
-"""Entries that every model card has: `architecture`, the units of each layer, of all networks or by
-network, `inputs` with their ranges, `sizes` it was trained for, the `sha256` of the tensors."""
 
 FILE_LIMIT = 2**24
 """Bytes of the largest file that is read, header and tensors: a thousand times what is shipped."""
@@ -68,41 +63,9 @@ class Weights:
         found = self.networks.get(name)
         if found is None or (found.widths[0], found.widths[-1]) != (inputs, outputs):
             raise WeightsError(
-                f'weights file {_name(self.path)} has no network {name!r} with {inputs} inputs '
-                f'and {outputs} outputs, which model {model!r} needs')
+                f'weights file {shown(str(self.path))} has no network {name!r} with {inputs} '
+                f'inputs and {outputs} outputs, which model {model!r} needs')
         return found
-
-
-def tensors_digest(tensors: dict[str, np.ndarray]) -> str:
-    """Return the SHA-256 over names, shapes and bytes of tensors, in the order of their names."""
-    digest = hashlib.sha256()
-    for name in sorted(tensors):
-        array = np.ascontiguousarray(tensors[name], dtype='<f4')
-        digest.update(f'{name}{array.shape}'.encode())
-        digest.update(array.tobytes())
-    return digest.hexdigest()
-
-
-def save_weights(path: Path, networks: dict[str, Layers], card: dict[str, Any]) -> None:
-    """Write networks, each a list of (weight, bias) per layer, and their model card."""
-    from safetensors.numpy import save
-
-    tensors = {}
-    for name, layers in networks.items():
-        for number, (weight, bias) in enumerate(layers):
-            tensors[f'{name}.{number}.weight'] = np.ascontiguousarray(weight, dtype=np.float32)
-            tensors[f'{name}.{number}.bias'] = np.ascontiguousarray(bias, dtype=np.float32)
-    card = {**card, 'sha256': tensors_digest(tensors)}
-    _check_complete(card)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    # Not safetensors' save_file, which leaves the file readable to its owner only.
-    path.write_bytes(save(tensors, metadata={'card': json.dumps(card, ensure_ascii=False)}))
-
-
-def _check_complete(card: dict[str, Any]) -> None:
-    missing = [field for field in CARD_FIELDS if field not in card]
-    if missing:
-        raise ValueError(f'the model card lacks {", ".join(missing)}')
 
 
 def load_weights(path: Path | str) -> Weights:
@@ -113,22 +76,19 @@ def load_weights(path: Path | str) -> Weights:
         raise ModuleNotFoundError(f'{error}: weights files need it; pip install safetensors',
                                   name=error.name) from None
     path = Path(path)
+    file = f'weights file {shown(str(path))}'
     try:
-        return Weights(path, *_checked(*_read(path)))
+        tensors, card = _read(path)
+        return Weights(path, _networks(tensors, card.get('architecture')), card)
     except FileNotFoundError as error:
-        raise WeightsError(f'weights file {_name(path)} does not exist') from error
+        raise WeightsError(f'{file} does not exist') from error
     except (OSError, ValueError, SafetensorError) as error:
         reason = shown(str(error)) if isinstance(error, SafetensorError) else error
-        raise WeightsError(f'weights file {_name(path)} cannot be read: {reason}') from error
+        raise WeightsError(f'{file} cannot be read: {reason}') from error
 
 
-def _name(path: Path) -> str:
-    """Return a path as refusals show it: nothing in its name starts a line or a terminal code."""
-    return shown(str(path))
-
-
-def _read(path: Path) -> tuple[dict[str, np.ndarray], dict[str, str]]:
-    """Return the tensors and the metadata of a file; raises ValueError for other tensors."""
+def _read(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+    """Return tensors of credible values and the model card, or raise ValueError."""
     from safetensors import safe_open
 
     if path.exists() and not path.is_file():
@@ -138,45 +98,38 @@ def _read(path: Path) -> tuple[dict[str, np.ndarray], dict[str, str]]:
     tensors = {}
     with safe_open(path, framework='numpy') as file:
         for name in file.keys():
-            part = file.get_slice(name)
-            if part.get_dtype() != 'F32':
-                raise ValueError(f'{shown(name)} is {part.get_dtype()}, not F32')
+            dtype = file.get_slice(name).get_dtype()
+            if dtype != 'F32':
+                raise ValueError(f'{shown(name)} is {dtype}, not F32')
             tensors[name] = file.get_tensor(name)
-        return tensors, file.metadata() or {}
-
-
-def _checked(tensors: dict[str, np.ndarray], metadata: dict[str, str],
-             ) -> tuple[dict[str, Network], dict[str, Any]]:
-    """Return the networks and the card of a file; raises ValueError where they do not fit."""
+            if not np.all(np.abs(tensors[name]) <= WEIGHT_LIMIT):  # nor is NaN
+                raise ValueError(f'{shown(name)} holds values that are not finite or beyond '
+                                 f'±{WEIGHT_LIMIT:g}')
+        text = (file.metadata() or {}).get('card', '')
     try:
-        card = json.loads(metadata['card'])
-    except (LookupError, ValueError, RecursionError):
+        card = json.loads(text)
+    except (ValueError, RecursionError):
         card = None
     if not isinstance(card, dict):
         raise ValueError('it has no readable model card')
-    _check_complete(card)
-    if not isinstance(card['inputs'], dict):
-        raise ValueError('inputs of the model card is no object')
-    for name, array in tensors.items():
-        if not np.all(np.abs(array) <= WEIGHT_LIMIT):  # nor is NaN
-            raise ValueError(f'{shown(name)} holds values that are not finite or beyond '
-                             f'±{WEIGHT_LIMIT:g}')
-    if tensors_digest(tensors) != card['sha256']:
-        raise ValueError('checksum differs from its model card')
+    return tensors, card
+
+
+def _networks(tensors: dict[str, np.ndarray], architecture: Any) -> dict[str, Network]:
+    """Return the networks of tensors; raises ValueError where they do not fit the architecture."""
     parts: defaultdict[str, dict[str, np.ndarray]] = defaultdict(dict)
     for key in sorted(tensors):
         name, _, part = key.partition('.')
         parts[name][part] = tensors[key]
     networks = {name: _network(name, own) for name, own in parts.items()}
     for name, network in networks.items():
-        wanted = card['architecture']
-        wanted = wanted.get(name) if isinstance(wanted, dict) else wanted
+        wanted = architecture.get(name) if isinstance(architecture, dict) else architecture
         if list(network.widths) != wanted:
             raise ValueError(f'{shown(name)} is {shown(network.widths)}, the model card says '
                              f'{shown(wanted)}')
     if not networks:
         raise ValueError('it holds no network')
-    return networks, card
+    return networks
 
 
 def _network(name: str, parts: dict[str, np.ndarray]) -> Network:

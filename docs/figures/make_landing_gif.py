@@ -4,13 +4,14 @@
 """Make docs/figures/landing.gif: one landing from the side, with contact point, patch and forces.
 
 Run as `python docs/figures/make_landing_gif.py [--out FILE]`. The crane lands by the exact contact,
-offline, as `demo.landing.land` does it. Tilt and gap are drawn larger, and the picture says so.
+offline, as `benchmarks.landing_ways.land` does it. Tilt and gap are drawn larger, and the picture says so.
 """
 from __future__ import annotations
 
 import argparse
 import io
 import math
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -23,10 +24,14 @@ import numpy as np
 from PIL import Image
 
 from box_contact_ros.demo.crane import CraneScenario
-from box_contact_ros.demo.landing import LandingRecord, land, solvers
+from box_contact_ros.demo.landing import LandingRecord
 from box_contact_ros.scene.laws import GRAVITY
 from box_contact_ros.scene.pose import rotation_matrix
 from box_contact_ros.view.style import BOX_A, BOX_B, CONTACT, ROPE
+
+sys.path.append(str(Path(__file__).resolve().parents[2]))  # where benchmarks/ is
+
+from benchmarks.landing_ways import land, solvers  # noqa: E402
 
 RATE = 200.0
 PICTURES = 12  # a second

@@ -12,11 +12,12 @@ import pytest
 from test_paper import touching
 
 from benchmarks.paper.models import Committee, committee, continuous, weights_path
+from benchmarks.weights import save_weights
 from box_contact_ros import ContactSolver
 from box_contact_ros.resources import resource_path
 from box_contact_ros.scene.pose import rotation_matrix
 from box_contact_ros.solver.paper import Paper
-from box_contact_ros.solver.weights_file import WeightsError, load_weights, save_weights
+from box_contact_ros.solver.weights_file import WeightsError, load_weights
 
 EXACT = ContactSolver(poses.CUBE, poses.CUBE, model='exact')
 MODELS = {'continuous': (continuous, 0.008, 0.15), 'committee': (committee, 0.55, 10.0)}

@@ -134,8 +134,7 @@ LANDED = {f'landed, case {number}': number for number in (0, 5, 17, 31)}
 def crane_series(name: str) -> Series:
     """Return the poses of one run of the crane."""
     pytest.importorskip('mujoco')
-    from benchmarks.landing_ways import aimed, grid
-    from box_contact_ros.demo.landing import land, solvers
+    from benchmarks.landing_ways import aimed, grid, land, solvers
 
     planned = grid()[LANDED[name]]
     scenario = aimed(planned.scenario, planned.overhang)

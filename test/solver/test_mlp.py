@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import ctypes
 import ctypes.util
+import json
 import platform
 import re
 from pathlib import Path
@@ -14,6 +15,7 @@ from typing import Any
 import numpy as np
 import poses
 import pytest
+from safetensors.numpy import save_file
 
 import box_contact_ros
 
@@ -37,7 +39,7 @@ from box_contact_ros.core import (
 from box_contact_ros.scene.pose import rotation_matrix
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.solver.mlp import ACTIVATION, NETWORK, UNITS_MAX, core_numbers, load_mlp
-from box_contact_ros.solver.weights_file import WeightsError, save_weights
+from box_contact_ros.solver.weights_file import WeightsError
 
 N = 4000
 LANES = native.lanes
@@ -474,11 +476,11 @@ def test_the_compiled_network_is_the_shipped_file() -> None:
 def written(path: Path, widths: tuple[int, ...] = (FEATURES, 4, 1), name: str = NETWORK,
             **changes: Any) -> str:
     """Return a weights file with a network of zeros and a card that fits it, but for `changes`."""
-    layers = [(np.zeros((b, a)), np.zeros(b)) for a, b in zip(widths, widths[1:])]
-    card = {'name': 'other', 'model': 'mlp', 'format': NETWORK_FORMAT, 'inputs': {},
-            'activation': ACTIVATION, 'outputs': [], 'sizes': [], 'architecture': list(widths),
-            'data': {}, 'seed': 0, 'commit': '', 'metrics': {}}
-    save_weights(path, {name: layers}, card | changes)
+    tensors = {f'{name}.{layer}.{part}': np.zeros(shape, np.float32)
+               for layer, (inputs, outputs) in enumerate(zip(widths, widths[1:]))
+               for part, shape in (('weight', (outputs, inputs)), ('bias', outputs))}
+    card = {'format': NETWORK_FORMAT, 'activation': ACTIVATION, 'architecture': list(widths)}
+    save_file(tensors, path, metadata={'card': json.dumps(card | changes)})
     return str(path)
 
 

@@ -18,7 +18,7 @@ import yaml
 
 import box_contact_ros
 from box_contact_ros import ContactSolver
-from box_contact_ros.solver.arguments import model_name, seed_number
+from box_contact_ros.solver.arguments import model_name
 from box_contact_ros.solver.models import (
     MODELS,
     NATIVE,
@@ -84,14 +84,10 @@ def test_what_is_no_model(model):
         ContactSolver(poses.CUBE, poses.CUBE, model=model)
 
 
-def test_programs_take_names_and_seeds():
+def test_programs_take_names_of_models():
     assert model_name('soup-64') == 'soup-64'
     with pytest.raises(argparse.ArgumentTypeError, match="'exakt' is not one of"):
         model_name('exakt')
-    assert seed_number('7') == 7
-    for text in ('-1', '1.5', '²', '9' * 19):
-        with pytest.raises(argparse.ArgumentTypeError, match='not a whole number from 0'):
-            seed_number(text)
 
 
 @pytest.mark.parametrize('name, words', [

@@ -17,12 +17,9 @@ from safetensors.numpy import load, load_file, save_file
 from box_contact_ros import ContactSolver
 from box_contact_ros.resources import resource_path
 from box_contact_ros.solver.weights_file import (
-    CARD_FIELDS,
     FILE_LIMIT,
     WeightsError,
     load_weights,
-    save_weights,
-    tensors_digest,
 )
 
 WIDTHS = (6, 5, 3, 4)
@@ -35,8 +32,7 @@ def layers(seed: int = 0) -> list[tuple[np.ndarray, np.ndarray]]:
 
 
 def card(**changes: object) -> dict[str, object]:
-    return {**dict.fromkeys(CARD_FIELDS, 'x'), 'inputs': {}, 'sizes': [],
-            'architecture': list(WIDTHS), **changes}
+    return {'architecture': list(WIDTHS), 'sizes': [], **changes}
 
 
 def tensors() -> dict[str, np.ndarray]:
@@ -45,34 +41,24 @@ def tensors() -> dict[str, np.ndarray]:
 
 
 def write(path: Path, content: dict[str, np.ndarray], **changes: object) -> Path:
-    """Return a weights file whose checksum is right, whatever is in it."""
-    text = json.dumps(card(sha256=tensors_digest(content), **changes))
-    save_file(content, path, metadata={'card': text})
+    """Return a weights file, whatever is in it; changes: of its card."""
+    save_file(content, path, metadata={'card': json.dumps(card(**changes))})
     return path
 
 
 @pytest.fixture
 def good(tmp_path: Path) -> Path:
-    path = tmp_path / 'folder' / 'good.safetensors'
-    save_weights(path, {'n': layers()}, card())
-    return path
+    return write(tmp_path / 'good.safetensors', tensors())
 
 
-def test_what_was_saved_is_loaded(good: Path) -> None:
+def test_networks_and_card_are_read(good: Path) -> None:
     """Weights (outputs × inputs) and biases of each layer."""
     weights = load_weights(good)
     network = weights.networks['n']
-    assert network.widths == WIDTHS
+    assert network.widths == WIDTHS and weights.card == card()
     for (weight, bias), (want, want_bias) in zip(network.layers, layers(), strict=True):
         np.testing.assert_array_equal(weight, want)
         np.testing.assert_array_equal(bias, want_bias)
-    assert weights.card['sha256'] == tensors_digest(tensors())
-
-
-def test_saved_weights_are_readable_to_all(good: Path) -> None:
-    """As the umask says: installed by root, they are read by everybody."""
-    (good.parent / 'plain').write_bytes(b'')
-    assert good.stat().st_mode == (good.parent / 'plain').stat().st_mode
 
 
 @pytest.mark.parametrize('share', [0.0, 0.02, 0.5, 0.999])
@@ -81,18 +67,6 @@ def test_truncated(good: Path, share: float) -> None:
     good.write_bytes(content[:int(share * len(content))])
     with pytest.raises(WeightsError, match='cannot be read'):
         load_weights(good)
-
-
-def test_every_edited_byte_of_the_tensors(good: Path) -> None:
-    """One bit, anywhere in the tensors."""
-    content = good.read_bytes()
-    begin = 8 + int.from_bytes(content[:8], 'little')
-    for place in range(begin, len(content)):
-        edited = bytearray(content)
-        edited[place] ^= 1 << place % 8
-        good.write_bytes(bytes(edited))
-        with pytest.raises(WeightsError, match='checksum|not finite'):
-            load_weights(good)
 
 
 @pytest.mark.parametrize('value', [np.nan, np.inf, -np.inf, 1e5])
@@ -126,12 +100,6 @@ def test_architecture_of_the_card(tmp_path: Path, architecture: object) -> None:
         load_weights(write(tmp_path / 'x', tensors(), architecture=architecture))
 
 
-@pytest.mark.parametrize('inputs', [[], 'x', None])
-def test_inputs_of_another_kind(tmp_path: Path, inputs: object) -> None:
-    with pytest.raises(WeightsError, match='inputs of the model card is no object'):
-        load_weights(write(tmp_path / 'x', tensors(), inputs=inputs))
-
-
 @pytest.mark.parametrize('sizes', [[], {}, None, 5, [5], [None], [[2, 2]], [[2, 2, -1]], ['abc']])
 def test_sizes_that_are_none(tmp_path: Path, sizes: object) -> None:
     """The paper's networks are for the boxes of their card."""
@@ -142,22 +110,12 @@ def test_sizes_that_are_none(tmp_path: Path, sizes: object) -> None:
         ContactSolver((2, 2, 2), (2, 2, 2), model='paper', weights=str(tmp_path / 'x'))
 
 
-@pytest.mark.parametrize('text', [None, '', '{', '3', '"name"', json.dumps(CARD_FIELDS), '[]',
+@pytest.mark.parametrize('text', [None, '', '{', '3', '"name"', '[]',
                                   '[["name", "a pair"]]', '[' * 200_000])
 def test_no_card(tmp_path: Path, text: str | None) -> None:
     metadata = {} if text is None else {'card': text}
     save_file(tensors(), tmp_path / 'x', metadata=metadata)
     with pytest.raises(WeightsError, match='no readable model card'):
-        load_weights(tmp_path / 'x')
-
-
-def test_incomplete_card(tmp_path: Path) -> None:
-    """Neither written nor read."""
-    short = {name: value for name, value in card().items() if name not in ('seed', 'metrics')}
-    with pytest.raises(ValueError, match='lacks seed, metrics'):
-        save_weights(tmp_path / 'x', {'n': layers()}, short)
-    save_file(tensors(), tmp_path / 'x', metadata={'card': json.dumps(short)})
-    with pytest.raises(WeightsError, match='lacks seed, metrics'):
         load_weights(tmp_path / 'x')
 
 
@@ -280,6 +238,6 @@ def test_no_file(tmp_path: Path) -> None:
         load_weights(tmp_path / 'x')
     with pytest.raises(WeightsError, match='cannot be read'):
         load_weights(tmp_path)
-    save_file({}, tmp_path / 'y', metadata={'card': json.dumps(card(sha256=tensors_digest({})))})
+    save_file({}, tmp_path / 'y', metadata={'card': json.dumps(card())})
     with pytest.raises(WeightsError, match='holds no network'):
         load_weights(tmp_path / 'y')

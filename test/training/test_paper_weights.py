@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_weights_file import card, layers
+from test_weights_file import layers, tensors, write
 
 from benchmarks.paper import __main__ as program
 from benchmarks.paper import dataset
@@ -20,16 +20,14 @@ from benchmarks.paper.errors import (
     wrapped,
 )
 from benchmarks.paper.models import SUBSETS, weights_path
-from box_contact_ros.solver.weights_file import load_weights, save_weights
+from box_contact_ros.solver.weights_file import load_weights
 
 SHIPPED = ('paper', 'paper-continuous', 'paper-12.192x2.438x2.591')
 
 
 @pytest.fixture
 def good(tmp_path: Path) -> Path:
-    path = tmp_path / 'good.safetensors'
-    save_weights(path, {'n': layers()}, card())
-    return path
+    return write(tmp_path / 'good.safetensors', tensors())
 
 
 def test_forward_is_the_formula(good: Path) -> None:

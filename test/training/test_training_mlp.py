@@ -13,10 +13,11 @@ import pytest
 torch = pytest.importorskip('torch')
 
 from benchmarks.pose_sets import SETS, Pairs
+from benchmarks.weights import save_weights
 from box_contact_ros import ContactSolver
 from box_contact_ros.core import BRACKET_LIMIT, FEATURES, SPREAD_LIMIT, UPPER_LIMIT
 from box_contact_ros.solver.mlp import NETWORK, load_mlp
-from box_contact_ros.solver.weights_file import load_weights, save_weights
+from box_contact_ros.solver.weights_file import load_weights
 from training import __main__ as train
 from training import recipe, samples
 from training.fit import ShareNetwork, errors_of, fit, loss_of, tensors

@@ -5,7 +5,7 @@
 //
 // The file begins with 8 bytes, the little-endian length of a JSON header. The header gives dtype,
 // shape and place of each tensor, and the tensors follow. The reader finds four tensors by name and
-// knows no more of JSON. It needs a little-endian machine and ignores the model card's checksum.
+// knows no more of JSON. It needs a little-endian machine.
 #pragma once
 
 #include <cctype>

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from box_contact_ros import output
+from benchmarks import output
 from box_contact_ros.core import native
 
 
@@ -34,12 +34,6 @@ def test_a_table_has_its_words_to_the_left() -> None:
     assert output.markdown_table(['', 'x'], rows) == (
         '|  | x |\n| --- | ---: |\n| a | 1 |\n| bcd | 22.5 |')
     assert output.markdown_table(['', 'x', 'y'], [], words=2).endswith('| --- | --- | ---: |')
-
-
-def test_a_padded_table_has_lines_of_one_length() -> None:
-    lines = output.markdown_table(['name', 'x'], [['a', 1], ['bcdef', 22.5]], padded=True)
-    assert lines.splitlines() == ['| name  |    x |', '| ----- | ---: |', '| a     |    1 |',
-                                  '| bcdef | 22.5 |']
 
 
 def test_a_csv_file_has_the_columns_of_all_rows(tmp_path: Path) -> None:

@@ -1,0 +1,46 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""Arguments that several reports have in common, on top of those of all programs."""
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from box_contact_ros.solver.arguments import model_name, program_parser
+from box_contact_ros.solver.checks import shown
+from box_contact_ros.solver.models import MODELS
+
+
+def report_parser(program: str, doc: str | None, *, quick: str = '', seed: int | None = None,
+                  out: str = '', **options: Any) -> argparse.ArgumentParser:
+    """Return the parser of a report, whose help begins with `doc`.
+
+    quick: help of `--quick`; seed: default of `--seed`; out: the files that go to the folder of
+    `--out`. The report has those of them that are given.
+    """
+    parser = program_parser(program, doc, **options)
+    if quick:
+        parser.add_argument('--quick', action='store_true', help=quick)
+    if seed is not None:
+        parser.add_argument('--seed', type=seed_number, default=seed,
+                            help='seed of the random numbers (default: %(default)s)')
+    if out:
+        parser.add_argument('--out', type=Path, metavar='DIR', help=f'folder for {out} (default: '
+                            'docs/results, or quick-results with --quick)')
+    return parser
+
+
+def add_models(parser: argparse.ArgumentParser, default: Sequence[str]) -> None:
+    """Add the option `--models`."""
+    parser.add_argument('--models', nargs='+', type=model_name, default=default, metavar='MODEL',
+                        help=f'of {", ".join(MODELS)} (default: {" ".join(default)})')
+
+
+def seed_number(text: str) -> int:
+    """Return a seed of random numbers, as a program's argument: a whole number from 0."""
+    if not text.isascii() or not text.isdecimal() or len(text) > 18:
+        raise argparse.ArgumentTypeError(f'{shown(text)} is not a whole number from 0')
+    return int(text)

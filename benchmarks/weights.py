@@ -1,0 +1,34 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""The writer of weights files, whose format is that of `box_contact_ros.solver.weights_file`."""
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from safetensors.numpy import save
+
+from box_contact_ros.solver.weights_file import Layers
+
+CARD_FIELDS = ('name', 'model', 'architecture', 'inputs', 'outputs', 'sizes', 'data', 'seed',
+               'commit', 'metrics')
+"""Entries that every model card has: `inputs` with their ranges, `sizes` it was trained for."""
+
+
+def save_weights(path: Path, networks: dict[str, Layers], card: dict[str, Any]) -> None:
+    """Write networks, each a list of (weight, bias) per layer, and their model card.
+
+    Raises ValueError where the card lacks an entry.
+    """
+    missing = [field for field in CARD_FIELDS if field not in card]
+    if missing:
+        raise ValueError(f'the model card lacks {", ".join(missing)}')
+    tensors = {f'{name}.{number}.{part}': np.ascontiguousarray(array, np.float32)
+               for name, layers in networks.items() for number, layer in enumerate(layers)
+               for part, array in zip(('weight', 'bias'), layer)}
+    path.parent.mkdir(parents=True, exist_ok=True)
+    # Not safetensors' save_file, which leaves the file readable to its owner only.
+    path.write_bytes(save(tensors, metadata={'card': json.dumps(card, ensure_ascii=False)}))

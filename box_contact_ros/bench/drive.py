@@ -1,0 +1,231 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""What drives the nodes: starts them, sends the poses, receives the answers, keeps the logs.
+
+Poses go out in blocks of half a second. A block goes to one node after the other, in an order that
+is drawn anew each time. One thread sends poses that were serialised before, on an absolute
+schedule. The executor receives in the main thread, and keeps the bytes with the time. Messages are
+read after the block.
+"""
+from __future__ import annotations
+
+import contextlib
+import gc
+import math
+import os
+import tempfile
+import threading
+import time
+from collections.abc import Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+from geometry_msgs.msg import PointStamped, PoseStamped, Vector3Stamped
+from rclpy.context import Context
+from rclpy.qos import QoSProfile
+from rclpy.serialization import deserialize_message, serialize_message
+
+from box_contact_msgs.msg import Contacts as ContactsMessage
+
+from ..node.messages import make_header
+from ..node.processes import Stop, end, printed, program, start
+from ..node.runtime import GuardedNode, spin_for
+from ..solver.contact_solver import ContactSolver
+from .echo_node import FRAME, raw_stamp, with_stamp
+from .poses import SIZE
+from .report import AnswerLog
+
+BLOCK_SECONDS = 0.5
+SLICE = 0.05  # time [s] between looks at whether the bench was called off
+# Bounds on everything that waits, so that a bench always ends.
+START_LIMIT = 60.0  # time [s] until all nodes answer
+DRAIN_SECONDS = 1.0  # time [s] without an answer, after which what is still out is lost
+
+DEEP = QoSProfile(depth=1000)
+"""Reliable: what comes in while Python is busy must not push out the rest."""
+NODES = {'echo': ('bench.echo_node', 'echo/'), 'contact': ('node.contact_node', ''),
+         'soup': ('soup.soup_node', 'soup/')}
+"""Module of each node, and what precedes the topics that it answers on. All topics of a node are
+in the namespace bench/NAME. Ratios are to the first one."""
+ANSWERS = {'point': (PointStamped, 'contact/point'), 'normal': (Vector3Stamped, 'contact/normal'),
+           'contacts': (ContactsMessage, 'contacts')}
+"""Type and topic of each kind of answer."""
+
+
+class MeasuredNode:
+    """A node that is measured: a process of its own, which can be closed (Linux)."""
+
+    def __init__(self, name: str, *, model: str, cores: set[int]) -> None:
+        """Start the node on some cores; model: of the contact node."""
+        values: dict[str, object] = {} if name == 'echo' else {'size_a': SIZE, 'size_b': SIZE}
+        if name == 'contact':
+            values['model'] = model
+        self.name = name
+        self._output = tempfile.TemporaryFile()
+        self.process = start([*program(NODES[name][0], **values), '-r', f'__ns:=/bench/{name}'],
+                             self._output)
+        # It has inherited this process's core. Before it has threads, it gets its own.
+        with contextlib.suppress(ProcessLookupError):
+            os.sched_setaffinity(self.process.pid, cores)
+
+    @property
+    def fault(self) -> str:
+        """Return why the process does not run any more, '' while it runs."""
+        status = self.process.poll()
+        if status is None:
+            return ''
+        *_, last = ['', *printed(self._output).splitlines()]
+        return f'the {self.name} node ended with status {status}: {last}'
+
+    def cpu_seconds(self) -> float:
+        """Return the processor time [s] so far; NaN once the process ended."""
+        try:
+            with open(f'/proc/{self.process.pid}/stat') as file:
+                fields = file.read().rpartition(')')[2].split()
+        except OSError:
+            return math.nan
+        return (int(fields[11]) + int(fields[12])) / os.sysconf('SC_CLK_TCK')
+
+    def close(self) -> None:
+        """End the process."""
+        end([self.process])
+        self._output.close()
+
+
+class BenchNode(GuardedNode):
+    """Publishes poses that were serialised before, keeps the bytes of what comes back."""
+
+    def __init__(self, context: Context, names: Sequence[str]) -> None:
+        """Take the names of the nodes."""
+        super().__init__('bench', context=context)
+        self.arrivals: list[tuple[int, str, bytes]] = []
+        """(received [ns], kind, message); stamps tell the nodes apart."""
+        self.senders = {
+            name: [self.create_publisher(PoseStamped, f'bench/{name}/box_{box}/pose', DEEP).publish
+                   for box in 'ab'] for name in names}
+        """What sends a serialised pose of box A and of box B to a node."""
+        for name in names:
+            for kind, (message, topic) in ANSWERS.items():  # the echo node sends no contacts
+                self.create_subscription(message, f'bench/{name}/{NODES[name][1]}{topic}',
+                                         partial(self._keep, kind), DEEP, raw=True)
+
+    def _keep(self, kind: str, data: bytes) -> None:
+        self.arrivals.append((time.time_ns(), kind, data))
+
+
+class Bench:
+    """Plays the stream to all nodes, and keeps the logs of what they answered."""
+
+    def __init__(self, client: BenchNode, executor: Any, poses: tuple[np.ndarray, np.ndarray], *,
+                 rate: float, stop: Stop) -> None:
+        """Take the stream: poses (n, 7) of A and of B.
+
+        rate: pairs per second [Hz]; stop: set to call all off.
+        """
+        self.client, self.executor, self.rate, self.stop = client, executor, rate, stop
+        self.block = max(1, round(rate * BLOCK_SECONDS))  # pairs
+        self._truth = ContactSolver(SIZE, SIZE, model='exact').batch(*poses)
+        self._pairs = [[_pose_bytes(pose) for pose in pair] for pair in zip(*poses)]
+
+    def run(self, nodes: Sequence[MeasuredNode]) -> list[AnswerLog]:
+        """Play the stream to all nodes; return a log for each.
+
+        The logs hold what was done when `stop` was set. Raises ValueError where a node does not
+        answer.
+        """
+        self._await_answers(nodes)
+        logs = {node.name: AnswerLog(node.name, self._truth) for node in nodes}
+        count = len(self._pairs)
+        blocks = [range(first, min(first + self.block, count))
+                  for first in range(0, count, self.block)]
+        for node in nodes:  # the log is thrown away: the nodes warm up
+            self._play(AnswerLog(node.name, self._truth), blocks[0])
+        before = [node.cpu_seconds() for node in nodes]
+        order = np.random.default_rng(1)
+        for rows in blocks:
+            if self.stop.is_set():
+                break
+            for name in order.permutation(list(logs)):
+                self._play(logs[name], rows)
+        for node, log, spent in zip(nodes, logs.values(), before):
+            sent = max(1, int((log.stamps > 0).sum()))
+            log.cpu = (node.cpu_seconds() - spent) * self.rate / sent
+        return list(logs.values())
+
+    def _await_answers(self, nodes: Sequence[MeasuredNode]) -> None:
+        """Send each node the first pair until it has answered, or raise ValueError."""
+        deadline = time.monotonic() + START_LIMIT
+        for node in nodes:
+            while not self.stop.is_set():
+                if node.fault:
+                    raise ValueError(node.fault)
+                if time.monotonic() > deadline:
+                    raise ValueError(f'no answer of the {node.name} node in {START_LIMIT:g} s')
+                log = AnswerLog(node.name, self._truth)
+                self._play(log, range(1))
+                if log.stamps[0] and not log.lost[0]:
+                    break
+
+    def _play(self, log: AnswerLog, rows: range) -> None:
+        """Send some pairs to a node, and log its answers."""
+        sent: list[tuple[int, float]] = []
+        sender = threading.Thread(target=self._send, args=(log.node, rows, sent))
+        gc.collect()  # now, and not while answers come in: it takes milliseconds
+        sender.start()
+        while sender.is_alive():
+            spin_for(self.client, self.executor, SLICE)
+        row_of = {}
+        for row, (stamp, lateness) in zip(rows, sent):
+            log.stamps[row], log.lateness[row], row_of[stamp] = stamp, lateness, row
+        deadline = time.monotonic() + DRAIN_SECONDS
+        while log.lost[rows].any() and time.monotonic() < deadline:
+            spin_for(self.client, self.executor, SLICE)
+            if self._read(log, row_of):
+                deadline = time.monotonic() + DRAIN_SECONDS
+        spin_for(self.client, self.executor, SLICE)  # whatever is on its way behind the last answer
+        self._read(log, row_of)
+
+    def _send(self, name: str, rows: range, sent: list[tuple[int, float]]) -> None:
+        """Send pairs at the rate; note stamp [ns] and lateness [s] of each.
+
+        The schedule is absolute, so that a pair that is late does not delay the next.
+        """
+        begin = time.perf_counter() + SLICE
+        for number, row in enumerate(rows):
+            due = begin + number / self.rate
+            time.sleep(max(0.0, due - time.perf_counter()))
+            if self.stop.is_set():
+                return
+            lateness = time.perf_counter() - due
+            stamp = time.time_ns()  # it names the pair: no two are the same
+            for publish, message in zip(self.client.senders[name], self._pairs[row]):
+                publish(with_stamp(message, stamp))
+            sent.append((stamp, lateness))
+
+    def _read(self, log: AnswerLog, row_of: dict[int, int]) -> bool:
+        """Log what has arrived by the rows of its stamps [ns]; return whether anything has.
+
+        What answers an earlier block came too late. Stale poses were not evaluated.
+        """
+        arrivals, self.client.arrivals[:] = self.client.arrivals[:], []
+        known = [(row_of[stamp], kind, received, data) for received, kind, data in arrivals
+                 if (stamp := raw_stamp(data)) in row_of]
+        for row, kind, received, data in known:
+            message = deserialize_message(data, ANSWERS[kind][0])
+            if kind != 'contacts' or not message.stale:
+                log.note(row, kind, received)
+            if kind == 'point' and log.node != 'echo':
+                log.points[row] = message.point.x, message.point.y, message.point.z
+            if kind == 'contacts' and message.contacts:
+                log.depths[row] = message.contacts[0].depth
+        return bool(known)
+
+
+def _pose_bytes(pose: np.ndarray) -> bytes:
+    """Return the serialised message of a pose (7,), under a stamp of 0."""
+    message = PoseStamped(header=make_header(0, FRAME))
+    p, q = message.pose.position, message.pose.orientation
+    p.x, p.y, p.z, q.x, q.y, q.z, q.w = map(float, pose)
+    return serialize_message(message)

@@ -1,0 +1,173 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""What came back from each node, its figures, and their table, CSV file and picture. No ROS.
+
+Stamps and times of receipt are nanoseconds of one clock. A pair is answered once all messages of
+its stamp have come: point, normal and contacts, from the echo node point and normal. Its latency
+runs from the stamp to the later of point and normal. A pair that was sent and not answered is lost.
+An answer is wrong if its depth differs from the exact one, if it has no contact, or if a message
+came twice.
+"""
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..solver.contact import Contacts
+
+DEPTH_TOLERANCE = 1e-9
+"""Largest difference of a right depth from the exact one [m]; all models take it from the same
+separating-axis test. The depths of two ticks differ by a thousand times more."""
+RESAMPLES = 2000  # of the bootstrap
+LATE = 'bench late p99 [ms]'  # a column
+COLORS = {'contact': 'tab:blue', 'soup': 'tab:red', 'echo': 'tab:gray'}
+
+
+class AnswerLog:
+    """What was sent to one node, and what came back; rows are pairs of poses that touch."""
+
+    def __init__(self, node: str, truth: Contacts) -> None:
+        """Make room for answers to the pairs whose exact contacts are `truth`."""
+        self.node, self.truth = node, truth
+        rows = len(truth.colliding)
+        self.stamps = np.zeros(rows, np.int64)  # [ns], 0: not sent
+        self.lateness = np.full(rows, np.nan)  # of the bench itself [s]
+        kinds = ('point', 'normal') if node == 'echo' else ('point', 'normal', 'contacts')
+        self.received = {kind: np.zeros(rows, np.int64) for kind in kinds}  # [ns], 0: not yet
+        self.twice = np.zeros(rows, bool)
+        self.points = np.full((rows, 3), np.nan)
+        self.depths = np.full(rows, np.nan)  # [m], NaN: no contact
+        self.cpu = math.nan  # share of one core while poses were sent
+
+    def note(self, row: int, kind: str, received: int) -> None:
+        """Note that a message came at `received` [ns]; of two, the first counts."""
+        if self.received[kind][row]:
+            self.twice[row] = True
+        else:
+            self.received[kind][row] = received
+
+    @property
+    def lost(self) -> np.ndarray:
+        """Which pairs were sent and not answered (rows,)."""
+        return (self.stamps > 0) & ~np.all([times > 0 for times in self.received.values()], axis=0)
+
+    @property
+    def latencies(self) -> np.ndarray:
+        """Return the latencies (rows,) [s], NaN without an answer."""
+        last = np.maximum(self.received['point'], self.received['normal'])
+        return np.where((self.stamps > 0) & ~self.lost, 1e-9 * (last - self.stamps), np.nan)
+
+    @property
+    def wrong(self) -> np.ndarray:
+        """Which answers are wrong (rows,)."""
+        right = np.abs(self.depths + self.truth.separation) <= DEPTH_TOLERANCE
+        return self.twice | (self.received.get('contacts', np.zeros(1)) > 0) & ~right
+
+
+def ratio(log: AnswerLog, baseline: AnswerLog, *, block: int) -> tuple[float, float, float]:
+    """Return how many times as long a node's answers take as another's, and a 95 % interval.
+
+    Latencies are paired by pose. The ratio is the median over blocks of their median ratios. The
+    interval comes from drawing the blocks anew, as neighbouring answers share what disturbs them.
+    NaN without answers.
+
+    block: pairs per block.
+    """
+    ratios = log.latencies / baseline.latencies
+    blocks = np.split(ratios, range(block, len(ratios), block))
+    medians = [np.nanmedian(part) for part in blocks if not np.isnan(part).all()]
+    if not medians:
+        return math.nan, math.nan, math.nan
+    drawn = np.random.default_rng(1).choice(medians, (RESAMPLES, len(medians)))
+    low, high = np.percentile(np.median(drawn, axis=1), (2.5, 97.5))
+    return float(np.median(medians)), float(low), float(high)
+
+
+def figures(logs: Sequence[AnswerLog], *, block: int) -> list[dict[str, Any]]:
+    """Return a row of the table and of the CSV file for each node; NaN where nothing was answered.
+
+    Ratios are to the first node. block: pairs per block.
+    """
+    rows = []
+    for log in logs:
+        middle, low, high = ratio(log, logs[0], block=block)
+        errors = np.linalg.norm(log.points - log.truth.point, axis=1)
+        rows.append({
+            'node': log.node, 'sent': np.count_nonzero(log.stamps), 'lost': int(log.lost.sum()),
+            'wrong': int(log.wrong.sum()),
+            **{f'{name} [ms]': 1e3 * _percentile(log.latencies, percent)
+               for name, percent in (('p50', 50), ('p99', 99), ('max', 100))},
+            f'/ {logs[0].node}': middle, 'low': low, 'high': high,
+            'point error [mm]': 1e3 * _percentile(errors, 100), 'CPU [%]': 100.0 * log.cpu,
+            LATE: 1e3 * _percentile(log.lateness, 99)})
+    return rows
+
+
+def _percentile(values: np.ndarray, percent: float) -> float:
+    """Return a percentile of those values that are no NaN; NaN of none."""
+    values = values[~np.isnan(values)]
+    return float(np.percentile(values, percent)) if len(values) else math.nan
+
+
+def void_reason(rows: Sequence[Mapping[str, Any]], rate: float) -> str:
+    """Return why a run is void, '' if it is not: the bench was late by more than a period.
+
+    One late pair of a hundred is let pass.
+    """
+    lateness, period = max(float(row[LATE]) for row in rows), 1e3 / rate
+    return '' if not lateness > period else (
+        f'void: the bench itself was late by p99 {lateness:.2f} ms, at a period of {period:.2f} ms')
+
+
+def table(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Return the figures as a Markdown table that reads well in a terminal, too."""
+    lines = [list(rows[0]), *([_cell(value) for value in row.values()] for row in rows)]
+    widths = [max(map(len, column)) for column in zip(*lines)]
+    lines.insert(1, ['-' * (width - 1) + ':' for width in widths])
+    return '\n'.join(
+        '| ' + ' | '.join(cell.rjust(width) for cell, width in zip(line, widths)) + ' |'
+        for line in lines)
+
+
+def _cell(value: object) -> str:
+    if not isinstance(value, float):
+        return str(value)
+    return '' if math.isnan(value) else f'{value:.3g}'
+
+
+def write_report(folder: Path, logs: Sequence[AnswerLog], rows: Sequence[Mapping[str, Any]],
+                 page: str) -> None:
+    """Write bench.md and bench.csv, and bench.png where matplotlib is installed."""
+    (folder / 'bench.md').write_text(f'# Bench\n\n{page}\n', 'utf-8')
+    with (folder / 'bench.csv').open('w', newline='', encoding='utf-8') as file:
+        writer = csv.DictWriter(file, list(rows[0]), lineterminator='\n')
+        writer.writeheader()
+        writer.writerows(rows)
+    try:
+        draw(folder / 'bench.png', logs)
+    except ModuleNotFoundError as error:
+        print(f'no picture: {error.name} is not installed (extra: report)')
+
+
+def draw(path: Path, logs: Sequence[AnswerLog]) -> None:
+    """Draw, for each node, which share of its answers takes at least how long."""
+    from matplotlib.figure import Figure
+
+    drawing = Figure(figsize=(7.0, 4.5), layout='constrained', dpi=110)
+    axis = drawing.subplots()
+    axis.set(xscale='log', yscale='log', xlabel='latency [ms]',
+             ylabel='share of answers that take at least as long')
+    for log in logs:
+        latencies = np.sort(1e3 * log.latencies[~np.isnan(log.latencies)])
+        # The i-th answer itself is counted, so the share is never zero.
+        share = np.arange(latencies.size, 0, -1) / max(1, latencies.size)
+        axis.step(latencies, share, where='post', color=COLORS[log.node], label=f'{log.node} node')
+    axis.grid(alpha=0.3)
+    axis.legend()
+    drawing.savefig(path)

@@ -1,0 +1,140 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""The bench's book-keeping and figures, without ROS: every planted fault shows up."""
+from __future__ import annotations
+
+import csv
+import math
+
+import numpy as np
+import pytest
+
+from box_contact_ros.bench.report import AnswerLog, figures, ratio, table, void_reason, write_report
+from box_contact_ros.solver.contact import Contacts, without_patch
+
+MS = 1_000_000  # ns
+START = 1_700_000_000_000_000_000  # ns: stamps as large as real ones
+PAIRS = 100
+BLOCK = 20  # pairs
+DEPTH = 2e-3  # of all pairs [m]
+
+
+def exact() -> Contacts:
+    """Return the truth: all pairs touch at a point of their own, at one depth."""
+    points = np.stack([0.01 * np.arange(PAIRS), np.ones(PAIRS), np.zeros(PAIRS)], axis=1)
+    return without_patch(np.ones(PAIRS, bool), np.full(PAIRS, -DEPTH),
+                         np.tile([0.0, 0.0, -1.0], (PAIRS, 1)), points)
+
+
+def played(node: str = 'contact', *, delay: int = MS) -> AnswerLog:
+    """Return the log of a node that answers every pair rightly.
+
+    The point comes after half the delay [ns], the normal after all of it, then the contacts.
+    """
+    log = AnswerLog(node, exact())
+    log.stamps[:] = START + 5 * MS * np.arange(PAIRS)
+    log.lateness[:] = 1e-4
+    for kind, later in (('point', delay // 2), ('normal', delay), ('contacts', delay + MS)):
+        if kind in log.received:
+            log.received[kind][:] = log.stamps + later
+    if node != 'echo':
+        log.points[:], log.depths[:] = log.truth.point, DEPTH
+    return log
+
+
+def counts(log: AnswerLog) -> tuple[int, int]:
+    """Return how many answers were lost, and how many are wrong."""
+    return int(log.lost.sum()), int(log.wrong.sum())
+
+
+@pytest.mark.parametrize('node', ['contact', 'echo'])
+def test_a_faultless_run(node):
+    """The latency is that of the normal, not that of the contacts."""
+    log = played(node)
+    assert counts(log) == (0, 0)
+    assert log.latencies == pytest.approx(1e-3, abs=1e-12)
+
+
+@pytest.mark.parametrize('kind', ['point', 'normal', 'contacts'])
+def test_an_answer_without_one_of_its_messages_is_lost(kind):
+    log = played()
+    log.received[kind][10] = 0
+    assert counts(log) == (1, 0)
+    assert math.isnan(log.latencies[10]) and not np.isnan(log.latencies[11])
+
+
+def test_what_was_not_sent_is_not_lost():
+    assert counts(AnswerLog('contact', exact())) == (0, 0)
+
+
+@pytest.mark.parametrize('depth, wrong', [
+    (math.nan, 1), (DEPTH + 1e-8, 1), (-DEPTH, 1), (DEPTH + 1e-12, 0)])
+def test_a_missing_contact_and_the_depth_of_another_tick_are_wrong(depth, wrong):
+    log = played()
+    log.depths[10] = depth
+    assert counts(log) == (0, wrong)
+
+
+@pytest.mark.parametrize('node', ['contact', 'echo'])
+def test_an_answer_that_comes_twice_is_wrong(node):
+    """The first message counts, with its latency."""
+    log = played(node)
+    log.note(20, 'normal', int(log.stamps[20]) + 50 * MS)
+    assert counts(log) == (0, 1)
+    assert log.latencies[20] == pytest.approx(1e-3, abs=1e-12)
+
+
+def test_percentiles_are_over_all_answers():
+    """Of a hundred answers of which ten are slow, p99 and maximum are those of a slow one."""
+    log = played()
+    log.received['normal'][90:] += 7 * MS
+    log.points[3, 2] += 0.005
+    row, = figures([log], block=BLOCK)
+    assert (row['p50 [ms]'], row['p99 [ms]'], row['max [ms]']) == pytest.approx((1.0, 8.0, 8.0))
+    assert (row['sent'], row['lost'], row['wrong']) == (PAIRS, 0, 0)
+    assert row['point error [mm]'] == pytest.approx(5.0)
+
+
+def test_ratios_are_paired_by_pose():
+    """Each pair takes a time of its own, and the contact node 1.5 times as long: no spread."""
+    echo, contact = played('echo'), played()
+    for log, factor in ((echo, 2), (contact, 3)):
+        log.received['normal'][:] = log.stamps + factor * MS * (1 + np.arange(PAIRS))
+    assert ratio(contact, echo, block=BLOCK) == pytest.approx((1.5, 1.5, 1.5), rel=1e-6)
+    assert ratio(echo, echo, block=BLOCK) == (1.0, 1.0, 1.0)
+
+
+def test_the_interval_of_a_ratio_spans_its_blocks():
+    """Four blocks at twice, one at three times the baseline: 2, and nothing beyond 3."""
+    echo, contact = played('echo'), played(delay=2 * MS)
+    contact.received['normal'][80:] += MS
+    middle, low, high = ratio(contact, echo, block=BLOCK)
+    assert middle == pytest.approx(2.0) and low == pytest.approx(2.0)
+    assert 2.0 <= high <= 3.0 + 1e-9
+
+
+def test_a_late_bench_is_void():
+    """One late pair of a hundred is not enough, three are: late by more than a period."""
+    log = played()
+    for late, void in ((0, False), (1, False), (3, True)):
+        log.lateness[:late] = 0.2
+        assert bool(reason := void_reason(figures([log], block=BLOCK), 200.0)) == void
+    assert reason.startswith('void: ') and '200.00 ms, at a period of 5.00 ms' in reason
+
+
+def test_a_dead_node_has_a_report(tmp_path):
+    """All lost, no latency: empty cells, and page, CSV file and picture still come."""
+    pytest.importorskip('matplotlib')
+    dead = AnswerLog('contact', exact())
+    dead.stamps[:] = START
+    logs = [played('echo'), dead]
+    rows = figures(logs, block=BLOCK)
+    assert (rows[1]['lost'], rows[1]['wrong']) == (PAIRS, 0)
+    lines = table(rows).splitlines()
+    assert len({len(line) for line in lines}) == 1 and 'nan' not in lines[3]
+    write_report(tmp_path, logs, rows, '- machine: one')
+    assert (tmp_path / 'bench.md').read_text() == '# Bench\n\n- machine: one\n'
+    assert (tmp_path / 'bench.png').read_bytes().startswith(b'\x89PNG')
+    with (tmp_path / 'bench.csv').open() as file:
+        assert [row['node'] for row in csv.DictReader(file)] == ['echo', 'contact']
