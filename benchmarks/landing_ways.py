@@ -51,7 +51,7 @@ def solvers(scenario: CraneScenario, model: str) -> list[ContactSolver]:
 
 
 def land(scenario: CraneScenario, sources: Sequence[ContactSource], *, rate_hz: float = 200.0,
-         latency: float = 0.0, law: MakeLaw = HeldPatch.for_loop) -> LandingRecord:
+         latency: float = 0.0, law: MakeLaw = HeldPatch.at_rate) -> LandingRecord:
     """Run one landing with contacts that act `latency` [s] after they were asked for.
 
     sources: for each box of the stack, such as `solvers`. ValueError: a contact lacks what the law
@@ -305,8 +305,8 @@ class Way(NamedTuple):
         """Run one landing."""
         if self.law == MUJOCO:
             return own_contact(scenario, timing.rate_hz)
-        law = (HeldPatch.for_loop if self.law == HELD_PATCH
-               else partial(PointLaw.for_loop, size=scenario.size))
+        law = (HeldPatch.at_rate if self.law == HELD_PATCH
+               else partial(PointLaw.at_rate, size=scenario.size))
         return land(scenario, self.sources(scenario), law=law, **timing._asdict())
 
 

@@ -70,7 +70,7 @@ def effective_mass(mass: float, size: Sequence[float]) -> float:
 
 
 class PointLaw:
-    """The law of one load, whose mass is in its middle; made by `for_loop`.
+    """The law of one load, whose mass is in its middle; made by `at_rate`.
 
     It is called as `HeldPatch` is, but the wrench of an answer acts until the next answer.
     """
@@ -84,7 +84,7 @@ class PointLaw:
         self._wrench = np.zeros(6)
 
     @classmethod
-    def for_loop(cls, load: Body, *, size: Sequence[float], rate_hz: float, **_: float) -> Self:
+    def at_rate(cls, load: Body, *, size: Sequence[float], rate_hz: float, **_: float) -> Self:
         """Return the law of a load of full extents `size` [m] that asks `rate_hz` times a second.
 
         The constants grow with the mass and shrink where the rate demands it. For 40 ft, 20 t,

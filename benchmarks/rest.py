@@ -160,7 +160,7 @@ class Client:
         scene = Scene(boxes, tuple(Pair.between(first.name, second.name) for first, second in
                                    combinations(parts, 2) if first.mass or second.mass))
         self._solver = SceneSolver(scene, model=model)
-        self._law = SceneLaw.for_loop(
+        self._law = SceneLaw.at_rate(
             scene, {part.name: Body.of_box(part.size, part.mass) for part in parts if part.mass},
             rate_hz=timing.rate_hz, latency=timing.latency, step=STEP)
         self._period, self._latency, self._next = 1.0 / timing.rate_hz, timing.latency, 0.0

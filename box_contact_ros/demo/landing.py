@@ -42,7 +42,7 @@ GAP_LIMIT = 0.020  # gap after the first touch [m]: how high it may bounce
 Contacts = Mapping[str, Contact]
 """The contacts of one question, by the names of their pairs."""
 MakeLaw = Callable[..., 'LoadLaw']
-"""What makes the law of a load, called as `HeldPatch.for_loop` is."""
+"""What makes the law of a load, called as `HeldPatch.at_rate` is."""
 
 
 class LoopState(NamedTuple):
@@ -220,7 +220,7 @@ class ClosedLoop:
     """A crane under the wrench of a law, recorded tick by tick, wherever contacts come from."""
 
     def __init__(self, scenario: CraneScenario, rate_hz: float, *, latency: float = 0.0,
-                 law: MakeLaw = HeldPatch.for_loop) -> None:
+                 law: MakeLaw = HeldPatch.at_rate) -> None:
         """Make the crane, and the law for its load, this rate and latency [s]."""
         self.crane, self.record = Crane(scenario, rate_hz), LandingRecord(scenario, rate_hz)
         self._law = law(scenario.load, rate_hz=rate_hz, latency=latency,

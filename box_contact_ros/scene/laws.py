@@ -134,7 +134,7 @@ class _Law:
 class HeldPatch(_Law):
     """The wrench on one load, at every physics step, from the patches of the last answer.
 
-    Make it with `for_loop`. A pair is known by its name, so friction remembers it from answer to
+    Make it with `at_rate`. A pair is known by its name, so friction remembers it from answer to
     answer, in whichever order they come.
     """
 
@@ -144,7 +144,7 @@ class HeldPatch(_Law):
         self._numbers: dict[str, int] = {}  # of pairs, by name
 
     @classmethod
-    def for_loop(cls, load: Body, *, rate_hz: float, latency: float = 0.0, step: float = 0.001,
+    def at_rate(cls, load: Body, *, rate_hz: float, latency: float = 0.0, step: float = 0.001,
                  friction: float = FRICTION, gravity: float = GRAVITY) -> Self:
         """Return the law of a load whose contacts are asked for `rate_hz` times a second.
 
@@ -184,19 +184,19 @@ class HeldPatch(_Law):
 class SceneLaw(_Law):
     """The wrenches on all bodies of a scene, at every physics step, from its last answer.
 
-    Make it with `for_loop`. Boxes that move without a body in the law (a conveyor, a spreader on
+    Make it with `at_rate`. Boxes that move without a body in the law (a conveyor, a spreader on
     rails) push, and are not pushed.
     """
 
     def __init__(self, law: native.Law, scene: Scene, moving: Sequence[str]) -> None:
-        """Take over a native law of the boxes `scene.moving`; see `for_loop`."""
+        """Take over a native law of the boxes `scene.moving`; see `at_rate`."""
         self._law, self._scene, self._free = law, scene, frozenset(moving)
         self._numbers = {pair: number for number, pair in enumerate(scene.pairs)}
         self._place = dict.fromkeys(scene.boxes, FIXED) | {
             name: place for place, name in enumerate(scene.moving)}
 
     @classmethod
-    def for_loop(cls, scene: Scene, bodies: Mapping[str, Body | float], *, rate_hz: float,
+    def at_rate(cls, scene: Scene, bodies: Mapping[str, Body | float], *, rate_hz: float,
                  latency: float = 0.0, step: float = 0.001, friction: float = FRICTION,
                  gravity: float = GRAVITY) -> Self:
         """Return the law of a scene whose contacts are asked for `rate_hz` times a second.

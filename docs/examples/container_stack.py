@@ -54,7 +54,7 @@ def main() -> None:
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     solver = SceneSolver(SCENE)
-    law = SceneLaw.for_loop(SCENE, dict.fromkeys(SCENE.moving, MASS), rate_hz=RATE, latency=LATENCY,
+    law = SceneLaw.at_rate(SCENE, dict.fromkeys(SCENE.moving, MASS), rate_hz=RATE, latency=LATENCY,
                             step=STEP)
     ticks, late = round(1 / (RATE * STEP)), round(LATENCY / STEP)
     for step in range(round(DURATION / STEP)):

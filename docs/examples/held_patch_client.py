@@ -33,7 +33,7 @@ def main() -> None:
     rclpy.init()
     client = LockstepClient()
     client.wait_for_node()
-    law = HeldPatch.for_loop(Body.of_box(SIZE, MASS), rate_hz=1e3 / PERIOD_MS,
+    law = HeldPatch.at_rate(Body.of_box(SIZE, MASS), rate_hz=1e3 / PERIOD_MS,
                              latency=1e-3 * LATENCY_MS, step=1e-3 * STEP_MS)
     stack = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
     load = np.array([0.0, 0.0, 2.611, 0.0, 0.0, 0.0, 1.0])

@@ -56,7 +56,7 @@ def main() -> None:
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     solver = ContactSolver(SIZE, SIZE, model='mlp')
-    law = HeldPatch.for_loop(Body.of_box(SIZE, MASS), rate_hz=1.0 / (STEPS * STEP),
+    law = HeldPatch.at_rate(Body.of_box(SIZE, MASS), rate_hz=1.0 / (STEPS * STEP),
                              latency=LATE * STEP, step=STEP)
     for tick in range(round(DURATION / (STEPS * STEP))):
         asked = pose_of(data)

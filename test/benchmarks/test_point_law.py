@@ -27,7 +27,7 @@ STILL = np.zeros(6)
 
 
 def law_of(mass, size, rate_hz):
-    return PointLaw.for_loop(Body.of_box(size, mass), size=size, rate_hz=rate_hz, latency=0.0)
+    return PointLaw.at_rate(Body.of_box(size, mass), size=size, rate_hz=rate_hz, latency=0.0)
 
 
 FAST = law_of(MASS, CONTAINER, 1000.0)

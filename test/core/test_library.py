@@ -169,7 +169,7 @@ def test_the_law_has_the_bits_of_python(tmp_path: Path, source: str) -> None:
     assert failures == '0'
     size = (12.192, 2.438, 2.591)
     solver = ContactSolver(size, size)
-    law = HeldPatch.for_loop(Body(mass=20000.0, inertia=(21000.0, 260000.0, 255000.0)),
+    law = HeldPatch.at_rate(Body(mass=20000.0, inertia=(21000.0, 260000.0, 255000.0)),
                              rate_hz=200.0, latency=0.002)
     stack, velocity = np.array([0, 0, 0, 0, 0, 0, 1.0]), np.zeros(6)
     load = np.array([0.3, 0.1, 2.601, 0.001, 0.002, 0.003, 1.0])
@@ -553,5 +553,5 @@ def test_refusals_name_value_and_remedy() -> None:
     load = Body.of_box(poses.CUBE, 1000.0)
     for wrong in ({'rate_hz': 0.005}, {'rate_hz': 200.0, 'latency': 2.0}):
         with pytest.raises(ValueError, match='a load would rest .* m deep'):
-            HeldPatch.for_loop(load, **wrong)
-    assert HeldPatch.for_loop(load, rate_hz=5.0, latency=0.1).frequency > 0.0
+            HeldPatch.at_rate(load, **wrong)
+    assert HeldPatch.at_rate(load, rate_hz=5.0, latency=0.1).frequency > 0.0

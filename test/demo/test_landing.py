@@ -100,7 +100,7 @@ def test_the_patch_of_a_flat_load_is_that_of_the_whole_load():
     assert assumed.covariance[:2, :2] == pytest.approx(exact.covariance[:2, :2])
     wrenches = []
     for contact in (exact, assumed):
-        law = HeldPatch.for_loop(Body.of_box(load, 20_000.0), rate_hz=200.0)
+        law = HeldPatch.at_rate(Body.of_box(load, 20_000.0), rate_hz=200.0)
         law.hold(contact, pose)
         wrenches.append(law.wrench(pose, np.array([0.1, 0.0, -0.2, 0.01, 0.02, 0.03])))
     assert wrenches[1] == pytest.approx(wrenches[0], rel=1e-9, abs=1e-3)

@@ -34,7 +34,7 @@ SIZE = np.array([12.192, 2.438, 2.591])
 LOAD = Body.of_box(SIZE, MASS)
 INERTIA = np.array(LOAD.inertia)
 RATE, STEP = 200.0, 0.001
-OMEGA = HeldPatch.for_loop(LOAD, rate_hz=RATE).frequency
+OMEGA = HeldPatch.at_rate(LOAD, rate_hz=RATE).frequency
 SUNK = GRAVITY / OMEGA**2
 """Depth of a load that rests on a whole face [m]."""
 WHOLE_DAMPER = 0.02 * SUNK
@@ -42,7 +42,7 @@ SHARE = 0.1  # of Ω² that tangential springs take
 
 
 def fresh(*, friction=0.5, **loop) -> HeldPatch:
-    return HeldPatch.for_loop(LOAD, rate_hz=RATE, friction=friction, **loop)
+    return HeldPatch.at_rate(LOAD, rate_hz=RATE, friction=friction, **loop)
 
 
 def wrench_of(contacts, pose=LEVEL, velocity=STILL, *, law=None, friction=0.5):
@@ -262,7 +262,7 @@ def test_a_patch_goes_with_what_carries_it():
     scene = Scene({'load': Box('load', tuple(SIZE), pose_topic='load'),
                    'truck': Box('truck', tuple(SIZE), pose_topic='truck')},
                   (Pair('p', 'load', 'truck'),))
-    law = SceneLaw.for_loop(scene, {'load': MASS}, rate_hz=RATE)
+    law = SceneLaw.at_rate(scene, {'load': MASS}, rate_hz=RATE)
     poses = np.array([LEVEL, LEVEL - [0.5, 0, SIZE[2] - SUNK, 0, 0, 0, 0]])
     velocity = moving(linear=(7.0, 1.0, 0.0))
     law.hold(SceneSolver(scene, model='exact')(poses), poses)
@@ -339,7 +339,7 @@ def test_no_constant_knows_the_size(scale):
                            covariance=scale**2 * patch.covariance)
     pose = np.concatenate([scale * LEVEL[:3], LEVEL[3:]])
     small = wrench_of(patch)
-    large = wrench_of(grown, pose, law=HeldPatch.for_loop(body, rate_hz=RATE))
+    large = wrench_of(grown, pose, law=HeldPatch.at_rate(body, rate_hz=RATE))
     assert large[:3] == pytest.approx(scale**3 * small[:3], rel=1e-9)
     assert large[3:] == pytest.approx(scale**4 * small[3:], rel=1e-9, abs=1e-9)
 
@@ -445,7 +445,7 @@ def two_free(mass_b=10_000.0):
     """Return the scene of a load on a free box, the law, and poses with the load `SUNK` deep."""
     scene = Scene({'a': Box('a', tuple(SIZE), pose_topic='a'),
                    'b': Box('b', (8.0, 2.0, 2.0), pose_topic='b')}, (Pair('ab', 'a', 'b'),))
-    law = SceneLaw.for_loop(scene, {'a': MASS, 'b': mass_b}, rate_hz=RATE)
+    law = SceneLaw.at_rate(scene, {'a': MASS, 'b': mass_b}, rate_hz=RATE)
     b = moved(LEVEL - [0.3, 0.1, 0.5 * SIZE[2] + 1.0 - SUNK, 0, 0, 0, 0], turn=(1e-6, 2e-6, 0.3))
     return scene, law, np.array([LEVEL, b])
 
@@ -471,7 +471,7 @@ def test_two_free_bodies_take_half_the_modulus_of_the_lighter():
     """κ = Ω² / w by the softer sum, and each patch counts twice: no mode is faster than Ω."""
     scene = Scene({name: Box(name, (2.0, 2.0, 2.0), pose_topic=name) for name in 'ab'},
                   (Pair('ab', 'a', 'b'),))
-    law = SceneLaw.for_loop(scene, {'a': MASS, 'b': 0.1 * MASS}, rate_hz=RATE)
+    law = SceneLaw.at_rate(scene, {'a': MASS, 'b': 0.1 * MASS}, rate_hz=RATE)
     poses = np.array([LEVEL, LEVEL - [0, 0, 2.0 - SUNK, 0, 0, 0, 0]])
     law.hold(SceneSolver(scene, model='exact')(poses), poses)
     force = law.wrenches(poses, np.zeros((2, 6)))[0][2]
@@ -530,7 +530,7 @@ def test_a_load_that_is_neither_box_is_refused(load):
 def test_an_answer_of_another_scene_is_refused():
     """A box that the law does not know counted as fixed, and held the others up."""
     known = {'ground': Box('ground', (9, 9, 1), (0, 0, -0.5, 0, 0, 0, 1)), 'b': Box('b', (1, 1, 1))}
-    law = SceneLaw.for_loop(Scene(known, (Pair.between('b', 'ground'),)), {'b': 1.0}, rate_hz=100.0)
+    law = SceneLaw.at_rate(Scene(known, (Pair.between('b', 'ground'),)), {'b': 1.0}, rate_hz=100.0)
     more = Scene(known | {'new': Box('new', (1, 1, 1))}, (Pair.between('new', 'b'),))
     where = np.array([[0, 0, 0.5, 0, 0, 0, 1], [0, 0, 1.499, 0, 0, 0, 1.0]])
     with pytest.raises(ValueError, match="Pair.*'new_b'.* is no pair of the scene of this law"):
@@ -542,7 +542,7 @@ def test_a_stale_pair_keeps_its_patch():
     ground = Box('ground', (9, 9, 1), (0, 0, -0.5, 0, 0, 0, 1))
     pair = Pair.between('load', 'ground')
     scene = Scene({'ground': ground, 'load': Box('load', (1, 1, 1))}, (pair,))
-    law = SceneLaw.for_loop(scene, {'load': 1.0}, rate_hz=200.0)
+    law = SceneLaw.at_rate(scene, {'load': 1.0}, rate_hz=200.0)
     where = np.array([[0, 0, 0.4999, 0, 0, 0, 1]])
     law.hold(SceneSolver(scene, model='exact')(where), where)
     law.wrenches(where, np.zeros((1, 6)))
@@ -559,7 +559,7 @@ def test_a_stale_pair_keeps_its_patch():
 def test_a_box_without_a_pose_is_named(absent):
     """A scene's solver takes such a box; a law cannot."""
     boxes = {name: Box(name, (1.0, 1.0, 1.0)) for name in ('left', 'right')}
-    law = SceneLaw.for_loop(Scene(boxes, (Pair.between('left', 'right'),)), {'left': 1.0},
+    law = SceneLaw.at_rate(Scene(boxes, (Pair.between('left', 'right'),)), {'left': 1.0},
                             rate_hz=100.0)
     where = [np.array(LEVEL, dtype=float), absent]
     with pytest.raises(ValueError, match="^'right' has no pose, and a law needs one for each of"):
@@ -574,7 +574,7 @@ def test_the_constants_follow_the_loop(rate, latency):
     """Ω is the least of what the delay and the step allow."""
     late = 0.5 / rate + latency
     loop = {'rate_hz': rate, 'latency': latency}
-    assert HeldPatch.for_loop(LOAD, **loop, step=0.0005).frequency == pytest.approx(
+    assert HeldPatch.at_rate(LOAD, **loop, step=0.0005).frequency == pytest.approx(
         min(2.0 / late, 0.45 / 0.0005))
 
 
@@ -584,7 +584,7 @@ def test_the_page_says_what_the_code_does():
                       re.MULTILINE)
     assert len(rows) >= 6
     for rate, latency, omega, depth in rows:
-        law = HeldPatch.for_loop(LOAD, rate_hz=float(rate), latency=1e-3 * float(latency),
+        law = HeldPatch.at_rate(LOAD, rate_hz=float(rate), latency=1e-3 * float(latency),
                                  step=0.0005)
         digits = len(depth.partition('.')[2])
         assert f'{law.frequency:.0f}' == omega
@@ -653,7 +653,7 @@ def test_a_right_order_is_never_refused(depth, seed):
     ({'gravity': math.inf}, 'gravity must be 0 or more, not inf')])
 def test_a_loop_that_is_none_is_refused(change, words):
     with pytest.raises(ValueError, match=words):
-        HeldPatch.for_loop(LOAD, **{'rate_hz': 200.0} | change)
+        HeldPatch.at_rate(LOAD, **{'rate_hz': 200.0} | change)
 
 
 @pytest.mark.parametrize(('change', 'words'), [
@@ -663,7 +663,7 @@ def test_a_loop_that_is_none_is_refused(change, words):
 def test_a_body_that_is_none_is_refused(change, words):
     body = Body(**{'mass': MASS, 'inertia': INERTIA} | change)
     with pytest.raises(ValueError, match=words):
-        HeldPatch.for_loop(body, rate_hz=RATE)
+        HeldPatch.at_rate(body, rate_hz=RATE)
 
 
 def test_wrong_calls_are_refused():
@@ -683,4 +683,4 @@ def test_wrong_calls_are_refused():
         law.hold(slab(), masked)
     scene, _, _ = two_free()
     with pytest.raises(ValueError, match="bodies: 'c' is none of the boxes that move"):
-        SceneLaw.for_loop(scene, {'c': 1.0}, rate_hz=RATE)
+        SceneLaw.at_rate(scene, {'c': 1.0}, rate_hz=RATE)
