@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from box_contact_ros.solver.arguments import model_name, program_parser
-from box_contact_ros.solver.checks import shown
+from box_contact_ros.solver.checks import short_repr
 from box_contact_ros.solver.models import MODELS
 
 
@@ -42,5 +42,5 @@ def add_models(parser: argparse.ArgumentParser, default: Sequence[str]) -> None:
 def seed_number(text: str) -> int:
     """Return a seed of random numbers, as a program's argument: a whole number from 0."""
     if not text.isascii() or not text.isdecimal() or len(text) > 18:
-        raise argparse.ArgumentTypeError(f'{shown(text)} is not a whole number from 0')
+        raise argparse.ArgumentTypeError(f'{short_repr(text)} is not a whole number from 0')
     return int(text)

@@ -186,7 +186,7 @@ def measured(path: Path, seed: int, count: int) -> dict[str, Any]:
 
 def metrics_table(card: dict[str, Any]) -> str:
     """Return the card's metrics for the terminal."""
-    def shown(f: dict[str, float]) -> str:
+    def short_repr(f: dict[str, float]) -> str:
         return f'{f["mean"]:.5f} / {f["p99"]:.4f} / {f["worst"]:.3f}'
 
     lines = ["errors against exact, %: mean / p99 / worst; the point's by the smaller box's "
@@ -194,7 +194,7 @@ def metrics_table(card: dict[str, Any]) -> str:
     width = max(map(len, card['metrics']))
     for name, entry in card['metrics'].items():
         for quantity, values in entry.items():
-            lines.append(f'{name:<{width}}  {quantity:<10}  {shown(values)}')
+            lines.append(f'{name:<{width}}  {quantity:<10}  {short_repr(values)}')
     lines.append('all networks, contacts of the training, p99 of point / volume / covariance')
     lines += ['  '.join(f'{entry["p99"]:.3f}' for entry in summary.values())
               for summary in card['spread']]

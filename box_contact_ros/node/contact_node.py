@@ -33,7 +33,7 @@ from ..core import LENGTH_MAX
 from ..scene.pairing import PAIRINGS, RESETS
 from ..scene.scene_file import read_scene
 from ..scene.scene_solver import CONTAINER, Scene, SceneSolver, two_boxes
-from ..solver.checks import shown
+from ..solver.checks import short_repr
 from ..solver.models import MODELS, check_model, most_near
 from .diagnostics import DIAGNOSTICS_SECONDS, Diagnostics, TickMonitor
 from .parameters import (
@@ -182,8 +182,8 @@ class ContactNode(GuardedNode, LifecycleNode):
         if values['scene']:
             for name in ('size_a', 'size_b'):
                 if values[name] != self.parameters[name].default:
-                    raise ValueError(f'{name} {shown(values[name])} has no effect while scene is '
-                                     'set: write sizes into the scene file')
+                    raise ValueError(f'{name} {short_repr(values[name])} has no effect while scene '
+                                     'is set: write sizes into the scene file')
             scene = read_scene(values['scene'])
         else:
             scene = two_boxes(values['size_a'], values['size_b'])
@@ -220,7 +220,7 @@ class ContactNode(GuardedNode, LifecycleNode):
         solver, topics = self._tick.solver, self._topics.pose_topics()
         scene = solver.scene
         pairs, more = len(scene.pairs), len(topics) - NAMED_TOPICS
-        frame = f' in frame {shown(scene.frame_id)}' if scene.frame_id else ''
+        frame = f' in frame {short_repr(scene.frame_id)}' if scene.frame_id else ''
         self.get_logger().info(
             f'ready: model {solver.model!r}, pairing {self._values["pairing"]!r}, {pairs} '
             f'{"pair" if pairs == 1 else "pairs"}; poses{frame} from '

@@ -14,7 +14,7 @@ from builtin_interfaces.msg import Time
 from std_msgs.msg import Header
 
 from ..scene.scene_solver import Answer, Scene
-from ..solver.checks import shown
+from ..solver.checks import short_repr
 from ..solver.contact import Contact
 
 NANOSECONDS = 1_000_000_000
@@ -52,8 +52,8 @@ def read_answer(message: Any, scene: Scene) -> Answer:
     pair_of = {pair.label: pair for pair in scene.pairs}
     for name in (*(entry.pair for entry in message.contacts), *message.stale):
         if name not in pair_of:
-            raise Refused('unknown pair', f'{shown(name)} is no pair of the scene: read the scene '
-                                          'file that the node has')
+            raise Refused('unknown pair', f'{short_repr(name)} is no pair of the scene: read the '
+                                          'scene file that the node has')
     listed = [(pair_of[name], contact) for name, contact in contacts_by_pair(message).items()]
     return Answer([entry for entry in listed if entry[1].colliding],
                   [pair_of[name] for name in message.stale], len(listed),

@@ -18,7 +18,7 @@ from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 
 from ..solver.arguments import program_parser
-from ..solver.checks import nearest_name, shown, size_fault
+from ..solver.checks import nearest_name, short_repr, size_fault
 from .rclpy_workarounds import parameter_overrides
 
 Check = Callable[[str, Any], Any]
@@ -43,7 +43,7 @@ def number(low: float, high: float) -> Check:
     """Check for a number within [low, high]; integers are as good as floats."""
     def check(name: str, value: Any) -> float:
         if not _is_number(value):
-            raise ValueError(f'{name} must be a number, not {shown(value)}')
+            raise ValueError(f'{name} must be a number, not {short_repr(value)}')
         if not low <= value <= high:
             raise ValueError(f'{name} must lie within {low:g} and {high:g}, not {value:g}')
         return float(value)
@@ -55,7 +55,7 @@ def whole_number(low: int, high: int) -> Check:
     def check(name: str, value: Any) -> int:
         if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
             raise ValueError(f'{name} must be a whole number from {low} to {high}, '
-                             f'not {shown(value)}')
+                             f'not {short_repr(value)}')
         return value
     return check
 
@@ -67,7 +67,7 @@ def numbers(count: int) -> Check:
         if len(given) != count or not all(map(_is_number, given)) or not all(
                 map(math.isfinite, given)):
             raise ValueError(f'{name} must be {count} finite numbers, not '
-                             f'{shown(list(given) if len(given) else value)}')
+                             f'{short_repr(list(given) if len(given) else value)}')
         return tuple(map(float, given))
     return check
 
@@ -84,7 +84,7 @@ def size(name: str, value: Any) -> tuple[float, ...]:
 def text(name: str, value: Any) -> str:
     """Check for a string."""
     if not isinstance(value, str):
-        raise ValueError(f'{name} must be a string, not {shown(value)}')
+        raise ValueError(f'{name} must be a string, not {short_repr(value)}')
     return value
 
 
@@ -93,7 +93,7 @@ def one_of(choices: Iterable[str]) -> Check:
     def check(name: str, value: Any) -> str:
         choice = text(name, value)
         if choice not in choices:
-            raise ValueError(f'{name} {shown(value)} is not one of: {", ".join(choices)}'
+            raise ValueError(f'{name} {short_repr(value)} is not one of: {", ".join(choices)}'
                              f'{nearest_name(choice, choices)}')
         return choice
     return check
@@ -102,7 +102,7 @@ def one_of(choices: Iterable[str]) -> Check:
 def flag(name: str, value: Any) -> bool:
     """Check for true or false."""
     if not isinstance(value, bool):
-        raise ValueError(f'{name} must be true or false, not {shown(value)}')
+        raise ValueError(f'{name} must be true or false, not {short_repr(value)}')
     return value
 
 
@@ -134,7 +134,7 @@ def warn_of_unknown(node: Node, settings: Mapping[str, Setting]) -> None:
     """
     for name in parameter_overrides(node):
         if not node.has_parameter(name):
-            node.get_logger().warning(f'unknown parameter {shown(name)}'
+            node.get_logger().warning(f'unknown parameter {short_repr(name)}'
                                       f'{nearest_name(name, settings)}; it is ignored')
 
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..scene.pairing import NEVER, PAIRINGS, Pairing, StampedPose, Tick
 from ..scene.scene_solver import ALL_BOXES, SceneSolver, TooManyNear
-from ..solver.checks import absent_poses, are_poses, pose_fault, shown
+from ..solver.checks import absent_poses, are_poses, pose_fault, short_repr
 from .diagnostics import TickMonitor
 from .message_bytes import ContactWriter, PoseReader, header_bytes
 from .messages import NANOSECONDS, Refused
@@ -132,7 +132,8 @@ class TickAnswerer:
         advice = ('the leading slash is the difference'
                   if frame.lstrip('/') == odd.frame_id.lstrip('/')
                   else 'publish the poses of all boxes in one frame')
-        return f'{first} is in frame {shown(frame)}, {box} in {shown(odd.frame_id)}: {advice}'
+        return (f'{first} is in frame {short_repr(frame)}, {box} in {short_repr(odd.frame_id)}: '
+                f'{advice}')
 
     def _refuse(self, error: Exception, topic: str, box: str = '') -> None:
         """Count what was refused, and hand it to the next report."""

@@ -18,7 +18,7 @@ from rclpy.subscription import Subscription
 from box_contact_msgs.msg import Contacts
 
 from ..scene.scene_solver import ALL_BOXES, Pair, Scene
-from ..solver.checks import shown
+from ..solver.checks import short_repr
 from .rclpy_workarounds import RCLError, qos_refused
 
 MOST_PAIRS_WITH_TOPICS = 1000
@@ -111,7 +111,7 @@ class SceneTopics:
             return f'nobody publishes {topic}'
         for offer in offers:
             if offer.topic_type != f'geometry_msgs/msg/{wanted}':
-                return (f'{topic} is published as {shown(offer.topic_type)}, not as '
+                return (f'{topic} is published as {short_repr(offer.topic_type)}, not as '
                         f'geometry_msgs/msg/{wanted}')
             fits, reason = qos_check_compatible(offer.qos_profile, subscription.qos_profile)
             if fits == QoSCompatibility.ERROR:
@@ -126,8 +126,8 @@ class SceneTopics:
         taken = {self._resolved(topic) for topic in own}
         for box, topic in scene.sources.items():
             if self._resolved(topic) in taken:
-                raise ValueError(f'scene: pose_topic {shown(topic)} of box {box} is a topic of '
-                                 'this node that carries no poses')
+                raise ValueError(f'scene: pose_topic {short_repr(topic)} of box {box} is a topic '
+                                 'of this node that carries no poses')
 
     def _topic_of(self, pair: Pair) -> str:
         return f'{self._prefix}{pair.name}{"/" if pair.name else ""}contact'
@@ -138,7 +138,7 @@ class SceneTopics:
             return self._node.resolve_topic_name(topic)
         except RCLError as error:
             reason = str(error).partition(', at ')[0]
-            raise ValueError(f'scene: {shown(topic)}: {reason}') from error
+            raise ValueError(f'scene: {short_repr(topic)}: {reason}') from error
 
     def _publisher(self, message: type, topic: str, **options: Any) -> Publisher:
         # Without events: an event that waits in EventsExecutor outlives a publisher that is

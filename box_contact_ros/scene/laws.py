@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core import native
-from ..solver.checks import as_floats, shown
+from ..solver.checks import as_floats, short_repr
 from ..solver.contact import Contact
 from .scene_solver import Answer, Pair, Scene
 
@@ -95,7 +95,7 @@ def _hold(law: native.Law, touches: Sequence[tuple[str, int, int, int, Contact |
 def _unmasked(rows: ArrayLike, name: str) -> ArrayLike:
     """Return rows, or raise ValueError for masked ones, whose mask NumPy would drop."""
     if isinstance(rows, np.ma.MaskedArray):
-        raise ValueError(f'{name} must be numbers without a mask, not {shown(rows)}')
+        raise ValueError(f'{name} must be numbers without a mask, not {short_repr(rows)}')
     return rows
 
 
@@ -166,7 +166,7 @@ class HeldPatch(_Law):
         `soup` or `paper`), or a normal that cannot be meant for this load; nothing changes then.
         """
         if load not in ('a', 'b'):
-            raise ValueError(f"load must be 'a' or 'b', not {shown(load)}")
+            raise ValueError(f"load must be 'a' or 'b', not {short_repr(load)}")
         a, b = (0, FIXED) if load == 'a' else (FIXED, 0)
         _hold(self._law, [(name, self._numbers.setdefault(name, len(self._numbers)), a, b, contact)
                           for name, contact in _named(contacts).items()], pose)
@@ -207,8 +207,8 @@ class SceneLaw(_Law):
         """
         for name in bodies:
             if name not in scene.moving:
-                raise ValueError(f'bodies: {shown(name)} is none of the boxes that move: '
-                                 f'{shown(list(scene.moving))}')
+                raise ValueError(f'bodies: {short_repr(name)} is none of the boxes that move: '
+                                 f'{short_repr(list(scene.moving))}')
         unmoved = Body(mass=0.0, inertia=np.zeros(3))
         each = []
         for name in scene.moving:
@@ -238,7 +238,7 @@ class SceneLaw(_Law):
                        for pair, contact in contacts
                        if pair.a in self._free or pair.b in self._free]
         except KeyError as error:
-            raise ValueError(f'{shown(error.args[0])} is no pair of the scene of this law'
+            raise ValueError(f'{short_repr(error.args[0])} is no pair of the scene of this law'
                              ) from None
         try:
             _hold(self._law, touches, poses)
@@ -264,6 +264,6 @@ class SceneLaw(_Law):
         for name, pose in zip(self._scene.moving, rows):
             if pose is None or (isinstance(pose, np.ndarray) and pose.dtype.kind == 'f'
                                 and np.isnan(pose).any()):
-                return ValueError(f'{shown(name)} has no pose, and a law needs one for each of '
-                                  f'{shown(list(self._scene.moving))}')
+                return ValueError(f'{short_repr(name)} has no pose, and a law needs one for each '
+                                  f'of {short_repr(list(self._scene.moving))}')
         return error

@@ -18,7 +18,7 @@ from typing import Any
 import yaml
 
 from ..resources import find_file, resource_path
-from ..solver.checks import shown
+from ..solver.checks import short_repr
 from .scene_solver import Box, Fault, Pair, Scene
 
 MOST_STREAMS = 1000
@@ -43,7 +43,7 @@ def _plain(pattern: re.Pattern[str], read: type) -> Any:
     def construct(loader: _Loader, node: yaml.ScalarNode) -> Any:
         if not pattern.fullmatch(node.value):
             raise yaml.constructor.ConstructorError(
-                None, None, f'{shown(node.value)} is not a plain number', node.start_mark)
+                None, None, f'{short_repr(node.value)} is not a plain number', node.start_mark)
         return read(node.value)
     return construct
 
@@ -62,7 +62,7 @@ def read_scene(path: str | os.PathLike[str]) -> Scene:
     try:
         data = yaml.load(find_file(path).read_text('utf-8'), Loader=_Loader)
     except OSError as error:
-        raise SceneError(f'scene {shown(os.fspath(path))} cannot be read: '
+        raise SceneError(f'scene {short_repr(os.fspath(path))} cannot be read: '
                          f'{error.strerror or error}') from error
     except (UnicodeDecodeError, yaml.YAMLError) as error:
         reason = ' '.join(str(error).split())
@@ -121,7 +121,7 @@ def _pairs(entries: Sequence[Mapping[str, str]], boxes: Mapping[str, Box]) -> It
             if pattern not in names_of:
                 names_of[pattern] = _matching(pattern, boxes)
             if not names_of[pattern]:
-                raise Fault(('pairs', number, side), f'{shown(pattern)} is the name of no box')
+                raise Fault(('pairs', number, side), f'{short_repr(pattern)} is the name of no box')
             sides.append(names_of[pattern])
         is_empty = True
         for a, b in product(*sides):

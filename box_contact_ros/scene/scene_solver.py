@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import LENGTH_MAX, native
-from ..solver.checks import absent_poses, as_floats, pose_fault, shown, size_fault
+from ..solver.checks import absent_poses, as_floats, pose_fault, short_repr, size_fault
 from ..solver.contact import Contact
 from ..solver.contact_solver import ContactSolver
 
@@ -132,7 +132,7 @@ def _check(boxes: Mapping[str, Box], pairs: Sequence[Pair]) -> None:
         for key, given, count in (('size', box.size, 3), ('pose', box.pose, 7)):
             if given is not None and (not isinstance(given, tuple | list) or len(given) != count):
                 raise Fault(('boxes', name, key),
-                            f'must be a tuple of {count} numbers, not {shown(given)}')
+                            f'must be a tuple of {count} numbers, not {short_repr(given)}')
         fault = size_fault(box.size)
         if fault:
             raise Fault(('boxes', name, 'size'), fault)
@@ -147,11 +147,11 @@ def _check(boxes: Mapping[str, Box], pairs: Sequence[Pair]) -> None:
         place = ('pairs', number)
         for side, name in (('a', pair.a), ('b', pair.b)):
             if name not in boxes:
-                raise Fault((*place, side), f'{shown(name)} is none of the boxes')
+                raise Fault((*place, side), f'{short_repr(name)} is none of the boxes')
         if pair.a == pair.b:
-            raise Fault((*place, 'b'), f'{shown(pair.b)} is the same box as a')
+            raise Fault((*place, 'b'), f'{short_repr(pair.b)} is the same box as a')
         if boxes[pair.a].pose and boxes[pair.b].pose:
-            raise Fault(place, f'{shown(pair.a)} and {shown(pair.b)} are both fixed')
+            raise Fault(place, f'{short_repr(pair.a)} and {short_repr(pair.b)} are both fixed')
     for what, field, values in (
             ('name', ('name',), [pair.label for pair in pairs]),
             ('pair of boxes', (), [tuple(sorted((pair.a, pair.b))) for pair in pairs])):
@@ -161,7 +161,7 @@ def _check(boxes: Mapping[str, Box], pairs: Sequence[Pair]) -> None:
             if first != number:
                 a, b = pairs[first].a, pairs[first].b
                 raise Fault(('pairs', number, *field),
-                            f'the same {what} as that of {shown(a)} and {shown(b)}')
+                            f'the same {what} as that of {short_repr(a)} and {short_repr(b)}')
 
 
 class TooManyNear(ValueError):
@@ -302,8 +302,8 @@ class SceneSolver:
         """
         if len(poses) != len(self.scene.moving):
             raise ValueError(f'{len(poses)} poses, but {len(self.scene.moving)} boxes move: '
-                             f'{shown(list(self.scene.moving))}; give a list of a pose or None '
-                             'for each')
+                             f'{short_repr(list(self.scene.moving))}; give a list of a pose or '
+                             'None for each')
         if isinstance(poses, np.ndarray):
             rows = as_floats(poses, 'poses', 'poses (n, 7)', (None, 7))
             absent = absent_poses(rows)

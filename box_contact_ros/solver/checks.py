@@ -26,7 +26,7 @@ _REPR.maxlevel = 3
 _REPR.maxstring = _REPR.maxother = SHOWN
 
 
-def shown(value: Any) -> str:
+def short_repr(value: Any) -> str:
     """Return `repr`, cut short for an error that a person reads."""
     try:
         text = _REPR.repr(value).replace('\n', ' ')
@@ -107,7 +107,7 @@ def as_floats(value: ArrayLike, name: str, shapes: str, *accepted: tuple[int | N
         with np.errstate(over='ignore', invalid='ignore'):  # infinity and NaN are refused later
             array = np.require(array, np.float64, ('C', 'A'))
     except (TypeError, ValueError, OverflowError) as error:
-        raise ValueError(f'{name} must be {shapes} of numbers, not {shown(value)}') from error
+        raise ValueError(f'{name} must be {shapes} of numbers, not {short_repr(value)}') from error
     for shape in accepted:
         if len(shape) == array.ndim and all(
                 want is None or want == have for want, have in zip(shape, array.shape)):
@@ -124,7 +124,7 @@ def as_places(value: ArrayLike, name: str, count: int) -> np.ndarray:
     if array.shape == (0,):  # an empty list
         array = array.reshape(0, 2)
     if array.dtype.kind not in 'iu' and not (array.size == 0 and array.ndim == 2):
-        raise ValueError(f'{name} must be whole numbers (n, 2), not {shown(value)}')
+        raise ValueError(f'{name} must be whole numbers (n, 2), not {short_repr(value)}')
     if array.ndim != 2 or array.shape[1] != 2:
         raise ValueError(f'{name} must be whole numbers (n, 2), not an array of shape '
                          f'{array.shape}')

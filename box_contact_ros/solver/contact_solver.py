@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core import native
-from .checks import as_floats, as_places, as_size, pose_fault, shown, size_fault
+from .checks import as_floats, as_places, as_size, pose_fault, short_repr, size_fault
 from .contact import Contact, Contacts, without_patch
 from .mlp import NETWORK, core_numbers, load_mlp
 from .models import NATIVE, Model, check_model, make_model
@@ -49,7 +49,7 @@ class ContactSolver(native.PairSolver):
         if not margin >= 0.0:
             raise ValueError(f'margin must be 0 or more, not {margin:g}')
         if weights is not None and not isinstance(weights, (str, os.PathLike)):
-            raise ValueError(f'weights must be the path of a file, not {shown(weights)}')
+            raise ValueError(f'weights must be the path of a file, not {short_repr(weights)}')
         core: str | None = None  # the model in C++, or
         self._model: Model | None = None  # the object that answers
         if isinstance(model, (str, type)) or not hasattr(model, 'solve'):
@@ -59,8 +59,8 @@ class ContactSolver(native.PairSolver):
         else:
             self._model = model
         if margin and self._model is not None:
-            raise ValueError(f'margin {margin:g} has no effect on model {shown(model)}: leave it '
-                             'at 0')
+            raise ValueError(f'margin {margin:g} has no effect on model {short_repr(model)}: leave '
+                             'it at 0')
         self._size_fault = getattr(self._model, 'size_fault', lambda a, b: None)
         if fault := self._size_fault(one[0], other[0]):
             raise ValueError(fault)
@@ -114,7 +114,7 @@ class ContactSolver(native.PairSolver):
         Raises ValueError, with field and value, for what is refused.
         """
         if isinstance(threads, bool) or not isinstance(threads, (int, np.integer)) or threads < 1:
-            raise ValueError(f'threads must be a whole number from 1 on, not {shown(threads)}')
+            raise ValueError(f'threads must be a whole number from 1 on, not {short_repr(threads)}')
         if pairs is not None:
             if poses_b is not None or size_a is not None or size_b is not None:
                 raise ValueError('pairs are places in poses and sizes: batch(poses, sizes=…, '

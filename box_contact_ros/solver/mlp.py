@@ -11,7 +11,7 @@ import numpy as np
 
 from ..core import FEATURES, NETWORK_FORMAT
 from ..resources import resource_path
-from .checks import shown
+from .checks import short_repr
 from .weights_file import Network, Weights, WeightsError, load_weights
 
 FEATURE_NAMES = (
@@ -38,10 +38,10 @@ def core_numbers(network: Network) -> np.ndarray:
 def load_mlp(path: str | None = None) -> Weights:
     """Read the weights of an MLP, for None the shipped file's; raises `WeightsError`."""
     found = load_weights(path or resource_path('weights', 'mlp.safetensors'))
-    file = f'weights file {shown(str(found.path))}'
+    file = f'weights file {short_repr(str(found.path))}'
     number = found.card.get('format')  # a card may say anything
     if type(number) is not int or number != NETWORK_FORMAT:
-        raise WeightsError(f'{file} has format {shown(number)}; this version reads '
+        raise WeightsError(f'{file} has format {short_repr(number)}; this version reads '
                            f'{NETWORK_FORMAT}')
     network = found.network(NETWORK, FEATURES, 1, model='mlp')
     if len(network.widths) != 3 or network.widths[1] > UNITS_MAX:
@@ -49,5 +49,5 @@ def load_mlp(path: str | None = None) -> Weights:
                            f'{UNITS_MAX} units')
     if found.card.get('activation') != ACTIVATION:
         raise WeightsError(f"{file}: this version's units are {ACTIVATION!r}, not "
-                           f"{shown(found.card.get('activation'))}")
+                           f"{short_repr(found.card.get('activation'))}")
     return found

@@ -15,7 +15,7 @@ from typing import Protocol
 import numpy as np
 
 from ..core import native
-from .checks import nearest_name, shown
+from .checks import nearest_name, short_repr
 from .contact import Contacts
 
 NATIVE = ('mlp', 'exact')
@@ -63,9 +63,9 @@ def check_model(where: str, name: object) -> None:
     if isinstance(name, str) and (name in MODELS[:-1] or soup_divisions(name)):
         return
     if isinstance(name, str) and name.startswith('soup-'):
-        raise ValueError(f'{where} {shown(name)}: N of soup-N must be a whole number from 1 to '
-                         f'{MOST_SOUP_DIVISIONS}')
-    raise ValueError(f'{where} {shown(name)} is not one of: {", ".join(MODELS)}'
+        raise ValueError(f'{where} {short_repr(name)}: N of soup-N must be a whole number from 1 '
+                         f'to {MOST_SOUP_DIVISIONS}')
+    raise ValueError(f'{where} {short_repr(name)} is not one of: {", ".join(MODELS)}'
                      f'{nearest_name(name, MODELS)}')
 
 

@@ -27,7 +27,7 @@ import numpy as np
 
 from ..core import native
 from ..resources import resource_path
-from .checks import as_size, shown
+from .checks import as_size, short_repr
 from .contact import Contacts, without_patch
 from .weights_file import Network, Weights, WeightsError, load_weights
 
@@ -123,8 +123,8 @@ class Paper:
         try:
             self._size = as_size(weights.card['sizes'][0], 'size')[0]
         except (LookupError, TypeError, ValueError) as error:
-            raise WeightsError(f'weights file {shown(str(weights.path))}: the sizes in its card '
-                               'are no list of three extents') from error
+            raise WeightsError(f'weights file {short_repr(str(weights.path))}: the sizes in its '
+                               'card are no list of three extents') from error
         self._cubes = is_cube(self._size)
 
     def answer(self, pairs: TouchingPairs) -> tuple[np.ndarray, np.ndarray]:
@@ -189,8 +189,8 @@ class Paper:
             return None
         known = 'cubes' if self._cubes else in_words(self._size)
         return pair_fault(self.name, size_a, size_b) or (
-            f'the weights {shown(self._file)} of model {self.name!r} are for {known}, not for size '
-            f"{in_words(size_a)}; any size works with model 'exact'")
+            f'the weights {short_repr(self._file)} of model {self.name!r} are for {known}, not for '
+            f"size {in_words(size_a)}; any size works with model 'exact'")
 
 
 def touching_pairs(stages: dict[str, np.ndarray]) -> TouchingPairs:

@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from .checks import shown
+from .checks import short_repr
 
 FILE_LIMIT = 2**24
 """Bytes of the largest file that is read, header and tensors: a thousand times what is shipped."""
@@ -63,7 +63,7 @@ class Weights:
         found = self.networks.get(name)
         if found is None or (found.widths[0], found.widths[-1]) != (inputs, outputs):
             raise WeightsError(
-                f'weights file {shown(str(self.path))} has no network {name!r} with {inputs} '
+                f'weights file {short_repr(str(self.path))} has no network {name!r} with {inputs} '
                 f'inputs and {outputs} outputs, which model {model!r} needs')
         return found
 
@@ -76,14 +76,14 @@ def load_weights(path: Path | str) -> Weights:
         raise ModuleNotFoundError(f'{error}: weights files need it; pip install safetensors',
                                   name=error.name) from None
     path = Path(path)
-    file = f'weights file {shown(str(path))}'
+    file = f'weights file {short_repr(str(path))}'
     try:
         tensors, card = _read(path)
         return Weights(path, _networks(tensors, card.get('architecture')), card)
     except FileNotFoundError as error:
         raise WeightsError(f'{file} does not exist') from error
     except (OSError, ValueError, SafetensorError) as error:
-        reason = shown(str(error)) if isinstance(error, SafetensorError) else error
+        reason = short_repr(str(error)) if isinstance(error, SafetensorError) else error
         raise WeightsError(f'{file} cannot be read: {reason}') from error
 
 
@@ -100,10 +100,10 @@ def _read(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
         for name in file.keys():
             dtype = file.get_slice(name).get_dtype()
             if dtype != 'F32':
-                raise ValueError(f'{shown(name)} is {dtype}, not F32')
+                raise ValueError(f'{short_repr(name)} is {dtype}, not F32')
             tensors[name] = file.get_tensor(name)
             if not np.all(np.abs(tensors[name]) <= WEIGHT_LIMIT):  # nor is NaN
-                raise ValueError(f'{shown(name)} holds values that are not finite or beyond '
+                raise ValueError(f'{short_repr(name)} holds values that are not finite or beyond '
                                  f'±{WEIGHT_LIMIT:g}')
         text = (file.metadata() or {}).get('card', '')
     try:
@@ -125,8 +125,8 @@ def _networks(tensors: dict[str, np.ndarray], architecture: Any) -> dict[str, Ne
     for name, network in networks.items():
         wanted = architecture.get(name) if isinstance(architecture, dict) else architecture
         if list(network.widths) != wanted:
-            raise ValueError(f'{shown(name)} is {shown(network.widths)}, the model card says '
-                             f'{shown(wanted)}')
+            raise ValueError(f'{short_repr(name)} is {short_repr(network.widths)}, the model card '
+                             f'says {short_repr(wanted)}')
     if not networks:
         raise ValueError('it holds no network')
     return networks
@@ -140,8 +140,8 @@ def _network(name: str, parts: dict[str, np.ndarray]) -> Network:
         weight, bias = parts.pop(f'{number}.weight'), parts.pop(f'{number}.bias', None)
         fits = weight.ndim == 2 and (not layers or weight.shape[1] == len(layers[-1][1]))
         if not fits or bias is None or bias.shape != weight.shape[:1]:
-            raise ValueError(f'layer {number} of {shown(name)} does not fit its neighbours')
+            raise ValueError(f'layer {number} of {short_repr(name)} does not fit its neighbours')
         layers.append((weight, bias))
     if parts:
-        raise ValueError(f'{shown(name)} has tensors that belong to no layer')
+        raise ValueError(f'{short_repr(name)} has tensors that belong to no layer')
     return Network(layers)
