@@ -32,7 +32,7 @@ from ..core import native
 from ..node.contact_node import PARAMETERS
 from ..node.parameters import outside_ros_args
 from ..node.processes import add_domain, asked_to_end, on_this_host
-from ..node.runtime import joined, refusals_end
+from ..node.runtime import exit_on_refusal, running_node
 from ..solver.arguments import add_model, program_parser, within
 from .drive import NODES, Bench, BenchNode, MeasuredNode
 from .poses import swaying_containers
@@ -41,7 +41,7 @@ from .report import figures, table, void_reason, write_report
 RATE, SECONDS, LONGEST = 200.0, 60.0, 3600.0  # [Hz], [s], [s]
 
 
-@refusals_end
+@exit_on_refusal
 def main(args: Sequence[str] | None = None) -> int:
     """Run the bench; return its exit status."""
     args = sys.argv[1:] if args is None else list(args)
@@ -61,7 +61,7 @@ def main(args: Sequence[str] | None = None) -> int:
                                rate=options.rate)
     with contextlib.ExitStack() as ended:
         stop = ended.enter_context(asked_to_end())
-        client, executor = ended.enter_context(joined(partial(BenchNode, names=names), args))
+        client, executor = ended.enter_context(running_node(partial(BenchNode, names=names), args))
         bench = Bench(client, executor, poses, rate=options.rate, stop=stop)
         nodes = [ended.enter_context(contextlib.closing(MeasuredNode(
             name, model=options.model, cores=cores - own or cores))) for name in names]

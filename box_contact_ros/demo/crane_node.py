@@ -33,11 +33,11 @@ from box_contact_msgs.msg import Contacts
 from ..node.messages import contacts_by_pair, make_header
 from ..node.parameters import (
     Setting,
-    answer_help,
     declare,
     flag,
     number,
     numbers,
+    parse_command_line,
     size,
     text,
     warn_of_unknown,
@@ -50,7 +50,7 @@ from ..node.ros_client import (
     pose_message,
     stamp_of,
 )
-from ..node.runtime import REFUSALS, GuardedNode, joined, spin_once
+from ..node.runtime import REFUSALS, GuardedNode, running_node, spin_once
 from ..node.topics import contact_qos
 from .crane import LIMITS, CraneScenario
 from .landing import CORNER_SPEED_LIMIT, ClosedLoop, Landing, LandingRecord, LoopState, with_patch
@@ -269,9 +269,9 @@ def verdict(landing: Landing, latencies: Sequence[float], lost: int) -> tuple[bo
 
 def main(args: Sequence[str] | None = None) -> int:
     """Land once; 0 only if the stack carries the load and no answer was lost."""
-    answer_help('crane', __doc__, PARAMETERS, args)
+    parse_command_line('crane', __doc__, PARAMETERS, args)
     try:
-        with joined(CraneNode, args, signals=SignalHandlerOptions.ALL) as (node, executor):
+        with running_node(CraneNode, args, signals=SignalHandlerOptions.ALL) as (node, executor):
             node.await_node(executor)
             node.lower(executor)
             landing = node.loop.record.judge()

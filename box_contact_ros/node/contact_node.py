@@ -38,11 +38,11 @@ from ..solver.models import MODELS, check_model, most_near
 from .diagnostics import DIAGNOSTICS_SECONDS, Diagnostics, TickMonitor
 from .parameters import (
     Setting,
-    answer_help,
     declare,
     flag,
     number,
     one_of,
+    parse_command_line,
     reason_of,
     size,
     text,
@@ -256,7 +256,7 @@ class ContactNode(GuardedNode, LifecycleNode):
 
 def run(node_type: type[ContactNode], doc: str | None, args: Sequence[str] | None) -> int:
     """Run a node of this class until SIGINT or SIGTERM; return the exit status."""
-    answer_help(node_type.name, doc, {**node_type.parameters, **AUTOSTART}, args)
+    parse_command_line(node_type.name, doc, {**node_type.parameters, **AUTOSTART}, args)
 
     def started(context: Context) -> ContactNode:
         node = node_type(context)

@@ -144,7 +144,7 @@ def reason_of(error: Exception) -> str:
     return (str(error) if known else f'{type(error).__name__}: {error}')[:LONGEST_REASON]
 
 
-def answer_help(program: str, doc: str | None, settings: Mapping[str, Setting],
+def parse_command_line(program: str, doc: str | None, settings: Mapping[str, Setting],
                 args: Sequence[str] | None) -> None:
     """Serve `--help`, and refuse arguments that ROS does not take (exit status 2).
 

@@ -168,7 +168,7 @@ def _complaints_of(node: Node) -> Iterator[None]:
                                     throttle_duration_sec=LOG_SECONDS)
 
 
-def let_callbacks_finish() -> None:
+def deprioritise_other_threads() -> None:
     """Keep this process's other threads from interrupting the one that calls this (Linux).
 
     Every reliable publish wakes two or three threads of the middleware. As batch threads they wait
@@ -222,7 +222,7 @@ def _ignore_signals() -> None:
 
 
 @contextlib.contextmanager
-def joined(make_node: Callable[[Context], NodeKind], args: Sequence[str] | None = None, *,
+def running_node(make_node: Callable[[Context], NodeKind], args: Sequence[str] | None = None, *,
            signals: SignalHandlerOptions = SignalHandlerOptions.NO,
            ) -> Iterator[tuple[NodeKind, Any]]:
     """Give a node and its executor in a context of their own; end all three afterwards.
@@ -269,7 +269,7 @@ def spin(node: Node, executor: Any) -> None:
         spin_for(node, executor, SPIN_SECONDS)
 
 
-def refusals_end(main: Callable[..., int]) -> Callable[..., int]:
+def exit_on_refusal(main: Callable[..., int]) -> Callable[..., int]:
     """Decorate what returns an exit status: REFUSALS end it with one line and status 1."""
     @functools.wraps(main)
     def run(*args: Any, **options: Any) -> int:
@@ -281,17 +281,17 @@ def refusals_end(main: Callable[..., int]) -> Callable[..., int]:
     return run
 
 
-@refusals_end
+@exit_on_refusal
 def run_node(make_node: Callable[[Context], Node], args: Sequence[str] | None, *,
              undisturbed: bool = True) -> int:
     """Start a node and `spin`; return 0 after a clean end, 1 (and print why) if it cannot start.
 
-    undisturbed: `let_callbacks_finish`.
+    undisturbed: `deprioritise_other_threads`.
     """
     try:
-        with joined(make_node, args, signals=SignalHandlerOptions.ALL) as (node, executor):
+        with running_node(make_node, args, signals=SignalHandlerOptions.ALL) as (node, executor):
             if undisturbed:
-                let_callbacks_finish()
+                deprioritise_other_threads()
             spin(node, executor)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass

@@ -22,7 +22,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from ..node.contact_node import PARAMETERS as CONTACT_PARAMETERS
 from ..node.messages import make_header
-from ..node.parameters import answer_help, declare, warn_of_unknown
+from ..node.parameters import declare, parse_command_line, warn_of_unknown
 from ..node.ros_client import line_marker, make_marker, set_pose
 from ..node.runtime import run_node
 from ..node.topics import contact_qos
@@ -123,7 +123,7 @@ class MarkersNode(Listener):
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node until SIGINT or SIGTERM."""
-    answer_help('markers', __doc__, PARAMETERS, args)
+    parse_command_line('markers', __doc__, PARAMETERS, args)
     return run_node(MarkersNode, args)
 
 

@@ -26,7 +26,7 @@ from ..extras import require
 from ..node import processes
 from ..node.parameters import outside_ros_args
 from ..node.processes import Stop, asked_to_end, on_this_host, printed, program
-from ..node.runtime import REFUSALS, joined, spin_for
+from ..node.runtime import REFUSALS, running_node, spin_for
 from ..scene.scene_file import read_scene
 from ..scene.scene_solver import CONTAINER, two_boxes
 from ..solver.arguments import model_name, program_parser, within
@@ -92,7 +92,7 @@ def serve(options: argparse.Namespace, args: Sequence[str], stop: Stop) -> None:
 
     scene = read_scene(options.scene) if options.scene else two_boxes(CONTAINER, CONTAINER)
     with ExitStack() as ending:
-        node, executor = ending.enter_context(joined(partial(ViewNode, scene=scene), args))
+        node, executor = ending.enter_context(running_node(partial(ViewNode, scene=scene), args))
         page = ending.enter_context(closing(Page(options.host, options.port)))
         # Programs end before the page: they must not outlive a page that hangs.
         landings = None if options.scene else ending.enter_context(closing(Landings(

@@ -18,7 +18,7 @@ from rclpy.qos import QoSProfile
 
 from box_contact_msgs.msg import Contacts
 from box_contact_ros.bench import drive
-from box_contact_ros.node.runtime import GuardedNode, joined, spin_for
+from box_contact_ros.node.runtime import GuardedNode, running_node, spin_for
 
 DEEP = QoSProfile(depth=1000)
 PATIENCE = 240.0  # time [s] after which a run hangs
@@ -91,7 +91,7 @@ class FaultyRelay(GuardedNode):
 
 def test_planted_faults_show_up(program, tmp_path):
     """One point is dropped, one depth wrong, one contact missing, one normal comes twice."""
-    with joined(FaultyRelay) as (relay, executor):
+    with running_node(FaultyRelay) as (relay, executor):
         remaps = ' '.join(f'-r bench/contact/{topic}:=relayed/{topic}'
                           for topic in ('contact/point', 'contact/normal', 'contacts'))
         running = bench(program, f'--rate 100 --duration 9 --model exact --out {tmp_path}',
@@ -117,7 +117,7 @@ class Listener(GuardedNode):
 
 def test_called_off(program):
     """SIGINT in mid-stream: results so far, and every process that was started ends."""
-    with joined(Listener) as (listener, executor):
+    with running_node(Listener) as (listener, executor):
         running = bench(program, '--duration 600')
         while listener.count < 200 and running.process.poll() is None:
             spin_for(listener, executor, 0.2)

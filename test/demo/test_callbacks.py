@@ -22,7 +22,7 @@ PROGRAM = f"""
 import time
 from box_contact_msgs.msg import Contacts
 from box_contact_ros.demo.crane_node import CraneNode
-from box_contact_ros.node.runtime import GuardedNode, joined, spin_for
+from box_contact_ros.node.runtime import GuardedNode, running_node, spin_for
 
 def fails(*_):
     raise KeyError('planted')
@@ -38,7 +38,7 @@ class Source(GuardedNode):
         self.out.publish(Contacts())
 
 CraneNode._on_contacts = fails
-with joined(Source) as (source, executor):
+with running_node(Source) as (source, executor):
     crane = CraneNode(source.context)
     executor.add_node(crane)
     until = time.monotonic() + {SECONDS}

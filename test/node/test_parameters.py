@@ -82,13 +82,13 @@ def test_help_lists_all_parameters_with_their_defaults(capsys):
 def test_options_outside_ros_args_are_refused(args, words, capsys):
     """With status 2 and a hint."""
     with pytest.raises(SystemExit) as ended:
-        parameters.answer_help('node', 'Test.', SETTINGS, args)
+        parameters.parse_command_line('node', 'Test.', SETTINGS, args)
     assert ended.value.code == 2 and words in capsys.readouterr().err
 
 
 def test_a_word_that_ros_does_not_know_ends_the_program(capsys, signal_handlers):
     """With one line and status 1: -p is easily forgotten."""
-    parameters.answer_help('node', 'Test.', SETTINGS, ['--ros-args', '-p', 'model:=exact'])
+    parameters.parse_command_line('node', 'Test.', SETTINGS, ['--ros-args', '-p', 'model:=exact'])
     assert contact_node.main(['--ros-args', 'model:=exact']) == 1
     assert capsys.readouterr().err == (
         "error: after --ros-args, ROS does not know ['model:=exact']: a parameter is "

@@ -77,7 +77,7 @@ class Hanging(Node):
         ctypes.PyDLL(None).sleep(60)  # with Python's lock
 
 runtime.END_SECONDS = 0.2
-with runtime.joined(lambda context: Hanging('hanging', context=context)):
+with runtime.running_node(lambda context: Hanging('hanging', context=context)):
     pass
 """
 
@@ -109,7 +109,7 @@ def test_other_threads_become_batch_threads(monkeypatch):
         {number: policy}))
     other = Thread(target=done.wait)
     other.start()
-    runtime.let_callbacks_finish()
+    runtime.deprioritise_other_threads()
     done.set()
     other.join()
     assert changed[other.native_id] == os.SCHED_BATCH and get_native_id() not in changed
@@ -118,7 +118,7 @@ def test_other_threads_become_batch_threads(monkeypatch):
         raise PermissionError(path)
 
     monkeypatch.setattr(os, 'listdir', forbidden)
-    runtime.let_callbacks_finish()
+    runtime.deprioritise_other_threads()
 
 
 SIGNALLED = """
@@ -139,7 +139,7 @@ def begin_late(**options):
 if when == 'before':  # rclpy has its handlers
     runtime.rclpy.init = begin_late
 try:
-    with runtime.joined(lambda context: Node('signalled', context=context), [],
+    with runtime.running_node(lambda context: Node('signalled', context=context), [],
                         signals=SignalHandlerOptions.ALL) as (node, executor):
         signal.raise_signal(number)
         signal.raise_signal(number)
@@ -188,7 +188,7 @@ def test_an_end_that_fails_goes_on(monkeypatch):
     monkeypatch.setattr(runtime, 'make_executor', lambda _: SimpleNamespace(
         add_node=lambda _: None, shutdown=fail))
     monkeypatch.setattr(runtime, 'keep_for_ever', kept.append)
-    with pytest.raises(RuntimeError, match='not now'), runtime.joined(
+    with pytest.raises(RuntimeError, match='not now'), runtime.running_node(
             lambda context: Node('left', context=context), []) as (node, executor):
         context = node.context
     assert kept == [executor] and not context.ok()
