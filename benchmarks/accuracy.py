@@ -141,7 +141,7 @@ class AccuracyRow:
     set: str
     errors: Mapping[str, Mapping[str, Summary]]  # by field of `ContactErrors`, then by part
     pairs: int
-    exact_share: float  # share of contacts answered by `exact`
+    fallback_share: float  # share of contacts answered by `exact`
     outside: float  # farthest point outside a box, of the size
 
     def broken(self) -> list[str]:
@@ -154,7 +154,7 @@ class AccuracyRow:
             for quantity, parts in self.errors.items()}
         return over(f'mlp, {self.set}', {
             **found, 'points outside by': (self.outside, OUTSIDE),
-            'left to exact': (self.exact_share, share)})
+            'left to exact': (self.fallback_share, share)})
 
 
 def over(what: str, found: Mapping[str, tuple[float, float]]) -> list[str]:
@@ -166,7 +166,7 @@ def over(what: str, found: Mapping[str, tuple[float, float]]) -> list[str]:
 def measure(model: Contestant, name: str, pairs: Pairs, truth: Contacts) -> AccuracyRow | None:
     """Measure a model on a set; None where the model is not for its sizes."""
     try:
-        contacts, left_to_exact = model.solve(pairs)
+        contacts, fallbacks = model.solve(pairs)
     except ValueError:
         if model.any_boxes:
             raise
@@ -180,7 +180,7 @@ def measure(model: Contestant, name: str, pairs: Pairs, truth: Contacts) -> Accu
         model=model.name, set=name, pairs=len(both),
         errors={quantity: by_part(values, classes, winners) for quantity, values
                 in errors._asdict().items() if np.isfinite(values).all()},
-        exact_share=left_to_exact / max(1, int(contacts.colliding.sum())),
+        fallback_share=fallbacks / max(1, int(contacts.colliding.sum())),
         outside=outside(pairs, contacts))
 
 
@@ -242,7 +242,7 @@ def error_table(rows: Sequence[AccuracyRow]) -> str:
 
     lines = [[f'{r.model}, {r.set}', *(cell(r, name) for name in ContactErrors._fields),
               ' / '.join(f'{limit_of(name, r.set):g}' for name in ContactErrors._fields)
-              if r.model == 'mlp' else '', f'{100.0 * r.exact_share:.3g} %', f'{r.outside:.1g}']
+              if r.model == 'mlp' else '', f'{100.0 * r.fallback_share:.3g} %', f'{r.outside:.1g}']
              for r in rows]
     return markdown_table(['model, set', 'point', 'volume', 'covariance', 'in-plane eigenvalues',
                            'limits of p99', 'left to exact', 'outside'], lines)
@@ -275,7 +275,7 @@ def csv_rows(rows: Sequence[AccuracyRow]) -> Iterator[dict[str, object]]:
                 if part == 'all' and row.model == 'mlp':
                     line['limit_p99'] = limit_of(quantity, row.set)
                 if part == 'all' and quantity == 'point':
-                    line |= {'exact_share': row.exact_share, 'outside': row.outside}
+                    line |= {'fallback_share': row.fallback_share, 'outside': row.outside}
                 yield line
 
 

@@ -54,7 +54,7 @@ class Solved(NamedTuple):
     """What a model of this package answers for n pairs, with what a manifold does not hold."""
 
     contacts: Contacts
-    left_to_exact: int  # contacts that the model handed to `exact`
+    fallbacks: int  # contacts that the model handed to `exact`
 
 
 class Answer(NamedTuple):
@@ -111,7 +111,7 @@ def ours(model: Any, *, weights: str | None = None, name: str = '') -> Contestan
 
     def solve(pairs: Pairs) -> Solved:
         made = solver(pairs.size_a[0], pairs.size_b[0])
-        return Solved(pairs.contacts(made), made.exact_answers)
+        return Solved(pairs.contacts(made), made.fallbacks)
 
     def prepare_batch(pairs: Pairs, threads: int = 1) -> Callable[[], Any]:
         a, b, size_a, size_b = pairs

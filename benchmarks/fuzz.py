@@ -194,7 +194,7 @@ class Tally:
     pairs: int = 0
     contacts: int = 0
     near_touch: int = 0  # pairs that were judged in 60 digits
-    exact_answers: int = 0
+    fallbacks: int = 0
     worst_depth: float = 0.0  # largest depth error, by its tolerance
     digest: str = ''  # of all verdicts and separations
     faults: Counter[str] = field(default_factory=lambda: Counter(dict.fromkeys(
@@ -203,7 +203,7 @@ class Tally:
 
     def add(self, piece: Tally) -> None:
         """Take in the next piece."""
-        for name in ('pairs', 'contacts', 'near_touch', 'exact_answers'):
+        for name in ('pairs', 'contacts', 'near_touch', 'fallbacks'):
             setattr(self, name, getattr(self, name) + getattr(piece, name))
         self.worst_depth = max(self.worst_depth, piece.worst_depth)
         self.digest = hashlib.sha256((self.digest + piece.digest).encode()).hexdigest()[:16]
@@ -224,10 +224,10 @@ def examine(pairs: Pairs, name: str, solvers: dict[str, ContactSolver]) -> list[
     for model, solver in solvers.items():
         tally = Tally(name, model, pairs=len(pairs.pose_a))
         tallies.append(tally)
-        before = solver.exact_answers
+        before = solver.fallbacks
         try:
             found = pairs.contacts(solver)
-            tally.exact_answers = solver.exact_answers - before
+            tally.fallbacks = solver.fallbacks - before
             changed = changed_bits(pairs, found, solver)
         except Exception as error:
             tally.faults['exception'] += 1
@@ -317,7 +317,7 @@ def main(args: Sequence[str] | None = None) -> int:
         print(f'\n{pose}')
     output.write_csv(folder / 'fuzz.csv', [
         {'class': t.name, 'model': t.model, 'pairs': t.pairs, 'contacts': t.contacts,
-         'near_touch': t.near_touch, 'exact_answers': t.exact_answers,
+         'near_touch': t.near_touch, 'fallbacks': t.fallbacks,
          'worst_depth_by_tolerance': t.worst_depth, 'digest': t.digest, **t.faults}
         for t in tallies], digits=3, about=output.machine(native))
     broken = sum(tally.faults.total() for tally in tallies)

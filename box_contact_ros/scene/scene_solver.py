@@ -238,9 +238,9 @@ class SceneSolver:
         self._warm_up()
 
     @property
-    def exact_answers(self) -> int:
+    def fallbacks(self) -> int:
         """Contacts so far that the model handed to `exact`: see `mlp`."""
-        return self._solver.exact_answers - self._warm_up_answers
+        return self._solver.fallbacks - self._warm_up_answers
 
     def _near_pairs(self, moved: np.ndarray, *, listed: bool = True) -> tuple[int, int]:
         """Bound the boxes `moved` anew, then, if `listed`, write to `_near` which pairs may touch.
@@ -292,7 +292,7 @@ class SceneSolver:
         self.gives_patch = not np.isnan(self._solver(a[0], b[0]).volume)
         """Whether contacts have volume and covariance, and not the point alone."""
         self([None] * len(self.scene.moving))
-        self._warm_up_answers = self._solver.exact_answers
+        self._warm_up_answers = self._solver.fallbacks
 
     def __call__(self, poses: Sequence[np.ndarray | None] | np.ndarray) -> Answer:
         """Return the answer to one tick: a pose (7,) or None for each box of `scene.moving`.

@@ -67,7 +67,7 @@ class ContactSolver(native.PairSolver):
         network = None
         if core == 'mlp' and weights is not None:
             network = core_numbers(load_mlp(weights).networks[NETWORK])
-        # Calls are answered in C++, which calls `converted` and `converted_batch` for the rest.
+        # Calls are answered in C++, which calls `_call_general` and `_batch_general` for the rest.
         super().__init__(core, tuple(one[0]), tuple(other[0]), network, margin)
         self.model = model
         self._size_a, self._size_b, self._weights, self._margin = one, other, weights, margin
@@ -89,11 +89,11 @@ class ContactSolver(native.PairSolver):
                 (self._size_a[0], self._size_b[0]))
 
     @property
-    def exact_answers(self) -> int:
+    def fallbacks(self) -> int:
         """Contacts so far that the model handed to `exact`: see `mlp`."""
-        return self.answered_exactly + int(getattr(self._model, 'exact_answers', 0))
+        return super().fallbacks + int(getattr(self._model, 'fallbacks', 0))
 
-    def converted(self, pose_a: ArrayLike, pose_b: ArrayLike) -> Contact:
+    def _call_general(self, pose_a: ArrayLike, pose_b: ArrayLike) -> Contact:
         """Return the contact of one pair whose poses (7,) are of any kind of numbers.
 
         Raises ValueError, with field and value, for poses that are refused.
@@ -105,7 +105,7 @@ class ContactSolver(native.PairSolver):
                        found.point[0], float(found.volume[0]), found.covariance[0],
                        int(found.axis[0]))
 
-    def converted_batch(self, poses_a: ArrayLike, poses_b: ArrayLike | None = None, *,
+    def _batch_general(self, poses_a: ArrayLike, poses_b: ArrayLike | None = None, *,
                         size_a: ArrayLike | None = None, size_b: ArrayLike | None = None,
                         sizes: ArrayLike | None = None, pairs: ArrayLike | None = None,
                         threads: int = 1, patch: bool = True) -> Contacts:

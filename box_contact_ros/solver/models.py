@@ -31,7 +31,7 @@ per box)."""
 class Model(Protocol):
     """A model in Python behind `ContactSolver`.
 
-    It may also have `exact_answers`, the number of contacts that it handed to `exact` so far, and
+    It may also have `fallbacks`, the number of contacts that it handed to `exact` so far, and
     `size_fault(size_a, size_b)`. That returns in words why it refuses boxes of two full extents
     (3,) [m], or None.
     """

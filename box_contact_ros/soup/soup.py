@@ -17,7 +17,7 @@ a bounding volume tree per box. The rest replaces the paper's "additional algori
 
 Some contacts have no pair of triangles: a box inside another, and some exact touches. Others have
 more than MOST_CONTACTS. There, and where the normals cancel, SAT's normal and the exact point are
-the answer. `Soup.exact_answers` counts them.
+the answer. `Soup.fallbacks` counts them.
 """
 from __future__ import annotations
 
@@ -118,11 +118,11 @@ def point_and_normal(contacts: Sequence[fcl.Contact], areas_a: np.ndarray, areas
 class Soup:
     """Polygon soup of N divisions per edge, for any sizes.
 
-    exact_answers: pairs in contact so far that the soup could not answer, and `exact` did.
+    fallbacks: pairs in contact so far that the soup could not answer, and `exact` did.
     """
 
     def __init__(self, divisions: int) -> None:
-        self.exact_answers = 0
+        self.fallbacks = 0
         self._exact = Exact()
 
         # Each solver keeps objects of its own, one for A and one for B: placing moves them. Their
@@ -158,7 +158,7 @@ class Soup:
             answer = None if len(contacts) >= MOST_CONTACTS else point_and_normal(
                 contacts, self._made(sizes[0], 0)[0].areas, self._made(sizes[1], 1)[0].areas)
             if answer is None:
-                self.exact_answers += 1
+                self.fallbacks += 1
             else:
                 found.point[row], found.normal[row] = a[row, :3] + answer[0], answer[1]
         return found, refused

@@ -64,11 +64,11 @@ def row_of(**changes: object) -> AccuracyRow:
     """Return a row of model `mlp` on containers without an error, but for what is changed."""
     none = {name: {'all': Summary(200, *[0.0] * 4)} for name in ContactErrors._fields}
     return AccuracyRow(**{'model': 'mlp', 'set': 'containers', 'errors': none, 'pairs': 200,
-                          'exact_share': 0.0, 'outside': 0.0, **changes})
+                          'fallback_share': 0.0, 'outside': 0.0, **changes})
 
 
 @pytest.mark.parametrize(('name', 'value'), [
-    ('exact_share', 0.021), ('outside', 1e-12), ('outside', np.nan)])
+    ('fallback_share', 0.021), ('outside', 1e-12), ('outside', np.nan)])
 def test_a_broken_limit_is_named(name: str, value: float) -> None:
     assert row_of().broken() == []
     text, = row_of(**{name: value}).broken()
@@ -124,7 +124,7 @@ def test_quick_run(quick: Path) -> None:
         assert float(row['p99']) <= float(row['limit_p99'])
         if row['quantity'] == 'point':
             assert float(row['outside']) <= accuracy.OUTSIDE
-            assert float(row['exact_share']) <= (0.12 if row['set'] == 'crossed bars' else 0.02)
+            assert float(row['fallback_share']) <= (0.12 if row['set'] == 'crossed bars' else 0.02)
 
 
 def test_searched_for_the_worst(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -160,7 +160,7 @@ def test_points_and_depths_of_a_known_contestant_have_known_errors() -> None:
         assert errors[1:] == pytest.approx((0.5,) * 4, rel=1e-9)
     assert row.errors['point']['all'].pairs == len(pairs.size)
     assert row.errors['volume']['all'].worst == row.errors['covariance']['all'].worst == 0.0
-    assert row.exact_share == pytest.approx(7 / len(pairs.size))
+    assert row.fallback_share == pytest.approx(7 / len(pairs.size))
     assert [text.split()[3] for text in row.broken()] == ['point,', 'points', 'left']
     assert 'point, p99 0.5 > 0.15' in row.broken()[0]
 

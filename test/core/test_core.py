@@ -215,7 +215,7 @@ def test_threads_change_no_bit_and_no_count(model: str, count: int) -> None:
         found, refused = solver.solve(*pairs, threads)
         assert refused == -1
         answers.append(found)
-        counts.append((solver.clipped, solver.answered_exactly))
+        counts.append((solver.clipped, solver.fallbacks))
         assert_same_bits(found, solve(a_solver(model), pairs, threads), threads)
     for threads, found in zip((2, 3, 7), answers[1:]):
         assert_same_bits(answers[0], found, threads)
@@ -239,7 +239,7 @@ def test_threads_name_the_first_row_that_is_refused(model: str, bad: tuple[int, 
         with pytest.raises(ValueError) as refusal:
             solve(solver, pairs, threads)
         said.append(str(refusal.value))
-        assert solver.exact_answers == 0  # nothing was answered
+        assert solver.fallbacks == 0  # nothing was answered
     assert len(set(said)) == 1
     assert said[0].startswith(f'poses_b[{bad[0]}] quaternion ')
 
@@ -266,13 +266,13 @@ def test_one_solver_in_many_threads(model: str) -> None:
     pairs = MIXED.first(2000)
     unit = np.ones((2000, 3))
     wanted, singles = solve(solver, pairs), solve(solver, Pairs(*pairs[:2], unit, unit))
-    before = solver.exact_answers
+    before = solver.fallbacks
     solve(solver, pairs)
-    a_batch = solver.exact_answers - before
+    a_batch = solver.fallbacks - before
     single_counts = a_solver(model)
     for row in range(2000):
         single_counts(pairs.pose_a[row], pairs.pose_b[row])
-    before = solver.exact_answers
+    before = solver.fallbacks
 
     def work(number: int) -> None:
         for turn in range(4):
@@ -285,7 +285,7 @@ def test_one_solver_in_many_threads(model: str) -> None:
     with ThreadPoolExecutor(8) as pool:
         list(pool.map(work, range(8)))
     # Each thread made two batches, and twice all single calls.
-    assert solver.exact_answers - before == 16 * (a_batch + single_counts.exact_answers)
+    assert solver.fallbacks - before == 16 * (a_batch + single_counts.fallbacks)
 
 
 # --- one call and many ----------------------------------------------------------------------------
@@ -393,7 +393,7 @@ def test_a_solver_is_pickled(model: str) -> None:
     solver(poses.IDENTITY, above)
     for protocol in range(2, pickle.HIGHEST_PROTOCOL + 1):
         other = pickle.loads(pickle.dumps(solver, protocol))
-        assert other.exact_answers == 0
+        assert other.fallbacks == 0
         assert_same_bits(other(poses.IDENTITY, above), solver(poses.IDENTITY, above))
         assert_same_bits(solve(other, MIXED.first(9)), solve(solver, MIXED.first(9)))
 
@@ -411,11 +411,11 @@ def test_a_solver_is_made_once() -> None:
 def test_a_solver_that_was_not_made_answers_nothing() -> None:
     """Python lets a subclass forget __init__: an exception, not a crash."""
     raw = native.PairSolver.__new__(native.PairSolver)
-    with pytest.raises(AttributeError, match='converted'):
+    with pytest.raises(AttributeError, match='_call_general'):
         raw(poses.IDENTITY, ABOVE)
     with pytest.raises(TypeError):
         raw.solve(*(part[:1] for part in MIXED), 1)
-    assert (raw.clipped, raw.answered_exactly) == (0, 0)
+    assert (raw.clipped, raw.fallbacks) == (0, 0)
 
 
 class Counting(ContactSolver):
@@ -423,9 +423,9 @@ class Counting(ContactSolver):
 
     calls = 0
 
-    def converted(self, pose_a: object, pose_b: object) -> Contact:
+    def _call_general(self, pose_a: object, pose_b: object) -> Contact:
         self.calls += 1
-        return super().converted(pose_a, pose_b)
+        return super()._call_general(pose_a, pose_b)
 
 
 @every_model

@@ -96,13 +96,13 @@ def with_numbers(pairs: Pairs, numbers: np.ndarray) -> Contacts:
     return Contacts(*native.PairSolver('mlp', UNIT, UNIT, numbers).solve(*pairs, 1)[0])
 
 
-def left_to_exact(pairs: Pairs) -> np.ndarray:
+def fallbacks(pairs: Pairs) -> np.ndarray:
     """Return which rows (n,) are left to `exact`, by asking for one after the other."""
     solver = native.PairSolver('mlp', UNIT, UNIT, SHIPPED)
     counts = [0]
     for row in range(len(pairs.pose_a)):
         solver.solve(*(part[row:row + 1] for part in pairs), 1)
-        counts.append(solver.answered_exactly)
+        counts.append(solver.fallbacks)
     return np.diff(counts) > 0
 
 
@@ -274,11 +274,11 @@ SHARES = {'random cubes': 0.002, 'touching': 0.001, 'random sizes': 0.012, 'stac
 
 def test_what_is_left_to_exact_is_exact_and_counted(pairs: Pairs) -> None:
     """Those rows have its bits. A batch counts what its single calls count, in any order."""
-    left, exact = left_to_exact(pairs), pairs.contacts()
+    left, exact = fallbacks(pairs), pairs.contacts()
     for order in (np.arange(len(left)), np.random.default_rng(1).permutation(len(left))):
         solver = ContactSolver(UNIT, UNIT)
         found = pairs.rows(order).contacts(solver)
-        assert solver.exact_answers == left.sum()
+        assert solver.fallbacks == left.sum()
         at = left[order]
         assert_same_bits(rows_of(found, at), rows_of(exact, order[at]))
     assert not left[~exact.colliding].any()
@@ -290,16 +290,16 @@ def test_few_are_left_to_exact(name: str) -> None:
     solver = ContactSolver(UNIT, UNIT)
     pairs = drawn(name, 5 * N)
     pairs.contacts(solver)
-    assert solver.exact_answers <= SHARES[name] * len(pairs.pose_a)
+    assert solver.fallbacks <= SHARES[name] * len(pairs.pose_a)
 
 
 @pytest.mark.parametrize('b', [poses.IDENTITY, poses.IDENTITY + (0.1, 0, 0, 0, 0, 0, 0)])
 def test_a_box_through_its_like_is_left_to_exact(b: np.ndarray) -> None:
     """Deeper than any contact; single calls count, too."""
     solver = ContactSolver(UNIT, (0.5, 0.5, 3.0))
-    assert solver(poses.IDENTITY, b).colliding and solver.exact_answers == 1
+    assert solver(poses.IDENTITY, b).colliding and solver.fallbacks == 1
     solver.batch([poses.IDENTITY] * 3, [b] * 3)
-    assert solver.exact_answers == 4
+    assert solver.fallbacks == 4
 
 
 # --- laws -----------------------------------------------------------------------------------------
@@ -313,8 +313,8 @@ def test_swap(mlp: ContactSolver, pairs: Pairs) -> None:
     other = Pairs(pairs.pose_b, pairs.pose_a, pairs.size_b, pairs.size_a)
     found = stages(*pairs, names=('certain', 'separation', 'size'))
     certain = found.certain & (found.separation < -DEPTH_FLOOR * found.size)
-    left = left_to_exact(pairs)
-    assert np.array_equal(left, left_to_exact(other))
+    left = fallbacks(pairs)
+    assert np.array_equal(left, fallbacks(other))
     for solver, asked in ((mlp, ~left | certain), (None, certain)):
         one, two = (rows_of(found, asked)
                     for found in (pairs.contacts(solver), other.contacts(solver)))

@@ -35,8 +35,8 @@ using detail::StageArrays;
 const Kernel* kernel = nullptr;        // of this process
 PyTypeObject* contact_type = nullptr;  // tuples, until `use_contact_types` is called
 PyTypeObject* contacts_type = nullptr;
-PyObject* name_converted = nullptr;  // of the methods for what is no plain array
-PyObject* name_converted_batch = nullptr;
+PyObject* name_call_general = nullptr;  // of the methods for what is no plain array
+PyObject* name_batch_general = nullptr;
 
 // Where the environment names an unknown instruction set, core/__init__.py goes no further.
 bool has_kernel() {
@@ -259,7 +259,7 @@ PyObject* solver_call(PyObject* self, PyObject* args, PyObject* keywords) {
     if (b && solver->solve(a, b, nullptr, nullptr, BC_COVARIANCE, contact))
       return new_contact(contact);
   }
-  return call_method(self, name_converted, args, keywords);
+  return call_method(self, name_call_general, args, keywords);
 }
 
 // Solve rows without Python's lock. Returns the first row that is refused, or −1.
@@ -322,7 +322,7 @@ PyObject* solver_batch(PyObject* self, PyObject* args, PyObject* keywords) {
     if (!plain.patch) found.fill_volumes(plain.count);
     if (refused < 0) return found.release(contacts_type);
   }
-  return call_method(self, name_converted_batch, args, keywords);
+  return call_method(self, name_batch_general, args, keywords);
 }
 
 // Whether a model has the network that it needs. A network of `mlp` has the output's bias, then the
@@ -432,7 +432,7 @@ PyMethodDef solver_methods[] = {
     {nullptr, nullptr, 0, nullptr}};
 PyGetSetDef solver_attributes[] = {{"clipped", Guarded<solver_clipped>::call, nullptr,
                                     "Contacts of model exact that were clipped.", nullptr},
-                                   {"answered_exactly", Guarded<solver_exact>::call, nullptr,
+                                   {"fallbacks", Guarded<solver_exact>::call, nullptr,
                                     "Contacts that model mlp left to exact.", nullptr},
                                    {nullptr, nullptr, nullptr, nullptr, nullptr}};
 
@@ -443,7 +443,7 @@ PyType_Slot solver_slots[] = {
          "Solve pairs of boxes by model 'exact' or 'mlp'; None leaves all to Python.\n\n"
          "A call with two poses (7,) returns a Contact, and batch(poses_a, poses_b) returns "
          "Contacts. What is no plain array, tuple or list of numbers, and what is refused, goes to "
-         "self.converted(pose_a, pose_b) and self.converted_batch(...).")},
+         "self._call_general(pose_a, pose_b) and self._batch_general(...).")},
     {Py_tp_new, slot<solver_new>()},
     {Py_tp_init, slot<solver_init>()},
     {Py_tp_dealloc, reinterpret_cast<void*>(solver_dealloc)},
@@ -654,10 +654,10 @@ PyMODINIT_FUNC PyInit__native() {
   kernel = detail::chosen_kernel();
   for (auto place : {&contact_type, &contacts_type})
     *place = reinterpret_cast<PyTypeObject*>(Py_NewRef(&PyTuple_Type));
-  name_converted = PyUnicode_InternFromString("converted");
-  name_converted_batch = PyUnicode_InternFromString("converted_batch");
+  name_call_general = PyUnicode_InternFromString("_call_general");
+  name_batch_general = PyUnicode_InternFromString("_batch_general");
   Owned module(PyModule_Create(&module_definition));
-  if (!name_converted || !name_converted_batch || !module) return nullptr;
+  if (!name_call_general || !name_batch_general || !module) return nullptr;
   bool added =
       add(module.get(), "kernel", PyUnicode_FromString(kernel ? kernel->name : "")) &&
       add(module.get(), "instruction_set", PyUnicode_FromString(kernel ? kernel->title : "")) &&
