@@ -55,7 +55,7 @@ class ContactSolver(native.PairSolver):
         if isinstance(model, (str, type)) or not hasattr(model, 'solve'):
             check_model('model', model)
             core = str(model) if model in NATIVE else None
-            self._model = None if core else make_model(str(model), one, other, weights)
+            self._model = None if core else make_model(str(model), one[0], weights)
         else:
             self._model = model
         if margin and self._model is not None:

@@ -84,12 +84,12 @@ def most_near(name: str) -> int:
     return 64 if soup_divisions(name) else 2**15
 
 
-def make_model(name: str, size_a: np.ndarray, size_b: np.ndarray, weights: str | None) -> Model:
-    """Return the object that answers as `paper` or `soup-N`, for full extents (1, 3) [m].
+def make_model(name: str, size: np.ndarray, weights: str | None) -> Model:
+    """Return the object that answers as `paper` or `soup-N`, for full extents (3,) [m] of A.
 
     Raises ValueError for sizes or weights that do not fit, and ModuleNotFoundError, which says what
     to install, where a library is missing.
     """
     if name == 'paper':
-        return import_module('box_contact_ros.solver.paper').paper(size_a[0], size_b[0], weights)
+        return import_module('box_contact_ros.solver.paper').paper(size, weights)
     return import_module('box_contact_ros.soup.soup').Soup(soup_divisions(name))

@@ -187,10 +187,10 @@ class Paper:
         """Return why the weights are not for two full extents (3,) [m], or None."""
         if self._fits(size_a[None], size_b[None])[0]:
             return None
-        known = 'cubes' if self._cubes else in_words(self._size)
-        return pair_fault(self.name, size_a, size_b) or (
-            f'the weights {short_repr(self._file)} of model {self.name!r} are for {known}, not for '
-            f"size {in_words(size_a)}; any size works with model 'exact'")
+        known = 'cubes of one size' if self._cubes else f'boxes of {in_words(self._size)}'
+        return (f'the weights {short_repr(self._file)} of model {self.name!r} are for two {known}, '
+                f'not for {in_words(size_a)} and {in_words(size_b)}; any sizes work with model '
+                "'exact'")
 
 
 def touching_pairs(stages: dict[str, np.ndarray]) -> TouchingPairs:
@@ -212,32 +212,23 @@ def is_cube(size: np.ndarray) -> bool:
     return bool(np.ptp(size) <= SAME_SIZE * size.max())
 
 
-def pair_fault(model: str, size_a: np.ndarray, size_b: np.ndarray) -> str | None:
-    """Return why no weights are for two boxes of different full extents (3,) [m], or None."""
-    if np.all(np.abs(size_a - size_b) <= SAME_SIZE * size_a):
-        return None
-    return (f'model {model!r} is for two boxes of one size, not {in_words(size_a)} and '
-            f"{in_words(size_b)}; any sizes work with model 'exact'")
-
-
 def in_words(size: np.ndarray) -> str:
     """Return full extents (3,) [m] for a refusal."""
     return ' × '.join(f'{extent:g}' for extent in size) + ' m'
 
 
-def paper(size_a: np.ndarray, size_b: np.ndarray, path: str | None) -> Paper:
-    """Return model `paper` for full extents (3,) [m], with the weights of a file.
+def paper(size: np.ndarray, path: str | None) -> Paper:
+    """Return model `paper` with the weights of a file.
 
-    path: None is the shipped file for these boxes. Raises ValueError for sizes without weights.
+    path: None is the shipped file for full extents (3,) [m] of A. Raises `WeightsError` where there
+    is none.
     """
-    if fault := pair_fault('paper', size_a, size_b):
-        raise ValueError(fault)
     if path is None:
-        suffix = '' if is_cube(size_a) else '-' + 'x'.join(f'{extent:g}' for extent in size_a)
+        suffix = '' if is_cube(size) else '-' + 'x'.join(f'{extent:g}' for extent in size)
         try:
             path = str(resource_path('weights', f'paper{suffix}.safetensors'))
         except FileNotFoundError as error:
             raise WeightsError(
-                f"model 'paper' has no weights for boxes of size {in_words(size_a)}: train them, "
+                f"model 'paper' has no weights for boxes of size {in_words(size)}: train them, "
                 "name a file with `weights`, or use model 'exact', which needs none") from error
     return Paper(load_weights(path))

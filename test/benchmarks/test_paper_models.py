@@ -83,7 +83,7 @@ def test_a_committee_is_the_weighted_mean_of_its_experts(tmp_path: Path) -> None
 
 
 def test_they_are_for_cubes_and_need_their_networks() -> None:
-    with pytest.raises(ValueError, match='are for cubes, not for size 1 × 2 × 3 m'):
+    with pytest.raises(ValueError, match='are for two cubes of one size, not for 1 × 2 × 3 m'):
         ContactSolver((1, 2, 3), (1, 2, 3), model=continuous())
     with pytest.raises(WeightsError, match="has no network 'classifier'"):
         Committee(load_weights(resource_path('weights', 'paper.safetensors')))

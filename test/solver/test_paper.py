@@ -148,7 +148,7 @@ def test_sizes_and_places_of_rows(name):
 
 
 @pytest.mark.parametrize('sizes, words', [
-    (((2, 2, 2), (3, 3, 3)), 'two boxes of one size'),
+    (((2, 2, 2), (3, 3, 3)), 'for two cubes of one size, not for 2 × 2 × 2 m and 3 × 3 × 3 m'),
     (((1, 2, 3), (1, 2, 3)), "no weights for boxes of size 1 × 2 × 3 m.*model 'exact'")])
 def test_other_sizes_are_refused(sizes, words):
     with pytest.raises(ValueError, match=words):
@@ -159,8 +159,8 @@ def test_other_sizes_in_a_batch_are_refused():
     """The first row that is refused is named, whether for its pose or for its size."""
     solver = ContactSolver(poses.CUBE, poses.CUBE, model='paper')
     two = np.tile(poses.IDENTITY, (2, 1))
-    for sizes, words in ((([2, 2, 2], [2, 2, 3]), 'for two boxes of one size'),
-                         (([1, 2, 3], [1, 2, 3]), 'are for cubes, not for size 1 × 2 × 3 m')):
+    for sizes, words in ((([2, 2, 2], [2, 2, 3]), 'for two cubes of one size, not for'),
+                         (([1, 2, 3], [1, 2, 3]), 'not for 1 × 2 × 3 m and 1 × 2 × 3 m')):
         with pytest.raises(ValueError, match=words):
             solver.batch(two, two, size_a=sizes[0], size_b=sizes[1])
     rows = np.array([[2.0, 2, 2], [2, 2, 3]])
@@ -172,7 +172,7 @@ def test_other_sizes_in_a_batch_are_refused():
 
 def test_weights_for_something_else_are_refused():
     cubes = str(resource_path('weights', 'paper.safetensors'))
-    with pytest.raises(ValueError, match='are for cubes, not for size'):
+    with pytest.raises(ValueError, match='are for two cubes of one size'):
         ContactSolver(poses.CONTAINER, poses.CONTAINER, model='paper', weights=cubes)
     with pytest.raises(WeightsError, match='does not exist'):
         ContactSolver(poses.CUBE, poses.CUBE, model='paper', weights='nowhere.safetensors')
