@@ -63,7 +63,7 @@ class GuardedNode(Node):
 
     def __init__(self, *args: Any, **options: Any) -> None:
         """Begin as rclpy's node does."""
-        self._silent_until: dict[str, float] = {}  # monotonic time [s], by kind of line
+        self._silent_until: dict[str, float] = {}  # monotonic time [s], by reason of a line
         super().__init__(*args, **options)
         for service in self.services:  # rclpy's own: parameters, and states of a lifecycle node
             service.callback = self.answered(service.callback, service.service_name)
@@ -108,12 +108,12 @@ class GuardedNode(Node):
                 return type(response)()  # nothing in it says success
         return answered
 
-    def may_log(self, kind: str) -> bool:
-        """Return whether no line of a kind was logged within LOG_SECONDS."""
+    def may_log(self, reason: str) -> bool:
+        """Return whether no line for a reason was logged within LOG_SECONDS."""
         now = time.monotonic()
-        if now < self._silent_until.get(kind, 0.0):
+        if now < self._silent_until.get(reason, 0.0):
             return False
-        self._silent_until[kind] = now + LOG_SECONDS
+        self._silent_until[reason] = now + LOG_SECONDS
         return True
 
     def _complain(self, what: str, error: Exception) -> None:

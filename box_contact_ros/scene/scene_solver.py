@@ -109,21 +109,21 @@ def two_boxes(size_a: Sequence[float], size_b: Sequence[float]) -> Scene:
     return Scene(boxes, (Pair('', 'box_a', 'box_b'),))
 
 
-Place = tuple[str | int, ...]  # A value of a scene: ('boxes', 'load', 'size') or ('pairs', 3, 'a')
+KeyPath = tuple[str | int, ...]  # ('boxes', 'load', 'size') or ('pairs', 3, 'a')
 
 
-def dotted(place: Place) -> str:
-    """Return a place in words: `boxes.load.size` or `pairs[3].a`."""
-    text = ''.join(f'[{part}]' if isinstance(part, int) else f'.{part}' for part in place)
+def dotted(path: KeyPath) -> str:
+    """Return a path in words: `boxes.load.size` or `pairs[3].a`."""
+    text = ''.join(f'[{part}]' if isinstance(part, int) else f'.{part}' for part in path)
     return text.removeprefix('.')
 
 
 class Fault(ValueError):
     """What is wrong with a scene, and where."""
 
-    def __init__(self, place: Place, reason: str) -> None:
-        super().__init__(f'{dotted(place)}: {reason}')
-        self.place, self.reason = place, reason
+    def __init__(self, path: KeyPath, reason: str) -> None:
+        super().__init__(f'{dotted(path)}: {reason}')
+        self.path, self.reason = path, reason
 
 
 def _check(boxes: Mapping[str, Box], pairs: Sequence[Pair]) -> None:
@@ -144,14 +144,14 @@ def _check(boxes: Mapping[str, Box], pairs: Sequence[Pair]) -> None:
     if not pairs:
         raise Fault(('pairs',), 'a scene needs at least one pair')
     for number, pair in enumerate(pairs):
-        place = ('pairs', number)
+        path = ('pairs', number)
         for side, name in (('a', pair.a), ('b', pair.b)):
             if name not in boxes:
-                raise Fault((*place, side), f'{short_repr(name)} is none of the boxes')
+                raise Fault((*path, side), f'{short_repr(name)} is none of the boxes')
         if pair.a == pair.b:
-            raise Fault((*place, 'b'), f'{short_repr(pair.b)} is the same box as a')
+            raise Fault((*path, 'b'), f'{short_repr(pair.b)} is the same box as a')
         if boxes[pair.a].pose and boxes[pair.b].pose:
-            raise Fault(place, f'{short_repr(pair.a)} and {short_repr(pair.b)} are both fixed')
+            raise Fault(path, f'{short_repr(pair.a)} and {short_repr(pair.b)} are both fixed')
     for what, field, values in (
             ('name', ('name',), [pair.label for pair in pairs]),
             ('pair of boxes', (), [tuple(sorted((pair.a, pair.b))) for pair in pairs])):
@@ -253,9 +253,9 @@ class SceneSolver:
             self._poses, self._bounded, moved, self._low, self._high, self._known,
             self._first[pairs], self._second[pairs], self._near, self._unknown)
 
-    def _key(self, one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    def _key(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
         """Return a number for every two boxes, the same for both orders."""
-        return np.minimum(one, other) * len(self._known) + np.maximum(one, other)
+        return np.minimum(first, second) * len(self._known) + np.maximum(first, second)
 
     def _broad_phase(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the pairs that may touch and those without poses; ValueError for a bad pose."""
@@ -316,11 +316,11 @@ class SceneSolver:
             if a is None or b is None:
                 return Answer([], [self._only], 0)
             contact = self._solver(a, b)
-            found = [(self._only, contact)]
+            entries = [(self._only, contact)]
             if contact.colliding:
-                return _new_tuple(Answer, (found, [], 1, ()))
+                return _new_tuple(Answer, (entries, [], 1, ()))
             return _new_tuple(
-                Answer, ([], [], 1, found if contact.separation <= self.margin else ()))
+                Answer, ([], [], 1, entries if contact.separation <= self.margin else ()))
         for number, pose in zip(self._moving, poses, strict=True):
             self._known[number] = pose is not None
             if pose is not None:
@@ -342,12 +342,10 @@ class SceneSolver:
         close: list[tuple[Pair, Contact]] = []
         if len(near):
             first, second = self._first[near], self._second[near]
-            found = self._solver.batch(self._poses[first], self._poses[second],
-                                       size_a=self._size[first], size_b=self._size[second])
-            for row in np.flatnonzero(found.separation <= self.margin if self.margin
-                                      else found.colliding):
-                colliding = bool(found.colliding[row])
-                (touching if colliding else close).append((pairs[near[row]], Contact(
-                    colliding, float(found.separation[row]), found.normal[row], found.point[row],
-                    float(found.volume[row]), found.covariance[row], int(found.axis[row]))))
+            contacts = self._solver.batch(self._poses[first], self._poses[second],
+                                          size_a=self._size[first], size_b=self._size[second])
+            for row in np.flatnonzero(contacts.separation <= self.margin if self.margin
+                                      else contacts.colliding):
+                contact = contacts.row(int(row))
+                (touching if contact.colliding else close).append((pairs[near[row]], contact))
         return Answer(touching, stale, len(near), close)

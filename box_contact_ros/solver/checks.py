@@ -40,7 +40,7 @@ def nearest_name(name: object, known: Iterable[str]) -> str:
 
     Capitals make no difference.
     """
-    spelled = {one.lower(): one for one in known}
+    spelled = {name.lower(): name for name in known}
     nearest = ''.join(get_close_matches(str(name)[:SHOWN].lower(), spelled, n=1))
     return nearest and f' (did you mean {spelled[nearest]}?)'
 

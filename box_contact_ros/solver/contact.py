@@ -71,6 +71,12 @@ class Contacts(NamedTuple):
     axis: np.ndarray
     """(n,) int32."""
 
+    def row(self, number: int) -> Contact:
+        """Return the contact of one pair."""
+        return Contact(bool(self.colliding[number]), float(self.separation[number]),
+                       self.normal[number], self.point[number], float(self.volume[number]),
+                       self.covariance[number], int(self.axis[number]))
+
 
 def without_patch(colliding: np.ndarray, separation: np.ndarray, normal: np.ndarray,
                   point: np.ndarray) -> Contacts:

@@ -44,7 +44,7 @@ class ContactSolver(native.PairSolver):
 
     def __init__(self, size_a: ArrayLike, size_b: ArrayLike, *, model: str | Model = 'mlp',
                  weights: str | None = None, margin: float = 0.0) -> None:
-        one, other = as_size(size_a, 'size_a'), as_size(size_b, 'size_b')
+        row_a, row_b = as_size(size_a, 'size_a'), as_size(size_b, 'size_b')
         margin = as_floats(margin, 'margin', 'a number', ()).item()
         if not margin >= 0.0:
             raise ValueError(f'margin must be 0 or more, not {margin:g}')
@@ -55,22 +55,22 @@ class ContactSolver(native.PairSolver):
         if isinstance(model, (str, type)) or not hasattr(model, 'solve'):
             check_model('model', model)
             core = str(model) if model in NATIVE else None
-            self._model = None if core else make_model(str(model), one[0], weights)
+            self._model = None if core else make_model(str(model), row_a[0], weights)
         else:
             self._model = model
         if margin and self._model is not None:
             raise ValueError(f'margin {margin:g} has no effect on model {short_repr(model)}: leave '
                              'it at 0')
         self._size_fault = getattr(self._model, 'size_fault', lambda a, b: None)
-        if fault := self._size_fault(one[0], other[0]):
+        if fault := self._size_fault(row_a[0], row_b[0]):
             raise ValueError(fault)
         network = None
         if core == 'mlp' and weights is not None:
             network = core_numbers(load_mlp(weights).networks[NETWORK])
         # Calls are answered in C++, which calls `_call_general` and `_batch_general` for the rest.
-        super().__init__(core, tuple(one[0]), tuple(other[0]), network, margin)
+        super().__init__(core, tuple(row_a[0]), tuple(row_b[0]), network, margin)
         self.model = model
-        self._size_a, self._size_b, self._weights, self._margin = one, other, weights, margin
+        self._size_a, self._size_b, self._weights, self._margin = row_a, row_b, weights, margin
 
     if TYPE_CHECKING:  # the core, which does it, knows no type of ours
         def __call__(self, pose_a: ArrayLike, pose_b: ArrayLike) -> Contact: ...  # noqa: D102
@@ -100,15 +100,12 @@ class ContactSolver(native.PairSolver):
         """
         a = as_floats(pose_a, 'pose_a', 'a pose (x y z qx qy qz qw)', (7,)).reshape(1, 7)
         b = as_floats(pose_b, 'pose_b', 'a pose (x y z qx qy qz qw)', (7,)).reshape(1, 7)
-        found = self._solve(a, b, self._size_a, self._size_b, _SINGLE)
-        return Contact(bool(found.colliding[0]), float(found.separation[0]), found.normal[0],
-                       found.point[0], float(found.volume[0]), found.covariance[0],
-                       int(found.axis[0]))
+        return self._solve(a, b, self._size_a, self._size_b, _SINGLE).row(0)
 
     def _batch_general(self, poses_a: ArrayLike, poses_b: ArrayLike | None = None, *,
-                        size_a: ArrayLike | None = None, size_b: ArrayLike | None = None,
-                        sizes: ArrayLike | None = None, pairs: ArrayLike | None = None,
-                        threads: int = 1, patch: bool = True) -> Contacts:
+                       size_a: ArrayLike | None = None, size_b: ArrayLike | None = None,
+                       sizes: ArrayLike | None = None, pairs: ArrayLike | None = None,
+                       threads: int = 1, patch: bool = True) -> Contacts:
         """Return what `batch` does, for arguments of any kind of numbers.
 
         Raises ValueError, with field and value, for what is refused.
@@ -120,10 +117,10 @@ class ContactSolver(native.PairSolver):
                 raise ValueError('pairs are places in poses and sizes: batch(poses, sizes=…, '
                                  'pairs=…) has neither poses_b nor size_a nor size_b')
             poses = as_floats(poses_a, 'poses', 'poses (m, 7) of rows x y z qx qy qz qw', (None, 7))
-            one = self._sizes(sizes, 'sizes', self._size_a, len(poses))
-            other = self._size_b if sizes is None else one
+            rows_a = self._sizes(sizes, 'sizes', self._size_a, len(poses))
+            rows_b = self._size_b if sizes is None else rows_a
             places = as_places(pairs, 'pairs', len(poses))
-            return self._solve(poses, poses, one, other, _BY_PLACE, threads, patch, places)
+            return self._solve(poses, poses, rows_a, rows_b, _BY_PLACE, threads, patch, places)
         if sizes is not None or poses_b is None:
             raise ValueError('batch takes (poses_a, poses_b), or (poses, sizes=…, pairs=…)')
         a = as_floats(poses_a, 'poses_a', 'poses (n, 7) of rows x y z qx qy qz qw', (None, 7))
@@ -148,19 +145,19 @@ class ContactSolver(native.PairSolver):
         threads = min(int(threads), 1 + len(a if places is None else places))
         if self._model is None:
             rows, refused = self.solve(a, b, size_a, size_b, threads, bool(patch), places)
-            found = Contacts(*rows)
+            contacts = Contacts(*rows)
         else:
             if places is not None:
                 first, second = places.T
                 size_a = size_a if len(size_a) == 1 else size_a[first]
                 size_b = size_b if len(size_b) == 1 else size_b[second]
                 a, b, places = a[first], b[second], None
-            found, refused = self._model.solve(a, b, size_a, size_b, threads)
-            found = found if patch else without_patch(*found[:4])
+            contacts, refused = self._model.solve(a, b, size_a, size_b, threads)
+            contacts = contacts if patch else without_patch(*contacts[:4])
         if refused >= 0:
             at = (refused, refused) if places is None else tuple(places[refused])
             raise ValueError(self._refusal(a, b, size_a, size_b, at, names))
-        return found
+        return contacts
 
     def _refusal(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
                  at: tuple[int, int], names: Names) -> str:

@@ -37,17 +37,17 @@ def core_numbers(network: Network) -> np.ndarray:
 
 def load_mlp(path: str | None = None) -> Weights:
     """Read the weights of an MLP, for None the shipped file's; raises `WeightsError`."""
-    found = load_weights(path or resource_path('weights', 'mlp.safetensors'))
-    file = f'weights file {short_repr(str(found.path))}'
-    number = found.card.get('format')  # a card may say anything
+    loaded = load_weights(path or resource_path('weights', 'mlp.safetensors'))
+    file = f'weights file {short_repr(str(loaded.path))}'
+    number = loaded.card.get('format')  # a card may say anything
     if type(number) is not int or number != NETWORK_FORMAT:
         raise WeightsError(f'{file} has format {short_repr(number)}; this version reads '
                            f'{NETWORK_FORMAT}')
-    network = found.network(NETWORK, FEATURES, 1, model='mlp')
+    network = loaded.network(NETWORK, FEATURES, 1, model='mlp')
     if len(network.widths) != 3 or network.widths[1] > UNITS_MAX:
         raise WeightsError(f'{file}: network {NETWORK!r} must have one hidden layer, of at most '
                            f'{UNITS_MAX} units')
-    if found.card.get('activation') != ACTIVATION:
+    if loaded.card.get('activation') != ACTIVATION:
         raise WeightsError(f"{file}: this version's units are {ACTIVATION!r}, not "
-                           f"{short_repr(found.card.get('activation'))}")
-    return found
+                           f"{short_repr(loaded.card.get('activation'))}")
+    return loaded

@@ -54,8 +54,8 @@ class Exact:
     def solve(self, a: np.ndarray, b: np.ndarray, size_a: np.ndarray, size_b: np.ndarray,
               threads: int = 1) -> tuple[Contacts, int]:
         """Return contacts for poses (n, 7), sizes (n or 1, 3), and the first refused row or −1."""
-        found, refused = self._pairs.solve(a, b, size_a, size_b, threads)
-        return Contacts(*found), refused
+        columns, refused = self._pairs.solve(a, b, size_a, size_b, threads)
+        return Contacts(*columns), refused
 
 
 def check_model(where: str, name: object) -> None:
@@ -71,8 +71,8 @@ def check_model(where: str, name: object) -> None:
 
 def soup_divisions(name: str) -> int:
     """Return N of the model soup-N, 0 for any other name."""
-    found = re.fullmatch('soup-([0-9]{1,2})', name)
-    divisions = int(found[1]) if found else 0
+    number = re.fullmatch('soup-([0-9]{1,2})', name)
+    divisions = int(number[1]) if number else 0
     return divisions if divisions <= MOST_SOUP_DIVISIONS else 0
 
 

@@ -147,13 +147,13 @@ class Paper:
             refused = int(misfits[0])
         touching = stages['colliding']
         nowhere = np.full((2, len(a), 3), np.nan)
-        found = without_patch(touching, stages['separation'], *nowhere)._replace(
+        answers = without_patch(touching, stages['separation'], *nowhere)._replace(
             axis=stages['axis'].astype(np.int32))
         if refused < 0 and touching.any():
             rows = {name: values[touching] for name, values in stages.items()}
-            found.point[touching], found.normal[touching] = self._contacts(
+            answers.point[touching], answers.normal[touching] = self._contacts(
                 a[touching, :3], 0.5 * sizes_a[touching], rows)
-        return found, refused
+        return answers, refused
 
     def _contacts(self, place_a: np.ndarray, half: np.ndarray, stages: dict[str, np.ndarray],
                   ) -> tuple[np.ndarray, np.ndarray]:

@@ -60,12 +60,12 @@ class Weights:
 
     def network(self, name: str, inputs: int, outputs: int, model: str) -> Network:
         """Return a network for a model; raises `WeightsError` if the file has no such shape."""
-        found = self.networks.get(name)
-        if found is None or (found.widths[0], found.widths[-1]) != (inputs, outputs):
+        network = self.networks.get(name)
+        if network is None or (network.widths[0], network.widths[-1]) != (inputs, outputs):
             raise WeightsError(
                 f'weights file {short_repr(str(self.path))} has no network {name!r} with {inputs} '
                 f'inputs and {outputs} outputs, which model {model!r} needs')
-        return found
+        return network
 
 
 def load_weights(path: Path | str) -> Weights:

@@ -151,8 +151,8 @@ class Soup:
               threads: int = 1) -> tuple[Contacts, int]:
         """Return contacts for poses (n, 7), sizes (n or 1, 3), and the first refused row or −1."""
         exact, refused = self._exact.solve(a, b, size_a, size_b, threads)
-        found = without_patch(*exact[:4])
-        for row in np.flatnonzero(found.colliding) if refused < 0 else ():
+        merged = without_patch(*exact[:4])
+        for row in np.flatnonzero(merged.colliding) if refused < 0 else ():
             sizes = tuple(size_a[row % len(size_a)]), tuple(size_b[row % len(size_b)])
             contacts = collide(*self.place(a[row], b[row], *sizes))
             answer = None if len(contacts) >= MOST_CONTACTS else point_and_normal(
@@ -160,5 +160,5 @@ class Soup:
             if answer is None:
                 self.fallbacks += 1
             else:
-                found.point[row], found.normal[row] = a[row, :3] + answer[0], answer[1]
-        return found, refused
+                merged.point[row], merged.normal[row] = a[row, :3] + answer[0], answer[1]
+        return merged, refused
