@@ -317,7 +317,7 @@ FORMS = """
 cmake_minimum_required(VERSION 3.18)
 project(forms LANGUAGES CXX)
 {take_in}
-add_executable(first_contact {example}/first_contact.cpp)
+add_executable(first_contact "{example}/first_contact.cpp")
 target_link_libraries(first_contact PRIVATE box_contact_ros::box_contact)
 """
 TAKE_IN = {
@@ -327,14 +327,14 @@ TAKE_IN = {
                     'FetchContent_MakeAvailable(box_contact_ros)'}
 LAUNCHER = """#!/bin/sh
 # Compile, or copy what the first project has compiled: sources and flags are the same.
-for last; do source=$last; done
-kept=$(dirname "$0")/$(basename "$source").o
-while [ "$1" != -o ]; do
-    case $1 in *DBOX_CONTACT_*) kept=$kept-library ;; esac
-    words="$words $1"; shift
+for word; do
+    case $word in *DBOX_CONTACT_*) library=$library-library ;; esac
+    if [ "$before" = -o ]; then output=$word; fi
+    before=$word
 done
-if [ ! -e "$kept" ]; then $words -O0 -o "$kept" -c "$source" || exit 1; fi
-cp "$kept" "$2"
+kept=$(dirname "$0")/$(basename "$before").o$library
+if [ ! -e "$kept" ]; then "$@" -O0 && cp "$output" "$kept" || exit 1; fi
+cp "$kept" "$output"
 """
 
 
