@@ -59,13 +59,13 @@ class AnswerLog:
 
     @property
     def latencies(self) -> np.ndarray:
-        """Return the latencies (rows,) [s], NaN without an answer."""
+        """Return the time from stamp to answer of each row [s], NaN without an answer."""
         last = np.maximum(self.received['point'], self.received['normal'])
         return np.where((self.stamps > 0) & ~self.lost, 1e-9 * (last - self.stamps), np.nan)
 
     @property
     def wrong(self) -> np.ndarray:
-        """Which answers are wrong (rows,)."""
+        """Return for each row whether its answer is not that of `exact`."""
         right = np.abs(self.depths + self.truth.separation) <= DEPTH_TOLERANCE
         return self.twice | (self.received.get('contacts', np.zeros(1)) > 0) & ~right
 

@@ -105,7 +105,8 @@ class SceneTopics:
     def why_silent(self, box: str) -> str:
         """Return who publishes on the topic of a box that gives no pose."""
         subscription = self._subscriptions[box]
-        topic, wanted = subscription.topic_name, subscription.msg_type.__name__  # type: ignore[attr-defined]
+        topic, message = subscription.topic_name, subscription.msg_type
+        wanted = message.__name__  # type: ignore[attr-defined]
         offers = self._node.get_publishers_info_by_topic(topic)
         if not offers:
             return f'nobody publishes {topic}'

@@ -174,7 +174,7 @@ class Pairing(ABC):
                 if state.newest != NEVER}
 
     def stamps(self, box: str) -> np.ndarray:
-        """Return the stamps (n,) [ns] of a box that are remembered, in the order of arrival."""
+        """Return an array (n,) of the stamps [ns] of a box, as far as they are remembered."""
         return np.array(self._boxes[box].taken if box in self._boxes else (), dtype=np.int64)
 
     def _state_at(self, box: str, stamp: int) -> BoxState:

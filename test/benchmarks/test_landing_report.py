@@ -81,7 +81,7 @@ def test_other_loads_and_stacks_do_what_is_expected(planned):
 
 @pytest.mark.parametrize('rate_hz', [200.0, 1000.0])
 def test_the_deepest_point_does_not_land(rate_hz):
-    """MuJoCo's deepest contact jumps between corners, metres a tick, and the load rattles."""
+    """The deepest contact of MuJoCo jumps between corners, metres a tick, and the load rattles."""
     planned = landing.aim(grid()[HANGING_OVER])
     result = landing.run('mujoco-deepest', LoopTiming(rate_hz, 0.0), planned).result
     assert math.isnan(result.settled) and not result.limits['force'][0]

@@ -143,7 +143,7 @@ def test_poses_are_position_then_x_y_z_w():
 
 @pytest.mark.parametrize('pitch', [-0.3, 0.0, 0.25])
 def test_without_a_wrench_the_load_sinks_into_the_stack(pitch):
-    """MuJoCo applies no contact force: the ropes still carry the weight, to some percent."""
+    """No contact force of MuJoCo is applied: the ropes still carry the weight, to some percent."""
     crane = Crane(CraneScenario(pitch=pitch, overlap=0.025))
     heights = run(crane)[:, 2] - 1.5 * HEIGHT
     assert heights[0] > 0.5 and -0.10 < heights.min() < -0.02

@@ -12,9 +12,8 @@ from __future__ import annotations
 
 import argparse
 import sys
+from importlib import import_module
 from pathlib import Path
-
-sys.path.append(str(Path(__file__).resolve().parents[2]))  # for benchmarks/
 
 import hard_pose_recipes as recipes
 import numpy as np
@@ -22,7 +21,8 @@ import oracle
 from gmpy2 import mpfr
 from tqdm import tqdm
 
-from benchmarks import hard_poses
+sys.path.append(str(Path(__file__).resolve().parents[2]))  # for benchmarks/
+hard_poses = import_module('benchmarks.hard_poses')
 
 FLOOR = mpfr(10)**-9
 """Depth, of the size, below which the point is that of boxes pressed in: no truth for it here."""

@@ -241,7 +241,7 @@ def test_ends_cleanly(program, number, pauses):
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 def test_signalled_until_it_has_ended(program, number):
-    """KeyboardInterrupt in EventsExecutor aborts a process, and late SIGTERMs kill it."""
+    """A KeyboardInterrupt in EventsExecutor aborts a process, and late SIGTERMs kill it."""
     running = program('contact_node', *arguments())
     running.wait_for_output('ready', 120)
     while running.process.poll() is None:

@@ -18,7 +18,8 @@ ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / 'docs' / 'examples'
 CLIENTS = ('lockstep_client.py', 'held_patch_client.py')  # of a contact node
 NEEDS = {'mujoco_loop.py': 'mujoco', 'container_stack.py': 'mujoco',
-         'dask_pairs.py': 'distributed'} | dict.fromkeys(CLIENTS, 'box_contact_msgs.msg')
+         'dask_pairs.py': 'distributed',
+         'tf_to_pose.py': 'tf2_ros'} | dict.fromkeys(CLIENTS, 'box_contact_msgs.msg')
 QUICK = {'vectorised_env.py': 'main(100)', 'dask_pairs.py': 'main(40_000, 10_000)'}
 """Shorter runs, whose figures are not those of the docstring."""
 
