@@ -145,7 +145,7 @@ def reason_of(error: Exception) -> str:
 
 
 def parse_command_line(program: str, doc: str | None, settings: Mapping[str, Setting],
-                args: Sequence[str] | None) -> None:
+                       args: Sequence[str] | None) -> None:
     """Serve `--help`, and refuse arguments that ROS does not take (exit status 2).
 
     args: what follows the program's name; None: those of this process.

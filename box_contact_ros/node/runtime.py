@@ -223,8 +223,8 @@ def _ignore_signals() -> None:
 
 @contextlib.contextmanager
 def running_node(make_node: Callable[[Context], NodeKind], args: Sequence[str] | None = None, *,
-           signals: SignalHandlerOptions = SignalHandlerOptions.NO,
-           ) -> Iterator[tuple[NodeKind, Any]]:
+                 signals: SignalHandlerOptions = SignalHandlerOptions.NO,
+                 ) -> Iterator[tuple[NodeKind, Any]]:
     """Give a node and its executor in a context of their own; end all three afterwards.
 
     signals: which handlers of rclpy's are installed; none where the caller has its own. They shut

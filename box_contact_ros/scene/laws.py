@@ -145,7 +145,7 @@ class HeldPatch(_Law):
 
     @classmethod
     def at_rate(cls, load: Body, *, rate_hz: float, latency: float = 0.0, step: float = 0.001,
-                 friction: float = FRICTION, gravity: float = GRAVITY) -> Self:
+                friction: float = FRICTION, gravity: float = GRAVITY) -> Self:
         """Return the law of a load whose contacts are asked for `rate_hz` times a second.
 
         latency: from a question to the use of its answer [s]. step: the physics step [s].
@@ -197,8 +197,8 @@ class SceneLaw(_Law):
 
     @classmethod
     def at_rate(cls, scene: Scene, bodies: Mapping[str, Body | float], *, rate_hz: float,
-                 latency: float = 0.0, step: float = 0.001, friction: float = FRICTION,
-                 gravity: float = GRAVITY) -> Self:
+                latency: float = 0.0, step: float = 0.001, friction: float = FRICTION,
+                gravity: float = GRAVITY) -> Self:
         """Return the law of a scene whose contacts are asked for `rate_hz` times a second.
 
         bodies: by the names of their boxes; a number is the mass [kg] of a box of one density.

@@ -170,7 +170,7 @@ def test_the_law_has_the_bits_of_python(tmp_path: Path, source: str) -> None:
     size = (12.192, 2.438, 2.591)
     solver = ContactSolver(size, size)
     law = HeldPatch.at_rate(Body(mass=20000.0, inertia=(21000.0, 260000.0, 255000.0)),
-                             rate_hz=200.0, latency=0.002)
+                            rate_hz=200.0, latency=0.002)
     stack, velocity = np.array([0, 0, 0, 0, 0, 0, 1.0]), np.zeros(6)
     load = np.array([0.3, 0.1, 2.601, 0.001, 0.002, 0.003, 1.0])
     for step in range(2000):

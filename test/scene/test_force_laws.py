@@ -560,7 +560,7 @@ def test_a_box_without_a_pose_is_named(absent):
     """A scene's solver takes such a box; a law cannot."""
     boxes = {name: Box(name, (1.0, 1.0, 1.0)) for name in ('left', 'right')}
     law = SceneLaw.at_rate(Scene(boxes, (Pair.between('left', 'right'),)), {'left': 1.0},
-                            rate_hz=100.0)
+                           rate_hz=100.0)
     where = [np.array(LEVEL, dtype=float), absent]
     with pytest.raises(ValueError, match="^'right' has no pose, and a law needs one for each of"):
         law.wrenches(where, np.zeros((2, 6)))
@@ -585,7 +585,7 @@ def test_the_page_says_what_the_code_does():
     assert len(rows) >= 6
     for rate, latency, omega, depth in rows:
         law = HeldPatch.at_rate(LOAD, rate_hz=float(rate), latency=1e-3 * float(latency),
-                                 step=0.0005)
+                                step=0.0005)
         digits = len(depth.partition('.')[2])
         assert f'{law.frequency:.0f}' == omega
         assert f'{1e3 * GRAVITY / law.frequency**2:.{digits}f}' == depth
