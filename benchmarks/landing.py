@@ -263,7 +263,7 @@ def main(args: Sequence[str] | None = None) -> int:
     folder = output.results_folder(parser, options)
     step, timings = (QUICK, [SHOWN_TIMING]) if options.quick else (1, TIMINGS)
     planned = [*grid()[SHOWN % step::step], *(ADDED[::3] if options.quick else ADDED)]
-    with left_when_asked(), Pool() as pool:
+    with Pool() as pool, left_when_asked():  # the workers end by SIGTERM, unhandled
         planned = list(tqdm(pool.imap(aim, planned), 'aiming', len(planned), unit=''))
         jobs = list(landings(options.ways, timings, planned, step=step))
         results = [pool.apply_async(run, job) for job in jobs]
