@@ -88,7 +88,7 @@ reports:
 	run benchmarks.speed $(ARGS)
 	run benchmarks.paper $(ARGS)
 	run benchmarks.paper.search $(ARGS)
-	run $(BENCH) --rate 1000 --out $(RESULTS)/bench
+	run $(BENCH) --rate 1000 --out $(RESULTS)
 	if [ $(RESULTS) = docs/results ]; then
 	    for figures in docs/figures/make_*.py; do $(PY) $$figures || failed+=" $$figures"; done
 	    $(PY) docs/tables.py || failed+=' docs/tables.py'

@@ -238,7 +238,8 @@ def locked(words: list[str], **_) -> None:
 def exported(words: list[str], **_) -> None:
     """Set a variable that ROS reads, or name a file of the checkout."""
     name, _, value = words[1].partition('=')
-    known = ('ROS_LOG_DIR', 'RMW_FASTRTPS_USE_QOS_FROM_XML')
+    known = ('AMENT_PREFIX_PATH', 'CMAKE_PREFIX_PATH', 'ROS_LOG_DIR',
+             'RMW_FASTRTPS_USE_QOS_FROM_XML')
     assert name in known or (ROOT / value.removeprefix('$PWD/')).exists()
 
 
