@@ -19,13 +19,8 @@ import yaml
 import box_contact_ros
 from box_contact_ros import ContactSolver
 from box_contact_ros.solver.arguments import model_name
-from box_contact_ros.solver.models import (
-    MODELS,
-    NATIVE,
-    Exact,
-    check_model,
-    most_near,
-)
+from box_contact_ros.solver.exact import Exact
+from box_contact_ros.solver.models import MODELS, NATIVE, check_model, most_near
 
 ROOT = Path(__file__).resolve().parents[2]
 HIGHER = np.array([0.5, 0.25, 1.875, 0, 0, 0, 1])
