@@ -17,7 +17,7 @@ import poses
 import pytest
 from gmpy2 import mpfr
 
-pytest.importorskip('benchmarks')
+pytest.importorskip('benchmarks.pose_sets')
 
 from benchmarks.pose_sets import LOADS, SETS, Pairs
 from box_contact_ros.core import Stages, native, stages

@@ -16,7 +16,7 @@ import numpy as np
 import poses
 import pytest
 
-pytest.importorskip('benchmarks')
+pytest.importorskip('benchmarks.pose_sets')
 
 from benchmarks.pose_sets import (
     SETS,

@@ -19,7 +19,7 @@ from safetensors.numpy import save_file
 
 import box_contact_ros
 
-pytest.importorskip('benchmarks')
+pytest.importorskip('benchmarks.pose_sets')
 
 from benchmarks.accuracy import limit_of
 from benchmarks.errors import contact_errors
