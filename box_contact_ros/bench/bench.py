@@ -25,6 +25,7 @@ import sys
 import tempfile
 from collections.abc import Sequence
 from functools import partial
+from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -101,11 +102,14 @@ def _options(args: Sequence[str]) -> argparse.Namespace:
 
 def _about(options: argparse.Namespace, own: set[int], nodes: set[int]) -> str:
     """Return where and how the bench runs, a line of a Markdown list for each fact."""
-    name = re.search(r'model name\s*: (.*)', Path('/proc/cpuinfo').read_text())
-    processor = name[1] if name else platform.machine()
+    fields = r'^(model name|cpu family|model)\s*: (.*)'
+    cpu = dict(re.findall(fields, Path('/proc/cpuinfo').read_text(), re.MULTILINE))
+    versions = ', '.join(f'{name} {version(name)}' for name in ('numpy', 'rclpy'))
     return '\n'.join([
-        f'- machine: {processor}, {native.instruction_set}, {os.cpu_count()} cores, '
-        f'Python {platform.python_version()}',
+        f'- machine: {cpu.get("model name", platform.machine())} (family '
+        f'{cpu.get("cpu family", "unknown")}, model {cpu.get("model", "unknown")}), '
+        f'{native.instruction_set}, {os.cpu_count()} cores',
+        f'- Python {platform.python_version()}, {versions}, compiler {native.compiler}',
         f'- cores: bench on {" ".join(map(str, sorted(own)))}, '
         f'nodes on {" ".join(map(str, sorted(nodes)))}',
         f'- load at start: {os.getloadavg()[0]:.2f}',
