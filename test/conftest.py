@@ -27,10 +27,9 @@ from typing import Any
 import pytest
 
 FIRST = (
-    'test_install.py', 'test_message_package.py', 'test_core.py', 'test_builds.py',
-    'test_library.py', 'test_exact.py', 'test_series.py', 'test_readme.py', 'test_frontier.py',
-    'test_training.py', 'test_training_mlp.py', 'test_contact_node.py', 'test_scene_node.py',
-    'test_view.py', 'test_bench.py', 'test_crane_node.py', 'test_crane.py')
+    'test_install.py', 'test_training.py', 'test_hostile.py', 'test_view.py', 'test_library.py',
+    'test_builds.py', 'test_core.py', 'test_exact.py', 'test_readme.py', 'test_faults.py',
+    'test_bench.py', 'test_contact_node.py', 'test_crane_node.py')
 """The longest files. Begun late, one of them would leave the other workers idle."""
 
 _modules = count()
