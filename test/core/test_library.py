@@ -33,7 +33,7 @@ from box_contact_ros.scene.pose import rotation_matrix
 from box_contact_ros.solver.contact import Contacts
 
 ROOT = Path(__file__).resolve().parents[2]
-CORE = Path(native.__file__).parent
+CORE = Path(native.__file__).resolve().parent
 LIBRARY = CORE / 'libbox_contact.so'
 INCLUDES = f'-I{CORE / "include"}'
 EXAMPLE = ROOT / 'docs' / 'examples' / 'cpp'

@@ -17,7 +17,6 @@ import poses
 import pytest
 from safetensors.numpy import save_file
 
-import box_contact_ros
 
 pytest.importorskip('benchmarks.pose_sets')
 
@@ -465,7 +464,7 @@ def test_steps_at_a_vanishing_change_of_pose(mlp: ContactSolver, name: str) -> N
 
 def test_the_compiled_network_is_the_shipped_file() -> None:
     """core/src/mlp/shipped_network.hpp has the numbers of weights/mlp.safetensors, to the bit."""
-    header = Path(box_contact_ros.__file__).parent / 'core' / 'src' / 'mlp' / 'shipped_network.hpp'
+    header = Path(__file__).parents[2] / 'box_contact_ros/core/src/mlp/shipped_network.hpp'
     body = header.read_text('utf-8').partition('{\n')[2].partition('};')[0]
     numbers = np.array([float(text) for text in re.findall(r'([-\d.e]+)F', body)], np.float32)
     assert np.array_equal(numbers, SHIPPED)
