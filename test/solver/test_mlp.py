@@ -17,7 +17,6 @@ import poses
 import pytest
 from safetensors.numpy import save_file
 
-
 pytest.importorskip('benchmarks.pose_sets')
 
 from benchmarks.accuracy import limit_of
