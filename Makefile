@@ -27,8 +27,9 @@ unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH LD_LIBRARY_PATH ROS_DISTRO
 endif
 
 PY := .venv/bin/python
-# Workers side by side: test/conftest.py chooses how many, and which tests belong together.
-PYTEST := $(PY) -m pytest -n auto --dist loadfile --no-loadscope-reorder -rs --durations 10
+# One worker more than cores: tests of nodes mostly wait. conftest.py says which files come first.
+WORKERS := $(shell expr $$(getconf _NPROCESSORS_ONLN) + 1)
+PYTEST := $(PY) -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder -rs --durations 10
 LINT := echo ruff; $(PY) -m ruff check .; echo mypy; $(PY) -m mypy
 
 help:
