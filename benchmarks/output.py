@@ -37,14 +37,6 @@ def make_folder(parser: argparse.ArgumentParser, folder: Path) -> Path:
     return folder
 
 
-def make_room(parser: argparse.ArgumentParser, path: Path) -> Path:
-    """Create the folder of a file that `--out` names, as `make_folder`."""
-    if path.is_dir():
-        parser.error(f'--out {path} is a folder: name a file')
-    make_folder(parser, path.parent)
-    return path
-
-
 def results_folder(parser: argparse.ArgumentParser, options: argparse.Namespace) -> Path:
     """Return the folder of results; a quick run replaces a full run's only where `--out` says."""
     return make_folder(parser, options.out or (QUICK_RESULTS if options.quick else RESULTS))

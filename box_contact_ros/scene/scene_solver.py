@@ -289,8 +289,6 @@ class SceneSolver:
         a[:, 6] = b[:, 6] = 1.0
         b[:, :3] = 0.5 * (size_a + size_b) - 0.02 * np.minimum(size_a, size_b)
         self._solver.batch(a, b, size_a=size_a, size_b=size_b)
-        self.gives_patch = not np.isnan(self._solver(a[0], b[0]).volume)
-        """Whether contacts have volume and covariance, and not the point alone."""
         self([None] * len(self.scene.moving))
         self._warm_up_answers = self._solver.fallbacks
 

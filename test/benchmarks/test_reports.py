@@ -60,10 +60,10 @@ def test_a_quick_run_leaves_the_results_alone(tmp_path: Path) -> None:
 
 
 def test_every_program_is_listed() -> None:
-    """The search for the worst case, which takes a third of an hour, and the soak are run alone."""
+    """The search for the worst case, which takes a third of an hour, is run alone."""
     programs = {f'benchmarks.{path.stem}' for path in (ROOT / 'benchmarks').glob('*.py')
                 if "__name__ == '__main__'" in path.read_text('utf-8')}
-    assert programs - {'benchmarks.searched', 'benchmarks.soak'} <= set(listed())
+    assert programs - {'benchmarks.searched'} <= set(listed())
 
 
 @pytest.mark.parametrize('name', listed())

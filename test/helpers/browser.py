@@ -75,12 +75,6 @@ class Tab:
         """Text of the element with this id, '' if there is none."""
         return self.evaluate(f'document.getElementById({name!r})?.innerText ?? ""')
 
-    def click(self, label: str) -> None:
-        """Click the button that says `label`."""
-        assert self.evaluate(
-            f'(() => {{ const b = [...document.querySelectorAll("button")]'
-            f'.find(b => b.innerText.trim() == {label!r}); b?.click(); return !!b; }})()'), label
-
     def picture(self) -> bytes:
         """Return what the page looks like, as PNG."""
         return base64.b64decode(self.command('Page.captureScreenshot', format='png')['data'])

@@ -38,7 +38,6 @@ OMEGA = HeldPatch.at_rate(LOAD, rate_hz=RATE).frequency
 SUNK = GRAVITY / OMEGA**2
 """Depth of a load that rests on a whole face [m]."""
 WHOLE_DAMPER = 0.02 * SUNK
-SHARE = 0.1  # of Ω² that tangential springs take
 
 
 def fresh(*, friction=0.5, **loop) -> HeldPatch:
