@@ -32,6 +32,12 @@ class ContactErrors(NamedTuple):
         return ContactErrors(*(errors[chosen] for errors in self))
 
 
+def degrees_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return the angles (n,) [deg] between vectors (n, 3); by atan2, as acos loses small angles."""
+    sines = np.linalg.norm(np.cross(a, b), axis=1)
+    return np.degrees(np.arctan2(sines, np.sum(a * b, axis=1)))
+
+
 def contact_errors(found: Contacts, truth: Contacts, edge: np.ndarray) -> ContactErrors:
     """Return the errors of n contacts; edge: see `Pairs.edge`. All pairs touch, by both."""
     exact = _in_plane(truth.covariance, truth.normal)

@@ -10,7 +10,9 @@ is 1 if held patches of `exact` or `mlp` do not do all that is expected.
 """
 from __future__ import annotations
 
+import contextlib
 import math
+import signal
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, replace
@@ -25,7 +27,6 @@ from tqdm import tqdm
 from box_contact_ros.core import native
 from box_contact_ros.demo.crane import CraneScenario
 from box_contact_ros.demo.landing import CORNER_SPEED_LIMIT, WATCHED, LandingRecord
-from box_contact_ros.node.processes import left_when_asked
 from box_contact_ros.scene.pose import rotation_matrix
 
 from . import output
@@ -252,6 +253,20 @@ def _draw_from_the_end(axis: Any, way: str, record: LandingRecord) -> None:
 # --- program --------------------------------------------------------------------------------------
 
 
+@contextlib.contextmanager
+def left_when_asked() -> Iterator[None]:
+    """Turn SIGTERM and SIGHUP into SystemExit, so that subprocesses are ended on the way out."""
+    def leave(number: int, _frame: Any) -> None:
+        sys.exit(128 + number)
+
+    before = {number: signal.signal(number, leave) for number in (signal.SIGTERM, signal.SIGHUP)}
+    try:
+        yield
+    finally:
+        for number, earlier in before.items():
+            signal.signal(number, earlier)
+
+
 def main(args: Sequence[str] | None = None) -> int:
     """Run the sweep and write its files; 1 if a gated way fails an expectation."""
     parser = report_parser(
@@ -263,7 +278,7 @@ def main(args: Sequence[str] | None = None) -> int:
     folder = output.results_folder(parser, options)
     step, timings = (QUICK, [SHOWN_TIMING]) if options.quick else (1, TIMINGS)
     planned = [*grid()[SHOWN % step::step], *(ADDED[::3] if options.quick else ADDED)]
-    with Pool() as pool, left_when_asked():  # the workers end by SIGTERM, unhandled
+    with Pool() as pool, left_when_asked():  # workers were started before: SIGTERM ends them
         planned = list(tqdm(pool.imap(aim, planned), 'aiming', len(planned), unit=''))
         jobs = list(landings(options.ways, timings, planned, step=step))
         results = [pool.apply_async(run, job) for job in jobs]

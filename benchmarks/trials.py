@@ -12,11 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from box_contact_ros.core import native
-from box_contact_ros.scene.pose import degrees_between
 
 from .accuracy import Summary, by_part, classify
 from .contestant import APART, Contestant, chosen, part_by_part
-from .errors import point_errors
+from .errors import degrees_between, point_errors
 from .output import percentiles
 from .pose_sets import Generator, Pairs, drawn
 from .timing import after_warm_up, each_call, take_turns

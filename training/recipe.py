@@ -24,12 +24,17 @@ from benchmarks.weights import save_weights
 from benchmarks.worst_case import climb, worst_start
 from box_contact_ros.core import BRACKET_LIMIT, FEATURES, NETWORK_FORMAT, SPREAD_LIMIT, UPPER_LIMIT
 from box_contact_ros.solver.contact_solver import ContactSolver
-from box_contact_ros.solver.mlp import ACTIVATION, FEATURE_NAMES, NETWORK, core_numbers
+from box_contact_ros.solver.mlp import ACTIVATION, NETWORK, core_numbers
 from box_contact_ros.solver.weights_file import Network
 
 from .fit import MlpErrors, ShareNetwork, errors_of, fit, tensors
 from .samples import MlpSamples, describe, draw_samples, mixture
 
+FEATURE_NAMES = (
+    "largest share of the body's extent beyond a side face", 'sum of these shares',
+    'deepest corner along these extents', 'centroid along these extents',
+    'sum of how far its own edges truncate the face', 'product of these')
+"""Features of what an upper face cuts off (core/src/columns/upper_faces.hpp)."""
 HIDDEN = 16
 """Hidden units. Only pairs with open brackets ask them, so that they cost next to nothing."""
 HARD_START, HARD_COUNT = 200_000, 3_000

@@ -6,12 +6,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from box_contact_ros.scene.pose import degrees_between
 from box_contact_ros.solver.weights_file import load_weights
 
 from .. import output
 from ..contestant import Contestant, ours
-from ..errors import distances
+from ..errors import degrees_between, distances
 from ..pose_sets import CUBE, Pairs
 from . import dataset
 from .dataset import Placements

@@ -19,13 +19,12 @@ import fcl
 import numpy as np
 from tqdm import tqdm
 
-from box_contact_ros.scene.pose import degrees_between
 from box_contact_ros.solver.contact import Contacts
 from box_contact_ros.soup import soup
 
 from .. import output
 from ..contestant import Contestant, ours
-from ..errors import distances
+from ..errors import degrees_between, distances
 from ..pose_sets import CUBE, Pairs, at_depth, coplanar, drawn, on_cube, stacks
 from ..timing import cpu_milliseconds, no_garbage_collection, pinned, usable_cores
 from .dataset import as_poses

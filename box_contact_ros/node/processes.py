@@ -18,7 +18,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import IO, Any
 
 from ..solver.arguments import within
@@ -150,30 +150,13 @@ def asked_to_end() -> Iterator[Stop]:
     After the first signal the process is about to end, and further ones stay without effect.
     """
     stop = Stop()
-    with _handled_by(stop.take, signal.SIGINT, signal.SIGTERM, signal.SIGHUP, ends=stop.is_set):
-        yield stop
-
-
-@contextlib.contextmanager
-def left_when_asked() -> Iterator[None]:
-    """Turn SIGTERM and SIGHUP into SystemExit, so that subprocesses are ended on the way out."""
-    def leave(number: int, _frame: Any) -> None:
-        sys.exit(128 + number)
-
-    with _handled_by(leave, signal.SIGTERM, signal.SIGHUP):
-        yield
-
-
-@contextlib.contextmanager
-def _handled_by(handler: Callable[[int, Any], None], *numbers: signal.Signals,
-                ends: Callable[[], bool] = lambda: False) -> Iterator[None]:
-    """Handle signals in the block; and afterwards, to the end of the process, where that `ends`."""
-    before = {number: signal.signal(number, handler) for number in numbers}
+    before = {number: signal.signal(number, stop.take)
+              for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
     try:
-        yield
+        yield stop
     finally:
         for number, earlier in before.items():
-            if ends():
+            if stop.is_set():
                 atexit.register(signal.signal, number, signal.SIG_IGN)
             else:
                 signal.signal(number, earlier)

@@ -39,12 +39,6 @@ def quaternion_multiply(p: np.ndarray, q: np.ndarray) -> np.ndarray:
                      pw * qw - px * qx - py * qy - pz * qz], axis=-1)
 
 
-def degrees_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return the angles (n,) [deg] between vectors (n, 3); by atan2, as acos loses small angles."""
-    sines = np.linalg.norm(np.cross(a, b), axis=1)
-    return np.degrees(np.arctan2(sines, np.sum(a * b, axis=1)))
-
-
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Return a × b of vectors (3,); np.cross takes ten times as long on single vectors."""
     ax, ay, az = a.tolist()

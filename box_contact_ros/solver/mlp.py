@@ -14,11 +14,6 @@ from ..resources import resource_path
 from .checks import short_repr
 from .weights_file import Network, Weights, WeightsError, load_weights
 
-FEATURE_NAMES = (
-    "largest share of the body's extent beyond a side face", 'sum of these shares',
-    'deepest corner along these extents', 'centroid along these extents',
-    'sum of how far its own edges truncate the face', 'product of these')
-"""Features of what an upper face cuts off (core/src/columns/upper_faces.hpp)."""
 NETWORK = 'share'  # name of the network in a weights file
 ACTIVATION = 'relu'  # activation of the hidden units; weights made for another one are refused
 UNITS_MAX = 64  # most hidden units

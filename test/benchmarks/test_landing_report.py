@@ -7,6 +7,11 @@ from __future__ import annotations
 import csv
 import dataclasses
 import math
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -181,3 +186,28 @@ def test_what_is_not_as_expected_ends_with_status_1(tmp_path, monkeypatch, capsy
     assert landing.main(['--quick', '--ways', 'exact', '--out', str(tmp_path)]) == 1
     assert 'exact at 200 Hz and 2 ms, grid 17: not as expected' in capsys.readouterr().err
     assert '**0 of 1** landings by held patches' in (tmp_path / 'landing.md').read_text()
+
+
+ASKED = """
+import os, signal, time
+from benchmarks.landing import left_when_asked
+from box_contact_ros.node import processes
+
+with left_when_asked():
+    started = processes.start(['-c', 'import time; time.sleep(100.0)'])
+    try:
+        print(started.pid, flush=True)
+        os.kill(os.getpid(), signal.SIGTERM)
+        time.sleep(100.0)
+    finally:
+        processes.end([started])
+"""
+
+
+def test_sigterm_ends_what_was_started():
+    """On the way out, with the status that a shell reports."""
+    done = subprocess.run([sys.executable, '-c', ASKED], capture_output=True, text=True, timeout=60,
+                          cwd=Path(__file__).resolve().parents[2])
+    assert done.returncode == 128 + signal.SIGTERM, done.stderr
+    with pytest.raises(ProcessLookupError):
+        os.kill(int(done.stdout), 0)

@@ -96,26 +96,3 @@ def test_a_child_that_does_not_listen_is_killed(monkeypatch):
     processes.end([child])
     assert child.returncode == -signal.SIGKILL
     child.stdout.close()
-
-
-ASKED = """
-import os, signal, time
-from box_contact_ros.node import processes
-
-with processes.left_when_asked():
-    started = processes.start(['-c', 'import time; time.sleep(100.0)'])
-    try:
-        print(started.pid, flush=True)
-        os.kill(os.getpid(), signal.SIGTERM)
-        time.sleep(100.0)
-    finally:
-        processes.end([started])
-"""
-
-
-def test_sigterm_ends_what_was_started():
-    """On the way out, with the status that a shell reports."""
-    done = subprocess.run([sys.executable, '-c', ASKED], capture_output=True, text=True, timeout=60)
-    assert done.returncode == 128 + signal.SIGTERM, done.stderr
-    with pytest.raises(ProcessLookupError):
-        os.kill(int(done.stdout), 0)
