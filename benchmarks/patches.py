@@ -20,7 +20,7 @@ from .pose_sets import Pairs
 SMOOTH = 2.0**-46
 """How far below zero an eigenvalue of `mlp` may be [of the trace]: roundings."""
 EXACT = 1e-9
-"""The same of `exact`, whose face sums cancel; or SLIVER times size by depth, if that is more."""
+"""The same of `exact`, whose sums cancel; or SLIVER times size by depth, if that is more."""
 SLIVER = 1e-15
 SINGLE, DOUBLE = 5e-4, 2.0**-39
 """How far beyond a bracket a volume may be [of itself]. The first is what float32 may cost: of 7.6

@@ -44,7 +44,7 @@ class Stages(NamedTuple):
     clipped_volume: np.ndarray  # (n,) the same by clipping
     covariance: np.ndarray  # (n, 3, 3) its second central moments by its volume [m²], common frame
     clipped_covariance: np.ndarray  # (n, 3, 3) the same by clipping
-    certain: np.ndarray  # (n,) bool: the exact moments are by face sums; else by clipping
+    certain: np.ndarray  # (n,) bool: the exact moments are by planes; else by clipping
     accurate: np.ndarray  # (n,) bool: float32 is enough for the columns
     unit: np.ndarray  # (n,) unit of length [m]
     true_volume: np.ndarray  # (n,) exact volume of the overlap

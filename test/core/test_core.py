@@ -523,7 +523,7 @@ def test_networks_are_freed() -> None:
     assert memory() - before < 20 * numbers.nbytes
 
 
-# --- face sums ------------------------------------------------------------------------------------
+# --- planes ---------------------------------------------------------------------------------------
 
 
 def share_certain(pairs: Pairs) -> float:

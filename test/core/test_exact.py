@@ -102,8 +102,8 @@ def test_clipping_concentric_boxes_gives_their_middle():
 
 
 @pytest.mark.parametrize('family', FAMILIES)
-def test_clipping_is_face_sums(family):
-    """Both methods give the moments, where face sums are certain, to half the bound."""
+def test_clipping_is_planes(family):
+    """Both methods give the moments, where planes are certain, to half the bound."""
     pairs = FAMILIES[family](np.random.default_rng(6), 20_000)
     found = stages(*pairs, names=[
         'colliding', 'separation', 'size', 'centroid', 'clipped_centroid', 'certain', 'volume',
@@ -230,12 +230,41 @@ def test_boxes_that_touch_in_a_point(kind, model):
 
 
 def test_slivers_that_are_cut_off_obliquely():
-    """Of 200,000 ridges, those whose face sums were wrong by more than the bound.
+    """Of 200,000 ridges, those that sums over faces had wrong by more than the bound.
 
     Both ends of a sliver had areas that rounding had changed by as much, one up, the other down.
     """
     pairs = poses.ridges(np.random.default_rng(99), 200_000)
     check('ridges', 99, *(part[SLIVERS] for part in pairs))
+
+
+NEEDLE = ((0, 0, 0, -.6680072783375012, -.5329684740396613, -.003947982704248489,
+           -.5193219571715855),
+          (.3551259815683192, .1129042864546822, -.4845977124395742, -.6966290338400403,
+           -.516764130576864, -.06430381572748332, -.49348540185411327),
+          (1, 2.5298221281347034e-06, 3.162277660168379e-06), (3.162277660168379e-06, .7, 1))
+
+
+def test_a_needle_whose_covariance_clipping_had_wrong():
+    """Found by a search; clipping was wrong by 4.5 % of the trace."""
+    check('needle', 0, *(np.array([part], dtype=float) for part in NEEDLE))
+
+
+@pytest.mark.parametrize('aspect', [1e3, 1e4, 1e5])
+def test_needles(aspect):
+    """Within all bounds up to an aspect of 100,000."""
+    pairs = poses.needles(np.random.default_rng([36, int(aspect)]), 150, aspect)
+    assert check('needles', int(aspect), *pairs).mean() > 0.8
+
+
+@pytest.mark.parametrize('aspect', [1e6, 1e7, 1e8])
+def test_needles_beyond_have_possible_covariances(aspect):
+    """No eigenvalue is negative, but by rounding."""
+    a, b, size_a, size_b = poses.needles(np.random.default_rng([37, int(aspect)]), 20_000, aspect)
+    found = SOLVER.batch(a, b, size_a=size_a, size_b=size_b)
+    least = np.linalg.eigvalsh(found.covariance[found.colliding])[:, 0]
+    trace = np.trace(found.covariance[found.colliding], axis1=1, axis2=2)
+    assert (least / trace).min() > -1e-6
 
 
 @pytest.mark.parametrize('gap', [-0.1, -0.01, -1e-3, -1e-6, -1e-9])

@@ -41,7 +41,7 @@ WEIGHTS = resource_path('weights', 'mlp.safetensors')
 STRICT = ('-Wall', '-Wextra', '-Werror', '-pedantic')
 EXAMPLE_SAYS = [
     'height 2.600 m: no contact, gap 0.009 m',
-    'height 2.590 m: contact, depth 0.001 m, normal (0.000, -0.000, -1.000), '
+    'height 2.590 m: contact, depth 0.001 m, normal (0.000, 0.000, -1.000), '
     'point (0.142, 0.044, 1.295) m',
     'batch: 1 0, volumes 0.030 0.000 m3, first refused row -1',
     'refused: pose_a quaternion (0, 0, 0, 0) has no length within 1e-100 to 1e100']

@@ -181,6 +181,25 @@ def cards(rng, n):
     return a, b, size_a, size_b
 
 
+def needles(rng, n, aspect):
+    """Needles, plates of this aspect and other boxes, deep in each other, many almost parallel."""
+    sizes = []
+    for _ in range(2):
+        size = np.exp(rng.uniform(-0.5, 0.5, (n, 3)))
+        thin = rng.integers(0, 3, n)[:, None] > np.arange(3)  # none, one or two extents
+        size[thin] /= aspect
+        sizes.append(rng.permuted(size, axis=1))
+    turn_a = unit_quaternions(rng, n)
+    angle = 10.0**rng.uniform(-np.log10(aspect) - 1.0, 0.0, n)
+    near = turn_a + rng.normal(size=(n, 4)) * angle[:, None]
+    turn_b = np.where((rng.random(n) < 2 / 3)[:, None], near, unit_quaternions(rng, n))
+    turn_b /= np.linalg.norm(turn_b, axis=1)[:, None]
+    in_a, in_b = (rng.uniform(-0.5, 0.5, (n, 3)) * size for size in sizes)
+    place = rotate(turn_a, in_a) - rotate(turn_b, in_b)
+    return (np.concatenate([np.zeros((n, 3)), turn_a], axis=1),
+            np.concatenate([place, turn_b], axis=1), *sizes)
+
+
 def sharing_an_axis(rng, n):
     """Boxes turned about an axis of both, with an edge of one exactly in a side of the other.
 

@@ -15,8 +15,7 @@
 #include "lanes/row_lanes.hpp"
 #include "minimum_depth.hpp"
 #include "near_parallel_edges.hpp"
-#include "overlap/clipping.hpp"
-#include "overlap/face_sums.hpp"
+#include "overlap/planes.hpp"
 #include "rows.hpp"
 
 namespace box_contact::BOX_CONTACT_SET {
@@ -54,17 +53,19 @@ BC_INLINE void query(const Pose<T>& a, const Pose<T>& b, const Vec<T>& half_a, c
   if (any(doubtful)) {
     for (int i = 0; i < width<T>; ++i) {
       if (!lane(doubtful, i)) continue;
-      Pose<double> one_a{lane(a.position, i), {}}, one_b{lane(b.position, i), {}};
+      bool swapped = lane(q.pair.swapped, i) != 0;
+      const Pose<T>&first = swapped ? b : a, &second = swapped ? a : b;
+      Pose<double> one_a{lane(first.position, i), {}}, one_b{lane(second.position, i), {}};
       for (int k = 0; k < 4; ++k) {
-        one_a.quaternion[k] = lane(a.quaternion[k], i);
-        one_b.quaternion[k] = lane(b.quaternion[k], i);
+        one_a.quaternion[k] = lane(first.quaternion[k], i);
+        one_b.quaternion[k] = lane(second.quaternion[k], i);
       }
       SeparatingAxis<double> one{lane(q.axis.separation, i), lane(q.axis.axis, i),
-                                 lane(q.axis.face, i), lane(q.axis.normal, i), true};
+                                 lane(q.axis.face, i), triple_of_lane<T>(q.axis.normal, i), true};
       refine(lane(q.pair, i), one_a, one_b, one);
       set_lane(q.axis.separation, i, one.separation);
       set_lane(q.axis.axis, i, one.axis);
-      set_lane(q.axis.normal, i, one.normal);
+      set_triple_of_lane<T>(q.axis.normal, i, components<double>(one.normal));
     }
   }
   q.touching = (q.axis.separation <= q.pair.touch) & q.pair.valid;
@@ -74,94 +75,158 @@ template <class T>
 BC_INLINE Query<double> lane(const Query<T>& q, int i) {
   return {lane(q.pair, i),
           {lane(q.axis.separation, i), lane(q.axis.axis, i), lane(q.axis.face, i),
-           lane(q.axis.normal, i), lane(q.axis.doubtful, i) != 0},
+           triple_of_lane<T>(q.axis.normal, i), lane(q.axis.doubtful, i) != 0},
           lane(q.touching, i) != 0};
 }
 
-// The same pair with the box that comes first in the order of the data as A.
-template <class T>
-BC_INLINE void put_first_as_a(const Pair<T>& pair, Pair<T>& ordered) {
-  Mask<T> a_first = pair.a_first;
-  ordered.origin_a = select(a_first, pair.origin_a, pair.origin_b);
-  ordered.origin_b = select(a_first, pair.origin_b, pair.origin_a);
-  ordered.size = pair.size;
-  ordered.touch = pair.touch;
-  ordered.a_first = a_first;
-  ordered.valid = pair.valid;
-  ordered.half_a = select(a_first, pair.half_a, pair.half_b);
-  ordered.half_b = select(a_first, pair.half_b, pair.half_a);
-  ordered.offset_a = select(a_first, pair.offset_a, -pair.offset_b);
-  ordered.offset_b = select(a_first, pair.offset_b, -pair.offset_a);
-  // Number by number: g++ copies whole matrices by string instructions, which take some per cent.
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) {
-      ordered.rotation[i][j] = select<T>(a_first, pair.rotation[i][j], pair.rotation[j][i]);
-      ordered.axes_a[i][j] = select<T>(a_first, pair.axes_a[i][j], pair.axes_b[i][j]);
-      ordered.axes_b[i][j] = select<T>(a_first, pair.axes_b[i][j], pair.axes_a[i][j]);
-    }
-}
-
-// The exact overlap of a single pair that `enforce_minimum_depth` has moved; the centroid in A's frame.
+// The exact overlap of a single pair that `enforce_minimum_depth` has moved, by clipping; the centroid
+// in A's frame.
 inline Moments<double> clipped_overlap(Pair<double> pair, int face, bool pressed) {
   if (pressed) enforce_on_further_axes(pair);
   return overlap_by_clipping(pair, face);
 }
 
-// A model has three members for lanes T:
+// The way from A to B, where pairs are pressed in to the minimum depth.
+template <class T>
+struct Pressed {
+  Triple<T> offset_a, offset_b;  // in the boxes' frames [m]
+  Triple<T> origin_b;            // B's centre, common frame [m]
+  Mask<T> moved;                 // and touching
+  Mask<T> too_shallow;           // along another axis: `enforce_on_further_axes` has work to do
+};
+template <class T>
+[[gnu::noinline]] void press(const Query<T>& q, Pressed<T>& pressed) {
+  Pair<T> pair = q.pair;
+  pressed.moved &= enforce_minimum_depth(pair, q.axis);
+  pressed.too_shallow = pressed.moved & has_too_little_depth(pair);
+  pressed.offset_a = pair.offset_a;
+  pressed.offset_b = pair.offset_b;
+  T distance = max(depth_floor * pair.size + q.axis.separation, T{});
+  pressed.origin_b = pair.origin_b - distance * direction_in_common_frame(pair, q.axis.normal);
+}
+
+// The overlap of a pair whose planes have been found, with its centroid in the common frame.
+template <bool two_sided, class T, class Found>
+BC_INLINE Mask<T> overlap_of(const Query<T>& q, const Pressed<T>& pressed,
+                             const planes::PairOfBoxes<T>& boxes, Found& found) {
+  const Pair<T>& pair = q.pair;
+  T depth = max(-q.axis.separation, depth_floor * pair.size);
+  Mask<T> certain = overlap_by_planes<two_sided>(pair, boxes, depth, found);
+  found.centroid =
+      components<T>(planes::one_of<T>(boxes.p_is_a, pair.origin_a, pressed.origin_b) +
+                    planes::one_of<T>(boxes.p_is_a, pair.axes_a, pair.axes_b) *
+                        triple(found.centroid));
+  return certain;
+}
+
+// What is not certain of a single pair: once more about the centroid that was found, because sums
+// about a point far from a thin overlap cancel. Or by clipping.
+template <class Found>
+[[gnu::noinline]] void solve_uncertain(Query<double> q, const Vec<double>& near, Found& found,
+                                       Counts& counts) {
+  bool moved = (depth_floor * q.pair.size + q.axis.separation > 0.0) & q.touching;
+  Pressed<double> pressed{q.pair.offset_a, q.pair.offset_b, q.pair.origin_b, moved, moved};
+  if (moved) press(q, pressed);
+  planes::PairOfBoxes<double> boxes(q.pair, q.axis);
+  planes::find_planes(q.pair, q.axis, pressed.offset_a, pressed.offset_b, boxes);
+  Columns<double> to_p = transpose(boxes.p_is_a ? q.pair.axes_a : q.pair.axes_b);
+  Triple<double> origin = boxes.p_is_a ? q.pair.origin_a : pressed.origin_b;
+  planes::move_origin(boxes, to_p * (triple(near) - origin));
+  if (!pressed.too_shallow && overlap_of<true>(q, pressed, boxes, found)) return;
+  ++counts.clipped;
+  enforce_minimum_depth(q.pair, q.axis);
+  Moments<double> clipped = clipped_overlap(q.pair, int(q.axis.face), moved);
+  clipped.centroid = components<double>(point_in_common_frame(q.pair, triple(clipped.centroid)));
+  set_lane(found, 0, clipped);
+}
+
+// The overlaps of the chosen lanes, whose planes have been found.
+template <bool two_sided, class T, class Found>
+BC_INLINE void solve_overlaps(const Query<T>& q, const Pressed<T>& pressed,
+                              const planes::PairOfBoxes<T>& boxes, unsigned chosen, Found& found,
+                              Counts& counts) {
+  unsigned certain = bits(overlap_of<two_sided>(q, pressed, boxes, found));
+  unsigned uncertain = chosen & (bits(pressed.too_shallow) | ~certain);
+  for (; uncertain; uncertain &= uncertain - 1) {
+    int i = __builtin_ctz(uncertain);
+    LaneOf<Found> one;
+    solve_uncertain(lane(q, i), lane(found.centroid, i), one, counts);
+    copy_lane(found, i, one);
+  }
+}
+// Not inlined, and with boxes of its own: those of the caller stay in registers.
+template <class T, class Found>
+[[gnu::noinline]] void solve_two_sided(const Query<T>& q, const Pressed<T>& pressed,
+                                       const planes::PairOfBoxes<T>& boxes, Found& found,
+                                       Counts& counts) {
+  solve_overlaps<true>(q, pressed, boxes, bits(q.touching), found, counts);
+}
+
+// The overlaps by planes of the pairs that touch. Of W pairs those that have two planes across an axis
+// of a box are left, unless they are most, or `all` are wanted. Returns which are left.
+template <class T, class Found>
+[[gnu::noinline]] unsigned solve_by_planes(const Query<T>& q, bool all, Found& found,
+                                           Counts& counts) {
+  const Pair<T>& pair = q.pair;
+  Mask<T> moved = (depth_floor * pair.size + q.axis.separation > 0.0) & q.touching;
+  Pressed<T> pressed{pair.offset_a, pair.offset_b, pair.origin_b, moved, moved};
+  if (any(moved)) press(q, pressed);
+  planes::PairOfBoxes<T> boxes(pair, q.axis);
+  planes::find_planes(pair, q.axis, pressed.offset_a, pressed.offset_b, boxes);
+  unsigned touching = bits(q.touching);
+  unsigned two_sided = bits(any_of(boxes.p.both | boxes.q.both)) & touching;
+  if (all || 2 * __builtin_popcount(two_sided) > __builtin_popcount(touching)) {
+    planes::PairOfBoxes<T> own = boxes;
+    solve_two_sided(q, pressed, own, found, counts);
+    return 0;
+  }
+  solve_overlaps<false>(q, pressed, boxes, touching & ~two_sided, found, counts);
+  return two_sided;
+}
+
+// A model has four members for lanes T:
 //
 //   Found<T>: what it finds of an overlap: `Moments<T>`, or `PointAndVolume<T>`.
 //   group<T>: how many queries it takes at once.
 //   Rest: the model to which it leaves pairs, or void.
+//   leaves_to_exact: whether those are counted as left to another model.
 //
 // And `solve(queries, found, left, counts)` fills `found` for the pairs that touch, with the centroid
-// in the common frame. It may move the boxes of the queries, unless it leaves them: then it sets the
-// pair's bit in `left`. Swapping A and B changes no bit of what it finds, except where `exact` presses
-// or clips: a tie of A's and B's faces decides there.
+// in the common frame. It sets the bits in `left` of those that it leaves.
 
-// Model `exact`: the moments of A∩B by face sums, or by clipping where these are not certain.
-// `FoundOf`: Moments, or PointAndVolume.
+// Pairs that have two planes across an axis of a box.
+template <template <class> class FoundOf>
+struct TwoSidedModelOf {
+  template <class T>
+  using Found = FoundOf<T>;
+  template <class T>
+  static constexpr int group = 1;
+  using Rest = void;
+  static constexpr bool leaves_to_exact = false;
+
+  template <class T>
+  BC_INLINE void solve(const Query<T> (&queries)[1], Found<T> (&found)[1], unsigned (&)[1],
+                       Counts& counts) const {
+    solve_by_planes(queries[0], true, found[0], counts);
+  }
+};
+
+// Model `exact`: the moments of A∩B by the planes that meet it, or by clipping where these are not
+// certain. `FoundOf`: Moments, or PointAndVolume.
 template <template <class> class FoundOf>
 struct ExactModelOf {
   template <class T>
   using Found = FoundOf<T>;
   template <class T>
   static constexpr int group = 1;
-  using Rest = void;
+  using Rest = TwoSidedModelOf<FoundOf>;
+  static constexpr bool leaves_to_exact = false;
 
+  // Few pairs of W that have two planes across an axis wait for others of their kind.
   template <class T>
-  BC_INLINE void solve(Query<T> (&queries)[1], Found<T> (&found)[1], unsigned (&)[1],
+  BC_INLINE void solve(const Query<T> (&queries)[1], Found<T> (&found)[1], unsigned (&left)[1],
                        Counts& counts) const {
-    found[0] = solve(queries[0], counts);
-  }
-
-  // Not inlined: single calls, fallbacks and stages share one copy. It presses the very pair, because
-  // a copy of so many lanes would cost some per cent of the time.
-  template <class T>
-  [[gnu::noinline]] Found<T> solve(Query<T>& q, Counts& counts) const {
-    Pair<T>& pair = q.pair;
-    Mask<T> pressed = enforce_minimum_depth(pair, q.axis) & q.touching;
-    Mask<T> fallback = pressed;
-    if (any(pressed)) fallback &= has_too_little_depth(pair);
-    T depth = max(-q.axis.separation, depth_floor * pair.size);
-    Pair<T> ordered;
-    put_first_as_a(pair, ordered);
-    Found<T> found;
-    Mask<T> certain = overlap_by_face_sums(ordered, depth, found);
-    fallback |= (certain == 0) & q.touching;
-    found.centroid = point_in_common_frame(ordered, found.centroid);
-    if (any(fallback)) {
-      for (int i = 0; i < width<T>; ++i) {
-        if (!lane(fallback, i)) continue;
-        ++counts.clipped;
-        Pair<double> one;
-        put_first_as_a(lane(pair, i), one);
-        int face = int(lane(q.axis.face, i)), of_first = one.a_first ? face : (face + 3) % 6;
-        Moments<double> clipped = clipped_overlap(one, of_first, lane(pressed, i) != 0);
-        clipped.centroid = point_in_common_frame(one, clipped.centroid);
-        set_lane(found, i, clipped);
-      }
-    }
-    return found;
+    left[0] = solve_by_planes(queries[0], false, found[0], counts);
   }
 };
 
@@ -169,8 +234,12 @@ using ExactModel = ExactModelOf<Moments>;
 using ExactPointModel = ExactModelOf<PointAndVolume>;
 
 // The exact overlap of a single pair.
-inline Moments<double> exact_overlap(Query<double> q, Counts& counts) {
-  return ExactModel{}.solve(q, counts);
+inline Moments<double> exact_overlap(const Query<double>& q, Counts& counts) {
+  Moments<double> found[1];
+  unsigned left[1]{};
+  const Query<double> queries[1] = {q};
+  ExactModel{}.solve(queries, found, left, counts);
+  return found[0];
 }
 
 // All moments. What a model does not find is NaN.
@@ -231,8 +300,12 @@ template <class T>
   T nothing = splat<T>(not_a_number);
   unsigned touching = bits(q.touching), valid = bits(q.pair.valid), all = ~0U >> (32 - width<T>);
   Mask<T> near = q.touching | ((q.axis.separation <= results.margin) & q.pair.valid);
-  Vec<T> none{nothing, nothing, nothing};
-  Vec<T> normal = select(near, direction_in_common_frame(q.pair, q.axis.normal), none);
+  Triple<T> none = uniform(nothing);
+  Triple<T> from_first = direction_in_common_frame(q.pair, q.axis.normal);
+  // Zeros keep no sign on a swap.
+  Triple<T> from_a = select(q.pair.swapped, Triple<T>{} - from_first, from_first);
+  Vec<T> normal = components<T>(select(near, from_a, none));
+  T axis = select<T>(q.pair.swapped, swapped_axis(q.axis.axis), q.axis.axis);
   T separation = select<T>(q.pair.valid, q.axis.separation, nothing);
   long count = min(last - first, long(width<T>));
   unsigned here = all >> (width<T> - count);
@@ -246,7 +319,7 @@ template <class T>
     bool touches = touching >> i & 1;
     if (results.colliding) results.colliding[row] = touches;
     if (results.separation) results.separation[row] = lane(separation, i);
-    if (results.axis) results.axis[row] = int32_t(lane(q.axis.axis, i));
+    if (results.axis) results.axis[row] = int32_t(lane(axis, i));
     counts.contacts += touches;
     if (touches) continue;
     for (int k = 0; results.point && k < 3; ++k) results.point[3 * row + k] = not_a_number;
@@ -313,8 +386,8 @@ struct Group {
       write_overlaps<T>(found[g], touching & ~left[g], rows[g], results);
       for (unsigned lanes_left = touching & left[g]; lanes_left; lanes_left &= lanes_left - 1) {
         int i = __builtin_ctz(lanes_left);
-        ++counts.exact;
-        rest.take(queries[g], i, rows[g][i], results);
+        counts.exact += Model::leaves_to_exact;
+        rest.take(queries[g], i, rows[g][i], results, counts);
       }
     }
   }
@@ -349,33 +422,44 @@ struct Waiting {
 };
 
 // What becomes of the pairs that a model leaves: nothing, where there are none.
-template <class T, class Model>
-struct RestOf {
-  BC_INLINE void take(const Query<T>&, int, long, const Results&) {}
-  BC_INLINE void finish(const Results&) {}
+template <class T>
+struct NoRest {
+  BC_INLINE void take(const Query<T>&, int, long, const Results&, Counts&) {}
+  BC_INLINE void finish(const Results&, Counts&) {}
 };
 template <class T, class Model>
+struct WaitingRest;
+template <class T, class Model>
+using Rest =
+    std::conditional_t<std::is_void_v<typename Model::Rest>, NoRest<T>, WaitingRest<T, Model>>;
+
+// They wait for the next model. What it clips counts, unless it is another model than was asked for.
+template <class T, class Model>
 struct WaitingRest {
-  Waiting<T, Model> waiting;
-  RestOf<T, void> none;
+  using Next = typename Model::Rest;
+  Waiting<T, Next> waiting;
+  Rest<T, Next> rest;
   Counts uncounted{};
 
-  BC_INLINE void take(const Query<T>& q, int i, long row, const Results& results) {
+  BC_INLINE void take(const Query<T>& q, int i, long row, const Results& results, Counts& counts) {
     if constexpr (is_scalar<T>) {
       waiting.group.queries[0] = q;
       waiting.group.rows[0][0] = row;
     } else {
       waiting.put(q, i, row, waiting.count);
     }
-    if (++waiting.count == waiting.group.lanes) finish(results);
+    if (++waiting.count == waiting.group.lanes) solve(results, counts);
   }
-  [[gnu::noinline]] void finish(const Results& results) {
-    waiting.solve(Model{}, results, uncounted, none);
+  BC_INLINE void finish(const Results& results, Counts& counts) {
+    if (waiting.count) solve(results, counts);
+    rest.finish(results, Model::leaves_to_exact ? uncounted : counts);
+  }
+
+ private:
+  [[gnu::noinline]] void solve(const Results& results, Counts& counts) {
+    waiting.solve(Next{}, results, Model::leaves_to_exact ? uncounted : counts, rest);
   }
 };
-template <class T, class Model>
-using Rest = std::conditional_t<std::is_void_v<typename Model::Rest>, RestOf<T, void>,
-                                WaitingRest<T, typename Model::Rest>>;
 
 // One row alone.
 template <class Model>
@@ -387,6 +471,7 @@ template <class Model>
   if (one.queries[0].touching) {
     Rest<double, Model> rest;
     one.solve(model, results, counts, rest);
+    rest.finish(results, counts);
   }
   return write_query(one.queries[0], row, row + 1, results, counts);
 }
@@ -433,7 +518,7 @@ template <class T, class Model>
       }
     }
     waiting.solve(model, results, counts, rest);
-    rest.finish(results);
+    rest.finish(results, counts);
   }
   for (; first < end; ++first) note(solve_row(model, rows, first, results, counts));
   return refused;

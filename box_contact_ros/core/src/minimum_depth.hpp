@@ -4,8 +4,8 @@
 // Pressing: the least depth at which the overlap of two boxes has a volume.
 //
 // At exact touch A∩B has no volume. One box is then moved against the normal, to a depth of
-// `depth_floor` of the size. Model `exact` moves the box that is second in the order of the data
-// (`Pair::a_first`). The contact point is that of the moved boxes. The separation stays as it was.
+// `depth_floor` of the size. Model `exact` moves B, the second box in the order of the data
+// (poses.hpp). The contact point is that of the moved boxes. The separation stays as it was.
 #pragma once
 
 #include "separating_axis.hpp"
@@ -35,20 +35,22 @@ struct Gap {
 // The largest gap over the fifteen axes, as the pair stands.
 inline Gap largest_gap(const Pair<double>& pair) {
   Gap best{-infinity, {}};
+  Vec<double> half_a = components<double>(pair.half_a), half_b = components<double>(pair.half_b);
+  Vec<double> offset = components<double>(pair.offset_a);
+  Mat<double> rotation = matrix(pair.b_in_a);
   auto offer = [&](const Vec<double>& n) {
-    double half_width =
-        dot(abs(n), pair.half_a) + dot(abs(transposed_times(pair.rotation, n)), pair.half_b);
-    double along = dot(n, pair.offset_a), gap = std::fabs(along) - half_width;
+    double half_width = dot(abs(n), half_a) + dot(abs(transposed_times(rotation, n)), half_b);
+    double along = dot(n, offset), gap = std::fabs(along) - half_width;
     if (gap > best.gap) best = {gap, along >= 0.0 ? n : -n};
   };
   for (int k = 0; k < 3; ++k) offer({k == 0 ? 1.0 : 0.0, k == 1 ? 1.0 : 0.0, k == 2 ? 1.0 : 0.0});
-  for (int k = 0; k < 3; ++k) offer(column(pair.rotation, k));
+  for (int k = 0; k < 3; ++k) offer(column(rotation, k));
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) {
       int y = (i + 1) % 3, z = (i + 2) % 3;
       Vec<double> n{};
-      n[y] = -pair.rotation[z][j];
-      n[z] = pair.rotation[y][j];
+      n[y] = -rotation[z][j];
+      n[z] = rotation[y][j];
       double length = std::sqrt(dot(n, n));
       if (length >= parallel) offer((1.0 / length) * n);
     }
@@ -64,7 +66,7 @@ inline bool enforce_on_further_axes(Pair<double>& pair) {
   for (int i = 0; i < most_presses; ++i) {
     Gap worst = largest_gap(pair);
     if (!(worst.gap > -0.5 * floor)) break;
-    move_against(pair, floor + worst.gap, worst.direction);
+    move_against(pair, floor + worst.gap, triple(worst.direction));
     moved = true;
   }
   return moved;
@@ -77,7 +79,7 @@ inline Mask<T> has_too_little_depth(const Pair<T>& pair) {
   BestAxis<T> best;
   Mask<T> doubtful;
   offer_face_axes(pair, best);
-  offer_edge_axes(pair, FirstFrame<T>(pair), best, doubtful);
+  offer_edge_axes(pair, best, doubtful);
   return best.largest() > -0.5 * depth_floor * pair.size;
 }
 

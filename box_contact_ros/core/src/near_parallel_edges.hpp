@@ -70,13 +70,12 @@ inline DoubleDouble sqrt(DoubleDouble a) {
   return quick_sum(root, rest.high / (2.0 * root));
 }
 
-// Two boxes in the frame of the one that comes first in the order of the data. So gaps have the
-// same bits, whichever box is called A.
+// Two boxes in A's frame.
 struct PrecisePair {
-  Vec<double> half, other_half;
-  DoubleDouble rotation[3][3];      // the other box's axes as columns, in the first one's frame
-  DoubleDouble offset[3];           // to the other box, in the first one's frame
-  DoubleDouble offset_in_other[3];  // the same, in the other one's frame
+  Vec<double> half_a, half_b;
+  DoubleDouble rotation[3][3];  // B's axes as columns
+  DoubleDouble offset_a[3];     // from A to B
+  DoubleDouble offset_b[3];     // the same, in B's frame
 };
 
 // Scale a quaternion by a power of two: fourth powers of its components must not overflow.
@@ -126,39 +125,37 @@ inline void relative_quaternion(const double p[4], const double q[4], DoubleDoub
 }
 
 inline PrecisePair precise_pair(const Pair<double>& pair, Pose<double> a, Pose<double> b) {
-  Pose<double>&first = pair.a_first ? a : b, &other = pair.a_first ? b : a;
-  scale_to_unit(first.quaternion);
-  scale_to_unit(other.quaternion);
+  scale_to_unit(a.quaternion);
+  scale_to_unit(b.quaternion);
   PrecisePair precise;
-  precise.half = pair.a_first ? pair.half_a : pair.half_b;
-  precise.other_half = pair.a_first ? pair.half_b : pair.half_a;
+  precise.half_a = components<double>(pair.half_a);
+  precise.half_b = components<double>(pair.half_b);
   DoubleDouble relative[4], own[4], axes[3][3];
-  relative_quaternion(first.quaternion, other.quaternion, relative);
+  relative_quaternion(a.quaternion, b.quaternion, relative);
   precise_rotation(relative, precise.rotation);
-  for (int k = 0; k < 4; ++k) own[k] = first.quaternion[k];
+  for (int k = 0; k < 4; ++k) own[k] = a.quaternion[k];
   precise_rotation(own, axes);
   for (int k = 0; k < 3; ++k) {
     DoubleDouble sum;
-    for (int j = 0; j < 3; ++j)
-      sum = sum + axes[j][k] * exact_sum(other.position[j], -first.position[j]);
-    precise.offset[k] = sum;
+    for (int j = 0; j < 3; ++j) sum = sum + axes[j][k] * exact_sum(b.position[j], -a.position[j]);
+    precise.offset_a[k] = sum;
   }
   for (int k = 0; k < 3; ++k) {
     DoubleDouble sum;
-    for (int j = 0; j < 3; ++j) sum = sum + precise.rotation[j][k] * precise.offset[j];
-    precise.offset_in_other[k] = sum;
+    for (int j = 0; j < 3; ++j) sum = sum + precise.rotation[j][k] * precise.offset_a[j];
+    precise.offset_b[k] = sum;
   }
   return precise;
 }
 
-// The gap on an axis counted from the first box, rounded once; −∞ where there is no axis.
+// The gap on an axis, rounded once; −∞ where there is no axis.
 inline double precise_gap(const PrecisePair& pair, int axis) {
   if (axis < first_edge_axis) {
     bool own = axis < 3;
     int k = axis % 3;
-    const Vec<double>&half = own ? pair.half : pair.other_half,
-          &across = own ? pair.other_half : pair.half;
-    DoubleDouble gap = abs(own ? pair.offset[k] : pair.offset_in_other[k]) + DoubleDouble(-half[k]);
+    const Vec<double>&half = own ? pair.half_a : pair.half_b,
+          &across = own ? pair.half_b : pair.half_a;
+    DoubleDouble gap = abs(own ? pair.offset_a[k] : pair.offset_b[k]) + DoubleDouble(-half[k]);
     for (int j = 0; j < 3; ++j)
       gap = gap + abs(own ? pair.rotation[k][j] : pair.rotation[j][k]) * DoubleDouble(-across[j]);
     return gap.high;
@@ -168,27 +165,20 @@ inline double precise_gap(const PrecisePair& pair, int axis) {
   DoubleDouble u = pair.rotation[k1][j], v = pair.rotation[k2][j];
   DoubleDouble length = sqrt(u * u + v * v);
   if (!(length.high > cross_product_min)) return -infinity;
-  DoubleDouble gap = abs(pair.offset[k2] * u - pair.offset[k1] * v);
-  gap = gap + abs(v) * DoubleDouble(-pair.half[k1]);
-  gap = gap + abs(u) * DoubleDouble(-pair.half[k2]);
-  gap = gap + abs(pair.rotation[k][j2]) * DoubleDouble(-pair.other_half[j1]);
-  gap = gap + abs(pair.rotation[k][j1]) * DoubleDouble(-pair.other_half[j2]);
+  DoubleDouble gap = abs(pair.offset_a[k2] * u - pair.offset_a[k1] * v);
+  gap = gap + abs(v) * DoubleDouble(-pair.half_a[k1]);
+  gap = gap + abs(u) * DoubleDouble(-pair.half_a[k2]);
+  gap = gap + abs(pair.rotation[k][j2]) * DoubleDouble(-pair.half_b[j1]);
+  gap = gap + abs(pair.rotation[k][j1]) * DoubleDouble(-pair.half_b[j2]);
   return (gap / length).high;
 }
 
-// The number of an axis when the boxes change names.
-inline int swapped_axis(int axis) {
-  if (axis < first_edge_axis) return (axis + 3) % 6;
-  return first_edge_axis + 3 * ((axis - first_edge_axis) % 3) + (axis - first_edge_axis) / 3;
-}
-
-// An axis counted from A as a unit vector from A to B, in A's frame.
-inline Vec<double> precise_normal(const PrecisePair& pair, bool a_first, int axis) {
+// An axis as a unit vector from A to B, in A's frame.
+inline Vec<double> precise_normal(const PrecisePair& pair, int axis) {
   double rotation[3][3], offset[3];
   for (int k = 0; k < 3; ++k) {
-    offset[k] = a_first ? pair.offset[k].high : -pair.offset_in_other[k].high;
-    for (int j = 0; j < 3; ++j)
-      rotation[k][j] = a_first ? pair.rotation[k][j].high : pair.rotation[j][k].high;
+    offset[k] = pair.offset_a[k].high;
+    for (int j = 0; j < 3; ++j) rotation[k][j] = pair.rotation[k][j].high;
   }
   Vec<double> n{};
   if (axis < 3) {
@@ -214,7 +204,7 @@ inline void refine(const Pair<double>& pair, const Pose<double>& a, const Pose<d
   double tolerance = tie * pair.size;
   int axis = 0;
   for (int number = 0; number < 15; ++number) {
-    double gap = precise_gap(precise, pair.a_first ? number : swapped_axis(number));
+    double gap = precise_gap(precise, number);
     largest = max(gap, largest);
     if (gap > best + tolerance) best = gap, axis = number;
   }
@@ -222,7 +212,7 @@ inline void refine(const Pair<double>& pair, const Pose<double>& a, const Pose<d
   if (!__builtin_isfinite(largest)) return;
   found.separation = largest;
   found.axis = axis;
-  found.normal = precise_normal(precise, pair.a_first, axis);
+  found.normal = triple(precise_normal(precise, axis));
 }
 
 }  // namespace box_contact::BOX_CONTACT_SET

@@ -7,8 +7,7 @@
 // both boxes. A size is three full extents [m]; the core works with half extents.
 //
 // What can cancel does so once, in float64. The offset is B − A before anything else. The
-// products of the boxes' axes are R[i][j] = a_i · b_j. When A and B are swapped, R becomes its
-// transpose and the offsets change sign, bit for bit. The verdict relies on that.
+// products of the boxes' axes are R[i][j] = a_i · b_j.
 #pragma once
 
 #include "lanes/triples.hpp"
@@ -33,29 +32,51 @@ struct Pose {
   T quaternion[4];  // x y z w, of any length but zero
 };
 
-// A pair of boxes, ready for the separating-axis test.
+// A pair of boxes, ready for the separating-axis test. The boxes are put in an order of the data
+// here, and the answer names them as the caller does: swapping them changes no bit in between. From
+// here on A is the first of both.
 template <class T>
 struct Pair {
-  Vec<T> half_a, half_b;      // half extents [m]
-  Vec<T> origin_a, origin_b;  // the boxes' centres, common frame [m]
-  Mat<T> axes_a, axes_b;      // the boxes' axes as columns, common frame
-  Vec<T> offset_a, offset_b;  // B − A in A's frame, and in B's [m]
-  Mat<T> rotation;            // R: B's axes as columns, in A's frame
-  T size;                     // largest full extent of both boxes [m]
-  T touch;                    // separation up to which the boxes touch [m]
-  Mask<T> a_first;            // A comes first in an order that swapping A and B reverses
-  Mask<T> valid;              // poses and sizes are accepted
+  Triple<T> half_a, half_b;      // half extents [m]
+  Triple<T> origin_a, origin_b;  // the boxes' centres, common frame [m]
+  Columns<T> axes_a, axes_b;     // the boxes' axes, common frame
+  Triple<T> offset_a, offset_b;  // B − A in A's frame, and in B's [m]
+  Columns<T> b_in_a, a_in_b;     // R and Rᵀ: B's axes in A's frame, A's axes in B's frame
+  T size;                        // largest full extent of both boxes [m]
+  T touch;                       // separation up to which the boxes touch [m]
+  Mask<T> swapped;               // the caller's A is the second box
+  Mask<T> valid;                 // poses and sizes are accepted
 };
 
-// The matrix of a quaternion of any length. Dividing by the squared norm needs no square root, and
-// q and −q give the same bits.
+// The matrix of a quaternion of any length. Dividing by the squared norm needs no square root, and q
+// and −q give the same bits.
 template <class T>
-BC_INLINE Mat<T> rotation_matrix(const T q[4]) {
+BC_INLINE Mat<T> rotation_matrix(const T (&q)[4]) {
   T x = q[0], y = q[1], z = q[2], w = q[3];
   T s = 2.0 / ((x * x + y * y) + (z * z + w * w));
   return {{{1.0 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y)},
            {s * (x * y + w * z), 1.0 - s * (x * x + z * z), s * (y * z - w * x)},
            {s * (x * z - w * y), s * (y * z + w * x), 1.0 - s * (x * x + y * y)}}};
+}
+// Its rows.
+template <class T>
+BC_INLINE Columns<T> rotation_rows(const T (&q)[4]) {
+  if constexpr (packed<T>) {
+    T x = q[0], y = q[1], z = q[2], w = q[3];
+    T s = 2.0 / ((x * x + y * y) + (z * z + w * w));
+    Triple<T> v{x, y, z, w}, yxw = __builtin_shufflevector(v, v, 1, 0, 3, 3);
+    Triple<T> zwx = __builtin_shufflevector(v, v, 2, 3, 0, 0);
+    Triple<T> wzy = __builtin_shufflevector(v, v, 3, 2, 1, 1);
+    Triple<T> x0{-1.0, 1.0, 1.0, 1.0}, x1{1.0, -1.0, 1.0, 1.0}, x2{1.0, 1.0, -1.0, -1.0};
+    Columns<T> rows{{s * (y * (x0 * yxw) + z * ((x0 * x1) * zwx)),
+                     s * (x * ((x1 * x2) * yxw) + z * (x1 * wzy)),
+                     s * (x * (x2 * zwx) + y * ((x0 * x2) * wzy))}};
+    for (int i = 0; i < 3; ++i) rows[i] = choose(is_at<T>(i), 1.0 + rows[i], rows[i]);
+    return rows;
+  } else {
+    Mat<T> m = rotation_matrix(q);
+    return {{triple(row(m, 0)), triple(row(m, 1)), triple(row(m, 2))}};
+  }
 }
 
 // Comparisons are written so that NaN fails them. An overflown square is infinite and fails too.
@@ -63,15 +84,13 @@ template <class T>
 BC_INLINE Mask<T> pose_valid(const Pose<T>& pose) {
   const T* q = pose.quaternion;
   T norm2 = (q[0] * q[0] + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3]);
-  Vec<T> reach = abs(pose.position);
-  return (reach[0] <= length_max) & (reach[1] <= length_max) & (reach[2] <= length_max) &
+  return all_of(abs(triple(pose.position)) <= uniform(splat<T>(length_max))) &
          (norm2 >= quaternion_min * quaternion_min) & (norm2 <= quaternion_max * quaternion_max);
 }
 template <class T>
 BC_INLINE Mask<T> size_valid(const Vec<T>& half) {
-  return (2.0 * half[0] >= length_min) & (2.0 * half[1] >= length_min) &
-         (2.0 * half[2] >= length_min) & (2.0 * half[0] <= length_max) &
-         (2.0 * half[1] <= length_max) & (2.0 * half[2] <= length_max);
+  Triple<T> size = 2.0 * triple(half);
+  return all_of((size >= uniform(splat<T>(length_min))) & (size <= uniform(splat<T>(length_max))));
 }
 
 // Distance from a positive number to the next larger one: 0.75 · 2⁻⁵² · x lies between 0.75 and
@@ -83,79 +102,95 @@ BC_INLINE T ulp(T x) {
 
 // Order two boxes with the same centre: by their sizes, then by their axes.
 template <class T>
-Mask<T> a_first_of_concentric(const Vec<T>& half_a, const Vec<T>& half_b, const Mat<T>& axes_a,
-                              const Mat<T>& axes_b) {
+Mask<T> a_first_of_concentric(const Vec<T>& half_a, const Vec<T>& half_b, const Columns<T>& rows_a,
+                              const Columns<T>& rows_b) {
   T order = half_b[0] - half_a[0];
   for (int k = 1; k < 3; ++k) order = select<T>(order == 0.0, half_b[k] - half_a[k], order);
   for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) order = select<T>(order == 0.0, axes_b[i][j] - axes_a[i][j], order);
+    for (int j = 0; j < 3; ++j) order = select<T>(order == 0.0, rows_b[i][j] - rows_a[i][j], order);
   return order >= 0.0;
+}
+
+// Whether A comes first. The sign of B − A changes on a swap: its first component that is not zero
+// orders the boxes.
+template <class T>
+BC_INLINE Mask<T> comes_first(const Triple<T>& t) {
+  if constexpr (packed<T>) {
+    unsigned below = bits(t < Triple<T>{}) & 7, off = below | (bits(t > Triple<T>{}) & 7);
+    return (off & -off & below) == 0;
+  } else {
+    return (t[0] > 0.0) | ((t[0] == 0.0) & ((t[1] > 0.0) | ((t[1] == 0.0) & (t[2] >= 0.0))));
+  }
 }
 
 template <class T>
 BC_INLINE void prepare(const Pose<T>& a, const Pose<T>& b, const Vec<T>& half_a,
                        const Vec<T>& half_b, Pair<T>& pair) {
-  Mat<T> axes_a = rotation_matrix(a.quaternion), axes_b = rotation_matrix(b.quaternion);
-  Vec<T> t = b.position - a.position;
-  pair.half_a = half_a;
-  pair.half_b = half_b;
-  pair.origin_a = a.position;
-  pair.origin_b = b.position;
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) pair.axes_a[i][j] = axes_a[i][j], pair.axes_b[i][j] = axes_b[i][j];
-  pair.offset_a = transposed_times(axes_a, t);
-  pair.offset_b = transposed_times(axes_b, t);
-  for (int i = 0; i < 3; ++i) {
-    Triple<T> by_b =
-        (axes_a[0][i] * triple(row(axes_b, 0)) + axes_a[1][i] * triple(row(axes_b, 1))) +
-        axes_a[2][i] * triple(row(axes_b, 2));
-    for (int j = 0; j < 3; ++j) pair.rotation[i][j] = by_b[j];
-  }
-  pair.size = 2.0 * max(largest(half_a), largest(half_b));
-  T reach = max(largest(abs(a.position)), largest(abs(b.position)));
-  pair.touch = contact_ulps * ulp(max(reach, pair.size));
-  // The sign of B − A changes on a swap: its first component that is not zero orders the boxes.
-  pair.a_first = (t[0] > 0.0) | ((t[0] == 0.0) & ((t[1] > 0.0) | ((t[1] == 0.0) & (t[2] >= 0.0))));
-  Mask<T> concentric = (t[0] == 0.0) & (t[1] == 0.0) & (t[2] == 0.0);
+  Columns<T> rows_a = rotation_rows(a.quaternion), rows_b = rotation_rows(b.quaternion);
+  Triple<T> at_a = triple(a.position), at_b = triple(b.position), t = at_b - at_a;
+  Triple<T> given_a = triple(half_a), given_b = triple(half_b);
+  Mask<T> in_order = comes_first<T>(t), concentric = all_of(t == Triple<T>{});
   if (any(concentric)) {
-    Mask<T> ordered = a_first_of_concentric(half_a, half_b, axes_a, axes_b);
-    pair.a_first = (pair.a_first & (concentric == 0)) | (ordered & concentric);
+    Mask<T> ordered = a_first_of_concentric(half_a, half_b, rows_a, rows_b);
+    in_order = (in_order & (concentric == 0)) | (ordered & concentric);
   }
+  pair.swapped = in_order == 0;
+  pair.half_a = select(in_order, given_a, given_b);
+  pair.half_b = select(in_order, given_b, given_a);
+  pair.origin_a = select(in_order, at_a, at_b);
+  pair.origin_b = select(in_order, at_b, at_a);
+  Columns<T> first = select<T>(in_order, rows_a, rows_b);
+  Columns<T> other = select<T>(in_order, rows_b, rows_a);
+  t = pair.origin_b - pair.origin_a;
+  pair.offset_a = first * t;
+  pair.offset_b = other * t;
+  for (int i = 0; i < 3; ++i)
+    pair.a_in_b[i] = (spread(first[0], i) * other[0] + spread(first[1], i) * other[1]) +
+                     spread(first[2], i) * other[2];
+  pair.b_in_a = transpose(pair.a_in_b);
+  pair.axes_a = transpose(first);
+  pair.axes_b = transpose(other);
+  pair.size = 2.0 * largest(max(given_a, given_b));
+  T reach = largest(max(abs(at_a), abs(at_b)));
+  pair.touch = contact_ulps * ulp(max(reach, pair.size));
   pair.valid = pose_valid(a) & pose_valid(b) & size_valid(half_a) & size_valid(half_b);
 }
 
 // Move B by `distance` [m] against a direction given in A's frame.
 template <class T>
-BC_INLINE void move_against(Pair<T>& pair, T distance, const Vec<T>& direction) {
+BC_INLINE void move_against(Pair<T>& pair, T distance, const Triple<T>& direction) {
   pair.offset_a = pair.offset_a - distance * direction;
-  pair.offset_b = pair.offset_b - distance * transposed_times(pair.rotation, direction);
+  pair.offset_b = pair.offset_b - distance * (pair.a_in_b * direction);
 }
 
 // Bring a point [m] or a direction from A's frame to the common frame.
 template <class T>
-BC_INLINE Vec<T> point_in_common_frame(const Pair<T>& pair, const Vec<T>& point) {
+BC_INLINE Triple<T> point_in_common_frame(const Pair<T>& pair, const Triple<T>& point) {
   return pair.origin_a + pair.axes_a * point;
 }
 template <class T>
-BC_INLINE Vec<T> direction_in_common_frame(const Pair<T>& pair, const Vec<T>& direction) {
+BC_INLINE Triple<T> direction_in_common_frame(const Pair<T>& pair, const Triple<T>& direction) {
   return pair.axes_a * direction;
 }
 
 template <class T>
 BC_INLINE Pair<double> lane(const Pair<T>& pair, int i) {
   Pair<double> one;
-  one.half_a = lane(pair.half_a, i);
-  one.half_b = lane(pair.half_b, i);
-  one.origin_a = lane(pair.origin_a, i);
-  one.origin_b = lane(pair.origin_b, i);
-  one.axes_a = lane(pair.axes_a, i);
-  one.axes_b = lane(pair.axes_b, i);
-  one.offset_a = lane(pair.offset_a, i);
-  one.offset_b = lane(pair.offset_b, i);
-  one.rotation = lane(pair.rotation, i);
+  one.half_a = triple_of_lane<T>(pair.half_a, i);
+  one.half_b = triple_of_lane<T>(pair.half_b, i);
+  one.origin_a = triple_of_lane<T>(pair.origin_a, i);
+  one.origin_b = triple_of_lane<T>(pair.origin_b, i);
+  one.offset_a = triple_of_lane<T>(pair.offset_a, i);
+  one.offset_b = triple_of_lane<T>(pair.offset_b, i);
+  for (int k = 0; k < 3; ++k) {
+    one.axes_a[k] = triple_of_lane<T>(pair.axes_a[k], i);
+    one.axes_b[k] = triple_of_lane<T>(pair.axes_b[k], i);
+    one.b_in_a[k] = triple_of_lane<T>(pair.b_in_a[k], i);
+    one.a_in_b[k] = triple_of_lane<T>(pair.a_in_b[k], i);
+  }
   one.size = lane(pair.size, i);
   one.touch = lane(pair.touch, i);
-  one.a_first = lane(pair.a_first, i) != 0;
+  one.swapped = lane(pair.swapped, i) != 0;
   one.valid = lane(pair.valid, i) != 0;
   return one;
 }

@@ -16,8 +16,7 @@
 // 3. Ties. An axis replaces an earlier one only if its gap is larger by more than `tie`, in the
 //    order faces of A, faces of B, edges. Aligned boxes get the normal of a face.
 //
-// The separation has the same bits when A and B are swapped. Face gaps are symmetric formulas. Edge
-// gaps are evaluated in the frame of the box that comes first in an order of the data.
+// A is the first box in an order of the data (poses.hpp), so no bit depends on what the caller calls A.
 #pragma once
 
 #include "poses.hpp"
@@ -54,7 +53,7 @@ struct SeparatingAxis {
   T separation;      // largest gap [m]
   T axis;            // 0–2 faces of A, 3–5 faces of B, 6 + 3 i + j for a_i × b_j
   T face;            // best face axis, 0–5, whatever wins
-  Vec<T> normal;     // unit vector along the axis, from A to B, in A's frame
+  Triple<T> normal;  // unit vector along the axis, from A to B, in A's frame
   Mask<T> doubtful;  // rounding of an edge axis may matter: see near_parallel_edges.hpp
 };
 
@@ -99,7 +98,9 @@ struct BestAxis<T, true> {
   BC_INLINE T winner(T tolerance) const {
     Triple<T> limit = Triple<T>{} + largest();
     unsigned near = 0;
-    for (int n = 0; n < count; ++n) near |= (~bits(offered[n] + tolerance < limit) & 7) << (3 * n);
+    auto note = [&](int n) { near |= (~bits(offered[n] + tolerance < limit) & 7) << (3 * n); };
+    for (int n = 0; n < 2; ++n) note(n);
+    for (int n = 2; n < 5 && count > 2; ++n) note(n);
     return (near & (near - 1)) == 0 ? __builtin_ctz(near) : first_of_near(tolerance);
   }
 
@@ -118,55 +119,67 @@ struct BestAxis<T, true> {
 // other's axes in its frame.
 template <class T>
 BC_INLINE Triple<T> face_gaps(const Triple<T>& offset, const Triple<T>& half,
-                              const Vec<T>& other_half, const Columns<T>& axes) {
-  Columns<T> width = abs(axes);
-  return abs(offset) - (half + ((other_half[0] * width[0] + other_half[1] * width[1]) +
-                                other_half[2] * width[2]));
+                              const Triple<T>& other_half, const Columns<T>& axes) {
+  return abs(offset) - (half + abs(axes) * other_half);
 }
 
 template <class T>
 BC_INLINE void offer_face_axes(const Pair<T>& pair, BestAxis<T>& best) {
   T tolerance = tie * pair.size;
-  Columns<T> axes_b = columns(pair.rotation), axes_a = columns(transpose(pair.rotation));
   Triple<T> one = uniform(splat<T>(1.0));
-  best.offer(0, face_gaps(triple(pair.offset_a), triple(pair.half_a), pair.half_b, axes_b), one,
-             tolerance);
-  best.offer(3, face_gaps(triple(pair.offset_b), triple(pair.half_b), pair.half_a, axes_a), one,
-             tolerance);
+  best.offer(0, face_gaps<T>(pair.offset_a, pair.half_a, pair.half_b, pair.b_in_a), one, tolerance);
+  best.offer(3, face_gaps<T>(pair.offset_b, pair.half_b, pair.half_a, pair.a_in_b), one, tolerance);
 }
 
-// Both boxes in the frame of the one that comes first: its half extents, the offset to the other
-// box, the other's half extents, and its edges: `edges[k]` has their components along axis k.
+// Whether no edge axis of a single pair can win over the gap `best` of a face, or is doubtful: overlap
+// divided by length is at most `best` for all nine. That takes no root.
 template <class T>
-struct FirstFrame {
-  Triple<T> half, offset, other_half;
-  Columns<T> edges;
-
-  BC_INLINE explicit FirstFrame(const Pair<T>& pair)
-      : half(select(pair.a_first, triple(pair.half_a), triple(pair.half_b))),
-        offset(select(pair.a_first, triple(pair.offset_a), triple(pair.offset_b))),
-        other_half(select(pair.a_first, triple(pair.half_b), triple(pair.half_a))),
-        edges(select<T>(pair.a_first, columns(transpose(pair.rotation)), columns(pair.rotation))) {}
-};
-
-// Offer the nine edge axes e_i × u_j. In this frame e_i × u_j is (−u_z, u_y) in the components y and
-// z that follow i.
-template <class T>
-BC_INLINE void offer_edge_axes(const Pair<T>& pair, const FirstFrame<T>& frame, BestAxis<T>& best,
-                               Mask<T>& doubtful) {
-  T tolerance = tie * pair.size, error = edge_gap_error * pair.size;
-  Triple<T> largest_possible = uniform(splat<T>(-infinity)), longest_skipped2{};
-  Triple<T> half_k = rotated(frame.other_half), half_l = rotated(half_k);
+BC_INLINE bool edges_stay_below(const Pair<T>& pair, T best) {
+  constexpr double least2 = cross_product_min * cross_product_min, used2 = parallel * parallel;
+  constexpr double margin = 1e-12;
+  T room = 2.0 * edge_gap_error * pair.size, limit = best * abs(best) - margin * (best * best);
+  Triple<T> half_k = rotated(pair.half_b), half_l = rotated(half_k), limits = uniform(limit);
+  Flags<T> below = limits == limits;
 #pragma GCC unroll 3
   for (int i = 0; i < 3; ++i) {
     int y = (i + 1) % 3, z = (i + 2) % 3;
-    // By j, and the other box's axes k and l that follow it.
-    Triple<T> uy = frame.edges[y], uz = frame.edges[z];
+    const Triple<T>&u = pair.a_in_b[i], &uy = pair.a_in_b[y], &uz = pair.a_in_b[z];
+    Triple<T> length2 = uy * uy + uz * uz;
+    Triple<T> width = (spread(pair.half_a, y) * abs(uz) + spread(pair.half_a, z) * abs(uy)) +
+                      (half_k * abs(rotated_back(u)) + half_l * abs(rotated(u)));
+    Triple<T> along = abs(spread(pair.offset_a, z) * uy - spread(pair.offset_a, y) * uz);
+    Triple<T> overlap = (along - width) + room;
+    below &= ((overlap * abs(overlap) <= limits * length2) & (length2 >= uniform(used2))) |
+             (length2 < uniform(least2));
+  }
+  return all_of(below);
+}
+
+// Offer the nine edge axes a_i × b_j. In A's frame a_i × b_j is (−u_z, u_y) in the components y and z
+// that follow i, with u = b_j.
+template <class T>
+BC_INLINE void offer_edge_axes(const Pair<T>& pair, BestAxis<T>& best, Mask<T>& doubtful) {
+  const Triple<T>&half = pair.half_a, &offset = pair.offset_a;
+  const Columns<T>& edges = pair.a_in_b;
+  if constexpr (packed<T>) {
+    if (edges_stay_below(pair, best.largest())) {
+      doubtful = false;
+      return;
+    }
+  }
+  T tolerance = tie * pair.size, error = edge_gap_error * pair.size;
+  Triple<T> largest_possible = uniform(splat<T>(-infinity)), longest_skipped2{};
+  Triple<T> half_k = rotated(pair.half_b), half_l = rotated(half_k);
+#pragma GCC unroll 3
+  for (int i = 0; i < 3; ++i) {
+    int y = (i + 1) % 3, z = (i + 2) % 3;
+    // By j, and B's axes k and l that follow it.
+    Triple<T> uy = edges[y], uz = edges[z];
     Triple<T> ky = rotated(uy), kz = rotated(uz), ly = rotated(ky), lz = rotated(kz);
     Triple<T> length2 = uy * uy + uz * uz;
-    Triple<T> width = (spread(frame.half, y) * abs(uz) + spread(frame.half, z) * abs(uy)) +
+    Triple<T> width = (spread(half, y) * abs(uz) + spread(half, z) * abs(uy)) +
                       (half_k * abs(kz * uy - ky * uz) + half_l * abs(lz * uy - ly * uz));
-    Triple<T> overlap = abs(spread(frame.offset, z) * uy - spread(frame.offset, y) * uz) - width;
+    Triple<T> overlap = abs(spread(offset, z) * uy - spread(offset, y) * uz) - width;
     Triple<T> inverse = each([](auto x) { return 1.0 / sqrt(x); }, length2);
     auto if_used = [](auto gap, auto length2) {
       return select<decltype(gap)>(length2 >= parallel * parallel, gap,
@@ -193,17 +206,16 @@ BC_INLINE void offer_edge_axes(const Pair<T>& pair, const FirstFrame<T>& frame, 
   doubtful = (gap <= pair.touch) & ((largest(largest_possible) > gap) | skipped_may_win);
 }
 
-// The edge of the first box, 0 to 2, of the edge axis at a place.
+// The edge of A, 0 to 2, of the edge axis at a place.
 template <class T>
-BC_INLINE T edge_of_first(T place) {
+BC_INLINE T edge_of_a(T place) {
   return select<T>(place < double(first_edge_axis + 3), T{},
                    select<T>(place < double(first_edge_axis + 6), splat<T>(1.0), splat<T>(2.0)));
 }
 
 // The winning axis as a unit vector from A to B, in A's frame.
 template <class T>
-BC_INLINE Vec<T> axis_normal(const Pair<T>& pair, const FirstFrame<T>& frame,
-                             const BestAxis<T>& best) {
+BC_INLINE Triple<T> axis_normal(const Pair<T>& pair, const BestAxis<T>& best) {
   T place = best.place;
   // A face of A or of B: a unit vector, or a column of R.
   Vec<T> face{};
@@ -211,14 +223,14 @@ BC_INLINE Vec<T> axis_normal(const Pair<T>& pair, const FirstFrame<T>& frame,
   for (int k = 0; k < 3; ++k) {
     Mask<T> of_a = place == double(k), of_b = place == double(3 + k);
     face_offset = select<T>(of_a, pair.offset_a[k], select<T>(of_b, pair.offset_b[k], face_offset));
-    face = select<T>(of_b, column(pair.rotation, k), face);
+    face = select(of_b, components<T>(pair.b_in_a[k]), face);
     face[k] = select<T>(of_a, splat<T>(1.0), face[k]);
   }
-  // A pair of edges, in the very frame in which their gap was evaluated.
-  T i = edge_of_first(place), j = (place - double(first_edge_axis)) - 3.0 * i;
+  // A pair of edges.
+  T i = edge_of_a(place), j = (place - double(first_edge_axis)) - 3.0 * i;
   Vec<T> u;
   for (int k = 0; k < 3; ++k) {
-    const Triple<T>& edges = frame.edges[k];
+    const Triple<T>& edges = pair.a_in_b[k];
     u[k] = select<T>(j == 0.0, edges[0], select<T>(j == 1.0, edges[1], edges[2]));
   }
   Vec<T> n;
@@ -227,35 +239,36 @@ BC_INLINE Vec<T> axis_normal(const Pair<T>& pair, const FirstFrame<T>& frame,
   n[2] = select<T>(i == 0.0, u[1], select<T>(i == 1.0, -u[0], T{}));
 
   Mask<T> edges = place >= double(first_edge_axis);
-  T along = select<T>(edges, dot(frame.offset, n), face_offset);
+  T along = select<T>(edges, dot(components<T>(pair.offset_a), n), face_offset);
   T side = select<T>(along >= 0.0, splat<T>(1.0), splat<T>(-1.0));
-  n = (side * best.scale) * n;
-  n = select(pair.a_first, n, pair.rotation * n);
-  return select(edges, n, side * face);
+  return triple(select(edges, (side * best.scale) * n, side * face));
 }
 
-// The same for a single pair whose triples are vectors of the machine, without a branch. The vectors
-// of all axes are in memory, three axes side by side.
+// The same for a single pair whose triples are vectors of the machine.
 template <class T>
-BC_INLINE Vec<T> axis_normal_by_place(const Pair<T>& pair, const FirstFrame<T>& frame,
-                                      const BestAxis<T>& best, int place) {
-  Columns<T> axes_b = columns(pair.rotation), vectors[5];
-  Triple<T> along[5] = {triple(pair.offset_a), triple(pair.offset_b)};
-  vectors[0] = columns(Mat<T>{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}});
-  vectors[1] = transpose(axes_b);
-  for (int i = 0; i < 3; ++i) {
-    int y = (i + 1) % 3, z = (i + 2) % 3;
-    vectors[2 + i][i] = Triple<T>{};
-    vectors[2 + i][y] = -frame.edges[z];
-    vectors[2 + i][z] = frame.edges[y];
-    along[2 + i] =
-        spread(frame.offset, z) * frame.edges[y] - spread(frame.offset, y) * frame.edges[z];
-  }
+BC_INLINE Triple<T> axis_normal_by_place(const Pair<T>& pair, const BestAxis<T>& best, int place) {
   int group = place / 3, k = place % 3;
-  T scale = best.scales[group][k], side = along[group][k] >= 0.0 ? scale : -scale;
-  const Columns<T>& v = vectors[group];
-  Triple<T> n = side * triple(Vec<T>{v[0][k], v[1][k], v[2][k]});
-  return components<T>(select(place < first_edge_axis || pair.a_first, n, axes_b * n));
+  Triple<T> zero{}, n, offset = pair.offset_a;
+  T along;
+  if (place < 6) {
+    n = place < 3 ? choose(is_at<T>(k), uniform(1.0), zero) : pair.b_in_a[k];
+    along = place < 3 ? offset[k] : pair.offset_b[k];
+  } else {
+    int i = group - 2, y = (i + 1) % 3, z = (i + 2) % 3;
+    Triple<T> u = pair.b_in_a[k];
+    n = choose(is_at<T>(y), -rotated(u), choose(is_at<T>(z), rotated_back(u), zero));
+    along = dot(offset, n);
+  }
+  T scale = best.scales[group][k];
+  return (along >= 0.0 ? scale : -scale) * n;
+}
+
+// The number of an axis when the boxes change names.
+template <class T>
+BC_INLINE T swapped_axis(T axis) {
+  T i = edge_of_a(axis), j = (axis - double(first_edge_axis)) - 3.0 * i;
+  T face = select<T>(axis < 3.0, axis + 3.0, axis - 3.0);
+  return select<T>(axis < double(first_edge_axis), face, (double(first_edge_axis) + 3.0 * j) + i);
 }
 
 template <class T>
@@ -265,18 +278,13 @@ BC_INLINE SeparatingAxis<T> separating_axis(const Pair<T>& pair) {
   offer_face_axes(pair, best);
   SeparatingAxis<T> found;
   found.face = best.winner(tolerance);
-  FirstFrame<T> frame(pair);
-  offer_edge_axes(pair, frame, best, found.doubtful);
+  offer_edge_axes(pair, best, found.doubtful);
   found.separation = best.largest();
-  // Edge axes are offered by the edges of the first box, and numbered by those of A.
-  T place = best.winner(tolerance), i = edge_of_first(place);
-  T j = (place - double(first_edge_axis)) - 3.0 * i;
-  found.axis = select<T>((place < double(first_edge_axis)) | pair.a_first, place,
-                         (double(first_edge_axis) + 3.0 * j) + i);
+  found.axis = best.winner(tolerance);
   if constexpr (packed<T>) {
-    found.normal = axis_normal_by_place(pair, frame, best, int(place));
+    found.normal = axis_normal_by_place(pair, best, int(found.axis));
   } else {
-    found.normal = axis_normal(pair, frame, best);
+    found.normal = axis_normal(pair, best);
   }
   return found;
 }

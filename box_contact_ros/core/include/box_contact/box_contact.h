@@ -84,7 +84,7 @@ typedef struct bc_contact {
 
 /* How many contacts took another way than most, since the solver was made. */
 typedef struct bc_counts {
-  int64_t clipped; /* by model exact: clipped, as the certificate of the face sums did not hold */
+  int64_t clipped; /* by model exact: clipped, as the certificate of the planes did not hold */
   int64_t exact;   /* by model mlp: left to model exact */
 } bc_counts;
 

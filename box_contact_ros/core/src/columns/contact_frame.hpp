@@ -12,7 +12,7 @@
 // start_k > 0 takes no part, and o lies on each of the others. All this is float64. What is left,
 // relative to o, is of the overlap's own magnitude and fits float32.
 //
-// Swapping A and B changes no bit: nothing here knows which box is called A.
+// Of equal faces that of A counts, the first box in the order of the data.
 #pragma once
 
 #include "../lanes/float_lanes.hpp"
@@ -125,18 +125,15 @@ BC_INLINE ContactFrame<T> contact_frame_of(const Pair<T>& pair, const Separating
   using namespace contact_frame;
   ContactFrame<T> frame;
   T tolerance = tie * pair.size;
-  Columns<T> axes_b = columns(pair.rotation), axes_a = columns(transpose(pair.rotation));
-  BestFace<T> of_a(face_gaps<T>(triple(pair.offset_a), triple(pair.half_a), pair.half_b, axes_b),
-                   tolerance);
-  BestFace<T> of_b(face_gaps<T>(triple(pair.offset_b), triple(pair.half_b), pair.half_a, axes_a),
-                   tolerance);
-  Mask<T> a_wins = of_a.gap > of_b.gap + tolerance, b_wins = of_b.gap > of_a.gap + tolerance;
-  Mask<T> p_is_a = a_wins | (pair.a_first & (b_wins == 0));
+  const Columns<T>&axes_b = pair.b_in_a, &axes_a = pair.a_in_b;
+  BestFace<T> of_a(face_gaps<T>(pair.offset_a, pair.half_a, pair.half_b, axes_b), tolerance);
+  BestFace<T> of_b(face_gaps<T>(pair.offset_b, pair.half_b, pair.half_a, axes_a), tolerance);
+  Mask<T> p_is_a = of_b.gap <= of_a.gap + tolerance;
   frame.b_is_incident = p_is_a;
   T face = select<T>(p_is_a, of_a.place, of_b.place), gap = select<T>(p_is_a, of_a.gap, of_b.gap);
-  Vec<T> offset = select(p_is_a, pair.offset_a, -pair.offset_b);
-  Vec<T> half_p = select(p_is_a, pair.half_a, pair.half_b);
-  frame.half = triple(select(p_is_a, pair.half_b, pair.half_a));
+  Vec<T> offset = components<T>(select(p_is_a, pair.offset_a, -pair.offset_b));
+  Vec<T> half_p = components<T>(select(p_is_a, pair.half_a, pair.half_b));
+  frame.half = select(p_is_a, pair.half_b, pair.half_a);
   Columns<T> turn = select<T>(p_is_a, axes_a, axes_b);
 
   // P's axes that follow the face's axis are x and y.
@@ -175,7 +172,7 @@ BC_INLINE ContactFrame<T> contact_frame_of(const Pair<T>& pair, const Separating
     frame.x = select<T>(pressed & by_edges, moved.x, frame.x);
     frame.y = select<T>(pressed & by_edges, moved.y, frame.y);
     // Of faces of equal gap SAT may have taken another one, and pressed along its normal.
-    Vec<T> normal = select(p_is_a, axis.normal, transposed_times(pair.rotation, axis.normal));
+    Triple<T> normal = select(p_is_a, axis.normal, pair.a_in_b * axis.normal);
     T upright = abs(of(normal[0], normal[1], normal[2]));
     T deeper = select<T>(upright > least_upright, frame.depth + distance, T{});
     frame.depth =

@@ -34,6 +34,10 @@ struct TripleOf<T, true> {
 template <class T>
 using Triple = typename TripleOf<T>::type;
 
+// What comparisons of triples give: a mask for each number.
+template <class T>
+using Flags = decltype(Triple<T>() > Triple<T>());
+
 // Functions below take a `Vec<T>`, or a vector of the machine, `Packed`.
 
 template <class T>
@@ -52,6 +56,23 @@ BC_INLINE Triple<T> uniform(T x) {
 template <class T>
 BC_INLINE Vec<T> components(const Triple<T>& a) {
   return {a[0], a[1], a[2]};
+}
+// One pair of several as a triple, and back.
+template <class T>
+BC_INLINE Triple<Number<T>> triple_of_lane(const Triple<T>& a, int i) {
+  if constexpr (is_scalar<T>) {
+    return a;
+  } else {
+    return triple(lane(a, i));
+  }
+}
+template <class T>
+BC_INLINE void set_triple_of_lane(Triple<T>& a, int i, const Vec<Number<T>>& value) {
+  if constexpr (is_scalar<T>) {
+    a = triple(value);
+  } else {
+    set_lane(a, i, value);
+  }
 }
 
 // A formula of single numbers, for each number of triples.
@@ -74,16 +95,6 @@ BC_INLINE Packed spread(Packed a, int k) {
   return k == 0   ? __builtin_shufflevector(a, a, 0, 0, 0, 0)
          : k == 1 ? __builtin_shufflevector(a, a, 1, 1, 1, 1)
                   : __builtin_shufflevector(a, a, 2, 2, 2, 2);
-}
-
-// The sum of the components, three times.
-template <class T>
-BC_INLINE Vec<T> total(const Vec<T>& a) {
-  return uniform((a[0] + a[1]) + a[2]);
-}
-template <class Packed>
-BC_INLINE Packed total(Packed a) {
-  return (spread(a, 0) + spread(a, 1)) + spread(a, 2);
 }
 
 // The sum of the components.
@@ -125,6 +136,34 @@ BC_INLINE Packed select(bool mask, Packed a, Packed b) {
   return (Mask<Packed>{} - Number<Mask<Packed>>(mask)) ? a : b;
 }
 
+// By numbers, each with its own mask.
+template <class Packed, class = std::enable_if_t<!is_scalar<Packed> && !std::is_class_v<Packed>>>
+BC_INLINE Packed choose(Mask<Packed> masks, Packed a, Packed b) {
+  return masks ? a : b;
+}
+// Which of three numbers is the one at `place`: 0, 1 or 2.
+template <class T>
+BC_INLINE Flags<T> is_at(T place) {
+  return triple(Vec<T>{splat<T>(0.0), splat<T>(1.0), splat<T>(2.0)}) == uniform(place);
+}
+// Whether all, or any, of three masks are set.
+template <class M>
+BC_INLINE M all_of(const Vec<M>& masks) {
+  return M((masks[0] & masks[1]) & masks[2]);
+}
+template <class Packed, class = std::enable_if_t<!is_scalar<Packed> && !std::is_class_v<Packed>>>
+BC_INLINE bool all_of(Packed masks) {
+  return (bits(masks) & 7) == 7;
+}
+template <class M>
+BC_INLINE M any_of(const Vec<M>& masks) {
+  return M((masks[0] | masks[1]) | masks[2]);
+}
+template <class Packed, class = std::enable_if_t<!is_scalar<Packed> && !std::is_class_v<Packed>>>
+BC_INLINE bool any_of(Packed masks) {
+  return bits(masks) != 0;
+}
+
 // The nearest point of the box of half extents `half` about the origin.
 template <class Three>
 BC_INLINE Three clamp(const Three& x, const Three& half) {
@@ -141,10 +180,6 @@ struct Columns {
 };
 
 template <class T>
-BC_INLINE Columns<T> columns(const Mat<T>& m) {
-  return {{triple(column(m, 0)), triple(column(m, 1)), triple(column(m, 2))}};
-}
-template <class T>
 BC_INLINE Mat<T> matrix(const Columns<T>& m) {
   return {{{m[0][0], m[1][0], m[2][0]}, {m[0][1], m[1][1], m[2][1]}, {m[0][2], m[1][2], m[2][2]}}};
 }
@@ -159,7 +194,7 @@ BC_INLINE Columns<T> transpose(const Columns<T>& m) {
              __builtin_shufflevector(odd, last_odd, 0, 1, 4, 5),
              __builtin_shufflevector(even, last_even, 2, 3, 6, 7)}};
   } else {
-    return columns(transpose(matrix(m)));
+    return {{{m[0][0], m[1][0], m[2][0]}, {m[0][1], m[1][1], m[2][1]}, {m[0][2], m[1][2], m[2][2]}}};
   }
 }
 template <class T>

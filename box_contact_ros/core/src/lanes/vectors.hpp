@@ -54,6 +54,35 @@ BC_INLINE Vec<T> operator-(T a, const Vec<T>& b) {
   return {a - b[0], a - b[1], a - b[2]};
 }
 template <class T>
+BC_INLINE void operator+=(Vec<T>& a, const Vec<T>& b) {
+  a = a + b;
+}
+// Comparisons by components: masks, which combine likewise.
+template <class T>
+BC_INLINE Vec<Mask<T>> operator==(const Vec<T>& a, const Vec<T>& b) {
+  return {a[0] == b[0], a[1] == b[1], a[2] == b[2]};
+}
+template <class T>
+BC_INLINE Vec<Mask<T>> operator>(const Vec<T>& a, const Vec<T>& b) {
+  return {a[0] > b[0], a[1] > b[1], a[2] > b[2]};
+}
+template <class T>
+BC_INLINE Vec<Mask<T>> operator>=(const Vec<T>& a, const Vec<T>& b) {
+  return {a[0] >= b[0], a[1] >= b[1], a[2] >= b[2]};
+}
+template <class T>
+BC_INLINE Vec<Mask<T>> operator<=(const Vec<T>& a, const Vec<T>& b) {
+  return {a[0] <= b[0], a[1] <= b[1], a[2] <= b[2]};
+}
+template <class M>
+BC_INLINE Vec<M> operator&(const Vec<M>& a, const Vec<M>& b) {
+  return {M(a[0] & b[0]), M(a[1] & b[1]), M(a[2] & b[2])};
+}
+template <class M>
+BC_INLINE Vec<M> operator|(const Vec<M>& a, const Vec<M>& b) {
+  return {M(a[0] | b[0]), M(a[1] | b[1]), M(a[2] | b[2])};
+}
+template <class T>
 BC_INLINE T dot(const Vec<T>& a, const Vec<T>& b) {
   return (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2];
 }
@@ -80,6 +109,13 @@ BC_INLINE T smallest(const Vec<T>& a) {
 template <class T>
 BC_INLINE Vec<T> select(Mask<T> mask, const Vec<T>& a, const Vec<T>& b) {
   return {select<T>(mask, a[0], b[0]), select<T>(mask, a[1], b[1]), select<T>(mask, a[2], b[2])};
+}
+
+// By components, each with its own mask.
+template <class T>
+BC_INLINE Vec<T> choose(const Vec<Mask<T>>& masks, const Vec<T>& a, const Vec<T>& b) {
+  return {select<T>(masks[0], a[0], b[0]), select<T>(masks[1], a[1], b[1]),
+          select<T>(masks[2], a[2], b[2])};
 }
 
 // A 3 × 3 matrix, row by row: m[i][j].

@@ -56,10 +56,11 @@ inline void put_columns(const StageArrays& arrays, long row, const Query<double>
   // From A's frame to that of the columns.
   const Pair<double>& boxes = queries[0].pair;
   double by_unit = 1.0 / pair.unit[0];
-  Mat<double> axes = frame.b_is_incident ? boxes.axes_b : boxes.axes_a;
-  Vec<double> centre = frame.b_is_incident ? boxes.origin_b : boxes.origin_a;
-  Vec<double> t = transposed_times(axes, exact.centroid - centre), mean;
-  Sym<double> covariance = rotated(transpose(axes), exact.covariance);
+  Columns<double> to_axes = transpose(frame.b_is_incident ? boxes.axes_b : boxes.axes_a);
+  Triple<double> centre = frame.b_is_incident ? boxes.origin_b : boxes.origin_a;
+  Triple<double> t = to_axes * (triple(exact.centroid) - centre);
+  Vec<double> mean;
+  Sym<double> covariance = rotated(to_axes, exact.covariance);
   for (int k = 0; k < 3; ++k) {
     mean[k] = by_unit * ((frame.sign[k] * t[k] + frame.half[k]) - frame.start[k]);
     for (int l = 0; l < 3; ++l) {
@@ -73,22 +74,51 @@ inline void put_columns(const StageArrays& arrays, long row, const Query<double>
   put(arrays.true_volume, row, exact.volume * by_unit * by_unit / pair.depth[0]);
 }
 
+// A single pair as the caller names its boxes, in the frame of the caller's A.
+struct CallersFrame {
+  const Pair<double>& pair;
+
+  double axis(double axis) const { return pair.swapped ? swapped_axis(axis) : axis; }
+  // From A to B.
+  Vec<double> normal(const Triple<double>& n) const {
+    return components<double>(pair.swapped ? -(pair.a_in_b * n) : n);
+  }
+  Vec<double> point(const Triple<double>& p) const {
+    return components<double>(pair.swapped ? pair.a_in_b * p - pair.offset_b : p);
+  }
+  Vec<double> from_common_frame(const Vec<double>& point) const {
+    const Columns<double>& axes = pair.swapped ? pair.axes_b : pair.axes_a;
+    const Triple<double>& origin = pair.swapped ? pair.origin_b : pair.origin_a;
+    return components<double>(transpose(axes) * (triple(point) - origin));
+  }
+  Vec<double> offset_a() const {
+    return components<double>(pair.swapped ? -pair.offset_b : pair.offset_a);
+  }
+  Vec<double> offset_b() const {
+    return components<double>(pair.swapped ? -pair.offset_a : pair.offset_b);
+  }
+  Mat<double> axes_a() const { return matrix(pair.swapped ? pair.axes_b : pair.axes_a); }
+  // B's axes as columns.
+  Mat<double> rotation() const { return matrix(pair.swapped ? pair.a_in_b : pair.b_in_a); }
+};
+
 // Fill one row. Returns false if its poses or sizes are refused.
 inline bool fill_stages(const Rows& rows, long row, const StageArrays& arrays) {
   Query<double> q;
   query_rows(rows, row, row + 1, q);
   if (!q.pair.valid) return false;
+  CallersFrame callers{q.pair};
   put(arrays.colliding, row, q.touching);
-  put(arrays.axis, row, q.axis.axis);
-  put(arrays.face, row, q.axis.face);
+  put(arrays.axis, row, callers.axis(q.axis.axis));
+  put(arrays.face, row, callers.axis(q.axis.face));
   put(arrays.separation, row, q.axis.separation);
   put(arrays.touch, row, q.pair.touch);
   put(arrays.size, row, q.pair.size);
-  put(arrays.normal, row, q.axis.normal);
-  put(arrays.axes_a, row, q.pair.axes_a);
-  put(arrays.rotation, row, q.pair.rotation);
-  put(arrays.offset_a, row, q.pair.offset_a);
-  put(arrays.offset_b, row, q.pair.offset_b);
+  put(arrays.normal, row, callers.normal(q.axis.normal));
+  put(arrays.axes_a, row, callers.axes_a());
+  put(arrays.rotation, row, callers.rotation());
+  put(arrays.offset_a, row, callers.offset_a());
+  put(arrays.offset_b, row, callers.offset_b());
   bool of_columns = arrays.accurate || arrays.unit || arrays.true_volume || arrays.true_mean ||
                     arrays.true_covariance || arrays.columns_volume || arrays.columns_mean ||
                     arrays.columns_covariance || arrays.upper_volume || arrays.upper_least ||
@@ -97,7 +127,7 @@ inline bool fill_stages(const Rows& rows, long row, const StageArrays& arrays) {
   if (of_columns || arrays.centroid || arrays.volume || arrays.covariance || arrays.certain) {
     Counts counts{};
     Moments<double> exact = exact_overlap(q, counts);
-    put(arrays.centroid, row, transposed_times(q.pair.axes_a, exact.centroid - q.pair.origin_a));
+    put(arrays.centroid, row, callers.from_common_frame(exact.centroid));
     put(arrays.volume, row, exact.volume);
     put(arrays.covariance, row, matrix(exact.covariance));
     put(arrays.certain, row, counts.clipped == 0);
@@ -106,14 +136,15 @@ inline bool fill_stages(const Rows& rows, long row, const StageArrays& arrays) {
   }
   Pair<double> pressed = q.pair;
   bool was_pressed = enforce_minimum_depth(pressed, q.axis);
+  CallersFrame pressed_callers{pressed};
   if (arrays.clipped_centroid || arrays.clipped_volume || arrays.clipped_covariance) {
     Moments<double> clipped = clipped_overlap(pressed, int(q.axis.face), was_pressed);
-    put(arrays.clipped_centroid, row, clipped.centroid);
+    put(arrays.clipped_centroid, row, pressed_callers.point(triple(clipped.centroid)));
     put(arrays.clipped_volume, row, clipped.volume);
     put(arrays.clipped_covariance, row, matrix(clipped.covariance));
   }
-  put(arrays.pressed_offset_a, row, pressed.offset_a);
-  put(arrays.pressed_offset_b, row, pressed.offset_b);
+  put(arrays.pressed_offset_a, row, pressed_callers.offset_a());
+  put(arrays.pressed_offset_b, row, pressed_callers.offset_b());
   return true;
 }
 

@@ -278,6 +278,7 @@ struct MlpModelOf {
   template <class T>
   static constexpr int group = narrow_group<T>;
   using Rest = ExactModelOf<FoundOf>;
+  static constexpr bool leaves_to_exact = true;
 
   template <class T, int count>
   [[gnu::noinline]] void solve(const Query<T> (&queries)[count], Found<T> (&found)[count],
@@ -308,12 +309,12 @@ struct MlpModelOf {
       sure &= (frame.depth <= frame.thickness) & mlp::is_deep_enough(queries[g]);
       sure &= mlp::is_inside(frame, pairs.unit[g] * widen_triple<T>(moments.mean, g), pair.size);
       left[g] = ~bits(sure);
-      Mat<T> axes = select(frame.b_is_incident, pair.axes_b, pair.axes_a);
-      Vec<T> centre = select(frame.b_is_incident, pair.origin_b, pair.origin_a);
+      Columns<T> axes = select<T>(frame.b_is_incident, pair.axes_b, pair.axes_a);
+      Triple<T> centre = select(frame.b_is_incident, pair.origin_b, pair.origin_a);
       Found<T>& one = found[g];
       one.volume = pairs.volume(moments.volume, g);
       one.centroid =
-          components<T>(triple(centre) + columns(axes) * pairs.in_incident(moments.mean, g));
+          components<T>(centre + axes * pairs.in_incident(moments.mean, g));
       if constexpr (std::is_same_v<FoundOf<T>, Moments<T>>)
         one.covariance = rotated(axes, pairs.in_incident(moments, g));
     }

@@ -1,7 +1,7 @@
 // Copyright 2026 The box_contact_ros maintainers
 // SPDX-License-Identifier: Apache-2.0
 
-// The exact moments of the overlap A∩B by clipping: the fallback where face sums are not certain.
+// The exact moments of the overlap A∩B by clipping: the fallback where the planes are not certain.
 //
 // The frame is that of the reference box, the one with the best face axis. Its contact face is the
 // plane w = 0, the box lies below, and (u, v) run along the face. Over each (u, v) the incident box
@@ -149,6 +149,35 @@ inline Sym<double> integrate_squares(const Polygon& polygon, const Vec<double>& 
   return sum;
 }
 
+// Keep a covariance possible where rounding has spoilt it: variances of what lies within these ranges,
+// and no negative eigenvalue. Of needles thinner than 1e-5 squares of the length may be left.
+inline void make_possible(Sym<double>& covariance, const Vec<double>& ranges) {
+  bool is_spoilt = false;
+  int k = 0;
+  for (int i = 0; i < 3; ++i) {
+    double most = 0.25 * ranges[i] * ranges[i];
+    is_spoilt = is_spoilt || covariance(i, i) > most;
+    covariance(i, i) = min(most, max(covariance(i, i), 0.0));
+    if (covariance(i, i) > covariance(k, k)) k = i;
+  }
+  // By the largest variance first; what it leaves of the others is a covariance, too.
+  int i = (k + 1) % 3, j = (k + 2) % 3;
+  double &ki = covariance(k, i), &kj = covariance(k, j), &ij = covariance(i, j);
+  double variance = covariance(k, k);
+  if (is_spoilt || !(variance > 0.0)) {
+    ki = kj = ij = 0.0;
+    return;
+  }
+  auto limit = [](double x, double most) { return min(most, max(x, -most)); };
+  ki = limit(ki, std::sqrt(variance * covariance(i, i)));
+  kj = limit(kj, std::sqrt(variance * covariance(j, j)));
+  double left_i = max(covariance(i, i) - ki * (ki / variance), 0.0);
+  double left_j = max(covariance(j, j) - kj * (kj / variance), 0.0);
+  double by_k = ki * (kj / variance);
+  double most = std::sqrt(left_i * left_j);
+  if (std::fabs(ij - by_k) > most) ij = by_k + limit(ij - by_k, most);
+}
+
 // Corner c of a box has the signs of the bits 1, 2, 4 of c; faces turn counter-clockwise outside.
 constexpr int face_corners[6][4] = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4},
                                     {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
@@ -158,9 +187,10 @@ constexpr int face_corners[6][4] = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4},
 inline Moments<double> overlap_from(const Pair<double>& pair, int face, double& kept) {
   bool of_a = face < 3;
   int w = face % 3, axes[3] = {(w + 1) % 3, (w + 2) % 3, w};
-  const Vec<double>&own = of_a ? pair.half_a : pair.half_b,
-        &other = of_a ? pair.half_b : pair.half_a;
-  Vec<double> offset = of_a ? pair.offset_a : -pair.offset_b;
+  Vec<double> own = components<double>(of_a ? pair.half_a : pair.half_b);
+  Vec<double> other = components<double>(of_a ? pair.half_b : pair.half_a);
+  Vec<double> offset = components<double>(of_a ? pair.offset_a : -pair.offset_b);
+  Mat<double> turn = matrix(of_a ? pair.b_in_a : pair.a_in_b);
   double side = offset[w] >= 0.0 ? 1.0 : -1.0;
 
   // The incident box in (u, v, w): its centre, and its half axes as columns.
@@ -171,8 +201,7 @@ inline Moments<double> overlap_from(const Pair<double>& pair, int face, double& 
     centre[d] = offset[x];
     half[d] = own[x];
     for (int j = 0; j < 3; ++j)
-      edges[d][j] =
-          (d == 2 ? side : 1.0) * (other[j] * (of_a ? pair.rotation[x][j] : pair.rotation[j][x]));
+      edges[d][j] = (d == 2 ? side : 1.0) * (other[j] * turn[x][j]);
   }
   // Moments are taken about the middle of the rectangle that bounds both projections, so that a
   // small box on a large one keeps its digits.
@@ -259,9 +288,15 @@ inline Moments<double> overlap_from(const Pair<double>& pair, int face, double& 
   for (int d = 0; d < 3; ++d)
     for (int e = d; e < 3; ++e)
       covariance(axes[d], axes[e]) = (d < 2 && e == 2 ? side * scale : scale) * squares(d, e);
+  Vec<double> ranges;
+  ranges[axes[0]] = high[0] - low[0];
+  ranges[axes[1]] = high[1] - low[1];
+  ranges[w] = -least;
+  make_possible(covariance, ranges);
   double volume = std::fabs(sum.volume);
   if (of_a) return {volume, centroid, rotated(pair.axes_a, covariance)};
-  return {volume, pair.offset_a + pair.rotation * centroid, rotated(pair.axes_b, covariance)};
+  Vec<double> in_a = components<double>(pair.offset_a + pair.b_in_a * triple(centroid));
+  return {volume, in_a, rotated(pair.axes_b, covariance)};
 }
 
 }  // namespace clipping

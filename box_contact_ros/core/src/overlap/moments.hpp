@@ -23,43 +23,16 @@ BC_INLINE Sym<T> operator+(const Sym<T>& a, const Sym<T>& b) {
   for (int k = 0; k < 6; ++k) sum.s[k] = a.s[k] + b.s[k];
   return sum;
 }
-template <class T>
-BC_INLINE Sym<T> operator-(const Sym<T>& a, const Sym<T>& b) {
-  Sym<T> sum;
-  for (int k = 0; k < 6; ++k) sum.s[k] = a.s[k] - b.s[k];
-  return sum;
-}
-template <class T>
-BC_INLINE Sym<T> operator*(T factor, const Sym<T>& a) {
-  Sym<T> scaled;
-  for (int k = 0; k < 6; ++k) scaled.s[k] = factor * a.s[k];
-  return scaled;
-}
-template <class T>
-BC_INLINE T trace(const Sym<T>& a) {
-  return (a.s[0] + a.s[1]) + a.s[2];
-}
-// a · aᵀ.
-template <class T>
-BC_INLINE Sym<T> squared(const Vec<T>& a) {
-  return {{a[0] * a[0], a[1] * a[1], a[2] * a[2], a[1] * a[2], a[0] * a[2], a[0] * a[1]}};
-}
 // R · S · Rᵀ: a tensor of one frame in another, where R's columns are the axes of the first.
 template <class T>
-BC_INLINE Sym<T> rotated(const Mat<T>& r, const Sym<T>& s) {
-  Columns<T> rows, axes = columns(r);
+BC_INLINE Sym<T> rotated(const Columns<T>& axes, const Sym<T>& s) {
+  Columns<T> rows, r = transpose(axes);
   for (int i = 0; i < 3; ++i) rows[i] = triple(Vec<T>{s(i, 0), s(i, 1), s(i, 2)});
   Sym<T> found;
   for (int i = 0; i < 3; ++i) {
-    Triple<T> turned = axes * (rows * triple(row(r, i)));
+    Triple<T> turned = axes * (rows * r[i]);
     for (int j = i; j < 3; ++j) found(i, j) = turned[j];
   }
-  return found;
-}
-template <class T>
-BC_INLINE Sym<T> select(Mask<T> mask, const Sym<T>& a, const Sym<T>& b) {
-  Sym<T> found;
-  for (int k = 0; k < 6; ++k) found.s[k] = select<T>(mask, a.s[k], b.s[k]);
   return found;
 }
 template <class T>
@@ -96,6 +69,25 @@ BC_INLINE void set_lane(Moments<T>& moments, int i, const Moments<N>& value) {
   set_lane(moments.volume, i, value.volume);
   set_lane(moments.centroid, i, value.centroid);
   set_lane(moments.covariance, i, value.covariance);
+}
+
+// What is found of one pair of several.
+template <class Found>
+struct LaneOfFound;
+template <template <class> class FoundOf, class T>
+struct LaneOfFound<FoundOf<T>> {
+  using type = FoundOf<Number<T>>;
+};
+template <class Found>
+using LaneOf = typename LaneOfFound<Found>::type;
+template <class T>
+BC_INLINE void copy_lane(PointAndVolume<T>& found, int i, const PointAndVolume<double>& one) {
+  set_lane(found.volume, i, one.volume);
+  set_lane(found.centroid, i, one.centroid);
+}
+template <class T>
+BC_INLINE void copy_lane(Moments<T>& found, int i, const Moments<double>& one) {
+  set_lane(found, i, one);
 }
 
 }  // namespace box_contact::BOX_CONTACT_SET

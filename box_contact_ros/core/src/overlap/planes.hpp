@@ -1,0 +1,674 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
+// The exact moments of the overlap A∩B by the planes that meet it, and a certificate that they are
+// right.
+//
+// The overlap K is what the twelve half-spaces of both boxes have in common. A plane that does not
+// meet K can be left out: from K, the first plane that is crossed on the way to any point outside
+// touches K. Of two boxes in contact six or seven planes are left as a rule, so 15 to 20 lines.
+//
+// Which are left. P is the box with the best face axis, D its depth, Q the other box.
+//
+// 1. The part of Q below the contact face reaches at most D / |q_kz| along Q's axis k, from Q's lowest
+//    vertex. What bounds it along P's axes tells which sides of P cut through it.
+// 2. P's part within these bounds tells which faces of Q may touch it.
+//
+// What they sum to. A line f × g of two planes is clipped by the slabs of both boxes (Kay and Kajiya
+// 1986). The sides of the slabs that do not meet K are moved away, so that a line may lie in such a
+// side. With o any point near K, f and g the distances of the planes from o along the axes n_f, n_g,
+// c = n_f · n_g, D = n_f × n_g, m the middle of a piece and `span` its length in units of D, each piece
+// adds to both its planes (Stokes; Lasserre 1998)
+//
+//   twice the area:               span · (g − c f),  span · (f − c g)
+//   three times its first moment: the same · m
+//
+// with the signs of both planes, and to the sums over K
+//
+//   w = f · (its part of the area of f) + g · (its part of the area of g),  six times the volume
+//   w m,  w (m mᵀ + span² / 12 · D Dᵀ).
+//
+// Planes add what belongs to them once. The edges of one box are the case c = 0.
+//
+// Whether they are right. Rounding may decide twice, and differently, which plane a line meets first.
+// Then a piece is lost, or counts twice. Over the surface of K, ∫ n dA is zero and ∫ x nᵀ dA is the
+// volume times the identity: twelve equations, which hold to a share of the accuracy that is asked
+// for. What does not pass is clipped (clipping.hpp).
+#pragma once
+
+#include "../separating_axis.hpp"
+#include "clipping.hpp"
+
+namespace box_contact::BOX_CONTACT_SET {
+
+// What is asked of the centroid: an error of size · max(1e-9, 1e-14 · size / depth).
+constexpr double least_centroid_error = 1e-9, centroid_rounding = 1e-14;
+// And of the covariance: max(1e-8, 1e-14 · size / depth) of its trace.
+constexpr double least_covariance_error = 1e-8;
+
+namespace planes {
+
+// Least magnitude of an entry of R that is inverted: an edge exactly along a slab must not give
+// 0 · ∞, and three of them multiplied must not underflow.
+constexpr double least_entry = 1e-90;
+// Rounding of a place [of the size] that may not decide whether a plane meets the overlap.
+constexpr double place_slack = 1e-14;
+// Sides of P that cut off less than this [of the overlap's extent] count as flush: they are left out.
+constexpr double flush_limit = 1e-10;
+// Squared sine below which two planes meet in no line.
+constexpr double least_sine2 = 1e-26;
+// Squared sine below which the line of two planes is known too badly: to 2⁻⁵³ · size / sine.
+constexpr double wedge_sine2 = 1e-12;
+// Where a clipped line begins, and where one that is not there does [m].
+constexpr double far_away = 1e300, nowhere = -1e300;
+// Sums about a point far outside the overlap cancel: most magnitude of their parts [of the sum].
+constexpr double most_cancelled = 4.0;
+
+// Rounding moves the areas of faces by about 2⁻⁵³ · size · L, with L the length of the pieces of
+// edges, and so the centroid by L² / volume times that. In slivers cut off obliquely the areas of
+// the end faces may be wrong by opposite amounts, which no equation shows. Those that were wrong
+// moved by at least 60 times the accuracy by this measure; ordinary scenes stay below 0.3.
+constexpr double area_rounding = 0x1p-53, sliver_limit = 18.0;
+
+// Depth [of the size] below which the centroid may be outside a box by rounding. The centroid is at
+// least 0.14 · depth from every face, and off by at most 1.4e-15 · size² / depth; the two are equal
+// at a depth of 1e-7 of the size.
+constexpr double safely_inside = 1e-6;
+// Distance from a box [of the size] up to which rounding alone puts a point outside.
+constexpr double outside_by_rounding = 0x1p-48;
+
+// Shares of the accuracy that the twelve equations may be off by. The covariance may be wrong by some
+// times as much as the diagonal is.
+constexpr double off_diagonal_share = 0.03, diagonal_share = 0.3, closure_share = 0.1;
+constexpr double covariance_diagonal_share = 0.2;
+
+// Reciprocals of the entries of R, given by its columns. Three need one division.
+template <class T>
+BC_INLINE Columns<T> reciprocals(const Columns<T>& r) {
+  auto away_from_zero = [](auto entry) {
+    return select(abs(entry) > least_entry, entry, splat<decltype(entry)>(least_entry));
+  };
+  Columns<T> x;
+  for (int j = 0; j < 3; ++j) x[j] = each(away_from_zero, r[j]);
+  Triple<T> product = uniform(splat<T>(1.0)) / (x[0] * (x[1] * x[2]));
+  return {{product * (x[1] * x[2]), product * (x[0] * x[2]), product * (x[0] * x[1])}};
+}
+
+// A matrix by its diagonal, and the entries one and two rows below it, in each column: its columns.
+template <class T>
+BC_INLINE Columns<T> from_diagonals(const Columns<T>& d) {
+  Columns<T> by_column = transpose(d);
+  return {{by_column[0], rotated_back(by_column[1]), rotated(by_column[2])}};
+}
+template <class T>
+BC_INLINE Columns<T> diagonals(const Columns<T>& m) {
+  return transpose(Columns<T>{{m[0], rotated(m[1]), rotated_back(m[2])}});
+}
+
+// The sums of each triple's numbers, side by side.
+template <class T>
+BC_INLINE Triple<T> totals(const Triple<T>& a, const Triple<T>& b, const Triple<T>& c) {
+  Columns<T> by_number = transpose(Columns<T>{{a, b, c}});
+  return (by_number[0] + by_number[1]) + by_number[2];
+}
+
+// The number of a triple, and the column of a matrix, at the axis `place` (0, 1 or 2).
+template <class T>
+BC_INLINE T at(const Triple<T>& x, T place) {
+  if constexpr (is_scalar<T>) {
+    return x[int(place)];
+  } else {
+    return select<T>(place == 0.0, x[0], select<T>(place == 1.0, x[1], x[2]));
+  }
+}
+template <class T>
+BC_INLINE Triple<T> at(const Columns<T>& m, T place) {
+  if constexpr (is_scalar<T>) {
+    return m[int(place)];
+  } else {
+    return select(place == 0.0, m[0], select(place == 1.0, m[1], m[2]));
+  }
+}
+// One of two things: of a single pair the thing itself, without a copy.
+template <class T, class Thing>
+using OneOf = std::conditional_t<is_scalar<T>, const Thing&, Thing>;
+template <class T, class Thing>
+BC_INLINE OneOf<T, Thing> one_of(Mask<T> mask, const Thing& a, const Thing& b) {
+  if constexpr (is_scalar<T>) {
+    return mask ? a : b;
+  } else if constexpr (std::is_same_v<Thing, Columns<T>>) {
+    return select<T>(mask, a, b);
+  } else {
+    return select(mask, a, b);
+  }
+}
+
+// One plane across each axis of a box.
+template <class T>
+struct Planes {
+  Triple<T> sign, place;  // side of the box: ±1; distance from the origin along the axis [m]
+  Triple<T> start;        // where its lines begin to be clipped; `nowhere`: there is no such plane
+};
+
+// A box, in its own frame.
+template <class T>
+struct Box {
+  Triple<T> half;          // half extents [m]
+  Triple<T> origin;        // of the sums [m]
+  Triple<T> slab, middle;  // half widths of the slabs that clip lines, and their middles [m]
+  Planes<T> planes[2];     // two across an axis where both sides meet the overlap
+  Flags<T> both;           // where they do
+
+  // Which sides meet the overlap. The first plane is the positive side, where that one does.
+  BC_INLINE void choose_planes(const Flags<T>& plus, const Flags<T>& minus) {
+    Triple<T> zero{}, one = uniform(splat<T>(1.0)), here = uniform(splat<T>(far_away));
+    Triple<T> up = half + choose(plus, zero, half), down = half + choose(minus, zero, half);
+    slab = 0.5 * (up + down);
+    middle = 0.5 * (up - down);
+    both = plus & minus;
+    planes[0].sign = choose(plus, one, -one);
+    planes[0].start = choose(plus | minus, here, -here);
+    planes[1].sign = -one;
+    planes[1].start = choose(both, here, -here);
+  }
+  BC_INLINE void place_planes() {
+    for (Planes<T>& side : planes) side.place = side.sign * half - origin;
+  }
+};
+
+// A pair in the frames of the box P with the best face and of the other, Q.
+template <class T>
+struct PairOfBoxes {
+  Mask<T> p_is_a;
+  OneOf<T, Columns<T>> columns, rows;  // Q's axes in P's frame; P's axes in Q's frame
+  Columns<T> by_columns, by_rows;      // their reciprocals
+  Triple<T> offset;                    // Q − P in P's frame [m]
+  Box<T> p, q;
+
+  BC_INLINE explicit PairOfBoxes(const Pair<T>& pair, const SeparatingAxis<T>& axis)
+      : p_is_a(axis.face < 3.0),
+        columns(one_of<T>(p_is_a, pair.b_in_a, pair.a_in_b)),
+        rows(one_of<T>(p_is_a, pair.a_in_b, pair.b_in_a)),
+        by_columns(reciprocals(columns)),
+        by_rows(transpose(by_columns)) {}
+};
+
+// Where the two edges of an edge axis cross: the middle of the shortest way between them, in A's frame.
+template <class T>
+BC_INLINE Triple<T> crossing(const Pair<T>& pair, const Triple<T>& offset_a,
+                             const SeparatingAxis<T>& axis) {
+  const Columns<T>& axes_b = pair.b_in_a;
+  T i = edge_of_a(axis.axis), j = (axis.axis - double(first_edge_axis)) - 3.0 * i;
+  Triple<T> zero{}, one = uniform(splat<T>(1.0)), n = axis.normal, n_b = pair.a_in_b * n;
+  auto corner = [&](const Triple<T>& half, const Triple<T>& direction) {
+    return choose(direction >= zero, half, -half);
+  };
+  Triple<T> on_a = choose(is_at(i), zero, corner(pair.half_a, n));
+  Triple<T> on_b = choose(is_at(j), zero, corner(pair.half_b, n_b));
+  Triple<T> along = at(axes_b, j), way = (offset_a - axes_b * on_b) - on_a;
+  T cosine = at<T>(along, i), way_i = at<T>(way, i), way_j = dot(way, along);
+  T scale = 1.0 / max(1.0 - cosine * cosine, splat<T>(1e-20));
+  T s = (way_i - cosine * way_j) * scale, t = (cosine * way_i - way_j) * scale;
+  return on_a + 0.5 * ((choose(is_at(i), s * one, zero) + way) + t * along);
+}
+
+// Find the planes that may meet the overlap. `offset_a`, `offset_b`: from A to B in their frames [m].
+template <class T>
+BC_INLINE void find_planes(const Pair<T>& pair, const SeparatingAxis<T>& axis,
+                           const Triple<T>& offset_a, const Triple<T>& offset_b,
+                           PairOfBoxes<T>& boxes) {
+  Box<T>&p = boxes.p, &q = boxes.q;
+  Mask<T> is_a = boxes.p_is_a;
+  const Columns<T>& m = boxes.columns;
+  p.half = one_of<T>(is_a, pair.half_a, pair.half_b);
+  q.half = one_of<T>(is_a, pair.half_b, pair.half_a);
+  const Triple<T>& c = boxes.offset = select(is_a, offset_a, -offset_b);
+
+  // 1. Q's part below the contact face.
+  T z = select<T>(is_a, axis.face, axis.face - 3.0), slack = place_slack * pair.size;
+  Triple<T> zero{}, up = at(boxes.rows, z);
+  T height = at<T>(c, z);
+  Mask<T> above = height >= 0.0;
+  T half_z = at<T>(p.half, z), radius_z = dot(abs(up), q.half);
+  T depth = (half_z + radius_z) - abs(height);
+  Triple<T> reach = min(q.half, (0.5 * depth) * abs(at(boxes.by_rows, z)));
+  Triple<T> rises = select(above, up, -up);
+  Triple<T> middle_q = choose(rises >= zero, reach - q.half, q.half - reach);
+  Triple<T> centre = c + m * middle_q, radius = abs(m) * reach;
+  Triple<T> high = centre + radius, low = centre - radius;
+  // P's sides: strictly through it. The contact face counts, unless Q does not come out of it.
+  Mask<T> comes_out = abs(height) + radius_z > half_z + max(flush_limit * depth, slack);
+  Flags<T> top = is_at(select<T>(comes_out & above, z, splat<T>(-1.0)));
+  Flags<T> bottom = is_at(select<T>(comes_out & (above == 0), z, splat<T>(-1.0)));
+  Triple<T> extent = min(high, p.half) - max(low, -p.half);
+  Triple<T> side = p.half + max(flush_limit * extent, uniform(slack));
+  Flags<T> plus = (high > side) | top, minus = (-low > side) | bottom;
+  p.choose_planes(plus, minus);
+
+  // 2. P's part within its bounds, and the faces of Q that touch it.
+  Triple<T> most = choose(plus, min(high, p.half), high);
+  Triple<T> least = choose(minus, max(low, -p.half), low);
+  p.origin = 0.5 * (most + least);
+  Triple<T> in_q = boxes.rows * (p.origin - c), radius_q = abs(boxes.rows) * (0.5 * (most - least));
+  Triple<T> edge = q.half + (-slack);
+  q.choose_planes((in_q + radius_q >= edge) & (middle_q + reach >= edge),
+                  (radius_q - in_q >= edge) & (reach - middle_q >= edge));
+
+  // The origin: the middle of P's part. A contact of two edges may be small in it.
+  Mask<T> by_edges = axis.axis >= double(first_edge_axis);
+  if (any(by_edges)) {
+    Triple<T> in_a = crossing(pair, offset_a, axis);
+    Triple<T> in_b = pair.a_in_b * in_a - offset_b;
+    p.origin = select(by_edges, select(is_a, in_a, in_b), p.origin);
+    in_q = boxes.rows * (p.origin - c);
+  }
+  q.origin = in_q;
+  p.place_planes();
+  q.place_planes();
+}
+
+// Take the sums about another point, given in P's frame.
+template <class T>
+BC_INLINE void move_origin(PairOfBoxes<T>& boxes, const Triple<T>& origin) {
+  boxes.p.origin = origin;
+  boxes.q.origin = boxes.rows * (origin - boxes.offset);
+  boxes.p.place_planes();
+  boxes.q.place_planes();
+}
+
+// Clip a line from −back to `to` by a slab: it is `at` from the slab's middle there, and its
+// direction's component is 1 / inverse.
+template <class N, class Slab>
+BC_INLINE void clip(const N& at, const Slab& slab, const N& inverse, N& back, N& to) {
+  N by = at * inverse, width = slab * abs(inverse);
+  back = min(back, width + by);
+  to = min(to, width - by);
+}
+
+// What pieces of lines add to the planes of a box. N: one plane, or one across each axis.
+template <class N>
+struct Faces {
+  N area{};        // twice the area, with the side's sign [m²]
+  N next{}, after{};  // three times its first moments along the two axes that follow, likewise
+};
+
+// And to the sums over the overlap, for the planes across an axis of P and its lines with Q's.
+template <class N, bool squares>
+struct Weighted {
+  N w{}, y{}, z{};  // Σ w, and w times the middles' places along the two axes that follow
+  N yy{}, zz{}, yz{};
+};
+
+// Symmetric tensors: xx yy zz, and yz xz xy beside the diagonal.
+template <class T>
+struct Squares {
+  Triple<T> diagonal{}, beside{};
+};
+
+template <class T>
+BC_INLINE Squares<T> square_of(const Triple<T>& x) {
+  return {x * x, rotated(x) * rotated_back(x)};
+}
+template <class T>
+BC_INLINE Sym<T> sym(const Squares<T>& s) {
+  return {{s.diagonal[0], s.diagonal[1], s.diagonal[2], s.beside[0], s.beside[1], s.beside[2]}};
+}
+// A tensor of the frame with these axes.
+template <class T>
+BC_INLINE Squares<T> turned(const Columns<T>& axes, const Squares<T>& s) {
+  Columns<T> c =
+      from_diagonals<T>({{s.diagonal, rotated_back(s.beside), rotated(s.beside)}});
+  Columns<T> half_way{{axes * c[0], axes * c[1], axes * c[2]}}, rows = transpose(axes);
+  Columns<T> found =
+      diagonals<T>({{half_way * rows[0], half_way * rows[1], half_way * rows[2]}});
+  return {found[0], rotated(found[1])};
+}
+
+// Sums over one box: its planes, and the pieces of its edges.
+template <class T>
+struct Sums {
+  Faces<Triple<T>> faces[2];
+  Triple<T> first{};  // Σ w · middle
+  Squares<T> squares;
+};
+
+// The numbers of Q's axes for one line or for three.
+template <class T>
+BC_INLINE auto& of_axis(Triple<T>& x, int j) {
+  if constexpr (packed<T>) {
+    return x;
+  } else {
+    return x[j];
+  }
+}
+template <class T>
+BC_INLINE const auto& of_axis(const Triple<T>& x, int j) {
+  if constexpr (packed<T>) {
+    return x;
+  } else {
+    return x[j];
+  }
+}
+
+// One line of a plane of P with one of Q, for W pairs; three with the planes across all of Q's axes,
+// for a single pair.
+template <class T>
+using Line = std::conditional_t<packed<T>, Triple<T>, T>;
+template <class T>
+constexpr int lines_at_once = packed<T> ? 3 : 1;
+
+// The line of P's plane s across axis i with Q's plane t across axis j.
+template <bool squares, class T>
+BC_INLINE void add_line(const PairOfBoxes<T>& boxes, int i, int s, int j, int t,
+                        Faces<Line<T>>& face_p, Weighted<Line<T>, squares>& sums,
+                        Faces<Triple<T>>& faces_q, Line<T>& least_sine2_here) {
+  using N = Line<T>;
+  const Box<T>&p = boxes.p, &q = boxes.q;
+  const Planes<T>&of_p = p.planes[s], &of_q = q.planes[t];
+  int y = (i + 1) % 3, z = (i + 2) % 3;
+  const Triple<T>&row_i = boxes.rows[i], &by_i = boxes.by_rows[i];
+  auto on = [&](const Triple<T>& x) { return of_axis<T>(x, j); };
+  // Components: of n_g along y and z; of n_f along the axes k and l of Q that follow j.
+  N c = on(row_i), qy = on(boxes.rows[y]), qz = on(boxes.rows[z]);
+  N pk = on(rotated(row_i)), pl = on(rotated_back(row_i));
+  N by_y = on(boxes.by_rows[y]), by_z = on(boxes.by_rows[z]);
+  N by_k = on(rotated(by_i)), by_l = on(rotated_back(by_i));
+
+  N f = spread(of_p.place, i), g = on(of_q.place);
+  N sine2 = qy * qy + qz * qz, scale = 1.0 / max(sine2, splat<N>(least_sine2));
+  N u = g - c * f, v = f - c * g, by_q = u * scale, by_p = v * scale;
+  N at_y = by_q * qy, at_z = by_q * qz, at_k = by_p * pk, at_l = by_p * pl;
+  N start = min(spread(of_p.start, i), on(of_q.start));
+  // The line's direction: −qz and qy in P, pl and −pk in Q.
+  N back = select<N>(sine2 > least_sine2, start, splat<N>(nowhere)), to = back;
+  N from_y = spread(p.origin, y) - spread(p.middle, y) + at_y;
+  N from_z = spread(p.origin, z) - spread(p.middle, z) + at_z;
+  N from_k = on(rotated(q.origin - q.middle)) + at_k;
+  N from_l = on(rotated_back(q.origin - q.middle)) + at_l;
+  clip(from_y, spread(p.slab, y), by_z, to, back);
+  clip(from_z, spread(p.slab, z), by_y, back, to);
+  clip(from_k, on(rotated(q.slab)), by_l, back, to);
+  clip(from_l, on(rotated_back(q.slab)), by_k, to, back);
+  N span = max(to + back, N{}), middle = 0.5 * (to - back);
+  least_sine2_here =
+      min(least_sine2_here, select<N>(span > 0.0, sine2, splat<N>(1.0)));
+
+  N side = span * (spread(of_p.sign, i) * on(of_q.sign)), area_p = side * u, area_q = side * v;
+  N my = at_y - middle * qz, mz = at_z + middle * qy;
+  N w = f * area_p + g * area_q;
+  face_p.area += area_p;
+  face_p.next += area_p * my;
+  face_p.after += area_p * mz;
+  of_axis<T>(faces_q.area, j) += area_q;
+  of_axis<T>(faces_q.next, j) += area_q * (at_k + middle * pl);
+  of_axis<T>(faces_q.after, j) += area_q * (at_l - middle * pk);
+  N wy = w * my, wz = w * mz;
+  sums.w += w;
+  sums.y += wy;
+  sums.z += wz;
+  if constexpr (squares) {
+    N along = (1.0 / 12.0) * (w * (span * span)), along_y = along * qy;
+    sums.yy += wy * my + along * (qz * qz);
+    sums.zz += wz * mz + along_y * qy;
+    sums.yz += wy * mz - along_y * qz;
+  }
+}
+
+// Put numbers of the lines of P's axis i where they belong, or add them up over Q's axes.
+template <class T>
+struct Gathered {
+  Triple<T> by_axis[3];  // of a single pair: three lines of each axis of P
+  Triple<T> total;       // of W pairs
+
+  BC_INLINE void put(int i, int j, const Line<T>& x) {
+    if constexpr (packed<T>) {
+      by_axis[i] = x;
+    } else {
+      total[i] = j == 0 ? x : total[i] + x;
+    }
+  }
+  BC_INLINE Triple<T> sum() const {
+    if constexpr (packed<T>) {
+      return totals<T>(by_axis[0], by_axis[1], by_axis[2]);
+    } else {
+      return total;
+    }
+  }
+};
+
+// All lines of P's planes with Q's.
+template <bool squares, bool two_sided, class T>
+BC_INLINE void add_lines(const PairOfBoxes<T>& boxes, Sums<T>& of_p, Sums<T>& of_q,
+                         Line<T>& least_sine2_here) {
+  constexpr int sides = two_sided ? 2 : 1;
+#pragma GCC unroll 1  // unrolled, the code would not fit the first cache
+  for (int s = 0; s < sides; ++s) {
+    Gathered<T> area, next, after, w, y, z, yy, zz, yz;
+#pragma GCC unroll 3
+    for (int i = 0; i < 3; ++i) {
+#pragma GCC unroll 3
+      for (int j = 0; j < 3; j += lines_at_once<T>) {
+        Faces<Line<T>> face;
+        Weighted<Line<T>, squares> sums;
+        if (!(packed<T> || two_sided) || any(spread(boxes.p.planes[s].start, i) > 0.0))
+#pragma GCC unroll 1
+          for (int t = 0; t < sides; ++t)
+            if (!two_sided || any(of_axis<T>(boxes.q.planes[t].start, j) > 0.0))
+              add_line<squares>(boxes, i, s, j, t, face, sums, of_q.faces[t], least_sine2_here);
+        area.put(i, j, face.area);
+        next.put(i, j, face.next);
+        after.put(i, j, face.after);
+        w.put(i, j, sums.w);
+        y.put(i, j, sums.y);
+        z.put(i, j, sums.z);
+        if constexpr (squares) {
+          yy.put(i, j, sums.yy);
+          zz.put(i, j, sums.zz);
+          yz.put(i, j, sums.yz);
+        }
+      }
+    }
+    const Triple<T>& f = boxes.p.planes[s].place;
+    Faces<Triple<T>>& faces = of_p.faces[s];
+    faces.area = area.sum();
+    faces.next = next.sum();
+    faces.after = after.sum();
+    Triple<T> wx = f * w.sum(), wy = y.sum(), wz = z.sum();
+    of_p.first += ((wx + rotated_back(wy)) + rotated(wz));
+    if constexpr (squares) {
+      of_p.squares.diagonal += ((f * wx + rotated_back(yy.sum())) + rotated(zz.sum()));
+      of_p.squares.beside += ((yz.sum() + rotated(f * wy)) + rotated_back(f * wz));
+    }
+  }
+}
+
+// The edges of a box x along its axes k, in its planes s across the axis that follows k and t across
+// the next. `axes`: y's axes in x's frame.
+template <bool squares, class T>
+BC_INLINE void add_edges(const Box<T>& x, int s, int t, const Box<T>& y, const Columns<T>& axes,
+                         const Columns<T>& inverse, Sums<T>& sums, Triple<T>& length) {
+  const Planes<T>&of_f = x.planes[s], &of_g = x.planes[t];
+  Triple<T> f = rotated(of_f.place), g = rotated_back(of_g.place);
+  Triple<T> start = min(rotated(of_f.start), rotated_back(of_g.start)), from = x.origin - x.middle;
+  Triple<T> from_y = y.origin - y.middle;
+  Triple<T> back = min(start, x.slab + from), to = min(start, x.slab - from);
+#pragma GCC unroll 3
+  for (int m = 0; m < 3; ++m) {
+    Triple<T> place = (f * rotated(axes[m]) + g * rotated_back(axes[m])) + spread(from_y, m);
+    clip(place, spread(y.slab, m), inverse[m], back, to);
+  }
+  Triple<T> span = max(to + back, Triple<T>{}), middle = 0.5 * (to - back);
+  length += span;
+  Triple<T> side = span * (rotated(of_f.sign) * rotated_back(of_g.sign));
+  Triple<T> area_f = side * g, area_g = side * f;
+  Faces<Triple<T>>& faces_f = sums.faces[s];
+  faces_f.area += rotated_back(area_f);
+  faces_f.next += rotated_back(area_f * g);
+  faces_f.after += rotated_back(area_f * middle);
+  Faces<Triple<T>>& faces_g = sums.faces[t];
+  faces_g.area += rotated(area_g);
+  faces_g.next += rotated(area_g * middle);
+  faces_g.after += rotated(area_g * f);
+  Triple<T> w = 2.0 * (area_f * f), along = w * middle, at_f = w * f, at_g = w * g;
+  sums.first += ((along + rotated_back(at_f)) + rotated(at_g));
+  if constexpr (squares) {
+    Triple<T> own = along * middle + (1.0 / 12.0) * (w * (span * span));
+    sums.squares.diagonal += ((own + rotated_back(at_f * f)) + rotated(at_g * g));
+    sums.squares.beside += ((at_f * g + rotated(at_f * middle)) + rotated_back(at_g * middle));
+  }
+}
+
+template <bool squares, bool two_sided, class T>
+BC_INLINE void add_edges(const Box<T>& x, const Box<T>& y, const Columns<T>& axes,
+                         const Columns<T>& inverse, Sums<T>& sums, Triple<T>& length) {
+  if constexpr (packed<T>) {
+    // Without two planes there is no edge.
+    unsigned there = bits(x.planes[0].start > Triple<T>{}) & 7;
+    if ((there & (there - 1)) == 0) return;
+  }
+  add_edges<squares>(x, 0, 0, y, axes, inverse, sums, length);
+  if constexpr (two_sided) {
+    if (!any(any_of(x.both))) return;
+#pragma GCC unroll 1
+    for (int c = 1; c < 4; ++c)
+      if (any(any_of(min(rotated(x.planes[c & 1].start), rotated_back(x.planes[c >> 1].start)) >
+                     Triple<T>{})))
+        add_edges<squares>(x, c & 1, c >> 1, y, axes, inverse, sums, length);
+  }
+}
+
+// What the planes of a box add up to, in its frame, about the origin.
+template <class T>
+struct Surface {
+  Triple<T> normal{}, size{};  // twice ∫ n dA and ∫ |n| dA, by axis
+  Columns<T> x_n;              // ∫ x nᵀ dA by its columns
+  Triple<T> first{};           // twelve times ∫ x dV
+  Squares<T> second;           // twenty times ∫ x xᵀ dV
+  T gross{};                   // Σ |distance| · twice the area
+};
+
+template <bool squares, bool two_sided, class T>
+BC_INLINE Surface<T> surface(const Box<T>& box, const Sums<T>& sums) {
+  Surface<T> s;
+  s.first = sums.first;
+  s.second = sums.squares;
+  Triple<T> own{}, next{}, after{}, gross{};
+#pragma GCC unroll 2
+  for (int n = 0; n < (two_sided ? 2 : 1); ++n) {
+    const Faces<Triple<T>>& faces = sums.faces[n];
+    Triple<T> f = box.planes[n].place, by_f = f * faces.area, by_f2 = f * by_f;
+    s.normal += faces.area;
+    s.size += abs(faces.area);
+    own += by_f;
+    next += faces.next;
+    after += faces.after;
+    gross += abs(by_f);
+    s.first += 0.5 * by_f2;
+    if constexpr (squares) {
+      Triple<T> third = (1.0 / 3.0) * (f * f);
+      s.second.diagonal += f * by_f2;
+      s.second.beside = s.second.beside +
+                        (rotated(third * faces.next) + rotated_back(third * faces.after));
+    }
+  }
+  // Column k has its own component from the places of the planes, and two from the moments.
+  s.gross = sum(gross);
+  s.x_n = from_diagonals<T>({{0.5 * own, (1.0 / 3.0) * next, (1.0 / 3.0) * after}});
+  return s;
+}
+
+// The twelve equations, and that the overlap is no sliver. `x_n`, `normal` and `size` as in Surface,
+// over both boxes; `length`: of the edges' pieces; `radius`: √trace of the covariance.
+template <bool squares, class T>
+BC_INLINE Mask<T> certificate(const Columns<T>& x_n, const Triple<T>& normal, const Triple<T>& size,
+                              T length, T volume, T radius, T pair_size, T depth) {
+  T rounding = centroid_rounding * pair_size / depth;
+  T error = pair_size * max(splat<T>(least_centroid_error), rounding);
+  T covariance_error = max(splat<T>(least_covariance_error), rounding);
+  T off_diagonal = (0.5 * off_diagonal_share) * min(error, covariance_error * radius);
+  T diagonal = diagonal_share * error, closure = closure_share * error;
+  if constexpr (squares) {
+    diagonal = min(diagonal, covariance_diagonal_share * covariance_error * pair_size);
+  }
+  Columns<T> entries = diagonals(x_n);
+  Triple<T> own = abs(entries[0] + (-volume)) * uniform(pair_size);
+  Triple<T> beside = max(abs(entries[1]), abs(entries[2]));
+  Mask<T> holds = volume > 0.0;
+  holds &= area_rounding * pair_size * (length * length * length) <= sliver_limit * error * volume;
+  return holds & all_of((own <= uniform(diagonal * volume)) & (beside <= off_diagonal * size) &
+                        (abs(normal) * uniform(pair_size) <= closure * size));
+}
+
+// Move a point of P's frame into both boxes, by the nearest points of each in turn. Returns where
+// that succeeds.
+template <class T>
+[[gnu::noinline]] Mask<T> move_inside(const PairOfBoxes<T>& boxes, Triple<T>& point, T size) {
+  Triple<T> outside;
+  for (int round = 0; round < 3; ++round) {
+    point = clamp(point, boxes.p.half);
+    Triple<T> in_q = boxes.rows * (point - boxes.offset);
+    point += boxes.columns * (clamp(in_q, boxes.q.half) - in_q);
+    outside = abs(point) - boxes.p.half;
+  }
+  return largest(outside) <= outside_by_rounding * size;
+}
+
+}  // namespace planes
+
+// Find the overlap of a pair of boxes that `planes::find_planes` has found the planes of, `depth` deep
+// [m], with its centroid in P's frame. Found: Moments<T>, or PointAndVolume<T>, without second moments
+// and with the equations that the centroid needs alone. `two_sided`: an axis may have two planes.
+// Returns where the certificate holds.
+template <bool two_sided, class Found, class T>
+BC_INLINE Mask<T> overlap_by_planes(const Pair<T>& pair, const planes::PairOfBoxes<T>& boxes,
+                                    T depth, Found& found) {
+  using namespace planes;
+  constexpr bool squares = std::is_same_v<Found, Moments<T>>;
+  Sums<T> of_p, of_q;
+  Line<T> least = splat<Line<T>>(1.0);
+  add_lines<squares, two_sided>(boxes, of_p, of_q, least);
+  Triple<T> lengths{};
+  add_edges<squares, two_sided>(boxes.p, boxes.q, boxes.columns, boxes.by_columns, of_p, lengths);
+  add_edges<squares, two_sided>(boxes.q, boxes.p, boxes.rows, boxes.by_rows, of_q, lengths);
+  Surface<T> p = surface<squares, two_sided>(boxes.p, of_p);
+  Surface<T> q = surface<squares, two_sided>(boxes.q, of_q);
+
+  const Columns<T>& m = boxes.columns;
+  Columns<T> x_n, half_way{{m * q.x_n[0], m * q.x_n[1], m * q.x_n[2]}};
+  for (int i = 0; i < 3; ++i) x_n[i] = p.x_n[i] + half_way * boxes.rows[i];
+  T volume = ((x_n[0][0] + x_n[1][1]) + x_n[2][2]) * (1.0 / 3.0), by_volume = 1.0 / volume;
+  Triple<T> from_origin = ((1.0 / 12.0) * by_volume) * (p.first + m * q.first);
+  Triple<T> centroid = boxes.p.origin + from_origin;
+  T radius = splat<T>(infinity), least_sine2_here;
+  if constexpr (packed<T>) {
+    least_sine2_here = min(min(least[0], least[1]), least[2]);
+  } else {
+    least_sine2_here = least;
+  }
+  if constexpr (squares) {
+    OneOf<T, Columns<T>> axes = one_of<T>(boxes.p_is_a, pair.axes_a, pair.axes_b);
+    Squares<T> from_q = turned<T>(m, q.second), mean2 = square_of<T>(from_origin);
+    T by_20_volume = 0.05 * by_volume;
+    Squares<T> covariance{by_20_volume * (p.second.diagonal + from_q.diagonal) - mean2.diagonal,
+                          by_20_volume * (p.second.beside + from_q.beside) - mean2.beside};
+    radius = sqrt(max(sum(covariance.diagonal), T{}));
+    found.covariance = sym<T>(turned<T>(axes, covariance));
+  }
+  Triple<T> normal = p.normal + m * q.normal, area = p.size + abs(m) * q.size;
+  Mask<T> certain =
+      certificate<squares>(x_n, normal, area, sum(lengths), volume, radius, pair.size, depth);
+  certain &= least_sine2_here >= wedge_sine2;
+  certain &= p.gross + q.gross <= (6.0 * most_cancelled) * volume;
+  Mask<T> shallow = depth < safely_inside * pair.size;
+  if (any(shallow)) {
+    Triple<T> moved = centroid;
+    Mask<T> inside = move_inside(boxes, moved, pair.size);
+    centroid = select(shallow, moved, centroid);
+    certain &= inside | (shallow == 0);
+  }
+  found.volume = volume;
+  found.centroid = components<T>(centroid);
+  return certain;
+}
+
+}  // namespace box_contact::BOX_CONTACT_SET
