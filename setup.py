@@ -89,11 +89,11 @@ class BuildCore(build_ext):
             # A file that is compiled several times has objects in folders of their own.
             macros = [('BOX_CONTACT_VERSION', f'"{self.distribution.get_version()}"')]
             macros += [(f'BOX_CONTACT_{one.upper()}', '1') for one in INSTRUCTION_SETS]
-            return compiler.compile([f'{CORE}/src/library/{source}'], str(folder / name), macros,
+            return compiler.compile([f'{CORE}/src/{source}'], str(folder / name), macros,
                                     extra_postargs=[*FLAGS, *flags])
 
         jobs = {name: ('kernel.cpp', flags) for name, flags in INSTRUCTION_SETS.items()}
-        jobs |= {name: (f'{name}.cpp', []) for name in ('library', 'force')}
+        jobs |= {name: (f'library/{name}.cpp', []) for name in ('library', 'force')}
         with ThreadPoolExecutor(os.cpu_count()) as pool:
             # The longest first.
             running = [pool.submit(compiled, name, *job) for name, job in reversed(jobs.items())]

@@ -389,7 +389,7 @@ def test_kernels_share_no_symbol(tmp_path: Path) -> None:
     with ThreadPoolExecutor(2) as pool:
         list(pool.map(lambda name: run(
             tool('g++'), '-std=c++17', '-O0', '-w', f'-march={machines[name]}', '-c',
-            CORE / 'src/library/kernel.cpp', '-o', tmp_path / f'{name}.o'), machines))
+            CORE / 'src/kernel.cpp', '-o', tmp_path / f'{name}.o'), machines))
     symbols = {name: {line.split(maxsplit=2)[2] for line in run(
         'nm', '--defined-only', '-g', tmp_path / f'{name}.o').splitlines()} for name in machines}
     for one, other in (('baseline', 'avx2'), ('baseline', 'avx512'), ('avx2', 'avx512')):

@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "../../include/box_contact/box_contact.h"
-#include "kernel.hpp"
+#include "../kernel.hpp"
 
 namespace box_contact::detail {
 

@@ -20,7 +20,7 @@
 #include <system_error>
 #include <vector>
 
-#include "../rows.hpp"
+#include "../kernel.hpp"
 #include "solver.hpp"
 
 namespace box_contact::detail {

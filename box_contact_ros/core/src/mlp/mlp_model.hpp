@@ -32,7 +32,7 @@
 #pragma once
 
 #include "../columns/upper_faces.hpp"
-#include "../contact.hpp"
+#include "../overlap/exact.hpp"
 #include "network.hpp"
 
 namespace box_contact::BOX_CONTACT_SET {

@@ -5,7 +5,7 @@
 #pragma once
 
 #include "../lanes/lanes.hpp"
-#include "../rows.hpp"
+#include "../kernel.hpp"
 
 namespace box_contact::BOX_CONTACT_SET {
 

@@ -4,7 +4,8 @@
 // Fill the arrays of what every stage of a pair computes.
 #pragma once
 
-#include "../mlp/mlp_model.hpp"
+#include "mlp/mlp_model.hpp"
+#include "rows.hpp"
 #include "stage_arrays.hpp"
 
 namespace box_contact::BOX_CONTACT_SET {

@@ -4,7 +4,8 @@
 // One kernel. It is compiled once for each instruction set, which names it.
 #include "kernel.hpp"
 
-#include "../mlp/mlp_model.hpp"
+#include "mlp/mlp_model.hpp"
+#include "queue.hpp"
 #include "stages.hpp"
 
 namespace box_contact::BOX_CONTACT_SET {

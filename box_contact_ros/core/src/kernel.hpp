@@ -1,0 +1,70 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
+// A kernel: the core compiled for one instruction set, as a table of functions without templates, and
+// the plain data that they share.
+#pragma once
+
+#include <cstdint>
+
+#include "stage_arrays.hpp"
+
+namespace box_contact::detail {
+
+// The network of model `mlp`: features of what it is asked of; it has one output. `network_format`
+// counts changes of what the numbers mean.
+constexpr int network_format = 3, network_features = 6;
+// Numbers of a unit: its bias, its weights for the features, and its weight to the output.
+constexpr int unit_numbers = 1 + network_features + 1;
+
+// A step of 0 gives all rows the same sizes, one of 3 each row its own.
+struct Rows {
+  const double *poses_a, *poses_b;  // 7 numbers a row: x y z qx qy qz qw
+  const double *sizes_a, *sizes_b;  // full extents [m]
+  long size_step_a, size_step_b;
+  const int64_t* pairs;  // (count, 2): the rows of a pair's boxes; nullptr: row i of both
+};
+
+// Normals and points have three numbers a row, covariances nine. What is nullptr is not wanted.
+struct Results {
+  bool* colliding;
+  double *separation, *normal, *point;
+  double *volume, *covariance;
+  int32_t* axis;
+  double margin;  // [m]; normals are given up to this separation
+};
+
+// How many contacts took another way than most.
+struct Counts {
+  long contacts;
+  long clipped;  // by model `exact`: clipped, because the certificate did not hold
+  long exact;    // by model `mlp`: left to `exact`
+};
+
+enum class Model { exact, mlp };
+constexpr int model_count = 2;
+
+// Whether a function finds point and volume alone, or all moments.
+enum class Finds { point, patch };
+
+// A network in memory: the bias of its output, then the numbers of each unit.
+struct NetworkNumbers {
+  const float* numbers;
+  long count;
+};
+
+struct Kernel {
+  const char* name;   // as BOX_CONTACT_INSTRUCTION_SET has it
+  const char* title;  // for people
+  int lanes;          // pairs that a batch solves side by side
+
+  // Solve rows `begin` to `end`. Returns the first row that is refused, or −1.
+  long (*solve_rows[model_count][2])(const NetworkNumbers&, const Rows&, long begin, long end,
+                                     const Results&, Counts&);
+  // Fill one row; see stages.hpp.
+  bool (*fill_stages)(const Rows&, long row, const StageArrays&);
+};
+
+extern const Kernel kernel_baseline, kernel_avx2, kernel_avx512;
+
+}  // namespace box_contact::detail

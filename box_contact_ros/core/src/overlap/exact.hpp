@@ -1,0 +1,194 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
+// Model `exact`: the overlap of pairs that touch, by its planes or by clipping.
+//
+// 1. `press`: pairs at exact touch get their least depth (minimum_depth.hpp).
+// 2. The moments of the overlap by the planes that meet it (planes.hpp).
+// 3. Once more about the centroid that was found, or by clipping, where that is not certain.
+#pragma once
+
+#include "../kernel.hpp"
+#include "../minimum_depth.hpp"
+#include "../query.hpp"
+#include "planes.hpp"
+
+namespace box_contact::BOX_CONTACT_SET {
+
+using detail::Counts;
+
+// The exact overlap of a single pair that `enforce_minimum_depth` has moved, by clipping; the centroid
+// in A's frame.
+inline Moments<double> clipped_overlap(Pair<double> pair, int face, bool pressed) {
+  if (pressed) enforce_on_further_axes(pair);
+  return overlap_by_clipping(pair, face);
+}
+
+// The way from A to B, where pairs are pressed in to the minimum depth.
+template <class T>
+struct Pressed {
+  Triple<T> offset_a, offset_b;  // in the boxes' frames [m]
+  Triple<T> origin_b;            // B's centre, common frame [m]
+  Mask<T> moved;                 // and touching
+  Mask<T> too_shallow;           // along another axis: `enforce_on_further_axes` has work to do
+};
+template <class T>
+[[gnu::noinline]] void press(const Query<T>& q, Pressed<T>& pressed) {
+  Pair<T> pair = q.pair;
+  pressed.moved &= enforce_minimum_depth(pair, q.axis);
+  pressed.too_shallow = pressed.moved & has_too_little_depth(pair);
+  pressed.offset_a = pair.offset_a;
+  pressed.offset_b = pair.offset_b;
+  T distance = max(depth_floor * pair.size + q.axis.separation, T{});
+  pressed.origin_b = pair.origin_b - distance * direction_in_common_frame(pair, q.axis.normal);
+}
+
+// The overlap of a pair whose planes have been found, with its centroid in the common frame.
+template <bool two_sided, class T, class Found>
+BC_INLINE Mask<T> overlap_of(const Query<T>& q, const Pressed<T>& pressed,
+                             const planes::PairOfBoxes<T>& boxes, Found& found) {
+  const Pair<T>& pair = q.pair;
+  T depth = max(-q.axis.separation, depth_floor * pair.size);
+  Mask<T> certain = overlap_by_planes<two_sided>(pair, boxes, depth, found);
+  found.centroid =
+      components<T>(planes::one_of<T>(boxes.p_is_a, pair.origin_a, pressed.origin_b) +
+                    planes::one_of<T>(boxes.p_is_a, pair.axes_a, pair.axes_b) *
+                        triple(found.centroid));
+  return certain;
+}
+
+// What is not certain of a single pair: once more about the centroid that was found, because sums
+// about a point far from a thin overlap cancel. Or by clipping.
+template <class Found>
+[[gnu::noinline]] void solve_uncertain(Query<double> q, const Vec<double>& near, Found& found,
+                                       Counts& counts) {
+  bool moved = (depth_floor * q.pair.size + q.axis.separation > 0.0) & q.touching;
+  Pressed<double> pressed{q.pair.offset_a, q.pair.offset_b, q.pair.origin_b, moved, moved};
+  if (moved) press(q, pressed);
+  planes::PairOfBoxes<double> boxes(q.pair, q.axis);
+  planes::find_planes(q.pair, q.axis, pressed.offset_a, pressed.offset_b, boxes);
+  Columns<double> to_p = transpose(boxes.p_is_a ? q.pair.axes_a : q.pair.axes_b);
+  Triple<double> origin = boxes.p_is_a ? q.pair.origin_a : pressed.origin_b;
+  planes::move_origin(boxes, to_p * (triple(near) - origin));
+  if (!pressed.too_shallow && overlap_of<true>(q, pressed, boxes, found)) return;
+  ++counts.clipped;
+  enforce_minimum_depth(q.pair, q.axis);
+  Moments<double> clipped = clipped_overlap(q.pair, int(q.axis.face), moved);
+  clipped.centroid = components<double>(point_in_common_frame(q.pair, triple(clipped.centroid)));
+  set_lane(found, 0, clipped);
+}
+
+// The overlaps of the chosen lanes, whose planes have been found.
+template <bool two_sided, class T, class Found>
+BC_INLINE void solve_overlaps(const Query<T>& q, const Pressed<T>& pressed,
+                              const planes::PairOfBoxes<T>& boxes, unsigned chosen, Found& found,
+                              Counts& counts) {
+  unsigned certain = bits(overlap_of<two_sided>(q, pressed, boxes, found));
+  unsigned uncertain = chosen & (bits(pressed.too_shallow) | ~certain);
+  for (; uncertain; uncertain &= uncertain - 1) {
+    int i = __builtin_ctz(uncertain);
+    LaneOf<Found> one;
+    solve_uncertain(lane(q, i), lane(found.centroid, i), one, counts);
+    copy_lane(found, i, one);
+  }
+}
+// Not inlined, and with boxes of its own: those of the caller stay in registers.
+template <class T, class Found>
+[[gnu::noinline]] void solve_two_sided(const Query<T>& q, const Pressed<T>& pressed,
+                                       const planes::PairOfBoxes<T>& boxes, Found& found,
+                                       Counts& counts) {
+  solve_overlaps<true>(q, pressed, boxes, bits(q.touching), found, counts);
+}
+
+// The overlaps by planes of the pairs that touch. Of W pairs those that have two planes across an axis
+// of a box are left, unless they are most, or `all` are wanted. Returns which are left.
+template <class T, class Found>
+[[gnu::noinline]] unsigned solve_by_planes(const Query<T>& q, bool all, Found& found,
+                                           Counts& counts) {
+  const Pair<T>& pair = q.pair;
+  Mask<T> moved = (depth_floor * pair.size + q.axis.separation > 0.0) & q.touching;
+  Pressed<T> pressed{pair.offset_a, pair.offset_b, pair.origin_b, moved, moved};
+  if (any(moved)) press(q, pressed);
+  planes::PairOfBoxes<T> boxes(pair, q.axis);
+  planes::find_planes(pair, q.axis, pressed.offset_a, pressed.offset_b, boxes);
+  unsigned touching = bits(q.touching);
+  unsigned two_sided = bits(any_of(boxes.p.both | boxes.q.both)) & touching;
+  if (all || 2 * __builtin_popcount(two_sided) > __builtin_popcount(touching)) {
+    planes::PairOfBoxes<T> own = boxes;
+    solve_two_sided(q, pressed, own, found, counts);
+    return 0;
+  }
+  solve_overlaps<false>(q, pressed, boxes, touching & ~two_sided, found, counts);
+  return two_sided;
+}
+
+// A model has four members for lanes T:
+//
+//   Found<T>: what it finds of an overlap: `Moments<T>`, or `PointAndVolume<T>`.
+//   group<T>: how many queries it takes at once.
+//   Rest: the model to which it leaves pairs, or void.
+//   leaves_to_exact: whether those are counted as left to another model.
+//
+// And `solve(queries, found, left, counts)` fills `found` for the pairs that touch, with the centroid
+// in the common frame. It sets the bits in `left` of those that it leaves.
+
+// Pairs that have two planes across an axis of a box.
+template <template <class> class FoundOf>
+struct TwoSidedModelOf {
+  template <class T>
+  using Found = FoundOf<T>;
+  template <class T>
+  static constexpr int group = 1;
+  using Rest = void;
+  static constexpr bool leaves_to_exact = false;
+
+  template <class T>
+  BC_INLINE void solve(const Query<T> (&queries)[1], Found<T> (&found)[1], unsigned (&)[1],
+                       Counts& counts) const {
+    solve_by_planes(queries[0], true, found[0], counts);
+  }
+};
+
+// Model `exact`: the moments of A∩B by the planes that meet it, or by clipping where these are not
+// certain. `FoundOf`: Moments, or PointAndVolume.
+template <template <class> class FoundOf>
+struct ExactModelOf {
+  template <class T>
+  using Found = FoundOf<T>;
+  template <class T>
+  static constexpr int group = 1;
+  using Rest = TwoSidedModelOf<FoundOf>;
+  static constexpr bool leaves_to_exact = false;
+
+  // Few pairs of W that have two planes across an axis wait for others of their kind.
+  template <class T>
+  BC_INLINE void solve(const Query<T> (&queries)[1], Found<T> (&found)[1], unsigned (&left)[1],
+                       Counts& counts) const {
+    left[0] = solve_by_planes(queries[0], false, found[0], counts);
+  }
+};
+
+using ExactModel = ExactModelOf<Moments>;
+using ExactPointModel = ExactModelOf<PointAndVolume>;
+
+// The exact overlap of a single pair.
+inline Moments<double> exact_overlap(const Query<double>& q, Counts& counts) {
+  Moments<double> found[1];
+  unsigned left[1]{};
+  const Query<double> queries[1] = {q};
+  ExactModel{}.solve(queries, found, left, counts);
+  return found[0];
+}
+
+// All moments. What a model does not find is NaN.
+template <class T>
+BC_INLINE const Moments<T>& all_moments(const Moments<T>& found) {
+  return found;
+}
+template <class T>
+BC_INLINE Moments<T> all_moments(const PointAndVolume<T>& found) {
+  T unknown = splat<T>(not_a_number);
+  return {found.volume, found.centroid, {{unknown, unknown, unknown, unknown, unknown, unknown}}};
+}
+
+}  // namespace box_contact::BOX_CONTACT_SET
