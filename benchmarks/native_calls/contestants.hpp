@@ -25,6 +25,7 @@ struct PlacedBox {
 struct Poses {
   std::vector<bc_pose> a, b;
   std::vector<bc_size> size_a, size_b;
+  std::vector<bc_box> box_a, box_b;
   std::vector<PlacedBox> placed_a, placed_b;
 
   explicit Poses(const char* path);

@@ -59,6 +59,8 @@ Poses::Poses(const char* path) {
   size_b = read<bc_size>(file, n);
   std::fclose(file);
   for (size_t pair = 0; pair < n; ++pair) {
+    box_a.push_back({a[pair], size_a[pair]});
+    box_b.push_back({b[pair], size_b[pair]});
     placed_a.push_back(placed(a[pair], size_a[pair]));
     placed_b.push_back(placed(b[pair], size_b[pair]));
   }

@@ -23,18 +23,16 @@ struct Found {
 };
 
 void add(const Poses& poses, size_t calls, bc_model model, bc_patch patch, Contestants& all) {
-  bc_options options = BC_DEFAULT_OPTIONS;
-  options.model = model;
-  bc_solver* solver;
-  if (bc_solver_create(&poses.size_a[0], &poses.size_b[0], &options, &solver) != BC_OK)
-    fail(bc_error_text());
+  bc_query query = bc_default_query();
+  query.model = model;
+  query.patch = patch;
   std::string name = model == BC_EXACT ? "exact" : "mlp";
   name += patch == BC_VOLUME ? " volume" : " covariance";
 
   bc_contact& contact = *new bc_contact;
   auto call = [=, &poses, &contact](size_t i) {
-    // call: bc_solve
-    bc_solve(solver, &poses.a[i], &poses.b[i], &poses.size_a[i], &poses.size_b[i], patch, &contact);
+    // call: bc_collide
+    bc_collide(&poses.box_a[i], &poses.box_b[i], &query, &contact);
     // end of call
     return contact.separation;
   };
@@ -42,9 +40,10 @@ void add(const Poses& poses, size_t calls, bc_model model, bc_patch patch, Conte
 
   Found& found = *new Found(poses.count());
   auto batch = [=, &poses, &found](size_t) {
-    // call: bc_solve_rows
-    bc_rows rows = {sizeof rows,         int64_t(poses.count()), poses.a.data(), poses.b.data(),
-                    poses.size_a.data(), poses.size_b.data(),    nullptr,        0};
+    // call: bc_collide_rows
+    int64_t n = int64_t(poses.count());
+    bc_rows rows = {sizeof rows,         n, n, poses.a.data(), poses.b.data(), poses.size_a.data(),
+                    poses.size_b.data(), n, n, nullptr};
     double* covariance = patch == BC_VOLUME ? nullptr : found.covariance.data();
     bc_results results = {sizeof results,
                           found.colliding.get(),
@@ -54,7 +53,7 @@ void add(const Poses& poses, size_t calls, bc_model model, bc_patch patch, Conte
                           found.volume.data(),
                           covariance,
                           nullptr};
-    bc_solve_rows(solver, &rows, &results, 1, nullptr);
+    bc_collide_rows(&rows, &query, &results, 1, nullptr);
     // end of call
   };
   all.push_back({name + ", batch", poses.count(), batch, [=, &found](size_t pair) {

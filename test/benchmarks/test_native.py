@@ -75,7 +75,7 @@ def test_quick_run(tmp_path: Path) -> None:
     assert {row['set'] for row in rows} == {*SETS, *LOADS, *FLUSH, native.MIXED}
     assert {row['by_unit'] for row in rows if row['contestant'] == native.UNIT} == {'1'}
     text = (tmp_path / 'native.md').read_text('utf-8')
-    for call in ('bc_solve(', 'bc_solve_rows(', 'mj_geomDistance(', 'box_box('):
+    for call in ('bc_collide(', 'bc_collide_rows(', 'mj_geomDistance(', 'box_box('):
         assert call in text
 
 

@@ -22,7 +22,6 @@
 using box_contact::Contact;
 using box_contact::Pose;
 using box_contact::Size;
-using box_contact::Solver;
 
 namespace {
 
@@ -59,19 +58,20 @@ Pairs read_pairs(const char* path) {
 }
 
 // Print the single calls of a model. Returns how many differ from their row of a batch.
-long print_answers(const Pairs& pairs, bc_model model) {
+long print_answers(const Pairs& pairs, box_contact::Model model) {
   const long count = long(pairs.poses_a.size());
-  const Solver solver({1, 1, 1}, {1, 1, 1}, Solver::Options{model, "", 0.0});
+  const box_contact::Query query{model};
   std::unique_ptr<bool[]> colliding(new bool[count]);
   std::vector<double> separation(count), normal(3 * count), point(3 * count), volume(count),
       covariance(9 * count);
   box_contact::Results results{colliding.get(), separation.data(), normal.data(),
                                point.data(),    volume.data(),     covariance.data()};
-  long different = solver.batch({pairs.poses_a, pairs.poses_b, pairs.sizes_a, pairs.sizes_b},
-                                results, 2) != -1;
+  long different = box_contact::collide(
+                       {pairs.poses_a, pairs.poses_b, pairs.sizes_a, pairs.sizes_b}, results, query,
+                       2) != -1;
   for (long row = 0; row < count; ++row) {
-    const Contact one = solver(pairs.poses_a[row], pairs.poses_b[row], pairs.sizes_a[row],
-                               pairs.sizes_b[row]);
+    const Contact one = box_contact::collide({pairs.poses_a[row], pairs.sizes_a[row]},
+                                             {pairs.poses_b[row], pairs.sizes_b[row]}, query);
     different += one.colliding != colliding[row] ||
                  !same_bits(&one.separation, &separation[row], 1) ||
                  !same_bits(one.normal, &normal[3 * row], 3) ||
@@ -89,7 +89,8 @@ long print_answers(const Pairs& pairs, bc_model model) {
 int main(int argc, char** argv) {
   if (argc != 2) return 2;
   const Pairs pairs = read_pairs(argv[1]);
-  const long different = print_answers(pairs, BC_EXACT) + print_answers(pairs, BC_MLP);
+  const long different = print_answers(pairs, box_contact::Model::exact) +
+                         print_answers(pairs, box_contact::Model::mlp);
   if (different) std::fprintf(stderr, "%ld rows differ from their single calls\n", different);
   return different != 0;
 }

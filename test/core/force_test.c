@@ -18,23 +18,21 @@ static void check(bool holds, const char* what) {
 }
 
 static const bc_body body = {20000.0, {21000.0, 260000.0, 255000.0}, {0.0, 0.0, 0.0}, false};
-static const bc_size size = {{12.192, 2.438, 2.591}};
-static const bc_pose stack = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 1.0}};
+static const bc_box stack = {{{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 1.0}}, {{12.192, 2.438, 2.591}}};
 
 static void drop(void) {
   bc_loop loop = BC_DEFAULT_LOOP;
   loop.latency = 0.002;
   bc_law* law;
-  bc_solver* solver;
   check(bc_law_create(&body, 1, &loop, &law) == BC_OK, "create");
-  check(bc_solver_create(&size, &size, NULL, &solver) == BC_OK, "solver");
   bc_pose load = {{0.3, 0.1, 2.601}, {0.001, 0.002, 0.003, 1.0}}, asked = load;
   bc_velocity velocity = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
   bc_wrench wrench;
   bc_touch touch = {.pair = 7, .a = 0, .b = -1}, late = touch;
   for (int step = 0; step < 2000; ++step) {
     if (step % 5 == 0) {
-      bc_solve(solver, &load, &stack, NULL, NULL, BC_COVARIANCE, &late.contact);
+      bc_box box = {load, stack.size};
+      bc_collide(&box, &stack, NULL, &late.contact);
       asked = load;
     }
     if (step % 5 == 2) {
@@ -60,7 +58,6 @@ static void drop(void) {
   check(wrench.force[2] > 1e5, "the copy");
   bc_law_destroy(copy);
   bc_law_destroy(law);
-  bc_solver_destroy(solver);
 }
 
 static void check_refusals(void) {
@@ -76,12 +73,12 @@ static void check_refusals(void) {
   check(bc_law_create(&body, 1, NULL, &law) == BC_OK, "the usual loop");
   check(bc_law_frequency(law) == 450.0, "its frequency");
   check(bc_law_hold(law, touches, 1, NULL) == BC_BAD_ARGUMENT, "no poses");
-  check(bc_law_hold(law, touches, 2, &stack) == BC_BAD_ARGUMENT, "a pair that comes twice");
+  check(bc_law_hold(law, touches, 2, &stack.pose) == BC_BAD_ARGUMENT, "a pair that comes twice");
   touches[1].a = 1;
-  check(bc_law_hold(law, touches + 1, 1, &stack) == BC_BAD_ARGUMENT, "no such body");
+  check(bc_law_hold(law, touches + 1, 1, &stack.pose) == BC_BAD_ARGUMENT, "no such body");
   touches[1].a = -1;
-  check(bc_law_hold(law, touches + 1, 1, &stack) == BC_BAD_ARGUMENT, "two fixed boxes");
-  check(bc_law_wrenches(NULL, &stack, NULL, NULL) == BC_BAD_ARGUMENT, "no law");
+  check(bc_law_hold(law, touches + 1, 1, &stack.pose) == BC_BAD_ARGUMENT, "two fixed boxes");
+  check(bc_law_wrenches(NULL, &stack.pose, NULL, NULL) == BC_BAD_ARGUMENT, "no law");
   bc_law_destroy(law);
   bc_law_destroy(NULL);
   bc_law_reset(NULL);

@@ -28,7 +28,7 @@ BUILDS: dict[str, tuple[str, tuple[str, ...]]] = {
 def compile_library(compiler: str, folder: Path) -> Path:
     """Return the program `answers`, with the library in it."""
     sources = [Path(__file__).with_name('answers.cpp'), *(
-        CORE / 'src' / 'library' / f'{name}.cpp' for name in ('kernel', 'library', 'force'))]
+        CORE / 'src' / f'{name}.cpp' for name in ('kernel', 'library/library', 'library/force'))]
     objects = [folder / f'{source.stem}.o' for source in sources]
 
     def run(*words: object) -> None:

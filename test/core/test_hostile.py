@@ -9,17 +9,16 @@ interface is called from here.
 from __future__ import annotations
 
 import ctypes
-import os
 import sys
 import sysconfig
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from ctypes import byref, c_double, c_int64, c_void_p
 from pathlib import Path
 
 import hostile_calls
 import numpy as np
 import pytest
-from test_library import BAD_WEIGHTS, LIBRARY, Options, Results, Rows, Size, run, tool
+from test_library import LIBRARY, Query, Results, Rows, run, tool
 
 from box_contact_ros.core import native
 
@@ -51,7 +50,7 @@ def test_with_sanitizers(tmp_path: Path) -> None:
         '-fsanitize=address,undefined,float-cast-overflow', '-fno-sanitize-recover=all',
         '-DBOX_CONTACT_VERSION=""', '-ffp-contract=off', '-fno-tree-slp-vectorize',
         f'-I{sysconfig.get_path("include")}', f'-I{np.get_include()}', CORE / 'binding/module.cpp',
-        *(CORE / 'src' / 'library' / f'{name}.cpp' for name in ('kernel', 'library', 'force')),
+        *(CORE / 'src' / f'{name}.cpp' for name in ('kernel', 'library/library', 'library/force')),
         '-o', extension)
     libraries = [run('g++', f'-print-file-name=lib{name}.so').strip() for name in ('asan', 'ubsan')]
     assert min(attack(37, 5000, EXTENSION=str(extension), LD_PRELOAD=' '.join(libraries),
@@ -62,24 +61,14 @@ def test_with_sanitizers(tmp_path: Path) -> None:
 
 
 class CLibrary(ctypes.CDLL):
-    """libbox_contact with a solver, a law, and what they are asked of."""
+    """libbox_contact with a law."""
 
     def __init__(self) -> None:
         super().__init__(str(LIBRARY))
         self.bc_error_text.restype = ctypes.c_char_p
-        self.size, self.solver, self.law = Size((c_double * 3)(1, 1, 1)), c_void_p(), c_void_p()
-        assert self.bc_solver_create(byref(self.size), byref(self.size), None,
-                                     byref(self.solver)) == 0
+        self.law = c_void_p()
         assert self.bc_law_create((c_double * 8)(1, 1, 1, 1), c_int64(1), None,
                                   byref(self.law)) == 0
-
-    def refused(self, options: Options) -> int:
-        """Return the status of making a solver that must not be made."""
-        made = c_void_p()
-        status: int = self.bc_solver_create(byref(self.size), byref(self.size), byref(options),
-                                            byref(made))
-        assert not made
-        return status
 
 
 @pytest.fixture(scope='module')
@@ -91,11 +80,10 @@ def test_null_pointers(library: CLibrary) -> None:
     """In the place of each argument that must not be one."""
     pose, contact, rows = (c_double * 7)(0, 0, 0, 0, 0, 0, 1), (c_double * 64)(), Rows()
     rows.size, results = ctypes.sizeof(Rows), Results(ctypes.sizeof(Results))
-    made, wrench, size = c_void_p(), (c_double * 6)(), byref(library.size)
+    made, wrench, box = c_void_p(), (c_double * 6)(), (c_double * 10)(*[0.0] * 6, *[1.0] * 4)
     calls: list[tuple[Callable[..., int], list[object], set[int]]] = [
-        (library.bc_solver_create, [size, size, None, byref(made)], {0, 1, 3}),
-        (library.bc_solve, [library.solver, pose, pose, None, None, 2, contact], {0, 1, 2, 6}),
-        (library.bc_solve_rows, [library.solver, byref(rows), byref(results), 1, None], {0, 1, 2}),
+        (library.bc_collide, [box, box, None, contact], {0, 1, 3}),
+        (library.bc_collide_rows, [byref(rows), None, byref(results), 1, None], {0, 2}),
         (library.bc_law_create, [(c_double * 8)(1, 1, 1, 1), c_int64(1), None, byref(made)],
          {0, 3}),
         (library.bc_law_copy, [library.law, byref(made)], {0, 1}),
@@ -107,48 +95,22 @@ def test_null_pointers(library: CLibrary) -> None:
             changed = [None if place == k else value for k, value in enumerate(given)]
             assert call(*changed) == BAD_ARGUMENT, (call.__name__, place)
             assert b'is a null pointer' in library.bc_error_text()
-    for name in ('bc_solver_destroy', 'bc_law_destroy', 'bc_law_reset', 'bc_law_frequency'):
+    for name in ('bc_law_destroy', 'bc_law_reset', 'bc_law_frequency'):
         getattr(library, name)(None)
 
 
 def test_numbers_of_nothing(library: CLibrary) -> None:
     """A patch, a model, or a count that there is not."""
-    pose, contact = (c_double * 7)(0, 0, 0, 0, 0, 0, 1), (c_double * 64)(*[7.0] * 64)
-    for patch in (3, -1, 2**31 - 1):
-        assert library.bc_solve(library.solver, pose, pose, None, None, patch, contact) == (
-            BAD_ARGUMENT)
+    box, contact = (c_double * 10)(*[0.0] * 6, *[1.0] * 4), (c_double * 64)(*[7.0] * 64)
+    wrong = [{'patch': patch} for patch in (3, -1, 2**31 - 1)]
+    wrong += [{'model': model} for model in (2, -1)]
+    for fields in wrong:
+        query = Query.of(**fields)
+        assert library.bc_collide(box, box, byref(query), contact) == BAD_ARGUMENT
     assert set(contact) == {7.0}
-    for model in (2, -1):
-        assert library.refused(Options(ctypes.sizeof(Options), model, None, 0.0)) == BAD_ARGUMENT
     for count in (-1, -2**63, 2**57, 2**62, 2**63 - 1):
-        rows = Rows(ctypes.sizeof(Rows), count, pose, pose, None, None, None, 1)
+        rows = Rows(ctypes.sizeof(Rows), count, 1, box, box, box, box, 1, 1, None)
         results, refused = Results(ctypes.sizeof(Results)), c_int64()
-        assert library.bc_solve_rows(library.solver, byref(rows), byref(results), 1,
-                                     byref(refused)) == BAD_ARGUMENT
+        assert library.bc_collide_rows(byref(rows), None, byref(results), 1,
+                                       byref(refused)) == BAD_ARGUMENT
         assert refused.value == -1
-
-
-@pytest.fixture(params=['a FIFO', 'a folder', 'zeros without end', 'too large'])
-def no_weights(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[tuple[Path, str]]:
-    """Return the path of something that holds no weights, and the library's words for it."""
-    path, words = tmp_path / 'weights.safetensors', 'is no regular file'
-    if request.param == 'a FIFO':
-        os.mkfifo(path)
-    elif request.param == 'a folder':
-        path.mkdir()
-    elif request.param == 'zeros without end':
-        path = Path('/dev/zero')
-    else:
-        words = 'is larger than 16 MiB'
-        path.touch()
-        os.truncate(path, 2**40)
-    yield path, words
-
-
-@pytest.mark.timeout(60)
-def test_what_is_no_weights_file(library: CLibrary, no_weights: tuple[Path, str]) -> None:
-    """Nothing waits, and no more than the limit is read."""
-    path, words = no_weights
-    options = Options(ctypes.sizeof(Options), 1, os.fsencode(path), 0.0)
-    assert library.refused(options) == BAD_WEIGHTS
-    assert library.bc_error_text().decode() == f'weights file {path} {words}'

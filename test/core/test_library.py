@@ -18,7 +18,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from ctypes import POINTER, byref, c_bool, c_char_p, c_double, c_int, c_int32, c_int64, c_size_t
+from ctypes import POINTER, byref, c_bool, c_double, c_int, c_int32, c_int64, c_size_t
 from pathlib import Path
 
 import numpy as np
@@ -28,7 +28,6 @@ from poses import Pairs
 
 from box_contact_ros import Body, ContactSolver, HeldPatch
 from box_contact_ros.core import FORCE, instruction_sets, native
-from box_contact_ros.resources import resource_path
 from box_contact_ros.scene.pose import rotation_matrix
 from box_contact_ros.solver.contact import Contacts
 
@@ -37,7 +36,6 @@ CORE = Path(native.__file__).resolve().parent
 LIBRARY = CORE / 'libbox_contact.so'
 INCLUDES = f'-I{CORE / "include"}'
 EXAMPLE = ROOT / 'docs' / 'examples' / 'cpp'
-WEIGHTS = resource_path('weights', 'mlp.safetensors')
 STRICT = ('-Wall', '-Wextra', '-Werror', '-pedantic')
 EXAMPLE_SAYS = [
     'height 2.600 m: no contact, gap 0.009 m',
@@ -71,29 +69,27 @@ def test_a_c_program(tmp_path: Path) -> None:
     run(tool('gcc'), '-std=c11', *STRICT, INCLUDES, ROOT / 'test/core/library_test.c',
         LIBRARY, f'-Wl,-rpath,{CORE}', '-lm', '-o', program)
     for name in instruction_sets():
-        assert run(program, WEIGHTS, **{FORCE: name}).endswith(f', {name}: 0 failures\n')
-    assert subprocess.run([program, WEIGHTS], env={FORCE: 'none'}).returncode == 1
+        assert run(program, **{FORCE: name}).endswith(f', {name}: 0 failures\n')
+    assert subprocess.run([program], env={FORCE: 'none'}).returncode == 1
 
 
-class Size(ctypes.Structure):
-    """`bc_size`."""
+class Query(ctypes.Structure):
+    """`bc_query`."""
 
-    _fields_ = [('extent', c_double * 3)]
+    _fields_ = [('size', c_size_t), ('model', c_int), ('patch', c_int), ('margin', c_double)]
 
-
-class Options(ctypes.Structure):
-    """`bc_options`."""
-
-    _fields_ = [('size', c_size_t), ('model', c_int), ('weights', c_char_p), ('margin', c_double)]
+    @classmethod
+    def of(cls, model: int = 0, patch: int = 2, margin: float = 0.0) -> Query:
+        return cls(ctypes.sizeof(cls), model, patch, margin)
 
 
 class Rows(ctypes.Structure):
     """`bc_rows`."""
 
-    _fields_ = [('size', c_size_t), ('count', c_int64), ('poses_a', POINTER(c_double)),
-                ('poses_b', POINTER(c_double)), ('sizes_a', POINTER(c_double)),
-                ('sizes_b', POINTER(c_double)), ('pairs', POINTER(c_int64)),
-                ('pose_count', c_int64)]
+    _fields_ = [('size', c_size_t), ('count', c_int64), ('pose_count', c_int64),
+                *((name, POINTER(c_double)) for name in (
+                    'poses_a', 'poses_b', 'sizes_a', 'sizes_b')),
+                ('size_count_a', c_int64), ('size_count_b', c_int64), ('pairs', POINTER(c_int64))]
 
 
 class Results(ctypes.Structure):
@@ -113,24 +109,20 @@ def library() -> ctypes.CDLL:
 def by_ctypes(library: ctypes.CDLL, model: str, pairs: Pairs, threads: int = 1,
               places: np.ndarray | None = None) -> Contacts:
     """Return what the library says of rows with sizes of their own."""
-    options = Options(ctypes.sizeof(Options), model == 'mlp', os.fsencode(WEIGHTS), 0.0)
-    solver = ctypes.c_void_p()
-    unit = Size((c_double * 3)(1, 1, 1))
-    assert library.bc_solver_create(byref(unit), byref(unit), byref(options), byref(solver)) == 0
-
     def at(array: np.ndarray, kind: type) -> object:
         return array.ctypes.data_as(POINTER(kind))
 
-    count = len(pairs.pose_a if places is None else places)
+    poses = len(pairs.pose_a)
+    count = poses if places is None else len(places)
     found = Contacts(np.empty(count, bool), np.empty(count), np.empty((count, 3)),
                      np.empty((count, 3)), np.empty(count), np.empty((count, 3, 3)),
                      np.empty(count, np.int32))
-    rows = Rows(ctypes.sizeof(Rows), count, *(at(part, c_double) for part in pairs),
-                None if places is None else at(places, c_int64), len(pairs.pose_a))
+    rows = Rows(ctypes.sizeof(Rows), count, poses, *(at(part, c_double) for part in pairs), poses,
+                poses, None if places is None else at(places, c_int64))
     results = Results(ctypes.sizeof(Results), at(found.colliding, c_bool),
                       *(at(field, c_double) for field in found[1:-1]), at(found.axis, c_int32))
-    assert library.bc_solve_rows(solver, byref(rows), byref(results), threads, None) == 0
-    library.bc_solver_destroy(solver)
+    query = Query.of(model=int(model == 'mlp'))
+    assert library.bc_collide_rows(byref(rows), byref(query), byref(results), threads, None) == 0
     return found
 
 
@@ -159,7 +151,7 @@ def test_other_languages_get_the_bits_of_python(library: ctypes.CDLL, model: str
 
 @pytest.mark.parametrize('source', ['force_test.c', 'force_test.cpp'])
 def test_the_law_has_the_bits_of_python(tmp_path: Path, source: str) -> None:
-    """A load that is dropped and pushed: 2,000 steps in C, in C++ and here; the default model."""
+    """A load that is dropped and pushed: 2,000 steps in C, in C++ and here."""
     compiler, standard = ('gcc', 'c11') if source.endswith('.c') else ('g++', 'c++17')
     program = tmp_path / 'force_test'
     run(tool(compiler), f'-std={standard}', '-O2', '-ffp-contract=off', *STRICT,
@@ -168,7 +160,7 @@ def test_the_law_has_the_bits_of_python(tmp_path: Path, source: str) -> None:
     *found, failures, _ = run(program).split()
     assert failures == '0'
     size = (12.192, 2.438, 2.591)
-    solver = ContactSolver(size, size)
+    solver = ContactSolver(size, size, model='exact')
     law = HeldPatch.at_rate(Body(mass=20000.0, inertia=(21000.0, 260000.0, 255000.0)),
                             rate_hz=200.0, latency=0.002)
     stack, velocity = np.array([0, 0, 0, 0, 0, 0, 1.0]), np.zeros(6)
@@ -193,7 +185,7 @@ def test_the_interface_alone_is_exported() -> None:
     """Nothing of the library meets a program's own names."""
     names = {line.split()[-1] for line in run(
         tool('nm'), '-D', '--defined-only', LIBRARY).splitlines()}
-    assert 'bc_solve' in names and all(name.startswith('bc_') for name in names)
+    assert 'bc_collide' in names and all(name.startswith('bc_') for name in names)
 
 
 # --- how programs find it -------------------------------------------------------------------------
@@ -216,8 +208,9 @@ def test_without_exceptions(tmp_path: Path) -> None:
     source, program = tmp_path / 'one.cpp', tmp_path / 'one'
     source.write_text('#include "box_contact/box_contact.hpp"\n'
                       'int main(int argc, char**) {\n'
-                      '  return box_contact::Solver({1, 1, 1}, {1, 1, 2.0 - argc})'
-                      '({{0, 0, 0}, {0, 0, 0, 1}}, {{0, 0, 1}, {0, 0, 0, 1}}).colliding - 1;\n}\n')
+                      '  box_contact::Box a{{{0, 0, 0}, {0, 0, 0, 1}}, {1, 1, 1}}, b = a;\n'
+                      '  b.size.extent[2] = 2.0 - argc;\n'
+                      '  return box_contact::collide(a, b).colliding - 1;\n}\n')
     run(tool('g++'), '-std=c++17', *STRICT, '-fno-exceptions', '-fno-rtti', INCLUDES,
         source, LIBRARY, f'-Wl,-rpath,{CORE}', '-o', program)
     assert run(program) == ''
@@ -270,21 +263,20 @@ ROWS = """
 using namespace box_contact;
 
 int main() {
-  const Solver solver({1, 1, 1}, {1, 1, 1});
   const std::vector<Pose> poses{{{0, 0, 0}, {0, 0, 0, 1}}, {{0, 0, 2.5}, {0, 0, 0, 1}}};
   const std::vector<Size> sizes{{2, 2, 2}, {4, 4, 4}};
   std::vector<std::int64_t> pairs{1, 0};
   std::vector<double> separation(2, 7.0);
   Results results;
   results.separation = separation.data();
-  const auto refused = solver.batch({poses, poses, sizes, sizes, pairs}, results);
+  const auto refused = collide({poses, poses, sizes, sizes, pairs}, results);
   std::printf("%d %g %g\\n", int(refused), separation[0], separation[1]);
-  solver.batch({poses, poses, sizes, sizes, std::vector<std::int64_t>()}, results);
+  collide({poses, poses, sizes, sizes, std::vector<std::int64_t>()}, results);
   std::printf("%g %g\\n", separation[0], separation[1]);
-  solver.batch({poses, poses, sizes, sizes}, results);
+  collide({poses, poses, sizes, sizes}, results);
   std::printf("%g %g\\n", separation[0], separation[1]);
   try {
-    solver.batch({poses, poses, sizes, std::vector<Size>()}, results);
+    collide({poses, poses, sizes, std::vector<Size>()}, results);
   } catch (const std::invalid_argument& error) {
     std::puts(error.what());
   }
@@ -295,13 +287,13 @@ int main() {
 def test_rows_by_place(tmp_path: Path) -> None:
     """Sizes go with poses; a tick without near pairs has no rows, and not all of them.
 
-    No sizes where some were meant are refused, and are not the solver's.
+    No sizes are refused.
     """
     (tmp_path / 'rows.cpp').write_text(ROWS)
     run(tool('g++'), '-std=c++17', *STRICT, INCLUDES, tmp_path / 'rows.cpp', LIBRARY,
         f'-Wl,-rpath,{CORE}', '-o', tmp_path / 'rows')
     assert run(tmp_path / 'rows') == (
-        '-1 -0.5 7\n-0.5 7\n-2 -4\nposes_a, poses_b and sizes must be equally many\n')
+        '-1 -0.5 7\n-0.5 7\n-2 -4\nsizes must be one, or one for each pose, not 0\n')
 
 
 def test_a_debug_build_is_as_fast(tmp_path: Path) -> None:
@@ -405,8 +397,8 @@ def test_a_machine_without_avx_takes_the_baseline(tmp_path: Path) -> None:
     emulator = tool('qemu-x86_64')
     run(tool('gcc'), '-std=c11', INCLUDES, ROOT / 'test/core/library_test.c', LIBRARY,
         f'-Wl,-rpath,{CORE}', '-lm', '-o', program)
-    assert run(emulator, '-cpu', 'Nehalem', program, WEIGHTS).endswith(', baseline: 0 failures\n')
-    done = subprocess.run([emulator, '-cpu', 'Nehalem', program, WEIGHTS], text=True,
+    assert run(emulator, '-cpu', 'Nehalem', program).endswith(', baseline: 0 failures\n')
+    done = subprocess.run([emulator, '-cpu', 'Nehalem', program], text=True,
                           env=os.environ | {FORCE: 'avx2'}, capture_output=True)
     assert 'BOX_CONTACT_INSTRUCTION_SET is none of: baseline' in done.stdout
 
@@ -475,74 +467,6 @@ def test_the_winning_axis(model: str) -> None:
         assert np.abs((along * found.normal).sum(axis=1)[edges]).max() < 1e-6
     one = ContactSolver(pairs.size_a[0], pairs.size_b[0], model=model)
     assert one(pairs.pose_a[0], pairs.pose_b[0]).axis == found.axis[0]
-
-
-def damaged(change: str) -> bytes:
-    """Return the shipped weights file with one thing that a damaged or hostile file may have."""
-    data = WEIGHTS.read_bytes()
-    length = int.from_bytes(data[:8], 'little')
-    header, tensors = data[8:8 + length].decode(), data[8 + length:]
-    if change == 'header longer than any file':
-        return (2**63).to_bytes(8, 'little') + data[8:]
-    if change == 'shape whose product overflows':
-        entries = json.loads(header)
-        entries['share.0.bias'] |= {'shape': [2**62], 'data_offsets': [4, 4]}
-        header = json.dumps(entries, separators=(',', ':'))
-    if change == 'tensors missing':
-        tensors = b''
-    if change in OTHER_WORDS:
-        before, after = OTHER_WORDS[change]
-        assert before in header
-        header = header.replace(before, after)
-    if change in OTHER_WEIGHTS:
-        tensors = np.array(OTHER_WEIGHTS[change], '<f4').tobytes() * (len(tensors) // 4)
-    return len(header).to_bytes(8, 'little') + header.encode() + tensors
-
-
-OTHER_WORDS = {'another name': ('share.1.weight', 'share.1.height'),
-               'another type': ('"F32"', '"I32"'), 'another shape': ('"shape":[1]', '"shape":[2]'),
-               'another format': (r'\"format\": 3', r'\"format\": 2')}
-OTHER_WEIGHTS = {'not a number': np.nan, 'infinite': np.inf, 'too large': -2e4}
-
-
-@pytest.mark.parametrize('change', ['header longer than any file', 'shape whose product overflows',
-                                    'tensors missing', *OTHER_WORDS, *OTHER_WEIGHTS])
-def test_damaged_weights_are_refused(library: ctypes.CDLL, tmp_path: Path, change: str) -> None:
-    path = tmp_path / 'weights.safetensors'
-    path.write_bytes(damaged(change))
-    assert status_with(library, path) == BAD_WEIGHTS
-
-
-def test_endless_weights_are_refused(library: ctypes.CDLL) -> None:
-    assert status_with(library, Path('/dev/zero')) == BAD_WEIGHTS
-
-
-def test_the_compiled_network_is_the_default(library: ctypes.CDLL) -> None:
-    """Without options: the bits of Python's default."""
-    pairs = some_pairs().first(500)
-    unit, solver = Size((c_double * 3)(1, 1, 1)), ctypes.c_void_p()
-    assert library.bc_solver_create(byref(unit), byref(unit), None, byref(solver)) == 0
-    points = np.empty((500, 3))
-    rows = Rows(ctypes.sizeof(Rows), 500, *(part.ctypes.data_as(POINTER(c_double))
-                                            for part in pairs), None, 500)
-    results = Results(size=ctypes.sizeof(Results), point=points.ctypes.data_as(POINTER(c_double)))
-    assert library.bc_solve_rows(solver, byref(rows), byref(results), 1, None) == 0
-    library.bc_solver_destroy(solver)
-    wanted = ContactSolver((1, 1, 1), (1, 1, 1)).batch(
-        *pairs[:2], size_a=pairs.size_a, size_b=pairs.size_b)
-    assert np.array_equal(points, wanted.point, equal_nan=True)
-
-
-BAD_WEIGHTS = 5
-
-
-def status_with(library: ctypes.CDLL, weights: Path) -> int:
-    """Return the status of making a solver with a weights file."""
-    options = Options(ctypes.sizeof(Options), 1, os.fsencode(weights), 0.0)
-    unit, solver = Size((c_double * 3)(1, 1, 1)), ctypes.c_void_p()
-    status: int = library.bc_solver_create(byref(unit), byref(unit), byref(options), byref(solver))
-    assert not solver
-    return status
 
 
 def test_refusals_name_value_and_remedy() -> None:

@@ -6,6 +6,7 @@
 // Arguments are checked here for kind and shape only. What is no plain number goes to Python, which
 // converts it or says what is wrong with it.
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstddef>
 #include <limits>
@@ -13,7 +14,7 @@
 #include <string>
 #include <vector>
 
-#include "../src/library/solver.hpp"
+#include "../src/library/batch.hpp"
 #include "../src/mlp/mlp_model.hpp"
 #include "../src/mlp/shipped_network.hpp"
 #include "arrays.hpp"  // first, as Python.h wants
@@ -141,12 +142,15 @@ bool read_pairs(PyObject* const* args, PyObject* places, PairArrays& pairs) {
   return true;
 }
 
+// Whether a weight is believed: trained ones stay below 1e2, a flipped exponent bit does not.
+bool is_weight(float number) { return std::fabs(number) <= 1e4F; }
+
 // A network from a float32 array. Leaves `network` empty for None.
 bool read_network(PyObject* object, std::vector<float>& network) {
   if (object == Py_None) return true;
   Array<float> array;
   if (!read(object, "network", {any_length}, array)) return false;
-  if (!std::all_of(array.numbers, array.numbers + array.length(0), detail::is_weight))
+  if (!std::all_of(array.numbers, array.numbers + array.length(0), is_weight))
     return fail(PyExc_ValueError, "the network has a weight that is not within -1e4 to 1e4");
   network.assign(array.numbers, array.numbers + array.length(0));
   return true;
@@ -237,8 +241,26 @@ struct ContactArrays {
 
 // --- PairSolver ---------------------------------------------------------------------------------
 
+// Who answers, for boxes of which sizes, and how many contacts took another way than most.
+struct Setup {
+  Model model = Model::exact;
+  double size_a[3], size_b[3];  // full extents [m]
+  double margin = 0.0;          // [m]
+  std::vector<float> network;   // of model `mlp`
+  std::atomic<long> clipped{0}, exact{0};
+
+  Solver solver() const { return {kernel, model, {network.data(), long(network.size())}}; }
+  Rows rows(const double* poses_a, const double* poses_b) const {
+    return {poses_a, poses_b, size_a, size_b, 0, 0, nullptr};
+  }
+  void count(const Counts& counts) {
+    if (counts.clipped) clipped += counts.clipped;
+    if (counts.exact) exact += counts.exact;
+  }
+};
+
 struct PairSolver {
-  PyObject_HEAD std::shared_ptr<Solver> solver;  // none: Python answers
+  PyObject_HEAD std::shared_ptr<Setup> setup;  // none: Python answers
   bool is_made;
 };
 
@@ -250,21 +272,31 @@ PyObject* call_method(PyObject* self, PyObject* name, PyObject* args, PyObject* 
 }
 
 PyObject* solver_call(PyObject* self, PyObject* args, PyObject* keywords) {
-  Solver* solver = self_of(self)->solver.get();
-  if (solver && !keywords && PyTuple_GET_SIZE(args) == 2) {
+  Setup* setup = self_of(self)->setup.get();
+  if (setup && !keywords && PyTuple_GET_SIZE(args) == 2) {
     double copy_a[7], copy_b[7];
     const double* a = numbers_of(PyTuple_GET_ITEM(args, 0), 7, copy_a);
     const double* b = a ? numbers_of(PyTuple_GET_ITEM(args, 1), 7, copy_b) : nullptr;
     bc_contact contact;
-    if (b && solver->solve(a, b, nullptr, nullptr, BC_COVARIANCE, contact))
+    Counts counts{};
+    if (b && detail::solve_pair(setup->solver(), setup->rows(a, b), BC_COVARIANCE, setup->margin,
+                                contact, counts)) {
+      setup->count(counts);
       return new_contact(contact);
+    }
   }
   return call_method(self, name_call_general, args, keywords);
 }
 
 // Solve rows without Python's lock. Returns the first row that is refused, or −1.
-long solve(Solver& solver, const Rows& rows, npy_intp count, const Results& results, long threads) {
-  return without_lock([&] { return solver.solve(rows, long(count), results, threads); });
+long solve(Setup& setup, const Rows& rows, npy_intp count, Results results, long threads) {
+  Counts counts{};
+  results.margin = setup.margin;
+  long refused = without_lock([&] {
+    return detail::solve_rows(setup.solver(), rows, long(count), results, threads, counts);
+  });
+  if (refused < 0) setup.count(counts);
+  return refused;
 }
 
 // What a call of `batch` asks for, if it is all plain.
@@ -275,15 +307,9 @@ struct PlainBatch {
   bool patch = true;
 
   // Returns false for what Python has to convert or to refuse.
-  bool read(PyObject* args, PyObject* keywords, const Solver& solver) {
+  bool read(PyObject* args, PyObject* keywords, const Setup& setup) {
     if (PyTuple_GET_SIZE(args) != 2) return false;
-    rows = {plain_rows(PyTuple_GET_ITEM(args, 0), count, 7),
-            nullptr,
-            solver.setup().size_a.data(),
-            solver.setup().size_b.data(),
-            0,
-            0,
-            nullptr};
+    rows = setup.rows(plain_rows(PyTuple_GET_ITEM(args, 0), count, 7), nullptr);
     if (rows.poses_a) rows.poses_b = plain_rows(PyTuple_GET_ITEM(args, 1), count, 7);
     if (!rows.poses_b) return false;
     PyObject *key, *value;
@@ -312,13 +338,13 @@ struct PlainBatch {
 };
 
 PyObject* solver_batch(PyObject* self, PyObject* args, PyObject* keywords) {
-  std::shared_ptr<Solver> solver = self_of(self)->solver;
+  std::shared_ptr<Setup> setup = self_of(self)->setup;
   PlainBatch plain;
-  if (solver && plain.read(args, keywords, *solver)) {
+  if (setup && plain.read(args, keywords, *setup)) {
     ContactArrays found;
     if (!found.make_for(plain.count, plain.patch)) return nullptr;
     long refused =
-        solve(*solver, plain.rows, plain.count, found.results(plain.patch), plain.threads);
+        solve(*setup, plain.rows, plain.count, found.results(plain.patch), plain.threads);
     if (!plain.patch) found.fill_volumes(plain.count);
     if (refused < 0) return found.release(contacts_type);
   }
@@ -333,9 +359,9 @@ bool fits(Model model, const std::vector<float>& network) {
 }
 
 // Sizes, model and network, as `PairSolver` takes them. No network: the shipped one.
-bool read_setup(PyObject* args, PyObject* keywords, Solver::Setup& setup, bool& has_model) {
+bool read_setup(PyObject* args, PyObject* keywords, Setup& setup, bool& has_model) {
   PyObject *name, *weights = Py_None;
-  double *a = setup.size_a.data(), *b = setup.size_b.data();
+  double *a = setup.size_a, *b = setup.size_b;
   static const char* names[] = {"model", "size_a", "size_b", "network", "margin", nullptr};
   if (!PyArg_ParseTupleAndKeywords(args, keywords, "O(ddd)(ddd)|Od", const_cast<char**>(names),
                                    &name, a, a + 1, a + 2, b, b + 1, b + 2, &weights,
@@ -347,7 +373,6 @@ bool read_setup(PyObject* args, PyObject* keywords, Solver::Setup& setup, bool& 
   };
   has_model = name != Py_None;
   setup.model = is("mlp") ? Model::mlp : Model::exact;
-  setup.kernel = kernel;
   if (setup.model == Model::mlp && weights == Py_None)
     setup.network.assign(std::begin(detail::shipped_network), std::end(detail::shipped_network));
   if ((is("mlp") || is("exact") || !has_model) && fits(setup.model, setup.network))
@@ -356,33 +381,33 @@ bool read_setup(PyObject* args, PyObject* keywords, Solver::Setup& setup, bool& 
 }
 
 int solver_init(PyObject* self, PyObject* args, PyObject* keywords) {
-  Solver::Setup setup{};
+  auto setup = std::make_shared<Setup>();
   bool has_model;
-  if (!read_setup(args, keywords, setup, has_model)) return -1;
+  if (!read_setup(args, keywords, *setup, has_model)) return -1;
   // Other threads may be using it.
   if (self_of(self)->is_made)
     return fail(PyExc_RuntimeError, "a solver is made once: make another"), -1;
-  if (has_model) self_of(self)->solver = std::make_shared<Solver>(std::move(setup));
+  if (has_model) self_of(self)->setup = std::move(setup);
   self_of(self)->is_made = true;
   return 0;
 }
 
 PyObject* solver_new(PyTypeObject* type, PyObject*, PyObject*) {
   PyObject* self = type->tp_alloc(type, 0);
-  if (self) new (&self_of(self)->solver) std::shared_ptr<Solver>();
+  if (self) new (&self_of(self)->setup) std::shared_ptr<Setup>();
   return self;
 }
 
 void solver_dealloc(PyObject* self) {
   PyTypeObject* type = Py_TYPE(self);
-  self_of(self)->solver.~shared_ptr();
+  self_of(self)->setup.~shared_ptr();
   type->tp_free(self);
   Py_DECREF(type);  // an object of a heap type keeps its type alive
 }
 
 PyObject* solver_solve(PyObject* self, PyObject* const* args, Py_ssize_t count) {
-  std::shared_ptr<Solver> solver = self_of(self)->solver;
-  if (count < 5 || count > 7 || !solver)
+  std::shared_ptr<Setup> setup = self_of(self)->setup;
+  if (count < 5 || count > 7 || !setup)
     return fail(PyExc_TypeError,
                 "solve(poses_a, poses_b, sizes_a, sizes_b, threads, patch=True, pairs=None)");
   PairArrays pairs;
@@ -394,19 +419,19 @@ PyObject* solver_solve(PyObject* self, PyObject* const* args, Py_ssize_t count) 
   if (!read_pairs(args, count > 6 ? args[6] : Py_None, pairs)) return nullptr;
   ContactArrays found;
   if (!found.make_for(pairs.count, patch)) return nullptr;
-  long refused = solve(*solver, pairs.rows, pairs.count, found.results(patch), threads);
+  long refused = solve(*setup, pairs.rows, pairs.count, found.results(patch), threads);
   if (!patch) found.fill_volumes(pairs.count);
   Owned contacts(found.release(&PyTuple_Type));
   return contacts ? Py_BuildValue("(Ol)", contacts.get(), refused) : nullptr;
 }
 
 PyObject* solver_clipped(PyObject* self, void*) {
-  const auto& solver = self_of(self)->solver;
-  return PyLong_FromLongLong(solver ? solver->counts().clipped : 0);
+  const auto& setup = self_of(self)->setup;
+  return PyLong_FromLong(setup ? setup->clipped.load() : 0);
 }
 PyObject* solver_exact(PyObject* self, void*) {
-  const auto& solver = self_of(self)->solver;
-  return PyLong_FromLongLong(solver ? solver->counts().exact : 0);
+  const auto& setup = self_of(self)->setup;
+  return PyLong_FromLong(setup ? setup->exact.load() : 0);
 }
 
 PyMethodDef solver_methods[] = {

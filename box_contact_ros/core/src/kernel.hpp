@@ -39,6 +39,12 @@ struct Counts {
   long contacts;
   long clipped;  // by model `exact`: clipped, because the certificate did not hold
   long exact;    // by model `mlp`: left to `exact`
+
+  void operator+=(const Counts& part) {
+    contacts += part.contacts;
+    clipped += part.clipped;
+    exact += part.exact;
+  }
 };
 
 enum class Model { exact, mlp };

@@ -41,8 +41,7 @@ int main() {
   const int count = int(masses.size());
   std::vector<Body> bodies;
   for (int i = 0; i < count; ++i) bodies.push_back(solid_box(masses[i], sizes[i]));
-  SceneLaw law(bodies, {1 / step, 0, step});      // answers at every step, used at once
-  const Solver solver(ground_size, ground_size);  // each call names other sizes
+  SceneLaw law(bodies, {1 / step, 0, step});  // answers at every step, used at once
 
   std::vector<Pose> poses{
       {{0, 0, 1.4}, {0, 0, 0, 1}}, {{0, 0, 4.1}, {0, 0, 0, 1}}, {{0, 0, 6.5}, {0, 0, 0, 1}}};
@@ -58,7 +57,7 @@ int main() {
         const Size& size_under = b == fixed ? ground_size : sizes[b];
         if (distance(poses[a], under) > radius(sizes[a]) + radius(size_under)) continue;
         const std::int64_t pair = (count + 1) * a + b + 1;  // the same number at every step
-        touches.push_back({pair, a, b, solver(poses[a], under, sizes[a], size_under)});
+        touches.push_back({pair, a, b, collide({poses[a], sizes[a]}, {under, size_under})});
       }
     }
     law.hold(touches, poses);

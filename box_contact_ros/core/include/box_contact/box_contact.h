@@ -3,21 +3,17 @@
 
 /* The C interface of libbox_contact: whether two boxes touch, where, and along which direction.
  *
- *   bc_size cube = {{1.0, 1.0, 1.0}};                                 full extents [m]
- *   bc_pose a = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 1.0}};              position, quaternion x y z w
- *   bc_pose b = {{0.0, 0.0, 0.99}, {0.0, 0.0, 0.0, 1.0}};
- *   bc_solver* solver;
+ *   bc_box a = {{{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 1.0}}, {{1.0, 1.0, 1.0}}};
+ *   bc_box b = {{{0.0, 0.0, 0.99}, {0.0, 0.0, 0.0, 1.0}}, {{1.0, 1.0, 1.0}}};
  *   bc_contact contact;
- *   if (bc_solver_create(&cube, &cube, NULL, &solver) != BC_OK) puts(bc_error_text());
- *   bc_solve(solver, &a, &b, NULL, NULL, BC_COVARIANCE, &contact);
- *   bc_solver_destroy(solver);
+ *   if (bc_collide(&a, &b, NULL, &contact) != BC_OK) puts(bc_error_text());
  *
  * Units are SI, frames are right-handed. A pose places a box's centre and axes in a frame common to
  * both boxes. Answers are in the same frame.
  *
- * Functions return BC_OK or what is wrong; `bc_error_text` says it in words. No function throws, and
- * none but `bc_solver_create` allocates memory on the way to an answer by one thread. Threads may
- * share a solver. A program needs no compiler flag.
+ * Functions return BC_OK or what is wrong; `bc_error_text` says it in words. No function throws or
+ * keeps anything, and none allocates memory on the way to an answer by one thread. A program needs no
+ * compiler flag.
  */
 #ifndef BOX_CONTACT_H
 #define BOX_CONTACT_H
@@ -37,23 +33,22 @@ extern "C" {
 #endif
 
 /* Raised by a change that a compiled program cannot follow. `bc_abi` is that of the library. */
-#define BC_ABI 1
+#define BC_ABI 2
 
 typedef enum bc_status {
   BC_OK = 0,
-  BC_BAD_ARGUMENT = 1, /* a null pointer, a count of no array, an unknown model, patch or use */
+  BC_BAD_ARGUMENT = 1, /* a null pointer, a count of no array, an unknown model or patch */
   BC_BAD_SIZE = 2,     /* extents outside 1e-50 to 1e50 m */
   BC_BAD_POSE = 3,     /* numbers that are not finite, or a quaternion without a length */
   BC_BAD_ROWS = 4,     /* some rows of a batch are refused: bad poses, sizes or places */
-  BC_BAD_WEIGHTS = 5,  /* a weights file that is missing, damaged, or made for something else */
-  BC_NO_MEMORY = 6,
-  BC_BAD_ENVIRONMENT = 7, /* BOX_CONTACT_INSTRUCTION_SET names none that this machine has */
-  BC_BAD_ABI = 8          /* the program was compiled for another version of this header */
+  BC_NO_MEMORY = 5,
+  BC_BAD_ENVIRONMENT = 6, /* BOX_CONTACT_INSTRUCTION_SET names none that this machine has */
+  BC_BAD_ABI = 7          /* the program was compiled for another version of this header */
 } bc_status;
 
 typedef enum bc_model {
   BC_EXACT = 0, /* the exact moments of the overlap */
-  BC_MLP = 1    /* columns under the contact face, a network between proven brackets; the default */
+  BC_MLP = 1    /* columns under the contact face, a network between proven brackets */
 } bc_model;
 
 /* What is computed of the overlap, beside its centroid. */
@@ -72,6 +67,25 @@ typedef struct bc_pose {
   double quaternion[4]; /* x y z w, of any length */
 } bc_pose;
 
+typedef struct bc_box {
+  bc_pose pose;
+  bc_size size;
+} bc_box;
+
+/* What is asked of boxes. Start from `bc_default_query`. */
+typedef struct bc_query {
+  size_t size; /* sizeof(bc_query) */
+  bc_model model;
+  bc_patch patch;
+  double margin; /* [m]; normals are given up to this separation */
+} bc_query;
+
+/* Model `exact`, with volume and covariance, without a margin. */
+static inline bc_query bc_default_query(void) {
+  bc_query query = {sizeof(bc_query), BC_EXACT, BC_COVARIANCE, 0.0};
+  return query;
+}
+
 typedef struct bc_contact {
   double separation;       /* [m]; negative: depth along the normal; positive: largest SAT gap */
   double normal[3];        /* unit vector from A to B; NaN where separation exceeds the margin */
@@ -82,32 +96,19 @@ typedef struct bc_contact {
   bool colliding;          /* touching counts, to 8 ulp of the largest coordinate or size */
 } bc_contact;
 
-/* How many contacts took another way than most, since the solver was made. */
-typedef struct bc_counts {
-  int64_t clipped; /* by model exact: clipped, as the certificate of the planes did not hold */
-  int64_t exact;   /* by model mlp: left to model exact */
-} bc_counts;
-
-typedef struct bc_options {
-  size_t size; /* sizeof(bc_options) */
-  bc_model model;
-  const char* weights; /* path of a regular file of at most 16 MiB; NULL: the shipped weights */
-  double margin;       /* [m]; normals are given up to this separation */
-} bc_options;
-
-#define BC_DEFAULT_OPTIONS {sizeof(bc_options), BC_MLP, NULL, 0.0}
-
 /* Rows of pairs. Row i is (poses_a[i], poses_b[i]), or with `pairs` (poses_a[p], poses_b[q]) for
  * p = pairs[2 i], q = pairs[2 i + 1]; `poses_a` and `poses_b` may then be one array. */
 typedef struct bc_rows {
   size_t size; /* sizeof(bc_rows) */
   int64_t count;
+  int64_t pose_count; /* of either array; without `pairs` it equals `count` */
   const bc_pose* poses_a;
   const bc_pose* poses_b;
-  const bc_size* sizes_a; /* one for each pose, or NULL: the solver's */
+  const bc_size* sizes_a; /* one for each pose, or one for all */
   const bc_size* sizes_b;
+  int64_t size_count_a; /* pose_count or 1 */
+  int64_t size_count_b;
   const int64_t* pairs; /* (count, 2) or NULL */
-  int64_t pose_count;   /* of either array; read with `pairs` alone */
 } bc_rows;
 
 /* Arrays of a row for each pair, or NULL for what is not wanted. What is not wanted is not computed:
@@ -123,8 +124,6 @@ typedef struct bc_results {
   int32_t* axis;
 } bc_results;
 
-typedef struct bc_solver bc_solver;
-
 BC_API int bc_abi(void);
 BC_API const char* bc_version(void);
 
@@ -135,25 +134,16 @@ BC_API const char* bc_instruction_set(void);
 /* Why the last call of this thread did not return BC_OK. Valid until the thread's next one. */
 BC_API const char* bc_error_text(void);
 
-/* Make a solver for boxes of these sizes. `options` NULL: BC_DEFAULT_OPTIONS. On failure *solver is
- * NULL. */
-BC_API bc_status bc_solver_create(const bc_size* size_a, const bc_size* size_b,
-                                  const bc_options* options, bc_solver** solver);
-BC_API void bc_solver_destroy(bc_solver* solver);
+/* Solve one pair. `query` NULL: bc_default_query(). On failure *contact is as it was. */
+BC_API bc_status bc_collide(const bc_box* a, const bc_box* b, const bc_query* query,
+                            bc_contact* contact);
 
-/* Solve one pair. Sizes NULL: the solver's. On failure *contact is as it was. */
-BC_API bc_status bc_solve(bc_solver* solver, const bc_pose* pose_a, const bc_pose* pose_b,
-                          const bc_size* size_a, const bc_size* size_b, bc_patch patch,
-                          bc_contact* contact);
-
-/* Solve many pairs, by `threads` threads. Bit for bit the answers of single calls with the same
- * `patch`, for any number of threads. Each refused row gets `colliding` false and `separation` NaN,
- * and the rest of it has no meaning; all other rows are solved, and *refused is the first refused
- * row, or −1. `refused` may be NULL. */
-BC_API bc_status bc_solve_rows(bc_solver* solver, const bc_rows* rows, const bc_results* results,
-                               int threads, int64_t* refused);
-
-BC_API bc_counts bc_solver_counts(const bc_solver* solver);
+/* Solve many pairs, by `threads` threads: bit for bit the answers of single calls, for any number of
+ * threads. The arrays of `results` say what is computed, not `query->patch`. Each refused row gets
+ * `colliding` false and `separation` NaN, and the rest of it has no meaning; all other rows are
+ * solved, and *refused is the first refused row, or −1. `refused` may be NULL. */
+BC_API bc_status bc_collide_rows(const bc_rows* rows, const bc_query* query,
+                                 const bc_results* results, int threads, int64_t* refused);
 
 #ifdef __cplusplus
 }

@@ -3,11 +3,11 @@
 
 // The C++17 interface of libbox_contact: whether two boxes touch, where, and along which direction.
 //
-//   box_contact::Solver solver({1.0, 1.0, 1.0}, {2.0, 2.0, 2.0});   // full extents [m]
-//   box_contact::Pose a{{0.0, 0.0, 1.49}, {0.0, 0.0, 0.0, 1.0}};    // position, quaternion x y z w
-//   box_contact::Pose b{{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 1.0}};
-//   box_contact::Contact contact = solver(a, b);  // the normal points down, from A to B
+//   box_contact::Box a{{{0.0, 0.0, 1.49}, {0.0, 0.0, 0.0, 1.0}}, {1.0, 1.0, 1.0}};
+//   box_contact::Box b{{{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 1.0}}, {2.0, 2.0, 2.0}};
+//   box_contact::Contact contact = box_contact::collide(a, b);  // the normal points down, from A to B
 //
+// A box has a pose, position [m] and quaternion x y z w, and a size, three full extents [m].
 // Units are SI, frames are right-handed. A pose places a box's centre and axes in a frame common to
 // both boxes. Answers are in the same frame. "Size" as a length: the largest extent of both boxes.
 //
@@ -40,7 +40,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
-#include <memory>
 #include <new>
 #include <optional>
 #include <stdexcept>
@@ -53,10 +52,18 @@ namespace box_contact {
 
 using Size = bc_size;        // full extents along the box's own axes [m]
 using Pose = bc_pose;        // position [m]; quaternion x y z w of any length
+using Box = bc_box;          // pose and size
 using Contact = bc_contact;  // see above
-using Counts = bc_counts;
 
+enum class Model { exact = BC_EXACT, mlp = BC_MLP };
 enum class Patch { none = BC_NO_PATCH, volume = BC_VOLUME, covariance = BC_COVARIANCE };
+
+// What is asked of boxes.
+struct Query {
+  Model model = Model::exact;
+  Patch patch = Patch::covariance;  // of single calls; a batch computes what has an array
+  double margin = 0.0;              // [m]; normals are given up to this separation
+};
 
 // Numbers in a row that somebody else owns: an array, a std::vector or a std::array.
 template <class T>
@@ -83,13 +90,21 @@ namespace detail {
 [[noreturn]] inline void raise(bc_status status, const char* words) {
 #if defined(__cpp_exceptions) || defined(_CPPUNWIND)
   if (status == BC_NO_MEMORY) throw std::bad_alloc();
-  if (status == BC_BAD_WEIGHTS || status == BC_BAD_ENVIRONMENT || status == BC_BAD_ABI)
+  if (status == BC_BAD_ENVIRONMENT || status == BC_BAD_ABI)
     throw std::runtime_error(words);
   throw std::invalid_argument(words);
 #else
   (void)status, (void)words;
   std::abort();
 #endif
+}
+
+inline void check(bc_status status) {
+  if (status != BC_OK) raise(status, bc_error_text());
+}
+
+inline bc_query plain(const Query& query) {
+  return {sizeof(bc_query), bc_model(query.model), bc_patch(query.patch), query.margin};
 }
 
 }  // namespace detail
@@ -105,121 +120,60 @@ struct Results {
   std::int32_t* axis = nullptr;
 };
 
-// Answers for pairs of boxes A and B. Threads may share a solver. Calls allocate no memory, but for
-// those of several threads.
-class Solver {
- public:
-  using Pose = box_contact::Pose;
-  using Size = box_contact::Size;
+// The contact of two boxes. Throws std::invalid_argument with field and value. Refused are numbers that
+// are not finite, coordinates beyond 1e50 m, extents outside 1e-50 to 1e50 m, and quaternions of a length
+// outside 1e-100 to 1e100. Throws std::runtime_error for an unknown BOX_CONTACT_INSTRUCTION_SET, and
+// where the library is of another version than this header.
+inline Contact collide(const Box& a, const Box& b, const Query& query = {}) {
+  Contact contact;
+  bc_query plain = detail::plain(query);
+  detail::check(bc_collide(&a, &b, &plain, &contact));
+  return contact;
+}
 
-  struct Options {
-    bc_model model = BC_MLP;
-    std::string weights;  // path of a regular file of at most 16 MiB; empty: the shipped weights
-    double margin = 0.0;  // [m]; normals are given up to this separation
-  };
-
-  // Model `mlp`. Throws std::invalid_argument, with field and value, for extents outside 1e-50 to
-  // 1e50 m.
-  Solver(const Size& size_a, const Size& size_b) : Solver(size_a, size_b, Options()) {}
-
-  // Throws std::invalid_argument as well, and std::runtime_error for a weights file that is refused
-  // and for an unknown BOX_CONTACT_INSTRUCTION_SET.
-  Solver(const Size& size_a, const Size& size_b, const Options& options) {
-    if (bc_abi() != BC_ABI)
-      detail::raise(BC_BAD_ABI, "libbox_contact is of another version than its header");
-    bc_options plain = BC_DEFAULT_OPTIONS;
-    plain.model = options.model;
-    plain.weights = options.weights.empty() ? nullptr : options.weights.c_str();
-    plain.margin = options.margin;
-    bc_solver* made;
-    check(bc_solver_create(&size_a, &size_b, &plain, &made));
-    solver_.reset(made);
-  }
-
-  // The contact of one pair. Throws std::invalid_argument with field and value. Refused are numbers
-  // that are not finite, coordinates beyond 1e50 m, and quaternions of a length outside 1e-100 to
-  // 1e100.
-  Contact operator()(const Pose& pose_a, const Pose& pose_b,
-                     Patch patch = Patch::covariance) const {
-    return solve(pose_a, pose_b, nullptr, nullptr, patch);
-  }
-  // The same for boxes of these sizes.
-  Contact operator()(const Pose& pose_a, const Pose& pose_b, const Size& size_a, const Size& size_b,
-                     Patch patch = Patch::covariance) const {
-    return solve(pose_a, pose_b, &size_a, &size_b, patch);
-  }
-
-  // Rows of pairs: row i is (poses_a[i], poses_b[i]). With `pairs` row i has box A at
-  // poses_a[pairs[2 i]] and box B at poses_b[pairs[2 i + 1]]; an empty list has no rows. Poses of A
-  // and B are equally many. Sizes go with poses, one for each; without them all are the solver's.
-  struct Rows {
-    Span<const Pose> poses_a, poses_b;
-    std::optional<Span<const Size>> sizes_a{}, sizes_b{};
-    std::optional<Span<const std::int64_t>> pairs{};
-  };
-
-  // Solve many pairs, bit for bit as single calls do. Returns the first row that is refused, or −1. A
-  // refused row gets `colliding` false and `separation` NaN, and its other fields have no meaning.
-  // All other rows are solved. Throws std::invalid_argument for arrays of unequal lengths, and where
-  // a place in `pairs` has no pose.
-  std::int64_t batch(const Rows& rows, const Results& results, int threads = 1) const {
-    std::size_t poses = rows.poses_a.size();
-    bool fits = rows.poses_b.size() == poses && fits_poses(rows.sizes_a, poses) &&
-                fits_poses(rows.sizes_b, poses);
-    if (!fits) detail::raise(BC_BAD_ARGUMENT, "poses_a, poses_b and sizes must be equally many");
-    Span<const std::int64_t> pairs = rows.pairs.value_or(Span<const std::int64_t>());
-    if (pairs.size() % 2) detail::raise(BC_BAD_ARGUMENT, "pairs must be two indices a row");
-    const bc_rows plain{sizeof(bc_rows),       std::int64_t(rows.pairs ? pairs.size() / 2 : poses),
-                        rows.poses_a.data(),   rows.poses_b.data(),
-                        data_of(rows.sizes_a), data_of(rows.sizes_b),
-                        pairs.data(),          std::int64_t(poses)};
-    const bc_results wanted{sizeof(bc_results), results.colliding, results.separation,
-                            results.normal,     results.point,     results.volume,
-                            results.covariance, results.axis};
-    std::int64_t refused = -1;
-    bc_status status = bc_solve_rows(solver_.get(), &plain, &wanted, threads, &refused);
-    if (status != BC_BAD_ROWS || is_bad_place(rows, refused)) check(status);
-    return refused;
-  }
-  std::int64_t batch(Span<const Pose> poses_a, Span<const Pose> poses_b, const Results& results,
-                     int threads = 1) const {
-    return batch({poses_a, poses_b}, results, threads);
-  }
-
-  // How many contacts took another way than most, since the solver was made.
-  Counts counts() const { return bc_solver_counts(solver_.get()); }
-
- private:
-  struct Destroy {
-    void operator()(bc_solver* solver) const { bc_solver_destroy(solver); }
-  };
-
-  Contact solve(const Pose& pose_a, const Pose& pose_b, const Size* size_a, const Size* size_b,
-                Patch patch) const {
-    Contact contact;
-    check(bc_solve(solver_.get(), &pose_a, &pose_b, size_a, size_b, bc_patch(patch), &contact));
-    return contact;
-  }
-
-  static bool fits_poses(const std::optional<Span<const Size>>& sizes, std::size_t poses) {
-    return !sizes || sizes->size() == poses;
-  }
-  static const Size* data_of(const std::optional<Span<const Size>>& sizes) {
-    return sizes ? sizes->data() : nullptr;
-  }
-  static bool is_bad_place(const Rows& rows, std::int64_t row) {
-    if (!rows.pairs) return false;
-    for (std::int64_t place : {rows.pairs->data()[2 * row], rows.pairs->data()[2 * row + 1]})
-      if (place < 0 || place >= std::int64_t(rows.poses_a.size())) return true;
-    return false;
-  }
-
-  static void check(bc_status status) {
-    if (status != BC_OK) detail::raise(status, bc_error_text());
-  }
-
-  std::unique_ptr<bc_solver, Destroy> solver_;
+// Rows of pairs: row i is (poses_a[i], poses_b[i]). With `pairs` row i has box A at poses_a[pairs[2 i]]
+// and box B at poses_b[pairs[2 i + 1]]; an empty list has no rows. Poses of A and B are equally many.
+// Sizes go with poses, one for each, or one for all.
+struct Rows {
+  Span<const Pose> poses_a, poses_b;
+  Span<const Size> sizes_a, sizes_b;
+  std::optional<Span<const std::int64_t>> pairs{};
 };
+
+// The contacts of many pairs, bit for bit those of single calls. Returns the first row that is refused, or
+// −1. A refused row gets `colliding` false and `separation` NaN, and its other fields have no meaning.
+// All other rows are solved. Throws as for one pair, for arrays of unequal lengths as well, and where a
+// place in `pairs` has no pose. Calls allocate no memory, but for those of several threads.
+inline std::int64_t collide(const Rows& rows, const Results& results, const Query& query = {},
+                            int threads = 1) {
+  auto size = [](const auto& span) { return std::int64_t(span.size()); };
+  if (size(rows.poses_a) != size(rows.poses_b))
+    detail::raise(BC_BAD_ARGUMENT, "poses_a and poses_b must be equally many");
+  Span<const std::int64_t> pairs = rows.pairs.value_or(Span<const std::int64_t>());
+  if (pairs.size() % 2) detail::raise(BC_BAD_ARGUMENT, "pairs must be two indices a row");
+  const bc_rows plain{sizeof(bc_rows),
+                      rows.pairs ? size(pairs) / 2 : size(rows.poses_a),
+                      size(rows.poses_a),
+                      rows.poses_a.data(),
+                      rows.poses_b.data(),
+                      rows.sizes_a.data(),
+                      rows.sizes_b.data(),
+                      size(rows.sizes_a),
+                      size(rows.sizes_b),
+                      pairs.data()};
+  const bc_results wanted{sizeof(bc_results), results.colliding, results.separation,
+                          results.normal,     results.point,     results.volume,
+                          results.covariance, results.axis};
+  const bc_query asked = detail::plain(query);
+  std::int64_t refused = -1;
+  bc_status status = bc_collide_rows(&plain, &asked, &wanted, threads, &refused);
+  auto is_place = [&](std::int64_t place) { return place >= 0 && place < size(rows.poses_a); };
+  bool bad_pose = status == BC_BAD_ROWS &&
+                  (!rows.pairs || (is_place(pairs.data()[2 * refused]) &&
+                                   is_place(pairs.data()[2 * refused + 1])));
+  if (!bad_pose) detail::check(status);
+  return refused;
+}
 
 // The instruction set of this process: "baseline", "avx2" or "avx512".
 inline std::string instruction_set() {

@@ -12,7 +12,7 @@
  *   bc_law* law;
  *   bc_law_create(&load, 1, &loop, &law);
  *   bc_touch touch = {7, 0, -1};                pair 7: body 0 is box A, and box B is fixed
- *   bc_solve(solver, &pose, &stack, NULL, NULL, BC_COVARIANCE, &touch.contact);
+ *   bc_collide(&load_box, &stack_box, NULL, &touch.contact);
  *   bc_law_hold(law, &touch, 1, &pose);
  *   bc_law_wrenches(law, &pose, &velocity, &wrench);                       at every physics step
  *

@@ -4,13 +4,15 @@
 // From contacts to forces in C++17: one load, or a scene of bodies.
 //
 //   box_contact::HeldPatch law({mass, {ix, iy, iz}}, {200.0, 0.002, 0.001});   // Hz, s, s
-//   law.hold(solver(load, stack), load);                     // when an answer comes
+//   law.hold(box_contact::collide(load, stack), load.pose);  // when an answer comes
 //   box_contact::Wrench wrench = law.wrench(now, velocity);  // at every physics step
 //
 // force.h says what the law does, and docs/explanation/force.md how. Refused input throws
 // std::invalid_argument that names field and value.
 #ifndef BOX_CONTACT_FORCE_HPP
 #define BOX_CONTACT_FORCE_HPP
+
+#include <memory>
 
 #include "box_contact.hpp"
 #include "force.h"

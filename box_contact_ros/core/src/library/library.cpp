@@ -4,13 +4,12 @@
 // The C interface, and the choice of the instruction set.
 #include <cstdlib>
 #include <cstring>
-#include <memory>
+#include <iterator>
 #include <string>
 
 #include "../mlp/shipped_network.hpp"
+#include "batch.hpp"
 #include "refusals.hpp"
-#include "solver.hpp"
-#include "weights_file.hpp"
 
 namespace box_contact::detail {
 
@@ -45,6 +44,8 @@ const Kernel* chosen_kernel() {
 
 namespace {
 
+NetworkNumbers shipped() { return {shipped_network, long(std::size(shipped_network))}; }
+
 bc_status refuse_size(const char* field, const double* size) {
   return fail(BC_BAD_SIZE, "%s (%g, %g, %g) is not within 1e-50 to 1e50 m", field, size[0], size[1],
               size[2]);
@@ -62,42 +63,27 @@ bc_status refuse_pair(const double* pose_a, const double* pose_b, const double* 
   return size_is_valid(size_a) ? refuse_size("size_b", size_b) : refuse_size("size_a", size_a);
 }
 
-bc_status make(const bc_size* size_a, const bc_size* size_b, const bc_options& options,
-               bc_solver** solver) {
-  if (!size_is_valid(size_a->extent)) return refuse_size("size_a", size_a->extent);
-  if (!size_is_valid(size_b->extent)) return refuse_size("size_b", size_b->extent);
-  Solver::Setup setup;
-  setup.kernel = chosen_kernel();
-  if (!setup.kernel) {
-    std::string names;
-    for (const Kernel* kernel : kernels())
-      names += (names.empty() ? "" : ", ") + std::string(kernel->name);
-    return fail(BC_BAD_ENVIRONMENT, "BOX_CONTACT_INSTRUCTION_SET is none of: %s", names.c_str());
-  }
-  std::copy_n(size_a->extent, 3, setup.size_a.begin());
-  std::copy_n(size_b->extent, 3, setup.size_b.begin());
-  setup.margin = options.margin;
-  if (!(options.margin >= 0.0))
-    return fail(BC_BAD_ARGUMENT, "margin must be 0 or more, not %g", options.margin);
-  if (number_of(options.model) == BC_MLP) {
-    setup.model = Model::mlp;
-    try {
-      if (options.weights) {
-        setup.network = read_numbers(options.weights);
-      } else {
-        setup.network.assign(std::begin(shipped_network), std::end(shipped_network));
-      }
-    } catch (const std::runtime_error& error) {
-      return fail(BC_BAD_WEIGHTS, "%s", error.what());
-    }
-  } else if (number_of(options.model) != BC_EXACT) {
-    return fail(BC_BAD_ARGUMENT, "model %u is unknown", number_of(options.model));
-  }
-  *solver = reinterpret_cast<bc_solver*>(new Solver(std::move(setup)));
-  return BC_OK;
+// Who answers a query, or why nobody does.
+bc_status read_query(const bc_query& query, Solver& solver) {
+  unsigned model = number_of(query.model);
+  if (model > BC_MLP) return fail(BC_BAD_ARGUMENT, "model %u is unknown", model);
+  if (number_of(query.patch) > BC_COVARIANCE)
+    return fail(BC_BAD_ARGUMENT, "patch %u is unknown", number_of(query.patch));
+  if (!(query.margin >= 0.0))
+    return fail(BC_BAD_ARGUMENT, "margin must be 0 or more, not %g", query.margin);
+  solver = {chosen_kernel(), model == BC_MLP ? Model::mlp : Model::exact, shipped()};
+  if (solver.kernel) return BC_OK;
+  std::string names;
+  for (const Kernel* kernel : kernels())
+    names += (names.empty() ? "" : ", ") + std::string(kernel->name);
+  return fail(BC_BAD_ENVIRONMENT, "BOX_CONTACT_INSTRUCTION_SET is none of: %s", names.c_str());
 }
 
-Solver& solver_of(bc_solver* solver) { return *reinterpret_cast<Solver*>(solver); }
+// The query that a program gives, which may be of an older header, or the default one.
+bool complete(const bc_query* given, bc_query& query) {
+  query = bc_default_query();
+  return !given || read(given, query);
+}
 
 // Whether all places of boxes are within the poses. `first`: the first row where they are not.
 bool places_are_valid(const bc_rows& rows, int64_t& first) {
@@ -115,27 +101,40 @@ constexpr int64_t largest_count = PTRDIFF_MAX / int64_t(sizeof(bc_contact));
 const double* numbers(const bc_pose* poses) { return reinterpret_cast<const double*>(poses); }
 const double* numbers(const bc_size* sizes) { return reinterpret_cast<const double*>(sizes); }
 
-bc_status solve_rows(Solver& solver, const bc_rows& given, const bc_results& wanted, int threads,
-                     int64_t& refused) {
-  if (given.count < 0 || given.count > largest_count)
-    return fail(BC_BAD_ARGUMENT, "count %lld is that of no array", (long long)given.count);
+bc_status check_rows(const bc_rows& rows, int threads, int64_t& refused) {
+  if (rows.count < 0 || rows.count > largest_count)
+    return fail(BC_BAD_ARGUMENT, "count %lld is that of no array", (long long)rows.count);
   if (threads < 1) return fail(BC_BAD_ARGUMENT, "threads must be 1 or more, not %d", threads);
-  if (given.count == 0) return BC_OK;
-  if (!given.poses_a || !given.poses_b) return refuse_null(given.poses_a ? "poses_b" : "poses_a");
-  if (!places_are_valid(given, refused))
-    return fail(BC_BAD_ROWS, "pairs[%lld] is (%lld, %lld), but there are %lld poses",
-                (long long)refused, (long long)given.pairs[2 * refused],
-                (long long)given.pairs[2 * refused + 1], (long long)given.pose_count);
+  if (rows.count == 0) return BC_OK;
+  if (!rows.poses_a || !rows.poses_b) return refuse_null(rows.poses_a ? "poses_b" : "poses_a");
+  if (!rows.pairs && rows.pose_count != rows.count)
+    return fail(BC_BAD_ARGUMENT, "pose_count must be count without pairs");
+  for (int64_t sizes : {rows.size_count_a, rows.size_count_b})
+    if (sizes != 1 && sizes != rows.pose_count)
+      return fail(BC_BAD_ARGUMENT, "sizes must be one, or one for each pose, not %lld",
+                  (long long)sizes);
+  if (!rows.sizes_a || !rows.sizes_b) return refuse_null(rows.sizes_a ? "sizes_b" : "sizes_a");
+  if (places_are_valid(rows, refused)) return BC_OK;
+  return fail(BC_BAD_ROWS, "pairs[%lld] is (%lld, %lld), but there are %lld poses",
+              (long long)refused, (long long)rows.pairs[2 * refused],
+              (long long)rows.pairs[2 * refused + 1], (long long)rows.pose_count);
+}
+
+bc_status collide_rows(const Solver& solver, const bc_rows& given, double margin,
+                       const bc_results& wanted, int threads, int64_t& refused) {
+  bc_status status = check_rows(given, threads, refused);
+  if (status != BC_OK || given.count == 0) return status;
   Rows rows{numbers(given.poses_a),
             numbers(given.poses_b),
-            given.sizes_a ? numbers(given.sizes_a) : solver.setup().size_a.data(),
-            given.sizes_b ? numbers(given.sizes_b) : solver.setup().size_b.data(),
-            given.sizes_a ? 3 : 0,
-            given.sizes_b ? 3 : 0,
+            numbers(given.sizes_a),
+            numbers(given.sizes_b),
+            given.size_count_a == 1 ? 0 : 3,
+            given.size_count_b == 1 ? 0 : 3,
             given.pairs};
   Results results{wanted.colliding, wanted.separation, wanted.normal, wanted.point,
-                  wanted.volume,    wanted.covariance, wanted.axis,   0.0};
-  refused = solver.solve(rows, long(given.count), results, threads);
+                  wanted.volume,    wanted.covariance, wanted.axis,   margin};
+  Counts counts{};
+  refused = solve_rows(solver, rows, long(given.count), results, threads, counts);
   if (refused < 0) return BC_OK;
   int64_t of_a = given.pairs ? given.pairs[2 * refused] : refused;
   int64_t of_b = given.pairs ? given.pairs[2 * refused + 1] : refused;
@@ -164,55 +163,41 @@ const char* bc_instruction_set(void) {
 
 const char* bc_error_text(void) { return error_text; }
 
-bc_status bc_solver_create(const bc_size* size_a, const bc_size* size_b, const bc_options* options,
-                           bc_solver** solver) {
+bc_status bc_collide(const bc_box* a, const bc_box* b, const bc_query* query,
+                     bc_contact* contact) {
   return guarded([&] {
-    if (!solver) return refuse_null("solver");
-    *solver = nullptr;
-    if (!size_a || !size_b) return refuse_null(size_a ? "size_b" : "size_a");
-    bc_options all = BC_DEFAULT_OPTIONS;
-    if (options && !read(options, all)) return fail(BC_BAD_ABI, "options.size is unknown");
-    return make(size_a, size_b, all, solver);
+    if (!a || !b || !contact) return refuse_null(!a ? "a" : !b ? "b" : "contact");
+    bc_query all;
+    if (!complete(query, all)) return fail(BC_BAD_ABI, "query.size is unknown");
+    Solver solver;
+    bc_status status = read_query(all, solver);
+    if (status != BC_OK) return status;
+    Rows pair{numbers(&a->pose), numbers(&b->pose), numbers(&a->size), numbers(&b->size), 0, 0,
+              nullptr};
+    Counts counts{};
+    if (solve_pair(solver, pair, all.patch, all.margin, *contact, counts)) return BC_OK;
+    return refuse_pair(pair.poses_a, pair.poses_b, pair.sizes_a, pair.sizes_b);
   });
 }
 
-void bc_solver_destroy(bc_solver* solver) { delete reinterpret_cast<Solver*>(solver); }
-
-bc_status bc_solve(bc_solver* solver, const bc_pose* pose_a, const bc_pose* pose_b,
-                   const bc_size* size_a, const bc_size* size_b, bc_patch patch,
-                   bc_contact* contact) {
-  return guarded([&] {
-    if (!solver || !pose_a || !pose_b || !contact)
-      return refuse_null(!solver ? "solver" : !pose_a ? "pose_a" : !pose_b ? "pose_b" : "contact");
-    if (number_of(patch) > BC_COVARIANCE)
-      return fail(BC_BAD_ARGUMENT, "patch %u is unknown", number_of(patch));
-    const double *a = numbers(pose_a), *b = numbers(pose_b);
-    const double *extents_a = numbers(size_a), *extents_b = numbers(size_b);
-    Solver& self = solver_of(solver);
-    if (self.solve(a, b, extents_a, extents_b, patch, *contact)) return BC_OK;
-    return refuse_pair(a, b, extents_a ? extents_a : self.setup().size_a.data(),
-                       extents_b ? extents_b : self.setup().size_b.data());
-  });
-}
-
-bc_status bc_solve_rows(bc_solver* solver, const bc_rows* rows, const bc_results* results,
-                        int threads, int64_t* refused) {
+bc_status bc_collide_rows(const bc_rows* rows, const bc_query* query, const bc_results* results,
+                          int threads, int64_t* refused) {
   int64_t first = -1;
   bc_status status = guarded([&] {
-    if (!solver || !rows || !results)
-      return refuse_null(!solver ? "solver" : !rows ? "rows" : "results");
+    if (!rows || !results) return refuse_null(rows ? "results" : "rows");
     bc_rows all_rows{};
     bc_results all_results{};
+    bc_query all;
     if (!read(rows, all_rows)) return fail(BC_BAD_ABI, "rows.size is unknown");
     if (!read(results, all_results)) return fail(BC_BAD_ABI, "results.size is unknown");
-    return solve_rows(solver_of(solver), all_rows, all_results, threads, first);
+    if (!complete(query, all)) return fail(BC_BAD_ABI, "query.size is unknown");
+    Solver solver;
+    bc_status status = read_query(all, solver);
+    if (status != BC_OK) return status;
+    return collide_rows(solver, all_rows, all.margin, all_results, threads, first);
   });
   if (refused) *refused = first;
   return status;
-}
-
-bc_counts bc_solver_counts(const bc_solver* solver) {
-  return solver ? reinterpret_cast<const Solver*>(solver)->counts() : bc_counts{};
 }
 
 }  // extern "C"

@@ -1,0 +1,110 @@
+// Copyright 2026 The box_contact_ros maintainers
+// SPDX-License-Identifier: Apache-2.0
+
+// Pairs and rows by the kernel of this process, in as many threads as are asked for. C, C++ and Python
+// are faces of it.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <exception>
+#include <limits>
+#include <thread>
+#include <vector>
+
+#include "../../include/box_contact/box_contact.h"
+#include "../kernel.hpp"
+
+namespace box_contact::detail {
+
+// The kernels that this machine can run and that were built, best last. No memory is allocated.
+struct Kernels {
+  std::array<const Kernel*, 3> all{};
+  size_t count = 0;
+
+  const Kernel* const* begin() const { return all.data(); }
+  const Kernel* const* end() const { return all.data() + count; }
+};
+const Kernels& kernels();
+// The best of them, or the one that the environment names; nullptr for a name that no set has.
+const Kernel* chosen_kernel();
+
+// Who answers.
+struct Solver {
+  const Kernel* kernel;
+  Model model;
+  NetworkNumbers network;  // of model `mlp`
+
+  // Solve rows `begin` to `end` in this thread. Returns the first row that is refused, or −1.
+  long solve(const Rows& rows, long begin, long end, const Results& results,
+             Counts& counts) const {
+    auto* solve_rows =
+        kernel->solve_rows[int(model)][int(results.covariance ? Finds::patch : Finds::point)];
+    return solve_rows(network, rows, begin, end, results, counts);
+  }
+};
+
+// Solve one pair: the poses and sizes of a row. Returns false, and leaves `contact`, if it is refused.
+inline bool solve_pair(const Solver& solver, const Rows& pair, bc_patch patch, double margin,
+                       bc_contact& contact, Counts& counts) {
+  bc_contact answer;
+  double* covariance = answer.covariance[0];
+  Results results{&answer.colliding,
+                  &answer.separation,
+                  answer.normal,
+                  answer.point,
+                  patch >= BC_VOLUME ? &answer.volume : nullptr,
+                  patch == BC_COVARIANCE ? covariance : nullptr,
+                  &answer.axis,
+                  margin};
+  if (solver.solve(pair, 0, 1, results, counts) >= 0) return false;
+  constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+  if (patch < BC_COVARIANCE) std::fill_n(covariance, 9, unknown);
+  if (patch < BC_VOLUME) answer.volume = answer.colliding ? unknown : 0.0;
+  contact = answer;
+  return true;
+}
+
+// Rows that a thread takes at a time: some 100 µs of work, and whole groups of blocks.
+constexpr long rows_per_chunk = 512;
+
+inline long solve_in_threads(const Solver& solver, const Rows& rows, long count,
+                             const Results& results, long threads, Counts& counts) {
+  long chunks = (count + rows_per_chunk - 1) / rows_per_chunk;
+  std::vector<Counts> counts_of(threads, Counts{});
+  std::vector<long> refused_of(threads, count);
+  std::atomic<long> next{0};
+  auto work = [&](long thread) {
+    for (long chunk = next++; chunk < chunks; chunk = next++) {
+      long begin = chunk * rows_per_chunk, end = std::min(begin + rows_per_chunk, count);
+      long refused = solver.solve(rows, begin, end, results, counts_of[thread]);
+      if (refused >= 0) refused_of[thread] = std::min(refused_of[thread], refused);
+    }
+  };
+  std::vector<std::thread> others;
+  others.reserve(threads - 1);
+  try {
+    for (long thread = 1; thread < threads; ++thread) others.emplace_back(work, thread);
+  } catch (const std::exception&) {
+    // No more threads, or no memory for them: those that run take all chunks.
+  }
+  work(0);
+  for (std::thread& other : others) other.join();
+  for (const Counts& part : counts_of) counts += part;
+  long refused = *std::min_element(refused_of.begin(), refused_of.end());
+  return refused < count ? refused : -1;
+}
+
+// Solve `count` rows, in as many threads as are asked for and worth it. Each takes the next chunk until
+// none is left: a thread that starts late costs little. Rows are independent, so no bit depends on the
+// number of threads. Returns the first row that is refused, or −1.
+inline long solve_rows(const Solver& solver, const Rows& rows, long count, const Results& results,
+                       long threads, Counts& counts) {
+  threads = std::min(threads, (count + rows_per_chunk - 1) / rows_per_chunk);
+  return threads <= 1 ? solver.solve(rows, 0, count, results, counts)
+                      : solve_in_threads(solver, rows, count, results, threads, counts);
+}
+
+}  // namespace box_contact::detail
