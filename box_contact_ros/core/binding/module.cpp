@@ -250,6 +250,9 @@ struct Setup {
   std::atomic<long> clipped{0}, exact{0};
 
   Solver solver() const { return {kernel, model, {network.data(), long(network.size())}}; }
+  detail::PairNumbers pair(const double* pose_a, const double* pose_b) const {
+    return {pose_a, pose_b, size_a, size_b};
+  }
   Rows rows(const double* poses_a, const double* poses_b) const {
     return {poses_a, poses_b, size_a, size_b, 0, 0, nullptr};
   }
@@ -279,7 +282,7 @@ PyObject* solver_call(PyObject* self, PyObject* args, PyObject* keywords) {
     const double* b = a ? numbers_of(PyTuple_GET_ITEM(args, 1), 7, copy_b) : nullptr;
     bc_contact contact;
     Counts counts{};
-    if (b && detail::solve_pair(setup->solver(), setup->rows(a, b), BC_COVARIANCE, setup->margin,
+    if (b && detail::solve_pair(setup->solver(), setup->pair(a, b), BC_COVARIANCE, setup->margin,
                                 contact, counts)) {
       setup->count(counts);
       return new_contact(contact);

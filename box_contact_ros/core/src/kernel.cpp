@@ -5,6 +5,7 @@
 #include "kernel.hpp"
 
 #include "mlp/mlp_model.hpp"
+#include "pair.hpp"
 #include "queue.hpp"
 #include "stages.hpp"
 
@@ -30,11 +31,22 @@ constexpr const char* title = "baseline";
 #endif
 
 template <class M>
-long solve(const NetworkNumbers& network, const Rows& rows, long begin, long end,
-           const Results& results, Counts& counts) {
-  M model{};
-  if constexpr (!std::is_empty_v<M>) model = {view(network.numbers, network.count)};
-  return solve_rows<Lanes<double, lanes>>(model, rows, begin, end, results, counts);
+M model_of(const NetworkNumbers& network) {
+  if constexpr (std::is_empty_v<M>) {
+    return {};
+  } else {
+    return {view(network.numbers, network.count)};
+  }
+}
+template <class M>
+bool pair_by(const NetworkNumbers& network, const detail::PairNumbers& pair, double margin,
+             bc_contact& contact, Counts& counts) {
+  return solve_pair(model_of<M>(network), pair, margin, contact, counts);
+}
+template <class M>
+long rows_by(const NetworkNumbers& network, const Rows& rows, long begin, long end,
+             const Results& results, Counts& counts) {
+  return solve_rows<Lanes<double, lanes>>(model_of<M>(network), rows, begin, end, results, counts);
 }
 
 #define NAME_OF(set) #set
@@ -51,7 +63,8 @@ const Kernel KERNEL(BOX_CONTACT_SET) = {
     NAME(BOX_CONTACT_SET),
     title,
     lanes,
-    {{solve<ExactPointModel>, solve<ExactModel>}, {solve<MlpPointModel>, solve<MlpModel>}},
+    {{pair_by<ExactPointModel>, pair_by<ExactModel>}, {pair_by<MlpPointModel>, pair_by<MlpModel>}},
+    {{rows_by<ExactPointModel>, rows_by<ExactModel>}, {rows_by<MlpPointModel>, rows_by<MlpModel>}},
     fill_stages};
 
 }  // namespace box_contact::detail

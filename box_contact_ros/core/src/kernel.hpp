@@ -7,6 +7,7 @@
 
 #include <cstdint>
 
+#include "../include/box_contact/box_contact.h"
 #include "stage_arrays.hpp"
 
 namespace box_contact::detail {
@@ -23,6 +24,11 @@ struct Rows {
   const double *sizes_a, *sizes_b;  // full extents [m]
   long size_step_a, size_step_b;
   const int64_t* pairs;  // (count, 2): the rows of a pair's boxes; nullptr: row i of both
+};
+
+// The numbers of a pair alone, as a row has them.
+struct PairNumbers {
+  const double *pose_a, *pose_b, *size_a, *size_b;
 };
 
 // Normals and points have three numbers a row, covariances nine. What is nullptr is not wanted.
@@ -64,6 +70,10 @@ struct Kernel {
   const char* title;  // for people
   int lanes;          // pairs that a batch solves side by side
 
+  // Solve a pair alone. Returns false, and leaves `contact`, if it is refused. What is not found of the
+  // overlap is NaN.
+  bool (*solve_pair[model_count][2])(const NetworkNumbers&, const PairNumbers&, double margin,
+                                     bc_contact& contact, Counts&);
   // Solve rows `begin` to `end`. Returns the first row that is refused, or −1.
   long (*solve_rows[model_count][2])(const NetworkNumbers&, const Rows&, long begin, long end,
                                      const Results&, Counts&);

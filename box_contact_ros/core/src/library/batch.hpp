@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <cmath>
 #include <exception>
 #include <limits>
 #include <thread>
@@ -46,24 +45,14 @@ struct Solver {
   }
 };
 
-// Solve one pair: the poses and sizes of a row. Returns false, and leaves `contact`, if it is refused.
-inline bool solve_pair(const Solver& solver, const Rows& pair, bc_patch patch, double margin,
+// Solve one pair. Returns false, and leaves `contact`, if it is refused.
+inline bool solve_pair(const Solver& solver, const PairNumbers& pair, bc_patch patch, double margin,
                        bc_contact& contact, Counts& counts) {
-  bc_contact answer;
-  double* covariance = answer.covariance[0];
-  Results results{&answer.colliding,
-                  &answer.separation,
-                  answer.normal,
-                  answer.point,
-                  patch >= BC_VOLUME ? &answer.volume : nullptr,
-                  patch == BC_COVARIANCE ? covariance : nullptr,
-                  &answer.axis,
-                  margin};
-  if (solver.solve(pair, 0, 1, results, counts) >= 0) return false;
-  constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
-  if (patch < BC_COVARIANCE) std::fill_n(covariance, 9, unknown);
-  if (patch < BC_VOLUME) answer.volume = answer.colliding ? unknown : 0.0;
-  contact = answer;
+  Finds finds = patch == BC_COVARIANCE ? Finds::patch : Finds::point;
+  auto* solve = solver.kernel->solve_pair[int(solver.model)][int(finds)];
+  if (!solve(solver.network, pair, margin, contact, counts)) return false;
+  if (patch == BC_NO_PATCH && contact.colliding)
+    contact.volume = std::numeric_limits<double>::quiet_NaN();
   return true;
 }
 

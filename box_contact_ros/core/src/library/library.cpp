@@ -44,8 +44,6 @@ const Kernel* chosen_kernel() {
 
 namespace {
 
-NetworkNumbers shipped() { return {shipped_network, long(std::size(shipped_network))}; }
-
 bc_status refuse_size(const char* field, const double* size) {
   return fail(BC_BAD_SIZE, "%s (%g, %g, %g) is not within 1e-50 to 1e50 m", field, size[0], size[1],
               size[2]);
@@ -63,26 +61,30 @@ bc_status refuse_pair(const double* pose_a, const double* pose_b, const double* 
   return size_is_valid(size_a) ? refuse_size("size_b", size_b) : refuse_size("size_a", size_a);
 }
 
-// Who answers a query, or why nobody does.
-bc_status read_query(const bc_query& query, Solver& solver) {
-  unsigned model = number_of(query.model);
-  if (model > BC_MLP) return fail(BC_BAD_ARGUMENT, "model %u is unknown", model);
+// Why nobody answers a query.
+bc_status refuse_query(const bc_query& query) {
+  if (number_of(query.model) > BC_MLP)
+    return fail(BC_BAD_ARGUMENT, "model %u is unknown", number_of(query.model));
   if (number_of(query.patch) > BC_COVARIANCE)
     return fail(BC_BAD_ARGUMENT, "patch %u is unknown", number_of(query.patch));
   if (!(query.margin >= 0.0))
     return fail(BC_BAD_ARGUMENT, "margin must be 0 or more, not %g", query.margin);
-  solver = {chosen_kernel(), model == BC_MLP ? Model::mlp : Model::exact, shipped()};
-  if (solver.kernel) return BC_OK;
   std::string names;
   for (const Kernel* kernel : kernels())
     names += (names.empty() ? "" : ", ") + std::string(kernel->name);
   return fail(BC_BAD_ENVIRONMENT, "BOX_CONTACT_INSTRUCTION_SET is none of: %s", names.c_str());
 }
 
-// The query that a program gives, which may be of an older header, or the default one.
-bool complete(const bc_query* given, bc_query& query) {
-  query = bc_default_query();
-  return !given || read(given, query);
+// Call `work` with the solver and the query that a program gives, which may be of an older header.
+template <class Work>
+bc_status with_query(const bc_query* given, Work work) {
+  bc_query query = bc_default_query();
+  if (given && !read(given, query)) return fail(BC_BAD_ABI, "query.size is unknown");
+  const Kernel* kernel = chosen_kernel();
+  bool known = number_of(query.model) <= BC_MLP && number_of(query.patch) <= BC_COVARIANCE;
+  if (!kernel || !known || !(query.margin >= 0.0)) return refuse_query(query);
+  constexpr NetworkNumbers shipped{shipped_network, long(std::size(shipped_network))};
+  return work(Solver{kernel, query.model == BC_MLP ? Model::mlp : Model::exact, shipped}, query);
 }
 
 // Whether all places of boxes are within the poses. `first`: the first row where they are not.
@@ -167,16 +169,12 @@ bc_status bc_collide(const bc_box* a, const bc_box* b, const bc_query* query,
                      bc_contact* contact) {
   return guarded([&] {
     if (!a || !b || !contact) return refuse_null(!a ? "a" : !b ? "b" : "contact");
-    bc_query all;
-    if (!complete(query, all)) return fail(BC_BAD_ABI, "query.size is unknown");
-    Solver solver;
-    bc_status status = read_query(all, solver);
-    if (status != BC_OK) return status;
-    Rows pair{numbers(&a->pose), numbers(&b->pose), numbers(&a->size), numbers(&b->size), 0, 0,
-              nullptr};
-    Counts counts{};
-    if (solve_pair(solver, pair, all.patch, all.margin, *contact, counts)) return BC_OK;
-    return refuse_pair(pair.poses_a, pair.poses_b, pair.sizes_a, pair.sizes_b);
+    return with_query(query, [&](const Solver& solver, const bc_query& asked) {
+      PairNumbers pair{numbers(&a->pose), numbers(&b->pose), numbers(&a->size), numbers(&b->size)};
+      Counts counts{};
+      if (solve_pair(solver, pair, asked.patch, asked.margin, *contact, counts)) return BC_OK;
+      return refuse_pair(pair.pose_a, pair.pose_b, pair.size_a, pair.size_b);
+    });
   });
 }
 
@@ -187,14 +185,11 @@ bc_status bc_collide_rows(const bc_rows* rows, const bc_query* query, const bc_r
     if (!rows || !results) return refuse_null(rows ? "results" : "rows");
     bc_rows all_rows{};
     bc_results all_results{};
-    bc_query all;
     if (!read(rows, all_rows)) return fail(BC_BAD_ABI, "rows.size is unknown");
     if (!read(results, all_results)) return fail(BC_BAD_ABI, "results.size is unknown");
-    if (!complete(query, all)) return fail(BC_BAD_ABI, "query.size is unknown");
-    Solver solver;
-    bc_status status = read_query(all, solver);
-    if (status != BC_OK) return status;
-    return collide_rows(solver, all_rows, all.margin, all_results, threads, first);
+    return with_query(query, [&](const Solver& solver, const bc_query& asked) {
+      return collide_rows(solver, all_rows, asked.margin, all_results, threads, first);
+    });
   });
   if (refused) *refused = first;
   return status;

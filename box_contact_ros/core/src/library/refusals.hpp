@@ -48,6 +48,10 @@ inline bc_status refuse_null(const char* name) {
 // A copy of a struct that the program may have compiled by an older header, which had less fields.
 template <class Struct>
 bool read(const Struct* given, Struct& copy) {
+  if (given->size == sizeof(Struct)) {
+    copy = *given;
+    return true;
+  }
   if (given->size == 0 || given->size > sizeof(Struct)) return false;
   std::memcpy(static_cast<void*>(&copy), given, given->size);
   return true;
