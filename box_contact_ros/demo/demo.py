@@ -76,7 +76,7 @@ def main(args: Sequence[str] | None = None) -> int:
 
 def _options(args: Sequence[str] | None) -> argparse.Namespace:
     parser = program_parser('demo', __doc__)
-    add_model(parser, 'mlp')
+    add_model(parser, 'exact')
     parser.add_argument('--rate', type=within(1.0, 2000.0), default=200.0, metavar='HZ',
                         help='pairs of poses per second (default: %(default)g)')
     add_domain(parser)

@@ -67,7 +67,7 @@ PARAMETERS = {
     'size_a': Setting(CONTAINER, 'full extents of box A, three numbers > 0 [m]', size),
     'size_b': Setting(CONTAINER, 'full extents of box B, three numbers > 0 [m]', size),
     'scene': Setting('', 'scene file, which replaces size_a and size_b', text),
-    'model': Setting('mlp', f'how the contact point is found: {", ".join(MODELS)}', model),
+    'model': Setting('exact', f'how the contact point is found: {", ".join(MODELS)}', model),
     'pairing': Setting('stamp', 'stamp: answer once, when poses of equal stamp are in; latest: '
                                 "answer every pose with the other boxes' last", one_of(PAIRINGS)),
     'tolerance': Setting(0.0, 'with pairing stamp: stamps this far apart still belong together [s]',

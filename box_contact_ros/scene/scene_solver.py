@@ -193,7 +193,7 @@ class SceneSolver:
     poses: use one per thread.
     """
 
-    def __init__(self, scene: Scene, *, model: str = 'mlp', weights: str | None = None,
+    def __init__(self, scene: Scene, *, model: str = 'exact', weights: str | None = None,
                  margin: float = 0.0, most_near: int | None = None) -> None:
         """Begin without poses.
 

@@ -42,7 +42,7 @@ class ContactSolver(native.PairSolver):
     margin: separation up to which pairs apart have a normal too [m]; infinity: all.
     """
 
-    def __init__(self, size_a: ArrayLike, size_b: ArrayLike, *, model: str | Model = 'mlp',
+    def __init__(self, size_a: ArrayLike, size_b: ArrayLike, *, model: str | Model = 'exact',
                  weights: str | None = None, margin: float = 0.0) -> None:
         row_a, row_b = as_size(size_a, 'size_a'), as_size(size_b, 'size_b')
         margin = as_floats(margin, 'margin', 'a number', ()).item()

@@ -3,7 +3,7 @@
 
 """Models: the names that users ask for, and the objects that answer under them.
 
-`mlp` and `exact` are answered in C++. Every other model is an object with `solve`: those that the
+`exact` and `mlp` are answered in C++. Every other model is an object with `solve`: those that the
 package ships are imported when their name is asked for, and a user passes an object of their own.
 """
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 from .checks import nearest_name, short_repr
 from .contact import Contacts
 
-NATIVE = ('mlp', 'exact')
+NATIVE = ('exact', 'mlp')
 """Models in C++. They alone give volume and covariance."""
 MODELS = (*NATIVE, 'paper', 'soup-N')
 """Names as help texts show them: N is 1 to `MOST_SOUP_DIVISIONS`."""
