@@ -89,7 +89,7 @@ def read_contacts(message: Any, rows: SceneRows) -> DrawnContacts:
 
     Raises Refused for a pair that is not in the scene, and for numbers that no contact has.
     """
-    touching = [c for c in message.contacts if not math.isnan(c.point.x)]
+    touching = message.contacts
     touching.sort(key=lambda c: -c.depth)
     pairs, stale = [c.pair for c in touching], list(message.stale)
     unknown = [pair for pair in (*pairs, *stale) if pair not in rows.boxes_of]
