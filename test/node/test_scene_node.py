@@ -169,16 +169,17 @@ def test_a_stale_pair_is_named_and_never_an_old_contact(client, scene_node):
         assert client.answer(ON_LORRY, LORRY)[BESIDE].separation == pytest.approx(-0.2)
 
 
-def test_close_pairs_are_listed_within_the_margin(client, scene_node):
+def test_near_pairs_are_listed_within_the_margin(client, scene_node):
     """Before the touch, without a point and without topics of their own."""
     lorry = (7.0, 0, 1.0, 0, 0, 0, 1)
     with scene_node(margin=0.3):
         client.offer_until_answered(ON_FLOOR, lorry)
         assert client.answer((0, 0, 1.35, 0, 0, 0, 1), lorry) == {}
         stamp = client.ask((0, 0, 1.25, 0, 0, 0, 1), lorry)
-        contact = contacts_by_pair(client.contacts[stamp])[FLOOR]
-        assert not contact.colliding and contact.separation == 0.25 and contact.volume == 0.0
-        assert np.isnan(contact.point).all() and contact.normal.tolist() == [0, 0, 1]
+        assert not client.contacts[stamp].contacts
+        near, = client.contacts[stamp].near
+        assert (near.pair, near.depth, near.volume, near.normal.z) == (FLOOR, -0.25, 0.0, 1.0)
+        assert np.isnan(near.point.x)
         assert client.answer(ON_FLOOR, lorry)[FLOOR].colliding
         assert stamp not in client.points_of[FLOOR]
 
