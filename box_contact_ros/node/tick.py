@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,7 @@ from ..solver.checks import absent_poses, are_poses, pose_fault, short_repr
 from .diagnostics import TickMonitor
 from .message_bytes import ContactWriter, PoseReader, header_bytes
 from .messages import NANOSECONDS, Refused
-from .topics import SceneTopics
+from .topics import PoseCallback, SceneTopics
 
 
 class TickAnswerer:
@@ -49,12 +49,13 @@ class TickAnswerer:
         self.pairing.tolerance, self.pairing.max_age = (
             round(NANOSECONDS * settings[name]) for name in ('tolerance', 'max_age'))
 
-    def callback_of(self, box: str, topic: str) -> Callable[[bytes], None]:
+    def callback_of(self, box: str, topic: str) -> PoseCallback:
         """Return the callback for the bytes of a box, or of all; it raises nothing at all."""
-        def callback(data: bytes) -> None:
+        def callback(data: bytes, info: Mapping[str, Any]) -> None:
             if not self.active:
                 return
             self._counts['poses'] += 1
+            self._monitor.came(box, info['publication_sequence_number'])
             try:
                 pose = (self._read_all(data) if box == ALL_BOXES else self._reader.read_pose(data))
                 ticks = self.pairing.add(box, pose)
@@ -63,7 +64,7 @@ class TickAnswerer:
                 return
             for tick in ticks:
                 try:
-                    self._answer(tick)
+                    self._answer(tick, info['received_timestamp'])
                 except Exception as error:  # one tick that is refused keeps back no other
                     self._refuse(error, topic)
         return callback
@@ -82,8 +83,11 @@ class TickAnswerer:
             box for box, absent in zip(moving, absent_poses(poses.numbers)) if absent]
         return poses
 
-    def _answer(self, tick: Tick) -> None:
-        """Publish the contacts of a tick: those of each pair, then all of them."""
+    def _answer(self, tick: Tick, arrived: int) -> None:
+        """Publish the contacts of a tick: those of each pair, then all of them.
+
+        arrived: when the pose came that completes the tick, by the wall clock [ns]; 0: unknown.
+        """
         is_array = self.solver.scene.pose_array
         stamp, frame_id = self._header_of(tick)
         started = time.perf_counter_ns()
@@ -103,7 +107,8 @@ class TickAnswerer:
         self._topics.contacts.publish(writer.contacts(header, answer))
         # What nobody waits for comes last. A box that an array leaves out is not there: nobody
         # asks for its pairs.
-        self._monitor.evaluated(took, [] if is_array else answer.stale)
+        age = time.time_ns() - arrived if arrived else 0
+        self._monitor.evaluated(took, age, [] if is_array else answer.stale)
         counts = self._counts
         counts['contacts'] += len(answer.touching)
         counts['evaluations'] += 1

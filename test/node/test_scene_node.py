@@ -25,6 +25,7 @@ from typed_messages import pose_array
 from box_contact_ros import ContactSolver
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import contacts_by_pair, make_header
+from box_contact_ros.node.topics import ARRAY_DEPTH
 from box_contact_ros.node.topics import MOST_PAIRS_WITH_TOPICS
 
 MS = 1_000_000  # ns
@@ -227,6 +228,38 @@ def test_one_message_has_all_poses(array_node, array_client):
     assert array_client.diagnostic('stale boxes') == 'lorry'
     assert BESIDE in array_client.answer(ON_LORRY, LORRY)
     assert array_client.contacts[array_client.ask(GONE, GONE)].stale == [FLOOR, BESIDE]
+
+
+def test_a_slow_node_says_so_and_is_late_by_few_ticks(array_node, array_client, monkeypatch):
+    """Of arrays at 100 Hz it answers a third: the newest that wait, not the oldest."""
+    tick = array_node._tick
+
+    def slow(poses, solver=tick.solver):
+        time.sleep(0.03)
+        return solver(poses)
+
+    slow.scene, slow.model = tick.solver.scene, tick.solver.model
+    monkeypatch.setattr(tick, 'solver', slow)
+    sent, behind = [], []
+
+    def is_late():
+        sent.append(array_client.send(ON_FLOOR, LORRY))
+        seen = len(array_client.contacts)
+        array_client.spin(lambda: False, 0.01)
+        behind.extend(len(sent) - sent.index(stamp) for stamp in list(array_client.contacts)[seen:]
+                      if stamp in sent)
+        return array_client.diagnostics[-1].status[0].message.startswith('answers are late: ')
+
+    assert array_client.spin(lambda: array_client.diagnostics)
+    deadline = time.monotonic() + PATIENCE
+    while not is_late():
+        assert time.monotonic() < deadline
+    status, = array_client.diagnostics[-1].status
+    values = {entry.key: entry.value for entry in status.values}
+    assert status.level == b'\x01'
+    assert int(values['lost since the last report']) > 10
+    assert 0 < int(values['rate [1/s]']) <= 34 and float(values['age p50 [ms]']) > 100.0
+    assert max(behind) < 5 * ARRAY_DEPTH  # three ticks pass while one is in work
 
 
 def test_bad_arrays_are_refused_and_counted(array_node, array_client):
