@@ -92,7 +92,7 @@ class Checker:
 
     def _sizes(self, boxes: Sequence[Any]) -> list[Row]:
         """Return full extents (3,) [m] of each box: its own, or those of the scene's box."""
-        sizes = [(box.size.x, box.size.y, box.size.z) for box in boxes]
+        sizes: list[Row] = [(box.size.x, box.size.y, box.size.z) for box in boxes]
         for number, (box, size) in enumerate(zip(boxes, sizes)):
             if not any(size):
                 known = self._scene.boxes.get(box.name)

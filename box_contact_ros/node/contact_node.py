@@ -265,10 +265,10 @@ class ContactNode(GuardedNode, LifecycleNode):
         """Publish diagnostics, once a second."""
         state = lifecycle_state(self)
         if self._answerer is None or self._topics is None:
-            self._diagnostics.publish(state=state, pairs=0)
+            self._diagnostics.publish(state=state, values={'pairs': 0})
         else:
             self._diagnostics.report(state, self._answerer.solver, self._answerer.pairing,
-                                     self._topics)
+                                     self._topics, self._answerer.take_lost())
 
 
 def run(node_type: type[ContactNode], doc: str | None, args: Sequence[str] | None) -> int:

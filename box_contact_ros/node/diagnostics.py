@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
 from math import ceil, floor, log10
 from typing import Any, NamedTuple
@@ -20,7 +20,7 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 
-from ..scene.pairing import OLD, REPEATED, RESETS, TOO_LATE, Pairing, Rejection
+from ..scene.pairing import OLD, OVERTAKEN, REPEATED, RESETS, TOO_LATE, Pairing, Rejection
 from ..scene.scene_solver import Pair, Scene, SceneSolver
 from .messages import make_header
 from .topics import SceneTopics
@@ -68,8 +68,6 @@ class TickMonitor:
         """Time in the solver [us] and age of the answer [ms] of the last evaluations, a ring."""
         self._evaluations = 0
         self._taken = time.monotonic()  # when `take_load` was called last
-        self._sequence: dict[str, int] = {}  # number that the publisher gave the last pose, by box
-        self._lost: Counter[str] = Counter()  # poses that never came, by box
         self._refusals: dict[str, str] = {}  # log lines of the next report, by reason
         self.refused_boxes: set[str] = set()  # boxes of which a message was refused
         self._pairs: Sequence[Pair] = ()
@@ -84,15 +82,6 @@ class TickMonitor:
         self._heard: float | None = None  # when poses last came
         self._pairs, self._open = pairs, None
         self._since.clear()
-
-    def came(self, box: str, sequence: int | None) -> None:
-        """Note a pose by the number that its publisher gave it: a gap is what was lost."""
-        if sequence is None:  # a middleware that has no numbers
-            return
-        gap = sequence - self._sequence.get(box, sequence) - 1
-        self._sequence[box] = sequence
-        if gap > 0:
-            self._lost[box] += gap
 
     def evaluated(self, took: int, age: int, stale: list[Pair]) -> None:
         """Note a tick: its time in the solver and the age of its answer [ns], the pairs left out.
@@ -120,17 +109,12 @@ class TickMonitor:
         lines, self._refusals = list(self._refusals.values()), {}
         return lines
 
-    def take_load(self, publishers: Callable[[str], int]) -> Load:
-        """Return what happened since the last call; `publishers` counts those of a box.
-
-        Several publishers of one box number their poses each from 1: nobody knows what is lost.
-        """
+    def take_load(self, lost: int) -> Load:
+        """Return what happened since the last call, of which the caller knows what was lost."""
         now = time.monotonic()
         times = self._times[:min(self._evaluations, KEPT_TIMES)].copy()
-        lost = sum(gap for box, gap in self._lost.items() if publishers(box) == 1)
         load = Load(now - self._taken, self._evaluations, lost, times[:, 0], times[:, 1])
         self._taken, self._evaluations = now, 0
-        self._lost.clear()
         return load
 
     def summary(self, *, came: bool, max_age: float) -> Summary:
@@ -181,8 +165,11 @@ class Diagnostics:
         self._logged: dict[str, float] = {}  # when a cause was logged [s]
 
     def report(self, state: str, solver: SceneSolver, pairing: Pairing, topics: SceneTopics,
-               ) -> None:
-        """Report on a node that is configured; `state` is that of the lifecycle."""
+               lost: int) -> None:
+        """Report on a node that is configured.
+
+        state: that of the lifecycle. lost: poses that never came since the last report.
+        """
         logger, scene = self._node.get_logger(), solver.scene
         rejections, pairing.rejections = pairing.rejections, {}
         for line in (*self._monitor.take_refusals(),
@@ -190,7 +177,7 @@ class Diagnostics:
             logger.warning(line)
         new = self._counts - self._reported
         self._reported = Counter(self._counts)
-        load = self._monitor.take_load(topics.publisher_count)
+        load = self._monitor.take_load(lost)
         summary = self._monitor.summary(came=new['poses'] > 0, max_age=1e-9 * pairing.max_age)
         unseen = [box for box in pairing.unseen() if box not in self._monitor.refused_boxes]
         stale = self._monitor.absent if scene.pose_array else pairing.stale()
@@ -198,7 +185,8 @@ class Diagnostics:
             summary, [name.partition(': ')[2] for name in new if name.startswith('refused')],
             unseen, stale, scene, pairing, topics))
         sent = (new['poses'] + load.lost) / len(scene.streams)
-        findings += _lateness(load, sent)
+        if state == ACTIVE and load.evaluations:
+            findings += _lateness(load, sent, new[OVERTAKEN])
         self._log(findings)
         self.publish(findings, state=state, load=load, values={
             'model': solver.model, 'pairs': len(scene.pairs), 'stale boxes': ' '.join(stale),
@@ -242,15 +230,13 @@ class Diagnostics:
                 self._node.get_logger().warning(f'{finding.message}: {finding.remedy}')
 
 
-def _lateness(load: Load, sent: float) -> Iterator[Finding]:
-    """Yield that answers are late; `sent`: poses of each box since the last report."""
-    if not load.evaluations:
-        return
+def _lateness(load: Load, sent: float, overtaken: int) -> Iterator[Finding]:
+    """Yield that answers are late, or poses left out for newer ones; sent: poses per box."""
     age = float(np.median(load.ages))
     ticks = 1e-3 * age * sent / load.seconds
-    if ticks > LATE_TICKS:
+    if ticks > LATE_TICKS or overtaken:
         yield Finding('late', f'answers are late: {age:.0f} ms, {ticks:.0f} ticks; '
-                              f'{load.lost} poses lost',
+                              f'{load.lost + overtaken} poses lost',
                       'the node is too slow for these poses; give it a core of its own, list fewer '
                       'pairs, set pair_topics to false, or send poses less often')
 

@@ -29,7 +29,7 @@ CONTACT_DEPTH = 10
 POSE_DEPTH = 100
 """Poses that wait: 100 ms at 1 kHz, longer than any collection of garbage."""
 QOS_OVERRIDES = QoSOverridingOptions.with_default_policies()  # of poses and of `contacts`
-ARRAY_DEPTH = 10
+ARRAY_DEPTH = 5
 """Arrays that wait: a node that cannot keep up is late by a few ticks, never by seconds."""
 
 PoseCallback = Callable[[bytes, Mapping[str, Any]], None]

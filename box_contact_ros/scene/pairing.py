@@ -75,6 +75,7 @@ TOO_LATE = 'dropped: tick answered before'
 REPEATED = 'refused: repeated stamp'
 OLD = 'refused: older than the last'
 RESETS = 'time went back'
+OVERTAKEN = 'dropped: newer poses wait'
 
 
 class StampedPose(NamedTuple):

@@ -19,9 +19,8 @@ from geometry_msgs.msg import (
 )
 from std_msgs.msg import Header
 
-from box_contact_msgs.msg import Box, BoxPair
+from box_contact_msgs.msg import Box, BoxPair, Contacts
 from box_contact_msgs.msg import Contact as ContactMessage
-from box_contact_msgs.msg import Contacts
 from box_contact_ros.node.messages import NANOSECONDS, UPPER, Refused, make_header
 from box_contact_ros.scene.pairing import StampedPose
 from box_contact_ros.scene.scene_solver import Answer, Pair

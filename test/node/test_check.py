@@ -27,7 +27,7 @@ from box_contact_ros.scene.scene_solver import Box, Pair, Scene
 CUBE = tuple(poses.CUBE)
 SCENE = Scene({name: Box(name, CUBE) for name in ('load', 'stack', 'lorry')},
               (Pair('landing', 'load', 'stack'), Pair.between('load', 'lorry')))
-EPISODES = 3  # of each length
+EPISODES = 1  # of each length; 50 were tried
 
 
 @pytest.fixture(scope='module')
@@ -119,7 +119,7 @@ def test_a_soup_answers_few_pairs() -> None:
     assert 'at most 64' in asked(checker, *boxes).message
     apart = (a_box('load', APART), a_box('stack', ORIGIN))
     assert asked(checker, *apart).success
-    assert "margin inf has no effect on model 'soup-2'" in asked(checker, *apart, margin=1.0).message
+    assert 'margin inf has no effect' in asked(checker, *apart, margin=1.0).message
 
 
 # --- over ROS -------------------------------------------------------------------------------------
