@@ -43,8 +43,8 @@ def test_every_definition_is_built() -> None:
     for path in DEFINITIONS:
         made = getattr(import_module(f'box_contact_msgs.{path.parent.name}'), path.stem)
         parts = path.read_text('utf-8').split('\n---\n')
-        for part, message in zip(parts, [made] if len(parts) == 1 else [made.Request,
-                                                                       made.Response]):
+        messages = [made] if len(parts) == 1 else [made.Request, made.Response]
+        for part, message in zip(parts, messages, strict=True):
             names = re.findall(r'^[\w/]+(?:\[\d*\])? (\w+)$', part, re.M)
             assert list(message.get_fields_and_field_types()) == names and names
 
