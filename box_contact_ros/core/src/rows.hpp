@@ -33,7 +33,7 @@ struct RowPlaces {
   static constexpr double nothing[7] = {not_a_number, not_a_number, not_a_number, not_a_number,
                                         not_a_number, not_a_number, not_a_number};
 
-  // The row of a box, or −1. Read once: another thread may change the pairs after they were checked.
+  // The row of a box, or −1. Read once: another thread may change pairs that were checked.
   BC_INLINE static long place(const Rows& rows, long number) {
     long found = long(*static_cast<const volatile int64_t*>(rows.pairs + number));
     return found < rows.pose_count ? found : -1;

@@ -144,7 +144,8 @@ bc_status collide_rows(const Solver& solver, const bc_rows& given, double margin
     if (given.pairs && (place < 0 || place >= given.pose_count))
       return fail(BC_BAD_ROWS, "pairs[%lld] was changed while it was read", (long long)refused);
   refuse_pair(rows.poses_a + 7 * places[0], rows.poses_b + 7 * places[1],
-              rows.sizes_a + rows.size_step_a * places[0], rows.sizes_b + rows.size_step_b * places[1]);
+              rows.sizes_a + rows.size_step_a * places[0],
+              rows.sizes_b + rows.size_step_b * places[1]);
   char why[sizeof error_text];
   std::memcpy(why, error_text, sizeof why);
   return fail(BC_BAD_ROWS, "row %lld: %.480s", (long long)refused, why);
