@@ -4,9 +4,11 @@
 """Build and installation, for colcon (ROS 2 workspaces) and for pip alike."""
 
 import copy
+import hashlib
 import os
 import platform
 import shutil
+import subprocess
 import sys
 import sysconfig
 from concurrent.futures import ThreadPoolExecutor
@@ -61,8 +63,7 @@ class BuildCore(build_ext):
     def finalize_options(self):
         super().finalize_options()
         self.parallel = self.parallel or os.cpu_count()
-        # File times, by which setuptools would leave out an extension, know no flags.
-        self.force = True
+        self.force = True  # `build_extension` knows what has changed
 
     def run(self):
         compiler = os.environ.get('CXX', 'g++').split()[0]
@@ -77,9 +78,29 @@ class BuildCore(build_ext):
         super().run()
 
     def build_extension(self, ext):
-        if ext.name == CORE_EXTENSION:
+        made = [Path(self.get_ext_fullpath(ext.name))]
+        made.append(made[0].with_name(LIBRARY))
+        note, now = Path(self.build_temp, 'built_from'), self.built_from()
+        if not (all(path.is_file() for path in made)
+                and note.is_file() and note.read_text() == now):
+            note.unlink(missing_ok=True)
             ext.extra_objects = self.build_library(ext)
-        super().build_extension(ext)
+            super().build_extension(ext)
+            note.write_text(now)
+        if not BY_PIP:  # where linkers look; `install_data` and colcon come to it after this
+            self.distribution.data_files.append(('lib', [str(made[1])]))
+
+    def built_from(self) -> str:
+        """Return a hash of all that the core is built from. Times of files know no flags."""
+        compiler = subprocess.run([os.environ.get('CXX', 'g++').split()[0], '--version'],
+                                  stdout=subprocess.PIPE).stdout
+        settings = (self.distribution.get_version(), sys.version, FLAGS, INSTRUCTION_SETS,
+                    os.environ.get('CXX', ''), os.environ.get('CXXFLAGS', ''))
+        parts = [compiler, repr(settings).encode()]
+        for path in sorted(Path(CORE).rglob('*')):
+            if path.suffix in ('.cpp', '.hpp', '.h', '.map'):
+                parts += [str(path).encode(), path.read_bytes()]
+        return hashlib.sha256(b'\0'.join(parts)).hexdigest()
 
     def build_library(self, ext) -> list[str]:
         """Build libbox_contact next to the extension `ext`; return its objects."""
@@ -139,9 +160,13 @@ def data_files() -> list[tuple[str, list[str]]]:
             # is_file() also drops links that colcon --symlink-install left to deleted files.
             if path.is_file() and '__pycache__' not in path.parts:
                 files.setdefault(f'{share}/{path.parent.as_posix()}', []).append(path.as_posix())
-    # Where find_package looks below a prefix, such as colcon's. The package has the rest.
+    # Where find_package looks below a prefix, such as colcon's.
     files[f'{share}/cmake'] = sorted(
         path.as_posix() for path in Path(CORE, 'cmake').glob('*.cmake'))
+    if not BY_PIP:
+        files[f'include/{NAME}/box_contact'] = sorted(
+            path.as_posix() for folder in (CORE, f'{NAME}/node')
+            for path in Path(folder, 'include', 'box_contact').iterdir())
     return list(files.items())
 
 
@@ -160,7 +185,8 @@ setup(
     packages=find_packages(include=[NAME, f'{NAME}.*']),
     # Said in so many words, it makes an editable install a path that type checkers follow.
     package_dir={'': '.'},
-    package_data={NAME: ['py.typed', '**/*.pyi', 'core/cmake/*', 'core/include/**/*.h*']},
+    package_data={NAME: ['py.typed', '**/*.pyi', 'core/cmake/*', 'core/include/**/*.h*',
+                         'node/include/**/*.hpp']},
     ext_modules=extensions(),
     data_files=data_files(),
     entry_points={

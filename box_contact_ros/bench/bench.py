@@ -7,8 +7,8 @@ Each node is a process of its own, in a ROS domain of its own on this host. The 
 poses of equal stamp: a container that sways on top of another one. Blocks of half a second go to
 one node after the other, in an order that is drawn for each block.
 
-Reports latencies, their ratios to the echo node with 95 % intervals, lost and wrong answers by
-comparison with the exact contacts, and each node's share of a core.
+The first line of the report says how many times as long a node takes as the one before it, with
+95 % intervals. A table has latencies, and answers that are lost or differ from the exact contacts.
 
 The exit status is 0 only if contact and echo node lost nothing, no answer was wrong, and the run is
 not void. It is void if the bench itself was late by more than a period in over 1 % of the pairs.
@@ -37,7 +37,7 @@ from ..node.runtime import exit_on_refusal, running_node
 from ..solver.arguments import add_model, program_parser, within
 from .drive import NODES, Bench, BenchNode, MeasuredNode
 from .poses import swaying_containers
-from .report import figures, table, void_reason, write_report
+from .report import comparison, figures, table, void_reason
 
 RATE, SECONDS, LONGEST = 200.0, 60.0, 3600.0  # [Hz], [s], [s]
 
@@ -68,13 +68,13 @@ def main(args: Sequence[str] | None = None) -> int:
             name, model=options.model, cores=cores - own or cores))) for name in names]
         logs = bench.run(nodes)
         faults = [node.fault for node in nodes if node.fault]
-    rows = figures(logs, block=bench.block)
+    rows, compared = figures(logs), comparison(logs, block=bench.block)
     void = void_reason(rows, options.rate)
     stopped = 'interrupted: figures are of what was sent before' if stop.is_set() else ''
-    results = '\n\n'.join(filter(None, (table(rows), *faults, void, stopped)))
+    results = '\n\n'.join(filter(None, (void, compared, table(rows), *faults, stopped)))
     print(f'\n{results}', flush=True)
     if options.out:
-        write_report(options.out, logs, rows, f'{about}\n\n{results}')
+        (options.out / 'bench.md').write_text(f'# Bench\n\n{about}\n\n{results}\n', 'utf-8')
     faulty = any(row['wrong'] or row['lost'] and row['node'] != 'soup' for row in rows)
     return stop.status or int(faulty or bool(faults) or bool(void))
 
@@ -88,7 +88,7 @@ def _options(args: Sequence[str]) -> argparse.Namespace:
                              '%(default)g)')
     add_model(parser, PARAMETERS['model'].default)
     parser.add_argument('--out', type=Path, metavar='DIR',
-                        help='folder for bench.md, bench.csv and bench.png (default: none)')
+                        help='folder for bench.md (default: none)')
     add_domain(parser)
     options = parser.parse_args(list(args))
     if options.out:
@@ -104,17 +104,14 @@ def _about(options: argparse.Namespace, own: set[int], nodes: set[int]) -> str:
     """Return where and how the bench runs, a line of a Markdown list for each fact."""
     fields = r'^(model name|cpu family|model)\s*: (.*)'
     cpu = dict(re.findall(fields, Path('/proc/cpuinfo').read_text(), re.MULTILINE))
-    versions = ', '.join(f'{name} {version(name)}' for name in ('numpy', 'rclpy'))
     return '\n'.join([
         f'- machine: {cpu.get("model name", platform.machine())} (family '
         f'{cpu.get("cpu family", "unknown")}, model {cpu.get("model", "unknown")}), '
-        f'{native.instruction_set}, {os.cpu_count()} cores',
-        f'- Python {platform.python_version()}, {versions}, compiler {native.compiler}',
-        f'- cores: bench on {" ".join(map(str, sorted(own)))}, '
-        f'nodes on {" ".join(map(str, sorted(nodes)))}',
-        f'- load at start: {os.getloadavg()[0]:.2f}',
-        f'- model of the contact node: {options.model}',
-        f'- {options.rate:g} pairs per second for {options.duration:g} s'])
+        f'{native.instruction_set}, {os.cpu_count()} cores; load {os.getloadavg()[0]:.2f}',
+        f'- Python {platform.python_version()}, numpy {version("numpy")}, rclpy '
+        f'{version("rclpy")}, compiler {native.compiler}',
+        f'- cores: bench on {own}, nodes on {nodes}',
+        f'- model {options.model}, {options.rate:g} pairs per second for {options.duration:g} s'])
 
 
 if __name__ == '__main__':

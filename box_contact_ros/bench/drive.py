@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import contextlib
 import gc
-import math
 import os
 import tempfile
 import threading
@@ -24,13 +23,13 @@ from typing import Any
 import numpy as np
 from geometry_msgs.msg import PointStamped, PoseStamped, Vector3Stamped
 from rclpy.context import Context
-from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message, serialize_message
 
 from box_contact_msgs.msg import Contacts as ContactsMessage
 
 from ..node.messages import make_header
 from ..node.processes import Stop, end, printed, program, start
+from ..node.ros_client import DEEP_RELIABLE, pose_message
 from ..node.runtime import GuardedNode, spin_for
 from ..solver.contact_solver import ContactSolver
 from .echo_node import FRAME, raw_stamp, with_stamp
@@ -43,12 +42,10 @@ SLICE = 0.05  # time [s] between looks at whether the bench was called off
 START_LIMIT = 60.0  # time [s] until all nodes answer
 DRAIN_SECONDS = 1.0  # time [s] without an answer, after which what is still out is lost
 
-DEEP = QoSProfile(depth=1000)
-"""Reliable: what comes in while Python is busy must not push out the rest."""
 NODES = {'echo': ('bench.echo_node', 'echo/'), 'contact': ('node.contact_node', ''),
          'soup': ('soup.soup_node', 'soup/')}
 """Module of each node, and what precedes the topics that it answers on. All topics of a node are
-in the namespace bench/NAME. Ratios are to the first one."""
+in the namespace bench/NAME. Each node is compared with the one before it."""
 ANSWERS = {'point': (PointStamped, 'contact/point'), 'normal': (Vector3Stamped, 'contact/normal'),
            'contacts': (ContactsMessage, 'contacts')}
 """Type and topic of each kind of answer."""
@@ -79,15 +76,6 @@ class MeasuredNode:
         *_, last = ['', *printed(self._output).splitlines()]
         return f'the {self.name} node ended with status {status}: {last}'
 
-    def cpu_seconds(self) -> float:
-        """Return the processor time [s] so far; NaN once the process ended."""
-        try:
-            with open(f'/proc/{self.process.pid}/stat') as file:
-                fields = file.read().rpartition(')')[2].split()
-        except OSError:
-            return math.nan
-        return (int(fields[11]) + int(fields[12])) / os.sysconf('SC_CLK_TCK')
-
     def close(self) -> None:
         """End the process."""
         end([self.process])
@@ -103,13 +91,14 @@ class BenchNode(GuardedNode):
         self.arrivals: list[tuple[int, str, bytes]] = []
         """(received [ns], kind, message); stamps tell the nodes apart."""
         self.senders = {
-            name: [self.create_publisher(PoseStamped, f'bench/{name}/box_{box}/pose', DEEP).publish
-                   for box in 'ab'] for name in names}
+            name: [self.create_publisher(
+                PoseStamped, f'bench/{name}/box_{box}/pose', DEEP_RELIABLE).publish
+                for box in 'ab'] for name in names}
         """What sends a serialised pose of box A and of box B to a node."""
         for name in names:
             for kind, (message, topic) in ANSWERS.items():  # the echo node sends no contacts
                 self.create_subscription(message, f'bench/{name}/{NODES[name][1]}{topic}',
-                                         partial(self._keep, kind), DEEP, raw=True)
+                                         partial(self._keep, kind), DEEP_RELIABLE, raw=True)
 
     def _keep(self, kind: str, data: bytes) -> None:
         self.arrivals.append((time.time_ns(), kind, data))
@@ -127,46 +116,41 @@ class Bench:
         self.client, self.executor, self.rate, self.stop = client, executor, rate, stop
         self.block = max(1, round(rate * BLOCK_SECONDS))  # pairs
         self._truth = ContactSolver(SIZE, SIZE, model='exact').batch(*poses)
-        self._pairs = [[_pose_bytes(pose) for pose in pair] for pair in zip(*poses)]
+        header = make_header(0, FRAME)
+        self._pairs = [[serialize_message(pose_message(header, pose)) for pose in pair]
+                       for pair in zip(*poses)]
 
     def run(self, nodes: Sequence[MeasuredNode]) -> list[AnswerLog]:
-        """Play the stream to all nodes; return a log for each.
+        """Play the stream to all nodes; return a log for each, of what was sent before `stop`.
 
-        The logs hold what was done when `stop` was set. Raises ValueError where a node does not
-        answer.
+        Raises ValueError where a node does not answer.
         """
-        self._await_answers(nodes)
         logs = {node.name: AnswerLog(node.name, self._truth) for node in nodes}
         count = len(self._pairs)
         blocks = [range(first, min(first + self.block, count))
                   for first in range(0, count, self.block)]
-        for node in nodes:  # the log is thrown away: the nodes warm up
-            self._play(AnswerLog(node.name, self._truth), blocks[0])
-        before = [node.cpu_seconds() for node in nodes]
+        for node in nodes:
+            self._warm_up(node, blocks[0])
         order = np.random.default_rng(1)
         for rows in blocks:
-            if self.stop.is_set():
-                break
             for name in order.permutation(list(logs)):
-                self._play(logs[name], rows)
-        for node, log, spent in zip(nodes, logs.values(), before):
-            sent = max(1, int((log.stamps > 0).sum()))
-            log.cpu = (node.cpu_seconds() - spent) * self.rate / sent
+                if not self.stop.is_set():
+                    self._play(logs[name], rows)
         return list(logs.values())
 
-    def _await_answers(self, nodes: Sequence[MeasuredNode]) -> None:
-        """Send each node the first pair until it has answered, or raise ValueError."""
+    def _warm_up(self, node: MeasuredNode, rows: range) -> None:
+        """Send a node the first pair until it has answered, then a block that nobody looks at."""
         deadline = time.monotonic() + START_LIMIT
-        for node in nodes:
-            while not self.stop.is_set():
-                if node.fault:
-                    raise ValueError(node.fault)
-                if time.monotonic() > deadline:
-                    raise ValueError(f'no answer of the {node.name} node in {START_LIMIT:g} s')
-                log = AnswerLog(node.name, self._truth)
-                self._play(log, range(1))
-                if log.stamps[0] and not log.lost[0]:
-                    break
+        while not self.stop.is_set():
+            if node.fault:
+                raise ValueError(node.fault)
+            if time.monotonic() > deadline:
+                raise ValueError(f'no answer of the {node.name} node in {START_LIMIT:g} s')
+            log = AnswerLog(node.name, self._truth)
+            self._play(log, range(1))
+            if log.stamps[0] and not log.lost[0]:
+                self._play(AnswerLog(node.name, self._truth), rows)
+                return
 
     def _play(self, log: AnswerLog, rows: range) -> None:
         """Send some pairs to a node, and log its answers."""
@@ -176,9 +160,9 @@ class Bench:
         sender.start()
         while sender.is_alive():
             spin_for(self.client, self.executor, SLICE)
-        row_of = {}
+        row_of = {stamp: row for row, (stamp, _) in zip(rows, sent)}
         for row, (stamp, lateness) in zip(rows, sent):
-            log.stamps[row], log.lateness[row], row_of[stamp] = stamp, lateness, row
+            log.stamps[row], log.lateness[row] = stamp, lateness
         deadline = time.monotonic() + DRAIN_SECONDS
         while log.lost[rows].any() and time.monotonic() < deadline:
             spin_for(self.client, self.executor, SLICE)
@@ -221,11 +205,3 @@ class Bench:
             if kind == 'contacts' and message.contacts:
                 log.depths[row] = message.contacts[0].depth
         return bool(known)
-
-
-def _pose_bytes(pose: np.ndarray) -> bytes:
-    """Return the serialised message of a pose (7,), under a stamp of 0."""
-    message = PoseStamped(header=make_header(0, FRAME))
-    p, q = message.pose.position, message.pose.orientation
-    p.x, p.y, p.z, q.x, q.y, q.z, q.w = map(float, pose)
-    return serialize_message(message)

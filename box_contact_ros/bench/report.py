@@ -1,7 +1,7 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""What came back from each node, its figures, and their table, CSV file and picture. No ROS.
+"""What came back from each node, and its figures as text. No ROS.
 
 Stamps and times of receipt are nanoseconds of one clock. A pair is answered once all messages of
 its stamp have come: point, normal and contacts, from the echo node point and normal. Its latency
@@ -11,10 +11,8 @@ came twice.
 """
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,7 +24,6 @@ DEPTH_TOLERANCE = 1e-9
 separating-axis test. The depths of two ticks differ by a thousand times more."""
 RESAMPLES = 2000  # of the bootstrap
 LATE = 'bench late p99 [ms]'  # a column
-COLORS = {'contact': 'tab:blue', 'soup': 'tab:red', 'echo': 'tab:gray'}
 
 
 class AnswerLog:
@@ -43,7 +40,6 @@ class AnswerLog:
         self.twice = np.zeros(rows, bool)
         self.points = np.full((rows, 3), np.nan)
         self.depths = np.full(rows, np.nan)  # [m], NaN: no contact
-        self.cpu = math.nan  # share of one core while poses were sent
 
     def note(self, row: int, kind: str, received: int) -> None:
         """Note that a message came at `received` [ns]; of two, the first counts."""
@@ -89,24 +85,24 @@ def ratio(log: AnswerLog, baseline: AnswerLog, *, block: int) -> tuple[float, fl
     return float(np.median(medians)), float(low), float(high)
 
 
-def figures(logs: Sequence[AnswerLog], *, block: int) -> list[dict[str, Any]]:
-    """Return a row of the table and of the CSV file for each node; NaN where nothing was answered.
+def comparison(logs: Sequence[AnswerLog], *, block: int) -> str:
+    """Return the ratio of each node to the one before it: `contact / echo 1.18 [1.15, 1.22]`."""
+    ratios = [(log, before, ratio(log, before, block=block))
+              for before, log in zip(logs, logs[1:])]
+    return ', '.join(f'{log.node} / {before.node} {middle:.2f} [{low:.2f}, {high:.2f}]'
+                     for log, before, (middle, low, high) in ratios)
 
-    Ratios are to the first node. block: pairs per block.
-    """
-    rows = []
-    for log in logs:
-        middle, low, high = ratio(log, logs[0], block=block)
-        errors = np.linalg.norm(log.points - log.truth.point, axis=1)
-        rows.append({
-            'node': log.node, 'sent': np.count_nonzero(log.stamps), 'lost': int(log.lost.sum()),
-            'wrong': int(log.wrong.sum()),
-            **{f'{name} [ms]': 1e3 * _percentile(log.latencies, percent)
-               for name, percent in (('p50', 50), ('p99', 99), ('max', 100))},
-            f'/ {logs[0].node}': middle, 'low': low, 'high': high,
-            'point error [mm]': 1e3 * _percentile(errors, 100), 'CPU [%]': 100.0 * log.cpu,
-            LATE: 1e3 * _percentile(log.lateness, 99)})
-    return rows
+
+def figures(logs: Sequence[AnswerLog]) -> list[dict[str, Any]]:
+    """Return a row of the table for each node; NaN where nothing was answered."""
+    return [{
+        'node': log.node, 'sent': np.count_nonzero(log.stamps), 'lost': int(log.lost.sum()),
+        'wrong': int(log.wrong.sum()),
+        **{f'{name} [ms]': 1e3 * _percentile(log.latencies, percent)
+           for name, percent in (('p50', 50), ('p99', 99), ('max', 100))},
+        'point error [mm]': 1e3 * _percentile(
+            np.linalg.norm(log.points - log.truth.point, axis=1), 100),
+        LATE: 1e3 * _percentile(log.lateness, 99)} for log in logs]
 
 
 def _percentile(values: np.ndarray, percent: float) -> float:
@@ -139,35 +135,3 @@ def _cell(value: object) -> str:
     if not isinstance(value, float):
         return str(value)
     return '' if math.isnan(value) else f'{value:.3g}'
-
-
-def write_report(folder: Path, logs: Sequence[AnswerLog], rows: Sequence[Mapping[str, Any]],
-                 page: str) -> None:
-    """Write bench.md and bench.csv, and bench.png where matplotlib is installed."""
-    (folder / 'bench.md').write_text(f'# Bench\n\n{page}\n', 'utf-8')
-    with (folder / 'bench.csv').open('w', newline='', encoding='utf-8') as file:
-        writer = csv.DictWriter(file, list(rows[0]), lineterminator='\n')
-        writer.writeheader()
-        writer.writerows(rows)
-    try:
-        draw(folder / 'bench.png', logs)
-    except ModuleNotFoundError as error:
-        print(f'no picture: {error.name} is not installed (extra: report)')
-
-
-def draw(path: Path, logs: Sequence[AnswerLog]) -> None:
-    """Draw, for each node, which share of its answers takes at least how long."""
-    from matplotlib.figure import Figure
-
-    drawing = Figure(figsize=(7.0, 4.5), layout='constrained', dpi=110)
-    axis = drawing.subplots()
-    axis.set(xscale='log', yscale='log', xlabel='latency [ms]',
-             ylabel='share of answers that take at least as long')
-    for log in logs:
-        latencies = np.sort(1e3 * log.latencies[~np.isnan(log.latencies)])
-        # The i-th answer itself is counted, so the share is never zero.
-        share = np.arange(latencies.size, 0, -1) / max(1, latencies.size)
-        axis.step(latencies, share, where='post', color=COLORS[log.node], label=f'{log.node} node')
-    axis.grid(alpha=0.3)
-    axis.legend()
-    drawing.savefig(path)

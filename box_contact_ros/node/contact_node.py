@@ -8,6 +8,7 @@ Subscribes box_a/pose and box_b/pose (geometry_msgs/PoseStamped). Publishes cont
 evaluation it publishes contacts (box_contact_msgs/Contacts), and once a second /diagnostics.
 
 With a scene file: <box>/pose of every moving box, and <pair>/contact/point, <pair>/contact/normal.
+The service ~/check (box_contact_msgs/Check) answers about the boxes of a request, without stamps.
 The service ~/reset (std_srvs/Trigger) forgets all poses and stamps.
 It is a lifecycle node that configures and activates itself, unless autostart is false. Its
 parameters are read when it is configured; model, tolerance and max_age may be set while it runs.
@@ -29,12 +30,15 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
+from box_contact_msgs.srv import Check
+
 from ..core import LENGTH_MAX
 from ..scene.pairing import PAIRINGS, RESETS
 from ..scene.scene_file import read_scene
 from ..scene.scene_solver import CONTAINER, Scene, SceneSolver, two_boxes
 from ..solver.checks import short_repr
 from ..solver.models import MODELS, check_model, most_near
+from .check import Checker
 from .diagnostics import DIAGNOSTICS_SECONDS, Diagnostics, TickMonitor
 from .parameters import (
     Setting,
@@ -54,6 +58,7 @@ from .tick import TickAnswerer
 from .topics import SceneTopics
 
 LONGEST = 1e6  # s, about twelve days
+NOT_CONFIGURED = 'the node is not configured'
 NAMED_TOPICS = 3  # how many pose topics the node names when it is ready
 
 
@@ -75,8 +80,8 @@ PARAMETERS = {
     'max_age': Setting(1.0, 'a box whose newest stamp is older than this is reported as stale; '
                             'with pairing latest, its pairs get no contact; 0: never [s]',
                        number(0.0, LONGEST)),
-    'margin': Setting(0.0, 'pairs apart are listed in contacts too, up to this separation [m]; '
-                           'their depth is negative', number(0.0, LENGTH_MAX)),
+    'margin': Setting(0.0, 'pairs apart are listed as near up to this separation [m]',
+                      number(0.0, LENGTH_MAX)),
     'pair_topics': Setting(True, 'whether pairs have topics of their own next to contacts', flag),
 }
 LIVE = ('model', 'tolerance', 'max_age')
@@ -106,7 +111,9 @@ class ContactNode(GuardedNode, LifecycleNode):
         self._values: dict[str, Any] = {}
         self._topics: SceneTopics | None = None  # from configure to cleanup
         self._answerer: TickAnswerer | None = None  # likewise
+        self._checker: Checker | None = None  # of the solver's scene and model
         self.add_on_set_parameters_callback(self._set_live)
+        self.create_service(Check, '~/check', self.answered(self._check, '~/check'))
         self.create_service(Trigger, '~/reset', self.answered(self._reset, '~/reset'))
         # On a clock of its own: simulated time may stand still.
         self.create_timer(DIAGNOSTICS_SECONDS, self._report, clock=Clock(
@@ -226,10 +233,20 @@ class ContactNode(GuardedNode, LifecycleNode):
             f'{"pair" if pairs == 1 else "pairs"}; poses{frame} from '
             f'{", ".join(topics[:NAMED_TOPICS])}{f" and {more} more" if more > 0 else ""}')
 
+    def _check(self, request: Check.Request, response: Check.Response) -> Check.Response:
+        """Answer about the boxes of a request, on the node's model; ticks know nothing of it."""
+        if self._answerer is None:
+            response.message = NOT_CONFIGURED
+            return response
+        solver = self._answerer.solver
+        if self._checker is None or self._checker.solver is not solver:
+            self._checker = Checker(solver)
+        return self._checker.answer(request, response)
+
     def _reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Forget all poses and stamps: a simulation begins anew."""
         if self._answerer is None:
-            response.message = 'the node is not configured'
+            response.message = NOT_CONFIGURED
             return response
         self._answerer.pairing.reset()
         response.success, response.message = True, 'all poses and stamps are forgotten'
@@ -248,10 +265,10 @@ class ContactNode(GuardedNode, LifecycleNode):
         """Publish diagnostics, once a second."""
         state = lifecycle_state(self)
         if self._answerer is None or self._topics is None:
-            self._diagnostics.publish(state=state, pairs=0)
+            self._diagnostics.publish(state=state, values={'pairs': 0})
         else:
             self._diagnostics.report(state, self._answerer.solver, self._answerer.pairing,
-                                     self._topics)
+                                     self._topics, self._answerer.take_lost())
 
 
 def run(node_type: type[ContactNode], doc: str | None, args: Sequence[str] | None) -> int:

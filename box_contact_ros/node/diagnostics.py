@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
 from math import ceil, floor, log10
 from typing import Any, NamedTuple
@@ -20,7 +20,7 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 
-from ..scene.pairing import OLD, REPEATED, RESETS, TOO_LATE, Pairing, Rejection
+from ..scene.pairing import OLD, OVERTAKEN, REPEATED, RESETS, TOO_LATE, Pairing, Rejection
 from ..scene.scene_solver import Pair, Scene, SceneSolver
 from .messages import make_header
 from .topics import SceneTopics
@@ -30,9 +30,11 @@ REPORT_JITTER = 0.1  # reports may be this much less than DIAGNOSTICS_SECONDS ap
 UNMATCHED_SECONDS = 1.0  # a pair unanswered for this long is worth a warning
 UNANSWERED_SECONDS = 5.0
 """A pair unanswered for this long is an error; so long nobody has to publish after a start."""
+LATE_TICKS = 3.0
+"""Answers that are older than so many periods of the poses are late: poses wait in the queue."""
 REMINDER_SECONDS = 10.0  # a finding that stays is logged again after this long
 KEPT_TIMES = 4096
-"""Evaluations whose computing times are kept for a report: more a second than any node makes."""
+"""Evaluations whose times are kept for a report: more a second than any node makes."""
 NAMED = 3  # boxes or pairs that a message names
 COMPARED = 16  # pairs at most whose stamps are compared for a report
 MARGIN = 1.2
@@ -62,8 +64,10 @@ class TickMonitor:
 
     def __init__(self) -> None:
         self.absent: list[str] = []  # the boxes that the last array had no pose of
-        self._times = np.zeros(KEPT_TIMES)  # [us], a ring
+        self._times = np.zeros((KEPT_TIMES, 2))
+        """Time in the solver [us] and age of the answer [ms] of the last evaluations, a ring."""
         self._evaluations = 0
+        self._taken = time.monotonic()  # when `take_load` was called last
         self._refusals: dict[str, str] = {}  # log lines of the next report, by reason
         self.refused_boxes: set[str] = set()  # boxes of which a message was refused
         self._pairs: Sequence[Pair] = ()
@@ -79,9 +83,12 @@ class TickMonitor:
         self._pairs, self._open = pairs, None
         self._since.clear()
 
-    def evaluated(self, nanoseconds: int, stale: list[Pair]) -> None:
-        """Note a tick, its time in the solver, and the pairs that could not be evaluated."""
-        self._times[self._evaluations % KEPT_TIMES] = 1e-3 * nanoseconds
+    def evaluated(self, took: int, age: int, stale: list[Pair]) -> None:
+        """Note a tick: its time in the solver and the age of its answer [ns], the pairs left out.
+
+        The age runs from the arrival of the pose that completes the tick, by the wall clock.
+        """
+        self._times[self._evaluations % KEPT_TIMES] = 1e-3 * took, 1e-6 * age
         self._evaluations += 1
         if self._open is None:
             self._open = stale
@@ -102,10 +109,13 @@ class TickMonitor:
         lines, self._refusals = list(self._refusals.values()), {}
         return lines
 
-    def take_times(self) -> np.ndarray:
-        """Return the computing times (n,) [us] since the last call, the last KEPT_TIMES at most."""
-        count, self._evaluations = min(self._evaluations, KEPT_TIMES), 0
-        return self._times[:count]
+    def take_load(self, lost: int) -> Load:
+        """Return what happened since the last call, of which the caller knows what was lost."""
+        now = time.monotonic()
+        times = self._times[:min(self._evaluations, KEPT_TIMES)].copy()
+        load = Load(now - self._taken, self._evaluations, lost, times[:, 0], times[:, 1])
+        self._taken, self._evaluations = now, 0
+        return load
 
     def summary(self, *, came: bool, max_age: float) -> Summary:
         """Return which pairs are not answered; `came`: whether any pose did."""
@@ -123,6 +133,16 @@ class TickMonitor:
              if now - since + REPORT_JITTER >= max(seconds, max_age)]
             for seconds in (UNMATCHED_SECONDS, UNANSWERED_SECONDS))
         return Summary(unmatched if came else [], unanswered, quiet, self._heard is not None)
+
+
+class Load(NamedTuple):
+    """How busy the node was since the last report."""
+
+    seconds: float
+    evaluations: int
+    lost: int  # poses that were sent and never came: the queue was full, or the network
+    computing: np.ndarray  # (n,) time in the solver of the last ticks [us]
+    ages: np.ndarray  # (n,) time from arrival to answer of the last ticks [ms]
 
 
 class Summary(NamedTuple):
@@ -145,8 +165,11 @@ class Diagnostics:
         self._logged: dict[str, float] = {}  # when a cause was logged [s]
 
     def report(self, state: str, solver: SceneSolver, pairing: Pairing, topics: SceneTopics,
-               ) -> None:
-        """Report on a node that is configured; `state` is that of the lifecycle."""
+               lost: int) -> None:
+        """Report on a node that is configured.
+
+        state: that of the lifecycle. lost: poses that never came since the last report.
+        """
         logger, scene = self._node.get_logger(), solver.scene
         rejections, pairing.rejections = pairing.rejections, {}
         for line in (*self._monitor.take_refusals(),
@@ -154,31 +177,40 @@ class Diagnostics:
             logger.warning(line)
         new = self._counts - self._reported
         self._reported = Counter(self._counts)
+        load = self._monitor.take_load(lost)
         summary = self._monitor.summary(came=new['poses'] > 0, max_age=1e-9 * pairing.max_age)
         unseen = [box for box in pairing.unseen() if box not in self._monitor.refused_boxes]
         stale = self._monitor.absent if scene.pose_array else pairing.stale()
         findings = [] if state != ACTIVE else list(_findings(
             summary, [name.partition(': ')[2] for name in new if name.startswith('refused')],
             unseen, stale, scene, pairing, topics))
+        sent = (new['poses'] + load.lost) / len(scene.streams)
+        if state == ACTIVE and load.evaluations:
+            findings += _lateness(load, sent, new[OVERTAKEN])
         self._log(findings)
-        self.publish(findings, state=state, model=solver.model, pairs=len(scene.pairs),
-                     stale_boxes=' '.join(stale), boxes_that_never_came=' '.join(unseen),
-                     unanswered_pairs=len(summary.unanswered))
+        self.publish(findings, state=state, load=load, values={
+            'model': solver.model, 'pairs': len(scene.pairs), 'stale boxes': ' '.join(stale),
+            'boxes that never came': ' '.join(unseen),
+            'unanswered pairs': len(summary.unanswered), 'waiting ticks': pairing.waiting_ticks,
+            'lost since the last report': load.lost,
+            'dropped since the last report': sum(
+                count for name, count in new.items() if name.startswith('dropped'))})
 
-    def publish(self, findings: Sequence[Finding] = (), *, state: str, **values: Any) -> None:
-        """Publish counts, findings and further `values`; `state` is that of the lifecycle."""
-        times = self._monitor.take_times()
-        entries: dict[str, Any] = {**self._counts, 'lifecycle state': state}
-        entries |= {name.replace('_', ' '): value for name, value in values.items()}
-        entries['rate [1/s]'] = len(times)
-        if len(times):
-            entries |= {f'compute {name} [us]': f'{value:.1f}' for name, value in zip(
+    def publish(self, findings: Sequence[Finding] = (), *, state: str, load: Load | None = None,
+                values: Mapping[str, Any] | None = None) -> None:
+        """Publish counts, findings and further values; `state` is that of the lifecycle."""
+        entries: dict[str, Any] = {**self._counts, 'lifecycle state': state, **(values or {})}
+        if load:
+            entries['rate [1/s]'] = round(load.evaluations / load.seconds)
+        if load and load.evaluations:
+            entries |= {f'{what} {name} [{unit}]': f'{value:.1f}' for what, unit, times in (
+                ('compute', 'us', load.computing), ('age', 'ms', load.ages)) for name, value in zip(
                 ('p50', 'p99', 'max'), np.percentile(times, (50, 99, 100)))}
         if state != ACTIVE:
             findings = [Finding('state', f'{state}: no pose is answered')]
         level = max((finding.level for finding in findings), default=OK)
         message = '; '.join(finding.message for finding in findings) or (
-            'answering' if len(times) else 'no poses')
+            'answering' if load and load.evaluations else 'no poses')
         status = DiagnosticStatus(
             level=level, name=f'{self._node.get_fully_qualified_name()}: contacts',
             message=message, hardware_id='none',
@@ -196,6 +228,17 @@ class Diagnostics:
             if finding.remedy and finding.cause not in self._logged:
                 self._logged[finding.cause] = now
                 self._node.get_logger().warning(f'{finding.message}: {finding.remedy}')
+
+
+def _lateness(load: Load, sent: float, overtaken: int) -> Iterator[Finding]:
+    """Yield that answers are late, or poses left out for newer ones; sent: poses per box."""
+    age = float(np.median(load.ages))
+    ticks = 1e-3 * age * sent / load.seconds
+    if ticks > LATE_TICKS or overtaken:
+        yield Finding('late', f'answers are late: {age:.0f} ms, {ticks:.0f} ticks; '
+                              f'{load.lost + overtaken} poses lost',
+                      'the node is too slow for these poses; give it a core of its own, list fewer '
+                      'pairs, set pair_topics to false, or send poses less often')
 
 
 def _findings(summary: Summary, refused: Sequence[str], unseen: Sequence[str],
@@ -223,7 +266,7 @@ def _findings(summary: Summary, refused: Sequence[str], unseen: Sequence[str],
 
 
 def _why_stale(box: str, pairing: Pairing, topics: SceneTopics) -> str:
-    if not topics.is_heard(box):
+    if not topics.publisher_count(box):
         return topics.why_silent(box)
     return (f'the newest stamp of {box} is {1e-9 * pairing.behind()[box]:.3g} s behind, max_age is '
             f'{1e-9 * pairing.max_age:g} s; does its publisher live, and stamp by the same clock?')

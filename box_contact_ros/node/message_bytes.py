@@ -10,6 +10,7 @@ Bytes halve the latency: docs/contributing/decisions/contact-node.md.
 from __future__ import annotations
 
 import struct
+from collections.abc import Sequence
 from math import hypot
 
 import numpy as np
@@ -18,7 +19,7 @@ from ..core import LENGTH_MAX, QUATERNION_MAX, QUATERNION_MIN
 from ..scene.pairing import StampedPose
 from ..scene.scene_solver import Answer, Pair
 from ..solver.checks import pose_fault
-from ..solver.contact import patch_area
+from ..solver.contact import Contact, patch_area
 from .messages import NANOSECONDS, Refused
 
 ENCAPSULATION = 4
@@ -159,19 +160,29 @@ class ContactWriter:
 
     def contacts(self, header: bytes, answer: Answer) -> bytes:
         """Return the `Contacts` of an answer."""
-        names_of, listed = self._names_of, answer.listed
-        parts = [header, _COUNT.pack(len(listed))]
-        at = (len(header) + _COUNT.size - ENCAPSULATION) % 8
+        parts, at = [header], (len(header) - ENCAPSULATION) % 8
+        for listed in (answer.touching, answer.close):
+            at = self._entries(parts, at, listed)
+        parts.append(_COUNT.pack(len(answer.stale)))
+        parts.append(b''.join([_string(pair.label) for pair in answer.stale]))
+        return b''.join(parts)
+
+    def _entries(self, parts: list[bytes], at: int, listed: Sequence[tuple[Pair, Contact]]) -> int:
+        """Append a list of contacts; `at` is the distance from a multiple of 8, before and after.
+
+        A contact ends with doubles, so the next one begins at a multiple of 8.
+        """
+        names_of = self._names_of
+        parts.append(_COUNT.pack(len(listed)))
+        at = (at + _COUNT.size) % 8
         for pair, c in listed:
             names = names_of.get((pair, at)) or names_of.setdefault((pair, at), _names(pair, at))
             parts.append(
                 names + c.point.tobytes() + c.normal.tobytes()
                 + _DEPTH_VOLUME_AREA.pack(-c.separation, c.volume, patch_area(c))
                 + _upper(c.covariance.tobytes()))
-            at = 0  # doubles end each contact, so the next one begins at a multiple of 8
-        parts.append(_COUNT.pack(len(answer.stale)))
-        parts.append(b''.join([_string(pair.label) for pair in answer.stale]))
-        return b''.join(parts)
+            at = 0
+        return at
 
 
 def header_bytes(stamp: int, frame_id: str) -> bytes:

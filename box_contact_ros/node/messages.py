@@ -1,9 +1,9 @@
 # Copyright 2026 The box_contact_ros maintainers
 # SPDX-License-Identifier: Apache-2.0
 
-"""What clients read: box_contact_msgs/Contacts as the contacts and answers that Python has.
+"""box_contact_msgs as the contacts and answers that Python has, and back.
 
-The node itself reads and writes bytes: `message_bytes`.
+What the node sends on topics it writes as bytes: `message_bytes`.
 """
 from __future__ import annotations
 
@@ -13,9 +13,11 @@ import numpy as np
 from builtin_interfaces.msg import Time
 from std_msgs.msg import Header
 
+from box_contact_msgs.msg import Contact as ContactMessage
+
 from ..scene.scene_solver import Answer, Scene
 from ..solver.checks import short_repr
-from ..solver.contact import Contact
+from ..solver.contact import Contact, patch_area
 
 NANOSECONDS = 1_000_000_000
 UPPER = np.triu_indices(3)
@@ -36,10 +38,22 @@ def make_header(stamp: int, frame_id: str) -> Header:
                   frame_id=frame_id)
 
 
-def contacts_by_pair(message: Any) -> dict[str, Contact]:
-    """Return the contacts of a `Contacts` message by the names of their pairs.
+def contact_message(label: str, box_a: str, box_b: str, contact: Contact) -> ContactMessage:
+    """Return the message of the contact of a pair, by its label and the names of its boxes."""
+    message = ContactMessage()  # arguments would cost a second object for each field
+    message.pair, message.box_a, message.box_b = label, box_a, box_b
+    point, normal = message.point, message.normal
+    point.x, point.y, point.z = contact.point.tolist()
+    normal.x, normal.y, normal.z = contact.normal.tolist()
+    message.depth, message.volume = -contact.separation, contact.volume
+    message.area, message.covariance = patch_area(contact), contact.covariance[UPPER]
+    return message
 
-    Numbers are those that the node computed, to the bit. Pairs that are close do not collide.
+
+def contacts_by_pair(message: Any) -> dict[str, Contact]:
+    """Return what touches in a `Contacts` message, by the names of the pairs.
+
+    Numbers are those that the node computed, to the bit.
     """
     return {entry.pair: _contact(entry) for entry in message.contacts}
 
@@ -50,14 +64,14 @@ def read_answer(message: Any, scene: Scene) -> Answer:
     scene: that of the node. Raises Refused for a pair that the scene lacks.
     """
     pair_of = {pair.label: pair for pair in scene.pairs}
-    for name in (*(entry.pair for entry in message.contacts), *message.stale):
+    for name in (*(entry.pair for entry in (*message.contacts, *message.near)), *message.stale):
         if name not in pair_of:
             raise Refused('unknown pair', f'{short_repr(name)} is no pair of the scene: read the '
                                           'scene file that the node has')
-    listed = [(pair_of[name], contact) for name, contact in contacts_by_pair(message).items()]
-    return Answer([entry for entry in listed if entry[1].colliding],
-                  [pair_of[name] for name in message.stale], len(listed),
-                  [entry for entry in listed if not entry[1].colliding])
+    touching, near = ([(pair_of[entry.pair], _contact(entry)) for entry in entries]
+                      for entries in (message.contacts, message.near))
+    return Answer(touching, [pair_of[name] for name in message.stale],
+                  len(touching) + len(near), near)
 
 
 def _contact(entry: Any) -> Contact:

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import ctypes
 import faulthandler
-from collections.abc import Iterator
+import functools
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
@@ -43,6 +44,19 @@ def lifecycle_state(node: LifecycleNode) -> str:
     Test: test_first_run.py::test_the_state_is_told.
     """
     return str(node._state_machine.current_state[1])
+
+
+def with_info(callback: Callable[[Any, Mapping[str, Any]], None]) -> Callable[..., None]:
+    """Return the callback of a subscription for a message and what is known of it.
+
+    Symptom: SingleThreadedExecutor calls it with two arguments, EventsExecutor with a tuple of
+    both. Either looks at its signature, which is that of `callback`.
+    Test: test_runtime.py::test_both_executors_tell_when_a_message_came.
+    """
+    @functools.wraps(callback)
+    def called(*given: Any) -> None:
+        callback(*(given[0] if len(given) == 1 else given))
+    return called
 
 
 @contextmanager

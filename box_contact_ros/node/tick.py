@@ -10,18 +10,54 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from ..scene.pairing import NEVER, PAIRINGS, Pairing, StampedPose, Tick
+from ..scene.pairing import NEVER, OVERTAKEN, PAIRINGS, Pairing, StampedPose, Tick
 from ..scene.scene_solver import ALL_BOXES, SceneSolver, TooManyNear
 from ..solver.checks import absent_poses, are_poses, pose_fault, short_repr
 from .diagnostics import TickMonitor
 from .message_bytes import ContactWriter, PoseReader, header_bytes
 from .messages import NANOSECONDS, Refused
-from .topics import SceneTopics
+from .topics import PoseCallback, SceneTopics
+
+
+class PoseQueue:
+    """What is lost of a stream of poses, and which of those that come are old.
+
+    A full queue pushes its oldest pose out. EventsExecutor still has an event for it, and timers
+    and services come behind all events: of a node that is too slow, they would wait ever longer.
+    So poses that wait when a loss shows are dropped. That takes no time, and empties both queues.
+    """
+
+    def __init__(self) -> None:
+        """Begin before the first pose."""
+        self._sequence: int | None = None  # number that the publisher gave the last pose
+        self._arrived = self._new_from = 0  # by the wall clock [ns]
+        self._lost = 0
+
+    def is_overtaken(self, sequence: int | None, arrived: int) -> bool:
+        """Return whether newer poses wait, by a pose's number and its time of arrival [ns].
+
+        A middleware without numbers gives None.
+        """
+        if sequence is None:
+            return False
+        if self._sequence is not None and sequence > self._sequence + 1:
+            periods = sequence - self._sequence
+            self._lost += periods - 1
+            now = time.time_ns()
+            if (now - arrived) * periods > 2 * (arrived - self._arrived):  # not lost on the way
+                self._new_from = now
+        self._sequence, self._arrived = sequence, arrived
+        return arrived < self._new_from
+
+    def take_lost(self) -> int:
+        """Return how many poses never came since the last call."""
+        lost, self._lost = self._lost, 0
+        return lost
 
 
 class TickAnswerer:
@@ -37,6 +73,7 @@ class TickAnswerer:
         self.pairing: Pairing = PAIRINGS[settings['pairing']](solver.scene, counts=counts)
         self.set_times(settings)
         self._reader, self._writer = PoseReader(), ContactWriter()
+        self._queues: dict[str, PoseQueue] = {}  # by box
         scene = solver.scene
         place = {box: number for number, box in enumerate(scene.streams)}
         self._sides = {pair: [place[box] for box in (pair.a, pair.b) if box in place]
@@ -49,12 +86,18 @@ class TickAnswerer:
         self.pairing.tolerance, self.pairing.max_age = (
             round(NANOSECONDS * settings[name]) for name in ('tolerance', 'max_age'))
 
-    def callback_of(self, box: str, topic: str) -> Callable[[bytes], None]:
+    def callback_of(self, box: str, topic: str) -> PoseCallback:
         """Return the callback for the bytes of a box, or of all; it raises nothing at all."""
-        def callback(data: bytes) -> None:
+        queue = self._queues[box] = PoseQueue()
+
+        def callback(data: bytes, info: Mapping[str, Any]) -> None:
             if not self.active:
                 return
             self._counts['poses'] += 1
+            arrived = info['received_timestamp']
+            if queue.is_overtaken(info['publication_sequence_number'], arrived):
+                self._counts[OVERTAKEN] += 1
+                return
             try:
                 pose = (self._read_all(data) if box == ALL_BOXES else self._reader.read_pose(data))
                 ticks = self.pairing.add(box, pose)
@@ -63,10 +106,18 @@ class TickAnswerer:
                 return
             for tick in ticks:
                 try:
-                    self._answer(tick)
+                    self._answer(tick, arrived)
                 except Exception as error:  # one tick that is refused keeps back no other
                     self._refuse(error, topic)
         return callback
+
+    def take_lost(self) -> int:
+        """Return how many poses never came since the last call.
+
+        Several publishers of one box number their poses each from 1: nobody knows what is lost.
+        """
+        return sum(queue.take_lost() for box, queue in self._queues.items()
+                   if self._topics.publisher_count(box) == 1)
 
     def _read_all(self, data: bytes) -> StampedPose:
         """Return the poses of all moving boxes; a bad one is counted, and its box absent."""
@@ -82,8 +133,11 @@ class TickAnswerer:
             box for box, absent in zip(moving, absent_poses(poses.numbers)) if absent]
         return poses
 
-    def _answer(self, tick: Tick) -> None:
-        """Publish the contacts of a tick: those of each pair, then all of them."""
+    def _answer(self, tick: Tick, arrived: int) -> None:
+        """Publish the contacts of a tick: those of each pair, then all of them.
+
+        arrived: when the pose came that completes the tick, by the wall clock [ns]; 0: unknown.
+        """
         is_array = self.solver.scene.pose_array
         stamp, frame_id = self._header_of(tick)
         started = time.perf_counter_ns()
@@ -103,7 +157,8 @@ class TickAnswerer:
         self._topics.contacts.publish(writer.contacts(header, answer))
         # What nobody waits for comes last. A box that an array leaves out is not there: nobody
         # asks for its pairs.
-        self._monitor.evaluated(took, [] if is_array else answer.stale)
+        age = time.time_ns() - arrived if arrived else 0
+        self._monitor.evaluated(took, age, [] if is_array else answer.stale)
         counts = self._counts
         counts['contacts'] += len(answer.touching)
         counts['evaluations'] += 1

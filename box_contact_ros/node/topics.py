@@ -4,7 +4,7 @@
 """Topics of a scene: pose subscriptions of its moving boxes, contact publishers of its pairs."""
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from geometry_msgs.msg import PointStamped, PoseArray, PoseStamped, Vector3Stamped
@@ -19,7 +19,7 @@ from box_contact_msgs.msg import Contacts
 
 from ..scene.scene_solver import ALL_BOXES, Pair, Scene
 from ..solver.checks import short_repr
-from .rclpy_workarounds import RCLError, qos_refused
+from .rclpy_workarounds import RCLError, qos_refused, with_info
 
 MOST_PAIRS_WITH_TOPICS = 1000
 """Two publishers a pair take milliseconds and memory, here and in every process that listens."""
@@ -29,8 +29,11 @@ CONTACT_DEPTH = 10
 POSE_DEPTH = 100
 """Poses that wait: 100 ms at 1 kHz, longer than any collection of garbage."""
 QOS_OVERRIDES = QoSOverridingOptions.with_default_policies()  # of poses and of `contacts`
-ARRAY_DEPTH = 10
+ARRAY_DEPTH = 5
 """Arrays that wait: a node that cannot keep up is late by a few ticks, never by seconds."""
+
+PoseCallback = Callable[[bytes, Mapping[str, Any]], None]
+"""Takes the bytes of poses, and what the middleware knows of them."""
 
 
 def pose_qos(source: str) -> QoSProfile:
@@ -74,14 +77,13 @@ class SceneTopics:
             self.of_pair[pair] = (self._publisher(PointStamped, f'{topic}/point'),
                                   self._publisher(Vector3Stamped, f'{topic}/normal'))
 
-    def subscribe(self, scene: Scene, callback_of: Callable[[str, str], Callable[[bytes], None]],
-                  ) -> None:
+    def subscribe(self, scene: Scene, callback_of: Callable[[str, str], PoseCallback]) -> None:
         """Subscribe to all poses, with the callback for the bytes of a box and its topic."""
         for box, topic in scene.sources.items():
             with qos_refused():
                 self._subscriptions[box] = self._node.create_subscription(
                     PoseArray if box == ALL_BOXES else PoseStamped, topic,
-                    callback_of(box, topic), pose_qos(box), raw=True,
+                    with_info(callback_of(box, topic)), pose_qos(box), raw=True,
                     event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
                     qos_overriding_options=QOS_OVERRIDES)
 
@@ -98,9 +100,9 @@ class SceneTopics:
         """Return the full names of the topics that are subscribed to."""
         return [subscription.topic_name for subscription in self._subscriptions.values()]
 
-    def is_heard(self, box: str) -> bool:
-        """Return whether somebody publishes poses of a box."""
-        return self._subscriptions[box].get_publisher_count() > 0
+    def publisher_count(self, box: str) -> int:
+        """Return how many publish poses of a box."""
+        return int(self._subscriptions[box].get_publisher_count())
 
     def why_silent(self, box: str) -> str:
         """Return who publishes on the topic of a box that gives no pose."""

@@ -75,6 +75,7 @@ TOO_LATE = 'dropped: tick answered before'
 REPEATED = 'refused: repeated stamp'
 OLD = 'refused: older than the last'
 RESETS = 'time went back'
+OVERTAKEN = 'dropped: newer poses wait'
 
 
 class StampedPose(NamedTuple):
@@ -173,6 +174,11 @@ class Pairing(ABC):
         return {box: now - state.newest for box, state in self._boxes.items()
                 if state.newest != NEVER}
 
+    @property
+    def waiting_ticks(self) -> int:
+        """Return how many ticks wait for poses."""
+        return 0
+
     def stamps(self, box: str) -> np.ndarray:
         """Return an array (n,) of the stamps [ns] of a box, as far as they are remembered."""
         return np.array(self._boxes[box].taken if box in self._boxes else (), dtype=np.int64)
@@ -268,6 +274,11 @@ class StampPairing(Pairing):
             return []
         newest = max(ready)
         return [self._answer(key) for key in sorted(self._whole) if key <= newest]
+
+    @property
+    def waiting_ticks(self) -> int:
+        """Return how many ticks wait for poses."""
+        return len(self._waiting)
 
     def _begin(self, key: int) -> WaitingTick:
         """Return a new tick; drop the oldest where too many wait."""

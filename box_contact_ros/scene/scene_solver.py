@@ -180,11 +180,6 @@ class Answer(NamedTuple):
     close: Sequence[tuple[Pair, Contact]] = ()
     """The pairs apart whose separation is at most `margin`; their contacts are not colliding."""
 
-    @property
-    def listed(self) -> list[tuple[Pair, Contact]]:
-        """Return the pairs that messages list: those in contact, then the close ones."""
-        return [*self.touching, *self.close] if self.close else self.touching
-
 
 class SceneSolver:
     """Contacts of all pairs of a scene, one tick at a time.

@@ -85,12 +85,11 @@ class Tick:
 
 
 def read_contacts(message: Any, rows: SceneRows) -> DrawnContacts:
-    """Return the contacts of a box_contact_msgs/Contacts; pairs apart are left out.
+    """Return the contacts of a box_contact_msgs/Contacts; near pairs are left out.
 
     Raises Refused for a pair that is not in the scene, and for numbers that no contact has.
     """
-    touching = [c for c in message.contacts if not math.isnan(c.point.x)]
-    touching.sort(key=lambda c: -c.depth)
+    touching = sorted(message.contacts, key=lambda c: -c.depth)
     pairs, stale = [c.pair for c in touching], list(message.stale)
     unknown = [pair for pair in (*pairs, *stale) if pair not in rows.boxes_of]
     if unknown:

@@ -5,7 +5,7 @@
 
 Start `box_contact_contact_node` first. A simulator that waits for each answer loses none, however
 fast or slow it runs. It sends both poses with one stamp, and waits for the contacts of that stamp.
-The stamps are the simulator's own time.
+The stamps are the simulator's own time. The service `~/check` needs none: see check_client.py.
 
 It prints:
 
@@ -40,14 +40,15 @@ class LockstepClient(Node):
         self.answer = answer
 
     def wait_for_node(self) -> None:
-        """Wait until the node listens to both poses and this client hears its answers."""
+        """Wait for the node, and begin an episode: the node forgets all stamps."""
         self.get_logger().info('waits for a contact node')
         while not (all(pose.get_subscription_count() for pose in self.poses)
                    and self.count_publishers('contacts')):
             rclpy.spin_once(self, timeout_sec=0.05)
+        self.reset()
 
     def reset(self) -> None:
-        """Begin a new episode: the node forgets all stamps, and takes them again."""
+        """Begin an episode, whose times may be those of the last one."""
         self.node_reset.wait_for_service()
         rclpy.spin_until_future_complete(self, self.node_reset.call_async(Trigger.Request()))
         self.answer = None
@@ -79,7 +80,6 @@ def main() -> None:
     rclpy.init()
     client = LockstepClient()
     client.wait_for_node()
-    client.reset()
     stack = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
     load = np.array([0.0, 0.0, 2.5925, 0.0, 0.0, 0.0, 1.0])
     for tick in range(1, 6):

@@ -4,7 +4,6 @@
 """The bench as a whole: real processes, short runs, and faults planted between node and bench."""
 from __future__ import annotations
 
-import csv
 import os
 import re
 import signal
@@ -31,30 +30,31 @@ def bench(program, *arguments: str):
                    *(word for text in ros for word in ('--ros-args', *text.split())))
 
 
-def rows_of(folder: Path) -> list[dict[str, str]]:
-    """Return the rows of the CSV file."""
-    with (folder / 'bench.csv').open() as file:
-        return list(csv.DictReader(file))
+def rows_of(text: str) -> list[dict[str, str]]:
+    """Return the rows of the table in a report."""
+    head, _, *rows = ([cell.strip() for cell in line.strip('| ').split('|')]
+                      for line in text.splitlines() if line.startswith('|'))
+    return [dict(zip(head, row)) for row in rows]
 
 
 def test_a_short_run(program, tmp_path):
-    """All pairs are answered rightly; table, page, CSV file and picture tell the same."""
+    """All pairs are answered rightly; page and terminal tell the same."""
     pytest.importorskip('fcl')
-    pytest.importorskip('matplotlib')
     running = bench(program, f'--rate 100 --duration 3 --model exact --out {tmp_path}')
     status = running.wait(PATIENCE)
-    assert status == ('void' in running.output), running.output  # on a machine that is too busy
-    rows = rows_of(tmp_path)
+    page = (tmp_path / 'bench.md').read_text()
+    assert status == ('void' in page), running.output  # on a machine that is too busy
+    rows = rows_of(page)
     assert [row['node'] for row in rows] == ['echo', 'contact', 'soup']
     for row in rows:
         assert (row['sent'], row['lost'], row['wrong']) == ('100', '0', '0')
         p50, p99, most = (float(row[f'{name} [ms]']) for name in ('p50', 'p99', 'max'))
         assert 0.0 < p50 <= p99 <= most
-        assert 0.0 < float(row['CPU [%]']) < 150.0
-        assert float(row['low']) <= float(row['/ echo']) <= float(row['high'])
-    assert rows[1]['point error [mm]'] == '0.0'  # the exact model, bit by bit
-    assert (tmp_path / 'bench.png').read_bytes().startswith(b'\x89PNG')
-    page = (tmp_path / 'bench.md').read_text()
+    assert rows[1]['point error [mm]'] == '0'  # the exact model, bit by bit
+    number = r'(\d+\.\d\d)'
+    compared = re.search(f'contact / echo {number} \\[{number}, {number}\\], soup / contact ', page)
+    middle, low, high = map(float, compared.groups())
+    assert low <= middle <= high
     assert all(line in running.output for line in page.splitlines() if line.startswith('|'))
 
 
@@ -89,17 +89,17 @@ class FaultyRelay(GuardedNode):
         return callback
 
 
-def test_planted_faults_show_up(program, tmp_path):
+def test_planted_faults_show_up(program):
     """One point is dropped, one depth wrong, one contact missing, one normal comes twice."""
     with running_node(FaultyRelay) as (relay, executor):
         remaps = ' '.join(f'-r bench/contact/{topic}:=relayed/{topic}'
                           for topic in ('contact/point', 'contact/normal', 'contacts'))
-        running = bench(program, f'--rate 100 --duration 9 --model exact --out {tmp_path}',
+        running = bench(program, '--rate 100 --duration 9 --model exact',
                         f'--ros-args {remaps}')
         while running.process.poll() is None:
             spin_for(relay, executor, 0.2)
     assert running.wait() == 1, running.output
-    row = next(row for row in rows_of(tmp_path) if row['node'] == 'contact')
+    row = next(row for row in rows_of(running.output) if row['node'] == 'contact')
     assert (row['lost'], row['wrong']) == ('1', '3'), running.output
 
 

@@ -15,6 +15,7 @@ import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from threading import Event, Thread
 from typing import Any
 
 import numpy as np
@@ -195,6 +196,29 @@ ALLOWED = (ValueError, TypeError, MemoryError, OverflowError, AttributeError, Ru
 """SystemError is none of them: it says that the extension broke Python's rules."""
 
 
+def pairs_changed_meanwhile() -> None:
+    """Another thread writes places that no pose has, and takes them back, while a batch runs."""
+    count = 20_000
+    pairs, stop = np.tile([[0, 1]], (count, 1)), Event()
+
+    def write() -> None:
+        while not stop.is_set():
+            for place in (2**40, -2**40, 1):
+                pairs[:, 1] = place
+
+    writer = Thread(target=write)
+    writer.start()
+    solver, one, refused = exact(), np.ones((1, 3)), 0
+    for _ in range(100):
+        try:
+            refused += solver.solve(rows(2), rows(2), one, one, 2, True, pairs)[1] >= 0
+        except ValueError:
+            refused += 1
+    stop.set()
+    writer.join()
+    assert refused > 10, refused
+
+
 def random_calls(seed: int, rounds: int) -> None:
     """Call each function with some arguments replaced; print how many calls were refused."""
     rng = np.random.default_rng(seed)
@@ -235,6 +259,7 @@ def random_calls(seed: int, rounds: int) -> None:
 
 if __name__ == '__main__':
     for attack in (places_of_no_box, arrays_too_short, bounds_without_an_order,
-                   networks_that_no_file_has, threads_below_one, extreme_numbers):
+                   networks_that_no_file_has, threads_below_one, extreme_numbers,
+                   pairs_changed_meanwhile):
         attack()
     random_calls(*map(int, sys.argv[1:]))

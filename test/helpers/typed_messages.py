@@ -19,8 +19,8 @@ from geometry_msgs.msg import (
 )
 from std_msgs.msg import Header
 
+from box_contact_msgs.msg import Box, BoxPair, Contacts
 from box_contact_msgs.msg import Contact as ContactMessage
-from box_contact_msgs.msg import Contacts
 from box_contact_ros.node.messages import NANOSECONDS, UPPER, Refused, make_header
 from box_contact_ros.scene.pairing import StampedPose
 from box_contact_ros.scene.scene_solver import Answer, Pair
@@ -36,6 +36,16 @@ def pose_stamped(numbers: Iterable[float], frame_id: str, stamp: int) -> PoseSta
 def pose_array(rows: Iterable[Iterable[float]], frame_id: str, stamp: int) -> PoseArray:
     """Return the message of poses (n, 7); stamp [ns]."""
     return PoseArray(header=make_header(stamp, frame_id), poses=[_pose(row) for row in rows])
+
+
+def a_box(name: str, pose: Iterable[float], size: Iterable[float] = (0.0, 0.0, 0.0)) -> Box:
+    """Return a box of a request; without a size it is the scene's."""
+    return Box(name=name, size=_vector(np.array(tuple(size))), pose=_pose(pose))
+
+
+def a_pair(box_a: str, box_b: str) -> BoxPair:
+    """Return a pair of a request."""
+    return BoxPair(box_a=box_a, box_b=box_b)
 
 
 def _pose(numbers: Iterable[float]) -> Pose:
@@ -84,13 +94,16 @@ def make_normal(header: Header, contact: Contact) -> Vector3Stamped:
 
 
 def make_contacts(header: Header, answer: Answer) -> Contacts:
-    """Return `contacts`: the pairs in contact, then the close ones, and the names of the stale."""
-    return Contacts(
-        header=header, stale=[pair.label for pair in answer.stale],
-        contacts=[ContactMessage(
-            pair=pair.label, box_a=pair.a, box_b=pair.b, point=_point(c.point),
-            normal=_vector(c.normal), depth=-float(c.separation), volume=float(c.volume),
-            area=patch_area(c), covariance=c.covariance[UPPER]) for pair, c in answer.listed])
+    """Return `contacts`: the pairs in contact, those near, and the names of the stale."""
+    return Contacts(header=header, contacts=_entries(answer.touching), near=_entries(answer.close),
+                    stale=[pair.label for pair in answer.stale])
+
+
+def _entries(listed: Iterable[tuple[Pair, Contact]]) -> list[ContactMessage]:
+    return [ContactMessage(
+        pair=pair.label, box_a=pair.a, box_b=pair.b, point=_point(c.point),
+        normal=_vector(c.normal), depth=-float(c.separation), volume=float(c.volume),
+        area=patch_area(c), covariance=c.covariance[UPPER]) for pair, c in listed]
 
 
 def named_contacts(touching: Mapping[str, Contact], stale: Sequence[str] = (), *, stamp: int,

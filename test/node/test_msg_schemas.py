@@ -21,9 +21,11 @@ from geometry_msgs.msg import PoseArray, PoseStamped
 from jsonschema import Draft202012Validator
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
+from referencing import Registry, Resource
 from ros_client import Client, serving
-from typed_messages import make_contacts, pose_array
+from typed_messages import a_box, a_pair, make_contacts, pose_array
 
+from box_contact_msgs.srv import Check
 from box_contact_ros.core import LENGTH_MAX, QUATERNION_MAX
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import make_header
@@ -35,8 +37,13 @@ ROOT = Path(__file__).resolve().parents[2]
 FOLDER = resource_path('msg_schemas')
 DOCUMENT = yaml.safe_load((FOLDER / 'asyncapi.yaml').read_text(encoding='utf-8'))
 SCHEMAS = {path.name: json.loads(path.read_text('utf-8')) for path in sorted(FOLDER.glob('*.json'))}
-OPERATIONS = DOCUMENT['operations']
-ADDRESSES = {name: channel['address'] for name, channel in DOCUMENT['channels'].items()}
+REGISTRY = Registry().with_resources(
+    (name, Resource.from_contents(schema)) for name, schema in SCHEMAS.items())
+SERVICE = 'answerCheck'
+OPERATIONS = {name: operation for name, operation in DOCUMENT['operations'].items()
+              if name != SERVICE}  # on topics
+ADDRESSES = {name: channel['address'] for name, channel in DOCUMENT['channels'].items()
+             if name not in ('check', 'reset')}
 ORIGIN = (0, 0, 0, 0, 0, 0, 1)
 TOUCHING = (0.5, 0.25, 1.875, 0.1, 0.2, 0, 1)
 CLOSE = (0.5, 0.25, 2.0625, 0, 0, 0, 1)
@@ -70,11 +77,16 @@ def message_of(operation: dict[str, Any]) -> dict[str, Any]:
     return follow(message['$ref'])
 
 
-def schema_at(address: str) -> dict[str, Any]:
-    """Return the payload schema of a topic."""
+def validator_at(address: str) -> Draft202012Validator:
+    """Return what checks the payloads of a topic."""
     operation, = (operation for operation in OPERATIONS.values()
                   if follow(operation['channel']['$ref'])['address'] == address)
-    return follow(message_of(operation)['payload']['schema']['$ref'])
+    return validator_of(message_of(operation))
+
+
+def validator_of(message: dict[str, Any]) -> Draft202012Validator:
+    """Return what checks the payloads of a message of the document."""
+    return Draft202012Validator(follow(message['payload']['schema']['$ref']), registry=REGISTRY)
 
 
 def plain(value: Any) -> Any:
@@ -86,7 +98,7 @@ def plain(value: Any) -> Any:
         return number
     if isinstance(value, float):
         return value if math.isfinite(value) else None
-    return value if isinstance(value, (str, int)) else [plain(entry) for entry in value]
+    return value if isinstance(value, (str, bool, int)) else [plain(entry) for entry in value]
 
 
 # --- the documents --------------------------------------------------------------------------------
@@ -148,10 +160,10 @@ def test_schema_is_valid(name):
 
 
 def test_shared_definitions_agree():
-    """Files stand alone, so what they share is written out in each; the limits are the code's."""
+    """Topics' files stand alone: what they share is written out in each, with the code's limits."""
     shared: dict[str, Any] = {}
     for schema in SCHEMAS.values():
-        for name, definition in schema['$defs'].items():
+        for name, definition in schema.get('$defs', {}).items():
             assert shared.setdefault(name, definition) == definition, name
     assert shared['coordinate']['maximum'] == -shared['coordinate']['minimum'] == LENGTH_MAX
     component = shared['quaternion_component']
@@ -208,16 +220,34 @@ def live(node, client) -> dict[str, list[Any]]:
 def test_live_messages_validate(live):
     """Everything that went over the wire, but for the one pose that was refused."""
     for address, messages in live.items():
-        check = Draft202012Validator(schema_at(address))
+        check = validator_at(address)
         faults = [[error.message for error in check.iter_errors(plain(m))] for m in messages]
         wrong = [fault for fault in faults if fault]
         assert len(wrong) == (address == 'box_b/pose'), (address, wrong)
         assert len(messages) > 1
     texts = {message.status[0].message for message in live['/diagnostics']}
     assert {'no poses', 'poses refused: bad pose'} <= {text.split(',')[0] for text in texts}
-    depths = {np.sign(entry.depth) for message in live['contacts']
-              for entry in message.contacts}
-    assert depths == {-1.0, 1.0}
+    for name, sign in (('contacts', 1.0), ('near', -1.0)):
+        assert {np.sign(entry.depth) for message in live['contacts']
+                for entry in getattr(message, name)} == {sign}
+
+
+@pytest.mark.parametrize('boxes, success', [
+    ([a_box('box_a', ORIGIN), a_box('p', TOUCHING, (2, 2, 2)), a_box('q', CLOSE, (2, 2, 2))], True),
+    ([a_box('box_a', ORIGIN), a_box('p', ORIGIN)], False), ([a_box('box_a', ORIGIN)], False)])
+def test_requests_and_responses_validate(node, client, boxes, success):
+    """Those of ~/check: with contacts, of a box without a size, of one box."""
+    channel = DOCUMENT['channels']['check']
+    request, response = (validator_of(follow(message['$ref']))
+                         for message in channel['messages'].values())
+    asked = Check.Request(boxes=boxes, pairs=[a_pair('box_a', box.name) for box in boxes[1:]],
+                          margin=0.5)
+    answer = client.call(Check, channel['address'], asked)
+    assert answer.success == success and request.is_valid(plain(asked)) == (len(boxes) > 1)
+    assert not [error.message for error in response.iter_errors(plain(answer))]
+    assert len(answer.contacts.contacts) == len(answer.contacts.near) == success
+    answer.success = not success
+    assert not response.is_valid(plain(answer))
 
 
 def set_in(path: str, value: Any):
@@ -254,7 +284,7 @@ WRONG_MESSAGES = {
 def test_wrong_messages_do_not_validate(live, name):
     """Each is a live message, which is valid, with one thing made wrong."""
     address, change = WRONG_MESSAGES[name]
-    check = Draft202012Validator(schema_at(address))
+    check = validator_at(address)
     message = copy.deepcopy(live[address][-1 if address == 'contacts' else 0])
     assert check.is_valid(plain(message))
     change(message)
@@ -263,7 +293,7 @@ def test_wrong_messages_do_not_validate(live, name):
 
 @pytest.mark.parametrize('address', ADDRESSES.values())
 def test_missing_and_extra_fields_do_not_validate(live, address):
-    check = Draft202012Validator(schema_at(address))
+    check = validator_at(address)
     message = plain(live[address][0])
     assert check.is_valid(message)
     for name in message:

@@ -9,6 +9,7 @@ import re
 import signal
 import subprocess
 import sys
+import time
 from threading import Event, Thread, get_native_id
 from types import SimpleNamespace
 
@@ -24,7 +25,7 @@ from ros_client import Client, serving
 
 from box_contact_ros.node import contact_node, runtime
 from box_contact_ros.node.contact_node import ContactNode
-from box_contact_ros.node.rclpy_workarounds import RCLError, shut_down
+from box_contact_ros.node.rclpy_workarounds import RCLError, shut_down, with_info
 from box_contact_ros.scene.pairing import RESETS
 
 
@@ -233,6 +234,23 @@ def test_rclpy_without_events_executor(monkeypatch):
     monkeypatch.setattr(runtime, 'EventsExecutor', None)
     client = Client()
     assert isinstance(client.executor, SingleThreadedExecutor)
+    client.close()
+
+
+@pytest.mark.parametrize('executor', [runtime.EventsExecutor, None])
+def test_both_executors_tell_when_a_message_came(monkeypatch, executor):
+    """By the wall clock; and the number that its publisher gave it."""
+    monkeypatch.setattr(runtime, 'EventsExecutor', executor)
+    client, came = Client(), []
+    client.node.create_subscription(
+        PoseStamped, 'pose', with_info(lambda message, info: came.append((message, info))), 10)
+    publisher = client.node.create_publisher(PoseStamped, 'pose', 10)
+    before = time.time_ns()
+    assert client.spin(lambda: len(came) > 1 or publisher.publish(PoseStamped()))
+    (message, first), (_, second) = came[:2]
+    assert isinstance(message, PoseStamped)
+    assert before < first['received_timestamp'] <= second['received_timestamp'] <= time.time_ns()
+    assert second['publication_sequence_number'] == first['publication_sequence_number'] + 1
     client.close()
 
 

@@ -25,7 +25,7 @@ from typed_messages import pose_array
 from box_contact_ros import ContactSolver
 from box_contact_ros.node.contact_node import ContactNode
 from box_contact_ros.node.messages import contacts_by_pair, make_header
-from box_contact_ros.node.topics import MOST_PAIRS_WITH_TOPICS
+from box_contact_ros.node.topics import ARRAY_DEPTH, MOST_PAIRS_WITH_TOPICS
 
 MS = 1_000_000  # ns
 SCENE = """\
@@ -169,16 +169,17 @@ def test_a_stale_pair_is_named_and_never_an_old_contact(client, scene_node):
         assert client.answer(ON_LORRY, LORRY)[BESIDE].separation == pytest.approx(-0.2)
 
 
-def test_close_pairs_are_listed_within_the_margin(client, scene_node):
+def test_near_pairs_are_listed_within_the_margin(client, scene_node):
     """Before the touch, without a point and without topics of their own."""
     lorry = (7.0, 0, 1.0, 0, 0, 0, 1)
     with scene_node(margin=0.3):
         client.offer_until_answered(ON_FLOOR, lorry)
         assert client.answer((0, 0, 1.35, 0, 0, 0, 1), lorry) == {}
         stamp = client.ask((0, 0, 1.25, 0, 0, 0, 1), lorry)
-        contact = contacts_by_pair(client.contacts[stamp])[FLOOR]
-        assert not contact.colliding and contact.separation == 0.25 and contact.volume == 0.0
-        assert np.isnan(contact.point).all() and contact.normal.tolist() == [0, 0, 1]
+        assert not client.contacts[stamp].contacts
+        near, = client.contacts[stamp].near
+        assert (near.pair, near.depth, near.volume, near.normal.z) == (FLOOR, -0.25, 0.0, 1.0)
+        assert np.isnan(near.point.x)
         assert client.answer(ON_FLOOR, lorry)[FLOOR].colliding
         assert stamp not in client.points_of[FLOOR]
 
@@ -226,6 +227,44 @@ def test_one_message_has_all_poses(array_node, array_client):
     assert array_client.diagnostic('stale boxes') == 'lorry'
     assert BESIDE in array_client.answer(ON_LORRY, LORRY)
     assert array_client.contacts[array_client.ask(GONE, GONE)].stale == [FLOOR, BESIDE]
+
+
+def test_a_slow_node_says_so_and_is_late_by_few_ticks(array_node, array_client, monkeypatch):
+    """Of arrays at 100 Hz it answers a third, and those that are new. Services come in between."""
+    tick, client = array_node._tick, array_client
+
+    def slow(poses, solver=tick.solver):
+        time.sleep(0.03)
+        return solver(poses)
+
+    slow.scene, slow.model = tick.solver.scene, tick.solver.model
+    reset = client._client_of(Trigger, 'contact_node/reset')
+    monkeypatch.setattr(tick, 'solver', slow)
+    sent, behind = [], []
+
+    def stream(done):
+        """Send until done, and note how many arrays were sent after each one that is answered."""
+        deadline = time.monotonic() + PATIENCE
+        while not done():
+            assert time.monotonic() < deadline
+            sent.append(client.send(ON_FLOOR, LORRY))
+            seen = len(client.contacts)
+            client.spin(lambda: False, 0.01)
+            behind.extend(len(sent) - sent.index(stamp)
+                          for stamp in list(client.contacts)[seen:] if stamp in sent)
+
+    stream(lambda: client.diagnostics and client.diagnostics[-1].status[0].message.startswith(
+        'answers are late: '))
+    status, = client.diagnostics[-1].status
+    values = {entry.key: entry.value for entry in status.values}
+    assert status.level == b'\x01'
+    assert sum(int(values[f'{how} since the last report']) for how in ('lost', 'dropped')) > 3
+    assert 0 < int(values['rate [1/s]']) <= 34 and float(values['age p50 [ms]']) > 30.0
+    assert max(behind) < 6 * ARRAY_DEPTH  # three ticks pass while one is in work
+    answered = len(client.contacts)
+    future = reset.call_async(Trigger.Request())
+    stream(future.done)
+    assert future.result().success and len(client.contacts) - answered < 4 * ARRAY_DEPTH
 
 
 def test_bad_arrays_are_refused_and_counted(array_node, array_client):

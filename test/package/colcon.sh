@@ -44,13 +44,33 @@ git -c safe.directory='*' ls-files -z --cached --others --exclude-standard |
     while IFS= read -r -d '' file; do if [ -e "$file" ]; then printf '%s\0' "$file"; fi; done |
     xargs -0 cp --parents --target-directory "$sources"
 
+# Run what a user's package installed, as a user does: in a sourced shell. Only ROS's own libraries,
+# which are wheels here, are in no place that a hook names.
+linked() {
+    (
+        set +u
+        source install/setup.bash
+        export LD_LIBRARY_PATH=$LD_LIBRARY_PATH:$work/venv/lib
+        for program in install/linked/lib/linked/*; do
+            [ "$("$program")" = 'landing: 0.010 m deep, 25.58 m2, the same' ]
+        done
+    )
+}
+
 # Build and test in a workspace; $1 is its name, the others are options of the build.
 workspace() {
     mkdir -p "$work/$1/src"
     cp -r "$sources" "$work/$1/src/"
     cd "$work/$1"
     ln -s box_contact_ros/box_contact_msgs src/box_contact_msgs
+    cp -r src/box_contact_ros/test/package/linked src/linked
     colcon build "${@:2}"
+    linked
+    # A second build compiles nothing.
+    local library=install/box_contact_ros/lib/libbox_contact.so before
+    before=$(stat --dereference --format %Y "$library")
+    colcon build "${@:2}" --packages-select box_contact_ros
+    [ "$(stat --dereference --format %Y "$library")" = "$before" ]
     # Where `ros2 run` and `ros2 launch` look.
     ls install/box_contact_ros/{lib/box_contact_ros/contact_node,share/box_contact_ros/package.xml}
     colcon test --packages-select box_contact_ros --pytest-args "${arguments[@]}"

@@ -22,14 +22,19 @@ import sys
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
 from conftest import PROGRAMS
 from geometry_msgs.msg import PoseStamped
 
+from box_contact_msgs.msg import Box
+from box_contact_msgs.srv import Check
+from box_contact_ros.node.check import Checker
 from box_contact_ros.node.contact_node import PARAMETERS
 from box_contact_ros.resources import resource_path
+from box_contact_ros.scene.scene_solver import SceneSolver, two_boxes
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [*sorted(ROOT.glob('*.md'), key=lambda page: page.name != 'README.md'),
@@ -149,6 +154,32 @@ def published(words: list[str], **_) -> None:
     assert not given and pose.pose.orientation.w == 1.0
 
 
+def called(words: list[str], **_) -> None:
+    """Ask what a node of two cubes would: the request is one, and its boxes touch."""
+    assert words[3:5] == ['/contact_node/check', 'box_contact_msgs/srv/Check']
+    request = filled(Check.Request(), yaml.safe_load(words[5]))
+    solver = SceneSolver(two_boxes((2.0, 2.0, 2.0), (2.0, 2.0, 2.0)))
+    response = Checker(solver).answer(request, Check.Response())
+    assert response.contacts.contacts, response.message
+
+
+def filled(message: Any, values: dict[str, Any]) -> Any:
+    """Return a message with the values of a command; a list is of boxes."""
+    for name, value in values.items():
+        if isinstance(value, dict):
+            filled(getattr(message, name), value)
+        else:
+            setattr(message, name, [filled(Box(), entry) for entry in value]
+                    if isinstance(value, list) else value)
+    return message
+
+
+def split(words: list[str], **_) -> None:
+    """Leave the branch to whoever releases: its folder is a package."""
+    assert words[1:4] == ['subtree', 'split', '--prefix']
+    assert (ROOT / words[4] / 'package.xml').is_file()
+
+
 def parameter(words: list[str], **_) -> None:
     """`ros2 param set NODE NAME VALUE`: the node has it, and takes the value."""
     node, name, value = words[3:]
@@ -264,6 +295,8 @@ COMMANDS = {
     r'box_contact_\w+( .*)?': start,
     r'ros2 topic echo (--\S+ (data )?)*/\S+': echoed,
     r'ros2 topic pub -r 10 .+': published,
+    r'ros2 service call .+': called,
+    r'git subtree .+': split,
     r'ros2 param set \S+ \S+ \S+': parameter,
     r'ros2 launch \S+ \S+( .*)?': launch,
     r'python (docs/examples|test/helpers)/\w+\.py( /tmp/\w+)?': example,

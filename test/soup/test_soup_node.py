@@ -106,10 +106,11 @@ def test_a_contained_box_is_answered(client):
 def test_its_topics_are_the_documents(client, soup_node):
     """Those of the contact node, with soup/ before what is sent; the same QoS."""
     document = yaml.safe_load(resource_path('msg_schemas', 'asyncapi.yaml').read_text('utf-8'))
-    addresses = {channel['address'] for channel in document['channels'].values()} - {'poses'}
+    services = {'contact_node/check', 'contact_node/reset'}
+    addresses = {channel['address'] for channel in document['channels'].values()} - services
     inputs = {'box_a/pose', 'box_b/pose', '/diagnostics'}
     expected = {f'/{name.lstrip("/")}' if name in inputs else f'/soup/{name}'
-                for name in addresses}
+                for name in addresses - {'poses'}}
     assert {entity.topic_name for entity in (*soup_node.publishers, *soup_node.subscriptions)
             } - {'/parameter_events', '/rosout'} == expected
     with serving(lambda context: ContactNode(context, parameter_overrides=overrides())) as node:

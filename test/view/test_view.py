@@ -171,14 +171,14 @@ def test_contacts_of_another_scene_are_refused():
 
 
 def test_the_deepest_contact_comes_first():
-    """Pairs that are close are left out; a model without a patch gives NaN."""
+    """Near pairs are left out; a model without a patch gives NaN."""
     scene = Scene({name: Box(name, CUBE, pose_topic=name) for name in 'abcd'},
                   tuple(Pair.between('a', b) for b in 'bcd'))
     nothing = EXACT._replace(volume=math.nan, covariance=np.full((3, 3), math.nan))
-    found = read_contacts(named_contacts({
-        'a_b': EXACT, 'a_c': nothing._replace(separation=-1.0),
-        'a_d': EXACT._replace(point=np.full(3, math.nan), separation=0.1)}, stamp=1),
-        SceneRows(scene))
+    apart = EXACT._replace(point=np.full(3, math.nan), separation=0.1)
+    message = named_contacts({'a_b': EXACT, 'a_c': nothing._replace(separation=-1.0)}, stamp=1)
+    message.near = named_contacts({'a_d': apart}, stamp=1).contacts
+    found = read_contacts(message, SceneRows(scene))
     assert found.pairs == ['a_c', 'a_b'] and found.depths.tolist() == [1.0, 0.125]
     assert np.isnan(found.volumes).tolist() == [True, False]
 

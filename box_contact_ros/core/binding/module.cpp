@@ -127,7 +127,8 @@ bool read_pairs(PyObject* const* args, PyObject* places, PairArrays& pairs) {
                 pairs.sizes_b.numbers,
                 step(pairs.sizes_a),
                 step(pairs.sizes_b),
-                nullptr};
+                nullptr,
+                poses};
   pairs.count = poses;
   if (places == Py_None) return true;
   if (!read(places, "pairs", {any_length, 2}, pairs.places)) return false;

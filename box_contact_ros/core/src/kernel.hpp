@@ -23,7 +23,8 @@ struct Rows {
   const double *poses_a, *poses_b;  // 7 numbers a row: x y z qx qy qz qw
   const double *sizes_a, *sizes_b;  // full extents [m]
   long size_step_a, size_step_b;
-  const int64_t* pairs;  // (count, 2): the rows of a pair's boxes; nullptr: row i of both
+  const int64_t* pairs = nullptr;  // (count, 2): the rows of a pair's boxes; nullptr: row i of both
+  long pose_count = 0;  // of either array; read with `pairs` alone
 };
 
 // The numbers of a pair alone, as a row has them.

@@ -21,11 +21,22 @@ struct RowPlaces {
 
   BC_INLINE RowPlaces(const Rows& rows, long row) {
     long of_a = row, of_b = row;
-    if (rows.pairs) of_a = long(rows.pairs[2 * row]), of_b = long(rows.pairs[2 * row + 1]);
-    pose_a = rows.poses_a + 7 * of_a;
-    pose_b = rows.poses_b + 7 * of_b;
-    size_a = rows.sizes_a + rows.size_step_a * of_a;
-    size_b = rows.sizes_b + rows.size_step_b * of_b;
+    if (rows.pairs) of_a = place(rows, 2 * row), of_b = place(rows, 2 * row + 1);
+    pose_a = of_a < 0 ? nothing : rows.poses_a + 7 * of_a;
+    pose_b = of_b < 0 ? nothing : rows.poses_b + 7 * of_b;
+    size_a = of_a < 0 ? nothing : rows.sizes_a + rows.size_step_a * of_a;
+    size_b = of_b < 0 ? nothing : rows.sizes_b + rows.size_step_b * of_b;
+  }
+
+ private:
+  // What is refused as a pose and as a size.
+  static constexpr double nothing[7] = {not_a_number, not_a_number, not_a_number, not_a_number,
+                                        not_a_number, not_a_number, not_a_number};
+
+  // The row of a box, or −1. Read once: another thread may change pairs that were checked.
+  BC_INLINE static long place(const Rows& rows, long number) {
+    long found = long(*static_cast<const volatile int64_t*>(rows.pairs + number));
+    return found < rows.pose_count ? found : -1;
   }
 };
 

@@ -132,16 +132,22 @@ bc_status collide_rows(const Solver& solver, const bc_rows& given, double margin
             numbers(given.sizes_b),
             given.size_count_a == 1 ? 0 : 3,
             given.size_count_b == 1 ? 0 : 3,
-            given.pairs};
+            given.pairs,
+            long(given.pose_count)};
   Results results{wanted.colliding, wanted.separation, wanted.normal, wanted.point,
                   wanted.volume,    wanted.covariance, wanted.axis,   margin};
   Counts counts{};
   refused = solve_rows(solver, rows, long(given.count), results, threads, counts);
   if (refused < 0) return BC_OK;
-  int64_t of_a = given.pairs ? given.pairs[2 * refused] : refused;
-  int64_t of_b = given.pairs ? given.pairs[2 * refused + 1] : refused;
-  refuse_pair(rows.poses_a + 7 * of_a, rows.poses_b + 7 * of_b,
-              rows.sizes_a + rows.size_step_a * of_a, rows.sizes_b + rows.size_step_b * of_b);
+  // Another thread may have changed the pairs since: each place is read once.
+  int64_t places[2] = {refused, refused};
+  if (given.pairs) std::memcpy(places, given.pairs + 2 * refused, sizeof places);
+  for (int64_t place : places)
+    if (given.pairs && (place < 0 || place >= given.pose_count))
+      return fail(BC_BAD_ROWS, "pairs[%lld] was changed while it was read", (long long)refused);
+  refuse_pair(rows.poses_a + 7 * places[0], rows.poses_b + 7 * places[1],
+              rows.sizes_a + rows.size_step_a * places[0],
+              rows.sizes_b + rows.size_step_b * places[1]);
   char why[sizeof error_text];
   std::memcpy(why, error_text, sizeof why);
   return fail(BC_BAD_ROWS, "row %lld: %.480s", (long long)refused, why);

@@ -1,0 +1,143 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""The service ~/check: the contacts of the boxes of one request, without stamps and topics."""
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from box_contact_msgs.srv import Check
+
+from ..scene.scene_solver import SceneSolver
+from ..solver.checks import nearest_name, pose_fault, short_repr, size_fault
+from ..solver.contact_solver import ContactSolver
+from ..solver.models import most_near
+from .messages import contact_message
+
+MOST_BOXES = 256
+MOST_PAIRS = 4096
+"""All pairs of 91 boxes. A request with as many contacts keeps the node from its ticks for about a
+tenth of a second, most of it for the objects of the response."""
+
+
+Row = tuple[float, ...]  # of numbers of one box
+
+
+class Checker:
+    """Answers requests with a model. It keeps nothing of a request."""
+
+    def __init__(self, solver: SceneSolver) -> None:
+        """Take the scene and the model; requests may name the scene's boxes without sizes."""
+        self.solver, self._scene, self._model = solver, solver.scene, solver.model
+        self._labels = {(pair.a, pair.b): pair.label for pair in self._scene.pairs}
+        self._most_pairs = min(MOST_PAIRS, most_near(self._model))
+        self._solvers: dict[bool, ContactSolver] = {}  # by whether pairs apart have a normal
+
+    def answer(self, request: Check.Request, response: Check.Response) -> Check.Response:
+        """Fill in the response: contacts, or why there are none."""
+        try:
+            self._answer(request, response)
+        except ValueError as error:
+            response.message = str(error)
+        else:
+            response.success = True
+        return response
+
+    def _answer(self, request: Check.Request, response: Check.Response) -> None:
+        """Fill in contacts; raise ValueError, with field and value, for what is refused."""
+        names, places = self._names_and_places(request)
+        if not request.margin >= 0.0:
+            raise ValueError(f'margin must be 0 or more, not {request.margin:g}')
+        solver = self._solver(request.margin > 0.0)
+        poses, sizes = [_pose(box) for box in request.boxes], self._sizes(request.boxes)
+        try:
+            contacts = solver.batch(np.array(poses), sizes=np.array(sizes), pairs=places)
+        except ValueError:
+            _refuse_by_name(request.boxes, poses, sizes)
+            raise  # the model's own refusal
+        listed = response.contacts
+        listed.header = request.header
+        for row in np.flatnonzero(contacts.separation <= request.margin if request.margin
+                                  else contacts.colliding).tolist():
+            contact = contacts.row(row)
+            a, b = names[places[row, 0]], names[places[row, 1]]
+            (listed.contacts if contact.colliding else listed.near).append(
+                contact_message(self._labels.get((a, b), f'{a}_{b}'), a, b, contact))
+
+    def _names_and_places(self, request: Check.Request) -> tuple[list[str], np.ndarray]:
+        """Return the names of the boxes, and places (n, 2) of the pairs among them."""
+        count = len(request.boxes)
+        if not 2 <= count <= MOST_BOXES:
+            raise ValueError(f'boxes: a request has 2 to {MOST_BOXES} boxes, not {count}')
+        pairs = len(request.pairs) or count * (count - 1) // 2
+        if pairs > self._most_pairs:
+            raise ValueError(f'pairs: {pairs} are asked for, and model {self._model!r} answers at '
+                             f'most {self._most_pairs} per request: name the pairs that matter')
+        place_of: dict[str, int] = {}
+        for number, box in enumerate(request.boxes):
+            if place_of.setdefault(box.name, number) != number:
+                raise ValueError(f'boxes[{number}]: {short_repr(box.name)} is the name of '
+                                 f'boxes[{place_of[box.name]}], too')
+        if request.pairs:
+            places = np.array([_places_of(number, pair, place_of)
+                               for number, pair in enumerate(request.pairs)])
+        else:
+            places = _all_pairs(count)
+        return list(place_of), places
+
+    def _sizes(self, boxes: Sequence[Any]) -> list[Row]:
+        """Return full extents (3,) [m] of each box: its own, or those of the scene's box."""
+        sizes: list[Row] = [(box.size.x, box.size.y, box.size.z) for box in boxes]
+        for number, (box, size) in enumerate(zip(boxes, sizes)):
+            if not any(size):
+                known = self._scene.boxes.get(box.name)
+                if known is None:
+                    raise ValueError(f'boxes[{number}] {short_repr(box.name)} has no size, and is '
+                                     'no box of the scene'
+                                     f'{nearest_name(box.name, self._scene.boxes)}')
+                sizes[number] = known.size
+        return sizes
+
+    def _solver(self, with_normals: bool) -> ContactSolver:
+        """Return the solver; of pairs apart it computes the normal only if one is listed."""
+        solver = self._solvers.get(with_normals)
+        if solver is None:
+            solver = self._solvers[with_normals] = ContactSolver(
+                (1.0, 1.0, 1.0), (1.0, 1.0, 1.0), model=self._model,
+                margin=math.inf if with_normals else 0.0)
+        return solver
+
+
+@functools.lru_cache(maxsize=8)
+def _all_pairs(count: int) -> np.ndarray:
+    """Return places (n, 2) of all pairs of so many boxes."""
+    return np.stack(np.triu_indices(count, 1), axis=1)
+
+
+def _pose(box: Any) -> Row:
+    """Return `x y z qx qy qz qw` of a box."""
+    p, q = box.pose.position, box.pose.orientation
+    return p.x, p.y, p.z, q.x, q.y, q.z, q.w
+
+
+def _refuse_by_name(boxes: Sequence[Any], poses: Sequence[Row], sizes: Sequence[Row]) -> None:
+    """Raise ValueError for the first box whose numbers are no pose or no size."""
+    for number, (box, pose, size) in enumerate(zip(boxes, poses, sizes)):
+        if fault := pose_fault(pose) or size_fault(size):
+            raise ValueError(f'boxes[{number}] {short_repr(box.name)}: {fault}')
+
+
+def _places_of(number: int, pair: Any, place_of: Mapping[str, int]) -> tuple[int, int]:
+    """Return the places of the boxes of pairs[number]."""
+    for side, name in (('box_a', pair.box_a), ('box_b', pair.box_b)):
+        if name not in place_of:
+            raise ValueError(f'pairs[{number}].{side}: {short_repr(name)} is none of the boxes of '
+                             f'the request{nearest_name(name, place_of)}')
+    if pair.box_a == pair.box_b:
+        raise ValueError(f'pairs[{number}]: {short_repr(pair.box_a)} is both box_a and box_b')
+    return place_of[pair.box_a], place_of[pair.box_b]

@@ -1,0 +1,182 @@
+# Copyright 2026 The box_contact_ros maintainers
+# SPDX-License-Identifier: Apache-2.0
+
+"""~/check and ~/reset: questions without stamps, and episodes of a simulator in lockstep."""
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import poses
+import pytest
+from raw_client import APART, ORIGIN, TOUCHING
+from rclpy.parameter import Parameter
+from ros_client import Client, serving
+from std_srvs.srv import Trigger
+from typed_messages import a_box, a_pair
+
+from box_contact_msgs.srv import Check
+from box_contact_ros import ContactSolver, SceneSolver
+from box_contact_ros.node.check import MOST_BOXES, MOST_PAIRS, Checker
+from box_contact_ros.node.contact_node import ContactNode
+from box_contact_ros.node.messages import contacts_by_pair
+from box_contact_ros.scene.scene_solver import Box, Pair, Scene
+
+CUBE = tuple(poses.CUBE)
+SCENE = Scene({name: Box(name, CUBE) for name in ('load', 'stack', 'lorry')},
+              (Pair('landing', 'load', 'stack'), Pair.between('load', 'lorry')))
+EPISODES = 1  # of each length; 50 were tried
+
+
+@pytest.fixture(scope='module')
+def checker() -> Checker:
+    return Checker(SceneSolver(SCENE, model='exact'))
+
+
+def asked(checker: Checker, *boxes: Any, **fields: Any) -> Check.Response:
+    """Return the response to boxes and further fields of a request."""
+    return checker.answer(Check.Request(boxes=list(boxes), **fields), Check.Response())
+
+
+def test_boxes_of_own_sizes_are_answered_as_the_solver_does(checker: Checker) -> None:
+    """To the bit; pairs in order, under the names of their boxes."""
+    turned = np.array([0.5, 0.25, 1.875, 0.1, 0.2, 0, 1])
+    response = asked(checker, a_box('p', ORIGIN, (2, 3, 1)), a_box('q', turned, (1, 2, 3)))
+    contact = contacts_by_pair(response.contacts)['p_q']
+    wanted = ContactSolver((2, 3, 1), (1, 2, 3), model='exact')(ORIGIN, turned)
+    assert response.success and not response.message and not response.contacts.near
+    assert (contact.separation, contact.volume) == (wanted.separation, wanted.volume)
+    for name in ('point', 'normal', 'covariance'):
+        assert np.array_equal(getattr(contact, name), getattr(wanted, name))
+
+
+def test_boxes_of_the_scene_need_no_size(checker: Checker) -> None:
+    """A pair of the scene has its label there, and another one the names of its boxes."""
+    response = asked(checker, a_box('load', TOUCHING), a_box('stack', ORIGIN),
+                     a_box('lorry', TOUCHING), a_box('mine', ORIGIN, CUBE))
+    assert list(contacts_by_pair(response.contacts)) == [
+        'landing', 'load_lorry', 'load_mine', 'stack_lorry', 'stack_mine', 'lorry_mine']
+    response = asked(checker, a_box('load', TOUCHING), a_box('stack', ORIGIN),
+                     a_box('lorry', TOUCHING), pairs=[a_pair('stack', 'load')])
+    entry, = response.contacts.contacts
+    assert (entry.pair, entry.box_a, entry.normal.z) == ('stack_load', 'stack', 1.0)
+
+
+def test_near_is_what_is_apart_within_the_margin(checker: Checker) -> None:
+    """`contacts` holds what touches and nothing else."""
+    boxes = (a_box('load', APART), a_box('stack', ORIGIN), a_box('lorry', APART))
+    for margin, near in ((0.0, []), (0.4, []), (0.5, ['landing', 'stack_lorry'])):
+        answer = asked(checker, *boxes, margin=margin).contacts
+        assert [entry.pair for entry in answer.contacts] == ['load_lorry']
+        assert [entry.pair for entry in answer.near] == near and not answer.stale
+    assert answer.near[0].depth == -0.5 and answer.near[0].normal.z == -1.0
+    assert math.isnan(answer.near[0].point.x)
+
+
+NAN = math.nan
+GOOD = a_box('p', ORIGIN, CUBE)
+
+
+@pytest.mark.parametrize('boxes, fields, words', [
+    ([], {}, 'boxes: a request has 2 to 256 boxes, not 0'),
+    ([GOOD], {}, 'boxes: a request has 2 to 256 boxes, not 1'),
+    ([GOOD, GOOD], {}, "boxes[1]: 'p' is the name of boxes[0], too"),
+    ([GOOD, a_box('laod', ORIGIN)], {},
+     "boxes[1] 'laod' has no size, and is no box of the scene (did you mean load?)"),
+    ([GOOD, a_box('q', ORIGIN, (1, 0, 1))], {}, "boxes[1] 'q': (1, 0, 1) is not positive"),
+    ([GOOD, a_box('q', ORIGIN, (1, NAN, 1))], {}, "boxes[1] 'q': (1, nan, 1) is not finite"),
+    ([GOOD, a_box('q', [0] * 7, CUBE)], {}, "boxes[1] 'q': quaternion (x=0, y=0, z=0, w=0) has ze"),
+    ([GOOD, a_box('q', [NAN] * 7, CUBE)], {}, "boxes[1] 'q': position (nan, nan, nan) is not fini"),
+    ([GOOD, a_box('load', ORIGIN)], {'margin': -1.0}, 'margin must be 0 or more, not -1'),
+    ([GOOD, a_box('load', ORIGIN)], {'margin': NAN}, 'margin must be 0 or more, not nan'),
+    ([GOOD, a_box('load', ORIGIN)], {'pairs': [a_pair('p', 'laod')]},
+     "pairs[0].box_b: 'laod' is none of the boxes of the request (did you mean load?)"),
+    ([GOOD, a_box('load', ORIGIN)], {'pairs': [a_pair('p', 'p')]}, "'p' is both box_a and box_b"),
+    ([GOOD, a_box('load', ORIGIN)], {'pairs': [a_pair('p', 'load')] * (MOST_PAIRS + 1)},
+     "pairs: 4097 are asked for, and model 'exact' answers at most 4096 per request"),
+    ([a_box(f'{i}', ORIGIN, CUBE) for i in range(92)], {}, 'pairs: 4186 are asked for'),
+])
+def test_what_is_wrong_comes_back_as_text(checker: Checker, boxes: list[Any],
+                                          fields: dict[str, Any], words: str) -> None:
+    response = asked(checker, *boxes, **fields)
+    assert not response.success and words in response.message
+    assert response.contacts == Check.Response().contacts
+
+
+def test_a_large_request_is_refused_at_its_size(checker: Checker) -> None:
+    """No box of it is looked at."""
+    request = SimpleNamespace(boxes=[None] * (MOST_BOXES + 1), pairs=[], margin=0.0)
+    assert 'not 257' in checker.answer(request, Check.Response()).message
+
+
+def test_a_soup_answers_few_pairs() -> None:
+    """Its pairs take up to a third of a second; and it knows no axis of those apart."""
+    pytest.importorskip('fcl')
+    checker = Checker(SceneSolver(SCENE, model='soup-2'))
+    boxes = [a_box(f'{i}', ORIGIN, CUBE) for i in range(13)]
+    assert 'at most 64' in asked(checker, *boxes).message
+    apart = (a_box('load', APART), a_box('stack', ORIGIN))
+    assert asked(checker, *apart).success
+    assert 'margin inf has no effect' in asked(checker, *apart, margin=1.0).message
+
+
+# --- over ROS -------------------------------------------------------------------------------------
+
+
+def overrides(**values: Any) -> list[Parameter]:
+    return [Parameter(name, value=value) for name, value in {
+        'size_a': [2.0] * 3, 'size_b': [2.0] * 3, 'model': 'exact', **values}.items()]
+
+
+@pytest.fixture
+def client() -> Any:
+    client = Client()
+    yield client
+    client.close()
+
+
+def check(client: Client, *poses_of: Any, **fields: Any) -> Check.Response:
+    boxes = [a_box(f'box_{letter}', pose) for letter, pose in zip('ab', poses_of)]
+    return client.call(Check, 'contact_node/check', Check.Request(boxes=boxes, **fields))
+
+
+def test_a_check_leaves_the_ticks_alone(client: Client) -> None:
+    """Its poses reach no tick. A new model answers the next one; before configure, none does."""
+    with serving(lambda context: ContactNode(
+            context, parameter_overrides=overrides(autostart=False))) as node:
+        assert check(client, ORIGIN, TOUCHING).message == 'the node is not configured'
+        node.start()
+        client.offer_until_answered(ORIGIN, APART)
+        before = dict(node.counts)
+        for model in ('exact', 'mlp'):
+            assert node.set_parameters([Parameter('model', value=model)])[0].successful
+            contact = contacts_by_pair(check(client, ORIGIN, TOUCHING).contacts)['box_a_box_b']
+            wanted = ContactSolver(CUBE, CUBE, model=model)(ORIGIN, TOUCHING)
+            assert contact.point.tolist() == wanted.point.tolist()
+        assert dict(node.counts) == before
+        assert client.answer(ORIGIN, APART) == {}
+        assert not check(client, ORIGIN, [0] * 7).success
+        client.ask(ORIGIN, TOUCHING)
+
+
+@pytest.mark.parametrize('by_topics', [False, True])
+def test_lockstep_episodes_never_wait(client: Client, by_topics: bool) -> None:
+    """Episodes of any length, each from time 0 on: by ~/check, or by topics after a ~/reset.
+
+    Without the reset, the node takes an episode shorter than a second for repeated stamps.
+    """
+    with serving(lambda context: ContactNode(context, parameter_overrides=overrides())):
+        client.offer_until_answered(ORIGIN, APART)
+        for ticks in (1, 20, 100, 300) * EPISODES:
+            if by_topics:
+                assert client.call(Trigger, 'contact_node/reset', Trigger.Request()).success
+                client.contacts.clear()
+            for tick in range(ticks):
+                load = (0, 0, 2.1 - 1e-3 * tick, 0, 0, 0, 1)
+                if by_topics:
+                    answer = client.contacts[client.ask(ORIGIN, load, stamps=(tick * 10**6,) * 2)]
+                else:
+                    answer = check(client, ORIGIN, load).contacts
+                assert len(answer.contacts) == (tick >= 100)
