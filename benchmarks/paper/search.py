@@ -38,11 +38,12 @@ from . import dataset
 from .fit import PaperSettings
 from .fit import fit as fit_paper
 from .halving import Candidate, CheckpointError, Rung, Rungs, Scores, Search, ranking
-from .jobs import JOBS, PaperJob
+from .jobs import JOBS, MIXTURE, PaperJob
 
 PACKAGES = ('numpy', 'torch')  # whose versions are named
 
 _CANDIDATES = 1001  # stream of random numbers
+QUICK_COUNTS = (400, 200, 200)  # patterns per set
 
 
 class PaperSearch(Search):
@@ -76,31 +77,36 @@ class PaperSearch(Search):
         return found
 
     def train(self, rung: Rung, group: Sequence[Candidate], seed: int) -> list[Scores]:
-        """Train by backpropagation with momentum; the error is the cross-validation RMSE [rad]."""
+        """Train by backpropagation with momentum; the error is the cross-validation RMSE [rad].
+
+        Finalists also get their error on the external set.
+        """
         inputs, outputs = self.settings.widths[0], self.settings.widths[-1]
         fitted = fit_paper(self.sets['training'], self.sets['cross-validation'], PaperSettings(
             (inputs, *map(max, zip(*(one.hidden for one in group))), outputs),
             networks=len(group), epochs=rung.effort, batch=rung.batch,
             rate=[one.rate for one in group], momentum=[one.momentum for one in group],
             initial=[one.initial for one in group], hidden=[one.hidden for one in group],
-            seed=seed))
-        return [{'error': inside, 'external': beyond} for inside, beyond in zip(
-            fitted.error.tolist(), fitted.errors(self.sets['external']).tolist())]
+            wrap=self.settings.wrap, seed=seed))
+        scores = [{'error': error} for error in fitted.error.tolist()]
+        if rung == self.rungs[-1]:
+            for score, error in zip(scores, fitted.errors(self.sets['external']).tolist()):
+                score['external'] = error
+        return scores
 
 
 def paper_searches(*, seed: int, count: int, quick: bool) -> list[PaperSearch]:
-    """Return one for the network with discontinuities, one for each subset of that without.
+    """Return one for the network with discontinuities, and one for a subset of that without.
 
-    Half of the candidates are the first's. External sets are cut to what ranks a few finalists.
+    Both are on the patterns of Tables 1 and 2, each with half of the candidates.
     """
-    counts, subset_counts = (((400, 200, 200),) * 2 if quick else
-                             ((8000, 5000, 5000), (10000, 6000, 5000)))
-    common: dict[str, Any] = {'seed': seed, 'quick': quick}
-    subsets = dataset.continuous(seed, counts=subset_counts)
-    return [PaperSearch('paper', JOBS['paper'], dataset.paper(seed, counts=counts),
-                        count=count - 2 * (count // 4), **common),
-            *(PaperSearch(f'paper-continuous, {subset}', JOBS['paper-continuous'], sets,
-                          count=count // 4, **common) for subset, sets in subsets.items())]
+    common: dict[str, Any] = {'seed': seed, 'quick': quick, 'count': count // 2}
+    counts, subset_counts = ((QUICK_COUNTS,) * 2 if quick else
+                             (dataset.PAPER_COUNTS, dataset.CONTINUOUS_COUNTS))
+    whole = dataset.paper(seed, counts=counts, folded_in=False, kept=MIXTURE)
+    subsets = dataset.by_subset(seed, dataset.NO_FOLD, counts=subset_counts, kept=MIXTURE)
+    return [PaperSearch('with discontinuities', JOBS['table-1-mixture'], whole, **common),
+            PaperSearch('without, signs +++', JOBS['table-2-by-signs'], subsets['+++'], **common)]
 
 
 def settings_of(search: Search, one: Candidate) -> dict[str, float]:
