@@ -90,7 +90,8 @@ JOBS = {
                  kept=MIXTURE, seeds=SEEDS),
         PaperJob('table-1-dropped', 'paper', CUBE, replace(_TABLE_1, wrap=True),
                  _DRAWN + 'Patterns as drawn.', folded_in=False, seeds=SEEDS),
-        PaperJob('table-2-by-signs', 'paper-continuous', CUBE, replace(_TABLE_1, widths=(6, 20, 17, 4)),
+        PaperJob('table-2-by-signs', 'paper-continuous', CUBE,
+                 replace(_TABLE_1, widths=(6, 20, 17, 4), batch=200, rate=0.1),
                  _MIXTURE + 'Split by the signs of roll, pitch and yaw.',
                  dataset.CONTINUOUS_COUNTS, folded_in=False, kept=MIXTURE))},
 }

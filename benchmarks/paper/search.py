@@ -206,7 +206,8 @@ def main(args: Sequence[str] | None = None) -> int:
             f'{(time.monotonic() - began) / 60.0:.1f} minutes on '
             f'{machine(native, PACKAGES)}.')
     text = page('benchmarks/paper/pages/search', made=made,
-                total=sum(len(done[0]) for _, done in results))
+                total=sum(len(done[0]) for _, done in results), external=' and '.join(
+            f'{len(search.sets["external"]):,} patterns' for search in searches))
     text += f'\n![Settings and errors]({name}.png)\n' + ''.join(
         section(*result) for result in results)
     text += f'\nAll candidates: [{name}.csv]({name}.csv).\n'

@@ -39,7 +39,7 @@ SHOWN = 150  # patterns in Figure 9
 Errors = dict[str, np.ndarray]  # errors (n, 4) [rad] by set
 
 
-@functools.lru_cache(maxsize=4)  # some tables and figures share them; they take seconds to make
+@functools.cache  # some tables and figures share them; they take seconds to make
 def with_sets(name: str) -> tuple[Weights, dict[str, dict[str, Patterns]]]:
     """Return a weights file, and the sets of its card by network and name."""
     weights = load_weights(weights_path(name))
@@ -125,9 +125,11 @@ def sections_1_and_2(tables: Collection[int], step: int) -> list[str]:
     sections, detail = [], {}
     if 1 in tables:
         found = {title: list(evaluate(name, step).values()) for title, name in TABLE_1.items()}
-        card = with_sets(TABLE_1['as written'])[0].card
+        card = with_sets(TABLE_1['mixture'])[0].card
+        shares = card['data']['kept']
         sections.append(_page('table_1', table=table_1(found), by_output=by_output(found),
                               seeds=len(card['data']['seeds']),
+                              inside=100 * shares[0], beyond=100 * shares[2],
                               starts=card['training']['seed_1']['starts']))
         detail['paper'] = evaluate('paper', step)['contact']
     if 2 in tables:
