@@ -103,6 +103,12 @@ def by_output(found: Trainings) -> str:
     return output.markdown_table(['', '', *dataset.OUTPUTS], rows, words=2)
 
 
+def spread_of_outputs(seeds: Sequence[Errors]) -> float:
+    """Return the largest MAE of an output on the external set divided by the smallest."""
+    mae = np.mean([np.abs(errors['external']).mean(axis=0) for errors in seeds], axis=0)
+    return float(mae.max() / mae.min())
+
+
 def by_part(columns: Mapping[str, Errors]) -> str:
     """Return our figures on all sets, for all outputs, the point's and the normal's."""
     rows = []
@@ -130,13 +136,18 @@ def sections_1_and_2(tables: Collection[int], step: int) -> list[str]:
         sections.append(_page('table_1', table=table_1(found), by_output=by_output(found),
                               seeds=len(card['data']['seeds']),
                               inside=100 * shares[0], beyond=100 * shares[2],
+                              spread=spread_of_outputs(found['mixture']),
                               starts=card['training']['seed_1']['starts']))
         detail['paper'] = evaluate('paper', step)['contact']
     if 2 in tables:
         pooled = {title: {name: np.concatenate([errors[name] for errors in
                                                 evaluate(file, step).values()]) for name in SETS}
                   for title, file in TABLE_2.items()}
-        sections.append(_page('table_2', table=beside_paper(2, pooled)))
+        above = [100.0 * (figures(pooled['by signs'][name])[figure] / theirs[place] - 1.0)
+                 for figure, theirs in PAPER[2].items() if figure != 'ME'
+                 for place, name in enumerate(SETS)]
+        sections.append(_page('table_2', table=beside_paper(2, pooled), least=min(above),
+                              most=max(above)))
     if 1 in tables:
         detail['containers'] = evaluate('paper-12.192x2.438x2.591', step)['contact']
         sections.append(committee.section(step))
