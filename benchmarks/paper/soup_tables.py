@@ -334,8 +334,10 @@ def section_4(result: SoupResult) -> str:
          'triangles that meet'],
         [[n, tests, row['most_tests'], took, row['most_tests_alone_ms'], row['most_tests_step_ms'],
           row['most_tests_pairs']] for (n, (_, tests, took)), row in zip(PAPER.items(), rows)])
+    by_paper = [row['most_tests'] / PAPER[row['divisions']][1] for row in rows]
     return output.page('benchmarks/paper/pages/table_4', table=table, repeats=REPEATS, sieve=SIEVE,
-                       sieved=SIEVED, count=result.counts['as written'].sieved)
+                       sieved=SIEVED, count=result.counts['as written'].sieved,
+                       least=min(by_paper), most=max(by_paper))
 
 
 def section_errors(result: SoupResult) -> str:
