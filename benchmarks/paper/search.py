@@ -44,6 +44,7 @@ PACKAGES = ('numpy', 'torch')  # whose versions are named
 
 _CANDIDATES = 1001  # stream of random numbers
 QUICK_COUNTS = (400, 200, 200)  # patterns per set
+SHOWN = 1.5  # errors up to which networks are drawn [rad]: some diverge
 
 
 class PaperSearch(Search):
@@ -148,21 +149,20 @@ def write_table(path: Path, results: Sequence[tuple[Search, Rungs]]) -> None:
 
 
 def plot(path: Path, results: Sequence[tuple[Search, Rungs]]) -> None:
-    """Draw the error after each rung against the network's size."""
+    """Draw the error of each network after its last rung against its size, where it converged."""
     name = 'multiply-adds'
-    figure, panels = subplots(1, len(results), (3.3 * len(results), 3.3))
+    figure, panels = subplots(1, len(results), (3.3 * len(results), 3.3), sharey=True)
     for panel, (search, done) in zip(panels[0], results):
         some = search.candidates()
         for number, rung in enumerate(done, start=1):
-            left = [one for one in some if one.number in rung]
+            left = [one for one in some if one.number in rung and rung[one.number]['error'] < SHOWN
+                    and not (number < len(done) and one.number in done[number])]
             panel.scatter([settings_of(search, one)[name] for one in left],
                           [rung[one.number]['error'] for one in left], s=5, linewidths=0,
-                          color=f'C{number}', label=f'after rung {number}')
+                          color=f'C{number}', label=f'last rung: {number}')
         panel.plot(settings_of(search, some[0])[name], done[-1][0]['error'], 'k*', markersize=11,
                    label='in use')
-        panel.set(title=search.name, xlabel=f'{name} of the network', yscale='log')
-        panel.yaxis.set_major_formatter('{x:g}')
-        panel.yaxis.set_minor_formatter('')
+        panel.set(title=search.name, xlabel=f'{name} of the network')
     panels[0, 0].set_ylabel('RMSE over the angles [rad]')
     panels[0, 0].legend(fontsize=8)
     figure.savefig(path)
