@@ -25,24 +25,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from box_contact_ros.core import DEPTH_FLOOR, Stages, native, stages
-from box_contact_ros.resources import resource_path
 from box_contact_ros.solver.arguments import model_name, within
 from box_contact_ros.solver.contact import Contacts
-from box_contact_ros.solver.weights_file import WeightsError, load_weights
+from box_contact_ros.solver.weights_file import WeightsError
 
 from . import output
 from .arguments import report_parser
 from .contestant import Contestant, ours
 from .errors import ContactErrors, contact_errors
 from .output import markdown_table
-from .paper import dataset
-from .paper.errors import figures_by_part, wrapped
-from .paper.tables import PAPER
 from .pose_sets import LOADS, SETS, Pairs, drawn
-
-OPENED = 5e-12
-"""By how much boxes of the paper's set may be apart [of the size]. Near a pitch of ±90° the angles
-keep a pose to 12 digits only. Still far below the 1e-9 that boxes are pressed in."""
 
 PAIRS, QUICK_PAIRS = 100_000, 5_000
 CLASSES = ('vertex-face', 'edge-edge', 'edge-face', 'face-face')
@@ -155,39 +147,6 @@ def measure_all(models: Sequence[Contestant], count: int, seed: int) -> list[Acc
     return [row for model in models for row in rows if row and row.model == model.name]
 
 
-def paper_errors(model: Contestant, step: int = 1) -> np.ndarray:
-    """Return wrapped errors (n, 4) [rad] of the contacts on the paper's external set.
-
-    Azimuth and elevation of the impact point, seen from the first box's centre, and of the normal.
-    The set is that of the weights of model `paper`.
-    """
-    card = load_weights(resource_path('weights', 'paper.safetensors')).card
-    patterns = dataset.of_card(card, sets=('external',))['contact']['external']
-    outputs, size = patterns.outputs[::step], card['sizes'][0]
-    pose_a, pose_b = dataset.as_poses(patterns.inputs[::step])
-    # The boxes touch exactly; writing their poses as angles has opened some.
-    azimuth, elevation = outputs[:, 2], outputs[:, 3]
-    normal = np.column_stack([np.cos(elevation) * np.cos(azimuth),
-                              np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
-    pose_b[:, :3] -= OPENED * max(size) * normal
-    sizes = np.tile(size, (len(pose_a), 1))
-    contact, _ = model.solve(Pairs(pose_a, pose_b, sizes, sizes))
-    angles = np.hstack([dataset.spherical(contact.point), dataset.spherical(contact.normal)])
-    return wrapped(angles - outputs)[contact.colliding]
-
-
-def paper_table(errors: Mapping[str, np.ndarray]) -> str:
-    """Return ME, MAE and RMSE, and those of Tables 1 and 2."""
-    rows = [[f"paper's Table {number}, {title} discontinuities",
-             *[f'{PAPER[number][name][2]:.4f}' for name in PAPER[number]], '', '', '']
-            for number, title in ((1, 'with'), (2, 'without'))]
-    for model, wrong in errors.items():
-        overall, point, normal = figures_by_part(wrong).values()
-        rows.append([f'`{model}`', *[f'{overall[name] + 0.0:.3g}' for name in PAPER[1]],
-                     f'{point["MAE"]:.3g}', f'{normal["MAE"]:.3g}', f'{len(wrong):,}'])
-    return markdown_table(['', *PAPER[1], 'point MAE', 'normal MAE', 'patterns'], rows)
-
-
 def error_table(rows: Sequence[AccuracyRow]) -> str:
     """Return mean/p99/worst of each quantity over whole sets.
 
@@ -287,20 +246,17 @@ def main(args: Sequence[str] | None = None) -> int:
         models = [ours(model, weights=options.weights if model == 'mlp' else None)
                   for model in options.model]
         rows = measure_all(models, count, options.seed)
-        judged = [ours('exact'), *(model for model in models if model.name == 'mlp')]
-        papers = {model.name: paper_errors(model, 10 if options.quick else 1) for model in judged}
     except WeightsError as error:
         print(f'accuracy: {error}', file=sys.stderr)
         return 1
-    on_paper = paper_table(papers)
     output.write_csv(folder / 'accuracy.csv', csv_rows(rows), about=output.machine(native))
     (folder / 'accuracy.md').write_text(output.page(
         'benchmarks/pages/accuracy', command=output.command_line('benchmarks.accuracy', args),
         machine=output.machine(native), seed=options.seed,
         error_table=error_table(rows),
-        point_classes=class_table(rows), paper_table=on_paper), encoding='utf-8')
+        point_classes=class_table(rows)), encoding='utf-8')
     draw(folder / 'accuracy.png', rows)
-    print(error_table(rows), class_table(rows), on_paper, sep='\n\n')
+    print(error_table(rows), class_table(rows), sep='\n\n')
     return 0
 
 
